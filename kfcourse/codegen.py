@@ -1,0 +1,229 @@
+"""SymPy expressions -> vectorised NumPy over the ensemble.
+
+The only place where expressions become code.  `lower` splits expressions into elementary assignments
+(common subexpressions once, small powers as products) that any target could print; `numpy_source`
+prints them as NumPy.  A compiled target would be a second printer beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from sympy.printing.numpy import NumPyPrinter
+
+
+@dataclass(frozen=True)
+class Program:
+    """Straight-line code: assignments in order, then the entries of each output.
+
+    Attributes
+    ----------
+    assignments : list of (Symbol, Expr)
+    outputs : dict
+        Name to Matrix; a column matrix of a *vector* output has `vectors` containing its name.
+    vectors : frozenset of str
+        Outputs returned as (..., n); the others are matrices (..., r, c).
+    """
+
+    assignments: list[tuple[sp.Symbol, sp.Expr]]
+    outputs: dict[str, sp.MatrixBase]
+    vectors: frozenset[str]
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A generated function and the source it was compiled from."""
+
+    function: Callable[..., Any]
+    source: str
+
+
+def compile_function(
+    name: str,
+    arguments: Mapping[str, sp.MatrixBase],
+    outputs: Mapping[str, sp.MatrixBase],
+    vectors: Sequence[str],
+    doc: str = "",
+) -> Compiled:
+    """Compile expressions into one function of arrays.
+
+    Parameters
+    ----------
+    name : str
+        Name of the generated function.
+    arguments : dict
+        Argument name to the matrix of symbols that it holds.
+    outputs : dict
+        Output name to the matrix of expressions; the function returns them as a tuple in this order.
+    vectors : sequence of str
+        Arguments and outputs that are vectors (..., n); the others are matrices (..., r, c).
+    doc : str
+        First line of the generated docstring.
+
+    Returns
+    -------
+    Compiled
+        `function(*arrays)`: leading axes broadcast.  An output that no argument enters comes back
+        without leading axes, the same for every trajectory.
+    """
+    program = lower(outputs, vectors)
+    source = numpy_source(name, arguments, program, doc)
+    namespace: dict[str, Any] = {"np": np}
+    exec(compile(source, f"<generated {name}>", "exec"), namespace)  # our own text: printed from SymPy, no user strings
+    return Compiled(namespace[name], source)
+
+
+def lower(outputs: Mapping[str, sp.MatrixBase], vectors: Sequence[str]) -> Program:
+    """Common subexpressions and small integer powers as elementary assignments."""
+    names = sp.numbered_symbols("s", cls=sp.Dummy)
+    shared, reduced = sp.cse([sp.Matrix(m) for m in outputs.values()], symbols=names, optimizations="basic", list=False)
+    assignments: list[tuple[sp.Symbol, sp.Expr]] = []
+    powers: dict[tuple[sp.Expr, int], sp.Expr] = {}
+    aliases: dict[sp.Expr, sp.Expr] = {}
+
+    def power(base: sp.Expr, exponent: int) -> sp.Expr:
+        """base**exponent as products; every intermediate power is computed once."""
+        if exponent == 1:
+            return base
+        if (base, exponent) not in powers:
+            left, right = (exponent - 1, 1) if exponent % 2 else (exponent // 2, exponent // 2)
+            powers[base, exponent] = assign(sp.Mul(power(base, left), power(base, right), evaluate=False))
+        return powers[base, exponent]
+
+    def assign(value: sp.Expr) -> sp.Symbol:
+        target = next(names)
+        assignments.append((target, value))
+        return target
+
+    def without_powers(e: sp.Expr) -> sp.Expr:
+        if not e.args:
+            return aliases.get(e, e)
+        arguments = [without_powers(a) for a in e.args]
+        if e.is_Pow and e.exp.is_Integer and not e.base.is_number and abs(e.exp) >= 2:
+            base = arguments[0] if arguments[0].is_Symbol else assign(arguments[0])
+            product = power(base, abs(int(e.exp)))
+            return product if e.exp > 0 else sp.Pow(product, -1, evaluate=False)
+        if e.is_Pow and e.exp.is_number:
+            return sp.Pow(arguments[0], e.exp, evaluate=False)
+        return e.func(*arguments, evaluate=False) if e.is_Add or e.is_Mul else e.func(*arguments)
+
+    for target, value in shared:
+        reduced_value = without_powers(value)
+        if reduced_value.is_Symbol:
+            aliases[target] = reduced_value
+        else:
+            assignments.append((target, reduced_value))
+    matrices = reduced if isinstance(reduced, list | tuple) else [reduced]
+    lowered = {
+        key: sp.Matrix(*matrix.shape, [without_powers(entry) for entry in matrix])
+        for key, matrix in zip(outputs, matrices, strict=True)
+    }
+    return Program(assignments, lowered, frozenset(vectors))
+
+
+class _Printer(NumPyPrinter):
+    """NumPy with floats for rational numbers and readable products."""
+
+    _module = "np"
+
+    def __init__(self, rename: Mapping[sp.Symbol, str]):
+        super().__init__({"fully_qualified_modules": True})
+        self.rename = rename
+
+    def _module_format(self, fqn: str, register: bool = True) -> str:
+        return super()._module_format(fqn, register).replace("numpy.", "np.")
+
+    def _print_Symbol(self, expr: sp.Symbol) -> str:
+        return self.rename[expr]
+
+    _print_Dummy = _print_Symbol
+
+    def _print_Rational(self, expr: sp.Rational) -> str:
+        return repr(float(expr))
+
+    _print_Integer = _print_Rational
+    _print_Half = _print_Rational
+
+    def _print_Mul(self, expr: sp.Mul) -> str:
+        numbers = [a for a in expr.args if a.is_number]
+        denominators = [a for a in expr.args if not a.is_number and a.is_Pow and a.exp == -1]
+        numerators = [a for a in expr.args if not a.is_number and a not in denominators]
+        coefficient = sp.Mul(*numbers)
+        if coefficient in (1, -1) and numerators:
+            factors = []
+        else:
+            factors = [self._constant(coefficient)]
+        factors += [self.parenthesize(a, sp.printing.precedence.PRECEDENCE["Mul"]) for a in numerators]
+        text = ("-" if coefficient == -1 and numerators else "") + "*".join(factors)
+        for d in denominators:
+            text += "/" + self.parenthesize(d.base, sp.printing.precedence.PRECEDENCE["Pow"])
+        return text
+
+    def _constant(self, number: sp.Expr) -> str:
+        if number.is_Rational:
+            return repr(float(number))
+        return self.parenthesize(number, sp.printing.precedence.PRECEDENCE["Mul"])
+
+    def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:
+        base = self.parenthesize(expr.base, sp.printing.precedence.PRECEDENCE["Pow"])
+        if expr.exp == -1:
+            return f"1.0/{base}"
+        if expr.exp == sp.S.Half:
+            return f"np.sqrt({self._print(expr.base)})"
+        return f"{base}**{self.parenthesize(expr.exp, sp.printing.precedence.PRECEDENCE['Pow'])}"
+
+
+def numpy_source(name: str, arguments: Mapping[str, sp.MatrixBase], program: Program, doc: str) -> str:
+    """The program as the text of a NumPy function."""
+    used = set().union(*(value.free_symbols for _, value in program.assignments), *(m.free_symbols for m in program.outputs.values()))
+    rename = {target: f"s{i}" for i, (target, _) in enumerate(program.assignments)}
+    lines = [f"def {name}({', '.join(arguments)}):", f'    """{doc}"""']
+    for argument, entries in arguments.items():
+        seen = set()
+        for index, entry in enumerate(entries):
+            if entry not in used or entry in seen:
+                continue
+            seen.add(entry)
+            row, column = divmod(index, entries.shape[1])
+            rename[entry] = f"{argument}_{row + 1}" if argument in program.vectors else f"{argument}_{row + 1}{column + 1}"
+            where = f"{row}" if argument in program.vectors else f"{row}, {column}"
+            lines.append(f"    {rename[entry]} = {argument}[..., {where}]")
+    printer = _Printer(rename)
+    lines += [f"    {rename[target]} = {printer.doprint(value)}" for target, value in program.assignments]
+    for output, entries in program.outputs.items():
+        lines += _assemble(output, entries, output in program.vectors, rename, arguments, program.vectors, printer)
+    lines.append(f"    return {', '.join(program.outputs)}{',' if len(program.outputs) == 1 else ''}")
+    return "\n".join(lines) + "\n"
+
+
+def _assemble(
+    output: str,
+    entries: sp.MatrixBase,
+    is_vector: bool,
+    rename: Mapping[sp.Symbol, str],
+    arguments: Mapping[str, sp.MatrixBase],
+    vectors: frozenset[str],
+    printer: _Printer,
+) -> list[str]:
+    """Lines that put the entries of one output together."""
+    rows, columns = entries.shape
+    if not entries.free_symbols:
+        texts = [[printer.doprint(entries[i, j]) for j in range(columns)] for i in range(rows)]
+        nested = [row[0] for row in texts] if is_vector else ["[" + ", ".join(row) + "]" for row in texts]
+        return [f"    {output} = np.array([{', '.join(nested)}])"]
+    if len(entries) == 1:
+        axes = "None" if is_vector else "None, None"
+        text = printer.doprint(entries[0])
+        return [f"    {output} = {text if text.isidentifier() else f'({text})'}[..., {axes}]"]
+    shapes = ", ".join(f"{a}.shape[:{-1 if a in vectors else -2}]" for a in arguments)
+    size = f"({rows},)" if is_vector else f"({rows}, {columns})"
+    lines = [f"    {output} = np.empty(np.broadcast_shapes({shapes}) + {size})"]
+    for index, entry in enumerate(entries):
+        row, column = divmod(index, columns)
+        where = f"{row}" if is_vector else f"{row}, {column}"
+        lines.append(f"    {output}[..., {where}] = {printer.doprint(entry)}")
+    return lines

@@ -1,0 +1,192 @@
+"""The Monte Carlo engine: all filters on common trajectories, statistics on the fly.
+
+    compare(filters, model, runs, steps, seed) -> Comparison
+
+designs the filters that need it on one ensemble, runs all of them on another, and keeps sums over
+batches of trajectories, never the trajectories themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+import numpy as np
+from tqdm import tqdm
+
+from kfcourse.comparison import Comparison, Subset
+from kfcourse.design import NotFinite, design
+from kfcourse.ensemble import BLOCK, Ensemble, Moment
+from kfcourse.filters.base import Design, Filter, State
+from kfcourse.gaussian import Array, Gaussian
+from kfcourse.model import Model
+from kfcourse.statistics import BATCHES, Sums
+
+SUBSET_CHUNK = 32  # trajectories a slow filter takes at once
+
+T = TypeVar("T")
+
+
+def run(one: Filter, y: Array) -> Gaussian:
+    """Run a filter over stored measurements.
+
+    Parameters
+    ----------
+    one : Filter
+    y : ndarray (steps, runs, p)
+        NaN where a measurement is missing.
+
+    Returns
+    -------
+    Gaussian
+        Estimates (steps, runs, n) and the filter's covariances (steps, runs, n, n).
+    """
+    if y.ndim != 3:
+        raise ValueError(f"measurements must have the shape (steps, runs, p), got {y.shape}; one trajectory is y[:, None, :]")
+    state = one.init(y.shape[1])
+    estimates: list[Gaussian] = []
+    for measurement in y:
+        state = one.step(state, measurement)
+        mean, cov = one.estimate(state)
+        estimates.append(Gaussian(mean, np.broadcast_to(cov, mean.shape + mean.shape[-1:])))
+    return Gaussian(np.stack([e.mean for e in estimates]), np.stack([e.cov for e in estimates]))
+
+
+def compare(
+    filters: Sequence[Filter | Design],
+    model: Model,
+    runs: int,
+    steps: int,
+    seed: int,
+    *,
+    design_runs: int | None = None,
+    same_ensemble: bool = False,
+    subset_runs: int = 500,
+    threads: int = 2,
+    progress: bool | None = None,
+) -> Comparison:
+    """Compare filters on common trajectories of a model.
+
+    Parameters
+    ----------
+    filters : sequence of Filter or Design
+        Designs are designed first, on an ensemble of their own.
+    model : Model
+    runs, steps : int
+        Trajectories, and measurements of each.
+    seed : int
+        The same seed gives the same numbers, whatever the number of threads.
+    design_runs : int, optional
+        Size of the design ensemble; `runs` by default.
+    same_ensemble : bool
+        Design on the very trajectories of the comparison, as the lab does: optimistic for the designed
+        filters, by about the number of coefficients over `runs`.
+    subset_runs : int
+        Slow filters (exact, particle) run on this many of the common trajectories; their error variance
+        is found through the paired difference with the first fast filter.  0 leaves them out.
+    threads : int
+        Threads that draw random numbers ahead, and run slow filters.
+    progress : bool, optional
+        Show progress bars; by default if standard error is a terminal.
+
+    Raises
+    ------
+    ValueError
+        Filters of equal name, sizes that are not positive whole numbers.
+    NotFinite
+        A trajectory or a filter left the finite numbers.
+    """
+    names = [one.name for one in filters]
+    if len(set(names)) < len(names) or not names:
+        raise ValueError(f"give at least one filter, and each a name of its own: {', '.join(names) or 'none given'}")
+    slow = [one for one in filters if one.slow and subset_runs]
+    fast = [one for one in filters if not one.slow]
+    if slow and not fast:
+        raise ValueError(f"{slow[0].name} is found through its difference from a fast filter; add one, such as aof-gaussian")
+    if not fast:
+        raise ValueError("only slow filters were given and their subset is 0; set subset_runs")
+    if subset_runs < 0:
+        raise ValueError(f"subset_runs must not be negative, got {subset_runs}")
+
+    run_seed, design_seed = np.random.SeedSequence(seed).spawn(2)
+    common = Ensemble(model, runs, steps, run_seed, threads)
+    if same_ensemble:
+        design_ensemble = common
+    else:
+        design_ensemble = Ensemble(model, runs if design_runs is None else design_runs, steps, design_seed, threads)
+    ready = _designed(fast, design_ensemble, progress)
+    sums = Sums.concatenate(list(_run_blocks(ready, common, progress)))
+    subset = None
+    if slow:
+        size = min(subset_runs, runs)
+        subset = Subset([one.name for one in slow], _run_subset([*ready, *_designed(slow, design_ensemble, progress)], common, size, progress))
+    return Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset)
+
+
+def _designed(filters: Sequence[Filter | Design], ensemble: Ensemble, progress: bool | None) -> list[Filter]:
+    """The filters in their order, those that need it designed on the ensemble."""
+    designs = [one for one in filters if isinstance(one, Design)]
+    fitted: dict[str, Filter] = {}
+    if designs:
+        steps = _progress(ensemble.by_step(), "designing", ensemble.steps, "step", progress)
+        fitted = {one.name: one for one in design(designs, steps)}
+    return [fitted[one.name] if isinstance(one, Design) else one for one in filters]
+
+
+def _run_blocks(filters: Sequence[Filter], ensemble: Ensemble, progress: bool | None) -> Iterator[Sums]:
+    """Sums of each block of the ensemble, one block after another."""
+    blocks = len(ensemble.sizes)
+    bar = _progress(zip(ensemble.sizes, ensemble.by_block(), strict=True), "comparing", blocks, "block", progress)
+    for size, moments in bar:
+        batches = max(1, round(BATCHES * size / ensemble.runs))
+        yield _run_block(filters, moments, size, ensemble.steps, batches, ensemble.model.n)
+
+
+def _run_block(filters: Sequence[Filter], moments: Iterable[Moment], size: int, steps: int, batches: int, n: int) -> Sums:
+    """Advance all filters together over the steps of one block of trajectories."""
+    sums = Sums.empty(len(filters), steps, n, size, batches)
+    states: list[State] = [one.init(size) for one in filters]
+    for k, moment in enumerate(moments):
+        for i, one in enumerate(filters):
+            states[i] = one.step(states[i], moment.y)
+            sums.record(i, k, moment.x, one.estimate(states[i]))
+            if not np.isfinite(sums.square[i, k]).all():
+                raise _diverged(one.name, k, moment)
+    return sums
+
+
+def _diverged(name: str, k: int, moment: Moment) -> NotFinite:
+    if not (np.isfinite(moment.x).all() and np.isfinite(moment.y).all()):
+        return NotFinite(f"step {k}: the model's own trajectories become infinite; it is not stable, check its equations and parameters")
+    return NotFinite(f"step {k}: {name} became infinite or NaN although the trajectories are finite; leave this filter out or check the variant")
+
+
+def _run_subset(filters: Sequence[Filter], ensemble: Ensemble, size: int, progress: bool | None) -> Sums:
+    """All filters on the first `size` trajectories, in chunks over the threads."""
+    starts = range(0, size, SUBSET_CHUNK)
+    x, y, x_next = _first(ensemble, size)
+
+    def chunk(start: int) -> Sums:
+        rows = slice(start, min(start + SUBSET_CHUNK, size))
+        moments = [Moment(x[k, rows], y[k, rows], x_next[k, rows]) for k in range(ensemble.steps)]
+        count = rows.stop - rows.start
+        return _run_block(filters, moments, count, ensemble.steps, max(1, round(2 * BATCHES * count / size)), ensemble.model.n)
+
+    with ThreadPoolExecutor(ensemble.threads) as pool:
+        return Sums.concatenate(list(_progress(pool.map(chunk, starts), "slow filters", len(starts), "chunk", progress)))
+
+
+def _first(ensemble: Ensemble, size: int) -> tuple[Array, Array, Array]:
+    """The first `size` of the ensemble's trajectories: x, y and the following x, (steps, size, ...)."""
+    parts: list[list[Moment]] = []
+    for start, moments in zip(range(0, size, BLOCK), ensemble.by_block(), strict=False):
+        rows = slice(0, min(BLOCK, size - start))
+        parts.append([Moment(*(a[rows].copy() for a in moment)) for moment in moments])
+    x, y, x_next = (np.stack([np.concatenate([part[k][i] for part in parts]) for k in range(ensemble.steps)]) for i in range(3))
+    return x, y, x_next
+
+
+def _progress(items: Iterable[T], what: str, total: int, unit: str, progress: bool | None) -> Iterable[T]:
+    # tqdm: disable=None means "unless standard error is a terminal"
+    return tqdm(items, desc=what, total=total, unit=unit, disable=None if progress is None else not progress, delay=0.5)

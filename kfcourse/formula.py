@@ -1,0 +1,196 @@
+"""Formulas typed by people, read safely.
+
+A variants file may come from anybody, so a formula such as ``"c*x + e*x*v"`` is never evaluated
+as Python.  Python's own parser builds the syntax tree (it runs nothing), and each node of a short
+white list is turned into SymPy; everything else is an error that points at the place.
+"""
+
+from __future__ import annotations
+
+import ast
+import keyword
+import math
+import re
+
+import sympy as sp
+
+FUNCTIONS = {
+    "sin": sp.sin,
+    "cos": sp.cos,
+    "tan": sp.tan,
+    "atan": sp.atan,
+    "exp": sp.exp,
+    "log": sp.log,
+    "sqrt": sp.sqrt,
+    "tanh": sp.tanh,
+    "sinh": sp.sinh,
+    "cosh": sp.cosh,
+    "abs": sp.Abs,
+}
+CONSTANTS = {"pi": sp.pi}
+
+MAX_LENGTH = 2000
+MAX_EXPONENT = 16
+MAX_DEGREE = 64
+MAX_NUMBER = sp.Integer(10) ** 16  # bases of numeric powers: nested powers must not exhaust the memory
+MAX_ARGUMENT = 500  # arguments of functions that are plain numbers: exp(exp(exp(9))) must not either
+
+
+class FormulaError(ValueError):
+    """A formula cannot be read; the message shows the formula and points at the place."""
+
+    def __init__(self, formula: str, problem: str, column: int = 0):
+        line = " ".join(formula.split("\n"))
+        shown = line if len(line) <= 100 else line[:97] + "..."
+        pointer = f"\n    {' ' * column}^" if column < 100 else ""
+        super().__init__(f"{problem}\n    {shown}{pointer}")
+        self.formula, self.problem, self.column = formula, problem, column
+
+
+def symbol(name: str) -> sp.Symbol:
+    """The real SymPy symbol called `name`: two calls give the same symbol."""
+    return sp.Symbol(name, real=True)
+
+
+def check_name(name: str) -> str:
+    """Return `name` if it can name a parameter or variable in a formula; raise ValueError if not."""
+    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name):
+        raise ValueError(f"{name!r} cannot name a symbol: use letters, digits and _, a letter first")
+    if keyword.iskeyword(name):
+        raise ValueError(f"{name!r} is a reserved word of Python; choose another name, such as {name}_")
+    if name in FUNCTIONS or name in CONSTANTS:
+        raise ValueError(f"{name!r} already means a function or constant in formulas; choose another name")
+    return name
+
+
+def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
+    """Read one formula.
+
+    Parameters
+    ----------
+    formula : str
+        Arithmetic (``+ - * / **``), numbers, the functions of `FUNCTIONS`, ``pi`` and the names in `symbols`.
+    symbols : dict
+        Name to SymPy symbol; any other name is an error.
+
+    Raises
+    ------
+    FormulaError
+        With the problem, the formula and a pointer to the column.
+
+    Examples
+    --------
+    >>> x, v = symbol("x"), symbol("v")
+    >>> parse("x - x**2*sin(v)", {"x": x, "v": v})
+    -x**2*sin(v) + x
+    """
+    if not isinstance(formula, str):
+        raise FormulaError(str(formula), f"a formula must be a string, got {type(formula).__name__}")
+    if not formula.strip():
+        raise FormulaError(formula, "the formula is empty")
+    if len(formula) > MAX_LENGTH:
+        raise FormulaError(formula, f"the formula has {len(formula)} characters; at most {MAX_LENGTH} are read")
+    if "^" in formula:
+        raise FormulaError(formula, "^ is not a power here; write ** (x**2)", formula.index("^"))
+    offset = len(formula) - len(formula.lstrip())
+    try:
+        tree = ast.parse(formula.strip(), mode="eval").body
+    except SyntaxError as error:
+        column = offset + max((error.offset or 1) - 1, 0)
+        hint = "; a product needs *, as in 2*x" if re.search(r"[0-9)]\s*[A-Za-z(]", formula) else ""
+        raise FormulaError(formula, f"the formula cannot be read ({error.msg}){hint}", column) from None
+    except (ValueError, MemoryError, RecursionError):
+        raise FormulaError(formula, "the formula cannot be read: nested too deeply or has forbidden characters") from None
+    try:
+        expression = _Reader(formula, symbols, offset).read(tree)
+    except RecursionError:
+        raise FormulaError(formula, "the formula is nested too deeply; split it up") from None
+    if expression.has(sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I):
+        raise FormulaError(formula, "the formula has no finite real value (division by zero or root of a negative?)")
+    return expression
+
+
+class _Reader:
+    """Turns white-listed syntax nodes into SymPy; `read` recurses over the tree."""
+
+    def __init__(self, formula: str, symbols: dict[str, sp.Symbol], offset: int):
+        self.formula, self.symbols, self.offset = formula, symbols, offset
+
+    def fail(self, node: ast.expr, problem: str) -> FormulaError:
+        return FormulaError(self.formula, problem, self.offset + node.col_offset)
+
+    def read(self, node: ast.expr) -> sp.Expr:
+        match node:
+            case ast.Constant():
+                return self.number(node)
+            case ast.Name():
+                return self.name(node)
+            case ast.UnaryOp(op=ast.USub()):
+                return -self.read(node.operand)
+            case ast.UnaryOp(op=ast.UAdd()):
+                return self.read(node.operand)
+            case ast.BinOp(op=ast.Add()):
+                return self.read(node.left) + self.read(node.right)
+            case ast.BinOp(op=ast.Sub()):
+                return self.read(node.left) - self.read(node.right)
+            case ast.BinOp(op=ast.Mult()):
+                return self.read(node.left) * self.read(node.right)
+            case ast.BinOp(op=ast.Div()):
+                return self.read(node.left) / self.read(node.right)
+            case ast.BinOp(op=ast.Pow()):
+                return self.power(node)
+            case ast.Call():
+                return self.call(node)
+        raise self.fail(node, f"{type(node).__name__} is not allowed in a formula; only + - * / ** numbers, names, functions")
+
+    def number(self, node: ast.Constant) -> sp.Expr:
+        value = node.value
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise self.fail(node, f"{value!r} is not a finite real number")
+        if value and not 1e-100 < abs(value) < 1e100:
+            raise self.fail(node, "the number is too large or too small")
+        return sp.Rational(str(value))
+
+    def name(self, node: ast.Name) -> sp.Expr:
+        known = self.symbols | CONSTANTS
+        if node.id in known:
+            return known[node.id]
+        if node.id in FUNCTIONS:
+            raise self.fail(node, f"{node.id} is a function; write {node.id}(...)")
+        names = ", ".join(sorted(known))
+        raise self.fail(node, f"unknown symbol {node.id!r}; known here: {names}. A parameter needs a value in `parameters`")
+
+    def power(self, node: ast.BinOp) -> sp.Expr:
+        base, exponent = self.read(node.left), self.read(node.right)
+        if exponent.free_symbols or not exponent.is_Rational:
+            raise self.fail(node.right, "an exponent must be a plain number; write exp(...) for exponentials")
+        if abs(exponent) > MAX_EXPONENT:
+            raise self.fail(node.right, f"the exponent is larger than {MAX_EXPONENT}")
+        if base.is_number and (abs(base) >= MAX_NUMBER or (base != 0 and abs(base) <= 1 / MAX_NUMBER)):
+            raise self.fail(node, "the power of this number is too large or too small")
+        result = base**exponent
+        if _degree(result) > MAX_DEGREE:
+            raise self.fail(node, f"powers of powers above degree {MAX_DEGREE}; simplify the formula")
+        return result
+
+    def call(self, node: ast.Call) -> sp.Expr:
+        if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:
+            called = node.func.id if isinstance(node.func, ast.Name) else "this"
+            raise self.fail(node, f"{called!r} is not a known function; known: {', '.join(sorted(FUNCTIONS))}")
+        if node.keywords or len(node.args) != 1:
+            raise self.fail(node, f"{node.func.id} takes exactly one argument")
+        argument = self.read(node.args[0])
+        if argument.is_number and abs(argument) >= MAX_ARGUMENT:
+            raise self.fail(node, f"the argument of {node.func.id} is too large")
+        return FUNCTIONS[node.func.id](argument)
+
+
+def _degree(expression: sp.Expr) -> int:
+    """A bound on the degree the expression would have if its integer powers were expanded."""
+    if expression.is_Pow and expression.exp.is_Integer:
+        return int(abs(expression.exp)) * _degree(expression.base)
+    if expression.is_Mul:
+        return sum(_degree(factor) for factor in expression.args)
+    if expression.args:
+        return max(_degree(argument) for argument in expression.args)
+    return int(bool(expression.free_symbols))

@@ -1,0 +1,188 @@
+"""The small linear algebra that every filter shares.
+
+Shapes: vectors are (..., n), matrices (..., r, c); the leading axes run over the ensemble, and an
+array without them is the same for every trajectory.  Scalar models keep their axes of length 1;
+for them the products below are plain multiplications, which is what makes the engine fast.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Gaussian(NamedTuple):
+    """A normal law N(mean, cov): mean (..., n), cov (..., n, n)."""
+
+    mean: Array
+    cov: Array
+
+
+class Measurement(NamedTuple):
+    """Structural functions of the meter at N(m, d): h (..., p), G (..., p, n), F (..., p, p)."""
+
+    h: Array
+    G: Array
+    F: Array
+
+
+class Affine(NamedTuple):
+    """The best affine predictor of a target from a regressor, and what it leaves unexplained.
+
+    target ~ matrix @ regressor + offset,  Cov(target - prediction) = residual
+    """
+
+    matrix: Array
+    offset: Array
+    residual: Array
+
+    def __call__(self, regressor: Array) -> Array:
+        return apply(self.matrix, regressor) + self.offset
+
+
+def apply(matrix: Array, vector: Array) -> Array:
+    """matrix @ vector: (..., r, c), (..., c) -> (..., r)."""
+    if matrix.shape[-2:] == (1, 1):
+        return matrix[..., 0] * vector
+    return (matrix @ vector[..., None])[..., 0]
+
+
+def product(left: Array, right: Array) -> Array:
+    """left @ right: (..., r, m), (..., m, c) -> (..., r, c)."""
+    if left.shape[-2:] == (1, 1) == right.shape[-2:]:
+        return left * right
+    return left @ right
+
+
+def transpose(matrix: Array) -> Array:
+    """The transpose of the last two axes."""
+    return matrix if matrix.shape[-2:] == (1, 1) else np.swapaxes(matrix, -1, -2)
+
+
+def symmetric(matrix: Array) -> Array:
+    """(P + P^T) / 2: rounding must not make a covariance asymmetric."""
+    return matrix if matrix.shape[-1] == 1 else 0.5 * (matrix + transpose(matrix))
+
+
+def gain(cross: Array, cov: Array) -> Array:
+    """The regression gain cross cov^+, the solution K of K cov = cross of least norm.
+
+    Parameters
+    ----------
+    cross : (..., n, p)
+        Cov(x, y).
+    cov : (..., p, p)
+        Cov(y), symmetric and non-negative; where it is singular the pseudo-inverse takes the place of
+        the inverse, so a measurement that cannot vary gets the gain 0.
+    """
+    if cov.shape[-1] == 1:
+        if cov.all():
+            return cross / cov
+        return np.divide(cross, cov, out=np.zeros(np.broadcast_shapes(cross.shape, cov.shape)), where=cov != 0)
+    # Scaling to correlations first: components may differ by orders of magnitude in size.
+    scale = np.sqrt(np.maximum(np.diagonal(cov, axis1=-2, axis2=-1), 0.0))
+    scale = np.where(scale > 0, scale, 1.0)
+    correlation = cov / (scale[..., :, None] * scale[..., None, :])
+    scaled_cross = cross / scale[..., None, :]
+    try:
+        if np.diagonal(np.linalg.cholesky(correlation), axis1=-2, axis2=-1).min() > SINGULAR:
+            return transpose(np.linalg.solve(correlation, transpose(scaled_cross))) / scale[..., None, :]
+    except np.linalg.LinAlgError:
+        pass
+    return scaled_cross @ np.linalg.pinv(correlation, rcond=SINGULAR**2, hermitian=True) / scale[..., None, :]
+
+
+# A Cholesky pivot of a correlation matrix below this is rounding (float64 carries 2e-16, its root 1.5e-8).
+SINGULAR = 1e-7
+
+
+def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
+    """The correction of the normal (Gaussian) filter, N(lambda, Psi) -> N(z, p).
+
+    K = Psi G^T F^+,   z = lambda + K (y - h),   p = Psi - K G Psi
+
+    A trajectory with a missing measurement (NaN) keeps its prior for the missing components.
+    """
+    h, G, F = measurement
+    innovation = y - h
+    if np.isnan(innovation.sum()):
+        innovation, G, F = _without_missing(innovation, G, F)
+    cross = product(prior.cov, transpose(G))
+    K = gain(cross, F)
+    mean = prior.mean + apply(K, innovation)
+    cov = symmetric(prior.cov - product(K, transpose(cross)))
+    return Gaussian(mean, cov)
+
+
+def _without_missing(innovation: Array, G: Array, F: Array) -> tuple[Array, Array, Array]:
+    """Take missing components out: no innovation, no sensitivity, uncorrelated with the others."""
+    missing = np.isnan(innovation)
+    either = missing[..., :, None] | missing[..., None, :]
+    identity = np.eye(innovation.shape[-1])
+    return (
+        np.where(missing, 0.0, innovation),
+        np.where(missing[..., :, None], 0.0, G),
+        np.where(either, identity, F),
+    )
+
+
+def where_measured(y: Array, correction: Array) -> Array:
+    """The correction, or 0 for trajectories whose measurement is missing (NaN)."""
+    if np.isnan(y.sum()):
+        return np.where(np.isnan(y).any(axis=-1, keepdims=True), 0.0, correction)
+    return correction
+
+
+class Moments(NamedTuple):
+    """Means and scatter of (target, regressor) over part of an ensemble; parts are merged by `merge`.
+
+    Scatter is the sum of products of deviations from the part's own mean: large means do not cancel.
+    """
+
+    count: int
+    mean: Array  # (r + s,)
+    scatter: Array  # (r + s, r + s)
+
+    @classmethod
+    def of(cls, target: Array, regressor: Array) -> Moments:
+        """Moments of target (N, r) and regressor (N, s) stacked into one vector."""
+        columns = [target[..., i] for i in range(target.shape[-1])]
+        columns += [regressor[..., i] for i in range(regressor.shape[-1])]
+        count, size = len(target), len(columns)
+        mean = np.array([column.mean() for column in columns])
+        deviations = [column - m for column, m in zip(columns, mean, strict=True)]
+        scatter = np.empty((size, size))
+        for i in range(size):
+            for j in range(i, size):
+                # einsum and not dot, which would start the linear algebra library's own threads
+                scatter[i, j] = scatter[j, i] = np.einsum("i,i", deviations[i], deviations[j])
+        return cls(count, mean, scatter)
+
+    def merge(self, other: Moments) -> Moments:
+        """Moments of both parts together (Chan's formula)."""
+        count = self.count + other.count
+        shift = other.mean - self.mean
+        mean = self.mean + shift * (other.count / count)
+        scatter = self.scatter + other.scatter + np.outer(shift, shift) * (self.count * other.count / count)
+        return Moments(count, mean, scatter)
+
+    def regression(self, size: int) -> Affine:
+        """Least squares of the first `size` components on the rest.
+
+        matrix = Cov(t, r) Cov(r)^+,  offset = M t - matrix M r,  residual = Cov(t) - matrix Cov(t, r)^T
+        """
+        cov = self.scatter / self.count
+        cross = cov[:size, size:]
+        matrix = gain(cross, cov[size:, size:])
+        offset = self.mean[:size] - matrix @ self.mean[size:]
+        return Affine(matrix, offset, symmetric(cov[:size, :size] - matrix @ cross.T))
+
+
+def square_root(cov: Array) -> Array:
+    """A matrix S with S S^T = cov, for any non-negative cov (..., n, n), singular or not."""
+    values, vectors = np.linalg.eigh(cov)
+    return vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]

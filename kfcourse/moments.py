@@ -1,0 +1,210 @@
+r"""Exact moments of functions of Gaussian variables.
+
+A function that is a sum of terms
+
+    coefficient * monomial(x) * exp(a^T x)        (sines and cosines are complex exponentials)
+
+has Gaussian moments in closed form, in any dimension, because an exponential only shifts the mean:
+
+    M[q(x) exp(a^T x)] = exp(a^T m + a^T P a / 2) M[q(m + P a + delta)],   delta ~ N(0, P)
+
+and the moments of the centred Gaussian delta are finite sums (Isserlis' theorem).  Covariances are
+assembled term by term from differences that vanish symbolically, never as M[fg] - M[f] M[g]: a
+large mean or a small variance then loses no digits in floating point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
+from typing import NamedTuple
+
+import sympy as sp
+from sympy.codegen.cfunctions import expm1
+
+MAX_DEGREE = 40
+
+
+class NoClosedForm(ValueError):
+    """The Gaussian mean of a term is not an elementary expression this module can find."""
+
+
+class Term(NamedTuple):
+    """coefficient * polynomial(x) * exp(rate^T x), with free parameters as symbols."""
+
+    polynomial: sp.Expr
+    rate: tuple[sp.Expr, ...]
+
+
+class GaussianMoments:
+    """Exact means, covariances and mean derivatives over x ~ N(m, P).
+
+    Parameters
+    ----------
+    variables : sequence of Symbol
+        The Gaussian variables x, n of them.
+    mean : sequence of Expr
+        Their means m, in any symbols or numbers.
+    cov : Matrix
+        Their covariance P, n x n, symmetric, in any symbols or numbers.
+
+    Examples
+    --------
+    >>> x, m = sp.symbols("x m", real=True)
+    >>> d = sp.Symbol("d", positive=True)
+    >>> law = GaussianMoments([x], [m], sp.Matrix([[d]]))
+    >>> law.mean_of(x**4)
+    3*d**2 + 6*d*m**2 + m**4
+    >>> law.covariance(x**2, x**2)
+    2*d**2 + 4*d*m**2
+    >>> law.mean_of(sp.sin(x))
+    exp(-d/2)*sin(m)
+    """
+
+    def __init__(self, variables: Sequence[sp.Symbol], mean: Sequence[sp.Expr], cov: sp.MatrixBase):
+        self.variables = tuple(variables)
+        self.mean = sp.Matrix(mean)
+        self.cov = sp.Matrix(cov)
+
+    def mean_of(self, function: sp.Expr) -> sp.Expr:
+        """M[function(x)]; NoClosedForm names the term if there is none."""
+        return _real(sum((self._mean_of_term(t) for t in decompose(function, self.variables)), sp.S.Zero))
+
+    def covariance(self, left: sp.Expr, right: sp.Expr) -> sp.Expr:
+        """Cov(left(x), right(x)) = M[left right] - M[left] M[right], without cancellation."""
+        total = sp.S.Zero
+        for s in decompose(left, self.variables):
+            for t in decompose(right, self.variables):
+                total += self._covariance_of_terms(s, t)
+        return _real(total)
+
+    def _mean_of_term(self, term: Term) -> sp.Expr:
+        return self._scale(term.rate) * self._polynomial_mean(term.polynomial, term.rate)
+
+    def _covariance_of_terms(self, s: Term, t: Term) -> sp.Expr:
+        # M[s t] - M[s] M[t] = scale(s) scale(t) (e^{a^T P b} Q_st - Q_s Q_t)
+        #                    = scale(s) scale(t) ((e^{a^T P b} - 1) Q_st + (Q_st - Q_s Q_t))
+        both = tuple(a + b for a, b in zip(s.rate, t.rate, strict=True))
+        q_st = self._polynomial_mean(s.polynomial * t.polynomial, both)
+        q_s, q_t = self._polynomial_mean(s.polynomial, s.rate), self._polynomial_mean(t.polynomial, t.rate)
+        exponent = sp.expand((sp.Matrix(s.rate).T * self.cov * sp.Matrix(t.rate))[0])
+        difference = sp.expand(q_st - q_s * q_t)
+        return self._scale(s.rate) * self._scale(t.rate) * (_exp_minus_one(exponent) * q_st + difference)
+
+    def _scale(self, rate: tuple[sp.Expr, ...]) -> sp.Expr:
+        """exp(a^T m + a^T P a / 2), the imaginary part of the exponent as cosine and sine."""
+        a = sp.Matrix(rate)
+        re, im = sp.expand((a.T * self.mean + a.T * self.cov * a / 2)[0]).as_real_imag()
+        return sp.exp(re) * (sp.cos(im) + sp.I * sp.sin(im))
+
+    def _polynomial_mean(self, polynomial: sp.Expr, rate: tuple[sp.Expr, ...]) -> sp.Expr:
+        """M[polynomial(m + P a + delta)], delta ~ N(0, P)."""
+        shift = self.mean + self.cov * sp.Matrix(rate)
+        deviations = [sp.Dummy(f"delta{i}", real=True) for i in range(len(self.variables))]
+        shifted = polynomial.subs({x: s + u for x, s, u in zip(self.variables, shift, deviations, strict=True)}, simultaneous=True)
+        total = sp.S.Zero
+        for powers, coefficient in sp.Poly(sp.expand(shifted), *deviations).terms():
+            total += coefficient * self._central(powers)
+        return sp.expand(total)
+
+    def _central(self, powers: tuple[int, ...]) -> sp.Expr:
+        """M[prod delta_i^powers_i] by Isserlis' recursion: pair one factor with each of the others."""
+        return self._central_moments(powers)
+
+    @cached_property
+    def _central_moments(self):
+        @lru_cache(maxsize=None)
+        def moment(powers: tuple[int, ...]) -> sp.Expr:
+            if sum(powers) % 2:
+                return sp.S.Zero
+            if not any(powers):
+                return sp.S.One
+            first = next(i for i, power in enumerate(powers) if power)
+            rest = list(powers)
+            rest[first] -= 1
+            total = sp.S.Zero
+            for j, power in enumerate(rest):
+                if power and self.cov[first, j] != 0:
+                    rest[j] -= 1
+                    total += power * self.cov[first, j] * moment(tuple(rest))
+                    rest[j] += 1
+            return sp.expand(total)
+
+        return moment
+
+
+def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
+    """Split a function into terms polynomial(x) exp(rate^T x); terms of equal rate are collected.
+
+    Raises
+    ------
+    NoClosedForm
+        For a term that is not a polynomial times exponentials, sines and cosines of linear arguments.
+    """
+    # Hyperbolic and trigonometric functions of x become exponentials; those of parameters stay.
+    def with_variables(e: sp.Basic) -> bool:
+        return isinstance(e, sp.sin | sp.cos | sp.sinh | sp.cosh) and e.has(*variables)
+
+    rewritten = sp.sympify(function).replace(with_variables, lambda e: e.rewrite(sp.exp))
+    if _polynomial_degree(rewritten, variables) > MAX_DEGREE:
+        raise NoClosedForm(
+            f"the degree of {function} is above {MAX_DEGREE}: its exact moments would be too long; "
+            "use a numerical structure, unscented(model) or gauss_hermite(model)"
+        )
+    expanded = sp.expand(rewritten)
+    collected: dict[tuple[sp.Expr, ...], sp.Expr] = {}
+    for term in sp.Add.make_args(expanded):
+        polynomial, exponent = sp.S.One, sp.S.Zero
+        for factor in sp.Mul.make_args(term):
+            if isinstance(factor, sp.exp) and factor.has(*variables):
+                exponent += factor.exp
+            elif factor.is_polynomial(*variables):
+                polynomial *= factor
+            else:
+                raise _no_closed_form(factor, function)
+        rate = tuple(sp.expand(sp.diff(exponent, x)) for x in variables)
+        if any(r.has(*variables) for r in rate):
+            raise _no_closed_form(sp.exp(exponent), function)
+        constant = sp.expand(exponent - sum((r * x for r, x in zip(rate, variables, strict=True)), sp.S.Zero))
+        collected[rate] = collected.get(rate, sp.S.Zero) + polynomial * _cis(constant)
+    return [Term(polynomial, rate) for rate, polynomial in collected.items()]
+
+
+def _no_closed_form(factor: sp.Expr, function: sp.Expr) -> NoClosedForm:
+    return NoClosedForm(
+        f"no closed-form Gaussian mean for the term {factor} in {function}; "
+        "use linearised(model), or a numerical structure: unscented(model) or gauss_hermite(model)"
+    )
+
+
+def _polynomial_degree(e: sp.Expr, variables: Sequence[sp.Symbol]) -> int:
+    """A bound on the degree after expansion, found without expanding."""
+    if not e.has(*variables) or isinstance(e, sp.exp):
+        return 0
+    if e.is_Pow and e.exp.is_Integer and e.exp > 0:
+        return int(e.exp) * max(_polynomial_degree(e.base, variables), 1)
+    if e.is_Mul:
+        return sum(_polynomial_degree(a, variables) for a in e.args)
+    if e.is_Add:
+        return max(_polynomial_degree(a, variables) for a in e.args)
+    return 1
+
+
+def _cis(exponent: sp.Expr) -> sp.Expr:
+    """exp of a constant complex exponent, its imaginary part as cosine and sine."""
+    re, im = exponent.as_real_imag()
+    return sp.exp(re) * (sp.cos(im) + sp.I * sp.sin(im))
+
+
+def _exp_minus_one(exponent: sp.Expr) -> sp.Expr:
+    """exp(u + iv) - 1 = expm1(u) cos v - 2 sin(v/2)^2 + i e^u sin v, exact for small u and v too."""
+    re, im = exponent.as_real_imag()
+    real = (expm1(re) if re != 0 else sp.S.Zero) * sp.cos(im) - 2 * sp.sin(im / 2) ** 2
+    return real + sp.I * sp.exp(re) * sp.sin(im)
+
+
+def _real(expression: sp.Expr) -> sp.Expr:
+    """The real part; the imaginary parts of conjugate terms cancel by construction."""
+    if not expression.has(sp.I):
+        return sp.expand(expression)
+    return sp.expand(sp.expand(expression).as_real_imag()[0])

@@ -1,0 +1,121 @@
+"""Running statistics of estimation errors, with standard errors that respect pairing.
+
+The ensemble is cut into batches of trajectories; what is kept is the sum over each batch.  Standard
+errors come from the scatter of batch means, so they hold for any difference or ratio of filters on
+common trajectories and any average over steps, and nothing is kept per trajectory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from kfcourse.gaussian import Array, Gaussian
+
+BATCHES = 128  # standard errors from 128 batches are themselves good to 6 %
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A mean over the ensemble, its standard error, and the freedom of that error's estimate.
+
+    Attributes
+    ----------
+    value, standard_error : ndarray, any shape
+    freedom : int
+        Degrees of freedom of the standard error (batches - 1).
+    """
+
+    value: Array
+    standard_error: Array
+    freedom: int
+
+    def interval(self, confidence: float = 0.95) -> tuple[Array, Array]:
+        """Lower and upper limit of the confidence interval (Student's t)."""
+        half = self.half_width(confidence)
+        return self.value - half, self.value + half
+
+    def half_width(self, confidence: float = 0.95) -> Array:
+        if not 0 < confidence < 1:
+            raise ValueError(f"a confidence lies between 0 and 1, got {confidence}")
+        return stats.t.ppf(0.5 + confidence / 2, self.freedom) * self.standard_error
+
+    def __getitem__(self, index) -> Estimate:
+        return Estimate(self.value[index], self.standard_error[index], self.freedom)
+
+
+def batch_mean(sums: Array, counts: Array) -> Estimate:
+    """Mean and standard error from sums over batches (last axis) of `counts` trajectories each.
+
+    With N trajectories in B batches of n_b, means m_b and total mean m,
+    SE^2 = B / (B - 1) sum_b n_b^2 (m_b - m)^2 / N^2.
+    """
+    total, batches = counts.sum(), len(counts)
+    value = sums.sum(axis=-1) / total
+    deviations = sums - counts * value[..., None]
+    variance = (deviations**2).sum(axis=-1) / total**2 * batches / (batches - 1) if batches > 1 else np.full(value.shape, np.nan)
+    return Estimate(value, np.sqrt(variance), max(batches - 1, 1))
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Sums over batches for a tuple of filters.
+
+    Attributes
+    ----------
+    counts : ndarray (batches,)
+    error : ndarray (filters, steps, n, batches)
+        Sums of e = x - z.
+    square : ndarray (filters, steps, n, batches)
+        Sums of e^2.
+    own : ndarray (filters, steps, n, batches)
+        Sums of the variances each filter claims (diagonal of its covariance).
+    normalised : ndarray (filters, steps, batches)
+        Sums of e^T p^-1 e / n.
+    """
+
+    counts: Array
+    error: Array
+    square: Array
+    own: Array
+    normalised: Array
+
+    @classmethod
+    def empty(cls, filters: int, steps: int, n: int, runs: int, batches: int) -> Sums:
+        """Room for `runs` trajectories in about `batches` batches of nearly equal size."""
+        edges = np.linspace(0, runs, min(batches, runs) + 1).astype(int)
+        size = len(edges) - 1
+        shape = (filters, steps, n, size)
+        return cls(np.diff(edges).astype(float), np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros((filters, steps, size)))
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[Sums]) -> Sums:
+        """Sums over the batches of all parts."""
+        return cls(*(np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in cls.__dataclass_fields__))
+
+    def record(self, filter_index: int, step: int, x: Array, estimate: Gaussian) -> None:
+        """Add one step of one filter: true states x (N, n) and its estimate."""
+        mean, cov = estimate
+        starts = np.concatenate([[0], np.cumsum(self.counts[:-1])]).astype(int)
+        error = x - mean
+        for i in range(error.shape[-1]):
+            e, variance = error[:, i], cov[..., i, i]
+            self.error[filter_index, step, i] = np.add.reduceat(e, starts)
+            self.square[filter_index, step, i] = np.add.reduceat(e * e, starts)
+            self.own[filter_index, step, i] = np.add.reduceat(variance, starts) if variance.ndim else variance * self.counts
+        self.normalised[filter_index, step] = np.add.reduceat(_normalised_square(error, cov), starts)
+
+
+def _normalised_square(error: Array, cov: Array) -> Array:
+    """e^T cov^-1 e / n, 1 expected; where the claimed variance is 0, 0 for no error and infinity for any."""
+    if cov.shape[-1] == 1:
+        square, variance = error[:, 0] ** 2, cov[..., 0, 0]
+        if np.all(variance > 0):
+            return square / variance
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = square / np.where(variance > 0, variance, 0.0)
+        return np.where(square > 0, ratio, 0.0)
+    return np.einsum("...i,...ij,...j->...", error, np.linalg.pinv(cov, hermitian=True), error) / error.shape[-1]

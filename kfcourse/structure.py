@@ -1,0 +1,316 @@
+r"""Structural functions: the seam between a model and every filter of the course.
+
+The first two conditional moments as functions of a Gaussian's mean and covariance,
+
+    tau(z, p), Theta(z, p)          mean and covariance of x_{k+1}  when x_k ~ N(z, p)
+    h(m, d),  G(m, d),  F(m, d)     mean of y_k, its sensitivity dh/dm, its covariance when x_k ~ N(m, d)
+
+`linearised` and `gaussian` derive them symbolically from the model; `unscented` and `gauss_hermite`
+compute them numerically, for models without a closed form.  All four give a `Structure`, and one
+predict/correct step serves them all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product as cartesian
+
+import numpy as np
+import sympy as sp
+
+from kfcourse.codegen import Compiled, compile_function
+from kfcourse.formula import symbol
+from kfcourse.gaussian import Array, Gaussian, Measurement, gain, square_root, symmetric, transpose
+from kfcourse.model import Model, ModelError
+from kfcourse.moments import GaussianMoments, NoClosedForm
+
+FUNCTION_LATEX = {"tau": r"\tau", "Theta": r"\Theta", "h": "h", "G": "G", "F": "F"}
+
+
+@dataclass(frozen=True)
+class Structure:
+    """The structural functions of a model, as functions of arrays and (if derived) as formulas.
+
+    Attributes
+    ----------
+    name : str
+        "linearised", "gaussian", "unscented" or "gauss-hermite".
+    model : Model
+    predict : callable
+        (z (..., n), p (..., n, n)) -> Gaussian(tau, Theta).
+    measure : callable
+        (m (..., n), d (..., n, n)) -> Measurement(h (..., p), G (..., p, n), F (..., p, p)).
+    formulas : Formulas or None
+        The symbolic functions; None for the numerical structures.
+
+    A result that does not depend on the trajectory may come without the leading axes.
+    """
+
+    name: str
+    model: Model
+    predict: Callable[[Array, Array], Gaussian]
+    measure: Callable[[Array, Array], Measurement]
+    formulas: Formulas | None = None
+
+    def __getitem__(self, function: str) -> sp.Expr | sp.MatrixBase:
+        """The formula of "tau", "Theta", "h", "G" or "F": an expression if scalar, else a matrix."""
+        matrix = self._derived().functions[function]
+        return matrix[0] if matrix.shape == (1, 1) else matrix
+
+    def latex(self) -> str:
+        """The five functions as a LaTeX `aligned` block, parameters as symbols."""
+        formulas = self._derived()
+        lines = []
+        for name in formulas.functions:
+            arguments = formulas.state_arguments if name in ("tau", "Theta") else formulas.meter_arguments
+            names = ", ".join(sp.latex(a) for a in arguments) if self.model.n == 1 else ("z, p" if name in ("tau", "Theta") else "m, d")
+            lines.append(rf"{FUNCTION_LATEX[name]}({names}) &= {sp.latex(self[name])}")
+        return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
+
+    def source(self) -> str:
+        """The generated NumPy code that runs."""
+        formulas = self._derived()
+        return formulas.compiled_predict.source + "\n\n" + formulas.compiled_measure.source
+
+    def _derived(self) -> Formulas:
+        if self.formulas is None:
+            raise NoClosedForm(f"the {self.name} structure is computed by quadrature and has no formulas; see linearised(model), gaussian(model)")
+        return self.formulas
+
+
+@dataclass(frozen=True)
+class Formulas:
+    """Symbolic structural functions with parameters as symbols.
+
+    Attributes
+    ----------
+    model : Model
+    z, p, m, d : sympy.Matrix
+        Arguments: mean and covariance before the state equation, and before the meter equation.
+    functions : dict
+        "tau", "Theta", "h", "G", "F" to matrices of expressions.
+    """
+
+    model: Model
+    name: str
+    z: sp.ImmutableMatrix
+    p: sp.ImmutableMatrix
+    m: sp.ImmutableMatrix
+    d: sp.ImmutableMatrix
+    functions: dict[str, sp.ImmutableMatrix]
+
+    @property
+    def state_arguments(self) -> list[sp.Symbol]:
+        return _distinct(self.z, self.p)
+
+    @property
+    def meter_arguments(self) -> list[sp.Symbol]:
+        return _distinct(self.m, self.d)
+
+    @cached_property
+    def compiled_predict(self) -> Compiled:
+        return self._compile("predict", {"z": self.z, "p": self.p}, ["tau", "Theta"])
+
+    @cached_property
+    def compiled_measure(self) -> Compiled:
+        return self._compile("measure", {"m": self.m, "d": self.d}, ["h", "G", "F"])
+
+    def _compile(self, name: str, arguments: dict[str, sp.MatrixBase], outputs: list[str]) -> Compiled:
+        numeric = {key: self.functions[key].subs(self.model.values) for key in outputs}
+        doc = f"{', '.join(outputs)}: {self.name} structural functions of {self.model}"
+        return compile_function(name, arguments, numeric, ["z", "m", "tau", "h"], doc)
+
+    def structure(self) -> Structure:
+        predict, measure = self.compiled_predict.function, self.compiled_measure.function
+        return Structure(
+            self.name,
+            self.model,
+            lambda z, p: Gaussian(*predict(z, p)),
+            lambda m, d: Measurement(*measure(m, d)),
+            self,
+        )
+
+
+def _distinct(mean: sp.MatrixBase, cov: sp.MatrixBase) -> list[sp.Symbol]:
+    return list(dict.fromkeys([*mean, *cov]))
+
+
+def gaussian_symbols(model: Model, mean: str, cov: str) -> tuple[sp.ImmutableMatrix, sp.ImmutableMatrix]:
+    """Symbols of a mean (n, 1) and a symmetric covariance (n, n): z, p or z1, z2, ..., p11, p12, ...
+
+    A name that the model already uses gets a trailing underscore.
+    """
+    taken = set(model.parameters) | {s.name for s in (*model.x, *model.v, *model.w)}
+
+    def fresh(name: str) -> sp.Symbol:
+        return symbol(name + "_" if name in taken else name)
+
+    n = model.n
+    if n == 1:
+        return sp.ImmutableMatrix([fresh(mean)]), sp.ImmutableMatrix([fresh(cov)])
+    means = [fresh(f"{mean}{i + 1}") for i in range(n)]
+    covs = [[fresh(f"{cov}{min(i, j) + 1}{max(i, j) + 1}") for j in range(n)] for i in range(n)]
+    return sp.ImmutableMatrix(means), sp.ImmutableMatrix(covs)
+
+
+def _exact(array: Array) -> sp.ImmutableMatrix:
+    """Decimal numbers as exact rationals; a vector becomes a column."""
+    rows = array[:, None] if array.ndim == 1 else array
+    return sp.ImmutableMatrix([[sp.Rational(str(float(value))) for value in row] for row in rows])
+
+
+def linearised(model: Model) -> Structure:
+    """Structural functions of the model linearised at the mean (the extended Kalman filter's).
+
+    tau = a(z, m_v),  Theta = a_x p a_x^T + a_v D_v a_v^T,
+    h = b(m, m_w),  G = b_x,  F = b_x d b_x^T + b_w D_w b_w^T,   derivatives at (z, m_v) and (m, m_w)
+
+    Raises
+    ------
+    NoClosedForm
+        If an equation is not differentiable.
+    """
+    (z, p), (m, d) = gaussian_symbols(model, "z", "p"), gaussian_symbols(model, "m", "d")
+    tau, A, B = _taylor(model.state_equation, model.x, z, model.v, _exact(model.state_noise.mean))
+    h, H, C = _taylor(model.meter_equation, model.x, m, model.w, _exact(model.meter_noise.mean))
+    functions = {
+        "tau": tau,
+        "Theta": A * p * A.T + B * _exact(model.state_noise.cov) * B.T,
+        "h": h,
+        "G": H,
+        "F": H * d * H.T + C * _exact(model.meter_noise.cov) * C.T,
+    }
+    return Formulas(model, "linearised", z, p, m, d, _expanded(functions)).structure()
+
+
+def _taylor(equation, x, mean, noise, noise_mean):
+    """Value and Jacobians by state and by noise, at (mean, noise_mean)."""
+    point = dict(zip(x, mean, strict=True)) | dict(zip(noise, noise_mean, strict=True))
+    parts = [equation, equation.jacobian(sp.Matrix(x)), equation.jacobian(sp.Matrix(noise))]
+    for part in parts:
+        if part.has(sp.Derivative, sp.DiracDelta):
+            raise NoClosedForm(f"{list(equation)} is not differentiable, so it cannot be linearised; use unscented(model) or gauss_hermite(model)")
+    return [part.subs(point, simultaneous=True) for part in parts]
+
+
+def gaussian(model: Model) -> Structure:
+    """Structural functions as exact moments over x ~ N (the normal, or Gaussian, filters').
+
+    tau = M a(x, v),  Theta = Cov a(x, v),  h = M b(x, w),  G = dh/dm,  F = Cov b(x, w)
+
+    Raises
+    ------
+    NoClosedForm
+        If a term has no closed-form Gaussian mean: use `unscented` or `gauss_hermite`.
+    """
+    (z, p), (m, d) = gaussian_symbols(model, "z", "p"), gaussian_symbols(model, "m", "d")
+    tau, Theta = _moments(model.state_equation, model.x, z, p, model.v, model.state_noise)
+    h, F = _moments(model.meter_equation, model.x, m, d, model.w, model.meter_noise)
+    functions = {"tau": tau, "Theta": Theta, "h": h, "G": h.jacobian(m), "F": F}
+    return Formulas(model, "gaussian", z, p, m, d, _expanded(functions)).structure()
+
+
+def _moments(equation, x, mean, cov, noise, law: Gaussian):
+    """Mean and covariance of equation(x, noise), x ~ N(mean, cov) and the noise independent."""
+    joint = GaussianMoments([*x, *noise], [*mean, *_exact(law.mean)], sp.diag(sp.Matrix(cov), sp.Matrix(_exact(law.cov))))
+    size = len(equation)
+    means = sp.Matrix([joint.mean_of(formula) for formula in equation])
+    covs = sp.zeros(size, size)
+    for i in range(size):
+        for j in range(i, size):
+            covs[i, j] = covs[j, i] = joint.covariance(equation[i], equation[j])
+    return means, covs
+
+
+def _expanded(functions) -> dict[str, sp.ImmutableMatrix]:
+    return {name: sp.ImmutableMatrix(matrix).applyfunc(sp.expand) for name, matrix in functions.items()}
+
+
+def unscented(model: Model, kappa: float | None = None) -> Structure:
+    """Structural functions by the unscented transform over (x, v) and (x, w).
+
+    2 s + 1 points at distance sqrt(s + kappa), s the joint dimension; exact for quadratic functions.
+
+    Parameters
+    ----------
+    kappa : float, optional
+        Spread; 3 - s by default (Julier and Uhlmann), but not below 0, so that no weight is negative.
+    """
+
+    def rule(size: int) -> tuple[Array, Array]:
+        k = max(3.0 - size, 0.0) if kappa is None else float(kappa)
+        if not size + k > 0:
+            raise ModelError(f"kappa = {kappa} is too small: {size} + kappa must be positive")
+        axes = np.sqrt(size + k) * np.eye(size)
+        weights = np.full(2 * size + 1, 0.5 / (size + k))
+        weights[0] = k / (size + k)
+        return np.concatenate([np.zeros((1, size)), axes, -axes]), weights
+
+    return _quadrature(model, "unscented", rule)
+
+
+def gauss_hermite(model: Model, order: int = 5) -> Structure:
+    """Structural functions by the Gauss-Hermite product rule; exact for polynomials below degree 2*order.
+
+    `order` points an axis, so order**(n + number of noises) evaluations.
+    """
+    if order < 2:
+        raise ModelError(f"Gauss-Hermite quadrature needs an order of at least 2, got {order}")
+
+    def rule(size: int) -> tuple[Array, Array]:
+        if order**size > 100_000:
+            raise ModelError(f"{order} points on each of {size} axes are too many; lower the order or use unscented(model)")
+        nodes, weights = np.polynomial.hermite_e.hermegauss(order)
+        weights = weights / weights.sum()
+        points = np.array(list(cartesian(nodes, repeat=size)))
+        return points, np.array([np.prod(c) for c in cartesian(weights, repeat=size)])
+
+    return _quadrature(model, "gauss-hermite", rule)
+
+
+def _quadrature(model: Model, name: str, rule: Callable[[int], tuple[Array, Array]]) -> Structure:
+    """A structure from standard normal points and weights: rule(size) -> (points (q, size), weights (q,))."""
+    n = model.n
+    state, meter = compile_model(model)
+
+    def propagate(function, mean, cov, law: Gaussian, points: Array):
+        x = mean[..., None, :] + points[:, :n] @ transpose(square_root(cov))
+        noise = law.mean + points[:, n:] @ square_root(law.cov).T
+        return x, function(x, np.broadcast_to(noise, x.shape[:-1] + noise.shape[-1:]))
+
+    state_points, state_weights = rule(n + len(model.v))
+    meter_points, meter_weights = rule(n + len(model.w))
+
+    def predict(z: Array, p: Array) -> Gaussian:
+        _, following = propagate(state, z, p, model.state_noise, state_points)
+        tau = state_weights @ following
+        return Gaussian(tau, _weighted(state_weights, following - tau[..., None, :]))
+
+    def measure(m: Array, d: Array) -> Measurement:
+        x, y = propagate(meter, m, d, model.meter_noise, meter_points)
+        h = meter_weights @ y
+        deviation = y - h[..., None, :]
+        cross = transpose(deviation * meter_weights[:, None]) @ (x - m[..., None, :])
+        return Measurement(h, gain(cross, np.broadcast_to(d, m.shape + (n,))), _weighted(meter_weights, deviation))
+
+    return Structure(name, model, predict, measure)
+
+
+def _weighted(weights: Array, deviation: Array) -> Array:
+    return symmetric(transpose(deviation * weights[:, None]) @ deviation)
+
+
+def compile_model(model: Model) -> tuple[Callable[[Array, Array], Array], Callable[[Array, Array], Array]]:
+    """The state and meter equations as functions of arrays: (x (..., n), v (..., r)) -> (..., n)."""
+
+    def build(name: str, equation, noise_name: str, noise) -> Callable[[Array, Array], Array]:
+        arguments = {"x": sp.Matrix(model.x), noise_name: sp.Matrix(noise)}
+        compiled = compile_function(
+            name, arguments, {name: equation.subs(model.values)}, ["x", noise_name, name], f"{name} equation of {model}"
+        )
+        function = compiled.function
+        return lambda x, noise: function(x, noise)[0]
+
+    return build("state", model.state_equation, "v", model.v), build("meter", model.meter_equation, "w", model.w)
