@@ -1,0 +1,41 @@
+"""Kalman and nonlinear suboptimal filtering: the package behind the course companion.
+
+    model = Model.define("c*x + e*x*v", "g*x + f*x**2*w", dict(c=0.9, e=0.05, g=1, f=0.02))
+    gaussian(model).latex()                            structural functions, derived
+    compare(lab_filters(model), model, 100_000, 51, seed=1).ranking()
+"""
+
+from kfcourse.comparison import Comparison
+from kfcourse.design import NotFinite, design
+from kfcourse.ensemble import Ensemble, Trajectories, simulate
+from kfcourse.experiment import compare, run
+from kfcourse.formula import FormulaError
+from kfcourse.gaussian import Gaussian
+from kfcourse.lab import lab_filters, load_variants
+from kfcourse.model import Model, ModelError
+from kfcourse.moments import GaussianMoments, NoClosedForm
+from kfcourse.structure import Structure, gauss_hermite, gaussian, linearised, unscented
+
+__all__ = [
+    "Comparison",
+    "Ensemble",
+    "FormulaError",
+    "Gaussian",
+    "GaussianMoments",
+    "Model",
+    "ModelError",
+    "NoClosedForm",
+    "NotFinite",
+    "Structure",
+    "Trajectories",
+    "compare",
+    "design",
+    "gauss_hermite",
+    "gaussian",
+    "lab_filters",
+    "linearised",
+    "load_variants",
+    "run",
+    "simulate",
+    "unscented",
+]

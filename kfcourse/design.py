@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from kfcourse.ensemble import Moment
-from kfcourse.filters.base import Design, Equations, Filter, Regression, Step
+from kfcourse.filters.base import Design, Filter, Step
 from kfcourse.gaussian import Affine, Gaussian, Moments
 
 
@@ -40,41 +40,54 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Moment]]) -> list[
         If a regression meets infinite or NaN values: the model or the filter diverges.
     """
     coefficients: list[list[list[Affine]]] = [[] for _ in designs]
-    predicted: list[list[Gaussian]] = []
+    predicted: list[list[Gaussian]] = []  # [block][design]
     for k, blocks in enumerate(ensemble):
         if not predicted:
-            predicted = [[Gaussian(np.tile(d.model.prior.mean, (len(b.x), 1)), d.model.prior.cov) for b in blocks] for d in designs]
-        for i, one in enumerate(designs):
-            running = [one.equations(before, block.y) for before, block in zip(predicted[i], blocks, strict=True)]
-            steps, fits = _fit_step(running, blocks, f"{one.name}, step {k}")
-            predicted[i] = [step.predicted for step in steps]
-            coefficients[i].append(fits)
+            predicted = [[Gaussian(np.tile(d.model.prior.mean, (len(b.x), 1)), d.model.prior.cov) for d in designs] for b in blocks]
+        runs = [_BlockStep(designs, before, block) for before, block in zip(predicted, blocks, strict=True)]
+        fits = _fit_step(designs, runs, k)
+        predicted = [[step.predicted for step in run.finished()] for run in runs]
+        for table, row in zip(coefficients, fits, strict=True):
+            table.append(row)
     return [one.with_coefficients(table) for one, table in zip(designs, coefficients, strict=True)]
 
 
-def _fit_step(running: list[Equations], blocks: list[Moment], where: str) -> tuple[list[Step], list[Affine]]:
-    """Run one step of every block, answering its regressions from the whole ensemble."""
-    fits: list[Affine] = []
-    answer: Affine | None = None
-    while True:
-        moments: Moments | None = None
-        finished: list[Step] = []
-        for equations, block in zip(running, blocks, strict=True):
-            try:
-                request = equations.send(answer)  # type: ignore[arg-type]  # None starts a generator
-            except StopIteration as stop:
-                finished.append(stop.value)
+class _BlockStep:
+    """The equations of all designs over one step of one block of trajectories."""
+
+    def __init__(self, designs: Sequence[Design], predicted: Sequence[Gaussian], block: Moment):
+        self.block = block
+        self.running = [one.equations(before, block.y) for one, before in zip(designs, predicted, strict=True)]
+        self.results: list[Step | None] = [None] * len(designs)
+
+    def advance(self, i: int, answer: Affine | None) -> Moments | None:
+        """Send the answer to design i; moments of the regression it asks for next, None if it is through."""
+        try:
+            request = self.running[i].send(answer)  # type: ignore[arg-type]  # None starts a generator
+        except StopIteration as stop:
+            self.results[i] = stop.value
+            return None
+        return Moments.of(request.target(self.block.x, self.block.x_next), request.regressor)
+
+    def finished(self) -> list[Step]:
+        return [step for step in self.results if step is not None]
+
+
+def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int) -> list[list[Affine]]:
+    """One step of every design: its coefficients, each regression answered from the whole ensemble."""
+    fits: list[list[Affine]] = [[] for _ in designs]
+    active = list(range(len(designs)))
+    while active:
+        # Blocks in the outer loop: a block's trajectories stay in the cache for all designs.
+        moments = [[run.advance(i, fits[i][-1] if fits[i] else None) for i in active] for run in runs]
+        asked = []
+        for i, parts in zip(active, zip(*moments, strict=True), strict=True):
+            if parts[0] is None:
                 continue
-            part, size = _moments(request, block)
-            moments = part if moments is None else moments.merge(part)
-        if moments is None:
-            return finished, fits
-        if not np.isfinite(moments.scatter).all():
-            raise NotFinite(f"{where}: the design met infinite or NaN values; the model or this filter diverges, check the variant")
-        answer = moments.regression(size)
-        fits.append(answer)
-
-
-def _moments(request: Regression, block: Moment) -> tuple[Moments, int]:
-    target = request.target(block.x, block.x_next)
-    return Moments.of(target, request.regressor), target.shape[-1]
+            merged = Moments.together([part for part in parts if part is not None])
+            if not np.isfinite(merged.scatter).all():
+                raise NotFinite(f"{designs[i].name}, step {k}: the design met infinite or NaN values; the model or this filter diverges")
+            fits[i].append(merged.regression(designs[i].model.n))
+            asked.append(i)
+        active = asked
+    return fits

@@ -19,7 +19,7 @@ from kfcourse.gaussian import Array, Gaussian, square_root
 from kfcourse.model import Model
 from kfcourse.structure import compile_model
 
-BLOCK = 16_384  # trajectories: a dozen arrays of this length stay in the second-level cache
+BLOCK = 50_000  # trajectories: long enough that the interpreter's overhead is small, short enough for the processor's caches
 STEPS_AT_ONCE = 4  # steps drawn by one call: few calls, and little memory over the whole ensemble
 
 T = TypeVar("T")
@@ -80,7 +80,7 @@ class Ensemble:
         """One iterator over the steps for each block; exhaust each before taking the next."""
         simulate = _Simulator(self.model)
         jobs = ((block, chunk) for block in range(len(self.sizes)) for chunk in range(len(self._chunks)))
-        noises = draw_ahead((self._job(block, chunk) for block, chunk in jobs), self.threads)
+        noises = draw_ahead((self._job(block, chunk) for block, chunk in jobs), self.threads, 2 * self.threads)
         for block in range(len(self.sizes)):
             yield self._steps_of_block(block, simulate, noises)
 
@@ -97,7 +97,7 @@ class Ensemble:
         simulate = _Simulator(self.model)
         blocks = range(len(self.sizes))
         jobs = (self._job(block, chunk) for chunk in range(len(self._chunks)) for block in blocks)
-        noises = draw_ahead(jobs, self.threads)
+        noises = draw_ahead(jobs, self.threads, len(blocks))
         x = [self._initial(block) for block in blocks]
         for chunk in self._chunks:
             drawn = [next(noises) for _ in blocks]
@@ -144,8 +144,8 @@ def _draw(rng: np.random.Generator, law: Gaussian, steps: int, size: int) -> Arr
     return law.mean + standard @ square_root(law.cov).T
 
 
-def draw_ahead(jobs: Iterable[Callable[[], T]], threads: int) -> Iterator[T]:
-    """Results of the jobs in order; threads - 1 workers stay a few jobs ahead of the consumer."""
+def draw_ahead(jobs: Iterable[Callable[[], T]], threads: int, ahead: int) -> Iterator[T]:
+    """Results of the jobs in order; threads - 1 workers stay up to `ahead` jobs ahead of the consumer."""
     if threads == 1:
         for job in jobs:
             yield job()
@@ -155,7 +155,7 @@ def draw_ahead(jobs: Iterable[Callable[[], T]], threads: int) -> Iterator[T]:
         try:
             for job in jobs:
                 waiting.append(pool.submit(job))
-                if len(waiting) > 2 * threads:
+                if len(waiting) > ahead:
                     yield waiting.popleft().result()
             while waiting:
                 yield waiting.popleft().result()

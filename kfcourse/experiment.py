@@ -18,7 +18,7 @@ from tqdm import tqdm
 from kfcourse.comparison import Comparison, Subset
 from kfcourse.design import NotFinite, design
 from kfcourse.ensemble import BLOCK, Ensemble, Moment
-from kfcourse.filters.base import Design, Filter, State
+from kfcourse.filters.base import Design, Filter
 from kfcourse.gaussian import Array, Gaussian
 from kfcourse.model import Model
 from kfcourse.statistics import BATCHES, Sums
@@ -140,26 +140,31 @@ def _run_blocks(filters: Sequence[Filter], ensemble: Ensemble, progress: bool | 
     bar = _progress(zip(ensemble.sizes, ensemble.by_block(), strict=True), "comparing", blocks, "block", progress)
     for size, moments in bar:
         batches = max(1, round(BATCHES * size / ensemble.runs))
-        yield _run_block(filters, moments, size, ensemble.steps, batches, ensemble.model.n)
+        sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, size, batches)
+        _run_block(filters, moments, sums)
+        yield sums
 
 
-def _run_block(filters: Sequence[Filter], moments: Iterable[Moment], size: int, steps: int, batches: int, n: int) -> Sums:
+def _run_block(filters: Sequence[Filter], moments: Iterable[Moment], sums: Sums) -> None:
     """Advance all filters together over the steps of one block of trajectories."""
-    sums = Sums.empty(len(filters), steps, n, size, batches)
-    states: list[State] = [one.init(size) for one in filters]
+    size = int(sums.counts.sum())
+    states = [one.init(size) for one in filters]
     for k, moment in enumerate(moments):
         for i, one in enumerate(filters):
             states[i] = one.step(states[i], moment.y)
             sums.record(i, k, moment.x, one.estimate(states[i]))
-            if not np.isfinite(sums.square[i, k]).all():
-                raise _diverged(one.name, k, moment)
-    return sums
+    _check_finite(filters, sums)
 
 
-def _diverged(name: str, k: int, moment: Moment) -> NotFinite:
-    if not (np.isfinite(moment.x).all() and np.isfinite(moment.y).all()):
-        return NotFinite(f"step {k}: the model's own trajectories become infinite; it is not stable, check its equations and parameters")
-    return NotFinite(f"step {k}: {name} became infinite or NaN although the trajectories are finite; leave this filter out or check the variant")
+def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
+    finite = np.isfinite(sums.square).all(axis=(2, 3))
+    if finite.all():
+        return
+    step = int(np.argmin(finite.all(axis=0)))
+    if not finite[:, step].any():
+        raise NotFinite(f"step {step}: every filter fails; the model's trajectories become infinite, check its equations and parameters")
+    name = filters[int(np.argmin(finite[:, step]))].name
+    raise NotFinite(f"step {step}: {name} became infinite or NaN although the trajectories are finite; leave this filter out or check the model")
 
 
 def _run_subset(filters: Sequence[Filter], ensemble: Ensemble, size: int, progress: bool | None) -> Sums:
@@ -171,7 +176,9 @@ def _run_subset(filters: Sequence[Filter], ensemble: Ensemble, size: int, progre
         rows = slice(start, min(start + SUBSET_CHUNK, size))
         moments = [Moment(x[k, rows], y[k, rows], x_next[k, rows]) for k in range(ensemble.steps)]
         count = rows.stop - rows.start
-        return _run_block(filters, moments, count, ensemble.steps, max(1, round(2 * BATCHES * count / size)), ensemble.model.n)
+        sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, count, max(1, round(BATCHES * count / size)))
+        _run_block(filters, moments, sums)
+        return sums
 
     with ThreadPoolExecutor(ensemble.threads) as pool:
         return Sums.concatenate(list(_progress(pool.map(chunk, starts), "slow filters", len(starts), "chunk", progress)))

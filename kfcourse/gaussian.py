@@ -7,6 +7,7 @@ for them the products below are plain multiplications, which is what makes the e
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -80,9 +81,9 @@ def gain(cross: Array, cov: Array) -> Array:
         the inverse, so a measurement that cannot vary gets the gain 0.
     """
     if cov.shape[-1] == 1:
-        if cov.all():
+        if np.minimum.reduce(cov, axis=None) > 0:
             return cross / cov
-        return np.divide(cross, cov, out=np.zeros(np.broadcast_shapes(cross.shape, cov.shape)), where=cov != 0)
+        return np.divide(cross, cov, out=np.zeros(np.broadcast_shapes(cross.shape, cov.shape)), where=cov > 0)
     # Scaling to correlations first: components may differ by orders of magnitude in size.
     scale = np.sqrt(np.maximum(np.diagonal(cov, axis1=-2, axis2=-1), 0.0))
     scale = np.where(scale > 0, scale, 1.0)
@@ -109,7 +110,7 @@ def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
     """
     h, G, F = measurement
     innovation = y - h
-    if np.isnan(innovation.sum()):
+    if np.isnan(innovation).any():
         innovation, G, F = _without_missing(innovation, G, F)
     cross = product(prior.cov, transpose(G))
     K = gain(cross, F)
@@ -132,13 +133,13 @@ def _without_missing(innovation: Array, G: Array, F: Array) -> tuple[Array, Arra
 
 def where_measured(y: Array, correction: Array) -> Array:
     """The correction, or 0 for trajectories whose measurement is missing (NaN)."""
-    if np.isnan(y.sum()):
+    if np.isnan(y).any():
         return np.where(np.isnan(y).any(axis=-1, keepdims=True), 0.0, correction)
     return correction
 
 
 class Moments(NamedTuple):
-    """Means and scatter of (target, regressor) over part of an ensemble; parts are merged by `merge`.
+    """Means and scatter of (target, regressor) over part of an ensemble; `together` merges parts.
 
     Scatter is the sum of products of deviations from the part's own mean: large means do not cancel.
     """
@@ -150,25 +151,25 @@ class Moments(NamedTuple):
     @classmethod
     def of(cls, target: Array, regressor: Array) -> Moments:
         """Moments of target (N, r) and regressor (N, s) stacked into one vector."""
-        columns = [target[..., i] for i in range(target.shape[-1])]
-        columns += [regressor[..., i] for i in range(regressor.shape[-1])]
+        columns = [target[:, i] for i in range(target.shape[1])] + [regressor[:, i] for i in range(regressor.shape[1])]
         count, size = len(target), len(columns)
-        mean = np.array([column.mean() for column in columns])
+        mean = [float(np.add.reduce(column)) / count for column in columns]
         deviations = [column - m for column, m in zip(columns, mean, strict=True)]
-        scatter = np.empty((size, size))
+        scatter = [[0.0] * size for _ in range(size)]
         for i in range(size):
             for j in range(i, size):
-                # einsum and not dot, which would start the linear algebra library's own threads
-                scatter[i, j] = scatter[j, i] = np.einsum("i,i", deviations[i], deviations[j])
-        return cls(count, mean, scatter)
+                scatter[i][j] = scatter[j][i] = dot(deviations[i], deviations[j])
+        return cls(count, np.array(mean), np.array(scatter))
 
-    def merge(self, other: Moments) -> Moments:
-        """Moments of both parts together (Chan's formula)."""
-        count = self.count + other.count
-        shift = other.mean - self.mean
-        mean = self.mean + shift * (other.count / count)
-        scatter = self.scatter + other.scatter + np.outer(shift, shift) * (self.count * other.count / count)
-        return Moments(count, mean, scatter)
+    @classmethod
+    def together(cls, parts: Sequence[Moments]) -> Moments:
+        """Moments of all parts taken together (Chan's formula)."""
+        counts = np.array([part.count for part in parts], dtype=float)
+        means = np.array([part.mean for part in parts])
+        mean = counts @ means / counts.sum()
+        shift = means - mean
+        scatter = np.sum([part.scatter for part in parts], axis=0) + (shift * counts[:, None]).T @ shift
+        return cls(int(counts.sum()), mean, scatter)
 
     def regression(self, size: int) -> Affine:
         """Least squares of the first `size` components on the rest.
@@ -180,6 +181,14 @@ class Moments(NamedTuple):
         matrix = gain(cross, cov[size:, size:])
         offset = self.mean[:size] - matrix @ self.mean[size:]
         return Affine(matrix, offset, symmetric(cov[:size, :size] - matrix @ cross.T))
+
+
+def dot(left: Array, right: Array) -> float:
+    """Inner product of two long vectors, in pieces too short for the linear algebra library to start threads."""
+    return sum(float(np.dot(left[i : i + DOT_PIECE], right[i : i + DOT_PIECE])) for i in range(0, len(left), DOT_PIECE))
+
+
+DOT_PIECE = 8192
 
 
 def square_root(cov: Array) -> Array:

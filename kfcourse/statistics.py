@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import stats
 
-from kfcourse.gaussian import Array, Gaussian
+from kfcourse.gaussian import Array, Gaussian, apply, gain
 
 BATCHES = 128  # standard errors from 128 batches are themselves good to 6 %
 
@@ -99,23 +100,36 @@ class Sums:
     def record(self, filter_index: int, step: int, x: Array, estimate: Gaussian) -> None:
         """Add one step of one filter: true states x (N, n) and its estimate."""
         mean, cov = estimate
-        starts = np.concatenate([[0], np.cumsum(self.counts[:-1])]).astype(int)
+        starts = self._starts
         error = x - mean
-        for i in range(error.shape[-1]):
-            e, variance = error[:, i], cov[..., i, i]
-            self.error[filter_index, step, i] = np.add.reduceat(e, starts)
-            self.square[filter_index, step, i] = np.add.reduceat(e * e, starts)
-            self.own[filter_index, step, i] = np.add.reduceat(variance, starts) if variance.ndim else variance * self.counts
-        self.normalised[filter_index, step] = np.add.reduceat(_normalised_square(error, cov), starts)
+        own = np.diagonal(cov, axis1=-2, axis2=-1)
+        for i in range(error.shape[1]):
+            self.error[filter_index, step, i] = np.add.reduceat(error[:, i], starts)
+            square = error[:, i] * error[:, i]
+            self.square[filter_index, step, i] = np.add.reduceat(square, starts)
+            self.own[filter_index, step, i] = np.add.reduceat(own[:, i], starts) if own.ndim == 2 else own[i] * self.counts
+        if error.shape[1] > 1:
+            self.normalised[filter_index, step] = np.add.reduceat(_normalised_square(error, cov), starts)
+        elif own.ndim == 2:
+            self.normalised[filter_index, step] = np.add.reduceat(_quotient(square, own[:, 0]), starts)
+        else:  # one variance for the whole ensemble: the sums of squares are there already
+            self.normalised[filter_index, step] = _quotient(self.square[filter_index, step, 0], own)
+
+    @cached_property
+    def _starts(self) -> Array:
+        return np.concatenate([[0], np.cumsum(self.counts[:-1])]).astype(int)
 
 
 def _normalised_square(error: Array, cov: Array) -> Array:
-    """e^T cov^-1 e / n, 1 expected; where the claimed variance is 0, 0 for no error and infinity for any."""
-    if cov.shape[-1] == 1:
-        square, variance = error[:, 0] ** 2, cov[..., 0, 0]
-        if np.all(variance > 0):
-            return square / variance
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = square / np.where(variance > 0, variance, 0.0)
-        return np.where(square > 0, ratio, 0.0)
-    return np.einsum("...i,...ij,...j->...", error, np.linalg.pinv(cov, hermitian=True), error) / error.shape[-1]
+    """e^T cov^+ e / n, (N,): 1 is expected of a filter whose covariance is right."""
+    inverse = gain(np.eye(cov.shape[-1]), cov)
+    return np.einsum("...i,...i", apply(inverse, error), error) / error.shape[1]
+
+
+def _quotient(square: Array, variance: Array) -> Array:
+    """square / variance; where the claimed variance is 0, 0 for no error and infinity for any."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        quotient = square / variance
+        if np.isnan(np.add.reduce(quotient)):
+            quotient = np.where(square > 0, square / np.maximum(variance, 0.0), 0.0)
+    return quotient

@@ -304,13 +304,21 @@ def _weighted(weights: Array, deviation: Array) -> Array:
 
 def compile_model(model: Model) -> tuple[Callable[[Array, Array], Array], Callable[[Array, Array], Array]]:
     """The state and meter equations as functions of arrays: (x (..., n), v (..., r)) -> (..., n)."""
+    state = _compile_equation("state", model.state_equation, {"x": model.x, "v": model.v}, model)
+    meter = _compile_equation("meter", model.meter_equation, {"x": model.x, "w": model.w}, model)
+    return lambda x, v: state(x, v)[0], lambda x, w: meter(x, w)[0]
 
-    def build(name: str, equation, noise_name: str, noise) -> Callable[[Array, Array], Array]:
-        arguments = {"x": sp.Matrix(model.x), noise_name: sp.Matrix(noise)}
-        compiled = compile_function(
-            name, arguments, {name: equation.subs(model.values)}, ["x", noise_name, name], f"{name} equation of {model}"
-        )
-        function = compiled.function
-        return lambda x, noise: function(x, noise)[0]
 
-    return build("state", model.state_equation, "v", model.v), build("meter", model.meter_equation, "w", model.w)
+def compile_noiseless(model: Model) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
+    """a(x, m_v) and b(x, m_w), the equations with the noises at their means: x (..., n) -> (..., n), (..., p)."""
+    state_equation = model.state_equation.subs(dict(zip(model.v, _exact(model.state_noise.mean), strict=True)))
+    meter_equation = model.meter_equation.subs(dict(zip(model.w, _exact(model.meter_noise.mean), strict=True)))
+    state = _compile_equation("state", state_equation, {"x": model.x}, model)
+    meter = _compile_equation("meter", meter_equation, {"x": model.x}, model)
+    return lambda x: state(x)[0], lambda x: meter(x)[0]
+
+
+def _compile_equation(name: str, equation: sp.MatrixBase, arguments: dict[str, tuple[sp.Symbol, ...]], model: Model) -> Callable[..., tuple[Array]]:
+    matrices = {key: sp.Matrix(symbols) for key, symbols in arguments.items()}
+    numeric = equation.subs(model.values)
+    return compile_function(name, matrices, {name: numeric}, [*arguments, name], f"{name} equation of {model}").function

@@ -13,7 +13,7 @@ from kfcourse.filters import notation as s
 from kfcourse.filters.base import Design, Equations, Regression, Step
 from kfcourse.gaussian import Array, Gaussian, where_measured
 from kfcourse.model import Model
-from kfcourse.structure import compile_model
+from kfcourse.structure import compile_noiseless
 
 _omega, _eps = s.matrix(r"\omega_{k}", s.p, s.ONE), s.matrix(r"\varepsilon_{k}", s.n, s.ONE)
 _alpha = s.matrix(r"\alpha_{k}", s.n, s.ONE)
@@ -39,15 +39,15 @@ def duof(model: Model) -> Design:
 
     Its own covariance is the residual of each regression, (n, n): one for the whole ensemble.
     """
-    state_equation, meter_equation = compile_model(model)
+    a, b = compile_noiseless(model)
 
     def equations(predicted: Gaussian, y: Array) -> Equations:
         lam = predicted.mean
-        omega = y - meter_equation(lam, np.broadcast_to(model.meter_noise.mean, y.shape[:-1] + (len(model.w),)))
+        omega = y - b(lam)
         fit = yield Regression(lambda x, x_next: x - lam, omega)
         posterior = Gaussian(lam + where_measured(y, fit(omega)), fit.residual)
 
-        alpha = state_equation(posterior.mean, np.broadcast_to(model.state_noise.mean, y.shape[:-1] + (len(model.v),)))
+        alpha = np.broadcast_to(a(posterior.mean), lam.shape)
         fit = yield Regression(lambda x, x_next: x_next, alpha)
         return Step(posterior, Gaussian(fit(alpha), fit.residual))
 
