@@ -48,6 +48,7 @@ def compile_function(
     outputs: Mapping[str, sp.MatrixBase],
     vectors: Sequence[str],
     doc: str = "",
+    definitions: Mapping[sp.Symbol, sp.Expr] | None = None,
 ) -> Compiled:
     """Compile expressions into one function of arrays.
 
@@ -63,6 +64,8 @@ def compile_function(
         Arguments and outputs that are vectors (..., n); the others are matrices (..., r, c).
     doc : str
         First line of the generated docstring.
+    definitions : dict, optional
+        Auxiliary symbols that the outputs may use, and their expressions in the arguments.
 
     Returns
     -------
@@ -70,17 +73,19 @@ def compile_function(
         `function(*arrays)`: leading axes broadcast.  An output that no argument enters comes back
         without leading axes, the same for every trajectory.
     """
-    program = lower(outputs, vectors)
+    program = lower(outputs, vectors, definitions or {})
     source = numpy_source(name, arguments, program, doc)
     namespace: dict[str, Any] = {"np": np}
     exec(compile(source, f"<generated {name}>", "exec"), namespace)  # our own text: printed from SymPy, no user strings
     return Compiled(namespace[name], source)
 
 
-def lower(outputs: Mapping[str, sp.MatrixBase], vectors: Sequence[str]) -> Program:
+def lower(outputs: Mapping[str, sp.MatrixBase], vectors: Sequence[str], definitions: Mapping[sp.Symbol, sp.Expr]) -> Program:
     """Common subexpressions and small integer powers as elementary assignments."""
     names = sp.numbered_symbols("s", cls=sp.Dummy)
-    shared, reduced = sp.cse([sp.Matrix(m) for m in outputs.values()], symbols=names, optimizations="basic", list=False)
+    everything = [*definitions.values(), *(sp.Matrix(m) for m in outputs.values())]
+    found, reduced = sp.cse(everything, symbols=names, optimizations="basic")
+    shared = _in_order([*found, *zip(definitions, reduced[: len(definitions)], strict=True)])
     assignments: list[tuple[sp.Symbol, sp.Expr]] = []
     powers: dict[tuple[sp.Expr, int], sp.Expr] = {}
     aliases: dict[sp.Expr, sp.Expr] = {}
@@ -117,12 +122,22 @@ def lower(outputs: Mapping[str, sp.MatrixBase], vectors: Sequence[str]) -> Progr
             aliases[target] = reduced_value
         else:
             assignments.append((target, reduced_value))
-    matrices = reduced if isinstance(reduced, list | tuple) else [reduced]
     lowered = {
         key: sp.Matrix(*matrix.shape, [without_powers(entry) for entry in matrix])
-        for key, matrix in zip(outputs, matrices, strict=True)
+        for key, matrix in zip(outputs, reduced[len(definitions) :], strict=True)
     }
     return Program(assignments, lowered, frozenset(vectors))
+
+
+def _in_order(assignments: list[tuple[sp.Symbol, sp.Expr]]) -> list[tuple[sp.Symbol, sp.Expr]]:
+    """The assignments with every symbol defined before it is used."""
+    waiting, ordered = list(assignments), []
+    while waiting:
+        undefined = {target for target, _ in waiting}
+        ready = [a for a in waiting if not a[1].free_symbols & undefined]
+        ordered += ready
+        waiting = [a for a in waiting if a not in ready]
+    return ordered
 
 
 class _Printer(NumPyPrinter):

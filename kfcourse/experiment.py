@@ -149,10 +149,11 @@ def _run_block(filters: Sequence[Filter], moments: Iterable[Moment], sums: Sums)
     """Advance all filters together over the steps of one block of trajectories."""
     size = int(sums.counts.sum())
     states = [one.init(size) for one in filters]
-    for k, moment in enumerate(moments):
-        for i, one in enumerate(filters):
-            states[i] = one.step(states[i], moment.y)
-            sums.record(i, k, moment.x, one.estimate(states[i]))
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
+        for k, moment in enumerate(moments):
+            for i, one in enumerate(filters):
+                states[i] = one.step(states[i], moment.y)
+                sums.record(i, k, moment.x, one.estimate(states[i]))
     _check_finite(filters, sums)
 
 

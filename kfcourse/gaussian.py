@@ -24,11 +24,16 @@ class Gaussian(NamedTuple):
 
 
 class Measurement(NamedTuple):
-    """Structural functions of the meter at N(m, d): h (..., p), G (..., p, n), F (..., p, p)."""
+    """Structural functions of the meter at N(m, d): h (..., p), G (..., p, n), F (..., p, p).
+
+    R = F - G d G^T, (..., p, p), is the part of F that the state does not explain.  It is derived, not
+    subtracted: where the meter is far sharper than the prediction the difference would be rounding.
+    """
 
     h: Array
     G: Array
     F: Array
+    R: Array
 
 
 class Affine(NamedTuple):
@@ -106,21 +111,26 @@ def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
 
     K = Psi G^T F^+,   z = lambda + K (y - h),   p = Psi - K G Psi
 
-    A trajectory with a missing measurement (NaN) keeps its prior for the missing components.
+    The last is evaluated as (I - K G) Psi (I - K G)^T + K R K^T (Joseph's form, with R = F - G Psi G^T), for
+    scalars as Psi R / F: equal, but never negative.  A trajectory with a missing measurement (NaN) keeps
+    its prior for the missing components.
     """
-    h, G, F = measurement
-    innovation = y - h
+    innovation, G, F, R = y - measurement.h, measurement.G, measurement.F, measurement.R
     if np.isnan(innovation).any():
-        innovation, G, F = _without_missing(innovation, G, F)
-    cross = product(prior.cov, transpose(G))
-    K = gain(cross, F)
-    mean = prior.mean + apply(K, innovation)
-    cov = symmetric(prior.cov - product(K, transpose(cross)))
-    return Gaussian(mean, cov)
+        innovation, G, F, R = _without_missing(innovation, G, F, R)
+    if G.shape[-2:] == (1, 1):
+        share = gain(prior.cov, F)
+        K = share * G
+        cov = share * R
+    else:
+        K = gain(product(prior.cov, transpose(G)), F)
+        rest = np.eye(prior.cov.shape[-1]) - product(K, G)
+        cov = symmetric(product(product(rest, prior.cov), transpose(rest)) + product(product(K, R), transpose(K)))
+    return Gaussian(prior.mean + apply(K, innovation), cov)
 
 
-def _without_missing(innovation: Array, G: Array, F: Array) -> tuple[Array, Array, Array]:
-    """Take missing components out: no innovation, no sensitivity, uncorrelated with the others."""
+def _without_missing(innovation: Array, G: Array, F: Array, R: Array) -> tuple[Array, Array, Array, Array]:
+    """Take missing components out: no innovation, no sensitivity, a variance of their own."""
     missing = np.isnan(innovation)
     either = missing[..., :, None] | missing[..., None, :]
     identity = np.eye(innovation.shape[-1])
@@ -128,6 +138,7 @@ def _without_missing(innovation: Array, G: Array, F: Array) -> tuple[Array, Arra
         np.where(missing, 0.0, innovation),
         np.where(missing[..., :, None], 0.0, G),
         np.where(either, identity, F),
+        np.where(either, identity, R),
     )
 
 

@@ -20,7 +20,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.formula import check_name, parse, symbol
-from kfcourse.gaussian import Gaussian
+from kfcourse.gaussian import Array, Gaussian
 
 Formula = str | sp.Expr
 Formulas = Formula | Sequence[Formula] | sp.MatrixBase
@@ -180,6 +180,12 @@ def _exact(name: str, value: Any) -> sp.Rational:
     if value and not 1e-100 < abs(value) < 1e100:
         raise ModelError(f"parameter {name} = {value!r} is too large or too small; change the units")
     return sp.Rational(str(value))
+
+
+def exact_matrix(array: Array) -> sp.ImmutableMatrix:
+    """Decimal numbers as exact rationals; a vector becomes a column."""
+    rows = array[:, None] if array.ndim == 1 else array
+    return sp.ImmutableMatrix([[sp.Rational(str(float(value))) for value in row] for row in rows])
 
 
 def _as_list(what: str, formulas: Formulas) -> list[Formula]:

@@ -56,7 +56,8 @@ def batch_mean(sums: Array, counts: Array) -> Estimate:
     """
     total, batches = counts.sum(), len(counts)
     value = sums.sum(axis=-1) / total
-    deviations = sums - counts * value[..., None]
+    with np.errstate(invalid="ignore"):  # an infinite mean (a filter that claims variance 0) has no standard error
+        deviations = sums - counts * value[..., None]
     variance = (deviations**2).sum(axis=-1) / total**2 * batches / (batches - 1) if batches > 1 else np.full(value.shape, np.nan)
     return Estimate(value, np.sqrt(variance), max(batches - 1, 1))
 

@@ -23,7 +23,7 @@ import sympy as sp
 from kfcourse.codegen import Compiled, compile_function
 from kfcourse.formula import symbol
 from kfcourse.gaussian import Array, Gaussian, Measurement, gain, square_root, symmetric, transpose
-from kfcourse.model import Model, ModelError
+from kfcourse.model import Model, ModelError, exact_matrix
 from kfcourse.moments import GaussianMoments, NoClosedForm
 
 FUNCTION_LATEX = {"tau": r"\tau", "Theta": r"\Theta", "h": "h", "G": "G", "F": "F"}
@@ -41,7 +41,7 @@ class Structure:
     predict : callable
         (z (..., n), p (..., n, n)) -> Gaussian(tau, Theta).
     measure : callable
-        (m (..., n), d (..., n, n)) -> Measurement(h (..., p), G (..., p, n), F (..., p, p)).
+        (m (..., n), d (..., n, n)) -> Measurement(h (..., p), G (..., p, n), F (..., p, p), R).
     formulas : Formulas or None
         The symbolic functions; None for the numerical structures.
 
@@ -111,16 +111,28 @@ class Formulas:
 
     @cached_property
     def compiled_predict(self) -> Compiled:
-        return self._compile("predict", {"z": self.z, "p": self.p}, ["tau", "Theta"])
+        return self._compile("predict", {"z": self.z, "p": self.p}, {key: self.functions[key].subs(self.model.values) for key in ("tau", "Theta")})
 
     @cached_property
     def compiled_measure(self) -> Compiled:
-        return self._compile("measure", {"m": self.m, "d": self.d}, ["h", "G", "F"])
+        h, G, F = (self.functions[key].subs(self.model.values) for key in ("h", "G", "F"))
+        explained = G * self.d * G.T
+        R = sp.ImmutableMatrix(F - explained).applyfunc(sp.expand)
+        # F is computed as G d G^T + R: R enters both outputs, and is found once.
+        auxiliary = {(i, j): sp.Dummy(f"R{i}{j}") for i in range(R.rows) for j in range(i, R.rows) if R[i, j].free_symbols}
+        named = sp.ImmutableMatrix(*R.shape, lambda i, j: auxiliary.get((min(i, j), max(i, j)), R[i, j]))
+        outputs = {"h": h, "G": G, "F": explained + named, "R": named}
+        return self._compile("measure", {"m": self.m, "d": self.d}, outputs, {name: R[ij] for ij, name in auxiliary.items()})
 
-    def _compile(self, name: str, arguments: dict[str, sp.MatrixBase], outputs: list[str]) -> Compiled:
-        numeric = {key: self.functions[key].subs(self.model.values) for key in outputs}
+    def _compile(
+        self,
+        name: str,
+        arguments: dict[str, sp.MatrixBase],
+        outputs: dict[str, sp.MatrixBase],
+        definitions: dict[sp.Symbol, sp.Expr] | None = None,
+    ) -> Compiled:
         doc = f"{', '.join(outputs)}: {self.name} structural functions of {self.model}"
-        return compile_function(name, arguments, numeric, ["z", "m", "tau", "h"], doc)
+        return compile_function(name, arguments, outputs, ["z", "m", "tau", "h"], doc, definitions)
 
     def structure(self) -> Structure:
         predict, measure = self.compiled_predict.function, self.compiled_measure.function
@@ -155,12 +167,6 @@ def gaussian_symbols(model: Model, mean: str, cov: str) -> tuple[sp.ImmutableMat
     return sp.ImmutableMatrix(means), sp.ImmutableMatrix(covs)
 
 
-def _exact(array: Array) -> sp.ImmutableMatrix:
-    """Decimal numbers as exact rationals; a vector becomes a column."""
-    rows = array[:, None] if array.ndim == 1 else array
-    return sp.ImmutableMatrix([[sp.Rational(str(float(value))) for value in row] for row in rows])
-
-
 def linearised(model: Model) -> Structure:
     """Structural functions of the model linearised at the mean (the extended Kalman filter's).
 
@@ -173,14 +179,14 @@ def linearised(model: Model) -> Structure:
         If an equation is not differentiable.
     """
     (z, p), (m, d) = gaussian_symbols(model, "z", "p"), gaussian_symbols(model, "m", "d")
-    tau, A, B = _taylor(model.state_equation, model.x, z, model.v, _exact(model.state_noise.mean))
-    h, H, C = _taylor(model.meter_equation, model.x, m, model.w, _exact(model.meter_noise.mean))
+    tau, A, B = _taylor(model.state_equation, model.x, z, model.v, exact_matrix(model.state_noise.mean))
+    h, H, C = _taylor(model.meter_equation, model.x, m, model.w, exact_matrix(model.meter_noise.mean))
     functions = {
         "tau": tau,
-        "Theta": A * p * A.T + B * _exact(model.state_noise.cov) * B.T,
+        "Theta": A * p * A.T + B * exact_matrix(model.state_noise.cov) * B.T,
         "h": h,
         "G": H,
-        "F": H * d * H.T + C * _exact(model.meter_noise.cov) * C.T,
+        "F": H * d * H.T + C * exact_matrix(model.meter_noise.cov) * C.T,
     }
     return Formulas(model, "linearised", z, p, m, d, _expanded(functions)).structure()
 
@@ -214,7 +220,7 @@ def gaussian(model: Model) -> Structure:
 
 def _moments(equation, x, mean, cov, noise, law: Gaussian):
     """Mean and covariance of equation(x, noise), x ~ N(mean, cov) and the noise independent."""
-    joint = GaussianMoments([*x, *noise], [*mean, *_exact(law.mean)], sp.diag(sp.Matrix(cov), sp.Matrix(_exact(law.cov))))
+    joint = GaussianMoments([*x, *noise], [*mean, *exact_matrix(law.mean)], sp.diag(sp.Matrix(cov), sp.Matrix(exact_matrix(law.cov))))
     size = len(equation)
     means = sp.Matrix([joint.mean_of(formula) for formula in equation])
     covs = sp.zeros(size, size)
@@ -293,7 +299,10 @@ def _quadrature(model: Model, name: str, rule: Callable[[int], tuple[Array, Arra
         h = meter_weights @ y
         deviation = y - h[..., None, :]
         cross = transpose(deviation * meter_weights[:, None]) @ (x - m[..., None, :])
-        return Measurement(h, gain(cross, np.broadcast_to(d, m.shape + (n,))), _weighted(meter_weights, deviation))
+        G, F = gain(cross, np.broadcast_to(d, m.shape + (n,))), _weighted(meter_weights, deviation)
+        # The part of y that is not linear in x: no difference of nearly equal matrices.
+        unexplained = deviation - (x - m[..., None, :]) @ transpose(G)
+        return Measurement(h, G, F, _weighted(meter_weights, unexplained))
 
     return Structure(name, model, predict, measure)
 
@@ -311,8 +320,8 @@ def compile_model(model: Model) -> tuple[Callable[[Array, Array], Array], Callab
 
 def compile_noiseless(model: Model) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
     """a(x, m_v) and b(x, m_w), the equations with the noises at their means: x (..., n) -> (..., n), (..., p)."""
-    state_equation = model.state_equation.subs(dict(zip(model.v, _exact(model.state_noise.mean), strict=True)))
-    meter_equation = model.meter_equation.subs(dict(zip(model.w, _exact(model.meter_noise.mean), strict=True)))
+    state_equation = model.state_equation.subs(dict(zip(model.v, exact_matrix(model.state_noise.mean), strict=True)))
+    meter_equation = model.meter_equation.subs(dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True)))
     state = _compile_equation("state", state_equation, {"x": model.x}, model)
     meter = _compile_equation("meter", meter_equation, {"x": model.x}, model)
     return lambda x: state(x)[0], lambda x: meter(x)[0]

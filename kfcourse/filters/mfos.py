@@ -48,7 +48,7 @@ def mfos(structure: Structure, arguments: int = 2) -> Design:
 
     def equations(predicted: Gaussian, y: Array) -> Equations:
         lam, Psi = predicted
-        h, G, F = structure.measure(lam, Psi)
+        h, G, F, _ = structure.measure(lam, Psi)
         sigma = apply(gain(product(Psi, transpose(G)), F), y - h)
         fit = yield Regression(lambda x, x_next: x - lam, sigma)
         posterior = Gaussian(lam + where_measured(y, fit(sigma)), fit.residual)

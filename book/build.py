@@ -1,0 +1,64 @@
+"""Build the book: execute the chapters, write _build/html, treat every warning as an error.
+
+    python book/build.py
+
+Sphinx itself always starts afresh, so that no warning is lost and no stale page is left; only the outputs of
+executed cells are kept (_build/.jupyter_cache), as long as the package, the requirements and the interpreter are the same.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+BUILD = ROOT / "_build"
+CACHE = BUILD / ".jupyter_cache"
+KEY = BUILD / ".executed-with"
+
+
+def fingerprint() -> str:
+    """Hash of all that the outputs of the chapters depend on, besides their own cells."""
+    files = [path for path in (ROOT / "kfcourse").rglob("*") if path.suffix in (".py", ".toml", ".j2")]
+    digest = hashlib.sha256(sys.version.encode())
+    for path in [*sorted(files), ROOT / "requirements.txt"]:
+        name, content = path.relative_to(ROOT).as_posix().encode(), path.read_bytes()
+        digest.update(b"%d %d " % (len(name), len(content)) + name + content)
+    return digest.hexdigest()
+
+
+def prepare() -> None:
+    """Remove the last build, and the cached outputs if they may be stale."""
+    key = fingerprint()
+    if not (KEY.exists() and KEY.read_text() == key):
+        shutil.rmtree(CACHE, ignore_errors=True)
+    for entry in BUILD.iterdir() if BUILD.exists() else ():
+        if entry.is_dir() and entry != CACHE:
+            shutil.rmtree(entry)
+    BUILD.mkdir(exist_ok=True)
+    KEY.write_text(key)
+
+
+def main() -> int:
+    prepare()
+    # On a new machine matplotlib announces its font cache on stderr; not in a chapter, please.
+    subprocess.run([sys.executable, "-c", "import matplotlib.font_manager"], stderr=subprocess.DEVNULL, check=True)
+    jupyter_book = [sys.executable, "-c", "from jupyter_book.cli.main import main; main()"]
+    options = ["--config", "_config.yml", "--path-output", ".", "-W", "--keep-going", "-n"]
+    result = subprocess.run([*jupyter_book, "build", "book", *options], cwd=ROOT)
+    if result.returncode:
+        for report in sorted((BUILD / "html" / "reports").rglob("*.log")):
+            print(f"\n{report.relative_to(ROOT)}:\n{report.read_text(encoding='utf-8')}", file=sys.stderr)
+        shutil.rmtree(BUILD / "html", ignore_errors=True)
+        print("\nThe book was NOT built: see the errors and warnings above.", file=sys.stderr)
+        return 1
+    page = BUILD / "html" / "index.html"
+    print(f"\nThe book: {page}\nTo read it, open that file in a browser, for instance with\n\n    {sys.executable} -m webbrowser {page.as_uri()}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,66 @@
+"""Conditional densities of a model whose noises enter linearly: what exact and particle filters need.
+
+    x_{k+1} | x_k ~ N(a(x, m_v), a_v D_v a_v^T),    y_k | x_k ~ N(b(x, m_w), b_w D_w b_w^T)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import sympy as sp
+
+from kfcourse.codegen import compile_function
+from kfcourse.gaussian import Array, Gaussian
+from kfcourse.model import Model, ModelError, exact_matrix
+
+TINY = 1e-300  # in place of a variance of exactly 0
+
+
+def transition(model: Model) -> Callable[[Array], Gaussian]:
+    """x (..., n) -> law of the next state given x; ModelError if the noise enters nonlinearly."""
+    return _conditional("transition", model.state_equation, model.v, model.state_noise, model)
+
+
+def likelihood(model: Model) -> Callable[[Array, Array], Array]:
+    """(y (..., p), x (..., n)) -> log p(y | x) (...); 0 where y is missing (NaN)."""
+    law = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model)
+
+    def log_likelihood(y: Array, x: Array) -> Array:
+        mean, cov = law(x)
+        innovation = y - mean
+        if model.p == 1:
+            value = _log_normal(innovation[..., 0], cov[..., 0, 0])
+        else:
+            _, logdet = np.linalg.slogdet(cov)
+            weighted = np.linalg.solve(cov, innovation[..., None])[..., 0]
+            value = -0.5 * ((innovation * weighted).sum(axis=-1) + logdet + model.p * np.log(2 * np.pi))
+        return np.where(np.isnan(y).any(axis=-1), 0.0, value)
+
+    return log_likelihood
+
+
+def noiseless_meter(model: Model) -> Callable[[Array], Array]:
+    """x (..., n) -> mean of y given x, (..., p)."""
+    law = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model)
+    return lambda x: law(x).mean
+
+
+def _log_normal(deviation: Array, variance: Array) -> Array:
+    variance = np.maximum(variance, TINY)
+    with np.errstate(over="ignore"):  # a deviation infinitely many sigmas away has log-density -inf
+        return -0.5 * (deviation**2 / variance + np.log(2 * np.pi * variance))
+
+
+def _conditional(name: str, equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian, model: Model) -> Callable[[Array], Gaussian]:
+    B = equation.jacobian(sp.Matrix(noise))
+    if B.has(*noise):
+        raise ModelError(
+            f"{list(equation)}: the noise enters nonlinearly, so there is no simple {name} density; "
+            "the Gaussian filters (gaussian, unscented, gauss_hermite) do not need one"
+        )
+    mean = equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True)))
+    cov = B * exact_matrix(law.cov) * B.T
+    outputs = {"mean": mean.subs(model.values), "cov": cov.subs(model.values)}
+    function = compile_function(name, {"x": sp.Matrix(model.x)}, outputs, ["x", "mean"], f"{name} law of {model}").function
+    return lambda x: Gaussian(*function(x))
