@@ -56,7 +56,8 @@ def main() -> int:
         print("\nThe book was NOT built: see the errors and warnings above.", file=sys.stderr)
         return 1
     page = BUILD / "html" / "index.html"
-    print(f"\nThe book: {page}\nTo read it, open that file in a browser, for instance with\n\n    {sys.executable} -m webbrowser {page.as_uri()}")
+    print(f"\nThe book: {page}\nTo read it, open that file in a browser, for instance with:")
+    print(f"\n    {sys.executable} -m webbrowser {page.as_uri()}")
     return 0
 
 

@@ -81,23 +81,30 @@ class Comparison:
         reference = reference or self.control
         base = self.error_variance(reference).value
         ratio = _ratio(self.error_variance(name).value, base)
-        deviation = self._combined({name: _inverse(base), reference: -ratio * _inverse(base)}) if name != reference else None
-        error = np.zeros_like(ratio) if deviation is None else deviation.standard_error
-        return Estimate(ratio, error, self._freedom(name, reference))
+        combination: dict[str, Array | float] = {name: _inverse(base)}
+        combination[reference] = combination.get(reference, 0.0) - ratio * _inverse(base)
+        deviation = self._combined(combination)
+        return Estimate(ratio, deviation.standard_error, deviation.freedom)
 
-    def mean_relative(self, name: str, reference: str | None = None, steps: slice = slice(None)) -> Estimate:
-        """The mean over steps of D_k(name) / D_k(reference): one number, with its standard error."""
-        reference = reference or self.control
-        base = self.error_variance(reference).value
-        ratio = _ratio(self.error_variance(name).value, base)
+    def score(self, name: str, steps: slice = slice(None)) -> Estimate:
+        """The mean over steps of D_k(name) / D_k(control): one number for a filter, with its standard error."""
+        return self._score({name: 1.0}, steps)
+
+    def score_difference(self, first: str, second: str, steps: slice = slice(None)) -> Estimate:
+        """score(first) - score(second), paired: the difference that a ranking turns on."""
+        return self._score({first: 1.0, second: -1.0} if first != second else {first: 0.0}, steps)
+
+    def _score(self, weights: dict[str, float], steps: slice) -> Estimate:
+        """Mean over steps of sum_i weight_i D_k(i) / D_k(control), by the delta method as in `relative`."""
+        base = self.error_variance(self.control).value
         mask = np.zeros(self.steps)
-        mask[steps] = 1.0
-        mask *= (base > 0) / max(np.count_nonzero(mask * (base > 0)), 1)
-        value = float(mask @ ratio)
-        if name == reference:
-            return Estimate(np.array(value), np.array(0.0), self._freedom(name, reference))
-        weights = mask * _inverse(base)
-        return Estimate(np.array(value), self._combined({name: weights, reference: -weights * ratio}, total=True).standard_error, self._freedom(name, reference))
+        mask[steps] = base[steps] > 0
+        mask *= _inverse(base) / max(np.count_nonzero(mask), 1)  # 1 / D_control, averaged over the steps
+        numerator = sum(weight * self.error_variance(name).value for name, weight in weights.items())
+        combination: dict[str, Array | float] = {name: weight * mask for name, weight in weights.items()}
+        combination[self.control] = combination.get(self.control, 0.0) - mask * numerator * _inverse(base)
+        deviation = self._combined(combination, total=True)
+        return Estimate(np.array(mask @ numerator), deviation.standard_error, deviation.freedom)
 
     def error_mean(self, name: str) -> Estimate:
         """M[x_k - z_k] per step and component, (steps, n)."""
@@ -120,8 +127,8 @@ class Comparison:
         return batch_mean(sums.normalised[i], sums.counts)
 
     def ranking(self, steps: slice = slice(None)) -> list[tuple[str, Estimate]]:
-        """Filters from the most accurate on, by the mean over steps of D_k relative to the control."""
-        scored = [(name, self.mean_relative(name, steps=steps)) for name in self.available]
+        """Filters from the most accurate on, each with its `score`."""
+        scored = [(name, self.score(name, steps)) for name in self.available]
         return sorted(scored, key=lambda item: float(item[1].value))
 
     def _is_slow(self, name: str) -> bool:
@@ -134,9 +141,6 @@ class Comparison:
         if self.subset is not None and name in self.subset.slow:
             return self.subset.sums, len(self.fast) + self.subset.slow.index(name)
         raise KeyError(f"no results for {name!r}; this comparison has {', '.join(self.available)}")
-
-    def _freedom(self, *names: str) -> int:
-        return min(len(self._where(name)[0].counts) for name in names) - 1 or 1
 
     def _combined(self, weights: dict[str, Array | float], total: bool = False) -> Estimate:
         """A linear combination of D_k's, paired; `total` sums it over the steps.
@@ -154,13 +158,13 @@ class Comparison:
         slow = {name: weight for name, weight in weights.items() if self._is_slow(name)}
         if not slow or self.subset is None:
             return full
-        correction = dict(slow)
+        correction: dict[str, Array | float] = dict(slow)
         correction[self.control] = -sum(slow.values())
         sums = self.subset.sums
         on_subset = self._combination(sums, everywhere, total)
-        y = batch_mean(self._combination(sums, correction, total), sums.counts)
-        # Var(x + y) - Var(x - y) = 4 Cov(x, y), each a variance of means over the n of the subset
         corrections = self._combination(sums, correction, total)
+        y = batch_mean(corrections, sums.counts)
+        # Var(x + y) - Var(x - y) = 4 Cov(x, y), each a variance of means over the n of the subset
         plus = batch_mean(on_subset + corrections, sums.counts).standard_error ** 2
         minus = batch_mean(on_subset - corrections, sums.counts).standard_error ** 2
         covariance = (plus - minus) / 4 * self.subset_runs / self.runs

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import sympy as sp
+from sympy.printing.latex import LatexPrinter
 
 n, p, r = sp.symbols("n p r", positive=True, integer=True)
 
@@ -77,7 +78,22 @@ def regression(
     )
 
 
+class _Printer(LatexPrinter):
+    """Sums in the order people write them: single symbols first, negative terms last."""
+
+    def _print_MatAdd(self, expr: sp.MatAdd) -> str:
+        def negative(term: sp.MatrixExpr) -> bool:
+            return bool(term.as_coeff_mmul()[0] < 0)
+
+        terms = sorted(expr.args, key=lambda term: (negative(term), not isinstance(term, sp.MatrixSymbol)))
+        text = self._print(terms[0])
+        for term in terms[1:]:
+            text += f" - {self._print(-term)}" if negative(term) else f" + {self._print(term)}"
+        return text
+
+
 def latex(equations: Sequence[sp.Eq]) -> str:
     """The equations as one aligned LaTeX block."""
-    lines = [rf"{sp.latex(q.lhs)} &= {sp.latex(q.rhs)}" for q in equations]
+    printer = _Printer()
+    lines = [rf"{printer.doprint(q.lhs)} &= {printer.doprint(q.rhs)}" for q in equations]
     return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"

@@ -1,0 +1,113 @@
+"""The command line: `kfcourse lab 53`, `kfcourse variants`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+
+from kfcourse.design import NotFinite
+from kfcourse.experiment import compare
+from kfcourse.formula import FormulaError
+from kfcourse.lab import FILTERS, LAB, VariantError, find_variant, has_exact, lab_filters, load_variants, title
+from kfcourse.model import ModelError
+from kfcourse.moments import NoClosedForm
+from kfcourse.report import conclusions, write_json, write_report
+
+_VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="kfcourse")
+def main() -> None:
+    """Kalman and nonlinear suboptimal filtering: the lab from the command line."""
+
+
+@main.command()
+@_VARIANTS
+def variants(variants_file: Path | None) -> None:
+    """List the variants of the lab."""
+    with _clear_errors():
+        for name, variant in load_variants(variants_file).items():
+            model = variant.model
+            click.echo(f"{name:>6}  {variant.title or 'no title'}")
+            click.echo(f"        x' = {', '.join(map(str, model.state_equation))};  y = {', '.join(map(str, model.meter_equation))}")
+
+
+@main.command()
+@click.argument("variant")
+@_VARIANTS
+@click.option("--runs", type=click.IntRange(min=2), default=100_000, show_default=True, help="Trajectories.")
+@click.option("--steps", type=click.IntRange(min=1), default=51, show_default=True, help="Measurements of each trajectory.")
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="The same seed gives the same numbers.")
+@click.option("--filters", "names", help=f"Short names, separated by commas. Known: {', '.join(FILTERS)}.  [default: the lab's seven and the exact AOF]")
+@click.option("--exact-runs", type=click.IntRange(min=0), default=300, show_default=True, help="Trajectories for the slow filters; 0 leaves them out.")
+@click.option("--same-ensemble", is_flag=True, help="Design DUOF, FOS and MFOS on the trajectories they are compared on.")
+@click.option("--threads", type=click.IntRange(min=1), default=2, show_default=True, help="Does not change the numbers.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]")
+@click.option("--json", "json_file", type=click.Path(path_type=Path), help="Also write the numbers to this file.")
+def lab(
+    variant: str,
+    variants_file: Path | None,
+    runs: int,
+    steps: int,
+    seed: int,
+    names: str | None,
+    exact_runs: int,
+    same_ensemble: bool,
+    threads: int,
+    out: Path | None,
+    json_file: Path | None,
+) -> None:
+    """Compare the filters on VARIANT (such as 53) and write the report."""
+    with _clear_errors():
+        chosen = find_variant(variant, variants_file)
+        model = chosen.model
+        if names is None:
+            wanted = [*LAB, "aof-exact"] if has_exact(model) and exact_runs else list(LAB)
+        else:
+            wanted = [name.strip() for name in names.split(",") if name.strip()]
+        filters = lab_filters(model, wanted)
+        folder = out or Path(f"lab-{chosen.name}")
+        _check_places(folder, json_file)  # before the long part
+        click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
+        result = compare(
+            filters, model, runs, steps, seed, subset_runs=exact_runs, same_ensemble=same_ensemble, threads=threads
+        )
+        if json_file:
+            write_json(chosen, result, json_file)
+        write_report(chosen, result, folder)
+    click.echo("filter       score   (mean over steps of D_k relative to " + title(result.control) + ")")
+    for name, score in result.ranking():
+        click.echo(f"{title(name):<10} {float(score.value):8.5f} ± {float(score.standard_error):.5f}")
+    for sentence in conclusions(result):
+        click.echo(sentence)
+    click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""))
+
+
+def _check_places(folder: Path, json_file: Path | None) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise click.ClickException(f"the report cannot go to {folder}: {error.strerror}; choose another folder with --out") from None
+    if json_file and (json_file.is_dir() or not json_file.parent.is_dir()):
+        raise click.ClickException(f"the numbers cannot go to {json_file}: name a file in an existing folder with --json")
+
+
+@contextmanager
+def _clear_errors() -> Iterator[None]:
+    """What a user did wrong is said in a sentence, not in a traceback."""
+    try:
+        yield
+    except (VariantError, FormulaError, ModelError, NoClosedForm, NotFinite, ValueError) as error:
+        raise click.ClickException(str(error)) from None
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise click.ClickException(f"{error.strerror or error}: {error.filename}") from None
+    except KeyboardInterrupt:
+        click.echo("Interrupted; files written before are as they were.", err=True)
+        sys.exit(130)
