@@ -22,6 +22,7 @@ TOC = yaml.safe_load((ROOT / "book" / "_toc.yml").read_text(encoding="utf-8"))
 PAGES = [TOC["root"], *(chapter["file"] for part in TOC["parts"] for chapter in part["chapters"])]
 NOTEBOOKS = [page for page in PAGES if "{code-cell}" in (ROOT / "book" / f"{page}.md").read_text(encoding="utf-8")]
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chromium-browser"))), None)
+LOCAL = ("file:", "data:", "blob:")
 LOADS = {"script": "src", "link": "href", "img": "src", "iframe": "src", "source": "src", "object": "data", "image": "href"}
 
 
@@ -102,7 +103,7 @@ def test_page_in_a_browser_without_network(browser, page: str) -> None:
         tab.on("console", lambda message: problems.append(message.text) if message.type in ("error", "warning") else None)
         tab.on("pageerror", lambda error: problems.append(str(error)))
         tab.on("requestfailed", lambda request: problems.append(f"failed: {request.url}"))
-        tab.on("request", lambda request: None if request.url.startswith(("file:", "data:", "blob:")) else problems.append(request.url))
+        tab.on("request", lambda request: request.url.startswith(LOCAL) or problems.append(f"external: {request.url}"))
         tab.goto(path.as_uri(), wait_until="load")
         if 'class="math' in path.read_text(encoding="utf-8"):
             tab.wait_for_function("window.MathJax?.startup?.promise")

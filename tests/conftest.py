@@ -1,0 +1,11 @@
+"""Fixtures that several test files share."""
+
+import pytest
+
+from kfcourse.model import Model
+
+
+@pytest.fixture(scope="session")
+def variant53() -> Model:
+    """Variant 53 of the lab, both noises multiplicative."""
+    return Model.define("c*x + e*x*v", "g*x + f*x**2*w", {"c": 0.9, "e": 0.05, "g": 1, "f": 0.02})

@@ -1,0 +1,144 @@
+"""Slow reference code, written straight from the lab's page for variant 53 and independent of the package.
+
+    x' = c x + e x v,   y = g x + f x^2 w,   x_0, v, w ~ N(0, 1),   c = 0.9, e = 0.05, g = 1, f = 0.02
+
+One trajectory at a time in plain floats for the filters without an ensemble; `np.mean`, `np.cov` and
+`np.linalg.pinv` for those whose coefficients are regressions over one.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+C, E, G, F = 0.9, 0.05, 1.0, 0.02
+
+
+def tau(z, p):
+    return C * z
+
+
+def theta_linearised(z, p):
+    return C**2 * p + E**2 * z**2
+
+
+def theta_gaussian(z, p):
+    return C**2 * p + E**2 * z**2 + E**2 * p
+
+
+def h(m, d):
+    return G * m
+
+
+def f_linearised(m, d):
+    return G**2 * d + F**2 * m**4
+
+
+def f_gaussian(m, d):
+    return G**2 * d + F**2 * (m**4 + 6 * m**2 * d + 3 * d**2)
+
+
+STRUCTURES = {"linearised": (theta_linearised, f_linearised), "gaussian": (theta_gaussian, f_gaussian)}
+
+
+def aof_trajectory(kind: str, measurements: list[float]) -> list[tuple[float, float]]:
+    """(z_k, p_k) of the linearised or Gaussian AOF along one trajectory; a NaN measurement is skipped."""
+    theta, f = STRUCTURES[kind]
+    lam, psi = 0.0, 1.0
+    found = []
+    for y in measurements:
+        if math.isnan(y):
+            z, p = lam, psi
+        else:
+            gain = psi * G / f(lam, psi)
+            z = lam + gain * (y - h(lam, psi))
+            p = psi - gain * G * psi
+        found.append((z, p))
+        lam, psi = tau(z, p), theta(z, p)
+    return found
+
+
+def kalman_trajectory(
+    measurements: list[float], a: float, q: float, b: float, r: float, mean: float, variance: float, u: float = 0.0, s: float = 0.0
+) -> list[tuple[float, float]]:
+    """(z_k, p_k) of the scalar Kalman filter of x' = a x + u + noise(q), y = b x + s + noise(r)."""
+    found = []
+    for y in measurements:
+        gain = variance * b / (b * variance * b + r)
+        mean, variance = mean + gain * (y - b * mean - s), (1 - gain * b) * variance
+        found.append((mean, variance))
+        mean, variance = a * mean + u, a * variance * a + q
+    return found
+
+
+def regression(target, *regressors):
+    """Affine least squares: (matrix, offset, residual variance) by Cov(t, r) Cov(r)^+."""
+    rows = np.stack(regressors)
+    joint = np.cov(np.vstack([target, rows]), bias=True)
+    matrix = joint[0, 1:] @ np.linalg.pinv(joint[1:, 1:], hermitian=True)
+    offset = np.mean(target) - matrix @ np.mean(rows, axis=1)
+    return matrix, offset, joint[0, 0] - matrix @ joint[1:, 0]
+
+
+def duof_ensemble(x, y, x_next):
+    """Estimates z (steps, N) of the DUOF designed on the same scalar ensemble (steps, N) that it filters."""
+    lam = np.zeros(x.shape[1])
+    estimates = []
+    for x_k, y_k, following in zip(x, y, x_next, strict=True):
+        omega = y_k - G * lam
+        matrix, offset, _ = regression(x_k - lam, omega)
+        z = lam + matrix[0] * omega + offset
+        alpha = C * z
+        matrix, offset, _ = regression(following, alpha)
+        lam = matrix[0] * alpha + offset
+        estimates.append(z)
+    return np.array(estimates)
+
+
+def fos_ensemble(kind: str, arguments: int, x, y):
+    """Estimates z (steps, N) of the FOS: x regressed on z, or with three arguments on (y, z)."""
+    theta, f = STRUCTURES[kind]
+    lam, psi = np.zeros(x.shape[1]), np.ones(x.shape[1])
+    estimates = []
+    for x_k, y_k in zip(x, y, strict=True):
+        z = lam + psi * G / f(lam, psi) * (y_k - h(lam, psi))
+        u, t = _condition(arguments, x_k, y_k, z)
+        lam, psi = tau(u, t), theta(u, t)
+        estimates.append(z)
+    return np.array(estimates)
+
+
+def mfos_ensemble(kind: str, arguments: int, x, y, x_next):
+    """Estimates z (steps, N) of the MFOS."""
+    theta, f = STRUCTURES[kind]
+    lam, psi = np.zeros(x.shape[1]), np.ones(x.shape[1])
+    estimates = []
+    for x_k, y_k, following in zip(x, y, x_next, strict=True):
+        sigma = psi * G / f(lam, psi) * (y_k - h(lam, psi))
+        matrix, offset, _ = regression(x_k - lam, sigma)
+        z = lam + matrix[0] * sigma + offset
+        u, t = _condition(arguments, x_k, y_k, z)
+        s = tau(u, t)
+        matrix, offset, _ = regression(following, s)
+        lam, psi = matrix[0] * s + offset, theta(u, t)
+        estimates.append(z)
+    return np.array(estimates)
+
+
+def _condition(arguments: int, x, y, z):
+    regressors = (z,) if arguments == 2 else (y, z)
+    matrix, offset, t = regression(x, *regressors)
+    return matrix @ np.stack(regressors) + offset, t
+
+
+def gaussian_mean(function, mean, cov, order: int = 40):
+    """M[function(x)], x ~ N(mean, cov), by a Gauss-Hermite product rule; function takes a list of components."""
+    mean, cov = np.asarray(mean, dtype=float), np.asarray(cov, dtype=float)
+    nodes, weights = np.polynomial.hermite_e.hermegauss(order)
+    grids = np.meshgrid(*[nodes] * len(mean), indexing="ij")
+    weight = np.ones_like(grids[0])
+    for w in np.meshgrid(*[weights / weights.sum()] * len(mean), indexing="ij"):
+        weight = weight * w
+    points = mean[:, None] + np.linalg.cholesky(cov) @ np.stack([g.ravel() for g in grids])
+    return float(np.sum(weight.ravel() * function(list(points))))
