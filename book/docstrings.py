@@ -38,6 +38,12 @@ def process(app, what, name, obj, options, lines) -> None:
     lines[:] = to_restructured(lines)
 
 
+def skip_tuple_fields(app, what, name, obj, skip, options) -> bool | None:
+    """Fields of a NamedTuple are described in its own docstring ("Alias for field number 0" is no description)."""
+    return True if type(obj).__name__ == "_tuplegetter" else None
+
+
 def setup(app) -> dict[str, bool]:
     app.connect("autodoc-process-docstring", process, priority=100)  # before numpydoc
+    app.connect("autodoc-skip-member", skip_tuple_fields)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -92,6 +92,7 @@ def consistency(result: Comparison, ax: Axes, names: Sequence[str] | None = None
         half = value.half_width(confidence)
         ax.fill_between(steps, value.value - half, value.value + half, color=line["color"], alpha=0.15, linewidth=0)
     ax.axhline(1, color="black", linewidth=0.8)
+    ax.set_yscale("log")
     ax.set_xlabel("step $k$")
     ax.set_ylabel(r"normalised squared error $\mathsf{M}[e^2/p]$")
     ax.grid(True, alpha=0.3)

@@ -86,7 +86,6 @@ HOSTILE = [
     ("c*x + v)", 7),
     ("x = 3", 2),
     ("x; v", 1),
-    ("x + ", 4),
     ("import os", 0),
     ("x + q*v", 4),
     ("ξ + x", 0),
@@ -95,7 +94,7 @@ HOSTILE = [
     ("x + sin(x, v)", 4),
     ("x + sin()", 4),
     ("x + sin(x=v)", 4),
-    ("x + sin(*x)", 4),
+    ("x + sin(*x)", 8),
     ("x + arcsin(x)", 4),
     ("x + v(2)", 4),
     ("x + 1e400", 4),
@@ -103,10 +102,10 @@ HOSTILE = [
     ("x**v", 3),
     ("2**x", 3),
     ("x**17", 3),
-    ("x**(10**9)", 3),
+    ("x**(10**9)", 4),
     ("9**9**9", 3),
     ("((10**16)**16)**16", 1),
-    ("x + (x**16)**16", 5),
+    ("x + (x**16)**16", 4),
     ("x + exp(exp(exp(9)))", 8),
 ]
 
@@ -124,7 +123,7 @@ def test_what_is_not_a_formula_is_refused_with_a_pointer_to_the_place(formula, c
 
 @pytest.mark.parametrize(
     "formula",
-    ["", "   ", "\n", "\0", "x + \0", "1/0", "x/0", "x/(v - v)", "0**-1", "sqrt(-1)*x", "log(0)", "x*log(-1)", "sqrt(-4*x**2)",
+    ["", "   ", "\n", "x + ", "*x", "\0", "x + \0", "1/0", "x/0", "x/(v - v)", "0**-1", "sqrt(-1)*x", "log(0)", "x*log(-1)", "sqrt(-4*x**2)",
      "x*(-8)**(1/3)", "x*(-1)**0.5", "x" * 10_000, "x + " * 3000 + "x", "(" * 300 + "x" + ")" * 300, "-" * 1900 + "x"],
 )  # fmt: skip
 def test_what_has_no_real_value_or_no_end_is_refused(formula):

@@ -123,10 +123,10 @@ def test_equations_that_do_not_fit_are_refused(state, meter, error):
         Model.define(state, meter)
 
 
-@pytest.mark.parametrize("arguments", [{"parameters": [1]}, {"prior": 3}, {"symbols": {"v": []}}])
-def test_what_is_not_a_table_is_refused_as_a_model_error(arguments):
+@pytest.mark.parametrize("arguments", [{"parameters": [1]}, {"prior": 3}, {"symbols": [1]}, {"symbols": {"v": []}}])
+def test_what_is_not_a_table_of_names_or_numbers_is_refused_as_a_model_error(arguments):
     with pytest.raises(ModelError):
-        Model.define("x/2 + v", "x + w", **arguments)
+        Model.define("x/2", "x + w", **arguments)
 
 
 def test_parameter_values_that_leave_no_finite_formula_are_refused():
