@@ -12,6 +12,9 @@ from kfcourse.model import Model
 from kfcourse.statistics import Estimate, Sums, batch_mean
 
 
+EXACT = "aof-exact"
+
+
 @dataclass(frozen=True)
 class Subset:
     """Sums of all filters, the slow ones last, over the first of the common trajectories."""
@@ -105,6 +108,33 @@ class Comparison:
         combination[self.control] = combination.get(self.control, 0.0) - mask * numerator * _inverse(base)
         deviation = self._combined(combination, total=True)
         return Estimate(np.array(mask @ numerator), deviation.standard_error, deviation.freedom)
+
+    def excess(self, name: str) -> Estimate:
+        """D_k(name) - D_k(exact AOF), (steps,), by orthogonality.
+
+        The error of the posterior mean is uncorrelated with every function of the measurements, so
+        M|x - z|^2 - M|x - z_exact|^2 = M|z - z_exact|^2.  The right side never sees the error itself, whose heavy
+        tails make the paired difference noisy: it needs hundreds of times fewer trajectories.  It relies on the
+        exact filter being exact; `difference(name, "aof-exact")` does not.
+        """
+        if not self._is_slow(EXACT) or self.subset is None:
+            raise KeyError(f"the bound needs {EXACT} among the filters, with subset_runs above 0")
+        sums = self.subset.sums
+        place = self.fast.index(name) if name in self.fast else len(self.fast) + self._slow_index(name)
+        return batch_mean(sums.distance[place], sums.counts)
+
+    def bound(self) -> Estimate:
+        """D_k of the exact AOF, (steps,), as D_k(control) - excess(control)."""
+        control, excess = self.error_variance(self.control), self.excess(self.control)
+        error = np.hypot(control.standard_error, excess.standard_error)
+        return Estimate(control.value - excess.value, error, excess.freedom)
+
+    def above_bound(self, name: str, steps: slice = slice(None)) -> Estimate:
+        """The mean over steps of D_k(name) / D_k(exact) - 1, from `excess` and `bound`."""
+        bound, excess = self.bound().value[steps], self.excess(name)[steps]
+        share = np.where(bound > 0, _inverse(bound), 0.0)
+        # Steps of one trajectory are dependent: the standard errors are added, which is on the safe side.
+        return Estimate(np.mean(share * excess.value), np.mean(share * excess.standard_error), excess.freedom)
 
     def error_mean(self, name: str) -> Estimate:
         """M[x_k - z_k] per step and component, (steps, n)."""

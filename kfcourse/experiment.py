@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 from tqdm import tqdm
 
-from kfcourse.comparison import Comparison, Subset
+from kfcourse.comparison import EXACT, Comparison, Subset
 from kfcourse.design import NotFinite, design
 from kfcourse.ensemble import BLOCK, Ensemble, Moment
 from kfcourse.filters.base import Design, Filter
@@ -145,8 +145,11 @@ def _run_blocks(filters: Sequence[Filter], ensemble: Ensemble, progress: bool | 
         yield sums
 
 
-def _run_block(filters: Sequence[Filter], moments: Iterable[Moment], sums: Sums) -> None:
-    """Advance all filters together over the steps of one block of trajectories."""
+def _run_block(filters: Sequence[Filter], moments: Iterable[Moment], sums: Sums, reference: int | None = None) -> None:
+    """Advance all filters together over the steps of one block of trajectories.
+
+    With a reference filter, the distance of every other estimate from its own is recorded too.
+    """
     size = int(sums.counts.sum())
     states = [one.init(size) for one in filters]
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
@@ -154,6 +157,9 @@ def _run_block(filters: Sequence[Filter], moments: Iterable[Moment], sums: Sums)
             for i, one in enumerate(filters):
                 states[i] = one.step(states[i], moment.y)
                 sums.record(i, k, moment.x, one.estimate(states[i]))
+            if reference is not None:
+                for i, state in enumerate(states):
+                    sums.record_distance(i, k, state.posterior.mean, states[reference].posterior.mean)
     _check_finite(filters, sums)
 
 
@@ -172,13 +178,15 @@ def _run_subset(filters: Sequence[Filter], ensemble: Ensemble, size: int, progre
     """All filters on the first `size` trajectories, in chunks over the threads."""
     starts = range(0, size, SUBSET_CHUNK)
     x, y, x_next = _first(ensemble, size)
+    names = [one.name for one in filters]
+    reference = names.index(EXACT) if EXACT in names else None
 
     def chunk(start: int) -> Sums:
         rows = slice(start, min(start + SUBSET_CHUNK, size))
         moments = [Moment(x[k, rows], y[k, rows], x_next[k, rows]) for k in range(ensemble.steps)]
         count = rows.stop - rows.start
         sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, count, max(1, round(BATCHES * count / size)))
-        _run_block(filters, moments, sums)
+        _run_block(filters, moments, sums, reference)
         return sums
 
     with ThreadPoolExecutor(ensemble.threads) as pool:

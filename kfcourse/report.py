@@ -23,7 +23,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kfcourse import plots
-from kfcourse.comparison import Comparison
+from kfcourse.comparison import EXACT, Comparison
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import FILTERS, Structures, Variant, title
@@ -144,7 +144,7 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
         "equations": _equation_sections(names),
         "names": [(name, title(name), FILTERS[name].russian if name in FILTERS else "") for name in names],
         "table": _table(result, names),
-        "ranking": [(title(name), f"{float(score.value):.5f}", f"{float(score.standard_error):.5f}") for name, score in result.ranking()],
+        "ranking": [(title(name), f"{float(score.value):.5f}", f"{float(score.standard_error):.5f}", _gap(result, name)) for name, score in result.ranking()],
         "conclusions": conclusions(result),
         "figures": [(name, caption) for name, (caption, _) in _FIGURES.items()],
         "control": title(result.control),
@@ -160,6 +160,14 @@ def _structure_sections(model: Model, names: tuple[str, ...]) -> list[Section]:
 def _equation_sections(names: tuple[str, ...]) -> list[Section]:
     families = dict.fromkeys(name.split("-")[0].removesuffix("3") for name in names)
     return [Section.of(_FAMILIES[family], equations_latex(EQUATIONS[family])) for family in families if family in EQUATIONS]
+
+
+def _gap(result: Comparison, name: str) -> str:
+    """How far a filter is above the exact bound, in per cent; empty if the exact filter did not run."""
+    if EXACT not in result.available:
+        return ""
+    above = result.above_bound(name)
+    return f"{100 * float(above.value):.3f} ± {100 * float(above.standard_error):.3f} %"
 
 
 def _table(result: Comparison, names: tuple[str, ...]) -> list[tuple[int, list[str]]]:

@@ -77,6 +77,8 @@ class Sums:
         Sums of the variances each filter claims (diagonal of its covariance).
     normalised : ndarray (filters, steps, batches)
         Sums of e^T p^-1 e / n.
+    distance : ndarray (filters, steps, batches)
+        Sums of |z - z_reference|^2, if there is a reference filter, else 0.
     """
 
     counts: Array
@@ -84,14 +86,15 @@ class Sums:
     square: Array
     own: Array
     normalised: Array
+    distance: Array
 
     @classmethod
     def empty(cls, filters: int, steps: int, n: int, runs: int, batches: int) -> Sums:
         """Room for `runs` trajectories in about `batches` batches of nearly equal size."""
         edges = np.linspace(0, runs, min(batches, runs) + 1).astype(int)
         size = len(edges) - 1
-        shape = (filters, steps, n, size)
-        return cls(np.diff(edges).astype(float), np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros((filters, steps, size)))
+        full, plain = (filters, steps, n, size), (filters, steps, size)
+        return cls(np.diff(edges).astype(float), np.zeros(full), np.zeros(full), np.zeros(full), np.zeros(plain), np.zeros(plain))
 
     @classmethod
     def concatenate(cls, parts: Sequence[Sums]) -> Sums:
@@ -115,6 +118,10 @@ class Sums:
             self.normalised[filter_index, step] = np.add.reduceat(_quotient(square, own[:, 0]), starts)
         else:  # one variance for the whole ensemble: the sums of squares are there already
             self.normalised[filter_index, step] = _quotient(self.square[filter_index, step, 0], own)
+
+    def record_distance(self, filter_index: int, step: int, mean: Array, reference: Array) -> None:
+        """Add one step of squared distances between two filters' estimates (N, n)."""
+        self.distance[filter_index, step] = np.add.reduceat(((mean - reference) ** 2).sum(axis=1), self._starts)
 
     @cached_property
     def _starts(self) -> Array:

@@ -77,7 +77,7 @@ LINEAR = {
     "n=2, p=1": linear(2, 1, 2, 1, 13),
     "n=2, p=2": linear(2, 2, 2, 2, 14),
     "n=2, p=2, more noises": linear(2, 2, 3, 3, 15),
-    "n=3, p=2": linear(3, 2, 3, 2, 16),
+    "n=3, p=2": linear(3, 2, 3, 2, 19),
     "n=1, p=2": linear(1, 2, 1, 2, 17),
 }
 STEPS = 6
@@ -130,8 +130,8 @@ def test_on_a_linear_gaussian_model_every_filter_is_the_kalman_filter(name):
     u = z and T = p.  Where Cov(z), Cov(sigma) or Cov(y, z) is singular (fewer measurements than components; z_0
     an affine function of y_0), the pseudo-inverse acts on the values that occur, and estimates are unchanged.
 
-    Tolerance: rounding (1e-16) times the condition of the regressions; the least non-zero eigenvalue of a
-    correlation matrix here is above 1e-6, and each step carries the error of the one before.
+    Tolerance: rounding (1e-16) times the condition of the regressions (the least non-zero eigenvalue of the
+    correlations of (y, z) is above 1e-5 here), and each of the six steps carries the error of the one before.
     """
     one = LINEAR[name]
     model = one.model()
@@ -140,7 +140,7 @@ def test_on_a_linear_gaussian_model_every_filter_is_the_kalman_filter(name):
     # Measured: new trajectories, not those of the design.
     y = simulate(model, 5, STEPS, seed=8).y
     expected = run(kalman(model), y)
-    for filter_, tolerance in [(f, 1e-11) for f in ready] + [(f, 1e-8) for f in design(designs, [[moment] for moment in moments])]:
+    for filter_, tolerance in [(f, 1e-11) for f in ready] + [(f, 1e-9) for f in design(designs, [[moment] for moment in moments])]:
         found = run(filter_, y)
         np.testing.assert_allclose(found.mean, expected.mean, rtol=tolerance, atol=tolerance, err_msg=filter_.name)
         np.testing.assert_allclose(found.cov, expected.cov, rtol=tolerance, atol=tolerance, err_msg=filter_.name)
@@ -172,6 +172,7 @@ def test_the_kalman_filter_is_the_loop_of_the_page():
 def test_the_kalman_filter_settles_at_the_riccati_solution(name):
     one = LINEAR[name]
     Q, R = one.B @ one.laws["state_noise"][1] @ one.B.T, one.C @ one.laws["meter_noise"][1] @ one.C.T
+    Q, R = (Q + Q.T) / 2, (R + R.T) / 2
     predicted = scipy.linalg.solve_discrete_are(one.A.T, one.H.T, Q, R)
     filter_ = kalman(one.model())
     state = filter_.init(1)
@@ -182,7 +183,7 @@ def test_the_kalman_filter_settles_at_the_riccati_solution(name):
     np.testing.assert_allclose(state.predicted.cov, P, rtol=1e-9, atol=1e-11)
     K = predicted @ one.H.T @ np.linalg.inv(one.H @ predicted @ one.H.T + R)
     np.testing.assert_allclose(state.posterior.cov, predicted - K @ one.H @ predicted, rtol=1e-9, atol=1e-11)
-    np.testing.assert_allclose(one.A @ K, L if np.allclose(one.A @ K, L) else one.A @ L, rtol=1e-9, atol=1e-11)  # versions of control differ
+    np.testing.assert_allclose(one.A @ K, L, rtol=1e-9, atol=1e-11)  # control's gain takes the innovation to the next state
 
 
 @pytest.mark.parametrize("name", ["scalar", "n=2, p=1", "n=2, p=2, more noises"])
