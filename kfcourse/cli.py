@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -71,7 +72,7 @@ def lab(
         else:
             wanted = [name.strip() for name in names.split(",") if name.strip()]
         filters = lab_filters(model, wanted)
-        folder = out or Path(f"lab-{chosen.name}")
+        folder = out or Path("lab-" + re.sub(r"[^\w.-]+", "-", chosen.name))  # no folder but this one
         _check_places(folder, json_file)  # before the long part
         click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
         result = compare(

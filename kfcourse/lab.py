@@ -136,7 +136,7 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
         raise VariantError(f"{where} cannot be read: {error}") from None
     try:
         tables = tomllib.loads(text).get("variants")
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError; so is a number of too many digits
         raise VariantError(f"{where} is not valid TOML: {error}") from None
     if not isinstance(tables, dict) or not tables:
         raise VariantError(f'{where} has no variants; it needs tables such as [variants.53] with state = "..." and meter = "..."')
@@ -157,7 +157,7 @@ def _variant(name: str, table: Any, where: str) -> Variant:
     options = {key: value for key, value in table.items() if key not in ("title", "state", "meter", "parameters")}
     try:
         return Variant(name, str(table.get("title", "")), Model.define(table["state"], table["meter"], table.get("parameters"), **options))
-    except (FormulaError, ModelError) as error:
+    except (ValueError, TypeError, OverflowError) as error:  # FormulaError and ModelError are ValueErrors
         raise VariantError(f"{prefix}{error}") from None
 
 

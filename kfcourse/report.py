@@ -44,6 +44,9 @@ _FIGURES: dict[str, tuple[str, Callable[[Comparison, Axes], Axes]]] = {
 }
 
 
+_GAP_STEPS = (0, 1, 5)  # where the report says how far the filters are above the exact bound
+
+
 @dataclass(frozen=True)
 class Section:
     """A heading and its displayed formulas, as the lines of a LaTeX `aligned` block ("left &= right")."""
@@ -144,7 +147,11 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
         "equations": _equation_sections(names),
         "names": [(name, title(name), FILTERS[name].russian if name in FILTERS else "") for name in names],
         "table": _table(result, names),
-        "ranking": [(title(name), f"{float(score.value):.5f}", f"{float(score.standard_error):.5f}", _gap(result, name)) for name, score in result.ranking()],
+        "ranking": [
+            (title(name), f"{float(score.value):.5f}", f"{float(score.standard_error):.5f}", [_gap(result, name, k) for k in _GAP_STEPS])
+            for name, score in result.ranking()
+        ],
+        "gap_steps": _GAP_STEPS,
         "conclusions": conclusions(result),
         "figures": [(name, caption) for name, (caption, _) in _FIGURES.items()],
         "control": title(result.control),
@@ -162,12 +169,12 @@ def _equation_sections(names: tuple[str, ...]) -> list[Section]:
     return [Section.of(_FAMILIES[family], equations_latex(EQUATIONS[family])) for family in families if family in EQUATIONS]
 
 
-def _gap(result: Comparison, name: str) -> str:
-    """How far a filter is above the exact bound, in per cent; empty if the exact filter did not run."""
-    if EXACT not in result.available:
+def _gap(result: Comparison, name: str, step: int) -> str:
+    """How far a filter is above the exact bound at a step, in per cent; empty if it cannot be said."""
+    if EXACT not in result.available or name not in result.fast or step >= result.steps:
         return ""
-    above = result.above_bound(name)
-    return f"{100 * float(above.value):.3f} ± {100 * float(above.standard_error):.3f} %"
+    above = result.above_bound(name)[step]
+    return f"{100 * float(above.value):.2f} ± {100 * float(above.standard_error):.2f}"
 
 
 def _table(result: Comparison, names: tuple[str, ...]) -> list[tuple[int, list[str]]]:
@@ -194,8 +201,8 @@ def _mathml(line: str) -> str:
 
 
 def _escape_tex(text: str) -> str:
-    text = re.sub(r"([#$%&_{}])", r"\\\1", text)
-    return text.replace("±", r"$\pm$").replace("·", r"$\cdot$")
+    special = {"\\": r"\textbackslash{}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}", "±": r"$\pm$", "·": r"$\cdot$"}
+    return re.sub(r"[#$%&_{}\\^~±·]", lambda found: special.get(found[0], "\\" + found[0]), text)
 
 
 def _finite(data: Any) -> Any:
@@ -209,6 +216,9 @@ def _finite(data: Any) -> Any:
 
 def _replace(path: Path, write: Callable[[Path], Any]) -> Path:
     """Write a file beside its place, then move it there: what was there before stays until that moment."""
+    if path.is_symlink() or (path.exists() and not path.is_file()):  # /dev/stdout, a pipe: written to, not replaced
+        write(path)
+        return path
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     os.close(handle)
     temporary = Path(name)

@@ -60,7 +60,15 @@ def aof_trajectory(kind: str, measurements: list[float]) -> list[tuple[float, fl
 
 
 def kalman_trajectory(
-    measurements: list[float], a: float, q: float, b: float, r: float, mean: float, variance: float, u: float = 0.0, s: float = 0.0
+    measurements: list[float],
+    a: float,
+    q: float,
+    b: float,
+    r: float,
+    mean: float,
+    variance: float,
+    u: float = 0.0,
+    s: float = 0.0,
 ) -> list[tuple[float, float]]:
     """(z_k, p_k) of the scalar Kalman filter of x' = a x + u + noise(q), y = b x + s + noise(r)."""
     found = []

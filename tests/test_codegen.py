@@ -70,7 +70,9 @@ def test_small_integer_powers_are_products():
 
 
 def test_each_power_is_computed_once():
-    body = compile_function("f", ARGUMENTS, {"a": sp.Matrix([x1**6 + x1**3]), "b": sp.Matrix([x1**2 * x2])}, ["x", "a", "b"]).source
+    body = compile_function(
+        "f", ARGUMENTS, {"a": sp.Matrix([x1**6 + x1**3]), "b": sp.Matrix([x1**2 * x2])}, ["x", "a", "b"]
+    ).source
     assert body.count("*") - body.count('"*') <= 5  # x^2, x^3, x^6, x^2 x2, and nothing twice
 
 
@@ -93,7 +95,11 @@ def test_one_trajectory_gets_the_numbers_it_gets_in_an_ensemble(ensemble):
 
 @pytest.mark.parametrize("constant", [sp.Rational(9, 10), sp.S.Zero, sp.sqrt(2) * sp.exp(1), 2 ** sp.Rational(1, 4)])
 def test_a_constant_output_is_one_value_for_all(constant, ensemble):
-    outputs = {"vector": sp.Matrix([constant]), "matrix": sp.Matrix([[constant, 0], [0, constant]]), "other": sp.Matrix([constant + x1])}
+    outputs = {
+        "vector": sp.Matrix([constant]),
+        "matrix": sp.Matrix([[constant, 0], [0, constant]]),
+        "other": sp.Matrix([constant + x1]),
+    }
     vector, matrix, other = compile_function("f", ARGUMENTS, outputs, ["x", "vector", "other"]).function(*ensemble)
     np.testing.assert_allclose(vector, np.array([float(constant)]), rtol=1e-15)
     np.testing.assert_allclose(matrix, float(constant) * np.eye(2), rtol=1e-15)
@@ -107,6 +113,8 @@ def test_no_symbol_can_hide_another(name, ensemble):
     # Names in the formula never reach the code as they are.
     odd = sp.Symbol(name, real=True)
     arguments = {"x": sp.Matrix([odd, x2])}
-    found = compile_function("f", arguments, {"value": sp.Matrix([odd**2 + sp.sin(odd) + x2])}, ["x", "value"]).function(ensemble[0])[0]
+    found = compile_function("f", arguments, {"value": sp.Matrix([odd**2 + sp.sin(odd) + x2])}, ["x", "value"]).function(
+        ensemble[0]
+    )[0]
     first, second = ensemble[0].T
     np.testing.assert_allclose(found[:, 0], first**2 + np.sin(first) + second, rtol=1e-14, atol=1e-14)

@@ -213,7 +213,9 @@ def test_an_ordinary_word_names_a_symbol(name):
     assert parse(f"2*{name}", {name: symbol(name)}) == 2 * symbol(name)
 
 
-@pytest.mark.parametrize("name", ["", "1x", "_x", "x y", "x-y", "lambda", "if", "None", "sin", "pi", "ξ", "x" * 40, "__class__", "x\n", 3, None])
+@pytest.mark.parametrize(
+    "name", ["", "1x", "_x", "x y", "x-y", "lambda", "if", "None", "sin", "pi", "ξ", "x" * 40, "__class__", "x\n", 3, None]
+)
 def test_other_words_do_not(name):
     with pytest.raises(ValueError, match=r"cannot name|reserved word|already means"):
         check_name(name)

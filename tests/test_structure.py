@@ -85,7 +85,12 @@ def quadrature(model, equation, law):
         return oracles.gaussian_mean(lambda points: function(points) + 0 * points[0], mean, cov, order)
 
     means = np.array([moment(lambda t, row=row: row(*t)) for row in rows])
-    covs = np.array([[moment(lambda t, r=r, q=q: (r(*t) - means[i]) * (q(*t) - means[j])) for j, q in enumerate(rows)] for i, r in enumerate(rows)])
+    covs = np.array(
+        [
+            [moment(lambda t, r=r, q=q: (r(*t) - means[i]) * (q(*t) - means[j])) for j, q in enumerate(rows)]
+            for i, r in enumerate(rows)
+        ]
+    )
     cross = np.array([[moment(lambda t, row=row, j=j: row(*t) * (t[j] - mean[j])) for j in range(n)] for row in rows])
     return means, covs, cross @ np.linalg.inv(model.prior.cov)
 
@@ -134,7 +139,11 @@ def test_gauss_hermite_is_exact_for_polynomials(name):
     mean, cov = np.stack([model.prior.mean, model.prior.mean + 0.3]), np.stack([model.prior.cov, 2 * model.prior.cov])
     exact, numerical = gaussian(model), gauss_hermite(model, 4)
     # degree 3 at most, so squares of degree 6 < 2 * 4; rounding of some hundred summands
-    for found, expected in zip((*numerical.predict(mean, cov), *numerical.measure(mean, cov)), (*exact.predict(mean, cov), *exact.measure(mean, cov)), strict=True):
+    for found, expected in zip(
+        (*numerical.predict(mean, cov), *numerical.measure(mean, cov)),
+        (*exact.predict(mean, cov), *exact.measure(mean, cov)),
+        strict=True,
+    ):
         np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), rtol=1e-11, atol=1e-11)
 
 
@@ -159,7 +168,15 @@ def test_the_unexplained_part_is_what_sensitivity_leaves(kind, name):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
-    ("state", "meter"), [("0.9*x + v", "x + w"), ("v", "x + w"), ("1", "x + w"), ("0.5", "2*x"), ("x + v", "x*w"), ("sqrt(sqrt(2))*x", "x*2**0.25 + w")]
+    ("state", "meter"),
+    [
+        ("0.9*x + v", "x + w"),
+        ("v", "x + w"),
+        ("1", "x + w"),
+        ("0.5", "2*x"),
+        ("x + v", "x*w"),
+        ("sqrt(sqrt(2))*x", "x*2**0.25 + w"),
+    ],
 )
 def test_results_broadcast_over_the_ensemble(kind, state, meter):
     structure = KINDS[kind](Model.define(state, meter))
