@@ -1,8 +1,8 @@
 """Kalman and nonlinear suboptimal filtering: the package behind the course companion.
 
-    model = Model.define("c*x + e*x*v", "g*x + f*x**2*w", dict(c=0.9, e=0.05, g=1, f=0.02))
-    gaussian(model).latex()                            structural functions, derived
-    compare(lab_filters(model), model, 100_000, 51, seed=1).ranking()
+model = Model.define("c*x + e*x*v", "g*x + f*x**2*w", dict(c=0.9, e=0.05, g=1, f=0.02))
+gaussian(model).latex()                            structural functions, derived
+compare(lab_filters(model), model, 100_000, 51, seed=1).ranking()
 """
 
 from kfcourse.comparison import Comparison

@@ -35,7 +35,9 @@ def variants(variants_file: Path | None) -> None:
         for name, variant in load_variants(variants_file).items():
             model = variant.model
             click.echo(f"{name:>6}  {variant.title or 'no title'}")
-            click.echo(f"        x' = {', '.join(map(str, model.state_equation))};  y = {', '.join(map(str, model.meter_equation))}")
+            click.echo(
+                f"        x' = {', '.join(map(str, model.state_equation))};  y = {', '.join(map(str, model.meter_equation))}"
+            )
 
 
 @main.command()
@@ -44,8 +46,18 @@ def variants(variants_file: Path | None) -> None:
 @click.option("--runs", type=click.IntRange(min=2), default=100_000, show_default=True, help="Trajectories.")
 @click.option("--steps", type=click.IntRange(min=1), default=51, show_default=True, help="Measurements of each trajectory.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="The same seed gives the same numbers.")
-@click.option("--filters", "names", help=f"Short names, separated by commas. Known: {', '.join(FILTERS)}.  [default: the lab's seven and the exact AOF]")
-@click.option("--exact-runs", type=click.IntRange(min=0), default=300, show_default=True, help="Trajectories for the slow filters; 0 leaves them out.")
+@click.option(
+    "--filters",
+    "names",
+    help=f"Short names, separated by commas. Known: {', '.join(FILTERS)}.  [default: the lab's seven and the exact AOF]",
+)
+@click.option(
+    "--exact-runs",
+    type=click.IntRange(min=0),
+    default=300,
+    show_default=True,
+    help="Trajectories for the slow filters; 0 leaves them out.",
+)
 @click.option("--same-ensemble", is_flag=True, help="Design DUOF, FOS and MFOS on the trajectories they are compared on.")
 @click.option("--threads", type=click.IntRange(min=1), default=2, show_default=True, help="Does not change the numbers.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]")
@@ -75,9 +87,7 @@ def lab(
         folder = out or Path("lab-" + re.sub(r"[^\w.-]+", "-", chosen.name))  # no folder but this one
         _check_places(folder, json_file)  # before the long part
         click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
-        result = compare(
-            filters, model, runs, steps, seed, subset_runs=exact_runs, same_ensemble=same_ensemble, threads=threads
-        )
+        result = compare(filters, model, runs, steps, seed, subset_runs=exact_runs, same_ensemble=same_ensemble, threads=threads)
         if json_file:
             write_json(chosen, result, json_file)
         write_report(chosen, result, folder)
@@ -93,7 +103,9 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise click.ClickException(f"the report cannot go to {folder}: {error.strerror}; choose another folder with --out") from None
+        raise click.ClickException(
+            f"the report cannot go to {folder}: {error.strerror}; choose another folder with --out"
+        ) from None
     if json_file and (json_file.is_dir() or not json_file.parent.is_dir()):
         raise click.ClickException(f"the numbers cannot go to {json_file}: name a file in an existing folder with --json")
 

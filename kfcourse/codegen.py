@@ -168,10 +168,7 @@ class _Printer(NumPyPrinter):
         denominators = [a for a in expr.args if not a.is_number and a.is_Pow and a.exp == -1]
         numerators = [a for a in expr.args if not a.is_number and a not in denominators]
         coefficient = sp.Mul(*numbers)
-        if coefficient in (1, -1) and numerators:
-            factors = []
-        else:
-            factors = [self._constant(coefficient)]
+        factors = [] if coefficient in (1, -1) and numerators else [self._constant(coefficient)]
         factors += [self.parenthesize(a, sp.printing.precedence.PRECEDENCE["Mul"]) for a in numerators]
         text = ("-" if coefficient == -1 and numerators else "") + "*".join(factors)
         for d in denominators:
@@ -194,7 +191,9 @@ class _Printer(NumPyPrinter):
 
 def numpy_source(name: str, arguments: Mapping[str, sp.MatrixBase], program: Program, doc: str) -> str:
     """The program as the text of a NumPy function."""
-    used = set().union(*(value.free_symbols for _, value in program.assignments), *(m.free_symbols for m in program.outputs.values()))
+    used = set().union(
+        *(value.free_symbols for _, value in program.assignments), *(m.free_symbols for m in program.outputs.values())
+    )
     rename = {target: f"s{i}" for i, (target, _) in enumerate(program.assignments)}
     lines = [f"def {name}({', '.join(arguments)}):", f'    """{doc}"""']
     for argument, entries in arguments.items():

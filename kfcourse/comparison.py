@@ -11,7 +11,6 @@ from kfcourse.gaussian import Array
 from kfcourse.model import Model
 from kfcourse.statistics import Estimate, Sums, batch_mean
 
-
 EXACT = "aof-exact"
 
 

@@ -43,7 +43,9 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Moment]]) -> list[
     predicted: list[list[Gaussian]] = []  # [block][design]
     for k, blocks in enumerate(ensemble):
         if not predicted:
-            predicted = [[Gaussian(np.tile(d.model.prior.mean, (len(b.x), 1)), d.model.prior.cov) for d in designs] for b in blocks]
+            predicted = [
+                [Gaussian(np.tile(d.model.prior.mean, (len(b.x), 1)), d.model.prior.cov) for d in designs] for b in blocks
+            ]
         runs = [_BlockStep(designs, before, block) for before, block in zip(predicted, blocks, strict=True)]
         fits = _fit_step(designs, runs, k)
         predicted = [[step.predicted for step in run.finished()] for run in runs]
@@ -86,7 +88,9 @@ def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int) -> 
                 continue
             merged = Moments.together([part for part in parts if part is not None])
             if not np.isfinite(merged.scatter).all():
-                raise NotFinite(f"{designs[i].name}, step {k}: the design met infinite or NaN values; the model or this filter diverges")
+                raise NotFinite(
+                    f"{designs[i].name}, step {k}: the design met infinite or NaN values; the model or this filter diverges"
+                )
             fits[i].append(merged.regression(designs[i].model.n))
             asked.append(i)
         active = asked

@@ -120,7 +120,9 @@ def compare(
     subset = None
     if slow:
         size = min(subset_runs, runs)
-        subset = Subset([one.name for one in slow], _run_subset([*ready, *_designed(slow, design_ensemble, progress)], common, size, progress))
+        subset = Subset(
+            [one.name for one in slow], _run_subset([*ready, *_designed(slow, design_ensemble, progress)], common, size, progress)
+        )
     return Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset)
 
 
@@ -164,14 +166,18 @@ def _run_block(filters: Sequence[Filter], moments: Iterable[Moment], sums: Sums,
 
 
 def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
-    finite = np.isfinite(sums.square).all(axis=(2, 3))
+    finite = np.asarray(np.isfinite(sums.square).all(axis=(2, 3)))
     if finite.all():
         return
     step = int(np.argmin(finite.all(axis=0)))
     if not finite[:, step].any():
-        raise NotFinite(f"step {step}: every filter fails; the model's trajectories become infinite, check its equations and parameters")
+        raise NotFinite(
+            f"step {step}: every filter fails; the model's trajectories become infinite, check its equations and parameters"
+        )
     name = filters[int(np.argmin(finite[:, step]))].name
-    raise NotFinite(f"step {step}: {name} became infinite or NaN although the trajectories are finite; leave this filter out or check the model")
+    raise NotFinite(
+        f"step {step}: {name} became infinite or NaN although the trajectories are finite; leave it out or check the model"
+    )
 
 
 def _run_subset(filters: Sequence[Filter], ensemble: Ensemble, size: int, progress: bool | None) -> Sums:

@@ -8,12 +8,12 @@ for them the products below are plain multiplications, which is what makes the e
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array: TypeAlias = NDArray[Any]
 
 
 class Gaussian(NamedTuple):
@@ -155,7 +155,7 @@ class Moments(NamedTuple):
     Scatter is the sum of products of deviations from the part's own mean: large means do not cancel.
     """
 
-    count: int
+    size: int
     mean: Array  # (r + s,)
     scatter: Array  # (r + s, r + s)
 
@@ -175,7 +175,7 @@ class Moments(NamedTuple):
     @classmethod
     def together(cls, parts: Sequence[Moments]) -> Moments:
         """Moments of all parts taken together (Chan's formula)."""
-        counts = np.array([part.count for part in parts], dtype=float)
+        counts = np.array([part.size for part in parts], dtype=float)
         means = np.array([part.mean for part in parts])
         mean = counts @ means / counts.sum()
         shift = means - mean
@@ -187,7 +187,7 @@ class Moments(NamedTuple):
 
         matrix = Cov(t, r) Cov(r)^+,  offset = M t - matrix M r,  residual = Cov(t) - matrix Cov(t, r)^T
         """
-        cov = self.scatter / self.count
+        cov = self.scatter / self.size
         cross = cov[:size, size:]
         matrix = gain(cross, cov[size:, size:])
         offset = self.mean[:size] - matrix @ self.mean[size:]

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from kfcourse.filters import Design, Filter, aof, duof, fos, mfos, particle, pointmass
-from kfcourse.formula import FormulaError
 from kfcourse.model import Model, ModelError
 from kfcourse.moments import NoClosedForm
 from kfcourse.structure import Structure, gauss_hermite, gaussian, linearised, unscented
@@ -156,7 +155,9 @@ def _variant(name: str, table: Any, where: str) -> Variant:
             raise VariantError(f"{prefix}`{key}` must be a table such as {{ c = 0.9 }}, got {table[key]!r}")
     options = {key: value for key, value in table.items() if key not in ("title", "state", "meter", "parameters")}
     try:
-        return Variant(name, str(table.get("title", "")), Model.define(table["state"], table["meter"], table.get("parameters"), **options))
+        return Variant(
+            name, str(table.get("title", "")), Model.define(table["state"], table["meter"], table.get("parameters"), **options)
+        )
     except (ValueError, TypeError, OverflowError) as error:  # FormulaError and ModelError are ValueErrors
         raise VariantError(f"{prefix}{error}") from None
 

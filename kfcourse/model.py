@@ -10,11 +10,12 @@ else (structural functions, filters, simulation, the printed equations) is deriv
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import sympy as sp
@@ -22,9 +23,9 @@ import sympy as sp
 from kfcourse.formula import check_name, parse, symbol
 from kfcourse.gaussian import Array, Gaussian
 
-Formula = str | sp.Expr
-Formulas = Formula | Sequence[Formula] | sp.MatrixBase
-Names = Sequence[str]
+Formula: TypeAlias = str | sp.Expr
+Formulas: TypeAlias = Formula | Sequence[Formula] | sp.MatrixBase
+Names: TypeAlias = Sequence[str]
 
 
 class ModelError(ValueError):
@@ -175,9 +176,9 @@ def _exact(name: str, value: Any) -> sp.Rational:
     """The decimal number a person typed, exactly: 0.9 is 9/10."""
     if isinstance(value, sp.Rational):
         return value
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating) or not math.isfinite(value):
         raise ModelError(f"parameter {name} = {value!r}: expected a finite number")
-    if value and not 1e-100 < abs(value) < 1e100:
+    if value and not 1e-100 < abs(float(value)) < 1e100:
         raise ModelError(f"parameter {name} = {value!r} is too large or too small; change the units")
     return sp.Rational(str(value))
 
@@ -212,7 +213,7 @@ def _symbols(symbols: Mapping[str, Names] | None, values: Mapping[str, Any], use
     result = {}
     for key in "xvw":
         if key in given:
-            names = [given[key]] if isinstance(given[key], str) else list(given[key])
+            names: list[str] = [*([given[key]] if isinstance(given[key], str) else given[key])]
         elif key == "x":
             names = ["x"] if n == 1 and "x1" not in used else [f"x{i + 1}" for i in range(n)]
         else:
@@ -246,7 +247,9 @@ def _law(what: str, law: Mapping[str, Any] | None, size: int) -> Gaussian:
         cov = np.asarray(law.get("variance", 1.0), dtype=float)
         cov = cov.copy() if cov.ndim == 2 else np.diag(np.broadcast_to(cov, (size,)))
     except (TypeError, ValueError):
-        raise ModelError(f"`{what}`: mean and variance must be numbers, or lists of {size} numbers (variance: or a matrix)") from None
+        raise ModelError(
+            f"`{what}`: mean and variance must be numbers, or lists of {size} numbers (variance: or a matrix)"
+        ) from None
     if cov.shape != (size, size):
         raise ModelError(f"`{what}`: the covariance has shape {cov.shape}, expected ({size}, {size})")
     if not (np.isfinite(mean).all() and np.isfinite(cov).all()):

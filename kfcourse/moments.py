@@ -16,7 +16,7 @@ large mean or a small variance then loses no digits in floating point.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property, lru_cache
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import sympy as sp
@@ -101,7 +101,9 @@ class GaussianMoments:
         """M[polynomial(m + P a + delta)], delta ~ N(0, P)."""
         shift = self.mean + self.cov * sp.Matrix(rate)
         deviations = [sp.Dummy(f"delta{i}", real=True) for i in range(len(self.variables))]
-        shifted = polynomial.subs({x: s + u for x, s, u in zip(self.variables, shift, deviations, strict=True)}, simultaneous=True)
+        shifted = polynomial.subs(
+            {x: s + u for x, s, u in zip(self.variables, shift, deviations, strict=True)}, simultaneous=True
+        )
         total = sp.S.Zero
         for powers, coefficient in sp.Poly(sp.expand(shifted), *deviations).terms():
             total += coefficient * self._central(powers)
@@ -113,7 +115,7 @@ class GaussianMoments:
 
     @cached_property
     def _central_moments(self):
-        @lru_cache(maxsize=None)
+        @cache
         def moment(powers: tuple[int, ...]) -> sp.Expr:
             if sum(powers) % 2:
                 return sp.S.Zero
@@ -141,6 +143,7 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
     NoClosedForm
         For a term that is not a polynomial times exponentials, sines and cosines of linear arguments.
     """
+
     # Hyperbolic and trigonometric functions of x become exponentials; those of parameters stay.
     def with_variables(e: sp.Basic) -> bool:
         return isinstance(e, sp.sin | sp.cos | sp.sinh | sp.cosh) and e.has(*variables)

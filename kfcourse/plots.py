@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,7 +26,7 @@ _FAMILIES = {
 _MARKERS = {"aof": "o", "duof": "s", "fos": "^", "mfos": "D", "fos3": "v", "mfos3": "P", "particle": "*", "kalman": "x"}
 
 
-def style(name: str) -> dict[str, str]:
+def style(name: str) -> dict[str, Any]:
     """Line style of a filter: colour by family, dashes for the linearised approximation, black for the exact."""
     family, _, approximation = name.partition("-")
     if approximation == "exact":
@@ -51,7 +52,9 @@ def accuracy(result: Comparison, ax: Axes, names: Sequence[str] | None = None) -
     return ax
 
 
-def relative_accuracy(result: Comparison, ax: Axes, names: Sequence[str] | None = None, steps: slice = slice(None), confidence: float = 0.95) -> Axes:
+def relative_accuracy(
+    result: Comparison, ax: Axes, names: Sequence[str] | None = None, steps: slice = slice(None), confidence: float = 0.95
+) -> Axes:
     """D_k of every filter relative to the Gaussian AOF's, in per cent, with bands of paired confidence."""
     k = np.arange(result.steps)[steps]
     for name in names or [n for n in result.available if n != result.control]:

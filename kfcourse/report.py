@@ -12,6 +12,8 @@ import re
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +40,10 @@ _FAMILIES = {
 }
 _FIGURES: dict[str, tuple[str, Callable[[Comparison, Axes], Axes]]] = {
     "accuracy": ("Error variance of each filter against the step.", plots.accuracy),
-    "relative": ("Error variance relative to the control filter, with 95 % bands of the paired difference.", plots.relative_accuracy),
+    "relative": (
+        "Error variance relative to the control filter, with 95 % bands of the paired difference.",
+        plots.relative_accuracy,
+    ),
     "ranking": ("Mean over the steps of the relative error variance, with 95 % confidence intervals.", plots.ranking),
     "consistency": ("Normalised squared error: 1 if the filter's own covariance is right.", plots.consistency),
 }
@@ -62,7 +67,11 @@ class Section:
 
 def model_latex(model: Model) -> str:
     """The two equations of a model and its parameter values, as a LaTeX `aligned` block."""
-    lines = [rf"{sp.latex(x)}_{{k+1}} &= {sp.latex(f)}" for x, f in zip(model.x, model.state_equation, strict=True)] if model.n == 1 else []
+    lines = (
+        [rf"{sp.latex(x)}_{{k+1}} &= {sp.latex(f)}" for x, f in zip(model.x, model.state_equation, strict=True)]
+        if model.n == 1
+        else []
+    )
     if model.n > 1:
         lines = [rf"{sp.latex(x)}' &= {sp.latex(f)}" for x, f in zip(model.x, model.state_equation, strict=True)]
     names = ["y"] if model.p == 1 else [f"y_{{{i + 1}}}" for i in range(model.p)]
@@ -81,9 +90,7 @@ def write_report(variant: Variant, result: Comparison, folder: Path) -> list[Pat
     for name, (_, draw) in _FIGURES.items():
         figure = Figure(figsize=(7, 4.2), layout="constrained")
         draw(result, figure.add_subplot())
-        for kind in ("svg", "pdf"):
-            # No dates in the files: the same numbers give the same report.
-            written.append(_replace(folder / f"{name}.{kind}", lambda path, kind=kind: figure.savefig(path, format=kind, metadata=_UNDATED[kind])))
+        written += [_replace(folder / f"{name}.{kind}", partial(_save_figure, figure, kind)) for kind in _UNDATED]
     content = _content(variant, result)
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("kfcourse"), trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
@@ -91,11 +98,20 @@ def write_report(variant: Variant, result: Comparison, folder: Path) -> list[Pat
     environment.filters |= {"mathml": _mathml, "tex": _escape_tex, "html": jinja2.filters.do_forceescape}
     for name in ("report.html", "report.tex"):
         text = environment.get_template(name + ".j2").render(content)
-        written.append(_replace(folder / name, lambda path, text=text: path.write_text(text, encoding="utf-8")))
+        written.append(_replace(folder / name, partial(_save_text, text)))
     return written
 
 
-_UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+# No dates in the figures: the same numbers give the same report.
+_UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+
+
+def _save_figure(figure: Figure, kind: str, path: Path) -> None:
+    figure.savefig(path, format=kind, metadata=_UNDATED[kind])
+
+
+def _save_text(text: str, path: Path) -> None:
+    path.write_text(text, encoding="utf-8")
 
 
 def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
@@ -119,14 +135,14 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
         "score": {name: {"value": float(e.value), "standard_error": float(e.standard_error)} for name, e in result.ranking()},
     }
     text = json.dumps(_finite(data), indent=1, allow_nan=False)
-    return _replace(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    return _replace(path, partial(_save_text, text))
 
 
 def conclusions(result: Comparison, confidence: float = 0.95) -> list[str]:
     """The ranking in sentences: each filter against the next, significant or not at the confidence."""
     ranked = [name for name, _ in result.ranking()]
     sentences = []
-    for better, worse in zip(ranked, ranked[1:], strict=False):
+    for better, worse in pairwise(ranked):
         difference = result.score_difference(worse, better)
         low, high = (100 * float(limit) for limit in difference.interval(confidence))
         verdict = "is more accurate than" if low > 0 else "is not significantly different from"
@@ -148,7 +164,12 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
         "names": [(name, title(name), FILTERS[name].russian if name in FILTERS else "") for name in names],
         "table": _table(result, names),
         "ranking": [
-            (title(name), f"{float(score.value):.5f}", f"{float(score.standard_error):.5f}", [_gap(result, name, k) for k in _GAP_STEPS])
+            (
+                title(name),
+                f"{float(score.value):.5f}",
+                f"{float(score.standard_error):.5f}",
+                [_gap(result, name, k) for k in _GAP_STEPS],
+            )
             for name, score in result.ranking()
         ],
         "gap_steps": _GAP_STEPS,

@@ -65,7 +65,11 @@ class Structure:
         lines = []
         for name in formulas.functions:
             arguments = formulas.state_arguments if name in ("tau", "Theta") else formulas.meter_arguments
-            names = ", ".join(sp.latex(a) for a in arguments) if self.model.n == 1 else ("z, p" if name in ("tau", "Theta") else "m, d")
+            names = (
+                ", ".join(sp.latex(a) for a in arguments)
+                if self.model.n == 1
+                else ("z, p" if name in ("tau", "Theta") else "m, d")
+            )
             lines.append(rf"{FUNCTION_LATEX[name]}({names}) &= {sp.latex(self[name])}")
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
@@ -76,7 +80,9 @@ class Structure:
 
     def _derived(self) -> Formulas:
         if self.formulas is None:
-            raise NoClosedForm(f"the {self.name} structure is computed by quadrature and has no formulas; see linearised(model), gaussian(model)")
+            raise NoClosedForm(
+                f"the {self.name} structure is computed by quadrature and has no formulas; see linearised(model), gaussian(model)"
+            )
         return self.formulas
 
 
@@ -111,7 +117,9 @@ class Formulas:
 
     @cached_property
     def compiled_predict(self) -> Compiled:
-        return self._compile("predict", {"z": self.z, "p": self.p}, {key: self.functions[key].subs(self.model.values) for key in ("tau", "Theta")})
+        return self._compile(
+            "predict", {"z": self.z, "p": self.p}, {key: self.functions[key].subs(self.model.values) for key in ("tau", "Theta")}
+        )
 
     @cached_property
     def compiled_measure(self) -> Compiled:
@@ -197,7 +205,9 @@ def _taylor(equation, x, mean, noise, noise_mean):
     parts = [equation, equation.jacobian(sp.Matrix(x)), equation.jacobian(sp.Matrix(noise))]
     for part in parts:
         if part.has(sp.Derivative, sp.DiracDelta):
-            raise NoClosedForm(f"{list(equation)} is not differentiable, so it cannot be linearised; use unscented(model) or gauss_hermite(model)")
+            raise NoClosedForm(
+                f"{list(equation)} is not differentiable and cannot be linearised; use unscented(model) or gauss_hermite(model)"
+            )
     return [part.subs(point, simultaneous=True) for part in parts]
 
 
@@ -220,7 +230,9 @@ def gaussian(model: Model) -> Structure:
 
 def _moments(equation, x, mean, cov, noise, law: Gaussian):
     """Mean and covariance of equation(x, noise), x ~ N(mean, cov) and the noise independent."""
-    joint = GaussianMoments([*x, *noise], [*mean, *exact_matrix(law.mean)], sp.diag(sp.Matrix(cov), sp.Matrix(exact_matrix(law.cov))))
+    joint = GaussianMoments(
+        [*x, *noise], [*mean, *exact_matrix(law.mean)], sp.diag(sp.Matrix(cov), sp.Matrix(exact_matrix(law.cov)))
+    )
     size = len(equation)
     means = sp.Matrix([joint.mean_of(formula) for formula in equation])
     covs = sp.zeros(size, size)
@@ -299,7 +311,7 @@ def _quadrature(model: Model, name: str, rule: Callable[[int], tuple[Array, Arra
         h = meter_weights @ y
         deviation = y - h[..., None, :]
         cross = transpose(deviation * meter_weights[:, None]) @ (x - m[..., None, :])
-        G, F = gain(cross, np.broadcast_to(d, m.shape + (n,))), _weighted(meter_weights, deviation)
+        G, F = gain(cross, np.broadcast_to(d, (*m.shape, n))), _weighted(meter_weights, deviation)
         # The part of y that is not linear in x: no difference of nearly equal matrices.
         unexplained = deviation - (x - m[..., None, :]) @ transpose(G)
         return Measurement(h, G, F, _weighted(meter_weights, unexplained))
@@ -327,7 +339,9 @@ def compile_noiseless(model: Model) -> tuple[Callable[[Array], Array], Callable[
     return lambda x: state(x)[0], lambda x: meter(x)[0]
 
 
-def _compile_equation(name: str, equation: sp.MatrixBase, arguments: dict[str, tuple[sp.Symbol, ...]], model: Model) -> Callable[..., tuple[Array]]:
+def _compile_equation(
+    name: str, equation: sp.MatrixBase, arguments: dict[str, tuple[sp.Symbol, ...]], model: Model
+) -> Callable[..., tuple[Array]]:
     matrices = {key: sp.Matrix(symbols) for key, symbols in arguments.items()}
     numeric = equation.subs(model.values)
     return compile_function(name, matrices, {name: numeric}, [*arguments, name], f"{name} equation of {model}").function

@@ -172,7 +172,7 @@ def test_batches_of_unequal_size_are_weighed():
         estimate = batch_mean(np.add.reduceat(sample, np.concatenate([[0], np.cumsum(counts[:-1])]).astype(int)), counts)
         errors.append(float(estimate.value) - 3.0)
         found.append(float(estimate.standard_error))
-    # The average of SE^2 is the variance of the mean; 300 repetitions know it to 4 sqrt(2 / 300) / sqrt(60), and the weights to 1/60.
+    # The average of SE^2 is the variance of the mean: known from 300 repetitions of 63 batches, its weights to 1/60.
     exact = 4.0 / counts.sum()
     assert np.mean(np.square(found)) == pytest.approx(exact, rel=SIGMA * np.sqrt(2 / 300 / 60) + 1 / 60)
     assert np.var(errors) == pytest.approx(exact, rel=SIGMA * np.sqrt(2 / 300))

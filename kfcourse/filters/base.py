@@ -126,7 +126,9 @@ class Design:
 
         def step(state: State, y: Array) -> State:
             if state.step >= len(table):
-                raise ValueError(f"{self.name} was designed for {len(table)} steps; design it with more to run step {state.step + 1}")
+                raise ValueError(
+                    f"{self.name} was designed for {len(table)} steps; design it with more to run step {state.step + 1}"
+                )
             result = _answer(self.equations(state.predicted, y), table[state.step])
             return State(state.step + 1, result.posterior, result.predicted)
 

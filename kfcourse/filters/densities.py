@@ -1,6 +1,6 @@
 """Conditional densities of a model whose noises enter linearly: what exact and particle filters need.
 
-    x_{k+1} | x_k ~ N(a(x, m_v), a_v D_v a_v^T),    y_k | x_k ~ N(b(x, m_w), b_w D_w b_w^T)
+x_{k+1} | x_k ~ N(a(x, m_v), a_v D_v a_v^T),    y_k | x_k ~ N(b(x, m_w), b_w D_w b_w^T)
 """
 
 from __future__ import annotations
@@ -52,7 +52,9 @@ def _log_normal(deviation: Array, variance: Array) -> Array:
         return -0.5 * (deviation**2 / variance + np.log(2 * np.pi * variance))
 
 
-def _conditional(name: str, equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian, model: Model) -> Callable[[Array], Gaussian]:
+def _conditional(
+    name: str, equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian, model: Model
+) -> Callable[[Array], Gaussian]:
     B = equation.jacobian(sp.Matrix(noise))
     if B.has(*noise):
         raise ModelError(

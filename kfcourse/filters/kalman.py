@@ -36,7 +36,9 @@ def kalman(model: Model) -> Filter:
     return Filter("kalman", initial_state(model), step)
 
 
-def _affine(equation: sp.MatrixBase, x: tuple[sp.Symbol, ...], noise: tuple[sp.Symbol, ...], model: Model) -> tuple[Array, Array, Array]:
+def _affine(
+    equation: sp.MatrixBase, x: tuple[sp.Symbol, ...], noise: tuple[sp.Symbol, ...], model: Model
+) -> tuple[Array, Array, Array]:
     """Matrices of equation = A x + B noise + constant."""
     numeric = equation.subs(model.values)
     A, B = numeric.jacobian(sp.Matrix(x)), numeric.jacobian(sp.Matrix(noise))

@@ -107,7 +107,10 @@ def pointmass(model: Model, order: int = 8, tolerance: float = 1e-5) -> Filter:
         The model is not scalar, or a noise enters nonlinearly.
     """
     if model.n != 1 or model.p != 1:
-        raise ModelError(f"the point-mass filter is for scalar models; this one has {model.n} states and {model.p} measurements: use particle(model)")
+        raise ModelError(
+            f"the point-mass filter is for scalar models; this one has {model.n} states and {model.p} measurements: "
+            "use particle(model)"
+        )
     if order < 6 or not 0 < tolerance < 1:
         raise ModelError(f"the point-mass filter needs order >= 6 and 0 < tolerance < 1, got {order} and {tolerance}")
     bayes = _Bayes(model)
@@ -115,9 +118,12 @@ def pointmass(model: Model, order: int = 8, tolerance: float = 1e-5) -> Filter:
     init = initial_state(model)
 
     def step(state: State, y: Array) -> State:
-        before = state.memory or PointMass([None] * len(y), [None] * len(y))
+        before = state.memory or ([None] * len(y), [None] * len(y))
         after = PointMass(
-            *([bayes.posterior(grid, value, rule) for grid, value in zip(grids, y[:, 0], strict=True)] for grids, rule in zip(before, rules, strict=True))
+            *(
+                [bayes.posterior(grid, value, rule) for grid, value in zip(grids, y[:, 0], strict=True)]
+                for grids, rule in zip(before, rules, strict=True)
+            )
         )
         posterior = Gaussian(np.array([[g.mean()] for g in after.fine]), np.array([[[g.variance()]] for g in after.fine]))
         return State(state.step + 1, posterior, bayes.predicted_moments(after.fine), after)
@@ -215,7 +221,9 @@ def _log_mixture(x: Array, mu: Array, sigma: Array, mass: Array) -> Array:
         return np.log(kernel @ (mass / (sigma * np.sqrt(2 * np.pi))))
 
 
-def _resolve(borders: Array, log_density: Callable[[Array], Array], too_wide: Callable[[Array, Array], Array], rule: Rule) -> Grid:
+def _resolve(
+    borders: Array, log_density: Callable[[Array], Array], too_wide: Callable[[Array, Array], Array], rule: Rule
+) -> Grid:
     """Nodes and masses of exp(log_density), its panels split until the rule resolves it on each."""
     left, right = borders[:-1], borders[1:]
     x, logs = _evaluate(left, right, log_density, rule)

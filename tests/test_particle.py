@@ -1,0 +1,122 @@
+"""The particle filter against the exact one and the Kalman filter, within its Monte Carlo error."""
+
+import numpy as np
+import pytest
+
+from kfcourse import Model, ModelError, load_variants, run, simulate
+from kfcourse.filters import kalman, particle, pointmass
+
+PARTICLES, REPLICAS = 1000, 100
+
+
+@pytest.fixture(scope="module")
+def variants():
+    return {name: variant.model for name, variant in load_variants().items()}
+
+
+def replicas(model, y, seed=5):
+    """Estimates (steps, runs, REPLICAS, n) and variances: each trajectory filtered many times with its own particles."""
+    runs = y.shape[1]
+    mean, cov = run(particle(model, PARTICLES, seed), np.repeat(y, REPLICAS, axis=1))
+    shape = (len(y), runs, REPLICAS)
+    return mean.reshape(*shape, model.n), np.diagonal(cov, axis1=-2, axis2=-1).reshape(*shape, model.n)
+
+
+def agree(sample, expected, unit):
+    """Mean over replicas (axis 2) equals the expected within 4 standard errors, and the bias of a ratio of sums over particles.
+
+    The estimate is such a ratio, so its bias is a few 1/particles; "few" is the particles over the effective ones, below 10 here.
+    """
+    error = sample.mean(axis=2) - expected
+    standard = sample.std(axis=2, ddof=1) / np.sqrt(REPLICAS)
+    np.testing.assert_array_less(np.abs(error), 4 * standard + 10 / PARTICLES * unit)
+
+
+@pytest.mark.parametrize("name", ["2", "5", "11"])
+def test_it_equals_the_exact_filter_within_monte_carlo_error(variants, name):
+    _, y = simulate(variants[name], 5, 6, seed=1)
+    exact = run(pointmass(variants[name]), y)
+    variance = exact.cov[..., 0]
+    mean, own = replicas(variants[name], y)
+    agree(mean, exact.mean, np.sqrt(variance))
+    agree(own, variance, variance)
+
+
+def test_on_a_linear_vector_model_it_is_the_kalman_filter_within_monte_carlo_error():
+    model = Model.define(
+        ["x1 + 0.2*x2 + 0.1*v1", "0.9*x2 - 0.1*x1 + 0.3*v2"],
+        ["x1 + 0.5*w1", "x2 + 0.3*x1 + 0.6*w2 + 0.2*w1"],
+        prior={"mean": [1.0, -1.0], "variance": [[0.5, 0.1], [0.1, 0.4]]},
+    )
+    _, y = simulate(model, 4, 6, seed=3)
+    expected = run(kalman(model), y)
+    variance = np.diagonal(expected.cov, axis1=-2, axis2=-1)
+    mean, own = replicas(model, y)
+    agree(mean, expected.mean, np.sqrt(variance))
+    agree(own, variance, variance)
+
+
+def test_the_same_state_and_measurement_give_the_same_result(variants):
+    one = particle(variants["2"], 50)
+    _, y = simulate(variants["2"], 7, 2, seed=1)
+    state = one.step(one.init(7), y[0])
+    kept = state.memory.x.copy()
+    first, second = one.step(state, y[1]), one.step(state, y[1])
+    assert np.array_equal(first.posterior.mean, second.posterior.mean)
+    assert np.array_equal(first.memory.x, second.memory.x)
+    assert np.array_equal(state.memory.x, kept)
+
+
+def test_it_is_reproducible_from_its_seed(variants):
+    _, y = simulate(variants["20"], 3, 4, seed=1)
+    again = [run(particle(variants["20"], 40, seed), y).mean for seed in (1, 1, 2)]
+    assert np.array_equal(again[0], again[1])
+    assert not np.array_equal(again[0], again[2])
+
+
+def test_trajectories_have_particles_of_their_own(variants):
+    one = particle(variants["2"], 30)
+    state = one.step(one.init(2), np.array([[0.3], [0.3]]))
+    assert not np.array_equal(state.memory.x[0], state.memory.x[1])
+
+
+@pytest.mark.parametrize("name", ["53", "5", "20"])
+def test_the_effective_number_is_between_one_and_all(variants, name):
+    one = particle(variants[name], 64)
+    _, y = simulate(variants[name], 20, 8, seed=2)
+    state = one.init(20)
+    assert np.array_equal(state.memory.effective, np.full(20, 64.0))
+    for measurement in y:
+        state = one.step(state, measurement)
+        rounding = 64 * np.finfo(float).eps
+        assert (state.memory.effective >= 1 - rounding).all()
+        assert (state.memory.effective <= 64 * (1 + rounding)).all()
+
+
+def test_a_missing_measurement_weighs_nothing(variants):
+    one = particle(variants["2"], 64)
+    state = one.step(one.init(3), np.full((3, 1), np.nan))
+    np.testing.assert_allclose(state.memory.effective, 64, rtol=64 * np.finfo(float).eps)
+    np.testing.assert_allclose(state.posterior.mean, one.init(3).memory.x.mean(axis=1), rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("value", [0.0, 1e3, -1e3, 1e150])
+def test_no_measurement_makes_nan(variants, value):
+    for name in ("53", "7", "12", "20"):
+        y = np.full((3, 2, variants[name].p), value)
+        estimates = run(particle(variants[name], 100), y)
+        assert np.isfinite(estimates.mean).all(), name
+        assert np.isfinite(estimates.cov).all(), name
+
+
+def test_impossible_requests_are_refused(variants):
+    with pytest.raises(ModelError, match="at least 2 particles, got 1"):
+        particle(variants["2"], 1)
+    with pytest.raises(ModelError, match="noise enters nonlinearly"):
+        particle(Model.define("x + v", "x + w**2"))
+
+
+def test_a_nonlinear_noise_of_the_object_is_admitted():
+    model = Model.define("0.5*x + v**2", "x + w")
+    _, y = simulate(model, 2, 3, seed=1)
+    assert np.isfinite(run(particle(model, 50), y).mean).all()
