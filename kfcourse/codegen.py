@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 from sympy.printing.numpy import NumPyPrinter
+from sympy.printing.precedence import PRECEDENCE
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,7 @@ def lower(outputs: Mapping[str, sp.MatrixBase], vectors: Sequence[str], definiti
 
     for target, value in shared:
         reduced_value = without_powers(value)
-        if reduced_value.is_Symbol:
+        if reduced_value.is_Symbol or not reduced_value.free_symbols:  # constants stay where they are used
             aliases[target] = reduced_value
         else:
             assignments.append((target, reduced_value))
@@ -164,29 +165,26 @@ class _Printer(NumPyPrinter):
     _print_Half = _print_Rational
 
     def _print_Mul(self, expr: sp.Mul) -> str:
-        numbers = [a for a in expr.args if a.is_number]
-        denominators = [a for a in expr.args if not a.is_number and a.is_Pow and a.exp == -1]
-        numerators = [a for a in expr.args if not a.is_number and a not in denominators]
-        coefficient = sp.Mul(*numbers)
-        factors = [] if coefficient in (1, -1) and numerators else [self._constant(coefficient)]
-        factors += [self.parenthesize(a, sp.printing.precedence.PRECEDENCE["Mul"]) for a in numerators]
-        text = ("-" if coefficient == -1 and numerators else "") + "*".join(factors)
+        rational = sp.Mul(*(a for a in expr.args if a.is_Rational))
+        others = [a for a in expr.args if not a.is_Rational]
+        denominators = [a for a in others if a.is_Pow and a.exp == -1]
+        numerators = [a for a in others if a not in denominators]
+        factors = [self.parenthesize(a, PRECEDENCE["Mul"]) for a in numerators]
+        if rational not in (1, -1) or not factors:
+            factors.insert(0, repr(float(rational)))
+            rational = sp.S.One
+        text = ("-" if rational == -1 else "") + "*".join(factors)
         for d in denominators:
-            text += "/" + self.parenthesize(d.base, sp.printing.precedence.PRECEDENCE["Pow"])
+            text += "/" + self.parenthesize(d.base, PRECEDENCE["Pow"])
         return text
 
-    def _constant(self, number: sp.Expr) -> str:
-        if number.is_Rational:
-            return repr(float(number))
-        return self.parenthesize(number, sp.printing.precedence.PRECEDENCE["Mul"])
-
     def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:
-        base = self.parenthesize(expr.base, sp.printing.precedence.PRECEDENCE["Pow"])
+        base = self.parenthesize(expr.base, PRECEDENCE["Pow"])
         if expr.exp == -1:
             return f"1.0/{base}"
         if expr.exp == sp.S.Half:
             return f"np.sqrt({self._print(expr.base)})"
-        return f"{base}**{self.parenthesize(expr.exp, sp.printing.precedence.PRECEDENCE['Pow'])}"
+        return f"{base}**{self.parenthesize(expr.exp, PRECEDENCE['Pow'])}"
 
 
 def numpy_source(name: str, arguments: Mapping[str, sp.MatrixBase], program: Program, doc: str) -> str:

@@ -32,6 +32,7 @@ CONSTANTS = {"pi": sp.pi}
 MAX_LENGTH = 2000
 MAX_EXPONENT = 16
 MAX_DEGREE = 64
+MAX_CALLS = 20
 MAX_NUMBER = sp.Integer(10) ** 16  # bases of numeric powers: nested powers must not exhaust the memory
 MAX_ARGUMENT = 500  # arguments of functions that are plain numbers: exp(exp(exp(9))) must not either
 
@@ -166,6 +167,8 @@ class _Reader:
             raise self.fail(node.right, "an exponent must be a plain number; write exp(...) for exponentials")
         if abs(exponent) > MAX_EXPONENT:
             raise self.fail(node.right, f"the exponent is larger than {MAX_EXPONENT}")
+        if base.is_number and base.is_negative and not exponent.is_Integer:
+            raise self.fail(node, "a root of a negative number has no real value")
         if base.is_number and (abs(base) >= MAX_NUMBER or (base != 0 and abs(base) <= 1 / MAX_NUMBER)):
             raise self.fail(node, "the power of this number is too large or too small")
         result = base**exponent
@@ -174,6 +177,8 @@ class _Reader:
         return result
 
     def call(self, node: ast.Call) -> sp.Expr:
+        if sum(isinstance(inner, ast.Call) for inner in ast.walk(node)) > MAX_CALLS:
+            raise self.fail(node, f"more than {MAX_CALLS} functions inside each other; split the formula up")
         if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:
             called = node.func.id if isinstance(node.func, ast.Name) else "this"
             raise self.fail(node, f"{called!r} is not a known function; known: {', '.join(sorted(FUNCTIONS))}")

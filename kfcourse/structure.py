@@ -293,21 +293,22 @@ def _quadrature(model: Model, name: str, rule: Callable[[int], tuple[Array, Arra
     n = model.n
     state, meter = compile_model(model)
 
-    def propagate(function, mean, cov, law: Gaussian, points: Array):
+    def propagate(function, size, mean, cov, law: Gaussian, points: Array):
         x = mean[..., None, :] + points[:, :n] @ transpose(square_root(cov))
         noise = law.mean + points[:, n:] @ square_root(law.cov).T
-        return x, function(x, np.broadcast_to(noise, x.shape[:-1] + noise.shape[-1:]))
+        values = function(x, np.broadcast_to(noise, x.shape[:-1] + noise.shape[-1:]))
+        return x, np.broadcast_to(values, (*x.shape[:-1], size))
 
     state_points, state_weights = rule(n + len(model.v))
     meter_points, meter_weights = rule(n + len(model.w))
 
     def predict(z: Array, p: Array) -> Gaussian:
-        _, following = propagate(state, z, p, model.state_noise, state_points)
+        _, following = propagate(state, n, z, p, model.state_noise, state_points)
         tau = state_weights @ following
         return Gaussian(tau, _weighted(state_weights, following - tau[..., None, :]))
 
     def measure(m: Array, d: Array) -> Measurement:
-        x, y = propagate(meter, m, d, model.meter_noise, meter_points)
+        x, y = propagate(meter, model.p, m, d, model.meter_noise, meter_points)
         h = meter_weights @ y
         deviation = y - h[..., None, :]
         cross = transpose(deviation * meter_weights[:, None]) @ (x - m[..., None, :])

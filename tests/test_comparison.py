@@ -222,9 +222,15 @@ def test_the_excess_over_the_optimal_filter_is_the_distance_from_it(linear):
     assert (excess.value > SIGMA * excess.standard_error).any()
     assert (abs(gap.value - excess.value) < SIGMA * np.hypot(gap.standard_error, excess.standard_error)).all()
     assert (excess.standard_error < gap.standard_error).all()
-    # Here the control is the exact filter too: no excess, and the bound is its own error variance.
+    # Here the control is the exact filter too: no excess, and the bound is the variance that both claim.
     np.testing.assert_allclose(result.excess("aof-gaussian").value, 0, atol=1e-20)
-    np.testing.assert_allclose(result.bound().value, result.error_variance("aof-gaussian").value, rtol=1e-12)
+    bound, actual = result.bound().value, result.error_variance("duof")
+    np.testing.assert_allclose(bound, result.own_variance("aof-gaussian").value, rtol=1e-12)
+    above = result.above_bound("duof")
+    np.testing.assert_allclose(above.value, actual.value / bound - 1, rtol=1e-9)
+    np.testing.assert_allclose(above.standard_error, actual.standard_error / bound, rtol=1e-9)
+    optimal = result.above_bound("aof-gaussian")
+    assert (abs(optimal.value) < SIGMA * optimal.standard_error).all()
 
 
 def test_without_a_subset_slow_filters_are_left_out(variant53):

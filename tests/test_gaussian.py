@@ -167,7 +167,7 @@ def test_moments_of_parts_taken_together_are_moments_of_the_whole(rng, cuts):
     whole = Moments.of(target, regressor)
     parts = [Moments.of(t, g) for t, g in zip(np.split(target, cuts), np.split(regressor, cuts), strict=True)]
     together = Moments.together(parts)
-    assert together.count == 60
+    assert together.size == 60
     # Means of size 1e6 are rounded to 1e-10; deviations from them are of order 1.
     np.testing.assert_allclose(together.mean, whole.mean, rtol=1e-15 * 4)
     np.testing.assert_allclose(together.scatter, whole.scatter, rtol=1e-7, atol=1e-7)
@@ -190,3 +190,12 @@ def test_one_trajectory_is_a_regression_on_a_constant():
 def test_long_sums_are_cut_without_loss(rng, count):
     column = rng.normal(size=(count, 1))
     np.testing.assert_allclose(Moments.of(column, column).scatter, np.full((2, 2), count * column.var()), rtol=1e-11)
+
+
+def test_a_perfect_regression_leaves_no_negative_variance(rng):
+    # Cov(t) - matrix Cov(t, r)^T is a difference of equal numbers, and its rounding must not become a variance below 0.
+    for _ in range(50):
+        regressor = rng.normal(size=(30, 2))
+        fit = Moments.of(regressor @ rng.normal(size=(2, 2)), regressor).regression(2)
+        assert (np.diagonal(fit.residual) >= 0).all()
+        assert Moments.of(0.7 * regressor[:, :1], regressor[:, :1]).regression(1).residual.item() >= 0
