@@ -47,7 +47,8 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Moment]]) -> list[
                 [Gaussian(np.tile(d.model.prior.mean, (len(b.x), 1)), d.model.prior.cov) for d in designs] for b in blocks
             ]
         runs = [_BlockStep(designs, before, block) for before, block in zip(predicted, blocks, strict=True)]
-        fits = _fit_step(designs, runs, k)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported, by name
+            fits = _fit_step(designs, runs, k)
         predicted = [[step.predicted for step in run.finished()] for run in runs]
         for table, row in zip(coefficients, fits, strict=True):
             table.append(row)
@@ -88,6 +89,8 @@ def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int) -> 
                 continue
             merged = Moments.together([part for part in parts if part is not None])
             if not np.isfinite(merged.scatter).all():
+                if not all(np.isfinite(run.block.x_next).all() and np.isfinite(run.block.y).all() for run in runs):
+                    raise NotFinite(f"step {k}: the model's trajectories become infinite, check its equations and parameters")
                 raise NotFinite(
                     f"{designs[i].name}, step {k}: the design met infinite or NaN values; the model or this filter diverges"
                 )

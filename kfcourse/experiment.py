@@ -44,6 +44,8 @@ def run(one: Filter, y: Array) -> Gaussian:
     """
     if y.ndim != 3:
         raise ValueError(f"measurements must have the shape (steps, runs, p), got {y.shape}; one trajectory is y[:, None, :]")
+    if y.shape[2] != one.model.p:
+        raise ValueError(f"{one.name} expects {one.model.p} measurement component(s), got {y.shape[2]}")
     state = one.init(y.shape[1])
     estimates: list[Gaussian] = []
     for measurement in y:
@@ -109,6 +111,14 @@ def compare(
     if subset_runs < 0:
         raise ValueError(f"subset_runs must not be negative, got {subset_runs}")
 
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ValueError(f"the seed must be a non-negative whole number, got {seed!r}")
+    for one in filters:
+        if (one.model.n, one.model.p) != (model.n, model.p):
+            raise ValueError(
+                f"{one.name} was built for a model with {one.model.n} states and {one.model.p} measurements; "
+                f"this one has {model.n} and {model.p}"
+            )
     run_seed, design_seed = np.random.SeedSequence(seed).spawn(2)
     common = Ensemble(model, runs, steps, run_seed, threads)
     if same_ensemble:

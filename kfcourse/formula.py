@@ -31,8 +31,8 @@ CONSTANTS = {"pi": sp.pi}
 
 MAX_LENGTH = 2000
 MAX_EXPONENT = 16
-MAX_DEGREE = 64
-MAX_CALLS = 20
+MAX_DEGREE = 24
+MAX_NESTED = 5
 MAX_NUMBER = sp.Integer(10) ** 16  # bases of numeric powers: nested powers must not exhaust the memory
 MAX_ARGUMENT = 500  # arguments of functions that are plain numbers: exp(exp(exp(9))) must not either
 
@@ -106,6 +106,8 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
         expression = _Reader(formula, symbols, offset).read(tree)
     except RecursionError:
         raise FormulaError(formula, "the formula is nested too deeply; split it up") from None
+    if _degree(expression) > MAX_DEGREE:
+        raise FormulaError(formula, f"the formula has products of powers above degree {MAX_DEGREE}; simplify it")
     if expression.has(sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I):
         raise FormulaError(formula, "the formula has no finite real value (division by zero or root of a negative?)")
     return expression
@@ -116,6 +118,7 @@ class _Reader:
 
     def __init__(self, formula: str, symbols: dict[str, sp.Symbol], offset: int):
         self.formula, self.symbols, self.offset = formula, symbols, offset
+        self.nested = 0  # function calls around the node being read
 
     def fail(self, node: ast.expr, problem: str) -> FormulaError:
         return FormulaError(self.formula, problem, self.offset + node.col_offset)
@@ -171,20 +174,19 @@ class _Reader:
             raise self.fail(node, "a root of a negative number has no real value")
         if base.is_number and (abs(base) >= MAX_NUMBER or (base != 0 and abs(base) <= 1 / MAX_NUMBER)):
             raise self.fail(node, "the power of this number is too large or too small")
-        result = base**exponent
-        if _degree(result) > MAX_DEGREE:
-            raise self.fail(node, f"powers of powers above degree {MAX_DEGREE}; simplify the formula")
-        return result
+        return base**exponent
 
     def call(self, node: ast.Call) -> sp.Expr:
-        if sum(isinstance(inner, ast.Call) for inner in ast.walk(node)) > MAX_CALLS:
-            raise self.fail(node, f"more than {MAX_CALLS} functions inside each other; split the formula up")
         if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:
             called = node.func.id if isinstance(node.func, ast.Name) else "this"
             raise self.fail(node, f"{called!r} is not a known function; known: {', '.join(sorted(FUNCTIONS))}")
         if node.keywords or len(node.args) != 1:
             raise self.fail(node, f"{node.func.id} takes exactly one argument")
+        if self.nested >= MAX_NESTED:
+            raise self.fail(node, f"functions are nested more than {MAX_NESTED} deep")
+        self.nested += 1
         argument = self.read(node.args[0])
+        self.nested -= 1
         if argument.is_number and abs(argument) >= MAX_ARGUMENT:
             raise self.fail(node, f"the argument of {node.func.id} is too large")
         return FUNCTIONS[node.func.id](argument)

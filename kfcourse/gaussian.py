@@ -74,6 +74,14 @@ def symmetric(matrix: Array) -> Array:
     return matrix if matrix.shape[-1] == 1 else 0.5 * (matrix + transpose(matrix))
 
 
+def nonnegative(matrix: Array) -> Array:
+    """A covariance that is one but for rounding: symmetrised, its negative eigenvalues set to 0."""
+    values, vectors = np.linalg.eigh(symmetric(matrix))
+    if values.min() >= 0:
+        return symmetric(matrix)
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T
+
+
 def gain(cross: Array, cov: Array) -> Array:
     """The regression gain cross cov^+, the solution K of K cov = cross of least norm.
 
@@ -122,6 +130,8 @@ def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
         share = gain(prior.cov, F)
         K = share * G
         cov = share * R
+        if np.minimum.reduce(F, axis=None) <= 0:  # a meter that cannot vary tells nothing
+            cov = np.where(F > 0, cov, prior.cov)
     else:
         K = gain(product(prior.cov, transpose(G)), F)
         rest = np.eye(prior.cov.shape[-1]) - product(K, G)
@@ -191,7 +201,7 @@ class Moments(NamedTuple):
         cross = cov[:size, size:]
         matrix = gain(cross, cov[size:, size:])
         offset = self.mean[:size] - matrix @ self.mean[size:]
-        return Affine(matrix, offset, symmetric(cov[:size, :size] - matrix @ cross.T))
+        return Affine(matrix, offset, nonnegative(cov[:size, :size] - matrix @ cross.T))
 
 
 def dot(left: Array, right: Array) -> float:

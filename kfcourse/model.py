@@ -10,7 +10,6 @@ else (structural functions, filters, simulation, the printed equations) is deriv
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -97,7 +96,7 @@ class Model:
         >>> Model.define("c*x + e*x*v", "g*x + f*x**2*w", dict(c=0.9, e=0.05, g=1, f=0.02))
         Model(x' = c*x + e*v*x, y = f*w*x**2 + g*x; c = 9/10, e = 1/20, g = 1, f = 1/50)
         """
-        values = {_checked(name): _exact(name, value) for name, value in (parameters or {}).items()}
+        values = {_checked(name): _exact(name, value) for name, value in _table("parameters", parameters).items()}
         a, b = _as_list("state", state), _as_list("meter", meter)
         used = {name for formula in (*a, *b) for name in _names_in(formula)}
         named = _symbols(symbols, values, used, len(a))
@@ -116,6 +115,11 @@ class Model:
             _law("state_noise", state_noise, len(v)),
             _law("meter_noise", meter_noise, len(w)),
         )
+        for equation in (*model.state_equation.subs(model.values), *model.meter_equation.subs(model.values)):
+            if equation.has(sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I) or any(
+                e.is_number and e.is_real is False for e in sp.preorder_traversal(equation)
+            ):
+                raise ModelError(f"with these parameters {model} has no finite real value: {equation}")
         if not model.meter_equation.has(*x):
             raise ModelError(f"the meter {list(model.meter_equation)} does not depend on the state {list(x)}: nothing to filter")
         return model
@@ -165,6 +169,14 @@ def _by_name(*groups: tuple[sp.Symbol, ...]) -> dict[str, sp.Symbol]:
     return {s.name: s for group in groups for s in group}
 
 
+def _table(what: str, table: Mapping[str, Any] | None) -> dict[str, Any]:
+    if table is None:
+        return {}
+    if not isinstance(table, Mapping):
+        raise ModelError(f"`{what}` must be a table such as {{'name': value}}, got {table!r}")
+    return dict(table)
+
+
 def _checked(name: str) -> str:
     try:
         return check_name(name)
@@ -176,9 +188,9 @@ def _exact(name: str, value: Any) -> sp.Rational:
     """The decimal number a person typed, exactly: 0.9 is 9/10."""
     if isinstance(value, sp.Rational):
         return value
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating) or value != value:
         raise ModelError(f"parameter {name} = {value!r}: expected a finite number")
-    if value and not 1e-100 < abs(float(value)) < 1e100:
+    if value and not 1e-100 < abs(value) < 1e100:
         raise ModelError(f"parameter {name} = {value!r} is too large or too small; change the units")
     return sp.Rational(str(value))
 
@@ -190,7 +202,9 @@ def exact_matrix(array: Array) -> sp.ImmutableMatrix:
 
 
 def _as_list(what: str, formulas: Formulas) -> list[Formula]:
-    result = [formulas] if isinstance(formulas, str | sp.Expr) else list(formulas)
+    if isinstance(formulas, str | sp.Expr):
+        return [formulas]
+    result = list(formulas) if isinstance(formulas, Sequence | sp.MatrixBase) else [formulas]
     if not result:
         raise ModelError(f"`{what}` holds no formula")
     for formula in result:
@@ -207,7 +221,7 @@ def _names_in(formula: Formula) -> set[str]:
 
 def _symbols(symbols: Mapping[str, Names] | None, values: Mapping[str, Any], used: set[str], n: int) -> dict[str, list[str]]:
     """Names of the state components and noises: given, or x, v, w with numbers as the formulas use them."""
-    given = dict(symbols or {})
+    given = _table("symbols", symbols)
     if set(given) - set("xvw"):
         raise ModelError(f"`symbols` has the keys x, v, w, not {', '.join(sorted(set(given) - set('xvw')))}")
     result = {}
@@ -219,6 +233,8 @@ def _symbols(symbols: Mapping[str, Names] | None, values: Mapping[str, Any], use
         else:
             numbers = [int(name[1:]) for name in used - set(values) if re.fullmatch(key + r"[1-9][0-9]?", name)]
             names = [f"{key}{i + 1}" for i in range(max(numbers))] if numbers else [key]
+        if not names:
+            raise ModelError(f"`symbols` names no {key}; leave the key out, or give at least one name")
         result[key] = [_checked(name) for name in names]
     every = [name for names in result.values() for name in names] + list(values)
     twice = sorted({name for name in every if every.count(name) > 1})
@@ -239,7 +255,7 @@ def _read(formula: Formula, known: dict[str, sp.Symbol], what: str) -> sp.Expr:
 
 def _law(what: str, law: Mapping[str, Any] | None, size: int) -> Gaussian:
     """A Gaussian from {"mean": ..., "variance": ...}; standard normal for what is left out."""
-    law = dict(law or {})
+    law = _table(what, law)
     if set(law) - {"mean", "variance"}:
         raise ModelError(f"`{what}` has the keys mean and variance, not {', '.join(sorted(set(law) - {'mean', 'variance'}))}")
     try:

@@ -145,7 +145,8 @@ def conclusions(result: Comparison, confidence: float = 0.95) -> list[str]:
     for better, worse in pairwise(ranked):
         difference = result.score_difference(worse, better)
         low, high = (100 * float(limit) for limit in difference.interval(confidence))
-        verdict = "is more accurate than" if low > 0 else "is not significantly different from"
+        # Filters that coincide, as on a linear model, differ by rounding: 1e-14 %.
+        verdict = "is more accurate than" if low > 1e-10 else "is not significantly different from"
         sentences.append(
             f"{title(better)} {verdict} {title(worse)}: {100 * float(difference.value):.3g} % "
             f"({100 * confidence:g} % confidence: {low:.3g} to {high:.3g} %)."

@@ -45,7 +45,7 @@ class Structure:
     formulas : Formulas or None
         The symbolic functions; None for the numerical structures.
 
-    A result that does not depend on the trajectory may come without the leading axes.
+    Covariances, G and h that do not depend on the trajectory may come without the leading axes.
     """
 
     name: str
@@ -147,10 +147,15 @@ class Formulas:
         return Structure(
             self.name,
             self.model,
-            lambda z, p: Gaussian(*predict(z, p)),
+            lambda z, p: _spread(Gaussian(*predict(z, p)), z),
             lambda m, d: Measurement(*measure(m, d)),
             self,
         )
+
+
+def _spread(law: Gaussian, over: Array) -> Gaussian:
+    """A mean that no argument enters is still one for each trajectory."""
+    return law if law.mean.ndim == over.ndim else Gaussian(np.broadcast_to(law.mean, over.shape), law.cov)
 
 
 def _distinct(mean: sp.MatrixBase, cov: sp.MatrixBase) -> list[sp.Symbol]:
@@ -165,7 +170,9 @@ def gaussian_symbols(model: Model, mean: str, cov: str) -> tuple[sp.ImmutableMat
     taken = set(model.parameters) | {s.name for s in (*model.x, *model.v, *model.w)}
 
     def fresh(name: str) -> sp.Symbol:
-        return symbol(name + "_" if name in taken else name)
+        while name in taken:
+            name += "_"
+        return symbol(name)
 
     n = model.n
     if n == 1:

@@ -41,4 +41,4 @@ def aof(structure: Structure) -> Filter:
         posterior = correct(state.predicted, structure.measure(*state.predicted), y)
         return State(state.step + 1, posterior, structure.predict(*posterior))
 
-    return Filter(f"aof-{structure.name}", initial_state(structure.model), step)
+    return Filter(f"aof-{structure.name}", structure.model, initial_state(structure.model), step)

@@ -50,6 +50,8 @@ class Filter:
     ----------
     name : str
         Short name, such as "aof-gaussian".
+    model : Model
+        The model it was built for.
     init : callable
         runs -> State before the first measurement.
     step : callable
@@ -59,6 +61,7 @@ class Filter:
     """
 
     name: str
+    model: Model
     init: Callable[[int], State]
     step: Callable[[State, Array], State]
     slow: bool = False
@@ -132,7 +135,7 @@ class Design:
             result = _answer(self.equations(state.predicted, y), table[state.step])
             return State(state.step + 1, result.posterior, result.predicted)
 
-        return Filter(self.name, initial_state(self.model), step)
+        return Filter(self.name, self.model, initial_state(self.model), step)
 
 
 def _answer(equations: Equations, fits: Sequence[Affine]) -> Step:

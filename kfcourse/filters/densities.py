@@ -61,6 +61,10 @@ def _conditional(
             f"{list(equation)}: the noise enters nonlinearly, so there is no simple {name} density; "
             "the Gaussian filters (gaussian, unscented, gauss_hermite) do not need one"
         )
+    if (B * exact_matrix(law.cov) * B.T).subs(model.values).is_zero_matrix:
+        raise ModelError(
+            f"{list(equation)}: without noise there is no {name} density; use the Gaussian filters (gaussian, unscented, gauss_hermite)"
+        )
     mean = equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True)))
     cov = B * exact_matrix(law.cov) * B.T
     outputs = {"mean": mean.subs(model.values), "cov": cov.subs(model.values)}

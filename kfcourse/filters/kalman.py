@@ -11,7 +11,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.gaussian import Array, Gaussian, apply
+from kfcourse.gaussian import Array, Gaussian, Measurement, apply, correct, gain
 from kfcourse.model import Model, ModelError
 
 
@@ -28,12 +28,15 @@ def kalman(model: Model) -> Filter:
 
     def step(state: State, y: Array) -> State:
         mean, cov = state.predicted
-        K = np.linalg.solve(H @ cov @ H.T + R, H @ cov).T
+        if np.isnan(y).any():  # what is missing differs between trajectories, and so do then the covariances
+            z, P = correct(state.predicted, Measurement(apply(H, mean) + r, H, H @ cov @ H.T + R, R), y)
+            return State(state.step + 1, Gaussian(z, P), Gaussian(apply(A, z) + q, A @ P @ A.T + Q))
+        K = gain(cov @ H.T, H @ cov @ H.T + R)
         z = mean + apply(K, y - (apply(H, mean) + r))
         P = (np.eye(model.n) - K @ H) @ cov
         return State(state.step + 1, Gaussian(z, P), Gaussian(apply(A, z) + q, A @ P @ A.T + Q))
 
-    return Filter("kalman", initial_state(model), step)
+    return Filter("kalman", model, initial_state(model), step)
 
 
 def _affine(

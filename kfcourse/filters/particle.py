@@ -66,7 +66,7 @@ def particle(model: Model, particles: int = 1000, seed: int = 0) -> Filter:
         predicted = _weighted(following, np.full(weights.shape, 1.0 / particles))
         return State(state.step + 1, posterior, predicted, Particles(following, 1 / (weights**2).sum(axis=1), root))
 
-    return Filter("particle", init, step, slow=True)
+    return Filter("particle", model, init, step, slow=True)
 
 
 def _stream(root: np.random.SeedSequence, step: int) -> np.random.Generator:

@@ -128,7 +128,7 @@ def pointmass(model: Model, order: int = 8, tolerance: float = 1e-5) -> Filter:
         posterior = Gaussian(np.array([[g.mean()] for g in after.fine]), np.array([[[g.variance()]] for g in after.fine]))
         return State(state.step + 1, posterior, bayes.predicted_moments(after.fine), after)
 
-    return Filter("aof-exact", init, step, slow=True)
+    return Filter("aof-exact", model, init, step, slow=True)
 
 
 class _Bayes:
@@ -183,14 +183,14 @@ class _Bayes:
         residual = y - self.meter(x)
         result = []
         for i in np.flatnonzero(np.signbit(residual[1:]) != np.signbit(residual[:-1])):
-            low, high, width = x[i], x[i + 1], x[i + 1] - x[i]
+            low, high = x[i], x[i + 1]
             while True:  # shrink the bracket 32 times at each pass, to the last bit
                 inner = np.linspace(low, high, 33)
                 j = int(np.argmax(np.signbit(y - self.meter(inner)[1:]) != np.signbit(residual[i])))
                 if not inner[j + 1] - inner[j] < high - low:
                     break
                 low, high = inner[j], inner[j + 1]
-            offsets = width * 0.5 ** np.arange(SPLITS)
+            offsets = (borders[-1] - borders[0]) * 0.5 ** np.arange(SPLITS)
             near = np.concatenate([low - offsets, low + offsets])
             # Stop approaching where the log-likelihood has become flat.
             drop = self.log_likelihood(y, np.array([low])) - self.log_likelihood(y, near)
