@@ -77,6 +77,8 @@ def lab(
 ) -> None:
     """Compare the filters on VARIANT (such as 53) and write the report."""
     with _clear_errors():
+        if exact_runs == 1:
+            raise click.ClickException("one trajectory has no standard error: give --exact-runs 0, or at least 2")
         chosen = find_variant(variant, variants_file)
         model = chosen.model
         if names is None:

@@ -63,7 +63,7 @@ class Ensemble:
     def __post_init__(self) -> None:
         for name in ("runs", "steps", "threads"):
             value = getattr(self, name)
-            if not isinstance(value, int | np.integer) or value < 1:
+            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
                 raise ValueError(f"{name} must be a positive whole number, got {value!r}")
 
     @property

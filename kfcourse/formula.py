@@ -174,7 +174,10 @@ class _Reader:
             raise self.fail(node, "a root of a negative number has no real value")
         if base.is_number and (abs(base) >= MAX_NUMBER or (base != 0 and abs(base) <= 1 / MAX_NUMBER)):
             raise self.fail(node, "the power of this number is too large or too small")
-        return base**exponent
+        result = base**exponent
+        if _degree(result) > MAX_DEGREE:
+            raise self.fail(node, f"powers of powers above degree {MAX_DEGREE}; simplify the formula")
+        return result
 
     def call(self, node: ast.Call) -> sp.Expr:
         if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:

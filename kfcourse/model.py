@@ -188,9 +188,13 @@ def _exact(name: str, value: Any) -> sp.Rational:
     """The decimal number a person typed, exactly: 0.9 is 9/10."""
     if isinstance(value, sp.Rational):
         return value
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating) or value != value:
+    try:
+        number = float(value) if isinstance(value, int | float | np.integer | np.floating) else float("nan")
+    except OverflowError:
+        number = float("inf")
+    if isinstance(value, bool) or not np.isfinite(number):
         raise ModelError(f"parameter {name} = {value!r}: expected a finite number")
-    if value and not 1e-100 < abs(value) < 1e100:
+    if number and not 1e-100 < abs(number) < 1e100:
         raise ModelError(f"parameter {name} = {value!r} is too large or too small; change the units")
     return sp.Rational(str(value))
 
@@ -233,7 +237,7 @@ def _symbols(symbols: Mapping[str, Names] | None, values: Mapping[str, Any], use
         else:
             numbers = [int(name[1:]) for name in used - set(values) if re.fullmatch(key + r"[1-9][0-9]?", name)]
             names = [f"{key}{i + 1}" for i in range(max(numbers))] if numbers else [key]
-        if not names:
+        if not names and key != "x":
             raise ModelError(f"`symbols` names no {key}; leave the key out, or give at least one name")
         result[key] = [_checked(name) for name in names]
     every = [name for names in result.values() for name in names] + list(values)

@@ -237,6 +237,6 @@ def test_a_diverging_filter_is_named():
     # Stable object, exact meter of sharp curvature: the trajectories stay finite.
     model = Model.define("0.5*x + 0.1*v", "x + 0.1*w")
     good = kalman(model)
-    bad = type(good)("bad", good.init, lambda state, y: good.step(state, np.where(state.step == 2, np.inf, y)))
+    bad = type(good)("bad", model, good.init, lambda state, y: good.step(state, np.where(state.step == 2, np.inf, y)))
     with pytest.raises(NotFinite, match="step 2: bad became infinite or NaN although the trajectories are finite"):
         compare([good, bad], model, 50, 4, seed=1, progress=False)

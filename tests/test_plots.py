@@ -69,7 +69,16 @@ def test_a_family_has_one_colour_and_an_approximation_its_dashes():
         assert one["color"] == two["color"]
         assert one["marker"] == two["marker"]
         assert one["linestyle"] != two["linestyle"]
-    families = ("aof-gaussian", "duof", "fos-gaussian", "mfos-gaussian", "fos3-gaussian", "mfos3-gaussian", "particle", "aof-exact")
+    families = (
+        "aof-gaussian",
+        "duof",
+        "fos-gaussian",
+        "mfos-gaussian",
+        "fos3-gaussian",
+        "mfos3-gaussian",
+        "particle",
+        "aof-exact",
+    )
     assert len({plots.style(name)["color"] for name in families}) == len(families)
 
 

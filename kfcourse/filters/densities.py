@@ -63,7 +63,8 @@ def _conditional(
         )
     if (B * exact_matrix(law.cov) * B.T).subs(model.values).is_zero_matrix:
         raise ModelError(
-            f"{list(equation)}: without noise there is no {name} density; use the Gaussian filters (gaussian, unscented, gauss_hermite)"
+            f"{list(equation)}: without noise there is no {name} density; "
+            "use the Gaussian filters (gaussian, unscented, gauss_hermite)"
         )
     mean = equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True)))
     cov = B * exact_matrix(law.cov) * B.T
