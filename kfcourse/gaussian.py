@@ -124,14 +124,13 @@ def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
     its prior for the missing components.
     """
     innovation, G, F, R = y - measurement.h, measurement.G, measurement.F, measurement.R
-    if np.isnan(innovation).any():
+    if any_missing(innovation):
         innovation, G, F, R = _without_missing(innovation, G, F, R)
     if G.shape[-2:] == (1, 1):
-        share = gain(prior.cov, F)
+        varies = np.minimum.reduce(F, axis=None) > 0
+        share = prior.cov / F if varies else gain(prior.cov, F)
         K = share * G
-        cov = share * R
-        if np.minimum.reduce(F, axis=None) <= 0:  # a meter that cannot vary tells nothing
-            cov = np.where(F > 0, cov, prior.cov)
+        cov = share * R if varies else np.where(F > 0, share * R, prior.cov)  # a meter that cannot vary tells nothing
     else:
         K = gain(product(prior.cov, transpose(G)), F)
         rest = np.eye(prior.cov.shape[-1]) - product(K, G)
@@ -152,9 +151,14 @@ def _without_missing(innovation: Array, G: Array, F: Array, R: Array) -> tuple[A
     )
 
 
+def any_missing(y: Array) -> bool:
+    """Whether any entry is NaN: the minimum is then NaN too, and is the fastest pass over an array."""
+    return bool(np.isnan(np.minimum.reduce(y, axis=None)))
+
+
 def where_measured(y: Array, correction: Array) -> Array:
     """The correction, or 0 for trajectories whose measurement is missing (NaN)."""
-    if np.isnan(y).any():
+    if any_missing(y):
         return np.where(np.isnan(y).any(axis=-1, keepdims=True), 0.0, correction)
     return correction
 

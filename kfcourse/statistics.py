@@ -115,7 +115,11 @@ class Sums:
         if error.shape[1] > 1:
             self.normalised[filter_index, step] = np.add.reduceat(_normalised_square(error, cov), starts)
         elif own.ndim == 2:
-            self.normalised[filter_index, step] = np.add.reduceat(_quotient(square, own[:, 0]), starts)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                quotients = np.add.reduceat(square / own[:, 0], starts)
+            if np.isnan(quotients).any():
+                quotients = np.add.reduceat(_quotient(square, own[:, 0]), starts)
+            self.normalised[filter_index, step] = quotients
         else:  # one variance for the whole ensemble: the sums of squares are there already
             self.normalised[filter_index, step] = _quotient(self.square[filter_index, step, 0], own)
 
@@ -137,7 +141,4 @@ def _normalised_square(error: Array, cov: Array) -> Array:
 def _quotient(square: Array, variance: Array) -> Array:
     """square / variance; where the claimed variance is 0, 0 for no error and infinity for any."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        quotient = square / variance
-        if np.isnan(np.add.reduce(quotient)):
-            quotient = np.where(square > 0, square / np.maximum(variance, 0.0), 0.0)
-    return quotient
+        return np.where(square > 0, square / np.maximum(variance, 0.0), 0.0)
