@@ -9,7 +9,7 @@ INSTALLED := .venv/installed
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help book test lint unit notebooks lock clean distclean install
+.PHONY: help book test lint unit notebooks lock clean distclean install figure benchmark
 
 help:
 	@echo "make book       execute the chapters and build the book in _build/html"
@@ -17,6 +17,8 @@ help:
 	@echo "make lint       ruff check, ruff format --check, mypy"
 	@echo "make unit       unit tests and documentation examples only"
 	@echo "make install    the virtual environment .venv only"
+	@echo "make benchmark  speed of the engine, as ratios"
+	@echo "make figure     the figure of README.md"
 	@echo "make lock       compile requirements.txt from pyproject.toml"
 	@echo "make clean      remove the book;  make distclean  removes .venv too"
 	@echo "Another interpreter for .venv:  make PYTHON=python3.12 book"
@@ -38,6 +40,12 @@ unit: $(INSTALLED)
 # Executes every notebook of the built book once more and compares all outputs.
 notebooks: $(INSTALLED)
 	KFCOURSE_BOOK=required $(BIN)/pytest -q -n 2 --dist loadscope --nbval --nbval-current-env tests/test_book.py _build/jupyter_execute
+
+figure: $(INSTALLED)
+	$(BIN)/python book/readme_figure.py
+
+benchmark: $(INSTALLED)
+	$(BIN)/python benchmarks/engine.py
 
 install: $(INSTALLED)
 

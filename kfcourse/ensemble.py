@@ -51,7 +51,7 @@ class Ensemble:
         Trajectories, and measurements y_0 ... y_{steps-1} of each.
     seed : numpy.random.SeedSequence
     threads : int
-        1 draws in the calling thread; more draw ahead in threads - 1 others.
+        1 draws in the calling thread; more draw ahead in so many others.
     """
 
     model: Model
@@ -145,13 +145,16 @@ def _draw(rng: np.random.Generator, law: Gaussian, steps: int, size: int) -> Arr
 
 
 def draw_ahead(jobs: Iterable[Callable[[], T]], threads: int, ahead: int) -> Iterator[T]:
-    """Results of the jobs in order; threads - 1 workers stay up to `ahead` jobs ahead of the consumer."""
+    """Results of the jobs in order; `threads` workers stay up to `ahead` jobs ahead of the consumer.
+
+    The consumer computes meanwhile; drawing leaves the interpreter to it.
+    """
     if threads == 1:
         for job in jobs:
             yield job()
         return
     waiting: deque[Future[T]] = deque()
-    with ThreadPoolExecutor(threads - 1) as pool:
+    with ThreadPoolExecutor(threads) as pool:
         try:
             for job in jobs:
                 waiting.append(pool.submit(job))

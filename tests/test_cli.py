@@ -55,6 +55,12 @@ def no_computation(monkeypatch):
     monkeypatch.setattr(cli, "compare", never)
 
 
+@pytest.fixture
+def no_report(monkeypatch):
+    """Drawing takes most of the time of a small run; for tests of the numbers only."""
+    monkeypatch.setattr(cli, "write_report", lambda *_: [])
+
+
 def refused(result, *words):
     """A single line says what is wrong, with an exit code, and no traceback."""
     assert result.exit_code == 1
@@ -163,7 +169,7 @@ def test_every_filter_can_be_chosen(call, tmp_path):
     assert set(json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]) == set(FILTERS)
 
 
-def test_the_issue_s_file_of_variants_works(call, tmp_path):
+def test_the_issue_s_file_of_variants_works(call, no_report, tmp_path):
     assert call("lab", "53", *QUICK, "--variants", "mine.toml", "--json", "a.json", "--out", "a").exit_code == 0
     assert call("lab", "53", *QUICK, "--json", "b.json", "--out", "b").exit_code == 0
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
@@ -188,7 +194,7 @@ def test_a_variant_s_name_cannot_lead_out_of_the_folder(call, tmp_path):
 # --- reproducibility
 
 
-def test_the_same_seed_gives_the_same_bytes_whatever_the_threads(call, tmp_path):
+def test_the_same_seed_gives_the_same_bytes_whatever_the_threads(call, no_report, tmp_path):
     common = ("lab", "53", "--runs", 2000, "--steps", 6, "--exact-runs", 40, "--out", "report")
     for name, options in {"a": (), "b": (), "c": ("--threads", 1), "d": ("--seed", 2)}.items():
         assert call(*common, *options, "--json", f"{name}.json").exit_code == 0
@@ -198,7 +204,7 @@ def test_the_same_seed_gives_the_same_bytes_whatever_the_threads(call, tmp_path)
     assert a != d
 
 
-def test_designing_on_the_same_ensemble_is_another_result(call, tmp_path):
+def test_designing_on_the_same_ensemble_is_another_result(call, no_report, tmp_path):
     for name, options in {"a": (), "b": ("--same-ensemble",)}.items():
         assert call("lab", "53", *QUICK, *options, "--json", f"{name}.json").exit_code == 0
     a, b = (json.loads((tmp_path / f"{name}.json").read_text(encoding="utf-8"))["error_variance"] for name in "ab")

@@ -316,7 +316,7 @@ def test_the_masses_are_a_distribution(variants):
 
 
 def test_the_gaussian_aof_differs_where_the_posterior_is_not_gaussian(variants):
-    # A sine meter: after a few steps the estimates are apart by more than the exact filter's own error, or nothing was tested here.
+    # A sine meter: the estimates are apart by more than the exact filter's own error, or nothing was tested here.
     _, y = simulate(variants["5"], 5, 5, seed=8)
     mean, _, reported = follow(variants["5"], y)
     assert (np.abs(run(aof(gaussian(variants["5"])), y).mean[..., 0] - mean) > reported).mean() > 0.9

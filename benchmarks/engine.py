@@ -1,0 +1,130 @@
+"""Speed of the Monte Carlo engine, as ratios measured side by side in one run.
+
+    .venv/bin/python benchmarks/engine.py [--runs 100000 1000000] [--repeats 3]
+
+Prints
+- the linearised AOF, random numbers included, against filterpy's extended Kalman filter in a loop;
+- all seven filters of the lab, designed on one ensemble and compared on another, against the time one NumPy
+  Generator needs to draw as many normal numbers (four for each trajectory and step);
+- how the cost grows with runs and steps, and what share drawing and each filter take.
+
+Absolute figures move with the machine; the ratios are what to keep.  Nothing else should run meanwhile.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
+
+from kfcourse import compare, lab_filters, simulate
+from kfcourse.ensemble import Ensemble
+from kfcourse.lab import LAB, find_variant, title
+
+STEPS = 51
+
+
+def best(work: Callable[[], object], repeats: int) -> float:
+    """Shortest time of several, in seconds: the least disturbed one."""
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def filterpy_loop(runs: int) -> Callable[[], object]:
+    """Variant 53's LAOF as filterpy's users write it: an object for each trajectory, a loop over steps."""
+    c, e, g, f = 0.9, 0.05, 1.0, 0.02
+    _, y = simulate(find_variant("53").model, runs, STEPS, seed=1)
+
+    def work() -> None:
+        for trajectory in y[:, :, 0].T:
+            one = ExtendedKalmanFilter(1, 1)
+            one.x, one.P, one.F = np.zeros((1, 1)), np.eye(1), np.array([[c]])
+            for measurement in trajectory:
+                one.R = np.array([[f**2 * one.x[0, 0] ** 4 + 1e-300]])
+                one.update(np.array([[measurement]]), lambda x: np.array([[g]]), lambda x: g * x)
+                one.Q = np.array([[e**2 * one.x[0, 0] ** 2]])
+                one.predict()
+
+    return work
+
+
+def draw(numbers: int) -> Callable[[], object]:
+    """What one Generator needs for as many normal numbers, in blocks that stay in the cache."""
+    block = np.empty(16_384)
+
+    def work() -> None:
+        rng = np.random.default_rng(1)
+        for _ in range(numbers // len(block)):
+            rng.standard_normal(out=block)
+
+    return work
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--runs", type=int, nargs="+", default=[100_000, 1_000_000])
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--threads", type=int, default=2)
+    options = parser.parse_args()
+    model = find_variant("53").model
+    filters = lab_filters(model)
+
+    def lab(names=LAB, runs=options.runs[0], steps=STEPS) -> Callable[[], object]:
+        chosen = [one for one in filters if one.name in names]
+        return lambda: compare(chosen, model, runs, steps, seed=1, threads=options.threads, progress=False)
+
+    loop = best(filterpy_loop(200), options.repeats) / (200 * STEPS)
+    print(f"filterpy EKF loop: {1e6 * loop:.1f} us a trajectory-step")
+    for runs in options.runs:
+        count = runs * STEPS
+        one = best(lab(["aof-linearised"], runs), options.repeats) / count
+        drawing = best(draw(4 * count), options.repeats)
+        seven = best(lab(runs=runs), options.repeats)
+        print(f"\n{runs} trajectories x {STEPS} steps")
+        print(f"  linearised AOF, drawing included: {1e9 * one:.1f} ns a trajectory-step, {loop / one:.0f} times filterpy's loop")
+        print(f"  drawing 4 normals a trajectory-step with one Generator: {1e9 * drawing / count:.1f} ns")
+        print(
+            f"  seven filters, design and comparison: {1e9 * seven / count:.1f} ns = {seven / drawing:.2f} times the drawing alone"
+        )
+
+    print("\nGrowth of the cost of all seven filters")
+    for runs, steps in ((50_000, STEPS), (100_000, STEPS), (200_000, STEPS), (400_000, STEPS), (100_000, 102), (100_000, 204)):
+        seconds = best(lab(runs=runs, steps=steps), options.repeats)
+        print(
+            f"  {runs:7d} runs x {steps:3d} steps: {seconds:6.2f} s, {1e9 * seconds / (runs * steps):6.1f} ns a trajectory-step"
+        )
+
+    runs = options.runs[0]
+    count = runs * STEPS
+    print(f"\nShares at {runs} x {STEPS}, one thread, ns a trajectory-step")
+
+    def trajectories() -> None:
+        ensemble = Ensemble(model, runs, STEPS, np.random.SeedSequence(1))
+        for block in ensemble.by_block():
+            for _ in block:
+                pass
+
+    print(f"  drawing and simulating one ensemble {1e9 * best(trajectories, options.repeats) / count:8.1f}")
+
+    def alone(names) -> float:
+        chosen = [one for one in filters if one.name in names]
+        return best(lambda: compare(chosen, model, runs, STEPS, seed=1, threads=1, progress=False), options.repeats)
+
+    base = alone(["aof-linearised"])
+    print(f"  with the {title('aof-linearised'):<26} {1e9 * base / count:8.1f}")
+    for name in LAB:
+        if name != "aof-linearised":
+            added = alone(["aof-linearised", name]) - base
+            designed = "" if name.startswith("aof") else " (with a design ensemble of its own)"
+            print(f"  the {title(name):<6} adds {1e9 * added / count:25.1f}{designed}")
+
+
+if __name__ == "__main__":
+    main()
