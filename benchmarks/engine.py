@@ -107,8 +107,8 @@ def main() -> None:
 
     def trajectories() -> None:
         ensemble = Ensemble(model, runs, STEPS, np.random.SeedSequence(1))
-        for block in ensemble.by_block():
-            for _ in block:
+        for index in range(len(ensemble.sizes)):
+            for _ in ensemble.block(index):
                 pass
 
     print(f"  drawing and simulating one ensemble {1e9 * best(trajectories, options.repeats) / count:8.1f}")

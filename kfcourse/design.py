@@ -8,10 +8,11 @@ sent back into the equations.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from concurrent.futures import Executor
 
 import numpy as np
 
-from kfcourse.ensemble import Moment
+from kfcourse.ensemble import Moment, Serial
 from kfcourse.filters.base import Design, Filter, Step
 from kfcourse.gaussian import Affine, Gaussian, Moments
 
@@ -20,14 +21,16 @@ class NotFinite(ArithmeticError):
     """A filter or trajectory left the finite numbers."""
 
 
-def design(designs: Sequence[Design], ensemble: Iterable[list[Moment]]) -> list[Filter]:
+def design(designs: Sequence[Design], ensemble: Iterable[list[Moment]], pool: Executor | None = None) -> list[Filter]:
     """Fit every design on the same trajectories.
 
     Parameters
     ----------
     designs : sequence of Design
     ensemble : iterable
-        For each step the list of blocks `Moment(x, y, x_next)`: `Ensemble.by_step()`, or stored trajectories.
+        For each step the list of blocks `Moment(x, y, x_next)`: `Ensemble.by_step(pool)`, or stored trajectories.
+    pool : Executor, optional
+        Blocks of a step are computed in its threads.
 
     Returns
     -------
@@ -47,8 +50,7 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Moment]]) -> list[
                 [Gaussian(np.tile(d.model.prior.mean, (len(b.x), 1)), d.model.prior.cov) for d in designs] for b in blocks
             ]
         runs = [_BlockStep(designs, before, block) for before, block in zip(predicted, blocks, strict=True)]
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported, by name
-            fits = _fit_step(designs, runs, k)
+        fits = _fit_step(designs, runs, k, pool or Serial())
         predicted = [[step.predicted for step in run.finished()] for run in runs]
         for table, row in zip(coefficients, fits, strict=True):
             table.append(row)
@@ -63,8 +65,12 @@ class _BlockStep:
         self.running = [one.equations(before, block.y) for one, before in zip(designs, predicted, strict=True)]
         self.results: list[Step | None] = [None] * len(designs)
 
-    def advance(self, i: int, answer: Affine | None) -> Moments | None:
-        """Send the answer to design i; moments of the regression it asks for next, None if it is through."""
+    def advance(self, answers: dict[int, Affine | None]) -> list[Moments | None]:
+        """Answer the waiting designs; the moments of the regression each asks for next, None if it is through."""
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported, by name
+            return [self._advance(i, answer) for i, answer in answers.items()]
+
+    def _advance(self, i: int, answer: Affine | None) -> Moments | None:
         try:
             request = self.running[i].send(answer)  # type: ignore[arg-type]  # None starts a generator
         except StopIteration as stop:
@@ -76,18 +82,19 @@ class _BlockStep:
         return [step for step in self.results if step is not None]
 
 
-def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int) -> list[list[Affine]]:
+def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int, pool: Executor) -> list[list[Affine]]:
     """One step of every design: its coefficients, each regression answered from the whole ensemble."""
     fits: list[list[Affine]] = [[] for _ in designs]
     active = list(range(len(designs)))
     while active:
-        # Blocks in the outer loop: a block's trajectories stay in the cache for all designs.
-        moments = [[run.advance(i, fits[i][-1] if fits[i] else None) for i in active] for run in runs]
+        answers = {i: fits[i][-1] if fits[i] else None for i in active}
+        moments = list(pool.map(lambda run, answers=answers: run.advance(answers), runs))
         asked = []
         for i, parts in zip(active, zip(*moments, strict=True), strict=True):
             if parts[0] is None:
                 continue
-            merged = Moments.together([part for part in parts if part is not None])
+            with np.errstate(over="ignore", invalid="ignore"):
+                merged = Moments.together([part for part in parts if part is not None])
             if not np.isfinite(merged.scatter).all():
                 if not all(np.isfinite(run.block.x_next).all() and np.isfinite(run.block.y).all() for run in runs):
                     raise NotFinite(f"step {k}: the model's trajectories become infinite, check its equations and parameters")

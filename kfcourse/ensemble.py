@@ -1,17 +1,17 @@
-"""Trajectories of a model, drawn reproducibly, in blocks that fit the processor's cache.
+"""Trajectories of a model, drawn reproducibly, in blocks.
 
 Every block of trajectories and every few steps draw from a stream of their own, spawned from the seed,
 so the numbers depend neither on the number of threads nor on the order in which blocks are computed.
-Drawing takes as long as several filter steps, so threads draw ahead while the filters compute.
+NumPy releases the interpreter while it works on a block, so blocks run in parallel threads.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Iterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,10 +19,10 @@ from kfcourse.gaussian import Array, Gaussian, square_root
 from kfcourse.model import Model
 from kfcourse.structure import compile_model
 
-BLOCK = 50_000  # trajectories: long enough that the interpreter's overhead is small, short enough for the processor's caches
+# Largest and smallest block of trajectories: operations long enough to leave the interpreter to the other threads,
+# arrays short enough for the processor's caches.
+BLOCK, SMALL_BLOCK = 100_000, 16_384
 STEPS_AT_ONCE = 4  # steps drawn by one call: few calls, and little memory over the whole ensemble
-
-T = TypeVar("T")
 
 
 class Moment(NamedTuple):
@@ -58,53 +58,50 @@ class Ensemble:
     runs: int
     steps: int
     seed: np.random.SeedSequence
-    threads: int = 1
 
     def __post_init__(self) -> None:
-        for name in ("runs", "steps", "threads"):
+        for name in ("runs", "steps"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
                 raise ValueError(f"{name} must be a positive whole number, got {value!r}")
 
-    @property
+    @cached_property
     def sizes(self) -> list[int]:
-        """Number of trajectories in each block."""
-        full, rest = divmod(self.runs, BLOCK)
-        return [BLOCK] * full + ([rest] if rest else [])
+        """Number of trajectories in each block: nearly equal, and two blocks at least if they are not too small."""
+        blocks = max(-(-self.runs // BLOCK), min(2, self.runs // SMALL_BLOCK), 1)
+        return np.diff(np.linspace(0, self.runs, blocks + 1).astype(int)).tolist()
 
     @property
     def _chunks(self) -> list[range]:
         return [range(k, min(k + STEPS_AT_ONCE, self.steps)) for k in range(0, self.steps, STEPS_AT_ONCE)]
 
-    def by_block(self) -> Iterator[Iterator[Moment]]:
-        """One iterator over the steps for each block; exhaust each before taking the next."""
-        simulate = _Simulator(self.model)
-        jobs = ((block, chunk) for block in range(len(self.sizes)) for chunk in range(len(self._chunks)))
-        noises = draw_ahead((self._job(block, chunk) for block, chunk in jobs), self.threads, 2 * self.threads)
-        for block in range(len(self.sizes)):
-            yield self._steps_of_block(block, simulate, noises)
-
-    def _steps_of_block(self, block: int, simulate: _Simulator, noises: Iterator[tuple[Array, Array]]) -> Iterator[Moment]:
-        x = self._initial(block)
-        for _ in self._chunks:
-            for v, w in zip(*next(noises), strict=True):
-                moment = simulate(x, v, w)
+    def block(self, index: int) -> Iterator[Moment]:
+        """The steps of one block of trajectories."""
+        x = self._initial(index)
+        for chunk in range(len(self._chunks)):
+            for v, w in zip(*self._draw(index, chunk), strict=True):
+                moment = self._simulator(x, v, w)
                 yield moment
                 x = moment.x_next
 
-    def by_step(self) -> Iterator[list[Moment]]:
+    def by_step(self, pool: Executor | None = None) -> Iterator[list[Moment]]:
         """All blocks of a step together, step by step: for coefficients that need the whole ensemble."""
-        simulate = _Simulator(self.model)
+        pool = pool or Serial()
         blocks = range(len(self.sizes))
-        jobs = (self._job(block, chunk) for chunk in range(len(self._chunks)) for block in blocks)
-        noises = draw_ahead(jobs, self.threads, len(blocks))
-        x = [self._initial(block) for block in blocks]
-        for chunk in self._chunks:
-            drawn = [next(noises) for _ in blocks]
-            for k in range(len(chunk)):
-                moments = [simulate(x[b], drawn[b][0][k], drawn[b][1][k]) for b in blocks]
+        x = list(pool.map(self._initial, blocks))
+        drawn = [pool.submit(self._draw, b, 0) for b in blocks]
+        for chunk, steps in enumerate(self._chunks):
+            noises = [future.result() for future in drawn]
+            if chunk + 1 < len(self._chunks):
+                drawn = [pool.submit(self._draw, b, chunk + 1) for b in blocks]  # ahead of time
+            for k in range(len(steps)):
+                moments = list(pool.map(self._simulator, x, [v[k] for v, _ in noises], [w[k] for _, w in noises]))
                 yield moments
                 x = [moment.x_next for moment in moments]
+
+    @cached_property
+    def _simulator(self) -> _Simulator:
+        return _Simulator(self.model)
 
     def _stream(self, *key: int) -> np.random.Generator:
         spawned = np.random.SeedSequence(self.seed.entropy, spawn_key=(*self.seed.spawn_key, *key))
@@ -113,13 +110,11 @@ class Ensemble:
     def _initial(self, block: int) -> Array:
         return _draw(self._stream(block, 0), self.model.prior, 1, self.sizes[block])[0]
 
-    def _job(self, block: int, chunk: int) -> Callable[[], tuple[Array, Array]]:
-        def draw() -> tuple[Array, Array]:
-            rng, steps, size = self._stream(block, 1 + chunk), len(self._chunks[chunk]), self.sizes[block]
-            v = _draw(rng, self.model.state_noise, steps, size)
-            return v, _draw(rng, self.model.meter_noise, steps, size)
-
-        return draw
+    def _draw(self, block: int, chunk: int) -> tuple[Array, Array]:
+        """Noises of a few steps of a block: v and w, (steps, size, r)."""
+        rng, steps, size = self._stream(block, 1 + chunk), len(self._chunks[chunk]), self.sizes[block]
+        v = _draw(rng, self.model.state_noise, steps, size)
+        return v, _draw(rng, self.model.meter_noise, steps, size)
 
 
 class _Simulator:
@@ -144,27 +139,20 @@ def _draw(rng: np.random.Generator, law: Gaussian, steps: int, size: int) -> Arr
     return law.mean + standard @ square_root(law.cov).T
 
 
-def draw_ahead(jobs: Iterable[Callable[[], T]], threads: int, ahead: int) -> Iterator[T]:
-    """Results of the jobs in order; `threads` workers stay up to `ahead` jobs ahead of the consumer.
+class Serial(Executor):
+    """An executor without threads: everything is done at once, by the caller."""
 
-    The consumer computes meanwhile; drawing leaves the interpreter to it.
-    """
-    if threads == 1:
-        for job in jobs:
-            yield job()
-        return
-    waiting: deque[Future[T]] = deque()
-    with ThreadPoolExecutor(threads) as pool:
-        try:
-            for job in jobs:
-                waiting.append(pool.submit(job))
-                if len(waiting) > ahead:
-                    yield waiting.popleft().result()
-            while waiting:
-                yield waiting.popleft().result()
-        finally:
-            for future in waiting:
-                future.cancel()
+    def submit(self, fn, /, *args, **kwargs) -> Future[Any]:
+        future: Future[Any] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+def workers(threads: int) -> Executor:
+    """An executor of so many threads; the results do not depend on their number."""
+    if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 1:
+        raise ValueError(f"threads must be a positive whole number, got {threads!r}")
+    return Serial() if threads == 1 else ThreadPoolExecutor(int(threads))
 
 
 def simulate(model: Model, runs: int, steps: int, seed: int) -> Trajectories:
@@ -172,8 +160,8 @@ def simulate(model: Model, runs: int, steps: int, seed: int) -> Trajectories:
     ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(seed))
     x, y = np.empty((steps, runs, model.n)), np.empty((steps, runs, model.p))
     start = 0
-    for size, block in zip(ensemble.sizes, ensemble.by_block(), strict=True):
-        for k, moment in enumerate(block):
+    for index, size in enumerate(ensemble.sizes):
+        for k, moment in enumerate(ensemble.block(index)):
             x[k, start : start + size], y[k, start : start + size] = moment.x, moment.y
         start += size
     return Trajectories(x, y)

@@ -8,8 +8,8 @@ batches of trajectories, never the trajectories themselves.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Sequence
+from concurrent.futures import Executor
 from typing import TypeVar
 
 import numpy as np
@@ -17,7 +17,7 @@ from tqdm import tqdm
 
 from kfcourse.comparison import EXACT, Comparison, Subset
 from kfcourse.design import NotFinite, design
-from kfcourse.ensemble import BLOCK, Ensemble, Moment
+from kfcourse.ensemble import Ensemble, Moment, workers
 from kfcourse.filters.base import Design, Filter
 from kfcourse.gaussian import Array, Gaussian
 from kfcourse.model import Model
@@ -88,7 +88,7 @@ def compare(
         Slow filters (exact, particle) run on this many of the common trajectories; their error variance
         is found through the paired difference with the first fast filter.  0 leaves them out.
     threads : int
-        Threads that draw random numbers ahead, and run slow filters.
+        Threads that share the blocks of trajectories.
     progress : bool, optional
         Show progress bars; by default if standard error is a terminal.
 
@@ -120,41 +120,42 @@ def compare(
                 f"this one has {model.n} and {model.p}"
             )
     run_seed, design_seed = np.random.SeedSequence(seed).spawn(2)
-    common = Ensemble(model, runs, steps, run_seed, threads)
-    if same_ensemble:
-        design_ensemble = common
-    else:
-        design_ensemble = Ensemble(model, runs if design_runs is None else design_runs, steps, design_seed, threads)
-    ready = _designed(fast, design_ensemble, progress)
-    sums = Sums.concatenate(list(_run_blocks(ready, common, progress)))
-    subset = None
-    if slow:
-        size = min(subset_runs, runs)
-        subset = Subset(
-            [one.name for one in slow], _run_subset([*ready, *_designed(slow, design_ensemble, progress)], common, size, progress)
-        )
+    common = Ensemble(model, runs, steps, run_seed)
+    design_ensemble = (
+        common if same_ensemble else Ensemble(model, runs if design_runs is None else design_runs, steps, design_seed)
+    )
+    with workers(threads) as pool:
+        ready = _designed(fast, design_ensemble, pool, progress)
+        sums = _run_blocks(ready, common, pool, progress)
+        subset = None
+        if slow:
+            ready += _designed(slow, design_ensemble, pool, progress)
+            size = min(subset_runs, runs)
+            subset = Subset([one.name for one in slow], _run_subset(ready, common, size, pool, progress))
     return Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset)
 
 
-def _designed(filters: Sequence[Filter | Design], ensemble: Ensemble, progress: bool | None) -> list[Filter]:
+def _designed(filters: Sequence[Filter | Design], ensemble: Ensemble, pool: Executor, progress: bool | None) -> list[Filter]:
     """The filters in their order, those that need it designed on the ensemble."""
     designs = [one for one in filters if isinstance(one, Design)]
     fitted: dict[str, Filter] = {}
     if designs:
-        steps = _progress(ensemble.by_step(), "designing", ensemble.steps, "step", progress)
-        fitted = {one.name: one for one in design(designs, steps)}
+        steps = _progress(ensemble.by_step(pool), "designing", ensemble.steps, "step", progress)
+        fitted = {one.name: one for one in design(designs, steps, pool)}
     return [fitted[one.name] if isinstance(one, Design) else one for one in filters]
 
 
-def _run_blocks(filters: Sequence[Filter], ensemble: Ensemble, progress: bool | None) -> Iterator[Sums]:
-    """Sums of each block of the ensemble, one block after another."""
-    blocks = len(ensemble.sizes)
-    bar = _progress(zip(ensemble.sizes, ensemble.by_block(), strict=True), "comparing", blocks, "block", progress)
-    for size, moments in bar:
-        batches = max(1, round(BATCHES * size / ensemble.runs))
-        sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, size, batches)
-        _run_block(filters, moments, sums)
-        yield sums
+def _run_blocks(filters: Sequence[Filter], ensemble: Ensemble, pool: Executor, progress: bool | None) -> Sums:
+    """Sums over all trajectories, its blocks in parallel."""
+
+    def block(index: int) -> Sums:
+        size = ensemble.sizes[index]
+        sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, size, max(1, round(BATCHES * size / ensemble.runs)))
+        _run_block(filters, ensemble.block(index), sums)
+        return sums
+
+    indices = range(len(ensemble.sizes))
+    return Sums.concatenate(list(_progress(pool.map(block, indices), "comparing", len(indices), "block", progress)))
 
 
 def _run_block(filters: Sequence[Filter], moments: Iterable[Moment], sums: Sums, reference: int | None = None) -> None:
@@ -190,7 +191,7 @@ def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
     )
 
 
-def _run_subset(filters: Sequence[Filter], ensemble: Ensemble, size: int, progress: bool | None) -> Sums:
+def _run_subset(filters: Sequence[Filter], ensemble: Ensemble, size: int, pool: Executor, progress: bool | None) -> Sums:
     """All filters on the first `size` trajectories, in chunks over the threads."""
     starts = range(0, size, SUBSET_CHUNK)
     x, y, x_next = _first(ensemble, size)
@@ -205,16 +206,17 @@ def _run_subset(filters: Sequence[Filter], ensemble: Ensemble, size: int, progre
         _run_block(filters, moments, sums, reference)
         return sums
 
-    with ThreadPoolExecutor(ensemble.threads) as pool:
-        return Sums.concatenate(list(_progress(pool.map(chunk, starts), "slow filters", len(starts), "chunk", progress)))
+    return Sums.concatenate(list(_progress(pool.map(chunk, starts), "slow filters", len(starts), "chunk", progress)))
 
 
 def _first(ensemble: Ensemble, size: int) -> tuple[Array, Array, Array]:
     """The first `size` of the ensemble's trajectories: x, y and the following x, (steps, size, ...)."""
     parts: list[list[Moment]] = []
-    for start, moments in zip(range(0, size, BLOCK), ensemble.by_block(), strict=False):
-        rows = slice(0, min(BLOCK, size - start))
-        parts.append([Moment(*(a[rows].copy() for a in moment)) for moment in moments])
+    left = size
+    for index, block in enumerate(ensemble.sizes):
+        if left > 0:
+            parts.append([Moment(*(a[:left].copy() for a in moment)) for moment in ensemble.block(index)])
+            left -= block
     x, y, x_next = (np.stack([np.concatenate([part[k][i] for part in parts]) for k in range(ensemble.steps)]) for i in range(3))
     return x, y, x_next
 

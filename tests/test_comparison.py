@@ -31,7 +31,8 @@ def linear():
 
 def stored(model, runs, steps, seed):
     """The trajectories of compare(..., seed): x (steps, runs, n) and y (steps, runs, p)."""
-    blocks = [list(block) for block in Ensemble(model, runs, steps, np.random.SeedSequence(seed).spawn(2)[0]).by_block()]
+    ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(seed).spawn(2)[0])
+    blocks = [list(ensemble.block(index)) for index in range(len(ensemble.sizes))]
     return tuple(np.stack([np.concatenate([block[k][i] for block in blocks]) for k in range(steps)]) for i in (0, 1))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kfcourse.design import NotFinite
-from kfcourse.ensemble import BLOCK, Ensemble, simulate
+from kfcourse.ensemble import BLOCK, SMALL_BLOCK, Ensemble, simulate, workers
 from kfcourse.experiment import compare, run
 from kfcourse.filters.aof import aof
 from kfcourse.filters.duof import duof
@@ -77,20 +77,22 @@ def test_the_seed_decides_the_trajectories(variant53):
     assert not np.isin(first.x[0], other.x[0]).any()
 
 
-def test_more_trajectories_leave_the_first_blocks_as_they_are(variant53):
-    short, long = simulate(variant53, BLOCK, 2, seed=4), simulate(variant53, BLOCK + 10, 2, seed=4)
-    np.testing.assert_array_equal(long.x[:, :BLOCK], short.x)
-    np.testing.assert_array_equal(long.y[:, :BLOCK], short.y)
-    assert long.x.shape == (2, BLOCK + 10, 1)
-    assert not np.isin(long.x[0, BLOCK:], short.x[0]).any()
+@pytest.mark.parametrize("runs", [1, 3, 2 * SMALL_BLOCK - 1, 2 * SMALL_BLOCK, BLOCK - 1, BLOCK + 1, 3 * BLOCK])
+def test_blocks_are_nearly_equal_and_none_is_too_long(variant53, runs):
+    sizes = Ensemble(variant53, runs, 1, np.random.SeedSequence(0)).sizes
+    assert sum(sizes) == runs
+    assert max(sizes) <= BLOCK
+    assert max(sizes) - min(sizes) <= 1
+    assert len(sizes) >= 2 or runs < 2 * SMALL_BLOCK
 
 
-@pytest.mark.parametrize("runs", [1, 3, BLOCK - 1, BLOCK, BLOCK + 1])
+@pytest.mark.parametrize("runs", [1, 3, 2 * SMALL_BLOCK + 1])
 @pytest.mark.parametrize("threads", [1, 3])
 def test_by_step_and_by_block_are_the_same_trajectories(variant53, runs, threads):
-    ensemble = Ensemble(variant53, runs, 5, np.random.SeedSequence(6), threads)
-    blocks = [list(block) for block in ensemble.by_block()]
-    steps = list(ensemble.by_step())
+    ensemble = Ensemble(variant53, runs, 5, np.random.SeedSequence(6))
+    blocks = [list(ensemble.block(index)) for index in range(len(ensemble.sizes))]
+    with workers(threads) as pool:
+        steps = list(ensemble.by_step(pool))
     assert (len(steps), len(blocks), sum(ensemble.sizes)) == (5, len(ensemble.sizes), runs)
     for k, step in enumerate(steps):
         for block, moment in zip(blocks, step, strict=True):
@@ -135,7 +137,7 @@ def numbers(comparison):
     return [getattr(comparison.sums, name) for name in ("counts", "error", "square", "own", "normalised")]
 
 
-@pytest.mark.parametrize("runs", [37, BLOCK + 1234])
+@pytest.mark.parametrize("runs", [37, 2 * SMALL_BLOCK + 1234])
 def test_the_number_of_threads_changes_nothing(variant53, runs):
     results = [compare(lab_of(variant53), variant53, runs, 6, seed=7, threads=threads, progress=False) for threads in (1, 2, 3)]
     for other in results[1:]:
