@@ -88,7 +88,7 @@ def main() -> None:
         drawing = best(draw(4 * count), options.repeats)
         seven = best(lab(runs=runs), options.repeats)
         print(f"\n{runs} trajectories x {STEPS} steps")
-        print(f"  linearised AOF, drawing included: {1e9 * one:.1f} ns a trajectory-step, {loop / one:.0f} times filterpy's loop")
+        print(f"  linearised AOF, drawing included: {1e9 * one:.1f} ns a trajectory-step, filterpy's loop x {loop / one:.0f}")
         print(f"  drawing 4 normals a trajectory-step with one Generator: {1e9 * drawing / count:.1f} ns")
         print(
             f"  seven filters, design and comparison: {1e9 * seven / count:.1f} ns = {seven / drawing:.2f} times the drawing alone"

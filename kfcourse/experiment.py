@@ -131,7 +131,7 @@ def compare(
         if slow:
             ready += _designed(slow, design_ensemble, pool, progress)
             size = min(subset_runs, runs)
-            subset = Subset([one.name for one in slow], _run_subset(ready, common, size, pool, progress))
+            subset = Subset([one.name for one in slow], _run_subset(ready, common, size, progress))
     return Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset)
 
 
@@ -191,8 +191,8 @@ def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
     )
 
 
-def _run_subset(filters: Sequence[Filter], ensemble: Ensemble, size: int, pool: Executor, progress: bool | None) -> Sums:
-    """All filters on the first `size` trajectories, in chunks over the threads."""
+def _run_subset(filters: Sequence[Filter], ensemble: Ensemble, size: int, progress: bool | None) -> Sums:
+    """All filters on the first `size` trajectories, in chunks; one thread, as short operations gain nothing from more."""
     starts = range(0, size, SUBSET_CHUNK)
     x, y, x_next = _first(ensemble, size)
     names = [one.name for one in filters]
@@ -206,7 +206,7 @@ def _run_subset(filters: Sequence[Filter], ensemble: Ensemble, size: int, pool: 
         _run_block(filters, moments, sums, reference)
         return sums
 
-    return Sums.concatenate(list(_progress(pool.map(chunk, starts), "slow filters", len(starts), "chunk", progress)))
+    return Sums.concatenate(list(_progress(map(chunk, starts), "slow filters", len(starts), "chunk", progress)))
 
 
 def _first(ensemble: Ensemble, size: int) -> tuple[Array, Array, Array]:

@@ -30,6 +30,7 @@ WIDTH = 8.0  # sigmas covered: 1e-15 of a normal law lies outside
 NEGLIGIBLE = 1e-14  # mass of a panel that may be left out
 KERNEL = 3.0  # a panel is at most so many sigmas of the transition kernel wide, that the integral be smooth on it
 SPLITS = 40  # times a panel may be halved
+SECTIONS = np.linspace(0, 1, 257)  # of a bracket, in the search for a zero
 SCALES = (0.5, 2.0, WIDTH)  # distances, in kernel sigmas, of panel borders from the prediction's own centres
 QUANTILES = np.array([0.02, 0.25, 0.5, 0.75, 0.98])  # of the posterior, where those centres are
 
@@ -138,7 +139,7 @@ class _Bayes:
         self.prior = model.prior
         law, meter, log_likelihood = transition(model), noiseless_meter(model), likelihood(model)
         self.law: Callable[[Array], Gaussian] = lambda x: law(x[:, None])
-        self.meter: Callable[[Array], Array] = lambda x: np.broadcast_to(meter(x[:, None])[:, 0], x.shape)
+        self.meter: Callable[[Array], Array] = lambda x: meter(x[:, None])[:, 0] + np.zeros(len(x))
         self.log_likelihood: Callable[[float, Array], Array] = lambda y, x: log_likelihood(np.array([[y]]), x[:, None])
 
     def posterior(self, before: Grid | None, y: float, rule: Rule) -> Grid:
@@ -184,8 +185,8 @@ class _Bayes:
         result = []
         for i in np.flatnonzero(np.signbit(residual[1:]) != np.signbit(residual[:-1])):
             low, high = x[i], x[i + 1]
-            while True:  # shrink the bracket 32 times at each pass, to the last bit
-                inner = np.linspace(low, high, 33)
+            while True:  # shrink the bracket 256 times at each pass, to the last bit
+                inner = low + (high - low) * SECTIONS
                 j = int(np.argmax(np.signbit(y - self.meter(inner)[1:]) != np.signbit(residual[i])))
                 if not inner[j + 1] - inner[j] < high - low:
                     break
