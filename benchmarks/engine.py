@@ -88,11 +88,10 @@ def main() -> None:
         drawing = best(draw(4 * count), options.repeats)
         seven = best(lab(runs=runs), options.repeats)
         print(f"\n{runs} trajectories x {STEPS} steps")
-        print(f"  linearised AOF, drawing included: {1e9 * one:.1f} ns a trajectory-step, filterpy's loop x {loop / one:.0f}")
+        print(f"  linearised AOF, drawing included: {1e9 * one:.1f} ns a trajectory-step")
+        print(f"  filterpy's loop takes {loop / one:.0f} times as long")
         print(f"  drawing 4 normals a trajectory-step with one Generator: {1e9 * drawing / count:.1f} ns")
-        print(
-            f"  seven filters, design and comparison: {1e9 * seven / count:.1f} ns = {seven / drawing:.2f} times the drawing alone"
-        )
+        print(f"  seven filters, designed and compared: {1e9 * seven / count:.1f} ns = {seven / drawing:.2f} times that")
 
     print("\nGrowth of the cost of all seven filters")
     for runs, steps in ((50_000, STEPS), (100_000, STEPS), (200_000, STEPS), (400_000, STEPS), (100_000, 102), (100_000, 204)):
