@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -148,11 +149,16 @@ class Serial(Executor):
         return future
 
 
-def workers(threads: int) -> Executor:
-    """An executor of so many threads; the results do not depend on their number."""
+@contextmanager
+def workers(threads: int) -> Iterator[Executor]:
+    """An executor of so many threads, on whose number no result depends; what waits is dropped on an error or interrupt."""
     if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 1:
         raise ValueError(f"threads must be a positive whole number, got {threads!r}")
-    return Serial() if threads == 1 else ThreadPoolExecutor(int(threads))
+    pool = Serial() if threads == 1 else ThreadPoolExecutor(int(threads))
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def simulate(model: Model, runs: int, steps: int, seed: int) -> Trajectories:

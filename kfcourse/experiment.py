@@ -86,7 +86,7 @@ def compare(
         filters, by about the number of coefficients over `runs`.
     subset_runs : int
         Slow filters (exact, particle) run on this many of the common trajectories; their error variance
-        is found through the paired difference with the first fast filter.  0 leaves them out.
+        is found through the paired difference from the Gaussian AOF (or else the first fast filter).  0 leaves them out.
     threads : int
         Threads that share the blocks of trajectories.
     progress : bool, optional
@@ -99,26 +99,10 @@ def compare(
     NotFinite
         A trajectory or a filter left the finite numbers.
     """
+    _check_arguments(filters, model, seed, subset_runs)
     names = [one.name for one in filters]
-    if len(set(names)) < len(names) or not names:
-        raise ValueError(f"give at least one filter, and each a name of its own: {', '.join(names) or 'none given'}")
     slow = [one for one in filters if one.slow and subset_runs]
     fast = [one for one in filters if not one.slow]
-    if slow and not fast:
-        raise ValueError(f"{slow[0].name} is found through its difference from a fast filter; add one, such as aof-gaussian")
-    if not fast:
-        raise ValueError("only slow filters were given and their subset is 0; set subset_runs")
-    if subset_runs < 0:
-        raise ValueError(f"subset_runs must not be negative, got {subset_runs}")
-
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise ValueError(f"the seed must be a non-negative whole number, got {seed!r}")
-    for one in filters:
-        if (one.model.n, one.model.p) != (model.n, model.p):
-            raise ValueError(
-                f"{one.name} was built for a model with {one.model.n} states and {one.model.p} measurements; "
-                f"this one has {model.n} and {model.p}"
-            )
     run_seed, design_seed = np.random.SeedSequence(seed).spawn(2)
     common = Ensemble(model, runs, steps, run_seed)
     design_ensemble = (
@@ -133,6 +117,25 @@ def compare(
             size = min(subset_runs, runs)
             subset = Subset([one.name for one in slow], _run_subset(ready, common, size, progress))
     return Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset)
+
+
+def _check_arguments(filters: Sequence[Filter | Design], model: Model, seed: int, subset_runs: int) -> None:
+    """ValueError for what `compare` cannot do with these arguments."""
+    names = [one.name for one in filters]
+    if len(set(names)) < len(names) or not names:
+        raise ValueError(f"give at least one filter, and each a name of its own: {', '.join(names) or 'none given'}")
+    if all(one.slow for one in filters):
+        raise ValueError(f"{names[0]} is found through its difference from a fast filter; add one, such as aof-gaussian")
+    if subset_runs < 0:
+        raise ValueError(f"subset_runs must not be negative, got {subset_runs}")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ValueError(f"the seed must be a non-negative whole number, got {seed!r}")
+    for one in filters:
+        if (one.model.n, one.model.p) != (model.n, model.p):
+            raise ValueError(
+                f"{one.name} was built for a model with {one.model.n} states and {one.model.p} measurements; "
+                f"this one has {model.n} and {model.p}"
+            )
 
 
 def _designed(filters: Sequence[Filter | Design], ensemble: Ensemble, pool: Executor, progress: bool | None) -> list[Filter]:

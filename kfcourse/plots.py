@@ -57,7 +57,8 @@ def relative_accuracy(
 ) -> Axes:
     """D_k of every filter relative to the Gaussian AOF's, in per cent, with bands of paired confidence."""
     k = np.arange(result.steps)[steps]
-    for name in names or [n for n in result.available if n != result.control]:
+    names = [n for n in result.available if n != result.control] if names is None else names
+    for name in names:
         ratio = result.relative(name)[steps]
         middle, half = 100 * (ratio.value - 1), 100 * ratio.half_width(confidence)
         line = style(name)
@@ -67,7 +68,8 @@ def relative_accuracy(
     ax.set_xlabel("step $k$")
     ax.set_ylabel(f"$D_k$ relative to {title(result.control)}, %")
     ax.grid(True, alpha=0.3)
-    ax.legend(fontsize="small", ncols=2)
+    if names:
+        ax.legend(fontsize="small", ncols=2)
     return ax
 
 

@@ -60,17 +60,18 @@ class Structure:
         return matrix[0] if matrix.shape == (1, 1) else matrix
 
     def latex(self) -> str:
-        """The five functions as a LaTeX `aligned` block, parameters as symbols."""
+        """The five functions as a LaTeX `aligned` block, parameters as symbols; matrices entry by entry."""
         formulas = self._derived()
         lines = []
-        for name in formulas.functions:
-            arguments = formulas.state_arguments if name in ("tau", "Theta") else formulas.meter_arguments
-            names = (
-                ", ".join(sp.latex(a) for a in arguments)
-                if self.model.n == 1
-                else ("z, p" if name in ("tau", "Theta") else "m, d")
-            )
-            lines.append(rf"{FUNCTION_LATEX[name]}({names}) &= {sp.latex(self[name])}")
+        for name, matrix in formulas.functions.items():
+            before_state = name in ("tau", "Theta")
+            arguments = formulas.state_arguments if before_state else formulas.meter_arguments
+            names = ", ".join(sp.latex(a) for a in arguments) if self.model.n == 1 else ("z, p" if before_state else "m, d")
+            for i, j in cartesian(range(matrix.rows), range(matrix.cols)):
+                if name in ("Theta", "F") and i > j:
+                    continue  # symmetric
+                index = "" if len(matrix) == 1 else f"_{{{i + 1}}}" if matrix.cols == 1 else f"_{{{i + 1}{j + 1}}}"
+                lines.append(rf"{FUNCTION_LATEX[name]}{index}({names}) &= {sp.latex(matrix[i, j])}")
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
     def source(self) -> str:
