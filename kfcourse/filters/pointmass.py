@@ -5,9 +5,9 @@
 The posterior is held as masses on nodes (point masses).  Its estimate, the posterior mean, has the least
 mean square error of all filters, so it bounds what any approximation can reach.
 
-The lab's noises are multiplicative: densities are a thousand times narrower at the end of a run than at
-its beginning, and within one step the posterior may be hundreds of times narrower than the prediction,
-far narrower than any fixed grid would see.  So each trajectory gets its own panels at every step: over
+The lab's noises are multiplicative: densities are many orders of magnitude narrower at the end of a run
+than at its beginning, and within one step the posterior may be thousands of times narrower than the
+prediction, far narrower than any fixed grid would see.  So each trajectory gets its own panels at every step: over
 the support of the prediction, geometrically finer towards the states that would explain the measurement
 without noise, and then split until a Gauss-Legendre rule resolves the posterior on each of them.
 """
