@@ -207,7 +207,7 @@ def numpy_source(name: str, arguments: Mapping[str, sp.MatrixBase], program: Pro
     printer = _Printer(rename)
     lines += [f"    {rename[target]} = {printer.doprint(value)}" for target, value in program.assignments]
     for output, entries in program.outputs.items():
-        lines += _assemble(output, entries, output in program.vectors, rename, arguments, program.vectors, printer)
+        lines += _assemble(output, entries, output in program.vectors, arguments, program.vectors, printer)
     lines.append(f"    return {', '.join(program.outputs)}{',' if len(program.outputs) == 1 else ''}")
     return "\n".join(lines) + "\n"
 
@@ -216,7 +216,6 @@ def _assemble(
     output: str,
     entries: sp.MatrixBase,
     is_vector: bool,
-    rename: Mapping[sp.Symbol, str],
     arguments: Mapping[str, sp.MatrixBase],
     vectors: frozenset[str],
     printer: _Printer,

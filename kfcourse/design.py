@@ -13,7 +13,7 @@ from concurrent.futures import Executor
 import numpy as np
 
 from kfcourse.ensemble import Moment, Serial
-from kfcourse.filters.base import Design, Filter, Step
+from kfcourse.filters.base import Design, Filter, Step, initial_state
 from kfcourse.gaussian import Affine, Gaussian, Moments
 
 
@@ -46,9 +46,7 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Moment]], pool: Ex
     predicted: list[list[Gaussian]] = []  # [block][design]
     for k, blocks in enumerate(ensemble):
         if not predicted:
-            predicted = [
-                [Gaussian(np.tile(d.model.prior.mean, (len(b.x), 1)), d.model.prior.cov) for d in designs] for b in blocks
-            ]
+            predicted = [[initial_state(d.model)(len(b.x)).predicted for d in designs] for b in blocks]
         runs = [_BlockStep(designs, before, block) for before, block in zip(predicted, blocks, strict=True)]
         fits = _fit_step(designs, runs, k, pool or Serial())
         predicted = [[step.predicted for step in run.finished()] for run in runs]

@@ -94,8 +94,7 @@ class GaussianMoments:
     def _scale(self, rate: tuple[sp.Expr, ...]) -> sp.Expr:
         """exp(a^T m + a^T P a / 2), the imaginary part of the exponent as cosine and sine."""
         a = sp.Matrix(rate)
-        re, im = sp.expand((a.T * self.mean + a.T * self.cov * a / 2)[0]).as_real_imag()
-        return sp.exp(re) * (sp.cos(im) + sp.I * sp.sin(im))
+        return _cis(sp.expand((a.T * self.mean + a.T * self.cov * a / 2)[0]))
 
     def _polynomial_mean(self, polynomial: sp.Expr, rate: tuple[sp.Expr, ...]) -> sp.Expr:
         """M[polynomial(m + P a + delta)], delta ~ N(0, P)."""
@@ -106,15 +105,13 @@ class GaussianMoments:
         )
         total = sp.S.Zero
         for powers, coefficient in sp.Poly(sp.expand(shifted), *deviations).terms():
-            total += coefficient * self._central(powers)
+            total += coefficient * self._central_moment(powers)
         return sp.expand(total)
 
-    def _central(self, powers: tuple[int, ...]) -> sp.Expr:
-        """M[prod delta_i^powers_i] by Isserlis' recursion: pair one factor with each of the others."""
-        return self._central_moments(powers)
-
     @cached_property
-    def _central_moments(self):
+    def _central_moment(self):
+        """M[prod delta_i^powers_i] by Isserlis' recursion: pair one factor with each of the others."""
+
         @cache
         def moment(powers: tuple[int, ...]) -> sp.Expr:
             if sum(powers) % 2:

@@ -40,12 +40,6 @@ def likelihood(model: Model) -> Callable[[Array, Array], Array]:
     return log_likelihood
 
 
-def noiseless_meter(model: Model) -> Callable[[Array], Array]:
-    """x (..., n) -> mean of y given x, (..., p)."""
-    law = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model)
-    return lambda x: law(x).mean
-
-
 def _log_normal(deviation: Array, variance: Array) -> Array:
     variance = np.maximum(variance, TINY)
     with np.errstate(over="ignore"):  # a deviation infinitely many sigmas away has log-density -inf

@@ -22,9 +22,10 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.filters.densities import likelihood, noiseless_meter, transition
+from kfcourse.filters.densities import likelihood, transition
 from kfcourse.gaussian import Array, Gaussian
 from kfcourse.model import Model, ModelError
+from kfcourse.structure import compile_noiseless
 
 WIDTH = 8.0  # sigmas covered: 1e-15 of a normal law lies outside
 NEGLIGIBLE = 1e-14  # mass of a panel that may be left out
@@ -137,7 +138,7 @@ class _Bayes:
 
     def __init__(self, model: Model):
         self.prior = model.prior
-        law, meter, log_likelihood = transition(model), noiseless_meter(model), likelihood(model)
+        law, log_likelihood, (_, meter) = transition(model), likelihood(model), compile_noiseless(model)
         self.law: Callable[[Array], Gaussian] = lambda x: law(x[:, None])
         self.meter: Callable[[Array], Array] = lambda x: meter(x[:, None])[:, 0] + np.zeros(len(x))
         self.log_likelihood: Callable[[float, Array], Array] = lambda y, x: log_likelihood(np.array([[y]]), x[:, None])
@@ -229,8 +230,7 @@ def _resolve(
     left, right = borders[:-1], borders[1:]
     x, logs = _evaluate(left, right, log_density, rule)
     for _ in range(SPLITS):
-        peak = logs.max()
-        values = np.exp(logs - peak) if np.isfinite(peak) else np.ones_like(logs)
+        values = _relative(logs)
         half = 0.5 * (right - left)
         mass = half * (values @ rule.weights)
         total = mass.sum()
@@ -247,13 +247,18 @@ def _resolve(
         new_x, new_logs = _evaluate(a, b, log_density, rule)
         left, right = np.concatenate([left[stay], a]), np.concatenate([right[stay], b])
         x, logs = np.concatenate([x[stay], new_x]), np.concatenate([logs[stay], new_logs])
-    peak = logs.max()
-    values = np.exp(logs - peak) if np.isfinite(peak) else np.ones_like(logs)
+    values = _relative(logs)
     masses = 0.5 * (right - left)[:, None] * rule.weights * values
     kept = masses.sum(axis=1) > NEGLIGIBLE * masses.sum()
     order = np.argsort(x[kept].ravel())
     total = masses[kept].sum()
     return Grid(*(array[kept].ravel()[order] for array in (x, masses / total, values / total)))
+
+
+def _relative(logs: Array) -> Array:
+    """The density relative to its peak; flat if no value is finite."""
+    peak = logs.max()
+    return np.exp(logs - peak) if np.isfinite(peak) else np.ones_like(logs)
 
 
 def _evaluate(left: Array, right: Array, log_density: Callable[[Array], Array], rule: Rule) -> tuple[Array, Array]:
