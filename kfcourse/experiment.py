@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
+from itertools import accumulate
 from typing import TypeVar
 
 import numpy as np
@@ -18,7 +19,7 @@ from tqdm import tqdm
 from kfcourse.comparison import EXACT, Comparison, Subset
 from kfcourse.design import NotFinite, design
 from kfcourse.ensemble import Ensemble, Moment, workers
-from kfcourse.filters.base import Design, Filter
+from kfcourse.filters.base import Design, Filter, State
 from kfcourse.gaussian import Array, Gaussian
 from kfcourse.model import Model
 from kfcourse.statistics import BATCHES, Sums
@@ -42,17 +43,29 @@ def run(one: Filter, y: Array) -> Gaussian:
     Gaussian
         Estimates (steps, runs, n) and the filter's covariances (steps, runs, n, n).
     """
+    return _stacked([one.estimate(state) for state in _states(one, y)[1:]])
+
+
+def predictions(one: Filter, y: Array) -> Gaussian:
+    """What a filter expects before each measurement: lambda_k (steps, runs, n) and Psi_k (steps, runs, n, n).
+
+    Arguments as in `run`.  `kfcourse.consistency` compares them with what then came.
+    """
+    return _stacked([state.predicted for state in _states(one, y)[:-1]])
+
+
+def _states(one: Filter, y: Array) -> list[State]:
+    """The filter's states: before the first measurement, and after each."""
     if y.ndim != 3:
         raise ValueError(f"measurements must have the shape (steps, runs, p), got {y.shape}; one trajectory is y[:, None, :]")
     if y.shape[2] != one.model.p:
         raise ValueError(f"{one.name} expects {one.model.p} measurement component(s), got {y.shape[2]}")
-    state = one.init(y.shape[1])
-    estimates: list[Gaussian] = []
-    for measurement in y:
-        state = one.step(state, measurement)
-        mean, cov = one.estimate(state)
-        estimates.append(Gaussian(mean, np.broadcast_to(cov, mean.shape + mean.shape[-1:])))
-    return Gaussian(np.stack([e.mean for e in estimates]), np.stack([e.cov for e in estimates]))
+    return list(accumulate(y, one.step, initial=one.init(y.shape[1])))
+
+
+def _stacked(laws: Sequence[Gaussian]) -> Gaussian:
+    full = [Gaussian(mean, np.broadcast_to(cov, mean.shape + mean.shape[-1:])) for mean, cov in laws]
+    return Gaussian(np.stack([law.mean for law in full]), np.stack([law.cov for law in full]))
 
 
 def compare(

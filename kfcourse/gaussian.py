@@ -102,16 +102,17 @@ def gain(cross: Array, cov: Array) -> Array:
     scale = np.where(scale > 0, scale, 1.0)
     correlation = cov / (scale[..., :, None] * scale[..., None, :])
     scaled_cross = cross / scale[..., None, :]
+    singular = SINGULAR * np.sqrt(np.finfo(correlation.dtype).eps)
     try:
-        if np.diagonal(np.linalg.cholesky(correlation), axis1=-2, axis2=-1).min() > SINGULAR:
+        if np.diagonal(np.linalg.cholesky(correlation), axis1=-2, axis2=-1).min() > singular:
             return transpose(np.linalg.solve(correlation, transpose(scaled_cross))) / scale[..., None, :]
     except np.linalg.LinAlgError:
         pass
-    return scaled_cross @ np.linalg.pinv(correlation, rcond=SINGULAR**2, hermitian=True) / scale[..., None, :]
+    return scaled_cross @ np.linalg.pinv(correlation, rcond=singular**2, hermitian=True) / scale[..., None, :]
 
 
-# A Cholesky pivot of a correlation matrix below this is rounding (float64 carries 2e-16, its root 1.5e-8).
-SINGULAR = 1e-7
+# A Cholesky pivot of a correlation matrix below this is rounding, in units of the root of the precision (1.5e-8 in float64).
+SINGULAR = 7.0
 
 
 def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
@@ -125,7 +126,7 @@ def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
     """
     innovation, G, F, R = y - measurement.h, measurement.G, measurement.F, measurement.R
     if any_missing(innovation):
-        innovation, G, F, R = _without_missing(innovation, G, F, R)
+        innovation, G, F, R = without_missing(innovation, G, F, R)
     if G.shape[-2:] == (1, 1):
         varies = np.minimum.reduce(F, axis=None) > 0
         share = prior.cov / F if varies else gain(prior.cov, F)
@@ -133,16 +134,16 @@ def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
         cov = share * R if varies else np.where(F > 0, share * R, prior.cov)  # a meter that cannot vary tells nothing
     else:
         K = gain(product(prior.cov, transpose(G)), F)
-        rest = np.eye(prior.cov.shape[-1]) - product(K, G)
+        rest = np.eye(prior.cov.shape[-1], dtype=prior.cov.dtype) - product(K, G)
         cov = symmetric(product(product(rest, prior.cov), transpose(rest)) + product(product(K, R), transpose(K)))
     return Gaussian(prior.mean + apply(K, innovation), cov)
 
 
-def _without_missing(innovation: Array, G: Array, F: Array, R: Array) -> tuple[Array, Array, Array, Array]:
+def without_missing(innovation: Array, G: Array, F: Array, R: Array) -> tuple[Array, Array, Array, Array]:
     """Take missing components out: no innovation, no sensitivity, a variance of their own."""
     missing = np.isnan(innovation)
     either = missing[..., :, None] | missing[..., None, :]
-    identity = np.eye(innovation.shape[-1])
+    identity = np.eye(innovation.shape[-1], dtype=F.dtype)
     return (
         np.where(missing, 0.0, innovation),
         np.where(missing[..., :, None], 0.0, G),

@@ -1,4 +1,4 @@
-"""The plain Kalman filter, kept as the readable special case of a linear-Gaussian model.
+"""The Kalman filter of a linear-Gaussian model, kept as the readable special case.
 
     x' = A x + B v,   y = H x + C w      (plus constants)
 
@@ -11,32 +11,50 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.gaussian import Array, Gaussian, Measurement, apply, correct, gain
+from kfcourse.gaussian import Array, symmetric
+from kfcourse.linear import LinearSystem, form
 from kfcourse.model import Model, ModelError
 
 
-def kalman(model: Model) -> Filter:
-    """The Kalman filter of a linear model; ModelError if the model is not linear.
+def kalman(model: Model, arithmetic: str = "covariance") -> Filter:
+    """The Kalman filter of a linear model.
 
     K = P^- H^T (H P^- H^T + R)^-1,   z = x^- + K (y - H x^-),   P = (I - K H) P^-
     x^- = A z,   P^- = A P A^T + Q                            (covariance (n, n): no trajectory enters)
+
+    Parameters
+    ----------
+    model : Model
+    arithmetic : {"covariance", "symmetrised", "joseph", "square-root"}
+        How the covariance is computed; see `kfcourse.linear`.
+
+    Raises
+    ------
+    ModelError
+        The model is not linear.
     """
-    A, B, a0 = _affine(model.state_equation, model.x, model.v, model)
-    H, C, b0 = _affine(model.meter_equation, model.x, model.w, model)
-    Q, q = B @ model.state_noise.cov @ B.T, a0 + B @ model.state_noise.mean
-    R, r = C @ model.meter_noise.cov @ C.T, b0 + C @ model.meter_noise.mean
+    system, shift, offset = linear_system(model)
+    chosen = form(arithmetic, system)
+
+    def init(runs: int) -> State:
+        state = initial_state(model)(runs)
+        return state._replace(memory=chosen.start(state.predicted))
 
     def step(state: State, y: Array) -> State:
-        mean, cov = state.predicted
-        if np.isnan(y).any():  # what is missing differs between trajectories, and so do then the covariances
-            z, P = correct(state.predicted, Measurement(apply(H, mean) + r, H, H @ cov @ H.T + R, R), y)
-            return State(state.step + 1, Gaussian(z, P), Gaussian(apply(A, z) + q, A @ P @ A.T + Q))
-        K = gain(cov @ H.T, H @ cov @ H.T + R)
-        z = mean + apply(K, y - (apply(H, mean) + r))
-        P = (np.eye(model.n) - K @ H) @ cov
-        return State(state.step + 1, Gaussian(z, P), Gaussian(apply(A, z) + q, A @ P @ A.T + Q))
+        corrected = chosen.correct(system, state.memory, y - offset)
+        predicted = chosen.predict(system, corrected, shift)
+        return State(state.step + 1, chosen.law(corrected), chosen.law(predicted), predicted)
 
-    return Filter("kalman", model, initial_state(model), step)
+    return Filter("kalman", model, init, step)
+
+
+def linear_system(model: Model) -> tuple[LinearSystem, Array, Array]:
+    """The matrices of a linear model, and the constants of its object (n,) and meter (p,); ModelError if it is not linear."""
+    A, B, a0 = _affine(model.state_equation, model.x, model.v, model)
+    H, C, b0 = _affine(model.meter_equation, model.x, model.w, model)
+    Q, R = (M @ law.cov @ M.T for M, law in ((B, model.state_noise), (C, model.meter_noise)))
+    system = LinearSystem(A, H, symmetric(Q), symmetric(R))
+    return system, a0 + B @ model.state_noise.mean, b0 + C @ model.meter_noise.mean
 
 
 def _affine(
