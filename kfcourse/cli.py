@@ -16,12 +16,37 @@ from kfcourse.formula import FormulaError
 from kfcourse.lab import FILTERS, LAB, VariantError, find_variant, has_exact, lab_filters, load_variants, title
 from kfcourse.model import ModelError
 from kfcourse.moments import NoClosedForm
+from kfcourse.notebooks import commands
 from kfcourse.report import conclusions, write_json, write_report
 
 _VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@contextmanager
+def _clear_errors() -> Iterator[None]:
+    """What a user did wrong is said in a sentence, not in a traceback."""
+    try:
+        yield
+    except (VariantError, FormulaError, ModelError, NoClosedForm, NotFinite, ValueError) as error:
+        raise click.ClickException(str(error)) from None
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise click.ClickException(f"{error.strerror or error}: {error.filename}") from None
+    except KeyboardInterrupt:
+        click.echo("Interrupted; files written before are as they were.", err=True)
+        sys.exit(130)
+
+
+class _Group(click.Group):
+    """Every command says what a user did wrong in a sentence."""
+
+    def invoke(self, ctx: click.Context) -> object:
+        with _clear_errors():
+            return super().invoke(ctx)
+
+
+@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="kfcourse")
 def main() -> None:
     """Kalman and nonlinear suboptimal filtering: the lab from the command line."""
@@ -31,13 +56,10 @@ def main() -> None:
 @_VARIANTS
 def variants(variants_file: Path | None) -> None:
     """List the variants of the lab."""
-    with _clear_errors():
-        for name, variant in load_variants(variants_file).items():
-            model = variant.model
-            click.echo(f"{name:>6}  {variant.title or 'no title'}")
-            click.echo(
-                f"        x' = {', '.join(map(str, model.state_equation))};  y = {', '.join(map(str, model.meter_equation))}"
-            )
+    for name, variant in load_variants(variants_file).items():
+        model = variant.model
+        click.echo(f"{name:>6}  {variant.title or 'no title'}")
+        click.echo(f"        x' = {', '.join(map(str, model.state_equation))};  y = {', '.join(map(str, model.meter_equation))}")
 
 
 @main.command()
@@ -76,23 +98,22 @@ def lab(
     json_file: Path | None,
 ) -> None:
     """Compare the filters on VARIANT (such as 53) and write the report."""
-    with _clear_errors():
-        if exact_runs == 1:
-            raise click.ClickException("one trajectory has no standard error: give --exact-runs 0, or at least 2")
-        chosen = find_variant(variant, variants_file)
-        model = chosen.model
-        if names is None:
-            wanted = [*LAB, "aof-exact"] if has_exact(model) and exact_runs else list(LAB)
-        else:
-            wanted = [name.strip() for name in names.split(",") if name.strip()]
-        filters = lab_filters(model, wanted)
-        folder = out or Path("lab-" + re.sub(r"[^\w.-]+", "-", chosen.name))  # no folder but this one
-        _check_places(folder, json_file)  # before the long part
-        click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
-        result = compare(filters, model, runs, steps, seed, subset_runs=exact_runs, same_ensemble=same_ensemble, threads=threads)
-        if json_file:
-            write_json(chosen, result, json_file)
-        write_report(chosen, result, folder)
+    if exact_runs == 1:
+        raise click.ClickException("one trajectory has no standard error: give --exact-runs 0, or at least 2")
+    chosen = find_variant(variant, variants_file)
+    model = chosen.model
+    if names is None:
+        wanted = [*LAB, "aof-exact"] if has_exact(model) and exact_runs else list(LAB)
+    else:
+        wanted = [name.strip() for name in names.split(",") if name.strip()]
+    filters = lab_filters(model, wanted)
+    folder = out or Path("lab-" + re.sub(r"[^\w.-]+", "-", chosen.name))  # no folder but this one
+    _check_places(folder, json_file)  # before the long part
+    click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
+    result = compare(filters, model, runs, steps, seed, subset_runs=exact_runs, same_ensemble=same_ensemble, threads=threads)
+    if json_file:
+        write_json(chosen, result, json_file)
+    write_report(chosen, result, folder)
     click.echo("filter       score   (mean over steps of D_k relative to " + title(result.control) + ")")
     for name, score in result.ranking():
         click.echo(f"{title(name):<10} {float(score.value):8.5f} ± {float(score.standard_error):.5f}")
@@ -112,17 +133,5 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
         raise click.ClickException(f"the numbers cannot go to {json_file}: name a file in an existing folder with --json")
 
 
-@contextmanager
-def _clear_errors() -> Iterator[None]:
-    """What a user did wrong is said in a sentence, not in a traceback."""
-    try:
-        yield
-    except (VariantError, FormulaError, ModelError, NoClosedForm, NotFinite, ValueError) as error:
-        raise click.ClickException(str(error)) from None
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        raise click.ClickException(f"{error.strerror or error}: {error.filename}") from None
-    except KeyboardInterrupt:
-        click.echo("Interrupted; files written before are as they were.", err=True)
-        sys.exit(130)
+main.add_command(commands.exercises)
+main.add_command(commands.solutions)

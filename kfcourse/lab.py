@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
@@ -24,11 +24,12 @@ class VariantError(ValueError):
 
 @dataclass(frozen=True)
 class Variant:
-    """A variant of the lab: its name in the file, a title, and its model."""
+    """A variant of the lab: its name in the file, a title, its model, and the table of the file it was read from."""
 
     name: str
     title: str
     model: Model
+    table: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
 
 class Structures:
@@ -139,10 +140,11 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
         raise VariantError(f"{where} is not valid TOML: {error}") from None
     if not isinstance(tables, dict) or not tables:
         raise VariantError(f'{where} has no variants; it needs tables such as [variants.53] with state = "..." and meter = "..."')
-    return {name: _variant(name, table, where) for name, table in tables.items()}
+    return {name: read_variant(name, table, where) for name, table in tables.items()}
 
 
-def _variant(name: str, table: Any, where: str) -> Variant:
+def read_variant(name: str, table: Any, where: str) -> Variant:
+    """A variant from its table; VariantError, naming the place, if it is not a model."""
     prefix = f"variant {name} in {where}: "
     if not isinstance(table, Mapping):
         raise VariantError(f"{prefix}expected a table [variants.{name}], got {table!r}")
@@ -155,11 +157,10 @@ def _variant(name: str, table: Any, where: str) -> Variant:
             raise VariantError(f"{prefix}`{key}` must be a table such as {{ c = 0.9 }}, got {table[key]!r}")
     options = {key: value for key, value in table.items() if key not in ("title", "state", "meter", "parameters")}
     try:
-        return Variant(
-            name, str(table.get("title", "")), Model.define(table["state"], table["meter"], table.get("parameters"), **options)
-        )
+        model = Model.define(table["state"], table["meter"], table.get("parameters"), **options)
     except (ValueError, TypeError, OverflowError) as error:  # FormulaError and ModelError are ValueErrors
         raise VariantError(f"{prefix}{error}") from None
+    return Variant(name, str(table.get("title", "")), model, dict(table))
 
 
 def find_variant(name: str, path: str | Path | None = None) -> Variant:

@@ -1,0 +1,284 @@
+"""Self-checks: is an answer right, and if not, what kind of mistake does it look like?
+
+A `Question` holds the right answer and a catalogue of `Mistake`s, wrong answers that students give, each with what to say of it.
+The student's function and they are called with the same hidden arguments; an answer that equals a mistake is recognised by name.
+Nothing that a student hands in may crash a check, and no message contains the answer.
+"""
+
+from __future__ import annotations
+
+import copy
+import signal
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from kfcourse.checks.compare import Unusable, equal, like
+
+SECONDS = 20.0  # an answer may take
+ROUNDING = 1e-9  # relative difference of numbers that rounding alone explains
+
+PASSED, WRONG, UNUSABLE, MISSING = "passed", "wrong", "unusable", "not implemented"
+MIME = "application/vnd.kfcourse.check+json"
+
+Answer = Callable[..., Any]
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """A known wrong answer.
+
+    Attributes
+    ----------
+    name : str
+        Such as "noise-forgotten"; for tests and the instructor's table.
+    says : str
+        What the student reads: the kind of mistake, not the answer.
+    answer : callable
+        Exercise -> the wrong answer (a function, as the student's).
+    """
+
+    name: str
+    says: str
+    answer: Callable[[Any], Answer]
+
+
+@dataclass(frozen=True)
+class Question:
+    """A question of an exercise set.
+
+    Attributes
+    ----------
+    name : str
+        Set and number: "a1".
+    title : str
+    level : {"warm-up", "core", "stretch"}
+    answer : callable
+        Exercise -> the right answer, a function.
+    arguments : callable
+        Exercise -> list of argument tuples with which every answer is called: symbols, or numbers from hidden seeds.
+    mistakes : tuple of Mistake
+    parts : tuple of str
+        Names of the results, if the answer returns several; each is then diagnosed by itself.
+    tolerance : float
+        Relative difference of numbers that still counts as equal.
+    """
+
+    name: str
+    title: str
+    level: str
+    answer: Callable[[Any], Answer]
+    arguments: Callable[[Any], Sequence[tuple]]
+    mistakes: tuple[Mistake, ...] = ()
+    parts: tuple[str, ...] = ()
+    tolerance: float = ROUNDING
+
+
+@dataclass(frozen=True)
+class Result:
+    """Outcome of a check; shows itself as a line of text.
+
+    Attributes
+    ----------
+    question, title : str
+    status : {"passed", "wrong", "unusable", "not implemented"}
+    message : str
+    diagnosis : tuple of str
+        Names of the mistakes it looks like.
+    """
+
+    question: str
+    title: str
+    status: str
+    message: str
+    diagnosis: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        return self.status == PASSED
+
+    def __repr__(self) -> str:
+        return f"{'✓' if self.passed else '✗'} {self.question} {self.title}: {self.message}"
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, Any]:
+        data = {"question": self.question, "status": self.status, "diagnosis": list(self.diagnosis), "message": self.message}
+        return {"text/plain": repr(self), MIME: data}
+
+
+class OutOfTime(BaseException):
+    """Not an Exception, so that `except Exception` of a student's loop does not swallow it."""
+
+
+@contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Raise OutOfTime in this block after so many seconds, and again every second while it goes on.
+
+    By the alarm signal; elsewhere than in a main thread with signals (Windows) there is no limit.
+    """
+    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(number: int, frame: Any) -> None:
+        raise OutOfTime
+
+    previous = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, seconds, 1.0)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, previous)
+
+
+class Missing(Exception):
+    """The student has not written this answer yet."""
+
+
+def call(answer: Any, arguments: Sequence[tuple], expected: Sequence[Any], seconds: float) -> list[Any]:
+    """The answer's results for every tuple of arguments, in the form of the expected ones.
+
+    Raises
+    ------
+    Missing
+        It raises NotImplementedError.
+    Unusable
+        It is not callable, fails, takes too long, or returns something of another form.
+    """
+    if not callable(answer):
+        raise Unusable(f"expected a function, got {type(answer).__name__}; pass the function itself, without calling it")
+    results = []
+    try:
+        with time_limit(seconds), np.errstate(all="ignore"):
+            for values, wanted in zip(arguments, expected, strict=True):
+                results.append(like(answer(*copy.deepcopy(values)), wanted))
+    except OutOfTime:
+        raise Unusable(f"still running after {seconds:g} s: is there a loop that never ends?") from None
+    except (Missing, Unusable):
+        raise
+    except NotImplementedError:
+        raise Missing from None
+    except RecursionError:
+        raise Unusable("calls itself without end (RecursionError)") from None
+    except (Exception, SystemExit) as error:
+        raise Unusable(f"stops with {_told(error)}") from None
+    return results
+
+
+def _told(error: BaseException) -> str:
+    """The error in one line, with the student's own line of code."""
+    text = " ".join(str(error).split())[:200]
+    if isinstance(error, TypeError) and ("to float" in text or "ufunc" in text):
+        text += " (functions of symbols are sp.sin, sp.exp, ..., not those of math or NumPy)"
+    frames = [
+        f for f in traceback.extract_tb(sys.exc_info()[2]) if "kfcourse" not in f.filename and "site-packages" not in f.filename
+    ]
+    where = f", in line {frames[-1].lineno} of {frames[-1].name}()" if frames else ""
+    return f"{type(error).__name__}: {text}{where}"
+
+
+def check(question: Question, exercise: Any, answer: Any, seconds: float = SECONDS) -> Result:
+    """Check an answer to a question; never raises because of the answer."""
+
+    def result(status: str, message: str, diagnosis: Sequence[str] = ()) -> Result:
+        return Result(question.name, question.title, status, message, tuple(diagnosis))
+
+    arguments = list(question.arguments(exercise))
+    expected = _reference(question.answer(exercise), arguments)
+    try:
+        found = call(answer, arguments, expected, seconds)
+    except Missing:
+        return result(MISSING, "not implemented yet")
+    except Unusable as reason:
+        return result(UNUSABLE, str(reason))
+    agree = partial(_agree, values=exercise.model.values, tolerance=question.tolerance)
+    if agree(found, expected):
+        return result(PASSED, "right")
+    catalogue = [(m, _wrong(m, exercise, arguments, expected)) for m in question.mistakes]
+    if not question.parts:
+        names, hint = _diagnosis(found, expected, catalogue, agree)
+        return result(WRONG, f"not right. {hint}", names)
+    right, names, hints = [], [], []
+    for i, part in enumerate(question.parts):
+        mine, theirs = _part(found, i), _part(expected, i)
+        if agree(mine, theirs):
+            right.append(part)
+            continue
+        seen, hint = _diagnosis(mine, theirs, [(m, wrong and _part(wrong, i)) for m, wrong in catalogue], agree)
+        names += seen
+        hints.append(f"{part}: {hint}")
+    start = f"{', '.join(right)} right, the rest not. " if right else "not right. "
+    return result(WRONG, start + " ".join(hints), list(dict.fromkeys(names)))
+
+
+def _part(results: Sequence[Any], place: int) -> list[Any]:
+    return [result[place] for result in results]
+
+
+def _reference(answer: Answer, arguments: Sequence[tuple]) -> list[Any]:
+    """Results of an answer of ours, in a form that others are compared with."""
+    return [_standard(answer(*copy.deepcopy(values))) for values in arguments]
+
+
+def _standard(value: Any) -> Any:
+    if isinstance(value, tuple | list):
+        return tuple(_standard(part) for part in value)
+    return value if isinstance(value, sp.Basic | sp.MatrixBase) else np.asarray(value, dtype=float)
+
+
+def _agree(found: Sequence[Any], expected: Sequence[Any], values: Mapping[sp.Symbol, Any], tolerance: float) -> bool:
+    return all(equal(a, b, tolerance, values) for a, b in zip(found, expected, strict=True))
+
+
+def _wrong(mistake: Mistake, exercise: Any, arguments: Sequence[tuple], expected: Sequence[Any]) -> list[Any] | None:
+    """Results of a known wrong answer; None if this variant does not allow the mistake."""
+    try:
+        wrong = mistake.answer(exercise)
+        with np.errstate(all="ignore"):
+            return [like(wrong(*copy.deepcopy(values)), wanted) for values, wanted in zip(arguments, expected, strict=True)]
+    except (Unusable, ValueError, TypeError, ZeroDivisionError, np.linalg.LinAlgError):
+        return None
+
+
+def _diagnosis(
+    found: Sequence[Any],
+    expected: Sequence[Any],
+    catalogue: Sequence[tuple[Mistake, Sequence[Any] | None]],
+    agree: Callable[[Sequence[Any], Sequence[Any]], bool],
+) -> tuple[list[str], str]:
+    """Names of the mistakes that a wrong answer looks like, and what to say."""
+    seen = [mistake for mistake, wrong in catalogue if wrong is not None and agree(found, wrong)]
+    if seen:
+        return [m.name for m in seen], " Or: ".join(dict.fromkeys(m.says for m in seen))
+    for name, hint, change in TRANSFORMATIONS:
+        try:
+            if agree([change(value) for value in found], expected):
+                return [name], hint
+        except (TypeError, ValueError, AttributeError, ZeroDivisionError):
+            continue
+    right = sum(agree([a], [b]) for a, b in zip(found, expected, strict=True))
+    if right:
+        return ["sometimes"], f"It is right for {right} of {len(expected)} hidden inputs: which case did you leave out?"
+    return [], GENERAL
+
+
+GENERAL = (
+    "It does not look like one of the usual mistakes. Check each step of the derivation, and try a case whose answer you know."
+)
+TRANSFORMATIONS: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
+    ("sign", "The size is right, the sign is not.", lambda v: -v),
+    ("transposed", "It looks transposed.", lambda v: v.T if isinstance(v, sp.MatrixBase) else np.swapaxes(v, -1, -2)),
+    ("root", "It looks like a standard deviation where a variance belongs.", lambda v: v**2),
+    ("square", "It looks like a variance where a standard deviation belongs.", lambda v: v**0.5),
+    ("factor-2", "It is half of what it should be.", lambda v: v * 2),
+    ("factor-half", "It is twice what it should be.", lambda v: v / 2),
+    ("inverse", "It looks like the inverse of what it should be.", lambda v: 1 / v),
+)

@@ -1,0 +1,1 @@
+"""Exercise notebooks: made from the masters in exercises/, executed, exported, graded."""

@@ -1,0 +1,292 @@
+"""A course's notebooks: every set for every variant, made in parallel, resumed where it was interrupted.
+
+A job is one set for one variant.  It executes the worked solution once; from it come the solution's notebook and page, and the
+student's notebook with the pictures to reach.  Files appear complete or not at all.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import os
+import re
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import joblib
+import nbformat
+from nbformat import NotebookNode
+from tqdm import tqdm
+
+from kfcourse.checks import SETS, Exercise
+from kfcourse.checks.engine import PASSED
+from kfcourse.lab import Variant, find_variant, load_variants
+from kfcourse.notebooks.execute import NotebookFailed, execute, html, pdf, pictures, results
+from kfcourse.notebooks.master import MASTERS, read, render, solution, student
+
+PACKAGE = Path(__file__).resolve().parent.parent
+
+
+@dataclass(frozen=True)
+class Job:
+    """One set for one variant, and what is wanted of it.
+
+    Attributes
+    ----------
+    letter, variant : str
+    folder : Path
+        Where the files go.
+    kind : {"exercises", "solutions"}
+    variants_file : Path or None
+    masters : Path
+    with_pdf : bool
+    """
+
+    letter: str
+    variant: str
+    folder: Path
+    kind: str
+    variants_file: Path | None = None
+    masters: Path = MASTERS
+    with_pdf: bool = False
+
+    @property
+    def name(self) -> str:
+        return f"variant {self.variant}, {SETS[self.letter].file}"
+
+    @property
+    def target(self) -> Path:
+        suffix = "-solution" if self.kind == "solutions" else ""
+        return self.folder / f"{SETS[self.letter].file}{suffix}.ipynb"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a job: "written", "up to date" or "failed", with a message."""
+
+    job: Job
+    status: str
+    message: str = ""
+
+
+def make(job: Job) -> Outcome:
+    """Do one job; what fails is told in the outcome."""
+    try:
+        text = read(job.letter, job.masters)
+        notebook = render(text, Exercise(job.letter, find_variant(job.variant, job.variants_file)))
+        notebook.metadata["kfcourse"]["fingerprint"] = fingerprint(notebook)
+        wanted = [job.target]
+        if job.kind == "solutions":
+            wanted += [job.target.with_suffix(".html"), *([job.target.with_suffix(".pdf")] if job.with_pdf else [])]
+        if _up_to_date(job.target, notebook) and all(path.exists() for path in wanted):
+            return Outcome(job, "up to date")
+        executed = execute(solution(notebook), job.name)
+        wrong = [result for result in results(executed) if result["status"] != PASSED]
+        if wrong:
+            return Outcome(job, "failed", f"the solution does not pass {wrong[0]['question']}: {wrong[0]['message']}")
+        _write(job, notebook, executed)
+    except (NotebookFailed, ValueError, OSError) as error:
+        return Outcome(job, "failed", str(error))
+    return Outcome(job, "written")
+
+
+def _write(job: Job, notebook: NotebookNode, executed: NotebookNode) -> None:
+    """The job's files; the notebook last, because its being there tells that all are."""
+    job.folder.mkdir(parents=True, exist_ok=True)
+    if job.kind == "exercises":
+        save(nbformat.writes(student(notebook, pictures(executed))), job.target)
+        return
+    page = job.target.with_suffix(".html")
+    save(html(executed, job.name), page)
+    if job.with_pdf:
+        with temporary(job.target.with_suffix(".pdf")) as path:
+            pdf(page, path)
+    save(nbformat.writes(executed), job.target)
+
+
+def fingerprint(notebook: NotebookNode) -> str:
+    """Hash of all that a notebook's outputs depend on: its cells and the package."""
+    digest = hashlib.sha256(_package().encode())
+    for cell in notebook.cells:
+        digest.update(repr((cell.cell_type, cell.source, cell.metadata.get("tags", []))).encode())
+    return digest.hexdigest()
+
+
+@lru_cache(maxsize=1)
+def _package() -> str:
+    digest = hashlib.sha256()
+    for path in sorted(PACKAGE.rglob("*")):
+        if path.suffix in (".py", ".toml", ".j2"):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _up_to_date(path: Path, notebook: NotebookNode) -> bool:
+    try:
+        old = nbformat.read(path, as_version=4)
+    except (OSError, ValueError):  # missing, or not a notebook
+        return False
+    return old.metadata.get("kfcourse", {}).get("fingerprint") == notebook.metadata["kfcourse"]["fingerprint"]
+
+
+@contextmanager
+def temporary(target: Path) -> Iterator[Path]:
+    """A path beside the target; what is written there becomes the target if the block ends well."""
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix)
+    os.close(handle)
+    path = Path(name)
+    try:
+        yield path
+        path.chmod(0o644)
+        path.replace(target)
+    finally:
+        path.unlink(missing_ok=True)
+
+
+def save(text: str, target: Path) -> None:
+    """Write a file completely or not at all."""
+    with temporary(target) as path:
+        path.write_text(text, encoding="utf-8")
+
+
+def run_all(jobs: Sequence[Any], work: Callable[[Any], Any], workers: int, what: str, dask: str | None = None) -> Iterator[Any]:
+    """The outcomes of all jobs as they come, with a progress bar.
+
+    Parameters
+    ----------
+    jobs : sequence
+    work : callable
+        Job -> outcome; never raises.
+    workers : int
+        Processes at once.
+    what : str
+        Label of the progress bar.
+    dask : str, optional
+        Address of a Dask scheduler whose workers do the jobs; they need this package and a common file system.
+
+    Raises
+    ------
+    ValueError
+        Dask is wanted and not installed, or not reachable.
+    """
+    with _backend(dask, workers) as parallel:
+        done = parallel(joblib.delayed(work)(job) for job in jobs)
+        yield from tqdm(done, desc=what, total=len(jobs), unit="notebook", disable=None)
+
+
+@contextmanager
+def _backend(dask: str | None, workers: int) -> Iterator[joblib.Parallel]:
+    if dask is None:
+        yield joblib.Parallel(n_jobs=workers, return_as="generator_unordered")
+        return
+    try:
+        from dask.distributed import Client
+    except ImportError:
+        raise ValueError("--dask needs the package `distributed`: pip install distributed") from None
+    try:
+        client = Client(dask, timeout=10)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise ValueError(f"no Dask scheduler answers at {dask}: {error}") from None
+    with client, joblib.parallel_config(backend="dask", wait_for_workers_timeout=60):
+        yield joblib.Parallel(return_as="generator_unordered")
+
+
+def jobs(
+    kind: str,
+    folder: Path,
+    variants: Iterable[str],
+    letters: Sequence[str],
+    variants_file: Path | None = None,
+    masters: Path = MASTERS,
+    with_pdf: bool = False,
+) -> list[Job]:
+    """One job a set and variant, each variant in a folder of its own."""
+    return [
+        Job(letter, name, folder / safe(name), kind, variants_file, masters, with_pdf) for name in variants for letter in letters
+    ]
+
+
+def safe(name: str) -> str:
+    """A name as one component of a path."""
+    return re.sub(r"[^\w.-]+", "-", name).strip(".-") or "unnamed"
+
+
+@dataclass(frozen=True)
+class Student:
+    """A line of the course list, and the variant it was given."""
+
+    name: str
+    group: str
+    variant: str
+
+
+def assign(path: Path, variants: Sequence[str]) -> list[Student]:
+    """Give each student of a course list a variant, always the same.
+
+    Every pair of student and variant has a score, a hash of their names.  Students, in the order of the file, take the free
+    variant of their group with the highest score; when all are taken, a second round begins.  Students added at the end of the
+    file change nothing for those before.
+
+    Parameters
+    ----------
+    path : Path
+        CSV with the columns name and group.
+    variants : sequence of str
+
+    Raises
+    ------
+    ValueError
+        The file is missing, is not such a table, or names a student twice; says which line.
+    """
+    taken: dict[str, list[str]] = {}
+    students: list[Student] = []
+    for line, name, group in course_list(path):
+        if any((s.name, s.group) == (name, group) for s in students):
+            raise ValueError(f"{path}, line {line}: {name}, {group} stands there twice; add a middle name")
+        used = taken.setdefault(group, [])
+        if len(used) == len(variants):
+            used.clear()
+        free = [variant for variant in variants if variant not in used]
+        best = max(free, key=lambda variant: hashlib.sha256(f"{name}/{group}/{variant}".encode()).digest())
+        used.append(best)
+        students.append(Student(name, group, best))
+    return students
+
+
+def course_list(path: Path) -> Iterator[tuple[int, str, str]]:
+    """Line number, name and group of every student in a CSV file."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise ValueError(f"no course list {path}; it is a CSV file with the columns name and group") from None
+    except UnicodeDecodeError:
+        raise ValueError(f"{path} is not UTF-8; save it as CSV UTF-8") from None
+    delimiter = ";" if text.partition("\n")[0].count(";") else ","
+    reader = csv.DictReader(text.splitlines(), delimiter=delimiter, skipinitialspace=True)
+    columns = [(column or "").strip().lower() for column in reader.fieldnames or []]
+    if not {"name", "group"} <= set(columns):
+        raise ValueError(f"{path}: the first line must name the columns name and group, got {', '.join(columns) or 'nothing'}")
+    reader.fieldnames = columns
+    for row in reader:
+        name, group = ((row[key] or "").strip() for key in ("name", "group"))
+        if not name:
+            if group:
+                raise ValueError(f"{path}, line {reader.line_num}: a student without a name")
+            continue
+        yield reader.line_num, name, group
+
+
+def chosen_variants(names: Sequence[str], everything: bool, variants_file: Path | None) -> list[Variant]:
+    """The variants asked for; ValueError if there is no such, or none is named."""
+    known = load_variants(variants_file)
+    if everything:
+        return list(known.values())
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise ValueError(f"no variant {', '.join(unknown)}; there are {', '.join(known)}")
+    return [known[name] for name in dict.fromkeys(names)]

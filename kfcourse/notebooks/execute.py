@@ -1,0 +1,149 @@
+"""Executing notebooks and exporting them: each in a kernel of its own, with a time limit."""
+
+from __future__ import annotations
+
+import base64
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import nbformat
+from latex2mathml.converter import convert
+from nbclient import NotebookClient
+from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernelError
+from nbconvert import HTMLExporter
+from nbformat import NotebookNode
+
+from kfcourse.checks.engine import MIME
+
+SECONDS = 120  # a cell may take
+BROWSERS = ("chromium", "google-chrome", "chromium-browser", "msedge", "chrome")
+
+
+class NotebookFailed(RuntimeError):
+    """A notebook stopped; the message names it and the cell."""
+
+
+def execute(notebook: NotebookNode, name: str, seconds: float = SECONDS, stop_at_error: bool = True) -> NotebookNode:
+    """Run a notebook in a new kernel and an empty folder.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        Not changed.
+    name : str
+        For messages.
+    seconds : float
+        Time limit of each cell.
+    stop_at_error : bool
+        False: an error is kept as the cell's output, and the cells after it run too.
+
+    Raises
+    ------
+    NotebookFailed
+        A cell raises an error (if `stop_at_error`) or takes too long, or the kernel dies.
+    """
+    result = nbformat.from_dict(notebook)
+    client = NotebookClient(
+        result,
+        timeout=int(seconds),
+        kernel_name="python3",
+        allow_errors=not stop_at_error,
+        record_timing=False,
+        extra_arguments=["--log-level=ERROR"],
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        client.resources = {"metadata": {"path": folder}}
+        try:
+            client.execute()
+        except CellExecutionError as error:
+            raise NotebookFailed(f"{name}, cell {_failed(result)}: {error.ename}: {error.evalue}") from None
+        except CellTimeoutError:
+            raise NotebookFailed(f"{name}, cell {_running(result)}: still running after {seconds:g} s") from None
+        except DeadKernelError:
+            raise NotebookFailed(f"{name}, cell {_running(result)}: the kernel died (out of memory?)") from None
+    return result
+
+
+def _failed(notebook: NotebookNode) -> str:
+    for cell in notebook.cells:
+        if any(output.output_type == "error" for output in cell.get("outputs", [])):
+            return str(cell.id)
+    return _running(notebook)
+
+
+def _running(notebook: NotebookNode) -> str:
+    """The first code cell that has not finished."""
+    for cell in notebook.cells:
+        if cell.cell_type == "code" and cell.source.strip() and not cell.execution_count:
+            return str(cell.id)
+    return str(notebook.cells[-1].id)
+
+
+def pictures(executed: NotebookNode) -> dict[str, bytes]:
+    """PNG of every cell tagged `picture`, by cell id."""
+    found = {}
+    for cell in executed.cells:
+        if "picture" in cell.metadata.get("tags", []):
+            for output in cell.outputs:
+                if "image/png" in output.get("data", {}):
+                    found[cell.id] = base64.b64decode(output.data["image/png"])
+    return found
+
+
+def results(executed: NotebookNode) -> list[dict[str, Any]]:
+    """What the checks of an executed notebook found: dicts with question, status, diagnosis and message."""
+    return [output.data[MIME] for cell in executed.cells for output in cell.get("outputs", []) if MIME in output.get("data", {})]
+
+
+def html(executed: NotebookNode, title: str) -> str:
+    """The executed notebook as one page that needs no network: formulas as MathML, pictures inside."""
+    copy = nbformat.from_dict(executed)
+    for cell in copy.cells:
+        if cell.cell_type == "markdown":
+            cell.source = mathml(cell.source)
+        for output in cell.get("outputs", []):
+            if "text/latex" in output.get("data", {}):
+                output.data["text/html"] = mathml(output.data["text/latex"])
+    body, _ = HTMLExporter(template_name="basic").from_notebook_node(copy)
+    environment = jinja2.Environment(loader=jinja2.PackageLoader("kfcourse"), autoescape=True)
+    return environment.get_template("notebook.html.j2").render(title=title, body=body)
+
+
+def mathml(text: str) -> str:
+    """TeX between dollars as MathML; code in backquotes stays."""
+    parts = re.split(r"(```.*?```|`[^`\n]*`)", text, flags=re.DOTALL)
+    return "".join(part if i % 2 else _formulas(part) for i, part in enumerate(parts))
+
+
+def _formulas(text: str) -> str:
+    def display(mode: str) -> Callable[[re.Match], str]:
+        return lambda match: convert(match.group(1).replace(r"\displaystyle", "").strip(), display=mode)
+
+    text = re.sub(r"\$\$(.+?)\$\$", display("block"), text, flags=re.DOTALL)
+    return re.sub(r"(?<![\\$])\$([^$]+?)\$", display("inline"), text)
+
+
+def pdf(page: Path, target: Path) -> None:
+    """Print an HTML file to PDF by a Chromium browser.
+
+    Raises
+    ------
+    NotebookFailed
+        No browser on this machine, or it fails.
+    """
+    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if browser is None:
+        raise NotebookFailed(f"no browser to print PDF with; install one of {', '.join(BROWSERS[:3])}, or print {page} yourself")
+    with tempfile.TemporaryDirectory() as profile:
+        command = [browser, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}", "--no-pdf-header-footer"]
+        done = subprocess.run(
+            [*command, f"--print-to-pdf={target}", page.resolve().as_uri()], capture_output=True, text=True, timeout=SECONDS
+        )
+    if done.returncode or not target.exists():
+        raise NotebookFailed(f"{browser} could not print {page}: {done.stderr.strip()[-200:]}")

@@ -1,0 +1,301 @@
+"""Masters of the exercise sets, and the notebooks made from them.
+
+A master is a MyST Markdown notebook in exercises/.  Text of the variant goes in by Jinja, with the delimiters [= ... =] and
+[% ... %] that neither Python nor LaTeX uses; what is between the lines
+
+    # BEGIN SOLUTION            <!-- BEGIN SOLUTION -->
+    # END SOLUTION              <!-- END SOLUTION -->
+
+of a code or text cell is the solution.  From a master come, for a variant,
+
+    render(...)     the complete notebook, with solutions
+    student(...)    the same without: stubs that raise NotImplementedError, and the pictures to reach
+    statement(...)  the text of the book's page: questions and stubs, nothing executed
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import jupytext
+import nbformat
+import sympy as sp
+from nbformat import NotebookNode
+from sympy.printing.str import StrPrinter
+
+from kfcourse.checks import SETS, Exercise
+from kfcourse.checks.structural import Side, plain, unexplained
+from kfcourse.lab import load_variants
+from kfcourse.structure import Structure
+
+MASTERS = Path(__file__).resolve().parent.parent.parent / "exercises"
+BEGIN, END = "BEGIN SOLUTION", "END SOLUTION"
+STUB = "# YOUR CODE HERE"
+
+
+class MasterError(ValueError):
+    """A master is missing or cannot be used; the message names the file and the place."""
+
+
+def read(letter: str, folder: Path = MASTERS) -> str:
+    """Text of the master of a set."""
+    path = folder / f"{SETS[letter].file}.md"
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise MasterError(
+            f"no master {path}; the masters are in the project's folder exercises/: name it with --masters"
+        ) from None
+
+
+def render(text: str, exercise: Exercise) -> NotebookNode:
+    """The complete notebook, solutions in, of a master's text for an exercise.
+
+    Raises
+    ------
+    MasterError
+        The text is no template, or its solution markers do not match; names the set and the line.
+    """
+    name = SETS[exercise.letter].file
+    environment = jinja2.Environment(
+        variable_start_string="[=",
+        variable_end_string="=]",
+        block_start_string="[%",
+        block_end_string="%]",
+        comment_start_string="[##",
+        comment_end_string="##]",
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    try:
+        filled = environment.from_string(text).render(context(exercise))
+    except jinja2.TemplateSyntaxError as error:
+        raise MasterError(f"master {name}, line {error.lineno}: {error.message}") from None
+    except jinja2.UndefinedError as error:
+        raise MasterError(f"master {name}: {error.message}") from None
+    notebook = jupytext.reads(filled, fmt="md:myst")
+    answers = iter(SETS[exercise.letter].questions)
+    for index, cell in enumerate(notebook.cells):
+        cell.id = f"{exercise.letter}-{index:02d}"
+        _check_markers(cell.source, f"master {name}, cell {index + 1}")
+        if cell.cell_type == "code" and BEGIN in cell.source:
+            cell.metadata["kfcourse"] = {"answer": _defined(cell.source, next(answers, None))}
+    notebook.metadata["kfcourse"] = {"set": exercise.letter, "variant": exercise.variant.name}
+    notebook.metadata["kernelspec"] = {"display_name": "Python 3", "language": "python", "name": "python3"}
+    return notebook
+
+
+def _defined(source: str, question: Any) -> str:
+    """Name of the function that an answer cell defines."""
+    found = re.search(r"^def (\w+)", source, re.MULTILINE)
+    return found.group(1) if found else getattr(question, "name", "")
+
+
+def _check_markers(source: str, where: str) -> None:
+    inside = False
+    for number, line in enumerate(source.splitlines(), 1):
+        if BEGIN in line or END in line:
+            if (BEGIN in line) == inside:
+                raise MasterError(
+                    f"{where}, line {number}: {BEGIN if inside else END} without {END if inside else BEGIN} before it"
+                )
+            inside = not inside
+    if inside:
+        raise MasterError(f"{where}: {BEGIN} without {END}")
+
+
+def without_solution(source: str, code: bool) -> str:
+    """The text without what is between the markers; in code a stub takes its place."""
+    kept: list[str] = []
+    inside = False
+    for line in source.splitlines():
+        if BEGIN in line:
+            inside = True
+            if code:
+                indent = line[: len(line) - len(line.lstrip())]
+                kept += [f"{indent}{STUB}", f"{indent}raise NotImplementedError"]
+        elif END in line:
+            inside = False
+        elif not inside:
+            kept.append(line)
+    return "\n".join(kept)
+
+
+def without_markers(source: str) -> str:
+    return "\n".join(line for line in source.splitlines() if BEGIN not in line and END not in line)
+
+
+def solution(notebook: NotebookNode) -> NotebookNode:
+    """The worked solution: the complete notebook without the marker lines."""
+    result = nbformat.from_dict(notebook)
+    for cell in result.cells:
+        cell.source = without_markers(cell.source)
+    return result
+
+
+def student(notebook: NotebookNode, pictures: Mapping[str, bytes]) -> NotebookNode:
+    """The student's notebook: stubs in place of the solutions, and the pictures to reach.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        From `render`.
+    pictures : dict
+        Cell id to PNG, of the solution's cells tagged `picture`.
+    """
+    result = nbformat.from_dict(notebook)
+    cells = []
+    for cell in result.cells:
+        cell.source = without_solution(cell.source, cell.cell_type == "code")
+        if cell.cell_type == "code":
+            cell.outputs, cell.execution_count = [], None
+            if cell.id in pictures:
+                cells.append(_picture(cell.id, pictures[cell.id]))
+        if cell.source.strip():
+            cells.append(cell)
+    result.cells = cells
+    return result
+
+
+def _picture(name: str, png: bytes) -> NotebookNode:
+    cell = nbformat.v4.new_markdown_cell(f"The picture to reach:\n\n![The picture to reach](attachment:{name}.png)")
+    cell.id = f"{name}-goal"
+    cell["attachments"] = {f"{name}.png": {"image/png": base64.b64encode(png).decode()}}
+    return cell
+
+
+def statement(notebook: NotebookNode, pictures: Mapping[str, str]) -> str:
+    """The set as a page of the book: text, stubs and checks as plain code; `pictures`: cell id to the image's path."""
+    parts = []
+    for cell in notebook.cells:
+        source = without_solution(cell.source, cell.cell_type == "code").strip()
+        if not source:
+            continue
+        if cell.cell_type == "code":
+            if cell.id in pictures:
+                parts.append(f"The picture to reach:\n\n![The picture to reach]({pictures[cell.id]})")
+            source = f"```python\n{source}\n```"
+        parts.append(source)
+    return "\n\n".join(parts) + "\n"
+
+
+def context(exercise: Exercise) -> dict[str, Any]:
+    """What a master's template may use."""
+    model = exercise.model
+    return {
+        "exercise": exercise,
+        "variant": exercise.variant.name,
+        "opened": opened(exercise),
+        "title": SETS[exercise.letter].title,
+        "model": model,
+        "scalar": model.n == 1 and model.p == 1,
+        "latex": sp.latex,
+        "equations": equations(exercise),
+        "symbols": parameter_symbols(exercise),
+        "values": {name: float(value) for name, value in model.parameters.items()},
+        "solution": Solutions(exercise),
+    }
+
+
+def equations(exercise: Exercise) -> str:
+    """The model as a LaTeX display."""
+    model = exercise.model
+    lines = [rf"{sp.latex(x)}_{{k+1}} &= {sp.latex(f)}" for x, f in zip(_state_names(model), model.state_equation, strict=True)]
+    names = ["y"] if model.p == 1 else [rf"y_{{{i + 1}}}" for i in range(model.p)]
+    lines += [rf"{{{name}}}_{{k}} &= {sp.latex(f)}" for name, f in zip(names, model.meter_equation, strict=True)]
+    return "$$\n\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}\n$$"
+
+
+def _state_names(model: Any) -> list[sp.Symbol]:
+    return [sp.Symbol("{" + sp.latex(x) + "}") for x in model.x]
+
+
+def opened(exercise: Exercise) -> str:
+    """Python for the variant: its name if it is a shipped one, else its table, so that the notebook needs no file."""
+    variant = exercise.variant
+    if load_variants().get(variant.name) == variant:
+        return f'"{variant.name}"'
+    return repr({"name": variant.name, **variant.table})
+
+
+def parameter_symbols(exercise: Exercise) -> str:
+    """The line of code that makes the parameters' symbols."""
+    names = list(exercise.model.parameters)
+    if not names:
+        return "# this variant has no parameters"
+    left = ", ".join(names)
+    return f'{left}{"," if len(names) == 1 else ""} = sp.symbols("{" ".join(names)}{"," if len(names) == 1 else ""}", real=True)'
+
+
+class Solutions:
+    """Lines of Python that compute a derived formula, for the solution cells of masters."""
+
+    def __init__(self, exercise: Exercise):
+        self.exercise = exercise
+
+    def functions(self, kind: str, side: str) -> str:
+        """Body of a function of (z, p) or (m, d) that returns (tau, Theta) or (h, G, F)."""
+        structure: Structure = getattr(self.exercise.structures, kind)
+        names = ("tau", "Theta") if side == "object" else ("h", "G", "F")
+        return self._body(side, {name: structure[name] for name in names})
+
+    def jacobians(self, side: str) -> str:
+        """Body of a function of the mean that returns the Jacobians by state and by noise."""
+        part = Side.of(self.exercise.model, side)
+        names = ("a_x", "a_v") if side == "object" else ("b_x", "b_w")
+        return self._body(side, dict(zip(names, (plain(part.A), plain(part.B)), strict=True)), cov=False)
+
+    def unexplained(self) -> str:
+        """Body of a function of (m, d) that returns R = F - G d G^T of the Gaussian functions."""
+        return self._body("meter", {"R": unexplained(self.exercise)})
+
+    def _body(self, side: str, formulas: Mapping[str, Any], cov: bool = True) -> str:
+        part = Side.of(self.exercise.model, side)
+        mean_name, cov_name = ("z", "p") if side == "object" else ("m", "d")
+        lines = []
+        if self.exercise.model.n > 1:
+            lines.append(f"{', '.join(map(str, part.mean))} = {mean_name}")
+            if cov:
+                n = self.exercise.model.n
+                upper = [(i, j) for i in range(n) for j in range(i, n)]
+                entries = ", ".join(f"{cov_name}[{i}, {j}]" for i, j in upper)
+                lines.append(f"{', '.join(str(part.cov[i, j]) for i, j in upper)} = {entries}")
+        if len(formulas) == 1:
+            lines += [f"return {python(formula)}" for formula in formulas.values()]
+        else:
+            lines += ["return (", *(f"    {python(formula)},  # {name}" for name, formula in formulas.items()), ")"]
+        return "\n".join(lines)
+
+
+def python(formula: Any) -> str:
+    """A formula as Python code that a student could have written: sp.sin(x), sp.Rational(1, 2)."""
+    if isinstance(formula, sp.MatrixBase):
+        rows = ", ".join("[" + ", ".join(python(entry) for entry in row) + "]" for row in formula.tolist())
+        return f"sp.Matrix([{rows}])"
+    expression = sp.sympify(formula).replace(lambda e: e.func.__name__ == "expm1", lambda e: sp.exp(e.args[0]) - 1)
+    return str(_Printer().doprint(expression))
+
+
+class _Printer(StrPrinter):
+    """SymPy's own text, with `sp.` before functions and constants, and exact fractions."""
+
+    def _print_Function(self, expr: sp.Function) -> str:
+        return f"sp.{expr.func.__name__}({self.stringify(expr.args, ', ')})"
+
+    def _print_Rational(self, expr: sp.Rational) -> str:
+        return f"sp.Rational({expr.p}, {expr.q})"
+
+    def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:
+        if abs(expr.exp) == sp.Rational(1, 2):
+            return ("" if expr.exp > 0 else "1/") + f"sp.sqrt({self._print(expr.base)})"
+        return super()._print_Pow(expr, rational)
+
+    def _print_Pi(self, expr: sp.Expr) -> str:
+        return "sp.pi"
