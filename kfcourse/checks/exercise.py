@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.checks import structural
+from kfcourse.checks import gaussian_filters, structural
 from kfcourse.checks.engine import Question, Result, check
+from kfcourse.ensemble import Trajectories, simulate
 from kfcourse.lab import Structures, Variant, find_variant, read_variant
 from kfcourse.model import Model
 
@@ -33,9 +34,11 @@ class SetOfQuestions:
 
 
 # One line a set; the masters are exercises/<file>.md.
-SETS: Mapping[str, SetOfQuestions] = MappingProxyType(
-    {s.letter: s for s in (SetOfQuestions("a", "a-structural-functions", "Structural functions", structural.QUESTIONS),)}
+_ALL = (
+    SetOfQuestions("a", "a-structural-functions", "Structural functions", structural.QUESTIONS),
+    SetOfQuestions("b", "b-aof", "Approximations of the absolutely optimal filter", gaussian_filters.QUESTIONS),
 )
+SETS: Mapping[str, SetOfQuestions] = MappingProxyType({one.letter: one for one in _ALL})
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,25 @@ class Exercise:
         """`.linearised` and `.gaussian` structural functions of the model."""
         return Structures(self.model)
 
+    def functions(self, kind: str) -> tuple[Callable, Callable]:
+        """Structural functions of arrays: measure(m, d) -> h, G, F and predict(z, p) -> tau, Theta.
+
+        `kind` is "gaussian" or "linearised"; shapes (N, n), (N, n, n), (N, p), (N, p, n), (N, p, p).
+        """
+        if kind not in ("gaussian", "linearised"):
+            raise ExerciseError(f"no structural functions {kind!r}; there are gaussian and linearised")
+        return gaussian_filters.functions(getattr(self.structures, kind))
+
+    @cached_property
+    def hidden(self) -> Structures:
+        """Structural functions of a model like the variant's with other parameters.
+
+        An answer that works for any functions is called with these: where the variant has a 1, a forgotten factor would pass.
+        """
+        factors = self.rng("hidden").uniform(1.1, 1.4, len(self.model.parameters))
+        changed = {name: float(value) * f for (name, value), f in zip(self.model.parameters.items(), factors, strict=True)}
+        return Structures(self.model.replace(**changed))
+
     @property
     def prior_mean(self) -> np.ndarray:
         """Mean of the state at the start, (n,)."""
@@ -78,6 +100,10 @@ class Exercise:
         n = self.model.n
         law = sp.Matrix([sp.Float(m) for m in mean]), sp.Float(variance) * sp.eye(n)
         return (law[0][0], law[1][0]) if n == 1 else law
+
+    def simulate(self, runs: int, steps: int, name: str) -> Trajectories:
+        """Trajectories of the variant, x (steps, runs, n) and y (steps, runs, p); the same name gives the same ones."""
+        return simulate(self.model, runs, steps, seed=int(self.rng(name).integers(2**31)))
 
     def rng(self, name: str) -> np.random.Generator:
         """Random numbers that belong to this variant and name: for personal numbers and hidden arguments."""
