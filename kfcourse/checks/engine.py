@@ -51,6 +51,11 @@ class Mistake:
     answer: Callable[[Any], Answer]
 
 
+def catalogue(rows: Sequence[tuple[str, str, Answer]]) -> tuple[Mistake, ...]:
+    """Mistakes whose wrong answer is the same function for every exercise: rows of name, says, answer."""
+    return tuple(Mistake(name, says, lambda _, wrong=wrong: wrong) for name, says, wrong in rows)
+
+
 @dataclass(frozen=True)
 class Question:
     """A question of an exercise set.

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.checks import gaussian_filters, structural
+from kfcourse.checks import gaussian_filters, montecarlo, optimal, structural
 from kfcourse.checks.engine import Question, Result, check
 from kfcourse.ensemble import Trajectories, simulate
 from kfcourse.lab import Structures, Variant, find_variant, read_variant
 from kfcourse.model import Model
+from kfcourse.structure import compile_noiseless
 
 
 class ExerciseError(ValueError):
@@ -37,6 +38,9 @@ class SetOfQuestions:
 _ALL = (
     SetOfQuestions("a", "a-structural-functions", "Structural functions", structural.QUESTIONS),
     SetOfQuestions("b", "b-aof", "Approximations of the absolutely optimal filter", gaussian_filters.QUESTIONS),
+    SetOfQuestions("c", "c-duof", "The two-step conditionally optimal filter", optimal.DUOF),
+    SetOfQuestions("d", "d-fos", "Filters of optimal structure", optimal.FOS),
+    SetOfQuestions("e", "e-comparison", "Comparison by Monte Carlo", montecarlo.QUESTIONS),
 )
 SETS: Mapping[str, SetOfQuestions] = MappingProxyType({one.letter: one for one in _ALL})
 
@@ -83,9 +87,23 @@ class Exercise:
 
         An answer that works for any functions is called with these: where the variant has a 1, a forgotten factor would pass.
         """
+        return Structures(self.hidden_model)
+
+    @cached_property
+    def hidden_model(self) -> Model:
         factors = self.rng("hidden").uniform(1.1, 1.4, len(self.model.parameters))
         changed = {name: float(value) * f for (name, value), f in zip(self.model.parameters.items(), factors, strict=True)}
-        return Structures(self.model.replace(**changed))
+        return self.model.replace(**changed)
+
+    @cached_property
+    def noiseless(self) -> tuple[Callable, Callable]:
+        """The equations with the noises at their means, a(x) and b(x): (N, n) -> (N, n) and (N, p)."""
+        return compile_noiseless(self.model)
+
+    @cached_property
+    def hidden_noiseless(self) -> tuple[Callable, Callable]:
+        """The same of the hidden model."""
+        return compile_noiseless(self.hidden_model)
 
     @property
     def prior_mean(self) -> np.ndarray:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from kfcourse.checks.engine import Answer, Mistake, Question
+from kfcourse.checks.engine import Answer, Question, catalogue
 from kfcourse.gaussian import Array, Gaussian, Measurement, apply, correct, gain, transpose
 from kfcourse.structure import Structure
 
@@ -354,19 +354,15 @@ WRONG_COVARIANCES: tuple[tuple[str, str, Answer], ...] = (
 )
 
 
-def _catalogue(rows: tuple[tuple[str, str, Answer], ...]) -> tuple[Mistake, ...]:
-    return tuple(Mistake(name, says, lambda _, wrong=wrong: wrong) for name, says, wrong in rows)
-
-
 QUESTIONS = (
-    Question("b1", "the gain", "warm-up", lambda e: right_gain, gain_arguments, _catalogue(WRONG_GAINS)),
+    Question("b1", "the gain", "warm-up", lambda e: right_gain, gain_arguments, catalogue(WRONG_GAINS)),
     Question(
         "b2",
         "the correction",
         "core",
         lambda e: right_correction,
         correction_arguments,
-        _catalogue(WRONG_CORRECTIONS),
+        catalogue(WRONG_CORRECTIONS),
         ("z", "p"),
     ),
     Question(
@@ -375,17 +371,17 @@ QUESTIONS = (
         "core",
         lambda e: right_step,
         step_arguments,
-        _catalogue(WRONG_STEPS),
+        catalogue(WRONG_STEPS),
         ("z", "p", "lam_next", "Psi_next"),
     ),
-    Question("b4", "a whole run", "core", lambda e: right_run, run_arguments, _catalogue(WRONG_RUNS)),
+    Question("b4", "a whole run", "core", lambda e: right_run, run_arguments, catalogue(WRONG_RUNS)),
     Question(
         "b5",
         "a covariance that survives rounding",
         "stretch",
         lambda e: right_covariance,
         covariance_arguments,
-        _catalogue(WRONG_COVARIANCES),
+        catalogue(WRONG_COVARIANCES),
         tolerance=1e-6,
     ),
 )
