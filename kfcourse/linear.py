@@ -151,13 +151,24 @@ def _correct_textbook(system: LinearSystem, law: Gaussian, y: Array) -> Gaussian
     """K = P H^T (H P H^T + R)^-1,  m + K (y - H m),  (I - K H) P."""
     innovation, H, R = _measured(system, y - apply(system.H, law.mean))
     cross = law.cov @ transpose(H)
-    K = gain(cross, H @ cross + R)
+    K = _same_precision(gain(cross, H @ cross + R), law.cov)
     return Gaussian(law.mean + apply(K, innovation), (np.eye(len(system.A), dtype=law.cov.dtype) - K @ H) @ law.cov)
 
 
 def _correct_symmetrised(system: LinearSystem, law: Gaussian, y: Array) -> Gaussian:
     mean, cov = _correct_textbook(system, law, y)
     return Gaussian(mean, symmetric(cov))
+
+
+def _correct_joseph(system: LinearSystem, law: Gaussian, y: Array) -> Gaussian:
+    """K as above, (I - K H) P (I - K H)^T + K R K^T."""
+    mean, cov = correct(law, system.measure(*law), y)
+    return Gaussian(_same_precision(mean, law.mean), _same_precision(cov, law.cov))
+
+
+def _same_precision(array: Array, other: Array) -> Array:
+    """A gain of 0, where the covariance of the measurement is not positive, comes in float64."""
+    return array.astype(other.dtype, copy=False)
 
 
 def _measured(system: LinearSystem, innovation: Array) -> tuple[Array, Array, Array]:
@@ -185,7 +196,7 @@ def _correct_root(system: LinearSystem, law: Root, y: Array) -> Root:
     p, noise = len(system.H), np.linalg.cholesky(R)
     top, bottom = _beside(noise, H @ law.root), _beside(np.zeros_like(transpose(H)), law.root)
     lower = _triangular(np.concatenate(_broadcast(top, bottom), axis=-2))
-    whitened = np.linalg.solve(lower[..., :p, :p], innovation[..., None])[..., 0]
+    whitened = _forward(lower[..., :p, :p], innovation)
     return Root(law.mean + apply(lower[..., p:, :p], whitened), lower[..., p:, p:])
 
 
@@ -200,19 +211,33 @@ def _broadcast(left: Array, right: Array) -> list[Array]:
 
 
 def _triangular(wide: Array) -> Array:
-    """Lower triangular L with L L^T = wide wide^T."""
-    return transpose(np.asarray(np.linalg.qr(transpose(wide), mode="r")))
+    """Lower triangular L with L L^T = wide wide^T, by Householder's reflections of the columns.
+
+    In the precision of `wide`: numpy.linalg.qr computes float32 in double, which would hide what short words do.
+    """
+    work, rows = np.array(wide), wide.shape[-2]
+    for i in range(rows):
+        size = np.abs(work[..., i, i:]).max(axis=-1, keepdims=True)
+        v = work[..., i, i:] / np.where(size > 0, size, 1)  # no square leaves the range of short words
+        v[..., 0] += np.copysign(np.sqrt((v * v).sum(axis=-1)), v[..., 0])
+        square = (v * v).sum(axis=-1)
+        factor = 2 / np.where(square > 0, square, 1)
+        work[..., i:, i:] -= (apply(work[..., i:, i:], v) * factor[..., None])[..., None] * v[..., None, :]
+    return np.tril(work[..., :rows])
+
+
+def _forward(lower: Array, right: Array) -> Array:
+    """The solution x of lower x = right for a triangular matrix, in its precision: (..., p, p), (..., p) -> (..., p)."""
+    x = np.zeros(np.broadcast_shapes(lower.shape[:-1], right.shape), dtype=lower.dtype)
+    for i in range(right.shape[-1]):
+        x[..., i] = (right[..., i] - (lower[..., i, :i] * x[..., :i]).sum(axis=-1)) / lower[..., i, i]
+    return x
 
 
 FORMS: dict[str, Form] = {
     "covariance": Form(lambda law: law, predict_law, _correct_textbook, lambda law: law),
     "symmetrised": Form(lambda law: law, _predict_symmetric, _correct_symmetrised, lambda law: law),
-    "joseph": Form(
-        lambda law: law,
-        _predict_symmetric,
-        lambda system, law, y: correct(law, system.measure(*law), y),
-        lambda law: law,
-    ),
+    "joseph": Form(lambda law: law, _predict_symmetric, _correct_joseph, lambda law: law),
     "square-root": Form(
         lambda law: Root(law.mean, square_root(law.cov)),
         _predict_root,
@@ -232,7 +257,7 @@ def form(name: str, system: LinearSystem) -> Form:
 
 
 class Run(NamedTuple):
-    """A filter's laws along stored measurements: posterior and predicted, each with mean (steps, runs, n)."""
+    """A filter's laws along stored measurements: posterior and predicted, each mean (steps, runs, n), cov (steps, runs, n, n)."""
 
     posterior: Gaussian
     predicted: Gaussian
@@ -251,20 +276,27 @@ def run(system: LinearSystem, prior: Gaussian, y: Array, u: Array | None = None,
     u : ndarray (steps, runs, m) or (steps, 1, m), optional
         Known input; u[k] acts between y[k] and y[k+1].
     arithmetic : {"joseph", "covariance", "symmetrised", "square-root"}
-        All of it runs in the precision of the system's matrices.
+        All of it runs in the precision of the system's matrices, but for the gain from p > 1 measurements at once: NumPy
+        solves float32 equations in double and rounds the solution.
 
     Returns
     -------
     Run
-        Covariances are (steps, n, n) where no measurement is missing, else (steps, runs, n, n).
+        Means (steps, runs, n) and covariances (steps, runs, n, n).  Covariances that are the same for all runs, because no
+        measurement is missing, are stored once and shown to each run: a read-only view.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit, a prior or inputs that are not finite.
     """
     chosen = form(arithmetic, system)
     if y.ndim != 3 or y.shape[2] != len(system.H):
         raise ValueError(f"measurements must have the shape (steps, runs, {len(system.H)}), got {y.shape}")
-    if u is not None and (u.ndim != 3 or len(u) != len(y)):
-        raise ValueError(f"inputs must have the shape ({len(y)}, runs, m), got {u.shape}")
-    dtype = system.A.dtype
-    mean = np.broadcast_to(prior.mean, (y.shape[1], len(system.A))).astype(dtype)
+    runs, n, dtype = y.shape[1], len(system.A), system.A.dtype
+    _check_input(system, u, len(y), runs)
+    _check_prior(prior, runs, n)
+    mean = np.broadcast_to(prior.mean, (runs, n)).astype(dtype)
     state = chosen.start(Gaussian(mean, np.asarray(prior.cov).astype(dtype)))
     predicted, posterior = [], []
     for k, measurement in enumerate(y.astype(dtype)):
@@ -275,10 +307,69 @@ def run(system: LinearSystem, prior: Gaussian, y: Array, u: Array | None = None,
     return Run(stacked(posterior), stacked(predicted))
 
 
+def _check_input(system: LinearSystem, u: Array | None, steps: int, runs: int) -> None:
+    if u is None:
+        return
+    if system.B is None:
+        system.input(u)  # says what to do
+        return
+    m = system.B.shape[1]
+    if u.ndim != 3 or len(u) != steps or u.shape[1] not in (1, runs) or u.shape[2] != m:
+        raise ValueError(f"inputs must have the shape ({steps}, {runs}, {m}), or ({steps}, 1, {m}) for all runs; got {u.shape}")
+    if not np.isfinite(u).all():
+        raise ValueError("inputs must be finite: give a missing input the value that the object had, or its mean with a larger Q")
+
+
+def _check_prior(prior: Gaussian, runs: int, n: int) -> None:
+    mean, cov = np.shape(prior.mean), np.shape(prior.cov)
+    if mean not in ((n,), (1, n), (runs, n)):
+        raise ValueError(f"the prior's mean must have the shape ({n},) or ({runs}, {n}), got {mean}")
+    if cov not in ((n, n), (1, n, n), (runs, n, n)):
+        raise ValueError(f"the prior's covariance must have the shape ({n}, {n}) or ({runs}, {n}, {n}), got {cov}")
+    if not (np.isfinite(prior.mean).all() and np.isfinite(prior.cov).all()):
+        raise ValueError("the prior must be finite: for an unknown state give a large variance, or start from measurements")
+
+
 def stacked(laws: list[Gaussian]) -> Gaussian:
-    """Laws of successive steps as one, the step before everything."""
-    covs = np.broadcast_arrays(*(law.cov for law in laws))
-    return Gaussian(np.stack([law.mean for law in laws]), np.stack(covs))
+    """Laws of successive steps as one, the step before everything: mean (steps, runs, n), cov (steps, runs, n, n)."""
+    mean = np.stack([law.mean for law in laws])
+    covs = np.stack(np.broadcast_arrays(*(law.cov for law in laws)))
+    by_run = covs if covs.ndim == mean.ndim + 1 else covs[:, None]
+    return Gaussian(mean, np.broadcast_to(by_run, (*mean.shape, mean.shape[-1])))
+
+
+class Trajectories(NamedTuple):
+    """Simulated states x (steps, runs, n) and measurements y (steps, runs, p)."""
+
+    x: Array
+    y: Array
+
+
+def simulate(system: LinearSystem, prior: Gaussian, steps: int, runs: int, seed: int, u: Array | None = None) -> Trajectories:
+    """Trajectories of the system with normal noises, from x_0 drawn from the prior.
+
+    Parameters
+    ----------
+    system : LinearSystem
+    prior : Gaussian
+        Law of x_0: mean (n,) or (runs, n), covariance (n, n).
+    steps, runs, seed : int
+    u : ndarray (steps, runs, m) or (steps, 1, m), optional
+        Known input; u[k] acts between x[k] and x[k+1].
+    """
+    _check_input(system, u, steps, runs)
+    _check_prior(prior, runs, len(system.A))
+    rng = np.random.default_rng(seed)
+
+    def noise(cov: Array) -> Array:
+        return rng.standard_normal((runs, len(cov))) @ square_root(cov).T
+
+    state, x, y = prior.mean + noise(prior.cov), [], []
+    for k in range(steps):
+        x.append(state)
+        y.append(apply(system.H, state) + noise(system.R))
+        state = apply(system.A, state) + system.input(None if u is None else u[k]) + noise(system.Q)
+    return Trajectories(np.stack(x), np.stack(y))
 
 
 class Covariances(NamedTuple):
