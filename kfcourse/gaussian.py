@@ -96,7 +96,8 @@ def gain(cross: Array, cov: Array) -> Array:
     if cov.shape[-1] == 1:
         if np.minimum.reduce(cov, axis=None) > 0:
             return cross / cov
-        return np.divide(cross, cov, out=np.zeros(np.broadcast_shapes(cross.shape, cov.shape)), where=cov > 0)
+        zero = np.zeros(np.broadcast_shapes(cross.shape, cov.shape), dtype=np.result_type(cross, cov))
+        return np.divide(cross, cov, out=zero, where=cov > 0)
     # Scaling to correlations first: components may differ by orders of magnitude in size.
     scale = np.sqrt(np.maximum(np.diagonal(cov, axis1=-2, axis2=-1), 0.0))
     scale = np.where(scale > 0, scale, 1.0)

@@ -151,7 +151,7 @@ def _correct_textbook(system: LinearSystem, law: Gaussian, y: Array) -> Gaussian
     """K = P H^T (H P H^T + R)^-1,  m + K (y - H m),  (I - K H) P."""
     innovation, H, R = _measured(system, y - apply(system.H, law.mean))
     cross = law.cov @ transpose(H)
-    K = _same_precision(gain(cross, H @ cross + R), law.cov)
+    K = gain(cross, H @ cross + R)
     return Gaussian(law.mean + apply(K, innovation), (np.eye(len(system.A), dtype=law.cov.dtype) - K @ H) @ law.cov)
 
 
@@ -162,13 +162,7 @@ def _correct_symmetrised(system: LinearSystem, law: Gaussian, y: Array) -> Gauss
 
 def _correct_joseph(system: LinearSystem, law: Gaussian, y: Array) -> Gaussian:
     """K as above, (I - K H) P (I - K H)^T + K R K^T."""
-    mean, cov = correct(law, system.measure(*law), y)
-    return Gaussian(_same_precision(mean, law.mean), _same_precision(cov, law.cov))
-
-
-def _same_precision(array: Array, other: Array) -> Array:
-    """A gain of 0, where the covariance of the measurement is not positive, comes in float64."""
-    return array.astype(other.dtype, copy=False)
+    return correct(law, system.measure(*law), y)
 
 
 def _measured(system: LinearSystem, innovation: Array) -> tuple[Array, Array, Array]:

@@ -205,6 +205,14 @@ def _exp_minus_one(exponent: sp.Expr) -> sp.Expr:
 
 def _real(expression: sp.Expr) -> sp.Expr:
     """The real part; the imaginary parts of conjugate terms cancel by construction."""
-    if not expression.has(sp.I):
-        return sp.expand(expression)
-    return sp.expand(sp.expand(expression).as_real_imag()[0])
+    real = sp.expand(expression if not expression.has(sp.I) else sp.expand(expression).as_real_imag()[0])
+    return real.replace(lambda e: e.is_Mul and e.has(expm1), _bounded)
+
+
+def _bounded(term: sp.Mul) -> sp.Expr:
+    """exp(-u) expm1(u) as -expm1(-u): equal, but neither factor can overflow for a large variance u."""
+    for factor in term.args:
+        inverse = sp.exp(-factor.args[0]) if isinstance(factor, expm1) else None
+        if inverse in term.args:
+            return -term / (factor * inverse) * expm1(-factor.args[0])
+    return term

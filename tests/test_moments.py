@@ -145,3 +145,11 @@ def test_no_closed_form_names_the_term_and_the_way_out(function, term):
     with pytest.raises(NoClosedForm, match=term) as caught:
         scalar.mean_of(function)
     assert "unscented(model)" in str(caught.value)
+
+
+def test_variance_of_a_sine_is_finite_for_any_variance():
+    """Var sin x -> 1/2 for a phase that is not known at all; exp(u) of the formula must not overflow on the way."""
+    x, m, d = sp.symbols("x m d", real=True)
+    variance = sp.lambdify([m, d], GaussianMoments([x], [m], sp.Matrix([[d]])).covariance(sp.sin(x), sp.sin(x)), "numpy")
+    with np.errstate(all="raise", under="ignore"):
+        assert variance(0.3, 5000.0) == pytest.approx(0.5, rel=1e-12)
