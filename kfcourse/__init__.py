@@ -8,7 +8,7 @@ compare(lab_filters(model), model, 100_000, 51, seed=1).ranking()
 from kfcourse.comparison import Comparison
 from kfcourse.design import NotFinite, design
 from kfcourse.ensemble import Ensemble, Trajectories, simulate
-from kfcourse.experiment import compare, run
+from kfcourse.experiment import compare, predictions, run
 from kfcourse.formula import FormulaError
 from kfcourse.gaussian import Gaussian
 from kfcourse.lab import lab_filters, load_variants
@@ -35,6 +35,7 @@ __all__ = [
     "lab_filters",
     "linearised",
     "load_variants",
+    "predictions",
     "run",
     "simulate",
     "unscented",

@@ -19,6 +19,7 @@ FUNCTIONS = {
     "cos": sp.cos,
     "tan": sp.tan,
     "atan": sp.atan,
+    "atan2": sp.atan2,
     "exp": sp.exp,
     "log": sp.log,
     "sqrt": sp.sqrt,
@@ -27,6 +28,7 @@ FUNCTIONS = {
     "cosh": sp.cosh,
     "abs": sp.Abs,
 }
+ARGUMENTS = {"atan2": 2}  # how many a function takes; 1 if not named here.  atan2(y, x) is the angle of the point (x, y)
 CONSTANTS = {"pi": sp.pi}
 
 MAX_LENGTH = 2000
@@ -183,16 +185,17 @@ class _Reader:
         if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:
             called = node.func.id if isinstance(node.func, ast.Name) else "this"
             raise self.fail(node, f"{called!r} is not a known function; known: {', '.join(sorted(FUNCTIONS))}")
-        if node.keywords or len(node.args) != 1:
-            raise self.fail(node, f"{node.func.id} takes exactly one argument")
+        count = ARGUMENTS.get(node.func.id, 1)
+        if node.keywords or len(node.args) != count:
+            raise self.fail(node, f"{node.func.id} takes exactly {'one argument' if count == 1 else f'{count} arguments'}")
         if self.nested >= MAX_NESTED:
             raise self.fail(node, f"functions are nested more than {MAX_NESTED} deep")
         self.nested += 1
-        argument = self.read(node.args[0])
+        arguments = [self.read(argument) for argument in node.args]
         self.nested -= 1
-        if argument.is_number and abs(argument) >= MAX_ARGUMENT:
+        if any(argument.is_number and abs(argument) >= MAX_ARGUMENT for argument in arguments):
             raise self.fail(node, f"the argument of {node.func.id} is too large")
-        return FUNCTIONS[node.func.id](argument)
+        return FUNCTIONS[node.func.id](*arguments)
 
 
 def _degree(expression: sp.Expr) -> int:

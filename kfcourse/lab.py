@@ -73,12 +73,20 @@ FILTERS: dict[str, Entry] = {
     "aof-exact": Entry("exact AOF", "АОФ", lambda s: pointmass(s.model)),
     "particle": Entry("particle", "АОФ, частицы", lambda s: particle(s.model)),
 }
+# Printed names of filters that are not among the lab's.
+TITLES = {
+    "kalman": "Kalman",
+    "iterated-linearised": "iterated EKF",
+    "alpha-beta": "alpha-beta",
+    "alpha-beta-gamma": "alpha-beta-gamma",
+    "imm": "IMM",
+}
 LAB = ("aof-gaussian", "aof-linearised", "duof", "fos-gaussian", "fos-linearised", "mfos-gaussian", "mfos-linearised")
 
 
 def title(name: str) -> str:
     """The printed name of a filter: "GAOF" for "aof-gaussian"."""
-    return FILTERS[name].title if name in FILTERS else name
+    return FILTERS[name].title if name in FILTERS else TITLES.get(name, name)
 
 
 def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Design]:

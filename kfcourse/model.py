@@ -206,7 +206,7 @@ def exact_matrix(array: Array) -> sp.ImmutableMatrix:
 
 
 def _as_list(what: str, formulas: Formulas) -> list[Formula]:
-    if isinstance(formulas, str | sp.Expr):
+    if isinstance(formulas, str) or (isinstance(formulas, sp.Expr) and not isinstance(formulas, sp.MatrixBase)):
         return [formulas]
     result = list(formulas) if isinstance(formulas, Sequence | sp.MatrixBase) else [formulas]
     if not result:

@@ -22,13 +22,16 @@ _FAMILIES = {
     "mfos3": "#E69F00",
     "particle": "#F0E442",
     "kalman": "#000000",
+    "iterated": "#E69F00",
+    "alpha-beta": "#E69F00",
+    "imm": "#D55E00",
 }
 _MARKERS = {"aof": "o", "duof": "s", "fos": "^", "mfos": "D", "fos3": "v", "mfos3": "P", "particle": "*", "kalman": "x"}
 
 
 def style(name: str) -> dict[str, Any]:
     """Line style of a filter: colour by family, dashes for the linearised approximation, black for the exact."""
-    family, _, approximation = name.partition("-")
+    family, _, approximation = (name, "", "") if name in _FAMILIES else name.partition("-")
     if approximation == "exact":
         return {"color": "black", "linestyle": "-", "marker": "*", "label": title(name)}
     dashes = {"linearised": "--", "unscented": ":", "gauss-hermite": "-."}.get(approximation, "-")

@@ -136,3 +136,9 @@ def test_parameter_values_that_leave_no_finite_formula_are_refused():
 
 def test_a_model_prints_its_equations_and_values(variant53):
     assert repr(variant53) == "Model(x' = c*x + e*v*x, y = f*w*x**2 + g*x; c = 9/10, e = 1/20, g = 1, f = 1/50)"
+
+
+def test_equations_may_be_an_immutable_matrix():
+    x1, x2, v = sp.symbols("x1 x2 v")
+    model = Model.define(sp.ImmutableMatrix([x1 + x2, x2 + v]), sp.ImmutableMatrix([x1 + sp.Symbol("w")]))
+    assert (model.n, model.p) == (2, 1)
