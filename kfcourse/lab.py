@@ -77,6 +77,7 @@ FILTERS: dict[str, Entry] = {
 TITLES = {
     "kalman": "Kalman",
     "iterated-linearised": "iterated EKF",
+    "iterated-unscented": "iterated UKF",
     "alpha-beta": "alpha-beta",
     "alpha-beta-gamma": "alpha-beta-gamma",
     "imm": "IMM",

@@ -1,6 +1,6 @@
 """Self-checks: is an answer right, and if not, what kind of mistake does it look like?
 
-A `Question` holds the right answer and a catalogue of `Mistake`s, wrong answers that students give, each with what to say of it.
+A `Question` holds the right answer and a catalogue of mistakes, wrong answers that students give, each with what to say of it.
 The student's function and they are called with the same hidden arguments; an answer that equals a mistake is recognised by name.
 Nothing that a student hands in may crash a check, and no message contains the answer.
 """
