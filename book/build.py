@@ -14,9 +14,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import manual
+
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "_build"
 CACHE = BUILD / ".jupyter_cache"
+KEPT = (CACHE, BUILD / "solutions")  # made anew by themselves when stale
 KEY = BUILD / ".executed-with"
 
 
@@ -36,7 +39,7 @@ def prepare() -> None:
     if not (KEY.exists() and KEY.read_text() == key):
         shutil.rmtree(CACHE, ignore_errors=True)
     for entry in BUILD.iterdir() if BUILD.exists() else ():
-        if entry.is_dir() and entry != CACHE:
+        if entry.is_dir() and entry not in KEPT:
             shutil.rmtree(entry)
     BUILD.mkdir(exist_ok=True)
     KEY.write_text(key)
@@ -46,6 +49,8 @@ def main() -> int:
     prepare()
     # On a new machine matplotlib announces its font cache on stderr; not in a chapter, please.
     subprocess.run([sys.executable, "-c", "import matplotlib.font_manager"], stderr=subprocess.DEVNULL, check=True)
+    if not manual.write():
+        return 1
     jupyter_book = [sys.executable, "-c", "from jupyter_book.cli.main import main; main()"]
     options = ["--config", "_config.yml", "--path-output", ".", "-W", "--keep-going", "-n"]
     result = subprocess.run([*jupyter_book, "build", "book", *options], cwd=ROOT)

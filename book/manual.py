@@ -1,7 +1,7 @@
 """The pages of the lab manual, made from the masters of the exercises for one variant.
 
-Into book/manual/ go, for every set, its page (questions, hints, no solutions), the pictures to reach, and the student's notebook to
-download.  The worked solutions are executed for that, and kept in _build/solutions.
+Into book/manual/ go, for every set, its page (questions, hints, no solutions), the pictures to reach, and the student's
+notebook to download.  The worked solutions are executed for that, and kept in _build/solutions.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ PAGES = Path(__file__).resolve().parent / "manual"
 SOLUTIONS = Path(__file__).resolve().parent.parent / "_build" / "solutions"
 NOTE = """
 ```{{admonition}} Your own notebook
-The formulas and pictures on this page are those of variant {variant}. {{download}}`Download its notebook <notebooks/{file}.ipynb>`, or ask your instructor
-for the notebook of your variant. Open it in Jupyter, in an environment in which `kfcourse` is installed ({{doc}}`../lab-manual`).
+The formulas and pictures on this page are those of variant {variant}.
+{{download}}`Download its notebook <notebooks/{file}.ipynb>`, or ask your instructor for the notebook of your variant.
+Open it in Jupyter, in an environment in which `kfcourse` is installed: {{doc}}`../lab-manual`.
 ```
 """
 

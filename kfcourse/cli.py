@@ -1,7 +1,8 @@
-"""The command line: `kfcourse lab 53`, `kfcourse variants`."""
+"""The command line: `kfcourse lab 53`, `kfcourse variants --check`."""
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from collections.abc import Iterator
@@ -13,10 +14,13 @@ import click
 from kfcourse.design import NotFinite
 from kfcourse.experiment import compare
 from kfcourse.formula import FormulaError
-from kfcourse.lab import FILTERS, LAB, VariantError, find_variant, has_exact, lab_filters, load_variants, title
+from kfcourse.grammar import generate
+from kfcourse.lab import FILTERS, LAB, VariantError, find_variant, has_exact, lab_filters, title
 from kfcourse.model import ModelError
 from kfcourse.moments import NoClosedForm
 from kfcourse.notebooks import commands
+from kfcourse.notebooks.course import chosen_variants, save
+from kfcourse.quality import FEWEST, RUNS, examine_all, table
 from kfcourse.report import conclusions, write_json, write_report
 
 _VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")
@@ -54,12 +58,59 @@ def main() -> None:
 
 @main.command()
 @_VARIANTS
-def variants(variants_file: Path | None) -> None:
-    """List the variants of the lab."""
-    for name, variant in load_variants(variants_file).items():
+@click.option("--variant", "names", multiple=True, help="Only this one; may be repeated.")
+@click.option("--check", is_flag=True, help="Say of each whether it is well posed, and how hard; exit status 1 if one is not.")
+@click.option("--generate", "wanted", type=click.IntRange(1, 200), help="Propose so many new variants that are well posed.")
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of the trajectories and proposals.")
+@click.option(
+    "--runs", type=click.IntRange(min=FEWEST), default=RUNS, show_default=True, help="Trajectories; an eighth if vectors."
+)
+@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Does not change the results.")
+@click.option("--out", type=click.Path(path_type=Path), help="New file for the proposed variants.  [default: print them]")
+def variants(
+    variants_file: Path | None,
+    names: tuple[str, ...],
+    check: bool,
+    wanted: int | None,
+    seed: int,
+    runs: int,
+    jobs: int,
+    out: Path | None,
+) -> None:
+    """List the variants of the lab, check them, or propose new ones."""
+    if wanted is not None and (check or names or variants_file):
+        raise click.UsageError("--generate goes with --seed, --runs, --jobs and --out only")
+    if wanted is None and out:
+        raise click.UsageError("--out goes with --generate only")
+    if wanted is not None:
+        _generate(wanted, seed, runs, jobs, out)
+        return
+    chosen = chosen_variants(names, not names, variants_file)
+    if check:
+        found = list(examine_all(chosen, runs, seed, jobs))
+        click.echo(table(found))
+        sys.exit(0 if all(one.well_posed for one in found) else 1)
+    for variant in chosen:
         model = variant.model
-        click.echo(f"{name:>6}  {variant.title or 'no title'}")
+        click.echo(f"{variant.name:>6}  {variant.title or 'no title'}")
         click.echo(f"        x' = {', '.join(map(str, model.state_equation))};  y = {', '.join(map(str, model.meter_equation))}")
+
+
+def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) -> None:
+    """Proposed variants to the file or to standard output, what was rejected to standard error."""
+    if out and (os.path.lexists(out) or not out.parent.is_dir()):
+        raise click.ClickException(f"the variants cannot go to {out}: name a new file in an existing folder with --out")
+    found = generate(wanted, seed, runs, jobs)
+    reasons = ", ".join(f"{number} {reason}" for reason, number in found.rejected.most_common())
+    click.echo(f"{found.rejected.total()} candidates rejected{': ' if reasons else ''}{reasons}", err=True)
+    if found.variants:
+        text = f"# Made by: kfcourse variants --generate {wanted} --seed {seed} --runs {runs}\n\n{found.toml()}"
+        if out:
+            save(text, out)
+        else:
+            click.echo(text, nl=False)
+    if len(found.variants) < wanted:
+        raise click.ClickException(f"only {len(found.variants)} of {wanted} variants found; ask for fewer, or try another --seed")
 
 
 @main.command()
@@ -135,3 +186,4 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
 
 main.add_command(commands.exercises)
 main.add_command(commands.solutions)
+main.add_command(commands.grade)

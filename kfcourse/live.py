@@ -1,6 +1,6 @@
 """The live page: a reader moves the pointer, and the filter of `kfcourse.pointer` cleans the track in the browser.
 
-    recording = record(hand_track(seed=7), seed=3)       a track and its noise, every 10 ms
+    recording = record(hand_track(seed=10), seed=6)      a track and its noise, every 10 ms
     HTML(page(recording))                                the page, one piece of HTML that loads nothing
 
 The page runs the filter itself, in JavaScript (templates/live.js.j2).  The matrices A, B, H and those of the start-up are
@@ -36,7 +36,7 @@ class Slider(NamedTuple):
 
 
 # ms; px; tenths of a decade: the intensity is 10^(value / 10) px^2/s^3.
-SLIDERS = {"interval": Slider(10, 200, 10), "sigma": Slider(0, 40, 1), "decibels": Slider(30, 80, 1)}
+SLIDERS = {"interval": Slider(10, 200, 10), "sigma": Slider(1, 40, 1), "decibels": Slider(30, 80, 1)}
 
 
 class Recording(NamedTuple):
@@ -81,7 +81,7 @@ def record(track: HandTrack, seed: int) -> Recording:
     return Recording(position.round(_DECIMALS), (samples.y[:, 0] - position).round(_DECIMALS))
 
 
-def page(recording: Recording, interval: int = 50, sigma: int = 8, decibels: int = 57) -> str:
+def page(recording: Recording, interval: int = 20, sigma: int = 8, decibels: int = 57) -> str:
     """The live page as a piece of HTML: markup, style, script and the recording; it loads nothing.
 
     Parameters
@@ -91,7 +91,7 @@ def page(recording: Recording, interval: int = 50, sigma: int = 8, decibels: int
     interval : int
         Where the slider of the sampling interval begins, ms: 10, 20, ..., 200.
     sigma : int
-        Of the noise of each coordinate, px: 0, 1, ..., 40.
+        Of the noise of each coordinate, px: 1, 2, ..., 40.
     decibels : int
         Of the intensity S of the acceleration's white noise, 10^(decibels / 10) px^2/s^3: 30, 31, ..., 80.  The filter's Q is
         that of `pointer.uniform_acceleration` with acceleration_sd = sqrt(S / interval).

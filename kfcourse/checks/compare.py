@@ -1,21 +1,23 @@
 """Is an answer the right one?  Comparison of formulas by value and of numbers to rounding.
 
-A formula counts as equal if it takes the same values, to 30 digits, at several random points: any equivalent form passes, and no
-simplification has to succeed.
+A formula counts as equal if it takes the same values, to 30 digits, at several random points of both signs: any equivalent form
+passes, and no simplification has to succeed.
 """
 
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
-DIGITS = 40  # of the values of formulas
-AGREE = sp.Float(10) ** -30  # relative difference of equal formulas
-POINTS = 4
+from kfcourse.formula import symbol
+
+DIGITS = 60  # of the values of formulas
+AGREE = sp.Float(10) ** -30  # relative difference of equal formulas: half of the digits may be lost by cancellation
+POINTS = 6
 
 
 class Unusable(Exception):
@@ -53,6 +55,8 @@ def _formula(answer: Any) -> sp.Expr:
     if isinstance(answer, bool | str) or not isinstance(answer, sp.Expr | int | float | np.number):
         raise Unusable(f"expected a formula in the symbols of the exercise, got {describe(answer)}")
     formula = sp.nsimplify(answer, rational=True) if isinstance(answer, float | np.floating) else sp.sympify(answer)
+    if formula.has(sp.Derivative, sp.Integral):
+        formula = formula.doit()
     if formula.has(sp.nan, sp.oo, -sp.oo, sp.zoo):
         raise Unusable("the formula is not finite: it contains NaN or infinity")
     return formula.replace(lambda e: e.is_Float, lambda e: sp.Rational(str(e)))  # 0.9 typed for 9/10 is no mistake
@@ -125,27 +129,45 @@ def equal_formulas(first: Sequence[sp.Expr], second: Sequence[sp.Expr], values: 
     """Whether the formulas agree, pairwise, at random points.
 
     Symbols are told apart by name only.  Where one side has no parameter left as a symbol, the other's get their values.
+    What cannot be evaluated is not equal.
     """
-    sides = [_by_name(formulas) for formulas in (first, second)]
-    parameters = {sp.Symbol(s.name): value for s, value in values.items()}
-    if any(set(parameters).isdisjoint(_symbols(side)) for side in sides):
-        sides = [[f.subs(parameters) for f in side] for side in sides]
-    symbols = sorted(_symbols(sides[0]) | _symbols(sides[1]), key=str)
-    source = random.Random(2701)
-    for _ in range(POINTS):
-        point = {s: sp.Rational(source.randint(101, 397), source.randint(101, 397)) for s in symbols}
-        for a, b in zip(*sides, strict=True):
-            try:
-                left, right = (sp.N(f.subs(point, simultaneous=True), DIGITS) for f in (a, b))
+    try:
+        sides = [_by_name(formulas) for formulas in (first, second)]
+        parameters = {symbol(s.name): value for s, value in values.items()}
+        if any(set(parameters).isdisjoint(_symbols(side)) for side in sides):
+            sides = [[f.subs(parameters) for f in side] for side in sides]
+        signs = {s: -1 if value < 0 else 1 for s, value in parameters.items()}
+        for point in _points(sorted(_symbols(sides[0]) | _symbols(sides[1]), key=str), signs, all(map(_entire, sides[1]))):
+            for a, b in zip(*sides, strict=True):
+                left, right = (sp.N(f.xreplace(point), DIGITS) for f in (a, b))
                 if not (left.is_number and right.is_number) or not abs(left - right) <= AGREE * (1 + abs(right)):
                     return False
-            except (TypeError, ValueError, AttributeError, ZeroDivisionError):
-                return False
+    except Exception:  # SymPy has many ways to stop at a formula that makes no sense
+        return False
     return True
 
 
+def _points(symbols: Sequence[sp.Symbol], signs: Mapping[sp.Symbol, int], both: bool) -> Iterator[dict[sp.Symbol, sp.Float]]:
+    """Random points: parameters with their own sign, other symbols of both signs, or positive only.
+
+    Floats: powers of fractions would grow without bound.
+    """
+    source = random.Random(2701)
+    for number in range(POINTS):
+        point = {}
+        for s in symbols:
+            sign = signs.get(s, (1, -1, source.choice((1, -1)))[min(number, 2)] if both else 1)
+            point[s] = sp.Float(sp.Rational(sign * source.randint(101, 397), source.randint(101, 397)), DIGITS)
+        yield point
+
+
+def _entire(formula: sp.Expr) -> bool:
+    """Whether a formula has no roots and the like: those differ in form where a variance becomes negative."""
+    return not formula.has(sp.log, sp.Abs) and all(power.exp.is_integer for power in formula.atoms(sp.Pow))
+
+
 def _by_name(formulas: Sequence[sp.Expr]) -> list[sp.Expr]:
-    return [f.xreplace({s: sp.Symbol(s.name) for s in f.free_symbols}) for f in formulas]
+    return [f.xreplace({s: symbol(s.name) for s in f.free_symbols}) for f in formulas]
 
 
 def _symbols(formulas: Sequence[sp.Expr]) -> set[sp.Symbol]:

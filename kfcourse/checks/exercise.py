@@ -12,7 +12,17 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.checks import gaussian_filters, montecarlo, optimal, structural
+from kfcourse.checks import (
+    continuous_time,
+    extended,
+    gaussian_filters,
+    grid,
+    montecarlo,
+    navigation,
+    optimal,
+    structural,
+    tracking,
+)
 from kfcourse.checks.engine import Question, Result, check
 from kfcourse.ensemble import Trajectories, simulate
 from kfcourse.lab import Structures, Variant, find_variant, read_variant
@@ -26,12 +36,13 @@ class ExerciseError(ValueError):
 
 @dataclass(frozen=True)
 class SetOfQuestions:
-    """An exercise set: its letter, the master's file name without .md, its title and its questions."""
+    """An exercise set: letter, the master's file name without .md, title, questions, and its personal numbers by exercise."""
 
     letter: str
     file: str
     title: str
     questions: tuple[Question, ...]
+    numbers: Callable[[Any], dict[str, float]] | None = None
 
 
 # One line a set; the masters are exercises/<file>.md.
@@ -41,6 +52,17 @@ _ALL = (
     SetOfQuestions("c", "c-duof", "The two-step conditionally optimal filter", optimal.DUOF),
     SetOfQuestions("d", "d-fos", "Filters of optimal structure", optimal.FOS),
     SetOfQuestions("e", "e-comparison", "Comparison by Monte Carlo", montecarlo.QUESTIONS),
+    SetOfQuestions("f", "f-exact", "The exact filter on a grid", grid.QUESTIONS, grid.companion_numbers),
+    SetOfQuestions("g", "g-extended", "The extended Kalman filter and its consistency", extended.QUESTIONS),
+    SetOfQuestions(
+        "h", "h-continuous", "The continuous-time filter", continuous_time.QUESTIONS, continuous_time.continuous_numbers
+    ),
+    SetOfQuestions("i", "i-track", "A track in the plane, and numerical care", tracking.TRACK, tracking.track_numbers),
+    SetOfQuestions("j", "j-radar", "Alpha-beta filter and radar track", tracking.RADAR, tracking.radar_numbers),
+    SetOfQuestions(
+        "k", "k-integration", "Inertial system and satellite receiver", navigation.INTEGRATION, navigation.integration_numbers
+    ),
+    SetOfQuestions("l", "l-time-tags", "Rates and time tags", navigation.TIMING, navigation.timing_numbers),
 )
 SETS: Mapping[str, SetOfQuestions] = MappingProxyType({one.letter: one for one in _ALL})
 
@@ -61,6 +83,12 @@ class Exercise:
     @property
     def questions(self) -> dict[str, Question]:
         return {question.name: question for question in SETS[self.letter].questions}
+
+    @cached_property
+    def numbers(self) -> dict[str, float]:
+        """Personal numbers of this set and variant, by name; none for a set that asks about the variant's model only."""
+        of_set = SETS[self.letter].numbers
+        return {} if of_set is None else of_set(self)
 
     @property
     def model(self) -> Model:

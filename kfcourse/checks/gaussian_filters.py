@@ -183,7 +183,8 @@ Functions = tuple[Callable, Callable]
 
 
 def right_step(lam: Array, Psi: Array, y: Array, measure: Callable, predict: Callable) -> tuple[Array, ...]:
-    z, p = right_correction(lam, Psi, *measure(lam, Psi), y)
+    h, G, F = measure(lam, Psi)
+    z, p = right_correction(lam, Psi, h, G, F, y)
     return z, p, *predict(z, p)
 
 
@@ -199,7 +200,8 @@ def step_with(correction: Answer = right_correction, following: Callable[..., tu
 
 def _swapped(lam: Array, Psi: Array, y: Array, measure: Callable, predict: Callable) -> tuple[Array, ...]:
     lam, Psi = predict(lam, Psi)
-    z, p = right_correction(lam, Psi, *measure(lam, Psi), y)
+    h, G, F = measure(lam, Psi)
+    z, p = right_correction(lam, Psi, h, G, F, y)
     return z, p, lam, Psi
 
 

@@ -22,7 +22,8 @@ Fit = Callable[[Array, Array], tuple[Array, Array, Array]]
 
 def right_regression(target: Array, regressor: Array) -> tuple[Array, Array, Array]:
     """matrix (r, s), offset (r,), residual covariance (r, r)."""
-    return tuple(Moments.of(target, regressor).regression(target.shape[1]))
+    matrix, offset, residual = Moments.of(target, regressor).regression(target.shape[1])
+    return matrix, offset, residual
 
 
 def ensemble(exercise: Any, name: str) -> tuple[Array, Array, Array]:
@@ -227,7 +228,9 @@ def duof_run(designed_x: Array, designed_y: Array, y: Array, mean: Array, a: Cal
     return duof_run_with()(designed_x, designed_y, y, mean, a, b)
 
 
-def duof_run_with(own_coefficients: bool = False, one_gain: bool = False, predictions: bool = False) -> Answer:
+def duof_run_with(
+    own_coefficients: bool = False, one_gain: bool = False, predictions: bool = False, object_alone: bool = False
+) -> Answer:
     """Design over x, y (steps, N, ...), then filter other measurements; with one thing changed."""
 
     def run(x: Array, y_design: Array, y: Array, mean: Array, a: Callable, b: Callable) -> Array:
@@ -246,7 +249,7 @@ def duof_run_with(own_coefficients: bool = False, one_gain: bool = False, predic
             estimates.append(other if predictions else z_other)
             if k + 1 < len(x):
                 F, g, _ = right_regression(x[k + 1], a(z))
-                lam, other = a(z) @ F.T + g, a(z_other) @ F.T + g
+                lam, other = a(z) @ F.T + g, a(z_other) if object_alone else a(z_other) @ F.T + g
         return np.array(estimates)
 
     return run
@@ -265,6 +268,11 @@ WRONG_DUOF_RUNS: tuple[tuple[str, str, Answer], ...] = (
     ),
     ("one-gain", "H and e of the first step are used at every step; each step has its own.", duof_run_with(one_gain=True)),
     ("predictions-returned", "These are the predictions; return the estimates.", duof_run_with(predictions=True)),
+    (
+        "prediction-not-fitted",
+        "The prediction is a(z) as it is; its coefficients F and g, found in the design, are not used.",
+        duof_run_with(object_alone=True),
+    ),
     ("offset-not-used", "The offset e is not used when the filter runs.", duof_run_with(own_coefficients=True)),
 )
 
@@ -377,7 +385,8 @@ def fos_step_with(
     """One step of the FOS's design, with another condition or another choice of what the prediction starts from."""
 
     def step(lam: Array, Psi: Array, x: Array, y: Array, measure: Callable, predict: Callable) -> tuple[Array, ...]:
-        z, p = right_correction(lam, Psi, *measure(lam, Psi), y)
+        h, G, F = measure(lam, Psi)
+        z, p = right_correction(lam, Psi, h, G, F, y)
         return z, *_predicting(predict, *choose(*condition(x, z), z, p))
 
     return step
@@ -425,7 +434,8 @@ def mfos_step_with(
     def step(
         lam: Array, Psi: Array, x: Array, y: Array, x_next: Array, measure: Callable, predict: Callable
     ) -> tuple[Array, ...]:
-        z, p = right_correction(lam, Psi, *measure(lam, Psi), y)
+        h, G, F = measure(lam, Psi)
+        z, p = right_correction(lam, Psi, h, G, F, y)
         sigma = z - lam
         if correction:
             H, e, _ = fit(target(x, lam), sigma)

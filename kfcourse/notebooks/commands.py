@@ -1,4 +1,4 @@
-"""The instructor's commands: exercises, solutions."""
+"""The instructor's commands: exercises, solutions, grade."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 from kfcourse.checks import SETS
+from kfcourse.notebooks import grade as grading
 from kfcourse.notebooks.course import Job, Outcome, assign, chosen_variants, jobs, make, run_all, safe
 from kfcourse.notebooks.master import MASTERS
 
@@ -68,6 +69,7 @@ def _make(
         work = _for_students(kind, students, variants, wanted, out, variants_file, masters, with_pdf)
     else:
         work = jobs(kind, out, variants, wanted, variants_file, masters, with_pdf)
+    _separate(work)
     out.mkdir(parents=True, exist_ok=True)
     outcomes = list(run_all(work, make, workers, kind, dask))
     _table(outcomes, work)
@@ -104,6 +106,15 @@ def _for_students(
     return work
 
 
+def _separate(work: Sequence[Job]) -> None:
+    """ValueError if two jobs would write the same file; some file systems take large and small letters for the same."""
+    seen: dict[str, Job] = {}
+    for job in work:
+        other = seen.setdefault(str(job.target).casefold(), job)
+        if other is not job:
+            raise ValueError(f"two notebooks would be {job.target}: of {other.name} and of {job.name}; change one of the names")
+
+
 def _table(outcomes: Sequence[Outcome], work: Sequence[Job]) -> None:
     """What was written, folder by folder, and what failed."""
     found = {(o.job.folder, o.job.letter): o for o in outcomes}
@@ -113,3 +124,68 @@ def _table(outcomes: Sequence[Outcome], work: Sequence[Job]) -> None:
         click.echo(f"{folder!s:<28} {count['written']:>7} {count['up to date']:>11} {count['failed']:>7}")
     for outcome in sorted((o for o in outcomes if o.status == "failed"), key=lambda o: o.job.name):
         click.echo(f"FAILED {outcome.job.name}: {outcome.message}", err=True)
+
+
+@click.command()
+@click.argument("folder", type=click.Path(exists=True, path_type=Path, file_okay=False))
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="File of the table.  [default: FOLDER/grades.csv]")
+@click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="The file of variants that you handed out.")
+@click.option("--masters", type=click.Path(path_type=Path), default=MASTERS, help="Folder of the masters.")
+@click.option("--jobs", "workers", type=click.IntRange(min=1), default=2, show_default=True, help="Notebooks at once.")
+@click.option(
+    "--seconds",
+    type=click.FloatRange(min=1),
+    default=grading.SECONDS,
+    show_default=True,
+    help="Time limit of a cell; a notebook may take five times as long.",
+)
+@click.option("--again", is_flag=True, help="Grade those too that have not changed since the last table.")
+def grade(
+    folder: Path, out: Path | None, variants_file: Path | None, masters: Path, workers: int, seconds: float, again: bool
+) -> None:
+    """Run the returned notebooks in FOLDER and write a table of what passed.
+
+    The notebook of each set and variant is made again from the master, and the student's cells are put into it: checks that a
+    student changed or deleted do not count.  Each notebook runs in a process and an empty folder of its own, with limits of time,
+    output and memory (4 GB, where the system can limit it), and cannot disturb the others.
+
+    The table is for your eye, not for a judge.  Notebooks run with your rights: use a container, or a user of its own, if
+    somebody may mean harm.  The right answers are in the package; the note names notebooks that reach for them.
+
+    Marks: a tick is passed, a cross is wrong or not usable, a dash is not implemented or not run.  Unchanged notebooks are not
+    run again.  Exit status: 0 if every exercise notebook could be graded, however badly; 1 if some could not.
+    """
+    work = grading.returned(folder, seconds, variants_file, masters)
+    if not work:
+        raise ValueError(f"no notebooks (*.ipynb) in {folder}")
+    table = out or folder / "grades.csv"
+    grades, old = grading.grade_all(work, table, again, lambda new: run_all(new, grading.grade, workers, "grade"))
+    _grades(grades)
+    click.echo(f"\n{len(grades) - old} run, {old} unchanged since the last table. Table: {table}")
+    if any(one.status == grading.FAILED for one in grades):
+        sys.exit(1)
+
+
+def _grades(grades: Sequence[grading.Grade]) -> None:
+    """The table on the screen; notes are cut."""
+    width = max(len(one.name) for one in grades)
+    signs = _signs()
+    click.echo(f"{'notebook':<{width}}  set  variant  passed  checks")
+    for one in grades:
+        if one.status != grading.GRADED:
+            click.echo(f"{one.name:<{width}}  {one.status}{': ' * bool(one.note)}{grading.clean(one.note, 100)}")
+            continue
+        marks = "".join(signs[mark] for mark in one.marks.values())
+        count = f"{one.passed} of {len(one.marks)}"
+        click.echo(
+            f"{one.name:<{width}}  {one.letter:<3}  {one.variant:<7}  {count:<6}  {marks:<7} {grading.clean(one.note, 100)}"
+        )
+
+
+def _signs() -> dict[str, str]:
+    """Signs of the marks that this screen can show."""
+    try:
+        "".join(grading.SIGNS.values()).encode(getattr(sys.stdout, "encoding", None) or "ascii")
+    except (UnicodeEncodeError, LookupError):
+        return {mark: {"✓": "+", "✗": "x"}.get(sign, "-") for mark, sign in grading.SIGNS.items()}
+    return grading.SIGNS

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import json
 import os
 import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -91,7 +93,9 @@ def make(job: Job) -> Outcome:
             return Outcome(job, "failed", f"the solution does not pass {wrong[0]['question']}: {wrong[0]['message']}")
         _write(job, notebook, executed)
     except (NotebookFailed, ValueError, OSError) as error:
-        return Outcome(job, "failed", str(error))
+        return Outcome(job, "failed", str(error).removeprefix(f"{job.name}, "))
+    except Exception as error:  # of a library: one notebook must not stop the others
+        return Outcome(job, "failed", f"{type(error).__name__}: {error}")
     return Outcome(job, "written")
 
 
@@ -101,24 +105,27 @@ def _write(job: Job, notebook: NotebookNode, executed: NotebookNode) -> None:
     if job.kind == "exercises":
         save(nbformat.writes(student(notebook, pictures(executed))), job.target)
         return
-    page = job.target.with_suffix(".html")
+    page, printed = job.target.with_suffix(".html"), job.target.with_suffix(".pdf")
     save(html(executed, job.name), page)
     if job.with_pdf:
-        with temporary(job.target.with_suffix(".pdf")) as path:
+        with temporary(printed) as path:
             pdf(page, path)
+    else:
+        printed.unlink(missing_ok=True)  # of an earlier version
     save(nbformat.writes(executed), job.target)
 
 
 def fingerprint(notebook: NotebookNode) -> str:
     """Hash of all that a notebook's outputs depend on: its cells and the package."""
-    digest = hashlib.sha256(_package().encode())
+    digest = hashlib.sha256(package_digest().encode())
     for cell in notebook.cells:
         digest.update(repr((cell.cell_type, cell.source, cell.metadata.get("tags", []))).encode())
     return digest.hexdigest()
 
 
 @lru_cache(maxsize=1)
-def _package() -> str:
+def package_digest() -> str:
+    """Hash of this package's files."""
     digest = hashlib.sha256()
     for path in sorted(PACKAGE.rglob("*")):
         if path.suffix in (".py", ".toml", ".j2"):
@@ -128,10 +135,10 @@ def _package() -> str:
 
 def _up_to_date(path: Path, notebook: NotebookNode) -> bool:
     try:
-        old = nbformat.read(path, as_version=4)
-    except (OSError, ValueError):  # missing, or not a notebook
+        old = json.loads(path.read_bytes())["metadata"]["kfcourse"]["fingerprint"]
+    except (OSError, ValueError, RecursionError, LookupError, TypeError):  # missing, or not a notebook of ours
         return False
-    return old.metadata.get("kfcourse", {}).get("fingerprint") == notebook.metadata["kfcourse"]["fingerprint"]
+    return old == notebook.metadata["kfcourse"]["fingerprint"]
 
 
 @contextmanager
@@ -172,11 +179,14 @@ def run_all(jobs: Sequence[Any], work: Callable[[Any], Any], workers: int, what:
     Raises
     ------
     ValueError
-        Dask is wanted and not installed, or not reachable.
+        Dask is wanted and not installed, or not reachable; or a process of ours was killed.
     """
     with _backend(dask, workers) as parallel:
         done = parallel(joblib.delayed(work)(job) for job in jobs)
-        yield from tqdm(done, desc=what, total=len(jobs), unit="notebook", disable=None)
+        try:
+            yield from tqdm(done, desc=what, total=len(jobs), unit="notebook", disable=None)
+        except BrokenProcessPool:
+            raise ValueError("a working process was killed (out of memory?); run the same again, with fewer --jobs") from None
 
 
 @contextmanager
@@ -255,6 +265,8 @@ def assign(path: Path, variants: Sequence[str]) -> list[Student]:
         best = max(free, key=lambda variant: hashlib.sha256(f"{name}/{group}/{variant}".encode()).digest())
         used.append(best)
         students.append(Student(name, group, best))
+    if not students:
+        raise ValueError(f"{path} names no student")
     return students
 
 
@@ -272,13 +284,15 @@ def course_list(path: Path) -> Iterator[tuple[int, str, str]]:
     if not {"name", "group"} <= set(columns):
         raise ValueError(f"{path}: the first line must name the columns name and group, got {', '.join(columns) or 'nothing'}")
     reader.fieldnames = columns
-    for row in reader:
-        name, group = ((row[key] or "").strip() for key in ("name", "group"))
-        if not name:
-            if group:
+    try:
+        for row in reader:
+            name, group = ((row[key] or "").strip() for key in ("name", "group"))
+            if name:
+                yield reader.line_num, name, group
+            elif group:
                 raise ValueError(f"{path}, line {reader.line_num}: a student without a name")
-            continue
-        yield reader.line_num, name, group
+    except csv.Error as error:
+        raise ValueError(f"{path}, line {reader.line_num + 1}: {error}") from None
 
 
 def chosen_variants(names: Sequence[str], everything: bool, variants_file: Path | None) -> list[Variant]:

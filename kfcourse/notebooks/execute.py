@@ -142,8 +142,11 @@ def pdf(page: Path, target: Path) -> None:
         raise NotebookFailed(f"no browser to print PDF with; install one of {', '.join(BROWSERS[:3])}, or print {page} yourself")
     with tempfile.TemporaryDirectory() as profile:
         command = [browser, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}", "--no-pdf-header-footer"]
-        done = subprocess.run(
-            [*command, f"--print-to-pdf={target}", page.resolve().as_uri()], capture_output=True, text=True, timeout=SECONDS
-        )
-    if done.returncode or not target.exists():
+        try:
+            done = subprocess.run(
+                [*command, f"--print-to-pdf={target}", page.resolve().as_uri()], capture_output=True, text=True, timeout=SECONDS
+            )
+        except subprocess.TimeoutExpired:
+            raise NotebookFailed(f"{browser} did not print {page} in {SECONDS} s") from None
+    if done.returncode or not target.exists() or not target.stat().st_size:
         raise NotebookFailed(f"{browser} could not print {page}: {done.stderr.strip()[-200:]}")

@@ -299,3 +299,6 @@ class _Printer(StrPrinter):
 
     def _print_Pi(self, expr: sp.Expr) -> str:
         return "sp.pi"
+
+    def _print_Exp1(self, expr: sp.Expr) -> str:
+        return "sp.E"
