@@ -24,8 +24,9 @@ import numpy as np
 import sympy as sp
 from numpy.polynomial import Polynomial
 
+from kfcourse.arithmetic import predict_law
 from kfcourse.gaussian import Array, Gaussian
-from kfcourse.linear import LinearSystem, Run, predict_law, run
+from kfcourse.linear import LinearSystem, Run, run
 
 DT = sp.Symbol("Delta", positive=True)
 _AXES = sp.eye(2)

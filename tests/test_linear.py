@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from kfcourse.arithmetic import FORMS, _triangular, form, predict_law
 from kfcourse.consistency import innovations, nis
 from kfcourse.experiment import run as run_filter
 from kfcourse.filters.kalman import kalman
 from kfcourse.gaussian import Gaussian
-from kfcourse.linear import FORMS, LinearSystem, _triangular, covariances, form, predict_law, run, simulate, steady_state
+from kfcourse.linear import LinearSystem, covariances, run, simulate, steady_state
 from kfcourse.model import Model
 
 # Conditions of the covariances below are up to 1e4: rounding of float64 (1e-16) times that, over a dozen steps.

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from kfcourse import live, pointer
+from kfcourse.arithmetic import predict_law
 from kfcourse.consistency import innovations, nis, normalised_square
 from kfcourse.gaussian import Gaussian
-from kfcourse.linear import covariances, predict_law, steady_state
+from kfcourse.linear import covariances, steady_state
 
 ROOT = Path(__file__).resolve().parent.parent
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chromium-browser"))), None)

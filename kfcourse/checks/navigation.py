@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from kfcourse.arithmetic import FORMS
 from kfcourse.checks.engine import Answer, Question, catalogue
 from kfcourse.checks.tracking import covariance, personal, substituted
 from kfcourse.gaussian import Array, Gaussian
-from kfcourse.linear import FORMS, LinearSystem
 from kfcourse.linear import run as run_linear
 from kfcourse.navigation import Clock, Dynamics, Observation, Sensor
 from kfcourse.navigation import fuse as fuse_events
+from kfcourse.system import LinearSystem
 
 
 def integration_numbers(exercise: Any) -> dict[str, float]:

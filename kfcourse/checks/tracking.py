@@ -14,12 +14,13 @@ import numpy as np
 import scipy.linalg
 import sympy as sp
 
+from kfcourse.arithmetic import FORMS, Root, predict_law
 from kfcourse.checks.engine import Answer, Question, catalogue
 from kfcourse.experiment import run
 from kfcourse.filters.alphabeta import alpha_beta, steady_beta, tracking_index
 from kfcourse.gaussian import Array, Gaussian, square_root
-from kfcourse.linear import FORMS, LinearSystem, Root, predict_law
 from kfcourse.pointer import DT, INPUT, SENSITIVITY, START, TRANSITION
+from kfcourse.system import LinearSystem
 from kfcourse.tracks import AZIMUTH, CARTESIAN, ELEVATION, RANGE, SPHERICAL, X, Y, Z, kinematic
 
 COURSE = "53"  # the variant that the course itself works through
