@@ -635,6 +635,11 @@ def test_cells_of_the_student_keep_their_places():
     assert len(own) == 7  # five, and two answers
 
 
+def test_students_code_is_read_without_warnings(recwarn):
+    assert sources([Cell(1, "", "", "text = '\\m'"), Cell(2, "", "", "!ls")])[0] == ["text = '\\m'", "!ls", *PLAIN]
+    assert not recwarn.list
+
+
 def test_a_copy_of_an_answer_for_trials_does_not_replace_it():
     notebook = solved()
     trial = nbformat.from_dict(cell(notebook, "def gain"))

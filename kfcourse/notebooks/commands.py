@@ -96,12 +96,18 @@ def _for_students(
     with_pdf: bool,
 ) -> list[Job]:
     """A folder for each student, out/group/name, with their variant's notebooks; the assignment is printed."""
-    work = []
+    work: list[Job] = []
+    taken: dict[Path, str] = {}
     given = assign(students, variants)
     click.echo("group       variant   name")
     for one in given:
         click.echo(f"{one.group:<11} {one.variant:<9} {one.name}")
         folder = out / safe(one.group) / safe(one.name)
+        if folder in taken:
+            raise ValueError(
+                f"{taken[folder]} and {one.name} of {one.group} would share the folder {folder}; add a middle name to one"
+            )
+        taken[folder] = one.name
         work += [Job(letter, one.variant, folder, kind, variants_file, masters, with_pdf) for letter in letters]
     return work
 
@@ -115,13 +121,18 @@ def _separate(work: Sequence[Job]) -> None:
             raise ValueError(f"two notebooks would be {job.target}: of {other.name} and of {job.name}; change one of the names")
 
 
+def _shown(folder: Path) -> str:
+    """A folder as a user would name it: relative to where the command runs, if it is there."""
+    return str(folder.relative_to(Path.cwd()) if folder.is_relative_to(Path.cwd()) else folder)
+
+
 def _table(outcomes: Sequence[Outcome], work: Sequence[Job]) -> None:
     """What was written, folder by folder, and what failed."""
     found = {(o.job.folder, o.job.letter): o for o in outcomes}
     click.echo(f"\n{'folder':<28} written  up to date  failed")
     for folder in dict.fromkeys(job.folder for job in work):
         count = Counter(found[job.folder, job.letter].status for job in work if job.folder == folder)
-        click.echo(f"{folder!s:<28} {count['written']:>7} {count['up to date']:>11} {count['failed']:>7}")
+        click.echo(f"{_shown(folder):<28} {count['written']:>7} {count['up to date']:>11} {count['failed']:>7}")
     for outcome in sorted((o for o in outcomes if o.status == "failed"), key=lambda o: o.job.name):
         click.echo(f"FAILED {outcome.job.name}: {outcome.message}", err=True)
 

@@ -57,6 +57,11 @@ class Job:
     masters: Path = MASTERS
     with_pdf: bool = False
 
+    def __post_init__(self) -> None:
+        for path in ("folder", "variants_file", "masters"):  # a worker process may have another working directory
+            if getattr(self, path) is not None:
+                object.__setattr__(self, path, getattr(self, path).absolute())
+
     @property
     def name(self) -> str:
         return f"variant {self.variant}, {SETS[self.letter].file}"

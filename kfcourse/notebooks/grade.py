@@ -24,6 +24,7 @@ import site
 import subprocess
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -43,8 +44,8 @@ from kfcourse.lab import find_variant, read_variant
 from kfcourse.notebooks.course import package_digest, save
 from kfcourse.notebooks.master import MASTERS, opened, read, render, student
 
-SECONDS = 60.0  # a cell may take; a notebook five times as long
-CELLS = 5
+SECONDS = 60.0  # a cell may take
+WHOLE = 5  # times as long may a notebook take
 MEMORY = 4 * 2**30  # bytes of a kernel
 OUTPUT = 10 * 2**20  # characters that a notebook may print, pictures included
 LARGEST = 64 * 2**20  # bytes of a returned file
@@ -151,7 +152,7 @@ def grade(work: Returned) -> Grade:
 
 
 def _grade(work: Returned, cells: Sequence[Cell], claim: Any) -> Grade:
-    with time_limit(CELLS * work.seconds):
+    with time_limit(WHOLE * work.seconds):
         exercise, notes = claimed(claim, cells, work.variants_file)
         master = _generated(read(exercise.letter, work.masters), exercise.letter, opened(exercise))
     notebook, own = assembled(master, cells, exercise)
@@ -237,11 +238,7 @@ def claimed(claim: Any, cells: Sequence[Cell], variants_file: Path | None) -> tu
 
 def _opened(source: str) -> Iterator[tuple[Any, Any]]:
     """Arguments of the calls exercise("a", ...) in a cell, where they are literals."""
-    try:
-        tree = ast.parse(source)
-    except (SyntaxError, ValueError, RecursionError, MemoryError):  # IPython's own commands, among others
-        return
-    for node in ast.walk(tree):
+    for node in ast.walk(_tree(source) or ast.Module([], [])):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "exercise":
             with suppress(ValueError, TypeError):
                 arguments = [ast.literal_eval(argument) for argument in node.args]
@@ -352,8 +349,10 @@ def _plain(source: str) -> str:
 
 
 def _tree(source: str) -> ast.Module | None:
+    """The cell's syntax; None if it is not Python, such as IPython's own commands."""
     try:
-        return ast.parse(source)
+        with warnings.catch_warnings(action="ignore"):  # such as "\m" in a text
+            return ast.parse(source)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return None
 
@@ -411,7 +410,7 @@ class _Client(NotebookClient):
 
     def _left(self, seconds: float) -> int:
         if self.deadline is None:
-            self.deadline = time.monotonic() + CELLS * seconds
+            self.deadline = time.monotonic() + WHOLE * seconds
         return max(1, round(min(seconds, self.deadline - time.monotonic())))
 
     def _started(self, notebook: NotebookNode) -> None:
@@ -462,7 +461,7 @@ def run(notebook: NotebookNode, seconds: float = SECONDS) -> tuple[NotebookNode,
             )
         except CellTimeoutError:
             late = client.deadline is not None and time.monotonic() > client.deadline - 1
-            reason = f"the notebook takes longer than {CELLS * seconds:g} s" if late else f"still running after {seconds:g} s"
+            reason = f"the notebook takes longer than {WHOLE * seconds:g} s" if late else f"still running after {seconds:g} s"
         except DeadKernelError:
             reason = "the kernel died (out of memory, or ended by the notebook itself)"
         finally:
