@@ -609,9 +609,3 @@ def test_safe_names_stay_in_their_folder(name):
 def test_context_of_a_variant_without_parameters():
     lab = exercise("b", {"name": "bare", "state": "x + v", "meter": "x + w"})
     assert context(lab)["symbols"] == "# this variant has no parameters"
-
-
-def test_students_whose_names_would_share_a_folder_are_refused(call, tmp_path, masters):
-    (tmp_path / "list.csv").write_text("name,group\nLee A.,X\nLee-A,X\n", encoding="utf-8")
-    result = call("exercises", "--students", tmp_path / "list.csv", "--sets", "b", "--masters", masters, "--out", "out")
-    refused(result, "Lee A.", "Lee-A", "share the folder")

@@ -96,8 +96,7 @@ def _for_students(
     with_pdf: bool,
 ) -> list[Job]:
     """A folder for each student, out/group/name, with their variant's notebooks; the assignment is printed."""
-    work: list[Job] = []
-    taken: dict[Path, str] = {}
+    work = []
     given = assign(students, variants)
     click.echo("group       variant   name")
     for one in given:
