@@ -102,11 +102,6 @@ def _for_students(
     for one in given:
         click.echo(f"{one.group:<11} {one.variant:<9} {one.name}")
         folder = out / safe(one.group) / safe(one.name)
-        if folder in taken:
-            raise ValueError(
-                f"{taken[folder]} and {one.name} of {one.group} would share the folder {folder}; add a middle name to one"
-            )
-        taken[folder] = one.name
         work += [Job(letter, one.variant, folder, kind, variants_file, masters, with_pdf) for letter in letters]
     return work
 
