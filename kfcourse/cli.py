@@ -63,7 +63,11 @@ def main() -> None:
 @click.option("--generate", "wanted", type=click.IntRange(1, 200), help="Propose so many new variants that are well posed.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of the trajectories and proposals.")
 @click.option(
-    "--runs", type=click.IntRange(min=FEWEST), default=RUNS, show_default=True, help="Trajectories; an eighth if vectors."
+    "--runs",
+    type=click.IntRange(min=FEWEST),
+    default=RUNS,
+    show_default=True,
+    help="Trajectories of a check, an eighth for vectors.",
 )
 @click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Does not change the results.")
 @click.option("--out", type=click.Path(path_type=Path), help="New file for the proposed variants.  [default: print them]")

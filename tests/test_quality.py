@@ -153,7 +153,9 @@ def test_a_derivation_without_end_is_given_up(monkeypatch):
 
 def test_a_variant_whose_questions_cannot_be_posed_is_named_with_the_question():
     """The prediction of this object is a constant: there is nothing to regress on."""
-    assert questions(variant("0.3*v", "x + 0.3*x**2 + 0.3*w")).says.startswith("question c3 of the exercises cannot be posed")
+    constant = variant("0.3*v", "x + 0.3*x**2 + 0.3*w")
+    assert questions(constant).says.startswith("question c3 of the exercises cannot be posed")
+    assert examine(constant, FEWEST).faults["solvable"] == questions(constant).says
     assert questions(SHIPPED["2"]) is None
 
 
