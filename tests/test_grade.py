@@ -635,6 +635,18 @@ def test_cells_of_the_student_keep_their_places():
     assert len(own) == 7  # five, and two answers
 
 
+def test_checks_of_the_student_are_not_run():
+    cells = [Cell(1, "", "", 'lab.check("b1", gain)  # again'), Cell(2, "", "", 'lab.check("b2", correct)\nlab.check("b9", 1)')]
+    assert sources(cells) == (PLAIN, [])
+
+
+def test_paths_hold_in_any_working_directory(three, monkeypatch):
+    monkeypatch.chdir(three)
+    (one, *_) = grading.returned(Path(), variants_file=Path("a.ipynb"), masters=Path("."))
+    assert one.path == three / "a.ipynb" == one.variants_file
+    assert one.masters == three
+
+
 def test_students_code_is_read_without_warnings(recwarn):
     assert sources([Cell(1, "", "", "text = '\\m'"), Cell(2, "", "", "!ls")])[0] == ["text = '\\m'", "!ls", *PLAIN]
     assert not recwarn.list
@@ -673,6 +685,9 @@ def test_the_kernels_environment(tmp_path, monkeypatch):
     assert "MY_TOKEN" not in found
     assert found["PATH"] == os.environ["PATH"]
     assert found["HOME"] == str(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(("here", "", str(tmp_path))))
+    (tmp_path / "other").mkdir()
+    assert grading.environment(tmp_path / "other")["PYTHONPATH"] == os.pathsep.join((str(Path("here").absolute()), str(tmp_path)))
 
 
 @pytest.fixture

@@ -65,6 +65,7 @@ class Returned:
     Attributes
     ----------
     path : Path
+        Absolute, as the others: a worker process may have another working directory.
     name : str
         The path in the folder, with slashes.
     digest : str
@@ -122,6 +123,8 @@ def returned(
     folder: Path, seconds: float = SECONDS, variants_file: Path | None = None, masters: Path = MASTERS
 ) -> list[Returned]:
     """The notebooks in a folder and the folders in it; hidden ones, such as .ipynb_checkpoints, are left out."""
+    folder, masters = folder.absolute(), masters.absolute()
+    variants_file = variants_file and variants_file.absolute()
     setting = hashlib.sha256(f"{package_digest()}{seconds}".encode())
     for path in (*sorted(masters.glob("*.md")), *([variants_file] if variants_file else [])):
         setting.update(path.read_bytes())
@@ -479,7 +482,7 @@ def kill(group: int) -> None:
 
 
 KEPT = re.compile(
-    r"PATH|LANG|LC_\w+|TZ|PYTHONPATH|VIRTUAL_ENV|CONDA_PREFIX|\w*LD_LIBRARY_PATH|SYSTEMROOT|WINDIR|COMSPEC|PATHEXT", re.IGNORECASE
+    r"PATH|LANG|LC_\w+|TZ|VIRTUAL_ENV|CONDA_PREFIX|\w*LD_LIBRARY_PATH|SYSTEMROOT|WINDIR|COMSPEC|PATHEXT", re.IGNORECASE
 )
 
 
@@ -489,7 +492,9 @@ def environment(folder: Path) -> dict[str, str]:
     fonts.mkdir()
     for path in Path(matplotlib.get_cachedir()).glob("fontlist*.json"):  # otherwise each kernel searches for fonts again
         shutil.copy(path, fonts)
+    packages = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     return {name: value for name, value in os.environ.items() if KEPT.fullmatch(name)} | {
+        "PYTHONPATH": os.pathsep.join(os.path.abspath(path) for path in packages if path),
         "HOME": str(folder),
         "USERPROFILE": str(folder),
         "IPYTHONDIR": str(folder / "ipython"),
