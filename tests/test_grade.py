@@ -7,6 +7,7 @@ import os
 import shutil
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 import nbformat
 import numpy as np
@@ -184,10 +185,8 @@ def claims(**claim):
     return notebook
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """The returned notebooks."""
-    folder = tmp_path_factory.mktemp("returned")
+def fill(folder):
+    """Write the returned notebooks."""
     own = Exercise("b", exercise("b", MINE).variant)
     foreign = solved()
     del foreign.metadata["kfcourse"]
@@ -224,12 +223,41 @@ def folder(tmp_path_factory):
         path.write_text(json.dumps(notebook), encoding="utf-8")  # as it is: nbformat would mend some of them
     (folder / "cut.ipynb").write_text(json.dumps(solved())[:500], encoding="utf-8")
     (folder / "list.ipynb").write_text("[1, 2]", encoding="utf-8")
-    return folder
+
+
+class Graded(NamedTuple):
+    """What the command did: exit status, screen, table by the notebooks' names, and the folder."""
+
+    exit_code: int
+    output: str
+    table: dict
+    folder: Path
 
 
 @pytest.fixture(scope="module")
-def graded(folder):
-    """Result of the command, and its table by name."""
+def graded(tmp_path_factory):
+    """The returned notebooks, graded once for all test processes."""
+    base = tmp_path_factory.getbasetemp()
+    place = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "returned"
+    told = place.with_suffix(".json")
+    try:
+        place.mkdir()
+    except FileExistsError:  # another process is at it
+        for _ in range(6000):
+            if told.exists():
+                break
+            time.sleep(0.1)
+    else:
+        part = told.with_suffix(".part")
+        part.write_text(json.dumps(graded_now(place)), encoding="utf-8")
+        part.rename(told)
+    table = csv.DictReader(io.StringIO((place / "grades.csv").read_text(encoding="utf-8-sig")))
+    rows = {row["notebook"].removesuffix(".ipynb"): row for row in table}
+    return Graded(*json.loads(told.read_text(encoding="utf-8")), rows, place)
+
+
+def graded_now(folder):
+    fill(folder)
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     os.environ["KFCOURSE_SECRET"] = "x"
     try:
@@ -237,35 +265,34 @@ def graded(folder):
     finally:
         del os.environ["KFCOURSE_SECRET"]
     after = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    table = after.pop(folder / "grades.csv").decode("utf-8-sig")
+    assert after.pop(folder / "grades.csv", None), result.output
     assert after == before
-    return result, {row["notebook"].removesuffix(".ipynb"): row for row in csv.DictReader(io.StringIO(table))}
+    return result.exit_code, result.output
 
 
 def row(graded, name):
-    found = graded[1][name]
+    found = graded.table[name]
     return (found["q1"], found["q2"]), found["note"]
 
 
-def test_every_notebook_has_a_row(graded, folder):
-    result, table = graded
-    assert result.exit_code == 1  # some could not be graded
-    names = {path.relative_to(folder).with_suffix("").as_posix() for path in folder.rglob("*.ipynb")}
-    assert set(table) == names - {".ipynb_checkpoints/wrong-checkpoint"}
-    assert "26 run, 0 unchanged since the last table" in result.output
+def test_every_notebook_has_a_row(graded):
+    assert graded.exit_code == 1  # some could not be graded
+    names = {path.relative_to(graded.folder).with_suffix("").as_posix() for path in graded.folder.rglob("*.ipynb")}
+    assert set(graded.table) == names - {".ipynb_checkpoints/wrong-checkpoint"}
+    assert "26 run, 0 unchanged since the last table" in graded.output
 
 
 def test_a_new_notebook_is_not_implemented(graded):
     assert row(graded, "М-1/Иванов Иван/b-aof") == (NEW, "")
-    assert graded[1]["М-1/Иванов Иван/b-aof"]["passed"] == "0"
+    assert graded.table["М-1/Иванов Иван/b-aof"]["passed"] == "0"
 
 
 def test_a_solution_passes(graded):
     assert row(graded, "М-1/Петров/b-aof") == (("passed", "passed"), "")
-    found = graded[1]["М-1/Петров/b-aof"]
+    found = graded.table["М-1/Петров/b-aof"]
     assert (found["set"], found["variant"], found["passed"], found["of"]) == ("b", "12", "2", "5")
     assert found["q3"] == found["q4"] == "not run"  # the tiny master asks two of the set's five
-    line = next(line for line in graded[0].output.splitlines() if line.startswith("М-1/Петров"))
+    line = next(line for line in graded.output.splitlines() if line.startswith("М-1/Петров"))
     assert line.split()[1:] == ["b", "12", "2", "of", "5", "✓✓–––"]
 
 
@@ -299,7 +326,7 @@ def test_another_variant_is_noticed_and_does_not_count(graded):
     marks, note = row(graded, "opens-another")
     assert marks == ("passed", "passed")
     assert note == "opens set b, variant 1"
-    assert graded[1]["opens-another"]["variant"] == "53"
+    assert graded.table["opens-another"]["variant"] == "53"
 
 
 def test_taking_the_answer_is_noticed(graded):
@@ -321,11 +348,11 @@ def test_an_endless_loop_is_ended(graded):
     assert note == f"cell {number}: still running after {SECONDS} s"
 
 
-def test_a_dead_kernel_is_reported_and_its_children_are_ended(graded, folder):
+def test_a_dead_kernel_is_reported_and_its_children_are_ended(graded):
     marks, note = row(graded, "leaves")
     assert marks == ("passed", "not run")
     assert "the kernel died" in note
-    pid = int((folder.parent / "pid").read_text())
+    pid = int((graded.folder.parent / "pid").read_text())
     for _ in range(100):  # a killed process stays as a zombie until somebody waits for it
         status = Path(f"/proc/{pid}/stat")
         if not status.exists() or status.read_text().split()[2] == "Z":
@@ -363,12 +390,12 @@ def test_notebooks_do_not_see_each_other(graded):
 def test_a_variant_of_the_courses_own(graded):
     marks, note = row(graded, "own-variant")
     assert marks == ("passed", "passed")
-    assert graded[1]["own-variant"]["variant"] == "mine"
+    assert graded.table["own-variant"]["variant"] == "mine"
     assert "its own table" in note
 
 
 def test_what_cannot_be_graded_is_named(graded):
-    status = {name: (one["status"], one["note"], one["digest"]) for name, one in graded[1].items()}
+    status = {name: (one["status"], one["note"], one["digest"]) for name, one in graded.table.items()}
     assert status["foreign"][:2] == ("not an exercise notebook", "")
     for name, words in {
         "cut": "the file is not JSON",
@@ -379,12 +406,12 @@ def test_what_cannot_be_graded_is_named(graded):
         assert status[name][0] == "not graded"
         assert words in status[name][1]
         assert status[name][2] == ""  # tried again next time
-    assert "\x1b" not in graded[0].output
+    assert "\x1b" not in graded.output
 
 
-def test_a_second_run_does_only_what_is_new(graded, folder, tmp_path, monkeypatch):
+def test_a_second_run_does_only_what_is_new(graded, tmp_path, monkeypatch):
     copied = tmp_path / "copy"
-    shutil.copytree(folder, copied)
+    shutil.copytree(graded.folder, copied)
     options = ["grade", str(copied), "--masters", str(FIXTURES), "--jobs", "1"]
     ran = []
 
