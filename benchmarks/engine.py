@@ -21,8 +21,8 @@ import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
 from kfcourse import compare, lab_filters, simulate
-from kfcourse.ensemble import Ensemble
-from kfcourse.lab import LAB, find_variant, title
+from kfcourse.lab.variants import LAB, find_variant, title
+from kfcourse.montecarlo.ensemble import Ensemble
 
 STEPS = 51
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import nbformat
 
-from kfcourse.checks import SETS, exercise
+from kfcourse.checks import exercise, sets
 from kfcourse.notebooks.course import jobs, make, run_all
 from kfcourse.notebooks.execute import pictures
 from kfcourse.notebooks.master import read, render, statement, student
@@ -31,7 +31,7 @@ Open it in Jupyter, in an environment in which `kfcourse` is installed: {{doc}}`
 
 def write() -> bool:
     """Write the pages; False, with a message, if a solution fails."""
-    work = jobs("solutions", SOLUTIONS, [VARIANT], list(SETS))
+    work = jobs("solutions", SOLUTIONS, [VARIANT], list(sets()))
     failed = [outcome for outcome in run_all(work, make, 2, "lab manual") if outcome.status == "failed"]
     for outcome in failed:
         print(f"FAILED {outcome.job.name}: {outcome.message}", file=sys.stderr)
@@ -44,7 +44,7 @@ def write() -> bool:
         found = pictures(nbformat.read(job.target, as_version=4))
         for name, png in found.items():
             (PAGES / f"{name}.png").write_bytes(png)
-        file = SETS[job.letter].file
+        file = sets()[job.letter].name
         heading, rest = statement(notebook, {name: f"{name}.png" for name in found}).split("\n", 1)
         (PAGES / f"{file}.md").write_text(f"{heading}\n{NOTE.format(variant=VARIANT, file=file)}{rest}", encoding="utf-8")
         nbformat.write(student(notebook, found), PAGES / "notebooks" / f"{file}.ipynb")

@@ -10,8 +10,8 @@ matplotlib.use("agg")
 import matplotlib.pyplot as plt
 
 from kfcourse import compare, lab_filters
-from kfcourse.lab import LAB, find_variant
-from kfcourse.plots import accuracy, relative_accuracy
+from kfcourse.lab.plots import accuracy, relative_accuracy
+from kfcourse.lab.variants import LAB, find_variant
 
 model = find_variant("53").model
 result = compare(lab_filters(model, [*LAB, "aof-exact"]), model, runs=400_000, steps=31, seed=1, subset_runs=64)

@@ -5,16 +5,16 @@ gaussian(model).latex()                            structural functions, derived
 compare(lab_filters(model), model, 100_000, 51, seed=1).ranking()
 """
 
-from kfcourse.comparison import Comparison
-from kfcourse.design import NotFinite, design
-from kfcourse.ensemble import Ensemble, Trajectories, simulate
-from kfcourse.experiment import compare, predictions, run
-from kfcourse.formula import FormulaError
-from kfcourse.gaussian import Gaussian
 from kfcourse.lab import lab_filters, load_variants
-from kfcourse.model import Model, ModelError
-from kfcourse.moments import GaussianMoments, NoClosedForm
-from kfcourse.structure import Structure, gauss_hermite, gaussian, linearised, unscented
+from kfcourse.laws import Gaussian
+from kfcourse.montecarlo.comparison import Comparison
+from kfcourse.montecarlo.designing import NotFinite, design
+from kfcourse.montecarlo.ensemble import Ensemble, Trajectories, simulate
+from kfcourse.montecarlo.experiment import compare, predictions, run
+from kfcourse.symbolic.formula import FormulaError
+from kfcourse.symbolic.model import Model, ModelError
+from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
+from kfcourse.symbolic.structure import Structure, gauss_hermite, gaussian, linearised, unscented
 
 __all__ = [
     "Comparison",

@@ -11,17 +11,17 @@ from pathlib import Path
 
 import click
 
-from kfcourse.design import NotFinite
-from kfcourse.experiment import compare
-from kfcourse.formula import FormulaError
-from kfcourse.grammar import generate
-from kfcourse.lab import FILTERS, LAB, VariantError, find_variant, has_exact, lab_filters, title
-from kfcourse.model import ModelError
-from kfcourse.moments import NoClosedForm
+from kfcourse.lab.grammar import generate
+from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
+from kfcourse.lab.report import conclusions, write_json, write_report
+from kfcourse.lab.variants import FILTERS, LAB, VariantError, find_variant, has_exact, lab_filters, title
+from kfcourse.montecarlo.designing import NotFinite
+from kfcourse.montecarlo.experiment import compare
 from kfcourse.notebooks import commands
 from kfcourse.notebooks.course import chosen_variants, save
-from kfcourse.quality import FEWEST, RUNS, examine_all, table
-from kfcourse.report import conclusions, write_json, write_report
+from kfcourse.symbolic.formula import FormulaError
+from kfcourse.symbolic.model import ModelError
+from kfcourse.symbolic.moments import NoClosedForm
 
 _VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")
 

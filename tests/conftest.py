@@ -2,7 +2,7 @@
 
 import pytest
 
-from kfcourse.model import Model
+from kfcourse.symbolic.model import Model
 
 
 @pytest.fixture(scope="session")

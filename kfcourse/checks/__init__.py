@@ -1,6 +1,7 @@
 """Self-checks of the exercises: `exercise("a", variant="53").check("a1", answer)`."""
 
-from kfcourse.checks.engine import Mistake, Question, Result
-from kfcourse.checks.exercise import SETS, Exercise, ExerciseError, exercise
+from kfcourse.checks.exercises import Exercise, ExerciseError, exercise
+from kfcourse.checks.question import Mistake, Question, Result
+from kfcourse.checks.registry import ExerciseSet, sets
 
-__all__ = ["SETS", "Exercise", "ExerciseError", "Mistake", "Question", "Result", "exercise"]
+__all__ = ["Exercise", "ExerciseError", "ExerciseSet", "Mistake", "Question", "Result", "exercise", "sets"]

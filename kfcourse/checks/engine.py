@@ -8,12 +8,8 @@ Nothing that a student hands in may crash a check, and no message contains the a
 from __future__ import annotations
 
 import copy
-import signal
-import threading
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,139 +17,14 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.checks.compare import Unusable, equal, like
+from kfcourse.checks.equality import Unusable, equal, like
+from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG, Answer, Mistake, Question, Result
+from kfcourse.checks.registry import folders
+from kfcourse.limits import OutOfTime, time_limit
 
 PACKAGE = Path(__file__).resolve().parent.parent
 SECONDS = 20.0  # an answer may take
 DIAGNOSIS = 60.0  # the search for the kind of mistake
-AGAIN = 0.01  # seconds after which a loop that survived its end is stopped again
-ROUNDING = 1e-9  # relative difference of numbers that rounding alone explains
-
-PASSED, WRONG, UNUSABLE, MISSING = "passed", "wrong", "unusable", "not implemented"
-MIME = "application/vnd.kfcourse.check+json"
-
-Answer = Callable[..., Any]
-
-
-@dataclass(frozen=True)
-class Mistake:
-    """A known wrong answer.
-
-    Attributes
-    ----------
-    name : str
-        Such as "noise-forgotten"; for tests and the instructor's table.
-    says : str
-        What the student reads: the kind of mistake, not the answer.
-    answer : callable
-        Exercise -> the wrong answer (a function, as the student's).
-    """
-
-    name: str
-    says: str
-    answer: Callable[[Any], Answer]
-
-
-def catalogue(rows: Sequence[tuple[str, str, Answer]]) -> tuple[Mistake, ...]:
-    """Mistakes whose wrong answer is the same function for every exercise: rows of name, says, answer."""
-
-    def always(wrong: Answer) -> Callable[[Any], Answer]:
-        return lambda _: wrong
-
-    return tuple(Mistake(name, says, always(wrong)) for name, says, wrong in rows)
-
-
-@dataclass(frozen=True)
-class Question:
-    """A question of an exercise set.
-
-    Attributes
-    ----------
-    name : str
-        Set and number: "a1".
-    title : str
-    level : {"warm-up", "core", "stretch"}
-    answer : callable
-        Exercise -> the right answer, a function.
-    arguments : callable
-        Exercise -> list of argument tuples with which every answer is called: symbols, or numbers from hidden seeds.
-    mistakes : tuple of Mistake
-    parts : tuple of str
-        Names of the results, if the answer returns several; each is then diagnosed by itself.
-    tolerance : float
-        Relative difference of numbers that still counts as equal.
-    """
-
-    name: str
-    title: str
-    level: str
-    answer: Callable[[Any], Answer]
-    arguments: Callable[[Any], Sequence[tuple]]
-    mistakes: tuple[Mistake, ...] = ()
-    parts: tuple[str, ...] = ()
-    tolerance: float = ROUNDING
-
-
-@dataclass(frozen=True)
-class Result:
-    """Outcome of a check; shows itself as a line of text.
-
-    Attributes
-    ----------
-    question, title : str
-    status : {"passed", "wrong", "unusable", "not implemented"}
-    message : str
-    diagnosis : tuple of str
-        Names of the mistakes it looks like.
-    """
-
-    question: str
-    title: str
-    status: str
-    message: str
-    diagnosis: tuple[str, ...] = ()
-
-    @property
-    def passed(self) -> bool:
-        return self.status == PASSED
-
-    def __repr__(self) -> str:
-        return f"{'✓' if self.passed else '✗'} {self.question} {self.title}: {self.message}"
-
-    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, Any]:
-        data = {"question": self.question, "status": self.status, "diagnosis": list(self.diagnosis), "message": self.message}
-        return {"text/plain": repr(self), MIME: data}
-
-
-class OutOfTime(BaseException):
-    """Not an Exception, so that `except Exception` of a student's loop does not swallow it."""
-
-
-@contextmanager
-def time_limit(seconds: float) -> Iterator[None]:
-    """Raise OutOfTime in this block after so many seconds, and again and again while it goes on.
-
-    By the alarm signal; elsewhere than in a main thread with signals (Windows) there is no limit.  One long operation of
-    compiled code, such as the power of two huge integers, is not stopped before its end.
-    """
-    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    running = True
-
-    def stop(number: int, frame: Any) -> None:
-        if running:
-            raise OutOfTime
-
-    previous = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds, AGAIN)
-    try:
-        yield
-    finally:
-        running = False  # an alarm between here and the next line does nothing
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, previous)
 
 
 class Missing(Exception):
@@ -196,7 +67,8 @@ def _frames(error: BaseException) -> list[traceback.FrameSummary]:
 
 def _foreign(frame: traceback.FrameSummary) -> bool:
     """Whether the line is of a library or of this package, not of a student."""
-    return "site-packages" in frame.filename or Path(frame.filename).is_relative_to(PACKAGE)
+    own = Path(frame.filename)
+    return "site-packages" in frame.filename or any(own.is_relative_to(folder) for folder in (PACKAGE, *folders()))
 
 
 def _in_library(error: BaseException) -> bool:

@@ -2,7 +2,8 @@ r"""Alpha-beta and alpha-beta-gamma filters: Kalman's prediction and correction 
 
     x^- = A z,   z = x^- + K (y - H x^-),   K = (alpha, beta/T, gamma/(2 T^2)) on each axis
 
-The coefficients that make it the stationary Kalman filter of `kfcourse.tracks.kinematic` depend on the tracking index alone,
+The coefficients that make it the stationary Kalman filter of `kfcourse.scenarios.aircraft.kinematic`
+depend on the tracking index alone,
 
     Lambda = noise_sd T^2 / measurement_sd,
     beta = 2 (2 - alpha) - 4 sqrt(1 - alpha) = 2 (1 - sqrt(1 - alpha))^2,   Lambda = beta / sqrt(1 - alpha)     (alpha-beta)
@@ -19,8 +20,8 @@ import numpy as np
 
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.kalman import linear_system
-from kfcourse.gaussian import Array, Gaussian, any_missing, apply, symmetric, transpose
-from kfcourse.model import Model, ModelError
+from kfcourse.laws import Array, Gaussian, any_missing, apply, symmetric, transpose
+from kfcourse.symbolic.model import Model, ModelError
 
 
 def steady_alpha(index: float) -> float:
@@ -74,7 +75,7 @@ def alpha_beta(model: Model, alpha: float, beta: float, start: str = "measuremen
     Parameters
     ----------
     model : Model
-        `kfcourse.tracks.kinematic(..., order=1)`, or equal to it in all but the noises.
+        `kfcourse.scenarios.aircraft.kinematic(..., order=1)`, or equal to it in all but the noises.
     alpha, beta : float
         The gain is (alpha, beta/T).
     start : {"measurements", "prior"}

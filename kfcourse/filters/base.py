@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kfcourse.gaussian import Affine, Array, Gaussian
-from kfcourse.model import Model
+from kfcourse.laws import Affine, Array, Gaussian
+from kfcourse.symbolic.model import Model
 
 
 class State(NamedTuple):

@@ -10,9 +10,9 @@ from collections.abc import Callable
 import numpy as np
 import sympy as sp
 
-from kfcourse.codegen import compile_function
-from kfcourse.gaussian import Array, Gaussian
-from kfcourse.model import Model, ModelError, exact_matrix
+from kfcourse.laws import Array, Gaussian
+from kfcourse.symbolic.codegen import compile_function
+from kfcourse.symbolic.model import Model, ModelError, exact_matrix
 
 TINY = 1e-300  # in place of a variance of exactly 0
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
-from kfcourse.arithmetic import form
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.gaussian import Array, symmetric
-from kfcourse.model import Model, ModelError
-from kfcourse.system import LinearSystem
+from kfcourse.laws import Array, symmetric
+from kfcourse.linear.arithmetic import form
+from kfcourse.linear.system import LinearSystem
+from kfcourse.symbolic.model import Model, ModelError
 
 
 def kalman(model: Model, arithmetic: str = "covariance") -> Filter:
@@ -27,7 +27,7 @@ def kalman(model: Model, arithmetic: str = "covariance") -> Filter:
     ----------
     model : Model
     arithmetic : {"covariance", "symmetrised", "joseph", "square-root"}
-        How the covariance is computed; see `kfcourse.arithmetic`.
+        How the covariance is computed; see `kfcourse.linear.arithmetic`.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""Exercise notebooks: made from the masters in exercises/, executed, exported, graded."""
+"""Exercise notebooks: made from the sets in exercises/, executed, exported, graded."""

@@ -11,10 +11,9 @@ from typing import Any
 
 import click
 
-from kfcourse.checks import SETS
-from kfcourse.notebooks import grade as grading
+from kfcourse.checks import sets
 from kfcourse.notebooks.course import Job, Outcome, assign, chosen_variants, jobs, make, run_all, safe
-from kfcourse.notebooks.master import MASTERS
+from kfcourse.notebooks.grading import grade as grading
 
 
 def _options(command: Callable) -> Callable:
@@ -22,11 +21,11 @@ def _options(command: Callable) -> Callable:
     options = [
         click.option("--variant", "names", multiple=True, help="Name of a variant; may be repeated."),
         click.option("--all", "everything", is_flag=True, help="Every variant of the file."),
-        click.option("--sets", "letters", help=f"Letters of the sets, separated by commas.  [default: {','.join(SETS)}]"),
+        click.option("--sets", "letters", help="Letters of the sets, separated by commas.  [default: all]"),
         click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants."),
         click.option("--students", type=click.Path(path_type=Path), help="CSV with name, group: a variant for each student."),
         click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder of the notebooks."),
-        click.option("--masters", type=click.Path(path_type=Path), default=MASTERS, help="Folder of the masters."),
+        click.option("--masters", type=click.Path(path_type=Path), help="Folder of other masters, <set>/statement.md each."),
         click.option("--jobs", "workers", type=click.IntRange(min=1), default=2, show_default=True, help="Notebooks at once."),
         click.option("--dask", help="Address of a Dask scheduler that does the work instead."),
     ]
@@ -56,7 +55,7 @@ def _make(
     variants_file: Path | None,
     students: Path | None,
     out: Path,
-    masters: Path,
+    masters: Path | None,
     workers: int,
     dask: str | None,
     with_pdf: bool = False,
@@ -78,10 +77,10 @@ def _make(
 
 
 def _letters(given: str | None) -> list[str]:
-    letters = list(SETS) if given is None else [letter.strip() for letter in given.split(",") if letter.strip()]
-    unknown = [letter for letter in letters if letter not in SETS]
+    letters = list(sets()) if given is None else [letter.strip() for letter in given.split(",") if letter.strip()]
+    unknown = [letter for letter in letters if letter not in sets()]
     if unknown or not letters:
-        raise click.UsageError(f"no exercise set {', '.join(unknown) or given}; there are {', '.join(SETS)}")
+        raise click.UsageError(f"no exercise set {', '.join(unknown) or given}; there are {', '.join(sets())}")
     return letters
 
 
@@ -92,7 +91,7 @@ def _for_students(
     letters: Sequence[str],
     out: Path,
     variants_file: Path | None,
-    masters: Path,
+    masters: Path | None,
     with_pdf: bool,
 ) -> list[Job]:
     """A folder for each student, out/group/name, with their variant's notebooks; the assignment is printed."""
@@ -135,7 +134,7 @@ def _table(outcomes: Sequence[Outcome], work: Sequence[Job]) -> None:
 @click.argument("folder", type=click.Path(exists=True, path_type=Path, file_okay=False))
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="File of the table.  [default: FOLDER/grades.csv]")
 @click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="The file of variants that you handed out.")
-@click.option("--masters", type=click.Path(path_type=Path), default=MASTERS, help="Folder of the masters.")
+@click.option("--masters", type=click.Path(path_type=Path), help="Folder of other masters, <set>/statement.md each.")
 @click.option("--jobs", "workers", type=click.IntRange(min=1), default=2, show_default=True, help="Notebooks at once.")
 @click.option(
     "--seconds",
@@ -146,7 +145,7 @@ def _table(outcomes: Sequence[Outcome], work: Sequence[Job]) -> None:
 )
 @click.option("--again", is_flag=True, help="Grade those too that have not changed since the last table.")
 def grade(
-    folder: Path, out: Path | None, variants_file: Path | None, masters: Path, workers: int, seconds: float, again: bool
+    folder: Path, out: Path | None, variants_file: Path | None, masters: Path | None, workers: int, seconds: float, again: bool
 ) -> None:
     """Run the returned notebooks in FOLDER and write a table of what passed.
 

@@ -17,6 +17,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +26,11 @@ import nbformat
 from nbformat import NotebookNode
 from tqdm import tqdm
 
-from kfcourse.checks import SETS, Exercise
-from kfcourse.checks.engine import PASSED
-from kfcourse.lab import Variant, find_variant, load_variants
+from kfcourse.checks import Exercise, sets
+from kfcourse.checks.question import PASSED
+from kfcourse.lab.variants import Variant, find_variant, load_variants
 from kfcourse.notebooks.execute import NotebookFailed, execute, html, pdf, pictures, results
-from kfcourse.notebooks.master import MASTERS, read, render, solution, student
+from kfcourse.notebooks.master import read, render, solution, student
 
 PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -45,7 +46,8 @@ class Job:
         Where the files go.
     kind : {"exercises", "solutions"}
     variants_file : Path or None
-    masters : Path
+    masters : Path or None
+        A folder like exercises/, in place of the shipped one.
     with_pdf : bool
     """
 
@@ -54,7 +56,7 @@ class Job:
     folder: Path
     kind: str
     variants_file: Path | None = None
-    masters: Path = MASTERS
+    masters: Path | None = None
     with_pdf: bool = False
 
     def __post_init__(self) -> None:
@@ -64,12 +66,12 @@ class Job:
 
     @property
     def name(self) -> str:
-        return f"variant {self.variant}, {SETS[self.letter].file}"
+        return f"variant {self.variant}, {sets()[self.letter].name}"
 
     @property
     def target(self) -> Path:
         suffix = "-solution" if self.kind == "solutions" else ""
-        return self.folder / f"{SETS[self.letter].file}{suffix}.ipynb"
+        return self.folder / f"{sets()[self.letter].name}{suffix}.ipynb"
 
 
 @dataclass(frozen=True)
@@ -132,9 +134,10 @@ def fingerprint(notebook: NotebookNode) -> str:
 def package_digest() -> str:
     """Hash of this package's files."""
     digest = hashlib.sha256()
-    for path in sorted(PACKAGE.rglob("*")):
-        if path.suffix in (".py", ".toml", ".j2"):
-            digest.update(path.read_bytes())
+    for folder in (PACKAGE, Path(str(resources.files("kfcourse.exercises")))):
+        for path in sorted(folder.rglob("*")):
+            if path.suffix in (".py", ".toml", ".j2"):
+                digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
@@ -217,7 +220,7 @@ def jobs(
     variants: Iterable[str],
     letters: Sequence[str],
     variants_file: Path | None = None,
-    masters: Path = MASTERS,
+    masters: Path | None = None,
     with_pdf: bool = False,
 ) -> list[Job]:
     """One job a set and variant, each variant in a folder of its own."""

@@ -19,7 +19,7 @@ from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernel
 from nbconvert import HTMLExporter
 from nbformat import NotebookNode
 
-from kfcourse.checks.engine import MIME
+from kfcourse.checks.question import MIME
 
 SECONDS = 120  # a cell may take
 BROWSERS = ("chromium", "google-chrome", "chromium-browser", "msedge", "chrome")
@@ -111,7 +111,7 @@ def html(executed: NotebookNode, title: str) -> str:
             if "text/latex" in output.get("data", {}):
                 output.data["text/html"] = mathml(output.data["text/latex"])
     body, _ = HTMLExporter(template_name="basic").from_notebook_node(copy)
-    environment = jinja2.Environment(loader=jinja2.PackageLoader("kfcourse"), autoescape=True)
+    environment = jinja2.Environment(loader=jinja2.PackageLoader("kfcourse.notebooks"), autoescape=True)
     return environment.get_template("notebook.html.j2").render(title=title, body=body)
 
 

@@ -1,7 +1,7 @@
 """Masters of the exercise sets, and the notebooks made from them.
 
-A master is a MyST Markdown notebook in exercises/.  Text of the variant goes in by Jinja, with the delimiters [= ... =] and
-[% ... %] that neither Python nor LaTeX uses; what is between the lines
+A master is a MyST Markdown notebook, exercises/<set>/statement.md.  Text of the variant goes in by Jinja, with the
+delimiters [= ... =] and [% ... %] that neither Python nor LaTeX uses; what is between the lines
 
     # BEGIN SOLUTION            <!-- BEGIN SOLUTION -->
     # END SOLUTION              <!-- END SOLUTION -->
@@ -28,12 +28,11 @@ import sympy as sp
 from nbformat import NotebookNode
 from sympy.printing.str import StrPrinter
 
-from kfcourse.checks import SETS, Exercise
-from kfcourse.checks.structural import Side, plain, unexplained
-from kfcourse.lab import load_variants
-from kfcourse.structure import Structure
+from kfcourse.checks import Exercise, sets
+from kfcourse.lab.variants import load_variants
+from kfcourse.symbolic.sides import Side, plain
+from kfcourse.symbolic.structure import Structure
 
-MASTERS = Path(__file__).resolve().parent.parent.parent / "exercises"
 BEGIN, END = "BEGIN SOLUTION", "END SOLUTION"
 STUB = "# YOUR CODE HERE"
 
@@ -42,15 +41,14 @@ class MasterError(ValueError):
     """A master is missing or cannot be used; the message names the file and the place."""
 
 
-def read(letter: str, folder: Path = MASTERS) -> str:
-    """Text of the master of a set."""
-    path = folder / f"{SETS[letter].file}.md"
+def read(letter: str, masters: Path | None = None) -> str:
+    """Text of the master of a set; from `masters`, a folder like exercises/, if one is given."""
+    own = sets()[letter].folder
+    path = (own if masters is None else masters / own.name) / "statement.md"
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise MasterError(
-            f"no master {path}; the masters are in the project's folder exercises/: name it with --masters"
-        ) from None
+        raise MasterError(f"no master {path}; leave --masters out, or name a folder that has {own.name}/statement.md") from None
 
 
 def render(text: str, exercise: Exercise) -> NotebookNode:
@@ -61,7 +59,7 @@ def render(text: str, exercise: Exercise) -> NotebookNode:
     MasterError
         The text is no template, or its solution markers do not match; names the set and the line.
     """
-    name = SETS[exercise.letter].file
+    name = sets()[exercise.letter].name
     environment = jinja2.Environment(
         variable_start_string="[=",
         variable_end_string="=]",
@@ -81,7 +79,7 @@ def render(text: str, exercise: Exercise) -> NotebookNode:
     except jinja2.UndefinedError as error:
         raise MasterError(f"master {name}: {error.message}") from None
     notebook = jupytext.reads(filled, fmt="md:myst")
-    answers = iter(SETS[exercise.letter].questions)
+    answers = iter(sets()[exercise.letter].questions)
     for index, cell in enumerate(notebook.cells):
         cell.id = f"{exercise.letter}-{index:02d}"
         _check_markers(cell.source, f"master {name}, cell {index + 1}")
@@ -193,7 +191,7 @@ def context(exercise: Exercise) -> dict[str, Any]:
         "exercise": exercise,
         "variant": exercise.variant.name,
         "opened": opened(exercise),
-        "title": SETS[exercise.letter].title,
+        "title": sets()[exercise.letter].title,
         "model": model,
         "scalar": model.n == 1 and model.p == 1,
         "latex": sp.latex,
@@ -254,7 +252,7 @@ class Solutions:
 
     def unexplained(self) -> str:
         """Body of a function of (m, d) that returns R = F - G d G^T of the Gaussian functions."""
-        return self._body("meter", {"R": unexplained(self.exercise)})
+        return self._body("meter", {"R": self.exercise.structures.gaussian["R"]})
 
     def _body(self, side: str, formulas: Mapping[str, Any], cov: bool = True) -> str:
         part = Side.of(self.exercise.model, side)

@@ -1,0 +1,230 @@
+"""Questions of set a: structural functions, by linearisation and exactly for a normal law.
+
+Answers are functions of symbols, (z, p) for the object and (m, d) for the meter; of matrices of symbols for a vector variant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import sympy as sp
+
+from kfcourse.checks.question import Answer, Mistake, Question
+from kfcourse.checks.registry import ExerciseSet
+from kfcourse.symbolic.sides import Side, plain
+
+Make = Callable[[Any], Any]  # exercise -> results in symbols
+
+
+def symbols(exercise: Any, side: str) -> tuple[Any, Any]:
+    """Mean and covariance of the law, as an answer is called with them."""
+    part = Side.of(exercise.model, side)
+    return plain(part.mean), plain(part.cov)
+
+
+def constant(make: Make) -> Callable[[Any], Answer]:
+    """Exercise -> an answer that ignores its arguments: the formulas are in those very symbols."""
+
+    def answer(exercise: Any) -> Answer:
+        result = make(exercise)
+        return lambda *_: result
+
+    return answer
+
+
+def right(kind: str, side: str) -> Make:
+    """(tau, Theta) of the object, or (h, G, F) of the meter."""
+    names = ("tau", "Theta") if side == "object" else ("h", "G", "F")
+    return lambda exercise: tuple(getattr(exercise.structures, kind)[name] for name in names)
+
+
+def wrong_covariance(name: str, says: str, kind: str, side: str, covariance: Callable[[Side], sp.MatrixBase]) -> Mistake:
+    """The right functions but for the last, the covariance."""
+
+    def make(exercise: Any) -> tuple:
+        return (*right(kind, side)(exercise)[:-1], plain(covariance(Side.of(exercise.model, side))))
+
+    return Mistake(name, says, constant(make))
+
+
+def covariance_to_power(name: str, says: str, kind: str, side: str, exponent: sp.Rational) -> Mistake:
+    """The right functions with every entry of p (or d) raised to a power."""
+
+    def make(exercise: Any) -> tuple:
+        powers = {entry: entry**exponent for entry in Side.of(exercise.model, side).cov}
+        return tuple(formula.subs(powers, simultaneous=True) for formula in right(kind, side)(exercise))
+
+    return Mistake(name, says, constant(make))
+
+
+def scalar(matrix: sp.MatrixBase) -> sp.Expr:
+    """The entry of a one by one matrix; ValueError otherwise: some mistakes are possible for scalars only."""
+    if matrix.shape != (1, 1):
+        raise ValueError("only scalar variants allow this mistake")
+    return matrix[0]
+
+
+def mistakes_of_variance(kind: str, side: str) -> tuple[Mistake, ...]:
+    p = "p" if side == "object" else "d"
+    return (
+        covariance_to_power(
+            "variance-squared", f"{p} is a variance already; it seems to enter squared.", kind, side, sp.Integer(2)
+        ),
+        covariance_to_power(
+            "variance-root", f"{p} is a variance; its square root seems to stand in its place.", kind, side, sp.Rational(1, 2)
+        ),
+    )
+
+
+def mistakes_of_linearised(side: str) -> tuple[Mistake, ...]:
+    p = "p" if side == "object" else "d"
+    catalogue: tuple[tuple[str, str, Callable[[Side], sp.MatrixBase]], ...] = (
+        (
+            "noise-forgotten",
+            "The noise adds to the covariance too; only the state's part is there.",
+            lambda s: s.A * s.cov * s.A.T,
+        ),
+        (
+            "state-forgotten",
+            f"Only the noise's part is there: how does the uncertainty {p} of the state come through the equation?",
+            lambda s: s.B * s.D * s.B.T,
+        ),
+        (
+            "noise-power",
+            "The noise's factor enters with the wrong power: a variance goes with its square.",
+            lambda s: s.A * s.cov * s.A.T + sp.diag(*[sum(s.B[i, :]) for i in range(s.B.rows)]),
+        ),
+        (
+            "slope-power",
+            "The derivative enters only once: a covariance goes with it on both sides.",
+            lambda s: s.A * s.cov + s.B * s.D * s.B.T,
+        ),
+        (
+            "function-for-derivative",
+            "The function itself stands where its derivative belongs.",
+            lambda s: sp.Matrix([scalar(s.value) ** 2 * scalar(s.cov)]) + s.B * s.D * s.B.T,
+        ),
+        (
+            "transposed",
+            "A matrix is transposed: in M p M^T the transposed one stands on the right.",
+            lambda s: s.A.T * s.cov * s.A + s.B * s.D * s.B.T,
+        ),
+    )
+    named = tuple(wrong_covariance(name, says, "linearised", side, covariance) for name, says, covariance in catalogue)
+    return named + mistakes_of_variance("linearised", side)
+
+
+def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
+    def second_moment(exercise: Any) -> tuple:
+        functions = right("gaussian", side)(exercise)
+        mean, cov = (sp.Matrix([f]) for f in (functions[0], functions[-1]))
+        return (*functions[:-1], plain(cov + mean * mean.T))
+
+    return (
+        wrong_covariance(
+            "noise-not-averaged",
+            "The noise's factor is taken at the mean. It depends on the state: its square has to be averaged over the law too.",
+            "gaussian",
+            side,
+            lambda s: s.noiseless_covariance() + s.B * s.D * s.B.T,
+        ),
+        wrong_covariance(
+            "noise-forgotten",
+            "The noise adds to the covariance too; only the state's part is there.",
+            "gaussian",
+            side,
+            Side.noiseless_covariance,
+        ),
+        Mistake(
+            "linearised",
+            "That is the linearised function. Here the mean over the whole normal law is asked for.",
+            constant(right("linearised", side)),
+        ),
+        Mistake(
+            "second-moment",
+            "It is a second moment: the product of the means has not been subtracted.",
+            constant(second_moment),
+        ),
+        *mistakes_of_variance("gaussian", side),
+    )
+
+
+def jacobians(side: str, change: Callable[[sp.Matrix, sp.Matrix], tuple] = lambda a, b: (a, b)) -> Callable[[Any], Answer]:
+    def make(exercise: Any) -> tuple:
+        part = Side.of(exercise.model, side)
+        return tuple(plain(matrix) for matrix in change(part.A, part.B))
+
+    return constant(make)
+
+
+def _unevaluated(exercise: Any) -> tuple:
+    """Derivatives divided by the variable: the slope of a secant through 0, not of the tangent."""
+    part = Side.of(exercise.model, "object")
+    return plain(sp.Matrix([scalar(part.value) / scalar(part.mean)])), plain(part.B)
+
+
+def unexplained(exercise: Any) -> Any:
+    """R = F - G d G^T of the Gaussian functions."""
+    return exercise.structures.gaussian["R"]
+
+
+def _question(number: int, title: str, level: str, kind: str, side: str, mistakes: tuple[Mistake, ...]) -> Question:
+    parts = ("tau", "Theta") if side == "object" else ("h", "G", "F")
+    return Question(f"a{number}", title, level, constant(right(kind, side)), lambda e: [symbols(e, side)], mistakes, parts)
+
+
+QUESTIONS = (
+    Question(
+        "a1",
+        "derivatives of the state equation",
+        "warm-up",
+        jacobians("object"),
+        lambda e: [symbols(e, "object")[:1]],
+        (
+            Mistake(
+                "swapped",
+                "The two derivatives seem to be swapped: the first is by the state, the second by the noise.",
+                jacobians("object", lambda a, b: (b, a)),
+            ),
+            Mistake(
+                "transposed",
+                "It looks transposed: row i holds the derivatives of equation i.",
+                jacobians("object", lambda a, b: (a.T, b.T)),
+            ),
+            Mistake("secant", "The value was divided by the state; the derivative is asked for.", constant(_unevaluated)),
+        ),
+        ("a_x", "a_v"),
+    ),
+    _question(2, "linearised functions of the object", "core", "linearised", "object", mistakes_of_linearised("object")),
+    _question(3, "linearised functions of the meter", "core", "linearised", "meter", mistakes_of_linearised("meter")),
+    _question(4, "Gaussian functions of the object", "core", "gaussian", "object", mistakes_of_gaussian("object")),
+    _question(5, "Gaussian functions of the meter", "core", "gaussian", "meter", mistakes_of_gaussian("meter")),
+    Question(
+        "a6",
+        "what the state does not explain of the measurement",
+        "stretch",
+        constant(unexplained),
+        lambda e: [symbols(e, "meter")],
+        (
+            Mistake(
+                "whole-variance",
+                "That is the whole variance of the measurement; subtract what the best linear function of the state explains.",
+                constant(lambda e: right("gaussian", "meter")(e)[2]),
+            ),
+            Mistake(
+                "slope-once",
+                "The explained part has the slope on both sides: G d G^T.",
+                constant(
+                    lambda e: plain(
+                        sp.Matrix([right("gaussian", "meter")(e)[2]])
+                        - sp.Matrix([scalar(sp.Matrix([right("gaussian", "meter")(e)[1]])) * Side.of(e.model, "meter").cov[0]])
+                    )
+                ),
+            ),
+        ),
+    ),
+)
+
+SET = ExerciseSet("a", "Structural functions", Path(__file__).parent, QUESTIONS)

@@ -1,0 +1,174 @@
+"""Is an answer the right one?  Comparison of formulas by value and of numbers to rounding.
+
+A formula counts as equal if it takes the same values, to 30 digits, at several random points of both signs: any equivalent form
+passes, and no simplification has to succeed.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from kfcourse.symbolic.formula import symbol
+
+DIGITS = 60  # of the values of formulas
+AGREE = sp.Float(10) ** -30  # relative difference of equal formulas: half of the digits may be lost by cancellation
+POINTS = 6
+
+
+class Unusable(Exception):
+    """An answer that cannot be compared; the message tells the student what was expected."""
+
+
+def like(answer: Any, expected: Any) -> Any:
+    """The answer in the form of the expected one: a formula, an array, or a tuple of these.
+
+    Raises
+    ------
+    Unusable
+        It has another form; says which, and what was expected.
+    """
+    if isinstance(expected, tuple):
+        if not isinstance(answer, tuple | list) or len(answer) != len(expected):
+            raise Unusable(f"expected {len(expected)} results, `return a, b, ...`, got {describe(answer)}")
+        parts = []
+        for place, (one, wanted) in enumerate(zip(answer, expected, strict=True), 1):
+            try:
+                parts.append(like(one, wanted))
+            except Unusable as reason:
+                raise Unusable(f"result {place} of {len(expected)}: {reason}") from None
+        return tuple(parts)
+    if isinstance(expected, sp.MatrixBase):
+        return _formulas(answer, expected)
+    if isinstance(expected, sp.Basic):
+        return _formula(answer)
+    return _array(answer, np.asarray(expected))
+
+
+def _formula(answer: Any) -> sp.Expr:
+    if isinstance(answer, sp.MatrixBase | np.ndarray) and getattr(answer, "size", len(answer)) == 1:
+        answer = answer[(0,) * np.ndim(answer)] if isinstance(answer, np.ndarray) else answer[0]
+    if isinstance(answer, bool | str) or not isinstance(answer, sp.Expr | int | float | np.number):
+        raise Unusable(f"expected a formula in the symbols of the exercise, got {describe(answer)}")
+    formula = sp.nsimplify(answer, rational=True) if isinstance(answer, float | np.floating) else sp.sympify(answer)
+    if formula.has(sp.Derivative, sp.Integral):
+        formula = formula.doit()
+    if formula.has(sp.nan, sp.oo, -sp.oo, sp.zoo):
+        raise Unusable("the formula is not finite: it contains NaN or infinity")
+    return formula.replace(lambda e: e.is_Float, lambda e: sp.Rational(str(e)))  # 0.9 typed for 9/10 is no mistake
+
+
+def _formulas(answer: Any, expected: sp.MatrixBase) -> sp.ImmutableMatrix:
+    try:
+        matrix = answer if isinstance(answer, sp.MatrixBase) else sp.Matrix(answer)
+    except (TypeError, ValueError, AttributeError):
+        raise Unusable(
+            f"expected a matrix of formulas with {expected.rows} rows and {expected.cols} columns, got {describe(answer)}"
+        ) from None
+    if matrix.shape != expected.shape:
+        raise Unusable(
+            f"expected a matrix with {expected.rows} rows and {expected.cols} columns, got {matrix.rows} x {matrix.cols}"
+        )
+    return sp.ImmutableMatrix(matrix.rows, matrix.cols, [_formula(entry) for entry in matrix])
+
+
+def _array(answer: Any, expected: np.ndarray) -> np.ndarray:
+    if isinstance(answer, bool | np.bool_ | str) or answer is None:
+        raise Unusable(f"expected {_wanted(expected)}, got {describe(answer)}")
+    try:
+        array = np.asarray(answer)
+        if array.dtype.kind == "b" or array.dtype.kind not in "iufO":
+            raise TypeError
+        array = array.astype(float)
+    except (TypeError, ValueError, AttributeError):
+        raise Unusable(f"expected {_wanted(expected)}, got {describe(answer)}") from None
+    if array.shape != expected.shape:
+        raise Unusable(f"expected {_wanted(expected)}, got the shape {array.shape}")
+    if not np.isfinite(array[np.isfinite(expected)]).all():
+        raise Unusable("the result contains NaN or infinity: was something divided by zero, or a missing measurement used?")
+    return array
+
+
+def _wanted(expected: np.ndarray) -> str:
+    return f"an array of shape {expected.shape}" if expected.ndim else "a number"
+
+
+def describe(value: Any) -> str:
+    """A few words on what came instead."""
+    if value is None:
+        return "nothing (is `return` missing?)"
+    if isinstance(value, np.ndarray):
+        return f"an array of shape {value.shape}"
+    if isinstance(value, tuple | list):
+        return f"{type(value).__name__} of {len(value)}"
+    return f"{type(value).__name__}"
+
+
+def equal(first: Any, second: Any, tolerance: float, values: Mapping[sp.Symbol, Any]) -> bool:
+    """Whether two answers of the same form are equal.
+
+    `tolerance` is relative, for numbers; `values` are the parameters' values, for formulas in which they were put in.
+    """
+    if isinstance(second, tuple):
+        return all(equal(a, b, tolerance, values) for a, b in zip(first, second, strict=True))
+    if isinstance(second, sp.MatrixBase):
+        return first.shape == second.shape and equal_formulas(list(first), list(second), values)
+    if isinstance(second, sp.Basic):
+        return equal_formulas([first], [second], values)
+    scale = np.max(np.abs(second[np.isfinite(second)]), initial=0.0)
+    return first.shape == second.shape and bool(
+        np.allclose(first, second, rtol=tolerance, atol=tolerance * scale, equal_nan=True)
+    )
+
+
+def equal_formulas(first: Sequence[sp.Expr], second: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any]) -> bool:
+    """Whether the formulas agree, pairwise, at random points.
+
+    Symbols are told apart by name only.  Where one side has no parameter left as a symbol, the other's get their values.
+    What cannot be evaluated is not equal.
+    """
+    try:
+        sides = [_by_name(formulas) for formulas in (first, second)]
+        parameters = {symbol(s.name): value for s, value in values.items()}
+        if any(set(parameters).isdisjoint(_symbols(side)) for side in sides):
+            sides = [[f.subs(parameters) for f in side] for side in sides]
+        signs = {s: -1 if value < 0 else 1 for s, value in parameters.items()}
+        for point in _points(sorted(_symbols(sides[0]) | _symbols(sides[1]), key=str), signs, all(map(_entire, sides[1]))):
+            for a, b in zip(*sides, strict=True):
+                left, right = (sp.N(f.xreplace(point), DIGITS) for f in (a, b))
+                if not (left.is_number and right.is_number) or not abs(left - right) <= AGREE * (1 + abs(right)):
+                    return False
+    except Exception:  # SymPy has many ways to stop at a formula that makes no sense
+        return False
+    return True
+
+
+def _points(symbols: Sequence[sp.Symbol], signs: Mapping[sp.Symbol, int], both: bool) -> Iterator[dict[sp.Symbol, sp.Float]]:
+    """Random points: parameters with their own sign, other symbols of both signs, or positive only.
+
+    Floats: powers of fractions would grow without bound.
+    """
+    source = random.Random(2701)
+    for number in range(POINTS):
+        point = {}
+        for s in symbols:
+            sign = signs.get(s, (1, -1, source.choice((1, -1)))[min(number, 2)] if both else 1)
+            point[s] = sp.Float(sp.Rational(sign * source.randint(101, 397), source.randint(101, 397)), DIGITS)
+        yield point
+
+
+def _entire(formula: sp.Expr) -> bool:
+    """Whether a formula has no roots and the like: those differ in form where a variance becomes negative."""
+    return not formula.has(sp.log, sp.Abs) and all(power.exp.is_integer for power in formula.atoms(sp.Pow))
+
+
+def _by_name(formulas: Sequence[sp.Expr]) -> list[sp.Expr]:
+    return [f.xreplace({s: symbol(s.name) for s in f.free_symbols}) for f in formulas]
+
+
+def _symbols(formulas: Sequence[sp.Expr]) -> set[sp.Symbol]:
+    return set().union(*(f.free_symbols for f in formulas))

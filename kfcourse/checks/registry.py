@@ -1,0 +1,58 @@
+"""The exercise sets that there are.  Sets register; nothing here knows one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from kfcourse.checks.question import Question
+
+_registered: dict[str, ExerciseSet] = {}
+
+
+@dataclass(frozen=True)
+class ExerciseSet:
+    """An exercise set.
+
+    Attributes
+    ----------
+    letter, title : str
+    folder : Path
+        Holds statement.md.
+    questions : tuple of Question
+    numbers : callable, optional
+        Exercise -> personal numbers by name, for a set that is not about the variant's own model.
+    """
+
+    letter: str
+    title: str
+    folder: Path
+    questions: tuple[Question, ...]
+    numbers: Callable[[Any], dict[str, float]] | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of its files: "a-structural-functions"."""
+        return self.folder.name.replace("_", "-")
+
+
+def register(one: ExerciseSet) -> None:
+    """Add a set; ValueError if its letter is taken."""
+    if one.letter in _registered:
+        raise ValueError(f"two exercise sets {one.letter!r}: {_registered[one.letter].folder} and {one.folder}")
+    _registered[one.letter] = one
+
+
+def folders() -> set[Path]:
+    """Folders in which the sets that are registered now live."""
+    return {one.folder for one in _registered.values()}
+
+
+def sets() -> Mapping[str, ExerciseSet]:
+    """All exercise sets by letter; the package of sets, which registers them, is imported at the first call."""
+    import_module("kfcourse.exercises")
+    return MappingProxyType(_registered)

@@ -1,0 +1,44 @@
+"""Approximations of the absolutely optimal filter (AOF, АОФ).
+
+The AOF is the Stratonovich recursion itself: its estimate is the posterior mean.  Replacing each
+density by the normal one with the same first two moments gives one predict/correct step, and the
+structural functions decide which filter it is:
+
+    linearised(model)                     the extended Kalman filter (ЛАОФ)
+    gaussian(model)                       the normal filter (ГАОФ)
+    unscented(model), gauss_hermite(...)  the unscented and quadrature Kalman filters
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from kfcourse.filters import notation as s
+from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.laws import Array, correct
+from kfcourse.symbolic.structure import Structure
+
+EQUATIONS = (
+    *s.MEASURE,
+    s.GAIN,
+    sp.Eq(s.z, s.lam + s.K * (s.y - s.h)),
+    sp.Eq(s.P, s.Psi - s.K * s.G * s.Psi),
+    sp.Eq(s.lam_next, s.tau_zp),
+    sp.Eq(s.Psi_next, s.Theta_zp),
+)
+
+
+def aof(structure: Structure) -> Filter:
+    """The Gaussian-approximated AOF with the given structural functions.
+
+    K = Psi G^T F^+,  z = lambda + K (y - h),  p = Psi - K G Psi
+    lambda' = tau(z, p),  Psi' = Theta(z, p)
+
+    Its own covariance p (runs, n, n) is that of the approximation, not the actual one.
+    """
+
+    def step(state: State, y: Array) -> State:
+        posterior = correct(state.predicted, structure.measure(*state.predicted), y)
+        return State(state.step + 1, posterior, structure.predict(*posterior))
+
+    return Filter(f"aof-{structure.name}", structure.model, initial_state(structure.model), step)

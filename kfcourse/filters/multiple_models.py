@@ -1,0 +1,165 @@
+"""The interacting-multiple-model filter (IMM) for an object that changes its way of moving.
+
+The object is in one of M modes, each with its own model of the same state; the mode is a Markov chain,
+
+    pi_ij = P(mode j at k + 1 | mode i at k)
+
+The exact filter would keep one normal law for each history of modes, M^k of them.  The IMM keeps M, by merging them once a
+step.  With mu_j the probability of mode j after y_k, c_j before it:
+
+    correct     z_j, p_j and the likelihood L_j = N(y_k; h_j, F_j) in each mode;   mu_j = c_j L_j / sum
+    combine     z = sum mu_j z_j,   p = sum mu_j (p_j + (z_j - z)(z_j - z)^T)
+    mix         c_j = sum_i pi_ij mu_i,   mu_i|j = pi_ij mu_i / c_j,   means and covariances as above with mu_i|j
+    predict     each mode from its own mixture
+
+Blom and Bar-Shalom (1988); Bar-Shalom, Li, Kirubarajan (2001), section 11.6.6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.laws import Array, Gaussian, Measurement, any_missing, correct, without_missing
+from kfcourse.linear.consistency import normalised_square
+from kfcourse.symbolic.structure import Structure
+
+
+class Modes(NamedTuple):
+    """What an IMM remembers.
+
+    Attributes
+    ----------
+    probability : ndarray (runs, M)
+        mu, probabilities of the modes after the last measurement.
+    expected : ndarray (runs, M)
+        c, probabilities before the next one.
+    predicted : tuple of M Gaussian
+        Law of the next state in each mode: mean (runs, n), cov (..., n, n).
+    """
+
+    probability: Array
+    expected: Array
+    predicted: tuple[Gaussian, ...]
+
+
+def imm(structures: Sequence[Structure], transition: Array, probabilities: Array | None = None, name: str = "imm") -> Filter:
+    """The IMM filter with one structure a mode.
+
+    Parameters
+    ----------
+    structures : sequence of M Structure
+        Models with the same state, measurement and prior.
+    transition : ndarray (M, M)
+        pi, rows sum to 1.
+    probabilities : ndarray (M,), optional
+        Of the modes before the first measurement; equal by default.
+    name : str
+        Name of the filter.
+
+    Returns
+    -------
+    Filter
+        `state.memory` is a `Modes`.  A missing measurement leaves laws and probabilities as predicted.
+
+    Raises
+    ------
+    ValueError
+        Models that do not fit together, or numbers that are no probabilities.
+    """
+    models = [structure.model for structure in structures]
+    pi, first = _checked(structures, transition, probabilities)
+
+    def init(runs: int) -> State:
+        start = initial_state(models[0])(runs)
+        expected = np.tile(first, (runs, 1))
+        return start._replace(memory=Modes(expected, expected, (start.predicted,) * len(models)))
+
+    def step(state: State, y: Array) -> State:
+        memory: Modes = state.memory
+        corrected, likelihoods = [], []
+        for structure, prior in zip(structures, memory.predicted, strict=True):
+            measurement = structure.measure(*prior)
+            corrected.append(correct(prior, measurement, y))
+            likelihoods.append(log_likelihood(measurement, y))
+        mu = _posterior(memory.expected, np.stack(likelihoods, axis=-1))
+
+        expected = mu @ pi
+        predicted = []
+        for j, structure in enumerate(structures):
+            joint = mu * pi[:, j]
+            # a mode that cannot come next starts from the combined law; nothing uses it
+            weights = np.where(expected[:, j, None] > 0, joint, mu)
+            mixed = mixture(corrected, weights / weights.sum(axis=-1, keepdims=True))
+            predicted.append(structure.predict(*mixed))
+        return State(
+            state.step + 1,
+            mixture(corrected, mu),
+            mixture(predicted, expected),
+            Modes(mu, expected, tuple(predicted)),
+        )
+
+    return Filter(name, models[0], init, step)
+
+
+def _checked(structures: Sequence[Structure], transition: Array, probabilities: Array | None) -> tuple[Array, Array]:
+    """Transition matrix (M, M) and first probabilities (M,); ValueError if the parts do not fit."""
+    size = len(structures)
+    if not size:
+        raise ValueError("give at least one structure, such as linearised(model)")
+    first = structures[0].model
+    for structure in structures[1:]:
+        model = structure.model
+        if [s.name for s in model.x] != [s.name for s in first.x] or model.p != first.p:
+            raise ValueError(
+                f"all modes need the same state and measurement: {[s.name for s in first.x]} with {first.p} component(s) "
+                f"and {[s.name for s in model.x]} with {model.p} differ"
+            )
+        if not all(np.array_equal(ours, theirs) for ours, theirs in zip(model.prior, first.prior, strict=True)):
+            raise ValueError("all modes need the same prior: before the first measurement there is one law of the state")
+    pi = np.asarray(transition, dtype=float)
+    start = np.full(size, 1.0 / size) if probabilities is None else np.asarray(probabilities, dtype=float)
+    for what, table, shape in (("transition", pi, (size, size)), ("probabilities", start, (size,))):
+        if table.shape != shape:
+            raise ValueError(f"{what} must have the shape {shape} for {size} mode(s), got {table.shape}")
+        if not (np.isfinite(table).all() and table.min() >= 0 and np.allclose(table.sum(axis=-1), 1.0, atol=1e-9)):
+            raise ValueError(
+                f"{what} must be probabilities that sum to 1{' in each row' * (table.ndim - 1)}, got {table.tolist()}"
+            )
+    return pi / pi.sum(axis=-1, keepdims=True), start / start.sum()
+
+
+def _posterior(expected: Array, log_likelihoods: Array) -> Array:
+    """c_j L_j / sum over the modes, (runs, M); in logarithms, as likelihoods far from the truth are 0 in floating point."""
+    with np.errstate(divide="ignore"):  # a mode that is excluded stays so
+        log_weights = np.log(expected) + log_likelihoods
+    weights = np.exp(log_weights - log_weights.max(axis=-1, keepdims=True))
+    return weights / weights.sum(axis=-1, keepdims=True)
+
+
+def log_likelihood(measurement: Measurement, y: Array) -> Array:
+    """Logarithm of N(y; h, F) without the constant, (runs,); what is missing (NaN) does not enter.
+
+    -1/2 nu^T F^-1 nu - 1/2 ln det F
+    """
+    innovation, F = y - measurement.h, measurement.F
+    if any_missing(innovation):
+        innovation, _, F, _ = without_missing(innovation, measurement.G, F, measurement.R)
+    return -0.5 * (normalised_square(innovation, F) + np.linalg.slogdet(F).logabsdet)
+
+
+def mixture(laws: Sequence[Gaussian], weights: Array) -> Gaussian:
+    """Mean and covariance of a mixture of normal laws, weights (runs, M).
+
+    m = sum w_j m_j,   P = sum w_j (P_j + (m_j - m)(m_j - m)^T)
+    """
+    columns = [weights[:, j, None] for j in range(len(laws))]
+    mean = sum(w * law.mean for w, law in zip(columns, laws, strict=True))
+    cov: Array | float = 0.0
+    for w, law in zip(columns, laws, strict=True):
+        deviation = law.mean - mean
+        cov = cov + w[..., None] * (law.cov + deviation[..., :, None] * deviation[..., None, :])
+    return Gaussian(np.asarray(mean), np.asarray(cov))

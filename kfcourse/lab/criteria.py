@@ -1,0 +1,259 @@
+"""What makes a variant well posed: each criterion measured, its `Finding` says the reason.
+
+Bounded, observable, solvable, and such that the filters differ; `kfcourse.lab.quality` puts them together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import sympy as sp
+from scipy import stats
+
+from kfcourse.checks import Exercise
+from kfcourse.filters import Filter
+from kfcourse.filters.base import State, initial_state
+from kfcourse.lab.difficulty import length
+from kfcourse.lab.variants import Structures, Variant, title
+from kfcourse.laws import Array, Gaussian
+from kfcourse.montecarlo.comparison import Comparison
+from kfcourse.montecarlo.statistics import Estimate, batch_mean
+from kfcourse.symbolic.codegen import compile_function
+from kfcourse.symbolic.model import Model, exact_matrix
+from kfcourse.symbolic.moments import NoClosedForm
+
+GROWTH = 10.0  # of a second moment over the second half of the steps: an unknown velocity has 4, x' = 1.05 x has 12
+CARRIERS = 10.0  # trajectories, at least, that carry a second moment
+DIVERGED = 10.0  # a filter's error variance over that without measurements
+UNSEEN = 0.9  # the same of the best filter, when the meter tells too little
+RANK = 1e-6  # singular values below, relative to the largest, are taken for 0
+SIGNIFICANCE = 0.01  # of "the filters differ", for all pairs and steps together
+ROUNDING = 1e-9  # relative differences that rounding alone explains
+LONGEST = 600  # operations of the Gaussian structural functions; the van der Pol oscillator has 309
+UNMEASURED = "without measurements"
+LETTERS = "abcdefg"  # sets of exercises about the variant; the later ones have models of their own
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One criterion.
+
+    Attributes
+    ----------
+    ok : bool or None
+        None: could not be examined, because another criterion fails.
+    says : str
+        The reason, in a sentence.
+    value : float
+        What was measured; NaN if nothing.
+    """
+
+    ok: bool | None
+    says: str
+    value: float = float("nan")
+
+
+# --- bounded
+
+
+def bounded(x: Array) -> Finding:
+    """Whether the second moments of trajectories x (steps, runs, n) stay in bounds.  Value: their growth.
+
+    The maximum of M x_k^2 over the second half of the steps is at most GROWTH times that over the first half, for every
+    component; and the sum of squared deviations u = x - M x is not that of a few trajectories,
+    (sum u^2)^2 / sum u^4 >= CARRIERS.
+    """
+    finite = np.isfinite(x**4).all(axis=(1, 2))
+    if not finite.all():
+        return Finding(False, f"trajectories become infinite (step {int(np.argmin(finite))})", float("inf"))
+    square, half = (x**2).mean(axis=1), (len(x) + 1) // 2
+    growth = float(_ratio(square[half:].max(axis=0), square[:half].max(axis=0)).max())
+    grows = f"the second moment grows {growth:.3g} times from the first half of the steps to the second"
+    if growth > GROWTH:
+        return Finding(False, grows, growth)
+    heaviest = float(kurtosis(x).max())
+    if heaviest * CARRIERS > x.shape[1]:
+        few = x.shape[1] / heaviest
+        return Finding(False, f"the second moment is that of {few:.1f} trajectories of {x.shape[1]}: too heavy tails", growth)
+    return Finding(True, grows, growth)
+
+
+def kurtosis(x: Array) -> Array:
+    """M u^4 / (M u^2)^2, u = x - M x, per step and component, (steps, n): 3 for a normal law; 0 for a constant."""
+    u = x - x.mean(axis=1, keepdims=True)
+    variance = np.where(varies(x), (u**2).mean(axis=1), 0.0)
+    return _ratio((u**4).mean(axis=1), variance**2)
+
+
+def varies(x: Array) -> Array:
+    """Whether a component of x (steps, runs, n) varies at a step, by more than rounding: (steps, n)."""
+    return np.asarray(x.std(axis=1) > 1e-12 * np.abs(x).max(axis=1))
+
+
+def not_diverging(comparison: Comparison) -> Finding | None:
+    """The filter that is DIVERGED times worse than no measurements; None if there is none."""
+    worst, name = max((float(shares(comparison, one).value.max()), one) for one in measured(comparison))
+    if worst <= DIVERGED:
+        return None
+    return Finding(False, f"{title(name)} diverges: its error variance is {worst:.3g} times that without measurements", worst)
+
+
+# --- observable
+
+
+def unmeasured(model: Model, x: Array) -> Filter:
+    """The estimate that uses no measurement: means and covariances of trajectories x (steps, runs, n)."""
+    means = x.mean(axis=1)
+    u = x - means[:, None]
+    covs = np.einsum("kri,krj->kij", u, u) / x.shape[1]
+
+    def step(state: State, y: Array) -> State:
+        law = Gaussian(np.tile(means[state.step], (len(y), 1)), covs[state.step])
+        return State(state.step + 1, law, law)
+
+    return Filter(UNMEASURED, model, initial_state(model), step)
+
+
+def measured(comparison: Comparison) -> list[str]:
+    """Names of the filters that use the measurements."""
+    return [name for name in comparison.names if name != UNMEASURED]
+
+
+def shares(comparison: Comparison, name: str) -> Estimate:
+    """Error variance of a filter over that without measurements, mean over the steps, for each component: (n,).
+
+    Steps where the component does not vary are left out; a component that never varies has the share 1.
+    """
+    square, base = (comparison.sums.square[comparison.fast.index(one)] for one in (name, UNMEASURED))
+    counts, total = comparison.sums.counts, base.sum(axis=-1)
+    used = total > 1e-24 * total.max(axis=0)
+    steps = np.maximum(used.sum(axis=0), 1)
+    ratio = np.where(used, _ratio(square.sum(axis=-1), total), 0.0)
+    weight = np.where(used, _ratio(counts.sum() / steps, total), 0.0)  # 1 / variance, averaged over the steps
+    deviation = batch_mean(((square - ratio[..., None] * base) * weight[..., None]).sum(axis=0), counts)  # delta method
+    value = np.where(used.any(axis=0), ratio.sum(axis=0) / steps, 1.0)
+    return Estimate(value, deviation.standard_error, deviation.freedom)
+
+
+def observable(model: Model, comparison: Comparison, x: Array) -> Finding:
+    """Whether the meter tells something about every component of the state.  Value: the worst component's share.
+
+    The share of the best filter, see `shares`, plus four standard errors, is below UNSEEN; and the linearised model is
+    observable along at least half of the trajectories x (steps, runs, n).
+    """
+    found = [shares(comparison, name) for name in measured(comparison)]
+    upper = np.min([one.value + 4 * one.standard_error for one in found], axis=0)
+    worst = int(np.argmax(upper))
+    share, symbol = float(min(one.value[worst] for one in found)), model.x[worst]
+    if not varies(x).any(axis=0).all():
+        constant = model.x[int(np.argmin(varies(x).any(axis=0)))]
+        return Finding(False, f"{constant} does not vary, there is nothing to estimate", share)
+    left = f"the best filter leaves {100 * share:.3g} % of the variance of {symbol}"
+    if not upper[worst] < UNSEEN:
+        return Finding(False, f"the meter hardly tells: {left}", share)
+    full = observable_share(model, x[:, :200])
+    if full < 0.5:
+        return Finding(
+            False, f"linearised along typical trajectories, the model is observable on {100 * full:.0f} % of them", share
+        )
+    return Finding(True, left, share)
+
+
+def observable_share(model: Model, x: Array) -> float:
+    """Share of the trajectories x (steps, runs, n) along which the linearised model is observable.
+
+    The rows b_x(x_j) a_x(x_{j-1}) ... a_x(x_0) of the first 4 n steps, noises at their means and columns in units of the
+    state's deviation, have rank n.  1 if the equations are not differentiable.
+    """
+    state = model.state_equation.subs(dict(zip(model.v, exact_matrix(model.state_noise.mean), strict=True)))
+    meter = model.meter_equation.subs(dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True)))
+    slopes = {name: part.subs(model.values).jacobian(sp.Matrix(model.x)) for name, part in (("A", state), ("C", meter))}
+    if any(slope.has(sp.Derivative, sp.DiracDelta) for slope in slopes.values()):
+        return 1.0
+    function = compile_function("slopes", {"x": sp.Matrix(model.x)}, slopes, ["x"], f"slopes of {model}").function
+    path = np.broadcast_to(np.diag(x.std(axis=1).max(axis=0)), (x.shape[1], model.n, model.n))
+    rows = []
+    for position in x[: 4 * model.n]:
+        A, C = function(position)
+        rows.append(C @ path)
+        path = A @ path
+    values = np.linalg.svd(np.concatenate(rows, axis=1), compute_uv=False)
+    return float(((values > RANK * values[:, :1]).sum(axis=1) == model.n).mean())
+
+
+# --- the filters differ
+
+
+def is_linear(model: Model) -> bool:
+    """Whether both equations are linear in state and noise, so that the Kalman filter is exact."""
+    symbols = [*model.x, *model.v, *model.w]
+    equations = [*model.state_equation.subs(model.values), *model.meter_equation.subs(model.values)]
+    return not any(sp.expand(sp.diff(one, symbol)).has(*symbols) for one in equations for symbol in symbols)
+
+
+def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
+    """Whether two filters differ in error variance by more than the statistical error, at a step or on average.
+
+    |D_a - D_b| > t SE + c D / runs.  t is Student's quantile of SIGNIFICANCE, shared by all pairs and steps (Bonferroni).  The
+    second term is for the `designed` filters, whose coefficients are fitted over as many trajectories: each costs 1/runs of the
+    error variance.  There are n + p + 1 for a component, and the prediction has its own.  Value: the largest significant
+    difference, relative to the error variance of the control.
+    """
+    pairs = list(combinations(measured(comparison), 2))
+    tests = max(len(pairs), 1) * (comparison.steps + 1)
+    fitted = 2 * (comparison.model.n + comparison.model.p + 1) / comparison.runs
+    control = comparison.error_variance(comparison.control).value
+    largest, says = 0.0, f"no two filters differ by more than the statistical error of {comparison.runs} trajectories"
+    for first, second in pairs:
+        difference, score = comparison.difference(first, second), comparison.score_difference(first, second)
+        relative = np.abs(np.append(_ratio(difference.value, control), score.value))
+        error = np.append(_ratio(difference.standard_error, control), score.standard_error)
+        quantile = stats.t.ppf(1 - SIGNIFICANCE / tests / 2, difference.freedom)
+        allowed = quantile * error + ROUNDING + (fitted if first in designed or second in designed else 0.0)
+        significant = np.where(relative > allowed, relative, 0.0)
+        if significant.max() > largest:
+            largest, step = float(significant.max()), int(significant.argmax())
+            when = f"at step {step}" if step < comparison.steps else "on average"
+            says = f"{title(first)} and {title(second)} differ by {100 * largest:.2g} % {when}"
+    return Finding(largest > 0, says, largest)
+
+
+# --- solvable
+
+
+def solvable(structures: Structures) -> Finding:
+    """Whether the structural functions have a closed form of sensible length.  Value: operations of the Gaussian ones."""
+    try:
+        operations = length(structures.gaussian)
+        _ = structures.linearised
+    except NoClosedForm as error:
+        return Finding(False, str(error))
+    says = f"closed form, {operations} operations in the Gaussian structural functions"
+    return Finding(operations <= LONGEST, says + ("" if operations <= LONGEST else f", more than {LONGEST}"), float(operations))
+
+
+def questions(variant: Variant) -> Finding | None:
+    """The first question of the exercises that cannot be posed for the variant; None if all can.
+
+    Its right answer fails, or is not accepted.
+    """
+    for letter in LETTERS:
+        exercise = Exercise(letter, variant)
+        for name, question in exercise.questions.items():
+            try:
+                result = exercise.check(name, question.answer(exercise))
+            except Exception as error:  # whatever a degenerate model leads to
+                return Finding(False, f"question {name} of the exercises cannot be posed ({type(error).__name__}: {error})")
+            if not result.passed:
+                return Finding(False, f"question {name} of the exercises does not accept its own answer: {result.message}")
+    return None
+
+
+def _ratio(numerator: Array, denominator: Array) -> Array:
+    """numerator / denominator, and 0 where that is 0."""
+    return np.divide(
+        numerator, denominator, out=np.zeros(np.broadcast_shapes(numerator.shape, denominator.shape)), where=denominator > 0
+    )

@@ -1,0 +1,122 @@
+"""Figures of the lab: functions (result, ax) -> ax, with one colour and one name for each filter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from kfcourse.lab.variants import title
+from kfcourse.laws import Array
+from kfcourse.montecarlo.comparison import Comparison
+
+# Okabe and Ito's colours, distinguishable by the colour-blind; linearised forms are dashed.
+_FAMILIES = {
+    "aof": "#0072B2",
+    "duof": "#D55E00",
+    "fos": "#009E73",
+    "mfos": "#CC79A7",
+    "fos3": "#56B4E9",
+    "mfos3": "#E69F00",
+    "particle": "#F0E442",
+    "kalman": "#000000",
+    "iterated": "#E69F00",
+    "alpha-beta": "#E69F00",
+    "imm": "#D55E00",
+}
+_MARKERS = {"aof": "o", "duof": "s", "fos": "^", "mfos": "D", "fos3": "v", "mfos3": "P", "particle": "*", "kalman": "x"}
+
+
+def style(name: str) -> dict[str, Any]:
+    """Line style of a filter: colour by family, dashes for the linearised approximation, black for the exact."""
+    family, _, approximation = (name, "", "") if name in _FAMILIES else name.partition("-")
+    if approximation == "exact":
+        return {"color": "black", "linestyle": "-", "marker": "*", "label": title(name)}
+    dashes = {"linearised": "--", "unscented": ":", "gauss-hermite": "-."}.get(approximation, "-")
+    return {
+        "color": _FAMILIES.get(family, "#555555"),
+        "linestyle": dashes,
+        "marker": _MARKERS.get(family, "."),
+        "label": title(name),
+    }
+
+
+def accuracy(result: Comparison, ax: Axes, names: Sequence[str] | None = None) -> Axes:
+    """Error variance D_k of every filter against the step, on a logarithmic scale."""
+    steps = np.arange(result.steps)
+    for name in names or result.available:
+        ax.semilogy(steps, result.error_variance(name).value, markevery=max(1, result.steps // 10), markersize=4, **style(name))
+    ax.set_xlabel("step $k$")
+    ax.set_ylabel("error variance $D_k$ (units of $x^2$)")
+    ax.grid(True, which="major", alpha=0.3)
+    ax.legend(fontsize="small", ncols=2)
+    return ax
+
+
+def relative_accuracy(
+    result: Comparison, ax: Axes, names: Sequence[str] | None = None, steps: slice = slice(None), confidence: float = 0.95
+) -> Axes:
+    """D_k of every filter relative to the Gaussian AOF's, in per cent, with bands of paired confidence."""
+    k = np.arange(result.steps)[steps]
+    names = [n for n in result.available if n != result.control] if names is None else names
+    for name in names:
+        ratio = result.relative(name)[steps]
+        middle, half = 100 * (ratio.value - 1), 100 * ratio.half_width(confidence)
+        line = style(name)
+        ax.plot(k, middle, markersize=4, markevery=max(1, len(k) // 12), **line)
+        ax.fill_between(k, middle - half, middle + half, color=line["color"], alpha=0.15, linewidth=0)
+    ax.axhline(0, color="black", linewidth=0.8)
+    ax.set_xlabel("step $k$")
+    ax.set_ylabel(f"$D_k$ relative to {title(result.control)}, %")
+    ax.grid(True, alpha=0.3)
+    if names:
+        ax.legend(fontsize="small", ncols=2)
+    return ax
+
+
+def ranking(result: Comparison, ax: Axes, steps: slice = slice(None), confidence: float = 0.95) -> Axes:
+    """Mean over steps of D_k relative to the Gaussian AOF's, best filter on top, with confidence intervals."""
+    ranked = result.ranking(steps)[::-1]
+    for row, (name, score) in enumerate(ranked):
+        line = style(name)
+        half = 100 * float(score.half_width(confidence))
+        ax.errorbar(100 * (float(score.value) - 1), row, xerr=half, fmt=line["marker"], color=line["color"], capsize=3)
+    ax.set_yticks(range(len(ranked)), [title(name) for name, _ in ranked])
+    ax.axvline(0, color="black", linewidth=0.8)
+    ax.set_xlabel(f"mean of $D_k$ relative to {title(result.control)}, %")
+    ax.grid(True, axis="x", alpha=0.3)
+    return ax
+
+
+def consistency(result: Comparison, ax: Axes, names: Sequence[str] | None = None, confidence: float = 0.95) -> Axes:
+    """Normalised squared error M[e^T p^-1 e]/n per step: 1 if the filter's own covariance is right."""
+    steps = np.arange(result.steps)
+    for name in names or result.available:
+        value = result.normalised_error(name)
+        line = style(name)
+        ax.plot(steps, value.value, markersize=4, markevery=max(1, result.steps // 10), **line)
+        half = value.half_width(confidence)
+        ax.fill_between(steps, value.value - half, value.value + half, color=line["color"], alpha=0.15, linewidth=0)
+    ax.axhline(1, color="black", linewidth=0.8)
+    ax.set_yscale("log")
+    ax.set_xlabel("step $k$")
+    ax.set_ylabel(r"normalised squared error $\mathsf{M}[e^2/p]$")
+    ax.grid(True, alpha=0.3)
+    ax.legend(fontsize="small", ncols=2)
+    return ax
+
+
+def trajectory(x: Array, y: Array, estimates: dict[str, Array], ax: Axes) -> Axes:
+    """One trajectory: true state x (steps,), measurements y (steps,), and estimates by filter name."""
+    steps = np.arange(len(x))
+    ax.plot(steps, x, color="black", linewidth=1.5, label="state $x_k$")
+    ax.plot(steps, y, ".", color="#999999", label="measurement $y_k$")
+    for name, estimate in estimates.items():
+        ax.plot(steps, estimate, markersize=0, **style(name))
+    ax.set_xlabel("step $k$")
+    ax.set_ylabel("state (units of $x$)")
+    ax.grid(True, alpha=0.3)
+    ax.legend(fontsize="small")
+    return ax

@@ -1,0 +1,254 @@
+"""The report of the lab: what a student hands in, computed.
+
+`write_report` puts into one folder: report.html (opens in any browser, without a network), report.tex
+(the same for LaTeX) and the figures of both.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+import sympy as sp
+from latex2mathml.converter import convert
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from kfcourse.filters import EQUATIONS
+from kfcourse.filters import latex as equations_latex
+from kfcourse.lab import plots
+from kfcourse.lab.variants import FILTERS, Structures, Variant, title
+from kfcourse.montecarlo.comparison import EXACT, Comparison
+from kfcourse.montecarlo.statistics import Estimate
+from kfcourse.symbolic.model import Model
+
+_FAMILIES = {
+    "aof": "AOF in Gaussian approximation",
+    "duof": "DUOF, the two-step conditionally optimal filter",
+    "fos": "FOS, the filter of optimal structure",
+    "mfos": "MFOS, the modified filter of optimal structure",
+}
+_FIGURES: dict[str, tuple[str, Callable[[Comparison, Axes], Axes]]] = {
+    "accuracy": ("Error variance of each filter against the step.", plots.accuracy),
+    "relative": (
+        "Error variance relative to the control filter, with 95 % bands of the paired difference.",
+        plots.relative_accuracy,
+    ),
+    "ranking": ("Mean over the steps of the relative error variance, with 95 % confidence intervals.", plots.ranking),
+    "consistency": ("Normalised squared error: 1 if the filter's own covariance is right.", plots.consistency),
+}
+
+
+_GAP_STEPS = (0, 1, 5)  # where the report says how far the filters are above the exact bound
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and its displayed formulas, as the lines of a LaTeX `aligned` block ("left &= right")."""
+
+    title: str
+    lines: list[str]
+
+    @classmethod
+    def of(cls, title: str, block: str) -> Section:
+        body = re.sub(r"\\(begin|end)\{aligned\}", "", block)
+        return cls(title, [line.strip() for line in body.split("\\\\\n")])
+
+
+def model_latex(model: Model) -> str:
+    """The two equations of a model and its parameter values, as a LaTeX `aligned` block."""
+    lines = (
+        [rf"{sp.latex(x)}_{{k+1}} &= {sp.latex(f)}" for x, f in zip(model.x, model.state_equation, strict=True)]
+        if model.n == 1
+        else []
+    )
+    if model.n > 1:
+        lines = [rf"{sp.latex(x)}' &= {sp.latex(f)}" for x, f in zip(model.x, model.state_equation, strict=True)]
+    names = ["y"] if model.p == 1 else [f"y_{{{i + 1}}}" for i in range(model.p)]
+    lines += [rf"{name} &= {sp.latex(f)}" for name, f in zip(names, model.meter_equation, strict=True)]
+    lines += [rf"{sp.latex(symbol)} &= {float(value):g}" for symbol, value in model.values.items()]
+    return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
+
+
+def write_report(variant: Variant, result: Comparison, folder: Path) -> list[Path]:
+    """Write report.html, report.tex and the figures; returns the paths.
+
+    Every file is completed beside its place and then moved there, so an interrupted run leaves no half.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, (_, draw) in _FIGURES.items():
+        figure = Figure(figsize=(7, 4.2), layout="constrained")
+        draw(result, figure.add_subplot())
+        written += [_replace(folder / f"{name}.{kind}", partial(_save_figure, figure, kind)) for kind in _UNDATED]
+    content = _content(variant, result)
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("kfcourse.lab"), trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    environment.filters |= {"mathml": _mathml, "tex": _escape_tex, "html": jinja2.filters.do_forceescape}
+    for name in ("report.html", "report.tex"):
+        text = environment.get_template(name + ".j2").render(content)
+        written.append(_replace(folder / name, partial(_save_text, text)))
+    return written
+
+
+# No dates in the figures: the same numbers give the same report.
+_UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+
+
+def _save_figure(figure: Figure, kind: str, path: Path) -> None:
+    figure.savefig(path, format=kind, metadata=_UNDATED[kind])
+
+
+def _save_text(text: str, path: Path) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
+    """Write the numbers, for programs: lists over the steps, keyed by the filters' short names."""
+    estimates = {name: result.error_variance(name) for name in result.available}
+    data: dict[str, Any] = {
+        "variant": variant.name,
+        "model": {
+            "state": [str(f) for f in result.model.state_equation],
+            "meter": [str(f) for f in result.model.meter_equation],
+            "parameters": {name: float(value) for name, value in result.model.parameters.items()},
+        },
+        "runs": result.runs,
+        "steps": result.steps,
+        "seed": result.seed,
+        "exact_runs": result.subset_runs,
+        "error_variance": {name: e.value.tolist() for name, e in estimates.items()},
+        "standard_error": {name: e.standard_error.tolist() for name, e in estimates.items()},
+        "error_mean": {name: result.error_mean(name).value.tolist() for name in result.available},
+        "own_variance": {name: result.own_variance(name).value.tolist() for name in result.available},
+        "score": {name: {"value": float(e.value), "standard_error": float(e.standard_error)} for name, e in result.ranking()},
+    }
+    text = json.dumps(_finite(data), indent=1, allow_nan=False)
+    return _replace(path, partial(_save_text, text))
+
+
+def conclusions(result: Comparison, confidence: float = 0.95) -> list[str]:
+    """The ranking in sentences: each filter against the next, significant or not at the confidence."""
+    ranked = [name for name, _ in result.ranking()]
+    sentences = []
+    for better, worse in pairwise(ranked):
+        difference = result.score_difference(worse, better)
+        low, high = (100 * float(limit) for limit in difference.interval(confidence))
+        # Filters that coincide, as on a linear model, differ by rounding: 1e-14 %.
+        verdict = "is more accurate than" if low > 1e-10 else "is not significantly different from"
+        sentences.append(
+            f"{title(better)} {verdict} {title(worse)}: {100 * float(difference.value):.3g} % "
+            f"({100 * confidence:g} % confidence: {low:.3g} to {high:.3g} %)."
+        )
+    return sentences
+
+
+def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
+    names = result.available
+    gap_steps = [k for k in _GAP_STEPS if k < result.steps] if EXACT in names else []
+    return {
+        "variant": variant,
+        "result": result,
+        "model": Section.of("Model", model_latex(result.model)),
+        "structures": _structure_sections(result.model, names),
+        "equations": _equation_sections(names),
+        "names": [(name, title(name), FILTERS[name].russian if name in FILTERS else "") for name in names],
+        "table": _table(result, names),
+        "ranking": [
+            (
+                title(name),
+                f"{float(score.value):.5f}",
+                f"{float(score.standard_error):.5f}",
+                [_gap(result, name, k) for k in gap_steps],
+            )
+            for name, score in result.ranking()
+        ],
+        "gap_steps": gap_steps,
+        "conclusions": conclusions(result),
+        "figures": [(name, caption) for name, (caption, _) in _FIGURES.items()],
+        "control": title(result.control),
+    }
+
+
+def _structure_sections(model: Model, names: tuple[str, ...]) -> list[Section]:
+    structures = Structures(model)
+    kinds = [kind for kind in ("gaussian", "linearised") if any(name.endswith(kind) for name in names)]
+    return [Section.of(kind.capitalize(), getattr(structures, kind).latex()) for kind in kinds]
+
+
+def _equation_sections(names: tuple[str, ...]) -> list[Section]:
+    families = dict.fromkeys(name.split("-")[0].removesuffix("3") for name in names)
+    return [Section.of(_FAMILIES[family], equations_latex(EQUATIONS[family])) for family in families if family in EQUATIONS]
+
+
+def _gap(result: Comparison, name: str, step: int) -> str:
+    """How far a filter is above the exact bound at a step, in per cent; empty for the slow ones."""
+    if name not in result.fast:
+        return ""
+    above = result.above_bound(name)[step]
+    return f"{100 * float(above.value):.2f} ± {100 * float(above.standard_error):.2f}"
+
+
+def _table(result: Comparison, names: tuple[str, ...]) -> list[tuple[int, list[str]]]:
+    """Rows (step, cells) of D_k with its standard error, for the first steps and then some."""
+    steps = [k for k in (0, 1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 50, 100, 200, 500, 1000) if k < result.steps]
+    if steps[-1] != result.steps - 1:
+        steps.append(result.steps - 1)
+    estimates = [result.error_variance(name) for name in names]
+    return [(k, [_cell(estimate[k]) for estimate in estimates]) for k in steps]
+
+
+def _cell(estimate: Estimate) -> str:
+    """A value and its standard error on one power of ten: "6.51e-04 ± 0.04e-04"."""
+    value, error = float(estimate.value), float(estimate.standard_error)
+    if not (np.isfinite(value) and value):
+        return f"{value:g}"
+    power = int(np.floor(np.log10(abs(value))))
+    return f"{value / 10.0**power:.3f} ± {error / 10.0**power:.3f} · 1e{power:d}"
+
+
+def _mathml(line: str) -> str:
+    """One line of an aligned block as MathML, which browsers show without any script."""
+    return convert(line.replace("&", ""), display="block")
+
+
+def _escape_tex(text: str) -> str:
+    special = {"\\": r"\textbackslash{}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}", "±": r"$\pm$", "·": r"$\cdot$"}
+    return re.sub(r"[#$%&_{}\\^~±·]", lambda found: special.get(found[0], "\\" + found[0]), text)
+
+
+def _finite(data: Any) -> Any:
+    """Infinite and undefined numbers as null: JSON has none."""
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list):
+        return [_finite(value) for value in data]
+    return data if not isinstance(data, float) or np.isfinite(data) else None
+
+
+def _replace(path: Path, write: Callable[[Path], Any]) -> Path:
+    """Write a file beside its place, then move it there: what was there before stays until that moment."""
+    if path.is_symlink() or (path.exists() and not path.is_file()):  # /dev/stdout, a pipe: written to, not replaced
+        write(path)
+        return path
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        write(temporary)
+        temporary.chmod(0o644)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return path

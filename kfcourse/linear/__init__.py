@@ -1,0 +1,12 @@
+"""Linear systems given by matrices: the Kalman filter in four arithmetic forms, and tests of consistency.
+
+system        `LinearSystem`: A, H, Q, R, B, checked
+arithmetic    one correction and prediction in four forms: textbook, symmetrised, Joseph, square root
+runs          the filter along stored measurements, simulation, covariance analysis, steady state
+consistency   NEES, NIS, whiteness: is a filter right about its own errors?
+"""
+
+from kfcourse.linear.runs import Run, Trajectories, covariances, run, simulate, stacked, steady_state
+from kfcourse.linear.system import LinearSystem
+
+__all__ = ["LinearSystem", "Run", "Trajectories", "covariances", "run", "simulate", "stacked", "steady_state"]

@@ -1,0 +1,102 @@
+"""Is a filter right about its own errors?  Tests of its covariance and of its innovations.
+
+    NEES   e^T p^-1 e,       e = x_k - z_k            needs the true state: simulation
+    NIS    nu^T F^-1 nu,     nu = y_k - h             needs only measurements: works on the real thing
+    whiteness of the innovations                      likewise
+
+For a filter that is right, and normal laws, NEES and NIS are chi-squared with n and p degrees of freedom, and
+innovations of different steps are uncorrelated.  Bar-Shalom, Li, Kirubarajan (2001), section 5.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from kfcourse.laws import Array, Gaussian, Measurement
+
+
+class Innovations(NamedTuple):
+    """What the measurements told beyond the prediction: value (steps, runs, p), and the covariance expected, (..., p, p)."""
+
+    value: Array
+    cov: Array
+
+
+def innovations(measure: Callable[[Array, Array], Measurement], predicted: Gaussian, y: Array) -> Innovations:
+    """Innovations nu = y - h(lambda, Psi) and their covariances F(lambda, Psi).
+
+    Parameters
+    ----------
+    measure : callable
+        `structure.measure` of the filter's structural functions, or `LinearSystem.measure`.
+    predicted : Gaussian
+        Laws before each measurement, from `kfcourse.predictions(filter, y)`.
+    y : ndarray (steps, runs, p)
+        NaN where missing.
+    """
+    measurement = measure(*predicted)
+    return Innovations(y - measurement.h, measurement.F)
+
+
+def normalised_square(vector: Array, cov: Array) -> Array:
+    """vector^T cov^-1 vector: (..., n), (..., n, n) -> (...); NaN where a component is NaN.
+
+    Raises
+    ------
+    ValueError
+        A covariance is singular: some component is claimed to be known exactly.
+    """
+    try:
+        return (vector * np.linalg.solve(cov, vector[..., None])[..., 0]).sum(axis=-1)
+    except np.linalg.LinAlgError:
+        raise ValueError("a covariance is singular: leave out the components that the filter knows exactly") from None
+
+
+def nees(x: Array, posterior: Gaussian) -> Array:
+    """Normalised estimation error squared, (..., n) -> (...): mean n for a filter that is right."""
+    return normalised_square(x - posterior.mean, posterior.cov)
+
+
+def nis(found: Innovations) -> Array:
+    """Normalised innovation squared, (steps, runs): mean p for a filter that is right; NaN where y is missing."""
+    return normalised_square(*found)
+
+
+def chi_squared_bounds(degrees: int, runs: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Interval in which the mean over `runs` of a chi-squared quantity lies with the given probability.
+
+    The sum of independent chi-squared numbers is chi-squared with runs * degrees degrees of freedom.  Only *independent* terms
+    may be counted: NEES of different runs, not of successive steps; NIS of successive steps too.
+    """
+    if degrees < 1 or runs < 1 or not 0 < confidence < 1:
+        raise ValueError(f"expected degrees >= 1, runs >= 1 and 0 < confidence < 1, got {degrees}, {runs}, {confidence}")
+    low, high = stats.chi2.interval(confidence, degrees * runs)
+    return float(low) / runs, float(high) / runs
+
+
+class Autocorrelation(NamedTuple):
+    """Correlation of innovations `lag` steps apart, (lags,), and its standard deviation for a filter that is right."""
+
+    value: Array
+    standard_deviation: Array
+
+
+def autocorrelation(found: Innovations, lags: int) -> Autocorrelation:
+    """Correlation of whitened innovations s_k = F^(-1/2) nu_k, M[s_k^T s_{k+l}] / p for l = 1 ... lags.
+
+    The mean is over steps and runs.  White innovations give 0 with the standard deviation 1 / sqrt(p * number of pairs).
+    """
+    steps, runs, p = found.value.shape
+    if not 0 < lags < steps:
+        raise ValueError(f"lags must be between 1 and {steps - 1}, got {lags}")
+    if np.isnan(found.value).any():
+        raise ValueError("the autocorrelation needs measurements at every step; select the steps at which they are there")
+    root = np.linalg.cholesky(found.cov)
+    white = np.linalg.solve(root, found.value[..., None])[..., 0]
+    value = [np.mean(np.sum(white[:-lag] * white[lag:], axis=-1)) / p for lag in range(1, lags + 1)]
+    deviation = [1 / np.sqrt(p * runs * (steps - lag)) for lag in range(1, lags + 1)]
+    return Autocorrelation(np.array(value), np.array(deviation))

@@ -1,0 +1,199 @@
+"""The Kalman filter for given matrices, its accuracy in advance, and its limit.
+
+    x_{k+1} = A x_k + B u_k + v_k,  v ~ N(0, Q)        u_k: known input
+    y_k     = H x_k + w_k,          w ~ N(0, R)
+
+Time runs as in the lab: a filter starts from the law of x_0, corrects with y_0, then predicts x_1.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+
+from kfcourse.laws import Array, Gaussian, apply, correct, gain, square_root, symmetric
+from kfcourse.linear.arithmetic import form
+from kfcourse.linear.system import LinearSystem
+
+
+class Run(NamedTuple):
+    """A filter's laws along stored measurements: posterior and predicted, each mean (steps, runs, n), cov (steps, runs, n, n)."""
+
+    posterior: Gaussian
+    predicted: Gaussian
+
+
+def run(system: LinearSystem, prior: Gaussian, y: Array, u: Array | None = None, arithmetic: str = "joseph") -> Run:
+    """The Kalman filter over stored measurements.
+
+    Parameters
+    ----------
+    system : LinearSystem
+    prior : Gaussian
+        Law of x_0: mean (n,) or (runs, n), covariance (n, n) or (runs, n, n).
+    y : ndarray (steps, runs, p)
+        NaN where a measurement, or a component of it, is missing.
+    u : ndarray (steps, runs, m) or (steps, 1, m), optional
+        Known input; u[k] acts between y[k] and y[k+1].
+    arithmetic : {"joseph", "covariance", "symmetrised", "square-root"}
+        All of it runs in the precision of the system's matrices, but for the gain from p > 1 measurements at once: NumPy
+        solves float32 equations in double and rounds the solution.
+
+    Returns
+    -------
+    Run
+        Means (steps, runs, n) and covariances (steps, runs, n, n).  Covariances that are the same for all runs, because no
+        measurement is missing, are stored once and shown to each run: a read-only view.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit, a prior or inputs that are not finite.
+    """
+    chosen = form(arithmetic, system)
+    if y.ndim != 3 or y.shape[2] != len(system.H):
+        raise ValueError(f"measurements must have the shape (steps, runs, {len(system.H)}), got {y.shape}")
+    runs, n, dtype = y.shape[1], len(system.A), system.A.dtype
+    _check_input(system, u, len(y), runs)
+    _check_prior(prior, runs, n)
+    mean = np.broadcast_to(prior.mean, (runs, n)).astype(dtype)
+    state = chosen.start(Gaussian(mean, np.asarray(prior.cov).astype(dtype)))
+    predicted, posterior = [], []
+    for k, measurement in enumerate(y.astype(dtype)):
+        predicted.append(chosen.law(state))
+        state = chosen.correct(system, state, measurement)
+        posterior.append(chosen.law(state))
+        state = chosen.predict(system, state, system.input(None if u is None else u[k].astype(dtype)))
+    return Run(stacked(posterior), stacked(predicted))
+
+
+def _check_input(system: LinearSystem, u: Array | None, steps: int, runs: int) -> None:
+    if u is None:
+        return
+    if system.B is None:
+        system.input(u)  # says what to do
+        return
+    m = system.B.shape[1]
+    if u.ndim != 3 or len(u) != steps or u.shape[1] not in (1, runs) or u.shape[2] != m:
+        raise ValueError(f"inputs must have the shape ({steps}, {runs}, {m}), or ({steps}, 1, {m}) for all runs; got {u.shape}")
+    if not np.isfinite(u).all():
+        raise ValueError("inputs must be finite: give a missing input the value that the object had, or its mean with a larger Q")
+
+
+def _check_prior(prior: Gaussian, runs: int, n: int) -> None:
+    mean, cov = np.shape(prior.mean), np.shape(prior.cov)
+    if mean not in ((n,), (1, n), (runs, n)):
+        raise ValueError(f"the prior's mean must have the shape ({n},) or ({runs}, {n}), got {mean}")
+    if cov not in ((n, n), (1, n, n), (runs, n, n)):
+        raise ValueError(f"the prior's covariance must have the shape ({n}, {n}) or ({runs}, {n}, {n}), got {cov}")
+    if not (np.isfinite(prior.mean).all() and np.isfinite(prior.cov).all()):
+        raise ValueError("the prior must be finite: for an unknown state give a large variance, or start from measurements")
+
+
+def stacked(laws: list[Gaussian]) -> Gaussian:
+    """Laws of successive steps as one, the step before everything: mean (steps, runs, n), cov (steps, runs, n, n)."""
+    mean = np.stack([law.mean for law in laws])
+    covs = np.stack(np.broadcast_arrays(*(law.cov for law in laws)))
+    by_run = covs if covs.ndim == mean.ndim + 1 else covs[:, None]
+    return Gaussian(mean, np.broadcast_to(by_run, (*mean.shape, mean.shape[-1])))
+
+
+class Trajectories(NamedTuple):
+    """Simulated states x (steps, runs, n) and measurements y (steps, runs, p)."""
+
+    x: Array
+    y: Array
+
+
+def simulate(system: LinearSystem, prior: Gaussian, steps: int, runs: int, seed: int, u: Array | None = None) -> Trajectories:
+    """Trajectories of the system with normal noises, from x_0 drawn from the prior.
+
+    Parameters
+    ----------
+    system : LinearSystem
+    prior : Gaussian
+        Law of x_0: mean (n,) or (runs, n), covariance (n, n).
+    steps, runs, seed : int
+    u : ndarray (steps, runs, m) or (steps, 1, m), optional
+        Known input; u[k] acts between x[k] and x[k+1].
+    """
+    _check_input(system, u, steps, runs)
+    _check_prior(prior, runs, len(system.A))
+    rng = np.random.default_rng(seed)
+
+    def noise(cov: Array) -> Array:
+        return rng.standard_normal((runs, len(cov))) @ square_root(cov).T
+
+    state, x, y = prior.mean + noise(prior.cov), [], []
+    for k in range(steps):
+        x.append(state)
+        y.append(apply(system.H, state) + noise(system.R))
+        state = apply(system.A, state) + system.input(None if u is None else u[k]) + noise(system.Q)
+    return Trajectories(np.stack(x), np.stack(y))
+
+
+class Covariances(NamedTuple):
+    """Covariance analysis: predicted (steps, n, n), posterior (steps, n, n), gains (steps, n, p)."""
+
+    predicted: Array
+    posterior: Array
+    gains: Array
+
+
+def covariances(system: LinearSystem, prior_cov: Array, steps: int, gains: Array | None = None) -> Covariances:
+    """Accuracy in advance: covariances of the error, which no measurement enters.
+
+    Parameters
+    ----------
+    system : LinearSystem
+        The *true* matrices.
+    prior_cov : ndarray (n, n)
+        True covariance of the error before y_0.
+    steps : int
+    gains : ndarray (steps, n, p) or (n, p), optional
+        Gains of another linear filter with the same A and H (one of a wrong model, or constant): its true errors are then
+        found, P = (I - K H) P^- (I - K H)^T + K R K^T for any K.  By default the optimal gains.
+    """
+    given = None if gains is None else np.broadcast_to(gains, (steps, len(system.A), len(system.H)))
+    cov = np.asarray(prior_cov, dtype=float)
+    rows = []
+    for k in range(steps):
+        K = gain(cov @ system.H.T, system.measure(np.zeros(len(cov)), cov).F) if given is None else given[k]
+        rest = np.eye(len(cov)) - K @ system.H
+        posterior = symmetric(rest @ cov @ rest.T + K @ system.R @ K.T)
+        rows.append((cov, posterior, K))
+        cov = symmetric(system.A @ posterior @ system.A.T + system.Q)
+    return Covariances(*(np.stack(column) for column in zip(*rows, strict=True)))
+
+
+class Steady(NamedTuple):
+    """The stationary Kalman filter: predicted (n, n), posterior (n, n), gain (n, p)."""
+
+    predicted: Array
+    posterior: Array
+    gain: Array
+
+
+def steady_state(system: LinearSystem) -> Steady:
+    """Limit of the covariances and of the gain, from the discrete algebraic Riccati equation.
+
+    P = A (P - P H^T (H P H^T + R)^-1 H P) A^T + Q
+
+    Raises
+    ------
+    ValueError
+        There is no limit that the filter reaches from every start: a part of the state is neither seen nor decays, or has
+        no noise.
+    """
+    try:
+        predicted = scipy.linalg.solve_discrete_are(system.A.T, system.H.T, system.Q, system.R)
+    except (np.linalg.LinAlgError, ValueError):
+        raise ValueError(
+            "the Riccati equation has no stabilising solution: a part of the state is neither seen by the meter nor decays, "
+            "or has no noise; use covariances(system, ...) to follow the filter step by step"
+        ) from None
+    law = Gaussian(np.zeros(len(system.A)), symmetric(predicted))
+    measurement = system.measure(*law)
+    return Steady(law.cov, correct(law, measurement, measurement.h).cov, gain(law.cov @ system.H.T, measurement.F))

@@ -1,0 +1,88 @@
+"""The matrices of a linear model, checked.
+
+x_{k+1} = A x_k + B u_k + v_k,  v ~ N(0, Q)        u_k: known input
+y_k     = H x_k + w_k,          w ~ N(0, R)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kfcourse.laws import Array, Measurement, apply, symmetric
+
+
+@dataclass(frozen=True)
+class LinearSystem:
+    """Matrices of a linear model.
+
+    Attributes
+    ----------
+    A : ndarray (n, n)
+        Transition of the state.
+    H : ndarray (p, n)
+        Sensitivity of the meter.
+    Q, R : ndarray (n, n), (p, p)
+        Covariances of the noises of object and meter.
+    B : ndarray (n, m), optional
+        Effect of the known input.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit, numbers that are not finite, covariances that are none.
+    """
+
+    A: Array
+    H: Array
+    Q: Array
+    R: Array
+    B: Array | None = None
+
+    def __post_init__(self) -> None:
+        for name in "AHQRB":
+            value = getattr(self, name)
+            if value is None:
+                continue
+            array = np.asarray(value)
+            array = array if array.dtype == np.float32 else array.astype(float)
+            if array.ndim != 2:
+                raise ValueError(f"{name} must be a matrix (2 axes), got the shape {array.shape}")
+            if not np.isfinite(array).all():
+                raise ValueError(f"{name} must be finite, got {array.tolist()}")
+            object.__setattr__(self, name, array)
+        n, p = len(self.A), len(self.H)
+        shapes = {"A": (n, n), "H": (p, n), "Q": (n, n), "R": (p, p)}
+        for name, shape in shapes.items():
+            if getattr(self, name).shape != shape:
+                raise ValueError(
+                    f"{name} has the shape {getattr(self, name).shape}; with {n} states and {p} measurements it is {shape}"
+                )
+        if self.B is not None and len(self.B) != n:
+            raise ValueError(f"B has {len(self.B)} rows; with {n} states it has {n}")
+        for name in "QR":
+            cov = getattr(self, name)
+            if not np.array_equal(cov, cov.T):
+                raise ValueError(f"{name} is a covariance and must be symmetric, got {cov.tolist()}")
+            values = np.linalg.eigvalsh(cov)
+            if values.min() < -1e-6 * max(values.max(), 0.0):  # rounding of eigvalsh, in float32 too
+                raise ValueError(f"{name} is a covariance and must not be negative, got {cov.tolist()}")
+
+    def astype(self, dtype: Any) -> LinearSystem:
+        """The same matrices in another arithmetic, such as numpy.float32."""
+        matrices = (self.A, self.H, self.Q, self.R, self.B)
+        return LinearSystem(*(None if matrix is None else matrix.astype(dtype) for matrix in matrices))  # type: ignore[arg-type]
+
+    def input(self, u: Array | None) -> Array | float:
+        """B u, (..., n); 0 without an input."""
+        if u is None:
+            return 0.0
+        if self.B is None:
+            raise ValueError("an input u was given, but the system has no matrix B; pass LinearSystem(A, H, Q, R, B)")
+        return apply(self.B, u)
+
+    def measure(self, m: Array, d: Array) -> Measurement:
+        """Structural functions of the meter: h = H m, G = H, F = H d H^T + R."""
+        return Measurement(apply(self.H, m), self.H, symmetric(self.H @ d @ self.H.T) + self.R, self.R)

@@ -1,0 +1,8 @@
+"""Monte Carlo: all filters on common trajectories, designed where they need it, compared with standard errors.
+
+ensemble     the trajectories that a seed stands for, drawn in blocks
+designing    coefficients of DUOF, FOS, MFOS: regressions over an ensemble
+experiment   `run`, `predictions`, `compare`
+statistics   means over batches of trajectories, standard errors
+comparison   `Comparison`: error variances, paired differences, ranking, distance from the exact filter
+"""

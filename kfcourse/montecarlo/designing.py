@@ -1,0 +1,105 @@
+"""Finding the coefficients of the designed filters (DUOF, FOS, MFOS) over an ensemble.
+
+All designs advance together, step by step.  At each step the equations of every block run until they
+ask for a regression; the moments of all blocks are merged, the regression solved, and its coefficients
+sent back into the equations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from concurrent.futures import Executor
+
+import numpy as np
+
+from kfcourse.filters.base import Design, Filter, Step, initial_state
+from kfcourse.laws import Affine, Gaussian, Moments
+from kfcourse.montecarlo.ensemble import Moment, Serial
+
+
+class NotFinite(ArithmeticError):
+    """A filter or trajectory left the finite numbers."""
+
+
+def design(designs: Sequence[Design], ensemble: Iterable[list[Moment]], pool: Executor | None = None) -> list[Filter]:
+    """Fit every design on the same trajectories.
+
+    Parameters
+    ----------
+    designs : sequence of Design
+    ensemble : iterable
+        For each step the list of blocks `Moment(x, y, x_next)`: `Ensemble.by_step(pool)`, or stored trajectories.
+    pool : Executor, optional
+        Blocks of a step are computed in its threads.
+
+    Returns
+    -------
+    list of Filter
+        In the order of `designs`, for as many steps as the ensemble has.
+
+    Raises
+    ------
+    NotFinite
+        If a regression meets infinite or NaN values: the model or the filter diverges.
+    """
+    coefficients: list[list[list[Affine]]] = [[] for _ in designs]
+    predicted: list[list[Gaussian]] = []  # [block][design]
+    for k, blocks in enumerate(ensemble):
+        if not predicted:
+            predicted = [[initial_state(d.model)(len(b.x)).predicted for d in designs] for b in blocks]
+        runs = [_BlockStep(designs, before, block) for before, block in zip(predicted, blocks, strict=True)]
+        fits = _fit_step(designs, runs, k, pool or Serial())
+        predicted = [[step.predicted for step in run.finished()] for run in runs]
+        for table, row in zip(coefficients, fits, strict=True):
+            table.append(row)
+    return [one.with_coefficients(table) for one, table in zip(designs, coefficients, strict=True)]
+
+
+class _BlockStep:
+    """The equations of all designs over one step of one block of trajectories."""
+
+    def __init__(self, designs: Sequence[Design], predicted: Sequence[Gaussian], block: Moment):
+        self.block = block
+        self.running = [one.equations(before, block.y) for one, before in zip(designs, predicted, strict=True)]
+        self.results: list[Step | None] = [None] * len(designs)
+
+    def advance(self, answers: dict[int, Affine | None]) -> list[Moments | None]:
+        """Answer the waiting designs; the moments of the regression each asks for next, None if it is through."""
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported, by name
+            return [self._advance(i, answer) for i, answer in answers.items()]
+
+    def _advance(self, i: int, answer: Affine | None) -> Moments | None:
+        try:
+            request = self.running[i].send(answer)  # type: ignore[arg-type]  # None starts a generator
+        except StopIteration as stop:
+            self.results[i] = stop.value
+            return None
+        return Moments.of(request.target(self.block.x, self.block.x_next), request.regressor)
+
+    def finished(self) -> list[Step]:
+        return [step for step in self.results if step is not None]
+
+
+def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int, pool: Executor) -> list[list[Affine]]:
+    """One step of every design: its coefficients, each regression answered from the whole ensemble."""
+    fits: list[list[Affine]] = [[] for _ in designs]
+    active = list(range(len(designs)))
+    while active:
+        answers = {i: fits[i][-1] if fits[i] else None for i in active}
+        moments = list(pool.map(lambda run, answers=answers: run.advance(answers), runs))
+        asked = []
+        for i, parts in zip(active, zip(*moments, strict=True), strict=True):
+            if parts[0] is None:
+                continue
+            with np.errstate(over="ignore", invalid="ignore"):
+                merged = Moments.together([part for part in parts if part is not None])
+            if not np.isfinite(merged.scatter).all():
+                if not all(np.isfinite(run.block.x_next).all() and np.isfinite(run.block.y).all() for run in runs):
+                    raise NotFinite(f"step {k}: the model's trajectories become infinite, check its equations and parameters")
+                raise NotFinite(
+                    f"{designs[i].name}, step {k}: the design met infinite or NaN values; the model or this filter diverges"
+                )
+            fits[i].append(merged.regression(designs[i].model.n))
+            asked.append(i)
+        active = asked
+    return fits

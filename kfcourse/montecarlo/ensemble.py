@@ -1,0 +1,173 @@
+"""Trajectories of a model, drawn reproducibly, in blocks.
+
+Every block of trajectories and every few steps draw from a stream of their own, spawned from the seed,
+so the numbers depend neither on the number of threads nor on the order in which blocks are computed.
+NumPy releases the interpreter while it works on a block, so blocks run in parallel threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kfcourse.laws import Array, Gaussian, square_root
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.structure import compile_model
+
+# Largest and smallest block of trajectories: operations long enough to leave the interpreter to the other threads,
+# arrays short enough for the processor's caches.
+BLOCK, SMALL_BLOCK = 100_000, 16_384
+STEPS_AT_ONCE = 4  # steps drawn by one call: few calls, and little memory over the whole ensemble
+
+
+class Moment(NamedTuple):
+    """One step of a block of trajectories: x_k (N, n), y_k (N, p), x_{k+1} (N, n)."""
+
+    x: Array
+    y: Array
+    x_next: Array
+
+
+class Trajectories(NamedTuple):
+    """Stored trajectories: x (steps, runs, n), y (steps, runs, p)."""
+
+    x: Array
+    y: Array
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """The trajectories that one seed stands for, generated whenever they are asked for.
+
+    Attributes
+    ----------
+    model : Model
+    runs, steps : int
+        Trajectories, and measurements y_0 ... y_{steps-1} of each.
+    seed : numpy.random.SeedSequence
+    threads : int
+        1 draws in the calling thread; more draw ahead in so many others.
+    """
+
+    model: Model
+    runs: int
+    steps: int
+    seed: np.random.SeedSequence
+
+    def __post_init__(self) -> None:
+        for name in ("runs", "steps"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+                raise ValueError(f"{name} must be a positive whole number, got {value!r}")
+
+    @cached_property
+    def sizes(self) -> list[int]:
+        """Number of trajectories in each block: nearly equal, and two blocks at least if they are not too small."""
+        blocks = max(-(-self.runs // BLOCK), min(2, self.runs // SMALL_BLOCK), 1)
+        return np.diff(np.linspace(0, self.runs, blocks + 1).astype(int)).tolist()
+
+    @property
+    def _chunks(self) -> list[range]:
+        return [range(k, min(k + STEPS_AT_ONCE, self.steps)) for k in range(0, self.steps, STEPS_AT_ONCE)]
+
+    def block(self, index: int) -> Iterator[Moment]:
+        """The steps of one block of trajectories."""
+        x = self._initial(index)
+        for chunk in range(len(self._chunks)):
+            for v, w in zip(*self._draw(index, chunk), strict=True):
+                moment = self._simulator(x, v, w)
+                yield moment
+                x = moment.x_next
+
+    def by_step(self, pool: Executor | None = None) -> Iterator[list[Moment]]:
+        """All blocks of a step together, step by step: for coefficients that need the whole ensemble."""
+        pool = pool or Serial()
+        blocks = range(len(self.sizes))
+        x = list(pool.map(self._initial, blocks))
+        drawn = [pool.submit(self._draw, b, 0) for b in blocks]
+        for chunk, steps in enumerate(self._chunks):
+            noises = [future.result() for future in drawn]
+            if chunk + 1 < len(self._chunks):
+                drawn = [pool.submit(self._draw, b, chunk + 1) for b in blocks]  # ahead of time
+            for k in range(len(steps)):
+                moments = list(pool.map(self._simulator, x, [v[k] for v, _ in noises], [w[k] for _, w in noises]))
+                yield moments
+                x = [moment.x_next for moment in moments]
+
+    @cached_property
+    def _simulator(self) -> _Simulator:
+        return _Simulator(self.model)
+
+    def _stream(self, *key: int) -> np.random.Generator:
+        spawned = np.random.SeedSequence(self.seed.entropy, spawn_key=(*self.seed.spawn_key, *key))
+        return np.random.Generator(np.random.SFC64(spawned))
+
+    def _initial(self, block: int) -> Array:
+        return _draw(self._stream(block, 0), self.model.prior, 1, self.sizes[block])[0]
+
+    def _draw(self, block: int, chunk: int) -> tuple[Array, Array]:
+        """Noises of a few steps of a block: v and w, (steps, size, r)."""
+        rng, steps, size = self._stream(block, 1 + chunk), len(self._chunks[chunk]), self.sizes[block]
+        v = _draw(rng, self.model.state_noise, steps, size)
+        return v, _draw(rng, self.model.meter_noise, steps, size)
+
+
+class _Simulator:
+    """One step of the model: (x, v, w) -> x, y = b(x, w), x' = a(x, v)."""
+
+    def __init__(self, model: Model):
+        self.state, self.meter = compile_model(model)
+        self.n, self.p = model.n, model.p
+
+    def __call__(self, x: Array, v: Array, w: Array) -> Moment:
+        y, x_next = self.meter(x, w), self.state(x, v)
+        # A formula without noise and state is one constant for all trajectories.
+        return Moment(x, np.broadcast_to(y, (len(x), self.p)), np.broadcast_to(x_next, (len(x), self.n)))
+
+
+def _draw(rng: np.random.Generator, law: Gaussian, steps: int, size: int) -> Array:
+    """Gaussian noise (steps, size, r), every component contiguous in memory."""
+    r = len(law.mean)
+    standard = rng.standard_normal((steps, r, size)).swapaxes(1, 2)
+    if not law.mean.any() and np.array_equal(law.cov, np.eye(r)):
+        return standard
+    return law.mean + standard @ square_root(law.cov).T
+
+
+class Serial(Executor):
+    """An executor without threads: everything is done at once, by the caller."""
+
+    def submit(self, fn, /, *args, **kwargs) -> Future[Any]:
+        future: Future[Any] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+@contextmanager
+def workers(threads: int) -> Iterator[Executor]:
+    """An executor of so many threads, on whose number no result depends; what waits is dropped on an error or interrupt."""
+    if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 1:
+        raise ValueError(f"threads must be a positive whole number, got {threads!r}")
+    pool = Serial() if threads == 1 else ThreadPoolExecutor(int(threads))
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def simulate(model: Model, runs: int, steps: int, seed: int) -> Trajectories:
+    """Trajectories to look at: x (steps, runs, n) and y (steps, runs, p), the same for the same seed."""
+    ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(seed))
+    x, y = np.empty((steps, runs, model.n)), np.empty((steps, runs, model.p))
+    start = 0
+    for index, size in enumerate(ensemble.sizes):
+        for k, moment in enumerate(ensemble.block(index)):
+            x[k, start : start + size], y[k, start : start + size] = moment.x, moment.y
+        start += size
+    return Trajectories(x, y)

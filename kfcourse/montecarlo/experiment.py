@@ -1,0 +1,242 @@
+"""The Monte Carlo engine: all filters on common trajectories, statistics on the fly.
+
+    compare(filters, model, runs, steps, seed) -> Comparison
+
+designs the filters that need it on one ensemble, runs all of them on another, and keeps sums over
+batches of trajectories, never the trajectories themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from concurrent.futures import Executor
+from itertools import accumulate
+from typing import TypeVar
+
+import numpy as np
+from tqdm import tqdm
+
+from kfcourse.filters.base import Design, Filter, State
+from kfcourse.laws import Array, Gaussian
+from kfcourse.montecarlo.comparison import EXACT, Comparison, Subset
+from kfcourse.montecarlo.designing import NotFinite, design
+from kfcourse.montecarlo.ensemble import Ensemble, Moment, workers
+from kfcourse.montecarlo.statistics import BATCHES, Sums
+from kfcourse.symbolic.model import Model
+
+SUBSET_CHUNK = 32  # trajectories a slow filter takes at once
+
+T = TypeVar("T")
+
+
+def run(one: Filter, y: Array) -> Gaussian:
+    """Run a filter over stored measurements.
+
+    Parameters
+    ----------
+    one : Filter
+    y : ndarray (steps, runs, p)
+        NaN where a measurement is missing.
+
+    Returns
+    -------
+    Gaussian
+        Estimates (steps, runs, n) and the filter's covariances (steps, runs, n, n).
+    """
+    return _stacked([one.estimate(state) for state in _states(one, y)[1:]])
+
+
+def predictions(one: Filter, y: Array) -> Gaussian:
+    """What a filter expects before each measurement: lambda_k (steps, runs, n) and Psi_k (steps, runs, n, n).
+
+    Arguments as in `run`.  `kfcourse.linear.consistency` compares them with what then came.
+    """
+    return _stacked([state.predicted for state in _states(one, y)[:-1]])
+
+
+def _states(one: Filter, y: Array) -> list[State]:
+    """The filter's states: before the first measurement, and after each."""
+    if y.ndim != 3:
+        raise ValueError(f"measurements must have the shape (steps, runs, p), got {y.shape}; one trajectory is y[:, None, :]")
+    if y.shape[2] != one.model.p:
+        raise ValueError(f"{one.name} expects {one.model.p} measurement component(s), got {y.shape[2]}")
+    return list(accumulate(y, one.step, initial=one.init(y.shape[1])))
+
+
+def _stacked(laws: Sequence[Gaussian]) -> Gaussian:
+    full = [Gaussian(mean, np.broadcast_to(cov, mean.shape + mean.shape[-1:])) for mean, cov in laws]
+    return Gaussian(np.stack([law.mean for law in full]), np.stack([law.cov for law in full]))
+
+
+def compare(
+    filters: Sequence[Filter | Design],
+    model: Model,
+    runs: int,
+    steps: int,
+    seed: int,
+    *,
+    design_runs: int | None = None,
+    same_ensemble: bool = False,
+    subset_runs: int = 500,
+    threads: int = 2,
+    progress: bool | None = None,
+) -> Comparison:
+    """Compare filters on common trajectories of a model.
+
+    Parameters
+    ----------
+    filters : sequence of Filter or Design
+        Designs are designed first, on an ensemble of their own.
+    model : Model
+    runs, steps : int
+        Trajectories, and measurements of each.
+    seed : int
+        The same seed gives the same numbers, whatever the number of threads.
+    design_runs : int, optional
+        Size of the design ensemble; `runs` by default.
+    same_ensemble : bool
+        Design on the very trajectories of the comparison, as the lab does: optimistic for the designed
+        filters, by about the number of coefficients over `runs`.
+    subset_runs : int
+        Slow filters (exact, particle) run on this many of the common trajectories; their error variance
+        is found through the paired difference from the Gaussian AOF (or else the first fast filter).  0 leaves them out.
+    threads : int
+        Threads that share the blocks of trajectories.
+    progress : bool, optional
+        Show progress bars; by default if standard error is a terminal.
+
+    Raises
+    ------
+    ValueError
+        Filters of equal name, sizes that are not positive whole numbers.
+    NotFinite
+        A trajectory or a filter left the finite numbers.
+    """
+    _check_arguments(filters, model, seed, subset_runs)
+    names = [one.name for one in filters]
+    slow = [one for one in filters if one.slow and subset_runs]
+    fast = [one for one in filters if not one.slow]
+    run_seed, design_seed = np.random.SeedSequence(seed).spawn(2)
+    common = Ensemble(model, runs, steps, run_seed)
+    design_ensemble = (
+        common if same_ensemble else Ensemble(model, runs if design_runs is None else design_runs, steps, design_seed)
+    )
+    with workers(threads) as pool:
+        ready = _designed(fast, design_ensemble, pool, progress)
+        sums = _run_blocks(ready, common, pool, progress)
+        subset = None
+        if slow:
+            ready += _designed(slow, design_ensemble, pool, progress)
+            size = min(subset_runs, runs)
+            subset = Subset([one.name for one in slow], _run_subset(ready, common, size, progress))
+    return Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset)
+
+
+def _check_arguments(filters: Sequence[Filter | Design], model: Model, seed: int, subset_runs: int) -> None:
+    """ValueError for what `compare` cannot do with these arguments."""
+    names = [one.name for one in filters]
+    if len(set(names)) < len(names) or not names:
+        raise ValueError(f"give at least one filter, and each a name of its own: {', '.join(names) or 'none given'}")
+    if all(one.slow for one in filters):
+        raise ValueError(f"{names[0]} is found through its difference from a fast filter; add one, such as aof-gaussian")
+    if subset_runs < 0:
+        raise ValueError(f"subset_runs must not be negative, got {subset_runs}")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ValueError(f"the seed must be a non-negative whole number, got {seed!r}")
+    for one in filters:
+        if (one.model.n, one.model.p) != (model.n, model.p):
+            raise ValueError(
+                f"{one.name} was built for a model with {one.model.n} states and {one.model.p} measurements; "
+                f"this one has {model.n} and {model.p}"
+            )
+
+
+def _designed(filters: Sequence[Filter | Design], ensemble: Ensemble, pool: Executor, progress: bool | None) -> list[Filter]:
+    """The filters in their order, those that need it designed on the ensemble."""
+    designs = [one for one in filters if isinstance(one, Design)]
+    fitted: dict[str, Filter] = {}
+    if designs:
+        steps = _progress(ensemble.by_step(pool), "designing", ensemble.steps, "step", progress)
+        fitted = {one.name: one for one in design(designs, steps, pool)}
+    return [fitted[one.name] if isinstance(one, Design) else one for one in filters]
+
+
+def _run_blocks(filters: Sequence[Filter], ensemble: Ensemble, pool: Executor, progress: bool | None) -> Sums:
+    """Sums over all trajectories, its blocks in parallel."""
+
+    def block(index: int) -> Sums:
+        size = ensemble.sizes[index]
+        sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, size, max(1, round(BATCHES * size / ensemble.runs)))
+        _run_block(filters, ensemble.block(index), sums)
+        return sums
+
+    indices = range(len(ensemble.sizes))
+    return Sums.concatenate(list(_progress(pool.map(block, indices), "comparing", len(indices), "block", progress)))
+
+
+def _run_block(filters: Sequence[Filter], moments: Iterable[Moment], sums: Sums, reference: int | None = None) -> None:
+    """Advance all filters together over the steps of one block of trajectories.
+
+    With a reference filter, the distance of every other estimate from its own is recorded too.
+    """
+    size = int(sums.counts.sum())
+    states = [one.init(size) for one in filters]
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
+        for k, moment in enumerate(moments):
+            for i, one in enumerate(filters):
+                states[i] = one.step(states[i], moment.y)
+                sums.record(i, k, moment.x, one.estimate(states[i]))
+            if reference is not None:
+                for i, state in enumerate(states):
+                    sums.record_distance(i, k, state.posterior.mean, states[reference].posterior.mean)
+    _check_finite(filters, sums)
+
+
+def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
+    finite = np.asarray(np.isfinite(sums.square).all(axis=(2, 3)))
+    if finite.all():
+        return
+    step = int(np.argmin(finite.all(axis=0)))
+    if not finite[:, step].any():
+        raise NotFinite(
+            f"step {step}: every filter fails; the model's trajectories become infinite, check its equations and parameters"
+        )
+    name = filters[int(np.argmin(finite[:, step]))].name
+    raise NotFinite(
+        f"step {step}: {name} became infinite or NaN although the trajectories are finite; leave it out or check the model"
+    )
+
+
+def _run_subset(filters: Sequence[Filter], ensemble: Ensemble, size: int, progress: bool | None) -> Sums:
+    """All filters on the first `size` trajectories, in chunks; one thread, as short operations gain nothing from more."""
+    starts = range(0, size, SUBSET_CHUNK)
+    x, y, x_next = _first(ensemble, size)
+    names = [one.name for one in filters]
+    reference = names.index(EXACT) if EXACT in names else None
+
+    def chunk(start: int) -> Sums:
+        rows = slice(start, min(start + SUBSET_CHUNK, size))
+        moments = [Moment(x[k, rows], y[k, rows], x_next[k, rows]) for k in range(ensemble.steps)]
+        count = rows.stop - rows.start
+        sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, count, max(1, round(BATCHES * count / size)))
+        _run_block(filters, moments, sums, reference)
+        return sums
+
+    return Sums.concatenate(list(_progress(map(chunk, starts), "slow filters", len(starts), "chunk", progress)))
+
+
+def _first(ensemble: Ensemble, size: int) -> tuple[Array, Array, Array]:
+    """The first `size` of the ensemble's trajectories: x, y and the following x, (steps, size, ...)."""
+    parts: list[list[Moment]] = []
+    left = size
+    for index, block in enumerate(ensemble.sizes):
+        if left > 0:
+            parts.append([Moment(*(a[:left].copy() for a in moment)) for moment in ensemble.block(index)])
+            left -= block
+    x, y, x_next = (np.stack([np.concatenate([part[k][i] for part in parts]) for k in range(ensemble.steps)]) for i in range(3))
+    return x, y, x_next
+
+
+def _progress(items: Iterable[T], what: str, total: int, unit: str, progress: bool | None) -> Iterable[T]:
+    # tqdm: disable=None means "unless standard error is a terminal"
+    return tqdm(items, desc=what, total=total, unit=unit, disable=None if progress is None else not progress, delay=0.5)

@@ -1,0 +1,245 @@
+"""Motion in continuous time, and its exact transition over any interval.
+
+    dx = (A x + B u(t)) dt + dW,   M[dW dW^T] = Qc dt
+
+Over an interval dt in which u does not change, with nothing approximated,
+
+    x(t + dt) = Phi x(t) + Gamma u + v,   v ~ N(0, Q)
+    Phi = exp(A dt),   Gamma = int_0^dt exp(A s) ds B,   Q = int_0^dt exp(A s) Qc exp(A s)^T ds
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from kfcourse.laws import Array, Gaussian, apply, square_root, symmetric
+
+ROUNDING = 1e-9  # s (or periods): moments that differ by less are the same but for rounding; float64 holds days to 1e-11 s
+TERMS = 20  # of the series: term k is below 1 / (k+1)! relative to the first, the next one left out 2e-20
+TRANSITIONS = 4096  # intervals remembered: sensors of fixed rates need a few, random delays many
+
+
+class Transition(NamedTuple):
+    """x' = A x + B u + v, v ~ N(0, Q): Phi (n, n), Gamma (n, m), Q (n, n), named as in `kfcourse.linear.runs.LinearSystem`."""
+
+    A: Array
+    B: Array
+    Q: Array
+
+
+@dataclass(frozen=True)
+class Dynamics:
+    """A linear stochastic differential equation with constant coefficients.
+
+    Attributes
+    ----------
+    A : ndarray (n, n)
+        In 1/s.
+    Qc : ndarray (n, n)
+        Intensity of the white noise, M[w(t) w(s)^T] = Qc delta(t - s): its two-sided spectral density, in (units of x)^2 / s.
+    B : ndarray (n, m), optional
+        Effect of the known input.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit, numbers that are not finite, an intensity that is no covariance.
+    """
+
+    A: Array
+    Qc: Array
+    B: Array | None = None
+
+    def __post_init__(self) -> None:
+        A, Qc = np.asarray(self.A, dtype=float), np.asarray(self.Qc, dtype=float)
+        if A.ndim != 2 or A.shape[0] != A.shape[1]:
+            raise ValueError(f"A must be a square matrix, got the shape {A.shape}")
+        n = len(A)
+        B = np.zeros((n, 0)) if self.B is None else np.asarray(self.B, dtype=float)
+        if Qc.shape != (n, n):
+            raise ValueError(f"Qc has the shape {Qc.shape}; with {n} states it is {(n, n)}")
+        if B.ndim != 2 or len(B) != n:
+            raise ValueError(f"B has the shape {B.shape}; with {n} states it is ({n}, number of inputs)")
+        for name, matrix in (("A", A), ("Qc", Qc), ("B", B)):
+            if not np.isfinite(matrix).all():
+                raise ValueError(f"{name} must be finite, got {matrix.tolist()}")
+            object.__setattr__(self, name, matrix)
+        values = np.linalg.eigvalsh(symmetric(Qc))
+        if not np.array_equal(Qc, Qc.T) or values.min() < -1e-12 * max(values.max(), 0.0):  # rounding of eigvalsh
+            raise ValueError(f"Qc is an intensity of noise: symmetric and not negative; got {Qc.tolist()}")
+
+    @property
+    def inputs(self) -> int:
+        """Number of known inputs."""
+        return 0 if self.B is None else self.B.shape[1]
+
+    def over(self, dt: float) -> Transition:
+        """The exact transition over dt seconds, to rounding.
+
+        All three are power series in s = a h, a the norm of A, here for a short part h of dt with s <= 1/2:
+
+            Phi = sum_k s^k (A/a)^k / k!,   Gamma = h sum_k s^k (A/a)^k / (k+1)! B,   Q = h sum_k s^k q_k / (k+1)!
+            q_0 = Qc,   q_{k+1} = (A/a) q_k + q_k (A/a)^T          from dQ/dt = A Q + Q A^T + Qc
+
+        and then doubled until h is dt:
+
+            Phi(2h) = Phi Phi,   Gamma(2h) = Gamma + Phi Gamma,   Q(2h) = Q + Phi Q Phi^T
+
+        Van Loan's exponential of [[-A, Qc], [0, A^T]] gives the same, but is much slower where sensors with delays of their own
+        ask for thousands of intervals, and loses Q where exp(-A dt) is huge.
+
+        Raises
+        ------
+        ValueError
+            dt negative or not finite.
+        """
+        if not (math.isfinite(dt) and dt >= 0):
+            raise ValueError(f"the interval must be finite and not negative, got {dt}")
+        size, coefficients = self._series
+        doublings = max(0, math.ceil(math.log2(max(2 * size * dt, 1.0))))
+        h = dt / 2**doublings
+        Phi, known, noise = np.tensordot((size * h) ** np.arange(TERMS), coefficients, axes=(0, 0))
+        Gamma, Q = h * known @ self.B, h * noise
+        for _ in range(doublings):
+            Q, Gamma, Phi = Q + Phi @ Q @ Phi.T, Gamma + Phi @ Gamma, Phi @ Phi
+        return Transition(Phi, Gamma, symmetric(Q))
+
+    @cached_property
+    def _series(self) -> tuple[float, Array]:
+        """Norm a of A, and coefficients of the series of Phi, Gamma and Q: (TERMS, 3, n, n)."""
+        size = float(np.abs(self.A).sum(axis=1).max())
+        A = self.A / size if size else self.A
+        power, noise, rows = np.eye(len(A)), self.Qc, []
+        for k in range(TERMS):
+            rows.append([power / math.factorial(k), power / math.factorial(k + 1), noise / math.factorial(k + 1)])
+            power, noise = power @ A, A @ noise + noise @ A.T
+        return size, np.array(rows)
+
+
+class Inputs(NamedTuple):
+    """A known input, sampled by a fast sensor: values[i], (runs, m) or (1, m), acts from times[i] until times[i + 1].
+
+    times (s,) ascending, values (s, runs, m).  The last value acts for ever.
+    """
+
+    times: Array
+    values: Array
+
+
+class Path(NamedTuple):
+    """True states (s, runs, n) at times (s,): as a function, it looks up the states at some of these times."""
+
+    times: Array
+    states: Array
+
+    def __call__(self, times: Array) -> Array:
+        """States (len(times), runs, n); ValueError for a time that is not stored."""
+        index = np.minimum(np.searchsorted(self.times, np.asarray(times) - ROUNDING), len(self.times) - 1)
+        missing = np.flatnonzero(np.abs(self.times[index] - times) > 2 * ROUNDING)
+        if len(missing):
+            raise ValueError(
+                f"the path is not known at t = {np.asarray(times)[missing[0]]:g} s; sample it at all moments that are needed: "
+                "np.unique(np.concatenate([outputs, *(sensor.captures(duration) for sensor in sensors)]))"
+            )
+        return self.states[index]
+
+
+Mover = Callable[[Array, float, float], Array]
+Predictor = Callable[[Gaussian, float, float], Gaussian]
+
+
+def motion(dynamics: Dynamics, inputs: Inputs | None = None) -> tuple[Callable[[float], Transition], Mover]:
+    """Transitions over intervals, each found once, and the noiseless motion (x (..., n), start, end) -> x.
+
+    Raises
+    ------
+    ValueError
+        Inputs that do not fit the dynamics, or begin after they are needed.
+    """
+    over = lru_cache(maxsize=TRANSITIONS)(dynamics.over)
+    if inputs is None:
+        if dynamics.inputs:
+            raise ValueError(f"the dynamics have {dynamics.inputs} known input(s); give them: inputs=Inputs(times, values)")
+        return over, lambda x, start, end: apply(over(end - start).A, x)
+    times, values = np.asarray(inputs.times, dtype=float), np.asarray(inputs.values, dtype=float)
+    _check_inputs(dynamics, times, values)
+
+    def move(x: Array, start: float, end: float) -> Array:
+        first = int(np.searchsorted(times, start, side="right")) - 1
+        if first < 0:
+            raise ValueError(f"the inputs begin at t = {times[0]:g} s, but are needed from t = {start:g} s")
+        last = int(np.searchsorted(times, end, side="left"))
+        edges = [start, *times[first + 1 : last].tolist(), end]
+        for i, (left, right) in enumerate(pairwise(edges)):
+            step = over(right - left)
+            x = apply(step.A, x) + apply(step.B, values[first + i])
+        return x
+
+    return over, move
+
+
+def predictor(dynamics: Dynamics, inputs: Inputs | None = None) -> Predictor:
+    """(law, start, end) -> law: the mean moves with the inputs, the covariance needs one step, whatever they are.
+
+    Phi m + Gamma u + ...,   Phi P Phi^T + Q
+    """
+    over, move = motion(dynamics, inputs)
+
+    def predict(law: Gaussian, start: float, end: float) -> Gaussian:
+        if end == start:
+            return law
+        step = over(end - start)
+        return Gaussian(move(law.mean, start, end), symmetric(step.A @ law.cov @ step.A.T + step.Q))
+
+    return predict
+
+
+def _check_inputs(dynamics: Dynamics, times: Array, values: Array) -> None:
+    if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+        raise ValueError("the times of the inputs must be finite and ascending, one for each value")
+    if values.ndim != 3 or len(values) != len(times) or values.shape[2] != dynamics.inputs:
+        raise ValueError(f"inputs must have the shape ({len(times)}, runs or 1, {dynamics.inputs}), got {values.shape}")
+    if not np.isfinite(values).all():
+        raise ValueError("inputs must be finite: fill a gap of the fast sensor by what it would have said, and enlarge Qc")
+
+
+def sample(
+    dynamics: Dynamics, prior: Gaussian, times: Array, runs: int, seed: int | np.random.Generator, inputs: Inputs | None = None
+) -> Path:
+    """True paths of the dynamics, exact at the given times.
+
+    Parameters
+    ----------
+    dynamics : Dynamics
+    prior : Gaussian
+        Law of the state at times[0]: (n,), (n, n).
+    times : ndarray (s,)
+        Ascending, in seconds: all moments at which the path will be needed.
+    runs : int
+    seed : int or Generator
+    inputs : Inputs, optional
+
+    Returns
+    -------
+    Path
+        times (s,) and states (s, runs, n).
+    """
+    times = np.asarray(times, dtype=float)
+    if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+        raise ValueError("times must be a finite ascending vector; np.unique sorts and removes what is twice")
+    rng, n = np.random.default_rng(seed), len(dynamics.A)
+    over, move = motion(dynamics, inputs)
+    states = np.empty((len(times), runs, n))
+    states[0] = prior.mean + rng.standard_normal((runs, n)) @ square_root(np.asarray(prior.cov)).T
+    for k in range(1, len(times)):
+        start, end = float(times[k - 1]), float(times[k])
+        noise = rng.standard_normal((runs, n)) @ square_root(over(end - start).Q).T
+        states[k] = move(states[k - 1], start, end) + noise
+    return Path(times, states)

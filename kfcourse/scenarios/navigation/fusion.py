@@ -1,0 +1,191 @@
+"""The event-driven filter: predict to the moment of capture, correct with that sensor's meter.
+
+A measurement that arrives late belongs to the past.  The filter keeps its laws of the last seconds and the
+measurements between them; it goes back to the law before the moment of capture and works forward again, with the
+late one in its place:
+
+    t:       1         2         3         4 = now
+    kept:   law ----- law ----- law              used so far
+    late:         x                              captured at 1.5, arrives at 4
+    again:  law - law - law --- law ------->     the same as if it had not been late
+
+Nothing is approximated; the price is memory for the longest delay, and the work of those steps once more.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from kfcourse.laws import Array, Gaussian, correct
+from kfcourse.linear.runs import stacked
+from kfcourse.scenarios.navigation.dynamics import ROUNDING, Dynamics, Inputs, Predictor, predictor
+from kfcourse.scenarios.navigation.sensors import Observation, Sensor, by_name
+
+
+class Event(NamedTuple):
+    """A measurement, and the moment (filter's time) for which the filter takes it."""
+
+    time: float
+    arrival: float
+    sensor: Sensor
+    value: Array
+
+
+class Past(NamedTuple):
+    """What the filter remembers: the law right after an event (the prior has none)."""
+
+    time: float
+    event: Event | None
+    law: Gaussian
+
+
+def fuse(
+    dynamics: Dynamics,
+    sensors: Sequence[Sensor],
+    prior: Gaussian,
+    observations: Sequence[Observation],
+    times: Array,
+    *,
+    inputs: Inputs | None = None,
+    by: str = "tag",
+    depth: float | None = None,
+    start: float = 0.0,
+) -> Gaussian:
+    """Estimates from several sensors, each at its own rate, delay and time scale.
+
+    Parameters
+    ----------
+    dynamics : Dynamics
+    sensors : sequence of Sensor
+        As the filter believes them to be: their meters, and clocks that turn tags into the filter's time.
+    prior : Gaussian
+        Law of the state at `start`: mean (n,) or (runs, n), covariance (n, n) or (runs, n, n).
+    observations : sequence of Observation
+        In any order.
+    times : ndarray (s,)
+        When estimates are wanted, ascending.  The estimate for a moment uses what has *arrived* by then.
+    inputs : Inputs, optional
+        The known input of the dynamics.
+    by : {"tag", "arrival"}
+        "arrival" ignores the tags, as if every measurement were captured when it arrives.
+    depth : float, optional
+        How many seconds back the filter remembers; by default as many as these observations need.
+    start : float
+        Time of the prior.
+
+    Returns
+    -------
+    Gaussian
+        Means (s, runs, n) and covariances (s, runs, n, n): read-only where all runs share them.
+
+    Raises
+    ------
+    ValueError
+        Sensors not known, moments not finite, before `start`, or after the arrival; a measurement older than `depth`;
+        shapes that do not fit.
+    """
+    events = sorted(_events(sensors, observations, by, start), key=lambda event: event.arrival)
+    depth = _checked_depth(events, depth)
+    predict = predictor(dynamics, inputs)
+    history = [Past(start, None, _checked_prior(prior, len(dynamics.A), events, inputs))]
+    laws, taken = [], 0
+    for now in _checked_times(times, start):
+        arrived = events[taken : bisect_right(events, now + ROUNDING, lo=taken, key=lambda event: event.arrival)]
+        taken += len(arrived)
+        history = _with(history, arrived, predict)
+        laws.append(predict(history[-1].law, history[-1].time, max(now, history[-1].time)))
+        history = history[_oldest_needed(history, now - depth - ROUNDING) :]
+    return stacked(laws)
+
+
+def _with(history: list[Past], arrived: list[Event], predict: Predictor) -> list[Past]:
+    """The history with the events that have arrived: back to before the earliest of them, and forward again."""
+    if not arrived:
+        return history
+    kept = bisect_right(history, min(event.time for event in arrived), key=lambda past: past.time)
+    again = [past.event for past in history[kept:] if past.event] + arrived
+    history = history[:kept]
+    for event in sorted(again, key=lambda event: event.time):
+        law = predict(history[-1].law, history[-1].time, event.time)
+        history.append(Past(event.time, event, correct(law, event.sensor.measure(*law), event.value)))
+    return history
+
+
+def _oldest_needed(history: list[Past], reach: float) -> int:
+    """Index of the last law at or before the earliest moment that a measurement may still come from."""
+    return max(bisect_right(history, reach, key=lambda past: past.time) - 1, 0)
+
+
+def _events(sensors: Sequence[Sensor], observations: Sequence[Observation], by: str, start: float) -> list[Event]:
+    if by not in ("tag", "arrival"):
+        raise ValueError(f'measurements are used by "tag" or by "arrival", not by {by!r}')
+    table, events = by_name(sensors), []
+    for name, tag, arrival, value in observations:
+        if name not in table:
+            raise ValueError(f"a measurement of {name!r}, but the filter knows only {', '.join(table) or 'no sensor'}")
+        sensor = table[name]
+        if not (np.isfinite(tag) and np.isfinite(arrival)):
+            raise ValueError(
+                f"{name}: tag and arrival must be finite, got {tag} and {arrival}; drop what cannot be placed in time"
+            )
+        if value.ndim != 2 or value.shape[1] != sensor.model.p:
+            raise ValueError(f"{name}: a measurement must have the shape (runs, {sensor.model.p}), got {value.shape}")
+        if np.isinf(value).any():
+            raise ValueError(f"{name}: a measurement must be finite, or NaN where it is missing")
+        time = sensor.clock.time(tag) if by == "tag" else arrival
+        if time > arrival + ROUNDING:
+            raise ValueError(
+                f"{name}: captured at t = {time:g} s by its tag, but arrived before that, at {arrival:g} s; "
+                f"the filter's clock for this sensor, {sensor.clock}, must be wrong: Clock.fit finds it from interrupts"
+            )
+        if time < start:
+            raise ValueError(
+                f"{name}: captured at t = {time:g} s, before the prior's {start:g} s; leave it out, or start earlier"
+            )
+        events.append(Event(time, arrival, sensor, value))
+    return events
+
+
+def _checked_depth(events: Sequence[Event], depth: float | None) -> float:
+    """Seconds that the filter must remember."""
+    if not events:
+        return 0.0
+    latest = max(events, key=lambda event: event.arrival - event.time)
+    needed = latest.arrival - latest.time
+    if depth is not None and needed > depth + ROUNDING:
+        raise ValueError(
+            f"{latest.sensor.name}: captured at t = {latest.time:g} s, arrived at {latest.arrival:g} s, but the filter remembers "
+            f"only {depth:g} s; give depth={needed:g} or more, or leave such measurements out"
+        )
+    return needed if depth is None else depth
+
+
+def _checked_times(times: Array, start: float) -> list[float]:
+    moments = np.asarray(times, dtype=float)
+    if moments.ndim != 1 or not len(moments) or not np.isfinite(moments).all() or (np.diff(moments) < 0).any():
+        raise ValueError("times of estimates must be a finite ascending vector")
+    if moments[0] < start:
+        raise ValueError(f"an estimate is wanted at t = {moments[0]:g} s, before the prior's {start:g} s; start earlier")
+    return moments.tolist()
+
+
+def _checked_prior(prior: Gaussian, n: int, events: Sequence[Event], inputs: Inputs | None) -> Gaussian:
+    """The prior with a mean for each run; the number of runs is that of the measurements, inputs, or the prior itself."""
+    mean, cov = np.asarray(prior.mean, dtype=float), np.asarray(prior.cov, dtype=float)
+    sizes = {1, *(len(event.value) for event in events), *([] if inputs is None else [np.shape(inputs.values)[1]])}
+    sizes |= {len(mean)} if mean.ndim == 2 else set()
+    if len(sizes - {1}) > 1:
+        raise ValueError(f"measurements, inputs and prior are of different numbers of runs: {sorted(sizes - {1})}")
+    runs = max(sizes)
+    if mean.shape not in ((n,), (1, n), (runs, n)) or cov.shape not in ((n, n), (1, n, n), (runs, n, n)):
+        raise ValueError(
+            f"the prior must have a mean ({n},) or ({runs}, {n}) and a covariance ({n}, {n}) or ({runs}, {n}, {n}), "
+            f"got {mean.shape} and {cov.shape}"
+        )
+    if not (np.isfinite(mean).all() and np.isfinite(cov).all()):
+        raise ValueError("the prior must be finite: for an unknown state give a large variance")
+    return Gaussian(np.broadcast_to(mean, (runs, n)), cov)

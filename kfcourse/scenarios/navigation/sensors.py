@@ -1,0 +1,241 @@
+"""Sensors that measure at their own moments, in their own time scale, and report late.
+
+    capture at t_j   --interrupt: the time tag-->   ...   --the data, over an interface-->   arrival at a_j >= t_j
+
+Each sensor's clock reads rate * t + shift at the filter's time t; its samples are equally spaced on that clock.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kfcourse.laws import Array, Measurement, square_root
+from kfcourse.scenarios.navigation.dynamics import ROUNDING
+from kfcourse.symbolic.model import Formula, Model
+from kfcourse.symbolic.structure import Structure, compile_model, linearised
+
+
+class Clock(NamedTuple):
+    """A time scale: the clock reads rate * t + shift (in s) when the filter's clock reads t."""
+
+    rate: float = 1.0
+    shift: float = 0.0
+
+    def reading(self, time: Any) -> Any:
+        """What this clock shows at the filter's time."""
+        return self.rate * time + self.shift
+
+    def time(self, reading: Any) -> Any:
+        """The filter's time at which this clock shows the reading."""
+        return (reading - self.shift) / self.rate
+
+    @classmethod
+    def fit(cls, times: Array, readings: Array) -> Clock:
+        """The clock from pairs: interrupts at the filter's times (s,), and the sensor's own readings (s,) at the same moments.
+
+        Least squares of times on readings, time = a + b reading: the error is in the times, an interrupt being served with a
+        delay, while a sensor knows its own clock.
+
+        Raises
+        ------
+        ValueError
+            Fewer than two different readings.
+        """
+        times, readings = np.asarray(times, dtype=float), np.asarray(readings, dtype=float)
+        if times.shape != readings.shape or times.ndim != 1 or len(np.unique(readings)) < 2:
+            raise ValueError(
+                f"the clock needs two or more pairs of times and readings, got the shapes {times.shape} and {readings.shape}"
+            )
+        # Around the means: readings such as seconds of the week are large beside their differences.
+        deviation = readings - readings.mean()
+        slope = deviation @ (times - times.mean()) / (deviation @ deviation)
+        return cls(float(1 / slope), float(readings.mean() - times.mean() / slope))
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A sensor; build it with `Sensor.define`.  `observe` takes the true ones, `fuse` those that the filter believes in.
+
+    Attributes
+    ----------
+    name : str
+    model : Model
+        Its meter equation is the sensor's; the state equation is not used.
+    period : float
+        Between samples, in s of its own clock.
+    offset : float
+        Its clock's reading at some sample.
+    latency, jitter : float
+        The data arrive latency + jitter * U after the capture (s), U uniform in (0, 1): the filter does not use these.
+    clock : Clock
+    structure : callable
+        Model -> Structure, which approximation of the meter the filter uses: `linearised`, `gaussian`, `unscented`.
+    """
+
+    name: str
+    model: Model
+    period: float
+    offset: float = 0.0
+    latency: float = 0.0
+    jitter: float = 0.0
+    clock: Clock = field(default_factory=Clock)
+    structure: Callable[[Model], Structure] = linearised
+
+    def __post_init__(self) -> None:
+        for name in ("period", "offset", "latency", "jitter"):
+            if not math.isfinite(getattr(self, name)):
+                raise ValueError(f"{self.name}: {name} must be finite, got {getattr(self, name)}")
+        if self.period <= 0:
+            raise ValueError(f"{self.name}: the period must be positive, got {self.period}")
+        if self.latency < 0 or self.jitter < 0:
+            raise ValueError(
+                f"{self.name}: data cannot arrive before they are captured; latency and jitter must not be negative, "
+                f"got {self.latency} and {self.jitter}"
+            )
+        if not (math.isfinite(self.clock.rate) and math.isfinite(self.clock.shift) and self.clock.rate > 0):
+            raise ValueError(f"{self.name}: the clock must have a positive finite rate and a finite shift, got {self.clock}")
+
+    @classmethod
+    def define(
+        cls,
+        name: str,
+        states: Sequence[str],
+        meter: Formula | Sequence[Formula],
+        variance: Any,
+        period: float,
+        *,
+        parameters: Mapping[str, float] | None = None,
+        **timing: Any,
+    ) -> Sensor:
+        """A sensor from the formulas of its meter.
+
+        Parameters
+        ----------
+        name : str
+        states : sequence of str
+            Names of the state components, in the order of the dynamics.
+        meter : str, sympy expression, or a list of them
+            In the states, the noise w (w1, w2, ... in a list) and the parameters.
+        variance : float, list or matrix
+            Of the noise.
+        period : float
+        parameters : dict, optional
+        **timing
+            Other attributes of `Sensor`.
+
+        Raises
+        ------
+        FormulaError, ModelError
+            As in `Model.define`.
+
+        Examples
+        --------
+        >>> Sensor.define("range", ["s", "h", "V"], "sqrt(s**2 + h**2) + w", variance=100.0, period=0.25).model.p
+        1
+        """
+        model = Model.define(
+            list(states),
+            meter,
+            parameters,
+            symbols={"x": list(states), "v": ["not_used"]},
+            meter_noise={"variance": variance},
+        )
+        return cls(name, model, period, **timing)
+
+    @cached_property
+    def measure(self) -> Callable[[Array, Array], Measurement]:
+        """Structural functions of the meter: (m (..., n), d (..., n, n)) -> Measurement."""
+        return self.structure(self.model).measure
+
+    def captures(self, duration: float) -> Array:
+        """Moments of capture from 0 to duration, in the filter's time (s,)."""
+        first = math.ceil((self.clock.reading(0.0) - self.offset) / self.period - ROUNDING)
+        last = math.floor((self.clock.reading(duration) - self.offset) / self.period + ROUNDING)
+        times = self.clock.time(self.offset + self.period * np.arange(first, last + 1))
+        return np.clip(times, 0.0, duration)
+
+    def delays(self, count: int, rng: np.random.Generator) -> Array:
+        """Delays from capture to arrival, (count,)."""
+        return self.latency + self.jitter * rng.random(count)
+
+
+class Observation(NamedTuple):
+    """One message of a sensor.
+
+    Attributes
+    ----------
+    sensor : str
+    tag : float
+        Moment of capture by the sensor's own clock.
+    arrival : float
+        When the data reach the filter, by the filter's clock.
+    value : ndarray (runs, p)
+        NaN where missing.
+    """
+
+    sensor: str
+    tag: float
+    arrival: float
+    value: Array
+
+
+def observe(
+    sensors: Sequence[Sensor], truth: Callable[[Array], Array], duration: float, seed: int | np.random.Generator
+) -> list[Observation]:
+    """What the sensors say of a motion, in the order of arrival.
+
+    Parameters
+    ----------
+    sensors : sequence of Sensor
+        The true ones.
+    truth : callable
+        Times (s,) -> states (s, runs, n): a formula, or a `Path` that holds the moments of all `captures`.
+    duration : float
+        Captures from 0 to duration; the last ones may arrive later.
+    seed : int or Generator
+        Each sensor draws from a stream of its own: one more at the end of the list does not change the others.
+
+    Returns
+    -------
+    list of Observation
+        Moments and delays are those of all runs, noises are each run's own.
+
+    Raises
+    ------
+    ValueError
+        Two sensors of one name; a truth of the wrong shape.
+    """
+    by_name(sensors)
+    messages = []
+    for sensor, rng in zip(sensors, np.random.default_rng(seed).spawn(len(sensors)), strict=True):
+        times, model = sensor.captures(duration), sensor.model
+        x = np.asarray(truth(times))
+        if x.ndim != 3 or len(x) != len(times) or x.shape[2] != model.n:
+            raise ValueError(
+                f"{sensor.name}: the truth at {len(times)} moments must have the shape ({len(times)}, runs, {model.n}), "
+                f"got {x.shape}"
+            )
+        arrivals = times + sensor.delays(len(times), rng)
+        law = model.meter_noise
+        w = law.mean + rng.standard_normal((*x.shape[:2], len(law.mean))) @ square_root(law.cov).T
+        values = np.broadcast_to(compile_model(model)[1](x, w), (*x.shape[:2], model.p))
+        tags = sensor.clock.reading(times)
+        messages += [
+            Observation(sensor.name, float(tag), float(arrival), value)
+            for tag, arrival, value in zip(tags, arrivals, values, strict=True)
+        ]
+    return sorted(messages, key=lambda message: message.arrival)
+
+
+def by_name(sensors: Sequence[Sensor]) -> dict[str, Sensor]:
+    """Sensors by their names; ValueError if two share one."""
+    table = {sensor.name: sensor for sensor in sensors}
+    if len(table) < len(sensors):
+        raise ValueError(f"each sensor needs a name of its own, got {', '.join(sensor.name for sensor in sensors)}")
+    return table

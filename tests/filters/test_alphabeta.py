@@ -1,0 +1,226 @@
+"""Alpha-beta(-gamma) filters against the Riccati equation, filterpy, plain floats, and their own errors in simulation."""
+
+import control
+import numpy as np
+import pytest
+from filterpy.gh import GHFilter, GHKFilter
+
+from kfcourse import Gaussian, Model, ModelError, run, simulate
+from kfcourse.filters.alphabeta import (
+    alpha_beta,
+    alpha_beta_gamma,
+    steady_alpha,
+    steady_beta,
+    steady_gamma,
+    tracking_index,
+)
+from kfcourse.filters.kalman import linear_system
+from kfcourse.linear.runs import covariances
+from kfcourse.scenarios.aircraft import kinematic
+
+T = 0.7
+ROUNDING = 1e-12  # relative, after some tens of steps of a stable recursion
+
+
+# --- the coefficients
+
+
+@pytest.mark.parametrize("alpha", [0.01, 0.095, 0.5, 0.9, 0.99])
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_coefficients_are_the_stationary_kalman_gain(alpha, order):
+    """python-control's solution of the Riccati equation."""
+    beta, gamma = steady_beta(alpha), steady_gamma(alpha)
+    index = tracking_index(alpha) if order == 1 else gamma / (2 * np.sqrt(1 - alpha))
+    sigma = 30.0
+    model = kinematic(T, dimensions=1, order=order, noise_sd=index * sigma / T**2, measurement_sd=sigma)
+    system, _, _ = linear_system(model)
+    predicted, _, _ = control.dare(system.A.T, system.H.T, system.Q, system.R)
+    gain = predicted @ system.H.T / (system.H @ predicted @ system.H.T + system.R)
+    # The Riccati equation loses digits where the noises differ much: alpha = 0.01 has an index of 5e-5, squared 2.5e-9.
+    np.testing.assert_allclose(gain[:, 0], np.array([alpha, beta / T, gamma / (2 * T**2)])[: order + 1], rtol=1e-6)
+
+
+def test_alpha_and_index_are_inverse():
+    for index in (1e-9, 1e-3, 0.2, 1.0, 50.0):
+        assert tracking_index(steady_alpha(index)) == pytest.approx(index, rel=1e-9)
+    # the textbook's form of the same formula, which cancels for a small index
+    index = 0.8
+    textbook = -(index**2 + 8 * index - (index + 4) * np.sqrt(index**2 + 8 * index)) / 8
+    assert steady_alpha(index) == pytest.approx(textbook, rel=1e-14)
+    assert steady_beta(0.6) == pytest.approx(2 * (2 - 0.6) - 4 * np.sqrt(1 - 0.6), rel=1e-14)
+
+
+@pytest.mark.parametrize("alpha", [0.0, 1.0, -0.1, np.nan])
+def test_coefficients_outside_their_range_are_refused(alpha):
+    for function in (steady_beta, steady_gamma, tracking_index):
+        with pytest.raises(ValueError, match="between 0 and 1"):
+            function(alpha)
+    with pytest.raises(ValueError, match="tracking index"):
+        steady_alpha(-1.0 if alpha == 1.0 else np.nan)
+
+
+# --- the estimates
+
+
+PRIOR = {"mean": [4.0, -7.0, 3.0, 1.5], "variance": [50.0, 30.0, 9.0, 4.0]}
+
+
+def planar(**changes):
+    return kinematic(**(dict(interval=T, dimensions=2, noise_sd=0.8, measurement_sd=5.0, prior=PRIOR) | changes))
+
+
+def test_alpha_beta_from_a_prior_is_filterpys():
+    model, alpha, beta = planar(), 0.4, 0.15
+    y = simulate(model, 3, 25, seed=1).y
+    found = run(alpha_beta(model, alpha, beta, start="prior"), y).mean
+    for trajectory in range(3):
+        for axis in range(2):
+            # filterpy predicts first: it starts a step earlier
+            r, s = PRIOR["mean"][axis], PRIOR["mean"][axis + 2]
+            reference = GHFilter(x=r - T * s, dx=s, dt=T, g=alpha, h=beta)
+            for k, value in enumerate(y[:, trajectory, axis]):
+                expected = reference.update(value)
+                np.testing.assert_allclose(found[k, trajectory, axis::2], expected, rtol=0, atol=100 * ROUNDING)
+
+
+def test_alpha_beta_gamma_from_a_prior_is_filterpys():
+    alpha, beta, gamma = 0.5, 0.3, 0.12
+    model = kinematic(T, dimensions=1, order=2, noise_sd=0.5, measurement_sd=4.0, prior={"mean": [0.0, 2.0, 0.0]})
+    y = simulate(model, 2, 25, seed=2).y
+    found = run(alpha_beta_gamma(model, alpha, beta, gamma, start="prior"), y).mean
+    for trajectory in range(2):
+        reference = GHKFilter(x=-T * 2.0, dx=2.0, ddx=0.0, dt=T, g=alpha, h=beta, k=gamma / 4)  # its gain is 2 k / T^2
+        for k, value in enumerate(y[:, trajectory, 0]):
+            reference.update(value)
+            expected = [reference.x, reference.dx, reference.ddx]
+            np.testing.assert_allclose(found[k, trajectory], expected, rtol=0, atol=100 * ROUNDING)
+
+
+def slow_alpha_beta(measurements, alpha, beta):
+    """One axis in plain floats: the first two measurements, at any distance, then constant gains; coasting over NaN."""
+    known, last, estimates, position, speed = 0, None, [], None, 0.0
+    for k, y in enumerate(measurements):
+        if known:
+            position += T * speed
+        if not np.isnan(y):
+            if known == 0:
+                position = y
+            elif known == 1:
+                position, speed = y, (y - last[1]) / (T * (k - last[0]))
+            else:
+                innovation = y - position
+                position, speed = position + alpha * innovation, speed + beta / T * innovation
+            known, last = known + 1, (k, y)
+        estimates.append((position, speed))
+    return estimates
+
+
+def test_the_start_from_two_measurements_with_gaps_by_a_slow_loop():
+    model, alpha, beta = planar(prior={"variance": 1e4}), 0.3, 0.07
+    y = simulate(model, 4, 20, seed=3).y
+    y[1, 0] = y[5:8, 1] = y[0, 2] = y[1, 2] = np.nan  # gaps in the start and later, all components
+    y[1, 3, 0] = y[6, 3, 1] = np.nan  # and one component alone
+    found = run(alpha_beta(model, alpha, beta), y).mean
+    for trajectory in range(4):
+        for axis in range(2):
+            expected = slow_alpha_beta(y[:, trajectory, axis], alpha, beta)
+            for k, values in enumerate(expected):
+                if values[0] is not None:  # nothing is known before the first measurement
+                    np.testing.assert_allclose(found[k, trajectory, axis::2], values, rtol=0, atol=1e3 * ROUNDING)
+
+
+def test_the_start_from_three_measurements_is_the_parabola_through_them():
+    model = kinematic(T, dimensions=1, order=2, prior={"mean": [1.0, 2.0, 3.0]})
+    y = np.array([2.0, np.nan, 5.0, 1.0, np.nan])[:, None, None]
+    found = run(alpha_beta_gamma(model, 0.5, 0.3, 0.1), y)
+    times = T * np.array([0, 2, 3])
+    parabola = np.polynomial.Polynomial.fit(times, [2.0, 5.0, 1.0], 2)
+    for k in (3, 4):  # at the third measurement, and coasting
+        expected = [parabola.deriv(d)(T * k) if d else parabola(T * k) for d in range(3)]
+        np.testing.assert_allclose(found.mean[k, 0], expected, rtol=1e-11)
+
+
+# --- the covariance
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_covariance_from_a_prior_is_that_of_covariance_analysis(order):
+    coefficients = (0.4, 0.15, 0.05)[: order + 1]
+    model = planar(order=order, prior={"variance": np.diag(np.arange(1.0, 2 * order + 3)) + 0.2})
+    make = alpha_beta if order == 1 else alpha_beta_gamma
+    found = run(make(model, *coefficients, start="prior"), simulate(model, 2, 60, seed=1).y).cov
+    gain = np.kron((np.array([1, 1 / T, 1 / (2 * T**2)])[: order + 1] * coefficients)[:, None], np.eye(2))
+    system, _, _ = linear_system(model)
+    expected = covariances(system, model.prior.cov, 60, gain).posterior
+    np.testing.assert_allclose(found[:, 1], expected, rtol=1e-10, atol=1e-12)
+
+
+def test_the_covariance_after_two_measurements_in_closed_form():
+    sigma, noise_sd = 5.0, 8.0
+    model = planar(noise_sd=noise_sd, measurement_sd=sigma)
+    found = run(alpha_beta(model, 0.3, 0.05), simulate(model, 1, 2, seed=4).y).cov[1, 0]
+    expected = [[sigma**2, sigma**2 / T], [sigma**2 / T, 2 * sigma**2 / T**2 + noise_sd**2 * T**2 / 4]]
+    np.testing.assert_allclose(found, np.kron(expected, np.eye(2)), rtol=1e-12, atol=1e-9)
+
+
+@pytest.mark.parametrize("missing", [False, True])
+def test_the_covariance_is_the_scatter_of_the_errors(missing):
+    model = planar(noise_sd=6.0)
+    runs, steps = 4000, 30
+    x, y = simulate(model, runs, steps, seed=5)
+    if missing:
+        y[[2, 9, 10]] = np.nan
+        y[15, :, 1] = np.nan
+    found = run(alpha_beta(model, 0.35, 0.1), y)
+    error = (x - found.mean)[1:]
+    scatter = np.einsum("kri,krj->kij", error, error) / runs
+    claimed = found.cov[1:, 0]
+    sd = np.sqrt(np.diagonal(claimed, axis1=1, axis2=2))
+    # entries of a sample covariance have standard errors of at most sqrt(2 / runs) of s_i s_j; 5 of them for some 500 entries
+    assert (np.abs(scatter - claimed) < 5 * np.sqrt(2 / runs) * sd[:, :, None] * sd[:, None, :]).all()
+
+
+def test_one_trajectory_is_an_ensemble_of_one():
+    model = planar()
+    y = simulate(model, 5, 12, seed=6).y
+    y[3, 2] = np.nan
+    one = alpha_beta(model, 0.3, 0.05)
+    together, alone = run(one, y), run(one, y[:, 2:3])
+    np.testing.assert_allclose(together.mean[:, 2], alone.mean[:, 0], rtol=ROUNDING)
+    np.testing.assert_allclose(together.cov[:, 2], alone.cov[:, 0], rtol=ROUNDING, atol=1e-12)
+
+
+def test_it_can_be_built_for_a_model_written_by_hand():
+    model = Model.define(["r + T*s + v", "s + w"], "r + n", {"T": 0.5}, symbols={"x": ["r", "s"], "v": ["v", "w"], "w": ["n"]})
+    assert isinstance(alpha_beta(model, 0.3, 0.1).init(2).posterior, Gaussian)
+
+
+# --- bad input
+
+
+def test_other_models_are_refused():
+    for model in (
+        kinematic(T, order=2),
+        Model.define(["0.9*x1 + x2", "x2 + v1"], "x1 + w1"),
+        Model.define(["x1 + x2", "x2 + v1"], "2*x1 + w1"),
+        Model.define("x + v", "x + w"),
+        Model.define(["x1 - x2", "x2 + v1"], "x1 + w1"),
+    ):
+        with pytest.raises(ModelError, match="build it with kinematic"):
+            alpha_beta(model, 0.3, 0.1)
+    shifted = Model.define(["x1 + x2", "x2 + v1"], "x1 + w1", state_noise={"mean": 1.0})
+    with pytest.raises(ModelError, match="mean other than 0"):
+        alpha_beta(shifted, 0.3, 0.1)
+    with pytest.raises(ModelError, match="not linear"):
+        alpha_beta(Model.define(["x1 + x2", "x2 + v1"], "x1**2 + w1"), 0.3, 0.1)
+
+
+@pytest.mark.parametrize("coefficients", [(0.3, 0.0), (0.3, 3.5), (-0.1, 0.01), (2.5, 0.1), (np.nan, 0.1)])
+def test_coefficients_whose_errors_grow_are_refused(coefficients):
+    with pytest.raises(ValueError, match="is unstable"):
+        alpha_beta(planar(), *coefficients)
+
+
+def test_an_unknown_start_is_refused():
+    with pytest.raises(ValueError, match="start must be"):
+        alpha_beta(planar(), 0.3, 0.1, start="now")

@@ -1,0 +1,586 @@
+"""The filters: linear-Gaussian theorem, slow loops from the page, the printed equations executed."""
+
+from types import SimpleNamespace
+
+import control
+import filterpy.kalman
+import numpy as np
+import oracles
+import pytest
+import scipy.linalg
+import sympy as sp
+
+from kfcourse.filters import notation as s
+from kfcourse.filters.approximations import EQUATIONS as AOF_EQUATIONS
+from kfcourse.filters.approximations import aof
+from kfcourse.filters.base import Design
+from kfcourse.filters.conditionally_optimal import EQUATIONS as DUOF_EQUATIONS
+from kfcourse.filters.conditionally_optimal import duof
+from kfcourse.filters.kalman import kalman
+from kfcourse.filters.modified_structure import EQUATIONS as MFOS_EQUATIONS
+from kfcourse.filters.modified_structure import mfos
+from kfcourse.filters.optimal_structure import EQUATIONS as FOS_EQUATIONS
+from kfcourse.filters.optimal_structure import fos
+from kfcourse.montecarlo.designing import NotFinite, design
+from kfcourse.montecarlo.ensemble import Moment, simulate
+from kfcourse.montecarlo.experiment import run
+from kfcourse.symbolic.model import Model, ModelError
+from kfcourse.symbolic.structure import gauss_hermite, gaussian, linearised, unscented
+
+STRUCTURES = {
+    "linearised": linearised,
+    "gaussian": gaussian,
+    "unscented": unscented,
+    "gauss-hermite": lambda m: gauss_hermite(m, 3),
+}
+
+# ---------------------------------------------------------------- linear-Gaussian models
+
+
+class Linear(SimpleNamespace):
+    """x' = A x + B v + a, y = H x + C w + b with laws of x_0, v, w: matrices, and the model built from strings."""
+
+    def model(self) -> Model:
+        def rows(matrix, symbol, other, noise, constant):
+            def name(letter, i, size):
+                return letter if size == 1 else f"{letter}{i + 1}"
+
+            return [
+                " + ".join(
+                    [f"({float(m)!r})*{name(symbol, j, len(row))}" for j, m in enumerate(row)]
+                    + [f"({float(m)!r})*{name(noise, j, len(more))}" for j, m in enumerate(more)]
+                    + [f"({float(c)!r})"]
+                )
+                for row, more, c in zip(matrix, other, constant, strict=True)
+            ]
+
+        state, meter = rows(self.A, "x", self.B, "v", self.a), rows(self.H, "x", self.C, "w", self.b)
+        laws = {key: {"mean": mean, "variance": cov} for key, (mean, cov) in self.laws.items()}
+        return Model.define(state if len(state) > 1 else state[0], meter if len(meter) > 1 else meter[0], **laws)
+
+
+def linear(n: int, p: int, v: int, w: int, seed: int) -> Linear:
+    """Everything non-unit, non-zero and correlated; rounded so that the strings are exact."""
+    rng = np.random.default_rng(seed)
+
+    def matrix(rows, columns):
+        return np.round(rng.normal(size=(rows, columns)), 2)
+
+    def law(size):
+        root = matrix(size, size)
+        return np.round(rng.normal(size=size), 2), np.round(root @ root.T + 0.3 * np.eye(size), 4)
+
+    A = matrix(n, n)
+    A = np.round(0.9 * A / max(abs(np.linalg.eigvals(A))), 2)
+    laws = {"prior": law(n), "state_noise": law(v), "meter_noise": law(w)}
+    return Linear(A=A, B=matrix(n, v), a=matrix(1, n)[0], H=matrix(p, n), C=matrix(p, w), b=matrix(1, p)[0], laws=laws)
+
+
+LINEAR = {
+    "scalar": linear(1, 1, 1, 1, 11),
+    "scalar, more noises": linear(1, 1, 2, 3, 12),
+    "n=2, p=1": linear(2, 1, 2, 1, 13),
+    "n=2, p=2": linear(2, 2, 2, 2, 14),
+    "n=2, p=2, more noises": linear(2, 2, 3, 3, 15),
+    "n=3, p=2": linear(3, 2, 3, 2, 19),
+    "n=1, p=2": linear(1, 2, 1, 2, 17),
+}
+STEPS = 6
+
+
+def exact_ensemble(one: Linear, steps: int, seed: int) -> list[Moment]:
+    """Trajectories whose sample moments are exactly the model's.
+
+    A random matrix (trajectories x all independent noises), centred, orthonormalised and scaled, has sample
+    mean 0 and sample covariance I to rounding; the trajectories are affine functions of its columns.
+    """
+    sizes = {key: len(mean) for key, (mean, _) in one.laws.items()}
+    columns = sizes["prior"] + steps * (sizes["state_noise"] + sizes["meter_noise"])
+    draws = np.random.default_rng(seed).normal(size=(3 * columns, columns))
+    orthonormal, _ = np.linalg.qr(draws - draws.mean(axis=0))
+    standard = iter((orthonormal * np.sqrt(len(draws))).T)
+
+    def draw(key):
+        mean, cov = one.laws[key]
+        return mean + np.stack([next(standard) for _ in mean], axis=-1) @ np.linalg.cholesky(cov).T
+
+    x, moments = draw("prior"), []
+    for _ in range(steps):
+        y = x @ one.H.T + draw("meter_noise") @ one.C.T + one.b
+        x_next = x @ one.A.T + draw("state_noise") @ one.B.T + one.a
+        moments.append(Moment(x, y, x_next))
+        x = x_next
+    return moments
+
+
+def every_filter(model: Model):
+    structures = {name: build(model) for name, build in STRUCTURES.items()}
+    ready = [aof(structure) for structure in structures.values()]
+    designs = [duof(model)]
+    for name in ("linearised", "gaussian"):
+        designs += [family(structures[name], arguments) for family in (fos, mfos) for arguments in (2, 3)]
+    return ready, designs
+
+
+@pytest.mark.parametrize("name", LINEAR)
+def test_on_a_linear_gaussian_model_every_filter_is_the_kalman_filter(name):
+    """Every filter equals the Kalman filter when the model is linear and Gaussian.
+
+    AOF: the structural functions of a linear model are exact whatever the approximation, and the posterior
+    is Gaussian, so its mean and covariance are the exact ones.  DUOF, FOS, MFOS: their estimates are affine
+    in the noises, so all that the design takes from the ensemble is means and covariances of affine functions
+    of the noises; in `exact_ensemble` these are the model's.  Pugachev's corrections find the Kalman
+    gain because nothing affine in the innovation does better, and the FOS's condition finds Cov(x, z) = Cov(z)
+    (the error is orthogonal to the estimate), so Gamma is the identity on all values that z takes,
+    u = z and T = p.  Where Cov(z), Cov(sigma) or Cov(y, z) is singular (fewer measurements than components; z_0
+    an affine function of y_0), the pseudo-inverse acts on the values that occur, and estimates are unchanged.
+
+    Tolerance: rounding (1e-16) times the condition of the regressions (the least non-zero eigenvalue of the
+    correlations of (y, z) is above 1e-7 here), and each of the six steps carries the error of the one before.
+    """
+    one = LINEAR[name]
+    model = one.model()
+    moments = exact_ensemble(one, STEPS, seed=3)
+    ready, designs = every_filter(model)
+    # Measured: new trajectories, not those of the design.
+    y = simulate(model, 5, STEPS, seed=8).y
+    expected = run(kalman(model), y)
+    for filter_, tolerance in [(f, 1e-11) for f in ready] + [
+        (f, 1e-9) for f in design(designs, [[moment] for moment in moments])
+    ]:
+        found = run(filter_, y)
+        np.testing.assert_allclose(found.mean, expected.mean, rtol=tolerance, atol=tolerance, err_msg=filter_.name)
+        np.testing.assert_allclose(found.cov, expected.cov, rtol=tolerance, atol=tolerance, err_msg=filter_.name)
+
+
+def test_the_design_does_not_depend_on_how_the_ensemble_is_cut():
+    one = LINEAR["n=2, p=2"]
+    moments = exact_ensemble(one, STEPS, seed=3)
+    _, designs = every_filter(one.model())
+    whole = design(designs, [[moment] for moment in moments])
+    cut = design(designs, [[Moment(*(a[:7] for a in m)), Moment(*(a[7:] for a in m))] for m in moments])
+    y = simulate(one.model(), 3, STEPS, seed=9).y
+    for first, second in zip(whole, cut, strict=True):
+        np.testing.assert_allclose(run(second, y).mean, run(first, y).mean, rtol=1e-8, atol=1e-8)
+
+
+def test_the_kalman_filter_is_the_loop_of_the_page():
+    one = LINEAR["scalar"]
+    (m, d), (m_v, d_v), (m_w, d_w) = ((mean.item(), cov.item()) for mean, cov in one.laws.values())
+    A, B, a, H, C, b = (array.item() for array in (one.A, one.B, one.a, one.H, one.C, one.b))
+    y = simulate(one.model(), 1, 20, seed=4).y
+    expected = oracles.kalman_trajectory(y[:, 0, 0].tolist(), A, B**2 * d_v, H, C**2 * d_w, m, d, u=B * m_v + a, s=C * m_w + b)
+    found = run(kalman(one.model()), y)
+    np.testing.assert_allclose(found.mean[:, 0, 0], [z for z, _ in expected], rtol=1e-12)
+    np.testing.assert_allclose(found.cov[:, 0, 0, 0], [p for _, p in expected], rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["scalar", "n=2, p=1", "n=2, p=2", "n=3, p=2"])
+def test_the_kalman_filter_settles_at_the_riccati_solution(name):
+    one = LINEAR[name]
+    Q, R = one.B @ one.laws["state_noise"][1] @ one.B.T, one.C @ one.laws["meter_noise"][1] @ one.C.T
+    Q, R = (Q + Q.T) / 2, (R + R.T) / 2
+    predicted = scipy.linalg.solve_discrete_are(one.A.T, one.H.T, Q, R)
+    filter_ = kalman(one.model())
+    state = filter_.init(1)
+    for _ in range(300):  # the closed loop's spectral radius is below 0.9: 0.9^600 is far below rounding
+        state = filter_.step(state, np.zeros((1, len(one.H))))
+    np.testing.assert_allclose(state.predicted.cov, predicted, rtol=1e-9, atol=1e-11)
+    L, P, _ = control.dlqe(one.A, np.eye(len(one.A)), one.H, Q, R)
+    np.testing.assert_allclose(state.predicted.cov, P, rtol=1e-9, atol=1e-11)
+    K = predicted @ one.H.T @ np.linalg.inv(one.H @ predicted @ one.H.T + R)
+    np.testing.assert_allclose(state.posterior.cov, predicted - K @ one.H @ predicted, rtol=1e-9, atol=1e-11)
+    np.testing.assert_allclose(one.A @ K, L, rtol=1e-9, atol=1e-11)  # control's gain takes the innovation to the next state
+
+
+@pytest.mark.parametrize("name", ["scalar", "n=2, p=1", "n=2, p=2, more noises"])
+def test_the_kalman_filter_is_filterpy_s(name):
+    one = LINEAR[name]
+    model, n, p = one.model(), len(one.A), len(one.H)
+    y = simulate(model, 1, 30, seed=6).y
+    reference = filterpy.kalman.KalmanFilter(n, p)
+    (m, d), (m_v, D_v), (m_w, D_w) = one.laws.values()
+    reference.x, reference.P, reference.F, reference.H = m[:, None], d, one.A, one.H
+    reference.Q, reference.R, reference.B = one.B @ D_v @ one.B.T, one.C @ D_w @ one.C.T, np.eye(n)
+    found = run(kalman(model), y)
+    for k in range(30):
+        reference.update((y[k, 0] - one.C @ m_w - one.b)[:, None])
+        np.testing.assert_allclose(found.mean[k, 0], reference.x[:, 0], rtol=1e-10, atol=1e-11)
+        np.testing.assert_allclose(found.cov[k, 0], reference.P, rtol=1e-10, atol=1e-11)
+        reference.predict(u=(one.B @ m_v + one.a)[:, None])
+
+
+def test_the_linearised_aof_is_filterpy_s_extended_kalman_filter():
+    model = Model.define(
+        ["x1 + 0.1*x2", "x2 - 0.1*sin(x1) + 0.2*v"], ["sqrt(1 + x1**2) + 0.3*w1", "x1*x2 + 0.4*w2"],
+        prior={"mean": [1, 0.5], "variance": [[0.4, 0.1], [0.1, 0.3]]}, meter_noise={"variance": [[1, 0.2], [0.2, 2]]},
+    )  # fmt: skip
+    y = simulate(model, 1, 30, seed=6).y
+    reference = filterpy.kalman.ExtendedKalmanFilter(2, 2)
+    reference.x, reference.P, reference.Q = model.prior.mean[:, None], model.prior.cov, np.diag([0, 0.04])
+    reference.R = np.diag([0.3, 0.4]) @ model.meter_noise.cov @ np.diag([0.3, 0.4])
+
+    def jacobian(x):
+        return np.array([[x[0, 0] / np.sqrt(1 + x[0, 0] ** 2), 0], [x[1, 0], x[0, 0]]])
+
+    def meter(x):
+        return np.array([[np.sqrt(1 + x[0, 0] ** 2)], [x[0, 0] * x[1, 0]]])
+
+    found = run(aof(linearised(model)), y)
+    for k in range(30):
+        reference.update(y[k, 0][:, None], jacobian, meter)
+        # 30 steps of two well-conditioned filters
+        np.testing.assert_allclose(found.mean[k, 0], reference.x[:, 0], rtol=1e-9, atol=1e-10)
+        np.testing.assert_allclose(found.cov[k, 0], reference.P, rtol=1e-9, atol=1e-10)
+        first, second = reference.x[:, 0]
+        F = np.array([[1, 0.1], [-0.1 * np.cos(first), 1]])
+        reference.x, reference.P = (
+            np.array([[first + 0.1 * second], [second - 0.1 * np.sin(first)]]),
+            F @ reference.P @ F.T + reference.Q,
+        )
+
+
+def test_the_kalman_filter_refuses_what_is_not_linear(variant53):
+    with pytest.raises(ModelError, match="not linear"):
+        kalman(variant53)
+
+
+# ---------------------------------------------------------------- variant 53 against the page's loops
+
+
+@pytest.fixture(scope="module")
+def trajectories(variant53):
+    """A small ensemble of variant 53: x, y, x_next (steps, 40)."""
+    x, y = (array[..., 0] for array in simulate(variant53, 40, 9, seed=21))
+    return x[:-1], y[:-1], x[1:]
+
+
+@pytest.mark.parametrize("kind", ["linearised", "gaussian"])
+def test_the_aof_is_the_loop_of_the_page(variant53, trajectories, kind):
+    _, y, _ = trajectories
+    y = y.copy()
+    y[2, 5] = y[0, 6] = y[3:5, 7] = np.nan
+    found = run(aof(STRUCTURES[kind](variant53)), y[..., None])
+    for i in range(y.shape[1]):
+        expected = np.array(oracles.aof_trajectory(kind, y[:, i].tolist()))
+        np.testing.assert_allclose(found.mean[:, i, 0], expected[:, 0], rtol=1e-12, atol=1e-15)
+        # The page's p = Psi - K G Psi loses digits where the meter is sharp: rounding of Psi beside p.
+        np.testing.assert_allclose(found.cov[:, i, 0, 0], expected[:, 1], rtol=1e-12, atol=1e-15)
+
+
+def designed_on(designs, trajectories):
+    x, y, x_next = (array[..., None] for array in trajectories)
+    return design(designs, [[Moment(*step)] for step in zip(x, y, x_next, strict=True)])
+
+
+def test_the_duof_is_the_loop_of_the_page(variant53, trajectories):
+    (filter_,) = designed_on([duof(variant53)], trajectories)
+    found = run(filter_, trajectories[1][..., None]).mean[..., 0]
+    # 40 trajectories: regressions of correlation near 1, conditioned up to 1e4 here
+    np.testing.assert_allclose(found, oracles.duof_ensemble(*trajectories), rtol=1e-9, atol=1e-11)
+
+
+@pytest.mark.parametrize("kind", ["linearised", "gaussian"])
+@pytest.mark.parametrize("arguments", [2, 3])
+def test_the_fos_is_the_loop_of_the_page(variant53, trajectories, kind, arguments):
+    (filter_,) = designed_on([fos(STRUCTURES[kind](variant53), arguments)], trajectories)
+    x, y, _ = trajectories
+    expected = oracles.fos_ensemble(kind, arguments, x, y)
+    np.testing.assert_allclose(run(filter_, y[..., None]).mean[..., 0], expected, rtol=1e-8, atol=1e-10)
+
+
+@pytest.mark.parametrize("kind", ["linearised", "gaussian"])
+@pytest.mark.parametrize("arguments", [2, 3])
+def test_the_mfos_is_the_loop_of_the_page(variant53, trajectories, kind, arguments):
+    (filter_,) = designed_on([mfos(STRUCTURES[kind](variant53), arguments)], trajectories)
+    expected = oracles.mfos_ensemble(kind, arguments, *trajectories)
+    np.testing.assert_allclose(run(filter_, trajectories[1][..., None]).mean[..., 0], expected, rtol=1e-8, atol=1e-10)
+
+
+# ---------------------------------------------------------------- the printed equations, executed
+
+
+class Interpreter:
+    """Executes printed equations for every trajectory of an ensemble, one at a time.
+
+    `values` maps each matrix symbol to an array (N, rows, columns).  Structural functions are looked up
+    when an equation asks for them; moments are taken over the trajectories.
+    """
+
+    def __init__(self, values, functions):
+        self.values, self.functions = dict(values), functions
+        self.runs = len(next(iter(values.values())))
+
+    def execute(self, equations):
+        for equation in equations:
+            for symbol in equation.rhs.atoms(sp.MatrixSymbol):
+                if symbol not in self.values:
+                    self.values[symbol] = self.look_up(symbol)
+            rows = [self.evaluate(equation.rhs, i) for i in range(self.runs)]
+            self.values[equation.lhs] = np.array(rows)
+        return self.values
+
+    def evaluate(self, e, i):
+        """The value of a matrix expression for trajectory i."""
+        if isinstance(e, sp.MatrixSymbol):
+            return self.values[e][i]
+        if isinstance(e, sp.MatAdd):
+            return sum(self.evaluate(a, i) for a in e.args)
+        if isinstance(e, sp.MatMul):
+            factors = [self.evaluate(a, i) for a in e.args]
+            numbers = np.prod([f for f in factors if np.ndim(f) == 0])
+            matrices = [f for f in factors if np.ndim(f) == 2]
+            return numbers * (np.linalg.multi_dot(matrices) if len(matrices) > 1 else matrices[0])
+        if isinstance(e, sp.Transpose):
+            return self.evaluate(e.arg, i).T
+        if isinstance(e, sp.Inverse):
+            return np.linalg.inv(self.evaluate(e.arg, i))
+        if e.is_number:
+            return float(e)
+        raise AssertionError(f"no rule for {type(e).__name__} in {e}")
+
+    def look_up(self, symbol):
+        if symbol in self.functions:
+            return self.functions[symbol](self.values)
+        return np.broadcast_to(self.moment(symbol), (self.runs, *self.moment(symbol).shape))
+
+    def moment(self, symbol):
+        columns = {known: array[..., 0] for known, array in self.values.items() if array.shape[-1] == 1}
+        for left, a in columns.items():
+            if symbol == s.mean(left):
+                return a.mean(axis=0)[:, None]
+            if symbol == s.cov(left):
+                return self.covariance(a, a)
+            if symbol == s.cov_pinv(left):
+                return np.linalg.pinv(self.covariance(a, a), rcond=1e-10, hermitian=True)
+            for right, b in columns.items():
+                if symbol == s.cov(left, right):
+                    return self.covariance(a, b)
+        raise AssertionError(f"the equations use {symbol}, which nothing defines")
+
+    @staticmethod
+    def covariance(a, b):
+        return (a - a.mean(axis=0)).T @ (b - b.mean(axis=0)) / len(a)
+
+
+PRINTED = {
+    "p=1": lambda: Model.define(
+        ["0.9*x1 + 0.3*x2 + 0.1*x1*v", "0.8*x2 - 0.1*x1**2 + 0.3*v"], ["x1 + 0.2*x2**2 + 0.3*w + 0.1*x1*w"],
+        prior={"mean": [0.5, -0.3], "variance": [[0.6, 0.2], [0.2, 0.5]]}, state_noise={"mean": 0.2, "variance": 0.7},
+        meter_noise={"mean": -0.1, "variance": 1.3},
+    ),
+    "p=2": lambda: Model.define(
+        ["0.9*x1 + 0.3*x2*x1 + 0.4*v1", "0.8*x2 - 0.1*x1**2 + 0.3*v2*x1"], ["x1*x2 + 0.3*w1", "x2 + 0.1*x1*w1 + 0.4*w2"],
+        prior={"mean": [0.5, -0.3], "variance": [[0.6, 0.2], [0.2, 0.5]]}, meter_noise={"variance": [[1, 0.3], [0.3, 0.5]]},
+    ),
+}  # fmt: skip
+
+
+def column(array):
+    return array[..., None]
+
+
+def structural_values(model, structure):
+    """What the printed functional symbols stand for: arrays (N, r, c) from the arrays of their arguments."""
+    n, p = model.n, model.p
+    taylor = linearised(model)  # whose tau and h are a(z, m_v) and b(lambda, m_w)
+
+    def value(function, mean, cov, which, columns=None):
+        def of(values):
+            size = len(values[mean])
+            found = function(values[mean][..., 0], values[cov] if cov else np.eye(n))[which]
+            return np.broadcast_to(
+                found[..., None] if columns is None else found, (size, found.shape[-1 if columns is None else -2], columns or 1)
+            )
+
+        return of
+
+    return {
+        s.h_value: value(structure.measure, s.lam, s.Psi, 0),
+        s.G_value: value(structure.measure, s.lam, s.Psi, 1, n),
+        s.F_value: value(structure.measure, s.lam, s.Psi, 2, p),
+        s.tau_zp: value(structure.predict, s.z, s.P, 0),
+        s.Theta_zp: value(structure.predict, s.z, s.P, 1, n),
+        s.tau_uT: value(structure.predict, s.u, s.T, 0),
+        s.Theta_uT: value(structure.predict, s.u, s.T, 1, n),
+        s.matrix(r"a(z_{k}, m_{v})", s.n, s.ONE): value(taylor.predict, s.z, None, 0),
+        s.matrix(r"b(\lambda_{k}, m_{w})", s.p, s.ONE): value(taylor.measure, s.lam, None, 0),
+    }
+
+
+FAMILIES = {
+    "aof": (AOF_EQUATIONS, aof),
+    "duof": (DUOF_EQUATIONS, lambda structure: duof(structure.model)),
+    "fos": (FOS_EQUATIONS, fos),
+    "mfos": (MFOS_EQUATIONS, mfos),
+}
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("size", PRINTED)
+@pytest.mark.parametrize("kind", ["linearised", "gaussian"])
+def test_the_printed_equations_are_what_runs(family, size, kind):
+    model = PRINTED[size]()
+    structure = STRUCTURES[kind](model)
+    equations, build = FAMILIES[family]
+    runs, steps = 15, 3
+    x, y = simulate(model, runs, steps + 1, seed=31)
+    filter_ = build(structure)
+    if isinstance(filter_, Design):
+        (filter_,) = design([filter_], [[Moment(x[k], y[k], x[k + 1])] for k in range(steps)])
+
+    functions = structural_values(model, structure)
+    state = filter_.init(runs)
+    lam, Psi = state.predicted.mean[..., None], np.broadcast_to(state.predicted.cov, (runs, 2, 2))
+    for k in range(steps):
+        given = {s.lam: lam, s.Psi: Psi, s.x: x[k][..., None], s.y: y[k][..., None], s.x_next: x[k + 1][..., None]}
+        printed = Interpreter(given, functions).execute(equations)
+        state = filter_.step(state, y[k])
+        # Printed: plain inverses and differences; run: solutions and Joseph's form. 15 trajectories, conditions up to 1e4.
+        tolerance = {"rtol": 1e-8, "atol": 1e-9}
+        np.testing.assert_allclose(state.posterior.mean, printed[s.z][..., 0], **tolerance)
+        np.testing.assert_allclose(state.predicted.mean, printed[s.lam_next][..., 0], **tolerance)
+        if s.P in printed:
+            np.testing.assert_allclose(state.posterior.cov, printed[s.P], **tolerance)
+        if s.Psi_next in printed:
+            np.testing.assert_allclose(np.broadcast_to(state.predicted.cov, (runs, 2, 2)), printed[s.Psi_next], **tolerance)
+            Psi = printed[s.Psi_next]
+        lam = printed[s.lam_next]
+
+
+# ---------------------------------------------------------------- missing measurements and degenerate cases
+
+
+def filters_of(model, trajectories):
+    ready = [aof(build(model)) for build in STRUCTURES.values()]
+    structures = [linearised(model), gaussian(model)]
+    return ready + designed_on(
+        [duof(model), *(f(one, a) for f in (fos, mfos) for one in structures for a in (2, 3))], trajectories
+    )
+
+
+def test_a_missing_measurement_is_no_correction_and_the_others_do_not_notice(variant53, trajectories):
+    y = trajectories[1][..., None]
+    gaps = y.copy()
+    gaps[3, 4] = np.nan
+    for filter_ in filters_of(variant53, trajectories):
+        state, holed = filter_.init(40), filter_.init(40)
+        others = np.arange(40) != 4
+        for k in range(len(y)):
+            predicted = holed.predicted
+            state, holed = filter_.step(state, y[k]), filter_.step(holed, gaps[k])
+            np.testing.assert_array_equal(holed.posterior.mean[others], state.posterior.mean[others], err_msg=filter_.name)
+            if k == 3:
+                np.testing.assert_array_equal(holed.posterior.mean[4], predicted.mean[4], err_msg=filter_.name)
+        assert np.isfinite(holed.posterior.mean).all()
+
+
+def test_the_kalman_filter_skips_what_is_missing_too():
+    one = LINEAR["n=2, p=2"]
+    model = one.model()
+    y = simulate(model, 4, 6, seed=2).y
+    y[2, 1] = np.nan
+    y[3, 2, 0] = np.nan
+    found, expected = run(kalman(model), y), run(aof(linearised(model)), y)
+    np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.parametrize("kind", STRUCTURES)
+def test_with_one_component_missing_the_aof_uses_the_other(kind):
+    both = PRINTED["p=2"]()
+    alone = Model.define(
+        list(both.state_equation), [both.meter_equation[1]], symbols={"v": ["v1", "v2"], "w": ["w1", "w2"]},
+        prior={"mean": both.prior.mean, "variance": both.prior.cov}, meter_noise={"variance": both.meter_noise.cov},
+    )  # fmt: skip
+    y = simulate(both, 6, 5, seed=12).y
+    holed = y.copy()
+    holed[:, :, 0] = np.nan
+    found, expected = run(aof(STRUCTURES[kind](both)), holed), run(aof(STRUCTURES[kind](alone)), y[..., 1:])
+    np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-10, atol=1e-11)
+    np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-10, atol=1e-11)
+
+
+@pytest.mark.parametrize("kind", STRUCTURES)
+def test_a_known_zero_stays_zero(kind):
+    # x_0 = 0 exactly: both noises vanish, F = 0, and the pseudo-inverse makes every gain 0.
+    model = Model.define("0.9*x + 0.05*x*v", "x + 0.02*x**2*w", prior={"variance": 0})
+    found = run(aof(STRUCTURES[kind](model)), np.ones((4, 3, 1)))
+    assert np.array_equal(found.mean, np.zeros((4, 3, 1)))
+    assert np.array_equal(found.cov, np.zeros((4, 3, 1, 1)))
+
+
+@pytest.mark.parametrize("state", ["0.9*x + v", "0.9*x1 + v1"])
+def test_a_blind_meter_leaves_the_prediction(state):
+    # A square meter linearised at 0 has neither sensitivity nor noise there: K = 0 and p = Psi, not 0.
+    x = "x1" if "x1" in state else "x"
+    model = Model.define([state], [f"{x}**2 + {x}**2*w{x[1:]}"])
+    state_ = aof(linearised(model)).step(aof(linearised(model)).init(2), np.ones((2, 1)))
+    assert np.array_equal(state_.posterior.mean, np.zeros((2, 1)))
+    np.testing.assert_array_equal(np.broadcast_to(state_.posterior.cov, (2, 1, 1)), np.ones((2, 1, 1)))
+
+
+@pytest.mark.parametrize("state", ["v", "0.5", "0.5 + 0.1*v"])
+def test_a_state_without_memory_can_be_filtered(state):
+    # tau is one constant for the whole ensemble.
+    model = Model.define(state, "x + w")
+    x, y = simulate(model, 50, 4, seed=5)
+    moments = (x[:-1, :, 0], y[:-1, :, 0], x[1:, :, 0])
+    for filter_ in filters_of(model, moments):
+        found = run(filter_, y[:-1])
+        assert found.mean.shape == (3, 50, 1)
+        assert np.isfinite(found.mean).all()
+
+
+def test_repeated_measurements_are_used_once():
+    # The same meter twice, and twice as strong: the pseudo-inverse makes of them one.
+    laws = {"prior": {"mean": [1, 2], "variance": [[2, 0.5], [0.5, 1]]}}
+    state = ["0.9*x1 + 0.2*x2 + v1", "0.7*x2 + v2"]
+    once, twice = Model.define(state, ["x1 + 0.5*w"], **laws), Model.define(state, ["x1 + 0.5*w", "2*x1 + w"], **laws)
+    y = simulate(twice, 5, 6, seed=5).y
+    for build in STRUCTURES.values():
+        found, expected = run(aof(build(twice)), y), run(aof(build(once)), y[..., :1])
+        np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-9, atol=1e-9)
+
+
+# ---------------------------------------------------------------- designs
+
+
+def test_a_designed_filter_stops_where_its_design_does(variant53, trajectories):
+    (filter_,) = designed_on([duof(variant53)], trajectories)
+    with pytest.raises(ValueError, match="designed for 8 steps"):
+        run(filter_, np.zeros((9, 1, 1)))
+
+
+def test_a_regression_cannot_make_its_own_step_worse(variant53, trajectories):
+    # "Change nothing" is an admissible coefficient, so on the design ensemble MFOS gains at k = 0 over the AOF.
+    x, y, _ = trajectories
+    plain = run(aof(gaussian(variant53)), y[..., None]).mean[0, :, 0]
+    better = run(designed_on([mfos(gaussian(variant53))], trajectories)[0], y[..., None]).mean[0, :, 0]
+    assert np.mean((x[0] - better) ** 2) <= np.mean((x[0] - plain) ** 2)
+    assert abs(np.mean(x[0] - better)) < 1e-15 * 40  # unbiased on its ensemble, to rounding
+
+
+@pytest.mark.parametrize("arguments", [1, 4, "2", None])
+@pytest.mark.parametrize("family", [fos, mfos])
+def test_other_numbers_of_arguments_are_refused(variant53, family, arguments):
+    with pytest.raises(ValueError, match="2 or 3 arguments"):
+        family(linearised(variant53), arguments)
+
+
+def test_a_design_on_trajectories_that_diverge_says_so(variant53):
+    broken = [[Moment(np.ones((3, 1)), np.full((3, 1), np.inf), np.ones((3, 1)))]]
+    with pytest.raises(NotFinite, match=r"step 0.*trajectories become infinite"):
+        design([duof(variant53)], broken)
+
+
+def test_filters_are_values(variant53):
+    filter_ = aof(gaussian(variant53))
+    start = filter_.init(3)
+    before = [np.array(a) for a in start.predicted]
+    first, second = filter_.step(start, np.ones((3, 1))), filter_.step(start, np.ones((3, 1)))
+    for a, b in zip(first.posterior, second.posterior, strict=True):
+        np.testing.assert_array_equal(a, b)
+    for a, b in zip(start.predicted, before, strict=True):
+        np.testing.assert_array_equal(a, b)

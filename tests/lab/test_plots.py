@@ -1,0 +1,142 @@
+"""Figures: labelled axes, one colour a family, bands that are confidence intervals."""
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+from kfcourse import compare, lab_filters, load_variants, run, simulate
+from kfcourse.filters import aof
+from kfcourse.lab import plots
+from kfcourse.lab.variants import FILTERS, LAB, title
+from kfcourse.symbolic.structure import gaussian
+
+DRAW = [plots.accuracy, plots.relative_accuracy, plots.ranking, plots.consistency]
+
+
+def comparison(name, names, subset):
+    model = load_variants()[name].model
+    return compare(lab_filters(model, names), model, 2000, 7, 1, subset_runs=subset, progress=False)
+
+
+@pytest.fixture(scope="module")
+def results():
+    return {
+        "scalar": comparison("53", [*LAB, "aof-exact"], 20),
+        "vector": comparison("20", [*LAB, "particle"], 20),
+        "without the slow": comparison("53", [*LAB, "aof-exact"], 0),
+        "one filter": comparison("53", ["duof"], 0),
+    }
+
+
+@pytest.fixture
+def ax():
+    return Figure().add_subplot()
+
+
+@pytest.mark.parametrize("kind", ["scalar", "vector", "without the slow", "one filter"])
+@pytest.mark.parametrize("draw", DRAW)
+@pytest.mark.filterwarnings("ignore:No artists with labels")  # the control relative to itself is not drawn
+def test_a_figure_draws_on_the_axes_given_and_labels_them(results, ax, draw, kind):
+    assert draw(results[kind], ax) is ax
+    assert isinstance(ax, Axes)
+    assert ax.get_xlabel()
+    if draw is plots.ranking:  # one row a filter
+        assert [label.get_text() for label in ax.get_yticklabels()][::-1] == [title(n) for n, _ in results[kind].ranking()]
+    else:
+        assert ax.get_xlabel() == "step $k$"
+        assert ax.get_ylabel()
+    ax.figure.canvas.draw()  # labels and formulas can be typeset
+
+
+@pytest.mark.parametrize("draw", [plots.accuracy, plots.relative_accuracy, plots.consistency])
+@pytest.mark.parametrize("kind", ["scalar", "vector", "without the slow"])
+def test_every_filter_with_results_is_drawn_in_its_own_style(results, ax, draw, kind):
+    result = results[kind]
+    draw(result, ax)
+    lines = {line.get_label(): line for line in ax.lines if not line.get_label().startswith("_")}
+    expected = [n for n in result.available if draw is not plots.relative_accuracy or n != result.control]
+    assert list(lines) == [title(name) for name in expected]
+    for name in expected:
+        line, style = lines[title(name)], plots.style(name)
+        assert to_hex(line.get_color()) == to_hex(style["color"])
+        assert line.get_linestyle() == style["linestyle"]
+
+
+def test_a_family_has_one_colour_and_an_approximation_its_dashes():
+    for family in ("aof", "fos", "mfos"):
+        one, two = plots.style(f"{family}-gaussian"), plots.style(f"{family}-linearised")
+        assert one["color"] == two["color"]
+        assert one["marker"] == two["marker"]
+        assert one["linestyle"] != two["linestyle"]
+    families = (
+        "aof-gaussian",
+        "duof",
+        "fos-gaussian",
+        "mfos-gaussian",
+        "fos3-gaussian",
+        "mfos3-gaussian",
+        "particle",
+        "aof-exact",
+    )
+    assert len({plots.style(name)["color"] for name in families}) == len(families)
+
+
+def test_no_two_filters_look_the_same():
+    looks = {(s["color"], s["linestyle"], s["marker"]) for s in map(plots.style, FILTERS)}
+    assert len(looks) == len(FILTERS)
+
+
+def test_a_filter_unknown_to_the_lab_still_has_a_style():
+    assert plots.style("mine")["label"] == "mine"
+
+
+def band(ax, index):
+    """Lower and upper edge of a filled band, by step."""
+    points = ax.collections[index].get_paths()[0].vertices
+    steps = np.unique(points[:, 0])
+    columns = [points[points[:, 0] == k, 1] for k in steps]
+    return np.array([c.min() for c in columns]), np.array([c.max() for c in columns])
+
+
+@pytest.mark.parametrize("confidence", [0.9, 0.95])
+def test_the_bands_are_confidence_intervals(results, confidence):
+    result = results["vector"]
+    ax = plots.relative_accuracy(result, Figure().add_subplot(), ["duof", "particle"], confidence=confidence)
+    for i, name in enumerate(["duof", "particle"]):
+        low, high = result.relative(name).interval(confidence)
+        np.testing.assert_allclose(band(ax, i), [100 * (low - 1), 100 * (high - 1)], rtol=1e-9, atol=1e-9)
+    ax = plots.consistency(result, Figure().add_subplot(), ["duof"], confidence=confidence)
+    np.testing.assert_allclose(band(ax, 0), result.normalised_error("duof").interval(confidence), rtol=1e-12)
+
+
+def test_the_bars_of_the_ranking_are_confidence_intervals(results, ax):
+    result = results["scalar"]
+    plots.ranking(result, ax)
+    for bars, (_, score) in zip(ax.containers, result.ranking()[::-1], strict=True):
+        (segment,) = bars.lines[2][0].get_segments()
+        np.testing.assert_allclose(segment[:, 0], [100 * (limit - 1) for limit in score.interval(0.95)], rtol=1e-9, atol=1e-12)
+
+
+def test_the_lines_are_the_numbers(results, ax):
+    result = results["vector"]
+    plots.accuracy(result, ax, ["fos-gaussian"])
+    np.testing.assert_array_equal(ax.lines[0].get_ydata(), result.error_variance("fos-gaussian").value)
+    assert ax.get_yscale() == "log"
+
+
+def test_relative_accuracy_can_show_a_part_of_the_steps(results, ax):
+    plots.relative_accuracy(results["scalar"], ax, ["duof"], steps=slice(2, 5))
+    np.testing.assert_array_equal(ax.lines[0].get_xdata(), [2, 3, 4])
+
+
+def test_one_trajectory_with_estimates(ax):
+    model = load_variants()["53"].model
+    x, y = simulate(model, 1, 10, seed=1)
+    z = run(aof(gaussian(model)), y).mean[:, 0, 0]
+    assert plots.trajectory(x[:, 0, 0], y[:, 0, 0], {"aof-gaussian": z}, ax) is ax
+    assert ax.get_xlabel()
+    assert ax.get_ylabel()
+    assert "GAOF" in [text.get_text() for text in ax.get_legend().get_texts()]
+    np.testing.assert_array_equal(ax.lines[-1].get_ydata(), z)

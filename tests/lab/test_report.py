@@ -1,0 +1,275 @@
+"""The lab's report: its sentences agree with its numbers, its files are whole, its formulas are those of the model."""
+
+import dataclasses
+import json
+import re
+from html.parser import HTMLParser
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from kfcourse import compare, gaussian, lab_filters, linearised, load_variants
+from kfcourse.filters import aof
+from kfcourse.lab import report
+from kfcourse.lab.report import conclusions, write_json, write_report
+from kfcourse.lab.variants import LAB, Variant, title
+
+FIGURES = ("accuracy", "relative", "ranking", "consistency")
+
+
+@pytest.fixture(scope="module")
+def variants():
+    return load_variants()
+
+
+@pytest.fixture(scope="module")
+def result53(variants):
+    model = variants["53"].model
+    return compare(lab_filters(model, [*LAB, "aof-exact"]), model, 4000, 6, 1, subset_runs=40, progress=False)
+
+
+@pytest.fixture(scope="module")
+def result20(variants):
+    model = variants["20"].model
+    return compare(lab_filters(model), model, 1000, 4, 1, progress=False)
+
+
+class Page(HTMLParser):
+    """What a page would load, and its tags."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.loads = [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.loads += [value for name, value in attrs if name in ("src", "href", "srcset", "data", "poster", "action")]
+
+
+# --- sentences
+
+
+@pytest.mark.parametrize("confidence", [0.5, 0.95, 0.999])
+def test_a_difference_is_significant_if_its_interval_excludes_zero(result53, confidence):
+    ranked = [name for name, _ in result53.ranking()]
+    sentences = conclusions(result53, confidence)
+    assert len(sentences) == len(ranked) - 1
+    for sentence, better, worse in zip(sentences, ranked, ranked[1:], strict=False):
+        low, high = result53.score_difference(worse, better).interval(confidence)
+        verdict = "is more accurate than" if low > 0 else "is not significantly different from"
+        assert sentence.startswith(f"{title(better)} {verdict} {title(worse)}: ")
+        printed = [float(number) for number in re.findall(r"confidence: (\S+) to (\S+) %", sentence)[0]]
+        np.testing.assert_allclose(printed, [100 * low, 100 * high], rtol=0.005)  # three digits
+        assert f"{100 * confidence:g} % confidence" in sentence
+
+
+def test_both_verdicts_occur(result53):
+    # otherwise the test above would say little
+    text = " ".join(conclusions(result53, 0.95))
+    assert "is more accurate than" in text
+    assert "is not significantly different from" in text
+
+
+def test_the_ranking_is_from_the_most_accurate_on(result53):
+    scores = [float(score.value) for _, score in result53.ranking()]
+    assert scores == sorted(scores)
+
+
+def test_rounding_is_not_a_difference(variants):
+    # On a linear model the Gaussian and the linearised form of each filter are the same: no verdict may tell them apart.
+    model = variants["1"].model
+    result = compare(lab_filters(model), model, 3000, 20, 1, progress=False)
+    alike = [{"GAOF", "LAOF"}, {"GFOS", "LFOS"}, {"GMFOS", "LMFOS"}, {"DUOF", "GMFOS"}, {"DUOF", "LMFOS"}]
+    for sentence in conclusions(result):
+        better, _, rest = sentence.partition(" is ")
+        worse = re.search(r"(?:than|from) (\w+):", rest)[1]
+        if {better, worse} in alike:
+            assert "not significantly different" in sentence
+
+
+# --- slow filters through the control variate
+
+
+def as_slow(one, name):
+    return dataclasses.replace(one, name=name, slow=True)
+
+
+def test_on_all_trajectories_the_control_variate_is_the_direct_mean(variants):
+    model = variants["5"].model
+    filters = lab_filters(model, ["aof-gaussian", "duof", "aof-exact"])
+    result = compare(filters, model, 60, 5, 3, subset_runs=60, progress=False)
+    direct = result.component_variance("aof-exact")
+    # sums of the same numbers in another order: D + (D_slow - D) against D_slow
+    np.testing.assert_allclose(result.error_variance("aof-exact").value, direct.value[:, 0], rtol=1e-12)
+    np.testing.assert_allclose(
+        result.difference("duof", "aof-exact").value,
+        result.component_variance("duof").value[:, 0] - direct.value[:, 0],
+        rtol=1e-10,
+        atol=1e-14,
+    )
+
+
+@pytest.mark.parametrize("name", ["53", "11"])
+def test_the_control_variate_narrows_the_standard_error(variants, name):
+    model = variants[name].model
+    slow = as_slow(aof(linearised(model)), "slow")
+    result = compare([aof(gaussian(model)), slow], model, 20_000, 12, 3, subset_runs=256, progress=False)
+    naive = result.component_variance("slow").standard_error[:, 0]
+    assert (result.error_variance("slow").standard_error < naive).all()
+
+
+@pytest.mark.parametrize("name", ["53", "4", "11"])
+def test_the_control_variate_finds_the_value_of_all_trajectories(variants, name):
+    # The same filter once fast and once as a slow one: what the subset tells against the truth of all trajectories.
+    model = variants[name].model
+    fast = aof(linearised(model))
+    result = compare([aof(gaussian(model)), fast, as_slow(fast, "slow")], model, 20_000, 12, 4, subset_runs=512, progress=False)
+    truth, found = result.error_variance("aof-linearised"), result.error_variance("slow")
+    error = result.difference("slow", "aof-linearised")
+    assert (np.abs(found.value - truth.value) <= 4 * error.standard_error).all()
+    # Var(a - b) <= (sd a + sd b)^2, with standard errors of 128 batches good to 6 % each
+    assert (error.standard_error <= 1.2 * (found.standard_error + truth.standard_error)).all()
+
+
+# --- the files
+
+
+def test_every_file_of_the_report_is_written(variants, result53, tmp_path):
+    written = write_report(variants["53"], result53, tmp_path / "a" / "b")
+    expected = {f"{name}.{kind}" for name in FIGURES for kind in ("svg", "pdf")} | {"report.html", "report.tex"}
+    assert {path.name for path in written} == expected
+    assert {path.name for path in (tmp_path / "a" / "b").iterdir()} == expected  # no leftovers
+    assert all(path.stat().st_size > 500 for path in written)
+
+
+@pytest.mark.parametrize("name", ["53", "20"])
+def test_the_page_needs_no_network_and_no_script(variants, result53, result20, tmp_path, name):
+    write_report(variants[name], {"53": result53, "20": result20}[name], tmp_path)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    page = Page(text)
+    assert "script" not in page.tags
+    assert "url(" not in text
+    assert "@import" not in text
+    for load in page.loads:
+        assert load == "data:," or (tmp_path / load).is_file()
+    assert page.tags.count("img") == len(FIGURES)
+    for figure in FIGURES:
+        links = re.findall(r'href="([^"]*)"', (tmp_path / f"{figure}.svg").read_text(encoding="utf-8"))
+        assert all(link.startswith("#") for link in links)
+
+
+@pytest.mark.parametrize("name", ["53", "20"])
+def test_every_formula_is_well_formed_mathml(variants, result53, result20, tmp_path, name):
+    write_report(variants[name], {"53": result53, "20": result20}[name], tmp_path)
+    formulas = re.findall(r"<math.*?</math>", (tmp_path / "report.html").read_text(encoding="utf-8"), re.DOTALL)
+    assert len(formulas) > 30
+    for formula in formulas:
+        text = "".join(ElementTree.fromstring(formula).itertext())
+        assert text.strip()
+        assert "\\" not in text, f"a LaTeX command that was not understood: {text}"
+
+
+def balanced(tex):
+    """Braces, environments and dollars of a LaTeX text match."""
+    bare = re.sub(r"\\\\", "", tex)
+    bare = re.sub(r"\\[{}$%]", "", bare)
+    depth = 0
+    for sign in re.findall(r"[{}]", bare):
+        depth += 1 if sign == "{" else -1
+        assert depth >= 0
+    assert depth == 0
+    assert bare.count("$") % 2 == 0
+    stack = []
+    for kind, environment in re.findall(r"\\(begin|end)\{([^}]*)\}", bare):
+        if kind == "begin":
+            stack.append(environment)
+        else:
+            assert stack.pop() == environment
+    assert not stack
+    assert bare.count(r"\left") - bare.count(r"\leftarrow") == bare.count(r"\right") - bare.count(r"\rightarrow")
+    return True
+
+
+@pytest.mark.parametrize("name", ["53", "20"])
+def test_the_latex_is_balanced_and_names_its_figures(variants, result53, result20, tmp_path, name):
+    write_report(variants[name], {"53": result53, "20": result20}[name], tmp_path)
+    tex = (tmp_path / "report.tex").read_text(encoding="utf-8")
+    assert balanced(tex)
+    assert {f"{figure}.pdf" for figure in FIGURES} == set(re.findall(r"\\includegraphics\[[^]]*\]\{([^}]*)\}", tex))
+
+
+def test_hostile_titles_stay_text(variants, result53, tmp_path):
+    hostile = Variant("5<3", r"50 % & x^2_1 ~ #1 $ \input{secret} <script>alert(1)</script> вариант", variants["53"].model)
+    write_report(hostile, result53, tmp_path)
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<script" not in html
+    assert "5&lt;3" in html
+    assert "вариант" in html
+    tex = (tmp_path / "report.tex").read_text(encoding="utf-8")
+    assert r"\input" not in tex
+    assert balanced(tex)
+    assert r"50 \% \& x\textasciicircum{}2\_1 \textasciitilde{} \#1 \$ \textbackslash{}input\{secret\}" in tex
+
+
+def test_the_structural_functions_are_those_derived(variants, result53, tmp_path):
+    write_report(variants["53"], result53, tmp_path)
+    tex = (tmp_path / "report.tex").read_text(encoding="utf-8")
+    for structure in (gaussian(variants["53"].model), linearised(variants["53"].model)):
+        for line in structure.latex().splitlines()[1:-1]:
+            assert line.removesuffix(r" \\") in tex
+
+
+@pytest.mark.filterwarnings("ignore:No artists with labels")  # the control relative to itself is not drawn
+def test_only_what_was_compared_is_explained(variants, tmp_path):
+    model = variants["53"].model
+    result = compare(lab_filters(model, ["aof-linearised"]), model, 200, 3, 1, progress=False)
+    write_report(variants["53"], result, tmp_path)
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Linearised" in html
+    assert "<h3>Gaussian</h3>" not in html
+    assert "DUOF, the two-step" not in html
+
+
+def test_the_same_numbers_give_the_same_report(variants, result20, tmp_path):
+    for folder in ("one", "two"):
+        write_report(variants["20"], result20, tmp_path / folder)
+    for path in (tmp_path / "one").glob("report.*"):
+        assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes()
+
+
+def test_the_numbers_are_those_of_the_comparison(variants, result53, tmp_path):
+    data = json.loads(write_json(variants["53"], result53, tmp_path / "n.json").read_text(encoding="utf-8"))
+    assert list(data["error_variance"]) == list(result53.available)
+    for name in result53.available:
+        estimate = result53.error_variance(name)
+        assert data["error_variance"][name] == estimate.value.tolist()  # every digit
+        assert data["standard_error"][name] == estimate.standard_error.tolist()
+    assert (data["variant"], data["runs"], data["steps"], data["seed"], data["exact_runs"]) == ("53", 4000, 6, 1, 40)
+    assert data["model"]["parameters"] == {"c": 0.9, "e": 0.05, "g": 1.0, "f": 0.02}
+
+
+def test_an_interrupted_write_leaves_what_was_there(variants, result53, tmp_path, monkeypatch):
+    path = tmp_path / "n.json"
+    path.write_text("before", encoding="utf-8")
+
+    def interrupted(text, place):
+        place.write_text(text[: len(text) // 2], encoding="utf-8")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(report, "_save_text", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_json(variants["53"], result53, path)
+    assert path.read_text(encoding="utf-8") == "before"
+    assert [p.name for p in tmp_path.iterdir()] == ["n.json"]
+
+
+def test_a_link_is_written_through_not_replaced(variants, result53, tmp_path):
+    # /dev/stdout is one
+    (tmp_path / "target").write_text("", encoding="utf-8")
+    link = tmp_path / "link.json"
+    link.symlink_to(tmp_path / "target")
+    write_json(variants["53"], result53, link)
+    assert link.is_symlink()
+    assert json.loads((tmp_path / "target").read_text(encoding="utf-8"))["variant"] == "53"

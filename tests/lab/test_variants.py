@@ -1,0 +1,253 @@
+"""The lab's variants and filters: the shipped ones are well posed, the hostile ones are refused by name."""
+
+import numpy as np
+import pytest
+
+from kfcourse import ModelError, NoClosedForm, compare, gaussian, lab_filters, linearised, load_variants
+from kfcourse.filters import Design, Filter
+from kfcourse.lab.variants import FILTERS, LAB, VariantError, find_variant, has_exact, title
+
+SHIPPED = load_variants()
+GOOD = 'state = "0.9*x + v"\nmeter = "x + w"\n'
+
+
+# --- the shipped variants
+
+
+def test_there_are_variant_53_and_eleven_more():
+    assert len(SHIPPED) >= 12
+    assert str(SHIPPED["53"].model.state_equation[0]) == "c*x + e*v*x"
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_variant_has_its_name_and_a_title_of_its_own(name):
+    assert SHIPPED[name].name == name
+    assert SHIPPED[name].title
+    assert [variant.title for variant in SHIPPED.values()].count(SHIPPED[name].title) == 1
+
+
+def test_the_variants_exercise_different_structural_functions():
+    printed = {gaussian(variant.model).latex() for variant in SHIPPED.values()}
+    assert len(printed) == len(SHIPPED)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_variant_is_well_posed(name):
+    """Both structures derive, every filter of the lab stays finite, and two seeds tell the same story."""
+    model = SHIPPED[name].model
+    linearised(model), gaussian(model)
+    runs = 20_000 if model.n == 1 else 2_000
+    one, two = (compare(lab_filters(model), model, runs, 51, seed, progress=False) for seed in (1, 2))
+    for result in (one, two):
+        for filter_name in LAB:
+            variance = result.error_variance(filter_name)
+            assert np.isfinite(variance.value).all()
+            assert (variance.value > 0).all()
+            assert np.isfinite(variance.standard_error).all()
+        normalised = result.normalised_error("aof-gaussian")
+        assert np.isfinite(normalised.value).all()
+        assert (normalised.value > 0).all()
+    for filter_name in LAB:
+        a, b = one.score(filter_name), two.score(filter_name)
+        combined = np.hypot(a.standard_error, b.standard_error)
+        # Five: of some hundred comparisons none should be outside; 1e-12 is rounding, where filters coincide.
+        assert abs(a.value - b.value) <= 5 * combined + 1e-12, filter_name
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_exact_filter_is_offered_for_the_scalar_variants(name):
+    assert has_exact(SHIPPED[name].model) == (SHIPPED[name].model.n == 1)
+
+
+# --- the filters by their short names
+
+
+def test_the_issue_s_short_names_are_there():
+    assert {*LAB, "aof-exact"} == {
+        "aof-gaussian",
+        "aof-linearised",
+        "duof",
+        "fos-gaussian",
+        "fos-linearised",
+        "mfos-gaussian",
+        "mfos-linearised",
+        "aof-exact",
+    }
+    assert set(LAB) < set(FILTERS)
+
+
+def test_every_filter_builds_and_carries_its_short_name():
+    built = lab_filters(SHIPPED["53"].model, list(FILTERS))
+    assert [one.name for one in built] == list(FILTERS)
+    assert all(isinstance(one, Filter | Design) for one in built)
+
+
+def test_titles_are_distinct():
+    assert len({title(name) for name in FILTERS}) == len(FILTERS)
+    assert len({entry.russian for entry in FILTERS.values()}) == len(FILTERS)
+    assert title("mine") == "mine"
+
+
+def test_a_name_asked_for_twice_is_built_once():
+    assert [one.name for one in lab_filters(SHIPPED["53"].model, ["duof", "duof"])] == ["duof"]
+
+
+def test_an_unknown_filter_is_named_with_the_known_ones():
+    with pytest.raises(ValueError, match=r"unknown filter 'ekf', 'x'; known: aof-gaussian, .*particle"):
+        lab_filters(SHIPPED["53"].model, ["duof", "ekf", "x"])
+
+
+def test_a_filter_that_a_model_does_not_admit_is_named_with_advice(tmp_path):
+    path = tmp_path / "v.toml"
+    path.write_text('[variants.t]\nstate = "0.9*x + v"\nmeter = "tan(x) + w"\n', encoding="utf-8")
+    model = load_variants(path)["t"].model
+    with pytest.raises(NoClosedForm, match=r"^fos-gaussian: .*tan\(x\).*unscented"):
+        lab_filters(model, ["duof", "fos-gaussian"])
+    with pytest.raises(ModelError, match=r"^aof-exact: .*scalar"):
+        lab_filters(SHIPPED["20"].model, ["aof-exact"])
+    assert len(lab_filters(model, ["aof-linearised", "aof-unscented", "aof-gauss-hermite", "duof"])) == 4
+
+
+# --- files of variants
+
+
+def test_the_issue_s_example_is_read(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        '[variants.53]\nstate = "c*x + e*x*v"\nmeter = "g*x + f*x**2*w"\n'
+        "parameters = { c = 0.9, e = 0.05, g = 1.0, f = 0.02 }\nprior = { mean = 0.0, variance = 1.0 }\n",
+        encoding="utf-8",
+    )
+    mine = load_variants(str(path))
+    assert list(mine) == ["53"]
+    assert mine["53"].model == SHIPPED["53"].model
+    assert mine["53"].title == ""
+
+
+def test_all_keys_of_a_vector_variant_are_read(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        '[variants.v]\ntitle = "two"\nstate = ["a + k*b", "b + q"]\nmeter = ["a + r"]\nparameters = { k = 0.1 }\n'
+        'symbols = { x = ["a", "b"], v = ["q"], w = ["r"] }\nprior = { mean = [1, 2], variance = [[2, 1], [1, 3]] }\n'
+        "state_noise = { variance = 0.25 }\nmeter_noise = { mean = 0.5, variance = 4 }\n",
+        encoding="utf-8",
+    )
+    model = find_variant("v", path).model
+    assert (model.n, model.p) == (2, 1)
+    assert model.prior.mean.tolist() == [1, 2]
+    assert model.prior.cov.tolist() == [[2, 1], [1, 3]]
+    assert model.state_noise.cov.tolist() == [[0.25]]
+    assert (model.meter_noise.mean.tolist(), model.meter_noise.cov.tolist()) == ([0.5], [[4.0]])
+
+
+def test_an_unknown_variant_is_named_with_the_known_ones():
+    with pytest.raises(VariantError, match=r"no variant '54'; there are 53, 1, "):
+        find_variant("54")
+
+
+BAD_VARIANTS = {
+    "no state": ('meter = "x + w"', "no state"),
+    "neither": ('title = "nothing"', "no meter and no state"),
+    "unknown key": (GOOD + "speed = 1", "unknown key speed"),
+    "bad formula": ('state = "x +* v"\nmeter = "x + w"', "cannot be read"),
+    "empty formula": ('state = ""\nmeter = "x + w"', "empty"),
+    "no formula": ('state = []\nmeter = "x + w"', "holds no formula"),
+    "a number for a formula": ('state = 5\nmeter = "x + w"', ""),
+    "numbers for formulas": ('state = [5]\nmeter = "x + w"', "formula"),
+    "unknown symbol": ('state = "c*x + v"\nmeter = "x + w"', "'c'"),
+    "noise of the other equation": ('state = "x + w"\nmeter = "x + w"', "'w'"),
+    "meter without state": ('state = "x + v"\nmeter = "3 + w"', "does not depend on the state"),
+    "attribute": ('state = "x.__class__"\nmeter = "x + w"', "not allowed"),
+    "a power tower": ('state = "x*9**9**9**9 + v"\nmeter = "x + w"', "exponent"),
+    "a long formula": ('state = "' + "(" * 5000 + "x" + ")" * 5000 + '"\nmeter = "x + w"', "characters"),
+    "division by zero": ('state = "x/0 + v"\nmeter = "x + w"', "finite"),
+    "parameter nan": ('state = "c*x + v"\nmeter = "x + w"\nparameters = { c = nan }', "c = nan"),
+    "parameter inf": ('state = "c*x + v"\nmeter = "x + w"\nparameters = { c = -inf }', "c = -inf"),
+    "parameter text": ('state = "c*x + v"\nmeter = "x + w"\nparameters = { c = "0.9" }', "'0.9'"),
+    "parameter true": ('state = "c*x + v"\nmeter = "x + w"\nparameters = { c = true }', "True"),
+    "parameter huge": ('state = "c*x + v"\nmeter = "x + w"\nparameters = { c = ' + "9" * 400 + " }", ""),
+    "parameter named as the state": (GOOD + "parameters = { x = 1 }", "named twice"),
+    "parameter named as code": (GOOD + 'parameters = { "import os" = 1 }', "import os"),
+    "parameters in a list": (GOOD + "parameters = [1]", "parameters"),
+    "negative variance": (GOOD + "prior = { variance = -1.0 }", "negative variance"),
+    "variance nan": (GOOD + "prior = { variance = nan }", "finite"),
+    "mean huge": (GOOD + "prior = { mean = " + "9" * 400 + " }", ""),
+    "mean of the wrong shape": (GOOD + "prior = { mean = [1, 2] }", "`prior`"),
+    "covariance of the wrong shape": (GOOD + "state_noise = { variance = [[1, 0], [0, 1]] }", "`state_noise`"),
+    "covariance not symmetric": (
+        'state = ["x1 + v1", "x2"]\nmeter = ["x1 + w1"]\nprior = { variance = [[1.0, 0.5], [0.0, 1.0]] }',
+        "symmetric",
+    ),
+    "ragged covariance": (GOOD + "meter_noise = { variance = [[1], [1, 2]] }", "`meter_noise`"),
+    "mean in words": (GOOD + 'prior = { mean = "zero" }', "`prior`"),
+    "law of other keys": (GOOD + "prior = { sigma = 1 }", "sigma"),
+    "law without a table": (GOOD + "prior = 3", "`prior`"),
+    "symbols of other keys": (GOOD + 'symbols = { z = ["x"] }', "z"),
+    "symbols not named": (GOOD + "symbols = { x = 5 }", ""),
+    "one symbol for two": ('state = ["x1 + v1", "x2"]\nmeter = ["x1 + w1"]\nsymbols = { x = ["x1"] }', ""),
+}
+
+
+@pytest.mark.parametrize("case", BAD_VARIANTS)
+def test_a_bad_variant_is_refused_by_file_and_name(tmp_path, case):
+    body, problem = BAD_VARIANTS[case]
+    path = tmp_path / "mine.toml"
+    path.write_text(f"[variants.good]\n{GOOD}\n[variants.bad]\n{body}\n", encoding="utf-8")
+    with pytest.raises(VariantError) as caught:
+        load_variants(path)
+    message = str(caught.value)
+    assert message.startswith(f"variant bad in {path}: ")
+    assert problem in message
+
+
+@pytest.mark.parametrize(
+    "formula",
+    [
+        "__import__('os').system('touch {marker}')",
+        "open('{marker}', 'w')",
+        "exec('open(\\\\'{marker}\\\\', \\\\'w\\\\')')",
+        "(lambda: open('{marker}', 'w'))()",
+        "[open('{marker}', 'w') for _ in (1,)][0]",
+        "x + ().__class__.__base__.__subclasses__()[0]",
+        "sympify('open')",
+        "f'{{open(1)}}'",
+    ],
+)
+def test_a_formula_cannot_execute_code(tmp_path, formula):
+    marker, path = tmp_path / "marker", tmp_path / "mine.toml"
+    path.write_text(f'[variants.bad]\nstate = "{formula.format(marker=marker)}"\nmeter = "x + w"\n', encoding="utf-8")
+    with pytest.raises(VariantError, match=r"variant bad in .*mine\.toml"):
+        load_variants(path)
+    assert not marker.exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        ("", "no variants"),
+        ("variants = 3", "no variants"),
+        ("[variants]", "no variants"),
+        ("[variant.53]\n" + GOOD, "no variants"),
+        ("[variants.53\n" + GOOD, "not valid TOML"),
+        ("[variants.a]\n" + GOOD + "[variants.a]\n" + GOOD, "not valid TOML"),
+        ("[variants.a]\n" + GOOD + f"prior = {{ mean = {'9' * 5000} }}", "not valid TOML"),
+        ("[variants.a]\n" + GOOD + f"prior = {{ mean = {'[' * 5000}{']' * 5000} }}", "not valid TOML"),
+        ("[variants]\nbad = 5", "variant bad in"),
+        ("[[variants]]\n" + GOOD, "no variants"),
+        (b"\xff\xfe", "cannot be read"),
+    ],
+)
+def test_a_bad_file_is_refused_by_name(tmp_path, content, problem):
+    path = tmp_path / "mine.toml"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(VariantError) as caught:
+        load_variants(path)
+    assert str(path) in str(caught.value)
+    assert problem in str(caught.value)
+
+
+def test_a_missing_file_and_a_folder_are_refused_by_name(tmp_path):
+    with pytest.raises(VariantError, match=r"no file of variants at .*nothing\.toml"):
+        load_variants(tmp_path / "nothing.toml")
+    with pytest.raises(VariantError, match=f"{tmp_path}.*cannot be read"):
+        load_variants(tmp_path)

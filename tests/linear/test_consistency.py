@@ -1,0 +1,255 @@
+"""Consistency tests: their bounds hold for filters that are right, and fail for those that are wrong."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+from kfcourse import linear
+from kfcourse.filters.approximations import aof
+from kfcourse.filters.kalman import kalman, linear_system
+from kfcourse.laws import Gaussian
+from kfcourse.linear.consistency import (
+    Innovations,
+    autocorrelation,
+    chi_squared_bounds,
+    innovations,
+    nees,
+    nis,
+    normalised_square,
+)
+from kfcourse.montecarlo.ensemble import simulate
+from kfcourse.montecarlo.experiment import predictions, run
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.structure import linearised
+
+SIGMA = 4  # standard errors: one chance in 16 000 a comparison
+RUNS, STEPS = 2000, 12
+
+
+def tracking(**noise) -> Model:
+    """Two components, two correlated measurements, noises with means; `noise` scales the two standard deviations."""
+    return Model.define(
+        ["x1 + 0.5*x2 + 0.2*q*v1", "0.9*x2 + 0.3*q*v2"], ["x1 + r*w1", "x2 - x1 + 0.5*r*w2"], {"q": 1, "r": 1} | noise,
+        prior={"mean": [1, -2], "variance": [[2, 0.5], [0.5, 1]]},
+        state_noise={"mean": [0.1, 0], "variance": [[1, 0.3], [0.3, 2]]},
+        meter_noise={"mean": [0, 0.4], "variance": [[1, 0.6], [0.6, 2]]},
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def paths():
+    return simulate(tracking(), RUNS, STEPS, seed=5)
+
+
+def found(model, y) -> Innovations:
+    return innovations(linearised(model).measure, predictions(kalman(model), y), y)
+
+
+# ---------------------------------------------------------------- quantities
+
+
+def test_the_normalised_square_is_the_loop_of_the_page():
+    rng = np.random.default_rng(1)
+    root, vector = rng.normal(size=(4, 3, 2, 2)), rng.normal(size=(4, 3, 2))
+    cov = root @ root.swapaxes(-1, -2) + 0.1 * np.eye(2)
+    expected = [[v @ np.linalg.inv(P) @ v for v, P in zip(*row, strict=True)] for row in zip(vector, cov, strict=True)]
+    # two products of 2 x 2 matrices whose condition is below 1e3
+    np.testing.assert_allclose(normalised_square(vector, cov), expected, rtol=1e-12)
+    shared = normalised_square(vector, cov[0, 0])  # one covariance for all
+    np.testing.assert_allclose(shared[2, 1], vector[2, 1] @ np.linalg.inv(cov[0, 0]) @ vector[2, 1], rtol=1e-12)
+    np.testing.assert_allclose(nees(vector, Gaussian(0.5 * vector, cov)), np.array(expected) / 4, rtol=1e-12)
+    np.testing.assert_allclose(nis(Innovations(vector, cov)), expected, rtol=1e-12)
+
+
+def test_a_covariance_that_is_singular_is_refused():
+    with pytest.raises(ValueError, match="leave out the components that the filter knows exactly"):
+        normalised_square(np.ones((3, 2)), np.array([[1.0, 0.0], [0.0, 0.0]]))
+
+
+def test_innovations_are_measurements_less_predictions(paths):
+    model = tracking()
+    system, _, offset = linear_system(model)
+    predicted = predictions(kalman(model), paths.y)
+    value, cov = found(model, paths.y)
+    for k, i in ((0, 0), (3, 17), (STEPS - 1, RUNS - 1)):
+        P = predicted.cov[k, i]
+        np.testing.assert_allclose(value[k, i], paths.y[k, i] - system.H @ predicted.mean[k, i] - offset, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(
+            np.broadcast_to(cov, (STEPS, RUNS, 2, 2))[k, i], system.H @ P @ system.H.T + system.R, rtol=1e-12
+        )
+
+
+def test_a_missing_measurement_has_no_innovation_and_spoils_no_other(paths):
+    y = paths.y[:, :3].copy()
+    y[2, 1, 0] = y[4, 0] = np.nan
+    value = nis(found(tracking(), y))
+    assert np.isnan(value).sum() == 2
+    assert np.isnan(value[2, 1])
+    assert np.isnan(value[4, 0])
+    whole = nis(found(tracking(), paths.y[:, :3]))
+    np.testing.assert_allclose(value[:, 2], whole[:, 2], rtol=1e-12)  # the run that misses nothing
+
+
+# ---------------------------------------------------------------- bounds
+
+
+@pytest.mark.parametrize(("degrees", "runs", "confidence"), [(1, 1, 0.9), (4, 1, 0.95), (2, 50, 0.95), (3, 7, 0.5)])
+def test_the_bounds_hold_as_often_as_they_say(degrees, runs, confidence):
+    low, high = chi_squared_bounds(degrees, runs, confidence)
+    size = 40_000
+    mean = (np.random.default_rng(degrees).normal(size=(size, runs, degrees)) ** 2).sum(axis=-1).mean(axis=-1)
+    for tail in (np.mean(mean < low), np.mean(mean > high)):  # equal tails; the standard error of a frequency
+        expected = (1 - confidence) / 2
+        assert abs(tail - expected) < SIGMA * np.sqrt(expected * (1 - expected) / size)
+
+
+def test_the_bounds_narrow_around_the_degrees_of_freedom():
+    low, high = chi_squared_bounds(3, 10_000)
+    half = 1.959964 * np.sqrt(2 * 3 / 10_000)
+    # the normal limit: the chi-squared's skewness shifts both bounds by about (1.96^2 - 1) * 2 / 3 / runs
+    np.testing.assert_allclose([low, high], [3 - half, 3 + half], atol=2e-4)
+    assert chi_squared_bounds(3, 10_000, 0.99)[0] < low < high < chi_squared_bounds(3, 10_000, 0.99)[1]
+
+
+@pytest.mark.parametrize("arguments", [(0, 5), (2, 0), (2, 5, 0.0), (2, 5, 1.0), (2, 5, 95), (-1, 5), (2, 5, float("nan"))])
+def test_bounds_of_nothing_are_refused(arguments):
+    with pytest.raises(ValueError, match="expected degrees >= 1, runs >= 1 and 0 < confidence < 1"):
+        chi_squared_bounds(*arguments)
+
+
+# ---------------------------------------------------------------- a filter that is right
+
+
+def test_the_kalman_filter_is_right_about_its_errors(paths):
+    model = tracking()
+    errors = nees(paths.x, run(kalman(model), paths.y))
+    low, high = chi_squared_bounds(2, RUNS, 1 - 6e-5)  # 4 standard deviations
+    assert ((low < errors.mean(axis=1)) & (errors.mean(axis=1) < high)).all()
+    surprises = nis(found(model, paths.y))
+    assert ((low < surprises.mean(axis=1)) & (surprises.mean(axis=1) < high)).all()
+    # innovations of different steps are independent: so are their squares, and all of them count
+    low, high = chi_squared_bounds(2, RUNS * STEPS, 1 - 6e-5)
+    assert low < surprises.mean() < high
+    # chi-squared itself, not only its mean: the share below its median
+    for values in (errors[7], surprises[7]):
+        assert abs(np.mean(values < 2 * np.log(2)) - 0.5) < SIGMA * 0.5 / np.sqrt(RUNS)
+
+
+def test_the_innovations_of_the_kalman_filter_are_white(paths):
+    value, deviation = autocorrelation(found(tracking(), paths.y), 5)
+    assert value.shape == deviation.shape == (5,)
+    assert (abs(value) < SIGMA * deviation).all()
+
+
+def test_the_measure_of_a_linear_system_serves_as_well(paths):
+    model = tracking()
+    system, shift, offset = linear_system(model)
+    y = paths.y[:, :5] - offset
+    drift = np.broadcast_to(shift, (STEPS, 1, 2))
+    known = linear.LinearSystem(system.A, system.H, system.Q, system.R, np.eye(2))
+    by_matrices = linear.run(known, model.prior, y, drift)
+    np.testing.assert_allclose(
+        nis(innovations(known.measure, by_matrices.predicted, y)), nis(found(model, paths.y[:, :5])), rtol=1e-9
+    )  # a dozen steps of a well-conditioned filter
+
+
+# ---------------------------------------------------------------- filters that are wrong
+
+
+@pytest.mark.parametrize(
+    ("wrong", "errors", "surprises", "correlation"),
+    [
+        ({"q": 0.2}, "above", "above", "positive"),  # trusts its model too much: lags behind
+        ({"q": 3}, "below", "below", "negative"),  # follows the noise, and takes it back
+        ({"r": 0.5}, "above", "above", "negative"),
+        ({"r": 2}, "below", "below", "positive"),
+    ],
+)
+def test_a_wrong_filter_is_found_out(paths, wrong, errors, surprises, correlation):
+    model = tracking(**wrong)
+    late = slice(5, None)  # the first steps are decided by the prior, which is right
+    e2 = nees(paths.x, run(kalman(model), paths.y))[-1].mean()
+    innovation = found(model, paths.y)
+    low, high = chi_squared_bounds(2, RUNS, 1 - 6e-5)
+    assert (e2 > high) if errors == "above" else (e2 < low)
+    i2 = nis(innovation)[late]
+    low, high = chi_squared_bounds(2, i2.size, 1 - 6e-5)
+    assert (i2.mean() > high) if surprises == "above" else (i2.mean() < low)
+    value, deviation = autocorrelation(innovation, 1)
+    assert value[0] * (1 if correlation == "positive" else -1) > SIGMA * deviation[0]
+
+
+# ---------------------------------------------------------------- autocorrelation
+
+
+def test_the_autocorrelation_is_the_loop_of_the_page():
+    rng = np.random.default_rng(3)
+    value, root = rng.normal(size=(6, 4, 2)), rng.normal(size=(6, 4, 2, 2))
+    cov = root @ root.swapaxes(-1, -2) + 0.1 * np.eye(2)
+    white = [
+        [scipy.linalg.solve_triangular(np.linalg.cholesky(cov[k, i]), value[k, i], lower=True) for i in range(4)]
+        for k in range(6)
+    ]
+    result = autocorrelation(Innovations(value, cov), 3)
+    for lag in (1, 2, 3):
+        products = [white[k][i] @ white[k + lag][i] / 2 for k in range(6 - lag) for i in range(4)]
+        np.testing.assert_allclose(result.value[lag - 1], np.mean(products), rtol=1e-12, atol=1e-14)
+        np.testing.assert_allclose(result.standard_deviation[lag - 1], 1 / np.sqrt(2 * len(products)), rtol=1e-14)
+
+
+@pytest.mark.parametrize("p", [1, 2])
+def test_a_known_correlation_is_found_and_white_noise_scatters_as_said(p):
+    rng = np.random.default_rng(4)
+    cov = np.array([[4.0, 1.5], [1.5, 3.0]])[:p, :p]
+    steps, runs, rho = 200, 300, 0.4
+    white = rng.normal(size=(steps, runs, p))
+    # the standard deviation, over parts that are independent: 300 of one run each
+    each = [autocorrelation(Innovations(white[:, i : i + 1] @ np.linalg.cholesky(cov).T, cov), 1) for i in range(runs)]
+    scatter = np.std([one.value[0] for one in each])
+    assert abs(scatter / each[0].standard_deviation[0] - 1) < SIGMA / np.sqrt(2 * runs)  # of a standard deviation
+    coloured = [white[0]]
+    for step in white[1:]:  # unit variance, correlation rho^lag
+        coloured.append(rho * coloured[-1] + np.sqrt(1 - rho**2) * step)
+    value, deviation = autocorrelation(Innovations(np.array(coloured) @ np.linalg.cholesky(cov).T, cov), 4)
+    # N Var = sum over m of rho_m^2 + rho_{m+l} rho_{m-l} (Isserlis), at most twice the sum of rho_m^2 = rho^(2 |m|)
+    inflation = 2 * (1 + rho**2) / (1 - rho**2)
+    assert (abs(value - rho ** np.arange(1, 5)) < SIGMA * deviation * np.sqrt(inflation)).all()
+
+
+@pytest.mark.parametrize("lags", [0, -1, 4, 10])
+def test_lags_that_the_record_does_not_have_are_refused(lags):
+    with pytest.raises(ValueError, match="lags must be between 1 and 3"):
+        autocorrelation(Innovations(np.zeros((4, 2, 1)), np.ones((1, 1))), lags)
+
+
+def test_the_autocorrelation_of_a_record_with_gaps_is_refused():
+    value = np.zeros((4, 2, 1))
+    value[2, 0] = np.nan
+    with pytest.raises(ValueError, match="measurements at every step"):
+        autocorrelation(Innovations(value, np.ones((1, 1))), 1)
+
+
+# ---------------------------------------------------------------- predictions
+
+
+def test_predictions_are_the_hand_loop(variant53):
+    y = simulate(variant53, 4, 6, seed=3).y.copy()
+    y[2, 1] = np.nan
+    one = aof(linearised(variant53))
+    result = predictions(one, y)
+    assert (result.mean.shape, result.cov.shape) == ((6, 4, 1), (6, 4, 1, 1))
+    state = one.init(4)
+    for k in range(6):
+        np.testing.assert_array_equal(result.mean[k], state.predicted.mean)
+        np.testing.assert_array_equal(result.cov[k], np.broadcast_to(state.predicted.cov, (4, 1, 1)))
+        state = one.step(state, y[k])
+    np.testing.assert_array_equal(result.mean[0], np.tile(variant53.prior.mean, (4, 1)))
+    # predictions see only the past: a change of the last measurement changes none of them
+    y[-1] += 5
+    np.testing.assert_array_equal(predictions(one, y).mean, result.mean)
+
+
+@pytest.mark.parametrize("shape", [(5,), (5, 3), (5, 3, 2)])
+def test_predictions_for_measurements_of_another_shape_are_refused(variant53, shape):
+    with pytest.raises(ValueError, match="measurement"):
+        predictions(aof(linearised(variant53)), np.zeros(shape))

@@ -1,0 +1,489 @@
+"""The linear Kalman filter in four arithmetic forms, covariance analysis and steady state, against independent references."""
+
+from fractions import Fraction
+
+import control
+import filterpy.kalman
+import numpy as np
+import pytest
+import scipy.linalg
+
+from kfcourse.filters.kalman import kalman
+from kfcourse.laws import Gaussian
+from kfcourse.linear.arithmetic import FORMS, _triangular, form, predict_law
+from kfcourse.linear.consistency import innovations, nis
+from kfcourse.linear.runs import LinearSystem, covariances, run, simulate, steady_state
+from kfcourse.montecarlo.experiment import run as run_filter
+from kfcourse.symbolic.model import Model
+
+# Conditions of the covariances below are up to 1e4: rounding of float64 (1e-16) times that, over a dozen steps.
+ROUNDING = {"rtol": 1e-10, "atol": 1e-10}
+
+
+def system(n, p, m, seed):
+    """Nothing zero, unit, diagonal or of equal size."""
+    rng = np.random.default_rng(seed)
+
+    def covariance(size):
+        root = rng.normal(size=(size, size))
+        return symmetrical(root @ root.T + 0.3 * np.eye(size))
+
+    A = rng.normal(size=(n, n))
+    A *= 0.95 / max(abs(np.linalg.eigvals(A)))
+    B = rng.normal(size=(n, m)) if m else None
+    one = LinearSystem(A, rng.normal(size=(p, n)), covariance(n), covariance(p), B)
+    return one, Gaussian(rng.normal(size=n), 3 * covariance(n))
+
+
+def symmetrical(matrix):
+    return (matrix + matrix.T) / 2
+
+
+# states, measurements, inputs, seed
+SYSTEMS = {
+    "scalar": (1, 1, 1, 1),
+    "two states": (2, 1, 0, 2),
+    "two meters": (2, 2, 1, 3),
+    "large": (4, 3, 2, 4),
+    "more meters": (2, 3, 2, 5),
+}
+
+
+@pytest.fixture(params=list(SYSTEMS))
+def case(request):
+    """A system, a prior, measurements with gaps (12, 5, p), inputs (12, 5, m)."""
+    n, p, m, seed = SYSTEMS[request.param]
+    one, prior = system(n, p, m, seed)
+    rng = np.random.default_rng(seed + 100)
+    u = rng.normal(size=(12, 5, m)) if m else None
+    y = simulate(one, prior, 12, 5, seed, u).y
+    gaps = y.copy()
+    gaps[3, 1] = np.nan  # a whole measurement
+    gaps[5, :, 0] = np.nan  # a component, of all runs
+    gaps[7:9, 2, -1] = np.nan  # a component, of one run
+    gaps[0, 4] = np.nan
+    return one, prior, y, gaps, u
+
+
+def slow_loop(one, prior, y, u):
+    """Predicted and posterior laws of one run, from the page: inv, missing components deleted."""
+    mean, cov = np.array(prior.mean), np.array(prior.cov)
+    predicted, posterior = [], []
+    for k in range(len(y)):
+        predicted.append((mean, cov))
+        there = ~np.isnan(y[k])
+        H, R = one.H[there], one.R[np.ix_(there, there)]
+        K = cov @ H.T @ np.linalg.inv(H @ cov @ H.T + R)
+        mean, cov = mean + K @ (y[k][there] - H @ mean), (np.eye(len(cov)) - K @ H) @ cov
+        posterior.append((mean, cov))
+        mean, cov = one.A @ mean + (0 if u is None else one.B @ u[k]), one.A @ cov @ one.A.T + one.Q
+    return predicted, posterior
+
+
+@pytest.mark.parametrize("arithmetic", FORMS)
+@pytest.mark.parametrize("missing", [False, True])
+def test_every_form_is_the_filter_of_the_page(case, arithmetic, missing):
+    one, prior, complete, gaps, u = case
+    y = gaps if missing else complete
+    result = run(one, prior, y, u, arithmetic)
+    for i in range(y.shape[1]):
+        references = slow_loop(one, prior, y[:, i], None if u is None else u[:, i])
+        for laws, reference in zip((result.predicted, result.posterior), references, strict=True):
+            np.testing.assert_allclose(laws.mean[:, i], [mean for mean, _ in reference], **ROUNDING)
+            np.testing.assert_allclose(laws.cov[:, i], [cov for _, cov in reference], **ROUNDING)
+
+
+@pytest.mark.parametrize("arithmetic", FORMS)
+def test_shapes_do_not_depend_on_what_is_missing(case, arithmetic):
+    one, prior, y, gaps, u = case
+    steps, runs, n = len(y), y.shape[1], len(one.A)
+    for data in (y, gaps):
+        for laws in run(one, prior, data, u, arithmetic):
+            assert laws.mean.shape == (steps, runs, n)
+            assert laws.cov.shape == (steps, runs, n, n)
+
+
+@pytest.mark.parametrize("arithmetic", FORMS)
+def test_the_laws_fit_the_consistency_tests(arithmetic):
+    # As many steps as runs, where axes that are taken for each other would go unnoticed; by a loop over both.
+    one, prior = system(3, 2, 0, 8)
+    y = simulate(one, prior, 6, 6, seed=1).y
+    predicted = run(one, prior, y, arithmetic=arithmetic).predicted
+    found = nis(innovations(one.measure, predicted, y))
+    for k in range(6):
+        for i in range(6):
+            innovation = y[k, i] - one.H @ predicted.mean[k, i]
+            F = one.H @ predicted.cov[k, i] @ one.H.T + one.R
+            np.testing.assert_allclose(found[k, i], innovation @ np.linalg.inv(F) @ innovation, rtol=1e-10)
+
+
+@pytest.mark.parametrize("arithmetic", FORMS)
+def test_a_prior_of_each_run(arithmetic):
+    one, prior = system(3, 2, 0, 9)
+    y = simulate(one, prior, 8, 4, seed=2).y
+    rng = np.random.default_rng(3)
+    means, roots = rng.normal(size=(4, 3)), rng.normal(size=(4, 3, 3))
+    covs = roots @ roots.swapaxes(1, 2) + 0.2 * np.eye(3)
+    together = run(one, Gaussian(means, covs), y, arithmetic=arithmetic).posterior
+    for i in range(4):
+        alone = run(one, Gaussian(means[i], covs[i]), y[:, [i]], arithmetic=arithmetic).posterior
+        np.testing.assert_allclose(together.mean[:, i], alone.mean[:, 0], rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(together.cov[:, i], alone.cov[:, 0], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("arithmetic", FORMS)
+def test_the_model_s_kalman_filter_is_the_same(arithmetic):
+    # x' = A x + C v + constant, y = H x + D w with correlated noises: the filter of a Model finds the matrices itself.
+    model = Model.define(
+        ["0.8*x1 + 0.3*x2 + 0.5*v1 + 0.2*v2 + 0.4", "-0.2*x1 + 0.9*x2 + 0.7*v2 - 0.1"],
+        ["1.2*x1 - 0.4*x2 + 0.6*w1 + 0.25"],
+        prior={"mean": [0.3, -1], "variance": [[2, 0.5], [0.5, 1]]},
+        state_noise={"variance": [[1, 0.3], [0.3, 0.5]]},
+    )
+    A, C = np.array([[0.8, 0.3], [-0.2, 0.9]]), np.array([[0.5, 0.2], [0, 0.7]])
+    Q = symmetrical(C @ np.array([[1, 0.3], [0.3, 0.5]]) @ C.T)
+    one = LinearSystem(A, np.array([[1.2, -0.4]]), Q, np.array([[0.36]]), np.eye(2))
+    prior = Gaussian(np.array([0.3, -1]), np.array([[2, 0.5], [0.5, 1]]))
+    shift = np.broadcast_to([0.4, -0.1], (9, 1, 2))
+    y = simulate(one, prior, 9, 3, 4, shift).y + 0.25
+    y[4, 1] = np.nan
+    estimates = run_filter(kalman(model, arithmetic), y)
+    laws = run(one, prior, y - 0.25, shift, arithmetic).posterior
+    np.testing.assert_allclose(estimates.mean, laws.mean, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(estimates.cov, laws.cov, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("reference", "arithmetic"),
+    [("KalmanFilter", "covariance"), ("KalmanFilter", "joseph"), ("SquareRootKalmanFilter", "square-root")],
+)
+@pytest.mark.parametrize("name", ["two meters", "large"])
+def test_filterpy(name, reference, arithmetic):
+    n, p, m, seed = SYSTEMS[name]
+    one, prior = system(n, p, m, seed)
+    u = np.random.default_rng(5).normal(size=(10, 1, m))
+    y = simulate(one, prior, 10, 1, 6, u).y
+    other = getattr(filterpy.kalman, reference)(dim_x=n, dim_z=p, dim_u=m)
+    other.F, other.H, other.Q, other.R, other.B = one.A, one.H, one.Q, one.R, one.B
+    other.x, other.P = prior.mean[:, None].copy(), prior.cov.copy()
+    laws = run(one, prior, y, u, arithmetic).posterior
+    for k in range(10):
+        other.update(y[k, 0][:, None])
+        np.testing.assert_allclose(laws.mean[k, 0], other.x[:, 0], **ROUNDING)
+        np.testing.assert_allclose(laws.cov[k, 0], other.P, **ROUNDING)
+        other.predict(u=u[k, 0][:, None])
+
+
+def test_the_input_may_be_one_for_all_runs():
+    one, prior = system(2, 1, 1, 7)
+    u = np.random.default_rng(1).normal(size=(6, 1, 1))
+    y = simulate(one, prior, 6, 3, 2, u).y
+    np.testing.assert_array_equal(run(one, prior, y, u).posterior.mean, run(one, prior, y, np.tile(u, (1, 3, 1))).posterior.mean)
+
+
+def test_predict_law_shifts_the_mean_only():
+    one, prior = system(3, 1, 0, 2)
+    law = predict_law(one, prior, np.array([1.0, -2.0, 0.5]))
+    np.testing.assert_allclose(law.mean, one.A @ prior.mean + [1.0, -2.0, 0.5], rtol=1e-14)
+    np.testing.assert_allclose(law.cov, one.A @ prior.cov @ one.A.T + one.Q, rtol=1e-14)
+
+
+# ---------------------------------------------------------------- simulation
+
+
+def test_simulated_moments_are_those_of_the_system():
+    one, prior = system(2, 2, 1, 6)
+    u = np.array([1.0, -2.0, 0.5])[:, None, None]
+    x, y = simulate(one, prior, 3, 40_000, 3, u)
+    mean, cov = prior.mean, prior.cov
+    for k in range(3):
+        for data, m, c in ((x[k], mean, cov), (y[k], one.H @ mean, one.H @ cov @ one.H.T + one.R)):
+            # 4 standard errors: of a mean, sd / sqrt(N); of a covariance of normal variables, at most sqrt(2 c_ii c_jj / N).
+            assert (abs(data.mean(axis=0) - m) < 4 * np.sqrt(np.diag(c) / 40_000)).all()
+            assert (abs(np.cov(data.T) - c) < 4 * np.sqrt(2 * np.outer(np.diag(c), np.diag(c)) / 40_000)).all()
+        mean, cov = one.A @ mean + one.B @ u[k, 0], one.A @ cov @ one.A.T + one.Q
+
+
+def test_simulation_is_reproducible():
+    one, prior = system(2, 1, 0, 6)
+    np.testing.assert_array_equal(simulate(one, prior, 4, 5, 9).y, simulate(one, prior, 4, 5, 9).y)
+    assert not np.array_equal(simulate(one, prior, 4, 5, 9).y, simulate(one, prior, 4, 5, 10).y)
+
+
+# ---------------------------------------------------------------- covariance analysis
+
+
+def test_covariances_in_advance_are_those_of_the_run(case):
+    one, prior, y, _, u = case
+    laws, found = run(one, prior, y, u), covariances(one, prior.cov, len(y))
+    np.testing.assert_allclose(found.predicted, laws.predicted.cov[:, 0], **ROUNDING)
+    np.testing.assert_allclose(found.posterior, laws.posterior.cov[:, 0], **ROUNDING)
+    F = one.H @ found.predicted @ one.H.T + one.R
+    np.testing.assert_allclose(found.gains @ F, found.predicted @ one.H.T, **ROUNDING)
+
+
+@pytest.mark.parametrize("constant", [True, False])
+def test_covariances_of_wrong_gains_against_simulation(constant):
+    # The filter believes in other noises; its true errors are those of `covariances` with its gains.
+    one, prior = system(3, 2, 0, 12)
+    believed = LinearSystem(one.A, one.H, 0.05 * one.Q, 4 * one.R)
+    runs, steps = 20_000, 6
+    gains = steady_state(believed).gain if constant else covariances(believed, 0.2 * prior.cov, steps).gains
+    x, y = simulate(one, prior, steps, runs, seed=13)
+    found = covariances(one, prior.cov, steps, gains)
+    estimate = np.tile(prior.mean, (runs, 1))
+    for k in range(steps):
+        K = gains if constant else gains[k]
+        for after, expected in ((False, found.predicted[k]), (True, found.posterior[k])):
+            if after:
+                estimate = estimate + (y[k] - estimate @ one.H.T) @ K.T
+            error = x[k] - estimate
+            # 4 standard errors of a covariance of normal variables: sqrt((c_ii c_jj + c_ij^2) / N)
+            bound = 4 * np.sqrt((np.outer(np.diag(expected), np.diag(expected)) + expected**2) / runs)
+            assert (abs(error.T @ error / runs - expected) < bound).all()
+        estimate = estimate @ one.A.T
+    optimal = covariances(one, prior.cov, steps).posterior
+    # Wrong gains lose in every direction, once two measurements of two components have reached all three states.
+    assert (np.linalg.eigvalsh((found.posterior - optimal)[1:]) > 0).all()
+
+
+def test_steady_state_against_python_control(case):
+    one = case[0]
+    found = steady_state(one)
+    L, P, _ = control.dlqe(one.A, np.eye(len(one.A)), one.H, one.Q, one.R)
+    np.testing.assert_allclose(found.predicted, P, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(one.A @ found.gain, L, rtol=1e-9, atol=1e-9)  # its gain is that of the prediction
+    X, _, _ = control.dare(one.A.T, one.H.T, one.Q, one.R)
+    np.testing.assert_allclose(found.predicted, X, rtol=1e-9, atol=1e-9)
+
+
+def test_steady_state_is_the_limit(case):
+    one, prior = case[:2]
+    # |eigenvalues of A| < 0.95 and the filter's are smaller: what is left of the start after 400 steps is below 0.95^800 = 1e-18
+    last, found = covariances(one, prior.cov, 400), steady_state(one)
+    np.testing.assert_allclose(last.predicted[-1], found.predicted, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(last.posterior[-1], found.posterior, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(last.gains[-1], found.gain, rtol=1e-9, atol=1e-10)
+
+
+def test_steady_state_closed_form():
+    # Scalar: P = a^2 P r / (h^2 P + r) + q is a quadratic equation, h^2 P^2 + (r - a^2 r - h^2 q) P - q r = 0.
+    a, h, q, r = 1.3, 0.7, 0.4, 0.9
+    P = max(np.roots([h**2, r - a**2 * r - h**2 * q, -q * r]))
+    found = steady_state(LinearSystem(*(np.array([[value]]) for value in (a, h, q, r))))
+    np.testing.assert_allclose(found.predicted, [[P]], rtol=1e-12)
+    np.testing.assert_allclose(found.gain, [[P * h / (h**2 * P + r)]], rtol=1e-12)
+    np.testing.assert_allclose(found.posterior, [[P * r / (h**2 * P + r)]], rtol=1e-12)
+
+
+@pytest.mark.parametrize("growth", [1.0, 1.1])
+def test_no_steady_state_of_what_is_not_seen(growth):
+    with pytest.raises(ValueError, match=r"no stabilising solution.*covariances"):
+        steady_state(LinearSystem(np.diag([0.5, growth]), np.array([[1.0, 0]]), np.eye(2), np.eye(1)))
+
+
+# ---------------------------------------------------------------- short words
+
+
+@pytest.fixture(scope="module")
+def ill_conditioned():
+    """Position, velocity, acceleration; a meter of 1 mm, 300 starts known to a kilometre, in float32; and the right answer."""
+    dt, rng = 0.1, np.random.default_rng(2)
+    A = np.array([[1, dt, dt**2 / 2], [0, 1, dt], [0, 0, 1]])
+    short = LinearSystem(A, np.array([[1.0, 0, 0]]), np.diag([0, 0, 1e-6]), np.array([[1e-6]])).astype(np.float32)
+    y = simulate(short.astype(float), Gaussian(np.zeros(3), 0.01 * np.eye(3)), 40, 300, seed=3).y.astype(np.float32)
+    prior = Gaussian(np.zeros(3), 1e6 * 10 ** rng.uniform(-0.5, 0.5, (300, 3))[:, :, None] * np.eye(3))
+    right = run(short.astype(float), prior, y.astype(float), arithmetic="square-root").posterior
+    return short, prior, y, right
+
+
+@pytest.mark.parametrize("arithmetic", FORMS)
+def test_float32_stays_float32(arithmetic, ill_conditioned):
+    # In this case the variance of a measurement gets negative, and the gain is 0.
+    short, prior, y, _ = ill_conditioned
+    for laws in run(short, prior, y, arithmetic=arithmetic):
+        assert (laws.mean.dtype, laws.cov.dtype) == (np.float32, np.float32)
+    one, calm = system(3, 2, 1, 4)
+    y, u = simulate(one, calm, 5, 3, 1).y, np.ones((5, 3, 1))
+    y[2, 1, 0] = np.nan
+    for laws in run(one.astype(np.float32), calm, y, u, arithmetic):
+        assert (laws.mean.dtype, laws.cov.dtype) == (np.float32, np.float32)
+
+
+@pytest.mark.parametrize("arithmetic", FORMS)
+def test_float32_is_float64_to_its_precision(arithmetic):
+    one, prior = system(3, 2, 0, 4)
+    y = simulate(one, prior, 10, 3, 1).y
+    short = one.astype(np.float32)
+    found = run(short, prior, y, arithmetic=arithmetic).posterior
+    exact = run(one, prior, y, arithmetic=arithmetic).posterior
+    # Rounding of float32 is 6e-8; condition numbers are below 1e3 here.
+    np.testing.assert_allclose(found.mean, exact.mean, rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(found.cov, exact.cov, rtol=1e-4, atol=1e-4)
+    assert not np.array_equal(found.cov, exact.cov)
+
+
+def lost(laws, right):
+    """Share of the runs in which the estimate is three standard deviations or more from the right one, after ten steps."""
+    sd = np.sqrt(np.diagonal(right.cov, axis1=-2, axis2=-1))
+    return (abs(laws.mean - right.mean)[10:] > 3 * sd[10:]).any(axis=(0, 2)).mean()
+
+
+@pytest.mark.parametrize("arithmetic", ["covariance", "symmetrised", "joseph"])
+def test_short_words_break_the_forms_with_covariances(arithmetic, ill_conditioned):
+    # The ratio of variances is 1e12, the word has 24 digits (1.7e7).  About 3 runs of 4 fail, on any processor more than 1 of 3.
+    short, prior, y, right = ill_conditioned
+    laws = run(short, prior, y, arithmetic=arithmetic).posterior
+    assert lost(laws, right) > 1 / 3
+    negative = (np.diagonal(laws.cov, axis1=-2, axis2=-1) < 0).any(axis=(0, 2))
+    assert negative.mean() > 1 / 3
+    symmetric_always = np.array_equal(laws.cov, laws.cov.swapaxes(-1, -2))
+    assert symmetric_always == (arithmetic != "covariance")
+
+
+def test_short_words_do_not_break_the_square_root(ill_conditioned):
+    short, prior, y, right = ill_conditioned
+    laws = run(short, prior, y, arithmetic="square-root").posterior
+    assert lost(laws, right) == 0
+    # The condition number of the root is 1e6: with rounding of 6e-8 and 40 steps, below 0.3 for all 300 starts.
+    np.testing.assert_allclose(laws.cov[5:], right.cov[5:], rtol=0.3, atol=0.3 * abs(right.cov[5:]).max())
+    assert (np.diagonal(laws.cov, axis1=-2, axis2=-1) >= 0).all()
+
+
+def test_a_well_conditioned_start_breaks_nothing(ill_conditioned):
+    short, _, y, _ = ill_conditioned
+    prior = Gaussian(np.zeros(3), 0.01 * np.eye(3))
+    right = run(short.astype(float), prior, y.astype(float), arithmetic="square-root").posterior
+    for arithmetic in FORMS:
+        assert lost(run(short, prior, y, arithmetic=arithmetic).posterior, right) == 0
+
+
+def test_bierman_s_case_against_rational_numbers():
+    # Two nearly equal measurements with the small noise delta: condition number of p 3e8.
+    delta = float(np.float32(1 + 1e-4) - np.float32(1))
+    one = LinearSystem(np.diag([1, 1 + delta]), np.ones((1, 2)), np.zeros((2, 2)), np.array([[float(np.float32(delta**2))]]))
+
+    def exact(matrix):
+        return np.vectorize(lambda entry: Fraction(float(entry)), otypes=[object])(matrix)
+
+    A, H, R, P = (exact(matrix) for matrix in (one.A, one.H, one.R, np.eye(2)))
+    for k in range(2):
+        P = A @ P @ A.T if k else P
+        P = P - P @ H.T @ H @ P / (H @ P @ H.T + R)[0, 0]
+
+    def error(arithmetic, dtype):
+        """Relative error of the variance of x1 + x2, found from the root where there is one."""
+        system, chosen = one.astype(dtype), form(arithmetic, one)
+        state = chosen.start(Gaussian(np.zeros((1, 2), dtype), np.eye(2, dtype=dtype)))
+        state = chosen.correct(system, state, np.zeros((1, 1), dtype))
+        state = chosen.correct(system, chosen.predict(system, state, 0.0), np.zeros((1, 1), dtype))
+        root = exact(state.root.reshape(2, 2)) if arithmetic == "square-root" else None
+        cov = exact(state.cov.reshape(2, 2)) if root is None else root @ root.T
+        return abs(float((cov.sum() - P.sum()) / P.sum()))
+
+    # Rounding 6e-8 or 1e-16; the root's condition number is 2e4, the covariance's 3e8.  A factor of 10 for the dozen operations.
+    assert error("square-root", np.float32) < 6e-8 * 2e4 * 10
+    assert error("square-root", float) < 1.1e-16 * 2e4 * 10
+    assert all(error(name, np.float32) > 1 for name in ("covariance", "symmetrised", "joseph"))
+    assert error("covariance", float) > error("square-root", float)
+
+
+# ---------------------------------------------------------------- the pieces of the square root
+
+
+@pytest.mark.parametrize("shape", [(2, 4), (3, 3), (1, 5), (4, 4)])
+@pytest.mark.parametrize("dtype", [np.float32, float])
+def test_triangular_roots(shape, dtype):
+    wide = np.random.default_rng(1).normal(size=(7, *shape)).astype(dtype)
+    wide[2] = 0  # what is known exactly
+    wide[3, 0] = 0
+    wide[4] *= 1e-25  # squares of float32 end at 1e-38
+    wide[5, 0] = 1e-5 * wide[5, 0]  # a reflection of the wrong sign would cancel all digits
+    wide[5, 0, 0] = -1
+    lower = _triangular(wide)
+    assert lower.dtype == dtype
+    assert np.array_equal(lower, np.tril(lower))
+    exact = wide.astype(float) @ wide.astype(float).swapaxes(1, 2)
+    found = lower.astype(float) @ lower.astype(float).swapaxes(1, 2)
+    # Backward error of Householder's transformation: a few roundings of the norm of each row.
+    size = np.sqrt(np.einsum("kii->ki", exact))
+    bound = 20 * np.finfo(dtype).eps * size[:, :, None] * size[:, None, :]
+    assert (abs(found - exact) <= bound).all()
+
+
+def test_the_triangular_root_is_that_of_a_library():
+    wide = np.random.default_rng(2).normal(size=(3, 5))
+    reference = scipy.linalg.qr(wide.T, mode="economic")[1].T
+    np.testing.assert_allclose(abs(_triangular(wide)), abs(reference), rtol=1e-12)  # up to signs of the columns
+    # Short words are computed with, not only rounded to at the end.
+    short = wide.astype(np.float32)
+    long = scipy.linalg.qr(short.astype(float).T, mode="economic")[1].T
+    assert not np.array_equal(abs(_triangular(short)), abs(long).astype(np.float32))
+
+
+# ---------------------------------------------------------------- errors
+
+
+GOOD = {"A": np.eye(2), "H": np.ones((1, 2)), "Q": np.eye(2), "R": np.eye(1), "B": np.ones((2, 1))}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("A", np.ones(2), "A must be a matrix"),
+        ("A", np.ones((2, 3)), r"A has the shape \(2, 3\); with 2 states and 1 measurements it is \(2, 2\)"),
+        ("H", np.ones((1, 3)), "H has the shape"),
+        ("Q", np.eye(3), "Q has the shape"),
+        ("R", np.eye(2), "R has the shape"),
+        ("B", np.ones((3, 1)), "B has 3 rows; with 2 states it has 2"),
+        ("A", np.array([[1, np.nan], [0, 1]]), "A must be finite"),
+        ("Q", np.array([[1, 0.5], [0, 1]]), "Q is a covariance and must be symmetric"),
+        ("Q", np.array([[1.0, 2], [2, 1]]), "Q is a covariance and must not be negative"),
+        ("R", np.array([[-1.0]]), "R is a covariance and must not be negative"),
+    ],
+)
+def test_a_system_that_is_none(name, value, message):
+    with pytest.raises(ValueError, match=message):
+        LinearSystem(**(GOOD | {name: value}))
+
+
+GOOD_PRIOR = Gaussian(np.zeros(2), np.eye(2))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"y": np.zeros((4, 1))}, r"shape \(steps, runs, 1\), got \(4, 1\)"),
+        ({"y": np.zeros((4, 3, 2))}, r"shape \(steps, runs, 1\)"),
+        ({"u": np.zeros((3, 3, 1))}, r"inputs must have the shape \(4, 3, 1\)"),
+        ({"u": np.zeros((4, 2, 1))}, r"or \(4, 1, 1\) for all runs"),
+        ({"u": np.zeros((4, 3, 2))}, "inputs must have the shape"),
+        ({"u": np.full((4, 3, 1), np.nan)}, "inputs must be finite"),
+        ({"prior": Gaussian(np.zeros(3), np.eye(2))}, "prior's mean must have the shape"),
+        ({"prior": Gaussian(np.zeros(2), np.eye(3))}, "prior's covariance must have the shape"),
+        ({"prior": Gaussian(np.zeros(2), np.diag([1, np.inf]))}, "prior must be finite"),
+        ({"arithmetic": "exact"}, "no form 'exact' of the Kalman filter; known: covariance, symmetrised"),
+    ],
+)
+def test_arguments_that_do_not_fit(change, message):
+    arguments = {"system": LinearSystem(**GOOD), "prior": GOOD_PRIOR, "y": np.zeros((4, 3, 1))} | change
+    with pytest.raises(ValueError, match=message):
+        run(**arguments)
+
+
+def test_an_input_without_its_matrix():
+    bare = LinearSystem(**(GOOD | {"B": None}))
+    with pytest.raises(ValueError, match="no matrix B"):
+        run(bare, GOOD_PRIOR, np.zeros((4, 3, 1)), np.zeros((4, 3, 1)))
+    with pytest.raises(ValueError, match="no matrix B"):
+        simulate(bare, GOOD_PRIOR, 4, 3, 1, np.zeros((4, 3, 1)))
+
+
+def test_the_square_root_needs_noise_of_the_meter():
+    silent = LinearSystem(**(GOOD | {"R": np.zeros((1, 1))}))
+    with pytest.raises(ValueError, match="R must be positive definite; use joseph"):
+        run(silent, GOOD_PRIOR, np.zeros((4, 3, 1)), arithmetic="square-root")
+    for arithmetic in ("covariance", "symmetrised", "joseph"):
+        law = run(silent, GOOD_PRIOR, np.ones((1, 1, 1)), arithmetic=arithmetic).posterior
+        np.testing.assert_allclose(law.mean[0, 0], [0.5, 0.5], rtol=1e-14)  # x1 + x2 = 1 exactly
+        np.testing.assert_allclose(law.cov[0, 0], [[0.5, -0.5], [-0.5, 0.5]], rtol=1e-14)

@@ -1,0 +1,332 @@
+"""What a comparison reports: against direct per-trajectory formulas, theory, and the page's table."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from kfcourse.filters.approximations import aof
+from kfcourse.filters.conditionally_optimal import duof
+from kfcourse.filters.kalman import kalman
+from kfcourse.filters.modified_structure import mfos
+from kfcourse.filters.optimal_structure import fos
+from kfcourse.montecarlo.ensemble import BLOCK, Ensemble
+from kfcourse.montecarlo.experiment import compare, run
+from kfcourse.montecarlo.statistics import BATCHES, batch_mean
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.structure import gaussian, linearised
+
+SIGMA = 4  # standard errors: one chance in 16 000 a comparison
+BATCH_ERROR = 1 / np.sqrt(2 * (BATCHES - 1))  # relative error of a standard error from so many batches
+
+
+@pytest.fixture(scope="module")
+def linear():
+    return Model.define(
+        ["0.9*x1 + 0.2*x2 + 0.3*v1", "0.8*x2 + v2"], ["x1 + w1", "x2 - x1 + 0.5*w2"],
+        prior={"mean": [1, -2], "variance": [[2, 0.5], [0.5, 1]]}, meter_noise={"variance": [[1, 0.2], [0.2, 2]]},
+    )  # fmt: skip
+
+
+def stored(model, runs, steps, seed):
+    """The trajectories of compare(..., seed): x (steps, runs, n) and y (steps, runs, p)."""
+    ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(seed).spawn(2)[0])
+    blocks = [list(ensemble.block(index)) for index in range(len(ensemble.sizes))]
+    return tuple(np.stack([np.concatenate([block[k][i] for block in blocks]) for k in range(steps)]) for i in (0, 1))
+
+
+RUNS, STEPS, SEED = 6000, 4, 5
+
+
+@pytest.fixture(scope="module")
+def direct(linear):
+    """The comparison, and errors and covariances of each trajectory kept beside it."""
+    filters = [aof(gaussian(linear)), duof(linear), replace(kalman(linear), name="other")]
+    wrong = Model.define(
+        list(linear.state_equation),
+        list(linear.meter_equation),
+        prior={"variance": 9},
+        symbols={"v": ["v1", "v2"], "w": ["w1", "w2"]},
+    )
+    filters[2] = replace(kalman(wrong), name="wrong")
+    result = compare(filters, linear, RUNS, STEPS, SEED, progress=False)
+    x, y = stored(linear, RUNS, STEPS, SEED)
+    found = {one.name: run(one, y) for one in (filters[0], filters[2])}
+    return result, {name: (x - estimate.mean, estimate.cov) for name, estimate in found.items()}
+
+
+def batches(values):
+    """Sums over the batches of one block: values (..., runs)."""
+    edges = np.linspace(0, RUNS, BATCHES + 1).astype(int)
+    return np.add.reduceat(values, edges[:-1], axis=-1), np.diff(edges).astype(float)
+
+
+def agree(estimate, values):
+    """The estimate is the mean of per-trajectory values (..., runs), with the standard error they have."""
+    np.testing.assert_allclose(estimate.value, values.mean(axis=-1), rtol=1e-11, atol=1e-13)
+    np.testing.assert_allclose(estimate.standard_error, batch_mean(*batches(values)).standard_error, rtol=1e-9, atol=1e-13)
+    exact = values.std(axis=-1) / np.sqrt(values.shape[-1])
+    assert (abs(estimate.standard_error / exact - 1) < SIGMA * BATCH_ERROR).all()
+
+
+def test_the_statistics_are_those_of_the_trajectories(direct):
+    result, errors = direct
+    for name, (error, cov) in errors.items():
+        agree(result.error_variance(name), (error**2).sum(axis=-1))
+        agree(result.error_mean(name), np.moveaxis(error, 1, -1))
+        agree(result.component_variance(name), np.moveaxis(error**2, 1, -1))
+        normalised = np.einsum("kni,knij,knj->kn", error, np.linalg.inv(cov), error) / 2
+        agree(result.normalised_error(name), normalised)
+        np.testing.assert_allclose(result.own_variance(name).value, np.trace(cov, axis1=-2, axis2=-1).mean(axis=-1), rtol=1e-11)
+
+
+def test_differences_and_ratios_are_paired(direct):
+    result, errors = direct
+    ours, theirs = ((errors[name][0] ** 2).sum(axis=-1) for name in ("aof-gaussian", "wrong"))
+    agree(result.difference("wrong", "aof-gaussian"), theirs - ours)
+    ratio = result.relative("wrong", "aof-gaussian")
+    np.testing.assert_allclose(ratio.value, theirs.mean(axis=1) / ours.mean(axis=1), rtol=1e-11)
+    influence = (theirs - ratio.value[:, None] * ours) / ours.mean(axis=1, keepdims=True)
+    np.testing.assert_allclose(ratio.standard_error, batch_mean(*batches(influence)).standard_error, rtol=1e-9)
+    for score in (result.score("wrong"), result.score_difference("wrong", "aof-gaussian")):
+        np.testing.assert_allclose(score.standard_error, batch_mean(*batches(influence.mean(axis=0))).standard_error, rtol=1e-9)
+    assert float(result.score("wrong").value) == pytest.approx(ratio.value.mean(), rel=1e-11)
+    assert float(result.score_difference("wrong", "aof-gaussian").value) == pytest.approx(ratio.value.mean() - 1, rel=1e-11)
+
+
+def test_pairing_pays(direct):
+    result, _ = direct
+    paired = result.difference("duof", "aof-gaussian").standard_error
+    separate = np.hypot(result.error_variance("duof").standard_error, result.error_variance("aof-gaussian").standard_error)
+    assert (paired < separate / 3).all()
+
+
+def test_a_filter_does_not_differ_from_itself(direct):
+    result, _ = direct
+    own = result.difference("duof", "duof")
+    assert not own.value.any()
+    assert not own.standard_error.any()
+    ratio = result.relative("duof", "duof")
+    assert (ratio.value == 1).all()
+    assert (ratio.standard_error == 0).all()
+
+
+def test_an_unknown_name_is_answered_with_the_known_ones(direct):
+    result, _ = direct
+    for ask in (result.error_variance, result.error_mean, result.normalised_error, result.relative, result.score):
+        with pytest.raises(KeyError, match="aof-gaussian, duof, wrong"):
+            ask("ekf")
+
+
+def test_the_optimal_filter_s_own_covariance_is_right_and_no_other_is_better(direct):
+    result, _ = direct
+    normalised = result.normalised_error("aof-gaussian")
+    assert (abs(normalised.value - 1) < SIGMA * normalised.standard_error).all()
+    claimed, actual = result.own_variance("aof-gaussian").value, result.error_variance("aof-gaussian")
+    assert (abs(claimed - actual.value) < SIGMA * actual.standard_error).all()
+    bias = result.error_mean("aof-gaussian")
+    assert (abs(bias.value) < SIGMA * bias.standard_error).all()
+    for name in ("duof", "wrong"):
+        gap = result.difference(name, "aof-gaussian")
+        assert (gap.value > -SIGMA * gap.standard_error).all()
+
+
+def test_the_ranking_is_by_mean_relative_variance(direct):
+    result, _ = direct
+    ranking = result.ranking()
+    assert sorted(name for name, _ in ranking) == sorted(result.names)
+    values = [float(estimate.value) for _, estimate in ranking]
+    assert values == sorted(values)
+    assert ranking[-1][0] == "wrong"
+
+
+def test_intervals_are_student_s(direct):
+    estimate = direct[0].error_variance("duof")
+    low, high = estimate.interval(0.9)
+    half = stats.t.ppf(0.95, BATCHES - 1) * estimate.standard_error
+    np.testing.assert_allclose(high - estimate.value, half, rtol=1e-9)
+    np.testing.assert_allclose(estimate.value - low, half, rtol=1e-9)
+    for confidence in (0, 1, 95):
+        with pytest.raises(ValueError, match="confidence"):
+            estimate.interval(confidence)
+
+
+def test_intervals_cover_the_truth_as_often_as_they_say(linear):
+    """95 % intervals of D_0 over 200 independent comparisons: the binomial's 4 standard errors around 190."""
+    truth = float(np.trace(kalman(linear).step(kalman(linear).init(1), np.zeros((1, 2))).posterior.cov))
+    hits = 0
+    for seed in range(200):
+        low, high = (
+            compare([kalman(linear)], linear, 400, 1, seed, threads=1, progress=False).error_variance("kalman").interval(0.95)
+        )
+        hits += bool(low[0] < truth < high[0])
+    assert abs(hits - 190) < SIGMA * np.sqrt(200 * 0.95 * 0.05)
+
+
+def test_batches_of_unequal_size_are_weighed():
+    rng = np.random.default_rng(0)
+    counts = np.array([50.0] * 60 + [1.0, 20.0, 30.0])
+    errors, found = [], []
+    for _ in range(300):
+        sample = rng.normal(3.0, 2.0, size=int(counts.sum()))
+        estimate = batch_mean(np.add.reduceat(sample, np.concatenate([[0], np.cumsum(counts[:-1])]).astype(int)), counts)
+        errors.append(float(estimate.value) - 3.0)
+        found.append(float(estimate.standard_error))
+    # The average of SE^2 is the variance of the mean: known from 300 repetitions of 63 batches, its weights to 1/60.
+    exact = 4.0 / counts.sum()
+    assert np.mean(np.square(found)) == pytest.approx(exact, rel=SIGMA * np.sqrt(2 / 300 / 60) + 1 / 60)
+    assert np.var(errors) == pytest.approx(exact, rel=SIGMA * np.sqrt(2 / 300))
+
+
+def test_one_trajectory_has_no_standard_error(linear):
+    estimate = compare([kalman(linear)], linear, 1, 2, seed=1, progress=False).error_variance("kalman")
+    assert np.isfinite(estimate.value).all()
+    assert np.isnan(estimate.standard_error).all()
+
+
+@pytest.mark.parametrize("runs", [700, BLOCK + 1])
+def test_a_slow_filter_is_found_through_its_difference_from_the_control(variant53, runs):
+    control, slow = aof(gaussian(variant53)), replace(aof(linearised(variant53)), name="slow", slow=True)
+    result = compare([control, slow], variant53, runs, 4, seed=3, subset_runs=500, progress=False)
+    assert result.subset_runs == 500
+    x, y = stored(variant53, runs, 4, 3)
+    ours, theirs = ((x - run(one, y).mean)[..., 0] ** 2 for one in (control, slow))
+    expected = ours.mean(axis=1) + (theirs - ours)[:, :500].mean(axis=1)
+    np.testing.assert_allclose(result.error_variance("slow").value, expected, rtol=1e-10)
+    np.testing.assert_allclose(
+        result.difference("slow", "aof-gaussian").value, (theirs - ours)[:, :500].mean(axis=1), rtol=1e-8, atol=1e-16
+    )
+    # the standard error of the difference is that of 500 trajectories
+    exact = (theirs - ours)[:, :500].std(axis=1) / np.sqrt(500)
+    found = result.difference("slow", "aof-gaussian").standard_error
+    assert (found > 0).all()
+    # from about 16 x 8 batches of 4 heavy-tailed values: not better than a factor 2
+    assert ((found > exact / 2) & (found < 2 * exact)).all()
+
+
+def test_a_slow_filter_on_all_trajectories_is_as_good_as_a_fast_one(variant53):
+    control, fast = aof(gaussian(variant53)), aof(linearised(variant53))
+    slow = replace(fast, name="slow", slow=True)
+    result = compare([control, fast, slow], variant53, 640, 3, seed=3, subset_runs=640, progress=False)
+    np.testing.assert_allclose(result.error_variance("slow").value, result.error_variance("aof-linearised").value, rtol=1e-11)
+
+
+def test_the_excess_over_the_optimal_filter_is_the_distance_from_it(linear):
+    """For a linear model the Kalman filter is exact: M|x - z|^2 - M|x - z_exact|^2 = M|z - z_exact|^2."""
+    exact, other = replace(kalman(linear), name="aof-exact", slow=True), duof(linear)
+    result = compare(
+        [aof(gaussian(linear)), other, exact], linear, 3000, 3, seed=8, design_runs=100, subset_runs=2000, progress=False
+    )
+    excess, gap = result.excess("duof"), result.difference("duof", "aof-exact")
+    # A design on 100 trajectories errs by per cents, so the excess is far above its noise.
+    assert (excess.value > SIGMA * excess.standard_error).any()
+    assert (abs(gap.value - excess.value) < SIGMA * np.hypot(gap.standard_error, excess.standard_error)).all()
+    assert (excess.standard_error < gap.standard_error).all()
+    # Here the control is the exact filter too: no excess, and the bound is the variance that both claim.
+    np.testing.assert_allclose(result.excess("aof-gaussian").value, 0, atol=1e-20)
+    bound, actual = result.bound().value, result.error_variance("duof")
+    np.testing.assert_allclose(bound, result.own_variance("aof-gaussian").value, rtol=1e-12)
+    above = result.above_bound("duof")
+    np.testing.assert_allclose(above.value, actual.value / bound - 1, rtol=1e-9)
+    np.testing.assert_allclose(above.standard_error, actual.standard_error / bound, rtol=1e-9)
+    optimal = result.above_bound("aof-gaussian")
+    assert (abs(optimal.value) < SIGMA * optimal.standard_error).all()
+
+
+def test_without_a_subset_slow_filters_are_left_out(variant53):
+    slow = replace(aof(linearised(variant53)), name="slow", slow=True)
+    result = compare([aof(gaussian(variant53)), slow], variant53, 50, 2, seed=3, subset_runs=0, progress=False)
+    assert result.available == ("aof-gaussian",)
+    with pytest.raises(KeyError, match="slow"):
+        result.error_variance("slow")
+    for filters in ([slow], []):
+        with pytest.raises(ValueError, match=r"fast|at least one|subset"):
+            compare(filters, variant53, 50, 2, seed=3, progress=False)
+
+
+def test_where_all_errors_are_zero_filters_are_equal(variant53):
+    known = Model.define("0.9*x + 0.05*x*v", "x + 0.02*x**2*w", prior={"variance": 0})
+    result = compare([aof(gaussian(known)), aof(linearised(known))], known, 200, 3, seed=1, progress=False)
+    assert not result.error_variance("aof-linearised").value.any()
+    assert (result.relative("aof-linearised").value == 1).all()
+    assert result.score("aof-linearised").standard_error == 0
+
+
+# ---------------------------------------------------------------- the table of the page
+
+PAGE_RUNS = 1_000_000
+COLUMNS = ("aof-gaussian", "aof-linearised", "duof", "fos-gaussian", "fos-linearised", "mfos-gaussian", "mfos-linearised")
+PAGE = {  # D_k x 10^4, last digit
+    1: ((6.506, 6.572, 6.478, 6.507, 6.486, 6.435, 6.424), 0.001),
+    2: ((4.238, 4.240, 4.466, 4.333, 4.321, 4.298, 4.293), 0.001),
+    3: ((2.853, 2.853, 3.018, 2.903, 2.897, 2.888, 2.885), 0.001),
+    5: ((1.349, 1.350, 1.422, 1.360, 1.359, 1.358, 1.357), 0.001),
+    10: ((0.1977, 0.1977, 0.2042, 0.1979, 0.1979, 0.1979, 0.1979), 0.0001),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def lab_filters(variant53):
+    structures = gaussian(variant53), linearised(variant53)
+    return [*(aof(one) for one in structures), duof(variant53), *(family(one) for family in (fos, mfos) for one in structures)]
+
+
+@pytest.fixture(scope="module")
+def lab(lab_filters, variant53):
+    return compare(lab_filters, variant53, 200_000, 11, seed=53, same_ensemble=True, progress=False)
+
+
+@pytest.mark.parametrize("k", PAGE)
+@pytest.mark.parametrize("name", COLUMNS)
+def test_the_table_of_the_page_is_reproduced(lab, name, k):
+    printed, digit = PAGE[k]
+    # Two independent ensembles: ours, and the page's of 10^6, whose error is ours times the root of the sizes' ratio.
+    both = np.sqrt(1 + lab.runs / PAGE_RUNS)
+    reference = printed[COLUMNS.index(name)] * 1e-4
+    found = lab.error_variance(name)[k]
+    assert abs(found.value - reference) < SIGMA * both * found.standard_error + 0.5e-4 * digit
+
+
+REPEATS = 8
+
+
+@pytest.fixture(scope="module")
+def repeated(lab_filters, variant53):
+    """Ratios to the Gaussian AOF, (repeats, filters, steps), in independent runs that together are as large as the page's."""
+    ratios = []
+    for seed in range(REPEATS):
+        result = compare(lab_filters, variant53, PAGE_RUNS // REPEATS, 11, seed, same_ensemble=True, progress=False)
+        ratios.append([result.relative(name, "aof-gaussian").value for name in COLUMNS])
+    return np.array(ratios)
+
+
+@pytest.mark.parametrize("k", PAGE)
+def test_the_ratios_to_the_gaussian_aof_are_the_page_s(repeated, k):
+    """Ratios on common trajectories are known far better than the variances themselves.
+
+    Their error is taken from the scatter of independent runs, each with a design of its own: a standard error from
+    one run holds for the filter as designed there, and does not know how much its coefficients would vary.
+    """
+    printed, digit = PAGE[k]
+    printed = np.array(printed)
+    ratios = repeated[:, :, k]
+    # Our mean and the page's run have the same size, so the same error; Student's quantile of 4 sigma for 8 runs.
+    error = np.sqrt(2) * ratios.std(axis=0, ddof=1) / np.sqrt(REPEATS)
+    quantile = stats.t.isf(stats.norm.sf(SIGMA), REPEATS - 1)
+    rounding = 0.5 * digit / printed[0] * (1 + printed / printed[0])
+    assert (abs(ratios.mean(axis=0) - printed / printed[0]) < quantile * error + rounding).all()
+
+
+def test_at_the_start_all_filters_are_near_the_page_s_value(lab):
+    for name in COLUMNS:
+        found = lab.error_variance(name)[0]
+        # "all near 11.92": filters of one step differ by less than a per cent
+        assert abs(found.value - 11.92e-4) < SIGMA * np.sqrt(1.2) * found.standard_error + 0.01 * 11.92e-4
+
+
+@pytest.mark.parametrize("name", sorted(set(COLUMNS) - {"duof"}))
+def test_from_the_second_step_on_the_duof_is_the_least_accurate(lab, name):
+    # Averaged over k = 2 ... 10, where the page's table has the DUOF last in every row.
+    low, _ = lab.score_difference("duof", name, slice(2, None)).interval(0.95)
+    assert low > 0

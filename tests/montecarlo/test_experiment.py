@@ -1,0 +1,244 @@
+"""The Monte Carlo engine: trajectories follow the model, and nothing but the seed decides the numbers."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from kfcourse.filters.approximations import aof
+from kfcourse.filters.conditionally_optimal import duof
+from kfcourse.filters.kalman import kalman
+from kfcourse.filters.modified_structure import mfos
+from kfcourse.filters.optimal_structure import fos
+from kfcourse.montecarlo.designing import NotFinite
+from kfcourse.montecarlo.ensemble import BLOCK, SMALL_BLOCK, Ensemble, simulate, workers
+from kfcourse.montecarlo.experiment import compare, run
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.structure import gaussian, linearised
+
+SIGMA = 4  # standard errors: one chance in 16 000 a comparison
+
+
+def lab_of(model):
+    structures = [gaussian(model), linearised(model)]
+    return [*(aof(one) for one in structures), duof(model), *(family(one) for family in (fos, mfos) for one in structures)]
+
+
+@pytest.fixture(scope="module")
+def vector():
+    return Model.define(
+        ["0.9*x1 + 0.2*x2 + 0.3*v1", "0.8*x2 + v2 - v3"], ["x1 + w1", "x2 - x1 + 0.5*w2"],
+        prior={"mean": [1, -2], "variance": [[2, 0.5], [0.5, 1]]},
+        state_noise={"mean": [1, 0, -1], "variance": [[2, 0.3, 0], [0.3, 1, 0.5], [0, 0.5, 3]]},
+        meter_noise={"mean": 0.5, "variance": [[1, 0.2], [0.2, 2]]},
+    )  # fmt: skip
+
+
+# ---------------------------------------------------------------- simulation
+
+
+def test_trajectories_satisfy_the_equations(vector):
+    x, y = simulate(vector, 1000, 5, seed=3)
+    assert (x.shape, y.shape) == ((5, 1000, 2), (5, 1000, 2))
+    # What the equations leave is noise: v and w recovered from x and y.
+    v1 = (x[1:, :, 0] - 0.9 * x[:-1, :, 0] - 0.2 * x[:-1, :, 1]) / 0.3
+    difference = x[1:, :, 1] - 0.8 * x[:-1, :, 1]
+    w = np.stack([y[..., 0] - x[..., 0], (y[..., 1] - x[..., 1] + x[..., 0]) / 0.5])
+    for sample, mean, variance in ((v1, 1, 2), (difference, 1, 1 + 3 - 2 * 0.5), (w[0], 0.5, 1), (w[1], 0.5, 2)):
+        n = sample.size
+        assert abs(sample.mean() - mean) < SIGMA * np.sqrt(variance / n)
+        assert abs(sample.var() - variance) < SIGMA * variance * np.sqrt(2 / n)
+    for left, right, cov, product in ((v1, difference, 0.3, 2 * 3), (w[0], w[1], 0.2, 1 * 2)):
+        found = np.mean((left - left.mean()) * (right - right.mean()))
+        assert abs(found - cov) < SIGMA * np.sqrt((product + cov**2) / left.size)
+    # independent of one another and in time
+    for left, right in ((v1, w[0][:-1]), (v1[1:], v1[:-1]), (w[1][1:], w[1][:-1]), (v1, x[:-1, :, 0])):
+        assert abs(np.corrcoef(left.ravel(), right.ravel())[0, 1]) < SIGMA / np.sqrt(left.size)
+
+
+def test_the_prior_is_drawn_as_given(vector):
+    x, n = simulate(vector, 20_000, 1, seed=5).x[0], 20_000
+    np.testing.assert_allclose(x.mean(axis=0), [1, -2], rtol=0, atol=SIGMA * np.sqrt(2 / n))
+    found, cov = np.cov(x.T), vector.prior.cov
+    error = np.sqrt((np.outer(np.diag(cov), np.diag(cov)) + cov**2) / n)  # Var of a sample covariance of Gaussians
+    assert (abs(found - cov) < SIGMA * error).all()
+
+
+def test_variant_53_decays_as_the_page_says(variant53):
+    # Var x_k = (c^2 + e^2)^k; x is heavy-tailed, so the standard error is taken from the sample itself.
+    squares = simulate(variant53, 20_000, 12, seed=2).x[..., 0] ** 2
+    expected = (0.9**2 + 0.05**2) ** np.arange(12)
+    assert (abs(squares.mean(axis=1) - expected) < SIGMA * squares.std(axis=1) / np.sqrt(20_000)).all()
+
+
+def test_the_seed_decides_the_trajectories(variant53):
+    first, again, other = simulate(variant53, 50, 7, 1), simulate(variant53, 50, 7, 1), simulate(variant53, 50, 7, 2)
+    np.testing.assert_array_equal(first.y, again.y)
+    assert not np.isin(first.x[0], other.x[0]).any()
+
+
+@pytest.mark.parametrize("runs", [1, 3, 2 * SMALL_BLOCK - 1, 2 * SMALL_BLOCK, BLOCK - 1, BLOCK + 1, 3 * BLOCK])
+def test_blocks_are_nearly_equal_and_none_is_too_long(variant53, runs):
+    sizes = Ensemble(variant53, runs, 1, np.random.SeedSequence(0)).sizes
+    assert sum(sizes) == runs
+    assert max(sizes) <= BLOCK
+    assert max(sizes) - min(sizes) <= 1
+    assert len(sizes) >= 2 or runs < 2 * SMALL_BLOCK
+
+
+@pytest.mark.parametrize("runs", [1, 3, 2 * SMALL_BLOCK + 1])
+@pytest.mark.parametrize("threads", [1, 3])
+def test_by_step_and_by_block_are_the_same_trajectories(variant53, runs, threads):
+    ensemble = Ensemble(variant53, runs, 5, np.random.SeedSequence(6))
+    blocks = [list(ensemble.block(index)) for index in range(len(ensemble.sizes))]
+    with workers(threads) as pool:
+        steps = list(ensemble.by_step(pool))
+    assert (len(steps), len(blocks), sum(ensemble.sizes)) == (5, len(ensemble.sizes), runs)
+    for k, step in enumerate(steps):
+        for block, moment in zip(blocks, step, strict=True):
+            for a, b in zip(block[k], moment, strict=True):
+                np.testing.assert_array_equal(a, b)
+
+
+# ---------------------------------------------------------------- run
+
+
+@pytest.mark.parametrize("kind", ["variant53", "vector"])
+def test_one_trajectory_gets_the_numbers_it_gets_in_the_ensemble(kind, request):
+    model = request.getfixturevalue(kind)
+    y = simulate(model, 30, 10, seed=1).y
+    for build in (gaussian, linearised):
+        together = run(aof(build(model)), y)
+        for i in (0, 29):
+            alone = run(aof(build(model)), y[:, i : i + 1])
+            # the library's matrix products may add in another order: a few roundings a step
+            np.testing.assert_allclose(alone.mean[:, 0], together.mean[:, i], rtol=1e-12, atol=1e-14)
+            np.testing.assert_allclose(alone.cov[:, 0], together.cov[:, i], rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("shape", [(5,), (5, 3), (5, 3, 1, 1)])
+def test_measurements_of_another_shape_are_refused(variant53, shape):
+    with pytest.raises(ValueError, match=r"shape \(steps, runs, p\)"):
+        run(aof(linearised(variant53)), np.zeros(shape))
+
+
+@pytest.mark.parametrize("kind", ["variant53", "vector"])
+def test_measurements_of_another_size_are_refused(kind, request):
+    model = request.getfixturevalue(kind)
+    for build in (lambda m: aof(linearised(m)), lambda m: aof(gaussian(m))):
+        with pytest.raises(ValueError, match=r"[0-9]"):
+            run(build(model), np.zeros((4, 3, 3)))
+
+
+# ---------------------------------------------------------------- compare
+
+
+def numbers(comparison):
+    return [getattr(comparison.sums, name) for name in ("counts", "error", "square", "own", "normalised")]
+
+
+@pytest.mark.parametrize("runs", [37, 2 * SMALL_BLOCK + 1234])
+def test_the_number_of_threads_changes_nothing(variant53, runs):
+    results = [compare(lab_of(variant53), variant53, runs, 6, seed=7, threads=threads, progress=False) for threads in (1, 2, 3)]
+    for other in results[1:]:
+        for first, second in zip(numbers(results[0]), numbers(other), strict=True):
+            np.testing.assert_array_equal(first, second)
+
+
+def test_the_seed_changes_everything(variant53):
+    first, second = (compare([aof(gaussian(variant53))], variant53, 100, 3, seed=seed, progress=False) for seed in (1, 2))
+    assert (first.error_variance("aof-gaussian").value != second.error_variance("aof-gaussian").value).all()
+
+
+def test_a_filter_s_numbers_do_not_depend_on_its_company(variant53):
+    filters = lab_of(variant53)
+    together = compare(filters, variant53, 500, 4, seed=7, progress=False)
+    for filter_ in (filters[0], filters[2], filters[5]):
+        alone = compare([filter_], variant53, 500, 4, seed=7, progress=False)
+        np.testing.assert_array_equal(alone.error_variance(filter_.name).value, together.error_variance(filter_.name).value)
+
+
+@pytest.mark.parametrize(("runs", "steps"), [(1, 1), (2, 1), (1, 5), (3, 4), (127, 3), (129, 2)])
+@pytest.mark.filterwarnings("error")
+def test_small_experiments_run(vector, runs, steps):
+    result = compare(lab_of(vector), vector, runs, steps, seed=3, design_runs=200, progress=False)
+    for name in result.names:
+        assert result.error_variance(name).value.shape == (steps,)
+        assert np.isfinite(result.error_variance(name).value).all()
+        assert result.error_mean(name).value.shape == (steps, 2)
+
+
+def test_the_design_ensemble_is_another_one(variant53):
+    """On the design's own trajectories MFOS looks better than on fresh ones, and never worse than it would by chance."""
+    filters = [aof(gaussian(variant53)), mfos(gaussian(variant53))]
+    same = compare(filters, variant53, 60, 1, seed=11, same_ensemble=True, progress=False)
+    fresh = compare(filters, variant53, 60, 1, seed=11, progress=False)
+    np.testing.assert_array_equal(same.error_variance("aof-gaussian").value, fresh.error_variance("aof-gaussian").value)
+    # At k = 0 the MFOS's correction is the best affine one over its own ensemble: no other coefficients can be below.
+    assert same.error_variance("mfos-gaussian").value[0] < fresh.error_variance("mfos-gaussian").value[0]
+    assert same.error_variance("mfos-gaussian").value[0] <= same.error_variance("aof-gaussian").value[0]
+
+
+def test_memory_does_not_grow_with_the_number_of_steps(variant53):
+    filters, runs = [aof(gaussian(variant53)), duof(variant53)], 20_000
+
+    def peak(steps):
+        tracemalloc.start()
+        compare(filters, variant53, runs, steps, seed=1, threads=1, progress=False)
+        found = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return found
+
+    peak(4)  # what is compiled and cached once
+    # The sums: 2 filters x 60 more steps x 4 statistics x 128 batches x 8 bytes = 0.5 MB; trajectories would be 20 MB.
+    assert peak(80) - peak(20) < 1.5e6
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"runs": 0}, "runs"),
+        ({"runs": -5}, "runs"),
+        ({"runs": 10.5}, "runs"),
+        ({"runs": "10"}, "runs"),
+        ({"runs": True}, "runs"),
+        ({"steps": 0}, "steps"),
+        ({"steps": 2.0}, "steps"),
+        ({"threads": 0}, "threads"),
+        ({"design_runs": 0}, "runs"),
+        ({"seed": -1}, "negative|seed"),
+        ({"seed": "one"}, "seed"),
+        ({"seed": 1.5}, "seed"),
+        ({"seed": None}, "seed"),
+        ({"subset_runs": -1}, "subset_runs"),
+        ({"filters": []}, "at least one"),
+        ({"filters": "twice"}, "name of its own"),
+        ({"filters": "other model"}, "model"),
+    ],
+)
+def test_bad_arguments_are_value_errors_that_name_them(variant53, arguments, message):
+    one, other = aof(gaussian(variant53)), Model.define(["x1 + v1", "x2 + v2"], ["x1 + w1", "x2 + w2"])
+    filters = {"twice": [one, one], "other model": [one, duof(other)]}
+    call = {"filters": [one, duof(variant53)], "model": variant53, "runs": 10, "steps": 2, "seed": 1} | arguments
+    call["filters"] = filters.get(call["filters"], call["filters"]) if isinstance(call["filters"], str) else call["filters"]
+    with pytest.raises(ValueError, match=message):
+        compare(progress=False, **call)
+
+
+@pytest.mark.parametrize("filters", ["ready", "designed"])
+@pytest.mark.filterwarnings("error")
+def test_a_diverging_model_says_so(filters):
+    model = Model.define("x**3*2 + v", "x + w")
+    chosen = {"ready": [aof(linearised(model)), aof(gaussian(model))], "designed": [duof(model)]}[filters]
+    with pytest.raises(NotFinite, match=r"(become infinite|diverges)"):
+        compare(chosen, model, 200, 12, seed=1, progress=False)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_diverging_filter_is_named():
+    # Stable object, exact meter of sharp curvature: the trajectories stay finite.
+    model = Model.define("0.5*x + 0.1*v", "x + 0.1*w")
+    good = kalman(model)
+    bad = type(good)("bad", model, good.init, lambda state, y: good.step(state, np.where(state.step == 2, np.inf, y)))
+    with pytest.raises(NotFinite, match="step 2: bad became infinite or NaN although the trajectories are finite"):
+        compare([good, bad], model, 50, 4, seed=1, progress=False)

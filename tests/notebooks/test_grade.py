@@ -1,0 +1,776 @@
+"""Grading returned notebooks: only what the student wrote counts, and no notebook disturbs another."""
+
+import csv
+import io
+import json
+import os
+import shutil
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import nbformat
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from kfcourse import cli
+from kfcourse.checks import Exercise, engine, exercise
+from kfcourse.checks.question import MIME
+from kfcourse.notebooks.grading import grade as grading
+from kfcourse.notebooks.grading import watch
+from kfcourse.notebooks.grading.grade import Cell, Grade, Unreadable, assembled, cells_of, claimed, clean, read_table, write_table
+from kfcourse.notebooks.master import opened, render, solution, student
+
+FIXTURES = Path(__file__).parent / "fixtures"
+TINY = (FIXTURES / "b_aof" / "statement.md").read_text(encoding="utf-8")
+SECONDS = 15  # of a cell; the endless loop below takes so long
+MARKS = {f"b{i}": mark for i, mark in enumerate(("passed", "wrong", "unusable", "not implemented", "not run"), 1)}
+NEW = ("not implemented", "not implemented")
+
+
+def handed_out(variant="53"):
+    """The tiny set as a student gets it."""
+    return student(render(TINY, exercise("b", variant) if isinstance(variant, str) else variant), {})
+
+
+def solved(variant="53"):
+    return solution(render(TINY, exercise("b", variant)))
+
+
+def cell(notebook, start):
+    return next(cell for cell in notebook.cells if cell.source.startswith(start))
+
+
+def place(notebook, start):
+    """Number of a cell as a reader counts."""
+    return 1 + notebook.cells.index(cell(notebook, start))
+
+
+def change(notebook, start, old, new):
+    one = cell(notebook, start)
+    assert old in one.source
+    one.source = one.source.replace(old, new)
+    return notebook
+
+
+def add(notebook, source, before=None):
+    index = len(notebook.cells) if before is None else notebook.cells.index(cell(notebook, before))
+    notebook.cells.insert(index, nbformat.v4.new_code_cell(source))
+    return notebook
+
+
+# -- notebooks that students return
+
+
+def wrong():
+    notebook = change(solved(), "def gain", "np.linalg.solve(F, cross)", "cross")
+    return change(notebook, "def correct", "K = gain(Psi, G, F)", "K = -np.swapaxes(np.linalg.solve(F, G @ Psi), -1, -2)")
+
+
+def fakes_checks():
+    """Check cells that print a tick, with outputs that say passed."""
+    notebook = wrong()
+    for name in ("b1", "b2"):
+        one = cell(notebook, f'lab.check("{name}"')
+        data = {MIME: {"question": name, "status": "passed", "diagnosis": [], "message": "right"}, "text/plain": "✓"}
+        one.source, one.outputs = "print('✓ right')", [nbformat.v4.new_output("execute_result", data, execution_count=1)]
+    return notebook
+
+
+def shows_results():
+    """The answer itself shows a result that says passed."""
+    passed = {"question": "b1", "status": "passed", "diagnosis": [], "message": "right"}
+    lie = f"from IPython.display import display\n    display({{{MIME!r}: {passed}}}, raw=True)\n    cross = G @ Psi"
+    return change(wrong(), "def gain", "cross = G @ Psi", lie)
+
+
+def patches():
+    source = (
+        "from kfcourse.checks.engine import Result\n"
+        "type(lab).check = lambda self, name, answer: Result(name, '', 'passed', 'right')"
+    )
+    return add(handed_out(), source, "def gain")
+
+
+def deletes():
+    """No ids, no metadata, no checks, no opening cell; the answer in two cells; another name of the file."""
+    notebook = change(solved(), "def gain", "    cross = G @ Psi\n", "")
+    change(notebook, "def gain", "solve(F, cross)", "solve(F, product(G, Psi))")
+    add(notebook, "def product(A, B):\n    return A @ B", "def gain")
+    notebook.cells = [
+        cell for cell in notebook.cells if cell.cell_type == "code" and not cell.source.startswith(("lab.check", "import"))
+    ]
+    for one in notebook.cells:
+        one.metadata.clear()
+    return notebook
+
+
+def rewrites():
+    """The stub stays; the answer is at the end, behind a cell of trials."""
+    notebook = handed_out()
+    add(notebook, "trial = [1, 2]\n%matplotlib inline")
+    return add(notebook, cell(solved(), "def gain").source)
+
+
+def merges():
+    """Both answers and both checks in the first answer's cell."""
+    notebook = solved()
+    sources = [cell(notebook, start).source for start in ("def gain", "def correct", 'lab.check("b1"', 'lab.check("b2"')]
+    cell(notebook, "def gain").source = "\n".join(sources)
+    notebook.cells = [
+        one for one in notebook.cells if not one.source.startswith(("def correct", "lab.check")) or one.cell_type != "code"
+    ]
+    return notebook
+
+
+def opens_another():
+    return add(solved(), 'lab = exercise("b", variant="1")', "def gain")
+
+
+def imports():
+    """The opening cell is changed, and what it adds is needed."""
+    notebook = change(solved(), "import matplotlib", "import numpy as np", "import numpy as np\nfrom numpy.linalg import solve")
+    return change(notebook, "def gain", "np.linalg.solve", "solve")
+
+
+def takes_the_answer():
+    return change(solved(), "def gain", "    cross = G @ Psi", "    return lab.questions['b1'].answer(lab)(Psi, G, F)")
+
+
+def syntax():
+    return change(solved(), "def gain", "cross = G @ Psi", "cross = G @@ Psi")
+
+
+def loops():
+    return add(solved(), "while True:\n    pass", "def correct")
+
+
+def leaves(flag):
+    """Ends its kernel, and leaves a process behind."""
+    source = f"import os, subprocess\nopen({str(flag)!r}, 'w').write(str(subprocess.Popen(['sleep', '600']).pid))\nos._exit(1)"
+    return add(solved(), source, "def correct")
+
+
+def hungry():
+    return add(solved(), "block = np.ones(10**9)", "def correct")
+
+
+def floods():
+    return add(solved(), "while True:\n    print('x' * 10_000)", "def correct")
+
+
+def exits():
+    return add(solved(), "import sys\nsys.exit(1)", "def gain")
+
+
+def litters():
+    source = (
+        "import os, pathlib\n"
+        "for place in (pathlib.Path.home(), pathlib.Path()):\n"
+        "    assert list(place.glob('litter')) == []\n"
+        "    (place / 'litter').write_text('x')\n"
+        "assert 'KFCOURSE_SECRET' not in os.environ\n"
+        "answer = input()"
+    )
+    return add(solved(), source, "def gain")
+
+
+MINE = {"name": "mine", "state": "q*x + v", "meter": "x + w", "parameters": {"q": 0.5}}
+
+
+def claims(**claim):
+    notebook = solved()
+    notebook.metadata["kfcourse"].update(claim)
+    return notebook
+
+
+def fill(folder):
+    """Write the returned notebooks."""
+    own = Exercise("b", exercise("b", MINE).variant)
+    foreign = solved()
+    del foreign.metadata["kfcourse"]
+    notebooks = {
+        "М-1/Иванов Иван/b-aof": handed_out(),
+        "М-1/Петров/b-aof": solved("12"),
+        "wrong": wrong(),
+        "fakes-checks": fakes_checks(),
+        "shows-results": shows_results(),
+        "patches": patches(),
+        "deletes": deletes(),
+        "rewrites": rewrites(),
+        "merges": merges(),
+        "opens-another": opens_another(),
+        "imports": imports(),
+        "takes": takes_the_answer(),
+        "syntax": syntax(),
+        "loops": loops(),
+        "leaves": leaves(folder.parent / "pid"),
+        "hungry": hungry(),
+        "floods": floods(),
+        "exits": exits(),
+        "litters": litters(),
+        "litters-too": litters(),
+        "own-variant": solution(render(TINY, own)),
+        "foreign": foreign,
+        "unknown-set": claims(set="zz"),
+        "unknown-variant": claims(variant="no \x1b[31m such"),
+        ".ipynb_checkpoints/wrong-checkpoint": wrong(),
+    }
+    for name, notebook in notebooks.items():
+        path = folder / f"{name}.ipynb"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(notebook), encoding="utf-8")  # as it is: nbformat would mend some of them
+    (folder / "cut.ipynb").write_text(json.dumps(solved())[:500], encoding="utf-8")
+    (folder / "list.ipynb").write_text("[1, 2]", encoding="utf-8")
+
+
+class Graded(NamedTuple):
+    """What the command did: exit status, screen, table by the notebooks' names, and the folder."""
+
+    exit_code: int
+    output: str
+    table: dict
+    folder: Path
+
+
+@pytest.fixture(scope="module")
+def graded(tmp_path_factory):
+    """The returned notebooks, graded once for all test processes."""
+    base = tmp_path_factory.getbasetemp()
+    place = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "returned"
+    told = place.with_suffix(".json")
+    try:
+        place.mkdir()
+    except FileExistsError:  # another process is at it
+        for _ in range(6000):
+            if told.exists():
+                break
+            time.sleep(0.1)
+    else:
+        part = told.with_suffix(".part")
+        part.write_text(json.dumps(graded_now(place)), encoding="utf-8")
+        part.rename(told)
+    table = csv.DictReader(io.StringIO((place / "grades.csv").read_text(encoding="utf-8-sig")))
+    rows = {row["notebook"].removesuffix(".ipynb"): row for row in table}
+    return Graded(*json.loads(told.read_text(encoding="utf-8")), rows, place)
+
+
+def graded_now(folder):
+    fill(folder)
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    os.environ["KFCOURSE_SECRET"] = "x"
+    try:
+        result = CliRunner().invoke(cli.main, ["grade", str(folder), "--masters", str(FIXTURES), "--seconds", str(SECONDS)])
+    finally:
+        del os.environ["KFCOURSE_SECRET"]
+    after = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    assert after.pop(folder / "grades.csv", None), result.output
+    assert after == before
+    return result.exit_code, result.output
+
+
+def row(graded, name):
+    found = graded.table[name]
+    return (found["q1"], found["q2"]), found["note"]
+
+
+def test_every_notebook_has_a_row(graded):
+    assert graded.exit_code == 1  # some could not be graded
+    names = {path.relative_to(graded.folder).with_suffix("").as_posix() for path in graded.folder.rglob("*.ipynb")}
+    assert set(graded.table) == names - {".ipynb_checkpoints/wrong-checkpoint"}
+    assert "26 run, 0 unchanged since the last table" in graded.output
+
+
+def test_a_new_notebook_is_not_implemented(graded):
+    assert row(graded, "М-1/Иванов Иван/b-aof") == (NEW, "")
+    assert graded.table["М-1/Иванов Иван/b-aof"]["passed"] == "0"
+
+
+def test_a_solution_passes(graded):
+    assert row(graded, "М-1/Петров/b-aof") == (("passed", "passed"), "")
+    found = graded.table["М-1/Петров/b-aof"]
+    assert (found["set"], found["variant"], found["passed"], found["of"]) == ("b", "12", "2", "5")
+    assert found["q3"] == found["q4"] == "not run"  # the tiny master asks two of the set's five
+    line = next(line for line in graded.output.splitlines() if line.startswith("М-1/Петров"))
+    assert line.split()[1:] == ["b", "12", "2", "of", "5", "✓✓–––"]
+
+
+def test_wrong_answers_are_diagnosed(graded):
+    marks, note = row(graded, "wrong")
+    assert marks == ("wrong", "wrong")
+    assert note == "b1: gain-not-divided; b2: innovation-sign, covariance-added"
+
+
+@pytest.mark.parametrize("name", ["fakes-checks", "shows-results"])
+def test_faked_results_do_not_count(graded, name):
+    assert row(graded, name)[0] == ("wrong", "wrong")
+
+
+def test_a_patched_package_is_noticed(graded):
+    marks, note = row(graded, "patches")
+    assert marks == ("not run", "not run")
+    assert "b1, b2: Changed: the notebook replaces kfcourse.checks.exercises.Exercise.check" in note
+    assert "look at cell" in note
+
+
+@pytest.mark.parametrize("name", ["deletes", "rewrites", "merges", "imports"])
+def test_answers_are_found_wherever_they_stand(graded, name):
+    marks, note = row(graded, name)
+    assert marks[0] == "passed"
+    assert marks[1] == ("not implemented" if name == "rewrites" else "passed")
+    assert note == ""
+
+
+def test_another_variant_is_noticed_and_does_not_count(graded):
+    marks, note = row(graded, "opens-another")
+    assert marks == ("passed", "passed")
+    assert note == "opens set b, variant 1"
+    assert graded.table["opens-another"]["variant"] == "53"
+
+
+def test_taking_the_answer_is_noticed(graded):
+    assert "(gain): return lab.questions['b1'].answer(lab)(Psi, G, F)" in row(graded, "takes")[1]
+
+
+def test_an_error_is_reported_by_cell(graded):
+    marks, note = row(graded, "syntax")
+    assert marks == ("not run", "unusable")
+    number = place(syntax(), "def gain")
+    assert f"cell {number} (gain): SyntaxError" in note
+    assert "b1: NameError: name 'gain' is not defined" in note
+
+
+def test_an_endless_loop_is_ended(graded):
+    marks, note = row(graded, "loops")
+    assert marks == ("passed", "not run")
+    number = place(loops(), "while True")
+    assert note == f"cell {number}: still running after {SECONDS} s"
+
+
+def test_a_dead_kernel_is_reported_and_its_children_are_ended(graded):
+    marks, note = row(graded, "leaves")
+    assert marks == ("passed", "not run")
+    assert "the kernel died" in note
+    pid = int((graded.folder.parent / "pid").read_text())
+    for _ in range(100):  # a killed process stays as a zombie until somebody waits for it
+        status = Path(f"/proc/{pid}/stat")
+        if not status.exists() or status.read_text().split()[2] == "Z":
+            return
+        time.sleep(0.05)
+    pytest.fail("the process that the notebook left is running")
+
+
+def test_memory_is_limited(graded):
+    marks, note = row(graded, "hungry")
+    assert marks == ("passed", "passed")
+    assert "MemoryError: Unable to allocate 7.45 GiB" in note
+
+
+def test_output_is_limited(graded):
+    marks, note = row(graded, "floods")
+    assert marks == ("passed", "not run")
+    assert "printed more than 10 MB" in note
+
+
+def test_exit_is_an_error_like_others(graded):
+    marks, note = row(graded, "exits")
+    assert marks == ("passed", "passed")
+    assert "SystemExit: 1" in note
+
+
+def test_notebooks_do_not_see_each_other(graded):
+    for name in ("litters", "litters-too"):
+        marks, note = row(graded, name)
+        assert marks == ("passed", "passed")
+        assert "AssertionError" not in note
+        assert "StdinNotImplementedError" in note  # nobody answers
+
+
+def test_a_variant_of_the_courses_own(graded):
+    marks, note = row(graded, "own-variant")
+    assert marks == ("passed", "passed")
+    assert graded.table["own-variant"]["variant"] == "mine"
+    assert "its own table" in note
+
+
+def test_what_cannot_be_graded_is_named(graded):
+    status = {name: (one["status"], one["note"], one["digest"]) for name, one in graded.table.items()}
+    assert status["foreign"][:2] == ("not an exercise notebook", "")
+    for name, words in {
+        "cut": "the file is not JSON",
+        "list": "JSON of something else",
+        "unknown-set": "claims set 'zz', variant '53'; the sets are a, b",
+        "unknown-variant": "no variant",
+    }.items():
+        assert status[name][0] == "not graded"
+        assert words in status[name][1]
+        assert status[name][2] == ""  # tried again next time
+    assert "\x1b" not in graded.output
+
+
+def test_a_second_run_does_only_what_is_new(graded, tmp_path, monkeypatch):
+    copied = tmp_path / "copy"
+    shutil.copytree(graded.folder, copied)
+    options = ["grade", str(copied), "--masters", str(FIXTURES), "--jobs", "1"]
+    ran = []
+
+    def instead(work):
+        ran.append(work.name)
+        return Grade(work.name, "graded", "b", "53", MARKS, "anew", work.digest)
+
+    monkeypatch.setattr(grading, "grade", instead)
+    failed = ["cut.ipynb", "list.ipynb", "unknown-set.ipynb", "unknown-variant.ipynb"]
+    again = CliRunner().invoke(cli.main, [*options, "--seconds", str(SECONDS)])
+    assert again.exit_code == 0
+    assert sorted(ran) == failed
+    assert "4 run, 22 unchanged" in again.output
+    assert "b1: gain-not-divided" in (copied / "grades.csv").read_text(encoding="utf-8")
+
+    ran.clear()
+    (copied / "wrong.ipynb").rename(copied / "renamed.ipynb")
+    change_file(copied / "syntax.ipynb")
+    (copied / "loops.ipynb").unlink()
+    CliRunner().invoke(cli.main, [*options, "--seconds", str(SECONDS)])
+    assert ran == ["syntax.ipynb"]
+    rows = {one.name for one in read_table(copied / "grades.csv").values()}
+    assert {"renamed.ipynb", "syntax.ipynb"} < rows and not {"wrong.ipynb", "loops.ipynb"} & rows
+
+    ran.clear()
+    CliRunner().invoke(cli.main, [*options, "--seconds", str(SECONDS), "--again"])
+    assert len(ran) == 25
+    ran.clear()
+    CliRunner().invoke(cli.main, [*options, "--seconds", "99"])  # what was ended too early may come to its end
+    assert len(ran) == 25
+
+
+def change_file(path):
+    path.write_text(path.read_text(encoding="utf-8") + "\n", encoding="utf-8")
+
+
+# -- without kernels
+
+
+@pytest.fixture
+def three(tmp_path):
+    for name in "abc":
+        (tmp_path / f"{name}.ipynb").write_text(json.dumps(handed_out()) + " " * ord(name), encoding="utf-8")
+    return tmp_path
+
+
+def test_an_interrupted_run_goes_on_where_it_was(three):
+    work = grading.returned(three, masters=FIXTURES)
+    table = three / "table.csv"
+
+    def interrupted(new):
+        yield Grade(new[0].name, "graded", "b", "53", MARKS, "", new[0].digest)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        grading.grade_all(work, table, False, interrupted)
+    assert [one.name for one in read_table(table).values()] == ["a.ipynb"]
+    assert sorted(path.name for path in three.iterdir()) == ["a.ipynb", "b.ipynb", "c.ipynb", "table.csv"]
+
+    def rest(new):
+        return [Grade(one.name, "graded", "b", "53", MARKS, "", one.digest) for one in new]
+
+    grades, old = grading.grade_all(work, table, False, rest)
+    assert ([one.name for one in grades], old) == (["a.ipynb", "b.ipynb", "c.ipynb"], 1)
+
+
+def test_the_digest_knows_all_that_a_grade_depends_on(three, tmp_path):
+    masters, variants = tmp_path / "masters", tmp_path / "my.toml"
+    shutil.copytree(FIXTURES, masters)
+    variants.write_text('[variants.53]\nstate = "x + v"\nmeter = "x + w"\n', encoding="utf-8")
+
+    def digests(**options):
+        return [one.digest for one in grading.returned(three, **({"masters": masters} | options))]
+
+    before = digests()
+    assert len(set(before)) == 3
+    assert digests() == before
+    assert not set(digests(seconds=7.0)) & set(before)
+    assert not set(digests(variants_file=variants)) & set(before)
+    change_file(masters / "b_aof" / "statement.md")
+    assert not set(digests()) & set(before)
+
+
+def test_a_kernel_that_does_not_start_is_a_row(three, monkeypatch):
+    def fails(*_, **__):
+        raise RuntimeError("Kernel didn't respond in 60 seconds")
+
+    monkeypatch.setattr(grading, "run", fails)
+    found = grading.grade(grading.returned(three, masters=FIXTURES)[0])
+    assert found == Grade("a.ipynb", "not graded", note="Kernel didn't respond in 60 seconds")
+
+
+def test_a_notebook_that_takes_too_long_to_make_is_a_row(three, monkeypatch):
+    def endless(*_, **__):
+        while True:
+            pass
+
+    monkeypatch.setattr(grading, "claimed", endless)
+    work = grading.returned(three, seconds=0.02, masters=FIXTURES)[0]
+    assert "cannot be made in time" in grading.grade(work).note
+
+
+def test_too_large_files_are_not_read(three, monkeypatch):
+    monkeypatch.setattr(grading, "LARGEST", 100)
+    assert "larger than" in grading.grade(grading.returned(three, masters=FIXTURES)[0]).note
+
+
+def test_no_notebooks_is_an_error(tmp_path):
+    result = CliRunner().invoke(cli.main, ["grade", str(tmp_path)])
+    assert (result.exit_code, result.output) == (1, f"Error: no notebooks (*.ipynb) in {tmp_path}\n")
+
+
+def test_a_file_that_is_no_table_is_not_lost(three):
+    (three / "grades.csv").write_text("name,mark\nA,5\n", encoding="utf-8")
+    result = CliRunner().invoke(cli.main, ["grade", str(three), "--masters", str(FIXTURES)])
+    assert result.exit_code == 1
+    assert "grades.csv is not a table of grades" in result.output
+    assert (three / "grades.csv").read_text(encoding="utf-8") == "name,mark\nA,5\n"
+
+
+@pytest.mark.parametrize("text", [b"\xff\xfe\x00", b"notebook;status\n1;2\n", b"x" * 200_000 + b"\n1\n"])
+def test_broken_tables_are_refused(tmp_path, text):
+    path = tmp_path / "grades.csv"
+    path.write_bytes(text)
+    with pytest.raises(ValueError, match="is not a table of grades"):
+        read_table(path)
+
+
+def test_the_table_comes_back_as_it_was(tmp_path):
+    grades = [
+        Grade("М-1/Иванов, И.ipynb", "graded", "b", "53", MARKS, 'b2: "sign"; look', "d1"),
+        Grade("=1+1.ipynb", "not an exercise notebook", digest="d2"),
+        Grade("x.ipynb", "not graded", note="+cmd"),
+    ]
+    path = tmp_path / "t.csv"
+    write_table(grades, path)
+    assert read_table(path) == {"d1": grades[0], "d2": grades[1]}
+    cells = [cell for line in csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig"))) for cell in line]
+    assert not [cell for cell in cells if cell.startswith(("=", "+", "-", "@"))]
+    assert path.read_bytes().startswith(b"\xef\xbb\xbf")
+
+
+def test_signs_of_a_screen_without_ticks(monkeypatch):
+    from kfcourse.notebooks import commands
+
+    monkeypatch.setattr(commands.sys, "stdout", io.TextIOWrapper(io.BytesIO(), encoding="cp1251"))
+    assert set(commands._signs().values()) == {"+", "x", "-"}
+
+
+def test_text_of_students_is_cleaned():
+    assert clean("a\n\x1b[31mb\t\u202e c") == "a [31mb c"
+    assert len(clean("x" * 999, 50)) == 50
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        [None, 7, "x", {}, {"cell_type": "code"}, {"cell_type": "code", "source": None}, {"cell_type": ["code"], "source": "x"}],
+        [{"cell_type": "code", "source": "  \n"}],
+    ],
+)
+def test_malformed_cells_are_left_out(cells):
+    assert [cell for cell in cells_of({"cells": cells}) if cell.source != "None"] == []
+
+
+def test_cells_keep_their_numbers():
+    found = cells_of(
+        {
+            "cells": [
+                {"cell_type": "markdown", "source": "x"},
+                {"cell_type": "code", "source": ["a = 1\n", "b"], "metadata": {"kfcourse": {"answer": "f"}}, "id": "i"},
+                {"cell_type": "code", "source": "c", "metadata": []},
+            ]
+        }
+    )
+    assert found == [Cell(2, "i", "f", "a = 1\nb"), Cell(3, "", "", "c")]
+    assert found[0].name == "cell 2 (f)"
+
+
+@pytest.mark.parametrize("document", [{}, {"cells": {}}, {"worksheets": []}])
+def test_notebooks_without_cells_are_explained(document):
+    with pytest.raises(Unreadable, match="without cells"):
+        cells_of(document)
+
+
+@pytest.mark.parametrize("claim", [7, "b", [], {}, {"set": "b"}, {"set": ["b"], "variant": "53"}, {"set": "b", "variant": None}])
+def test_strange_claims_are_explained(claim):
+    with pytest.raises(ValueError, match=r"claims set|no variant 'None'"):
+        claimed(claim, [], None)
+
+
+def test_claimed_variants(tmp_path):
+    table = {key: value for key, value in MINE.items() if key != "name"}
+    claim, cells = {"set": "b", "variant": "mine"}, [Cell(1, "", "", f'lab = exercise("b", {MINE!r})')]
+    found, notes = claimed(claim, cells, None)
+    assert found.variant.table == table
+    assert notes == ["its variant is its own table: compare with yours by --variants"]
+    file = tmp_path / "mine.toml"
+    file.write_text('[variants.mine]\nstate = "q*x + v"\nmeter = "x + w"\nparameters = { q = 0.9 }\n', encoding="utf-8")
+    found, notes = claimed(claim, cells, file)
+    assert (float(found.model.parameters["q"]), notes) == (0.9, [])
+    with pytest.raises(ValueError, match="no variant 'mine'"):
+        claimed(claim, [], None)
+    _, notes = claimed({"set": "b", "variant": "53"}, [Cell(1, "", "", 'x = exercise("a", variant="7")')], None)
+    assert notes == ["opens set a, variant 7"]
+    _, notes = claimed({"set": "b", "variant": "53"}, [Cell(1, "", "", "exercise(letter, 1)\n!ls")], None)
+    assert notes == []
+
+
+def sources(cells, notebook=None):
+    """Sources of the assembled notebook's cells, shortened to their first lines."""
+    made, own = assembled(notebook or handed_out(), cells, exercise("b", "53"))
+    assert made.cells[0].source.startswith("from kfcourse.notebooks.grading.watch import Watch")
+    nbformat.validate(made)
+    return [cell.source.splitlines()[0] for cell in made.cells[1:]], own
+
+
+PLAIN = [
+    "import matplotlib.pyplot as plt",
+    "def gain(Psi, G, F):",
+    "lab = kfcourse_watch()",
+    "def correct(lam, Psi, h, G, F, y):",
+    "lab = kfcourse_watch()",
+    "one = np.ones((1, 1, 1))",
+]
+
+
+def test_nothing_returned_is_the_notebook_handed_out():
+    assert sources([]) == (PLAIN, [])
+    assert sources(cells_of(handed_out())) == (PLAIN, [])
+
+
+def test_cells_of_the_student_keep_their_places():
+    notebook = solved()
+    add(notebook, "first = 1", "import matplotlib")
+    notebook.cells.insert(0, notebook.cells.pop(notebook.cells.index(cell(notebook, "first"))))
+    add(notebook, "before = 1", "def gain")
+    add(notebook, "between = 1", 'lab.check("b1"')
+    add(notebook, "after = 1", "def correct")
+    add(notebook, "last = 1")
+    found, own = sources(cells_of(notebook))
+    expected = list(PLAIN)
+    expected.insert(0, "first = 1")
+    expected.insert(2, "before = 1")
+    expected.insert(4, "between = 1")
+    expected.insert(6, "after = 1")
+    assert found == [*expected, "last = 1"]
+    assert len(own) == 7  # five, and two answers
+
+
+def test_checks_of_the_student_are_not_run():
+    cells = [Cell(1, "", "", 'lab.check("b1", gain)  # again'), Cell(2, "", "", 'lab.check("b2", correct)\nlab.check("b9", 1)')]
+    assert sources(cells) == (PLAIN, [])
+
+
+def test_paths_hold_in_any_working_directory(three, monkeypatch):
+    monkeypatch.chdir(three)
+    (one, *_) = grading.returned(Path(), variants_file=Path("a.ipynb"), masters=Path("."))
+    assert one.path == three / "a.ipynb" == one.variants_file
+    assert one.masters == three
+
+
+def test_students_code_is_read_without_warnings(recwarn):
+    assert sources([Cell(1, "", "", "text = '\\m'"), Cell(2, "", "", "!ls")])[0] == ["text = '\\m'", "!ls", *PLAIN]
+    assert not recwarn.list
+
+
+def test_a_copy_of_an_answer_for_trials_does_not_replace_it():
+    notebook = solved()
+    trial = nbformat.from_dict(cell(notebook, "def gain"))
+    trial.source, trial.id = trial.source.replace("cross = G @ Psi", "cross = 0"), "copy"  # its metadata are copied too
+    notebook.cells.append(trial)
+    made, _ = assembled(handed_out(), cells_of(notebook), exercise("b", "53"))
+    assert ["cross = 0" in cell.source for cell in made.cells] == [False] * 7 + [True]
+
+
+def test_answers_are_known_by_name_when_the_master_has_moved_on():
+    """A cell was added to the master since: all ids behind it have shifted."""
+    added = TINY.replace("### Question 1", "```{code-cell} python\nextra = 1\n```\n\n### Question 1")
+    master = student(render(added, exercise("b", "53")), {})
+    found, _ = sources(cells_of(solved()), master)
+    assert [line for line in found if line.startswith("def")] == ["def gain(Psi, G, F):", "def correct(lam, Psi, h, G, F, y):"]
+    assert found.index("lab = kfcourse_watch()") > found.index("def gain(Psi, G, F):")
+
+
+def test_an_answer_with_an_error_is_known_by_its_cell():
+    notebook = change(solved(), "def correct", "def correct(", "def corect(")
+    change(notebook, "def gain", "def gain(Psi, G, F):", "def gain(Psi, G, F)")
+    found, _ = sources(cells_of(notebook))
+    assert found[1] == "def gain(Psi, G, F)"
+    assert found[3] == "def corect(lam, Psi, h, G, F, y):"
+    assert len(found) == len(PLAIN)
+
+
+def test_the_kernels_environment(tmp_path, monkeypatch):
+    monkeypatch.setenv("MY_TOKEN", "x")
+    found = grading.environment(tmp_path)
+    assert "MY_TOKEN" not in found
+    assert found["PATH"] == os.environ["PATH"]
+    assert found["HOME"] == str(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(("here", "", str(tmp_path))))
+    (tmp_path / "other").mkdir()
+    assert grading.environment(tmp_path / "other")["PYTHONPATH"] == os.pathsep.join((str(Path("here").absolute()), str(tmp_path)))
+
+
+@pytest.fixture
+def watched(monkeypatch):
+    monkeypatch.setattr(watch, "limit", lambda _: None)  # this process must not be limited
+    return watch.Watch("b", "53", memory=2**32)
+
+
+def test_watch_gives_the_exercise(watched):
+    assert watched() is watched()
+    assert (watched().letter, opened(watched())) == ("b", '"53"')
+    watched().check("b1", lambda Psi, G, F: Psi)
+    watched()  # checking changes nothing
+
+
+@pytest.mark.parametrize(
+    ("where", "name", "told"),
+    [
+        (np, "allclose", "numpy.allclose"),
+        (engine, "check", "kfcourse.checks.engine.check"),
+        (Exercise, "questions", "kfcourse.checks.exercises.Exercise.questions"),
+    ],
+)
+def test_watch_notices_replaced_functions(watched, monkeypatch, where, name, told):
+    monkeypatch.setattr(where, name, lambda *_, **__: True)
+    with pytest.raises(watch.Changed, match=told):
+        watched()
+
+
+def test_watch_notices_replaced_code(watched, monkeypatch):
+    monkeypatch.setattr(engine._agree, "__code__", (lambda found, expected, values, tolerance: True).__code__)
+    with pytest.raises(watch.Changed, match=r"kfcourse\.checks\.engine\._agree\.__code__"):
+        watched()
+
+
+def test_results_count_only_from_the_cell_that_asked():
+    def made(*outputs):
+        return nbformat.v4.new_code_cell("x", outputs=list(outputs))
+
+    def value(kind="execute_result", question="b1", status="passed", **more):
+        data = {MIME: {"question": question, "status": status} | more, "text/plain": ""}
+        return nbformat.v4.new_output(kind, data)
+
+    result = grading._result
+    assert result(made(value()), "b1") == ("passed", "")
+    assert result(made(value(status="wrong", diagnosis=["sign"])), "b1") == ("wrong", "sign")
+    assert result(made(value(status="unusable", message="why")), "b1") == ("unusable", "why")
+    assert result(made(value("display_data")), "b1") == (None, "")
+    assert result(made(), "b1") == (None, "")
+    for strange in (
+        [value(question="b2")],
+        [value(), value()],
+        [value(status="excellent")],
+        [nbformat.v4.new_output("execute_result", {MIME: "passed"})],
+        [nbformat.v4.new_output("execute_result", {MIME: [1]})],
+    ):
+        assert result(made(*strange), "b1") == (None, "the check's result was tampered with")
+    error = nbformat.v4.new_output("error", ename="NameError", evalue="gain")
+    assert result(made(value(), error), "b1") == (None, "NameError: gain")

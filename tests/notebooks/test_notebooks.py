@@ -1,0 +1,612 @@
+"""Exercise notebooks: what masters become, what is written, and what happens if something fails on the way."""
+
+import ast
+import hashlib
+import random
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+import sympy as sp
+from click.testing import CliRunner
+
+from kfcourse import cli
+from kfcourse.checks import exercise, sets
+from kfcourse.checks.equality import equal_formulas
+from kfcourse.lab.variants import load_variants
+from kfcourse.notebooks import course, execute
+from kfcourse.notebooks.course import Job, Outcome, assign, make, run_all, safe, save
+from kfcourse.notebooks.execute import NotebookFailed, html, mathml, pictures, results
+from kfcourse.notebooks.master import (
+    STUB,
+    MasterError,
+    context,
+    python,
+    read,
+    render,
+    solution,
+    statement,
+    student,
+    without_markers,
+    without_solution,
+)
+
+FIXTURES = Path(__file__).parent / "fixtures"
+TINY = (FIXTURES / "b_aof" / "statement.md").read_text(encoding="utf-8")
+PNG = b"\x89PNG not a real one"
+REQUEST = re.compile(
+    r"""<(?:script|img|link|iframe|source|object|embed|video|audio)[^>]*?(?:src|href|data)\s*=\s*["']?+(?!data:|#)"""
+)
+
+
+def tiny(variant="53", text=TINY):
+    return render(text, exercise("b", variant))
+
+
+@pytest.fixture(scope="module")
+def executed():
+    """The tiny set's solution, really executed."""
+    return execute.execute(solution(tiny()), "tiny")
+
+
+@pytest.fixture
+def masters(tmp_path):
+    folder = tmp_path / "masters"
+    shutil.copytree(FIXTURES, folder)
+    return folder
+
+
+@pytest.fixture
+def no_kernel(monkeypatch, executed):
+    """Notebooks of the tiny set come executed; the number of executions is counted."""
+    calls = []
+
+    def instead(notebook, name, *_, **__):
+        calls.append(name)
+        result = nbformat.from_dict(notebook)
+        for cell, done in zip(result.cells, executed.cells, strict=True):
+            if cell.cell_type == "code":
+                cell.outputs, cell.execution_count = done.outputs, done.execution_count
+        return result
+
+    monkeypatch.setattr(course, "execute", instead)
+    return calls
+
+
+def job(tmp_path, masters, kind="solutions", **options):
+    return Job("b", "53", tmp_path / "out", kind, masters=masters, **options)
+
+
+def code(notebook):
+    return [cell for cell in notebook.cells if cell.cell_type == "code"]
+
+
+def contents(folder):
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+# -- masters
+
+
+def test_solution_and_stub():
+    notebook = tiny()
+    answer = code(student(notebook, {}))[1]
+    assert answer.source == f'def gain(Psi, G, F):\n    """K, (N, n, p)."""\n    {STUB}\n    raise NotImplementedError'
+    assert answer.metadata["kfcourse"] == {"answer": "gain"}
+    assert code(solution(notebook))[1].source.splitlines()[2:] == [
+        "    cross = G @ Psi",
+        "    return np.swapaxes(np.linalg.solve(F, cross), -1, -2)",
+    ]
+    texts = ["\n".join(cell.source for cell in n.cells) for n in (student(notebook, {}), solution(notebook))]
+    assert ["solution's" in text for text in texts] == [False, True]
+    assert not any("SOLUTION" in text for text in texts)
+    assert "correct_name = correct.__name__" in texts[0]  # what stands behind the end marker stays
+
+
+def test_notebook_knows_its_set_and_variant():
+    notebook = student(tiny("7"), {})
+    assert notebook.metadata["kfcourse"] == {"set": "b", "variant": "7"}
+    assert 'exercise("b", "7")' in code(notebook)[0].source
+    assert "Variant 7:" in notebook.cells[0].source
+    nbformat.validate(notebook)
+
+
+def test_picture_to_reach_stands_before_its_cell():
+    notebook = tiny()
+    drawn = next(cell for cell in notebook.cells if "picture" in cell.metadata.get("tags", []))
+    cells = student(notebook, {drawn.id: PNG}).cells
+    place = next(i for i, cell in enumerate(cells) if cell.id == drawn.id)
+    assert cells[place - 1].cell_type == "markdown"
+    assert f"attachment:{drawn.id}.png" in cells[place - 1].source
+    assert list(cells[place - 1].attachments) == [f"{drawn.id}.png"]
+    nbformat.validate(student(notebook, {drawn.id: PNG}))
+
+
+AFTER, WITHOUT = "END SOLUTION without BEGIN SOLUTION before it", "BEGIN SOLUTION without END SOLUTION"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("    # BEGIN SOLUTION\n    cross", "    cross", rf"master b-aof, cell \d+, line 5: {AFTER}"),
+        ("    cross = G @ Psi\n", "    # BEGIN SOLUTION\n", rf"master b-aof, cell \d+, line 4: {WITHOUT} before it"),
+        ("swapaxes(np.linalg.solve(F, cross), -1, -2)\n    # END SOLUTION", "a", rf"master b-aof, cell \d+: {WITHOUT}$"),
+        ("[= variant =]", "[= variant", r"master b-aof, line \d+: "),
+        ("[= variant =]", "[= nothing =]", "master b-aof: 'nothing' is undefined"),
+        ("[= variant =]", "[% if %]", r"master b-aof, line 13: "),
+    ],
+)
+def test_errors_of_a_master_name_the_place(old, new, message):
+    assert old in TINY
+    with pytest.raises(MasterError, match=message):
+        tiny(text=TINY.replace(old, new, 1))
+
+
+def test_missing_master(tmp_path):
+    with pytest.raises(MasterError, match=r"no master .*b_aof/statement\.md; .*--masters"):
+        read("b", tmp_path)
+
+
+def test_markers_in_code_and_text():
+    text = "before\n  # BEGIN SOLUTION\n  secret\n  # END SOLUTION\nafter"
+    assert without_solution(text, True) == f"before\n  {STUB}\n  raise NotImplementedError\nafter"
+    assert without_solution(text, False) == "before\nafter"
+    assert without_markers(text) == "before\n  secret\nafter"
+
+
+def test_statement_is_a_page_without_solutions():
+    page = statement(tiny(), {})
+    assert "secret" not in page and "solve" not in page and "SOLUTION" not in page
+    assert f"```python\ndef gain(Psi, G, F):\n    \"\"\"K, (N, n, p).\"\"\"\n    {STUB}" in page  # fmt: skip
+
+
+def test_a_variant_that_is_not_shipped_is_written_into_the_notebook(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('[variants.mine]\nstate = "q*x + v"\nmeter = "x + w"\nparameters = { q = 0.5 }\n', encoding="utf-8")
+    variant = load_variants(file)["mine"]
+    notebook = render(TINY, exercise("b", {"name": "mine", **variant.table}))
+    line = next(line for line in code(notebook)[0].source.splitlines() if line.startswith("lab ="))
+    letter, table = (ast.literal_eval(argument) for argument in ast.parse(line).body[0].value.args)
+    assert exercise(letter, table).model == variant.model
+
+
+# -- formulas as Python
+
+
+x, y, c = sp.symbols("x y c", real=True)
+FORMULAS = [
+    sp.Rational(1, 3), x - sp.Rational(1, 3), -x / 3, 2 * x / 7, x ** sp.Rational(1, 3), sp.sqrt(2) * x / 3, sp.E, sp.E**2,
+    sp.pi * x, 1 / sp.sqrt(x), c / sp.sqrt(x * y), 1 / (1 + 1 / sp.sqrt(x)), (x * y) ** sp.Rational(-3, 2), 2 ** (1 / sp.sqrt(x)),
+    x ** (-y), sp.exp(-(x**2) / 2), sp.exp(sp.Rational(1, 3)), sp.exp(x) ** y, sp.exp(x) - 1, sp.sin(x) ** 2, sp.atan2(y, x),
+    sp.Abs(x), sp.sign(x), sp.log(x), sp.tanh(x), sp.cosh(x), (x + sp.Rational(2, 3)) ** -2, sp.Integer(0), sp.Integer(-4),
+    x * (y + c) ** 2 - (x - y) / (c + 1),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("formula", FORMULAS, ids=str)
+def test_printed_formula_is_the_formula(formula):
+    assert sp.sympify(evaluated(python(formula))) == formula
+
+
+def evaluated(text):
+    return eval(text, {"sp": sp, "x": x, "y": y, "c": c})
+
+
+def test_printed_random_formulas_are_exact():
+    source = random.Random(4)
+
+    def grown(depth):
+        if depth == 0:
+            return source.choice([x, y, c, sp.Rational(source.randint(-9, 9), source.randint(1, 9))])
+        a, b = grown(depth - 1), grown(depth - 1)
+        power = sp.Rational(source.choice([-3, -2, -1, 1, 3]), 2)
+        return source.choice(
+            [lambda: a + b, lambda: a * b, lambda: sp.sin(a) - b, lambda: sp.exp(a), lambda: (1 + a**2) ** power]
+        )()
+
+    for _ in range(200):
+        formula = grown(3)
+        assert equal_formulas([sp.sympify(evaluated(python(formula)))], [formula], {})  # 7*(x + 1) may come back as 7*x + 7
+
+
+def test_printed_matrix():
+    matrix = sp.Matrix([[x, sp.sqrt(y)], [sp.Rational(1, 3), 0]])
+    assert evaluated(python(matrix)) == matrix
+
+
+# -- every set
+
+
+@pytest.mark.parametrize("variant", ["53", "21"])
+@pytest.mark.parametrize("letter", sets())
+def test_every_line_of_a_stub_is_in_the_solution(letter, variant):
+    notebook = render(read(letter), exercise(letter, variant))
+    solved = {cell.id: cell.source for cell in solution(notebook).cells}
+    answers = 0
+    for cell in student(notebook, {}).cells:
+        own = [line for line in cell.source.splitlines() if STUB not in line and line.strip() != "raise NotImplementedError"]
+        lines = iter(solved[cell.id].splitlines())
+        assert all(line in lines for line in own)  # in this order
+        answers += STUB in cell.source
+    asked = re.findall(r"\.check\(\s*\"(\w+)\"", "\n".join(cell.source for cell in code(notebook)))
+    assert asked == [question.name for question in sets()[letter].questions]
+    assert answers >= len(asked)
+    tags = [tag for cell in notebook.cells for tag in cell.metadata.get("tags", [])]
+    assert tags.count("check") == len(asked)
+    assert "picture" in tags
+    text = "\n".join(cell.source for cell in notebook.cells)
+    assert "To hand in" in text and "Hint</summary>" in text
+
+
+@pytest.mark.parametrize("variant", ["53", "21"])
+@pytest.mark.parametrize("letter", sets())
+def test_a_new_notebook_fails_only_with_not_implemented(letter, variant):
+    """The cells up to the last check, in this process."""
+    notebook = student(render(read(letter), exercise(letter, variant)), {})
+    cells = code(notebook)
+    last = max(i for i, cell in enumerate(cells) if "check" in cell.metadata.get("tags", []))
+    namespace, found = {}, {}
+    for cell in cells[: last + 1]:
+        if "check" in cell.metadata.get("tags", []):
+            result = eval(cell.source, namespace)
+            found[result.question] = result.status
+        else:
+            try:
+                exec(cell.source, namespace)
+            except NotImplementedError:
+                continue
+    assert found == dict.fromkeys([question.name for question in sets()[letter].questions], "not implemented")
+
+
+@pytest.mark.parametrize(("letter", "variant"), [("b", "53"), ("c", "21")])
+def test_a_new_notebook_in_a_kernel(letter, variant):
+    notebook = student(render(read(letter), exercise(letter, variant)), {})
+    ran = execute.execute(notebook, "new", stop_at_error=False)
+    assert [result["status"] for result in results(ran)] == ["not implemented"] * len(sets()[letter].questions)
+    outputs = [output for cell in code(ran) for output in cell.outputs]
+    assert {output.ename for output in outputs if output.output_type == "error"} <= {"NotImplementedError"}
+    assert not [output for output in outputs if output.output_type == "stream" and output.name == "stderr"]
+
+
+# -- executing
+
+
+def test_executed_solution_passes_and_draws(executed):
+    assert [(r["question"], r["status"]) for r in results(executed)] == [("b1", "passed"), ("b2", "passed")]
+    (png,) = pictures(executed).values()
+    assert png.startswith(b"\x89PNG")
+
+
+def test_page_needs_no_network(executed):
+    page = html(executed, "A <title>")
+    assert not REQUEST.search(page)
+    assert not re.search(r"@import|url\(\s*[\"']?+(?!data:|#)", page)
+    addresses = set(re.findall(r"https?://[^\s\"'<>)]+", page))
+    assert addresses <= {"http://www.w3.org/1998/Math/MathML", "http://www.w3.org/2000/svg"}  # names, not loaded
+    assert page.count("<math") >= 2
+    assert 'display="block"' in page and 'display="inline"' in page
+    assert "$" not in re.sub(r"<(script|style|pre)\b.*?</\1>", "", page, flags=re.DOTALL)
+    assert "data:image/png;base64," in page
+    assert "A &lt;title&gt;" in page
+    assert "This text is the solution" in page
+
+
+def test_mathml_leaves_code_alone():
+    assert mathml("`$x$` costs \\$5") == "`$x$` costs \\$5"
+    assert mathml("```\n$x$\n```") == "```\n$x$\n```"
+    assert "<mi>x</mi>" in mathml("so $x$.")
+
+
+def test_a_failing_cell_is_named():
+    broken = tiny(text=TINY.replace("cross = G @ Psi", "cross = G @ nothing"))
+    cell = next(cell for cell in code(broken) if "picture" in cell.metadata.get("tags", []))
+    with pytest.raises(NotebookFailed, match=rf"here, cell {cell.id}: NameError: name 'nothing' is not defined"):
+        execute.execute(solution(broken), "here")
+
+
+# -- jobs
+
+
+def test_written_then_up_to_date_then_written_again(tmp_path, masters, no_kernel):
+    one = job(tmp_path, masters)
+    assert make(one).status == "written"
+    names = sorted(contents(one.folder))
+    assert names == ["b-aof-solution.html", "b-aof-solution.ipynb"]
+    before = contents(one.folder)
+    assert make(one).status == "up to date"
+    assert contents(one.folder) == before
+    assert len(no_kernel) == 1
+
+    master = masters / "b_aof" / "statement.md"
+    master.write_text(TINY.replace("Divide.", "Divide by F."), encoding="utf-8")
+    assert make(one).status == "written"
+    assert "Divide by F." in one.target.read_text(encoding="utf-8")
+    assert make(one).status == "up to date"
+
+
+def test_a_changed_package_or_a_lost_page_means_work(tmp_path, masters, no_kernel, monkeypatch):
+    one = job(tmp_path, masters)
+    make(one)
+    one.target.with_suffix(".html").unlink()
+    assert make(one).status == "written"
+    monkeypatch.setattr(course, "package_digest", lambda: "another version")
+    assert make(one).status == "written"
+    assert len(no_kernel) == 3
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "7", '{"metadata": []}', '{"metadata": {"kfcourse": 1}}', "\x00"])
+def test_what_is_no_notebook_is_written_over(tmp_path, masters, no_kernel, text):
+    one = job(tmp_path, masters, "exercises")
+    one.folder.mkdir()
+    one.target.write_text(text, encoding="utf-8")
+    assert make(one).status == "written"
+    nbformat.validate(nbformat.read(one.target, as_version=4))
+
+
+def test_exercises_have_pictures_and_no_solutions(tmp_path, masters, no_kernel):
+    one = job(tmp_path, masters, "exercises")
+    assert make(one) == Outcome(one, "written")
+    assert list(contents(one.folder)) == ["b-aof.ipynb"]
+    notebook = nbformat.read(one.target, as_version=4)
+    assert "linalg.solve" not in one.target.read_text(encoding="utf-8")
+    assert sum(bool(cell.get("attachments")) for cell in notebook.cells) == 1
+    assert not any(cell.outputs or cell.execution_count for cell in code(notebook))
+
+
+@pytest.mark.parametrize("error", [OSError("disk full"), RuntimeError("a bug"), MemoryError(), KeyboardInterrupt()])
+@pytest.mark.parametrize("place", ["html", "pdf", "write"])
+def test_an_interruption_leaves_nothing_half_written(tmp_path, masters, no_kernel, monkeypatch, place, error):
+    one = job(tmp_path, masters, with_pdf=True)
+    monkeypatch.setattr(course, "pdf", lambda page, target: target.write_bytes(b"%PDF"))
+    make(one)
+    whole = contents(one.folder)
+    (masters / "b_aof" / "statement.md").write_text(TINY.replace("Divide.", "Divide by F."), encoding="utf-8")
+
+    def fails(*arguments, **_):
+        if place == "pdf":
+            arguments[1].write_bytes(b"%PD")
+        raise error
+
+    with monkeypatch.context() as broken:
+        if place == "write":
+            broken.setattr(nbformat, "writes", fails)
+        else:
+            broken.setattr(course, place, fails)
+        if isinstance(error, KeyboardInterrupt):
+            with pytest.raises(KeyboardInterrupt):
+                make(one)
+        else:
+            outcome = make(one)
+            assert outcome.status == "failed"
+            assert str(error) in outcome.message
+
+    now = contents(one.folder)
+    assert set(now) == set(whole)  # no temporary files
+    assert now["b-aof-solution.ipynb"] == whole["b-aof-solution.ipynb"]
+    assert now["b-aof-solution.pdf"].startswith(b"%PDF")
+    assert now["b-aof-solution.html"].rstrip().endswith(b"</html>")
+    assert make(one).status == "written"
+    assert b"Divide by F." in contents(one.folder)["b-aof-solution.html"]
+
+
+def test_an_old_pdf_does_not_stay_beside_a_new_page(tmp_path, masters, no_kernel, monkeypatch):
+    monkeypatch.setattr(course, "pdf", lambda page, target: target.write_bytes(hashlib.sha256(page.read_bytes()).digest()))
+    make(job(tmp_path, masters, with_pdf=True))
+    old = contents(tmp_path / "out")["b-aof-solution.pdf"]
+    (masters / "b_aof" / "statement.md").write_text(TINY.replace("Divide.", "Divide by F."), encoding="utf-8")
+    make(job(tmp_path, masters))
+    assert make(job(tmp_path, masters, with_pdf=True)).status == "written"
+    assert contents(tmp_path / "out")["b-aof-solution.pdf"] != old
+
+
+def test_without_a_browser_it_is_said(tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda _: None)
+    with pytest.raises(NotebookFailed, match="no browser to print PDF with; install one of chromium"):
+        execute.pdf(tmp_path / "page.html", tmp_path / "page.pdf")
+
+
+def test_a_browser_that_prints_nothing_has_failed(tmp_path, monkeypatch):
+    target = tmp_path / "page.pdf"
+    target.touch()  # as a temporary file is
+    monkeypatch.setattr(shutil, "which", lambda _: "/bin/true")
+    with pytest.raises(NotebookFailed, match="could not print"):
+        execute.pdf(tmp_path / "page.html", target)
+
+
+def test_save_is_all_or_nothing(tmp_path):
+    target = tmp_path / "file.txt"
+    save("first", target)
+    with pytest.raises(UnicodeEncodeError):
+        save("second \ud800", target)
+    assert contents(tmp_path) == {"file.txt": b"first"}
+    assert target.stat().st_mode & 0o777 == 0o644
+
+
+def test_a_solution_that_does_not_pass_is_not_handed_out(tmp_path, masters):
+    (masters / "b_aof" / "statement.md").write_text(TINY.replace("cross = G @ Psi", "cross = 2 * G @ Psi"), encoding="utf-8")
+    outcome = make(job(tmp_path, masters))
+    assert outcome.status == "failed"
+    assert re.match(r"the solution does not pass b1: not right\. It is twice", outcome.message)
+    assert not (tmp_path / "out").exists()
+
+
+# -- commands
+
+
+@pytest.fixture
+def call(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return lambda *arguments: CliRunner().invoke(cli.main, [str(argument) for argument in arguments])
+
+
+def refused(result, *words):
+    assert result.exit_code in (1, 2)
+    assert isinstance(result.exception, SystemExit)
+    line = next(line for line in result.output.splitlines() if line.startswith("Error: "))
+    for word in words:
+        assert word in line
+
+
+def test_jobs_do_not_change_what_is_written_and_failures_do_not_stop_the_rest(call, tmp_path, masters):
+    (masters / "c_duof").mkdir()
+    (masters / "c_duof" / "statement.md").write_text(TINY.replace('exercise("b"', 'exercise("b" / 0'), encoding="utf-8")
+    for workers in (1, 2):
+        variants = ("--variant", "53", "--variant", "12")
+        result = call(
+            "exercises", *variants, "--sets", "b,c,d", "--masters", masters, "--out", f"out{workers}", "--jobs", workers
+        )
+        assert result.exit_code == 1
+        failed = [line for line in result.output.splitlines() if line.startswith("FAILED")]
+        assert len(failed) == 4
+        assert failed[0].startswith("FAILED variant 12, c-duof: cell c-01: TypeError")
+        assert failed[1].startswith("FAILED variant 12, d-fos: no master")
+        rows = [line.split() for line in result.output.splitlines() if line.startswith(f"out{workers}/")]
+        assert rows == [[f"out{workers}/{name}", "1", "0", "2"] for name in ("53", "12")]
+    first, second = contents(tmp_path / "out1"), contents(tmp_path / "out2")
+    assert first == second
+    assert sorted(first) == ["12/b-aof.ipynb", "53/b-aof.ipynb"]
+
+    result = call("exercises", "--variant", "53", "--sets", "b", "--masters", masters, "--out", "out1")
+    assert result.exit_code == 0
+    assert ["out1/53", "0", "1", "0"] in [line.split() for line in result.output.splitlines()]
+
+
+def double(number):
+    return 2 * number
+
+
+def test_run_all_gives_every_outcome_once():
+    assert sorted(run_all(range(20), double, 1, "test")) == sorted(run_all(range(20), double, 2, "test")) == list(range(0, 40, 2))
+
+
+def killed(_):
+    import os
+
+    os._exit(1)
+
+
+def test_a_killed_worker_is_told():
+    with pytest.raises(ValueError, match="a working process was killed"):
+        list(run_all([1, 2], killed, 2, "test"))
+
+
+def test_dask_has_to_be_installed(call, masters, monkeypatch):
+    monkeypatch.setitem(sys.modules, "dask", None)
+    monkeypatch.setitem(sys.modules, "dask.distributed", None)
+    result = call(
+        "exercises", "--variant", "53", "--sets", "b", "--masters", masters, "--out", "out", "--dask", "tcp://nowhere:1"
+    )
+    refused(result, "--dask needs the package `distributed`: pip install distributed")
+
+
+def test_unknown_names_are_refused(call, tmp_path):
+    refused(call("exercises", "--out", "o"), "name the variants: --variant 53, or --all")
+    refused(call("exercises", "--out", "o", "--variant", "99"), "no variant 99; there are 53, 1,")
+    refused(call("solutions", "--out", "o", "--variant", "53", "--sets", "b,zz"), "no exercise set zz; there are a, b")
+    refused(call("solutions", "--out", "o", "--variant", "53", "--sets", ","), "no exercise set")
+    refused(call("exercises", "--out", "o", "--variant", "53", "--variants", "no.toml"), "no file of variants at no.toml")
+    refused(call("exercises", "--out", "o", "--students", "no.csv"), "no course list no.csv")
+    assert not (tmp_path / "o").exists()
+
+
+def test_two_notebooks_never_share_a_file(call, tmp_path):
+    (tmp_path / "list.csv").write_text("name,group\nИванов И.,1\nИванов И,1\n", encoding="utf-8")
+    refused(call("exercises", "--out", "o", "--students", "list.csv", "--sets", "b"), "two notebooks would be", "Иванов-И")
+    (tmp_path / "my.toml").write_text(
+        "".join(f'[variants."{name}"]\nstate = "x + v"\nmeter = "x + w"\n' for name in ("A/b", "a-B")), encoding="utf-8"
+    )
+    refused(call("exercises", "--out", "o", "--all", "--variants", "my.toml", "--sets", "b"), "two notebooks would be")
+    assert not (tmp_path / "o").exists()
+
+
+def test_a_course_list_makes_a_folder_for_each_student(call, tmp_path, masters, monkeypatch):
+    from kfcourse.notebooks import commands
+
+    monkeypatch.setattr(commands, "run_all", lambda work, *_: [Outcome(job, "written") for job in work])
+    (tmp_path / "list.csv").write_text("name;group\nИванов Иван;М-1\n../../evil;..\n", encoding="utf-8-sig")
+    result = call("exercises", "--students", "list.csv", "--out", "o", "--sets", "b,c", "--masters", masters)
+    assert result.exit_code == 0
+    folders = [line.split()[0] for line in result.output.splitlines() if line.startswith("o/")]
+    assert folders == ["o/М-1/Иванов-Иван", "o/unnamed/evil"]
+
+
+# -- course lists
+
+
+VARIANTS = ["53", "1", "2", "3"]
+
+
+def course_list(tmp_path, text, encoding="utf-8"):
+    path = tmp_path / "list.csv"
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+def students(tmp_path, count, groups=2):
+    rows = "".join(f"Student {i},G{i % groups}\n" for i in range(count))
+    return assign(course_list(tmp_path, "name,group\n" + rows), VARIANTS)
+
+
+def test_assignment_is_deterministic_and_does_not_move(tmp_path):
+    whole = students(tmp_path, 30)
+    assert whole == students(tmp_path, 30)
+    for count in (1, 7, 29):
+        assert students(tmp_path, count) == whole[:count]
+    assert {one.variant for one in whole} == set(VARIANTS)
+
+
+def test_variants_differ_within_a_group_until_all_are_taken(tmp_path):
+    whole = students(tmp_path, 40)
+    for group in ("G0", "G1"):
+        given = [one.variant for one in whole if one.group == group]
+        for start in range(0, 20, len(VARIANTS)):
+            assert sorted(given[start : start + len(VARIANTS)]) == sorted(VARIANTS)
+
+
+def test_assignment_does_not_follow_the_order_of_the_variants(tmp_path):
+    """Otherwise the first in every group would have the same."""
+    firsts = {assign(course_list(tmp_path, f"name,group\nA,{i}\n"), VARIANTS)[0].variant for i in range(30)}
+    assert firsts == set(VARIANTS)
+
+
+@pytest.mark.parametrize("separator", [",", ";"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+def test_lists_of_spreadsheets_are_read(tmp_path, separator, encoding):
+    text = separator.join((" Group ", "No", "NAME")) + "\r\n" + separator.join(("М-1", "1", '"Иванов, Иван"')) + "\r\n\r\n"
+    (one,) = assign(course_list(tmp_path, text, encoding), VARIANTS)
+    assert (one.name, one.group) == ("Иванов, Иван", "М-1")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "the first line must name the columns name and group, got nothing"),
+        ("student,group\nA,1\n", "got student, group"),
+        ("A,1\nB,1\n", "got a, 1"),
+        ("name,group\n", "names no student"),
+        ("name,group\nA,1\n,1\n", "line 3: a student without a name"),
+        ("name,group\nA,1\nB,1\nA,1\n", "line 4: A, 1 stands there twice"),
+        ("name,group\nA" + "a" * 200_000 + ",1\n", "line 2: field larger than field limit"),
+    ],
+)
+def test_bad_lists_are_explained(tmp_path, text, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        assign(course_list(tmp_path, text), VARIANTS)
+
+
+def test_other_encodings_are_explained(tmp_path):
+    with pytest.raises(ValueError, match="is not UTF-8; save it as CSV UTF-8"):
+        assign(course_list(tmp_path, "name,group\nИванов,1\n", "cp1251"), VARIANTS)
+
+
+@pytest.mark.parametrize("name", ["..", "../a", "a/b", ".hidden", "a\\b", " ", "con:", "a\nb"])
+def test_safe_names_stay_in_their_folder(name):
+    assert re.fullmatch(r"\w[\w.-]*", safe(name))
+
+
+def test_context_of_a_variant_without_parameters():
+    lab = exercise("b", {"name": "bare", "state": "x + v", "meter": "x + w"})
+    assert context(lab)["symbols"] == "# this variant has no parameters"

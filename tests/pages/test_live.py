@@ -1,0 +1,623 @@
+"""The live page in a real browser: its numbers are the package's; it works by mouse, finger and keyboard, without a network."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kfcourse.laws import Gaussian
+from kfcourse.linear.arithmetic import predict_law
+from kfcourse.linear.consistency import innovations, nis, normalised_square
+from kfcourse.linear.runs import covariances, steady_state
+from kfcourse.pages import live
+from kfcourse.scenarios import pointer
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chromium-browser"))), None)
+RECORDING = live.record(pointer.hand_track(seed=10), seed=6)
+SECONDS = live.GRID * (len(RECORDING.position) - 1)
+START = {"interval": 20, "sigma": 8, "decibels": 57}
+ALONE = '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Live</title></head><body>{}</body></html>'
+
+
+def system_of(interval: int, sigma: int, decibels: int):
+    return pointer.uniform_acceleration(interval / 1000, np.sqrt(10 ** (decibels / 10) / (interval / 1000)), sigma)
+
+
+def reference(interval: int, sigma: int, decibels: int, recording: live.Recording = RECORDING, last: float | None = None):
+    """The page's table by the package: of the whole recording, or of its last seconds."""
+    truth, y = recording.sampled(interval / 1000, sigma)
+    system = system_of(interval, sigma, decibels)
+    laws = pointer.follow(system, y, interval / 1000)
+    error = laws.posterior.mean[:, 0, :2] - truth[3:]
+    time = interval / 1000 * np.arange(3, len(truth))
+    part = time > (-1 if last is None else time[-1] - last + 1e-9)
+    size = normalised_square(error, laws.posterior.cov[:, 0, :2, :2])
+    return {
+        "noisy": np.sqrt(((y[3:, 0] - truth[3:])[part] ** 2).sum(axis=-1).mean()),
+        "filtered": np.sqrt((error[part] ** 2).sum(axis=-1).mean()),
+        "inside": 100 * np.mean(size[part] <= -2 * np.log(0.05)),
+        "nis": nis(innovations(system.measure, laws.predicted, y[3:]))[part].mean(),
+    }
+
+
+def written(numbers: dict[str, float]) -> dict[str, str]:
+    formats = {"noisy": "{:.2f} px", "filtered": "{:.2f} px", "inside": "{:.0f} %", "nis": "{:.2f}"}
+    return {name: formats[name].format(value) for name, value in numbers.items()}
+
+
+# ---------------------------------------------------------------- without a browser
+
+
+def test_a_recording_is_the_track_and_its_noise():
+    track = pointer.hand_track(seed=3, strokes=4)
+    recording = live.record(track, seed=5)
+    noisy = pointer.sample(track, live.GRID, 8.0, runs=1, seed=5)
+    for every in (1, 4, 20):
+        truth, y = recording.sampled(every * live.GRID, 8.0)
+        # rounded to 0.001 px and 0.001 sigma: half of each, times 1 and 8
+        np.testing.assert_allclose(truth, noisy.state[::every, 0, :2], atol=0.5001e-3)
+        np.testing.assert_allclose(y, noisy.y[::every], atol=4.6e-3)
+    np.testing.assert_array_equal(recording.position, recording.position.round(3))
+
+
+def test_a_page_loads_nothing_and_has_no_ids():
+    text = live.page(RECORDING)
+    assert not re.search(r"\b(src|href|srcset|url\()\s*=?", text)
+    assert not re.search(r"https?:|import\s*\(|fetch\s*\(|XMLHttpRequest|localStorage|document\.cookie", text)
+    assert not re.search(r"<[^>]*\sid=", text)  # two pages may stand in one document
+    assert text == live.page(RECORDING)
+    assert "{{" not in text and "{%" not in text
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: live.page(RECORDING, interval=15), "interval: expected 10, 20, ..., 200, got 15"),
+        (lambda: live.page(RECORDING, interval=210), "interval: expected"),
+        (lambda: live.page(RECORDING, sigma=0), "sigma: expected 1, 2, ..., 40, got 0"),
+        (lambda: live.page(RECORDING, decibels=float("nan")), "decibels: expected 30, 31, ..., 80, got nan"),
+        (lambda: live.page(live.Recording(np.zeros((5, 2)), np.zeros((4, 2)))), "of one shape"),
+        (lambda: live.page(live.Recording(np.zeros((0, 2)), np.zeros((0, 2)))), "of one shape"),
+        (lambda: live.page(live.Recording(np.zeros(5), np.zeros(5))), "of one shape"),
+        (lambda: live.page(live.Recording(np.full((5, 2), np.nan), np.zeros((5, 2)))), "must be finite"),
+        (lambda: RECORDING.sampled(0.015, 8.0), "multiple of 0.01 s"),
+        (lambda: RECORDING.sampled(0.0, 8.0), "multiple of 0.01 s"),
+        (lambda: RECORDING.sampled(np.inf, 8.0), "multiple of 0.01 s"),
+        (lambda: RECORDING.sampled(0.02, -1.0), "standard deviation"),
+    ],
+)
+def test_arguments_that_do_not_fit(call, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        call()
+
+
+# ---------------------------------------------------------------- the browser
+
+
+@pytest.fixture(scope="module")
+def browser():
+    if BROWSER is None:
+        pytest.skip("no Chromium or Chrome on this machine")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=BROWSER)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def opened(browser, tmp_path):
+    """opened(html, **options) -> page of a browser without network; time stands still but for page.clock.run_for(ms)."""
+    contexts, problems = [], []
+
+    def open_page(html: str | None = None, real_time: bool = False, **options):
+        path = tmp_path / "live.html"
+        path.write_text(ALONE.format(html or live.page(RECORDING, **START)), encoding="utf-8")
+        context = browser.new_context(offline=True, **({"viewport": {"width": 800, "height": 1000}} | options))
+        contexts.append(context)
+        tab = context.new_page()
+        tab.set_default_timeout(20_000)
+        tab.on("console", lambda message: problems.append(message.text))
+        tab.on("pageerror", lambda error: problems.append(str(error)))
+        tab.on("request", lambda request: request.url == path.as_uri() or problems.append(f"loads {request.url}"))
+        if not real_time:
+            tab.clock.install(time=0)
+        tab.goto(path.as_uri())
+        if not real_time:
+            tab.clock.pause_at(1000)
+        return tab
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert problems == []
+
+
+def shown(tab, column: str = "all") -> dict[str, str]:
+    return {name: tab.locator(f"[data-show={name}-{column}]").inner_text() for name in ("noisy", "filtered", "inside", "nis")}
+
+
+def text(tab, name: str) -> str:
+    return tab.locator(f"[data-show={name}]").inner_text()
+
+
+def status(tab) -> str:
+    return tab.get_by_role("status").inner_text()
+
+
+def press(tab, name: str) -> None:
+    tab.get_by_role("button", name=name, exact=True).press("Enter")
+
+
+def play_to_the_end(tab) -> None:
+    press(tab, "Play the recorded track")
+    tab.clock.run_for(1000 * SECONDS + 500)
+    assert tab.get_by_role("button", name="Play again").is_visible()
+
+
+def set_slider(tab, name: str, value: int) -> None:
+    """By the keyboard: to the lower end, then up."""
+    slider = tab.locator(f"input[data-set={name}]")
+    slider.press("Home")
+    for _ in range((value - live.SLIDERS[name].low) // live.SLIDERS[name].step):
+        slider.press("ArrowRight")
+    assert slider.input_value() == str(value)
+
+
+# ---------------------------------------------------------------- the filter of the page is the filter of the package
+
+
+@pytest.mark.parametrize(
+    ("interval", "sigma", "decibels"),
+    [(20, 8, 57), (10, 8, 57), (100, 8, 57), (200, 3, 45), *itertools.product((10, 200), (1, 40), (30, 80))],
+)
+def test_estimates_covariances_and_gains(opened, interval, sigma, decibels):
+    tab = opened()
+    found = tab.evaluate(
+        "([recording, settings]) => kfcourseLive.run(recording, settings)",
+        [
+            {"position": RECORDING.position.tolist(), "noise": RECORDING.noise.tolist()},
+            {"interval": interval / 1000, "sigma": sigma, "intensity": 10 ** (decibels / 10)},
+        ],
+    )
+    samples, system = found["samples"], system_of(interval, sigma, decibels)
+    truth, y = RECORDING.sampled(interval / 1000, sigma)
+    np.testing.assert_array_equal([one["truth"] for one in samples], truth)
+    np.testing.assert_array_equal([one["y"] for one in samples], y[:, 0])
+    assert [one["point"] for one in samples] == list(range(0, len(RECORDING.position), interval // 10))
+
+    def same(actual, expected, scale):
+        # Rounding of 1e-16 in each of some hundred steps, times Psi / R, which is sigma_a^2 Delta^4 / (4 sigma^2) = 2e5 at the
+        # worst of these settings (200 ms, 1 px, 80 dB): there the covariance is a small difference.  1e-9 leaves room for it.
+        assert np.max(np.abs(np.asarray(actual) - expected) / scale) < 1e-9
+
+    assert [one["law"] for one in samples[:2]] == [None, None]
+    start = pointer.start_up(y[:3], interval / 1000, system.R)
+    law, sd = samples[2]["law"], np.sqrt(np.diag(start.cov)[:4])
+    same(np.ravel(law["mean"]), start.mean[0, :4], sd)
+    same(law["cov"], start.cov[:4, :4], np.outer(sd, sd))
+    assert "gain" not in law
+
+    laws = pointer.follow(system, y, interval / 1000).posterior
+    gains = covariances(system, predict_law(system, Gaussian(start.mean[0, :4], start.cov[:4, :4])).cov, len(y) - 3).gains
+    sd = np.sqrt(np.diagonal(laws.cov[:, 0], axis1=1, axis2=2))
+    page = {name: np.array([one["law"][name] for one in samples[3:]]) for name in ("mean", "cov", "gain", "nis")}
+    same(page["mean"][..., 0], laws.mean[:, 0], sd)
+    same(page["cov"], laws.cov[:, 0], sd[:, :, None] * sd[:, None, :])
+    same(page["gain"], gains, sd[:, :, None] / sigma)  # K = p H^T R^-1
+    assert (page["cov"] == page["cov"].swapaxes(1, 2)).all()
+
+    expected = reference(interval, sigma, decibels)
+    assert found["measures"]["noisy"] == pytest.approx(expected["noisy"], rel=1e-12)
+    assert found["measures"]["filtered"] == pytest.approx(expected["filtered"], rel=1e-9)
+    assert 100 * found["measures"]["inside"] == pytest.approx(expected["inside"], rel=1e-12)
+    assert found["measures"]["nis"] == pytest.approx(expected["nis"], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"interval": None}, {"interval": 0.015}, {"interval": 0}, {"sigma": None}, {"sigma": 0}, {"sigma": -1}, {"intensity": None}],
+)
+def test_settings_that_are_none_are_refused(opened, change):
+    message = opened().evaluate(
+        """change => {
+            const settings = { interval: 0.02, sigma: 8, intensity: 5e5, ...change };
+            for (const name in settings) settings[name] ??= NaN;
+            try { kfcourseLive.run({ position: [[0, 0]], noise: [[0, 0]] }, settings); } catch (error) { return String(error); }
+        }""",
+        change,
+    )
+    assert re.match(rf"RangeError: {next(iter(change))}: expected .*, got ", message)
+
+
+def test_noise_of_the_reader_s_track(opened):
+    tab = opened()
+
+    def mulberry32(seed):  # T. Ettinger's generator, in Python's unlimited integers
+        mask = 2**32 - 1
+        while True:
+            seed = (seed + 0x6D2B79F5) & mask
+            t = (seed ^ seed >> 15) * (seed | 1) & mask
+            t ^= (t + ((t ^ t >> 7) * (t | 61) & mask)) & mask
+            yield (t ^ t >> 14) / 2**32
+
+    found = tab.evaluate("() => { const next = kfcourseLive.uniforms(4); return Array.from({ length: 50 }, next); }")
+    assert found == list(itertools.islice(mulberry32(4), 50))
+    count = 50_000
+    pairs = np.array(
+        tab.evaluate("n => { const next = kfcourseLive.normals(1); return Array.from({ length: n }, next); }", count)
+    )
+    # 4 standard errors each: mean, variance, correlation of the axes and of neighbours, fourth moment (variance 96 of x^4)
+    assert abs(pairs.mean(axis=0)).max() < 4 / np.sqrt(count)
+    assert abs(pairs.var(axis=0) - 1).max() < 4 * np.sqrt(2 / count)
+    assert abs((pairs[:, 0] * pairs[:, 1]).mean()) < 4 / np.sqrt(count)
+    assert abs((pairs[1:] * pairs[:-1]).mean(axis=0)).max() < 4 / np.sqrt(count)
+    assert abs((pairs**4).mean(axis=0) - 3).max() < 4 * np.sqrt(96 / count)
+
+
+def test_the_pointer_between_its_events(opened):
+    found = opened().evaluate("""() => {
+        const line = kfcourseLive.timeline();
+        line.add(100, [10, 0]); line.add(116, [26, 32]); line.add(116, [99, 99]); line.add(110, [99, 99]); line.add(132, [26, 0]);
+        const moving = [90, 100, 104, 116, 124, 132, 200].map(line.at);
+        line.add(1000, [126, 0]);
+        return [...moving, ...[900, 985, 991, 1000, 1100].map(line.at)];
+    }""")
+    moving = [[10, 0], [10, 0], [14, 8], [26, 32], [26, 16], [26, 0], [26, 0]]
+    rested = [[26, 0], [26, 0], [66, 0], [126, 0], [126, 0]]  # at rest until 15 ms before the next event
+    np.testing.assert_allclose(found, moving + rested, rtol=1e-12)
+
+
+# ---------------------------------------------------------------- by keyboard
+
+
+def test_nothing_moves_by_itself(opened):
+    tab = opened(reduced_motion="reduce")
+    tab.clock.run_for(3000)
+    assert text(tab, "count") == "–" and text(tab, "phase") == "waiting"
+    assert status(tab).startswith("Move the mouse or a finger")
+
+
+def test_the_recorded_track_by_keyboard(opened):
+    tab = opened()
+    focus = "document.activeElement.textContent + document.activeElement.tagName"
+    order = []
+    for _ in range(8):
+        tab.keyboard.press("Tab")
+        order.append(tab.evaluate(focus))
+    assert [stop[-6:] for stop in order[:1]] == ["CANVAS"]
+    assert order[1:] == ["Play the recorded trackBUTTON", "StepBUTTON", "ClearBUTTON", "INPUT", "INPUT", "INPUT", "INPUT"]
+    for _ in range(6):
+        tab.keyboard.press("Shift+Tab")
+    tab.keyboard.press("Enter")
+    assert status(tab) == "Playing."
+    tab.clock.run_for(2000)
+    tab.keyboard.press("Space")
+    count, seconds = re.fullmatch(r"(\d+) in (\d+\.\d\d) s", text(tab, "count")).groups()
+    # frames of 16 ms; the first begins the track
+    assert 1.9 < float(seconds) <= 2.0 and int(count) == int(float(seconds) / 0.02 + 1e-9) + 1
+    part = live.Recording(*(values[: round(float(seconds) / live.GRID) + 1] for values in RECORDING))
+    assert shown(tab) == written(reference(**START, recording=part))
+    assert status(tab) == "Paused at {} s: noisy {noisy}, filtered {filtered}.".format(seconds, **shown(tab))
+    tab.clock.run_for(1000)
+    assert text(tab, "count") == f"{count} in {seconds} s"
+    tab.keyboard.press("Enter")
+    tab.clock.run_for(1000 * SECONDS)
+    assert shown(tab) == written(reference(**START))
+    assert shown(tab, "recent") == written(reference(**START, last=3.0))
+    assert shown(tab, "recent") != shown(tab)
+    assert status(tab) == "End of the recorded track: noisy {noisy}, filtered {filtered}.".format(**shown(tab))
+    assert tab.evaluate(focus) == "Play againBUTTON"
+    tab.keyboard.press("Enter")
+    tab.clock.run_for(500)
+    assert float(text(tab, "count").split()[2]) <= 0.5
+
+
+def test_start_up_step_by_step(opened):
+    tab = opened()
+    step = tab.get_by_role("button", name="Step")
+    system = system_of(**START)
+    y = RECORDING.sampled(START["interval"] / 1000, START["sigma"])[1]
+    start = pointer.start_up(y[:3], START["interval"] / 1000, system.R)
+    found = covariances(system, predict_law(system, Gaussian(start.mean[0, :4], start.cov[:4, :4])).cov, 10)
+    phases = []
+    for k in range(12):
+        step.press("Space")
+        phases.append(text(tab, "phase"))
+        assert text(tab, "count") == f"{k + 1} in {0.02 * k:.2f} s"
+        assert status(tab) == f"Sample {k + 1} at {0.02 * k:.2f} s."
+        if k >= 3:
+            assert text(tab, "gain") == f"{found.gains[k - 3, 0, 0]:.3f}"
+            assert text(tab, "gain-velocity") == f"{found.gains[k - 3, 2, 0]:.2f} s⁻¹"
+            assert text(tab, "claim") == f"{np.sqrt(found.posterior[k - 3, 0, 0]):.2f} px"
+        else:
+            assert text(tab, "gain") == "–" and set(shown(tab).values()) == {"–"}
+            assert text(tab, "claim") == ("8.00 px" if k == 2 else "–")
+    assert phases == ["collecting: 1 of 3", "collecting: 2 of 3", *["ready"] * 10]
+    # other intervals: the next sample is the next multiple
+    set_slider(tab, "interval", 100)
+    assert text(tab, "count") == "3 in 0.22 s" and text(tab, "phase") == "ready"
+    step.press("Space")
+    assert text(tab, "count") == "4 in 0.30 s" and text(tab, "phase") == "ready"
+    press(tab, "Continue")
+    tab.clock.run_for(500)
+    press(tab, "Pause")
+    assert 0.7 < float(text(tab, "count").split()[2]) <= 0.8
+    press(tab, "Clear")
+    assert text(tab, "phase") == "waiting" and text(tab, "count") == "–"
+
+
+def test_sliders_filter_the_same_track_anew(opened):
+    tab = opened()
+    play_to_the_end(tab)
+    for settings in (
+        {**START, "sigma": 9},
+        {"interval": 100, "sigma": 9, "decibels": 57},
+        {"interval": 100, "sigma": 9, "decibels": 41},
+    ):
+        for name, value in settings.items():
+            set_slider(tab, name, value)
+        assert shown(tab) == written(reference(**settings))
+        assert text(tab, "interval") == f"{settings['interval']} ms" and text(tab, "sigma") == f"{settings['sigma']} px"
+    assert text(tab, "decibels") == "41 dB, 1.3·10⁴ px²/s³"
+    tab.clock.run_for(1000)
+    assert status(tab) == "At {:.2f} s: noisy {noisy}, filtered {filtered}.".format(SECONDS, **shown(tab))
+    for name, value in (("interval", "100 ms"), ("sigma", "9 px"), ("decibels", "41 decibels")):
+        assert tab.locator(f"input[data-set={name}]").get_attribute("aria-valuetext") == value
+
+
+def test_extreme_settings_and_nonsense(opened):
+    tab = opened()
+    play_to_the_end(tab)
+    ends = [(slider.low, slider.high) for slider in live.SLIDERS.values()]
+    set_value = "(input, value) => { input.value = value; input.dispatchEvent(new Event('input', { bubbles: true })); }"
+    for values in itertools.product(*ends):
+        for name, value in zip(live.SLIDERS, values, strict=True):
+            tab.locator(f"input[data-set={name}]").evaluate(set_value, str(value))
+        assert shown(tab) == written(reference(*values))
+    for nonsense in ("NaN", "", "1e9", "-5", "Infinity"):
+        for name in live.SLIDERS:
+            tab.locator(f"input[data-set={name}]").evaluate(set_value, nonsense)
+        assert all(re.match(r"\d", value) for value in shown(tab).values())
+
+
+def test_a_pointer_moved_by_arrow_keys(opened):
+    tab = opened(viewport={"width": 800, "height": 600})
+    assert tab.evaluate("document.documentElement.scrollHeight > innerHeight")  # the keys could scroll the page
+    tab.keyboard.press("Tab")
+    for key in ("ArrowRight", "ArrowDown", "ArrowLeft", "ArrowUp"):
+        tab.keyboard.down(key)
+        tab.clock.run_for(400)
+        tab.keyboard.up(key)
+    assert text(tab, "phase") == "ready"
+    tab.clock.run_for(200)
+    assert tab.evaluate("[scrollX, scrollY]") == [0, 0]
+    tab.keyboard.press("Escape")
+    seconds = float(text(tab, "count").split()[2])
+    assert 1.7 < seconds <= 1.8  # less the time that the page waits for events, and a frame
+    assert status(tab) == "Your track, {:.2f} s: noisy {noisy}, filtered {filtered}.".format(seconds, **shown(tab))
+    tab.clock.run_for(500)
+    assert float(text(tab, "count").split()[2]) == seconds
+    # the sliders filter the reader's track too; leaving the field ends a track
+    set_slider(tab, "interval", 50)
+    assert text(tab, "count").startswith(f"{int(seconds / 0.05 + 1e-9) + 1} in")
+    tab.locator("canvas").focus()
+    tab.keyboard.press("ArrowLeft")
+    tab.clock.run_for(300)
+    tab.keyboard.press("Tab")
+    assert status(tab).startswith("Your track, 0.2")
+
+
+# ---------------------------------------------------------------- by mouse and finger
+
+
+def circle(tab, move, turns: float = 1.5, seconds: float = 3.0, radius: float = 0.3) -> None:
+    """Move along a circle in the middle of the field, at the rate of a screen; `radius` in heights of the field."""
+    box = tab.locator("canvas").bounding_box()
+    for i in range(round(seconds / 0.016)):
+        angle = 2 * np.pi * turns * i * 0.016 / seconds
+        x = box["x"] + box["width"] / 2 + radius * box["height"] * np.cos(angle)
+        y = box["y"] + box["height"] / 2 + radius * box["height"] * np.sin(angle)
+        move(x, y)
+        tab.clock.run_for(16)
+
+
+def pixel(tab, x: float, y: float) -> list[int]:
+    """Colour of the field at a point of the window."""
+    return tab.locator("canvas").evaluate(
+        """(canvas, [x, y]) => {
+            const box = canvas.getBoundingClientRect(), scale = canvas.width / box.width;
+            const copy = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
+            copy.drawImage(canvas, (x - box.left) * scale, (y - box.top) * scale, 1, 1, 0, 0, 1, 1);
+            return [...copy.getImageData(0, 0, 1, 1).data.slice(0, 3)];
+        }""",
+        [x, y],
+    )
+
+
+def test_the_mouse_is_followed_and_its_track_cleaned(opened):
+    tab = opened()
+    tab.mouse.move(5, 5)
+    assert text(tab, "phase") == "waiting"
+    circle(tab, tab.mouse.move)
+    assert text(tab, "phase") == "ready" and status(tab) == "The filter is ready."
+    tab.mouse.move(5, 5)
+    count, seconds = re.fullmatch(r"(\d+) in (\d+\.\d\d) s", text(tab, "count")).groups()
+    assert 2.9 < float(seconds) <= 3.0 and int(count) == int(float(seconds) / 0.02 + 1e-9) + 1
+    assert status(tab) == "Your track, {} s: noisy {noisy}, filtered {filtered}.".format(seconds, **shown(tab))
+    found = {name: float(value.split()[0]) for name, value in shown(tab).items()}
+    # The standard error of a root mean square of n plane vectors is 1 / (2 sqrt(n)) of it.
+    assert abs(found["noisy"] / (8 * np.sqrt(2)) - 1) < 4 / (2 * np.sqrt(int(count)))
+    # The stationary filter leaves the share sqrt(gain) of the noise, and the circle is too slow for a lag.  Its errors are
+    # correlated over about 1 / gain samples, to either side.
+    gain = steady_state(system_of(**START)).gain[0, 0]
+    assert abs(found["filtered"] / (8 * np.sqrt(2 * gain)) - 1) < 4 / (2 * np.sqrt(int(count) * gain / 2))
+    assert found["filtered"] < found["noisy"]
+    tab.clock.run_for(2000)
+    assert text(tab, "count") == f"{count} in {seconds} s"  # ended when the mouse left
+
+
+@pytest.mark.parametrize("options", [{}, {"viewport": {"width": 400, "height": 900}, "device_scale_factor": 2}])
+def test_the_dot_is_under_the_pointer(opened, options):
+    tab = opened(**options)
+    box = tab.locator("canvas").bounding_box()
+    assert box["width"] == pytest.approx(box["height"] * 1.6, abs=1)
+    assert tab.locator("canvas").evaluate("canvas => canvas.width") == round(box["width"] * options.get("device_scale_factor", 1))
+    x, y = box["x"] + 0.8 * box["width"], box["y"] + 0.3 * box["height"]
+    tab.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    tab.clock.run_for(50)
+    tab.mouse.move(x, y)
+    tab.clock.run_for(300)
+    assert pixel(tab, x, y) == [0, 0, 0]
+    assert pixel(tab, box["x"] + 4, box["y"] + 4) == [255, 255, 255]
+    assert not tab.evaluate("document.documentElement.scrollWidth > innerWidth")
+
+
+def test_a_recorded_track_is_not_wiped_off_by_a_passing_mouse(opened):
+    tab = opened()
+    play_to_the_end(tab)
+    before = shown(tab), text(tab, "count")
+    circle(tab, tab.mouse.move, seconds=0.5)
+    assert (shown(tab), text(tab, "count")) == before
+    tab.mouse.down()  # on purpose
+    circle(tab, tab.mouse.move, seconds=0.5)
+    tab.mouse.up()
+    assert float(text(tab, "count").split()[2]) < 0.6
+    tab.get_by_role("button", name="Play the recorded track").click()
+    tab.clock.run_for(500)
+    tab.locator("canvas").click()
+    tab.clock.run_for(200)
+    assert tab.get_by_role("button", name="Play the recorded track").is_visible()  # no longer playing
+    press(tab, "Clear")
+    assert text(tab, "phase") == "waiting"
+    circle(tab, tab.mouse.move, seconds=0.5)
+    assert text(tab, "phase") == "ready"
+
+
+def test_a_track_has_an_end(opened):
+    tab = opened()
+    circle(tab, tab.mouse.move, seconds=0.2)
+    tab.clock.run_for(62_000)
+    assert text(tab, "count") == "3000 in 59.99 s"
+    assert status(tab).startswith("Your track, 59.99 s")
+    circle(tab, tab.mouse.move, seconds=0.5)
+    assert float(text(tab, "count").split()[2]) < 0.5
+
+
+def test_a_finger(opened):
+    tab = opened(has_touch=True, is_mobile=True, viewport={"width": 400, "height": 900})
+    session = tab.context.new_cdp_session(tab)
+
+    def touch(kind, *points):
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in points]})
+
+    box = tab.locator("canvas").bounding_box()
+    touch("touchStart", (box["x"] + 0.7 * box["width"], box["y"] + box["height"] / 2))
+    circle(tab, lambda x, y: touch("touchMove", (x, y)), seconds=2.0, turns=1.0)
+    assert text(tab, "phase") == "ready"
+    touch("touchEnd")
+    assert re.match(r"Your track, (1\.[89]|2\.0)", status(tab)), status(tab)  # the browser has not taken the touch for scrolling
+    found = {name: float(value.split()[0]) for name, value in shown(tab).items()}
+    assert found["filtered"] < found["noisy"]
+    assert tab.evaluate("[scrollX, scrollY]") == [0, 0]
+    assert tab.locator("canvas").evaluate("canvas => getComputedStyle(canvas).touchAction") == "none"
+    assert tab.locator("body").evaluate("body => getComputedStyle(body).touchAction") == "auto"
+
+
+def test_in_real_time(opened):
+    tab = opened(real_time=True)
+    tab.get_by_role("button", name="Play the recorded track").click()
+    tab.wait_for_function("document.querySelector('[data-show=phase]').textContent === 'ready'")
+    tab.wait_for_function("parseFloat(document.querySelector('[data-show=count]').textContent.split(' in ')[1]) > 0.5")
+    tab.get_by_role("button", name="Pause").click()
+    seconds = float(text(tab, "count").split()[2])
+    part = live.Recording(*(values[: round(seconds / live.GRID) + 1] for values in RECORDING))
+    assert shown(tab) == written(reference(**START, recording=part))
+
+
+# ---------------------------------------------------------------- for everybody
+
+
+def test_every_control_has_a_name(opened):
+    tab = opened()
+    assert tab.get_by_role("group", name="Live Kalman filter").count() == 1
+    assert tab.get_by_role("application", name=re.compile("arrow keys")).count() == 1
+    for name in ("Sampling interval Δ", "Noise of the meter σ", "Noise of the object S"):
+        slider = tab.get_by_role("slider", name=name, exact=True)
+        assert slider.count() == 1 and slider.get_attribute("aria-valuetext")
+    assert tab.get_by_role("checkbox", name=re.compile("whole track")).count() == 1
+    assert tab.get_by_role("button").all_inner_texts() == ["Play the recorded track", "Step", "Clear"]
+    assert tab.get_by_role("status").count() == 1
+    assert tab.locator("input, button, canvas").count() == 8
+    assert tab.get_by_role("columnheader").all_inner_texts() == ["last 3 s", "whole track"]
+    assert tab.get_by_role("rowheader").count() == 4
+
+
+def contrast(one: str, other: str) -> float:
+    """Contrast ratio of two colours #rrggbb (WCAG 2)."""
+    luminance = []
+    for colour in (one, other):
+        c = np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)])
+        luminance.append(np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4) @ [0.2126, 0.7152, 0.0722])
+    return (max(luminance) + 0.05) / (min(luminance) + 0.05)
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("by", ["system", "book"])
+def test_both_themes_are_legible(opened, theme, by):
+    other = {"light": "dark", "dark": "light"}[theme]
+    tab = opened(color_scheme=other)
+    if by == "book":
+        tab.evaluate("theme => document.documentElement.dataset.theme = theme", theme)
+    else:
+        tab.emulate_media(color_scheme=theme)
+    tab.clock.run_for(100)
+    names = ("page", "text", "line", "accent", "on-accent", "true", "noisy", "filtered", "circle")
+    colours = tab.locator(".kf-live").evaluate(
+        "(root, names) => names.map(name => getComputedStyle(root).getPropertyValue(`--kf-${name}`).trim())", names
+    )
+    colour = dict(zip(names, colours, strict=True))
+    # WCAG 2 AA: 4.5 for text, 3 for lines and controls
+    assert min(contrast(colour["page"], colour[name]) for name in ("text", "accent", "line")) >= 4.5
+    assert contrast(colour["accent"], colour["on-accent"]) >= 4.5
+    assert min(contrast(colour["page"], colour[name]) for name in ("true", "noisy", "filtered", "circle")) >= 3
+    box = tab.locator("canvas").bounding_box()
+    red, green, blue = pixel(tab, box["x"] + 4, box["y"] + 4)  # the field is drawn anew when the theme changes
+    assert f"#{red:02x}{green:02x}{blue:02x}" == colour["page"]
+    assert (red < 128) == (theme == "dark")
+
+
+def test_two_pages_in_one_document(opened):
+    tab = opened(live.page(RECORDING, **START) + live.page(RECORDING, interval=100))
+    first, second = tab.locator(".kf-live").all()
+    second.get_by_role("button", name="Step").press("Enter")
+    assert second.locator("[data-show=count]").inner_text() == "1 in 0.00 s"
+    assert first.locator("[data-show=count]").inner_text() == "–"
+    assert second.locator("[data-show=interval]").inner_text() == "100 ms"
+
+
+# ---------------------------------------------------------------- the chapter
+
+
+def test_the_chapter_prints_what_its_page_shows(opened, tmp_path):
+    import jupytext
+    from nbclient import NotebookClient
+
+    notebook = jupytext.read(ROOT / "book" / "live-track.md")
+    NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(tmp_path)}}).execute()  # far from the package
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    (page,) = (output.data["text/html"] for output in outputs if "text/html" in output.get("data", {}))
+    assert [output.name for output in outputs if output.output_type == "stream" and output.name != "stdout"] == []
+    printed = "\n".join(output.text for output in outputs if output.output_type == "stream")
+    tab = opened(page)
+    tab.get_by_role("button", name="Play the recorded track").press("Enter")
+    tab.clock.run_for(60_000)
+    for name, value in shown(tab).items():
+        assert re.search(rf"^{name} +{re.escape(value)}$", printed, re.MULTILINE), (name, value, printed)

@@ -1,0 +1,274 @@
+"""The simulated flight, what a radar measures of it, and errors by part."""
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.integrate import solve_ivp
+
+from kfcourse import ModelError
+from kfcourse.filters.kalman import linear_system
+from kfcourse.scenarios.aircraft import (
+    CARTESIAN,
+    SPHERICAL,
+    aircraft,
+    cartesian,
+    kinematic,
+    measure_cartesian,
+    measure_spherical,
+    rms_by_part,
+    rms_difference,
+    spherical,
+)
+
+# Not the defaults: every number different, one turn to the right.
+OTHER = dict(
+    start=(3_000.0, 40_000.0, 9_000.0),
+    heading=0.4,
+    speeds=(180.0, 110.0),
+    radii=(4_000.0, 9_000.0),
+    turns=(-2.0, 1.2),
+    durations=(50.0, 45.0, 30.0),
+    descent=7.0,
+    ramp=6.0,
+)
+FLIGHTS = pytest.mark.parametrize("flight", [{}, OTHER], ids=["default", "other"])
+
+
+@FLIGHTS
+def test_velocity_is_the_derivative_of_position_and_acceleration_of_velocity(flight):
+    h = 0.01
+    track = aircraft(h, **flight)
+    # Central differences: their error is h^2/6 times the third derivative.  The steepest is of the acceleration on a ramp: below
+    # a (6 / ramp^2) < 1.2 m/s^4 away from the ends of ramps; there the second derivative of the ramp jumps by as much.
+    for function, derivative in ((track.position, track.velocity), (track.velocity, track.acceleration)):
+        slope = (function[2:] - function[:-2]) / (2 * h)
+        assert np.abs(slope - derivative[1:-1]).max() < 2e-3  # 1.2 h / 8 at a jump, the worst case
+    # Continuous acceleration: a step of h changes it by no more than the steepest ramp, 1.5 a / ramp h, and the turning of a.
+    size = np.linalg.norm(track.acceleration, axis=1).max()
+    change = np.linalg.norm(np.diff(track.acceleration, axis=0), axis=1).max()
+    assert change < h * size * (1.5 / flight.get("ramp", 8.0) + 0.05) + 1e-12
+
+
+def test_the_path_is_that_of_an_integrator_that_knows_only_speed_and_turn_rate():
+    track = aircraft(1.3, **OTHER)
+    speeds, radii, turns, ramp = OTHER["speeds"], OTHER["radii"], OTHER["turns"], OTHER["ramp"]
+    ends = np.cumsum([50.0, abs(turns[0]) * radii[0] / speeds[0] + ramp, 45.0, abs(turns[1]) * radii[1] / speeds[1] + ramp, 30.0])
+
+    def smooth(u):
+        u = min(max(u, 0.0), 1.0)
+        return 3 * u**2 - 2 * u**3
+
+    def bump(t, start, end):
+        return smooth((t - start) / ramp) - smooth((t - end + ramp) / ramp)
+
+    def slope(t, state):
+        _, _, _, speed, heading = state
+        rate = -speeds[0] / radii[0] * bump(t, ends[0], ends[1]) + speeds[1] / radii[1] * bump(t, ends[2], ends[3])
+        slowing = -(speeds[0] - speeds[1]) / (45.0 - ramp) * bump(t, ends[1], ends[2])
+        sinking = -7.0 * smooth((t - ends[2]) / ramp)
+        return [speed * np.cos(heading), speed * np.sin(heading), sinking, slowing, rate]
+
+    first = [*OTHER["start"], speeds[0], OTHER["heading"]]
+    options = dict(method="DOP853", rtol=1e-12, atol=1e-9, max_step=0.5)
+    solved = solve_ivp(slope, (0, track.time[-1]), first, t_eval=track.time, **options).y.T
+    # Tolerance 1e-12 of 4e4 m over some 10^3 steps; the kinks of the ramps and the interpolation between steps cost more.
+    np.testing.assert_allclose(track.position, solved[:, :3], rtol=0, atol=1e-4)
+    np.testing.assert_allclose(np.linalg.norm(track.velocity[:, :2], axis=1), solved[:, 3], rtol=0, atol=1e-6)
+
+
+@FLIGHTS
+def test_the_five_parts_are_as_described(flight):
+    track = aircraft(0.5, **flight)
+    speeds, radii = flight.get("speeds", (200.0, 130.0)), flight.get("radii", (6_000.0, 10_000.0))
+    speed = np.linalg.norm(track.velocity[:, :2], axis=1)
+    turning = (track.velocity[:, 0] * track.acceleration[:, 1] - track.velocity[:, 1] * track.acceleration[:, 0]) / speed**2
+    parts = [track.part == number for number in range(1, 6)]
+    assert np.array_equal(np.unique(track.part), [1, 2, 3, 4, 5])
+    assert (np.diff(track.part) >= 0).all()
+    rounding = 1e-12
+    assert np.abs(track.acceleration[parts[0]]).max() < rounding
+    assert np.ptp(track.position[parts[0] | parts[1] | parts[2], 2]) == 0
+    for part, radius, value in zip((parts[1], parts[3]), radii, speeds, strict=True):
+        assert np.abs(speed[part] - value).max() < 1e-9
+        assert np.abs(turning[part]).max() == pytest.approx(value / radius, rel=1e-9)
+        # away from the two ramps it is a circle: equal distances from one centre
+        inside = np.where(part)[0][40:-40]
+        left = np.column_stack([-track.velocity[inside, 1], track.velocity[inside, 0]])
+        centres = track.position[inside, :2] + left / turning[inside, None]
+        assert np.ptp(centres, axis=0).max() < 1e-6  # rounding of positions of 4e4 m over the sum of 10^3 pieces
+    assert np.abs(turning[parts[2] | parts[4]]).max() < rounding
+    assert (np.diff(speed[parts[2]]) <= rounding).all()
+    assert speed[parts[2]][-1] < 1.001 * speeds[1]
+    assert (np.diff(track.position[parts[4], 2]) < 0).all()
+    assert track.velocity[-1, 2] == -flight.get("descent", 10.0)
+
+
+@FLIGHTS
+def test_the_headings_turn_by_the_given_angles(flight):
+    track = aircraft(0.5, **flight)
+    heading = np.unwrap(np.arctan2(track.velocity[:, 1], track.velocity[:, 0]))
+    turns = flight.get("turns", (1.5 * np.pi, np.pi))
+    assert heading[track.part == 3][-1] - heading[0] == pytest.approx(turns[0], abs=1e-12)
+    assert heading[-1] - heading[0] == pytest.approx(sum(turns), abs=1e-12)
+
+
+def test_the_samples_do_not_depend_on_the_interval():
+    coarse, fine = aircraft(1.0), aircraft(0.25)
+    same = fine.time[::4][: len(coarse.time)]
+    np.testing.assert_allclose(same, coarse.time, atol=1e-12)
+    # rounding: the path is the sum of some 10^3 pieces, at 4e4 m
+    np.testing.assert_allclose(fine.state[::4][: len(coarse.time)], coarse.state, rtol=0, atol=1e-7)
+    assert np.array_equal(fine.part[::4][: len(coarse.time)], coarse.part)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"interval": 0.0}, "interval must be a positive"),
+        ({"ramp": np.nan}, "ramp must be a positive"),
+        ({"speeds": (200.0, -1.0)}, "speeds must be positive"),
+        ({"radii": (6e3,)}, "radii must be 2 finite numbers"),
+        ({"start": (0.0, np.inf, 1.0)}, "start must be 3 finite numbers"),
+        ({"turns": (0.0, 1.0)}, "part 2 lasts 8 s, less than its two ramps"),
+        ({"durations": (100.0, 10.0, 60.0)}, "part 3 lasts 10 s"),
+        ({"descent": 40.0}, "start higher, lower `descent`"),
+        ({"heading": np.nan}, "heading must be a finite"),
+    ],
+)
+def test_a_flight_that_cannot_be_flown_is_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        aircraft(**({"interval": 1.0} | change))
+
+
+# --- measurements
+
+
+def test_spherical_coordinates_by_trigonometry():
+    position = np.array([[3.0, 4.0, 12.0], [-5.0, 2.0, -1.0], [1.0, -1.0, 0.5], [0.0, 2.0, 0.0]])
+    found = spherical(position)
+    for (x, y, z), (distance, azimuth, elevation) in zip(position, found, strict=True):
+        assert distance == pytest.approx(np.hypot(np.hypot(x, y), z), rel=1e-15)
+        # directions by sines and cosines, not by the same arctangent
+        assert (np.cos(azimuth), np.sin(azimuth)) == pytest.approx((x / np.hypot(x, y), y / np.hypot(x, y)), abs=1e-15)
+        assert np.sin(elevation) == pytest.approx(z / distance, abs=1e-15)
+    np.testing.assert_allclose(cartesian(found), position, rtol=0, atol=1e-14)
+
+
+def test_the_two_sets_of_formulas_are_inverse():
+    x, y, z = sp.symbols("x y z", positive=True)
+    names = {s.name: s for s in SPHERICAL.free_symbols}
+    there = SPHERICAL.subs({names["x"]: x, names["y"]: y, names["z"]: z})
+    back = {s.name: s for s in CARTESIAN.free_symbols}
+    values = dict(zip((back["r"], back["varphi"], back["epsilon"]), there, strict=True))
+    assert sp.simplify(CARTESIAN.subs(values) - sp.Matrix([x, y, z])) == sp.zeros(3, 1)
+
+
+def test_measurements_have_the_given_errors():
+    track, runs = aircraft(10.0), 4000
+    true = spherical(track.position)
+    for measured, expected, sigmas in (
+        (measure_cartesian(track, (10.0, 30.0, 50.0), runs, seed=1), track.position, (10.0, 30.0, 50.0)),
+        (measure_cartesian(track, 20.0, runs, seed=2), track.position, (20.0,) * 3),
+        (measure_spherical(track, (40.0, 2e-3, 3e-3), runs, seed=3), true, (40.0, 2e-3, 3e-3)),
+    ):
+        noise = (measured - expected[:, None]) / np.array(sigmas)
+        count = noise[..., 0].size
+        assert measured.shape == (len(track.time), runs, 3)
+        assert (np.abs(noise.mean(axis=(0, 1))) < 4 / np.sqrt(count)).all()  # 4 standard errors
+        assert (np.abs(noise.std(axis=(0, 1)) - 1) < 4 / np.sqrt(2 * count)).all()
+        correlation = np.corrcoef(noise.reshape(-1, 3).T)[np.triu_indices(3, 1)]
+        assert (np.abs(correlation) < 4 / np.sqrt(count)).all()
+
+
+def test_the_same_seed_gives_the_same_measurements():
+    track = aircraft(20.0)
+    assert np.array_equal(measure_cartesian(track, 10.0, 3, 7), measure_cartesian(track, 10.0, 3, np.random.default_rng(7)))
+    assert not np.array_equal(measure_cartesian(track, 10.0, 3, 7), measure_cartesian(track, 10.0, 3, 8))
+
+
+def test_a_flight_through_the_azimuth_pi_is_refused():
+    behind = aircraft(1.0, start=(-40_000.0, -3_000.0, 8_500.0), heading=np.pi / 2)
+    with pytest.raises(ValueError, match="crosses the azimuth pi"):
+        measure_spherical(behind, (1.0, 0.0, 0.0), 2, seed=1)
+    beside = aircraft(1.0, start=(-40_000.0, 1.0, 8_500.0))  # not across, but within the noise of it
+    with pytest.raises(ValueError, match="crosses the azimuth pi"):
+        measure_spherical(beside, (1.0, 1e-3, 1e-3), 2, seed=1)
+    assert np.isfinite(measure_cartesian(behind, 1.0, 2, seed=1)).all()
+
+
+@pytest.mark.parametrize(
+    ("sigmas", "runs", "message"),
+    [((1.0, 2.0), 3, "one number or three"), (-1.0, 3, "not negative"), (np.nan, 3, "finite"), (1.0, 0, "runs must be")],
+)
+def test_measurements_that_cannot_be_are_refused(sigmas, runs, message):
+    with pytest.raises(ValueError, match=message):
+        measure_cartesian(aircraft(50.0), sigmas, runs, seed=1)
+
+
+# --- models and errors
+
+
+def test_matrices_of_the_kinematic_models():
+    T, q, r = 0.7, 3.0, 20.0
+    system, _, _ = linear_system(kinematic(T, dimensions=2, order=1, noise_sd=q, measurement_sd=r))
+    g = np.array([[T**2 / 2, 0], [0, T**2 / 2], [T, 0], [0, T]])
+    np.testing.assert_allclose(system.A, [[1, 0, T, 0], [0, 1, 0, T], [0, 0, 1, 0], [0, 0, 0, 1]], rtol=1e-15)
+    np.testing.assert_allclose(system.Q, q**2 * g @ g.T, rtol=1e-14)
+    np.testing.assert_allclose(system.R, r**2 * np.eye(2), rtol=1e-15)
+    np.testing.assert_array_equal(system.H, np.eye(2, 4))
+    system, _, _ = linear_system(kinematic(T, dimensions=1, order=2, noise_sd=q))
+    g = np.array([[T**2 / 2], [T], [1]])
+    np.testing.assert_allclose(system.A, [[1, T, T**2 / 2], [0, 1, T], [0, 0, 1]], rtol=1e-15)
+    np.testing.assert_allclose(system.Q, q**2 * g @ g.T, rtol=1e-14)
+    assert [s.name for s in kinematic(T, order=2).x] == ["x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"dimensions": 4}, "dimensions must be 1, 2 or 3"),
+        ({"order": 0}, "order 1 or 2"),
+        ({"interval": -1.0}, "interval must be"),
+        ({"noise_sd": np.nan}, "noise_sd must be finite"),
+        ({"measurement_sd": -1.0}, "measurement_sd must be finite and not negative"),
+    ],
+)
+def test_kinematic_models_that_cannot_be_are_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        kinematic(**({"interval": 1.0} | change))
+
+
+def test_a_bad_prior_of_a_kinematic_model_is_the_models_own_error():
+    with pytest.raises(ModelError, match="prior"):
+        kinematic(1.0, prior={"variance": np.eye(2)})
+
+
+def test_rms_by_part_by_hand():
+    error = np.array([[[3.0, 4.0], [0.0, 1.0]], [[0.0, 0.0], [1.0, 0.0]], [[2.0, 0.0], [0.0, 6.0]]])  # (3 steps, 2 runs, 2)
+    found = rms_by_part(error, np.array([1, 1, 7]))
+    first, second = np.sqrt((12.5 + 1) / 2), np.sqrt((4 + 36) / 2)
+    assert found.value == pytest.approx([first, second])
+    # two numbers a and b: standard deviation |a - b| / sqrt 2, of their mean |a - b| / 2
+    assert found.standard_error == pytest.approx([11.5 / 2 / (2 * first), 32 / 2 / (2 * second)])
+    assert found.freedom == 1
+    with pytest.raises(ValueError, match="at least 2 runs"):
+        rms_by_part(error[:, :1], np.array([1, 1, 7]))
+    with pytest.raises(ValueError, match=r"shape \(2, runs"):
+        rms_by_part(error, np.array([1, 1]))
+
+
+def test_standard_errors_are_the_scatter_of_repeated_experiments():
+    rng = np.random.default_rng(5)
+    repeats, runs, steps = 400, 50, 6
+    part = np.array([1, 1, 1, 2, 2, 2])
+    common = rng.standard_normal((steps, repeats, runs, 2)) + rng.standard_normal((1, repeats, runs, 2))  # steps of a run agree
+    other = common + 0.3 * rng.standard_normal(common.shape) + 0.5
+    single = [rms_by_part(common[:, i], part) for i in range(repeats)]
+    paired = [rms_difference(common[:, i], other[:, i], part) for i in range(repeats)]
+    for found in (single, paired):
+        scatter = np.std([one.value for one in found], axis=0, ddof=1)
+        claimed = np.sqrt(np.mean([one.standard_error**2 for one in found], axis=0))
+        # a standard deviation from 400 repeats is good to 1/sqrt(800); the delta method adds a bias of the order of 1/runs
+        assert (np.abs(claimed / scatter - 1) < 4 / np.sqrt(2 * repeats) + 1 / runs).all()
+    assert np.mean([one.value for one in paired]) < 0
+    assert rms_difference(common[:, 0], common[:, 0], part).standard_error == pytest.approx([0, 0], abs=1e-15)

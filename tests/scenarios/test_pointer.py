@@ -1,0 +1,265 @@
+"""The pointer's track, the model of uniformly accelerated motion, the start-up from three samples."""
+
+import numpy as np
+import pytest
+
+from kfcourse.laws import Gaussian
+from kfcourse.linear.runs import run as run_linear
+from kfcourse.linear.runs import steady_state
+from kfcourse.scenarios.pointer import (
+    MINIMUM_JERK,
+    SHORTEST,
+    acceleration_from,
+    follow,
+    hand_track,
+    sample,
+    start_up,
+    uniform_acceleration,
+)
+
+# ---------------------------------------------------------------- the model
+
+
+def test_the_matrices_are_those_of_the_paper():
+    dt, sd = 0.1, 7.0
+    one = uniform_acceleration(dt, sd, 3.0)
+    F = [[1, 0, dt, 0], [0, 1, 0, dt], [0, 0, 1, 0], [0, 0, 0, 1]]
+    G = np.diag([dt**2 / 2, dt**2 / 2, dt, dt])  # acts on (ax, ay, ax, ay)
+    np.testing.assert_allclose(one.A, F, rtol=1e-15)
+    np.testing.assert_allclose(one.H, [[1, 0, 0, 0], [0, 1, 0, 0]], rtol=1e-15)
+    np.testing.assert_allclose(one.B @ [2.0, -5.0], G @ [2.0, -5.0, 2.0, -5.0], rtol=1e-14)
+    np.testing.assert_allclose(one.R, 9 * np.eye(2), rtol=1e-15)
+    # Covariance of what a random acceleration (ax, ay), constant in the interval, does to (x, y, vx, vy).
+    effect = G @ np.array([[1, 0], [0, 1], [1, 0], [0, 1]])
+    np.testing.assert_allclose(one.Q, sd**2 * effect @ effect.T, rtol=1e-13)
+
+
+def test_the_stationary_gain_is_kalata_s():
+    # Kalata (1984): with Lambda = sigma_a dt^2 / sigma, the gains (alpha, beta / dt) fulfil Lambda^2 = beta^2 / (1 - alpha) and
+    # beta = 2 (2 - alpha) - 4 sqrt(1 - alpha).
+    for dt, acceleration_sd, sigma in ((0.1, 500.0, 8.0), (0.01, 3e4, 2.0), (0.5, 0.3, 11.0)):
+        gain = steady_state(uniform_acceleration(dt, acceleration_sd, sigma)).gain
+        alpha, beta = gain[0, 0], gain[2, 0] * dt
+        np.testing.assert_allclose(beta**2 / (1 - alpha), (acceleration_sd * dt**2 / sigma) ** 2, rtol=1e-6)
+        np.testing.assert_allclose(beta, 2 * (2 - alpha) - 4 * np.sqrt(1 - alpha), rtol=1e-6)
+        np.testing.assert_allclose([gain[1, 1], gain[3, 1] * dt], [alpha, beta], rtol=1e-9)  # both axes alike
+
+
+# ---------------------------------------------------------------- start-up
+
+
+def test_the_start_up_is_the_parabola_through_three_samples():
+    rng, dt = np.random.default_rng(1), 0.3
+    y = rng.normal(size=(3, 5, 2))
+    law = start_up(y, dt, np.eye(2))
+    t = dt * np.array([-2, -1, 0])  # the last sample at 0
+    for run in range(5):
+        for axis in range(2):
+            c2, c1, c0 = np.polyfit(t, y[:, run, axis], 2)
+            np.testing.assert_allclose(law.mean[run, axis::2], [c0, c1, 2 * c2], rtol=1e-11, atol=1e-11)
+
+
+def test_the_covariance_of_the_start_up_is_that_of_its_errors():
+    rng, dt, runs = np.random.default_rng(2), 0.05, 100_000
+    R = np.array([[4.0, 1.5], [1.5, 2.0]])  # the axes' noises may be correlated
+    y = rng.standard_normal((3, runs, 2)) @ np.linalg.cholesky(R).T
+    law = start_up(y, dt, R)
+    assert law.cov.shape == (6, 6)
+    # 4 standard errors of a covariance of normal variables
+    bound = 4 * np.sqrt((np.outer(np.diag(law.cov), np.diag(law.cov)) + law.cov**2) / runs)
+    assert (abs(law.mean.T @ law.mean / runs - law.cov) < bound).all()
+
+
+def test_variance_of_velocity_and_acceleration():
+    # v = (3 y2 - 4 y1 + y0) / (2 dt), a = (y2 - 2 y1 + y0) / dt^2: 26/4 and 6, the sums of squares of the coefficients
+    law = start_up(np.zeros((3, 1, 2)), 0.01, 9.0 * np.eye(2))
+    np.testing.assert_allclose(np.diag(law.cov), np.repeat([9, 9 * 6.5 / 0.01**2, 9 * 6 / 0.01**4], 2), rtol=1e-12)
+
+
+def test_the_start_up_is_the_limit_of_a_large_prior():
+    # Without noise of the object and with the true input, three measurements after a nearly unknown start leave the law that
+    # least squares give: velocity with variance sigma^2 / (2 dt^2) - smaller than from the parabola, which also fits a.
+    dt, sigma = 0.1, 2.0
+    system = uniform_acceleration(dt, 0.0, sigma)
+    y = np.random.default_rng(4).normal(size=(4, 3, 2))
+    wide = Gaussian(np.zeros(4), 1e6 * np.eye(4))
+
+    law = run_linear(system, wide, y).posterior
+    t = dt * np.array([-2, -1, 0])
+    slope, offset = np.polyfit(t, y[:3, 1, 0], 1)
+    # the prior's weight against the measurements': sigma^2 / (1e6 dt^2) = 4e-4 of the velocity's scale
+    np.testing.assert_allclose(law.mean[2, 1, [0, 2]], [offset, slope], rtol=2e-3, atol=2e-3)
+    np.testing.assert_allclose(law.cov[2, 1, 2, 2], sigma**2 / (2 * dt**2), rtol=1e-3)
+    assert law.cov[2, 1, 2, 2] < start_up(y[:3], dt, system.R).cov[2, 2]
+
+
+def test_accelerations_of_a_parabola_are_found():
+    t = 0.1 * np.arange(7)[:, None, None]
+    y = 3.0 + np.array([2.0, -1.0]) * t + np.array([4.0, -6.0]) * t**2 / 2
+    found = acceleration_from(y, 0.1)
+    assert np.isnan(found[:2]).all()
+    np.testing.assert_allclose(found[2:], np.broadcast_to([4.0, -6.0], (5, 1, 2)), rtol=1e-10)
+    np.testing.assert_allclose(found[2], start_up(y[:3], 0.1, np.eye(2)).mean[:, 4:], rtol=1e-12)
+
+
+# ---------------------------------------------------------------- the filter
+
+
+@pytest.mark.parametrize("arithmetic", ["covariance", "symmetrised", "joseph", "square-root"])
+def test_a_uniformly_accelerated_track_without_noise_is_followed_exactly(arithmetic):
+    dt, a = 0.1, np.array([30.0, -20.0])
+    t = dt * np.arange(20)[:, None, None]
+    position, velocity = 5 + np.array([7.0, -3.0]) * t + a * t**2 / 2, np.array([7.0, -3.0]) + a * t
+    u = np.broadcast_to(a, (20, 1, 2))
+    laws = follow(uniform_acceleration(dt, 100.0, 2.0), position, dt, u, arithmetic=arithmetic)
+    truth = np.concatenate([position, velocity], axis=-1)
+    assert laws.posterior.mean.shape == (17, 1, 4)
+    np.testing.assert_allclose(laws.posterior.mean, truth[3:], rtol=1e-11)
+    np.testing.assert_allclose(laws.predicted.mean, truth[3:], rtol=1e-11)
+    # Without the input the first prediction misses by B a, and the filter lags.
+    without = follow(uniform_acceleration(dt, 100.0, 2.0), position, dt, arithmetic=arithmetic)
+    np.testing.assert_allclose((truth[3:] - without.predicted.mean)[0, 0], np.concatenate([a * dt**2 / 2, a * dt]), rtol=1e-9)
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_the_filter_by_a_slow_loop(given):
+    dt, sd, sigma = 0.05, 400.0, 3.0
+    samples = sample(hand_track(3, strokes=2), dt, sigma, runs=2, seed=1)
+    y = samples.y.copy()
+    y[6, 1, 0] = np.nan
+    u = samples.input if given else None
+    laws = follow(uniform_acceleration(dt, sd, sigma), y, dt, u)
+    A = np.array([[1, 0, dt, 0], [0, 1, 0, dt], [0, 0, 1, 0], [0, 0, 0, 1]])
+    B = np.array([[dt**2 / 2, 0], [0, dt**2 / 2], [dt, 0], [0, dt]])
+    for run in range(2):
+        y0, y1, y2 = y[:3, run]
+        z = np.concatenate([y2, (3 * y2 - 4 * y1 + y0) / (2 * dt)])
+        p = sigma**2 * np.kron([[1, 1.5 / dt], [1.5 / dt, 6.5 / dt**2]], np.eye(2))
+        for k in range(3, len(y)):
+            z, p = A @ z + (B @ u[k - 1, 0] if given else 0), A @ p @ A.T + sd**2 * B @ B.T
+            there = ~np.isnan(y[k, run])
+            H = np.eye(2, 4)[there]
+            K = p @ H.T @ np.linalg.inv(H @ p @ H.T + sigma**2 * np.eye(len(H)))
+            z, p = z + K @ (y[k, run][there] - H @ z), (np.eye(4) - K @ H) @ p
+            np.testing.assert_allclose(laws.posterior.mean[k - 3, run], z, rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(laws.posterior.cov[k - 3, run], p, rtol=1e-8, atol=1e-9)
+
+
+def test_a_start_of_one_s_own():
+    samples = sample(hand_track(3, strokes=2), 0.1, 3.0, runs=2, seed=1)
+    system = uniform_acceleration(0.1, 400.0, 3.0)
+    own = start_up(samples.y[:3], 0.1, system.R)
+    own = Gaussian(own.mean[:, :4], own.cov[:4, :4])
+    default, same = (follow(system, samples.y, 0.1, start=start).posterior for start in (None, own))
+    np.testing.assert_array_equal(same.mean, default.mean)
+    diagonal = follow(system, samples.y, 0.1, start=own._replace(cov=np.diag(np.diag(own.cov)))).posterior
+    assert not np.allclose(diagonal.mean[0], default.mean[0], rtol=1e-3)
+
+
+# ---------------------------------------------------------------- the track
+
+
+def test_a_stroke_is_smooth_from_rest_to_rest():
+    for order in range(3):
+        np.testing.assert_allclose(MINIMUM_JERK.deriv(order)(np.array([0.0, 1.0])), [0, 1 if order == 0 else 0], atol=1e-13)
+    # Least jerk: the sixth derivative is zero, and any other smooth path has more.
+    assert MINIMUM_JERK.degree() == 5
+    tau = np.linspace(0, 1, 2001)
+    bump = np.polynomial.Polynomial([0, 0, 0, 1, -3, 3, -1])  # tau^3 (1 - tau)^3: changes nothing at the ends
+    least = np.trapezoid(MINIMUM_JERK.deriv(3)(tau) ** 2, tau)
+    for size in (-1.0, -0.01, 0.01, 1.0):
+        assert np.trapezoid((MINIMUM_JERK + size * bump).deriv(3)(tau) ** 2, tau) > least
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_velocity_and_acceleration_are_derivatives(seed):
+    track = hand_track(seed)
+    t, h = np.random.default_rng(seed).uniform(-0.2, track.end + 0.2, 200), 1e-5
+    now, before, after = track.at(t), track.at(t - h), track.at(t + h)
+    # central differences: h^2 / 6 times the next derivative but one, below 1e8 px/s^5 here, and rounding 1e-13 * 1000 / h
+    np.testing.assert_allclose((after.position - before.position) / (2 * h), now.velocity, atol=1e-3)
+    np.testing.assert_allclose((after.velocity - before.velocity) / (2 * h), now.acceleration, atol=5)
+
+
+def test_strokes_keep_their_order():
+    # Then the position is a mean of the targets with positive weights, and on the screen.
+    for seed in range(200):
+        track = hand_track(seed)
+        assert (np.diff(track.begin) > 0).all()
+        assert (np.diff(track.begin + track.duration) > 0).all()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_track_stays_on_the_screen_and_comes_to_rest(seed):
+    track = hand_track(seed, screen=(500.0, 300.0))
+    position = track.at(np.linspace(0, track.end, 5000)).position
+    assert (position >= -1e-9).all() and (position <= np.array([500, 300]) + 1e-9).all()
+    assert (np.hypot(*track.displacement.T) >= SHORTEST).all()
+    before, after = track.at(np.array(-1.0)), track.at(np.array(track.end + 1))
+    np.testing.assert_allclose(before.position, track.origin, rtol=1e-12)
+    np.testing.assert_allclose(after.position, track.origin + track.displacement.sum(axis=0), rtol=1e-12)
+    for motion in (before, after):
+        assert not motion.velocity.any() and not motion.acceleration.any()
+
+
+def test_a_seed_is_a_track():
+    one, same, other = (hand_track(seed).at(np.arange(0, 5, 0.1)).position for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one, same)
+    assert not np.allclose(one, other)
+
+
+def test_samples_of_different_rates_are_of_one_track():
+    track = hand_track(1, strokes=4)
+    slow, fast = (sample(track, interval, 0.0, 1, seed=0) for interval in (0.1, 0.01))
+    np.testing.assert_allclose(fast.state[::10][: len(slow.state)], slow.state, rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(slow.y, slow.state[..., :2])
+    assert slow.time[-1] <= track.end < slow.time[-1] + 0.1
+    # the input is the mean acceleration: it brings the velocity of one sample to that of the next
+    np.testing.assert_allclose(slow.state[:-1, :, 2:] + 0.1 * slow.input[:-1], slow.state[1:, :, 2:], rtol=1e-9, atol=1e-9)
+
+
+def test_the_noise_added():
+    samples = sample(hand_track(1, strokes=4), 0.01, 8.0, 300, seed=5)
+    noise = samples.y - samples.state[..., :2]
+    count = noise.size
+    assert abs(noise.mean()) < 4 * 8 / np.sqrt(count)
+    assert abs(noise.var() / 64 - 1) < 4 * np.sqrt(2 / count)
+    assert abs((noise[1:] * noise[:-1]).mean() / 64) < 4 / np.sqrt(count)  # white
+    np.testing.assert_array_equal(samples.y, sample(hand_track(1, strokes=4), 0.01, 8.0, 300, seed=5).y)
+
+
+# ---------------------------------------------------------------- errors
+
+
+@pytest.mark.parametrize("interval", [0.0, -0.1, np.nan, np.inf])
+def test_an_interval_that_is_none(interval):
+    track, y = hand_track(1, strokes=2), np.zeros((5, 1, 2))
+    for call in (
+        lambda: uniform_acceleration(interval, 1.0, 1.0),
+        lambda: start_up(y[:3], interval, np.eye(2)),
+        lambda: acceleration_from(y, interval),
+        lambda: sample(track, interval, 1.0, 1, 0),
+    ):
+        with pytest.raises(ValueError, match="positive number of seconds"):
+            call()
+
+
+def test_arguments_that_do_not_fit():
+    y = np.zeros((5, 1, 2))
+    system = uniform_acceleration(0.1, 1.0, 1.0)
+    missing = y.copy()
+    missing[1, 0, 0] = np.nan
+    for call, message in (
+        (lambda: uniform_acceleration(0.1, -1.0, 1.0), "acceleration_sd is a standard deviation"),
+        (lambda: uniform_acceleration(0.1, 1.0, np.nan), "measurement_sd is a standard deviation"),
+        (lambda: start_up(y, 0.1, np.eye(2)), "three samples of two coordinates"),
+        (lambda: start_up(missing[:3], 0.1, np.eye(2)), "wait for three complete samples"),
+        (lambda: follow(system, missing, 0.1), "wait for three complete samples"),
+        (lambda: follow(system, y[:3], 0.1), "ready after three samples"),
+        (lambda: acceleration_from(y[:2], 0.1), "takes three samples"),
+        (lambda: hand_track(1, strokes=0), "at least one stroke"),
+        (lambda: hand_track(1, screen=(100.0, 500.0)), "at least 100 px long"),
+        (lambda: sample(hand_track(1), 0.1, -1.0, 1, 0), "measurement_sd is a standard deviation"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            call()

@@ -1,0 +1,120 @@
+"""Generated code computes its formulas, over any leading axes."""
+
+import re
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from kfcourse.symbolic.codegen import compile_function
+
+x1, x2, p11, p12, p22 = sp.symbols("x1 x2 p11 p12 p22", real=True)
+ARGUMENTS = {"x": sp.Matrix([x1, x2]), "p": sp.Matrix([[p11, p12], [p12, p22]])}
+
+EXPRESSIONS = [
+    x1**2 - 3 * x2**7 / 5,
+    (x1 + x2) ** 4 * x1**-3,
+    sp.sqrt(p11) * sp.exp(-x1 * p12) + sp.sin(x2) ** 3,
+    sp.Abs(x1 - x2) ** sp.Rational(3, 2) - x1 / (3 * x2),
+    sp.tanh(x1) + sp.atan(x2) + sp.log(p22) + sp.cosh(x1) * sp.sinh(x2) * sp.tan(x1 / 4),
+    x1 - (x2 - (p11 - p22)) * -2,
+    -x1,
+    2 / x1,
+    1 / (x1 * x2**2),
+    x1 * sp.exp(sp.Rational(1, 200)) * sp.sqrt(2) * sp.sin(1),  # constants that are not rational
+    sp.exp(sp.Rational(1, 200)) * sp.sin(1) + x2 * sp.pi * sp.sqrt(3),
+    sp.sqrt(2 + sp.sqrt(3)) * x1 + sp.Rational(1, 3) * sp.pi,
+    2 ** sp.Rational(1, 4) * x1,
+    sp.cot(x1) + sp.sec(x2),
+    sp.sign(x1) * x2 + sp.Piecewise((x1, x2 > 0), (p11, True)),
+    sp.Float(0.1) * x1 + sp.Float(1e-20) * x2,
+]
+
+
+@pytest.fixture
+def ensemble():
+    rng = np.random.default_rng(1)
+    root = rng.normal(size=(50, 2, 2))
+    return rng.normal(size=(50, 2)), root @ root.swapaxes(1, 2) + 0.1 * np.eye(2)
+
+
+def reference(expression, x, p):
+    return sp.lambdify([x1, x2, p11, p12, p22], expression)(x[:, 0], x[:, 1], p[:, 0, 0], p[:, 0, 1], p[:, 1, 1])
+
+
+@pytest.mark.parametrize("expression", EXPRESSIONS, ids=str)
+def test_generated_code_equals_lambdify(expression, ensemble):
+    code = compile_function("f", ARGUMENTS, {"value": sp.Matrix([expression])}, ["x", "value"])
+    found = code.function(*ensemble)[0]
+    assert found.shape == (50, 1)
+    # A few roundings each; the conditioning of these expressions at these points is below 1e3.
+    np.testing.assert_allclose(found[:, 0], reference(expression, *ensemble), rtol=1e-12, atol=1e-12)
+
+
+def test_a_matrix_of_all_expressions_equals_them_one_by_one(ensemble):
+    count = len(EXPRESSIONS) // 2
+    together = sp.Matrix(count, 2, EXPRESSIONS[: 2 * count])
+    found = compile_function("f", ARGUMENTS, {"value": together, "first": together[:, 0]}, ["x", "first"]).function(*ensemble)
+    assert found[0].shape == (50, count, 2)
+    for i in range(count):
+        np.testing.assert_allclose(found[1][:, i], found[0][:, i, 0], rtol=0, atol=0)
+        for j in range(2):
+            np.testing.assert_allclose(found[0][:, i, j], reference(together[i, j], *ensemble), rtol=1e-12, atol=1e-12)
+
+
+def test_small_integer_powers_are_products():
+    code = compile_function("f", ARGUMENTS, {"value": sp.Matrix(EXPRESSIONS[:3])}, ["x", "value"])
+    body = code.source.split('"""')[-1]
+    assert not re.search(r"\*\*", body)
+    assert "np.power" not in body
+
+
+def test_each_power_is_computed_once():
+    body = compile_function(
+        "f", ARGUMENTS, {"a": sp.Matrix([x1**6 + x1**3]), "b": sp.Matrix([x1**2 * x2])}, ["x", "a", "b"]
+    ).source
+    assert body.count("*") - body.count('"*') <= 5  # x^2, x^3, x^6, x^2 x2, and nothing twice
+
+
+def test_leading_axes_broadcast(ensemble):
+    x, p = ensemble
+    code = compile_function("f", ARGUMENTS, {"value": sp.Matrix([x1 * p11, x2 - p12])}, ["x", "value"]).function
+    expected = code(x, np.broadcast_to(p[0], p.shape))[0]
+    np.testing.assert_array_equal(code(x, p[0])[0], expected)  # one covariance for all trajectories
+    np.testing.assert_array_equal(code(x.reshape(5, 10, 2), p[0])[0], expected.reshape(5, 10, 2))
+    np.testing.assert_array_equal(code(x[3], p[0])[0], expected[3])  # no leading axes at all
+
+
+def test_one_trajectory_gets_the_numbers_it_gets_in_an_ensemble(ensemble):
+    x, p = ensemble
+    code = compile_function("f", ARGUMENTS, {"value": sp.Matrix(EXPRESSIONS[:4])}, ["x", "value"]).function
+    for i in (0, 17):
+        # numpy's vectorised sine and exponential may differ from their scalar loops in the last bit
+        np.testing.assert_allclose(code(x[i : i + 1], p[i : i + 1])[0], code(x, p)[0][i : i + 1], rtol=1e-14)
+
+
+@pytest.mark.parametrize("constant", [sp.Rational(9, 10), sp.S.Zero, sp.sqrt(2) * sp.exp(1), 2 ** sp.Rational(1, 4)])
+def test_a_constant_output_is_one_value_for_all(constant, ensemble):
+    outputs = {
+        "vector": sp.Matrix([constant]),
+        "matrix": sp.Matrix([[constant, 0], [0, constant]]),
+        "other": sp.Matrix([constant + x1]),
+    }
+    vector, matrix, other = compile_function("f", ARGUMENTS, outputs, ["x", "vector", "other"]).function(*ensemble)
+    np.testing.assert_allclose(vector, np.array([float(constant)]), rtol=1e-15)
+    np.testing.assert_allclose(matrix, float(constant) * np.eye(2), rtol=1e-15)
+    assert vector.shape == (1,)
+    assert matrix.shape == (2, 2)
+    assert other.shape == (50, 1)
+
+
+@pytest.mark.parametrize("name", ["np", "x", "s0", "return_", "Dummy", "x_1", "value", "E", "I"])
+def test_no_symbol_can_hide_another(name, ensemble):
+    # Names in the formula never reach the code as they are.
+    odd = sp.Symbol(name, real=True)
+    arguments = {"x": sp.Matrix([odd, x2])}
+    found = compile_function("f", arguments, {"value": sp.Matrix([odd**2 + sp.sin(odd) + x2])}, ["x", "value"]).function(
+        ensemble[0]
+    )[0]
+    first, second = ensemble[0].T
+    np.testing.assert_allclose(found[:, 0], first**2 + np.sin(first) + second, rtol=1e-14, atol=1e-14)

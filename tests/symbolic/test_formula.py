@@ -1,0 +1,233 @@
+"""Formulas typed by people: what is read is right, and nothing else is read."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+import sympy as sp
+
+from kfcourse.symbolic.formula import FormulaError, check_name, parse, symbol
+
+NAMES = {name: symbol(name) for name in ("x", "v", "w", "c", "f")}
+x, v, c = NAMES["x"], NAMES["v"], NAMES["c"]
+
+
+def read(formula):
+    return parse(formula, NAMES)
+
+
+@pytest.mark.parametrize(
+    ("formula", "expected"),
+    [
+        ("c*x - v", c * x - v),
+        ("  x + v  ", x + v),
+        ("-x**2", -(x**2)),
+        ("(-x)**2", x**2),
+        ("2**-1*x", x / 2),
+        ("x - v - c", x - v - c),
+        ("x/v/c", x / (v * c)),
+        ("+x", x),
+        ("0.1*x", x / 10),
+        ("1e-3*x", x / 1000),
+        ("sqrt(x)", sp.sqrt(x)),
+        ("x**0.5", sp.sqrt(x)),
+        ("abs(x)", sp.Abs(x)),
+        ("sin(pi*x)", sp.sin(sp.pi * x)),
+        ("exp(-x**2/2)", sp.exp(-(x**2) / 2)),
+        ("tanh(x) + sinh(x) + cosh(x) + tan(x) + atan(x) + log(c) + cos(v)",
+         sp.tanh(x) + sp.sinh(x) + sp.cosh(x) + sp.tan(x) + sp.atan(x) + sp.log(c) + sp.cos(v)),
+    ],
+)  # fmt: skip
+def test_a_formula_means_what_it_says(formula, expected):
+    assert sp.simplify(read(formula) - expected) == 0
+
+
+def test_decimals_are_exact():
+    assert read("0.1 + 0.2") == sp.Rational(3, 10)
+
+
+HOSTILE = [
+    # formula, column of the pointer
+    ("__import__('os').system('true')", 0),
+    ("x + __import__('os').system('true')", 4),
+    ("x + open('secret')", 4),
+    ("x.__class__.__bases__", 0),
+    ("c*x.real", 2),
+    ("x + (lambda: v)()", 4),
+    ("x + (lambda: v)", 5),
+    ("[x for x in (1, 2)]", 0),
+    ("x + {x: v}", 4),
+    ("x + [v]", 4),
+    ("x[0]", 0),
+    ("x, v", 0),
+    ("x + 'v'", 4),
+    ("x + b'v'", 4),
+    ("x + f'{v}'", 4),
+    ("x + None", 4),
+    ("x + True", 4),
+    ("x + ...", 4),
+    ("x + 2j", 4),
+    ("x if v else c", 0),
+    ("x < v", 0),
+    ("x and v", 0),
+    ("not x", 0),
+    ("x // v", 0),
+    ("x % v", 0),
+    ("x @ v", 0),
+    ("~x", 0),
+    ("x | v", 0),
+    ("c + (q := 3)", 5),
+    ("await x", 0),
+    ("x^2", 1),
+    ("c*x + x^2", 7),
+    ("2x", 0),
+    ("x v", 2),
+    ("c*x + v)", 7),
+    ("x = 3", 2),
+    ("x; v", 1),
+    ("import os", 0),
+    ("x + q*v", 4),
+    ("ξ + x", 0),
+    ("x + eval", 4),
+    ("x + sin", 4),
+    ("x + sin(x, v)", 4),
+    ("x + sin()", 4),
+    ("x + sin(x=v)", 4),
+    ("x + sin(*x)", 8),
+    ("x + arcsin(x)", 4),
+    ("x + v(2)", 4),
+    ("x + 1e400", 4),
+    ("x + 1e-300", 4),
+    ("x**v", 3),
+    ("2**x", 3),
+    ("x**17", 3),
+    ("x**(10**9)", 4),
+    ("9**9**9", 3),
+    ("((10**16)**16)**16", 1),
+    ("x + (x**16)**16", 4),
+    ("x + exp(exp(exp(9)))", 8),
+]
+
+
+@pytest.mark.parametrize(("formula", "column"), HOSTILE)
+def test_what_is_not_a_formula_is_refused_with_a_pointer_to_the_place(formula, column):
+    with pytest.raises(FormulaError) as caught:
+        read(formula)
+    message = str(caught.value).split("\n")
+    assert message[0].strip()
+    assert message[1] == "    " + formula
+    assert message[2] == "    " + " " * column + "^"
+    assert (caught.value.formula, caught.value.column) == (formula, column)
+
+
+NO_VALUE = [
+    "1/0",
+    "x/0",
+    "x/(v - v)",
+    "0**-1",
+    "sqrt(-1)*x",
+    "log(0)",
+    "x*log(-1)",
+    "sqrt(-4*x**2)",
+    "x*(-8)**(1/3)",
+    "x*(-1)**0.5",
+]
+NO_END = ["x" * 10_000, "x + " * 3000 + "x", "(" * 300 + "x" + ")" * 300, "-" * 1900 + "x"]
+NO_FORMULA = ["", "   ", "\n", "x + ", "*x", "\0", "x + \0"]
+
+
+@pytest.mark.parametrize("formula", NO_VALUE + NO_END + NO_FORMULA)
+def test_what_has_no_real_value_or_no_end_is_refused(formula):
+    with pytest.raises(FormulaError):
+        read(formula)
+
+
+@pytest.mark.parametrize("formula", [None, 3, 2.5, ["x"], b"x", sp.Symbol("x")])
+def test_only_strings_are_read(formula):
+    with pytest.raises(FormulaError, match="must be a string"):
+        read(formula)
+
+
+def test_a_long_formula_is_cut_in_the_message():
+    with pytest.raises(FormulaError) as caught:
+        read("x + " * 100 + "?")
+    assert all(len(line) <= 104 for line in str(caught.value).split("\n"))
+
+
+def test_the_message_names_what_is_known():
+    with pytest.raises(FormulaError, match=r"unknown symbol 'k'; known here: c, f, pi, v, w, x"):
+        read("k*x")
+
+
+def test_a_missing_product_sign_is_explained():
+    with pytest.raises(FormulaError, match=r"a product needs \*, as in 2\*x"):
+        read("2x + v")
+
+
+BOMBS = [
+    "9**9**9",
+    "((10**16)**16)**16",
+    "((((10**15)**16+1)*0+10)**15)**16",
+    "(((x+1)**16)**16)**16",
+    "exp(exp(exp(exp(9))))",
+    "log(" * 20 + "2" + ")" * 20,
+    "log(" * 30 + "0.3" + ")" * 30,
+    "tanh(" * 90 + "2" + ")" * 90,
+    "tan(" * 90 + "2" + ")" * 90,
+    "sqrt(" * 90 + "x" + ")" * 90,
+    "sin(" * 90 + "x" + ")" * 90,
+    "(1e99*x)**16",
+    "((1e99*x)**8)**8",
+    "(499.123456789012345678)**15.999",
+    "(2**0.9999999999)**15.99999",
+    "sin(10**15*10**15)",
+    "cos(pi/65537)",
+    "1/(sqrt(2)+sqrt(3)+sqrt(5)+sqrt(7)+sqrt(11))",
+    "*".join(f"(x+{i})" for i in range(60)),
+    "(" * 90 + "x" + ")" * 90,
+    "-" * 1900 + "x",
+    "x+" * 999 + "x",
+    "x*" * 999 + "x",
+    "(" * 1000 + "x" + ")" * 1000,
+    "x" * 10_000,
+]
+
+TIMER = """
+import json, sys, time
+from kfcourse.symbolic.formula import FormulaError, parse, symbol
+for formula in json.load(sys.stdin):
+    start = time.perf_counter()
+    try:
+        parse(formula, {"x": symbol("x")})
+    except FormulaError:
+        pass
+    print(time.perf_counter() - start, flush=True)
+"""
+
+
+def test_no_formula_takes_a_second_to_read_or_refuse():
+    # In a process of its own, so that a formula that never ends is a failure, not a hanging test.
+    try:
+        done = subprocess.run([sys.executable, "-c", TIMER], input=json.dumps(BOMBS), capture_output=True, text=True, timeout=20)
+        output, error = done.stdout, done.stderr
+    except subprocess.TimeoutExpired as expired:
+        output, error = (expired.stdout or b"").decode(), "timeout"
+    times = [float(line) for line in output.split()]
+    assert len(times) == len(BOMBS), f"{BOMBS[len(times)][:60]!r} is not done ({error[-300:]})"
+    slow = [formula[:60] for formula, seconds in zip(BOMBS, times, strict=True) if seconds > 1]
+    assert not slow
+
+
+@pytest.mark.parametrize("name", ["x", "x1", "alpha_2", "E", "I", "S", "N", "Q"])
+def test_an_ordinary_word_names_a_symbol(name):
+    assert check_name(name) == name
+    assert parse(f"2*{name}", {name: symbol(name)}) == 2 * symbol(name)
+
+
+@pytest.mark.parametrize(
+    "name", ["", "1x", "_x", "x y", "x-y", "lambda", "if", "None", "sin", "pi", "ξ", "x" * 40, "__class__", "x\n", 3, None]
+)
+def test_other_words_do_not(name):
+    with pytest.raises(ValueError, match=r"cannot name|reserved word|already means"):
+        check_name(name)

@@ -1,0 +1,155 @@
+"""Exact Gaussian moments: against closed forms, quadrature, and many-digit arithmetic."""
+
+import mpmath
+import numpy as np
+import oracles
+import pytest
+import sympy as sp
+
+from kfcourse.symbolic.codegen import compile_function
+from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
+
+x, y, m, mu = sp.symbols("x y m mu", real=True)
+d, q = sp.symbols("d q", positive=True)
+scalar = GaussianMoments([x], [m], sp.Matrix([[d]]))
+
+# A correlated pair, not close to singular; Gauss-Hermite with 40 points an axis integrates what follows to rounding.
+MEAN, COV = [0.3, -0.7], [[0.5, 0.2], [0.2, 0.4]]
+numeric = GaussianMoments([x, y], [sp.Rational(3, 10), -sp.Rational(7, 10)], sp.Matrix(COV).applyfunc(sp.nsimplify))
+ROUNDING = 1e-12  # thousands of float64 operations on numbers of order 1
+
+
+def test_moments_follow_the_recursion_of_the_page():
+    # q_0 = 1, q_1 = m, q_{n+1} = m q_n + n d q_{n-1}
+    previous, current = sp.S.One, m
+    for n in range(1, 12):
+        assert sp.expand(scalar.mean_of(x**n) - current) == 0
+        previous, current = current, sp.expand(m * current + n * d * previous)
+
+
+@pytest.mark.parametrize(
+    ("function", "expected"),
+    [
+        (sp.exp(q * x), sp.exp(q * m + q**2 * d / 2)),
+        (sp.cos(q * x), sp.cos(q * m) * sp.exp(-(q**2) * d / 2)),
+        (sp.sin(q * x + mu), sp.sin(q * m + mu) * sp.exp(-(q**2) * d / 2)),
+        (x * sp.sin(x), (m * sp.sin(m) + d * sp.cos(m)) * sp.exp(-d / 2)),
+        (sp.cosh(x), sp.cosh(m) * sp.exp(d / 2)),
+        (sp.S(7), sp.S(7)),
+    ],
+)
+def test_known_means(function, expected):
+    assert sp.simplify((scalar.mean_of(function) - expected).rewrite(sp.exp)) == 0
+
+
+FUNCTIONS = [
+    x**4 * y**2 - 3 * x * y,
+    sp.exp(x / 2 - y) * x**2,
+    sp.sin(2 * x + y) * sp.cos(y) + y,
+    x * sp.sin(x) ** 2 * sp.exp(-y / 3),
+    sp.sinh(x) * sp.cosh(y / 2) + (x + y) ** 3,
+    sp.exp(x) * (1 + sp.exp(y) * sp.cos(x)),
+]
+
+
+def plain(function):
+    return lambda points: np.broadcast_to(sp.lambdify([x, y], function)(*points), points[0].shape)
+
+
+@pytest.mark.parametrize("function", FUNCTIONS)
+def test_the_mean_is_what_quadrature_finds(function):
+    exact = float(numeric.mean_of(function))
+    assert exact == pytest.approx(oracles.gaussian_mean(plain(function), MEAN, COV), rel=ROUNDING, abs=ROUNDING)
+
+
+@pytest.mark.parametrize("left", FUNCTIONS[:4])
+@pytest.mark.parametrize("right", FUNCTIONS[2:])
+def test_the_covariance_is_what_quadrature_finds(left, right):
+    f, g = plain(left), plain(right)
+    mean_f, mean_g = (oracles.gaussian_mean(one, MEAN, COV) for one in (f, g))
+    expected = oracles.gaussian_mean(lambda points: (f(points) - mean_f) * (g(points) - mean_g), MEAN, COV)
+    # The variances bound the size of what was added up, and so the rounding.
+    assert float(numeric.covariance(left, right)) == pytest.approx(expected, rel=1e-10, abs=1e-10)
+
+
+def test_covariance_is_bilinear_and_symmetric():
+    f, g, h = FUNCTIONS[0], FUNCTIONS[1], FUNCTIONS[2]
+    combined = numeric.covariance(2 * f - 3 * g, h)
+    assert float(combined) == pytest.approx(float(2 * numeric.covariance(f, h) - 3 * numeric.covariance(g, h)), rel=ROUNDING)
+    assert float(numeric.covariance(h, 2 * f - 3 * g)) == pytest.approx(float(combined), rel=ROUNDING)
+
+
+def test_a_variable_without_variance_is_a_constant():
+    fixed = GaussianMoments([x, y], [m, mu], sp.Matrix([[d, 0], [0, 0]]))
+    assert sp.expand(fixed.mean_of(x**2 * y**3) - (m**2 + d) * mu**3) == 0
+    assert fixed.covariance(y**2, sp.exp(x)) == 0
+
+
+def many_digits(function):
+    """Var function(x), x ~ N(mean, variance), in 60 digits: M f^2 - M f M f with Gauss-Hermite sums."""
+
+    def variance(mean, cov):
+        with mpmath.workdps(80):
+            nodes, weights = (mpmath.matrix(a) for a in _hermite(12))
+            values = [function(mpmath.mpf(mean) + mpmath.sqrt(mpmath.mpf(cov)) * node) for node in nodes]
+            average = mpmath.fsum(w * v for w, v in zip(weights, values, strict=True))
+            return float(mpmath.fsum(w * (v - average) ** 2 for w, v in zip(weights, values, strict=True)))
+
+    return variance
+
+
+def _hermite(order):
+    """Nodes and weights for N(0, 1) in the working precision of mpmath."""
+    coefficients = [mpmath.mpf(c) for c in sp.Poly(sp.hermite_prob(order, x), x).all_coeffs()]
+    nodes = mpmath.polyroots(coefficients, maxsteps=500, extraprec=500)
+    previous = sp.lambdify(x, sp.hermite_prob(order - 1, x), "mpmath")
+    weights = [mpmath.factorial(order - 1) / (order * previous(node) ** 2) for node in nodes]
+    return nodes, weights
+
+
+@pytest.mark.parametrize(
+    ("function", "precise"),
+    [
+        (x**2, lambda t: t**2),
+        (x + x**3 / 10, lambda t: t + t**3 / 10),
+        (x + sp.sin(x), lambda t: t + mpmath.sin(t)),
+        (sp.cos(x), mpmath.cos),
+        (sp.exp(x / 10**6), lambda t: mpmath.exp(t / 10**6)),
+    ],
+)
+@pytest.mark.parametrize(("mean", "variance"), [(1e6, 1e-10), (1e3, 1e-6), (0.5, 1e-20), (2.0, 0.01)])
+def test_the_variance_keeps_its_digits_for_large_means_and_small_variances(function, precise, mean, variance):
+    # M f^2 - (M f)^2 in float64 would lose everything: f^2 is 1e12 and more, the variance 1e-10 and less.
+    arguments = {"m": sp.Matrix([m]), "d": sp.Matrix([[d]])}
+    code = compile_function("variance", arguments, {"p": sp.Matrix([[scalar.covariance(function, function)]])}, ["m"])
+    found = code.function(np.array([[mean]]), np.array([[[variance]]]))[0].item()
+    # Rounding of the argument itself: sin and cos at 1e6 know their phase to 1e6 * 1e-16, a few products more.
+    assert found == pytest.approx(many_digits(precise)(mean, variance), rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("function", "term"),
+    [
+        (x + sp.tan(x), r"tan\(x\)"),
+        (x**2 * sp.log(x), r"log\(x\)"),
+        (sp.sqrt(x) + x, r"sqrt\(x\)"),
+        (1 / (1 + x**2), r"1/\(x\*\*2 \+ 1\)"),
+        (sp.Abs(x), r"Abs\(x\)"),
+        (sp.exp(-(x**2)), r"exp\(-x\*\*2\)"),
+        (sp.sin(x**2), r"x\*\*2"),
+        (sp.exp(sp.sin(x)), r"sin\(x\)|exp\("),
+        (x**100, "degree"),
+    ],
+)
+def test_no_closed_form_names_the_term_and_the_way_out(function, term):
+    with pytest.raises(NoClosedForm, match=term) as caught:
+        scalar.mean_of(function)
+    assert "unscented(model)" in str(caught.value)
+
+
+def test_variance_of_a_sine_is_finite_for_any_variance():
+    """Var sin x -> 1/2 for a phase that is not known at all; exp(u) of the formula must not overflow on the way."""
+    x, m, d = sp.symbols("x m d", real=True)
+    variance = sp.lambdify([m, d], GaussianMoments([x], [m], sp.Matrix([[d]])).covariance(sp.sin(x), sp.sin(x)), "numpy")
+    with np.errstate(all="raise", under="ignore"):
+        assert variance(0.3, 5000.0) == pytest.approx(0.5, rel=1e-12)

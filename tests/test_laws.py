@@ -1,0 +1,201 @@
+"""The shared linear algebra: gains, corrections, regressions."""
+
+import numpy as np
+import pytest
+
+from kfcourse.laws import Gaussian, Measurement, Moments, apply, correct, gain, product, square_root, symmetric, transpose
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(5)
+
+
+def covariances(rng, runs, size):
+    root = rng.normal(size=(runs, size, size))
+    return root @ root.swapaxes(1, 2) + 0.1 * np.eye(size)
+
+
+@pytest.mark.parametrize(("n", "p"), [(1, 1), (2, 1), (1, 2), (3, 2), (2, 3)])
+def test_the_products_are_matrix_products(rng, n, p):
+    left, right, vector = rng.normal(size=(7, n, p)), rng.normal(size=(7, p, n)), rng.normal(size=(7, p))
+    np.testing.assert_allclose(apply(left, vector), np.einsum("kij,kj->ki", left, vector), rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(product(left, right), np.einsum("kij,kjl->kil", left, right), rtol=1e-13, atol=1e-13)
+    np.testing.assert_array_equal(transpose(left), np.einsum("kij->kji", left))
+    np.testing.assert_allclose(apply(left[0], vector), vector @ left[0].T, rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize(("n", "p"), [(1, 1), (2, 1), (1, 2), (3, 3)])
+def test_the_gain_solves_its_equation(rng, n, p):
+    cov, cross = covariances(rng, 9, p), rng.normal(size=(9, n, p))
+    # condition numbers up to 1e3 here
+    np.testing.assert_allclose(product(gain(cross, cov), cov), cross, rtol=1e-11, atol=1e-11)
+
+
+def test_the_gain_does_not_depend_on_units(rng):
+    cov, cross, units = covariances(rng, 4, 3), rng.normal(size=(4, 2, 3)), np.array([1e-9, 1.0, 1e8])
+    scaled = gain(cross * units, cov * units[:, None] * units)
+    np.testing.assert_allclose(scaled * units, gain(cross, cov), rtol=1e-11, atol=1e-11)
+
+
+def test_where_nothing_can_vary_the_gain_is_zero():
+    assert np.array_equal(gain(np.zeros((3, 1, 1)), np.array([0.0, 1.0, 2.0])[:, None, None]), np.zeros((3, 1, 1)))
+    cov = np.array([[[2.0, 0.0], [0.0, 0.0]]])
+    np.testing.assert_allclose(gain(np.array([[[1.0, 0.0]]]), cov), [[[0.5, 0.0]]], rtol=1e-14)
+    assert np.array_equal(gain(np.zeros((1, 2, 2)), np.zeros((1, 2, 2))), np.zeros((1, 2, 2)))
+
+
+def test_a_singular_covariance_gets_its_pseudo_inverse(rng):
+    # y2 = 2 y1: the gain of least norm in units of the standard deviations gives both the same weight.
+    cov = np.array([[1.0, 2.0], [2.0, 4.0]])
+    K = gain(np.array([[1.0, 2.0]]), cov)
+    np.testing.assert_allclose(K @ cov, [[1.0, 2.0]], rtol=1e-12)
+    np.testing.assert_allclose(K * [1, 2], np.full((1, 2), 0.5), rtol=1e-12)
+
+
+def test_one_singular_trajectory_does_not_disturb_the_others(rng):
+    cov, cross = covariances(rng, 6, 2), rng.normal(size=(6, 2, 2))
+    expected = gain(cross, cov)
+    cov[2] = [[1.0, 1.0], [1.0, 1.0]]
+    cross[2] = [[1.0, 1.0], [0.5, 0.5]]
+    found = gain(cross, cov)
+    others = [0, 1, 3, 4, 5]
+    # By the pseudo-inverse of eigenvalues instead of a solution: condition numbers up to 1e3.
+    np.testing.assert_allclose(found[others], expected[others], rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(found[2] @ cov[2], cross[2], rtol=1e-12)
+
+
+def measurement(G, R, prior):
+    explained = product(product(G, prior.cov), transpose(G))
+    return Measurement(np.zeros(G.shape[:-1]), G, explained + R, R)
+
+
+@pytest.mark.parametrize(("n", "p"), [(1, 1), (2, 1), (1, 2), (2, 2), (3, 2)])
+def test_the_correction_is_the_conditional_law(rng, n, p):
+    prior = Gaussian(rng.normal(size=(8, n)), covariances(rng, 8, n))
+    G, R, y = rng.normal(size=(8, p, n)), covariances(rng, 8, p), rng.normal(size=(8, p))
+    posterior = correct(prior, measurement(G, R, prior), y)
+    # information form: an algebraically different route
+    information = np.linalg.inv(prior.cov) + transpose(G) @ np.linalg.inv(R) @ G
+    cov = np.linalg.inv(information)
+    gained = cov @ transpose(G) @ np.linalg.inv(R)
+    np.testing.assert_allclose(posterior.cov, cov, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(posterior.mean, prior.mean + apply(gained, y), rtol=1e-10, atol=1e-10)
+    assert np.array_equal(posterior.cov, transpose(posterior.cov))
+
+
+@pytest.mark.parametrize(("n", "p"), [(1, 1), (2, 1), (2, 2)])
+def test_a_meter_that_sees_nothing_leaves_the_prior(rng, n, p):
+    # No sensitivity and no variance either (a square meter linearised at 0): K = 0 and p = Psi.
+    prior = Gaussian(rng.normal(size=(3, n)), covariances(rng, 3, n))
+    blind = Measurement(np.zeros((3, p)), np.zeros((3, p, n)), np.zeros((3, p, p)), np.zeros((3, p, p)))
+    posterior = correct(prior, blind, np.ones((3, p)))
+    np.testing.assert_array_equal(posterior.mean, prior.mean)
+    np.testing.assert_allclose(posterior.cov, prior.cov, rtol=1e-15)
+
+
+def test_an_exact_meter_leaves_no_variance(rng):
+    prior = Gaussian(np.array([[1.0]]), np.array([[[2.0]]]))
+    posterior = correct(prior, measurement(np.array([[[3.0]]]), np.array([[[0.0]]]), prior), np.array([[6.0]]))
+    np.testing.assert_allclose(posterior.mean, [[3.0]], rtol=1e-15)  # 1 + (2 * 3 / 18) * 6
+    np.testing.assert_array_equal(posterior.cov, [[[0.0]]])
+
+
+@pytest.mark.parametrize("sharpness", [1e-8, 1e-16, 1e-24])
+@pytest.mark.parametrize("n", [1, 2])
+def test_a_sharp_meter_leaves_a_positive_variance_with_its_digits(sharpness, n):
+    prior = Gaussian(np.zeros((1, n)), np.eye(n)[None])
+    G, R = np.eye(n)[None], sharpness * np.eye(n)[None]
+    posterior = correct(prior, measurement(G, R, prior), np.ones((1, n)))
+    expected = sharpness / (1 + sharpness)
+    # Joseph's form adds (1 - K)^2 Psi, K rounded to 1e-16: an absolute 1e-32 beside the 1e-24 of the sharpest.
+    np.testing.assert_allclose(posterior.cov[0], expected * np.eye(n), rtol=1e-7, atol=1e-7 * sharpness)
+
+
+@pytest.mark.parametrize("p", [1, 2])
+def test_a_missing_measurement_changes_nothing_and_the_others_do_not_notice(rng, p):
+    prior = Gaussian(rng.normal(size=(5, 2)), covariances(rng, 5, 2))
+    meter, y = measurement(rng.normal(size=(5, p, 2)), covariances(rng, 5, p), prior), rng.normal(size=(5, p))
+    complete = correct(prior, meter, y)
+    y[3] = np.nan
+    posterior = correct(prior, meter, y)
+    np.testing.assert_array_equal(posterior.mean[3], prior.mean[3])
+    np.testing.assert_allclose(posterior.cov[3], prior.cov[3], rtol=1e-15)
+    others = [0, 1, 2, 4]
+    np.testing.assert_array_equal(posterior.mean[others], complete.mean[others])
+    np.testing.assert_array_equal(posterior.cov[others], complete.cov[others])
+
+
+def test_a_missing_component_is_a_meter_without_it(rng):
+    prior = Gaussian(rng.normal(size=(4, 2)), covariances(rng, 4, 2))
+    G, R, y = rng.normal(size=(4, 2, 2)), covariances(rng, 4, 2), rng.normal(size=(4, 2))
+    alone = correct(prior, measurement(G[:, 1:], R[:, 1:, 1:], prior), y[:, 1:])
+    y[:, 0] = np.nan
+    posterior = correct(prior, measurement(G, R, prior), y)
+    np.testing.assert_allclose(posterior.mean, alone.mean, rtol=1e-12)
+    np.testing.assert_allclose(posterior.cov, alone.cov, rtol=1e-12)
+
+
+@pytest.mark.parametrize("cov", [np.diag([2.0, 0.0]), np.ones((2, 2)), np.zeros((2, 2)), np.array([[2.0, 1e-5], [1e-5, 1e-9]])])
+def test_the_square_root_squares_to_the_covariance(cov):
+    root = square_root(cov)
+    np.testing.assert_allclose(root @ root.T, cov, atol=1e-15 * 2)  # rounding relative to the largest eigenvalue
+
+
+def test_symmetric_is_symmetric(rng):
+    matrix = rng.normal(size=(4, 3, 3))
+    assert np.array_equal(symmetric(matrix), transpose(symmetric(matrix)))
+
+
+@pytest.mark.parametrize(("r", "s"), [(1, 1), (2, 1), (1, 2), (2, 3)])
+def test_a_regression_is_least_squares(rng, r, s):
+    regressor = rng.normal(size=(60, s)) @ rng.normal(size=(s, s)) + 3
+    target = regressor @ rng.normal(size=(s, r)) + rng.normal(size=(60, r)) - 2
+    fit = Moments.of(target, regressor).regression(r)
+    design = np.column_stack([regressor, np.ones(60)])
+    solution, *_ = np.linalg.lstsq(design, target, rcond=None)
+    np.testing.assert_allclose(fit.matrix, solution[:s].T, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(fit.offset, solution[s], rtol=1e-9, atol=1e-9)
+    residual = target - design @ solution
+    np.testing.assert_allclose(fit.residual, residual.T @ residual / 60, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(fit(regressor), design @ solution, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("cuts", [[10], [1, 59], [1, 2, 3, 30], list(range(1, 60))])
+def test_moments_of_parts_taken_together_are_moments_of_the_whole(rng, cuts):
+    target, regressor = rng.normal(size=(60, 2)) + 1e6, rng.normal(size=(60, 2)) - 1e5
+    whole = Moments.of(target, regressor)
+    parts = [Moments.of(t, g) for t, g in zip(np.split(target, cuts), np.split(regressor, cuts), strict=True)]
+    together = Moments.together(parts)
+    assert together.size == 60
+    # Means of size 1e6 are rounded to 1e-10; deviations from them are of order 1.
+    np.testing.assert_allclose(together.mean, whole.mean, rtol=1e-15 * 4)
+    np.testing.assert_allclose(together.scatter, whole.scatter, rtol=1e-7, atol=1e-7)
+    np.testing.assert_allclose(whole.scatter, 60 * np.cov(np.hstack([target, regressor]).T, bias=True), rtol=1e-7, atol=1e-7)
+
+
+def test_a_constant_regressor_predicts_the_mean(rng):
+    target = rng.normal(size=(20, 1))
+    fit = Moments.of(target, np.full((20, 1), 0.5)).regression(1)
+    np.testing.assert_allclose(fit(np.array([[0.5], [7.0]])), np.full((2, 1), target.mean()), rtol=1e-14)
+    np.testing.assert_allclose(fit.residual, [[target.var()]], rtol=1e-14)
+
+
+def test_one_trajectory_is_a_regression_on_a_constant():
+    fit = Moments.of(np.array([[2.0]]), np.array([[3.0]])).regression(1)
+    assert (fit.matrix.item(), fit.offset.item(), fit.residual.item()) == (0.0, 2.0, 0.0)
+
+
+@pytest.mark.parametrize("count", [8191, 8192, 8193, 20_000])
+def test_long_sums_are_cut_without_loss(rng, count):
+    column = rng.normal(size=(count, 1))
+    np.testing.assert_allclose(Moments.of(column, column).scatter, np.full((2, 2), count * column.var()), rtol=1e-11)
+
+
+def test_a_perfect_regression_leaves_no_negative_variance(rng):
+    # Cov(t) - matrix Cov(t, r)^T is a difference of equal numbers, and its rounding must not become a variance below 0.
+    for _ in range(50):
+        regressor = rng.normal(size=(30, 2))
+        fit = Moments.of(regressor @ rng.normal(size=(2, 2)), regressor).regression(2)
+        assert (np.diagonal(fit.residual) >= 0).all()
+        assert Moments.of(0.7 * regressor[:, :1], regressor[:, :1]).regression(1).residual.item() >= 0
