@@ -25,7 +25,9 @@ KEY = BUILD / ".executed-with"
 
 def fingerprint() -> str:
     """Hash of all that the outputs of the chapters depend on, besides their own cells."""
-    files = [path for part in ("kfcourse", "exercises") for path in (ROOT / part).rglob("*") if path.suffix in (".py", ".toml", ".j2")]
+    files = [
+        path for part in ("kfcourse", "exercises") for path in (ROOT / part).rglob("*") if path.suffix in (".py", ".toml", ".j2")
+    ]
     digest = hashlib.sha256(sys.version.encode())
     for path in [*sorted(files), ROOT / "requirements.txt"]:
         name, content = path.relative_to(ROOT).as_posix().encode(), path.read_bytes()

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 import sympy as sp
 
+from kfcourse.checks.exercises import Exercise
 from kfcourse.laws import Array, Moments
 
+Map = Callable[[Array], Array]
 COURSE = "53"  # the variant that the course itself works through
 Ranges = Mapping[str, tuple[float, float]]
 
 
-def personal(exercise: Any, name: str, course: Mapping[str, float], ranges: Ranges) -> dict[str, float]:
+def personal(exercise: Exercise, name: str, course: Mapping[str, float], ranges: Ranges) -> dict[str, float]:
     """Numbers of two digits from the ranges, the same for a variant and name; the course's own for its variant."""
     if exercise.variant.name == COURSE:
         return dict(course)
@@ -40,19 +41,19 @@ RUNS = 60  # hidden trajectories: a regression over so few differs clearly from 
 Fit = Callable[[Array, Array], tuple[Array, Array, Array]]
 
 
-def right_regression(target: Array, regressor: Array) -> tuple[Array, Array, Array]:
+def regression(target: Array, regressor: Array) -> tuple[Array, Array, Array]:
     """matrix (r, s), offset (r,), residual covariance (r, r)."""
     matrix, offset, residual = Moments.of(target, regressor).regression(target.shape[1])
     return matrix, offset, residual
 
 
-def ensemble(exercise: Any, name: str) -> tuple[Array, Array, Array]:
+def ensemble(exercise: Exercise, name: str) -> tuple[Array, Array, Array]:
     """x_k, y_k and x_{k+1} of hidden trajectories, (N, ...), at a step when the filter is under way."""
     x, y = exercise.simulate(RUNS, 4, name)
     return x[2], y[2], x[3]
 
 
-def predicted(exercise: Any, name: str, x: Array) -> Array:
+def predicted(exercise: Exercise, name: str, x: Array) -> Array:
     """What a filter may have predicted of x: near it, and biased a little."""
     spread = x.std(axis=0) + 0.1 * np.sqrt(np.diagonal(exercise.model.prior.cov))
     return x + spread * (0.1 + 0.5 * exercise.rng(name).normal(size=x.shape))
@@ -124,11 +125,11 @@ WRONG_REGRESSIONS: tuple[tuple[str, str, Fit], ...] = (
     (
         "residual-is-variance",
         "The residual covariance is the whole covariance of the target; subtract what the regression explains.",
-        lambda t, r: (*right_regression(t, r)[:2], covariance_of(t, t)),
+        lambda t, r: (*regression(t, r)[:2], covariance_of(t, t)),
     ),
     (
         "unbiased-residual",
         "The residual is divided by N - 1; use 1/N throughout, as for the coefficients.",
-        lambda t, r: (*right_regression(t, r)[:2], right_regression(t, r)[2] * len(t) / (len(t) - 1)),
+        lambda t, r: (*regression(t, r)[:2], regression(t, r)[2] * len(t) / (len(t) - 1)),
     ),
 )

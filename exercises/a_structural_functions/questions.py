@@ -11,27 +11,38 @@ from typing import Any
 
 import sympy as sp
 
-from kfcourse.checks.question import Answer, Mistake, Question
+from kfcourse.checks.exercises import Exercise
+from kfcourse.checks.question import Answer, ForVariant, Mistake, Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.symbolic.sides import Side, plain
 
 Make = Callable[[Any], Any]  # exercise -> results in symbols
 
 
-def symbols(exercise: Any, side: str) -> tuple[Any, Any]:
+def symbols(exercise: Exercise, side: str) -> tuple[Any, Any]:
     """Mean and covariance of the law, as an answer is called with them."""
     part = Side.of(exercise.model, side)
     return plain(part.mean), plain(part.cov)
 
 
-def constant(make: Make) -> Callable[[Any], Answer]:
-    """Exercise -> an answer that ignores its arguments: the formulas are in those very symbols."""
+def constant(make: Make) -> ForVariant:
+    """An answer that ignores its arguments: the formulas are in those very symbols."""
 
-    def answer(exercise: Any) -> Answer:
+    def answer(exercise: Exercise) -> Answer:
         result = make(exercise)
         return lambda *_: result
 
-    return answer
+    return ForVariant(answer)
+
+
+def key(name: str, make: Make, side: str) -> ForVariant:
+    """The same for a key, with the student's own name and arguments."""
+
+    def answer(exercise: Exercise) -> Answer:
+        result = make(exercise)
+        return (lambda z, p: result) if side == "object" else (lambda m, d: result)
+
+    return ForVariant(answer, name)
 
 
 def right(kind: str, side: str) -> Make:
@@ -43,7 +54,7 @@ def right(kind: str, side: str) -> Make:
 def wrong_covariance(name: str, says: str, kind: str, side: str, covariance: Callable[[Side], sp.MatrixBase]) -> Mistake:
     """The right functions but for the last, the covariance."""
 
-    def make(exercise: Any) -> tuple:
+    def make(exercise: Exercise) -> tuple:
         return (*right(kind, side)(exercise)[:-1], plain(covariance(Side.of(exercise.model, side))))
 
     return Mistake(name, says, constant(make))
@@ -52,7 +63,7 @@ def wrong_covariance(name: str, says: str, kind: str, side: str, covariance: Cal
 def covariance_to_power(name: str, says: str, kind: str, side: str, exponent: sp.Rational) -> Mistake:
     """The right functions with every entry of p (or d) raised to a power."""
 
-    def make(exercise: Any) -> tuple:
+    def make(exercise: Exercise) -> tuple:
         powers = {entry: entry**exponent for entry in Side.of(exercise.model, side).cov}
         return tuple(formula.subs(powers, simultaneous=True) for formula in right(kind, side)(exercise))
 
@@ -117,7 +128,7 @@ def mistakes_of_linearised(side: str) -> tuple[Mistake, ...]:
 
 
 def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
-    def second_moment(exercise: Any) -> tuple:
+    def second_moment(exercise: Exercise) -> tuple:
         functions = right("gaussian", side)(exercise)
         mean, cov = (sp.Matrix([f]) for f in (functions[0], functions[-1]))
         return (*functions[:-1], plain(cov + mean * mean.T))
@@ -151,28 +162,29 @@ def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
     )
 
 
-def jacobians(side: str, change: Callable[[sp.Matrix, sp.Matrix], tuple] = lambda a, b: (a, b)) -> Callable[[Any], Answer]:
-    def make(exercise: Any) -> tuple:
+def jacobians(side: str, change: Callable[[sp.Matrix, sp.Matrix], tuple] = lambda a, b: (a, b)) -> ForVariant:
+    def make(exercise: Exercise) -> tuple:
         part = Side.of(exercise.model, side)
         return tuple(plain(matrix) for matrix in change(part.A, part.B))
 
     return constant(make)
 
 
-def _unevaluated(exercise: Any) -> tuple:
+def _unevaluated(exercise: Exercise) -> tuple:
     """Derivatives divided by the variable: the slope of a secant through 0, not of the tangent."""
     part = Side.of(exercise.model, "object")
     return plain(sp.Matrix([scalar(part.value) / scalar(part.mean)])), plain(part.B)
 
 
-def unexplained(exercise: Any) -> Any:
+def unexplained(exercise: Exercise) -> Any:
     """R = F - G d G^T of the Gaussian functions."""
     return exercise.structures.gaussian["R"]
 
 
-def _question(number: int, title: str, level: str, kind: str, side: str, mistakes: tuple[Mistake, ...]) -> Question:
+def _question(number: int, title: str, kind: str, side: str, mistakes: tuple[Mistake, ...]) -> Question:
     parts = ("tau", "Theta") if side == "object" else ("h", "G", "F")
-    return Question(f"a{number}", title, level, constant(right(kind, side)), lambda e: [symbols(e, side)], mistakes, parts)
+    right_one = key(f"{side}_{kind}", right(kind, side), side)
+    return Question(f"a{number}", title, "core", right_one, lambda e: [symbols(e, side)], mistakes, parts)
 
 
 QUESTIONS = (
@@ -180,7 +192,7 @@ QUESTIONS = (
         "a1",
         "derivatives of the state equation",
         "warm-up",
-        jacobians("object"),
+        ForVariant(lambda e: lambda z: jacobians("object").make(e)(z), "derivatives"),
         lambda e: [symbols(e, "object")[:1]],
         (
             Mistake(
@@ -197,15 +209,15 @@ QUESTIONS = (
         ),
         ("a_x", "a_v"),
     ),
-    _question(2, "linearised functions of the object", "core", "linearised", "object", mistakes_of_linearised("object")),
-    _question(3, "linearised functions of the meter", "core", "linearised", "meter", mistakes_of_linearised("meter")),
-    _question(4, "Gaussian functions of the object", "core", "gaussian", "object", mistakes_of_gaussian("object")),
-    _question(5, "Gaussian functions of the meter", "core", "gaussian", "meter", mistakes_of_gaussian("meter")),
+    _question(2, "linearised functions of the object", "linearised", "object", mistakes_of_linearised("object")),
+    _question(3, "linearised functions of the meter", "linearised", "meter", mistakes_of_linearised("meter")),
+    _question(4, "Gaussian functions of the object", "gaussian", "object", mistakes_of_gaussian("object")),
+    _question(5, "Gaussian functions of the meter", "gaussian", "meter", mistakes_of_gaussian("meter")),
     Question(
         "a6",
         "what the state does not explain of the measurement",
         "stretch",
-        constant(unexplained),
+        key("unexplained", unexplained, "meter"),
         lambda e: [symbols(e, "meter")],
         (
             Mistake(

@@ -7,19 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from kfcourse.checks.exercises import array_functions, full
+from kfcourse import laws
+from kfcourse.checks.exercises import Exercise, array_functions, full
 from kfcourse.checks.question import Answer, Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, gain, transpose
+from kfcourse.laws import Array, Gaussian, Measurement, apply, transpose
 
 RUNS = 6  # hidden trajectories
 
 
-def law(exercise: Any, name: str) -> Gaussian:
+def law(exercise: Exercise, name: str) -> Gaussian:
     """A hidden normal law for every trajectory, near the prior; correlated where the state has components."""
     rng, prior = exercise.rng(name), exercise.model.prior
     n = exercise.model.n
@@ -29,19 +29,19 @@ def law(exercise: Any, name: str) -> Gaussian:
     return Gaussian(mean, 0.3 * roots @ transpose(roots))
 
 
-def measurement(exercise: Any, at: Gaussian) -> Measurement:
+def measurement(exercise: Exercise, at: Gaussian) -> Measurement:
     """Structural functions of a hidden meter at a law, one of each for every trajectory."""
     h, G, F, R = exercise.hidden.gaussian.measure(*at)
     return Measurement(np.array(np.broadcast_to(h, (RUNS, exercise.model.p))), full(G, RUNS), full(F, RUNS), full(R, RUNS))
 
 
-def measured(exercise: Any, name: str, expected: Measurement) -> Array:
+def measured(exercise: Exercise, name: str, expected: Measurement) -> Array:
     """Hidden measurements about one standard deviation from what is expected, (N, p)."""
     deviation = np.sqrt(np.diagonal(expected.F, axis1=-2, axis2=-1))
     return expected.h + deviation * exercise.rng(name).normal(size=expected.h.shape)
 
 
-def structure_functions(exercise: Any) -> tuple[Callable, Callable]:
+def structure_functions(exercise: Exercise) -> tuple[Callable, Callable]:
     """(measure, predict) as students get them: h, G, F and tau, Theta, full arrays."""
     return array_functions(exercise.hidden.gaussian)
 
@@ -51,11 +51,11 @@ def structure_functions(exercise: Any) -> tuple[Callable, Callable]:
 Gain = Callable[[Array, Array, Array], Array]
 
 
-def right_gain(Psi: Array, G: Array, F: Array) -> Array:
-    return gain(Psi @ transpose(G), F)
+def gain(Psi: Array, G: Array, F: Array) -> Array:
+    return laws.gain(Psi @ transpose(G), F)
 
 
-def gain_arguments(exercise: Any) -> list[tuple]:
+def gain_arguments(exercise: Exercise) -> list[tuple]:
     at = law(exercise, "b1")
     _, G, F, _ = measurement(exercise, at)
     return [(at.cov, G, F)]
@@ -81,35 +81,35 @@ WRONG_GAINS: tuple[tuple[str, str, Gain], ...] = (
     (
         "gain-without-G",
         "The meter's sensitivity G is missing in the gain.",
-        lambda Psi, G, F: gain(Psi @ _only_square(G), F),
+        lambda Psi, G, F: laws.gain(Psi @ _only_square(G), F),
     ),
     (
         "gain-without-Psi",
         "The covariance Psi of the prediction is missing in the gain: how sure was the filter before?",
-        lambda Psi, G, F: gain(transpose(G), F),
+        lambda Psi, G, F: laws.gain(transpose(G), F),
     ),
     (
         "gain-transposed",
         "The gain is transposed: it has as many rows as states and as many columns as measurements.",
-        lambda Psi, G, F: transpose(right_gain(Psi, G, F)),
+        lambda Psi, G, F: transpose(gain(Psi, G, F)),
     ),
     (
         "gain-of-noise",
         "The gain is divided by the noise's part only; F is the whole variance of the measurement, the state's part included.",
-        lambda Psi, G, F: gain(Psi @ transpose(G), F - G @ Psi @ transpose(G)),
+        lambda Psi, G, F: laws.gain(Psi @ transpose(G), F - G @ Psi @ transpose(G)),
     ),
 )
 
 # -- b2: the correction
 
 
-def right_correction(lam: Array, Psi: Array, h: Array, G: Array, F: Array, y: Array) -> tuple[Array, Array]:
-    z, p = correct(Gaussian(lam, Psi), Measurement(h, G, F, F - G @ Psi @ transpose(G)), y)
+def correct(lam: Array, Psi: Array, h: Array, G: Array, F: Array, y: Array) -> tuple[Array, Array]:
+    z, p = laws.correct(Gaussian(lam, Psi), Measurement(h, G, F, F - G @ Psi @ transpose(G)), y)
     return z, full(p, len(lam))
 
 
 def correction_with(
-    of_gain: Gain = right_gain,
+    of_gain: Gain = gain,
     innovation: Callable[[Array, Array], Array] = lambda y, h: y - h,
     covariance: Callable[[Array, Array, Array, Array], Array] = lambda Psi, K, G, F: Psi - K @ G @ Psi,
 ) -> Answer:
@@ -122,7 +122,7 @@ def correction_with(
     return answer
 
 
-def correction_arguments(exercise: Any) -> list[tuple]:
+def correction_arguments(exercise: Exercise) -> list[tuple]:
     at = law(exercise, "b2")
     expected = measurement(exercise, at)
     return [(at.mean, at.cov, expected.h, expected.G, expected.F, measured(exercise, "b2-y", expected))]
@@ -167,13 +167,13 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
 Functions = tuple[Callable, Callable]
 
 
-def right_step(lam: Array, Psi: Array, y: Array, measure: Callable, predict: Callable) -> tuple[Array, ...]:
+def step(lam: Array, Psi: Array, y: Array, measure: Callable, predict: Callable) -> tuple[Array, ...]:
     h, G, F = measure(lam, Psi)
-    z, p = right_correction(lam, Psi, h, G, F, y)
+    z, p = correct(lam, Psi, h, G, F, y)
     return z, p, *predict(z, p)
 
 
-def step_with(correction: Answer = right_correction, following: Callable[..., tuple[Array, Array]] | None = None) -> Answer:
+def step_with(correction: Answer = correct, following: Callable[..., tuple[Array, Array]] | None = None) -> Answer:
     """A step with another correction, or another prediction: (lam, Psi, z, p, predict) -> (lam, Psi)."""
 
     def answer(lam: Array, Psi: Array, y: Array, measure: Callable, predict: Callable) -> tuple[Array, ...]:
@@ -186,11 +186,11 @@ def step_with(correction: Answer = right_correction, following: Callable[..., tu
 def _swapped(lam: Array, Psi: Array, y: Array, measure: Callable, predict: Callable) -> tuple[Array, ...]:
     lam, Psi = predict(lam, Psi)
     h, G, F = measure(lam, Psi)
-    z, p = right_correction(lam, Psi, h, G, F, y)
+    z, p = correct(lam, Psi, h, G, F, y)
     return z, p, lam, Psi
 
 
-def step_arguments(exercise: Any) -> list[tuple]:
+def step_arguments(exercise: Exercise) -> list[tuple]:
     at = law(exercise, "b3")
     y = measured(exercise, "b3-y", measurement(exercise, at))
     return [(*at, y, *structure_functions(exercise))]
@@ -228,8 +228,8 @@ WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
 # -- b4: a whole run, with measurements missing
 
 
-def right_run(y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
-    return run_with(right_step, y, mean, cov, measure, predict)
+def run_filter(y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
+    return run_with(step, y, mean, cov, measure, predict)
 
 
 def run_with(step: Answer, y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
@@ -245,7 +245,7 @@ def run_with(step: Answer, y: Array, mean: Array, cov: Array, measure: Callable,
     return np.array(estimates)
 
 
-def run_arguments(exercise: Any) -> list[tuple]:
+def run_arguments(exercise: Exercise) -> list[tuple]:
     y = exercise.simulate(runs=RUNS, steps=6, name="b4").y
     gaps = y.copy()
     gaps[2, 1] = gaps[4, :3] = np.nan
@@ -255,7 +255,7 @@ def run_arguments(exercise: Any) -> list[tuple]:
 
 def _predicted_first(y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
     lam, Psi = predict(mean[None], cov[None])
-    return run_with(right_step, y, lam[0], Psi[0], measure, predict)
+    return run_with(step, y, lam[0], Psi[0], measure, predict)
 
 
 def _predictions(y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
@@ -263,7 +263,7 @@ def _predictions(y: Array, mean: Array, cov: Array, measure: Callable, predict: 
     predictions = []
     for one in y:
         predictions.append(lam)
-        *_, lam, Psi = right_step(lam, Psi, one, measure, predict)
+        *_, lam, Psi = step(lam, Psi, one, measure, predict)
     return np.array(predictions)
 
 
@@ -271,13 +271,13 @@ def _frozen(y: Array, mean: Array, cov: Array, measure: Callable, predict: Calla
     lam, Psi = np.tile(mean, (y.shape[1], 1)), full(cov, y.shape[1])
     estimates = []
     for one in y:
-        z, _, lam, _ = right_step(lam, Psi, one, measure, predict)
+        z, _, lam, _ = step(lam, Psi, one, measure, predict)
         estimates.append(z)
     return np.array(estimates)
 
 
 def _zeros_for_missing(y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
-    return right_run(np.nan_to_num(y), mean, cov, measure, predict)
+    return run_filter(np.nan_to_num(y), mean, cov, measure, predict)
 
 
 WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
@@ -303,13 +303,13 @@ WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
 # -- b5: a covariance that rounding cannot make negative
 
 
-def right_covariance(Psi: Array, G: Array, F: Array, R: Array) -> Array:
+def covariance(Psi: Array, G: Array, F: Array, R: Array) -> Array:
     at = Gaussian(np.zeros(Psi.shape[:-1]), Psi)
     zero = np.zeros(F.shape[:-1])
-    return full(correct(at, Measurement(zero, G, F, R), zero).cov, len(Psi))
+    return full(laws.correct(at, Measurement(zero, G, F, R), zero).cov, len(Psi))
 
 
-def covariance_arguments(exercise: Any) -> list[tuple]:
+def covariance_arguments(exercise: Exercise) -> list[tuple]:
     at = law(exercise, "b5")
     _, G, _, R = measurement(exercise, at)
     one, sharp = np.full((RUNS, 1, 1), 0.7), np.full((RUNS, 1, 1), 1e-18)  # a scalar meter, far sharper than the prediction
@@ -318,7 +318,7 @@ def covariance_arguments(exercise: Any) -> list[tuple]:
 
 def _joseph_part(which: int) -> Answer:
     def answer(Psi: Array, G: Array, F: Array, R: Array) -> Array:
-        K = right_gain(Psi, G, F)
+        K = gain(Psi, G, F)
         rest = np.eye(Psi.shape[-1]) - K @ G
         return (rest @ Psi @ transpose(rest), K @ R @ transpose(K))[which]
 
@@ -330,7 +330,7 @@ WRONG_COVARIANCES: tuple[tuple[str, str, Answer], ...] = (
         "cancellation",
         "On paper it is right. Where the meter is sharp it is the difference of two nearly equal numbers, and all digits "
         "are lost: write it as a sum or product of terms that cannot be negative.",
-        lambda Psi, G, F, R: Psi - right_gain(Psi, G, F) @ G @ Psi,
+        lambda Psi, G, F, R: Psi - gain(Psi, G, F) @ G @ Psi,
     ),
     (
         "noise-of-meter-missing",
@@ -342,31 +342,31 @@ WRONG_COVARIANCES: tuple[tuple[str, str, Answer], ...] = (
 
 
 QUESTIONS = (
-    Question("b1", "the gain", "warm-up", lambda e: right_gain, gain_arguments, catalogue(WRONG_GAINS)),
+    Question("b1", "the gain", "warm-up", gain, gain_arguments, catalogue(WRONG_GAINS)),
     Question(
         "b2",
         "the correction",
         "core",
-        lambda e: right_correction,
+        correct,
         correction_arguments,
         catalogue(WRONG_CORRECTIONS),
         ("z", "p"),
     ),
     Question(
         "b3",
-        "a whole step",
+        "one step",
         "core",
-        lambda e: right_step,
+        step,
         step_arguments,
         catalogue(WRONG_STEPS),
         ("z", "p", "lam_next", "Psi_next"),
     ),
-    Question("b4", "a whole run", "core", lambda e: right_run, run_arguments, catalogue(WRONG_RUNS)),
+    Question("b4", "a run", "core", run_filter, run_arguments, catalogue(WRONG_RUNS)),
     Question(
         "b5",
         "a covariance that survives rounding",
         "stretch",
-        lambda e: right_covariance,
+        covariance,
         covariance_arguments,
         catalogue(WRONG_COVARIANCES),
         tolerance=1e-6,

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from kfcourse.exercises.shared import RUNS, WRONG_REGRESSIONS, Fit, ensemble, predicted, right_regression
 
+from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.exercises.shared import RUNS, WRONG_REGRESSIONS, Fit, ensemble, predicted, regression
 from kfcourse.laws import Array
 
 
-def noiseless(exercise: Any) -> tuple[Callable, Callable]:
+def noiseless(exercise: Exercise) -> tuple[Callable, Callable]:
     """a(x, m_v) and b(x, m_w) of the hidden model, (N, n) -> (N, n) and (N, p)."""
     return exercise.hidden_noiseless
 
@@ -26,11 +26,11 @@ def noiseless(exercise: Any) -> tuple[Callable, Callable]:
 # -- c1: the structure
 
 
-def right_structure(lam: Array, z: Array, y: Array, a: Callable, b: Callable) -> tuple[Array, Array]:
+def structure(lam: Array, z: Array, y: Array, a: Callable, b: Callable) -> tuple[Array, Array]:
     return y - b(lam), a(z)
 
 
-def structure_arguments(exercise: Any) -> list[tuple]:
+def structure_arguments(exercise: Exercise) -> list[tuple]:
     x, y, _ = ensemble(exercise, "c1")
     return [(predicted(exercise, "c1-lam", x), predicted(exercise, "c1-z", x), y, *noiseless(exercise))]
 
@@ -54,7 +54,7 @@ WRONG_STRUCTURES: tuple[tuple[str, str, Answer], ...] = (
 # -- c2 and d1: regression
 
 
-def regression_arguments(exercise: Any) -> list[tuple]:
+def regression_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("c2")
     n, p = exercise.model.n, exercise.model.p
     regressor = 0.7 + rng.normal(size=(RUNS, p))
@@ -66,12 +66,12 @@ def regression_arguments(exercise: Any) -> list[tuple]:
 # -- c3: one step of the design
 
 
-def duof_step(lam: Array, x: Array, y: Array, x_next: Array, a: Callable, b: Callable) -> tuple[Array, Array]:
+def design_step(lam: Array, x: Array, y: Array, x_next: Array, a: Callable, b: Callable) -> tuple[Array, Array]:
     return duof_step_with()(lam, x, y, x_next, a, b)
 
 
 def duof_step_with(
-    fit: Fit = right_regression,
+    fit: Fit = regression,
     first: Callable[[Array, Array], Array] = lambda x, lam: x - lam,
     base: Callable[[Array], Array] = lambda lam: lam,
     alpha: Callable[[Array, Array, Callable], Array] = lambda z, lam, a: a(z),
@@ -89,7 +89,7 @@ def duof_step_with(
     return step
 
 
-def duof_arguments(exercise: Any) -> list[tuple]:
+def duof_arguments(exercise: Exercise) -> list[tuple]:
     x, y, x_next = ensemble(exercise, "c3")
     return [(predicted(exercise, "c3-lam", x), x, y, x_next, *noiseless(exercise))]
 
@@ -129,8 +129,8 @@ WRONG_DUOF_STEPS: tuple[tuple[str, str, Answer], ...] = (
 Ensemble = tuple[Array, Array]
 
 
-def duof_run(designed_x: Array, designed_y: Array, y: Array, mean: Array, a: Callable, b: Callable) -> Array:
-    return duof_run_with()(designed_x, designed_y, y, mean, a, b)
+def design_and_run(x: Array, y_design: Array, y: Array, mean: Array, a: Callable, b: Callable) -> Array:
+    return duof_run_with()(x, y_design, y, mean, a, b)
 
 
 def duof_run_with(
@@ -143,7 +143,7 @@ def duof_run_with(
         estimates, first = [], None
         for k in range(len(x)):
             omega = y_design[k] - b(lam)
-            H, e, _ = right_regression(x[k] - lam, omega)
+            H, e, _ = regression(x[k] - lam, omega)
             first = (H, e) if first is None else first
             if one_gain:
                 H, e = first
@@ -153,14 +153,14 @@ def duof_run_with(
             z_other = other + (y[k] - b(other)) @ H.T + e
             estimates.append(other if predictions else z_other)
             if k + 1 < len(x):
-                F, g, _ = right_regression(x[k + 1], a(z))
+                F, g, _ = regression(x[k + 1], a(z))
                 lam, other = a(z) @ F.T + g, a(z_other) if object_alone else a(z_other) @ F.T + g
         return np.array(estimates)
 
     return run
 
 
-def duof_run_arguments(exercise: Any) -> list[tuple]:
+def duof_run_arguments(exercise: Exercise) -> list[tuple]:
     x, y = exercise.simulate(RUNS, 4, "c4-design")
     return [(x, y, exercise.simulate(5, 4, "c4").y, exercise.model.prior.mean, *noiseless(exercise))]
 
@@ -169,7 +169,7 @@ WRONG_DUOF_RUNS: tuple[tuple[str, str, Answer], ...] = (
     (
         "part-of-ensemble",
         "The coefficients seem to come from a part of the design ensemble only; use all of its trajectories.",
-        lambda x, yd, y, mean, a, b: duof_run(x[:, : y.shape[1]], yd[:, : y.shape[1]], y, mean, a, b),
+        lambda x, yd, y, mean, a, b: design_and_run(x[:, : y.shape[1]], yd[:, : y.shape[1]], y, mean, a, b),
     ),
     ("one-gain", "H and e of the first step are used at every step; each step has its own.", duof_run_with(one_gain=True)),
     ("predictions-returned", "These are the predictions; return the estimates.", duof_run_with(predictions=True)),
@@ -186,7 +186,7 @@ QUESTIONS = (
         "c1",
         "innovation and alpha",
         "warm-up",
-        lambda e: right_structure,
+        structure,
         structure_arguments,
         catalogue(WRONG_STRUCTURES),
         ("omega", "alpha"),
@@ -195,7 +195,7 @@ QUESTIONS = (
         "c2",
         "regression over the ensemble",
         "core",
-        lambda e: right_regression,
+        regression,
         regression_arguments,
         catalogue(WRONG_REGRESSIONS),
         ("matrix", "offset", "residual"),
@@ -204,12 +204,14 @@ QUESTIONS = (
         "c3",
         "one step of the design",
         "core",
-        lambda e: duof_step,
+        design_step,
         duof_arguments,
         catalogue(WRONG_DUOF_STEPS),
         ("z", "lam_next"),
     ),
-    Question("c4", "designed, then run", "core", lambda e: duof_run, duof_run_arguments, catalogue(WRONG_DUOF_RUNS)),
+    Question(
+        "c4", "designed on one ensemble, run on another", "core", design_and_run, duof_run_arguments, catalogue(WRONG_DUOF_RUNS)
+    ),
 )
 
 SET = ExerciseSet("c", "The two-step conditionally optimal filter", Path(__file__).parent, QUESTIONS)

@@ -7,23 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from kfcourse.exercises.b_aof.questions import right_correction
-from kfcourse.exercises.shared import RUNS, WRONG_REGRESSIONS, Fit, covariance_of, ensemble, predicted, right_regression
 
-from kfcourse.checks.exercises import array_functions, full
+from kfcourse.checks.exercises import Exercise, array_functions, full
 from kfcourse.checks.question import Answer, Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.exercises.b_aof.questions import correct
+from kfcourse.exercises.shared import RUNS, WRONG_REGRESSIONS, Fit, covariance_of, ensemble, predicted, regression
 from kfcourse.laws import Array
 
 # -- set d: filters of optimal structure
 
 
-def right_condition(x: Array, z: Array) -> tuple[Array, Array]:
+def condition(x: Array, z: Array) -> tuple[Array, Array]:
     """u = Gamma z + chi and T: what the estimate says of the state."""
-    matrix, offset, residual = right_regression(x, z)
+    matrix, offset, residual = regression(x, z)
     return z @ matrix.T + offset, residual
 
 
@@ -35,13 +34,13 @@ def condition_with(fit: Fit) -> Callable[[Array, Array], tuple[Array, Array]]:
     return condition
 
 
-def condition_arguments(exercise: Any) -> list[tuple]:
+def condition_arguments(exercise: Exercise) -> list[tuple]:
     x, _, _ = ensemble(exercise, "d1")
     return [(x, 0.2 + predicted(exercise, "d1-z", 1.3 * x))]
 
 
 def _standard_deviation(x: Array, z: Array) -> tuple[Array, Array]:
-    u, T = right_condition(x, z)
+    u, T = condition(x, z)
     return u, np.sqrt(np.maximum(T, 0.0))
 
 
@@ -54,12 +53,12 @@ WRONG_CONDITIONS: tuple[tuple[str, str, Callable], ...] = (
     (
         "regressed-the-other-way",
         "The estimate was regressed on the state; the filter knows z and asks for x.",
-        lambda x, z: right_condition(z, x),
+        lambda x, z: condition(z, x),
     ),
     (
         "residual-is-variance",
         "T is the whole covariance of the state; subtract what the estimate explains.",
-        lambda x, z: (right_condition(x, z)[0], covariance_of(x, x)),
+        lambda x, z: (condition(x, z)[0], covariance_of(x, x)),
     ),
     ("deviation-for-variance", "T is a variance; its square root stands there.", _standard_deviation),
     (
@@ -75,7 +74,7 @@ WRONG_CONDITIONS: tuple[tuple[str, str, Callable], ...] = (
     (
         "unbiased-residual",
         "T is divided by N - 1; use 1/N throughout.",
-        lambda x, z: (right_condition(x, z)[0], right_condition(x, z)[1] * len(x) / (len(x) - 1)),
+        lambda x, z: (condition(x, z)[0], condition(x, z)[1] * len(x) / (len(x) - 1)),
     ),
 )
 
@@ -91,19 +90,19 @@ def fos_step(lam: Array, Psi: Array, x: Array, y: Array, measure: Callable, pred
 
 
 def fos_step_with(
-    condition: Condition = right_condition, choose: Callable[..., tuple[Array, Array]] = lambda u, T, z, p: (u, T)
+    condition: Condition = condition, choose: Callable[..., tuple[Array, Array]] = lambda u, T, z, p: (u, T)
 ) -> Answer:
     """One step of the FOS's design, with another condition or another choice of what the prediction starts from."""
 
     def step(lam: Array, Psi: Array, x: Array, y: Array, measure: Callable, predict: Callable) -> tuple[Array, ...]:
         h, G, F = measure(lam, Psi)
-        z, p = right_correction(lam, Psi, h, G, F, y)
+        z, p = correct(lam, Psi, h, G, F, y)
         return z, *_predicting(predict, *choose(*condition(x, z), z, p))
 
     return step
 
 
-def fos_arguments(exercise: Any, name: str = "d2") -> list[tuple]:
+def fos_arguments(exercise: Exercise, name: str = "d2") -> list[tuple]:
     x, y, _ = ensemble(exercise, name)
     lam = predicted(exercise, f"{name}-lam", x)
     Psi = full(covariance_of(x - lam, x - lam), RUNS) * (1 + 0.3 * exercise.rng(f"{name}-Psi").random((RUNS, 1, 1)))
@@ -133,11 +132,11 @@ def mfos_step(
 
 
 def mfos_step_with(
-    fit: Fit = right_regression,
+    fit: Fit = regression,
     correction: bool = True,
     prediction: bool = True,
     target: Callable[[Array, Array], Array] = lambda x, lam: x - lam,
-    condition: Condition = right_condition,
+    condition: Condition = condition,
     own_variance: bool = False,
 ) -> Answer:
     """One step of the MFOS's design, with one thing changed."""
@@ -146,7 +145,7 @@ def mfos_step_with(
         lam: Array, Psi: Array, x: Array, y: Array, x_next: Array, measure: Callable, predict: Callable
     ) -> tuple[Array, ...]:
         h, G, F = measure(lam, Psi)
-        z, p = right_correction(lam, Psi, h, G, F, y)
+        z, p = correct(lam, Psi, h, G, F, y)
         sigma = z - lam
         if correction:
             H, e, _ = fit(target(x, lam), sigma)
@@ -161,7 +160,7 @@ def mfos_step_with(
     return step
 
 
-def mfos_arguments(exercise: Any) -> list[tuple]:
+def mfos_arguments(exercise: Exercise) -> list[tuple]:
     x, y, x_next = ensemble(exercise, "d3")
     lam, Psi, _, _, measure, predict = fos_arguments(exercise, "d3")[0]
     return [(lam, Psi, x, y, x_next, measure, predict)]
@@ -198,12 +197,12 @@ WRONG_MFOS_STEPS: tuple[tuple[str, str, Answer], ...] = (
 )
 
 
-def three_arguments(x: Array, y: Array, z: Array) -> tuple[Array, Array]:
+def condition_on_both(x: Array, y: Array, z: Array) -> tuple[Array, Array]:
     """u and T from the measurement and the estimate together."""
-    return right_condition(x, np.concatenate([y, z], axis=1))
+    return condition(x, np.concatenate([y, z], axis=1))
 
 
-def three_arguments_hidden(exercise: Any) -> list[tuple]:
+def three_arguments_hidden(exercise: Exercise) -> list[tuple]:
     x, y, _ = ensemble(exercise, "d4")
     return [(x, y, predicted(exercise, "d4-z", x))]
 
@@ -213,7 +212,7 @@ QUESTIONS = (
         "d1",
         "what the estimate says of the state",
         "warm-up",
-        lambda e: right_condition,
+        condition,
         condition_arguments,
         catalogue(WRONG_CONDITIONS),
         ("u", "T"),
@@ -222,7 +221,7 @@ QUESTIONS = (
         "d2",
         "one step of the FOS",
         "core",
-        lambda e: fos_step,
+        fos_step,
         fos_arguments,
         catalogue(WRONG_FOS_STEPS),
         ("z", "lam_next", "Psi_next"),
@@ -231,7 +230,7 @@ QUESTIONS = (
         "d3",
         "one step of the MFOS",
         "core",
-        lambda e: mfos_step,
+        mfos_step,
         mfos_arguments,
         catalogue(WRONG_MFOS_STEPS),
         ("z", "lam_next", "Psi_next"),
@@ -240,19 +239,19 @@ QUESTIONS = (
         "d4",
         "three arguments",
         "stretch",
-        lambda e: three_arguments,
+        condition_on_both,
         three_arguments_hidden,
         catalogue(
             (
                 (
                     "measurement-unused",
                     "Only the estimate is used; the measurement may tell more.",
-                    lambda x, y, z: right_condition(x, z),
+                    lambda x, y, z: condition(x, z),
                 ),
                 (
                     "estimate-unused",
                     "Only the measurement is used; the estimate knows the past.",
-                    lambda x, y, z: right_condition(x, y),
+                    lambda x, y, z: condition(x, y),
                 ),
             )
         ),

@@ -6,10 +6,10 @@ Answers are functions of stored trajectories: x and z are (steps, N, n), p is (s
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.filters import aof
@@ -19,7 +19,7 @@ from kfcourse.montecarlo.experiment import run
 RUNS, STEPS = 40, 5
 
 
-def hidden(exercise: Any, name: str) -> tuple[Array, Array, Array, Array]:
+def hidden(exercise: Exercise, name: str) -> tuple[Array, Array, Array, Array]:
     """States, the estimates of two filters and the first one's covariances, on common trajectories."""
     x, y = exercise.simulate(RUNS, STEPS, name)
     first = run(aof(exercise.structures.gaussian), y)
@@ -44,18 +44,18 @@ def with_standard_error(x: Array, z: Array) -> tuple[Array, Array]:
     return error_variance(x, z), spread_of_mean(squared_error(x, z))
 
 
-def difference(x: Array, z: Array, other: Array) -> tuple[Array, Array]:
-    paired = squared_error(x, z) - squared_error(x, other)
+def difference(x: Array, z_first: Array, z_second: Array) -> tuple[Array, Array]:
+    paired = squared_error(x, z_first) - squared_error(x, z_second)
     return paired.mean(axis=1), spread_of_mean(paired)
 
 
-def ratio(x: Array, z: Array, other: Array) -> tuple[Array, Array]:
-    D, base = error_variance(x, z), error_variance(x, other)
+def ratio(x: Array, z_first: Array, z_second: Array) -> tuple[Array, Array]:
+    D, base = error_variance(x, z_first), error_variance(x, z_second)
     r = D / base
-    return r, spread_of_mean(squared_error(x, z) - r[:, None] * squared_error(x, other)) / base
+    return r, spread_of_mean(squared_error(x, z_first) - r[:, None] * squared_error(x, z_second)) / base
 
 
-def normalised(x: Array, z: Array, p: Array) -> Array:
+def normalised_error(x: Array, z: Array, p: Array) -> Array:
     error = x - z
     return np.mean(np.sum(error * np.linalg.solve(p, error[..., None])[..., 0], axis=2), axis=1) / x.shape[2]
 
@@ -199,7 +199,7 @@ WRONG_NORMALISED: tuple[tuple[str, str, Answer], ...] = (
     (
         "not-per-component",
         "Divide by the number of components: a filter that is right should give 1.",
-        lambda x, z, p: normalised(x, z, p) * x.shape[2],
+        lambda x, z, p: normalised_error(x, z, p) * x.shape[2],
     ),
     (
         "correlations-ignored",
@@ -219,7 +219,7 @@ QUESTIONS = (
         "e1",
         "the error variance",
         "warm-up",
-        lambda e: error_variance,
+        error_variance,
         lambda e: [hidden(e, "e1")[:2]],
         catalogue(WRONG_VARIANCES),
     ),
@@ -227,7 +227,7 @@ QUESTIONS = (
         "e2",
         "its standard error",
         "core",
-        lambda e: with_standard_error,
+        with_standard_error,
         lambda e: [hidden(e, "e2")[:2]],
         catalogue(WRONG_ERRORS),
         TWO,
@@ -236,17 +236,17 @@ QUESTIONS = (
         "e3",
         "a paired difference",
         "core",
-        lambda e: difference,
+        difference,
         lambda e: [hidden(e, "e3")[:3]],
         catalogue(WRONG_DIFFERENCES),
         TWO,
     ),
-    Question("e4", "a ratio", "stretch", lambda e: ratio, lambda e: [hidden(e, "e4")[:3]], catalogue(WRONG_RATIOS), TWO),
+    Question("e4", "a ratio", "stretch", ratio, lambda e: [hidden(e, "e4")[:3]], catalogue(WRONG_RATIOS), TWO),
     Question(
         "e5",
-        "consistency",
+        "does the filter know its own error?",
         "core",
-        lambda e: normalised,
+        normalised_error,
         lambda e: [(hidden(e, "e5")[0], hidden(e, "e5")[1], hidden(e, "e5")[3])],
         catalogue(WRONG_NORMALISED),
     ),

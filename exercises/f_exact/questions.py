@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.lab.variants import has_exact
@@ -29,7 +30,7 @@ Kernel = Callable[[Array, Array, Array], Array]  # density of a value, given mea
 COMPANION = {"c": (0.75, 0.95), "e": (0.3, 0.5), "g": (0.4, 0.8), "h": (0.4, 0.7), "f": (0.3, 0.5), "m": (0.2, 0.8)}
 
 
-def companion_numbers(exercise: Any) -> dict[str, float]:
+def companion_numbers(exercise: Exercise) -> dict[str, float]:
     """Numbers of a scalar companion of the variant; none if the exact filter exists for the variant's own model."""
     if has_exact(exercise.model):
         return {}
@@ -37,7 +38,7 @@ def companion_numbers(exercise: Any) -> dict[str, float]:
     return {name: round(float(rng.uniform(*limits)), 2) for name, limits in COMPANION.items()}
 
 
-def scalar_model(exercise: Any) -> Model:
+def scalar_model(exercise: Exercise) -> Model:
     """The variant's model if the exact filter exists for it, else a scalar companion with numbers of the variant's own.
 
     x_{k+1} = c x_k + e v_k,    y_k = g x_k + h x_k^2 + f w_k,    x_0 ~ N(m, 1)
@@ -75,7 +76,7 @@ def nodes(count: int = 240) -> Array:
     return np.linspace(-7.3, 8.1, count)
 
 
-def density(exercise: Any, name: str) -> Array:
+def density(exercise: Exercise, name: str) -> Array:
     """A hidden density at `nodes()`: two humps, not normalised."""
     rng, x = exercise.rng(name), nodes()
     centres, widths, weights = (
@@ -90,7 +91,7 @@ def normalised(density: Array, x: Array) -> Array:
     return density / (density.sum() * (x[1] - x[0]))
 
 
-def hidden_law(exercise: Any, name: str) -> Law:
+def hidden_law(exercise: Exercise, name: str) -> Law:
     """A hidden nonlinear law, with a variance that depends on the state."""
     slope, bend, level, rise = exercise.rng(name).uniform([0.6, 0.3, 0.15, 0.05], [0.9, 0.5, 0.25, 0.1])
     return lambda x: (slope * x + bend * np.sin(x) + level, level + rise * np.sin(x) ** 2 + rise * np.cos(x / 2) ** 2)
@@ -99,7 +100,7 @@ def hidden_law(exercise: Any, name: str) -> Law:
 # -- f1: mass, mean and variance
 
 
-def right_moments(density: Array, x: Array) -> tuple[Array, Array, Array]:
+def moments(density: Array, x: Array) -> tuple[Array, Array, Array]:
     h = x[1] - x[0]
     density = normalised(density, x)
     mean = h * np.sum(density * x)
@@ -119,12 +120,12 @@ def _without_step(density: Array, x: Array) -> tuple[Array, Array, Array]:
 
 
 def _second_moment(density: Array, x: Array) -> tuple[Array, Array, Array]:
-    density, mean, variance = right_moments(density, x)
+    density, mean, variance = moments(density, x)
     return density, mean, variance + mean**2
 
 
 def _deviation(density: Array, x: Array) -> tuple[Array, Array, Array]:
-    density, mean, variance = right_moments(density, x)
+    density, mean, variance = moments(density, x)
     return density, mean, np.sqrt(variance)
 
 
@@ -133,7 +134,7 @@ WRONG_MOMENTS: tuple[tuple[str, str, Answer], ...] = (
     (
         "step-forgotten",
         "The values at the nodes add up to one. It is the integral that is one; the step of the grid is missing.",
-        lambda density, x: (density / density.sum(), *right_moments(density, x)[1:]),
+        lambda density, x: (density / density.sum(), *moments(density, x)[1:]),
     ),
     ("step-forgotten", "An integral is approximated by a sum times the step of the grid; the step is missing.", _without_step),
     (
@@ -146,7 +147,7 @@ WRONG_MOMENTS: tuple[tuple[str, str, Answer], ...] = (
     (
         "mode",
         "That is where the density is highest, not its mean.",
-        lambda density, x: (density / density.max(), x[np.argmax(density)], right_moments(density, x)[2]),
+        lambda density, x: (density / density.max(), x[np.argmax(density)], moments(density, x)[2]),
     ),
 )
 
@@ -157,7 +158,7 @@ def normal(value: Array, mean: Array, variance: Array) -> Array:
     return np.exp(-((value - mean) ** 2) / (2 * variance)) / np.sqrt(2 * np.pi * variance)
 
 
-def right_correction(predicted: Array, y: float, x: Array, see: Law) -> tuple[Array, Array]:
+def correct(predicted: Array, y: float, x: Array, see: Law) -> tuple[Array, Array]:
     return correction_with()(predicted, y, x, see)
 
 
@@ -242,14 +243,14 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
         "likelihood-summed",
         "The integral of the likelihood alone is no probability; it has to be weighed by the prediction.",
         lambda predicted, y, x, see: (
-            right_correction(predicted, y, x, see)[0],
+            correct(predicted, y, x, see)[0],
             (x[1] - x[0]) * normal(np.asarray(y), *see(x)).sum(),
         ),
     ),
 )
 
 
-def correction_arguments(exercise: Any) -> list[tuple]:
+def correction_arguments(exercise: Exercise) -> list[tuple]:
     x, see = nodes(), hidden_law(exercise, "f2")
     predicted = normalised(density(exercise, "f2"), x)
     return [(predicted, float(y), x, see) for y in exercise.rng("f2-y").uniform([0.5, -1.2], [1.5, -0.4])]
@@ -268,7 +269,8 @@ def prediction_with(kernel: Kernel = normal, total: Callable[[Array, Array, floa
     return answer
 
 
-right_prediction = prediction_with()
+def predict(posterior: Array, x: Array, move: Law) -> Array:
+    return prediction_with()(posterior, x, move)
 
 
 def _variance_of_target(posterior: Array, x: Array, move: Law) -> Array:
@@ -277,7 +279,7 @@ def _variance_of_target(posterior: Array, x: Array, move: Law) -> Array:
 
 
 def _object_at_rest(posterior: Array, x: Array, move: Law) -> Array:
-    return right_prediction(posterior, x, lambda nodes: (nodes, move(nodes)[1]))
+    return predict(posterior, x, lambda nodes: (nodes, move(nodes)[1]))
 
 
 WRONG_PREDICTIONS: tuple[tuple[str, str, Answer], ...] = (
@@ -315,7 +317,7 @@ WRONG_PREDICTIONS: tuple[tuple[str, str, Answer], ...] = (
 )
 
 
-def prediction_arguments(exercise: Any) -> list[tuple]:
+def prediction_arguments(exercise: Exercise) -> list[tuple]:
     x = nodes()
     return [(normalised(density(exercise, "f3"), x), x, hidden_law(exercise, "f3"))]
 
@@ -323,14 +325,14 @@ def prediction_arguments(exercise: Any) -> list[tuple]:
 # -- f4: a whole run
 
 
-def right_run(y: Array, x: Array, prior: Array, move: Law, see: Law) -> tuple[Array, Array, Array]:
+def run_filter(y: Array, x: Array, prior: Array, move: Law, see: Law) -> tuple[Array, Array, Array]:
     return run_with()(y, x, prior, move, see)
 
 
 def run_with(
-    correction: Answer = right_correction,
-    prediction: Answer = right_prediction,
-    moments: Answer = right_moments,
+    correction: Answer = correct,
+    prediction: Answer = predict,
+    moments: Answer = moments,
     again: bool = False,
     before: bool = False,
 ) -> Answer:
@@ -356,16 +358,16 @@ def run_with(
 
 
 def _predicted_first(y: Array, x: Array, prior: Array, move: Law, see: Law) -> tuple[Array, Array, Array]:
-    return right_run(y, x, right_prediction(prior, x, move), move, see)
+    return run_filter(y, x, predict(prior, x, move), move, see)
 
 
 def _zeros_for_missing(y: Array, x: Array, prior: Array, move: Law, see: Law) -> tuple[Array, Array, Array]:
-    return right_run(np.nan_to_num(y), x, prior, move, see)
+    return run_filter(np.nan_to_num(y), x, prior, move, see)
 
 
 def _not_predicted_over_gaps(y: Array, x: Array, prior: Array, move: Law, see: Law) -> tuple[Array, Array, Array]:
     """A missing measurement skips the whole step, prediction and all: the estimates before it are repeated."""
-    z, p, total = right_run(y[~np.isnan(y)], x, prior, move, see)
+    z, p, total = run_filter(y[~np.isnan(y)], x, prior, move, see)
     last = np.maximum(np.cumsum(~np.isnan(y)) - 1, 0)
     return z[last], p[last], total
 
@@ -377,7 +379,7 @@ def _after_run(change: Callable[[Array], Any]) -> Answer:
         evidences = []
 
         def remembered(*arguments: Any) -> tuple[Array, Array]:
-            posterior, evidence = right_correction(*arguments)
+            posterior, evidence = correct(*arguments)
             evidences.append(evidence)
             return posterior, evidence
 
@@ -417,7 +419,7 @@ WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
     (
         "mode",
         "The estimate is where the density is highest; the best one is its mean.",
-        run_with(moments=lambda density, x: (density, x[np.argmax(density)], right_moments(density, x)[2])),
+        run_with(moments=lambda density, x: (density, x[np.argmax(density)], moments(density, x)[2])),
     ),
     ("about-zero", "It is the second moment about zero; a variance is about the mean.", run_with(moments=_second_moment)),
     ("deviation", "It is a standard deviation; the variance is asked for.", run_with(moments=_deviation)),
@@ -438,7 +440,7 @@ WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
 )
 
 
-def run_arguments(exercise: Any) -> list[tuple]:
+def run_arguments(exercise: Exercise) -> list[tuple]:
     x, move, see = nodes(), hidden_law(exercise, "f4-move"), hidden_law(exercise, "f4-see")
     y = exercise.rng("f4-y").uniform(0.4, 1.4, 6) * [1, -1, 1, 1, -1, 1]
     gaps = np.where(np.arange(len(y)) == 3, np.nan, y)
@@ -448,7 +450,7 @@ def run_arguments(exercise: Any) -> list[tuple]:
 # -- f5: how many nodes
 
 
-def right_nodes(low: float, high: float, sigma: float, error: float) -> Array:
+def nodes_needed(low: float, high: float, sigma: float, error: float) -> Array:
     return nodes_with()(low, high, sigma, error)
 
 
@@ -501,7 +503,7 @@ WRONG_NODES: tuple[tuple[str, str, Answer], ...] = (
 )
 
 
-def nodes_arguments(exercise: Any) -> list[tuple]:
+def nodes_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("f5")
     return [
         (-rng.uniform(2, 5), rng.uniform(3, 7), rng.uniform(0.002, 0.01), 10 ** -rng.uniform(exponent, exponent + 1))
@@ -514,7 +516,7 @@ QUESTIONS = (
         "f1",
         "mass, mean and variance",
         "warm-up",
-        lambda e: right_moments,
+        moments,
         lambda e: [(density(e, "f1"), nodes())],
         catalogue(WRONG_MOMENTS),
         ("density", "mean", "variance"),
@@ -523,14 +525,14 @@ QUESTIONS = (
         "f2",
         "the correction",
         "core",
-        lambda e: right_correction,
+        correct,
         correction_arguments,
         catalogue(WRONG_CORRECTIONS),
         ("posterior", "density of y"),
     ),
-    Question("f3", "the prediction", "core", lambda e: right_prediction, prediction_arguments, catalogue(WRONG_PREDICTIONS)),
-    Question("f4", "a whole run", "core", lambda e: right_run, run_arguments, catalogue(WRONG_RUNS), ("z", "p", "ln p(y)")),
-    Question("f5", "how many nodes", "stretch", lambda e: right_nodes, nodes_arguments, catalogue(WRONG_NODES)),
+    Question("f3", "the prediction", "core", predict, prediction_arguments, catalogue(WRONG_PREDICTIONS)),
+    Question("f4", "a run", "core", run_filter, run_arguments, catalogue(WRONG_RUNS), ("z", "p", "ln p(y)")),
+    Question("f5", "how many nodes", "stretch", nodes_needed, nodes_arguments, catalogue(WRONG_NODES)),
 )
 
 SET = ExerciseSet("f", "The exact filter on a grid", Path(__file__).parent, QUESTIONS, companion_numbers)

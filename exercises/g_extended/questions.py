@@ -15,10 +15,12 @@ import numpy as np
 import sympy as sp
 from scipy import stats
 
-from kfcourse.checks.exercises import full
+from kfcourse import laws
+from kfcourse.checks.exercises import Exercise, full
 from kfcourse.checks.question import Answer, Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, gain, symmetric, transpose
+from kfcourse.exercises.shared import Map
+from kfcourse.laws import Array, Gaussian, Measurement, apply, gain, symmetric, transpose
 from kfcourse.linear.consistency import chi_squared_bounds, normalised_square
 from kfcourse.symbolic.codegen import compile_function
 from kfcourse.symbolic.model import Model, exact_matrix
@@ -34,13 +36,13 @@ class Functions(NamedTuple):
     S (..., p), H = dS/dx (..., p, n), covariance D_n (..., p, p) of n, which may depend on the state.
     """
 
-    f: Callable[[Array], Array]
-    Phi: Callable[[Array], Array]
-    g: Callable[[Array], Array]
+    f: Map
+    Phi: Map
+    g: Map
     D_xi: Array
-    S: Callable[[Array], Array]
-    H: Callable[[Array], Array]
-    D_n: Callable[[Array], Array]
+    S: Map
+    H: Map
+    D_n: Map
 
 
 def linearisation(model: Model) -> Functions:
@@ -61,7 +63,7 @@ def linearisation(model: Model) -> Functions:
         "D_n": by_noise * exact_matrix(model.meter_noise.cov) * by_noise.T,
     }
 
-    def compiled(name: str) -> Callable[[Array], Array]:
+    def compiled(name: str) -> Map:
         formula = sp.ImmutableMatrix(matrices[name].subs(model.values))
         function = compile_function(name, {"x": x}, {name: formula}, ["x", "f", "S"], f"{name} of {model}").function
         shape = formula.shape[:1] if name in ("f", "S") else formula.shape
@@ -91,13 +93,13 @@ def curved(rng: np.random.Generator, rows: int, n: int, size: float) -> tuple[Ca
     )
 
 
-def varying(rng: np.random.Generator, matrix: Array, n: int) -> Callable[[Array], Array]:
+def varying(rng: np.random.Generator, matrix: Array, n: int) -> Map:
     """The matrix (r, c) times a positive function of the state: (..., n) -> (..., r, c)."""
     direction = rng.normal(size=n)
     return lambda x: matrix * (1 + 0.4 * np.sin(x @ direction + 0.7))[..., None, None]
 
 
-def hidden(exercise: Any, name: str, n: int, r: int, p: int) -> Functions:
+def hidden(exercise: Exercise, name: str, n: int, r: int, p: int) -> Functions:
     """Hidden functions with n states, r noises of the object, p measurements."""
     rng = exercise.rng(f"{name}-functions-{n}-{r}-{p}")
     f, Phi = curved(rng, n, n, 0.7)
@@ -106,7 +108,7 @@ def hidden(exercise: Any, name: str, n: int, r: int, p: int) -> Functions:
     return Functions(f, Phi, g, covariance(rng, r, 0.2), S, H, varying(rng, covariance(rng, p, 0.3), n))
 
 
-def sizes(exercise: Any) -> tuple[tuple[int, int, int], ...]:
+def sizes(exercise: Exercise) -> tuple[tuple[int, int, int], ...]:
     """Dimensions that answers are called with."""
     return DIMENSIONS, (exercise.model.n, len(exercise.model.v), exercise.model.p)
 
@@ -116,7 +118,7 @@ def law(rng: np.random.Generator, n: int) -> Gaussian:
     return Gaussian(rng.normal(size=(RUNS, n)), np.array([covariance(rng, n, 0.4) for _ in range(RUNS)]))
 
 
-def cases(exercise: Any, name: str) -> list[tuple[Functions, np.random.Generator, int, int]]:
+def cases(exercise: Exercise, name: str) -> list[tuple[Functions, np.random.Generator, int, int]]:
     """Hidden functions, random numbers, n and p for each of the dimensions."""
     return [
         (hidden(exercise, name, n, r, p), exercise.rng(f"{name}-{place}"), n, p)
@@ -127,8 +129,8 @@ def cases(exercise: Any, name: str) -> list[tuple[Functions, np.random.Generator
 # -- g1: a Jacobian by differences
 
 
-def right_jacobian(function: Callable, x: Array, step: float) -> Array:
-    return jacobian_with()(function, x, step)
+def jacobian(function: Callable, x: Array, h: float) -> Array:
+    return jacobian_with()(function, x, h)
 
 
 def jacobian_with(
@@ -148,7 +150,7 @@ def _all_at_once(function: Callable, x: Array, step: float) -> Array:
     return np.repeat(difference[..., None], x.shape[-1], axis=-1)
 
 
-def jacobian_arguments(exercise: Any) -> list[tuple]:
+def jacobian_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("g1")
     return [(curved(rng, n, n, 1.0)[0], rng.normal(size=(RUNS, n)), step) for n, step in ((3, 0.02), (exercise.model.n, 0.05))]
 
@@ -174,7 +176,7 @@ WRONG_JACOBIANS: tuple[tuple[str, str, Answer], ...] = (
     (
         "transposed",
         "It is transposed: row i holds the derivatives of component i of the function.",
-        lambda function, x, step: np.swapaxes(right_jacobian(function, x, step), -1, -2),
+        lambda function, x, step: np.swapaxes(jacobian(function, x, step), -1, -2),
     ),
 )
 
@@ -232,7 +234,11 @@ WRONG_BOUNDS: tuple[tuple[str, str, Bounds], ...] = (
 )
 
 
-def bounds_arguments(exercise: Any) -> list[tuple]:
+def bounds(degrees: int, runs: int, confidence: float) -> tuple[float, float]:
+    return chi_squared_bounds(degrees, runs, confidence)
+
+
+def bounds_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("g2")
     return [
         (int(rng.integers(2, 7)), int(rng.integers(8, 60)), float(rng.uniform(*limits)))
@@ -243,7 +249,7 @@ def bounds_arguments(exercise: Any) -> list[tuple]:
 # -- g3: the prediction
 
 
-def right_prediction(z: Array, p: Array, f: Callable, Phi: Callable, g: Callable, D_xi: Array) -> tuple[Array, Array]:
+def predict(z: Array, p: Array, f: Callable, Phi: Callable, g: Callable, D_xi: Array) -> tuple[Array, Array]:
     return prediction_with()(z, p, f, Phi, g, D_xi)
 
 
@@ -265,7 +271,7 @@ def prediction_with(
     return answer
 
 
-def prediction_arguments(exercise: Any) -> list[tuple]:
+def prediction_arguments(exercise: Exercise) -> list[tuple]:
     return [(*law(rng, n), one.f, one.Phi, one.g, one.D_xi) for one, rng, n, _ in cases(exercise, "g3")]
 
 
@@ -336,9 +342,9 @@ WRONG_PREDICTIONS: tuple[tuple[str, str, Answer], ...] = (
 # -- g4: the correction
 
 
-def right_correction(lam: Array, Psi: Array, y: Array, S: Callable, H: Callable, D_n: Callable) -> tuple[Array, Array]:
+def correct(lam: Array, Psi: Array, y: Array, S: Callable, H: Callable, D_n: Callable) -> tuple[Array, Array]:
     G, R = H(lam), D_n(lam)
-    z, p = correct(Gaussian(lam, Psi), Measurement(S(lam), G, G @ Psi @ transpose(G) + R, R), y)
+    z, p = laws.correct(Gaussian(lam, Psi), Measurement(S(lam), G, G @ Psi @ transpose(G) + R, R), y)
     return z, full(p, len(lam))
 
 
@@ -365,7 +371,7 @@ def correction_with(
     return answer
 
 
-def correction_arguments(exercise: Any) -> list[tuple]:
+def correction_arguments(exercise: Exercise) -> list[tuple]:
     found = []
     for one, rng, n, p in cases(exercise, "g4"):
         lam, Psi = law(rng, n)
@@ -437,13 +443,13 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
 Run = tuple[Array, ...]  # z, p, lam, Psi
 
 
-def right_run(y: Array, mean: Array, cov: Array, *functions: Any) -> Run:
-    return run_with()(y, mean, cov, *functions)
+def run_filter(y: Array, mean: Array, cov: Array, f: Map, Phi: Map, g: Map, D_xi: Map, S: Map, H: Map, D_n: Map) -> Run:
+    return run_with()(y, mean, cov, f, Phi, g, D_xi, S, H, D_n)
 
 
 def run_with(
-    prediction: Answer = right_prediction,
-    correction: Answer = right_correction,
+    prediction: Answer = predict,
+    correction: Answer = correct,
     meter_at: Callable[[Array, Array], Array] = lambda lam, before: lam,
     object_at: Callable[[Array, Array], Array] = lambda z, lam: z,
     frozen: bool = False,
@@ -482,7 +488,7 @@ def run_with(
     return answer
 
 
-def fixed(function: Callable[[Array], Array], at: Array) -> Callable[[Array], Array]:
+def fixed(function: Map, at: Array) -> Map:
     """The function's value at one place, wherever it is asked for."""
     return lambda _: function(at)
 
@@ -502,21 +508,21 @@ def _linearised_once(
     def at_start(function: Callable) -> Callable:
         return lambda x: function(np.tile(mean, (len(x), 1)))
 
-    return right_run(y, mean, cov, f, at_start(Phi), g, D_xi, S, at_start(H), D_n)
+    return run_filter(y, mean, cov, f, at_start(Phi), g, D_xi, S, at_start(H), D_n)
 
 
 def _predictions_as_estimates(*arguments: Any) -> Run:
-    _, _, lam, Psi = right_run(*arguments)
+    _, _, lam, Psi = run_filter(*arguments)
     return lam, Psi, lam, Psi
 
 
 def _predictions_of_next(y: Array, mean: Array, cov: Array, *functions: Any) -> Run:
-    z, p, lam, Psi = right_run(y, mean, cov, *functions)
-    following = right_prediction(z[-1], p[-1], *functions[:4])
+    z, p, lam, Psi = run_filter(y, mean, cov, *functions)
+    following = predict(z[-1], p[-1], *functions[:4])
     return z, p, np.array([*lam[1:], following[0]]), np.array([*Psi[1:], following[1]])
 
 
-def run_arguments(exercise: Any) -> list[tuple]:
+def run_arguments(exercise: Exercise) -> list[tuple]:
     found = []
     for one, rng, n, p in cases(exercise, "g5"):
         mean, cov = rng.normal(size=n), covariance(rng, n, 0.6)
@@ -558,7 +564,7 @@ WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
     (
         "covariance-not-predicted",
         "The gain is made of the covariance of the last estimate; it needs that of the prediction, after the object has moved.",
-        run_with(lambda z, p, *functions: (right_prediction(z, p, *functions)[0], p)),
+        run_with(lambda z, p, *functions: (predict(z, p, *functions)[0], p)),
     ),
     (
         "predictions-for-estimates",
@@ -611,7 +617,8 @@ def normalised_with(
     return answer
 
 
-right_normalised = normalised_with()
+def consistency(x: Array, z: Array, p: Array, y: Array, lam: Array, Psi: Array, S: Map, H: Map, D_n: Map) -> tuple[Array, Array]:
+    return normalised_with()(x, z, p, y, lam, Psi, S, H, D_n)
 
 
 def _by_diagonal(vector: Array, cov: Array) -> Array:
@@ -635,7 +642,7 @@ def _mean_first(
     return tuple(normalised_square(vector.mean(axis=1), cov.mean(axis=1)) for vector, cov in pairs)
 
 
-def normalised_arguments(exercise: Any) -> list[tuple]:
+def normalised_arguments(exercise: Exercise) -> list[tuple]:
     found = []
     for one, rng, n, p in cases(exercise, "g6"):
         shape = (STEPS, RUNS)
@@ -699,13 +706,13 @@ WRONG_NORMALISED: tuple[tuple[str, str, Normalised], ...] = (
 Information = Callable[[Array, Array, Array], tuple[Array, Array]]
 
 
-def right_information(W: Array, H: Array, D_n: Array) -> tuple[Array, Array]:
+def information(W: Array, H: Array, D_n: Array) -> tuple[Array, Array]:
     return information_with()(W, H, D_n)
 
 
 def information_with(
     added: Callable[[Array, Array], Array] = lambda H, D_n: transpose(H) @ np.linalg.solve(D_n, H),
-    prior: Callable[[Array], Array] = lambda W: W,
+    prior: Map = lambda W: W,
     inverted: bool = True,
     K_of: Callable[[Array, Array, Array, Array], Array] = lambda p, W, H, D_n: gain(p @ transpose(H), D_n),
 ) -> Information:
@@ -723,7 +730,7 @@ def _gain_from_prior(p: Array, W: Array, H: Array, D_n: Array) -> Array:
     return gain(np.linalg.pinv(W) @ transpose(H), D_n)
 
 
-def information_arguments(exercise: Any) -> list[tuple]:
+def information_arguments(exercise: Exercise) -> list[tuple]:
     found = []
     for place, (n, p) in enumerate(((3, 4), (exercise.model.n, exercise.model.n + 1))):
         rng = exercise.rng(f"g7-{place}")
@@ -744,7 +751,7 @@ WRONG_INFORMATION: tuple[tuple[str, str, Information], ...] = (
     (
         "inverse-forgotten-in-p",
         "That is the information, not the covariance: invert the sum.",
-        lambda W, H, D_n: (information_with(inverted=False)(W, H, D_n)[0], right_information(W, H, D_n)[1]),
+        lambda W, H, D_n: (information_with(inverted=False)(W, H, D_n)[0], information(W, H, D_n)[1]),
     ),
     (
         "noise-not-inverted",
@@ -779,7 +786,7 @@ WRONG_INFORMATION: tuple[tuple[str, str, Information], ...] = (
     (
         "gain-by-information",
         "The gain is multiplied by the information; the covariance, its inverse, belongs there.",
-        lambda W, H, D_n: (right_information(W, H, D_n)[0], information_with(inverted=False)(W, H, D_n)[1]),
+        lambda W, H, D_n: (information(W, H, D_n)[0], information_with(inverted=False)(W, H, D_n)[1]),
     ),
 )
 
@@ -789,28 +796,28 @@ QUESTIONS = (
         "g1",
         "a Jacobian by differences",
         "warm-up",
-        lambda e: right_jacobian,
+        jacobian,
         jacobian_arguments,
         catalogue(WRONG_JACOBIANS),
         tolerance=1e-8,
     ),
-    Question("g2", "bounds", "warm-up", lambda e: chi_squared_bounds, bounds_arguments, catalogue(WRONG_BOUNDS), ("low", "high")),
+    Question("g2", "bounds", "warm-up", bounds, bounds_arguments, catalogue(WRONG_BOUNDS), ("low", "high")),
     Question(
         "g3",
         "the prediction",
         "core",
-        lambda e: right_prediction,
+        predict,
         prediction_arguments,
         catalogue(WRONG_PREDICTIONS),
         ("lam", "Psi"),
     ),
-    Question("g4", "the correction", "core", lambda e: right_correction, correction_arguments, catalogue(WRONG_CORRECTIONS), TWO),
-    Question("g5", "a whole run", "core", lambda e: right_run, run_arguments, catalogue(WRONG_RUNS), ("z", "p", "lam", "Psi")),
+    Question("g4", "the correction, in the gain form", "core", correct, correction_arguments, catalogue(WRONG_CORRECTIONS), TWO),
+    Question("g5", "a run", "core", run_filter, run_arguments, catalogue(WRONG_RUNS), ("z", "p", "lam", "Psi")),
     Question(
         "g6",
         "NEES and NIS",
         "core",
-        lambda e: right_normalised,
+        consistency,
         normalised_arguments,
         catalogue(WRONG_NORMALISED),
         ("NEES", "NIS"),
@@ -819,7 +826,7 @@ QUESTIONS = (
         "g7",
         "the information form",
         "stretch",
-        lambda e: right_information,
+        information,
         information_arguments,
         catalogue(WRONG_INFORMATION),
         ("p", "K"),

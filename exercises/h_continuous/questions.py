@@ -7,14 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import sympy as sp
 
+from kfcourse import continuous
+from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.continuous.model import ContinuousModel, log_likelihood_rate, steady_state, to_discrete
+from kfcourse.continuous.model import ContinuousModel, log_likelihood_rate, to_discrete
+from kfcourse.exercises.shared import Map
 from kfcourse.laws import Array
 
 RUNS = 6
@@ -23,7 +25,7 @@ RUNS = 6
 NUMBERS = {"a": (0.4, 0.9), "s": (0.6, 1.1), "h": (0.7, 1.3), "S_xi": (1.5, 2.5), "N": (0.15, 0.4), "d": (0.8, 1.5)}
 
 
-def continuous_numbers(exercise: Any) -> dict[str, float]:
+def continuous_numbers(exercise: Exercise) -> dict[str, float]:
     """Numbers of the variant's continuous model."""
     rng = exercise.rng("continuous")
     return {name: round(float(rng.uniform(*limits)), 2) for name, limits in NUMBERS.items()}
@@ -32,7 +34,7 @@ def continuous_numbers(exercise: Any) -> dict[str, float]:
 # -- h1: variances of means over a step
 
 
-def right_variances(S_xi: float, N: float, T: float) -> tuple[Array, Array]:
+def noise_variances(S_xi: float, N: float, T: float) -> tuple[Array, Array]:
     discrete = to_discrete(ContinuousModel.define("-x", "1", "x", spectral_density=S_xi, noise_density=N), T)
     return discrete.state_noise.cov[0, 0], discrete.meter_noise.cov[0, 0]
 
@@ -68,7 +70,7 @@ WRONG_VARIANCES: tuple[tuple[str, str, Answer], ...] = (
 )
 
 
-def variances_arguments(exercise: Any) -> list[tuple]:
+def variances_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("h1")
     return [tuple(round(float(v), 3) for v in rng.uniform([1.2, 0.2, 0.01], [4, 0.9, 0.3])) for _ in range(3)]
 
@@ -76,7 +78,7 @@ def variances_arguments(exercise: Any) -> list[tuple]:
 # -- h2: a step of a simulation
 
 
-def right_simulation(x: Array, xi: Array, n: Array, T: float, f: Callable, g: Callable, S: Callable, S_xi: float, N: float):
+def simulate_step(x: Array, xi: Array, n: Array, T: float, f: Callable, g: Callable, S: Callable, S_xi: float, N: float):
     return simulation_with()(x, xi, n, T, f, g, S, S_xi, N)
 
 
@@ -165,7 +167,7 @@ def positive(rng: np.random.Generator) -> Callable:
     return lambda x: level + swing * np.sin(x + shift)
 
 
-def simulation_arguments(exercise: Any) -> list[tuple]:
+def simulation_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("h2")
     x, xi, n = rng.normal(size=(3, RUNS))
     return [
@@ -187,7 +189,7 @@ def simulation_arguments(exercise: Any) -> list[tuple]:
 Rate = Callable[[Array, Array, Array, Array, Array, Array], Array]
 
 
-def right_rate(D: Array, A: Array, G: Array, H: Array, S_xi: Array, N: Array) -> Array:
+def riccati(D: Array, A: Array, G: Array, H: Array, S_xi: Array, N: Array) -> Array:
     return rate_with()(D, A, G, H, S_xi, N)
 
 
@@ -200,7 +202,7 @@ def rate_with(
     return lambda D, A, G, H, S_xi, N: motion(A, D) + shaken(G, S_xi) - learnt(D, H, N)
 
 
-def rate_arguments(exercise: Any) -> list[tuple]:
+def rate_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("h3")
 
     def covariance(size: int) -> Array:
@@ -273,9 +275,9 @@ WRONG_RATES: tuple[tuple[str, str, Rate], ...] = (
 # -- h4: the steady state of dx/dt = -a x + s xi, y = h x + n
 
 
-def right_steady(a: float, s: float, h: float, S_xi: float, N: float) -> tuple[Array, Array]:
+def steady_state(a: float, s: float, h: float, S_xi: float, N: float) -> tuple[Array, Array]:
     model = ContinuousModel.define("-a*x", "s", "h*x", {"a": a, "s": s, "h": h}, spectral_density=S_xi, noise_density=N)
-    D, K = steady_state(model)
+    D, K = continuous.steady_state(model)
     return D[0, 0], K[0, 0]
 
 
@@ -349,7 +351,7 @@ WRONG_STEADY: tuple[tuple[str, str, Answer], ...] = (
 )
 
 
-def steady_arguments(exercise: Any) -> list[tuple]:
+def steady_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("h4")
     low, high = [0.3, 0.6, 1.3, 1.3, 0.15], [0.7, 0.9, 1.8, 2.6, 0.5]
     return [tuple(round(float(v), 3) for v in rng.uniform(low, high)) for _ in range(3)]
@@ -358,8 +360,10 @@ def steady_arguments(exercise: Any) -> list[tuple]:
 # -- h5: a step of the filter
 
 
-def right_step(*arguments: Any) -> tuple[Array, Array]:
-    return step_with()(*arguments)
+def filter_step(
+    z: Array, D: Array, y: Array, T: float, f: Map, f_x: Map, g: Map, S: Map, S_x: Map, S_xi: float, N: float
+) -> tuple[Array, Array]:
+    return step_with()(z, D, y, T, f, f_x, g, S, S_x, S_xi, N)
 
 
 def step_with(
@@ -493,7 +497,7 @@ WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
 )
 
 
-def step_arguments(exercise: Any) -> list[tuple]:
+def step_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("h5")
     z, y = rng.normal(size=(2, RUNS))
     D, T = rng.uniform(0.4, 1.2, RUNS), rng.uniform(0.01, 0.03)
@@ -503,7 +507,7 @@ def step_arguments(exercise: Any) -> list[tuple]:
 # -- h6: derivatives of the log-likelihood
 
 
-def right_derivatives(S: sp.Expr, x: sp.Symbol, y: sp.Symbol, N: sp.Symbol) -> tuple[sp.Expr, sp.Expr]:
+def derivatives(S: sp.Expr, x: sp.Symbol, y: sp.Symbol, N: sp.Symbol) -> tuple[sp.Expr, sp.Expr]:
     F = log_likelihood_rate(sp.Matrix([S]), sp.Matrix([y]), sp.Matrix([N]))
     return F.diff(x), F.diff(x, 2)
 
@@ -562,7 +566,7 @@ WRONG_DERIVATIVES: tuple[tuple[str, str, Answer], ...] = (
 )
 
 
-def derivatives_arguments(exercise: Any) -> list[tuple]:
+def derivatives_arguments(exercise: Exercise) -> list[tuple]:
     x, y, N = sp.symbols("x y N_n", real=True)
     a, b, c = (sp.Rational(int(k), 10) for k in exercise.rng("h6").integers(3, 10, 3))
     return [(signal, x, y, N) for signal in (sp.sin(x + a) + b * x, sp.exp(c * x) + b * x**2, x + a * x**3)]
@@ -571,9 +575,9 @@ def derivatives_arguments(exercise: Any) -> list[tuple]:
 QUESTIONS = (
     Question(
         "h1",
-        "the variances of means over a step",
+        "white noise on a computer",
         "warm-up",
-        lambda e: right_variances,
+        noise_variances,
         variances_arguments,
         catalogue(WRONG_VARIANCES),
         ("D_xi", "D_n"),
@@ -582,19 +586,19 @@ QUESTIONS = (
         "h2",
         "a step of a simulation",
         "core",
-        lambda e: right_simulation,
+        simulate_step,
         simulation_arguments,
         catalogue(WRONG_SIMULATIONS),
         ("x_next", "y"),
     ),
-    Question("h3", "the Riccati equation", "core", lambda e: right_rate, rate_arguments, catalogue(WRONG_RATES)),
-    Question("h4", "the steady state", "core", lambda e: right_steady, steady_arguments, catalogue(WRONG_STEADY), ("D", "K")),
-    Question("h5", "a step of the filter", "core", lambda e: right_step, step_arguments, catalogue(WRONG_STEPS), ("z", "D")),
+    Question("h3", "the Riccati equation", "core", riccati, rate_arguments, catalogue(WRONG_RATES)),
+    Question("h4", "the steady state", "core", steady_state, steady_arguments, catalogue(WRONG_STEADY), ("D", "K")),
+    Question("h5", "a step of the extended filter", "core", filter_step, step_arguments, catalogue(WRONG_STEPS), ("z", "D")),
     Question(
         "h6",
         "derivatives of the log-likelihood",
         "stretch",
-        lambda e: right_derivatives,
+        derivatives,
         derivatives_arguments,
         catalogue(WRONG_DERIVATIVES),
         ("u", "U"),

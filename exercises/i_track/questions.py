@@ -12,17 +12,18 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from kfcourse.exercises.shared import covariance, personal
 
+from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.exercises.shared import covariance, personal
 from kfcourse.laws import Array, Gaussian, square_root
 from kfcourse.linear.arithmetic import FORMS, Root, predict_law
 from kfcourse.linear.system import LinearSystem
 from kfcourse.scenarios.pointer import DT, INPUT, SENSITIVITY, START, TRANSITION
 
 
-def track_numbers(exercise: Any) -> dict[str, float]:
+def track_numbers(exercise: Exercise) -> dict[str, float]:
     """dt (s), sigma (px), sigma_a (px/s^2), and the number of the hand's track."""
     found = personal(
         exercise,
@@ -49,7 +50,7 @@ def interleaved(matrix: sp.MatrixBase) -> sp.ImmutableMatrix:
     return sp.ImmutableMatrix(matrix.extract(list(rows), list(columns)))
 
 
-def right_matrices(dt: Any) -> tuple:
+def matrices(dt: Any) -> tuple:
     return TRANSITION.subs(DT, dt), INPUT.subs(DT, dt), SENSITIVITY
 
 
@@ -62,7 +63,7 @@ WRONG_MATRICES: tuple[tuple[str, str, Answer], ...] = (
     (
         "time-missing",
         "The time between samples is missing: a velocity has to be multiplied by it before it is added to a position.",
-        lambda dt: right_matrices(1),
+        lambda dt: matrices(1),
     ),
     (
         "half-missing",
@@ -82,22 +83,22 @@ WRONG_MATRICES: tuple[tuple[str, str, Answer], ...] = (
     (
         "transposed",
         "It looks transposed: row i says how component i of the next state is made.",
-        lambda dt: tuple(matrix.T if matrix.rows == matrix.cols else matrix for matrix in right_matrices(dt)),
+        lambda dt: tuple(matrix.T if matrix.rows == matrix.cols else matrix for matrix in matrices(dt)),
     ),
     (
         "order-of-components",
         "The order of the components is another: the state is (x, y, vx, vy), both positions first.",
-        lambda dt: tuple(interleaved(matrix) for matrix in right_matrices(dt)),
+        lambda dt: tuple(interleaved(matrix) for matrix in matrices(dt)),
     ),
     (
         "velocity-measured",
         "H takes the velocities out of the state; the meter gives the positions.",
-        lambda dt: (*right_matrices(dt)[:2], SENSITIVITY.extract([0, 1], [2, 3, 0, 1])),
+        lambda dt: (*matrices(dt)[:2], SENSITIVITY.extract([0, 1], [2, 3, 0, 1])),
     ),
 )
 
 
-def right_noise(dt: Any, sigma_a: Any) -> sp.ImmutableMatrix:
+def process_noise(dt: Any, sigma_a: Any) -> sp.ImmutableMatrix:
     B = INPUT.subs(DT, dt)
     return sp.ImmutableMatrix(sigma_a**2 * B * B.T)
 
@@ -111,12 +112,12 @@ WRONG_NOISES: tuple[tuple[str, str, Answer], ...] = (
     (
         "deviation-for-variance",
         "The standard deviation of the acceleration stands where its variance belongs.",
-        lambda dt, sigma_a: right_noise(dt, sigma_a) / sigma_a,
+        lambda dt, sigma_a: process_noise(dt, sigma_a) / sigma_a,
     ),
     (
         "diagonal",
         "Only the diagonal is there. One and the same acceleration moves position and velocity, so their errors are correlated.",
-        lambda dt, sigma_a: sp.diag(*[right_noise(dt, sigma_a)[i, i] for i in range(4)]),
+        lambda dt, sigma_a: sp.diag(*[process_noise(dt, sigma_a)[i, i] for i in range(4)]),
     ),
     (
         "axes-coupled",
@@ -142,14 +143,14 @@ WRONG_NOISES: tuple[tuple[str, str, Answer], ...] = (
     (
         "order-of-components",
         "The order of the components is another: the state is (x, y, vx, vy), both positions first.",
-        lambda dt, sigma_a: interleaved(right_noise(dt, sigma_a)),
+        lambda dt, sigma_a: interleaved(process_noise(dt, sigma_a)),
     ),
 )
 
 # -- i3: start-up from three samples
 
 
-def right_start(y0: Any, y1: Any, y2: Any, dt: Any) -> tuple:
+def start_up(y0: Any, y1: Any, y2: Any, dt: Any) -> tuple:
     return tuple(START.subs(DT, dt) * sp.Matrix([y0, y1, y2]))
 
 
@@ -176,7 +177,7 @@ WRONG_STARTS: tuple[tuple[str, str, Answer], ...] = (
     (
         "samples-reversed",
         "The samples seem to be taken in the reverse order.",
-        lambda y0, y1, y2, dt: right_start(y2, y1, y0, dt),
+        lambda y0, y1, y2, dt: start_up(y2, y1, y0, dt),
     ),
     (
         "moved-too-far",
@@ -190,28 +191,28 @@ WRONG_STARTS: tuple[tuple[str, str, Answer], ...] = (
     (
         "coefficient-for-acceleration",
         "That is the coefficient of the parabola's square; an acceleration is a second derivative.",
-        lambda y0, y1, y2, dt: (*right_start(y0, y1, y2, dt)[:2], second_difference(y0, y1, y2) / (2 * dt**2)),
+        lambda y0, y1, y2, dt: (*start_up(y0, y1, y2, dt)[:2], second_difference(y0, y1, y2) / (2 * dt**2)),
     ),
     (
         "power-of-dt",
         "A power of dt is missing: check the units.",
         lambda y0, y1, y2, dt: (
             y2,
-            right_start(y0, y1, y2, dt)[1] * dt,
+            start_up(y0, y1, y2, dt)[1] * dt,
             second_difference(y0, y1, y2) / dt,
         ),
     ),
     (
         "averaged",
         "The mean of the samples is no estimate of the last position: the object moves.",
-        lambda y0, y1, y2, dt: ((y0 + y1 + y2) / 3, *right_start(y0, y1, y2, dt)[1:]),
+        lambda y0, y1, y2, dt: ((y0 + y1 + y2) / 3, *start_up(y0, y1, y2, dt)[1:]),
     ),
 )
 
 # -- i4: one step of the filter with a known input
 
 
-def right_step(z: Array, p: Array, u: Array, y: Array, A: Array, B: Array, H: Array, Q: Array, R: Array) -> tuple[Array, ...]:
+def step(z: Array, p: Array, u: Array, y: Array, A: Array, B: Array, H: Array, Q: Array, R: Array) -> tuple[Array, ...]:
     system = LinearSystem(A, H, Q, R, B)
     before = predict_law(system, Gaussian(z, p), system.input(u))
     return *before, *FORMS["covariance"].correct(system, before, y)
@@ -237,9 +238,9 @@ def step_with(
     return answer
 
 
-def step_arguments(exercise: Any) -> list[tuple]:
+def step_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("i4")
-    A, B, H = (np.array(m, dtype=float) for m in right_matrices(rng.uniform(0.2, 0.6)))
+    A, B, H = (np.array(m, dtype=float) for m in matrices(rng.uniform(0.2, 0.6)))
     A, B, H = (matrix + 0.2 * rng.normal(size=matrix.shape) for matrix in (A, B, H))  # no zeros, no ones
     z, u, y = rng.normal(size=4), rng.normal(size=2), rng.normal(size=2)
     return [(z, covariance(rng, 4), u, y, A, B, H, covariance(rng, 4), covariance(rng, 2))]
@@ -308,7 +309,7 @@ WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
 # -- i5: a square root that never forms the covariance
 
 
-def right_root(lam: Array, S: Array, y: Array, H: Array, R: Array) -> tuple[Array, Array]:
+def correct_root(lam: Array, S: Array, y: Array, H: Array, R: Array) -> tuple[Array, Array]:
     n = len(lam)
     system = LinearSystem(np.eye(n), H, np.zeros((n, n)), R)
     law = FORMS["square-root"].correct(system, Root(lam, S), y)
@@ -350,7 +351,7 @@ def _through_covariance(lam: Array, S: Array, y: Array, H: Array, R: Array) -> t
     return lam + K @ (y - H @ lam), lower * np.where(np.diag(lower) < 0, -1, 1)
 
 
-def root_arguments(exercise: Any) -> list[tuple]:
+def root_arguments(exercise: Exercise) -> list[tuple]:
     """A regular case; a meter so sharp that 1 - K H rounds to 0; components so nearly dependent that S S^T rounds to singular.
 
     An orthogonal transformation keeps 7 digits of the last two (rounding over 3e-9), a covariance none: hence the tolerance.
@@ -397,7 +398,7 @@ WRONG_ROOTS: tuple[tuple[str, str, Answer], ...] = (
         "root-kept",
         "The root is that of the prediction: a measurement must make it smaller.",
         lambda lam, S, y, H, R: (
-            right_root(lam, S, y, H, R)[0],
+            correct_root(lam, S, y, H, R)[0],
             S,
         ),
     ),
@@ -408,7 +409,7 @@ QUESTIONS = (
         "i1",
         "the matrices of the model",
         "warm-up",
-        lambda e: right_matrices,
+        matrices,
         lambda e: [(sp.Symbol("dt", positive=True),)],
         catalogue(WRONG_MATRICES),
         ("A", "B", "H"),
@@ -417,7 +418,7 @@ QUESTIONS = (
         "i2",
         "the noise of the object",
         "core",
-        lambda e: right_noise,
+        process_noise,
         lambda e: [sp.symbols("dt sigma_a", positive=True)],
         catalogue(WRONG_NOISES),
     ),
@@ -425,7 +426,7 @@ QUESTIONS = (
         "i3",
         "start-up from three samples",
         "core",
-        lambda e: right_start,
+        start_up,
         lambda e: [(*sp.symbols("y0 y1 y2", real=True), sp.Symbol("dt", positive=True))],
         catalogue(WRONG_STARTS),
         ("r", "v", "a"),
@@ -434,7 +435,7 @@ QUESTIONS = (
         "i4",
         "one step with a known input",
         "core",
-        lambda e: right_step,
+        step,
         step_arguments,
         catalogue(WRONG_STEPS),
         ("lam", "Psi", "z", "p"),
@@ -443,7 +444,7 @@ QUESTIONS = (
         "i5",
         "a square root instead of the covariance",
         "stretch",
-        lambda e: right_root,
+        correct_root,
         root_arguments,
         catalogue(WRONG_ROOTS),
         ("z", "S"),

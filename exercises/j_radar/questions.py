@@ -14,17 +14,19 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 import sympy as sp
-from kfcourse.exercises.shared import personal, substituted
 
+from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.filters.alphabeta import alpha_beta, steady_beta, tracking_index
+from kfcourse.exercises.shared import personal, substituted
+from kfcourse.filters import alphabeta
+from kfcourse.filters.alphabeta import steady_beta, tracking_index
 from kfcourse.laws import Array
 from kfcourse.montecarlo.experiment import run
 from kfcourse.scenarios.aircraft import AZIMUTH, CARTESIAN, ELEVATION, RANGE, SPHERICAL, X, Y, Z, kinematic
 
 
-def radar_numbers(exercise: Any) -> dict[str, float]:
+def radar_numbers(exercise: Exercise) -> dict[str, float]:
     """T (s), sigma (m), alpha, and the radius of the first circle (m)."""
     return personal(
         exercise,
@@ -41,7 +43,7 @@ MEASURED, POSITION = (RANGE, AZIMUTH, ELEVATION), (X, Y, Z)
 _cartesian = substituted(CARTESIAN, MEASURED)
 
 
-def right_cartesian(r: Any, phi: Any, eps: Any) -> tuple:
+def cartesian(r: Any, phi: Any, eps: Any) -> tuple:
     return tuple(_cartesian(r, phi, eps))
 
 
@@ -49,17 +51,17 @@ WRONG_CARTESIANS: tuple[tuple[str, str, Answer], ...] = (
     (
         "azimuth-from-y",
         "The azimuth is counted from the y axis; here it goes from x towards y.",
-        lambda r, phi, eps: right_cartesian(r, sp.pi / 2 - phi, eps),
+        lambda r, phi, eps: cartesian(r, sp.pi / 2 - phi, eps),
     ),
     (
         "azimuth-sense",
         "The azimuth turns the other way: it grows from x towards y.",
-        lambda r, phi, eps: right_cartesian(r, -phi, eps),
+        lambda r, phi, eps: cartesian(r, -phi, eps),
     ),
     (
         "from-the-zenith",
         "The elevation is counted from the vertical; here it is the angle above the horizon.",
-        lambda r, phi, eps: right_cartesian(r, phi, sp.pi / 2 - eps),
+        lambda r, phi, eps: cartesian(r, phi, sp.pi / 2 - eps),
     ),
     (
         "slant-range",
@@ -69,12 +71,12 @@ WRONG_CARTESIANS: tuple[tuple[str, str, Answer], ...] = (
     (
         "height-by-tangent",
         "The height is found as if the range were the distance along the ground.",
-        lambda r, phi, eps: (*right_cartesian(r, phi, eps)[:2], r * sp.tan(eps)),
+        lambda r, phi, eps: (*cartesian(r, phi, eps)[:2], r * sp.tan(eps)),
     ),
     (
         "degrees",
         "The angles are turned from degrees into radians; they are in radians already.",
-        lambda r, phi, eps: right_cartesian(r, phi * sp.pi / 180, eps * sp.pi / 180),
+        lambda r, phi, eps: cartesian(r, phi * sp.pi / 180, eps * sp.pi / 180),
     ),
 )
 
@@ -84,12 +86,17 @@ def jacobian_of(formulas: Any) -> Answer:
 
 
 SLANT, GROUND = sp.sqrt(X**2 + Y**2 + Z**2), sp.sqrt(X**2 + Y**2)
-right_jacobian = jacobian_of(SPHERICAL)
+
+
+def meter_jacobian(x: Any, y: Any, z: Any) -> sp.ImmutableMatrix:
+    return jacobian_of(SPHERICAL)(x, y, z)
+
+
 WRONG_JACOBIANS: tuple[tuple[str, str, Answer], ...] = (
     (
         "transposed",
         "It looks transposed: row i holds the derivatives of measurement i.",
-        lambda x, y, z: right_jacobian(x, y, z).T,
+        lambda x, y, z: meter_jacobian(x, y, z).T,
     ),
     (
         "inverse",
@@ -140,7 +147,7 @@ WRONG_JACOBIANS: tuple[tuple[str, str, Answer], ...] = (
 # -- j3: the constant gain
 
 
-def right_gains(alpha: float) -> tuple[float, float]:
+def steady_gain(alpha: float) -> tuple[float, float]:
     return steady_beta(alpha), tracking_index(alpha)
 
 
@@ -201,8 +208,8 @@ def _model(T: float, position: tuple[float, ...], velocity: tuple[float, ...]) -
     return kinematic(T, dimensions=len(position), prior=prior)
 
 
-def right_filter(y: Array, T: float, alpha: float, beta: float, r: Array, v: Array) -> tuple[Array, Array]:
-    laws = run(alpha_beta(_model(T, tuple(r), tuple(v)), alpha, beta, start="prior"), y)
+def alpha_beta(y: Array, T: float, alpha: float, beta: float, r: Array, v: Array) -> tuple[Array, Array]:
+    laws = run(alphabeta.alpha_beta(_model(T, tuple(r), tuple(v)), alpha, beta, start="prior"), y)
     return laws.mean[..., : len(r)], laws.mean[..., len(r) :]
 
 
@@ -239,7 +246,7 @@ def _position_first(r: Array, v: Array, y: Array, T: float, alpha: float, beta: 
     return r, v + beta / T * (y - r)
 
 
-def filter_arguments(exercise: Any) -> list[tuple]:
+def filter_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("j4")
     T, alpha, beta = rng.uniform(1.3, 2.2), rng.uniform(0.3, 0.6), rng.uniform(0.1, 0.25)
     r, v = 10 * rng.normal(size=3), rng.normal(size=3)
@@ -323,9 +330,9 @@ def _lag() -> tuple[tuple[sp.Symbol, ...], sp.Matrix, sp.Matrix]:
     return symbols, after, sp.simplify(A * after + push)
 
 
-def right_lag(*values: Any) -> tuple:
+def lag(a: Any, T: Any, alpha: Any, beta: Any) -> tuple:
     symbols, after, _ = _lag()
-    return tuple(substituted(after, symbols)(*values))
+    return tuple(substituted(after, symbols)(a, T, alpha, beta))
 
 
 def _lag_of_prediction(*values: Any) -> tuple:
@@ -342,22 +349,22 @@ WRONG_LAGS: tuple[tuple[str, str, Answer], ...] = (
     (
         "gains-swapped",
         "alpha and beta are swapped.",
-        lambda a, T, alpha, beta: right_lag(a, T, beta, alpha),
+        lambda a, T, alpha, beta: lag(a, T, beta, alpha),
     ),
     (
         "time-missing",
         "The time between measurements is missing: check the units.",
-        lambda a, T, alpha, beta: right_lag(a, 1, alpha, beta),
+        lambda a, T, alpha, beta: lag(a, 1, alpha, beta),
     ),
     (
         "half-interval",
         "The factor 1/2 of a parabola has no place here: the second difference of a t^2/2 is a T^2.",
-        lambda *values: (right_lag(*values)[0] / 2, right_lag(*values)[1]),
+        lambda *values: (lag(*values)[0] / 2, lag(*values)[1]),
     ),
     (
         "alpha-for-rest",
         "The share of the error that a correction leaves is 1 - alpha, not alpha.",
-        lambda a, T, alpha, beta: (a * T**2 * alpha / beta, right_lag(a, T, alpha, beta)[1]),
+        lambda a, T, alpha, beta: (a * T**2 * alpha / beta, lag(a, T, alpha, beta)[1]),
     ),
     (
         "beta-forgotten",
@@ -367,7 +374,7 @@ WRONG_LAGS: tuple[tuple[str, str, Answer], ...] = (
     (
         "beta-not-divided",
         "A gain of the velocity of beta instead of beta/T was used.",
-        lambda a, T, alpha, beta: right_lag(a, T, alpha, beta * T),
+        lambda a, T, alpha, beta: lag(a, T, alpha, beta * T),
     ),
     (
         "position-not-accelerated",
@@ -389,7 +396,7 @@ def _stationary(alpha: float, beta: float) -> tuple[Array, Array]:
     return after, A @ after @ A.T
 
 
-def right_share(alpha: float, beta: float) -> float:
+def noise_left(alpha: float, beta: float) -> float:
     return float(_stationary(alpha, beta)[0][0, 0])
 
 
@@ -422,7 +429,7 @@ WRONG_SHARES: tuple[tuple[str, str, Answer], ...] = (
     (
         "gains-swapped",
         "alpha and beta are swapped.",
-        lambda alpha, beta: right_share(beta, alpha),
+        lambda alpha, beta: noise_left(beta, alpha),
     ),
 )
 
@@ -430,14 +437,14 @@ WRONG_SHARES: tuple[tuple[str, str, Answer], ...] = (
 def several(name: str, limits: tuple[tuple[float, float], ...]) -> Callable[[Any], list[tuple]]:
     """Three sets of hidden numbers."""
 
-    def arguments(exercise: Any) -> list[tuple]:
+    def arguments(exercise: Exercise) -> list[tuple]:
         rng = exercise.rng(name)
         return [tuple(float(rng.uniform(*one)) for one in limits) for _ in range(3)]
 
     return arguments
 
 
-def share_arguments(exercise: Any) -> list[tuple]:
+def share_arguments(exercise: Exercise) -> list[tuple]:
     """Gains that are not those of a stationary Kalman filter: any stable pair is asked for."""
     numbers = several("j6", ((0.1, 0.6), (0.6, 1.6)))(exercise)
     return [(alpha, factor * steady_beta(alpha)) for alpha, factor in numbers]
@@ -446,9 +453,9 @@ def share_arguments(exercise: Any) -> list[tuple]:
 QUESTIONS = (
     Question(
         "j1",
-        "from range and angles to Cartesian coordinates",
+        "what the radar measures",
         "warm-up",
-        lambda e: right_cartesian,
+        cartesian,
         lambda e: [sp.symbols("r phi eps", positive=True)],
         catalogue(WRONG_CARTESIANS),
         ("x", "y", "z"),
@@ -457,7 +464,7 @@ QUESTIONS = (
         "j2",
         "the meter's derivatives",
         "core",
-        lambda e: right_jacobian,
+        meter_jacobian,
         lambda e: [sp.symbols("x y z", positive=True)],
         catalogue(WRONG_JACOBIANS),
     ),
@@ -465,22 +472,22 @@ QUESTIONS = (
         "j3",
         "the constant gain",
         "core",
-        lambda e: right_gains,
+        steady_gain,
         several("j3", ((0.15, 0.7),)),
         catalogue(WRONG_GAINS),
         ("beta", "index"),
     ),
-    Question("j4", "the filter", "core", lambda e: right_filter, filter_arguments, catalogue(WRONG_FILTERS), ("r", "v")),
+    Question("j4", "the filter", "core", alpha_beta, filter_arguments, catalogue(WRONG_FILTERS), ("r", "v")),
     Question(
         "j5",
         "the lag in a turn",
         "core",
-        lambda e: right_lag,
+        lag,
         lambda e: [sp.symbols("a T alpha beta", positive=True)],
         catalogue(WRONG_LAGS),
         ("position", "velocity"),
     ),
-    Question("j6", "the noise that is left", "stretch", lambda e: right_share, share_arguments, catalogue(WRONG_SHARES)),
+    Question("j6", "the noise that is left", "stretch", noise_left, share_arguments, catalogue(WRONG_SHARES)),
 )
 
 SET = ExerciseSet("j", "Alpha-beta filter and radar track", Path(__file__).parent, QUESTIONS, radar_numbers)

@@ -13,16 +13,17 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from kfcourse.exercises.shared import personal, substituted
 
+from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.exercises.shared import personal, substituted
 from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.runs import run as run_linear
 from kfcourse.linear.system import LinearSystem
 
 
-def integration_numbers(exercise: Any) -> dict[str, float]:
+def integration_numbers(exercise: Exercise) -> dict[str, float]:
     """T (s), sigma_n and sigma_xi (m/s), gap: how long the receiver is lost (s)."""
     return personal(
         exercise,
@@ -35,12 +36,12 @@ def integration_numbers(exercise: Any) -> dict[str, float]:
 # -- k1: the error of the slow sensor as the state
 
 
-def right_meter(signal: Callable, y: Any, eps: Any) -> tuple:
+def error_meter(signal: Callable, y: Any, eps: Any) -> tuple:
     h = signal(y - eps)
     return h, sp.diff(h, eps)
 
 
-def signals(exercise: Any) -> list[tuple]:
+def signals(exercise: Exercise) -> list[tuple]:
     """The receiver measures the quantity itself, or a formula of it."""
     rng = exercise.rng("k1")
     a, b, c = (sp.Rational(int(number), 10) for number in rng.integers(12, 40, 3))
@@ -101,7 +102,7 @@ def _steady() -> sp.ImmutableMatrix:
     return sp.ImmutableMatrix([found, found - S_XI**2, K.subs(Psi, found)])
 
 
-def right_steady(sigma_xi: Any, sigma_n: Any) -> tuple:
+def steady_state(sigma_xi: Any, sigma_n: Any) -> tuple:
     return tuple(substituted(_steady(), (S_XI, S_N))(sigma_xi, sigma_n))
 
 
@@ -117,7 +118,7 @@ def steady_from(Psi: Callable[[Any, Any], Any]) -> Answer:
 
 def steady_with(change: Callable[..., tuple]) -> Answer:
     """change(Psi, p, K, sigma_xi, sigma_n) of the right ones."""
-    return lambda sigma_xi, sigma_n: change(*right_steady(sigma_xi, sigma_n), sigma_xi, sigma_n)
+    return lambda sigma_xi, sigma_n: change(*steady_state(sigma_xi, sigma_n), sigma_xi, sigma_n)
 
 
 WRONG_STEADY: tuple[tuple[str, str, Answer], ...] = (
@@ -174,8 +175,8 @@ WRONG_STEADY: tuple[tuple[str, str, Answer], ...] = (
 )
 
 
-def right_improvement(sigma_xi: Any, sigma_n: Any, T: Any) -> tuple:
-    _, p, K = right_steady(sigma_xi, sigma_n)
+def gained(sigma_xi: Any, sigma_n: Any, T: Any) -> tuple:
+    _, p, K = steady_state(sigma_xi, sigma_n)
     return sigma_n / sp.sqrt(p), -T / sp.log(1 + K)
 
 
@@ -183,8 +184,8 @@ def improvement_with(factor: Callable | None = None, time: Callable | None = Non
     """The right factor and time constant, with one of them changed."""
 
     def answer(sigma_xi: Any, sigma_n: Any, T: Any) -> tuple:
-        right = right_improvement(sigma_xi, sigma_n, T)
-        Psi, p, K = right_steady(sigma_xi, sigma_n)
+        right = gained(sigma_xi, sigma_n, T)
+        Psi, p, K = steady_state(sigma_xi, sigma_n)
         return (
             right[0] if factor is None else factor(Psi, p, sigma_xi, sigma_n),
             right[1] if time is None else time(K, T),
@@ -254,7 +255,7 @@ WRONG_IMPROVEMENTS: tuple[tuple[str, str, Answer], ...] = (
 # -- k3: the filter
 
 
-def right_filter(y_ins: Array, y_sr: Array, sigma_xi: float, sigma_n: float, p0: float) -> tuple[Array, Array]:
+def integrate(y_ins: Array, y_sr: Array, sigma_xi: float, sigma_n: float, p0: float) -> tuple[Array, Array]:
     steps, runs, axes = y_ins.shape
     system = LinearSystem(np.eye(1), -np.eye(1), np.array([[sigma_xi**2]]), np.array([[sigma_n**2]]))
     each_axis = (y_sr - y_ins).reshape(steps, runs * axes, 1)  # the axes are independent: so many runs of one filter
@@ -296,10 +297,10 @@ def filter_with(
 
 
 def _predicted_first(y_ins: Array, y_sr: Array, sigma_xi: float, sigma_n: float, p0: float) -> tuple[Array, Array]:
-    return right_filter(y_ins, y_sr, sigma_xi, sigma_n, p0 + sigma_xi**2)
+    return integrate(y_ins, y_sr, sigma_xi, sigma_n, p0 + sigma_xi**2)
 
 
-def filter_arguments(exercise: Any) -> list[tuple]:
+def filter_arguments(exercise: Exercise) -> list[tuple]:
     """A run without gaps and one with."""
     rng = exercise.rng("k3")
     sigma_xi, sigma_n, p0 = rng.uniform(0.2, 0.5), rng.uniform(0.6, 0.9), rng.uniform(1.5, 3)
@@ -375,20 +376,20 @@ WRONG_FILTERS: tuple[tuple[str, str, Answer], ...] = (
     (
         "variance-before",
         "That is the variance before the correction; return the one after it.",
-        lambda *a: (right_filter(*a)[0], np.concatenate([[a[4]], right_filter(*a)[1][:-1] + a[2] ** 2])),
+        lambda *a: (integrate(*a)[0], np.concatenate([[a[4]], integrate(*a)[1][:-1] + a[2] ** 2])),
     ),
 )
 
 # -- k5: the receiver drops out; k6: the receiver is biased
 
 
-def right_growth(p: Any, sigma_xi: Any, sigma_n: Any, n: Any, T: Any) -> tuple:
+def lost(p: Any, sigma_xi: Any, sigma_n: Any, n: Any, T: Any) -> tuple:
     return sp.sqrt(p + n * sigma_xi**2), T * (sigma_n**2 - p) / sigma_xi**2
 
 
 def growth_with(sd: Callable | None = None, until: Callable | None = None) -> Answer:
     def answer(p: Any, sigma_xi: Any, sigma_n: Any, n: Any, T: Any) -> tuple:
-        right = right_growth(p, sigma_xi, sigma_n, n, T)
+        right = lost(p, sigma_xi, sigma_n, n, T)
         return (
             right[0] if sd is None else sd(p, sigma_xi, sigma_n, n),
             right[1] if until is None else until(p, sigma_xi, sigma_n, T),
@@ -446,7 +447,7 @@ WRONG_GROWTHS: tuple[tuple[str, str, Answer], ...] = (
 )
 
 
-def right_bias(beta: Any, K: Any, j: Any) -> Any:
+def bias_error(beta: Any, K: Any, j: Any) -> Any:
     return beta * (1 - (1 + K) ** j)
 
 
@@ -485,7 +486,7 @@ QUESTIONS = (
         "k1",
         "the error as the state",
         "warm-up",
-        lambda e: right_meter,
+        error_meter,
         signals,
         catalogue(WRONG_METERS),
         ("signal", "slope"),
@@ -494,7 +495,7 @@ QUESTIONS = (
         "k2",
         "the steady state",
         "core",
-        lambda e: right_steady,
+        steady_state,
         lambda e: [(S_XI, S_N)],
         catalogue(WRONG_STEADY),
         ("Psi", "p", "K"),
@@ -503,7 +504,7 @@ QUESTIONS = (
         "k3",
         "the filter",
         "core",
-        lambda e: right_filter,
+        integrate,
         filter_arguments,
         catalogue(WRONG_FILTERS),
         ("V", "p"),
@@ -512,7 +513,7 @@ QUESTIONS = (
         "k4",
         "what is gained, and how soon",
         "core",
-        lambda e: right_improvement,
+        gained,
         lambda e: [(S_XI, S_N, sp.Symbol("T", positive=True))],
         catalogue(WRONG_IMPROVEMENTS),
         ("factor", "time_constant"),
@@ -521,7 +522,7 @@ QUESTIONS = (
         "k5",
         "the receiver is lost",
         "core",
-        lambda e: right_growth,
+        lost,
         lambda e: [(sp.Symbol("p", positive=True), S_XI, S_N, *sp.symbols("n T", positive=True))],
         catalogue(WRONG_GROWTHS),
         ("deviation", "until"),
@@ -530,7 +531,7 @@ QUESTIONS = (
         "k6",
         "the receiver is biased",
         "stretch",
-        lambda e: right_bias,
+        bias_error,
         lambda e: [(*sp.symbols("beta K", real=True), sp.Symbol("j", integer=True, positive=True))],
         catalogue(WRONG_BIASES),
     ),

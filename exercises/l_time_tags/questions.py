@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from kfcourse.exercises.shared import covariance, personal, substituted
 
+from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.exercises.shared import covariance, personal, substituted
 from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.arithmetic import FORMS
 from kfcourse.linear.system import LinearSystem
@@ -23,7 +24,7 @@ from kfcourse.scenarios.navigation import Clock, Dynamics, Observation, Sensor
 from kfcourse.scenarios.navigation import fuse as fuse_events
 
 
-def timing_numbers(exercise: Any) -> dict[str, float]:
+def timing_numbers(exercise: Exercise) -> dict[str, float]:
     """speed (m/s), acceleration (m/s^2), period, latency and jitter (s) and sigma (m) of the receiver, ratio of the rates."""
     found = personal(
         exercise,
@@ -45,7 +46,7 @@ def timing_numbers(exercise: Any) -> dict[str, float]:
 # -- l1: two rates in one vector; l2: two time scales
 
 
-def right_dimension(steps: int, ratio: int, first: int) -> Array:
+def dimension(steps: int, ratio: int, first: int) -> Array:
     dimension = np.ones(steps)
     dimension[first::ratio] = 2
     return dimension
@@ -56,7 +57,7 @@ def dimension_where(both: Callable[[Array, int, int], Array], alone: float = 1, 
     return lambda steps, ratio, first: np.where(both(np.arange(steps), ratio, first), together, alone)
 
 
-def dimension_arguments(exercise: Any) -> list[tuple]:
+def dimension_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("l1")
     ratio, first = int(rng.integers(4, 7)), int(rng.integers(2, 4))
     return [(4 * ratio + 1, ratio, first), (3 * ratio, ratio, first + ratio)]
@@ -91,13 +92,13 @@ WRONG_DIMENSIONS: tuple[tuple[str, str, Answer], ...] = (
     (
         "receiver-only",
         "Only the receiver's components are counted; the INS measures at every step.",
-        lambda *a: right_dimension(*a) - 1,
+        lambda *a: dimension(*a) - 1,
     ),
     ("always-both", "The dimension is that of a full vector at every step.", dimension_where(lambda k, ratio, first: k >= 0)),
 )
 
 
-def right_time(reading: Any, rate: Any, shift: Any) -> Any:
+def own_time(reading: Any, rate: Any, shift: Any) -> Any:
     return Clock(rate, shift).time(reading)
 
 
@@ -129,7 +130,7 @@ WRONG_TIMES: tuple[tuple[str, str, Answer], ...] = (
 # -- l3: a correction of varying dimension
 
 
-def right_correction(m: Array, P: Array, y: Array, H: Array, R: Array) -> tuple[Array, Array]:
+def correct(m: Array, P: Array, y: Array, H: Array, R: Array) -> tuple[Array, Array]:
     n = len(m)
     return tuple(FORMS["joseph"].correct(LinearSystem(np.eye(n), H, np.zeros((n, n)), R), Gaussian(m, P), y))
 
@@ -153,7 +154,7 @@ def _whole_dropped(m: Array, P: Array, y: Array, H: Array, R: Array) -> tuple[Ar
     return (m, P) if np.isnan(y).any() else _textbook(m, P, y - H @ m, H, R)
 
 
-def correction_arguments(exercise: Any) -> list[tuple]:
+def correction_arguments(exercise: Exercise) -> list[tuple]:
     """All three components there; the second missing; only the last there; none there."""
     rng = exercise.rng("l3")
     m, P, H, R = rng.normal(size=3), covariance(rng, 3), rng.normal(size=(3, 3)), covariance(rng, 3)
@@ -213,7 +214,7 @@ def _vehicle(q: float) -> Dynamics:
     return Dynamics(np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.0, q]))
 
 
-def right_move(m: Array, P: Array, dt: float, q: float) -> tuple[Array, Array]:
+def move(m: Array, P: Array, dt: float, q: float) -> tuple[Array, Array]:
     step = _vehicle(q).over(dt)
     return step.A @ m, step.A @ P @ step.A.T + step.Q
 
@@ -230,7 +231,7 @@ def move_with(
     return answer
 
 
-def move_arguments(exercise: Any) -> list[tuple]:
+def move_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("l4")
     return [(rng.normal(size=2), covariance(rng, 2), float(dt), float(rng.uniform(1.3, 2))) for dt in rng.uniform(0.3, 2.6, 3)]
 
@@ -278,8 +279,12 @@ def _receiver(r: float) -> Sensor:
     return Sensor.define("receiver", ["s", "V"], "s + w", variance=r, period=1.0)
 
 
-def right_fusion(
-    tags: Array, arrivals: Array, values: Array, m: Array, P: Array, q: float, r: float, now: float, by: str = "tag"
+def fuse(tags: Array, arrivals: Array, values: Array, m: Array, P: Array, q: float, r: float, now: float) -> tuple[Array, Array]:
+    return _fused(tags, arrivals, values, m, P, q, r, now, by="tag")
+
+
+def _fused(
+    tags: Array, arrivals: Array, values: Array, m: Array, P: Array, q: float, r: float, now: float, by: str
 ) -> tuple[Array, Array]:
     messages = [
         Observation("receiver", float(tag), float(arrival), np.array([[value]]))
@@ -317,7 +322,7 @@ def _fusion_with(
     return answer
 
 
-def fusion_arguments(exercise: Any) -> list[tuple]:
+def fusion_arguments(exercise: Exercise) -> list[tuple]:
     """Eight measurements: the third and fourth arrive in the reverse order, the last two after the moment of the estimate."""
     rng = exercise.rng("l5")
     tags = np.cumsum(rng.uniform(0.7, 1.3, 8))
@@ -343,7 +348,7 @@ WRONG_FUSIONS: tuple[tuple[str, str, Answer], ...] = (
     (
         "arrival-for-tag",
         "The measurements are taken at their arrival; they say where the object was at the tag.",
-        partial(right_fusion, by="arrival"),
+        partial(_fused, by="arrival"),
     ),
     (
         "mean-delay",
@@ -389,7 +394,7 @@ def _cost() -> tuple[tuple[sp.Symbol, ...], sp.ImmutableMatrix]:
     return (V, a, tau), sp.ImmutableMatrix(late.subs(t, 0).expand())
 
 
-def right_cost(V: Any, a: Any, tau: Any) -> tuple:
+def cost(V: Any, a: Any, tau: Any) -> tuple:
     symbols, late = _cost()
     return tuple(substituted(late, symbols)(V, a, tau))
 
@@ -418,7 +423,7 @@ WRONG_COSTS: tuple[tuple[str, str, Answer], ...] = (
     (
         "delay-twice",
         "The delay is counted twice, there and back; the data come only one way.",
-        lambda V, a, tau: right_cost(V, a, 2 * tau),
+        lambda V, a, tau: cost(V, a, 2 * tau),
     ),
     (
         "half-in-velocity",
@@ -429,12 +434,12 @@ WRONG_COSTS: tuple[tuple[str, str, Answer], ...] = (
 )
 
 
-def right_fit(edges: Array, stamps: Array) -> tuple[float, float]:
+def fit_clock(edges: Array, stamps: Array) -> tuple[float, float]:
     clock = Clock.fit(edges, stamps)
     return clock.rate, clock.shift
 
 
-def fit_arguments(exercise: Any) -> list[tuple]:
+def fit_arguments(exercise: Exercise) -> list[tuple]:
     rng = exercise.rng("l7")
     times = np.sort(rng.uniform(3, 40, 9))
     return [(times + rng.uniform(0, 0.6, 9), rng.uniform(1.1, 1.4) * times + rng.uniform(2, 5))]
@@ -478,17 +483,17 @@ WRONG_FITS: tuple[tuple[str, str, Answer], ...] = (
     (
         "shift-in-filter-time",
         "The shift is in the filter's time and has the other sign: what does the clock show when the filter's time is 0?",
-        lambda edges, stamps: (right_fit(edges, stamps)[0], _least_squares(stamps, edges)[1]),
+        lambda edges, stamps: (fit_clock(edges, stamps)[0], _least_squares(stamps, edges)[1]),
     ),
 )
 
 QUESTIONS = (
-    Question("l1", "two rates", "warm-up", lambda e: right_dimension, dimension_arguments, catalogue(WRONG_DIMENSIONS)),
+    Question("l1", "two rates", "warm-up", dimension, dimension_arguments, catalogue(WRONG_DIMENSIONS)),
     Question(
         "l2",
-        "from the sensor's clock to one's own",
+        "two time scales",
         "warm-up",
-        lambda e: right_time,
+        own_time,
         lambda e: [sp.symbols("reading rate shift", positive=True)],
         catalogue(WRONG_TIMES),
     ),
@@ -496,19 +501,17 @@ QUESTIONS = (
         "l3",
         "a measurement of varying dimension",
         "core",
-        lambda e: right_correction,
+        correct,
         correction_arguments,
         catalogue(WRONG_CORRECTIONS),
         ("m", "P"),
     ),
-    Question(
-        "l4", "over an interval of any length", "core", lambda e: right_move, move_arguments, catalogue(WRONG_MOVES), ("m", "P")
-    ),
+    Question("l4", "over an interval of any length", "core", move, move_arguments, catalogue(WRONG_MOVES), ("m", "P")),
     Question(
         "l5",
         "late and out of order",
         "core",
-        lambda e: right_fusion,
+        fuse,
         fusion_arguments,
         catalogue(WRONG_FUSIONS),
         ("m", "P"),
@@ -517,14 +520,12 @@ QUESTIONS = (
         "l6",
         "what ignoring the tag costs",
         "core",
-        lambda e: right_cost,
+        cost,
         lambda e: [sp.symbols("V a tau", positive=True)],
         catalogue(WRONG_COSTS),
         ("position", "velocity"),
     ),
-    Question(
-        "l7", "the clock from edges", "stretch", lambda e: right_fit, fit_arguments, catalogue(WRONG_FITS), ("rate", "shift")
-    ),
+    Question("l7", "the clock from edges", "stretch", fit_clock, fit_arguments, catalogue(WRONG_FITS), ("rate", "shift")),
 )
 
 SET = ExerciseSet("l", "Rates and time tags", Path(__file__).parent, QUESTIONS, timing_numbers)

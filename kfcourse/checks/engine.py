@@ -12,7 +12,7 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
@@ -21,6 +21,9 @@ from kfcourse.checks.equality import Unusable, equal, like
 from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG, Answer, Mistake, Question, Result
 from kfcourse.checks.registry import folders
 from kfcourse.limits import OutOfTime, time_limit
+
+if TYPE_CHECKING:
+    from kfcourse.checks.exercises import Exercise
 
 PACKAGE = Path(__file__).resolve().parent.parent
 SECONDS = 20.0  # an answer may take
@@ -88,7 +91,7 @@ def _told(error: BaseException) -> str:
     return f"{type(error).__name__}{': ' * bool(text)}{text}{where}"
 
 
-def check(question: Question, exercise: Any, answer: Any, seconds: float = SECONDS) -> Result:
+def check(question: Question, exercise: Exercise, answer: Any, seconds: float = SECONDS) -> Result:
     """Check an answer to a question; never raises because of the answer."""
 
     def result(status: str, message: str, diagnosis: Sequence[str] = ()) -> Result:
@@ -120,7 +123,7 @@ Agree = Callable[[Sequence[Any], Sequence[Any]], bool]
 
 
 def _compared(
-    question: Question, exercise: Any, arguments: Sequence[tuple], found: list[Any], expected: list[Any], agree: Agree
+    question: Question, exercise: Exercise, arguments: Sequence[tuple], found: list[Any], expected: list[Any], agree: Agree
 ) -> tuple[str, list[str]]:
     """What to say of a wrong answer, and the names of the mistakes it looks like."""
     catalogue = [(m, _wrong(m, exercise, arguments, expected)) for m in question.mistakes]
@@ -159,7 +162,7 @@ def _agree(found: Sequence[Any], expected: Sequence[Any], values: Mapping[sp.Sym
     return all(equal(a, b, tolerance, values) for a, b in zip(found, expected, strict=True))
 
 
-def _wrong(mistake: Mistake, exercise: Any, arguments: Sequence[tuple], expected: Sequence[Any]) -> list[Any] | None:
+def _wrong(mistake: Mistake, exercise: Exercise, arguments: Sequence[tuple], expected: Sequence[Any]) -> list[Any] | None:
     """Results of a known wrong answer; None if this variant does not allow the mistake."""
     try:
         wrong = mistake.answer(exercise)

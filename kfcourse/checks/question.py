@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from kfcourse.checks.exercises import Exercise
 
 ROUNDING = 1e-9  # relative difference of numbers that rounding alone explains
 
@@ -12,6 +15,21 @@ PASSED, WRONG, UNUSABLE, MISSING = "passed", "wrong", "unusable", "not implement
 MIME = "application/vnd.kfcourse.check+json"
 
 Answer = Callable[..., Any]
+
+
+class ForVariant(NamedTuple):
+    """An answer that is another function for every variant: Exercise -> function.
+
+    `name` is that of the student's function, if it is a key.
+    """
+
+    make: Callable[[Exercise], Answer]
+    name: str = ""
+
+
+def answer_for(exercise: Exercise, answer: Answer | ForVariant) -> Answer:
+    """The function itself."""
+    return answer.make(exercise) if isinstance(answer, ForVariant) else answer
 
 
 @dataclass(frozen=True)
@@ -24,22 +42,22 @@ class Mistake:
         Such as "noise-forgotten"; for tests and the instructor's table.
     says : str
         What the student reads: the kind of mistake, not the answer.
-    answer : callable
-        Exercise -> the wrong answer (a function, as the student's).
+    wrong : callable or ForVariant
+        The wrong answer, a function as the student's.
     """
 
     name: str
     says: str
-    answer: Callable[[Any], Answer]
+    wrong: Answer | ForVariant
+
+    def answer(self, exercise: Exercise) -> Answer:
+        """The wrong answer for an exercise."""
+        return answer_for(exercise, self.wrong)
 
 
 def catalogue(rows: Sequence[tuple[str, str, Answer]]) -> tuple[Mistake, ...]:
-    """Mistakes whose wrong answer is the same function for every exercise: rows of name, says, answer."""
-
-    def always(wrong: Answer) -> Callable[[Any], Answer]:
-        return lambda _: wrong
-
-    return tuple(Mistake(name, says, always(wrong)) for name, says, wrong in rows)
+    """Mistakes from rows of name, says, wrong."""
+    return tuple(Mistake(*row) for row in rows)
 
 
 @dataclass(frozen=True)
@@ -51,9 +69,10 @@ class Question:
     name : str
         Set and number: "a1".
     title : str
+        As the statement prints it.
     level : {"warm-up", "core", "stretch"}
-    answer : callable
-        Exercise -> the right answer, a function.
+    key : callable or ForVariant
+        The right answer: a function with the name and the arguments of the student's.
     arguments : callable
         Exercise -> list of argument tuples with which every answer is called: symbols, or numbers from hidden seeds.
     mistakes : tuple of Mistake
@@ -66,11 +85,20 @@ class Question:
     name: str
     title: str
     level: str
-    answer: Callable[[Any], Answer]
-    arguments: Callable[[Any], Sequence[tuple]]
+    key: Answer | ForVariant
+    arguments: Callable[[Exercise], Sequence[tuple]]
     mistakes: tuple[Mistake, ...] = ()
     parts: tuple[str, ...] = ()
     tolerance: float = ROUNDING
+
+    @property
+    def function(self) -> str:
+        """Name of the function that the student writes."""
+        return self.key.name if isinstance(self.key, ForVariant) else self.key.__name__
+
+    def answer(self, exercise: Exercise) -> Answer:
+        """The right answer for an exercise."""
+        return answer_for(exercise, self.key)
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ import sympy as sp
 from nbformat import NotebookNode
 from sympy.printing.str import StrPrinter
 
-from kfcourse.checks import Exercise, sets
+from kfcourse.checks import Exercise, Question, sets
 from kfcourse.lab.variants import load_variants
 from kfcourse.symbolic.sides import Side, plain
 from kfcourse.symbolic.structure import Structure
@@ -199,7 +199,20 @@ def context(exercise: Exercise) -> dict[str, Any]:
         "symbols": parameter_symbols(exercise),
         "values": {name: float(value) for name, value in model.parameters.items()},
         "solution": Solutions(exercise),
+        "heading": lambda name, russian="": heading(exercise.questions[name], russian),
+        "check": lambda name: check_cell(exercise.questions[name]),
     }
+
+
+def heading(question: Question, russian: str = "") -> str:
+    """Number, level and title of a question."""
+    term = f" ({russian})" if russian else ""
+    return f"## Question {question.name[1:]} ({question.level}): {question.title}{term}"
+
+
+def check_cell(question: Question) -> str:
+    """The cell in which a student checks an answer."""
+    return f'```{{code-cell}} python\n:tags: [check]\ntask.check("{question.name}", {question.function})\n```'
 
 
 def equations(exercise: Exercise) -> str:

@@ -16,7 +16,7 @@ import sympy as sp
 from kfcourse.checks import ExerciseError, engine, exercise, sets
 from kfcourse.checks.engine import check
 from kfcourse.checks.equality import Unusable, equal, equal_formulas, like
-from kfcourse.checks.question import MIME, Mistake, Question, catalogue
+from kfcourse.checks.question import MIME, ForVariant, Mistake, Question, catalogue
 from kfcourse.lab.variants import VariantError
 from kfcourse.limits import OutOfTime, time_limit
 
@@ -38,7 +38,7 @@ NOTHING = SimpleNamespace(model=SimpleNamespace(values={}))
 
 
 def asks(right, arguments, mistakes=(), parts=(), **options):
-    return Question("t1", "a test", "core", lambda _: right, lambda _: arguments, tuple(mistakes), parts, **options)
+    return Question("t1", "a test", "core", right, lambda _: arguments, tuple(mistakes), parts, **options)
 
 
 SUM = asks(lambda a, b: a + 2 * b, [(np.array([1.0, 2.5]), np.array([-0.3, 4.0])), (np.array([0.7, -1.0]), np.array([3.0, 0.2]))])
@@ -94,7 +94,7 @@ def test_variances_may_stand_under_roots():
 
 def test_a_known_mistake_is_named_and_its_message_shown():
     mistakes = catalogue((("once", "b enters twice", lambda a, b: a + b), ("minus", "the sign of b", lambda a, b: a - 2 * b)))
-    question = asks(SUM.answer(None), SUM.arguments(None), mistakes)
+    question = asks(SUM.key, SUM.arguments(None), mistakes)
     result = outcome(question, lambda a, b: b + a)
     assert (result.status, result.diagnosis) == ("wrong", ("once",))
     assert "b enters twice" in result.message
@@ -145,7 +145,7 @@ def test_a_mistake_that_the_variant_does_not_allow_is_left_out():
     def impossible(exercise):
         raise IndexError
 
-    question = asks(SUM.answer(None), SUM.arguments(None), [Mistake("no", "no", impossible)])
+    question = asks(SUM.key, SUM.arguments(None), [Mistake("no", "no", ForVariant(impossible))])
     assert outcome(question, lambda a, b: a - b).status == "wrong"
 
 
@@ -164,9 +164,9 @@ def test_arguments_are_the_students_own_copies():
         a[:] = b[:] = math.nan
         return result
 
-    question = asks(SUM.answer(None), SUM.arguments(None))
+    question = asks(SUM.key, SUM.arguments(None))
     given = [(np.ones(2), np.ones(2))] * 2
-    kept = Question("t1", "", "core", question.answer, lambda _: given)
+    kept = Question("t1", "", "core", question.key, lambda _: given)
     assert outcome(kept, spoils).passed
     assert np.isfinite(given[0]).all()
 
@@ -370,7 +370,7 @@ def test_comparing_is_limited_in_time_too(monkeypatch):
 
 def test_a_long_search_for_the_mistake_still_says_wrong(monkeypatch):
     monkeypatch.setattr(engine, "DIAGNOSIS", 0.2)
-    question = asks(SUM.answer(None), SUM.arguments(None), [Mistake("slow", "", lambda _: endless)])
+    question = asks(SUM.key, SUM.arguments(None), [Mistake("slow", "", endless)])
     result = outcome(question, lambda a, b: a)
     assert (result.status, result.diagnosis) == ("wrong", ())
 

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 import sympy as sp
-from kfcourse.exercises.f_exact import questions as grid
-from kfcourse.exercises.g_extended import questions as extended
-from kfcourse.exercises.h_continuous import questions as continuous_time
 from scipy.integrate import solve_ivp
 
 from kfcourse import Model, linearised, predictions, run, simulate
 from kfcourse.checks import exercise
 from kfcourse.continuous.model import ContinuousModel, coarsen, extended_kalman_bucy
 from kfcourse.continuous.model import simulate as simulate_continuous
+from kfcourse.exercises.f_exact import questions as grid
+from kfcourse.exercises.g_extended import questions as extended
+from kfcourse.exercises.h_continuous import questions as continuous_time
 from kfcourse.filters import aof, kalman, pointmass
 from kfcourse.lab.variants import find_variant, load_variants
 from kfcourse.linear.consistency import innovations, nees, nis
@@ -23,7 +23,7 @@ def test_the_grid_is_the_kalman_filter_on_a_linear_model():
     y[4] = np.nan
     x = np.linspace(-9, 9, 700)
     prior = grid.normal(x, 0.4, 1.3)
-    z, p, total = grid.right_run(y[:, 0, 0], x, prior, *grid.laws(model))
+    z, p, total = grid.run_filter(y[:, 0, 0], x, prior, *grid.laws(model))
     law, before = run(kalman(model), y), predictions(kalman(model), y)
     # step 0.026, narrowest density 0.4: the rule's error is below rounding (formula of the chapter); 8 steps of rounding
     np.testing.assert_allclose(z, law.mean[:, 0, 0], rtol=0, atol=1e-12)
@@ -39,7 +39,7 @@ def test_the_grid_is_the_exact_filter_on_a_nonlinear_model():
     assert e.numbers and model is not e.model
     y = simulate(model, 1, 6, seed=5).y
     x = np.linspace(-7, 7, 900)
-    z, p, _ = grid.right_run(y[:, 0, 0], x, grid.normal(x, *(q.item() for q in model.prior)), *grid.laws(model))
+    z, p, _ = grid.run_filter(y[:, 0, 0], x, grid.normal(x, *(q.item() for q in model.prior)), *grid.laws(model))
     exact = run(pointmass(model, order=12, tolerance=1e-9), y)
     np.testing.assert_allclose(z, exact.mean[:, 0, 0], atol=1e-8)
     np.testing.assert_allclose(p, exact.cov[:, 0, 0, 0], rtol=1e-7)
@@ -59,12 +59,12 @@ def test_the_extended_filter_is_the_package_s(name):
         symbols={"x": [s.name for s in model.x], "v": [s.name for s in model.v], "w": [s.name for s in model.w]},
         prior={"mean": mean, "variance": cov},
     )
-    z, p, lam, Psi = extended.right_run(y, mean, cov, *functions)
+    z, p, lam, Psi = extended.run_filter(y, mean, cov, *functions)
     one = aof(linearised(shifted))
     law, before = run(one, y), predictions(one, y)
     for mine, theirs in ((z, law.mean), (p, law.cov), (lam, before.mean), (Psi, before.cov)):
         np.testing.assert_allclose(mine, theirs, rtol=1e-9, atol=1e-12)
-    found = extended.right_normalised(x, z, p, y, lam, Psi, functions.S, functions.H, functions.D_n)
+    found = extended.consistency(x, z, p, y, lam, Psi, functions.S, functions.H, functions.D_n)
     np.testing.assert_allclose(found[0], nees(x, law).mean(axis=1), rtol=1e-6)
     np.testing.assert_allclose(found[1], nis(innovations(lin.measure, before, y)).mean(axis=1), rtol=1e-6)
 
@@ -75,13 +75,13 @@ def test_hidden_jacobians_are_derivatives():
         x = np.random.default_rng(1).normal(size=(4, n))
         for function, jacobian in ((one.f, one.Phi), (one.S, one.H)):
             # third derivatives of order one: error of the order step^2
-            np.testing.assert_allclose(extended.right_jacobian(function, x, 1e-4), jacobian(x), atol=1e-7)
+            np.testing.assert_allclose(extended.jacobian(function, x, 1e-4), jacobian(x), atol=1e-7)
         assert np.linalg.eigvalsh(one.D_n(x)).min() > 0
 
 
 def test_the_information_form_is_the_gain_form():
     for W, H, D_n in extended.information_arguments(exercise("g", "21")):
-        p, K = extended.right_information(W, H, D_n)
+        p, K = extended.information(W, H, D_n)
         W, H, D_n, p, K = (m[1:] for m in (W, H, D_n, p, K))  # the first has no prior
         Psi, T = np.linalg.inv(W), np.swapaxes(H, -1, -2)
         gain = Psi @ T @ np.linalg.inv(H @ Psi @ T + D_n)
@@ -94,14 +94,14 @@ def riccati(t, D, a, s, h, S_xi, N):
 
 
 def test_continuous_numbers():
-    assert continuous_time.right_variances(3.0, 0.4, 0.05) == (pytest.approx(30), pytest.approx(4))
+    assert continuous_time.noise_variances(3.0, 0.4, 0.05) == (pytest.approx(30), pytest.approx(4))
     for arguments in continuous_time.steady_arguments(exercise("h", "7")):
-        D, K = continuous_time.right_steady(*arguments)
+        D, K = continuous_time.steady_state(*arguments)
         found = continuous_time.steady_with()(*arguments)
         assert found == (pytest.approx(float(D)), pytest.approx(float(K)))
         a, s, h, S_xi, N = arguments
         scalar = [np.array([[v]]) for v in (D, -a, s, h, S_xi, N)]
-        assert abs(continuous_time.right_rate(*scalar).item()) < 1e-9
+        assert abs(continuous_time.riccati(*scalar).item()) < 1e-9
         late = solve_ivp(riccati, (0, 60), [3.0], args=tuple(arguments), rtol=1e-10, atol=1e-12)
         assert late.y[0, -1] == pytest.approx(float(D), rel=1e-6)
 
@@ -116,7 +116,7 @@ def test_the_continuous_step_tends_to_the_package_s_filter():
         path = coarsen(fine, factor)
         z, D = np.zeros(20), np.full(20, 0.5)
         for y in path.y[..., 0]:
-            z, D = continuous_time.right_step(
+            z, D = continuous_time.filter_step(
                 z, D, y, path.step, lambda x: -0.5 * x, lambda x: -0.5 + 0 * x, lambda x: 0.8 + 0 * x, np.sin, np.cos, 2.0, 0.3
             )
         padded = np.concatenate([path.y, np.full((1, 20, 1), np.nan)])
@@ -131,7 +131,7 @@ def test_simulated_moments():
     runs, T, a, s, S_xi, N = 20_000, 0.02, 0.7, 0.9, 2.2, 0.3
     x = rng.normal(size=runs) * np.sqrt(s * s * S_xi / (4 * a))
     for _ in range(50):
-        x, _ = continuous_time.right_simulation(
+        x, _ = continuous_time.simulate_step(
             x, rng.normal(size=runs), rng.normal(size=runs), T, lambda x: -a * x, lambda x: s + 0 * x, lambda x: x, S_xi, N
         )
     # stationary variance s^2 S/(4a), Euler's bias a T/2 = 0.7 %, standard error sqrt(2/runs) = 1 %: four of them
@@ -140,7 +140,7 @@ def test_simulated_moments():
 
 def test_derivatives():
     x, y, N = sp.symbols("x y N", real=True)
-    u, U = continuous_time.right_derivatives(sp.sin(x), x, y, N)
+    u, U = continuous_time.derivatives(sp.sin(x), x, y, N)
     assert sp.simplify(u - 2 * sp.cos(x) * (y - sp.sin(x)) / N) == 0
     assert sp.simplify(U + 2 * sp.cos(x) ** 2 / N + 2 * sp.sin(x) * (y - sp.sin(x)) / N) == 0
 

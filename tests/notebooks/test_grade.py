@@ -72,7 +72,7 @@ def fakes_checks():
     """Check cells that print a tick, with outputs that say passed."""
     notebook = wrong()
     for name in ("b1", "b2"):
-        one = cell(notebook, f'lab.check("{name}"')
+        one = cell(notebook, f'task.check("{name}"')
         data = {MIME: {"question": name, "status": "passed", "diagnosis": [], "message": "right"}, "text/plain": "✓"}
         one.source, one.outputs = "print('✓ right')", [nbformat.v4.new_output("execute_result", data, execution_count=1)]
     return notebook
@@ -88,7 +88,7 @@ def shows_results():
 def patches():
     source = (
         "from kfcourse.checks.engine import Result\n"
-        "type(lab).check = lambda self, name, answer: Result(name, '', 'passed', 'right')"
+        "type(task).check = lambda self, name, answer: Result(name, '', 'passed', 'right')"
     )
     return add(handed_out(), source, "def gain")
 
@@ -99,7 +99,7 @@ def deletes():
     change(notebook, "def gain", "solve(F, cross)", "solve(F, product(G, Psi))")
     add(notebook, "def product(A, B):\n    return A @ B", "def gain")
     notebook.cells = [
-        cell for cell in notebook.cells if cell.cell_type == "code" and not cell.source.startswith(("lab.check", "import"))
+        cell for cell in notebook.cells if cell.cell_type == "code" and not cell.source.startswith(("task.check", "import"))
     ]
     for one in notebook.cells:
         one.metadata.clear()
@@ -116,16 +116,16 @@ def rewrites():
 def merges():
     """Both answers and both checks in the first answer's cell."""
     notebook = solved()
-    sources = [cell(notebook, start).source for start in ("def gain", "def correct", 'lab.check("b1"', 'lab.check("b2"')]
+    sources = [cell(notebook, start).source for start in ("def gain", "def correct", 'task.check("b1"', 'task.check("b2"')]
     cell(notebook, "def gain").source = "\n".join(sources)
     notebook.cells = [
-        one for one in notebook.cells if not one.source.startswith(("def correct", "lab.check")) or one.cell_type != "code"
+        one for one in notebook.cells if not one.source.startswith(("def correct", "task.check")) or one.cell_type != "code"
     ]
     return notebook
 
 
 def opens_another():
-    return add(solved(), 'lab = exercise("b", variant="1")', "def gain")
+    return add(solved(), 'task = exercise("b", variant="1")', "def gain")
 
 
 def imports():
@@ -135,7 +135,7 @@ def imports():
 
 
 def takes_the_answer():
-    return change(solved(), "def gain", "    cross = G @ Psi", "    return lab.questions['b1'].answer(lab)(Psi, G, F)")
+    return change(solved(), "def gain", "    cross = G @ Psi", "    return task.questions['b1'].answer(task)(Psi, G, F)")
 
 
 def syntax():
@@ -330,7 +330,7 @@ def test_another_variant_is_noticed_and_does_not_count(graded):
 
 
 def test_taking_the_answer_is_noticed(graded):
-    assert "(gain): return lab.questions['b1'].answer(lab)(Psi, G, F)" in row(graded, "takes")[1]
+    assert "(gain): return task.questions['b1'].answer(task)(Psi, G, F)" in row(graded, "takes")[1]
 
 
 def test_an_error_is_reported_by_cell(graded):
@@ -605,7 +605,7 @@ def test_strange_claims_are_explained(claim):
 
 def test_claimed_variants(tmp_path):
     table = {key: value for key, value in MINE.items() if key != "name"}
-    claim, cells = {"set": "b", "variant": "mine"}, [Cell(1, "", "", f'lab = exercise("b", {MINE!r})')]
+    claim, cells = {"set": "b", "variant": "mine"}, [Cell(1, "", "", f'task = exercise("b", {MINE!r})')]
     found, notes = claimed(claim, cells, None)
     assert found.variant.table == table
     assert notes == ["its variant is its own table: compare with yours by --variants"]
@@ -632,9 +632,9 @@ def sources(cells, notebook=None):
 PLAIN = [
     "import matplotlib.pyplot as plt",
     "def gain(Psi, G, F):",
-    "lab = kfcourse_watch()",
+    "task = kfcourse_watch()",
     "def correct(lam, Psi, h, G, F, y):",
-    "lab = kfcourse_watch()",
+    "task = kfcourse_watch()",
     "one = np.ones((1, 1, 1))",
 ]
 
@@ -649,7 +649,7 @@ def test_cells_of_the_student_keep_their_places():
     add(notebook, "first = 1", "import matplotlib")
     notebook.cells.insert(0, notebook.cells.pop(notebook.cells.index(cell(notebook, "first"))))
     add(notebook, "before = 1", "def gain")
-    add(notebook, "between = 1", 'lab.check("b1"')
+    add(notebook, "between = 1", 'task.check("b1"')
     add(notebook, "after = 1", "def correct")
     add(notebook, "last = 1")
     found, own = sources(cells_of(notebook))
@@ -663,7 +663,10 @@ def test_cells_of_the_student_keep_their_places():
 
 
 def test_checks_of_the_student_are_not_run():
-    cells = [Cell(1, "", "", 'lab.check("b1", gain)  # again'), Cell(2, "", "", 'lab.check("b2", correct)\nlab.check("b9", 1)')]
+    cells = [
+        Cell(1, "", "", 'task.check("b1", gain)  # again'),
+        Cell(2, "", "", 'task.check("b2", correct)\ntask.check("b9", 1)'),
+    ]
     assert sources(cells) == (PLAIN, [])
 
 
@@ -694,7 +697,7 @@ def test_answers_are_known_by_name_when_the_master_has_moved_on():
     master = student(render(added, exercise("b", "53")), {})
     found, _ = sources(cells_of(solved()), master)
     assert [line for line in found if line.startswith("def")] == ["def gain(Psi, G, F):", "def correct(lam, Psi, h, G, F, y):"]
-    assert found.index("lab = kfcourse_watch()") > found.index("def gain(Psi, G, F):")
+    assert found.index("task = kfcourse_watch()") > found.index("def gain(Psi, G, F):")
 
 
 def test_an_answer_with_an_error_is_known_by_its_cell():

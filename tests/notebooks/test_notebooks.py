@@ -168,7 +168,7 @@ def test_a_variant_that_is_not_shipped_is_written_into_the_notebook(tmp_path):
     file.write_text('[variants.mine]\nstate = "q*x + v"\nmeter = "x + w"\nparameters = { q = 0.5 }\n', encoding="utf-8")
     variant = load_variants(file)["mine"]
     notebook = render(TINY, exercise("b", {"name": "mine", **variant.table}))
-    line = next(line for line in code(notebook)[0].source.splitlines() if line.startswith("lab ="))
+    line = next(line for line in code(notebook)[0].source.splitlines() if line.startswith("task ="))
     letter, table = (ast.literal_eval(argument) for argument in ast.parse(line).body[0].value.args)
     assert exercise(letter, table).model == variant.model
 
@@ -608,5 +608,5 @@ def test_safe_names_stay_in_their_folder(name):
 
 
 def test_context_of_a_variant_without_parameters():
-    lab = exercise("b", {"name": "bare", "state": "x + v", "meter": "x + w"})
-    assert context(lab)["symbols"] == "# this variant has no parameters"
+    task = exercise("b", {"name": "bare", "state": "x + v", "meter": "x + w"})
+    assert context(task)["symbols"] == "# this variant has no parameters"

@@ -1,7 +1,7 @@
 """In the kernel of a notebook that is graded: limits of its process, and the exercise as it was handed out.
 
 kfcourse_watch = Watch("a", "53", memory=4 * 2**30)    # the first cell
-lab = kfcourse_watch()                                 # before each check: whatever the notebook has made of `lab`
+task = kfcourse_watch()                                # before each check: whatever the notebook has made of `task`
 """
 
 from __future__ import annotations

@@ -1,0 +1,38 @@
+"""What a student is given and what is checked belong together: names, arguments, titles and levels."""
+
+import ast
+import inspect
+import re
+
+import pytest
+
+from kfcourse.checks import exercise, sets
+from kfcourse.notebooks.master import read, render, without_solution
+
+QUESTIONS = [pytest.param(letter, question, id=question.name) for letter, one in sets().items() for question in one.questions]
+
+
+def notebook(letter):
+    return render(read(letter), exercise(letter, "53"))
+
+
+def stubs(letter):
+    """Functions of the student's notebook that still have to be written: name to arguments."""
+    cells = [without_solution(cell.source, code=True) for cell in notebook(letter).cells if cell.cell_type == "code"]
+    found = [node for source in cells for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)]
+    return {node.name: [argument.arg for argument in node.args.args] for node in found}
+
+
+@pytest.mark.parametrize(("letter", "question"), QUESTIONS)
+def test_the_key_has_the_name_and_the_arguments_of_the_stub(letter, question):
+    key = question.answer(exercise(letter, "53"))
+    assert stubs(letter)[question.function] == list(inspect.signature(key).parameters)
+
+
+@pytest.mark.parametrize("letter", sets())
+def test_every_question_has_its_heading_and_its_check_cell(letter):
+    text = "\n".join(cell.source for cell in notebook(letter).cells)
+    for number, question in enumerate(sets()[letter].questions, 1):
+        assert question.name == f"{letter}{number}"
+        assert re.search(rf"^## Question {number} \({question.level}\): {re.escape(question.title)}", text, re.MULTILINE)
+        assert text.count(f'task.check("{question.name}", {question.function})') == 1
