@@ -10,7 +10,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.filters import notation as s
-from kfcourse.filters.base import Design, Equations, Regression, Step
+from kfcourse.filters.designed import Design, Equations, Regression, Step
 from kfcourse.laws import Array, Gaussian, where_measured
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import compile_noiseless

@@ -14,8 +14,8 @@ from kfcourse.filters.alphabeta import (
     steady_gamma,
     tracking_index,
 )
-from kfcourse.filters.kalman import linear_system
-from kfcourse.linear.runs import covariances
+from kfcourse.linear import covariances
+from kfcourse.linear.system import linear_system
 from kfcourse.scenarios.aircraft import kinematic
 
 T = 0.7

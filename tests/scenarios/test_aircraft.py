@@ -6,7 +6,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from kfcourse import ModelError
-from kfcourse.filters.kalman import linear_system
+from kfcourse.linear.system import linear_system
 from kfcourse.scenarios.aircraft import (
     CARTESIAN,
     SPHERICAL,
