@@ -9,11 +9,13 @@ executed cells are kept (_build/.jupyter_cache), as long as the package, the req
 from __future__ import annotations
 
 import hashlib
+import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import chapters
 import manual
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -21,6 +23,7 @@ BUILD = ROOT / "_build"
 CACHE = BUILD / ".jupyter_cache"
 KEPT = (CACHE, BUILD / "solutions")  # made anew by themselves when stale
 KEY = BUILD / ".executed-with"
+NOT_BUILT = "\nThe book was NOT built: see the errors and warnings above."
 
 
 def fingerprint() -> str:
@@ -49,10 +52,17 @@ def prepare() -> None:
 
 def main() -> int:
     prepare()
+    # Small matrices: several threads inside one kernel cost more than they gain, and the kernels share the processors.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     # On a new machine matplotlib announces its font cache on stderr; not in a chapter, please.
     subprocess.run([sys.executable, "-c", "import matplotlib.font_manager"], stderr=subprocess.DEVNULL, check=True)
-    if not manual.write():
+    failures = chapters.execute_all(CACHE, manual.solutions())
+    for failure in failures:
+        print(f"\nFAILED {failure}", file=sys.stderr)
+    if failures:
+        print(NOT_BUILT, file=sys.stderr)
         return 1
+    manual.write()
     jupyter_book = [sys.executable, "-c", "from jupyter_book.cli.main import main; main()"]
     options = ["--config", "_config.yml", "--path-output", ".", "-W", "--keep-going", "-n"]
     result = subprocess.run([*jupyter_book, "build", "book", *options], cwd=ROOT)
@@ -60,7 +70,7 @@ def main() -> int:
         for report in sorted((BUILD / "html" / "reports").rglob("*.log")):
             print(f"\n{report.relative_to(ROOT)}:\n{report.read_text(encoding='utf-8')}", file=sys.stderr)
         shutil.rmtree(BUILD / "html", ignore_errors=True)
-        print("\nThe book was NOT built: see the errors and warnings above.", file=sys.stderr)
+        print(NOT_BUILT, file=sys.stderr)
         return 1
     page = BUILD / "html" / "index.html"
     print(f"\nThe book: {page}\nTo read it, open that file in a browser, for instance with:")

@@ -1,19 +1,18 @@
 """The pages of the lab manual, made from the masters of the exercises for one variant.
 
 Into book/manual/ go, for every set, its page (questions, hints, no solutions), the pictures to reach, and the student's
-notebook to download.  The worked solutions are executed for that, and kept in _build/solutions.
+notebook to download.  The worked solutions, executed before, are kept in _build/solutions.
 """
 
 from __future__ import annotations
 
 import shutil
-import sys
 from pathlib import Path
 
 import nbformat
 
 from kfcourse.checks import exercise, sets
-from kfcourse.notebooks.course import jobs, make, run_all
+from kfcourse.notebooks.course import Job, jobs
 from kfcourse.notebooks.execute import pictures
 from kfcourse.notebooks.master import read, render, statement, student
 
@@ -29,17 +28,16 @@ Open it in Jupyter, in an environment in which `kfcourse` is installed: {{doc}}`
 """
 
 
-def write() -> bool:
-    """Write the pages; False, with a message, if a solution fails."""
-    work = jobs("solutions", SOLUTIONS, [VARIANT], list(sets()))
-    failed = [outcome for outcome in run_all(work, make, 2, "lab manual") if outcome.status == "failed"]
-    for outcome in failed:
-        print(f"FAILED {outcome.job.name}: {outcome.message}", file=sys.stderr)
-    if failed:
-        return False
+def solutions() -> list[Job]:
+    """The worked solutions that the pages are made from."""
+    return jobs("solutions", SOLUTIONS, [VARIANT], list(sets()))
+
+
+def write() -> None:
+    """Write the pages; the solutions are there."""
     shutil.rmtree(PAGES, ignore_errors=True)
     (PAGES / "notebooks").mkdir(parents=True)
-    for job in work:
+    for job in solutions():
         notebook = render(read(job.letter), exercise(job.letter, VARIANT))
         found = pictures(nbformat.read(job.target, as_version=4))
         for name, png in found.items():
@@ -48,4 +46,3 @@ def write() -> bool:
         heading, rest = statement(notebook, {name: f"{name}.png" for name in found}).split("\n", 1)
         (PAGES / f"{file}.md").write_text(f"{heading}\n{NOTE.format(variant=VARIANT, file=file)}{rest}", encoding="utf-8")
         nbformat.write(student(notebook, found), PAGES / "notebooks" / f"{file}.ipynb")
-    return True

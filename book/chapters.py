@@ -1,0 +1,85 @@
+"""The chapters, executed several at once into the cache from which Sphinx takes their outputs.
+
+Sphinx would execute them one after another.  The worked solutions of the lab manual run in the same processes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import joblib
+import yaml
+from jupyter_cache import get_cache
+from jupyter_cache.base import CacheBundleIn
+from jupyter_cache.executors.utils import single_nb_execution
+from myst_nb.core.read import is_myst_markdown_notebook, myst_nb_reader_plugin
+from nbclient.exceptions import DeadKernelError
+from nbformat import NotebookNode
+
+from kfcourse.notebooks.course import Job, Outcome, make, run_all
+
+BOOK = Path(__file__).resolve().parent
+SETTINGS = yaml.safe_load((BOOK.parent / "_config.yml").read_text(encoding="utf-8"))["execute"]
+
+
+class Executed(NamedTuple):
+    """A chapter with its outputs; or the traceback, if it failed."""
+
+    path: Path
+    notebook: NotebookNode
+    seconds: float
+    traceback: str | None
+
+    @property
+    def failure(self) -> str | None:
+        return self.traceback and f"{self.path.name}:\n{self.traceback}"
+
+
+def notebooks() -> list[Path]:
+    """The chapters of the book that have code."""
+    toc = yaml.safe_load((BOOK / "_toc.yml").read_text(encoding="utf-8"))
+    pages = [toc["root"], *(chapter["file"] for part in toc["parts"] for chapter in part["chapters"])]
+    paths = [BOOK / f"{page}.md" for page in pages if not page.startswith("manual/")]
+    return [path for path in paths if is_myst_markdown_notebook(path.read_text(encoding="utf-8"))]
+
+
+def execute(chapter: Path) -> Executed:
+    """Execute a chapter, in the folder of the book."""
+    notebook = myst_nb_reader_plugin(str(chapter))
+    try:
+        done = single_nb_execution(notebook, cwd=str(BOOK), timeout=SETTINGS["timeout"], allow_errors=False)
+    except (DeadKernelError, RuntimeError) as error:  # RuntimeError: no kernel starts
+        return Executed(chapter, notebook, 0.0, f"{type(error).__name__}: {error}")
+    return Executed(chapter, done.nb, done.time, done.exc_string)
+
+
+def work(job: Path | Job) -> Executed | Outcome:
+    """Execute a chapter, or make a worked solution."""
+    return execute(job) if isinstance(job, Path) else make(job)
+
+
+def execute_all(folder: Path, solutions: Sequence[Job]) -> list[str]:
+    """Execute the chapters that the cache does not hold, and make the solutions; what failed, in words."""
+    cache = get_cache(folder)
+    new = [path for path in notebooks() if not _cached(cache, path)]
+    failures = []
+    for done in run_all([*new, *solutions], work, joblib.cpu_count(), "executing"):
+        if isinstance(done, Outcome):
+            if done.status == "failed":
+                failures.append(f"{done.job.name}: {done.message}")
+        elif done.failure:
+            failures.append(done.failure)
+        else:
+            bundle = CacheBundleIn(done.notebook, str(done.path), data={"execution_seconds": done.seconds})
+            cache.cache_notebook_bundle(bundle, check_validity=False, overwrite=True)
+    return failures
+
+
+def _cached(cache, path: Path) -> bool:
+    try:
+        cache.match_cache_notebook(myst_nb_reader_plugin(str(path)))
+    except KeyError:
+        return False
+    return True
