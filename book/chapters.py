@@ -49,7 +49,13 @@ def execute(chapter: Path) -> Executed:
     """Execute a chapter, in the folder of the book."""
     notebook = myst_nb_reader_plugin(str(chapter))
     try:
-        done = single_nb_execution(notebook, cwd=str(BOOK), timeout=SETTINGS["timeout"], allow_errors=False)
+        done = single_nb_execution(
+            notebook,
+            cwd=str(BOOK),
+            timeout=SETTINGS["timeout"],
+            allow_errors=False,
+            extra_arguments=["--log-level=ERROR"],  # kernels tell of their connections
+        )
     except (DeadKernelError, RuntimeError) as error:  # RuntimeError: no kernel starts
         return Executed(chapter, notebook, 0.0, f"{type(error).__name__}: {error}")
     return Executed(chapter, done.nb, done.time, done.exc_string)

@@ -112,3 +112,19 @@ def test_page_in_a_browser_without_network(browser, page: str) -> None:
             assert tab.locator("mjx-merror, [data-mjx-error]").count() == 0, "a formula that MathJax cannot read"
         tab.wait_for_load_state("networkidle")
     assert problems == []
+
+
+def test_the_live_chapter_prints_what_its_page_shows(browser):
+    notebook = nbformat.read(EXECUTED / "live-track.ipynb", as_version=4)
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    printed = "\n".join(output.text for output in outputs if output.output_type == "stream")
+    with browser.new_context(offline=True) as context:
+        tab = context.new_page()
+        tab.clock.install(time=0)  # time stands still but for run_for(ms)
+        tab.goto((HTML / "live-track.html").as_uri())
+        tab.clock.pause_at(1000)
+        tab.get_by_role("button", name="Play the recorded track").press("Enter")
+        tab.clock.run_for(60_000)
+        for name in ("noisy", "filtered", "inside", "nis"):
+            value = tab.locator(f"[data-show={name}-all]").inner_text()
+            assert re.search(rf"^{name} +{re.escape(value)}$", printed, re.MULTILINE), (name, value, printed)

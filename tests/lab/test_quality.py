@@ -69,10 +69,10 @@ def test_a_shipped_variant_is_well_posed(name):
 
 def test_the_result_does_not_depend_on_the_number_of_processes():
     chosen = [SHIPPED["53"], SHIPPED["1"]]
-    one, two = (list(examine_all(chosen, 512, 3, jobs, unposed)) for jobs in (1, 2))
+    one, two = (list(examine_all(chosen, 512, 3, jobs)) for jobs in (1, 2))
     assert [found.name for found in one] == ["53", "1"]
     assert one == two
-    assert one[0].bounded != next(examine_all(chosen[:1], 512, 4, 1, unposed)).bounded
+    assert one[0].bounded != examine(chosen[0], 512, 4).bounded
 
 
 # --- bad variants, each refused for its own reason
@@ -455,7 +455,7 @@ def test_no_two_pieces_of_an_equation_share_a_parameter():
 
 @pytest.fixture(scope="module")
 def generated():
-    return generate(2, seed=2, runs=4000, jobs=1, ask=unposed)
+    return generate(2, seed=6, runs=1000, jobs=1, ask=unposed)
 
 
 def test_what_is_generated_is_read_back_and_well_posed_with_another_seed(generated, tmp_path):
@@ -468,14 +468,14 @@ def test_what_is_generated_is_read_back_and_well_posed_with_another_seed(generat
         assert one.title == before.title != ""
         assert one.model.prior.mean.tolist() == before.model.prior.mean.tolist()
         assert one.model.prior.cov.tolist() == before.model.prior.cov.tolist()
-        found = examine(one, 4000, seed=77, ask=unposed)
+        found = examine(one, 1000, seed=77, ask=unposed)
         assert found.well_posed, found.faults
         assert not found.linear
     assert sum(generated.rejected.values()) > 0
 
 
 def test_the_same_seed_generates_the_same_text_whatever_the_processes(generated):
-    again = generate(2, seed=2, runs=4000, jobs=2, ask=unposed)
+    again = generate(2, seed=6, runs=1000, jobs=2, ask=unposed)
     assert again.toml() == generated.toml()
     assert again.rejected == generated.rejected
     assert again.qualities == generated.qualities

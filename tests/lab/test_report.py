@@ -35,6 +35,22 @@ def result20(variants):
     return compare(lab_filters(model), model, 1000, 4, 1, progress=False)
 
 
+@pytest.fixture(scope="module")
+def written(variants, result53, result20, tmp_path_factory):
+    """Folders of the reports of variants 53 and 20, written once."""
+    folders = {name: tmp_path_factory.mktemp("reports") / "below" / name for name in ("53", "20")}
+    for name, result in (("53", result53), ("20", result20)):
+        write_report(variants[name], result, folders[name])
+    return folders
+
+
+@pytest.fixture
+def no_figures(monkeypatch):
+    """Drawing takes most of the time of a report; for tests of its text only."""
+    monkeypatch.setattr(report, "_FIGURES", {name: (caption, lambda *_: None) for name, (caption, _) in report._FIGURES.items()})
+    monkeypatch.setattr(report, "_save_figure", lambda figure, kind, path: path.touch())
+
+
 class Page(HTMLParser):
     """What a page would load, and its tags."""
 
@@ -136,34 +152,35 @@ def test_the_control_variate_finds_the_value_of_all_trajectories(variants, name)
 # --- the files
 
 
-def test_every_file_of_the_report_is_written(variants, result53, tmp_path):
-    written = write_report(variants["53"], result53, tmp_path / "a" / "b")
+def test_every_file_of_the_report_is_written(variants, result20, written, tmp_path):
+    again = write_report(variants["20"], result20, tmp_path / "again")
     expected = {f"{name}.{kind}" for name in FIGURES for kind in ("svg", "pdf")} | {"report.html", "report.tex"}
-    assert {path.name for path in written} == expected
-    assert {path.name for path in (tmp_path / "a" / "b").iterdir()} == expected  # no leftovers
-    assert all(path.stat().st_size > 500 for path in written)
+    assert {path.name for path in again} == expected
+    assert {path.name for path in (tmp_path / "again").iterdir()} == expected  # no leftovers
+    assert all(path.stat().st_size > 500 for path in again)
+    for name in ("report.html", "report.tex"):  # the same numbers give the same report
+        assert (tmp_path / "again" / name).read_bytes() == (written["20"] / name).read_bytes()
 
 
 @pytest.mark.parametrize("name", ["53", "20"])
-def test_the_page_needs_no_network_and_no_script(variants, result53, result20, tmp_path, name):
-    write_report(variants[name], {"53": result53, "20": result20}[name], tmp_path)
-    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+def test_the_page_needs_no_network_and_no_script(written, name):
+    folder = written[name]
+    text = (folder / "report.html").read_text(encoding="utf-8")
     page = Page(text)
     assert "script" not in page.tags
     assert "url(" not in text
     assert "@import" not in text
     for load in page.loads:
-        assert load == "data:," or (tmp_path / load).is_file()
+        assert load == "data:," or (folder / load).is_file()
     assert page.tags.count("img") == len(FIGURES)
     for figure in FIGURES:
-        links = re.findall(r'href="([^"]*)"', (tmp_path / f"{figure}.svg").read_text(encoding="utf-8"))
+        links = re.findall(r'href="([^"]*)"', (folder / f"{figure}.svg").read_text(encoding="utf-8"))
         assert all(link.startswith("#") for link in links)
 
 
 @pytest.mark.parametrize("name", ["53", "20"])
-def test_every_formula_is_well_formed_mathml(variants, result53, result20, tmp_path, name):
-    write_report(variants[name], {"53": result53, "20": result20}[name], tmp_path)
-    formulas = re.findall(r"<math.*?</math>", (tmp_path / "report.html").read_text(encoding="utf-8"), re.DOTALL)
+def test_every_formula_is_well_formed_mathml(written, name):
+    formulas = re.findall(r"<math.*?</math>", (written[name] / "report.html").read_text(encoding="utf-8"), re.DOTALL)
     assert len(formulas) > 30
     for formula in formulas:
         text = "".join(ElementTree.fromstring(formula).itertext())
@@ -193,14 +210,13 @@ def balanced(tex):
 
 
 @pytest.mark.parametrize("name", ["53", "20"])
-def test_the_latex_is_balanced_and_names_its_figures(variants, result53, result20, tmp_path, name):
-    write_report(variants[name], {"53": result53, "20": result20}[name], tmp_path)
-    tex = (tmp_path / "report.tex").read_text(encoding="utf-8")
+def test_the_latex_is_balanced_and_names_its_figures(written, name):
+    tex = (written[name] / "report.tex").read_text(encoding="utf-8")
     assert balanced(tex)
     assert {f"{figure}.pdf" for figure in FIGURES} == set(re.findall(r"\\includegraphics\[[^]]*\]\{([^}]*)\}", tex))
 
 
-def test_hostile_titles_stay_text(variants, result53, tmp_path):
+def test_hostile_titles_stay_text(variants, result53, no_figures, tmp_path):
     hostile = Variant("5<3", r"50 % & x^2_1 ~ #1 $ \input{secret} <script>alert(1)</script> вариант", variants["53"].model)
     write_report(hostile, result53, tmp_path)
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -213,16 +229,14 @@ def test_hostile_titles_stay_text(variants, result53, tmp_path):
     assert r"50 \% \& x\textasciicircum{}2\_1 \textasciitilde{} \#1 \$ \textbackslash{}input\{secret\}" in tex
 
 
-def test_the_structural_functions_are_those_derived(variants, result53, tmp_path):
-    write_report(variants["53"], result53, tmp_path)
-    tex = (tmp_path / "report.tex").read_text(encoding="utf-8")
+def test_the_structural_functions_are_those_derived(variants, written):
+    tex = (written["53"] / "report.tex").read_text(encoding="utf-8")
     for structure in (gaussian(variants["53"].model), linearised(variants["53"].model)):
         for line in structure.latex().splitlines()[1:-1]:
             assert line.removesuffix(r" \\") in tex
 
 
-@pytest.mark.filterwarnings("ignore:No artists with labels")  # the control relative to itself is not drawn
-def test_only_what_was_compared_is_explained(variants, tmp_path):
+def test_only_what_was_compared_is_explained(variants, no_figures, tmp_path):
     model = variants["53"].model
     result = compare(lab_filters(model, ["aof-linearised"]), model, 200, 3, 1, progress=False)
     write_report(variants["53"], result, tmp_path)
@@ -230,13 +244,6 @@ def test_only_what_was_compared_is_explained(variants, tmp_path):
     assert "Linearised" in html
     assert "<h3>Gaussian</h3>" not in html
     assert "DUOF, the two-step" not in html
-
-
-def test_the_same_numbers_give_the_same_report(variants, result20, tmp_path):
-    for folder in ("one", "two"):
-        write_report(variants["20"], result20, tmp_path / folder)
-    for path in (tmp_path / "one").glob("report.*"):
-        assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes()
 
 
 def test_the_numbers_are_those_of_the_comparison(variants, result53, tmp_path):

@@ -1,9 +1,8 @@
-"""The lab's variants and filters: the shipped ones are well posed, the hostile ones are refused by name."""
+"""The lab's variants and filters by name; hostile ones are refused.  That the shipped ones are well posed: test_quality."""
 
-import numpy as np
 import pytest
 
-from kfcourse import ModelError, NoClosedForm, compare, gaussian, lab_filters, linearised, load_variants
+from kfcourse import ModelError, NoClosedForm, gaussian, lab_filters, load_variants
 from kfcourse.filters import Design, Filter
 from kfcourse.lab.variants import FILTERS, LAB, VariantError, find_variant, has_exact, title
 
@@ -32,26 +31,8 @@ def test_the_variants_exercise_different_structural_functions():
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_a_variant_is_well_posed(name):
-    """Both structures derive, every filter of the lab stays finite, and two seeds tell the same story."""
-    model = SHIPPED[name].model
-    linearised(model), gaussian(model)
-    runs = 20_000 if model.n == 1 else 2_000
-    one, two = (compare(lab_filters(model), model, runs, 51, seed, progress=False) for seed in (1, 2))
-    for result in (one, two):
-        for filter_name in LAB:
-            variance = result.error_variance(filter_name)
-            assert np.isfinite(variance.value).all()
-            assert (variance.value > 0).all()
-            assert np.isfinite(variance.standard_error).all()
-        normalised = result.normalised_error("aof-gaussian")
-        assert np.isfinite(normalised.value).all()
-        assert (normalised.value > 0).all()
-    for filter_name in LAB:
-        a, b = one.score(filter_name), two.score(filter_name)
-        combined = np.hypot(a.standard_error, b.standard_error)
-        # Five: of some hundred comparisons none should be outside; 1e-12 is rounding, where filters coincide.
-        assert abs(a.value - b.value) <= 5 * combined + 1e-12, filter_name
+def test_every_filter_of_the_lab_is_built_for_a_variant(name):
+    assert [one.name for one in lab_filters(SHIPPED[name].model)] == list(LAB)
 
 
 @pytest.mark.parametrize("name", SHIPPED)

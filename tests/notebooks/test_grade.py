@@ -13,6 +13,7 @@ import nbformat
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from inside import execute_inside
 
 from kfcourse import cli
 from kfcourse.checks import Exercise, engine, exercise
@@ -143,7 +144,7 @@ def syntax():
 
 
 def loops():
-    return add(solved(), "while True:\n    pass", "def correct")
+    return add(solved(), "import time\nwhile True:\n    time.sleep(1)", "def correct")  # idle: the processors are for others
 
 
 def leaves(flag):
@@ -152,16 +153,13 @@ def leaves(flag):
     return add(solved(), source, "def correct")
 
 
-def hungry():
-    return add(solved(), "block = np.ones(10**9)", "def correct")
-
-
 def floods():
     return add(solved(), "while True:\n    print('x' * 10_000)", "def correct")
 
 
-def exits():
-    return add(solved(), "import sys\nsys.exit(1)", "def gain")
+def careless():
+    """Asks for too much memory, and leaves where a kernel goes on."""
+    return add(add(solved(), "import sys\nsys.exit(1)", "def gain"), "block = np.ones(10**9)", "def correct")
 
 
 def litters():
@@ -187,31 +185,20 @@ def claims(**claim):
 
 def fill(folder):
     """Write the returned notebooks."""
-    own = Exercise("b", exercise("b", MINE).variant)
     foreign = solved()
     del foreign.metadata["kfcourse"]
     notebooks = {
         "М-1/Иванов Иван/b-aof": handed_out(),
         "М-1/Петров/b-aof": solved("12"),
-        "wrong": wrong(),
-        "fakes-checks": fakes_checks(),
         "shows-results": shows_results(),
         "patches": patches(),
-        "deletes": deletes(),
         "rewrites": rewrites(),
-        "merges": merges(),
-        "opens-another": opens_another(),
-        "imports": imports(),
-        "takes": takes_the_answer(),
-        "syntax": syntax(),
         "loops": loops(),
         "leaves": leaves(folder.parent / "pid"),
-        "hungry": hungry(),
+        "careless": careless(),
         "floods": floods(),
-        "exits": exits(),
         "litters": litters(),
         "litters-too": litters(),
-        "own-variant": solution(render(TINY, own)),
         "foreign": foreign,
         "unknown-set": claims(set="zz"),
         "unknown-variant": claims(variant="no \x1b[31m such"),
@@ -236,38 +223,19 @@ class Graded(NamedTuple):
 
 @pytest.fixture(scope="module")
 def graded(tmp_path_factory):
-    """The returned notebooks, graded once for all test processes."""
-    base = tmp_path_factory.getbasetemp()
-    place = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "returned"
-    told = place.with_suffix(".json")
-    try:
-        place.mkdir()
-    except FileExistsError:  # another process is at it
-        for _ in range(6000):
-            if told.exists():
-                break
-            time.sleep(0.1)
-    else:
-        part = told.with_suffix(".part")
-        part.write_text(json.dumps(graded_now(place)), encoding="utf-8")
-        part.rename(told)
-    table = csv.DictReader(io.StringIO((place / "grades.csv").read_text(encoding="utf-8-sig")))
-    rows = {row["notebook"].removesuffix(".ipynb"): row for row in table}
-    return Graded(*json.loads(told.read_text(encoding="utf-8")), rows, place)
-
-
-def graded_now(folder):
+    """The returned notebooks, graded by the command."""
+    folder = tmp_path_factory.mktemp("grade") / "returned"
     fill(folder)
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    os.environ["KFCOURSE_SECRET"] = "x"
-    try:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("KFCOURSE_SECRET", "x")
         result = CliRunner().invoke(cli.main, ["grade", str(folder), "--masters", str(FIXTURES), "--seconds", str(SECONDS)])
-    finally:
-        del os.environ["KFCOURSE_SECRET"]
     after = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     assert after.pop(folder / "grades.csv", None), result.output
     assert after == before
-    return result.exit_code, result.output
+    table = csv.DictReader(io.StringIO((folder / "grades.csv").read_text(encoding="utf-8-sig")))
+    rows = {row["notebook"].removesuffix(".ipynb"): row for row in table}
+    return Graded(result.exit_code, result.output, rows, folder)
 
 
 def row(graded, name):
@@ -275,11 +243,27 @@ def row(graded, name):
     return (found["q1"], found["q2"]), found["note"]
 
 
+@pytest.fixture
+def graded_here(tmp_path, monkeypatch):
+    """Grades a notebook that does nothing to its process in this one: its grade, two marks and note."""
+    monkeypatch.setattr(watch, "limit", lambda _: None)
+    monkeypatch.setattr(grading, "run", lambda notebook, _: (execute_inside(notebook), ""))
+
+    def graded(notebook):
+        path = tmp_path / "x.ipynb"
+        path.write_text(json.dumps(notebook), encoding="utf-8")  # as it is: nbformat would mend some of them
+        found = grading.grade(grading.returned(tmp_path, masters=FIXTURES)[0])
+        assert found.status == "graded", found.note
+        return found, (found.marks["b1"], found.marks["b2"]), found.note
+
+    return graded
+
+
 def test_every_notebook_has_a_row(graded):
     assert graded.exit_code == 1  # some could not be graded
     names = {path.relative_to(graded.folder).with_suffix("").as_posix() for path in graded.folder.rglob("*.ipynb")}
     assert set(graded.table) == names - {".ipynb_checkpoints/wrong-checkpoint"}
-    assert "26 run, 0 unchanged since the last table" in graded.output
+    assert "16 run, 0 unchanged since the last table" in graded.output
 
 
 def test_a_new_notebook_is_not_implemented(graded):
@@ -296,15 +280,15 @@ def test_a_solution_passes(graded):
     assert line.split()[1:] == ["b", "12", "2", "of", "5", "✓✓–––"]
 
 
-def test_wrong_answers_are_diagnosed(graded):
-    marks, note = row(graded, "wrong")
+def test_wrong_answers_are_diagnosed(graded_here):
+    _, marks, note = graded_here(wrong())
     assert marks == ("wrong", "wrong")
     assert note == "b1: gain-not-divided; b2: innovation-sign, covariance-added"
 
 
-@pytest.mark.parametrize("name", ["fakes-checks", "shows-results"])
-def test_faked_results_do_not_count(graded, name):
-    assert row(graded, name)[0] == ("wrong", "wrong")
+def test_faked_results_do_not_count(graded, graded_here):
+    assert row(graded, "shows-results")[0] == ("wrong", "wrong")
+    assert graded_here(fakes_checks())[1] == ("wrong", "wrong")
 
 
 def test_a_patched_package_is_noticed(graded):
@@ -314,27 +298,25 @@ def test_a_patched_package_is_noticed(graded):
     assert "look at cell" in note
 
 
-@pytest.mark.parametrize("name", ["deletes", "rewrites", "merges", "imports"])
-def test_answers_are_found_wherever_they_stand(graded, name):
-    marks, note = row(graded, name)
-    assert marks[0] == "passed"
-    assert marks[1] == ("not implemented" if name == "rewrites" else "passed")
-    assert note == ""
+def test_answers_are_found_wherever_they_stand(graded, graded_here):
+    assert row(graded, "rewrites") == (("passed", "not implemented"), "")
+    for notebook in (deletes(), merges(), imports()):
+        assert graded_here(notebook)[1:] == (("passed", "passed"), "")
 
 
-def test_another_variant_is_noticed_and_does_not_count(graded):
-    marks, note = row(graded, "opens-another")
+def test_another_variant_is_noticed_and_does_not_count(graded_here):
+    found, marks, note = graded_here(opens_another())
     assert marks == ("passed", "passed")
     assert note == "opens set b, variant 1"
-    assert graded.table["opens-another"]["variant"] == "53"
+    assert found.variant == "53"
 
 
-def test_taking_the_answer_is_noticed(graded):
-    assert "(gain): return task.questions['b1'].answer(task)(Psi, G, F)" in row(graded, "takes")[1]
+def test_taking_the_answer_is_noticed(graded_here):
+    assert "(gain): return task.questions['b1'].answer(task)(Psi, G, F)" in graded_here(takes_the_answer())[2]
 
 
-def test_an_error_is_reported_by_cell(graded):
-    marks, note = row(graded, "syntax")
+def test_an_error_is_reported_by_cell(graded_here):
+    _, marks, note = graded_here(syntax())
     assert marks == ("not run", "unusable")
     number = place(syntax(), "def gain")
     assert f"cell {number} (gain): SyntaxError" in note
@@ -344,7 +326,7 @@ def test_an_error_is_reported_by_cell(graded):
 def test_an_endless_loop_is_ended(graded):
     marks, note = row(graded, "loops")
     assert marks == ("passed", "not run")
-    number = place(loops(), "while True")
+    number = place(loops(), "import time")
     assert note == f"cell {number}: still running after {SECONDS} s"
 
 
@@ -361,22 +343,17 @@ def test_a_dead_kernel_is_reported_and_its_children_are_ended(graded):
     pytest.fail("the process that the notebook left is running")
 
 
-def test_memory_is_limited(graded):
-    marks, note = row(graded, "hungry")
+def test_memory_is_limited_and_exit_is_an_error_like_others(graded):
+    marks, note = row(graded, "careless")
     assert marks == ("passed", "passed")
     assert "MemoryError: Unable to allocate 7.45 GiB" in note
+    assert "SystemExit: 1" in note
 
 
 def test_output_is_limited(graded):
     marks, note = row(graded, "floods")
     assert marks == ("passed", "not run")
     assert "printed more than 10 MB" in note
-
-
-def test_exit_is_an_error_like_others(graded):
-    marks, note = row(graded, "exits")
-    assert marks == ("passed", "passed")
-    assert "SystemExit: 1" in note
 
 
 def test_notebooks_do_not_see_each_other(graded):
@@ -387,10 +364,11 @@ def test_notebooks_do_not_see_each_other(graded):
         assert "StdinNotImplementedError" in note  # nobody answers
 
 
-def test_a_variant_of_the_courses_own(graded):
-    marks, note = row(graded, "own-variant")
+def test_a_variant_of_the_courses_own(graded_here):
+    own = Exercise("b", exercise("b", MINE).variant)
+    found, marks, note = graded_here(solution(render(TINY, own)))
     assert marks == ("passed", "passed")
-    assert graded.table["own-variant"]["variant"] == "mine"
+    assert found.variant == "mine"
     assert "its own table" in note
 
 
@@ -424,24 +402,24 @@ def test_a_second_run_does_only_what_is_new(graded, tmp_path, monkeypatch):
     again = CliRunner().invoke(cli.main, [*options, "--seconds", str(SECONDS)])
     assert again.exit_code == 0
     assert sorted(ran) == failed
-    assert "4 run, 22 unchanged" in again.output
-    assert "b1: gain-not-divided" in (copied / "grades.csv").read_text(encoding="utf-8")
+    assert "4 run, 12 unchanged" in again.output
+    assert "b1: gain-not-divided" in (copied / "grades.csv").read_text(encoding="utf-8")  # of shows-results
 
     ran.clear()
-    (copied / "wrong.ipynb").rename(copied / "renamed.ipynb")
-    change_file(copied / "syntax.ipynb")
+    (copied / "shows-results.ipynb").rename(copied / "renamed.ipynb")
+    change_file(copied / "rewrites.ipynb")
     (copied / "loops.ipynb").unlink()
     CliRunner().invoke(cli.main, [*options, "--seconds", str(SECONDS)])
-    assert ran == ["syntax.ipynb"]
+    assert ran == ["rewrites.ipynb"]
     rows = {one.name for one in read_table(copied / "grades.csv").values()}
-    assert {"renamed.ipynb", "syntax.ipynb"} < rows and not {"wrong.ipynb", "loops.ipynb"} & rows
+    assert {"renamed.ipynb", "rewrites.ipynb"} < rows and not {"shows-results.ipynb", "loops.ipynb"} & rows
 
     ran.clear()
     CliRunner().invoke(cli.main, [*options, "--seconds", str(SECONDS), "--again"])
-    assert len(ran) == 25
+    assert len(ran) == 15
     ran.clear()
     CliRunner().invoke(cli.main, [*options, "--seconds", "99"])  # what was ended too early may come to its end
-    assert len(ran) == 25
+    assert len(ran) == 15
 
 
 def change_file(path):

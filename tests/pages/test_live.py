@@ -604,20 +604,3 @@ def test_two_pages_in_one_document(opened):
 
 
 # ---------------------------------------------------------------- the chapter
-
-
-def test_the_chapter_prints_what_its_page_shows(opened, tmp_path):
-    import jupytext
-    from nbclient import NotebookClient
-
-    notebook = jupytext.read(ROOT / "book" / "live-track.md")
-    NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(tmp_path)}}).execute()  # far from the package
-    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
-    (page,) = (output.data["text/html"] for output in outputs if "text/html" in output.get("data", {}))
-    assert [output.name for output in outputs if output.output_type == "stream" and output.name != "stdout"] == []
-    printed = "\n".join(output.text for output in outputs if output.output_type == "stream")
-    tab = opened(page)
-    tab.get_by_role("button", name="Play the recorded track").press("Enter")
-    tab.clock.run_for(60_000)
-    for name, value in shown(tab).items():
-        assert re.search(rf"^{name} +{re.escape(value)}$", printed, re.MULTILINE), (name, value, printed)
