@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import re
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from kfcourse.linear.consistency import innovations, nis
 from kfcourse.pages import live
 from kfcourse.scenarios import pointer
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chromium-browser"))), None)
 RECORDING = live.record(pointer.hand_track(seed=10), seed=6)
 SECONDS = live.GRID * (len(RECORDING.position) - 1)
@@ -601,6 +599,3 @@ def test_two_pages_in_one_document(opened):
     assert second.locator("[data-show=count]").inner_text() == "1 in 0.00 s"
     assert first.locator("[data-show=count]").inner_text() == "–"
     assert second.locator("[data-show=interval]").inner_text() == "100 ms"
-
-
-# ---------------------------------------------------------------- the chapter
