@@ -18,7 +18,7 @@ import numpy as np
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.lab.variants import has_exact
+from kfcourse.lab.short_names import has_exact
 from kfcourse.laws import Array
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import linearised

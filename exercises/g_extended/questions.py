@@ -23,7 +23,8 @@ from kfcourse.exercises.shared import Map
 from kfcourse.laws import Array, Gaussian, Measurement, apply, gain, symmetric, transpose
 from kfcourse.linear.consistency import chi_squared_bounds, normalised_square
 from kfcourse.symbolic.codegen import compile_function
-from kfcourse.symbolic.model import Model, exact_matrix
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import exact_matrix
 
 RUNS, STEPS = 6, 5
 DIMENSIONS = (3, 3, 2)  # states, noises of the object, measurements: besides the variant's

@@ -15,7 +15,7 @@ from kfcourse import continuous
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.continuous.model import ContinuousModel, log_likelihood_rate, to_discrete
+from kfcourse.continuous import ContinuousModel, log_likelihood_rate, to_discrete
 from kfcourse.exercises.shared import Map
 from kfcourse.laws import Array
 

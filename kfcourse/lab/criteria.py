@@ -16,13 +16,14 @@ from scipy import stats
 from kfcourse.filters import Filter
 from kfcourse.filters.base import State, initial_state
 from kfcourse.lab.difficulty import length
-from kfcourse.lab.variants import Structures, title
+from kfcourse.lab.short_names import Structures, title
 from kfcourse.laws import Array, Gaussian
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.statistics import Estimate, batch_mean, ratio
 from kfcourse.symbolic.codegen import compile_function
-from kfcourse.symbolic.model import Model, exact_matrix
+from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
+from kfcourse.symbolic.reading import exact_matrix
 
 GROWTH = 10.0  # of a second moment over the second half of the steps: an unknown velocity has 4, x' = 1.05 x has 12
 CARRIERS = 10.0  # trajectories, at least, that carry a second moment

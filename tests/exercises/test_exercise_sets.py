@@ -7,8 +7,8 @@ from scipy.integrate import solve_ivp
 
 from kfcourse import Model, linearised, predictions, run, simulate
 from kfcourse.checks import exercise
-from kfcourse.continuous.model import ContinuousModel, coarsen, extended_kalman_bucy
-from kfcourse.continuous.model import simulate as simulate_continuous
+from kfcourse.continuous import ContinuousModel, coarsen, extended_kalman_bucy
+from kfcourse.continuous import simulate as simulate_continuous
 from kfcourse.exercises.f_exact import questions as grid
 from kfcourse.exercises.g_extended import questions as extended
 from kfcourse.exercises.h_continuous import questions as continuous_time
