@@ -9,7 +9,7 @@ INSTALLED := .venv/installed
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help book test lint unit notebooks lock clean distclean install figure benchmark
+.PHONY: help book test lint unit notebooks lock lock-check clean distclean install figure benchmark
 
 help:
 	@echo "make book       execute the chapters and build the book in _build/html"
@@ -19,7 +19,8 @@ help:
 	@echo "make install    the virtual environment .venv only"
 	@echo "make benchmark  speed of the engine, as ratios"
 	@echo "make figure     the figure of README.md"
-	@echo "make lock       compile requirements.txt from pyproject.toml"
+	@echo "make lock       compile requirements.txt from pyproject.toml; all versions anew: make UPGRADE=--upgrade lock"
+	@echo "make lock-check  does requirements.txt fit pyproject.toml, and every Python and system?"
 	@echo "make clean      remove the book;  make distclean  removes .venv too"
 	@echo "Another interpreter for .venv:  make PYTHON=python3.12 book"
 
@@ -60,9 +61,22 @@ $(INSTALLED): requirements.txt pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	@touch $@
 
+# One lock for all: versions and hashes for every Python from 3.11.0 on and every system. Versions stay unless a bound forces them.
+COMPILE := pip compile --quiet --universal --python-version 3.11.0 --generate-hashes --all-extras --no-annotate \
+  --no-emit-index-url --no-emit-find-links --custom-compile-command "make lock"
 lock: $(INSTALLED)
-	CUSTOM_COMPILE_COMMAND='make lock' $(BIN)/pip-compile --quiet --upgrade --all-extras --strip-extras --no-annotate --no-emit-index-url \
-	  --no-emit-find-links --no-emit-trusted-host --no-emit-options --output-file requirements.txt pyproject.toml
+	$(BIN)/uv $(COMPILE) $(UPGRADE) --output-file requirements.txt pyproject.toml
+
+# Compiled again, nothing changes; and every requirement has a wheel, with its hash, for each Python and system.
+lock-check: $(INSTALLED)
+	@mkdir -p _build && cp requirements.txt _build/requirements.txt
+	@$(BIN)/uv $(COMPILE) --output-file _build/requirements.txt pyproject.toml
+	@diff -u requirements.txt _build/requirements.txt || { echo "requirements.txt does not fit pyproject.toml: make lock"; exit 1; }
+	@for python in 3.11.0 3.12 3.13 3.14; do for system in linux macos windows; do \
+	  echo "Python $$python, $$system"; \
+	  $(BIN)/uv pip install --quiet --dry-run --target _build/none --python-version $$python --python-platform $$system \
+	    --require-hashes --only-binary :all: -r requirements.txt || exit 1; \
+	done; done
 
 clean:
 	rm -rf _build .pytest_cache .mypy_cache .ruff_cache
