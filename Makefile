@@ -11,11 +11,12 @@ endif
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help book test lint unit notebooks lock lock-check clean distclean install figure benchmark
+.PHONY: help book test quick lint unit notebooks lock lock-check clean distclean install figure benchmark
 
 help:
 	@echo "make book        execute the chapters and build the book in _build/html"
 	@echo "make test        lint, types, unit tests, documentation examples, the book, nbval on its notebooks"
+	@echo "make quick       lint, types and the tests marked quick, before a commit"
 	@echo "make lint        ruff check, ruff format --check, mypy"
 	@echo "make unit        unit tests and documentation examples only"
 	@echo "make install     the virtual environment .venv only"
@@ -29,8 +30,11 @@ help:
 book: install
 	$(BIN)/python book/build.py
 
-test: lint unit book notebooks
-	@echo "All checks passed."
+test: install
+	@$(BIN)/python .ci/cost.py "$(MAKE)" lint unit book notebooks
+
+quick: lint
+	$(BIN)/pytest -q -n auto -m quick --ignore tests/test_book.py
 
 lint: install
 	$(BIN)/ruff check .
