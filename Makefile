@@ -78,6 +78,7 @@ lock-check: install
 	  $(BIN)/uv pip install --quiet --dry-run --target _build/none --python-version $$python --python-platform $$system \
 	    --require-hashes --only-binary :all: -r requirements.txt || exit 1; \
 	done; done
+	@rm -rf _build/none _build/requirements.txt
 
 clean:
 	rm -rf _build .pytest_cache .mypy_cache .ruff_cache
