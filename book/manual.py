@@ -13,8 +13,8 @@ from pathlib import Path
 import nbformat
 
 from kfcourse.checks import exercise, sets
-from kfcourse.notebooks.execute import pictures
-from kfcourse.notebooks.jobs import jobs, make, run_all
+from kfcourse.notebooks.execution import pictures
+from kfcourse.notebooks.jobs import make, plan, run_all
 from kfcourse.notebooks.master import read, render, statement, student
 
 VARIANT = "53"
@@ -31,7 +31,7 @@ Open it in Jupyter, in an environment in which `kfcourse` is installed: {{doc}}`
 
 def write() -> bool:
     """Write the pages; False, with a message, if a solution fails."""
-    work = jobs("solutions", SOLUTIONS, [VARIANT], list(sets()))
+    work = plan("solutions", SOLUTIONS, [VARIANT], list(sets()))
     failed = [outcome for outcome in run_all(work, make, 2, "lab manual") if outcome.status == "failed"]
     for outcome in failed:
         print(f"FAILED {outcome.job.name}: {outcome.message}", file=sys.stderr)

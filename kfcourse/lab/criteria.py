@@ -11,7 +11,6 @@ from itertools import combinations
 
 import numpy as np
 import sympy as sp
-from scipy import stats
 
 from kfcourse.filters import Filter
 from kfcourse.filters.base import State, initial_state
@@ -194,6 +193,8 @@ def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
     error variance.  There are n + p + 1 for a component, and the prediction has its own.  Value: the largest significant
     difference, relative to the error variance of the control.
     """
+    from scipy import stats  # slow to import
+
     pairs = list(combinations(measured(comparison), 2))
     tests = max(len(pairs), 1) * (comparison.steps + 1)
     fitted = 2 * (comparison.model.n + comparison.model.p + 1) / comparison.runs

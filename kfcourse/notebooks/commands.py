@@ -16,7 +16,7 @@ from kfcourse.notebooks.course_list import assign, chosen_variants
 from kfcourse.notebooks.grading.marking import grade as mark
 from kfcourse.notebooks.grading.submissions import SECONDS, clean, returned
 from kfcourse.notebooks.grading.table import FAILED, GRADED, SIGNS, Grade, grade_all
-from kfcourse.notebooks.jobs import Job, Outcome, jobs, make, run_all, safe
+from kfcourse.notebooks.jobs import Job, Outcome, make, plan, run_all, safe
 
 
 def _options(command: Callable) -> Callable:
@@ -70,7 +70,7 @@ def _make(
     if students:
         work = _for_students(kind, students, variants, wanted, out, variants_file, masters, with_pdf)
     else:
-        work = jobs(kind, out, variants, wanted, variants_file, masters, with_pdf)
+        work = plan(kind, out, variants, wanted, variants_file, masters, with_pdf)
     _separate(work)
     out.mkdir(parents=True, exist_ok=True)
     outcomes = list(run_all(work, make, workers, kind, dask))

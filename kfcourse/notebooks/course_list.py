@@ -40,7 +40,7 @@ def assign(path: Path, variants: Sequence[str]) -> list[Student]:
     """
     taken: dict[str, list[str]] = {}
     students: list[Student] = []
-    for line, name, group in course_list(path):
+    for line, name, group in read_course_list(path):
         if any((s.name, s.group) == (name, group) for s in students):
             raise ValueError(f"{path}, line {line}: {name}, {group} stands there twice; add a middle name")
         used = taken.setdefault(group, [])
@@ -55,7 +55,7 @@ def assign(path: Path, variants: Sequence[str]) -> list[Student]:
     return students
 
 
-def course_list(path: Path) -> Iterator[tuple[int, str, str]]:
+def read_course_list(path: Path) -> Iterator[tuple[int, str, str]]:
     """Line number, name and group of every student in a CSV file."""
     try:
         text = path.read_text(encoding="utf-8-sig")

@@ -25,7 +25,7 @@ from kfcourse.checks import Exercise, sets
 from kfcourse.checks.question import PASSED
 from kfcourse.files import package_digest, replacing, save
 from kfcourse.lab.variants import find_variant
-from kfcourse.notebooks.execute import NotebookFailed, execute, html, pdf, pictures, results
+from kfcourse.notebooks.execution import NotebookFailed, execute, html, pdf, pictures, results
 from kfcourse.notebooks.master import read, render, solution, student
 
 
@@ -177,7 +177,7 @@ def _backend(dask: str | None, workers: int) -> Iterator[joblib.Parallel]:
         yield joblib.Parallel(return_as="generator_unordered")
 
 
-def jobs(
+def plan(
     kind: str,
     folder: Path,
     variants: Iterable[str],

@@ -8,7 +8,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.laws import Array
-from kfcourse.scenarios.aircraft import Track
+from kfcourse.scenarios.flight import Track
 from kfcourse.symbolic.codegen import compile_function
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model

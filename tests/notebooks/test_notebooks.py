@@ -18,15 +18,14 @@ from kfcourse.checks import exercise, sets
 from kfcourse.checks.equality import equal_formulas
 from kfcourse.files import save
 from kfcourse.lab.variants import load_variants
-from kfcourse.notebooks import execute, jobs
+from kfcourse.notebooks import execution, jobs
 from kfcourse.notebooks.course_list import assign
-from kfcourse.notebooks.execute import NotebookFailed, html, mathml, pictures, results
+from kfcourse.notebooks.execution import NotebookFailed, html, mathml, pictures, results
 from kfcourse.notebooks.jobs import Job, Outcome, make, run_all, safe
 from kfcourse.notebooks.master import (
     STUB,
     MasterError,
     context,
-    python,
     read,
     render,
     solution,
@@ -35,6 +34,7 @@ from kfcourse.notebooks.master import (
     without_markers,
     without_solution,
 )
+from kfcourse.notebooks.written_code import python
 
 FIXTURES = Path(__file__).parent / "fixtures"
 TINY = (FIXTURES / "b_aof" / "statement.md").read_text(encoding="utf-8")
@@ -51,7 +51,7 @@ def tiny(variant="53", text=TINY):
 @pytest.fixture(scope="module")
 def executed():
     """The tiny set's solution, really executed."""
-    return execute.execute(solution(tiny()), "tiny")
+    return execution.execute(solution(tiny()), "tiny")
 
 
 @pytest.fixture
@@ -266,7 +266,7 @@ def test_a_new_notebook_fails_only_with_not_implemented(letter, variant):
 @pytest.mark.parametrize(("letter", "variant"), [("b", "53"), ("c", "21")])
 def test_a_new_notebook_in_a_kernel(letter, variant):
     notebook = student(render(read(letter), exercise(letter, variant)), {})
-    ran = execute.execute(notebook, "new", stop_at_error=False)
+    ran = execution.execute(notebook, "new", stop_at_error=False)
     assert [result["status"] for result in results(ran)] == ["not implemented"] * len(sets()[letter].questions)
     outputs = [output for cell in code(ran) for output in cell.outputs]
     assert {output.ename for output in outputs if output.output_type == "error"} <= {"NotImplementedError"}
@@ -306,7 +306,7 @@ def test_a_failing_cell_is_named():
     broken = tiny(text=TINY.replace("cross = G @ Psi", "cross = G @ nothing"))
     cell = next(cell for cell in code(broken) if "picture" in cell.metadata.get("tags", []))
     with pytest.raises(NotebookFailed, match=rf"here, cell {cell.id}: NameError: name 'nothing' is not defined"):
-        execute.execute(solution(broken), "here")
+        execution.execute(solution(broken), "here")
 
 
 # -- jobs
@@ -407,7 +407,7 @@ def test_an_old_pdf_does_not_stay_beside_a_new_page(tmp_path, masters, no_kernel
 def test_without_a_browser_it_is_said(tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda _: None)
     with pytest.raises(NotebookFailed, match="no browser to print PDF with; install one of chromium"):
-        execute.pdf(tmp_path / "page.html", tmp_path / "page.pdf")
+        execution.pdf(tmp_path / "page.html", tmp_path / "page.pdf")
 
 
 def test_a_browser_that_prints_nothing_has_failed(tmp_path, monkeypatch):
@@ -415,7 +415,7 @@ def test_a_browser_that_prints_nothing_has_failed(tmp_path, monkeypatch):
     target.touch()  # as a temporary file is
     monkeypatch.setattr(shutil, "which", lambda _: "/bin/true")
     with pytest.raises(NotebookFailed, match="could not print"):
-        execute.pdf(tmp_path / "page.html", target)
+        execution.pdf(tmp_path / "page.html", target)
 
 
 def test_save_is_all_or_nothing(tmp_path):

@@ -1,4 +1,4 @@
-"""Grading a folder of returned notebooks: what passed, for the instructor's eye.
+"""Marking one returned notebook: what passed, for the instructor's eye.
 
 Nothing of a returned notebook is trusted but the student's own cells.  The notebook of its set and variant is made again from the
 master, the student's cells are put into it, it runs in a kernel of its own, and only what the master's check cells report counts.
