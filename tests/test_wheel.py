@@ -6,7 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import nbformat
 import pytest
 
 ROOT = Path(__file__).parent.parent
@@ -52,12 +51,8 @@ def test_every_command_runs_without_a_checkout(kfcourse):
     call("lab", 53, "--runs", 500, "--steps", 3, "--exact-runs", 0)
     assert (folder / "lab-53" / "report.html").exists()
     call("exercises", "--variant", 53, "--sets", "e", "--out", "handed-out")
-    notebook = folder / "handed-out" / "53" / "e-comparison.ipynb"
-    assert "task.check" in notebook.read_text(encoding="utf-8")
+    assert "task.check" in (folder / "handed-out" / "53" / "e-comparison.ipynb").read_text(encoding="utf-8")
     call("solutions", "--variant", 53, "--sets", "e", "--out", "solved")
-    solved = nbformat.read(folder / "solved" / "53" / "e-comparison-solution.ipynb", as_version=4)
-    shutil.copytree(notebook.parent, folder / "returned")
-    nbformat.write(solved, folder / "returned" / "solved.ipynb")
-    rows = call("grade", "returned").splitlines()
-    assert next(row for row in rows if row.startswith("e-comparison.ipynb")).split()[1:6] == ["e", "53", "0", "of", "5"]
-    assert next(row for row in rows if row.startswith("solved.ipynb")).split()[1:6] == ["e", "53", "5", "of", "5"]
+    assert "<math" in (folder / "solved" / "53" / "e-comparison-solution.html").read_text(encoding="utf-8")
+    row = next(line for line in call("grade", "solved").splitlines() if "e-comparison-solution" in line)
+    assert row.split()[1:6] == ["e", "53", "5", "of", "5"]
