@@ -7,19 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TypeAlias
 
 import sympy as sp
 
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, ForVariant, Mistake, Question
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.exercises import messages
 from kfcourse.symbolic.sides import Side, plain
 
-Make = Callable[[Any], Any]  # exercise -> results in symbols
+Formula: TypeAlias = sp.Expr | sp.MatrixBase  # an expression for a scalar variant, a matrix for a vector one
+Make = Callable[[Exercise], Formula | tuple[Formula, ...]]  # the results in symbols
 
 
-def symbols(exercise: Exercise, side: str) -> tuple[Any, Any]:
+def symbols(exercise: Exercise, side: str) -> tuple[Formula, Formula]:
     """Mean and covariance of the law, as an answer is called with them."""
     part = Side.of(exercise.model, side)
     return plain(part.mean), plain(part.cov)
@@ -92,11 +94,7 @@ def mistakes_of_variance(kind: str, side: str) -> tuple[Mistake, ...]:
 def mistakes_of_linearised(side: str) -> tuple[Mistake, ...]:
     p = "p" if side == "object" else "d"
     catalogue: tuple[tuple[str, str, Callable[[Side], sp.MatrixBase]], ...] = (
-        (
-            "noise-forgotten",
-            "The noise adds to the covariance too; only the state's part is there.",
-            lambda s: s.A * s.cov * s.A.T,
-        ),
+        ("noise-forgotten", messages.NOISE_PART_FORGOTTEN, lambda s: s.A * s.cov * s.A.T),
         (
             "state-forgotten",
             f"Only the noise's part is there: how does the uncertainty {p} of the state come through the equation?",
@@ -141,22 +139,14 @@ def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
             side,
             lambda s: s.noiseless_covariance() + s.B * s.D * s.B.T,
         ),
-        wrong_covariance(
-            "noise-forgotten",
-            "The noise adds to the covariance too; only the state's part is there.",
-            "gaussian",
-            side,
-            Side.noiseless_covariance,
-        ),
+        wrong_covariance("noise-forgotten", messages.NOISE_PART_FORGOTTEN, "gaussian", side, Side.noiseless_covariance),
         Mistake(
             "linearised",
             "That is the linearised function. Here the mean over the whole normal law is asked for.",
             constant(right("linearised", side)),
         ),
         Mistake(
-            "second-moment",
-            "It is a second moment: the product of the means has not been subtracted.",
-            constant(second_moment),
+            "second-moment", "It is a second moment: the product of the means has not been subtracted.", constant(second_moment)
         ),
         *mistakes_of_variance("gaussian", side),
     )
@@ -176,7 +166,7 @@ def _unevaluated(exercise: Exercise) -> tuple:
     return plain(sp.Matrix([scalar(part.value) / scalar(part.mean)])), plain(part.B)
 
 
-def unexplained(exercise: Exercise) -> Any:
+def unexplained(exercise: Exercise) -> Formula:
     """R = F - G d G^T of the Gaussian functions."""
     return exercise.structures.gaussian["R"]
 
