@@ -13,8 +13,8 @@ from pathlib import Path
 import nbformat
 
 from kfcourse.checks import exercise, sets
-from kfcourse.notebooks.course import jobs, make, run_all
 from kfcourse.notebooks.execute import pictures
+from kfcourse.notebooks.jobs import jobs, make, run_all
 from kfcourse.notebooks.master import read, render, statement, student
 
 VARIANT = "53"

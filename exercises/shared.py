@@ -8,7 +8,8 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.laws import Array, Moments
+from kfcourse.filters.designed import Scatter
+from kfcourse.laws import Array
 
 Map = Callable[[Array], Array]
 COURSE = "53"  # the variant that the course itself works through
@@ -43,7 +44,7 @@ Fit = Callable[[Array, Array], tuple[Array, Array, Array]]
 
 def regression(target: Array, regressor: Array) -> tuple[Array, Array, Array]:
     """matrix (r, s), offset (r,), residual covariance (r, r)."""
-    matrix, offset, residual = Moments.of(target, regressor).regression(target.shape[1])
+    matrix, offset, residual = Scatter.of(target, regressor).regression(target.shape[1])
     return matrix, offset, residual
 
 

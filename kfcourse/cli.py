@@ -11,17 +11,20 @@ from pathlib import Path
 
 import click
 
+from kfcourse.checks.posing import unposed
+from kfcourse.files import save
 from kfcourse.lab.grammar import generate
 from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
 from kfcourse.lab.report import conclusions, write_json, write_report
-from kfcourse.lab.variants import FILTERS, LAB, VariantError, find_variant, has_exact, lab_filters, title
+from kfcourse.lab.short_names import FILTERS, LAB, has_exact, lab_filters, title
+from kfcourse.lab.variants import VariantError, find_variant
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.notebooks import commands
-from kfcourse.notebooks.course import chosen_variants, save
+from kfcourse.notebooks.course_list import chosen_variants
 from kfcourse.symbolic.formula import FormulaError
-from kfcourse.symbolic.model import ModelError
 from kfcourse.symbolic.moments import NoClosedForm
+from kfcourse.symbolic.reading import ModelError
 
 _VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")
 
@@ -91,7 +94,7 @@ def variants(
         return
     chosen = chosen_variants(names, not names, variants_file)
     if check:
-        found = list(examine_all(chosen, runs, seed, jobs))
+        found = list(examine_all(chosen, runs, seed, jobs, unposed))
         click.echo(table(found))
         sys.exit(0 if all(one.well_posed for one in found) else 1)
     for variant in chosen:
@@ -104,7 +107,7 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
     """Proposed variants to the file or to standard output, what was rejected to standard error."""
     if out and (os.path.lexists(out) or not out.parent.is_dir()):
         raise click.ClickException(f"the variants cannot go to {out}: name a new file in an existing folder with --out")
-    found = generate(wanted, seed, runs, jobs)
+    found = generate(wanted, seed, runs, jobs, unposed)
     reasons = ", ".join(f"{number} {reason}" for reason, number in found.rejected.most_common())
     click.echo(f"{found.rejected.total()} candidates rejected{': ' if reasons else ''}{reasons}", err=True)
     if found.variants:

@@ -1,4 +1,4 @@
-"""The small linear algebra that every filter shares.
+"""Normal laws, their correction by a measurement, and the little linear algebra that every filter shares.
 
 Shapes: vectors are (..., n), matrices (..., r, c); the leading axes run over the ensemble, and an
 array without them is the same for every trajectory.  Scalar models keep their axes of length 1;
@@ -23,8 +23,17 @@ class Gaussian(NamedTuple):
     cov: Array
 
 
+class Trajectories(NamedTuple):
+    """Stored trajectories: states x (steps, runs, n), measurements y (steps, runs, p)."""
+
+    x: Array
+    y: Array
+
+
 class Measurement(NamedTuple):
-    """Structural functions of the meter at N(m, d): h (..., p), G (..., p, n), F (..., p, p).
+    """What a correction must know of the meter: its structural functions at N(m, d).
+
+    h (..., p), G (..., p, n), F (..., p, p): mean of y, its sensitivity dh/dm, covariance of y.
 
     R = F - G d G^T, (..., p, p), is the part of F that the state does not explain.  It is derived, not
     subtracted: where the meter is far sharper than the prediction the difference would be rounding.
@@ -34,20 +43,6 @@ class Measurement(NamedTuple):
     G: Array
     F: Array
     R: Array
-
-
-class Affine(NamedTuple):
-    """The best affine predictor of a target from a regressor, and what it leaves unexplained.
-
-    target ~ matrix @ regressor + offset,  Cov(target - prediction) = residual
-    """
-
-    matrix: Array
-    offset: Array
-    residual: Array
-
-    def __call__(self, regressor: Array) -> Array:
-        return apply(self.matrix, regressor) + self.offset
 
 
 def apply(matrix: Array, vector: Array) -> Array:
@@ -72,14 +67,6 @@ def transpose(matrix: Array) -> Array:
 def symmetric(matrix: Array) -> Array:
     """(P + P^T) / 2: rounding must not make a covariance asymmetric."""
     return matrix if matrix.shape[-1] == 1 else 0.5 * (matrix + transpose(matrix))
-
-
-def nonnegative(matrix: Array) -> Array:
-    """A covariance that is one but for rounding: symmetrised, its negative eigenvalues set to 0."""
-    values, vectors = np.linalg.eigh(symmetric(matrix))
-    if values.min() >= 0:
-        return symmetric(matrix)
-    return (vectors * np.maximum(values, 0.0)) @ vectors.T
 
 
 def gain(cross: Array, cov: Array) -> Array:
@@ -165,57 +152,26 @@ def where_measured(y: Array, correction: Array) -> Array:
     return correction
 
 
-class Moments(NamedTuple):
-    """Means and scatter of (target, regressor) over part of an ensemble; `together` merges parts.
-
-    Scatter is the sum of products of deviations from the part's own mean: large means do not cancel.
-    """
-
-    size: int
-    mean: Array  # (r + s,)
-    scatter: Array  # (r + s, r + s)
-
-    @classmethod
-    def of(cls, target: Array, regressor: Array) -> Moments:
-        """Moments of target (N, r) and regressor (N, s) stacked into one vector."""
-        columns = [target[:, i] for i in range(target.shape[1])] + [regressor[:, i] for i in range(regressor.shape[1])]
-        count, size = len(target), len(columns)
-        mean = [float(np.add.reduce(column)) / count for column in columns]
-        deviations = [column - m for column, m in zip(columns, mean, strict=True)]
-        scatter = [[0.0] * size for _ in range(size)]
-        for i in range(size):
-            for j in range(i, size):
-                scatter[i][j] = scatter[j][i] = dot(deviations[i], deviations[j])
-        return cls(count, np.array(mean), np.array(scatter))
-
-    @classmethod
-    def together(cls, parts: Sequence[Moments]) -> Moments:
-        """Moments of all parts taken together (Chan's formula)."""
-        counts = np.array([part.size for part in parts], dtype=float)
-        means = np.array([part.mean for part in parts])
-        mean = counts @ means / counts.sum()
-        shift = means - mean
-        scatter = np.sum([part.scatter for part in parts], axis=0) + (shift * counts[:, None]).T @ shift
-        return cls(int(counts.sum()), mean, scatter)
-
-    def regression(self, size: int) -> Affine:
-        """Least squares of the first `size` components on the rest.
-
-        matrix = Cov(t, r) Cov(r)^+,  offset = M t - matrix M r,  residual = Cov(t) - matrix Cov(t, r)^T
-        """
-        cov = self.scatter / self.size
-        cross = cov[:size, size:]
-        matrix = gain(cross, cov[size:, size:])
-        offset = self.mean[:size] - matrix @ self.mean[size:]
-        return Affine(matrix, offset, nonnegative(cov[:size, :size] - matrix @ cross.T))
-
-
-def dot(left: Array, right: Array) -> float:
-    """Inner product of two long vectors; not `np.dot`, which would start the linear algebra library's own threads."""
-    return float(np.einsum("i,i", left, right))
-
-
 def square_root(cov: Array) -> Array:
     """A matrix S with S S^T = cov, for any non-negative cov (..., n, n), singular or not."""
     values, vectors = np.linalg.eigh(cov)
     return vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]
+
+
+def normalised_square(vector: Array, cov: Array) -> Array:
+    """vector^T cov^+ vector: (..., n), (..., n, n) -> (...); NaN where a component is NaN.
+
+    Directions in which cov is singular do not enter.
+    """
+    return np.einsum("...i,...i", apply(gain(np.eye(cov.shape[-1]), cov), vector), vector)
+
+
+def stacked(laws: Sequence[Gaussian]) -> Gaussian:
+    """Laws of successive steps as one: mean (steps, runs, n), cov (steps, runs, n, n).
+
+    Covariances that are the same for all runs are stored once and shown to each: a read-only view.
+    """
+    mean = np.stack([law.mean for law in laws])
+    covs = np.stack(np.broadcast_arrays(*(law.cov for law in laws)))
+    by_run = covs if covs.ndim == mean.ndim + 1 else covs[:, None]
+    return Gaussian(mean, np.broadcast_to(by_run, (*mean.shape, mean.shape[-1])))

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from kfcourse.laws import Gaussian, Measurement, Moments, apply, correct, gain, product, square_root, symmetric, transpose
+from kfcourse.filters.designed import Scatter
+from kfcourse.laws import Gaussian, Measurement, apply, correct, gain, product, square_root, symmetric, transpose
 
 
 @pytest.fixture
@@ -151,7 +152,7 @@ def test_symmetric_is_symmetric(rng):
 def test_a_regression_is_least_squares(rng, r, s):
     regressor = rng.normal(size=(60, s)) @ rng.normal(size=(s, s)) + 3
     target = regressor @ rng.normal(size=(s, r)) + rng.normal(size=(60, r)) - 2
-    fit = Moments.of(target, regressor).regression(r)
+    fit = Scatter.of(target, regressor).regression(r)
     design = np.column_stack([regressor, np.ones(60)])
     solution, *_ = np.linalg.lstsq(design, target, rcond=None)
     np.testing.assert_allclose(fit.matrix, solution[:s].T, rtol=1e-9, atol=1e-9)
@@ -164,9 +165,9 @@ def test_a_regression_is_least_squares(rng, r, s):
 @pytest.mark.parametrize("cuts", [[10], [1, 59], [1, 2, 3, 30], list(range(1, 60))])
 def test_moments_of_parts_taken_together_are_moments_of_the_whole(rng, cuts):
     target, regressor = rng.normal(size=(60, 2)) + 1e6, rng.normal(size=(60, 2)) - 1e5
-    whole = Moments.of(target, regressor)
-    parts = [Moments.of(t, g) for t, g in zip(np.split(target, cuts), np.split(regressor, cuts), strict=True)]
-    together = Moments.together(parts)
+    whole = Scatter.of(target, regressor)
+    parts = [Scatter.of(t, g) for t, g in zip(np.split(target, cuts), np.split(regressor, cuts), strict=True)]
+    together = Scatter.together(parts)
     assert together.size == 60
     # Means of size 1e6 are rounded to 1e-10; deviations from them are of order 1.
     np.testing.assert_allclose(together.mean, whole.mean, rtol=1e-15 * 4)
@@ -176,26 +177,26 @@ def test_moments_of_parts_taken_together_are_moments_of_the_whole(rng, cuts):
 
 def test_a_constant_regressor_predicts_the_mean(rng):
     target = rng.normal(size=(20, 1))
-    fit = Moments.of(target, np.full((20, 1), 0.5)).regression(1)
+    fit = Scatter.of(target, np.full((20, 1), 0.5)).regression(1)
     np.testing.assert_allclose(fit(np.array([[0.5], [7.0]])), np.full((2, 1), target.mean()), rtol=1e-14)
     np.testing.assert_allclose(fit.residual, [[target.var()]], rtol=1e-14)
 
 
 def test_one_trajectory_is_a_regression_on_a_constant():
-    fit = Moments.of(np.array([[2.0]]), np.array([[3.0]])).regression(1)
+    fit = Scatter.of(np.array([[2.0]]), np.array([[3.0]])).regression(1)
     assert (fit.matrix.item(), fit.offset.item(), fit.residual.item()) == (0.0, 2.0, 0.0)
 
 
 @pytest.mark.parametrize("count", [8191, 8192, 8193, 20_000])
 def test_long_sums_are_cut_without_loss(rng, count):
     column = rng.normal(size=(count, 1))
-    np.testing.assert_allclose(Moments.of(column, column).scatter, np.full((2, 2), count * column.var()), rtol=1e-11)
+    np.testing.assert_allclose(Scatter.of(column, column).scatter, np.full((2, 2), count * column.var()), rtol=1e-11)
 
 
 def test_a_perfect_regression_leaves_no_negative_variance(rng):
     # Cov(t) - matrix Cov(t, r)^T is a difference of equal numbers, and its rounding must not become a variance below 0.
     for _ in range(50):
         regressor = rng.normal(size=(30, 2))
-        fit = Moments.of(regressor @ rng.normal(size=(2, 2)), regressor).regression(2)
+        fit = Scatter.of(regressor @ rng.normal(size=(2, 2)), regressor).regression(2)
         assert (np.diagonal(fit.residual) >= 0).all()
-        assert Moments.of(0.7 * regressor[:, :1], regressor[:, :1]).regression(1).residual.item() >= 0
+        assert Scatter.of(0.7 * regressor[:, :1], regressor[:, :1]).regression(1).residual.item() >= 0

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.lab.variants import has_exact
+from kfcourse.lab.short_names import has_exact
 from kfcourse.laws import Array
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import linearised

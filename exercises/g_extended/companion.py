@@ -10,7 +10,8 @@ import sympy as sp
 from kfcourse.exercises.shared import Map
 from kfcourse.laws import Array
 from kfcourse.symbolic.codegen import compile_function
-from kfcourse.symbolic.model import Model, exact_matrix
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import exact_matrix
 
 
 class Functions(NamedTuple):

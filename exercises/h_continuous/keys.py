@@ -12,7 +12,7 @@ import sympy as sp
 
 from kfcourse import continuous
 from kfcourse.checks.question import Answer
-from kfcourse.continuous.model import ContinuousModel, log_likelihood_rate, to_discrete
+from kfcourse.continuous import ContinuousModel, log_likelihood_rate, to_discrete
 from kfcourse.exercises.shared import Map
 from kfcourse.laws import Array
 

@@ -135,4 +135,4 @@ QUESTIONS = (
     ),
 )
 
-SET = ExerciseSet("h", "The continuous-time filter", Path(__file__).parent, QUESTIONS, continuous_numbers)
+SET = ExerciseSet("h", "The continuous-time filter", Path(__file__).parent, QUESTIONS, continuous_numbers, about_variant=False)

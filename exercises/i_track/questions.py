@@ -102,4 +102,6 @@ QUESTIONS = (
     ),
 )
 
-SET = ExerciseSet("i", "A track in the plane, and numerical care", Path(__file__).parent, QUESTIONS, track_numbers)
+SET = ExerciseSet(
+    "i", "A track in the plane, and numerical care", Path(__file__).parent, QUESTIONS, track_numbers, about_variant=False
+)

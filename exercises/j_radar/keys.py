@@ -15,7 +15,7 @@ from kfcourse.filters import alphabeta
 from kfcourse.filters.alphabeta import steady_beta, tracking_index
 from kfcourse.laws import Array
 from kfcourse.montecarlo.experiment import run
-from kfcourse.scenarios.aircraft import AZIMUTH, CARTESIAN, ELEVATION, RANGE, SPHERICAL, X, Y, Z, kinematic
+from kfcourse.scenarios.radar import AZIMUTH, CARTESIAN, ELEVATION, RANGE, SPHERICAL, X, Y, Z, kinematic
 from kfcourse.symbolic.model import Model
 
 # -- j1, j2: what the radar measures

@@ -8,7 +8,7 @@ from kfcourse.checks.question import Answer
 from kfcourse.exercises import messages
 from kfcourse.exercises.j_radar.keys import MEASURED, POSITION, cartesian, jacobian_of, meter_jacobian
 from kfcourse.exercises.shared import substituted
-from kfcourse.scenarios.aircraft import CARTESIAN, SPHERICAL, X, Y, Z
+from kfcourse.scenarios.radar import CARTESIAN, SPHERICAL, X, Y, Z
 
 # -- j1, j2: what the radar measures
 

@@ -99,4 +99,4 @@ QUESTIONS = (
     Question("j6", "the noise that is left", "stretch", noise_left, share_arguments, catalogue(WRONG_SHARES)),
 )
 
-SET = ExerciseSet("j", "Alpha-beta filter and radar track", Path(__file__).parent, QUESTIONS, radar_numbers)
+SET = ExerciseSet("j", "Alpha-beta filter and radar track", Path(__file__).parent, QUESTIONS, radar_numbers, about_variant=False)

@@ -88,4 +88,6 @@ QUESTIONS = (
     ),
 )
 
-SET = ExerciseSet("k", "Inertial system and satellite receiver", Path(__file__).parent, QUESTIONS, integration_numbers)
+SET = ExerciseSet(
+    "k", "Inertial system and satellite receiver", Path(__file__).parent, QUESTIONS, integration_numbers, about_variant=False
+)

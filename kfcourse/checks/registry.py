@@ -25,7 +25,9 @@ class ExerciseSet:
         Holds statement.md.
     questions : tuple of Question
     numbers : callable, optional
-        Exercise -> personal numbers by name, for a set that is not about the variant's own model.
+        Exercise -> personal numbers by name, for a set that needs others than the variant's.
+    about_variant : bool
+        Whether the questions are about the variant's model; otherwise the set has a model of its own.
     """
 
     letter: str
@@ -33,6 +35,7 @@ class ExerciseSet:
     folder: Path
     questions: tuple[Question, ...]
     numbers: Callable[[Any], dict[str, float]] | None = None
+    about_variant: bool = True
 
     @property
     def name(self) -> str:

@@ -3,12 +3,13 @@
 from kfcourse.filters.alphabeta import alpha_beta, alpha_beta_gamma
 from kfcourse.filters.approximations import EQUATIONS as _AOF
 from kfcourse.filters.approximations import aof
-from kfcourse.filters.base import Design, Filter, State
+from kfcourse.filters.base import Filter, State
 from kfcourse.filters.conditionally_optimal import EQUATIONS as _DUOF
 from kfcourse.filters.conditionally_optimal import duof
+from kfcourse.filters.designed import Design
 from kfcourse.filters.exact import pointmass
 from kfcourse.filters.iterated_ekf import iterated
-from kfcourse.filters.kalman import kalman
+from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.modified_structure import EQUATIONS as _MFOS
 from kfcourse.filters.modified_structure import mfos
 from kfcourse.filters.multiple_models import imm
@@ -32,7 +33,7 @@ __all__ = [
     "fos",
     "imm",
     "iterated",
-    "kalman",
+    "kalman_filter",
     "latex",
     "mfos",
     "particle",

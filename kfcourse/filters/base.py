@@ -1,23 +1,13 @@
-"""What a filter is: an immutable value with `init`, `step` and `estimate`.
-
-Two kinds of filters reach that interface:
-
-* `Filter`: ready to run (AOF, Kalman, exact, particle);
-* `Design`: a filter of given structure whose coefficients are regressions over an ensemble (DUOF, FOS,
-  MFOS).  Its equations are written once, as a generator that yields each `Regression` it needs and
-  receives the fitted `Affine`: while designing, the ensemble answers; while running, the stored
-  coefficients do.
-"""
+"""What a filter is: an immutable value with `init` and `step`; state goes in and comes out."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from kfcourse.laws import Affine, Array, Gaussian
+from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.model import Model
 
 
@@ -42,6 +32,18 @@ class State(NamedTuple):
     memory: Any = None
 
 
+class Init(Protocol):
+    """The state of so many trajectories before the first measurement."""
+
+    def __call__(self, runs: int, /) -> State: ...
+
+
+class Advance(Protocol):
+    """Correct with y_k, (runs, p), then predict k + 1.  A trajectory whose y is NaN is not corrected."""
+
+    def __call__(self, state: State, y: Array, /) -> State: ...
+
+
 @dataclass(frozen=True)
 class Filter:
     """A filter ready to run.
@@ -52,26 +54,22 @@ class Filter:
         Short name, such as "aof-gaussian".
     model : Model
         The model it was built for.
-    init : callable
-        runs -> State before the first measurement.
-    step : callable
-        (State, y (runs, p)) -> State: correct with y_k, then predict k + 1.  NaN in y: no correction.
+    init : Init
+        runs -> State.
+    step : Advance
+        (State, y (runs, p)) -> State.  The estimate and the filter's own error covariance are its `posterior`.
     slow : bool
         Thousands of times the cost of the others: comparisons run it on a subset of the trajectories.
     """
 
     name: str
     model: Model
-    init: Callable[[int], State]
-    step: Callable[[State, Array], State]
+    init: Init
+    step: Advance
     slow: bool = False
 
-    def estimate(self, state: State) -> Gaussian:
-        """Estimate z (runs, n) and the filter's own error covariance (..., n, n)."""
-        return state.posterior
 
-
-def initial_state(model: Model) -> Callable[[int], State]:
+def initial_state(model: Model) -> Init:
     """`init` of every Gaussian filter: lambda_0 = m, Psi_0 = d."""
 
     def init(runs: int) -> State:
@@ -79,71 +77,3 @@ def initial_state(model: Model) -> Callable[[int], State]:
         return State(0, prior, prior)
 
     return init
-
-
-class Regression(NamedTuple):
-    """A request: fit `target` by an affine function of `regressor` over the ensemble.
-
-    Attributes
-    ----------
-    target : callable
-        (x_k (N, n), x_{k+1} (N, n)) -> (N, r); known only while designing.
-    regressor : ndarray (N, s)
-        What the filter itself knows.
-    """
-
-    target: Callable[[Array, Array], Array]
-    regressor: Array
-
-
-class Step(NamedTuple):
-    """What the equations of one step return."""
-
-    posterior: Gaussian
-    predicted: Gaussian
-
-
-Equations = Generator[Regression, Affine, Step]
-
-
-@dataclass(frozen=True)
-class Design:
-    """A filter of given structure whose coefficients are still to be found.
-
-    Attributes
-    ----------
-    name : str
-    model : Model
-    equations : callable
-        (predicted: Gaussian, y) -> generator of one step: yields `Regression`, receives `Affine`, returns `Step`.
-    """
-
-    name: str
-    model: Model
-    equations: Callable[[Gaussian, Array], Equations]
-    slow: bool = False
-
-    def with_coefficients(self, coefficients: Sequence[Sequence[Affine]]) -> Filter:
-        """The filter with the coefficients of every step, in the order the equations ask for them."""
-        table = tuple(tuple(fits) for fits in coefficients)
-
-        def step(state: State, y: Array) -> State:
-            if state.step >= len(table):
-                raise ValueError(
-                    f"{self.name} was designed for {len(table)} steps; design it with more to run step {state.step + 1}"
-                )
-            result = _answer(self.equations(state.predicted, y), table[state.step])
-            return State(state.step + 1, result.posterior, result.predicted)
-
-        return Filter(self.name, self.model, initial_state(self.model), step)
-
-
-def _answer(equations: Equations, fits: Sequence[Affine]) -> Step:
-    """Run the equations of one step, answering each regression with its stored coefficients."""
-    try:
-        next(equations)
-        for fit in fits:
-            equations.send(fit)
-    except StopIteration as stop:
-        return stop.value
-    raise ValueError("the equations ask for more regressions than were designed")

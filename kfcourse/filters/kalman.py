@@ -1,70 +1,54 @@
-"""The Kalman filter of a linear-Gaussian model, kept as the readable special case.
+"""The Kalman filter: the textbook step, and the filter of a linear model made of it.
 
-    x' = A x + B v,   y = H x + C w      (plus constants)
+    x_{k+1} = A x_k + v_k,  v ~ N(0, Q)
+    y_k     = H x_k + w_k,  w ~ N(0, R)
 
-Every filter of the course must give these numbers on such a model; the tests pin it.
+Read this file first.  Every filter of the course is this correction and prediction with other functions in the place of the
+matrices; on a linear model with normal noises each must give these numbers, and the tests pin it.  What rounding does to
+the step, and the forms that stand it better, is in `kfcourse.linear.arithmetic`.
 """
 
 from __future__ import annotations
 
-import numpy as np
-import sympy as sp
-
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.laws import Array, symmetric
-from kfcourse.linear.arithmetic import form
-from kfcourse.linear.system import LinearSystem
-from kfcourse.symbolic.model import Model, ModelError
+from kfcourse.laws import Array, Gaussian, any_missing, apply, gain, transpose, without_missing
+from kfcourse.linear.system import LinearSystem, linear_system
+from kfcourse.symbolic.model import Model
 
 
-def kalman(model: Model, arithmetic: str = "covariance") -> Filter:
-    """The Kalman filter of a linear model.
+def correct(system: LinearSystem, predicted: Gaussian, y: Array) -> Gaussian:
+    """The law of the state after a measurement y, (..., p); its missing components (NaN) tell nothing.
 
-    K = P^- H^T (H P^- H^T + R)^-1,   z = x^- + K (y - H x^-),   P = (I - K H) P^-
-    x^- = A z,   P^- = A P A^T + Q                            (covariance (n, n): no trajectory enters)
+    K = P^- H^T (H P^- H^T + R)^-1,   z = x^- + K (y - H x^-),   P = P^- - K H P^-
+    """
+    x, P = predicted
+    H, R = system.H, system.R
+    innovation = y - apply(H, x)
+    if any_missing(innovation):
+        innovation, H, R, _ = without_missing(innovation, H, R, R)
+    K = gain(P @ transpose(H), H @ P @ transpose(H) + R)
+    return Gaussian(x + apply(K, innovation), P - K @ H @ P)
 
-    Parameters
-    ----------
-    model : Model
-    arithmetic : {"covariance", "symmetrised", "joseph", "square-root"}
-        How the covariance is computed; see `kfcourse.linear.arithmetic`.
+
+def predict(system: LinearSystem, posterior: Gaussian) -> Gaussian:
+    """The law of the next state, x^- = A z, P^- = A P A^T + Q."""
+    z, P = posterior
+    return Gaussian(apply(system.A, z), system.A @ P @ system.A.T + system.Q)
+
+
+def kalman_filter(model: Model) -> Filter:
+    """The Kalman filter of a linear model; as long as no measurement is missing, one covariance (n, n) for all runs.
 
     Raises
     ------
     ModelError
         The model is not linear.
     """
-    system, shift, offset = linear_system(model)
-    chosen = form(arithmetic, system)
-
-    def init(runs: int) -> State:
-        state = initial_state(model)(runs)
-        return state._replace(memory=chosen.start(state.predicted))
+    system, shift, offset = linear_system(model)  # constants of the object and of the meter
 
     def step(state: State, y: Array) -> State:
-        corrected = chosen.correct(system, state.memory, y - offset)
-        predicted = chosen.predict(system, corrected, shift)
-        return State(state.step + 1, chosen.law(corrected), chosen.law(predicted), predicted)
+        posterior = correct(system, state.predicted, y - offset)
+        mean, cov = predict(system, posterior)
+        return State(state.step + 1, posterior, Gaussian(mean + shift, cov))
 
-    return Filter("kalman", model, init, step)
-
-
-def linear_system(model: Model) -> tuple[LinearSystem, Array, Array]:
-    """The matrices of a linear model, and the constants of its object (n,) and meter (p,); ModelError if it is not linear."""
-    A, B, a0 = _affine(model.state_equation, model.x, model.v, model)
-    H, C, b0 = _affine(model.meter_equation, model.x, model.w, model)
-    Q, R = (M @ law.cov @ M.T for M, law in ((B, model.state_noise), (C, model.meter_noise)))
-    system = LinearSystem(A, H, symmetric(Q), symmetric(R))
-    return system, a0 + B @ model.state_noise.mean, b0 + C @ model.meter_noise.mean
-
-
-def _affine(
-    equation: sp.MatrixBase, x: tuple[sp.Symbol, ...], noise: tuple[sp.Symbol, ...], model: Model
-) -> tuple[Array, Array, Array]:
-    """Matrices of equation = A x + B noise + constant."""
-    numeric = equation.subs(model.values)
-    A, B = numeric.jacobian(sp.Matrix(x)), numeric.jacobian(sp.Matrix(noise))
-    if A.has(*x, *noise) or B.has(*x, *noise):
-        raise ModelError(f"{list(equation)} is not linear, so the Kalman filter does not apply; use aof(linearised(model))")
-    constant = numeric.subs(dict.fromkeys([*x, *noise], 0))
-    return np.array(A, dtype=float), np.array(B, dtype=float), np.array(constant, dtype=float)[:, 0]
+    return Filter("kalman", model, initial_state(model), step)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import sympy as sp
 
 from kfcourse.filters import notation as s
-from kfcourse.filters.base import Design, Equations, Regression, Step
+from kfcourse.filters.designed import Design, Equations, Regression, Step
 from kfcourse.filters.optimal_structure import CONDITION, check_arguments, with_measurement
 from kfcourse.laws import Array, Gaussian, apply, gain, product, transpose, where_measured
 from kfcourse.symbolic.structure import Structure

@@ -23,8 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.laws import Array, Gaussian, Measurement, any_missing, correct, without_missing
-from kfcourse.linear.consistency import normalised_square
+from kfcourse.laws import Array, Gaussian, Measurement, any_missing, correct, normalised_square, without_missing
 from kfcourse.symbolic.structure import Structure
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.filters import notation as s
-from kfcourse.filters.base import Design, Equations, Regression, Step
+from kfcourse.filters.designed import Design, Equations, Regression, Step
 from kfcourse.laws import Array, Gaussian, correct
 from kfcourse.symbolic.structure import Structure
 

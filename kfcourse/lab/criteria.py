@@ -13,17 +13,17 @@ import numpy as np
 import sympy as sp
 from scipy import stats
 
-from kfcourse.checks import Exercise
 from kfcourse.filters import Filter
 from kfcourse.filters.base import State, initial_state
 from kfcourse.lab.difficulty import length
-from kfcourse.lab.variants import Structures, Variant, title
+from kfcourse.lab.short_names import Structures, title
 from kfcourse.laws import Array, Gaussian
 from kfcourse.montecarlo.comparison import Comparison
-from kfcourse.montecarlo.statistics import Estimate, batch_mean
+from kfcourse.montecarlo.statistics import Estimate, batch_mean, ratio
 from kfcourse.symbolic.codegen import compile_function
-from kfcourse.symbolic.model import Model, exact_matrix
+from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
+from kfcourse.symbolic.reading import exact_matrix
 
 GROWTH = 10.0  # of a second moment over the second half of the steps: an unknown velocity has 4, x' = 1.05 x has 12
 CARRIERS = 10.0  # trajectories, at least, that carry a second moment
@@ -34,7 +34,6 @@ SIGNIFICANCE = 0.01  # of "the filters differ", for all pairs and steps together
 ROUNDING = 1e-9  # relative differences that rounding alone explains
 LONGEST = 600  # operations of the Gaussian structural functions; the van der Pol oscillator has 309
 UNMEASURED = "without measurements"
-LETTERS = "abcdefg"  # sets of exercises about the variant; the later ones have models of their own
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,7 @@ def bounded(x: Array) -> Finding:
     if not finite.all():
         return Finding(False, f"trajectories become infinite (step {int(np.argmin(finite))})", float("inf"))
     square, half = (x**2).mean(axis=1), (len(x) + 1) // 2
-    growth = float(_ratio(square[half:].max(axis=0), square[:half].max(axis=0)).max())
+    growth = float(ratio(square[half:].max(axis=0), square[:half].max(axis=0), 0.0).max())
     grows = f"the second moment grows {growth:.3g} times from the first half of the steps to the second"
     if growth > GROWTH:
         return Finding(False, grows, growth)
@@ -85,7 +84,7 @@ def kurtosis(x: Array) -> Array:
     """M u^4 / (M u^2)^2, u = x - M x, per step and component, (steps, n): 3 for a normal law; 0 for a constant."""
     u = x - x.mean(axis=1, keepdims=True)
     variance = np.where(varies(x), (u**2).mean(axis=1), 0.0)
-    return _ratio((u**4).mean(axis=1), variance**2)
+    return ratio((u**4).mean(axis=1), variance**2, 0.0)
 
 
 def varies(x: Array) -> Array:
@@ -131,10 +130,10 @@ def shares(comparison: Comparison, name: str) -> Estimate:
     counts, total = comparison.sums.counts, base.sum(axis=-1)
     used = total > 1e-24 * total.max(axis=0)
     steps = np.maximum(used.sum(axis=0), 1)
-    ratio = np.where(used, _ratio(square.sum(axis=-1), total), 0.0)
-    weight = np.where(used, _ratio(counts.sum() / steps, total), 0.0)  # 1 / variance, averaged over the steps
-    deviation = batch_mean(((square - ratio[..., None] * base) * weight[..., None]).sum(axis=0), counts)  # delta method
-    value = np.where(used.any(axis=0), ratio.sum(axis=0) / steps, 1.0)
+    share = np.where(used, ratio(square.sum(axis=-1), total, 0.0), 0.0)
+    weight = np.where(used, ratio(counts.sum() / steps, total, 0.0), 0.0)  # 1 / variance, averaged over the steps
+    deviation = batch_mean(((square - share[..., None] * base) * weight[..., None]).sum(axis=0), counts)  # delta method
+    value = np.where(used.any(axis=0), share.sum(axis=0) / steps, 1.0)
     return Estimate(value, deviation.standard_error, deviation.freedom)
 
 
@@ -187,13 +186,6 @@ def observable_share(model: Model, x: Array) -> float:
 # --- the filters differ
 
 
-def is_linear(model: Model) -> bool:
-    """Whether both equations are linear in state and noise, so that the Kalman filter is exact."""
-    symbols = [*model.x, *model.v, *model.w]
-    equations = [*model.state_equation.subs(model.values), *model.meter_equation.subs(model.values)]
-    return not any(sp.expand(sp.diff(one, symbol)).has(*symbols) for one in equations for symbol in symbols)
-
-
 def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
     """Whether two filters differ in error variance by more than the statistical error, at a step or on average.
 
@@ -209,8 +201,8 @@ def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
     largest, says = 0.0, f"no two filters differ by more than the statistical error of {comparison.runs} trajectories"
     for first, second in pairs:
         difference, score = comparison.difference(first, second), comparison.score_difference(first, second)
-        relative = np.abs(np.append(_ratio(difference.value, control), score.value))
-        error = np.append(_ratio(difference.standard_error, control), score.standard_error)
+        relative = np.abs(np.append(ratio(difference.value, control, 0.0), score.value))
+        error = np.append(ratio(difference.standard_error, control, 0.0), score.standard_error)
         quantile = stats.t.ppf(1 - SIGNIFICANCE / tests / 2, difference.freedom)
         allowed = quantile * error + ROUNDING + (fitted if first in designed or second in designed else 0.0)
         significant = np.where(relative > allowed, relative, 0.0)
@@ -233,27 +225,3 @@ def solvable(structures: Structures) -> Finding:
         return Finding(False, str(error))
     says = f"closed form, {operations} operations in the Gaussian structural functions"
     return Finding(operations <= LONGEST, says + ("" if operations <= LONGEST else f", more than {LONGEST}"), float(operations))
-
-
-def questions(variant: Variant) -> Finding | None:
-    """The first question of the exercises that cannot be posed for the variant; None if all can.
-
-    Its right answer fails, or is not accepted.
-    """
-    for letter in LETTERS:
-        exercise = Exercise(letter, variant)
-        for name, question in exercise.questions.items():
-            try:
-                result = exercise.check(name, question.answer(exercise))
-            except Exception as error:  # whatever a degenerate model leads to
-                return Finding(False, f"question {name} of the exercises cannot be posed ({type(error).__name__}: {error})")
-            if not result.passed:
-                return Finding(False, f"question {name} of the exercises does not accept its own answer: {result.message}")
-    return None
-
-
-def _ratio(numerator: Array, denominator: Array) -> Array:
-    """numerator / denominator, and 0 where that is 0."""
-    return np.divide(
-        numerator, denominator, out=np.zeros(np.broadcast_shapes(numerator.shape, denominator.shape)), where=denominator > 0
-    )

@@ -20,7 +20,7 @@ import joblib
 import numpy as np
 from tqdm import tqdm
 
-from kfcourse.lab.quality import FEWEST, RUNS, Quality, examine
+from kfcourse.lab.quality import FEWEST, RUNS, Ask, Quality, examine
 from kfcourse.lab.variants import Variant, read_variant
 
 VECTORS = 0.1  # probability of a vector model
@@ -170,7 +170,7 @@ def _value(value: Any) -> str:
     return json.dumps(value)  # strings, numbers and lists of them are written alike in JSON and TOML
 
 
-def generate(wanted: int, seed: int = 1, runs: int = RUNS, jobs: int = 2) -> Generated:
+def generate(wanted: int, seed: int = 1, runs: int = RUNS, jobs: int = 2, ask: Ask | None = None) -> Generated:
     """Well-posed variants g1, g2, ...: candidates in order, without those that fail a criterion or repeat formulas.
 
     Parameters
@@ -181,6 +181,8 @@ def generate(wanted: int, seed: int = 1, runs: int = RUNS, jobs: int = 2) -> Gen
         Trajectories of each check, see `kfcourse.lab.quality.examine`; a tenth of them for a first one.
     jobs : int
         Processes; no result depends on it.
+    ask : callable, optional
+        As in `examine`.
 
     Returns
     -------
@@ -206,7 +208,7 @@ def generate(wanted: int, seed: int = 1, runs: int = RUNS, jobs: int = 2) -> Gen
     with joblib.Parallel(n_jobs=jobs) as parallel, tqdm(desc="generating", total=wanted, unit="variant", disable=None) as bar:
         while len(found) < wanted and (tables := list(islice(candidates, chunk))):
             new = [shapes[_shape(table)] < most for table in tables]
-            judged = iter(parallel(joblib.delayed(_judge)(table, runs, seed) for table in compress(tables, new)))
+            judged = iter(parallel(joblib.delayed(_judge)(table, runs, seed, ask) for table in compress(tables, new)))
             qualities = [next(judged) if examined else None for examined in new]
             for table, quality in zip(tables, qualities, strict=True):
                 if len(found) == wanted:
@@ -228,11 +230,11 @@ def _shape(table: Mapping[str, Any]) -> str:
     return json.dumps([table["state"], table["meter"]])
 
 
-def _judge(table: Mapping[str, Any], runs: int, seed: int) -> Quality:
+def _judge(table: Mapping[str, Any], runs: int, seed: int, ask: Ask | None) -> Quality:
     """A candidate's quality: from few trajectories if these show that it is none, else from all, with the exercises."""
     variant = read_variant("candidate", table, "the grammar")
-    first = examine(variant, max(runs // SCREEN, FEWEST), seed, exercises=False)
-    return first if _reason(first) else examine(variant, runs, seed)
+    first = examine(variant, max(runs // SCREEN, FEWEST), seed)
+    return first if _reason(first) else examine(variant, runs, seed, ask)
 
 
 def _reason(quality: Quality) -> str:

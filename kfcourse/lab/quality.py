@@ -15,7 +15,7 @@ A variant is well posed if it is
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import joblib
@@ -28,27 +28,28 @@ from kfcourse.lab.criteria import (
     Finding,
     bounded,
     differences,
-    is_linear,
     kurtosis,
     measured,
     not_diverging,
     observable,
-    questions,
     shares,
     solvable,
     unmeasured,
 )
 from kfcourse.lab.difficulty import Hardness, hardness
-from kfcourse.lab.variants import FILTERS, LAB, Structures, Variant, has_exact, title
+from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_exact, title
+from kfcourse.lab.variants import Variant
 from kfcourse.laws import Array, Gaussian
 from kfcourse.limits import OutOfTime, time_limit
+from kfcourse.linear.system import is_linear
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.statistics import BATCHES
-from kfcourse.symbolic.model import Model, ModelError
+from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
+from kfcourse.symbolic.reading import ModelError
 
 STEPS = 51  # of the lab
 RUNS = 40_000  # trajectories of a check
@@ -59,6 +60,8 @@ HEAVY = 20.0  # kurtosis worth a remark; 3 is the normal law's
 SECONDS = 60.0  # for the derivation
 FAILURES = (NotFinite, np.linalg.LinAlgError)  # a filter left the finite numbers, or a decomposition did not converge for it
 NOT_EXAMINED = Finding(None, "not examined")
+
+Ask = Callable[[Variant], Finding | None]
 
 
 @dataclass(frozen=True)
@@ -101,7 +104,7 @@ class Quality:
         return not self.faults
 
 
-def examine(variant: Variant, runs: int = RUNS, seed: int = 1, *, exercises: bool = True) -> Quality:
+def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None = None) -> Quality:
     """Check a variant.
 
     Parameters
@@ -110,8 +113,8 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, *, exercises: boo
     runs : int
         Trajectories, at least 256; a vector model gets an eighth of them.
     seed : int
-    exercises : bool
-        Pose every question of the exercises too.
+    ask : callable, optional
+        Variant -> the question of the exercises that cannot be posed, as a `Finding`, or None; `kfcourse.checks.posing.unposed`.
 
     Raises
     ------
@@ -130,9 +133,7 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, *, exercises: boo
     found = Quality(variant.name, NOT_EXAMINED, NOT_EXAMINED, NOT_EXAMINED, answers, is_linear(variant.model))
     with np.errstate(all="ignore"):  # what diverges is told in the findings
         if answers.ok:
-            found = dataclasses.replace(
-                found, solvable=(exercises and questions(variant)) or answers, hardness=hardness(structures)
-            )
+            found = dataclasses.replace(found, solvable=(ask(variant) if ask else None) or answers, hardness=hardness(structures))
         return _simulated(found, structures, runs if variant.model.n == 1 else max(runs // VECTOR, FEWEST), seed)
 
 
@@ -203,10 +204,12 @@ def _fragile(result: Comparison, x: Array, filters: Sequence[Filter | Design], h
         yield f"a filter diverges when deviations are {STRESS:g} times larger"
 
 
-def examine_all(variants: Sequence[Variant], runs: int = RUNS, seed: int = 1, jobs: int = 2) -> Iterator[Quality]:
+def examine_all(
+    variants: Sequence[Variant], runs: int = RUNS, seed: int = 1, jobs: int = 2, ask: Ask | None = None
+) -> Iterator[Quality]:
     """`examine` every variant, in order, in so many processes, on which no number depends; with a progress bar."""
     with joblib.Parallel(n_jobs=max(1, min(jobs, len(variants))), return_as="generator") as parallel:
-        done = parallel(joblib.delayed(examine)(one, runs, seed) for one in variants)
+        done = parallel(joblib.delayed(examine)(one, runs, seed, ask) for one in variants)
         yield from tqdm(done, desc="checking", total=len(variants), unit="variant", disable=None)
 
 

@@ -6,7 +6,8 @@ runs          the filter along stored measurements, simulation, covariance analy
 consistency   NEES, NIS, whiteness: is a filter right about its own errors?
 """
 
-from kfcourse.linear.runs import Run, Trajectories, covariances, run, simulate, stacked, steady_state
+from kfcourse.linear.accuracy import covariances, steady_state
+from kfcourse.linear.runs import Run, run, simulate
 from kfcourse.linear.system import LinearSystem
 
-__all__ = ["LinearSystem", "Run", "Trajectories", "covariances", "run", "simulate", "stacked", "steady_state"]
+__all__ = ["LinearSystem", "Run", "covariances", "run", "simulate", "steady_state"]

@@ -15,18 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kfcourse.laws import (
-    Array,
-    Gaussian,
-    any_missing,
-    apply,
-    correct,
-    gain,
-    square_root,
-    symmetric,
-    transpose,
-    without_missing,
-)
+from kfcourse.laws import Array, Gaussian, any_missing, apply, correct, gain, square_root, symmetric, transpose, without_missing
 from kfcourse.linear.system import LinearSystem
 
 

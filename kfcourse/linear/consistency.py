@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-from kfcourse.laws import Array, Gaussian, Measurement
+from kfcourse.laws import Array, Gaussian, Measurement, normalised_square
 
 
 class Innovations(NamedTuple):
@@ -42,28 +42,32 @@ def innovations(measure: Callable[[Array, Array], Measurement], predicted: Gauss
     return Innovations(y - measurement.h, measurement.F)
 
 
-def normalised_square(vector: Array, cov: Array) -> Array:
-    """vector^T cov^-1 vector: (..., n), (..., n, n) -> (...); NaN where a component is NaN.
+def nees(x: Array, posterior: Gaussian) -> Array:
+    """Normalised estimation error squared, (..., n) -> (...): mean n for a filter that is right.
 
     Raises
     ------
     ValueError
         A covariance is singular: some component is claimed to be known exactly.
     """
-    try:
-        return (vector * np.linalg.solve(cov, vector[..., None])[..., 0]).sum(axis=-1)
-    except np.linalg.LinAlgError:
-        raise ValueError("a covariance is singular: leave out the components that the filter knows exactly") from None
-
-
-def nees(x: Array, posterior: Gaussian) -> Array:
-    """Normalised estimation error squared, (..., n) -> (...): mean n for a filter that is right."""
-    return normalised_square(x - posterior.mean, posterior.cov)
+    return normalised_square(x - posterior.mean, _regular(posterior.cov))
 
 
 def nis(found: Innovations) -> Array:
-    """Normalised innovation squared, (steps, runs): mean p for a filter that is right; NaN where y is missing."""
-    return normalised_square(*found)
+    """Normalised innovation squared, (steps, runs): mean p for a filter that is right; NaN where y is missing.
+
+    Raises
+    ------
+    ValueError
+        A covariance is singular: some measurement is claimed to be known before it comes.
+    """
+    return normalised_square(found.value, _regular(found.cov))
+
+
+def _regular(cov: Array) -> Array:
+    if not np.linalg.det(cov).all():
+        raise ValueError("a covariance is singular: leave out the components that the filter knows exactly")
+    return cov
 
 
 def chi_squared_bounds(degrees: int, runs: int, confidence: float = 0.95) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""The Kalman filter for given matrices, its accuracy in advance, and its limit.
+"""The Kalman filter for given matrices along stored measurements, and simulation.
 
     x_{k+1} = A x_k + B u_k + v_k,  v ~ N(0, Q)        u_k: known input
     y_k     = H x_k + w_k,          w ~ N(0, R)
@@ -11,9 +11,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
 
-from kfcourse.laws import Array, Gaussian, apply, correct, gain, square_root, symmetric
+from kfcourse.laws import Array, Gaussian, Trajectories, apply, square_root, stacked
 from kfcourse.linear.arithmetic import form
 from kfcourse.linear.system import LinearSystem
 
@@ -92,21 +91,6 @@ def _check_prior(prior: Gaussian, runs: int, n: int) -> None:
         raise ValueError("the prior must be finite: for an unknown state give a large variance, or start from measurements")
 
 
-def stacked(laws: list[Gaussian]) -> Gaussian:
-    """Laws of successive steps as one, the step before everything: mean (steps, runs, n), cov (steps, runs, n, n)."""
-    mean = np.stack([law.mean for law in laws])
-    covs = np.stack(np.broadcast_arrays(*(law.cov for law in laws)))
-    by_run = covs if covs.ndim == mean.ndim + 1 else covs[:, None]
-    return Gaussian(mean, np.broadcast_to(by_run, (*mean.shape, mean.shape[-1])))
-
-
-class Trajectories(NamedTuple):
-    """Simulated states x (steps, runs, n) and measurements y (steps, runs, p)."""
-
-    x: Array
-    y: Array
-
-
 def simulate(system: LinearSystem, prior: Gaussian, steps: int, runs: int, seed: int, u: Array | None = None) -> Trajectories:
     """Trajectories of the system with normal noises, from x_0 drawn from the prior.
 
@@ -132,68 +116,3 @@ def simulate(system: LinearSystem, prior: Gaussian, steps: int, runs: int, seed:
         y.append(apply(system.H, state) + noise(system.R))
         state = apply(system.A, state) + system.input(None if u is None else u[k]) + noise(system.Q)
     return Trajectories(np.stack(x), np.stack(y))
-
-
-class Covariances(NamedTuple):
-    """Covariance analysis: predicted (steps, n, n), posterior (steps, n, n), gains (steps, n, p)."""
-
-    predicted: Array
-    posterior: Array
-    gains: Array
-
-
-def covariances(system: LinearSystem, prior_cov: Array, steps: int, gains: Array | None = None) -> Covariances:
-    """Accuracy in advance: covariances of the error, which no measurement enters.
-
-    Parameters
-    ----------
-    system : LinearSystem
-        The *true* matrices.
-    prior_cov : ndarray (n, n)
-        True covariance of the error before y_0.
-    steps : int
-    gains : ndarray (steps, n, p) or (n, p), optional
-        Gains of another linear filter with the same A and H (one of a wrong model, or constant): its true errors are then
-        found, P = (I - K H) P^- (I - K H)^T + K R K^T for any K.  By default the optimal gains.
-    """
-    given = None if gains is None else np.broadcast_to(gains, (steps, len(system.A), len(system.H)))
-    cov = np.asarray(prior_cov, dtype=float)
-    rows = []
-    for k in range(steps):
-        K = gain(cov @ system.H.T, system.measure(np.zeros(len(cov)), cov).F) if given is None else given[k]
-        rest = np.eye(len(cov)) - K @ system.H
-        posterior = symmetric(rest @ cov @ rest.T + K @ system.R @ K.T)
-        rows.append((cov, posterior, K))
-        cov = symmetric(system.A @ posterior @ system.A.T + system.Q)
-    return Covariances(*(np.stack(column) for column in zip(*rows, strict=True)))
-
-
-class Steady(NamedTuple):
-    """The stationary Kalman filter: predicted (n, n), posterior (n, n), gain (n, p)."""
-
-    predicted: Array
-    posterior: Array
-    gain: Array
-
-
-def steady_state(system: LinearSystem) -> Steady:
-    """Limit of the covariances and of the gain, from the discrete algebraic Riccati equation.
-
-    P = A (P - P H^T (H P H^T + R)^-1 H P) A^T + Q
-
-    Raises
-    ------
-    ValueError
-        There is no limit that the filter reaches from every start: a part of the state is neither seen nor decays, or has
-        no noise.
-    """
-    try:
-        predicted = scipy.linalg.solve_discrete_are(system.A.T, system.H.T, system.Q, system.R)
-    except (np.linalg.LinAlgError, ValueError):
-        raise ValueError(
-            "the Riccati equation has no stabilising solution: a part of the state is neither seen by the meter nor decays, "
-            "or has no noise; use covariances(system, ...) to follow the filter step by step"
-        ) from None
-    law = Gaussian(np.zeros(len(system.A)), symmetric(predicted))
-    measurement = system.measure(*law)
-    return Steady(law.cov, correct(law, measurement, measurement.h).cov, gain(law.cov @ system.H.T, measurement.F))

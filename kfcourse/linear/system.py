@@ -1,4 +1,4 @@
-"""The matrices of a linear model, checked.
+"""The matrices of a linear model, checked; given, or taken from a `Model`.
 
 x_{k+1} = A x_k + B u_k + v_k,  v ~ N(0, Q)        u_k: known input
 y_k     = H x_k + w_k,          w ~ N(0, R)
@@ -6,12 +6,16 @@ y_k     = H x_k + w_k,          w ~ N(0, R)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from kfcourse.laws import Array, Measurement, apply, symmetric
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import ModelError
 
 
 @dataclass(frozen=True)
@@ -86,3 +90,40 @@ class LinearSystem:
     def measure(self, m: Array, d: Array) -> Measurement:
         """Structural functions of the meter: h = H m, G = H, F = H d H^T + R."""
         return Measurement(apply(self.H, m), self.H, symmetric(self.H @ d @ self.H.T) + self.R, self.R)
+
+
+def linear_system(model: Model) -> tuple[LinearSystem, Array, Array]:
+    """The matrices of a linear model, and the constants of its object (n,) and meter (p,).
+
+    Raises
+    ------
+    ModelError
+        The model is not linear.
+    """
+    A, B, a0 = _affine(model.state_equation, model.x, model.v, model)
+    H, C, b0 = _affine(model.meter_equation, model.x, model.w, model)
+    Q, R = (M @ law.cov @ M.T for M, law in ((B, model.state_noise), (C, model.meter_noise)))
+    system = LinearSystem(A, H, symmetric(Q), symmetric(R))
+    return system, a0 + B @ model.state_noise.mean, b0 + C @ model.meter_noise.mean
+
+
+def is_linear(model: Model) -> bool:
+    """Whether both equations are linear in state and noise, so that the Kalman filter is exact."""
+    sides = (model.state_equation, model.v), (model.meter_equation, model.w)
+    return not any(_slopes(equation, [*model.x, *noise], model).has(*model.x, *noise) for equation, noise in sides)
+
+
+def _slopes(equation: sp.MatrixBase, symbols: Sequence[sp.Symbol], model: Model) -> sp.MatrixBase:
+    return equation.subs(model.values).jacobian(sp.Matrix(symbols)).applyfunc(sp.expand)
+
+
+def _affine(
+    equation: sp.MatrixBase, x: Sequence[sp.Symbol], noise: Sequence[sp.Symbol], model: Model
+) -> tuple[Array, Array, Array]:
+    """Matrices of equation = A x + B noise + constant."""
+    slopes = _slopes(equation, [*x, *noise], model)
+    if slopes.has(*x, *noise):
+        raise ModelError(f"{list(equation)} is not linear, so the Kalman filter does not apply; use aof(linearised(model))")
+    constant = equation.subs(model.values).subs(dict.fromkeys([*x, *noise], 0))
+    matrix = np.array(slopes, dtype=float)
+    return matrix[:, : len(x)], matrix[:, len(x) :], np.array(constant, dtype=float)[:, 0]

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from kfcourse.laws import Array
-from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean
+from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean, ratio
 from kfcourse.symbolic.model import Model
 
 EXACT = "aof-exact"
@@ -82,11 +82,12 @@ class Comparison:
         """
         reference = reference or self.control
         base = self.error_variance(reference).value
-        ratio = _ratio(self.error_variance(name).value, base)
+        own = self.error_variance(name).value
+        quotient = ratio(own, base, np.where(own == 0, 1.0, np.inf))  # both know everything: equal
         combination: dict[str, Array | float] = {name: _inverse(base)}
-        combination[reference] = combination.get(reference, 0.0) - ratio * _inverse(base)
+        combination[reference] = combination.get(reference, 0.0) - quotient * _inverse(base)
         deviation = self._combined(combination)
-        return Estimate(ratio, deviation.standard_error, deviation.freedom)
+        return Estimate(quotient, deviation.standard_error, deviation.freedom)
 
     def score(self, name: str, steps: slice = slice(None)) -> Estimate:
         """The mean over steps of D_k(name) / D_k(control): one number for a filter, with its standard error."""
@@ -233,10 +234,4 @@ class Comparison:
 
 def _inverse(values: Array) -> Array:
     """1 / values, and 0 where there is nothing to compare with."""
-    return np.divide(1.0, values, out=np.zeros_like(values), where=values > 0)
-
-
-def _ratio(numerator: Array, denominator: Array) -> Array:
-    """numerator / denominator; 1 where both are 0 (all errors are 0 there)."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where((numerator == 0) & (denominator == 0), 1.0, numerator / denominator)
+    return ratio(np.ones_like(values), values, 0.0)

@@ -12,23 +12,24 @@ from concurrent.futures import Executor
 
 import numpy as np
 
-from kfcourse.filters.base import Design, Filter, Step, initial_state
-from kfcourse.laws import Affine, Gaussian, Moments
-from kfcourse.montecarlo.ensemble import Moment, Serial
+from kfcourse.filters.base import Filter, initial_state
+from kfcourse.filters.designed import Affine, Design, Scatter, Step
+from kfcourse.laws import Gaussian
+from kfcourse.montecarlo.ensemble import Instant, Serial
 
 
 class NotFinite(ArithmeticError):
     """A filter or trajectory left the finite numbers."""
 
 
-def design(designs: Sequence[Design], ensemble: Iterable[list[Moment]], pool: Executor | None = None) -> list[Filter]:
+def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: Executor | None = None) -> list[Filter]:
     """Fit every design on the same trajectories.
 
     Parameters
     ----------
     designs : sequence of Design
     ensemble : iterable
-        For each step the list of blocks `Moment(x, y, x_next)`: `Ensemble.by_step(pool)`, or stored trajectories.
+        For each step the list of blocks `Instant(x, y, x_next)`: `Ensemble.by_step(pool)`, or stored trajectories.
     pool : Executor, optional
         Blocks of a step are computed in its threads.
 
@@ -58,23 +59,23 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Moment]], pool: Ex
 class _BlockStep:
     """The equations of all designs over one step of one block of trajectories."""
 
-    def __init__(self, designs: Sequence[Design], predicted: Sequence[Gaussian], block: Moment):
+    def __init__(self, designs: Sequence[Design], predicted: Sequence[Gaussian], block: Instant):
         self.block = block
         self.running = [one.equations(before, block.y) for one, before in zip(designs, predicted, strict=True)]
         self.results: list[Step | None] = [None] * len(designs)
 
-    def advance(self, answers: dict[int, Affine | None]) -> list[Moments | None]:
+    def advance(self, answers: dict[int, Affine | None]) -> list[Scatter | None]:
         """Answer the waiting designs; the moments of the regression each asks for next, None if it is through."""
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported, by name
             return [self._advance(i, answer) for i, answer in answers.items()]
 
-    def _advance(self, i: int, answer: Affine | None) -> Moments | None:
+    def _advance(self, i: int, answer: Affine | None) -> Scatter | None:
         try:
             request = self.running[i].send(answer)  # type: ignore[arg-type]  # None starts a generator
         except StopIteration as stop:
             self.results[i] = stop.value
             return None
-        return Moments.of(request.target(self.block.x, self.block.x_next), request.regressor)
+        return Scatter.of(request.target(self.block.x, self.block.x_next), request.regressor)
 
     def finished(self) -> list[Step]:
         return [step for step in self.results if step is not None]
@@ -92,7 +93,7 @@ def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int, poo
             if parts[0] is None:
                 continue
             with np.errstate(over="ignore", invalid="ignore"):
-                merged = Moments.together([part for part in parts if part is not None])
+                merged = Scatter.together([part for part in parts if part is not None])
             if not np.isfinite(merged.scatter).all():
                 if not all(np.isfinite(run.block.x_next).all() and np.isfinite(run.block.y).all() for run in runs):
                     raise NotFinite(f"step {k}: the model's trajectories become infinite, check its equations and parameters")

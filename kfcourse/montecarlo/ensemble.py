@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kfcourse.laws import Array, Gaussian, square_root
+from kfcourse.laws import Array, Gaussian, Trajectories, square_root
+from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import compile_model
 
 # Largest and smallest block of trajectories: operations long enough to leave the interpreter to the other threads,
 # arrays short enough for the processor's caches.
@@ -26,19 +26,12 @@ BLOCK, SMALL_BLOCK = 100_000, 16_384
 STEPS_AT_ONCE = 4  # steps drawn by one call: few calls, and little memory over the whole ensemble
 
 
-class Moment(NamedTuple):
+class Instant(NamedTuple):
     """One step of a block of trajectories: x_k (N, n), y_k (N, p), x_{k+1} (N, n)."""
 
     x: Array
     y: Array
     x_next: Array
-
-
-class Trajectories(NamedTuple):
-    """Stored trajectories: x (steps, runs, n), y (steps, runs, p)."""
-
-    x: Array
-    y: Array
 
 
 @dataclass(frozen=True)
@@ -51,8 +44,6 @@ class Ensemble:
     runs, steps : int
         Trajectories, and measurements y_0 ... y_{steps-1} of each.
     seed : numpy.random.SeedSequence
-    threads : int
-        1 draws in the calling thread; more draw ahead in so many others.
     """
 
     model: Model
@@ -76,16 +67,16 @@ class Ensemble:
     def _chunks(self) -> list[range]:
         return [range(k, min(k + STEPS_AT_ONCE, self.steps)) for k in range(0, self.steps, STEPS_AT_ONCE)]
 
-    def block(self, index: int) -> Iterator[Moment]:
+    def block(self, index: int) -> Iterator[Instant]:
         """The steps of one block of trajectories."""
         x = self._initial(index)
         for chunk in range(len(self._chunks)):
             for v, w in zip(*self._draw(index, chunk), strict=True):
-                moment = self._simulator(x, v, w)
-                yield moment
-                x = moment.x_next
+                instant = self._simulator(x, v, w)
+                yield instant
+                x = instant.x_next
 
-    def by_step(self, pool: Executor | None = None) -> Iterator[list[Moment]]:
+    def by_step(self, pool: Executor | None = None) -> Iterator[list[Instant]]:
         """All blocks of a step together, step by step: for coefficients that need the whole ensemble."""
         pool = pool or Serial()
         blocks = range(len(self.sizes))
@@ -96,9 +87,9 @@ class Ensemble:
             if chunk + 1 < len(self._chunks):
                 drawn = [pool.submit(self._draw, b, chunk + 1) for b in blocks]  # ahead of time
             for k in range(len(steps)):
-                moments = list(pool.map(self._simulator, x, [v[k] for v, _ in noises], [w[k] for _, w in noises]))
-                yield moments
-                x = [moment.x_next for moment in moments]
+                instants = list(pool.map(self._simulator, x, [v[k] for v, _ in noises], [w[k] for _, w in noises]))
+                yield instants
+                x = [instant.x_next for instant in instants]
 
     @cached_property
     def _simulator(self) -> _Simulator:
@@ -125,10 +116,10 @@ class _Simulator:
         self.state, self.meter = compile_model(model)
         self.n, self.p = model.n, model.p
 
-    def __call__(self, x: Array, v: Array, w: Array) -> Moment:
+    def __call__(self, x: Array, v: Array, w: Array) -> Instant:
         y, x_next = self.meter(x, w), self.state(x, v)
         # A formula without noise and state is one constant for all trajectories.
-        return Moment(x, np.broadcast_to(y, (len(x), self.p)), np.broadcast_to(x_next, (len(x), self.n)))
+        return Instant(x, np.broadcast_to(y, (len(x), self.p)), np.broadcast_to(x_next, (len(x), self.n)))
 
 
 def _draw(rng: np.random.Generator, law: Gaussian, steps: int, size: int) -> Array:
@@ -167,7 +158,7 @@ def simulate(model: Model, runs: int, steps: int, seed: int) -> Trajectories:
     x, y = np.empty((steps, runs, model.n)), np.empty((steps, runs, model.p))
     start = 0
     for index, size in enumerate(ensemble.sizes):
-        for k, moment in enumerate(ensemble.block(index)):
-            x[k, start : start + size], y[k, start : start + size] = moment.x, moment.y
+        for k, instant in enumerate(ensemble.block(index)):
+            x[k, start : start + size], y[k, start : start + size] = instant.x, instant.y
         start += size
     return Trajectories(x, y)

@@ -16,11 +16,12 @@ from typing import TypeVar
 import numpy as np
 from tqdm import tqdm
 
-from kfcourse.filters.base import Design, Filter, State
-from kfcourse.laws import Array, Gaussian
+from kfcourse.filters.base import Filter, State
+from kfcourse.filters.designed import Design
+from kfcourse.laws import Array, Gaussian, stacked
 from kfcourse.montecarlo.comparison import EXACT, Comparison, Subset
 from kfcourse.montecarlo.designing import NotFinite, design
-from kfcourse.montecarlo.ensemble import Ensemble, Moment, workers
+from kfcourse.montecarlo.ensemble import Ensemble, Instant, workers
 from kfcourse.montecarlo.statistics import BATCHES, Sums
 from kfcourse.symbolic.model import Model
 
@@ -43,7 +44,7 @@ def run(one: Filter, y: Array) -> Gaussian:
     Gaussian
         Estimates (steps, runs, n) and the filter's covariances (steps, runs, n, n).
     """
-    return _stacked([one.estimate(state) for state in _states(one, y)[1:]])
+    return stacked([state.posterior for state in _states(one, y)[1:]])
 
 
 def predictions(one: Filter, y: Array) -> Gaussian:
@@ -51,7 +52,7 @@ def predictions(one: Filter, y: Array) -> Gaussian:
 
     Arguments as in `run`.  `kfcourse.linear.consistency` compares them with what then came.
     """
-    return _stacked([state.predicted for state in _states(one, y)[:-1]])
+    return stacked([state.predicted for state in _states(one, y)[:-1]])
 
 
 def _states(one: Filter, y: Array) -> list[State]:
@@ -61,11 +62,6 @@ def _states(one: Filter, y: Array) -> list[State]:
     if y.shape[2] != one.model.p:
         raise ValueError(f"{one.name} expects {one.model.p} measurement component(s), got {y.shape[2]}")
     return list(accumulate(y, one.step, initial=one.init(y.shape[1])))
-
-
-def _stacked(laws: Sequence[Gaussian]) -> Gaussian:
-    full = [Gaussian(mean, np.broadcast_to(cov, mean.shape + mean.shape[-1:])) for mean, cov in laws]
-    return Gaussian(np.stack([law.mean for law in full]), np.stack([law.cov for law in full]))
 
 
 def compare(
@@ -174,7 +170,7 @@ def _run_blocks(filters: Sequence[Filter], ensemble: Ensemble, pool: Executor, p
     return Sums.concatenate(list(_progress(pool.map(block, indices), "comparing", len(indices), "block", progress)))
 
 
-def _run_block(filters: Sequence[Filter], moments: Iterable[Moment], sums: Sums, reference: int | None = None) -> None:
+def _run_block(filters: Sequence[Filter], instants: Iterable[Instant], sums: Sums, reference: int | None = None) -> None:
     """Advance all filters together over the steps of one block of trajectories.
 
     With a reference filter, the distance of every other estimate from its own is recorded too.
@@ -182,10 +178,10 @@ def _run_block(filters: Sequence[Filter], moments: Iterable[Moment], sums: Sums,
     size = int(sums.counts.sum())
     states = [one.init(size) for one in filters]
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
-        for k, moment in enumerate(moments):
+        for k, instant in enumerate(instants):
             for i, one in enumerate(filters):
-                states[i] = one.step(states[i], moment.y)
-                sums.record(i, k, moment.x, one.estimate(states[i]))
+                states[i] = one.step(states[i], instant.y)
+                sums.record(i, k, instant.x, states[i].posterior)
             if reference is not None:
                 for i, state in enumerate(states):
                     sums.record_distance(i, k, state.posterior.mean, states[reference].posterior.mean)
@@ -216,10 +212,10 @@ def _run_subset(filters: Sequence[Filter], ensemble: Ensemble, size: int, progre
 
     def chunk(start: int) -> Sums:
         rows = slice(start, min(start + SUBSET_CHUNK, size))
-        moments = [Moment(x[k, rows], y[k, rows], x_next[k, rows]) for k in range(ensemble.steps)]
+        instants = [Instant(x[k, rows], y[k, rows], x_next[k, rows]) for k in range(ensemble.steps)]
         count = rows.stop - rows.start
         sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, count, max(1, round(BATCHES * count / size)))
-        _run_block(filters, moments, sums, reference)
+        _run_block(filters, instants, sums, reference)
         return sums
 
     return Sums.concatenate(list(_progress(map(chunk, starts), "slow filters", len(starts), "chunk", progress)))
@@ -227,11 +223,11 @@ def _run_subset(filters: Sequence[Filter], ensemble: Ensemble, size: int, progre
 
 def _first(ensemble: Ensemble, size: int) -> tuple[Array, Array, Array]:
     """The first `size` of the ensemble's trajectories: x, y and the following x, (steps, size, ...)."""
-    parts: list[list[Moment]] = []
+    parts: list[list[Instant]] = []
     left = size
     for index, block in enumerate(ensemble.sizes):
         if left > 0:
-            parts.append([Moment(*(a[:left].copy() for a in moment)) for moment in ensemble.block(index)])
+            parts.append([Instant(*(a[:left].copy() for a in instant)) for instant in ensemble.block(index)])
             left -= block
     x, y, x_next = (np.stack([np.concatenate([part[k][i] for part in parts]) for k in range(ensemble.steps)]) for i in range(3))
     return x, y, x_next

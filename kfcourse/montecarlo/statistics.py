@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy import stats
 
-from kfcourse.laws import Array, Gaussian, apply, gain
+from kfcourse.laws import Array, Gaussian, normalised_square
 
 BATCHES = 128  # standard errors from 128 batches are themselves good to 6 %
 
@@ -60,6 +60,12 @@ def batch_mean(sums: Array, counts: Array) -> Estimate:
         deviations = sums - counts * value[..., None]
     variance = (deviations**2).sum(axis=-1) / total**2 * batches / (batches - 1) if batches > 1 else np.full(value.shape, np.nan)
     return Estimate(value, np.sqrt(variance), max(batches - 1, 1))
+
+
+def ratio(numerator: Array, denominator: Array, of_zero: Array | float) -> Array:
+    """numerator / denominator, and `of_zero` where the denominator is not positive."""
+    shape = np.broadcast_shapes(np.shape(numerator), np.shape(denominator))
+    return np.divide(numerator, denominator, out=np.broadcast_to(of_zero, shape).astype(float), where=denominator > 0)
 
 
 @dataclass(frozen=True)
@@ -113,7 +119,7 @@ class Sums:
             self.square[filter_index, step, i] = np.add.reduceat(square, starts)
             self.own[filter_index, step, i] = np.add.reduceat(own[:, i], starts) if own.ndim == 2 else own[i] * self.counts
         if error.shape[1] > 1:
-            self.normalised[filter_index, step] = np.add.reduceat(_normalised_square(error, cov), starts)
+            self.normalised[filter_index, step] = np.add.reduceat(normalised_square(error, cov), starts) / error.shape[1]
         elif own.ndim == 2:
             with np.errstate(divide="ignore", invalid="ignore"):
                 quotients = np.add.reduceat(square / own[:, 0], starts)
@@ -132,13 +138,6 @@ class Sums:
         return np.concatenate([[0], np.cumsum(self.counts[:-1])]).astype(int)
 
 
-def _normalised_square(error: Array, cov: Array) -> Array:
-    """e^T cov^+ e / n, (N,): 1 is expected of a filter whose covariance is right."""
-    inverse = gain(np.eye(cov.shape[-1]), cov)
-    return np.einsum("...i,...i", apply(inverse, error), error) / error.shape[1]
-
-
 def _quotient(square: Array, variance: Array) -> Array:
     """square / variance; where the claimed variance is 0, 0 for no error and infinity for any."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(square > 0, square / np.maximum(variance, 0.0), 0.0)
+    return ratio(square, variance, np.where(square > 0, np.inf, 0.0))

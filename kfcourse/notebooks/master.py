@@ -195,7 +195,7 @@ def context(exercise: Exercise) -> dict[str, Any]:
         "model": model,
         "scalar": model.n == 1 and model.p == 1,
         "latex": sp.latex,
-        "equations": equations(exercise),
+        "equations": f"$$\n{model.latex(values=False)}\n$$",
         "symbols": parameter_symbols(exercise),
         "values": {name: float(value) for name, value in model.parameters.items()},
         "solution": Solutions(exercise),
@@ -213,19 +213,6 @@ def heading(question: Question, russian: str = "") -> str:
 def check_cell(question: Question) -> str:
     """The cell in which a student checks an answer."""
     return f'```{{code-cell}} python\n:tags: [check]\ntask.check("{question.name}", {question.function})\n```'
-
-
-def equations(exercise: Exercise) -> str:
-    """The model as a LaTeX display."""
-    model = exercise.model
-    lines = [rf"{sp.latex(x)}_{{k+1}} &= {sp.latex(f)}" for x, f in zip(_state_names(model), model.state_equation, strict=True)]
-    names = ["y"] if model.p == 1 else [rf"y_{{{i + 1}}}" for i in range(model.p)]
-    lines += [rf"{{{name}}}_{{k}} &= {sp.latex(f)}" for name, f in zip(names, model.meter_equation, strict=True)]
-    return "$$\n\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}\n$$"
-
-
-def _state_names(model: Any) -> list[sp.Symbol]:
-    return [sp.Symbol("{" + sp.latex(x) + "}") for x in model.x]
 
 
 def opened(exercise: Exercise) -> str:

@@ -26,7 +26,8 @@ from numpy.polynomial import Polynomial
 
 from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.arithmetic import predict_law
-from kfcourse.linear.runs import LinearSystem, Run, run
+from kfcourse.linear.runs import Run, run
+from kfcourse.linear.system import LinearSystem
 
 DT = sp.Symbol("Delta", positive=True)
 _AXES = sp.eye(2)

@@ -7,8 +7,8 @@ from scipy.integrate import solve_ivp
 
 from kfcourse import Model, linearised, predictions, run, simulate
 from kfcourse.checks import exercise
-from kfcourse.continuous.model import ContinuousModel, coarsen, extended_kalman_bucy
-from kfcourse.continuous.model import simulate as simulate_continuous
+from kfcourse.continuous import ContinuousModel, coarsen, extended_kalman_bucy
+from kfcourse.continuous import simulate as simulate_continuous
 from kfcourse.exercises.f_exact import companion
 from kfcourse.exercises.f_exact import keys as grid
 from kfcourse.exercises.g_extended import keys as extended
@@ -18,7 +18,7 @@ from kfcourse.exercises.g_extended.hidden import hidden_functions
 from kfcourse.exercises.h_continuous import keys as continuous_time
 from kfcourse.exercises.h_continuous import questions as continuous_questions
 from kfcourse.exercises.h_continuous.mistakes_of_filter import steady_with
-from kfcourse.filters import aof, kalman, pointmass
+from kfcourse.filters import aof, kalman_filter, pointmass
 from kfcourse.lab.variants import find_variant, load_variants
 from kfcourse.linear.consistency import innovations, nees, nis
 
@@ -30,7 +30,7 @@ def test_the_grid_is_the_kalman_filter_on_a_linear_model():
     x = np.linspace(-9, 9, 700)
     prior = grid.normal(x, 0.4, 1.3)
     z, p, total = grid.run_filter(y[:, 0, 0], x, prior, *companion.laws(model))
-    law, before = run(kalman(model), y), predictions(kalman(model), y)
+    law, before = run(kalman_filter(model), y), predictions(kalman_filter(model), y)
     # step 0.026, narrowest density 0.4: the rule's error is below rounding (formula of the chapter); 8 steps of rounding
     np.testing.assert_allclose(z, law.mean[:, 0, 0], rtol=0, atol=1e-12)
     np.testing.assert_allclose(p, law.cov[:, 0, 0, 0], rtol=1e-11)

@@ -14,9 +14,9 @@ from kfcourse.filters.alphabeta import (
     steady_gamma,
     tracking_index,
 )
-from kfcourse.filters.kalman import linear_system
-from kfcourse.linear.runs import covariances
-from kfcourse.scenarios.aircraft import kinematic
+from kfcourse.linear import covariances
+from kfcourse.linear.system import linear_system
+from kfcourse.scenarios.radar import kinematic
 
 T = 0.7
 ROUNDING = 1e-12  # relative, after some tens of steps of a stable recursion

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from kfcourse import Model, ModelError, compare, lab_filters, load_variants, run, simulate
-from kfcourse.filters import aof, kalman, pointmass
-from kfcourse.lab.variants import LAB, has_exact
+from kfcourse.filters import aof, kalman_filter, pointmass
+from kfcourse.lab.short_names import LAB, has_exact
 from kfcourse.symbolic.structure import gaussian
 
 # A panel is resolved when its last Legendre coefficients are below `tolerance` (1e-5) of the mass.  A Gauss rule of q nodes
@@ -55,7 +55,7 @@ def followed53(request, variants):
 def test_on_a_linear_gaussian_model_it_is_the_kalman_filter(state, meter, prior):
     model = Model.define(state, meter, prior=prior)
     _, y = simulate(model, 8, 12, seed=4)
-    exact, expected = run(pointmass(model), y), run(kalman(model), y)
+    exact, expected = run(pointmass(model), y), run(kalman_filter(model), y)
     sigma = np.sqrt(expected.cov[..., 0, 0])
     assert (np.abs(exact.mean - expected.mean)[..., 0] <= RESOLVED * sigma).all()
     np.testing.assert_allclose(exact.cov, expected.cov, rtol=2 * RESOLVED)
@@ -63,7 +63,7 @@ def test_on_a_linear_gaussian_model_it_is_the_kalman_filter(state, meter, prior)
 
 def test_its_prediction_is_the_kalman_filters_too():
     model = Model.define("0.9*x + 1 + 0.3*v", "x + 0.5*w")
-    exact, expected = pointmass(model), kalman(model)
+    exact, expected = pointmass(model), kalman_filter(model)
     a, b = exact.init(1), expected.init(1)
     for y in (0.3, -1.2, 2.0):
         a, b = exact.step(a, np.array([[y]])), expected.step(b, np.array([[y]]))

@@ -13,19 +13,21 @@ import sympy as sp
 from kfcourse.filters import notation as s
 from kfcourse.filters.approximations import EQUATIONS as AOF_EQUATIONS
 from kfcourse.filters.approximations import aof
-from kfcourse.filters.base import Design
 from kfcourse.filters.conditionally_optimal import EQUATIONS as DUOF_EQUATIONS
 from kfcourse.filters.conditionally_optimal import duof
-from kfcourse.filters.kalman import kalman
+from kfcourse.filters.designed import Design
+from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.modified_structure import EQUATIONS as MFOS_EQUATIONS
 from kfcourse.filters.modified_structure import mfos
 from kfcourse.filters.optimal_structure import EQUATIONS as FOS_EQUATIONS
 from kfcourse.filters.optimal_structure import fos
 from kfcourse.montecarlo.designing import NotFinite, design
-from kfcourse.montecarlo.ensemble import Moment, simulate
+from kfcourse.montecarlo.ensemble import Instant, simulate
 from kfcourse.montecarlo.experiment import run
-from kfcourse.symbolic.model import Model, ModelError
-from kfcourse.symbolic.structure import gauss_hermite, gaussian, linearised, unscented
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.quadrature import gauss_hermite, unscented
+from kfcourse.symbolic.reading import ModelError
+from kfcourse.symbolic.structure import gaussian, linearised
 
 STRUCTURES = {
     "linearised": linearised,
@@ -88,7 +90,7 @@ LINEAR = {
 STEPS = 6
 
 
-def exact_ensemble(one: Linear, steps: int, seed: int) -> list[Moment]:
+def exact_ensemble(one: Linear, steps: int, seed: int) -> list[Instant]:
     """Trajectories whose sample moments are exactly the model's.
 
     A random matrix (trajectories x all independent noises), centred, orthonormalised and scaled, has sample
@@ -108,7 +110,7 @@ def exact_ensemble(one: Linear, steps: int, seed: int) -> list[Moment]:
     for _ in range(steps):
         y = x @ one.H.T + draw("meter_noise") @ one.C.T + one.b
         x_next = x @ one.A.T + draw("state_noise") @ one.B.T + one.a
-        moments.append(Moment(x, y, x_next))
+        moments.append(Instant(x, y, x_next))
         x = x_next
     return moments
 
@@ -144,7 +146,7 @@ def test_on_a_linear_gaussian_model_every_filter_is_the_kalman_filter(name):
     ready, designs = every_filter(model)
     # Measured: new trajectories, not those of the design.
     y = simulate(model, 5, STEPS, seed=8).y
-    expected = run(kalman(model), y)
+    expected = run(kalman_filter(model), y)
     for filter_, tolerance in [(f, 1e-11) for f in ready] + [
         (f, 1e-9) for f in design(designs, [[moment] for moment in moments])
     ]:
@@ -158,7 +160,7 @@ def test_the_design_does_not_depend_on_how_the_ensemble_is_cut():
     moments = exact_ensemble(one, STEPS, seed=3)
     _, designs = every_filter(one.model())
     whole = design(designs, [[moment] for moment in moments])
-    cut = design(designs, [[Moment(*(a[:7] for a in m)), Moment(*(a[7:] for a in m))] for m in moments])
+    cut = design(designs, [[Instant(*(a[:7] for a in m)), Instant(*(a[7:] for a in m))] for m in moments])
     y = simulate(one.model(), 3, STEPS, seed=9).y
     for first, second in zip(whole, cut, strict=True):
         np.testing.assert_allclose(run(second, y).mean, run(first, y).mean, rtol=1e-8, atol=1e-8)
@@ -170,7 +172,7 @@ def test_the_kalman_filter_is_the_loop_of_the_page():
     A, B, a, H, C, b = (array.item() for array in (one.A, one.B, one.a, one.H, one.C, one.b))
     y = simulate(one.model(), 1, 20, seed=4).y
     expected = oracles.kalman_trajectory(y[:, 0, 0].tolist(), A, B**2 * d_v, H, C**2 * d_w, m, d, u=B * m_v + a, s=C * m_w + b)
-    found = run(kalman(one.model()), y)
+    found = run(kalman_filter(one.model()), y)
     np.testing.assert_allclose(found.mean[:, 0, 0], [z for z, _ in expected], rtol=1e-12)
     np.testing.assert_allclose(found.cov[:, 0, 0, 0], [p for _, p in expected], rtol=1e-12)
 
@@ -181,7 +183,7 @@ def test_the_kalman_filter_settles_at_the_riccati_solution(name):
     Q, R = one.B @ one.laws["state_noise"][1] @ one.B.T, one.C @ one.laws["meter_noise"][1] @ one.C.T
     Q, R = (Q + Q.T) / 2, (R + R.T) / 2
     predicted = scipy.linalg.solve_discrete_are(one.A.T, one.H.T, Q, R)
-    filter_ = kalman(one.model())
+    filter_ = kalman_filter(one.model())
     state = filter_.init(1)
     for _ in range(300):  # the closed loop's spectral radius is below 0.9: 0.9^600 is far below rounding
         state = filter_.step(state, np.zeros((1, len(one.H))))
@@ -202,7 +204,7 @@ def test_the_kalman_filter_is_filterpy_s(name):
     (m, d), (m_v, D_v), (m_w, D_w) = one.laws.values()
     reference.x, reference.P, reference.F, reference.H = m[:, None], d, one.A, one.H
     reference.Q, reference.R, reference.B = one.B @ D_v @ one.B.T, one.C @ D_w @ one.C.T, np.eye(n)
-    found = run(kalman(model), y)
+    found = run(kalman_filter(model), y)
     for k in range(30):
         reference.update((y[k, 0] - one.C @ m_w - one.b)[:, None])
         np.testing.assert_allclose(found.mean[k, 0], reference.x[:, 0], rtol=1e-10, atol=1e-11)
@@ -242,7 +244,7 @@ def test_the_linearised_aof_is_filterpy_s_extended_kalman_filter():
 
 def test_the_kalman_filter_refuses_what_is_not_linear(variant53):
     with pytest.raises(ModelError, match="not linear"):
-        kalman(variant53)
+        kalman_filter(variant53)
 
 
 # ---------------------------------------------------------------- variant 53 against the page's loops
@@ -270,7 +272,7 @@ def test_the_aof_is_the_loop_of_the_page(variant53, trajectories, kind):
 
 def designed_on(designs, trajectories):
     x, y, x_next = (array[..., None] for array in trajectories)
-    return design(designs, [[Moment(*step)] for step in zip(x, y, x_next, strict=True)])
+    return design(designs, [[Instant(*step)] for step in zip(x, y, x_next, strict=True)])
 
 
 def test_the_duof_is_the_loop_of_the_page(variant53, trajectories):
@@ -427,7 +429,7 @@ def test_the_printed_equations_are_what_runs(family, size, kind):
     x, y = simulate(model, runs, steps + 1, seed=31)
     filter_ = build(structure)
     if isinstance(filter_, Design):
-        (filter_,) = design([filter_], [[Moment(x[k], y[k], x[k + 1])] for k in range(steps)])
+        (filter_,) = design([filter_], [[Instant(x[k], y[k], x[k + 1])] for k in range(steps)])
 
     functions = structural_values(model, structure)
     state = filter_.init(runs)
@@ -481,7 +483,7 @@ def test_the_kalman_filter_skips_what_is_missing_too():
     y = simulate(model, 4, 6, seed=2).y
     y[2, 1] = np.nan
     y[3, 2, 0] = np.nan
-    found, expected = run(kalman(model), y), run(aof(linearised(model)), y)
+    found, expected = run(kalman_filter(model), y), run(aof(linearised(model)), y)
     np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-11, atol=1e-11)
     np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-11, atol=1e-11)
 
@@ -570,7 +572,7 @@ def test_other_numbers_of_arguments_are_refused(variant53, family, arguments):
 
 
 def test_a_design_on_trajectories_that_diverge_says_so(variant53):
-    broken = [[Moment(np.ones((3, 1)), np.full((3, 1), np.inf), np.ones((3, 1)))]]
+    broken = [[Instant(np.ones((3, 1)), np.full((3, 1), np.inf), np.ones((3, 1)))]]
     with pytest.raises(NotFinite, match=r"step 0.*trajectories become infinite"):
         design([duof(variant53)], broken)
 

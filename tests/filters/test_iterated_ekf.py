@@ -10,11 +10,12 @@ from scipy.optimize import least_squares
 from kfcourse.filters import notation as s
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.iterated_ekf import EQUATIONS, iterated
-from kfcourse.filters.kalman import kalman
+from kfcourse.filters.kalman import kalman_filter
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import run
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import gauss_hermite, gaussian, linearised, unscented
+from kfcourse.symbolic.quadrature import gauss_hermite, unscented
+from kfcourse.symbolic.structure import gaussian, linearised
 
 STRUCTURES = {
     "linearised": linearised,
@@ -62,7 +63,7 @@ def linear() -> Model:
 def test_on_a_linear_model_every_round_is_the_kalman_filter(linear, kind, iterations):
     y = simulate(linear, 5, 8, seed=2).y.copy()
     y[3, 1] = y[5, 2, 0] = np.nan
-    found, expected = run(iterated(STRUCTURES[kind](linear), iterations), y), run(kalman(linear), y)
+    found, expected = run(iterated(STRUCTURES[kind](linear), iterations), y), run(kalman_filter(linear), y)
     # the affine meter is the same wherever it is taken; eight steps of well-conditioned 2 x 2 solutions
     np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-11, atol=1e-11)
     np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-11, atol=1e-11)

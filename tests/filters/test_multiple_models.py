@@ -8,9 +8,9 @@ from filterpy.kalman import IMMEstimator, KalmanFilter
 
 from kfcourse import Gaussian, Model, gaussian, linearised, run, simulate, unscented
 from kfcourse.filters import aof
-from kfcourse.filters.kalman import linear_system
 from kfcourse.filters.multiple_models import imm, log_likelihood, mixture
 from kfcourse.laws import Measurement
+from kfcourse.linear.system import linear_system
 
 ROUNDING = 1e-10  # relative; some tens of steps, with likelihoods in between
 

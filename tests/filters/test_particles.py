@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kfcourse import Model, ModelError, load_variants, run, simulate
-from kfcourse.filters import kalman, particle, pointmass
+from kfcourse.filters import kalman_filter, particle, pointmass
 
 PARTICLES, REPLICAS = 1000, 100
 
@@ -50,7 +50,7 @@ def test_on_a_linear_vector_model_it_is_the_kalman_filter_within_monte_carlo_err
         prior={"mean": [1.0, -1.0], "variance": [[0.5, 0.1], [0.1, 0.4]]},
     )
     _, y = simulate(model, 4, 6, seed=3)
-    expected = run(kalman(model), y)
+    expected = run(kalman_filter(model), y)
     variance = np.diagonal(expected.cov, axis1=-2, axis2=-1)
     mean, own = replicas(model, y)
     agree(mean, expected.mean, np.sqrt(variance))

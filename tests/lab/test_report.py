@@ -11,9 +11,9 @@ import pytest
 
 from kfcourse import compare, gaussian, lab_filters, linearised, load_variants
 from kfcourse.filters import aof
-from kfcourse.lab import report
 from kfcourse.lab.report import conclusions, write_json, write_report
-from kfcourse.lab.variants import LAB, Variant, title
+from kfcourse.lab.short_names import LAB, title
+from kfcourse.lab.variants import Variant
 
 FIGURES = ("accuracy", "relative", "ranking", "consistency")
 
@@ -254,11 +254,13 @@ def test_an_interrupted_write_leaves_what_was_there(variants, result53, tmp_path
     path = tmp_path / "n.json"
     path.write_text("before", encoding="utf-8")
 
-    def interrupted(text, place):
-        place.write_text(text[: len(text) // 2], encoding="utf-8")
+    whole = Path.write_text
+
+    def interrupted(place, text, **options):
+        whole(place, text[: len(text) // 2], **options)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(report, "_save_text", interrupted)
+    monkeypatch.setattr(Path, "write_text", interrupted)
     with pytest.raises(KeyboardInterrupt):
         write_json(variants["53"], result53, path)
     assert path.read_text(encoding="utf-8") == "before"

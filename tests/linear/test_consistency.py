@@ -6,8 +6,8 @@ import scipy.linalg
 
 from kfcourse import linear
 from kfcourse.filters.approximations import aof
-from kfcourse.filters.kalman import kalman, linear_system
-from kfcourse.laws import Gaussian
+from kfcourse.filters.kalman import kalman_filter
+from kfcourse.laws import Gaussian, normalised_square
 from kfcourse.linear.consistency import (
     Innovations,
     autocorrelation,
@@ -15,8 +15,8 @@ from kfcourse.linear.consistency import (
     innovations,
     nees,
     nis,
-    normalised_square,
 )
+from kfcourse.linear.system import linear_system
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import predictions, run
 from kfcourse.symbolic.model import Model
@@ -42,7 +42,7 @@ def paths():
 
 
 def found(model, y) -> Innovations:
-    return innovations(linearised(model).measure, predictions(kalman(model), y), y)
+    return innovations(linearised(model).measure, predictions(kalman_filter(model), y), y)
 
 
 # ---------------------------------------------------------------- quantities
@@ -63,13 +63,13 @@ def test_the_normalised_square_is_the_loop_of_the_page():
 
 def test_a_covariance_that_is_singular_is_refused():
     with pytest.raises(ValueError, match="leave out the components that the filter knows exactly"):
-        normalised_square(np.ones((3, 2)), np.array([[1.0, 0.0], [0.0, 0.0]]))
+        nees(np.ones((3, 2)), Gaussian(np.zeros(2), np.array([[1.0, 0.0], [0.0, 0.0]])))
 
 
 def test_innovations_are_measurements_less_predictions(paths):
     model = tracking()
     system, _, offset = linear_system(model)
-    predicted = predictions(kalman(model), paths.y)
+    predicted = predictions(kalman_filter(model), paths.y)
     value, cov = found(model, paths.y)
     for k, i in ((0, 0), (3, 17), (STEPS - 1, RUNS - 1)):
         P = predicted.cov[k, i]
@@ -122,7 +122,7 @@ def test_bounds_of_nothing_are_refused(arguments):
 
 def test_the_kalman_filter_is_right_about_its_errors(paths):
     model = tracking()
-    errors = nees(paths.x, run(kalman(model), paths.y))
+    errors = nees(paths.x, run(kalman_filter(model), paths.y))
     low, high = chi_squared_bounds(2, RUNS, 1 - 6e-5)  # 4 standard deviations
     assert ((low < errors.mean(axis=1)) & (errors.mean(axis=1) < high)).all()
     surprises = nis(found(model, paths.y))
@@ -168,7 +168,7 @@ def test_the_measure_of_a_linear_system_serves_as_well(paths):
 def test_a_wrong_filter_is_found_out(paths, wrong, errors, surprises, correlation):
     model = tracking(**wrong)
     late = slice(5, None)  # the first steps are decided by the prior, which is right
-    e2 = nees(paths.x, run(kalman(model), paths.y))[-1].mean()
+    e2 = nees(paths.x, run(kalman_filter(model), paths.y))[-1].mean()
     innovation = found(model, paths.y)
     low, high = chi_squared_bounds(2, RUNS, 1 - 6e-5)
     assert (e2 > high) if errors == "above" else (e2 < low)

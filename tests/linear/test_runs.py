@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from kfcourse.filters.kalman import kalman
+from kfcourse.filters.kalman import kalman_filter
 from kfcourse.laws import Gaussian
+from kfcourse.linear import LinearSystem, covariances, run, simulate, steady_state
 from kfcourse.linear.arithmetic import FORMS, _triangular, form, predict_law
 from kfcourse.linear.consistency import innovations, nis
-from kfcourse.linear.runs import LinearSystem, covariances, run, simulate, steady_state
 from kfcourse.montecarlo.experiment import run as run_filter
 from kfcourse.symbolic.model import Model
 
@@ -147,7 +147,7 @@ def test_the_model_s_kalman_filter_is_the_same(arithmetic):
     shift = np.broadcast_to([0.4, -0.1], (9, 1, 2))
     y = simulate(one, prior, 9, 3, 4, shift).y + 0.25
     y[4, 1] = np.nan
-    estimates = run_filter(kalman(model, arithmetic), y)
+    estimates = run_filter(kalman_filter(model), y)
     laws = run(one, prior, y - 0.25, shift, arithmetic).posterior
     np.testing.assert_allclose(estimates.mean, laws.mean, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(estimates.cov, laws.cov, rtol=1e-12, atol=1e-12)

@@ -8,7 +8,7 @@ from scipy import stats
 
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.conditionally_optimal import duof
-from kfcourse.filters.kalman import kalman
+from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.modified_structure import mfos
 from kfcourse.filters.optimal_structure import fos
 from kfcourse.montecarlo.ensemble import BLOCK, Ensemble
@@ -42,14 +42,14 @@ RUNS, STEPS, SEED = 6000, 4, 5
 @pytest.fixture(scope="module")
 def direct(linear):
     """The comparison, and errors and covariances of each trajectory kept beside it."""
-    filters = [aof(gaussian(linear)), duof(linear), replace(kalman(linear), name="other")]
+    filters = [aof(gaussian(linear)), duof(linear), replace(kalman_filter(linear), name="other")]
     wrong = Model.define(
         list(linear.state_equation),
         list(linear.meter_equation),
         prior={"variance": 9},
         symbols={"v": ["v1", "v2"], "w": ["w1", "w2"]},
     )
-    filters[2] = replace(kalman(wrong), name="wrong")
+    filters[2] = replace(kalman_filter(wrong), name="wrong")
     result = compare(filters, linear, RUNS, STEPS, SEED, progress=False)
     x, y = stored(linear, RUNS, STEPS, SEED)
     found = {one.name: run(one, y) for one in (filters[0], filters[2])}
@@ -154,11 +154,13 @@ def test_intervals_are_student_s(direct):
 
 def test_intervals_cover_the_truth_as_often_as_they_say(linear):
     """95 % intervals of D_0 over 200 independent comparisons: the binomial's 4 standard errors around 190."""
-    truth = float(np.trace(kalman(linear).step(kalman(linear).init(1), np.zeros((1, 2))).posterior.cov))
+    truth = float(np.trace(kalman_filter(linear).step(kalman_filter(linear).init(1), np.zeros((1, 2))).posterior.cov))
     hits = 0
     for seed in range(200):
         low, high = (
-            compare([kalman(linear)], linear, 400, 1, seed, threads=1, progress=False).error_variance("kalman").interval(0.95)
+            compare([kalman_filter(linear)], linear, 400, 1, seed, threads=1, progress=False)
+            .error_variance("kalman")
+            .interval(0.95)
         )
         hits += bool(low[0] < truth < high[0])
     assert abs(hits - 190) < SIGMA * np.sqrt(200 * 0.95 * 0.05)
@@ -180,7 +182,7 @@ def test_batches_of_unequal_size_are_weighed():
 
 
 def test_one_trajectory_has_no_standard_error(linear):
-    estimate = compare([kalman(linear)], linear, 1, 2, seed=1, progress=False).error_variance("kalman")
+    estimate = compare([kalman_filter(linear)], linear, 1, 2, seed=1, progress=False).error_variance("kalman")
     assert np.isfinite(estimate.value).all()
     assert np.isnan(estimate.standard_error).all()
 
@@ -214,7 +216,7 @@ def test_a_slow_filter_on_all_trajectories_is_as_good_as_a_fast_one(variant53):
 
 def test_the_excess_over_the_optimal_filter_is_the_distance_from_it(linear):
     """For a linear model the Kalman filter is exact: M|x - z|^2 - M|x - z_exact|^2 = M|z - z_exact|^2."""
-    exact, other = replace(kalman(linear), name="aof-exact", slow=True), duof(linear)
+    exact, other = replace(kalman_filter(linear), name="aof-exact", slow=True), duof(linear)
     result = compare(
         [aof(gaussian(linear)), other, exact], linear, 3000, 3, seed=8, design_runs=100, subset_runs=2000, progress=False
     )

@@ -7,7 +7,7 @@ import pytest
 
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.conditionally_optimal import duof
-from kfcourse.filters.kalman import kalman
+from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.modified_structure import mfos
 from kfcourse.filters.optimal_structure import fos
 from kfcourse.montecarlo.designing import NotFinite
@@ -238,7 +238,7 @@ def test_a_diverging_model_says_so(filters):
 def test_a_diverging_filter_is_named():
     # Stable object, exact meter of sharp curvature: the trajectories stay finite.
     model = Model.define("0.5*x + 0.1*v", "x + 0.1*w")
-    good = kalman(model)
+    good = kalman_filter(model)
     bad = type(good)("bad", model, good.init, lambda state, y: good.step(state, np.where(state.step == 2, np.inf, y)))
     with pytest.raises(NotFinite, match="step 2: bad became infinite or NaN although the trajectories are finite"):
         compare([good, bad], model, 50, 4, seed=1, progress=False)

@@ -16,10 +16,12 @@ from click.testing import CliRunner
 from kfcourse import cli
 from kfcourse.checks import exercise, sets
 from kfcourse.checks.equality import equal_formulas
+from kfcourse.files import save
 from kfcourse.lab.variants import load_variants
-from kfcourse.notebooks import course, execute
-from kfcourse.notebooks.course import Job, Outcome, assign, make, run_all, safe, save
+from kfcourse.notebooks import execute, jobs
+from kfcourse.notebooks.course_list import assign
 from kfcourse.notebooks.execute import NotebookFailed, html, mathml, pictures, results
+from kfcourse.notebooks.jobs import Job, Outcome, make, run_all, safe
 from kfcourse.notebooks.master import (
     STUB,
     MasterError,
@@ -72,7 +74,7 @@ def no_kernel(monkeypatch, executed):
                 cell.outputs, cell.execution_count = done.outputs, done.execution_count
         return result
 
-    monkeypatch.setattr(course, "execute", instead)
+    monkeypatch.setattr(jobs, "execute", instead)
     return calls
 
 
@@ -332,7 +334,7 @@ def test_a_changed_package_or_a_lost_page_means_work(tmp_path, masters, no_kerne
     make(one)
     one.target.with_suffix(".html").unlink()
     assert make(one).status == "written"
-    monkeypatch.setattr(course, "package_digest", lambda: "another version")
+    monkeypatch.setattr(jobs, "package_digest", lambda: "another version")
     assert make(one).status == "written"
     assert len(no_kernel) == 3
 
@@ -360,7 +362,7 @@ def test_exercises_have_pictures_and_no_solutions(tmp_path, masters, no_kernel):
 @pytest.mark.parametrize("place", ["html", "pdf", "write"])
 def test_an_interruption_leaves_nothing_half_written(tmp_path, masters, no_kernel, monkeypatch, place, error):
     one = job(tmp_path, masters, with_pdf=True)
-    monkeypatch.setattr(course, "pdf", lambda page, target: target.write_bytes(b"%PDF"))
+    monkeypatch.setattr(jobs, "pdf", lambda page, target: target.write_bytes(b"%PDF"))
     make(one)
     whole = contents(one.folder)
     (masters / "b_aof" / "statement.md").write_text(TINY.replace("Divide.", "Divide by F."), encoding="utf-8")
@@ -374,7 +376,7 @@ def test_an_interruption_leaves_nothing_half_written(tmp_path, masters, no_kerne
         if place == "write":
             broken.setattr(nbformat, "writes", fails)
         else:
-            broken.setattr(course, place, fails)
+            broken.setattr(jobs, place, fails)
         if isinstance(error, KeyboardInterrupt):
             with pytest.raises(KeyboardInterrupt):
                 make(one)
@@ -393,7 +395,7 @@ def test_an_interruption_leaves_nothing_half_written(tmp_path, masters, no_kerne
 
 
 def test_an_old_pdf_does_not_stay_beside_a_new_page(tmp_path, masters, no_kernel, monkeypatch):
-    monkeypatch.setattr(course, "pdf", lambda page, target: target.write_bytes(hashlib.sha256(page.read_bytes()).digest()))
+    monkeypatch.setattr(jobs, "pdf", lambda page, target: target.write_bytes(hashlib.sha256(page.read_bytes()).digest()))
     make(job(tmp_path, masters, with_pdf=True))
     old = contents(tmp_path / "out")["b-aof-solution.pdf"]
     (masters / "b_aof" / "statement.md").write_text(TINY.replace("Divide.", "Divide by F."), encoding="utf-8")

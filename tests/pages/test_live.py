@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kfcourse.laws import Gaussian
+from kfcourse.laws import Gaussian, normalised_square
+from kfcourse.linear import covariances, steady_state
 from kfcourse.linear.arithmetic import predict_law
-from kfcourse.linear.consistency import innovations, nis, normalised_square
-from kfcourse.linear.runs import covariances, steady_state
+from kfcourse.linear.consistency import innovations, nis
 from kfcourse.pages import live
 from kfcourse.scenarios import pointer
 

@@ -14,8 +14,8 @@ import pytest
 import scipy.linalg
 
 from kfcourse.laws import Gaussian
+from kfcourse.linear import LinearSystem, run
 from kfcourse.linear.consistency import nees
-from kfcourse.linear.runs import LinearSystem, run
 from kfcourse.scenarios.navigation import Clock, Dynamics, Inputs, Observation, Path, Sensor, fuse, observe, sample
 
 # Position and velocity driven by a known acceleration, with white noise of both; everything non-unit.

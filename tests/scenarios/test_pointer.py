@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from kfcourse.laws import Gaussian
-from kfcourse.linear.runs import run as run_linear
-from kfcourse.linear.runs import steady_state
+from kfcourse.linear import run as run_linear
+from kfcourse.linear import steady_state
 from kfcourse.scenarios.pointer import (
     MINIMUM_JERK,
     SHORTEST,

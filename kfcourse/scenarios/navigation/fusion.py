@@ -20,8 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.laws import Array, Gaussian, correct
-from kfcourse.linear.runs import stacked
+from kfcourse.laws import Array, Gaussian, correct, stacked
 from kfcourse.scenarios.navigation.dynamics import ROUNDING, Dynamics, Inputs, Predictor, predictor
 from kfcourse.scenarios.navigation.sensors import Observation, Sensor, by_name
 

@@ -1,0 +1,27 @@
+"""Can every question of the exercises be posed for a variant?"""
+
+from __future__ import annotations
+
+from kfcourse.checks.exercises import Exercise
+from kfcourse.checks.registry import sets
+from kfcourse.lab.criteria import Finding
+from kfcourse.lab.variants import Variant
+
+
+def unposed(variant: Variant) -> Finding | None:
+    """The first question about the variant's model that cannot be posed; None if all can.
+
+    Its right answer fails, or is not accepted.
+    """
+    for letter, one in sets().items():
+        if not one.about_variant:
+            continue
+        exercise = Exercise(letter, variant)
+        for name, question in exercise.questions.items():
+            try:
+                result = exercise.check(name, question.answer(exercise))
+            except Exception as error:  # whatever a degenerate model leads to
+                return Finding(False, f"question {name} of the exercises cannot be posed ({type(error).__name__}: {error})")
+            if not result.passed:
+                return Finding(False, f"question {name} of the exercises does not accept its own answer: {result.message}")
+    return None

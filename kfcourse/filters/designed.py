@@ -1,0 +1,158 @@
+"""Filters of given structure whose coefficients are regressions over an ensemble (DUOF, FOS, MFOS).
+
+The equations of such a filter are written once, as a generator that yields each `Regression` it needs and receives the
+fitted `Affine`.  While it is designed the ensemble answers, through the `Scatter` of its blocks
+(`kfcourse.montecarlo.designing`); while it runs, the stored coefficients do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.laws import Array, Gaussian, apply, gain, symmetric
+from kfcourse.symbolic.model import Model
+
+
+class Affine(NamedTuple):
+    """The best affine predictor of a target from a regressor, and what it leaves unexplained.
+
+    target ~ matrix @ regressor + offset,  Cov(target - prediction) = residual
+    """
+
+    matrix: Array
+    offset: Array
+    residual: Array
+
+    def __call__(self, regressor: Array) -> Array:
+        return apply(self.matrix, regressor) + self.offset
+
+
+class Scatter(NamedTuple):
+    """Means and scatter of (target, regressor) over part of an ensemble; `together` merges parts.
+
+    Scatter is the sum of products of deviations from the part's own mean: large means do not cancel.
+    """
+
+    size: int
+    mean: Array  # (r + s,)
+    scatter: Array  # (r + s, r + s)
+
+    @classmethod
+    def of(cls, target: Array, regressor: Array) -> Scatter:
+        """Those of target (N, r) and regressor (N, s) stacked into one vector."""
+        columns = [target[:, i] for i in range(target.shape[1])] + [regressor[:, i] for i in range(regressor.shape[1])]
+        count, size = len(target), len(columns)
+        mean = [float(np.add.reduce(column)) / count for column in columns]
+        deviations = [column - m for column, m in zip(columns, mean, strict=True)]
+        scatter = [[0.0] * size for _ in range(size)]
+        for i in range(size):
+            for j in range(i, size):
+                scatter[i][j] = scatter[j][i] = _dot(deviations[i], deviations[j])
+        return cls(count, np.array(mean), np.array(scatter))
+
+    @classmethod
+    def together(cls, parts: Sequence[Scatter]) -> Scatter:
+        """Those of all parts taken together (Chan's formula)."""
+        counts = np.array([part.size for part in parts], dtype=float)
+        means = np.array([part.mean for part in parts])
+        mean = counts @ means / counts.sum()
+        shift = means - mean
+        scatter = np.sum([part.scatter for part in parts], axis=0) + (shift * counts[:, None]).T @ shift
+        return cls(int(counts.sum()), mean, scatter)
+
+    def regression(self, size: int) -> Affine:
+        """Least squares of the first `size` components on the rest.
+
+        matrix = Cov(t, r) Cov(r)^+,  offset = M t - matrix M r,  residual = Cov(t) - matrix Cov(t, r)^T
+        """
+        cov = self.scatter / self.size
+        cross = cov[:size, size:]
+        matrix = gain(cross, cov[size:, size:])
+        offset = self.mean[:size] - matrix @ self.mean[size:]
+        return Affine(matrix, offset, _nonnegative(cov[:size, :size] - matrix @ cross.T))
+
+
+def _dot(left: Array, right: Array) -> float:
+    """Inner product of two long vectors; not `np.dot`, which would start the linear algebra library's own threads."""
+    return float(np.einsum("i,i", left, right))
+
+
+def _nonnegative(matrix: Array) -> Array:
+    """A covariance that is one but for rounding: symmetrised, its negative eigenvalues set to 0."""
+    values, vectors = np.linalg.eigh(symmetric(matrix))
+    if values.min() >= 0:
+        return symmetric(matrix)
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T
+
+
+class Regression(NamedTuple):
+    """A request: fit `target` by an affine function of `regressor` over the ensemble.
+
+    Attributes
+    ----------
+    target : callable
+        (x_k (N, n), x_{k+1} (N, n)) -> (N, r); known only while designing.
+    regressor : ndarray (N, s)
+        What the filter itself knows.
+    """
+
+    target: Callable[[Array, Array], Array]
+    regressor: Array
+
+
+class Step(NamedTuple):
+    """What the equations of one step return."""
+
+    posterior: Gaussian
+    predicted: Gaussian
+
+
+Equations = Generator[Regression, Affine, Step]
+
+
+@dataclass(frozen=True)
+class Design:
+    """A filter of given structure whose coefficients are still to be found.
+
+    Attributes
+    ----------
+    name : str
+    model : Model
+    equations : callable
+        (predicted: Gaussian, y) -> generator of one step: yields `Regression`, receives `Affine`, returns `Step`.
+    """
+
+    name: str
+    model: Model
+    equations: Callable[[Gaussian, Array], Equations]
+    slow: bool = False
+
+    def with_coefficients(self, coefficients: Sequence[Sequence[Affine]]) -> Filter:
+        """The filter with the coefficients of every step, in the order the equations ask for them."""
+        table = tuple(tuple(fits) for fits in coefficients)
+
+        def step(state: State, y: Array) -> State:
+            if state.step >= len(table):
+                raise ValueError(
+                    f"{self.name} was designed for {len(table)} steps; design it with more to run step {state.step + 1}"
+                )
+            result = _answer(self.equations(state.predicted, y), table[state.step])
+            return State(state.step + 1, result.posterior, result.predicted)
+
+        return Filter(self.name, self.model, initial_state(self.model), step)
+
+
+def _answer(equations: Equations, fits: Sequence[Affine]) -> Step:
+    """Run the equations of one step, answering each regression with its stored coefficients."""
+    try:
+        next(equations)
+        for fit in fits:
+            equations.send(fit)
+    except StopIteration as stop:
+        return stop.value
+    raise ValueError("the equations ask for more regressions than were designed")
