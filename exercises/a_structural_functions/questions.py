@@ -80,6 +80,7 @@ def scalar(matrix: sp.MatrixBase) -> sp.Expr:
 
 
 def mistakes_of_variance(kind: str, side: str) -> tuple[Mistake, ...]:
+    """The variance squared, or its root: as easily made by linearisation as exactly."""
     p = "p" if side == "object" else "d"
     return (
         covariance_to_power(
@@ -92,6 +93,7 @@ def mistakes_of_variance(kind: str, side: str) -> tuple[Mistake, ...]:
 
 
 def mistakes_of_linearised(side: str) -> tuple[Mistake, ...]:
+    """Mistakes in (tau, Theta) or (h, G, F) by linearisation."""
     p = "p" if side == "object" else "d"
     catalogue: tuple[tuple[str, str, Callable[[Side], sp.MatrixBase]], ...] = (
         ("noise-forgotten", messages.NOISE_PART_FORGOTTEN, lambda s: s.A * s.cov * s.A.T),
@@ -126,6 +128,8 @@ def mistakes_of_linearised(side: str) -> tuple[Mistake, ...]:
 
 
 def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
+    """Mistakes in (tau, Theta) or (h, G, F) for a normal law."""
+
     def second_moment(exercise: Exercise) -> tuple:
         functions = right("gaussian", side)(exercise)
         mean, cov = (sp.Matrix([f]) for f in (functions[0], functions[-1]))
@@ -153,6 +157,8 @@ def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
 
 
 def jacobians(side: str, change: Callable[[sp.Matrix, sp.Matrix], tuple] = lambda a, b: (a, b)) -> ForVariant:
+    """Derivatives by state and by noise, changed."""
+
     def make(exercise: Exercise) -> tuple:
         part = Side.of(exercise.model, side)
         return tuple(plain(matrix) for matrix in change(part.A, part.B))
@@ -172,6 +178,7 @@ def unexplained(exercise: Exercise) -> Formula:
 
 
 def _question(number: int, title: str, kind: str, side: str, mistakes: tuple[Mistake, ...]) -> Question:
+    """A question for the functions of one kind and one side."""
     parts = ("tau", "Theta") if side == "object" else ("h", "G", "F")
     right_one = key(f"{side}_{kind}", right(kind, side), side)
     return Question(f"a{number}", title, "core", right_one, lambda e: [symbols(e, side)], mistakes, parts)

@@ -52,6 +52,7 @@ def structure_functions(exercise: Exercise) -> tuple[Callable, Callable]:
 
 
 def gain_arguments(exercise: Exercise) -> list[tuple]:
+    """Covariances Psi, G and F of a hidden law, a trajectory each."""
     at = hidden_law(exercise, "b1")
     _, G, F, _ = hidden_meter(exercise, at)
     return [(at.cov, G, F)]
@@ -61,6 +62,7 @@ def gain_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def correction_arguments(exercise: Exercise) -> list[tuple]:
+    """A hidden law, what the hidden meter makes of it, and measurements."""
     at = hidden_law(exercise, "b2")
     expected = hidden_meter(exercise, at)
     return [(at.mean, at.cov, expected.h, expected.G, expected.F, hidden_measurements(exercise, "b2-y", expected))]
@@ -70,6 +72,7 @@ def correction_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def step_arguments(exercise: Exercise) -> list[tuple]:
+    """A hidden law, measurements and the hidden structural functions."""
     at = hidden_law(exercise, "b3")
     y = hidden_measurements(exercise, "b3-y", hidden_meter(exercise, at))
     return [(*at, y, *structure_functions(exercise))]
@@ -79,6 +82,7 @@ def step_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def run_arguments(exercise: Exercise) -> list[tuple]:
+    """Measurements over six steps, without gaps and with some."""
     y = exercise.simulate(runs=RUNS, steps=6, name="b4").y
     gaps = y.copy()
     gaps[2, 1] = gaps[4, :3] = np.nan
@@ -90,6 +94,7 @@ def run_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def covariance_arguments(exercise: Exercise) -> list[tuple]:
+    """A usual meter, and one so sharp that a difference loses all digits."""
     at = hidden_law(exercise, "b5")
     _, G, _, R = hidden_meter(exercise, at)
     one, sharp = np.full((RUNS, 1, 1), 0.7), np.full((RUNS, 1, 1), 1e-18)  # a scalar meter, far sharper than the prediction

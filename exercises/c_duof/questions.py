@@ -28,6 +28,7 @@ def noiseless(exercise: Exercise) -> tuple[Callable, Callable]:
 
 
 def structure_arguments(exercise: Exercise) -> list[tuple]:
+    """Predictions, estimates and measurements at one step."""
     x, y, _ = ensemble(exercise, "c1")
     return [(predicted(exercise, "c1-lam", x), predicted(exercise, "c1-z", x), y, *noiseless(exercise))]
 
@@ -36,6 +37,7 @@ def structure_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def regression_arguments(exercise: Exercise) -> list[tuple]:
+    """A correlated sample; the same with a regressor that never varies."""
     rng = exercise.rng("c2")
     n, p = exercise.model.n, exercise.model.p
     regressor = 0.7 + rng.normal(size=(RUNS, p))
@@ -48,6 +50,7 @@ def regression_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def duof_arguments(exercise: Exercise) -> list[tuple]:
+    """Predictions, states and measurements at one step of the design."""
     x, y, x_next = ensemble(exercise, "c3")
     return [(predicted(exercise, "c3-lam", x), x, y, x_next, *noiseless(exercise))]
 
@@ -56,6 +59,7 @@ def duof_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def duof_run_arguments(exercise: Exercise) -> list[tuple]:
+    """An ensemble to design on, and measurements of other trajectories."""
     x, y = exercise.simulate(RUNS, 4, "c4-design")
     return [(x, y, exercise.simulate(5, 4, "c4").y, exercise.model.prior.mean, *noiseless(exercise))]
 

@@ -30,6 +30,7 @@ def condition(x: Array, z: Array) -> tuple[Array, Array]:
 
 
 def _predicting(predict: Callable, mean: Array, cov: Array) -> tuple[Array, Array]:
+    """The prediction from one covariance for all trajectories, or from one each."""
     return predict(mean, full(np.asarray(cov), len(mean)))
 
 

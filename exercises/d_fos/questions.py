@@ -19,6 +19,7 @@ from kfcourse.exercises.shared import RUNS, covariance_of, ensemble, predicted
 
 
 def condition_arguments(exercise: Exercise) -> list[tuple]:
+    """States and estimates of another scale and with a bias."""
     x, _, _ = ensemble(exercise, "d1")
     return [(x, 0.2 + predicted(exercise, "d1-z", 1.3 * x))]
 
@@ -27,6 +28,7 @@ def condition_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def fos_arguments(exercise: Exercise, name: str = "d2") -> list[tuple]:
+    """Predictions, their covariances, states and measurements at one step of the design."""
     x, y, _ = ensemble(exercise, name)
     lam = predicted(exercise, f"{name}-lam", x)
     Psi = full(covariance_of(x - lam, x - lam), RUNS) * (1 + 0.3 * exercise.rng(f"{name}-Psi").random((RUNS, 1, 1)))
@@ -37,6 +39,7 @@ def fos_arguments(exercise: Exercise, name: str = "d2") -> list[tuple]:
 
 
 def mfos_arguments(exercise: Exercise) -> list[tuple]:
+    """The same with the next states."""
     x, y, x_next = ensemble(exercise, "d3")
     lam, Psi, _, _, measure, predict = fos_arguments(exercise, "d3")[0]
     return [(lam, Psi, x, y, x_next, measure, predict)]
@@ -46,6 +49,7 @@ def mfos_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def both_arguments(exercise: Exercise) -> list[tuple]:
+    """States, measurements and estimates."""
     x, y, _ = ensemble(exercise, "d4")
     return [(x, y, predicted(exercise, "d4-z", x))]
 

@@ -71,6 +71,7 @@ WRONG_MOMENTS: tuple[tuple[str, str, Answer], ...] = (
 
 
 def log_normal(value: Array, mean: Array, variance: Array) -> Array:
+    """The logarithm of the normal density."""
     return -0.5 * ((value - mean) ** 2 / variance + np.log(2 * np.pi * variance))
 
 

@@ -51,6 +51,7 @@ def hidden_law(exercise: Exercise, name: str) -> Law:
 
 
 def correction_arguments(exercise: Exercise) -> list[tuple]:
+    """A hidden density and law, and two measurements."""
     x, see = nodes(), hidden_law(exercise, "f2")
     predicted = normalised(hidden_density(exercise, "f2"), x)
     return [(predicted, float(y), x, see) for y in exercise.rng("f2-y").uniform([0.5, -1.2], [1.5, -0.4])]
@@ -60,6 +61,7 @@ def correction_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def prediction_arguments(exercise: Exercise) -> list[tuple]:
+    """A hidden density and law."""
     x = nodes()
     return [(normalised(hidden_density(exercise, "f3"), x), x, hidden_law(exercise, "f3"))]
 
@@ -68,6 +70,7 @@ def prediction_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def run_arguments(exercise: Exercise) -> list[tuple]:
+    """Six measurements, all there and with one missing."""
     x, move, see = nodes(), hidden_law(exercise, "f4-move"), hidden_law(exercise, "f4-see")
     y = exercise.rng("f4-y").uniform(0.4, 1.4, 6) * [1, -1, 1, 1, -1, 1]
     gaps = np.where(np.arange(len(y)) == 3, np.nan, y)
@@ -78,6 +81,7 @@ def run_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def nodes_arguments(exercise: Exercise) -> list[tuple]:
+    """Three intervals, widths and errors."""
     rng = exercise.rng("f5")
     return [
         (-rng.uniform(2, 5), rng.uniform(3, 7), rng.uniform(0.002, 0.01), 10 ** -rng.uniform(exponent, exponent + 1))

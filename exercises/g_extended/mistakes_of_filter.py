@@ -118,6 +118,7 @@ WRONG_PREDICTIONS: tuple[tuple[str, str, Answer], ...] = (
 
 
 def of_gain(Psi: Array, G: Array, R: Array) -> Array:
+    """K = Psi G^T (G Psi G^T + R)^-1."""
     return gain(Psi @ transpose(G), G @ Psi @ transpose(G) + R)
 
 

@@ -30,6 +30,7 @@ from kfcourse.laws import apply
 
 
 def jacobian_arguments(exercise: Exercise) -> list[tuple]:
+    """Hidden functions of three components, and of as many as the variant has."""
     rng = exercise.rng("g1")
     return [(curved(rng, n, n, 1.0)[0], rng.normal(size=(RUNS, n)), step) for n, step in ((3, 0.02), (exercise.model.n, 0.05))]
 
@@ -38,6 +39,7 @@ def jacobian_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def bounds_arguments(exercise: Exercise) -> list[tuple]:
+    """Degrees of freedom, runs and a confidence, twice."""
     rng = exercise.rng("g2")
     return [
         (int(rng.integers(2, 7)), int(rng.integers(8, 60)), float(rng.uniform(*limits)))
@@ -49,6 +51,7 @@ def bounds_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def prediction_arguments(exercise: Exercise) -> list[tuple]:
+    """Estimates, covariances and the functions of the object."""
     return [(*hidden_law(rng, n), one.f, one.Phi, one.g, one.D_xi) for one, rng, n, _ in cases(exercise, "g3")]
 
 
@@ -56,6 +59,7 @@ def prediction_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def correction_arguments(exercise: Exercise) -> list[tuple]:
+    """Predictions, covariances, measurements and the functions of the meter."""
     found = []
     for one, rng, n, p in cases(exercise, "g4"):
         lam, Psi = hidden_law(rng, n)
@@ -67,6 +71,7 @@ def correction_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def run_arguments(exercise: Exercise) -> list[tuple]:
+    """Measurements of hidden trajectories, the prior and all functions."""
     found = []
     for one, rng, n, p in cases(exercise, "g5"):
         mean, cov = rng.normal(size=n), covariance(rng, n, 0.6)
@@ -83,6 +88,7 @@ def run_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def normalised_arguments(exercise: Exercise) -> list[tuple]:
+    """States, estimates, predictions with their covariances, and measurements."""
     found = []
     for one, rng, n, p in cases(exercise, "g6"):
         shape = (STEPS, RUNS)
@@ -97,6 +103,7 @@ def normalised_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def information_arguments(exercise: Exercise) -> list[tuple]:
+    """Information matrices, the first of them zero, and a meter with more components than the state."""
     found = []
     for place, (n, p) in enumerate(((3, 4), (exercise.model.n, exercise.model.n + 1))):
         rng = exercise.rng(f"g7-{place}")

@@ -35,6 +35,7 @@ def continuous_numbers(exercise: Exercise) -> dict[str, float]:
 
 
 def variances_arguments(exercise: Exercise) -> list[tuple]:
+    """Densities of both noises and a step, three times."""
     rng = exercise.rng("h1")
     return [tuple(round(float(v), 3) for v in rng.uniform([1.2, 0.2, 0.01], [4, 0.9, 0.3])) for _ in range(3)]
 
@@ -55,6 +56,7 @@ def positive(rng: np.random.Generator) -> Map:
 
 
 def simulation_arguments(exercise: Exercise) -> list[tuple]:
+    """States, standard normal numbers, a step and hidden functions."""
     rng = exercise.rng("h2")
     x, xi, n = rng.normal(size=(3, RUNS))
     return [
@@ -75,6 +77,7 @@ def simulation_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def rate_arguments(exercise: Exercise) -> list[tuple]:
+    """A covariance and matrices without symmetry."""
     rng = exercise.rng("h3")
     A, G, H = rng.normal(size=(3, 3)), rng.normal(size=(3, 3)), rng.normal(size=(2, 3))
     return [(covariance(rng, 3), A, G, H, covariance(rng, 3), covariance(rng, 2, 0.4))]
@@ -84,6 +87,7 @@ def rate_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def steady_arguments(exercise: Exercise) -> list[tuple]:
+    """Three scalar models."""
     rng = exercise.rng("h4")
     low, high = [0.3, 0.6, 1.3, 1.3, 0.15], [0.7, 0.9, 1.8, 2.6, 0.5]
     return [tuple(round(float(v), 3) for v in rng.uniform(low, high)) for _ in range(3)]
@@ -93,6 +97,7 @@ def steady_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def step_arguments(exercise: Exercise) -> list[tuple]:
+    """Estimates, variances, measurements and hidden functions with their slopes."""
     rng = exercise.rng("h5")
     z, y = rng.normal(size=(2, RUNS))
     D, T = rng.uniform(0.4, 1.2, RUNS), rng.uniform(0.01, 0.03)
@@ -103,6 +108,7 @@ def step_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def derivatives_arguments(exercise: Exercise) -> list[tuple]:
+    """Three signals of x."""
     x, y, N = sp.symbols("x y N_n", real=True)
     a, b, c = (sp.Rational(int(k), 10) for k in exercise.rng("h6").integers(3, 10, 3))
     return [(signal, x, y, N) for signal in (sp.sin(x + a) + b * x, sp.exp(c * x) + b * x**2, x + a * x**3)]

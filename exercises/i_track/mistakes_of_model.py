@@ -106,6 +106,7 @@ WRONG_NOISES: tuple[tuple[str, str, Answer], ...] = (
 
 
 def second_difference(y0: sp.Expr, y1: sp.Expr, y2: sp.Expr) -> sp.Expr:
+    """y2 - 2 y1 + y0."""
     return y2 - 2 * y1 + y0
 
 

@@ -37,6 +37,7 @@ def track_numbers(exercise: Exercise) -> dict[str, float]:
 
 
 def step_arguments(exercise: Exercise) -> list[tuple]:
+    """A law, an input, a measurement and matrices without zeros or ones."""
     rng = exercise.rng("i4")
     A, B, H = (np.array(m, dtype=float) for m in matrices(rng.uniform(0.2, 0.6)))
     A, B, H = (matrix + 0.2 * rng.normal(size=matrix.shape) for matrix in (A, B, H))  # no zeros, no ones

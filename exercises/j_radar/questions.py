@@ -38,6 +38,7 @@ def radar_numbers(exercise: Exercise) -> dict[str, float]:
 
 
 def filter_arguments(exercise: Exercise) -> list[tuple]:
+    """Measurements of four tracks in space that accelerate."""
     rng = exercise.rng("j4")
     T, alpha, beta = rng.uniform(1.3, 2.2), rng.uniform(0.3, 0.6), rng.uniform(0.1, 0.25)
     r, v = 10 * rng.normal(size=3), rng.normal(size=3)

@@ -136,6 +136,8 @@ WRONG_IMPROVEMENTS: tuple[tuple[str, str, Answer], ...] = (
 
 
 def growth_with(sd: Callable | None = None, until: Callable | None = None) -> Answer:
+    """The right deviation and time, with one of them changed."""
+
     def answer(p: sp.Expr, sigma_xi: sp.Expr, sigma_n: sp.Expr, n: sp.Expr, T: sp.Expr) -> tuple[sp.Expr, ...]:
         right = lost(p, sigma_xi, sigma_n, n, T)
         return (

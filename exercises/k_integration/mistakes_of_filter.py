@@ -16,6 +16,7 @@ from kfcourse.laws import Array
 
 
 def _slope(signal: Callable, at: sp.Expr) -> sp.Expr:
+    """The derivative of the signal by its argument."""
     x = sp.Dummy("x", real=True)
     return sp.diff(signal(x), x).subs(x, at)
 

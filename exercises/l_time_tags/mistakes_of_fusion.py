@@ -124,6 +124,8 @@ def move_with(
     carried: Callable[[Array, Array], Array] = lambda A, P: A @ P @ A.T,
     moved: Callable[[Array, Array], Array] = lambda A, m: A @ m,
 ) -> Answer:
+    """The motion over dt, with another noise, covariance or mean."""
+
     def answer(m: Array, P: Array, dt: float, q: float) -> tuple[Array, Array]:
         A = np.array([[1, dt], [0, 1]])
         return moved(A, m), carried(A, P) + q * np.array(Q(dt))
@@ -198,10 +200,12 @@ def _fusion_with(
 
 
 def by_tag(tags: Array, arrivals: Array) -> Array:
+    """The order in which things were measured."""
     return tags
 
 
 def by_arrival(tags: Array, arrivals: Array) -> Array:
+    """The order in which they came."""
     return arrivals
 
 

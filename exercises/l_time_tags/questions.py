@@ -43,6 +43,7 @@ def timing_numbers(exercise: Exercise) -> dict[str, float]:
 
 
 def dimension_arguments(exercise: Exercise) -> list[tuple]:
+    """Two series; in the second a whole period passes before the first measurement of the receiver."""
     rng = exercise.rng("l1")
     ratio, first = int(rng.integers(4, 7)), int(rng.integers(2, 4))
     return [(4 * ratio + 1, ratio, first), (3 * ratio, ratio, first + ratio)]
@@ -64,6 +65,7 @@ def correction_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def move_arguments(exercise: Exercise) -> list[tuple]:
+    """Three laws, intervals and intensities."""
     rng = exercise.rng("l4")
     return [(rng.normal(size=2), covariance(rng, 2), float(dt), float(rng.uniform(1.3, 2))) for dt in rng.uniform(0.3, 2.6, 3)]
 
@@ -86,6 +88,7 @@ def fusion_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def fit_arguments(exercise: Exercise) -> list[tuple]:
+    """Pairs of edge and stamp, the edges late."""
     rng = exercise.rng("l7")
     times = np.sort(rng.uniform(3, 40, 9))
     return [(times + rng.uniform(0, 0.6, 9), rng.uniform(1.1, 1.4) * times + rng.uniform(2, 5))]

@@ -2,6 +2,7 @@
 
 import ast
 import random
+from collections import Counter
 from functools import cache
 
 import numpy as np
@@ -139,3 +140,12 @@ def test_messages_of_the_package_are_not_code():
             for mistake in question.mistakes:
                 with pytest.raises(SyntaxError):
                     ast.parse(mistake.says)
+
+
+def test_no_message_is_typed_twice():
+    """What is said in more than one place has its home in exercises/messages.py."""
+    said = {mistake.says for one in sets().values() for question in one.questions for mistake in question.mistakes}
+    files = sorted(sets()["a"].folder.parent.rglob("*.py"))
+    nodes = [node for file in files for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))]
+    typed = Counter(node.value for node in nodes if isinstance(node, ast.Constant) and node.value in said)
+    assert [text for text, times in typed.items() if times > 1] == []
