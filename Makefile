@@ -1,68 +1,84 @@
 # make book   the book        make test   every check        make help   the rest
-PYTHON ?= python3
 ifeq ($(OS),Windows_NT)
   BIN := .venv/Scripts
 else
   BIN := .venv/bin
 endif
-INSTALLED := .venv/installed
+# The interpreter of .venv: the one that is named; else the one of a finished .venv as long as it runs; else python3.
+ifndef PYTHON
+  PYTHON := $(or $(if $(wildcard .venv/installed),$(shell $(BIN)/python -c "print('$(BIN)/python')" 2>/dev/null)),python3)
+endif
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help book test lint unit notebooks lock clean distclean install figure benchmark
+.PHONY: help book test quick lint unit notebooks lock lock-check clean distclean install figure benchmark
 
 help:
-	@echo "make book       execute the chapters and build the book in _build/html"
-	@echo "make test       lint, types, unit tests, documentation examples, the book, nbval on its notebooks"
-	@echo "make lint       ruff check, ruff format --check, mypy"
-	@echo "make unit       unit tests and documentation examples only"
-	@echo "make install    the virtual environment .venv only"
-	@echo "make benchmark  speed of the engine, as ratios"
-	@echo "make figure     the figure of README.md"
-	@echo "make lock       compile requirements.txt from pyproject.toml"
-	@echo "make clean      remove the book;  make distclean  removes .venv too"
+	@echo "make book        execute the chapters and build the book in _build/html"
+	@echo "make test        lint, types, unit tests, documentation examples, the book, nbval on its notebooks"
+	@echo "make quick       lint, types and the tests marked quick, before a commit"
+	@echo "make lint        ruff check, ruff format --check, mypy"
+	@echo "make unit        unit tests and documentation examples only"
+	@echo "make install     the virtual environment .venv only"
+	@echo "make benchmark   speed of the engine, as ratios"
+	@echo "make figure      the figure of README.md"
+	@echo "make lock        compile requirements.txt from pyproject.toml; all versions anew: make UPGRADE=--upgrade lock"
+	@echo "make lock-check  does requirements.txt fit pyproject.toml, and every Python and system?"
+	@echo "make clean       remove the book;  make distclean  removes .venv too"
 	@echo "Another interpreter for .venv:  make PYTHON=python3.12 book"
 
-book: $(INSTALLED)
+book: install
 	$(BIN)/python book/build.py
 
-test: lint unit book notebooks
-	@echo "All checks passed."
+test: install
+	@$(BIN)/python .ci/cost.py "$(MAKE)" lint unit book notebooks
 
-lint: $(INSTALLED)
+quick: lint
+	$(BIN)/pytest -q -n auto -m quick --ignore tests/test_book.py
+
+lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-unit: $(INSTALLED)
+unit: install
 	$(BIN)/pytest -q -n auto --ignore tests/test_book.py
 
 # Executes every notebook of the built book once more and compares all outputs; so it does with the worked solutions of the
 # exercises, for variants of different kinds: multiplicative noises, a sine meter, a vector state.
 CHECKED := --variant 53 --variant 5 --variant 20
-notebooks: $(INSTALLED)
+notebooks: install
 	$(BIN)/kfcourse solutions $(CHECKED) --out _build/solutions
 	KFCOURSE_BOOK=required $(BIN)/pytest -q -n 2 --dist loadscope --nbval --nbval-current-env tests/test_book.py _build/jupyter_execute _build/solutions
 
-figure: $(INSTALLED)
+figure: install
 	$(BIN)/python book/readme_figure.py
 
-benchmark: $(INSTALLED)
+benchmark: install
 	$(BIN)/python benchmarks/engine.py
 
-install: $(INSTALLED)
+install:
+	@$(PYTHON) -c "" 2>/dev/null || { echo "$(PYTHON) does not start. Install Python 3.11 or newer, or name it: make PYTHON=/path/to/python3 $(MAKECMDGOALS)" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; v >= (3, 11) or sys.exit("$(PYTHON) is Python %d.%d, too old: 3.11 or newer is needed. Name another one: make PYTHON=python3.12 $(MAKECMDGOALS)" % v)'
+	@$(PYTHON) .ci/environment.py $(MAKECMDGOALS)
 
-$(INSTALLED): requirements.txt pyproject.toml
-	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; v >= (3, 11) or sys.exit("kfcourse needs Python 3.11 or newer, and $(PYTHON) is %d.%d; name another one: make PYTHON=python3.12 $(MAKECMDGOALS)" % v)' \
-	  || { command -v $(PYTHON) >/dev/null || echo "No $(PYTHON) found: install Python 3.11 or newer, or name it: make PYTHON=/path/to/python3 $(MAKECMDGOALS)"; exit 1; }
-	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
-	@touch $@
+# One lock for all: versions and hashes for every Python from 3.11.0 on and every system. Versions stay unless a bound forces them.
+COMPILE := pip compile --quiet --universal --python-version 3.11.0 --generate-hashes --all-extras --no-annotate \
+  --no-emit-index-url --no-emit-find-links --custom-compile-command "make lock"
+lock: install
+	$(BIN)/uv $(COMPILE) $(UPGRADE) --output-file requirements.txt pyproject.toml
 
-lock: $(INSTALLED)
-	CUSTOM_COMPILE_COMMAND='make lock' $(BIN)/pip-compile --quiet --upgrade --all-extras --strip-extras --no-annotate --no-emit-index-url \
-	  --no-emit-find-links --no-emit-trusted-host --no-emit-options --output-file requirements.txt pyproject.toml
+# Compiled again, nothing changes; and every requirement has a wheel, with its hash, for each Python and system.
+lock-check: install
+	@mkdir -p _build && cp requirements.txt _build/requirements.txt
+	@$(BIN)/uv $(COMPILE) --output-file _build/requirements.txt pyproject.toml
+	@diff -u requirements.txt _build/requirements.txt || { echo "requirements.txt does not fit pyproject.toml: make lock"; exit 1; }
+	@for python in 3.11.0 3.12 3.13 3.14; do for system in linux macos windows; do \
+	  echo "Python $$python, $$system"; \
+	  $(BIN)/uv pip install --quiet --dry-run --target _build/none --python-version $$python --python-platform $$system \
+	    --require-hashes --only-binary :all: -r requirements.txt || exit 1; \
+	done; done
+	@rm -rf _build/none _build/requirements.txt
 
 clean:
 	rm -rf _build .pytest_cache .mypy_cache .ruff_cache

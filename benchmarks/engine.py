@@ -21,7 +21,8 @@ import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
 from kfcourse import compare, lab_filters, simulate
-from kfcourse.lab.variants import LAB, find_variant, title
+from kfcourse.lab.short_names import LAB, title
+from kfcourse.lab.variants import find_variant
 from kfcourse.montecarlo.ensemble import Ensemble
 
 STEPS = 51

@@ -12,8 +12,8 @@ from pathlib import Path
 import nbformat
 
 from kfcourse.checks import exercise, sets
-from kfcourse.notebooks.course import Job, jobs
-from kfcourse.notebooks.execute import pictures
+from kfcourse.notebooks.execution import pictures
+from kfcourse.notebooks.jobs import Job, plan
 from kfcourse.notebooks.master import read, render, statement, student
 
 VARIANT = "53"
@@ -30,7 +30,7 @@ Open it in Jupyter, in an environment in which `kfcourse` is installed: {{doc}}`
 
 def solutions() -> list[Job]:
     """The worked solutions that the pages are made from."""
-    return jobs("solutions", SOLUTIONS, [VARIANT], list(sets()))
+    return plan("solutions", SOLUTIONS, [VARIANT], list(sets()))
 
 
 def write() -> None:

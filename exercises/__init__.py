@@ -1,16 +1,28 @@
 """The exercise sets, a folder each.
 
     <letter>_<name>/statement.md    text, stubs and typed solution; Jinja fills in the variant
-    <letter>_<name>/questions.py    `SET`: the keys, the known mistakes with what to say of them, hidden arguments
+    <letter>_<name>/questions.py    `SET`: what is asked, and the hidden arguments
+                    keys.py         the right answers: plain functions with the student's names
+                    mistakes.py     the known mistakes and what is said of each; several mistakes_of_*.py if there are many
+                    companion.py    what the notebook itself imports, if it needs more than the package; never a key
+    messages.py                     what is said of a mistake that is made in more than one place
     shared.py                       what the questions of several sets share
 
-A new folder is a new set: there is no list to add it to.  Installed, this package is `kfcourse.exercises`.
+A new folder is a new set: there is no list to add it to.  Only questions.py with its SET is looked for; a small set may hold its
+keys and mistakes there too, as set a does.  Installed, this package is `kfcourse.exercises`.
 """
 
 from importlib import import_module
 from pathlib import Path
 
-from kfcourse.checks.registry import register
+from kfcourse.checks.registry import ExerciseSet, register
 
-for _folder in sorted(path.parent.name for path in Path(__file__).parent.glob("*/questions.py")):
-    register(import_module(f"{__name__}.{_folder}.questions").SET)
+
+def discover(package: str, folder: Path) -> list[ExerciseSet]:
+    """The sets of a package: `SET` of the questions.py in each subfolder that has one."""
+    names = sorted(path.parent.name for path in folder.glob("*/questions.py"))
+    return [import_module(f"{package}.{name}.questions").SET for name in names]
+
+
+for _set in discover(__name__, Path(__file__).parent):
+    register(_set)

@@ -24,15 +24,15 @@ def personal(exercise: Exercise, name: str, course: Mapping[str, float], ranges:
     return {key: float(f"{rng.uniform(*limits):.2g}") for key, limits in ranges.items()}
 
 
-def covariance(rng: np.random.Generator, size: int) -> Array:
+def covariance(rng: np.random.Generator, size: int, scale: float = 1.0) -> Array:
     """A hidden covariance: correlated, and well away from singular."""
     root = np.eye(size) + 0.4 * rng.normal(size=(size, size))
-    return root @ root.T
+    return scale * root @ root.T
 
 
 def substituted(formulas: sp.MatrixBase, names: tuple[sp.Symbol, ...]) -> Callable[..., sp.ImmutableMatrix]:
     """The formulas as a function of other symbols in the place of these."""
-    return lambda *values: sp.ImmutableMatrix(formulas.subs(dict(zip(names, values, strict=True)), simultaneous=True))
+    return lambda *values: sp.ImmutableMatrix(formulas.xreplace(dict(zip(names, map(sp.sympify, values), strict=True))))
 
 
 # -- regressions over an ensemble
@@ -60,14 +60,12 @@ def predicted(exercise: Exercise, name: str, x: Array) -> Array:
     return x + spread * (0.1 + 0.5 * exercise.rng(name).normal(size=x.shape))
 
 
-def regression_with(moments: Callable[[Array, Array], tuple[Array, Array]], offset: bool = True, transposed: bool = False) -> Fit:
+def regression_with(moments: Callable[[Array, Array], tuple[Array, Array]], offset: bool = True) -> Fit:
     """A regression from other second moments: (target, regressor) -> (cross (r, s), of the regressor (s, s))."""
 
     def fit(target: Array, regressor: Array) -> tuple[Array, Array, Array]:
         cross, own = moments(target, regressor)
         matrix = cross @ np.linalg.pinv(own)
-        if transposed:
-            matrix = (np.linalg.pinv(own) @ cross.T).reshape(matrix.shape)
         shift = target.mean(axis=0) - matrix @ regressor.mean(axis=0) if offset else target.mean(axis=0)
         return matrix, shift, covariance_of(target, target) - matrix @ covariance_of(target, regressor).T
 
@@ -75,62 +73,14 @@ def regression_with(moments: Callable[[Array, Array], tuple[Array, Array]], offs
 
 
 def covariance_of(a: Array, b: Array) -> Array:
+    """Cross covariance of two samples (N, r), (N, s), over N."""
     return (a - a.mean(axis=0)).T @ (b - b.mean(axis=0)) / len(a)
 
 
 def raw_moment(a: Array, b: Array) -> Array:
+    """The same about zero."""
     return a.T @ b / len(a)
 
 
-def _over_components(a: Array, b: Array) -> Array:
-    """Deviations from the mean over the components of each trajectory."""
-    return (a - a.mean(axis=1, keepdims=True)).T @ (b - b.mean(axis=1, keepdims=True)) / len(a)
-
-
-BIASED = (
-    "Cross covariance and covariance are divided by different numbers, N and N - 1; np.cov divides by N - 1 unless told "
-    "otherwise."
-)
-WRONG_REGRESSIONS: tuple[tuple[str, str, Fit], ...] = (
-    (
-        "means-not-subtracted",
-        "The second moments are taken about zero; covariances are about the means.",
-        regression_with(lambda t, r: (raw_moment(t, r), raw_moment(r, r))),
-    ),
-    (
-        "offset-forgotten",
-        "The offset is the target's mean; what the matrix makes of the regressor's mean has to be subtracted.",
-        regression_with(lambda t, r: (covariance_of(t, r), covariance_of(r, r)), offset=False),
-    ),
-    (
-        "wrong-index",
-        "The mean seems to be taken over the components (the second index) instead of the trajectories (the first).",
-        regression_with(lambda t, r: (_over_components(t, r), _over_components(r, r))),
-    ),
-    (
-        "biased",
-        BIASED,
-        regression_with(lambda t, r: (covariance_of(t, r), covariance_of(r, r) * len(r) / (len(r) - 1))),
-    ),
-    (
-        "biased",
-        BIASED,
-        regression_with(lambda t, r: (covariance_of(t, r) * len(r) / (len(r) - 1), covariance_of(r, r))),
-    ),
-    (
-        "regularised",
-        "Something was added to the covariance of the regressor to make it invertible: that biases every coefficient. The "
-        "pseudo-inverse needs no such help.",
-        regression_with(lambda t, r: (covariance_of(t, r), covariance_of(r, r) + 1e-3 * np.eye(r.shape[1]))),
-    ),
-    (
-        "residual-is-variance",
-        "The residual covariance is the whole covariance of the target; subtract what the regression explains.",
-        lambda t, r: (*regression(t, r)[:2], covariance_of(t, t)),
-    ),
-    (
-        "unbiased-residual",
-        "The residual is divided by N - 1; use 1/N throughout, as for the coefficients.",
-        lambda t, r: (*regression(t, r)[:2], regression(t, r)[2] * len(t) / (len(t) - 1)),
-    ),
-)
+MOMENTS_ABOUT_ZERO = regression_with(lambda t, r: (raw_moment(t, r), raw_moment(r, r)))
+WITHOUT_OFFSET = regression_with(lambda t, r: (covariance_of(t, r), covariance_of(r, r)), offset=False)

@@ -12,9 +12,11 @@ from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, Trajectories, simulate
 from kfcourse.montecarlo.experiment import compare, predictions, run
 from kfcourse.symbolic.formula import FormulaError
-from kfcourse.symbolic.model import Model, ModelError
+from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
-from kfcourse.symbolic.structure import Structure, gauss_hermite, gaussian, linearised, unscented
+from kfcourse.symbolic.quadrature import gauss_hermite, unscented
+from kfcourse.symbolic.reading import ModelError
+from kfcourse.symbolic.structure import Structure, gaussian, linearised
 
 __all__ = [
     "Comparison",

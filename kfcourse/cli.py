@@ -12,17 +12,19 @@ from pathlib import Path
 import click
 
 from kfcourse.checks.posing import unposed
+from kfcourse.files import save
 from kfcourse.lab.grammar import generate
 from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
 from kfcourse.lab.report import conclusions, write_json, write_report
-from kfcourse.lab.variants import FILTERS, LAB, VariantError, find_variant, has_exact, lab_filters, title
+from kfcourse.lab.short_names import FILTERS, LAB, has_exact, lab_filters, title
+from kfcourse.lab.variants import VariantError, find_variant
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.notebooks import commands
-from kfcourse.notebooks.course import chosen_variants, save
+from kfcourse.notebooks.course_list import chosen_variants
 from kfcourse.symbolic.formula import FormulaError
-from kfcourse.symbolic.model import ModelError
 from kfcourse.symbolic.moments import NoClosedForm
+from kfcourse.symbolic.reading import ModelError
 
 _VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")
 

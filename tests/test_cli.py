@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from kfcourse import cli
-from kfcourse.lab.variants import FILTERS, LAB
+from kfcourse.lab.short_names import FILTERS, LAB
 
 QUICK = ("--runs", "400", "--steps", "4", "--exact-runs", "0")
 EXAMPLE = """

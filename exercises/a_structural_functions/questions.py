@@ -7,19 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TypeAlias
 
 import sympy as sp
 
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, ForVariant, Mistake, Question
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.exercises import messages
 from kfcourse.symbolic.sides import Side, plain
 
-Make = Callable[[Any], Any]  # exercise -> results in symbols
+Formula: TypeAlias = sp.Expr | sp.MatrixBase  # an expression for a scalar variant, a matrix for a vector one
+Make = Callable[[Exercise], Formula | tuple[Formula, ...]]  # the results in symbols
 
 
-def symbols(exercise: Exercise, side: str) -> tuple[Any, Any]:
+def symbols(exercise: Exercise, side: str) -> tuple[Formula, Formula]:
     """Mean and covariance of the law, as an answer is called with them."""
     part = Side.of(exercise.model, side)
     return plain(part.mean), plain(part.cov)
@@ -78,6 +80,7 @@ def scalar(matrix: sp.MatrixBase) -> sp.Expr:
 
 
 def mistakes_of_variance(kind: str, side: str) -> tuple[Mistake, ...]:
+    """The variance squared, or its root: as easily made by linearisation as exactly."""
     p = "p" if side == "object" else "d"
     return (
         covariance_to_power(
@@ -90,13 +93,10 @@ def mistakes_of_variance(kind: str, side: str) -> tuple[Mistake, ...]:
 
 
 def mistakes_of_linearised(side: str) -> tuple[Mistake, ...]:
+    """Mistakes in (tau, Theta) or (h, G, F) by linearisation."""
     p = "p" if side == "object" else "d"
     catalogue: tuple[tuple[str, str, Callable[[Side], sp.MatrixBase]], ...] = (
-        (
-            "noise-forgotten",
-            "The noise adds to the covariance too; only the state's part is there.",
-            lambda s: s.A * s.cov * s.A.T,
-        ),
+        ("noise-forgotten", messages.NOISE_PART_FORGOTTEN, lambda s: s.A * s.cov * s.A.T),
         (
             "state-forgotten",
             f"Only the noise's part is there: how does the uncertainty {p} of the state come through the equation?",
@@ -128,6 +128,8 @@ def mistakes_of_linearised(side: str) -> tuple[Mistake, ...]:
 
 
 def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
+    """Mistakes in (tau, Theta) or (h, G, F) for a normal law."""
+
     def second_moment(exercise: Exercise) -> tuple:
         functions = right("gaussian", side)(exercise)
         mean, cov = (sp.Matrix([f]) for f in (functions[0], functions[-1]))
@@ -141,28 +143,22 @@ def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
             side,
             lambda s: s.noiseless_covariance() + s.B * s.D * s.B.T,
         ),
-        wrong_covariance(
-            "noise-forgotten",
-            "The noise adds to the covariance too; only the state's part is there.",
-            "gaussian",
-            side,
-            Side.noiseless_covariance,
-        ),
+        wrong_covariance("noise-forgotten", messages.NOISE_PART_FORGOTTEN, "gaussian", side, Side.noiseless_covariance),
         Mistake(
             "linearised",
             "That is the linearised function. Here the mean over the whole normal law is asked for.",
             constant(right("linearised", side)),
         ),
         Mistake(
-            "second-moment",
-            "It is a second moment: the product of the means has not been subtracted.",
-            constant(second_moment),
+            "second-moment", "It is a second moment: the product of the means has not been subtracted.", constant(second_moment)
         ),
         *mistakes_of_variance("gaussian", side),
     )
 
 
 def jacobians(side: str, change: Callable[[sp.Matrix, sp.Matrix], tuple] = lambda a, b: (a, b)) -> ForVariant:
+    """Derivatives by state and by noise, changed."""
+
     def make(exercise: Exercise) -> tuple:
         part = Side.of(exercise.model, side)
         return tuple(plain(matrix) for matrix in change(part.A, part.B))
@@ -176,12 +172,13 @@ def _unevaluated(exercise: Exercise) -> tuple:
     return plain(sp.Matrix([scalar(part.value) / scalar(part.mean)])), plain(part.B)
 
 
-def unexplained(exercise: Exercise) -> Any:
+def unexplained(exercise: Exercise) -> Formula:
     """R = F - G d G^T of the Gaussian functions."""
     return exercise.structures.gaussian["R"]
 
 
 def _question(number: int, title: str, kind: str, side: str, mistakes: tuple[Mistake, ...]) -> Question:
+    """A question for the functions of one kind and one side."""
     parts = ("tau", "Theta") if side == "object" else ("h", "G", "F")
     right_one = key(f"{side}_{kind}", right(kind, side), side)
     return Question(f"a{number}", title, "core", right_one, lambda e: [symbols(e, side)], mistakes, parts)

@@ -1,4 +1,12 @@
-"""Self-checks of the exercises: `exercise("a", variant="53").check("a1", answer)`."""
+"""Self-checks of the exercises: `exercise("a", variant="53").check("a1", answer)`.
+
+question    what a question is: key, hidden arguments, known mistakes
+registry    the sets that there are; they register, nothing here knows one
+exercises   a set for a variant: what a notebook opens
+engine      is an answer right, and if not, what kind of mistake is it?
+equality    are two formulas, two arrays equal?
+posing      can every question be posed for a variant?
+"""
 
 from kfcourse.checks.exercises import Exercise, ExerciseError, exercise
 from kfcourse.checks.question import Mistake, Question, Result

@@ -14,11 +14,13 @@ import sympy as sp
 from kfcourse.checks.engine import check
 from kfcourse.checks.question import Question, Result
 from kfcourse.checks.registry import sets
-from kfcourse.lab.variants import Structures, Variant, find_variant, read_variant
+from kfcourse.lab.short_names import Structures
+from kfcourse.lab.variants import Variant, find_variant, read_variant
 from kfcourse.laws import Array
 from kfcourse.montecarlo.ensemble import Trajectories, simulate
+from kfcourse.symbolic.equations import compile_noiseless
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import Structure, compile_noiseless
+from kfcourse.symbolic.structure import Structure
 
 
 class ExerciseError(ValueError):

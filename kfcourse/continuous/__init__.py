@@ -1,21 +1,28 @@
-"""Continuous time: white noise of given spectral density, simulation, and the extended Kalman-Bucy filter."""
+r"""Continuous time: white noise of given spectral density, simulation, and the extended Kalman-Bucy filter.
 
-from kfcourse.continuous.model import (
-    ContinuousModel,
-    FilterEquations,
-    Linear,
-    Path,
-    Steady,
-    coarsen,
-    extended_kalman_bucy,
-    filter_equations,
-    linear_matrices,
-    log_likelihood_rate,
-    simulate,
-    steady_state,
-    symmetrised_drift,
-    to_discrete,
-)
+    dx/dt = f(x) + g(x) xi(t)        xi: white, one-sided spectral density S_xi, intensity S_xi / 2
+    y(t)  = S(x) + n(t)              n:  white, one-sided spectral density N,    intensity N / 2
+
+in Ito's sense: over a short step T the state changes by T f + g times a normal number of variance S_xi T / 2, with f and g at
+the *beginning* of the step.  That is what a discrete model turns into when T -> 0; `symmetrised_drift` is the difference from
+the other (symmetrised, Stratonovich) sense.
+
+White noise has no values, only means over intervals: a stored measurement is y_k = (1/T) Integral y dt over step k, with the
+noise variance N / (2 T).  A continuous filter is therefore an ordinary `Filter` of this y_k, made for one step T; it tends to
+its differential equations as T -> 0.
+
+    model        `ContinuousModel`, and `to_discrete`: the discrete model with the same limit
+    paths        `simulate`, `coarsen`
+    equations    `log_likelihood_rate`, `filter_equations`: the filter's formulas, derived
+    bucy         `extended_kalman_bucy`: the filter
+    stationary   `steady_state` of a linear model
+"""
+
+from kfcourse.continuous.bucy import extended_kalman_bucy
+from kfcourse.continuous.equations import FilterEquations, filter_equations, log_likelihood_rate, symmetrised_drift
+from kfcourse.continuous.model import ContinuousModel, to_discrete
+from kfcourse.continuous.paths import Path, coarsen, simulate
+from kfcourse.continuous.stationary import Linear, Steady, linear_matrices, steady_state
 
 __all__ = [
     "ContinuousModel",

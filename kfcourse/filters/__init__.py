@@ -1,4 +1,17 @@
-"""The filters of the course, one file per family."""
+"""The filters of the course, one file a family.  Read `kalman` first.
+
+kalman                  the textbook step
+base, designed          what a filter is: ready to run, or with coefficients to be found over an ensemble
+approximations          approximations of the absolutely optimal filter (AOF): EKF, normal, unscented, quadrature
+conditionally_optimal   Pugachev's two-step conditionally optimal filter (DUOF)
+optimal_structure       Rudenko's filter of optimal structure (FOS)
+modified_structure      its modification (MFOS)
+exact                   the AOF itself, on a grid;  particles: by sampling;  densities: what both need
+iterated_ekf            the meter linearised again at the estimate
+alphabeta               constant gains
+multiple_models         several ways of moving (IMM)
+notation                symbols in which the equations are printed
+"""
 
 from kfcourse.filters.alphabeta import alpha_beta, alpha_beta_gamma
 from kfcourse.filters.approximations import EQUATIONS as _AOF

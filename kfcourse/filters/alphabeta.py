@@ -2,7 +2,7 @@ r"""Alpha-beta and alpha-beta-gamma filters: Kalman's prediction and correction 
 
     x^- = A z,   z = x^- + K (y - H x^-),   K = (alpha, beta/T, gamma/(2 T^2)) on each axis
 
-The coefficients that make it the stationary Kalman filter of `kfcourse.scenarios.aircraft.kinematic`
+The coefficients that make it the stationary Kalman filter of `kfcourse.scenarios.radar.kinematic`
 depend on the tracking index alone,
 
     Lambda = noise_sd T^2 / measurement_sd,
@@ -21,7 +21,8 @@ import numpy as np
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.kalman import linear_system
 from kfcourse.laws import Array, Gaussian, any_missing, apply, symmetric, transpose
-from kfcourse.symbolic.model import Model, ModelError
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import ModelError
 
 
 def steady_alpha(index: float) -> float:
@@ -75,7 +76,7 @@ def alpha_beta(model: Model, alpha: float, beta: float, start: str = "measuremen
     Parameters
     ----------
     model : Model
-        `kfcourse.scenarios.aircraft.kinematic(..., order=1)`, or equal to it in all but the noises.
+        `kfcourse.scenarios.flight.kinematic(..., order=1)`, or equal to it in all but the noises.
     alpha, beta : float
         The gain is (alpha, beta/T).
     start : {"measurements", "prior"}

@@ -12,8 +12,8 @@ import sympy as sp
 from kfcourse.filters import notation as s
 from kfcourse.filters.designed import Design, Equations, Regression, Step
 from kfcourse.laws import Array, Gaussian, where_measured
+from kfcourse.symbolic.equations import compile_noiseless
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import compile_noiseless
 
 _omega, _eps = s.matrix(r"\omega_{k}", s.p, s.ONE), s.matrix(r"\varepsilon_{k}", s.n, s.ONE)
 _alpha = s.matrix(r"\alpha_{k}", s.n, s.ONE)

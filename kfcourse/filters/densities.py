@@ -12,7 +12,8 @@ import sympy as sp
 
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.codegen import compile_function
-from kfcourse.symbolic.model import Model, ModelError, exact_matrix
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import ModelError, exact_matrix
 
 TINY = 1e-300  # in place of a variance of exactly 0
 

@@ -24,8 +24,9 @@ from numpy.polynomial import legendre
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood, transition
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.model import Model, ModelError
-from kfcourse.symbolic.structure import compile_noiseless
+from kfcourse.symbolic.equations import compile_noiseless
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import ModelError
 
 WIDTH = 8.0  # sigmas covered: 1e-15 of a normal law lies outside
 NEGLIGIBLE = 1e-14  # mass of a panel that may be left out

@@ -13,8 +13,9 @@ import numpy as np
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
 from kfcourse.laws import Array, Gaussian, square_root
-from kfcourse.symbolic.model import Model, ModelError
-from kfcourse.symbolic.structure import compile_model
+from kfcourse.symbolic.equations import compile_model
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import ModelError
 
 
 class Particles(NamedTuple):

@@ -1,24 +1,14 @@
 """The lab: its variants, its filters by short name, whether a variant is well posed, figures and report.
 
-variants     `Variant`, read from variants.toml or a file like it; the lab's filters by short name
+variants     `Variant`, read from variants.toml or a file like it
+short_names  the lab's filters: "duof" -> how to build it, "DUOF" in tables
 quality      is a variant well posed?  criteria: each criterion;  difficulty: how hard;  grammar: new ones
 plots        figures of a comparison, one colour and name for each filter
 report       what `kfcourse lab` writes
 """
 
-from kfcourse.lab.variants import (
-    FILTERS,
-    LAB,
-    Structures,
-    Variant,
-    VariantError,
-    find_variant,
-    has_exact,
-    lab_filters,
-    load_variants,
-    read_variant,
-    title,
-)
+from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_exact, lab_filters, title
+from kfcourse.lab.variants import Variant, VariantError, find_variant, load_variants, read_variant
 
 __all__ = [
     "FILTERS",

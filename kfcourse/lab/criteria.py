@@ -11,18 +11,18 @@ from itertools import combinations
 
 import numpy as np
 import sympy as sp
-from scipy import stats
 
 from kfcourse.filters import Filter
 from kfcourse.filters.base import State, initial_state
 from kfcourse.lab.difficulty import length
-from kfcourse.lab.variants import Structures, title
+from kfcourse.lab.short_names import Structures, title
 from kfcourse.laws import Array, Gaussian
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.statistics import Estimate, batch_mean, ratio
 from kfcourse.symbolic.codegen import compile_function
-from kfcourse.symbolic.model import Model, exact_matrix
+from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
+from kfcourse.symbolic.reading import exact_matrix
 
 GROWTH = 10.0  # of a second moment over the second half of the steps: an unknown velocity has 4, x' = 1.05 x has 12
 CARRIERS = 10.0  # trajectories, at least, that carry a second moment
@@ -193,6 +193,8 @@ def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
     error variance.  There are n + p + 1 for a component, and the prediction has its own.  Value: the largest significant
     difference, relative to the error variance of the control.
     """
+    from scipy import stats  # slow to import
+
     pairs = list(combinations(measured(comparison), 2))
     tests = max(len(pairs), 1) * (comparison.steps + 1)
     fitted = 2 * (comparison.model.n + comparison.model.p + 1) / comparison.runs

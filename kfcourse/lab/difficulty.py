@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import sympy as sp
 
-from kfcourse.lab.variants import Structures
+from kfcourse.lab.short_names import Structures
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.structure import Structure
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from kfcourse.lab.variants import title
+from kfcourse.lab.short_names import title
 from kfcourse.laws import Array
 from kfcourse.montecarlo.comparison import Comparison
 

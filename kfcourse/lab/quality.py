@@ -37,7 +37,8 @@ from kfcourse.lab.criteria import (
     unmeasured,
 )
 from kfcourse.lab.difficulty import Hardness, hardness
-from kfcourse.lab.variants import FILTERS, LAB, Structures, Variant, has_exact, title
+from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_exact, title
+from kfcourse.lab.variants import Variant
 from kfcourse.laws import Array, Gaussian
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.linear.system import is_linear
@@ -46,8 +47,9 @@ from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.statistics import BATCHES
-from kfcourse.symbolic.model import Model, ModelError
+from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
+from kfcourse.symbolic.reading import ModelError
 
 STEPS = 51  # of the lab
 RUNS = 40_000  # trajectories of a check

@@ -7,27 +7,25 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import jinja2
 import numpy as np
-import sympy as sp
 from latex2mathml.converter import convert
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from kfcourse.files import replacing, save
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
-from kfcourse.lab.variants import FILTERS, Structures, Variant, title
+from kfcourse.lab.short_names import FILTERS, Structures, title
+from kfcourse.lab.variants import Variant
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.statistics import Estimate
 from kfcourse.symbolic.model import Model
@@ -65,21 +63,6 @@ class Section:
         return cls(title, [line.strip() for line in body.split("\\\\\n")])
 
 
-def model_latex(model: Model) -> str:
-    """The two equations of a model and its parameter values, as a LaTeX `aligned` block."""
-    lines = (
-        [rf"{sp.latex(x)}_{{k+1}} &= {sp.latex(f)}" for x, f in zip(model.x, model.state_equation, strict=True)]
-        if model.n == 1
-        else []
-    )
-    if model.n > 1:
-        lines = [rf"{sp.latex(x)}' &= {sp.latex(f)}" for x, f in zip(model.x, model.state_equation, strict=True)]
-    names = ["y"] if model.p == 1 else [f"y_{{{i + 1}}}" for i in range(model.p)]
-    lines += [rf"{name} &= {sp.latex(f)}" for name, f in zip(names, model.meter_equation, strict=True)]
-    lines += [rf"{sp.latex(symbol)} &= {float(value):g}" for symbol, value in model.values.items()]
-    return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
-
-
 def write_report(variant: Variant, result: Comparison, folder: Path) -> list[Path]:
     """Write report.html, report.tex and the figures; returns the paths.
 
@@ -90,7 +73,10 @@ def write_report(variant: Variant, result: Comparison, folder: Path) -> list[Pat
     for name, (_, draw) in _FIGURES.items():
         figure = Figure(figsize=(7, 4.2), layout="constrained")
         draw(result, figure.add_subplot())
-        written += [_replace(folder / f"{name}.{kind}", partial(_save_figure, figure, kind)) for kind in _UNDATED]
+        for kind, metadata in _UNDATED.items():
+            written.append(folder / f"{name}.{kind}")
+            with replacing(written[-1]) as path:
+                figure.savefig(path, format=kind, metadata=metadata)
     content = _content(variant, result)
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("kfcourse.lab"), trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
@@ -98,20 +84,13 @@ def write_report(variant: Variant, result: Comparison, folder: Path) -> list[Pat
     environment.filters |= {"mathml": _mathml, "tex": _escape_tex, "html": jinja2.filters.do_forceescape}
     for name in ("report.html", "report.tex"):
         text = environment.get_template(name + ".j2").render(content)
-        written.append(_replace(folder / name, partial(_save_text, text)))
+        written.append(folder / name)
+        save(text, written[-1])
     return written
 
 
 # No dates in the figures: the same numbers give the same report.
 _UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
-
-
-def _save_figure(figure: Figure, kind: str, path: Path) -> None:
-    figure.savefig(path, format=kind, metadata=_UNDATED[kind])
-
-
-def _save_text(text: str, path: Path) -> None:
-    path.write_text(text, encoding="utf-8")
 
 
 def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
@@ -135,7 +114,8 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
         "score": {name: {"value": float(e.value), "standard_error": float(e.standard_error)} for name, e in result.ranking()},
     }
     text = json.dumps(_finite(data), indent=1, allow_nan=False)
-    return _replace(path, partial(_save_text, text))
+    save(text, path)
+    return path
 
 
 def conclusions(result: Comparison, confidence: float = 0.95) -> list[str]:
@@ -160,7 +140,7 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
     return {
         "variant": variant,
         "result": result,
-        "model": Section.of("Model", model_latex(result.model)),
+        "model": Section.of("Model", result.model.latex()),
         "structures": _structure_sections(result.model, names),
         "equations": _equation_sections(names),
         "names": [(name, title(name), FILTERS[name].russian if name in FILTERS else "") for name in names],
@@ -235,20 +215,3 @@ def _finite(data: Any) -> Any:
     if isinstance(data, list):
         return [_finite(value) for value in data]
     return data if not isinstance(data, float) or np.isfinite(data) else None
-
-
-def _replace(path: Path, write: Callable[[Path], Any]) -> Path:
-    """Write a file beside its place, then move it there: what was there before stays until that moment."""
-    if path.is_symlink() or (path.exists() and not path.is_file()):  # /dev/stdout, a pipe: written to, not replaced
-        write(path)
-        return path
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        write(temporary)
-        temporary.chmod(0o644)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
-    return path

@@ -1,19 +1,15 @@
-"""The lab: its variants and its filters by their short names."""
+"""The variants of the lab, read from TOML."""
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from importlib import resources
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from kfcourse.filters import Design, Filter, aof, duof, fos, mfos, particle, pointmass
-from kfcourse.symbolic.model import Model, ModelError
-from kfcourse.symbolic.moments import NoClosedForm
-from kfcourse.symbolic.structure import Structure, gauss_hermite, gaussian, linearised, unscented
+from kfcourse.symbolic.model import Model
 
 VARIANT_KEYS = {"title", "state", "meter", "parameters", "symbols", "prior", "state_noise", "meter_noise"}
 
@@ -30,96 +26,6 @@ class Variant:
     title: str
     model: Model
     table: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
-
-
-class Structures:
-    """The structural functions of a model, derived when first asked for."""
-
-    def __init__(self, model: Model):
-        self.model = model
-
-    @cached_property
-    def linearised(self) -> Structure:
-        return linearised(self.model)
-
-    @cached_property
-    def gaussian(self) -> Structure:
-        return gaussian(self.model)
-
-
-class Entry(NamedTuple):
-    """A filter of the lab: printed names and how to build it."""
-
-    title: str
-    russian: str
-    build: Callable[[Structures], Filter | Design]
-
-
-# One line a filter: this is where a new one is added.
-FILTERS: dict[str, Entry] = {
-    "aof-gaussian": Entry("GAOF", "ГАОФ", lambda s: aof(s.gaussian)),
-    "aof-linearised": Entry("LAOF", "ЛАОФ", lambda s: aof(s.linearised)),
-    "duof": Entry("DUOF", "ДУОФ", lambda s: duof(s.model)),
-    "fos-gaussian": Entry("GFOS", "ГФОС", lambda s: fos(s.gaussian)),
-    "fos-linearised": Entry("LFOS", "ЛФОС", lambda s: fos(s.linearised)),
-    "mfos-gaussian": Entry("GMFOS", "ГМФОС", lambda s: mfos(s.gaussian)),
-    "mfos-linearised": Entry("LMFOS", "ЛМФОС", lambda s: mfos(s.linearised)),
-    "fos3-gaussian": Entry("GFOS3", "ГФОС, 3 арг.", lambda s: fos(s.gaussian, arguments=3)),
-    "fos3-linearised": Entry("LFOS3", "ЛФОС, 3 арг.", lambda s: fos(s.linearised, arguments=3)),
-    "mfos3-gaussian": Entry("GMFOS3", "ГМФОС, 3 арг.", lambda s: mfos(s.gaussian, arguments=3)),
-    "mfos3-linearised": Entry("LMFOS3", "ЛМФОС, 3 арг.", lambda s: mfos(s.linearised, arguments=3)),
-    "aof-unscented": Entry("UKF", "АОФ, unscented", lambda s: aof(unscented(s.model))),
-    "aof-gauss-hermite": Entry("GHKF", "АОФ, Гаусс–Эрмит", lambda s: aof(gauss_hermite(s.model))),
-    "aof-exact": Entry("exact AOF", "АОФ", lambda s: pointmass(s.model)),
-    "particle": Entry("particle", "АОФ, частицы", lambda s: particle(s.model)),
-}
-# Printed names of filters that are not among the lab's.
-TITLES = {
-    "kalman": "Kalman",
-    "iterated-linearised": "iterated EKF",
-    "iterated-unscented": "iterated UKF",
-    "alpha-beta": "alpha-beta",
-    "alpha-beta-gamma": "alpha-beta-gamma",
-    "imm": "IMM",
-}
-LAB = ("aof-gaussian", "aof-linearised", "duof", "fos-gaussian", "fos-linearised", "mfos-gaussian", "mfos-linearised")
-
-
-def title(name: str) -> str:
-    """The printed name of a filter: "GAOF" for "aof-gaussian"."""
-    return FILTERS[name].title if name in FILTERS else TITLES.get(name, name)
-
-
-def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Design]:
-    """Filters of the lab for a model, by short names.
-
-    Raises
-    ------
-    ValueError
-        An unknown name; the message lists the known ones.
-    NoClosedForm, ModelError
-        A filter that this model does not admit; the message names the filter and says what to use instead.
-    """
-    unknown = [name for name in names if name not in FILTERS]
-    if unknown:
-        raise ValueError(f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(FILTERS)}")
-    structures = Structures(model)
-    built = []
-    for name in dict.fromkeys(names):
-        try:
-            built.append(FILTERS[name].build(structures))
-        except (NoClosedForm, ModelError) as error:
-            raise type(error)(f"{name}: {error}") from None
-    return built
-
-
-def has_exact(model: Model) -> bool:
-    """Whether the exact AOF can be computed for the model: scalar, noises entering linearly."""
-    try:
-        pointmass(model)
-    except ModelError:
-        return False
-    return True
 
 
 def load_variants(path: str | Path | None = None) -> dict[str, Variant]:

@@ -14,7 +14,8 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.laws import Array, Measurement, apply, symmetric
-from kfcourse.symbolic.model import Model, ModelError
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import ModelError
 
 
 @dataclass(frozen=True)

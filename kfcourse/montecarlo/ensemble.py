@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kfcourse.laws import Array, Gaussian, Trajectories, square_root
+from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import compile_model
 
 # Largest and smallest block of trajectories: operations long enough to leave the interpreter to the other threads,
 # arrays short enough for the processor's caches.

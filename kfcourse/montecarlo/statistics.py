@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import stats
 
 from kfcourse.laws import Array, Gaussian, normalised_square
 
@@ -42,6 +41,8 @@ class Estimate:
     def half_width(self, confidence: float = 0.95) -> Array:
         if not 0 < confidence < 1:
             raise ValueError(f"a confidence lies between 0 and 1, got {confidence}")
+        from scipy import stats  # slow to import
+
         return stats.t.ppf(0.5 + confidence / 2, self.freedom) * self.standard_error
 
     def __getitem__(self, index) -> Estimate:

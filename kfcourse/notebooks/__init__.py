@@ -1,1 +1,10 @@
-"""Exercise notebooks: made from the sets in exercises/, executed, exported, graded."""
+"""Exercise notebooks, and the instructor's commands.
+
+master         statement.md -> the complete notebook, the student's, the book's page
+written_code   formulas as the code of a solution
+execution      a notebook in a kernel of its own; pictures, checks, HTML, PDF
+jobs           every set for every variant, in parallel, resumed
+course_list    a variant for each student
+grading        what came back
+commands       `kfcourse exercises`, `solutions`, `grade`
+"""

@@ -12,8 +12,11 @@ from typing import Any
 import click
 
 from kfcourse.checks import sets
-from kfcourse.notebooks.course import Job, Outcome, assign, chosen_variants, jobs, make, run_all, safe
-from kfcourse.notebooks.grading import grade as grading
+from kfcourse.notebooks.course_list import assign, chosen_variants
+from kfcourse.notebooks.grading.marking import grade as mark
+from kfcourse.notebooks.grading.submissions import SECONDS, clean, returned
+from kfcourse.notebooks.grading.table import FAILED, GRADED, SIGNS, Grade, grade_all
+from kfcourse.notebooks.jobs import Job, Outcome, make, plan, run_all, safe
 
 
 def _options(command: Callable) -> Callable:
@@ -67,7 +70,7 @@ def _make(
     if students:
         work = _for_students(kind, students, variants, wanted, out, variants_file, masters, with_pdf)
     else:
-        work = jobs(kind, out, variants, wanted, variants_file, masters, with_pdf)
+        work = plan(kind, out, variants, wanted, variants_file, masters, with_pdf)
     _separate(work)
     out.mkdir(parents=True, exist_ok=True)
     outcomes = list(run_all(work, make, workers, kind, dask))
@@ -139,7 +142,7 @@ def _table(outcomes: Sequence[Outcome], work: Sequence[Job]) -> None:
 @click.option(
     "--seconds",
     type=click.FloatRange(min=1),
-    default=grading.SECONDS,
+    default=SECONDS,
     show_default=True,
     help="Time limit of a cell; a notebook may take five times as long.",
 )
@@ -159,37 +162,35 @@ def grade(
     Marks: a tick is passed, a cross is wrong or not usable, a dash is not implemented or not run.  Unchanged notebooks are not
     run again.  Exit status: 0 if every exercise notebook could be graded, however badly; 1 if some could not.
     """
-    work = grading.returned(folder, seconds, variants_file, masters)
+    work = returned(folder, seconds, variants_file, masters)
     if not work:
         raise ValueError(f"no notebooks (*.ipynb) in {folder}")
     table = out or folder / "grades.csv"
-    grades, old = grading.grade_all(work, table, again, lambda new: run_all(new, grading.grade, workers, "grade"))
+    grades, old = grade_all(work, table, again, lambda new: run_all(new, mark, workers, "grade"))
     _grades(grades)
     click.echo(f"\n{len(grades) - old} run, {old} unchanged since the last table. Table: {table}")
-    if any(one.status == grading.FAILED for one in grades):
+    if any(one.status == FAILED for one in grades):
         sys.exit(1)
 
 
-def _grades(grades: Sequence[grading.Grade]) -> None:
+def _grades(grades: Sequence[Grade]) -> None:
     """The table on the screen; notes are cut."""
     width = max(len(one.name) for one in grades)
     signs = _signs()
     click.echo(f"{'notebook':<{width}}  set  variant  passed  checks")
     for one in grades:
-        if one.status != grading.GRADED:
-            click.echo(f"{one.name:<{width}}  {one.status}{': ' * bool(one.note)}{grading.clean(one.note, 100)}")
+        if one.status != GRADED:
+            click.echo(f"{one.name:<{width}}  {one.status}{': ' * bool(one.note)}{clean(one.note, 100)}")
             continue
         marks = "".join(signs[mark] for mark in one.marks.values())
         count = f"{one.passed} of {len(one.marks)}"
-        click.echo(
-            f"{one.name:<{width}}  {one.letter:<3}  {one.variant:<7}  {count:<6}  {marks:<7} {grading.clean(one.note, 100)}"
-        )
+        click.echo(f"{one.name:<{width}}  {one.letter:<3}  {one.variant:<7}  {count:<6}  {marks:<7} {clean(one.note, 100)}")
 
 
 def _signs() -> dict[str, str]:
     """Signs of the marks that this screen can show."""
     try:
-        "".join(grading.SIGNS.values()).encode(getattr(sys.stdout, "encoding", None) or "ascii")
+        "".join(SIGNS.values()).encode(getattr(sys.stdout, "encoding", None) or "ascii")
     except (UnicodeEncodeError, LookupError):
-        return {mark: {"✓": "+", "✗": "x"}.get(sign, "-") for mark, sign in grading.SIGNS.items()}
-    return grading.SIGNS
+        return {mark: {"✓": "+", "✗": "x"}.get(sign, "-") for mark, sign in SIGNS.items()}
+    return SIGNS

@@ -26,12 +26,10 @@ import jupytext
 import nbformat
 import sympy as sp
 from nbformat import NotebookNode
-from sympy.printing.str import StrPrinter
 
 from kfcourse.checks import Exercise, Question, sets
 from kfcourse.lab.variants import load_variants
-from kfcourse.symbolic.sides import Side, plain
-from kfcourse.symbolic.structure import Structure
+from kfcourse.notebooks.written_code import Solutions
 
 BEGIN, END = "BEGIN SOLUTION", "END SOLUTION"
 STUB = "# YOUR CODE HERE"
@@ -195,7 +193,7 @@ def context(exercise: Exercise) -> dict[str, Any]:
         "model": model,
         "scalar": model.n == 1 and model.p == 1,
         "latex": sp.latex,
-        "equations": equations(exercise),
+        "equations": f"$$\n{model.latex(values=False)}\n$$",
         "symbols": parameter_symbols(exercise),
         "values": {name: float(value) for name, value in model.parameters.items()},
         "solution": Solutions(exercise),
@@ -215,19 +213,6 @@ def check_cell(question: Question) -> str:
     return f'```{{code-cell}} python\n:tags: [check]\ntask.check("{question.name}", {question.function})\n```'
 
 
-def equations(exercise: Exercise) -> str:
-    """The model as a LaTeX display."""
-    model = exercise.model
-    lines = [rf"{sp.latex(x)}_{{k+1}} &= {sp.latex(f)}" for x, f in zip(_state_names(model), model.state_equation, strict=True)]
-    names = ["y"] if model.p == 1 else [rf"y_{{{i + 1}}}" for i in range(model.p)]
-    lines += [rf"{{{name}}}_{{k}} &= {sp.latex(f)}" for name, f in zip(names, model.meter_equation, strict=True)]
-    return "$$\n\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}\n$$"
-
-
-def _state_names(model: Any) -> list[sp.Symbol]:
-    return [sp.Symbol("{" + sp.latex(x) + "}") for x in model.x]
-
-
 def opened(exercise: Exercise) -> str:
     """Python for the variant: its name if it is a shipped one, else its table, so that the notebook needs no file."""
     variant = exercise.variant
@@ -243,73 +228,3 @@ def parameter_symbols(exercise: Exercise) -> str:
         return "# this variant has no parameters"
     left = ", ".join(names)
     return f'{left}{"," if len(names) == 1 else ""} = sp.symbols("{" ".join(names)}{"," if len(names) == 1 else ""}", real=True)'
-
-
-class Solutions:
-    """Lines of Python that compute a derived formula, for the solution cells of masters."""
-
-    def __init__(self, exercise: Exercise):
-        self.exercise = exercise
-
-    def functions(self, kind: str, side: str) -> str:
-        """Body of a function of (z, p) or (m, d) that returns (tau, Theta) or (h, G, F)."""
-        structure: Structure = getattr(self.exercise.structures, kind)
-        names = ("tau", "Theta") if side == "object" else ("h", "G", "F")
-        return self._body(side, {name: structure[name] for name in names})
-
-    def jacobians(self, side: str) -> str:
-        """Body of a function of the mean that returns the Jacobians by state and by noise."""
-        part = Side.of(self.exercise.model, side)
-        names = ("a_x", "a_v") if side == "object" else ("b_x", "b_w")
-        return self._body(side, dict(zip(names, (plain(part.A), plain(part.B)), strict=True)), cov=False)
-
-    def unexplained(self) -> str:
-        """Body of a function of (m, d) that returns R = F - G d G^T of the Gaussian functions."""
-        return self._body("meter", {"R": self.exercise.structures.gaussian["R"]})
-
-    def _body(self, side: str, formulas: Mapping[str, Any], cov: bool = True) -> str:
-        part = Side.of(self.exercise.model, side)
-        mean_name, cov_name = ("z", "p") if side == "object" else ("m", "d")
-        lines = []
-        if self.exercise.model.n > 1:
-            lines.append(f"{', '.join(map(str, part.mean))} = {mean_name}")
-            if cov:
-                n = self.exercise.model.n
-                upper = [(i, j) for i in range(n) for j in range(i, n)]
-                entries = ", ".join(f"{cov_name}[{i}, {j}]" for i, j in upper)
-                lines.append(f"{', '.join(str(part.cov[i, j]) for i, j in upper)} = {entries}")
-        if len(formulas) == 1:
-            lines += [f"return {python(formula)}" for formula in formulas.values()]
-        else:
-            lines += ["return (", *(f"    {python(formula)},  # {name}" for name, formula in formulas.items()), ")"]
-        return "\n".join(lines)
-
-
-def python(formula: Any) -> str:
-    """A formula as Python code that a student could have written: sp.sin(x), sp.Rational(1, 2)."""
-    if isinstance(formula, sp.MatrixBase):
-        rows = ", ".join("[" + ", ".join(python(entry) for entry in row) + "]" for row in formula.tolist())
-        return f"sp.Matrix([{rows}])"
-    expression = sp.sympify(formula).replace(lambda e: e.func.__name__ == "expm1", lambda e: sp.exp(e.args[0]) - 1)
-    return str(_Printer().doprint(expression))
-
-
-class _Printer(StrPrinter):
-    """SymPy's own text, with `sp.` before functions and constants, and exact fractions."""
-
-    def _print_Function(self, expr: sp.Function) -> str:
-        return f"sp.{expr.func.__name__}({self.stringify(expr.args, ', ')})"
-
-    def _print_Rational(self, expr: sp.Rational) -> str:
-        return f"sp.Rational({expr.p}, {expr.q})"
-
-    def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:
-        if abs(expr.exp) == sp.Rational(1, 2):
-            return ("" if expr.exp > 0 else "1/") + f"sp.sqrt({self._print(expr.base)})"
-        return super()._print_Pow(expr, rational)
-
-    def _print_Pi(self, expr: sp.Expr) -> str:
-        return "sp.pi"
-
-    def _print_Exp1(self, expr: sp.Expr) -> str:
-        return "sp.E"

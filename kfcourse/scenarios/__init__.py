@@ -1,6 +1,8 @@
 """Tracks and sensors of the applications.
 
-aircraft     the five-part flight, the radar that follows it, errors by part
+flight       the five-part flight of an aircraft
+radar        what a radar measures of it, and the models that track it
+errors       errors by part of the flight
 pointer      a pointer moved by hand, and the filter that cleans its track
 navigation   sensors of any rate, delay and clock, and the filter that fuses them
 """

@@ -1,8 +1,12 @@
 """From two formulas to compiled functions; everything here knows SymPy, and nothing of filters.
 
-formula     formulas typed by people, read without executing them
-model       `Model`: object, meter, noises, prior
-moments     exact moments of functions of normal variables
-structure   structural functions tau, Theta, h, G, F: derived or by quadrature
-codegen     expressions -> NumPy over the ensemble; the only place where formulas become code
+formula      formulas typed by people, read without executing them
+reading      the other things that people write of a model: names, numbers, laws
+model        `Model`: object, meter, noises, prior
+equations    its two equations as functions of arrays
+moments      exact moments of functions of normal variables
+structure    structural functions tau, Theta, h, G, F, derived: `linearised`, `gaussian`
+quadrature   the same by quadrature: `unscented`, `gauss_hermite`
+sides        object and meter at a normal law, in symbols: what derivations by hand start from
+codegen      expressions -> NumPy over the ensemble; the only place where formulas become code
 """

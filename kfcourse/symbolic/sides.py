@@ -8,8 +8,9 @@ from typing import Any
 import sympy as sp
 
 from kfcourse.laws import Gaussian
-from kfcourse.symbolic.model import Model, exact_matrix
+from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments
+from kfcourse.symbolic.reading import exact_matrix
 from kfcourse.symbolic.structure import gaussian_symbols
 
 

@@ -9,7 +9,7 @@ import pytest
 import scipy.linalg
 import sympy as sp
 
-from kfcourse.continuous.model import (
+from kfcourse.continuous import (
     ContinuousModel,
     coarsen,
     extended_kalman_bucy,
@@ -26,7 +26,7 @@ from kfcourse.laws import Gaussian
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare, predictions, run
 from kfcourse.symbolic.formula import FormulaError
-from kfcourse.symbolic.model import ModelError
+from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import linearised
 
 N_VECTOR = [[0.3, 0.1], [0.1, 0.2]]

@@ -36,3 +36,12 @@ def test_every_question_has_its_heading_and_its_check_cell(letter):
         assert question.name == f"{letter}{number}"
         assert re.search(rf"^## Question {number} \({question.level}\): {re.escape(question.title)}", text, re.MULTILINE)
         assert text.count(f'task.check("{question.name}", {question.function})') == 1
+
+
+@pytest.mark.parametrize("letter", sets())
+def test_a_notebook_imports_no_module_of_a_key(letter):
+    imported = set(re.findall(r"kfcourse\.exercises\.\w+\.(\w+)", read(letter)))
+    assert imported <= {"companion"}
+    for name in imported:
+        source = (sets()[letter].folder / f"{name}.py").read_text(encoding="utf-8")
+        assert not re.search(r"kfcourse\.exercises\.\w+\.", source)

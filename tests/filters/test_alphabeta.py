@@ -16,7 +16,7 @@ from kfcourse.filters.alphabeta import (
 )
 from kfcourse.linear import covariances
 from kfcourse.linear.system import linear_system
-from kfcourse.scenarios.aircraft import kinematic
+from kfcourse.scenarios.radar import kinematic
 
 T = 0.7
 ROUNDING = 1e-12  # relative, after some tens of steps of a stable recursion

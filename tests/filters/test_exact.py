@@ -6,7 +6,7 @@ import pytest
 
 from kfcourse import Model, ModelError, compare, lab_filters, load_variants, run, simulate
 from kfcourse.filters import aof, kalman_filter, pointmass
-from kfcourse.lab.variants import LAB, has_exact
+from kfcourse.lab.short_names import LAB, has_exact
 from kfcourse.symbolic.structure import gaussian
 
 # A panel is resolved when its last Legendre coefficients are below `tolerance` (1e-5) of the mass.  A Gauss rule of q nodes

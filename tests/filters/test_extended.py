@@ -11,10 +11,12 @@ from kfcourse.filters.approximations import aof
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import run
 from kfcourse.symbolic.codegen import compile_function
+from kfcourse.symbolic.equations import compile_noiseless
 from kfcourse.symbolic.formula import FormulaError, check_name, parse, symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
-from kfcourse.symbolic.structure import compile_noiseless, gaussian, linearised, unscented
+from kfcourse.symbolic.quadrature import unscented
+from kfcourse.symbolic.structure import gaussian, linearised
 
 # A falling body with drag, gusts that grow with the speed, and a radar: range and elevation with correlated errors.
 T, DRAG, GRAVITY, GUST = 0.5, 5e-5, 9.81, 0.01

@@ -24,8 +24,10 @@ from kfcourse.filters.optimal_structure import fos
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Instant, simulate
 from kfcourse.montecarlo.experiment import run
-from kfcourse.symbolic.model import Model, ModelError
-from kfcourse.symbolic.structure import gauss_hermite, gaussian, linearised, unscented
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.quadrature import gauss_hermite, unscented
+from kfcourse.symbolic.reading import ModelError
+from kfcourse.symbolic.structure import gaussian, linearised
 
 STRUCTURES = {
     "linearised": linearised,

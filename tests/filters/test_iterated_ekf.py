@@ -14,7 +14,8 @@ from kfcourse.filters.kalman import kalman_filter
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import run
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import gauss_hermite, gaussian, linearised, unscented
+from kfcourse.symbolic.quadrature import gauss_hermite, unscented
+from kfcourse.symbolic.structure import gaussian, linearised
 
 STRUCTURES = {
     "linearised": linearised,

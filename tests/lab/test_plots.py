@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from kfcourse import compare, lab_filters, load_variants, run, simulate
 from kfcourse.filters import aof
 from kfcourse.lab import plots
-from kfcourse.lab.variants import FILTERS, LAB, title
+from kfcourse.lab.short_names import FILTERS, LAB, title
 from kfcourse.symbolic.structure import gaussian
 
 DRAW = [plots.accuracy, plots.relative_accuracy, plots.ranking, plots.consistency]

@@ -4,6 +4,7 @@ import dataclasses
 import json
 import re
 from html.parser import HTMLParser
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -13,7 +14,8 @@ from kfcourse import compare, gaussian, lab_filters, linearised, load_variants
 from kfcourse.filters import aof
 from kfcourse.lab import report
 from kfcourse.lab.report import conclusions, write_json, write_report
-from kfcourse.lab.variants import LAB, Variant, title
+from kfcourse.lab.short_names import LAB, title
+from kfcourse.lab.variants import Variant
 
 FIGURES = ("accuracy", "relative", "ranking", "consistency")
 
@@ -48,7 +50,7 @@ def written(variants, result53, result20, tmp_path_factory):
 def no_figures(monkeypatch):
     """Drawing takes most of the time of a report; for tests of its text only."""
     monkeypatch.setattr(report, "_FIGURES", {name: (caption, lambda *_: None) for name, (caption, _) in report._FIGURES.items()})
-    monkeypatch.setattr(report, "_save_figure", lambda figure, kind, path: path.touch())
+    monkeypatch.setattr(report.Figure, "savefig", lambda _, path, **__: path.touch())
 
 
 class Page(HTMLParser):
@@ -261,11 +263,13 @@ def test_an_interrupted_write_leaves_what_was_there(variants, result53, tmp_path
     path = tmp_path / "n.json"
     path.write_text("before", encoding="utf-8")
 
-    def interrupted(text, place):
-        place.write_text(text[: len(text) // 2], encoding="utf-8")
+    whole = Path.write_text
+
+    def interrupted(place, text, **options):
+        whole(place, text[: len(text) // 2], **options)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(report, "_save_text", interrupted)
+    monkeypatch.setattr(Path, "write_text", interrupted)
     with pytest.raises(KeyboardInterrupt):
         write_json(variants["53"], result53, path)
     assert path.read_text(encoding="utf-8") == "before"

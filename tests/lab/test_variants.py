@@ -4,7 +4,8 @@ import pytest
 
 from kfcourse import ModelError, NoClosedForm, gaussian, lab_filters, load_variants
 from kfcourse.filters import Design, Filter
-from kfcourse.lab.variants import FILTERS, LAB, VariantError, find_variant, has_exact, title
+from kfcourse.lab.short_names import FILTERS, LAB, has_exact, title
+from kfcourse.lab.variants import VariantError, find_variant
 
 SHIPPED = load_variants()
 GOOD = 'state = "0.9*x + v"\nmeter = "x + w"\n'

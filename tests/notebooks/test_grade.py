@@ -18,9 +18,11 @@ from inside import execute_inside
 from kfcourse import cli
 from kfcourse.checks import Exercise, engine, exercise
 from kfcourse.checks.question import MIME
-from kfcourse.notebooks.grading import grade as grading
-from kfcourse.notebooks.grading import watch
-from kfcourse.notebooks.grading.grade import Cell, Grade, Unreadable, assembled, cells_of, claimed, clean, read_table, write_table
+from kfcourse.notebooks import commands
+from kfcourse.notebooks.grading import marking, running, submissions, watch
+from kfcourse.notebooks.grading.assembly import assembled
+from kfcourse.notebooks.grading.submissions import Cell, Unreadable, cells_of, claimed, clean
+from kfcourse.notebooks.grading.table import Grade, grade_all, read_table, write_table
 from kfcourse.notebooks.master import opened, render, solution, student
 
 FIXTURES = Path(__file__).parent / "fixtures"
@@ -247,12 +249,12 @@ def row(graded, name):
 def graded_here(tmp_path, monkeypatch):
     """Grades a notebook that does nothing to its process in this one: its grade, two marks and note."""
     monkeypatch.setattr(watch, "limit", lambda _: None)
-    monkeypatch.setattr(grading, "run", lambda notebook, _: (execute_inside(notebook), ""))
+    monkeypatch.setattr(marking, "run", lambda notebook, _: (execute_inside(notebook), ""))
 
     def graded(notebook):
         path = tmp_path / "x.ipynb"
         path.write_text(json.dumps(notebook), encoding="utf-8")  # as it is: nbformat would mend some of them
-        found = grading.grade(grading.returned(tmp_path, masters=FIXTURES)[0])
+        found = marking.grade(submissions.returned(tmp_path, masters=FIXTURES)[0])
         assert found.status == "graded", found.note
         return found, (found.marks["b1"], found.marks["b2"]), found.note
 
@@ -397,7 +399,7 @@ def test_a_second_run_does_only_what_is_new(graded, tmp_path, monkeypatch):
         ran.append(work.name)
         return Grade(work.name, "graded", "b", "53", MARKS, "anew", work.digest)
 
-    monkeypatch.setattr(grading, "grade", instead)
+    monkeypatch.setattr(commands, "mark", instead)
     failed = ["cut.ipynb", "list.ipynb", "unknown-set.ipynb", "unknown-variant.ipynb"]
     again = CliRunner().invoke(cli.main, [*options, "--seconds", str(SECONDS)])
     assert again.exit_code == 0
@@ -437,7 +439,7 @@ def three(tmp_path):
 
 
 def test_an_interrupted_run_goes_on_where_it_was(three):
-    work = grading.returned(three, masters=FIXTURES)
+    work = submissions.returned(three, masters=FIXTURES)
     table = three / "table.csv"
 
     def interrupted(new):
@@ -445,14 +447,14 @@ def test_an_interrupted_run_goes_on_where_it_was(three):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        grading.grade_all(work, table, False, interrupted)
+        grade_all(work, table, False, interrupted)
     assert [one.name for one in read_table(table).values()] == ["a.ipynb"]
     assert sorted(path.name for path in three.iterdir()) == ["a.ipynb", "b.ipynb", "c.ipynb", "table.csv"]
 
     def rest(new):
         return [Grade(one.name, "graded", "b", "53", MARKS, "", one.digest) for one in new]
 
-    grades, old = grading.grade_all(work, table, False, rest)
+    grades, old = grade_all(work, table, False, rest)
     assert ([one.name for one in grades], old) == (["a.ipynb", "b.ipynb", "c.ipynb"], 1)
 
 
@@ -462,7 +464,7 @@ def test_the_digest_knows_all_that_a_grade_depends_on(three, tmp_path):
     variants.write_text('[variants.53]\nstate = "x + v"\nmeter = "x + w"\n', encoding="utf-8")
 
     def digests(**options):
-        return [one.digest for one in grading.returned(three, **({"masters": masters} | options))]
+        return [one.digest for one in submissions.returned(three, **({"masters": masters} | options))]
 
     before = digests()
     assert len(set(before)) == 3
@@ -477,8 +479,8 @@ def test_a_kernel_that_does_not_start_is_a_row(three, monkeypatch):
     def fails(*_, **__):
         raise RuntimeError("Kernel didn't respond in 60 seconds")
 
-    monkeypatch.setattr(grading, "run", fails)
-    found = grading.grade(grading.returned(three, masters=FIXTURES)[0])
+    monkeypatch.setattr(marking, "run", fails)
+    found = marking.grade(submissions.returned(three, masters=FIXTURES)[0])
     assert found == Grade("a.ipynb", "not graded", note="Kernel didn't respond in 60 seconds")
 
 
@@ -487,14 +489,14 @@ def test_a_notebook_that_takes_too_long_to_make_is_a_row(three, monkeypatch):
         while True:
             pass
 
-    monkeypatch.setattr(grading, "claimed", endless)
-    work = grading.returned(three, seconds=0.02, masters=FIXTURES)[0]
-    assert "cannot be made in time" in grading.grade(work).note
+    monkeypatch.setattr(marking, "claimed", endless)
+    work = submissions.returned(three, seconds=0.02, masters=FIXTURES)[0]
+    assert "cannot be made in time" in marking.grade(work).note
 
 
 def test_too_large_files_are_not_read(three, monkeypatch):
-    monkeypatch.setattr(grading, "LARGEST", 100)
-    assert "larger than" in grading.grade(grading.returned(three, masters=FIXTURES)[0]).note
+    monkeypatch.setattr(submissions, "LARGEST", 100)
+    assert "larger than" in marking.grade(submissions.returned(three, masters=FIXTURES)[0]).note
 
 
 def test_no_notebooks_is_an_error(tmp_path):
@@ -650,7 +652,7 @@ def test_checks_of_the_student_are_not_run():
 
 def test_paths_hold_in_any_working_directory(three, monkeypatch):
     monkeypatch.chdir(three)
-    (one, *_) = grading.returned(Path(), variants_file=Path("a.ipynb"), masters=Path("."))
+    (one, *_) = submissions.returned(Path(), variants_file=Path("a.ipynb"), masters=Path("."))
     assert one.path == three / "a.ipynb" == one.variants_file
     assert one.masters == three
 
@@ -689,13 +691,13 @@ def test_an_answer_with_an_error_is_known_by_its_cell():
 
 def test_the_kernels_environment(tmp_path, monkeypatch):
     monkeypatch.setenv("MY_TOKEN", "x")
-    found = grading.environment(tmp_path)
+    found = running.environment(tmp_path)
     assert "MY_TOKEN" not in found
     assert found["PATH"] == os.environ["PATH"]
     assert found["HOME"] == str(tmp_path)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(("here", "", str(tmp_path))))
     (tmp_path / "other").mkdir()
-    assert grading.environment(tmp_path / "other")["PYTHONPATH"] == os.pathsep.join((str(Path("here").absolute()), str(tmp_path)))
+    assert running.environment(tmp_path / "other")["PYTHONPATH"] == os.pathsep.join((str(Path("here").absolute()), str(tmp_path)))
 
 
 @pytest.fixture
@@ -739,7 +741,7 @@ def test_results_count_only_from_the_cell_that_asked():
         data = {MIME: {"question": question, "status": status} | more, "text/plain": ""}
         return nbformat.v4.new_output(kind, data)
 
-    result = grading._result
+    result = marking._result
     assert result(made(value()), "b1") == ("passed", "")
     assert result(made(value(status="wrong", diagnosis=["sign"])), "b1") == ("wrong", "sign")
     assert result(made(value(status="unusable", message="why")), "b1") == ("unusable", "why")

@@ -17,15 +17,16 @@ from inside import execute_inside
 from kfcourse import cli
 from kfcourse.checks import exercise, sets
 from kfcourse.checks.equality import equal_formulas
+from kfcourse.files import save
 from kfcourse.lab.variants import load_variants
-from kfcourse.notebooks import course, execute
-from kfcourse.notebooks.course import Job, Outcome, assign, make, run_all, safe, save
-from kfcourse.notebooks.execute import NotebookFailed, html, mathml, pictures, results
+from kfcourse.notebooks import execution, jobs
+from kfcourse.notebooks.course_list import assign
+from kfcourse.notebooks.execution import NotebookFailed, html, mathml, pictures, results
+from kfcourse.notebooks.jobs import Job, Outcome, make, run_all, safe
 from kfcourse.notebooks.master import (
     STUB,
     MasterError,
     context,
-    python,
     read,
     render,
     solution,
@@ -34,6 +35,7 @@ from kfcourse.notebooks.master import (
     without_markers,
     without_solution,
 )
+from kfcourse.notebooks.written_code import python
 
 FIXTURES = Path(__file__).parent / "fixtures"
 TINY = (FIXTURES / "b_aof" / "statement.md").read_text(encoding="utf-8")
@@ -50,7 +52,7 @@ def tiny(variant="53", text=TINY):
 @pytest.fixture(scope="module")
 def executed():
     """The tiny set's solution, really executed."""
-    return execute.execute(solution(tiny()), "tiny")
+    return execution.execute(solution(tiny()), "tiny")
 
 
 @pytest.fixture
@@ -73,7 +75,7 @@ def no_kernel(monkeypatch, executed):
                 cell.outputs, cell.execution_count = done.outputs, done.execution_count
         return result
 
-    monkeypatch.setattr(course, "execute", instead)
+    monkeypatch.setattr(jobs, "execute", instead)
     return calls
 
 
@@ -264,7 +266,7 @@ def test_a_new_notebook_fails_only_with_not_implemented(letter, variant):
 
 def test_a_new_notebook_in_a_kernel():
     notebook = student(render(read("c"), exercise("c", "21")), {})
-    ran = execute.execute(notebook, "new", stop_at_error=False)
+    ran = execution.execute(notebook, "new", stop_at_error=False)
     assert [result["status"] for result in results(ran)] == ["not implemented"] * len(sets()["c"].questions)
     outputs = [output for cell in code(ran) for output in cell.outputs]
     assert {output.ename for output in outputs if output.output_type == "error"} <= {"NotImplementedError"}
@@ -303,7 +305,7 @@ def test_mathml_leaves_code_alone():
 def test_a_failing_cell_is_named():
     broken = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(source) for source in ("1", "nothing", "2")])
     with pytest.raises(NotebookFailed, match=rf"here, cell {broken.cells[1].id}: NameError: name 'nothing' is not defined"):
-        execute.execute(broken, "here")
+        execution.execute(broken, "here")
 
 
 # -- jobs
@@ -331,7 +333,7 @@ def test_a_changed_package_or_a_lost_page_means_work(tmp_path, masters, no_kerne
     make(one)
     one.target.with_suffix(".html").unlink()
     assert make(one).status == "written"
-    monkeypatch.setattr(course, "package_digest", lambda: "another version")
+    monkeypatch.setattr(jobs, "package_digest", lambda: "another version")
     assert make(one).status == "written"
     assert len(no_kernel) == 3
 
@@ -359,7 +361,7 @@ def test_exercises_have_pictures_and_no_solutions(tmp_path, masters, no_kernel):
 @pytest.mark.parametrize("place", ["html", "pdf", "write"])
 def test_an_interruption_leaves_nothing_half_written(tmp_path, masters, no_kernel, monkeypatch, place, error):
     one = job(tmp_path, masters, with_pdf=True)
-    monkeypatch.setattr(course, "pdf", lambda page, target: target.write_bytes(b"%PDF"))
+    monkeypatch.setattr(jobs, "pdf", lambda page, target: target.write_bytes(b"%PDF"))
     make(one)
     whole = contents(one.folder)
     (masters / "b_aof" / "statement.md").write_text(TINY.replace("Divide.", "Divide by F."), encoding="utf-8")
@@ -373,7 +375,7 @@ def test_an_interruption_leaves_nothing_half_written(tmp_path, masters, no_kerne
         if place == "write":
             broken.setattr(nbformat, "writes", fails)
         else:
-            broken.setattr(course, place, fails)
+            broken.setattr(jobs, place, fails)
         if isinstance(error, KeyboardInterrupt):
             with pytest.raises(KeyboardInterrupt):
                 make(one)
@@ -392,7 +394,7 @@ def test_an_interruption_leaves_nothing_half_written(tmp_path, masters, no_kerne
 
 
 def test_an_old_pdf_does_not_stay_beside_a_new_page(tmp_path, masters, no_kernel, monkeypatch):
-    monkeypatch.setattr(course, "pdf", lambda page, target: target.write_bytes(hashlib.sha256(page.read_bytes()).digest()))
+    monkeypatch.setattr(jobs, "pdf", lambda page, target: target.write_bytes(hashlib.sha256(page.read_bytes()).digest()))
     make(job(tmp_path, masters, with_pdf=True))
     old = contents(tmp_path / "out")["b-aof-solution.pdf"]
     (masters / "b_aof" / "statement.md").write_text(TINY.replace("Divide.", "Divide by F."), encoding="utf-8")
@@ -404,7 +406,7 @@ def test_an_old_pdf_does_not_stay_beside_a_new_page(tmp_path, masters, no_kernel
 def test_without_a_browser_it_is_said(tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda _: None)
     with pytest.raises(NotebookFailed, match="no browser to print PDF with; install one of chromium"):
-        execute.pdf(tmp_path / "page.html", tmp_path / "page.pdf")
+        execution.pdf(tmp_path / "page.html", tmp_path / "page.pdf")
 
 
 def test_a_browser_that_prints_nothing_has_failed(tmp_path, monkeypatch):
@@ -412,7 +414,7 @@ def test_a_browser_that_prints_nothing_has_failed(tmp_path, monkeypatch):
     target.touch()  # as a temporary file is
     monkeypatch.setattr(shutil, "which", lambda _: "/bin/true")
     with pytest.raises(NotebookFailed, match="could not print"):
-        execute.pdf(tmp_path / "page.html", target)
+        execution.pdf(tmp_path / "page.html", target)
 
 
 def test_save_is_all_or_nothing(tmp_path):
@@ -425,7 +427,7 @@ def test_save_is_all_or_nothing(tmp_path):
 
 
 def test_a_solution_that_does_not_pass_is_not_handed_out(tmp_path, masters, monkeypatch):
-    monkeypatch.setattr(course, "execute", execute_inside)
+    monkeypatch.setattr(jobs, "execute", execute_inside)
     (masters / "b_aof" / "statement.md").write_text(TINY.replace("cross = G @ Psi", "cross = 2 * G @ Psi"), encoding="utf-8")
     outcome = make(job(tmp_path, masters))
     assert outcome.status == "failed"
@@ -455,14 +457,14 @@ def test_jobs_do_not_change_what_is_written_and_failures_do_not_stop_the_rest(ca
     (masters / "c_duof").mkdir()
     fails = TINY.replace("import matplotlib", "1 / 0\nimport matplotlib", 1)
     (masters / "c_duof" / "statement.md").write_text(fails, encoding="utf-8")
-    without = course.execute
+    without = jobs.execute
 
     def instead(notebook, name, *_, **__):
         if "1 / 0" in code(notebook)[0].source:
             raise NotebookFailed(f"{name}, cell c-01: ZeroDivisionError: division by zero")
         return without(notebook, name)
 
-    monkeypatch.setattr(course, "execute", instead)  # in this process
+    monkeypatch.setattr(jobs, "execute", instead)  # in this process
     for workers in (1, 2):
         variants = ("--variant", "53", "--variant", "12")
         result = call(

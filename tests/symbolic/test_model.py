@@ -5,7 +5,8 @@ import pytest
 import sympy as sp
 
 from kfcourse.symbolic.formula import FormulaError, symbol
-from kfcourse.symbolic.model import Model, ModelError
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import ModelError
 
 
 def test_a_model_keeps_its_formulas_symbolic_and_its_parameters_exact(variant53):

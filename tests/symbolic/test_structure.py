@@ -7,9 +7,12 @@ import oracles
 import pytest
 import sympy as sp
 
-from kfcourse.symbolic.model import Model, ModelError
+from kfcourse.symbolic.equations import compile_model, compile_noiseless
+from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
-from kfcourse.symbolic.structure import compile_model, compile_noiseless, gauss_hermite, gaussian, linearised, unscented
+from kfcourse.symbolic.quadrature import gauss_hermite, unscented
+from kfcourse.symbolic.reading import ModelError
+from kfcourse.symbolic.structure import gaussian, linearised
 
 c, e, g, f, z, p, m, d = sp.symbols("c e g f z p m d", real=True)
 KINDS = {"linearised": linearised, "gaussian": gaussian, "unscented": unscented, "gauss-hermite": gauss_hermite}

@@ -17,8 +17,10 @@ import numpy as np
 
 from kfcourse.laws import Array, Measurement, square_root
 from kfcourse.scenarios.navigation.dynamics import ROUNDING
-from kfcourse.symbolic.model import Formula, Model
-from kfcourse.symbolic.structure import Structure, compile_model, linearised
+from kfcourse.symbolic.equations import compile_model
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import Formula
+from kfcourse.symbolic.structure import Structure, linearised
 
 
 class Clock(NamedTuple):

@@ -7,18 +7,9 @@ from scipy.integrate import solve_ivp
 
 from kfcourse import ModelError
 from kfcourse.linear.system import linear_system
-from kfcourse.scenarios.aircraft import (
-    CARTESIAN,
-    SPHERICAL,
-    aircraft,
-    cartesian,
-    kinematic,
-    measure_cartesian,
-    measure_spherical,
-    rms_by_part,
-    rms_difference,
-    spherical,
-)
+from kfcourse.scenarios.errors import rms_by_part, rms_difference
+from kfcourse.scenarios.flight import aircraft
+from kfcourse.scenarios.radar import CARTESIAN, SPHERICAL, cartesian, kinematic, measure_cartesian, measure_spherical, spherical
 
 # Not the defaults: every number different, one turn to the right.
 OTHER = dict(

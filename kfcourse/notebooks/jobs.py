@@ -6,18 +6,13 @@ student's notebook with the pictures to reach.  Files appear complete or not at 
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import json
-import os
 import re
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +23,10 @@ from tqdm import tqdm
 
 from kfcourse.checks import Exercise, sets
 from kfcourse.checks.question import PASSED
-from kfcourse.lab.variants import Variant, find_variant, load_variants
-from kfcourse.notebooks.execute import NotebookFailed, execute, html, pdf, pictures, results
+from kfcourse.files import package_digest, replacing, save
+from kfcourse.lab.variants import find_variant
+from kfcourse.notebooks.execution import NotebookFailed, execute, html, pdf, pictures, results
 from kfcourse.notebooks.master import read, render, solution, student
-
-PACKAGE = Path(__file__).resolve().parent.parent
 
 
 @dataclass(frozen=True)
@@ -115,7 +109,7 @@ def _write(job: Job, notebook: NotebookNode, executed: NotebookNode) -> None:
     page, printed = job.target.with_suffix(".html"), job.target.with_suffix(".pdf")
     save(html(executed, job.name), page)
     if job.with_pdf:
-        with temporary(printed) as path:
+        with replacing(printed) as path:
             pdf(page, path)
     else:
         printed.unlink(missing_ok=True)  # of an earlier version
@@ -130,43 +124,12 @@ def fingerprint(notebook: NotebookNode) -> str:
     return digest.hexdigest()
 
 
-@lru_cache(maxsize=1)
-def package_digest() -> str:
-    """Hash of this package's files."""
-    digest = hashlib.sha256()
-    for folder in (PACKAGE, Path(str(resources.files("kfcourse.exercises")))):
-        for path in sorted(folder.rglob("*")):
-            if path.suffix in (".py", ".toml", ".j2"):
-                digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
 def _up_to_date(path: Path, notebook: NotebookNode) -> bool:
     try:
         old = json.loads(path.read_bytes())["metadata"]["kfcourse"]["fingerprint"]
     except (OSError, ValueError, RecursionError, LookupError, TypeError):  # missing, or not a notebook of ours
         return False
     return old == notebook.metadata["kfcourse"]["fingerprint"]
-
-
-@contextmanager
-def temporary(target: Path) -> Iterator[Path]:
-    """A path beside the target; what is written there becomes the target if the block ends well."""
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix)
-    os.close(handle)
-    path = Path(name)
-    try:
-        yield path
-        path.chmod(0o644)
-        path.replace(target)
-    finally:
-        path.unlink(missing_ok=True)
-
-
-def save(text: str, target: Path) -> None:
-    """Write a file completely or not at all."""
-    with temporary(target) as path:
-        path.write_text(text, encoding="utf-8")
 
 
 def run_all(jobs: Sequence[Any], work: Callable[[Any], Any], workers: int, what: str, dask: str | None = None) -> Iterator[Any]:
@@ -214,7 +177,7 @@ def _backend(dask: str | None, workers: int) -> Iterator[joblib.Parallel]:
         yield joblib.Parallel(return_as="generator_unordered")
 
 
-def jobs(
+def plan(
     kind: str,
     folder: Path,
     variants: Iterable[str],
@@ -232,83 +195,3 @@ def jobs(
 def safe(name: str) -> str:
     """A name as one component of a path."""
     return re.sub(r"[^\w.-]+", "-", name).strip(".-") or "unnamed"
-
-
-@dataclass(frozen=True)
-class Student:
-    """A line of the course list, and the variant it was given."""
-
-    name: str
-    group: str
-    variant: str
-
-
-def assign(path: Path, variants: Sequence[str]) -> list[Student]:
-    """Give each student of a course list a variant, always the same.
-
-    Every pair of student and variant has a score, a hash of their names.  Students, in the order of the file, take the free
-    variant of their group with the highest score; when all are taken, a second round begins.  Students added at the end of the
-    file change nothing for those before.
-
-    Parameters
-    ----------
-    path : Path
-        CSV with the columns name and group.
-    variants : sequence of str
-
-    Raises
-    ------
-    ValueError
-        The file is missing, is not such a table, or names a student twice; says which line.
-    """
-    taken: dict[str, list[str]] = {}
-    students: list[Student] = []
-    for line, name, group in course_list(path):
-        if any((s.name, s.group) == (name, group) for s in students):
-            raise ValueError(f"{path}, line {line}: {name}, {group} stands there twice; add a middle name")
-        used = taken.setdefault(group, [])
-        if len(used) == len(variants):
-            used.clear()
-        free = [variant for variant in variants if variant not in used]
-        best = max(free, key=lambda variant: hashlib.sha256(f"{name}/{group}/{variant}".encode()).digest())
-        used.append(best)
-        students.append(Student(name, group, best))
-    if not students:
-        raise ValueError(f"{path} names no student")
-    return students
-
-
-def course_list(path: Path) -> Iterator[tuple[int, str, str]]:
-    """Line number, name and group of every student in a CSV file."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise ValueError(f"no course list {path}; it is a CSV file with the columns name and group") from None
-    except UnicodeDecodeError:
-        raise ValueError(f"{path} is not UTF-8; save it as CSV UTF-8") from None
-    delimiter = ";" if text.partition("\n")[0].count(";") else ","
-    reader = csv.DictReader(text.splitlines(), delimiter=delimiter, skipinitialspace=True)
-    columns = [(column or "").strip().lower() for column in reader.fieldnames or []]
-    if not {"name", "group"} <= set(columns):
-        raise ValueError(f"{path}: the first line must name the columns name and group, got {', '.join(columns) or 'nothing'}")
-    reader.fieldnames = columns
-    try:
-        for row in reader:
-            name, group = ((row[key] or "").strip() for key in ("name", "group"))
-            if name:
-                yield reader.line_num, name, group
-            elif group:
-                raise ValueError(f"{path}, line {reader.line_num}: a student without a name")
-    except csv.Error as error:
-        raise ValueError(f"{path}, line {reader.line_num + 1}: {error}") from None
-
-
-def chosen_variants(names: Sequence[str], everything: bool, variants_file: Path | None) -> list[Variant]:
-    """The variants asked for; ValueError if there is no such, or none is named."""
-    known = load_variants(variants_file)
-    if everything:
-        return list(known.values())
-    unknown = [name for name in names if name not in known]
-    if unknown:
-        raise ValueError(f"no variant {', '.join(unknown)}; there are {', '.join(known)}")
-    return [known[name] for name in dict.fromkeys(names)]

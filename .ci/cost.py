@@ -1,0 +1,32 @@
+"""Run targets of the Makefile one after another, and print what each cost: `python .ci/cost.py make lint unit`."""
+
+import os
+import subprocess
+import sys
+import time
+
+
+def main(make: str, targets: list[str]) -> int:
+    rows: list[tuple[str, float, float]] = []
+    status = 0
+    for target in targets:
+        wall, before = time.perf_counter(), os.times()
+        try:
+            status = subprocess.run([make, "--no-print-directory", target]).returncode
+        except KeyboardInterrupt:
+            status = 130
+        after = os.times()
+        cpu = after.children_user + after.children_system - before.children_user - before.children_system
+        rows.append((target, time.perf_counter() - wall, cpu))
+        if status:
+            break
+    rows.append(("together", sum(row[1] for row in rows), sum(row[2] for row in rows)))
+    print(f"\n{'':12}{'wall s':>10}{'CPU s':>10}")
+    for name, wall, cpu in rows:
+        print(f"{name:12}{wall:10.1f}{cpu:10.1f}")
+    print(f"\n{target} failed." if status else "\nAll checks passed.")
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1], sys.argv[2:]))

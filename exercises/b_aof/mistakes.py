@@ -1,0 +1,211 @@
+"""Known mistakes of set b, question by question, and what is said of each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from kfcourse import laws
+from kfcourse.checks.exercises import full
+from kfcourse.checks.question import Answer
+from kfcourse.exercises import messages
+from kfcourse.exercises.b_aof.keys import Gain, correct, gain, run_filter, run_with, step
+from kfcourse.laws import Array, apply, transpose
+
+# -- b1: the gain
+
+
+def _root(F: Array) -> Array:
+    return np.linalg.cholesky(F)
+
+
+def _only_square(G: Array) -> Array:
+    if G.shape[-1] != G.shape[-2]:
+        raise ValueError("only with as many measurements as states")
+    return np.broadcast_to(np.eye(G.shape[-1]), G.shape)
+
+
+WRONG_GAINS: tuple[tuple[str, str, Gain], ...] = (
+    ("gain-not-divided", "The gain is not divided by the covariance F of the measurement.", lambda Psi, G, F: Psi @ transpose(G)),
+    (
+        "gain-by-standard-deviation",
+        "The gain is divided by a standard deviation; the variance F belongs there.",
+        lambda Psi, G, F: np.linalg.solve(transpose(_root(F)), transpose(Psi @ transpose(G))).swapaxes(-1, -2),
+    ),
+    (
+        "gain-without-G",
+        "The meter's sensitivity G is missing in the gain.",
+        lambda Psi, G, F: laws.gain(Psi @ _only_square(G), F),
+    ),
+    ("gain-without-Psi", messages.GAIN_WITHOUT_PSI, lambda Psi, G, F: laws.gain(transpose(G), F)),
+    (
+        "gain-transposed",
+        "The gain is transposed: it has as many rows as states and as many columns as measurements.",
+        lambda Psi, G, F: transpose(gain(Psi, G, F)),
+    ),
+    (
+        "gain-of-noise",
+        "The gain is divided by the noise's part only; F is the whole variance of the measurement, the state's part included.",
+        lambda Psi, G, F: laws.gain(Psi @ transpose(G), F - G @ Psi @ transpose(G)),
+    ),
+)
+
+
+# -- b2: the correction
+
+
+def correction_with(
+    of_gain: Gain = gain,
+    innovation: Callable[[Array, Array], Array] = lambda y, h: y - h,
+    covariance: Callable[[Array, Array, Array, Array], Array] = lambda Psi, K, G, F: Psi - K @ G @ Psi,
+) -> Answer:
+    """A correction with one thing changed."""
+
+    def answer(lam: Array, Psi: Array, h: Array, G: Array, F: Array, y: Array) -> tuple[Array, Array]:
+        K = of_gain(Psi, G, F)
+        return lam + apply(K, innovation(y, h)), covariance(Psi, K, G, F)
+
+    return answer
+
+
+WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
+    *((name, says, correction_with(of_gain=wrong)) for name, says, wrong in WRONG_GAINS),
+    ("innovation-sign", messages.INNOVATION_SIGN, correction_with(innovation=lambda y, h: h - y)),
+    ("innovation-without-h", messages.MEASUREMENT_FOR_INNOVATION, correction_with(innovation=lambda y, h: y)),
+    ("covariance-kept", messages.COVARIANCE_KEPT, correction_with(covariance=lambda Psi, K, G, F: Psi)),
+    ("covariance-added", messages.COVARIANCE_ADDED, correction_with(covariance=lambda Psi, K, G, F: Psi + K @ G @ Psi)),
+    (
+        "covariance-once",
+        "K G is a share, without units: it has to be multiplied by Psi before it is subtracted from it.",
+        correction_with(covariance=lambda Psi, K, G, F: Psi - K @ G),
+    ),
+    (
+        "covariance-of-gain",
+        "G is missing in the covariance of the estimate.",
+        correction_with(covariance=lambda Psi, K, G, F: Psi - K @ _only_square(G) @ Psi),
+    ),
+)
+
+
+# -- b3: a whole step
+
+Functions = tuple[Callable, Callable]
+
+
+def step_with(correction: Answer = correct, following: Callable[..., tuple[Array, Array]] | None = None) -> Answer:
+    """A step with another correction, or another prediction: (lam, Psi, z, p, predict) -> (lam, Psi)."""
+
+    def answer(lam: Array, Psi: Array, y: Array, measure: Callable, predict: Callable) -> tuple[Array, ...]:
+        z, p = correction(lam, Psi, *measure(lam, Psi), y)
+        return z, p, *(predict(z, p) if following is None else following(lam, Psi, z, p, predict))
+
+    return answer
+
+
+def _swapped(lam: Array, Psi: Array, y: Array, measure: Callable, predict: Callable) -> tuple[Array, ...]:
+    lam, Psi = predict(lam, Psi)
+    h, G, F = measure(lam, Psi)
+    z, p = correct(lam, Psi, h, G, F, y)
+    return z, p, lam, Psi
+
+
+WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
+    (
+        "beats-swapped",
+        "Prediction and correction are swapped: lam and Psi are already the prediction for this measurement.",
+        _swapped,
+    ),
+    (
+        "predicted-from-prediction",
+        "The prediction starts from lam and Psi again, as if nothing had been measured; it starts from z and p.",
+        step_with(following=lambda lam, Psi, z, p, predict: predict(lam, Psi)),
+    ),
+    (
+        "covariance-not-predicted",
+        "Psi for the next step is not p: the object moves and is shaken meanwhile.",
+        step_with(following=lambda lam, Psi, z, p, predict: (predict(z, p)[0], p)),
+    ),
+    (
+        "mean-not-predicted",
+        "lam for the next step is not z: it is where the object is expected to be then.",
+        step_with(following=lambda lam, Psi, z, p, predict: (z, predict(z, p)[1])),
+    ),
+    (
+        "variance-mixed",
+        "The prediction takes Psi in place of p: the uncertainty before the measurement, not after it.",
+        step_with(following=lambda lam, Psi, z, p, predict: predict(z, Psi)),
+    ),
+    *((name, says, step_with(wrong)) for name, says, wrong in WRONG_CORRECTIONS if name.startswith(("innovation", "covariance"))),
+)
+
+
+# -- b4: a whole run, with measurements missing
+
+
+def _predicted_first(y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
+    lam, Psi = predict(mean[None], cov[None])
+    return run_with(step, y, lam[0], Psi[0], measure, predict)
+
+
+def _predictions(y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
+    lam, Psi = np.tile(mean, (y.shape[1], 1)), full(cov, y.shape[1])
+    predictions = []
+    for one in y:
+        predictions.append(lam)
+        *_, lam, Psi = step(lam, Psi, one, measure, predict)
+    return np.array(predictions)
+
+
+def _frozen(y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
+    lam, Psi = np.tile(mean, (y.shape[1], 1)), full(cov, y.shape[1])
+    estimates = []
+    for one in y:
+        z, _, lam, _ = step(lam, Psi, one, measure, predict)
+        estimates.append(z)
+    return np.array(estimates)
+
+
+def _zeros_for_missing(y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
+    return run_filter(np.nan_to_num(y), mean, cov, measure, predict)
+
+
+WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
+    ("predicted-first", messages.PREDICTED_FIRST, _predicted_first),
+    ("predictions-returned", messages.PREDICTIONS_RETURNED, _predictions),
+    ("covariance-frozen", "The covariance never changes from step to step: hand Psi on, not only lam.", _frozen),
+    ("missing-as-zero", messages.MISSING_AS_ZERO, _zeros_for_missing),
+    *(
+        (name, says, lambda *a, wrong=wrong: run_with(step_with(wrong), *a))
+        for name, says, wrong in WRONG_CORRECTIONS
+        if name in ("innovation-sign", "covariance-kept")
+    ),
+)
+
+
+# -- b5: a covariance that rounding cannot make negative
+
+
+def _joseph_part(which: int) -> Answer:
+    def answer(Psi: Array, G: Array, F: Array, R: Array) -> Array:
+        K = gain(Psi, G, F)
+        rest = np.eye(Psi.shape[-1]) - K @ G
+        return (rest @ Psi @ transpose(rest), K @ R @ transpose(K))[which]
+
+    return answer
+
+
+WRONG_COVARIANCES: tuple[tuple[str, str, Answer], ...] = (
+    (
+        "cancellation",
+        "On paper it is right. Where the meter is sharp it is the difference of two nearly equal numbers, and all digits "
+        "are lost: write it as a sum or product of terms that cannot be negative.",
+        lambda Psi, G, F, R: Psi - gain(Psi, G, F) @ G @ Psi,
+    ),
+    (
+        "noise-of-meter-missing",
+        "The estimate inherits noise from the measurement through the gain: a term is missing.",
+        _joseph_part(0),
+    ),
+    ("prior-part-missing", "Only the measurement's noise is there; part of the prediction's error remains too.", _joseph_part(1)),
+)

@@ -1,0 +1,119 @@
+"""Known mistakes of set c, question by question, and what is said of each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kfcourse.checks.question import Answer
+from kfcourse.exercises import messages
+from kfcourse.exercises.c_duof.keys import design_and_run, duof_run_with, duof_step_with
+from kfcourse.exercises.shared import MOMENTS_ABOUT_ZERO, WITHOUT_OFFSET, Fit, covariance_of, regression, regression_with
+from kfcourse.laws import Array
+
+# -- c1: the structure
+
+WRONG_STRUCTURES: tuple[tuple[str, str, Answer], ...] = (
+    ("omega-sign", messages.INNOVATION_SIGN, lambda lam, z, y, a, b: (b(lam) - y, a(z))),
+    (
+        "omega-from-estimate",
+        "What is expected of y follows from the prediction lam, not from z.",
+        lambda lam, z, y, a, b: (y - b(z), a(z)),
+    ),
+    ("omega-is-y", "The measurement itself is not the innovation.", lambda lam, z, y, a, b: (y, a(z))),
+    (
+        "alpha-from-prediction",
+        "alpha follows from the estimate z, which knows y already.",
+        lambda lam, z, y, a, b: (y - b(lam), a(lam)),
+    ),
+    ("alpha-is-z", "The object moves: alpha is the state equation at z.", lambda lam, z, y, a, b: (y - b(lam), z)),
+)
+
+
+# -- c2: regression over the ensemble
+
+
+def _over_components(a: Array, b: Array) -> Array:
+    """Deviations from the mean over the components of each trajectory."""
+    return (a - a.mean(axis=1, keepdims=True)).T @ (b - b.mean(axis=1, keepdims=True)) / len(a)
+
+
+WRONG_REGRESSIONS: tuple[tuple[str, str, Fit], ...] = (
+    ("means-not-subtracted", messages.MEANS_NOT_SUBTRACTED, MOMENTS_ABOUT_ZERO),
+    ("offset-forgotten", messages.OFFSET_FORGOTTEN, WITHOUT_OFFSET),
+    (
+        "wrong-index",
+        "The mean seems to be taken over the components (the second index) instead of the trajectories (the first).",
+        regression_with(lambda t, r: (_over_components(t, r), _over_components(r, r))),
+    ),
+    (
+        "biased",
+        messages.DIFFERENT_DIVISORS,
+        regression_with(lambda t, r: (covariance_of(t, r), covariance_of(r, r) * len(r) / (len(r) - 1))),
+    ),
+    (
+        "biased",
+        messages.DIFFERENT_DIVISORS,
+        regression_with(lambda t, r: (covariance_of(t, r) * len(r) / (len(r) - 1), covariance_of(r, r))),
+    ),
+    (
+        "regularised",
+        "Something was added to the covariance of the regressor to make it invertible: that biases every coefficient. The "
+        "pseudo-inverse needs no such help.",
+        regression_with(lambda t, r: (covariance_of(t, r), covariance_of(r, r) + 1e-3 * np.eye(r.shape[1]))),
+    ),
+    (
+        "residual-is-variance",
+        "The residual covariance is the whole covariance of the target; subtract what the regression explains.",
+        lambda t, r: (*regression(t, r)[:2], covariance_of(t, t)),
+    ),
+    (
+        "unbiased-residual",
+        "The residual is divided by N - 1; use 1/N throughout, as for the coefficients.",
+        lambda t, r: (*regression(t, r)[:2], regression(t, r)[2] * len(t) / (len(t) - 1)),
+    ),
+)
+
+
+# -- c3: one step of the design
+
+WRONG_DUOF_STEPS: tuple[tuple[str, str, Answer], ...] = (
+    (
+        "state-for-error",
+        "The correction is a regression of the prediction's error x - lam on the innovation, not of the state.",
+        duof_step_with(first=lambda x, lam: x),
+    ),
+    (
+        "prediction-not-added",
+        "H omega + e is only the correction: it is added to lam.",
+        duof_step_with(base=lambda lam: 0.0 * lam),
+    ),
+    (
+        "alpha-from-prediction",
+        "The prediction uses a(lam): the estimate z knows the measurement, lam does not.",
+        duof_step_with(alpha=lambda z, lam, a: a(lam)),
+    ),
+    ("alpha-is-z", "The regressor of the prediction is alpha = a(z), not z itself.", duof_step_with(alpha=lambda z, lam, a: z)),
+    ("means-not-subtracted", messages.MEANS_NOT_SUBTRACTED, duof_step_with(fit=MOMENTS_ABOUT_ZERO)),
+    ("offset-forgotten", messages.OFFSET_FORGOTTEN, duof_step_with(fit=WITHOUT_OFFSET)),
+)
+
+
+# -- c4: coefficients found on one ensemble, used on another
+
+Ensemble = tuple[Array, Array]
+
+WRONG_DUOF_RUNS: tuple[tuple[str, str, Answer], ...] = (
+    (
+        "part-of-ensemble",
+        "The coefficients seem to come from a part of the design ensemble only; use all of its trajectories.",
+        lambda x, yd, y, mean, a, b: design_and_run(x[:, : y.shape[1]], yd[:, : y.shape[1]], y, mean, a, b),
+    ),
+    ("one-gain", "H and e of the first step are used at every step; each step has its own.", duof_run_with(one_gain=True)),
+    ("predictions-returned", messages.PREDICTIONS_RETURNED, duof_run_with(predictions=True)),
+    (
+        "prediction-not-fitted",
+        "The prediction is a(z) as it is; its coefficients F and g, found in the design, are not used.",
+        duof_run_with(object_alone=True),
+    ),
+    ("offset-not-used", "The offset e is not used when the filter runs.", duof_run_with(without_offset=True)),
+)

@@ -1,0 +1,130 @@
+"""Known mistakes in the test of a filter's consistency: bounds (g2), NEES and NIS (g6)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy import stats
+
+from kfcourse.exercises import messages
+from kfcourse.exercises.g_extended.keys import Normalised, innovation_covariance, normalised_with
+from kfcourse.exercises.shared import Map
+from kfcourse.laws import Array, apply, transpose
+from kfcourse.linear.consistency import chi_squared_bounds, normalised_square
+
+# -- g2: bounds
+
+Bounds = Callable[[int, int, float], tuple[float, float]]
+
+
+def _normal_bounds(degrees: int, runs: int, confidence: float) -> tuple[float, float]:
+    half = stats.norm.ppf((1 + confidence) / 2) * np.sqrt(2 * degrees / runs)
+    return degrees - half, degrees + half
+
+
+WRONG_BOUNDS: tuple[tuple[str, str, Bounds], ...] = (
+    (
+        "one-value",
+        "These are the bounds of a single value. The mean of many runs varies less: the degrees of freedom of a sum add up.",
+        lambda degrees, runs, confidence: stats.chi2.interval(confidence, degrees),
+    ),
+    (
+        "not-divided",
+        "These are the bounds of the sum over the runs; those of the mean are asked for.",
+        lambda degrees, runs, confidence: stats.chi2.interval(confidence, degrees * runs),
+    ),
+    (
+        "runs-only",
+        "The degrees of freedom are not only the number of runs: each run adds as many as the vector has components.",
+        lambda degrees, runs, confidence: tuple(np.array(stats.chi2.interval(confidence, runs)) / runs),
+    ),
+    (
+        "per-component",
+        "Divided by the number of components too; the mean itself is asked for.",
+        lambda degrees, runs, confidence: tuple(np.array(chi_squared_bounds(degrees, runs, confidence)) / degrees),
+    ),
+    (
+        "one-value-divided",
+        "The sum of the runs has more degrees of freedom than one value: they add up.",
+        lambda degrees, runs, confidence: tuple(np.array(stats.chi2.interval(confidence, degrees)) / runs),
+    ),
+    (
+        "one-sided",
+        "Each bound leaves out the whole of the small probability; both together may leave it out, one half each.",
+        lambda degrees, runs, confidence: tuple(stats.chi2.ppf([1 - confidence, confidence], degrees * runs) / runs),
+    ),
+    (
+        "half-confidence",
+        "Halve what lies outside, not the confidence.",
+        lambda degrees, runs, confidence: tuple(stats.chi2.ppf([confidence / 2, 1 - confidence / 2], degrees * runs) / runs),
+    ),
+    ("normal", "That is the normal approximation; the chi-squared law itself is not symmetric.", _normal_bounds),
+)
+
+
+# -- g6: NEES and NIS
+
+
+def _by_diagonal(vector: Array, cov: Array) -> Array:
+    return (vector**2 / np.diagonal(cov, axis1=-2, axis2=-1)).sum(axis=-1)
+
+
+def _by_deviation(vector: Array, cov: Array) -> Array:
+    return (vector**2 / np.sqrt(np.diagonal(cov, axis1=-2, axis2=-1))).sum(axis=-1)
+
+
+def _without_inverse(vector: Array, cov: Array) -> Array:
+    return (vector * apply(cov, vector)).sum(axis=-1)
+
+
+def _mean_first(x: Array, z: Array, p: Array, y: Array, lam: Array, Psi: Array, S: Map, H: Map, D_n: Map) -> tuple[Array, Array]:
+    """The mean error normalised, instead of the mean of normalised errors."""
+    F = innovation_covariance(Psi, H(lam), D_n(lam))
+    state, measured = ((vector.mean(axis=1), cov.mean(axis=1)) for vector, cov in ((x - z, p), (y - S(lam), F)))
+    return normalised_square(*state), normalised_square(*measured)
+
+
+WRONG_NORMALISED: tuple[tuple[str, str, Normalised], ...] = (
+    (
+        "inverse-forgotten",
+        "The covariance itself stands between the errors; its inverse belongs there: an unsure filter may err.",
+        normalised_with(_without_inverse),
+    ),
+    (
+        "noise-for-innovation",
+        "The innovation is compared with the noise of the meter alone; its covariance has the part of the state too.",
+        normalised_with(F=lambda Psi, H, D_n: D_n),
+    ),
+    (
+        "noise-forgotten",
+        "The noise of the meter is missing in the covariance of the innovation.",
+        normalised_with(
+            lambda vector, cov: (vector * apply(np.linalg.pinv(cov), vector)).sum(axis=-1),
+            F=lambda Psi, H, D_n: H @ Psi @ transpose(H),
+        ),
+    ),
+    (
+        "residual-for-innovation",
+        "The measurement is compared with the estimate, which knows it already; an innovation is taken from the prediction.",
+        normalised_with(measured_at=lambda z, lam: z),
+    ),
+    (
+        "prediction-for-estimate",
+        "That is the error of the prediction; NEES is about the estimate.",
+        normalised_with(error=lambda x, z, lam: x - lam, error_cov=lambda p, Psi: Psi),
+    ),
+    (
+        "covariance-of-prediction",
+        "The error of the estimate is compared with the covariance of the prediction.",
+        normalised_with(error_cov=lambda p, Psi: Psi),
+    ),
+    ("correlations-ignored", messages.CORRELATIONS_IGNORED, normalised_with(_by_diagonal)),
+    ("by-deviation", "The squares are divided by standard deviations; variances belong there.", normalised_with(_by_deviation)),
+    (
+        "per-component",
+        "Divided by the number of components; the plain mean is asked for: it should be n, or p.",
+        normalised_with(per_component=True),
+    ),
+    ("mean-first", "The errors are averaged before they are squared; average the squares.", _mean_first),
+)

@@ -1,0 +1,100 @@
+"""The equations of the extended Kalman-Bucy filter, derived."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import sympy as sp
+
+from kfcourse.continuous.model import ContinuousModel, numbered
+from kfcourse.symbolic.reading import (
+    exact_matrix,
+)
+
+
+def log_likelihood_rate(signal: sp.MatrixBase, y: sp.MatrixBase, noise_density: sp.MatrixBase) -> sp.Expr:
+    """F(x, t) = 2 S^T N^-1 (y - S / 2), what the log-likelihood gains in unit time: (p, 1), (p, 1), (p, p) -> scalar."""
+    return (2 * signal.T * noise_density.inv() * (y - signal / 2))[0]
+
+
+def symmetrised_drift(
+    rates: sp.MatrixBase, state: Sequence[sp.Symbol], noise: Sequence[sp.Symbol], intensity: sp.MatrixBase
+) -> sp.ImmutableMatrix:
+    """What is added to ds/dt = rates(s, noise) in Ito's sense to give the same in the symmetrised (Stratonovich) sense, (n, 1).
+
+    With b_l = d rates / d noise_l:   1/2 sum_lm intensity_lm (d b_l / d s) b_m;   for scalar g(x) xi: g g' S_xi / 4.
+    """
+    b, q = rates.jacobian(sp.Matrix(noise)), range(len(noise))
+    terms = [intensity[i, j] / 2 * b.col(i).jacobian(sp.Matrix(state)) * b.col(j) for i in q for j in q]
+    return sp.ImmutableMatrix(sum(terms, sp.zeros(len(rates), 1)))
+
+
+class FilterEquations(NamedTuple):
+    """The extended Kalman-Bucy filter in formulas, parameters as symbols.
+
+    dz/dt = f + D u,     dD/dt = A D + D A^T + Q + D U D,     u = (dF/dx)^T,  U = d2F/dx2  at x = z
+
+    Attributes
+    ----------
+    z, D, y : sympy.Matrix
+        Symbols: estimate (n, 1), covariance (n, n), measurement (p, 1).
+    f, A, Q : sympy.Matrix
+        f(z), df/dx, g S_xi g^T / 2.
+    S, H : sympy.Matrix
+        S(z), dS/dx.
+    F : sympy expression
+        The gain of the log-likelihood in unit time, at z.
+    u, U : sympy.Matrix
+        Its derivatives.  Without second derivatives of S, U is its noise-free part -H^T 2 N^-1 H.
+    """
+
+    z: sp.ImmutableMatrix
+    D: sp.ImmutableMatrix
+    y: sp.ImmutableMatrix
+    f: sp.ImmutableMatrix
+    A: sp.ImmutableMatrix
+    Q: sp.ImmutableMatrix
+    S: sp.ImmutableMatrix
+    H: sp.ImmutableMatrix
+    F: sp.Expr
+    u: sp.ImmutableMatrix
+    U: sp.ImmutableMatrix
+
+    @property
+    def state(self) -> list[sp.Symbol]:
+        """z, and D row by row from its diagonal on."""
+        return [*self.z, *upper_triangle(self.D)]
+
+    @property
+    def rates(self) -> sp.ImmutableMatrix:
+        """dz/dt and dD/dt, in the order of `state`."""
+        dD = self.A * self.D + self.D * self.A.T + self.Q + self.D * self.U * self.D
+        return sp.ImmutableMatrix([*(self.f + self.D * self.u), *upper_triangle(dD)])
+
+
+def upper_triangle(matrix: sp.MatrixBase) -> list[sp.Expr]:
+    return [matrix[i, j] for i in range(matrix.rows) for j in range(i, matrix.cols)]
+
+
+def filter_equations(model: ContinuousModel, second_derivatives: bool = True) -> FilterEquations:
+    """Derive the filter's equations from f, g, S and F(x, t).
+
+    The second derivatives of S enter U times y - S, so without them U is U at y = S.
+    """
+    n = model.n
+    z = sp.ImmutableMatrix([model.fresh(name) for name in numbered("z", n)])
+    D = sp.ImmutableMatrix(n, n, lambda i, j: model.fresh("D" if n == 1 else f"D{min(i, j) + 1}{max(i, j) + 1}"))
+    y = sp.ImmutableMatrix([model.fresh(name) for name in numbered("y", model.p)])
+    at = dict(zip(model.x, z, strict=True))
+    f, g, S = (sp.ImmutableMatrix(matrix.subs(at, simultaneous=True)) for matrix in (model.drift, model.diffusion, model.signal))
+    F = log_likelihood_rate(S, y, exact_matrix(model.noise_density))
+    U = sp.ImmutableMatrix(sp.hessian(F, list(z)))
+    if not second_derivatives:
+        U = without_noise(U, y, S)
+    Q = g * exact_matrix(model.spectral_density) * g.T / 2
+    return FilterEquations(z, D, y, f, f.jacobian(z), Q, S, S.jacobian(z), F, sp.ImmutableMatrix([F]).jacobian(z).T, U)
+
+
+def without_noise(U: sp.MatrixBase, y: sp.MatrixBase, S: sp.MatrixBase) -> sp.ImmutableMatrix:
+    return sp.ImmutableMatrix(U.subs(dict(zip(y, S, strict=True)))).applyfunc(sp.expand)

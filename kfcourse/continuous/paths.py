@@ -1,0 +1,76 @@
+"""Trajectories of a continuous model, simulated and seen with a longer step."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import sympy as sp
+
+from kfcourse.continuous.model import ContinuousModel, check_step, compiled
+from kfcourse.laws import Array, apply, square_root
+from kfcourse.montecarlo.designing import NotFinite
+
+
+class Path(NamedTuple):
+    """Trajectories of a continuous model, seen with the step T.
+
+    step : float
+    x : (steps + 1, runs, n), the state at the times 0, T, ..., steps T
+    y : (steps, runs, p), the mean of y(t) over each step
+    """
+
+    step: float
+    x: Array
+    y: Array
+
+
+def simulate(
+    model: ContinuousModel, step: float, steps: int, runs: int, seed: int | np.random.Generator, substeps: int = 1
+) -> Path:
+    """Trajectories by the Euler-Maruyama scheme with the step T / substeps.
+
+    x' = x + dt f(x) + g(x) N(0, S_xi dt / 2),     y_k = mean over the step of S(x) + N(0, N / (2 dt))
+
+    The error of a trajectory is of the order dt if g is constant, and sqrt(dt) if g depends on x; that of its moments is of the
+    order dt in both cases.
+
+    Raises
+    ------
+    ValueError
+        A step that is not positive, sizes that are not positive whole numbers.
+    NotFinite
+        The trajectories became infinite.
+    """
+    check_step(step)
+    for name, value in {"steps": steps, "runs": runs, "substeps": substeps}.items():
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+            raise ValueError(f"{name} must be a positive whole number, got {value!r}")
+    rng, dt = np.random.default_rng(seed), step / substeps
+    formulas = {"f": model.drift, "g": model.diffusion, "S": model.signal}
+    equations = compiled(model, {"x": sp.Matrix(model.x)}, formulas, ["x", "f", "S"])
+    xi_root, n_root = square_root(model.spectral_density * dt / 2), square_root(model.noise_density / (2 * dt))
+    x = np.empty((steps + 1, runs, model.n))
+    y = np.zeros((steps, runs, model.p))
+    now = model.prior.mean + rng.standard_normal((runs, model.n)) @ square_root(model.prior.cov).T
+    x[0] = now
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what becomes infinite is reported below
+        for k in range(steps):
+            for _ in range(substeps):
+                f, g, S = equations(now)
+                y[k] += (S + rng.standard_normal((runs, model.p)) @ n_root.T) / substeps
+                now = now + dt * f + apply(g, rng.standard_normal((runs, len(xi_root))) @ xi_root.T)
+            x[k + 1] = now
+            if not (np.isfinite(now).all() and np.isfinite(y[k]).all()):
+                raise NotFinite(
+                    f"step {k}, time {(k + 1) * step:g}: a trajectory became infinite; check the model, or use more substeps"
+                )
+    return Path(step, x, y)
+
+
+def coarsen(path: Path, factor: int) -> Path:
+    """The same trajectories seen with a step `factor` times as long: every factor-th state, means of the measurements."""
+    steps = len(path.y)
+    if isinstance(factor, bool) or not isinstance(factor, int | np.integer) or factor < 1 or steps % factor:
+        raise ValueError(f"the factor must be a whole number that divides the {steps} steps, got {factor!r}")
+    return Path(path.step * factor, path.x[::factor], path.y.reshape(steps // factor, factor, *path.y.shape[1:]).mean(axis=1))

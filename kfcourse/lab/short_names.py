@@ -1,0 +1,104 @@
+"""The lab's filters by short name: how each is built, and what it is called in tables and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+from kfcourse.filters import Design, Filter, aof, duof, fos, mfos, particle, pointmass
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.moments import NoClosedForm
+from kfcourse.symbolic.quadrature import gauss_hermite, unscented
+from kfcourse.symbolic.reading import ModelError
+from kfcourse.symbolic.structure import Structure, gaussian, linearised
+
+
+class Structures:
+    """The structural functions of a model, derived when first asked for."""
+
+    def __init__(self, model: Model):
+        self.model = model
+
+    @cached_property
+    def linearised(self) -> Structure:
+        return linearised(self.model)
+
+    @cached_property
+    def gaussian(self) -> Structure:
+        return gaussian(self.model)
+
+
+class Entry(NamedTuple):
+    """A filter of the lab: printed names and how to build it."""
+
+    title: str
+    russian: str
+    build: Callable[[Structures], Filter | Design]
+
+
+# One line a filter: this is where a new one is added.
+FILTERS: dict[str, Entry] = {
+    "aof-gaussian": Entry("GAOF", "ГАОФ", lambda s: aof(s.gaussian)),
+    "aof-linearised": Entry("LAOF", "ЛАОФ", lambda s: aof(s.linearised)),
+    "duof": Entry("DUOF", "ДУОФ", lambda s: duof(s.model)),
+    "fos-gaussian": Entry("GFOS", "ГФОС", lambda s: fos(s.gaussian)),
+    "fos-linearised": Entry("LFOS", "ЛФОС", lambda s: fos(s.linearised)),
+    "mfos-gaussian": Entry("GMFOS", "ГМФОС", lambda s: mfos(s.gaussian)),
+    "mfos-linearised": Entry("LMFOS", "ЛМФОС", lambda s: mfos(s.linearised)),
+    "fos3-gaussian": Entry("GFOS3", "ГФОС, 3 арг.", lambda s: fos(s.gaussian, arguments=3)),
+    "fos3-linearised": Entry("LFOS3", "ЛФОС, 3 арг.", lambda s: fos(s.linearised, arguments=3)),
+    "mfos3-gaussian": Entry("GMFOS3", "ГМФОС, 3 арг.", lambda s: mfos(s.gaussian, arguments=3)),
+    "mfos3-linearised": Entry("LMFOS3", "ЛМФОС, 3 арг.", lambda s: mfos(s.linearised, arguments=3)),
+    "aof-unscented": Entry("UKF", "АОФ, unscented", lambda s: aof(unscented(s.model))),
+    "aof-gauss-hermite": Entry("GHKF", "АОФ, Гаусс–Эрмит", lambda s: aof(gauss_hermite(s.model))),
+    "aof-exact": Entry("exact AOF", "АОФ", lambda s: pointmass(s.model)),
+    "particle": Entry("particle", "АОФ, частицы", lambda s: particle(s.model)),
+}
+# Printed names of filters that are not among the lab's.
+TITLES = {
+    "kalman": "Kalman",
+    "iterated-linearised": "iterated EKF",
+    "iterated-unscented": "iterated UKF",
+    "alpha-beta": "alpha-beta",
+    "alpha-beta-gamma": "alpha-beta-gamma",
+    "imm": "IMM",
+}
+LAB = ("aof-gaussian", "aof-linearised", "duof", "fos-gaussian", "fos-linearised", "mfos-gaussian", "mfos-linearised")
+
+
+def title(name: str) -> str:
+    """The printed name of a filter: "GAOF" for "aof-gaussian"."""
+    return FILTERS[name].title if name in FILTERS else TITLES.get(name, name)
+
+
+def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Design]:
+    """Filters of the lab for a model, by short names.
+
+    Raises
+    ------
+    ValueError
+        An unknown name; the message lists the known ones.
+    NoClosedForm, ModelError
+        A filter that this model does not admit; the message names the filter and says what to use instead.
+    """
+    unknown = [name for name in names if name not in FILTERS]
+    if unknown:
+        raise ValueError(f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(FILTERS)}")
+    structures = Structures(model)
+    built = []
+    for name in dict.fromkeys(names):
+        try:
+            built.append(FILTERS[name].build(structures))
+        except (NoClosedForm, ModelError) as error:
+            raise type(error)(f"{name}: {error}") from None
+    return built
+
+
+def has_exact(model: Model) -> bool:
+    """Whether the exact AOF can be computed for the model: scalar, noises entering linearly."""
+    try:
+        pointmass(model)
+    except ModelError:
+        return False
+    return True

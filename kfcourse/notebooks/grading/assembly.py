@@ -1,0 +1,142 @@
+"""The notebook that is run: the master's, made again, with the student's cells in it."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import nbformat
+from nbformat import NotebookNode
+
+from kfcourse.checks import Exercise, exercise
+from kfcourse.notebooks.grading.submissions import Cell, syntax
+from kfcourse.notebooks.master import opened, render, student
+
+MEMORY = 4 * 2**30  # bytes of a kernel
+
+
+@lru_cache(maxsize=64)
+def generated(text: str, letter: str, opening: str) -> NotebookNode:
+    """The student's notebook as it was handed out.  Not to be changed."""
+    return student(render(text, exercise(letter, ast.literal_eval(opening))), {})
+
+
+def check_cells(master: NotebookNode) -> dict[str, list[str]]:
+    """Id of a check cell to the questions it asks."""
+    return {cell.id: _asked(cell.source) for cell in master.cells if cell.cell_type == "code" and _asked(cell.source)}
+
+
+CHECK = re.compile(r"""(\w+)\.check\(\s*["'](\w+)["']""")
+
+
+def _asked(source: str) -> list[str]:
+    return [question for _, question in CHECK.findall(source)]
+
+
+def assembled(master: NotebookNode, cells: Sequence[Cell], exercise: Exercise) -> tuple[NotebookNode, list[Cell]]:
+    """The master's notebook with the student's cells in it, and those cells.
+
+    A cell that defines an asked function takes the place of its stub, wherever it stands; a changed cell of the master, known by
+    its id, takes that cell's place; other cells follow what they followed in the returned notebook.  The master's check cells
+    stay, and get the exercise as it was handed out.
+    """
+    code = [(index, cell) for index, cell in enumerate(master.cells) if cell.cell_type == "code"]
+    checks = check_cells(master)
+    place = _places(code, checks, cells)
+    ordered = []  # (place, number, cell)
+    for index, cell in code:
+        source = cell.source
+        if cell.id in checks:
+            names = dict.fromkeys(name for name, _ in CHECK.findall(source))
+            source = "".join(f"{name} = kfcourse_watch()\n" for name in names) + source
+        elif index in place.taken:
+            continue
+        ordered.append((index, 0, _cell(cell.id, source, f"the master's cell {cell.id}")))
+    own = [cell for cell in cells if cell.number in place.of]
+    for cell in own:
+        ordered.append((place.of[cell.number], cell.number, _cell(f"returned-{cell.number}", cell.source, cell.name)))
+    opening = (
+        "from kfcourse.notebooks.grading.watch import Watch\n"
+        f"kfcourse_watch = Watch({exercise.letter!r}, {opened(exercise)}, memory={MEMORY})"
+    )
+    ordered.sort(key=lambda row: row[:2])
+    return nbformat.v4.new_notebook(cells=[_cell("watch", opening, "the first cell"), *(cell for *_, cell in ordered)]), own
+
+
+def _cell(name: str, source: str, where: str) -> NotebookNode:
+    return nbformat.v4.new_code_cell(source, id=name, metadata={"where": where})
+
+
+class Places(NamedTuple):
+    """of: number of a student's cell to the index of the master's cell that it replaces or follows;  taken: those replaced."""
+
+    of: dict[int, int]
+    taken: set[int]
+
+
+def _places(code: Sequence[tuple[int, NotebookNode]], checks: Mapping[str, list[str]], cells: Sequence[Cell]) -> Places:
+    by_id = {cell.id: index for index, cell in code}
+    answers = {cell.metadata["kfcourse"]["answer"]: index for index, cell in code if "kfcourse" in cell.metadata}
+    asked_at = {question: by_id[name] for name, questions in checks.items() for question in questions}
+    unchanged = {_plain(cell.source): index for index, cell in reversed(code)}
+    of: dict[int, int] = {}
+    taken: set[int] = set()
+
+    mine = [cell for cell in cells if _plain(cell.source) not in unchanged and not _only_checks(cell.source)]
+    defines = {cell.number: _defined(cell.source) & set(answers) for cell in mine}
+    for name, index in answers.items():
+        candidates = [cell for cell in mine if name in defines[cell.number]]
+        if candidates:
+            best = min(candidates, key=lambda cell: (by_id.get(cell.id) != index, cell.answer != name, cell.number))
+            of[best.number] = min(index, of.get(best.number, index))
+            taken.add(index)
+    for cell in mine:
+        index = answers.get(cell.answer, by_id.get(cell.id, -1))
+        if cell.number not in of and not defines[cell.number] and index not in taken | set(asked_at.values()) | {-1}:
+            of[cell.number] = index
+            taken.add(index)
+
+    last = -1
+    kept = {cell.number for cell in mine}
+    for cell in cells:
+        if cell.number in of:
+            last = of[cell.number]
+        elif cell.number in kept:
+            of[cell.number] = last
+        else:  # a cell of the master's, as it was
+            asked = [asked_at[question] for question in _asked(cell.source) if question in asked_at]
+            last = asked[-1] if asked else unchanged.get(_plain(cell.source), last)
+    return Places(of, taken)
+
+
+def _plain(source: str) -> str:
+    return "\n".join(line.rstrip() for line in source.strip().splitlines())
+
+
+def _only_checks(source: str) -> bool:
+    """Whether a cell does nothing but call checks."""
+    tree = syntax(source)
+    return tree is not None and all(
+        isinstance(line, ast.Expr)
+        and isinstance(line.value, ast.Call)
+        and isinstance(line.value.func, ast.Attribute)
+        and line.value.func.attr == "check"
+        for line in tree.body
+    )
+
+
+def _defined(source: str) -> set[str]:
+    """Names that a cell defines at top level; roughly, if it is not Python."""
+    tree = syntax(source)
+    if tree is None:
+        return {a or b for a, b in re.findall(r"^(?:def\s+(\w+)|(\w+)\s*=(?!=))", source, re.MULTILINE)}
+    names = set()
+    for line in tree.body:
+        if isinstance(line, ast.FunctionDef | ast.ClassDef):
+            names.add(line.name)
+        elif isinstance(line, ast.Assign):
+            names |= {target.id for target in line.targets if isinstance(target, ast.Name)}
+    return names

@@ -1,0 +1,140 @@
+"""Grades and their table: one row a notebook, written after each, so that an interrupted run goes on where it was."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from kfcourse.checks import sets
+from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG
+from kfcourse.files import save
+from kfcourse.notebooks.grading.submissions import Returned
+
+NOT_RUN = "not run"
+GRADED, OTHER, FAILED = "graded", "not an exercise notebook", "not graded"
+SIGNS = {PASSED: "✓", WRONG: "✗", UNUSABLE: "✗", MISSING: "–", NOT_RUN: "–"}
+
+
+@dataclass(frozen=True)
+class Grade:
+    """A row of the table.
+
+    Attributes
+    ----------
+    name : str
+        Of the notebook: its path in the folder.
+    status : {"graded", "not an exercise notebook", "not graded"}
+    letter, variant : str
+        As the notebook claims.
+    marks : dict
+        Question to "passed", "wrong", "unusable", "not implemented" or "not run".
+    note : str
+        Where it stopped, what the wrong answers look like, what to look at.
+    digest : str
+        Empty if it was not graded.
+    """
+
+    name: str
+    status: str
+    letter: str = ""
+    variant: str = ""
+    marks: Mapping[str, str] = field(default_factory=dict)
+    note: str = ""
+    digest: str = ""
+
+    @property
+    def passed(self) -> int:
+        return sum(mark == PASSED for mark in self.marks.values())
+
+
+FIRST = ("notebook", "status", "set", "variant")
+LAST = ("passed", "of", "note", "digest")
+
+
+def columns() -> list[str]:
+    most = max(len(one.questions) for one in sets().values())
+    return [*FIRST, *(f"q{i + 1}" for i in range(most)), *LAST]
+
+
+def write_table(grades: Iterable[Grade], path: Path) -> None:
+    """Write the table as CSV that spreadsheets open, completely or not at all."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns(), restval="", lineterminator="\n")
+    writer.writeheader()
+    for one in sorted(grades, key=lambda one: one.name):
+        row: dict[str, Any] = dict(zip(FIRST, (_cautious(one.name), one.status, one.letter, _cautious(one.variant)), strict=True))
+        row |= {f"q{i + 1}": mark for i, mark in enumerate(one.marks.values())}
+        count = (one.passed, len(one.marks)) if one.status == GRADED else ("", "")
+        writer.writerow(row | dict(zip(LAST, (*count, _cautious(one.note), one.digest), strict=True)))
+    save("\ufeff" + text.getvalue(), path)
+
+
+def _cautious(text: str) -> str:
+    """A spreadsheet takes what begins so for a formula."""
+    return f" {text}" if text[:1] in ("=", "+", "-", "@") else text
+
+
+def read_table(path: Path) -> dict[str, Grade]:
+    """Rows of an earlier table, by digest; none if there is no file.
+
+    Raises
+    ------
+    ValueError
+        The file is not such a table, and would be lost.
+    """
+    try:
+        rows = list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8-sig"))))
+    except FileNotFoundError:
+        return {}
+    except (UnicodeDecodeError, csv.Error):
+        rows = [{}]
+    found = {}
+    for row in rows:
+        if not set((*FIRST, *LAST)) <= set(row):
+            raise ValueError(
+                f"{path} is not a table of grades (or a spreadsheet has changed it); move it, or choose another --out"
+            )
+        values = {key: (row[key] or "").strip() for key in (*FIRST, *LAST)}
+        letter = values["set"]
+        questions = [question.name for question in sets()[letter].questions] if letter in sets() else []
+        marks = {name: row.get(f"q{i + 1}") or "" for i, name in enumerate(questions)}
+        if values["digest"] and all(mark in SIGNS for mark in marks.values()):
+            name, status, _, variant = (values[key] for key in FIRST)
+            found[values["digest"]] = Grade(name, status, letter, variant, marks, values["note"], values["digest"])
+    return found
+
+
+def unchanged(work: Sequence[Returned], table: Mapping[str, Grade]) -> tuple[list[Grade], list[Returned]]:
+    """Rows that hold still, under the notebooks' present names, and the notebooks that have to be graded."""
+    old, new = [], []
+    for one in work:
+        row = table.get(one.digest)
+        if row is None:
+            new.append(one)
+        else:
+            old.append(replace(row, name=one.name))
+    return old, new
+
+
+def grade_all(
+    work: Sequence[Returned], path: Path, again: bool, run_all: Callable[[Sequence[Returned]], Iterable[Grade]]
+) -> tuple[list[Grade], int]:
+    """Grade what is new, and write the table after each notebook, so that an interrupted run goes on where it was.
+
+    Returns
+    -------
+    grades, old : list of Grade, int
+        By name; how many were taken from the earlier table.
+    """
+    table = read_table(path)
+    grades, new = unchanged(work, {} if again else table)
+    old = len(grades)
+    for one in run_all(new):
+        grades.append(one)
+        write_table(grades, path)
+    write_table(grades, path)
+    return sorted(grades, key=lambda one: one.name), old

@@ -1,0 +1,115 @@
+"""The structure of this package, read from its imports: which folder uses which, and what each file is for."""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+from collections.abc import Iterator
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
+
+# From the top floor down: imports only run down this list.
+LAYERS = (
+    "cli",
+    "notebooks",
+    "exercises",
+    "pages",
+    "checks",
+    "lab",
+    "scenarios",
+    "continuous",
+    "montecarlo",
+    "filters",
+    "linear",
+    "symbolic",
+    "laws",
+    "limits",
+    "files",
+)
+
+
+def modules() -> Iterator[tuple[str, Path]]:
+    """Name below `kfcourse`, such as "filters.kalman", and file of every module; a folder by its own name."""
+    root, sets = (Path(str(resources.files(package))) for package in ("kfcourse", "kfcourse.exercises"))
+    for folder, above in ((root, ""), (sets, "exercises.")):
+        for path in sorted(folder.rglob("*.py")):
+            parts = path.relative_to(folder).with_suffix("").parts
+            name = above + ".".join(parts)
+            if not name.startswith("__"):
+                yield name.removesuffix(".__init__"), path
+
+
+def imported(path: Path) -> set[str]:
+    """Modules of this package that a file imports, below `kfcourse`; not those that only a type checker reads."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    typing = {id(node) for block in ast.walk(tree) if _for_types(block) for node in ast.walk(block)}
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and id(node) not in typing and (node.module or "").split(".")[0] == "kfcourse":
+            module = (node.module or "").removeprefix("kfcourse").lstrip(".")
+            found |= {module} if module else {alias.name for alias in node.names}
+    return found
+
+
+def _for_types(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+
+
+def layer(module: str) -> str:
+    """The floor a module is on."""
+    return module.split(".")[0]
+
+
+def imports() -> Counter[tuple[str, str]]:
+    """Number of imports from one layer into another: (from, to) -> files that have one."""
+    found: Counter[tuple[str, str]] = Counter()
+    for name, path in modules():
+        found.update({(layer(name), layer(other)) for other in imported(path)} - {(layer(name), layer(name))})
+    return found
+
+
+def sentence(path: Path) -> str:
+    """What a module says of itself first."""
+    return (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n\n")[0].replace("\n", " ")
+
+
+def contents() -> str:
+    """All modules with a sentence each, folder by folder: a table in Markdown."""
+    rows = [
+        f"| `{name}` | {sentence(path).replace('|', chr(92) + '|')} |"
+        for name, path in sorted(modules(), key=lambda row: (LAYERS.index(layer(row[0])), row[0]))
+        if layer(name) != "exercises"
+    ]
+    return "\n".join(["| module | what it is for |", "| --- | --- |", *rows])
+
+
+def floors() -> str:
+    """The floors with a sentence each, from the top down: a table in Markdown."""
+    said = {name: sentence(path) for name, path in modules() if name in LAYERS}
+    return "\n".join(["| floor | what lives there |", "| --- | --- |", *(f"| `{name}` | {said[name]} |" for name in LAYERS)])
+
+
+def drawing(ax: Axes) -> Axes:
+    """Who uses whom: a row and a column for each floor, and in each square how many files of the row import from the column.
+
+    Imports run down the house if nothing stands below the diagonal.
+    """
+    used, size = imports(), len(LAYERS)
+    counts = np.array([[used[above, below] for below in LAYERS] for above in LAYERS])
+    ax.pcolormesh(np.where(counts > 0, np.sqrt(counts), np.nan), cmap="Blues", vmin=0, vmax=1.6 * np.sqrt(counts.max()))
+    for i, j in zip(*np.nonzero(counts), strict=True):
+        ax.text(j + 0.5, i + 0.5, counts[i, j], ha="center", va="center")
+    for i in range(size):
+        ax.add_patch(Rectangle((i, i), 1, 1, color="0.85", lw=0))
+    ticks = np.arange(size) + 0.5
+    ax.set(xticks=ticks, yticks=ticks, aspect="equal", xlim=(0, size), ylim=(size, 0))
+    ax.set_xticklabels(LAYERS, rotation=60, ha="left", rotation_mode="anchor")
+    ax.set_yticklabels(LAYERS)
+    ax.xaxis.tick_top()
+    ax.tick_params(length=0)
+    ax.spines[:].set_visible(False)
+    return ax

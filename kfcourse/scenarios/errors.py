@@ -1,0 +1,52 @@
+"""Errors of a track by part of the flight, with standard errors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kfcourse.laws import Array
+from kfcourse.montecarlo.statistics import Estimate
+
+
+def rms_by_part(error: Array, part: Array) -> Estimate:
+    """Root mean square length of the error in each part, with standard errors.
+
+    For a run, the mean over the steps of the part of |e|^2; then the root of its mean over the runs.  The runs are independent,
+    the steps of a run are not: the standard error comes from the scatter of the runs.
+
+    Parameters
+    ----------
+    error : ndarray (steps, runs, 3)
+    part : ndarray (steps,)
+        Labels, such as `track.part`; the results are in their sorted order.
+    """
+    squares = _by_part(error, part)
+    return _root(squares, squares.mean(axis=1))
+
+
+def rms_difference(error: Array, other: Array, part: Array) -> Estimate:
+    """RMS of `error` less that of `other` by part, as `rms_by_part`, on common runs: the standard error is of the pair."""
+    ours, theirs = _by_part(error, part), _by_part(other, part)
+    first, second = (np.sqrt(squares.mean(axis=1)) for squares in (ours, theirs))
+    # d sqrt(m) = dm / (2 sqrt(m)), for both from the same run
+    influence = ours / (2 * first[:, None]) - theirs / (2 * second[:, None])
+    return Estimate(first - second, _standard_error(influence), ours.shape[1] - 1)
+
+
+def _by_part(error: Array, part: Array) -> Array:
+    """Mean square length by part and run, (parts, runs)."""
+    if error.ndim != 3 or len(error) != len(part):
+        raise ValueError(f"errors must have the shape ({len(part)}, runs, components), got {error.shape}")
+    if error.shape[1] < 2:
+        raise ValueError("a standard error needs at least 2 runs")
+    square = (error**2).sum(axis=-1)
+    return np.stack([square[part == label].mean(axis=0) for label in np.unique(part)])
+
+
+def _root(squares: Array, mean: Array) -> Estimate:
+    root = np.sqrt(mean)
+    return Estimate(root, _standard_error(squares / (2 * root[:, None])), squares.shape[1] - 1)
+
+
+def _standard_error(values: Array) -> Array:
+    return values.std(axis=1, ddof=1) / np.sqrt(values.shape[1])

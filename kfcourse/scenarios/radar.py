@@ -1,0 +1,173 @@
+"""What a radar measures of an aircraft: range and angles or Cartesian coordinates, with normal errors; its tracking models."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import sympy as sp
+
+from kfcourse.laws import Array
+from kfcourse.scenarios.flight import Track
+from kfcourse.symbolic.codegen import compile_function
+from kfcourse.symbolic.formula import symbol
+from kfcourse.symbolic.model import Model
+
+X, Y, Z = symbol("x"), symbol("y"), symbol("z")
+RANGE, AZIMUTH, ELEVATION = symbol("r"), symbol("varphi"), symbol("epsilon")
+
+# Range, azimuth from the x axis towards y in (-pi, pi], elevation above the horizon; and the way back.
+SPHERICAL = sp.ImmutableMatrix(
+    [sp.sqrt(X**2 + Y**2 + Z**2), sp.atan2(Y, X), sp.atan2(Z, sp.sqrt(X**2 + Y**2))],
+)
+CARTESIAN = sp.ImmutableMatrix(
+    [
+        RANGE * sp.cos(ELEVATION) * sp.cos(AZIMUTH),
+        RANGE * sp.cos(ELEVATION) * sp.sin(AZIMUTH),
+        RANGE * sp.sin(ELEVATION),
+    ]
+)
+
+_to_spherical = compile_function(
+    "spherical",
+    {"position": sp.Matrix([X, Y, Z])},
+    {"measured": SPHERICAL},
+    ["position", "measured"],
+    "range, azimuth, elevation",
+).function
+_to_cartesian = compile_function(
+    "cartesian",
+    {"measured": sp.Matrix([RANGE, AZIMUTH, ELEVATION])},
+    {"position": CARTESIAN},
+    ["measured", "position"],
+    "x, y, z",
+).function
+
+
+def spherical(position: Array) -> Array:
+    """Range (m), azimuth and elevation (rad) of positions (..., 3) in m: `SPHERICAL`."""
+    return _to_spherical(position)[0]
+
+
+def cartesian(measured: Array) -> Array:
+    """Positions (..., 3) in m of range (m), azimuth and elevation (rad): `CARTESIAN`, the inverse of `spherical`."""
+    return _to_cartesian(measured)[0]
+
+
+def measure_cartesian(track: Track, sigmas: float | Sequence[float], runs: int, seed: int | np.random.Generator) -> Array:
+    """The position with independent normal errors on the three axes.
+
+    Parameters
+    ----------
+    track : Track
+    sigmas : float or (x, y, z)
+        Standard deviations, m.
+    runs : int
+        Independent sets of measurements of the same flight.
+    seed : int or numpy.random.Generator
+
+    Returns
+    -------
+    ndarray (steps, runs, 3)
+    """
+    return _noisy(track.position, sigmas, runs, seed)
+
+
+def measure_spherical(track: Track, sigmas: Sequence[float], runs: int, seed: int | np.random.Generator) -> Array:
+    """Range, azimuth and elevation with independent normal errors, (steps, runs, 3).
+
+    Parameters
+    ----------
+    track : Track
+    sigmas : (range, azimuth, elevation)
+        Standard deviations in m, rad, rad.
+    runs, seed
+        As in `measure_cartesian`.
+
+    Raises
+    ------
+    ValueError
+        The flight comes so near to the azimuth pi that measurements jump by 2 pi there: a filter would take the jump for an
+        innovation.
+    """
+    true = spherical(track.position)
+    measured = _noisy(true, sigmas, runs, seed)
+    if (np.abs(np.diff(np.unwrap(true[:, 1]) - true[:, 1])) > 1).any() or (np.abs(measured[..., 1]) > np.pi).any():
+        raise ValueError(
+            "the flight crosses the azimuth pi, where the angle jumps by 2 pi; move it with `start`, or turn it with `heading`"
+        )
+    return measured
+
+
+def _noisy(true: Array, sigmas: float | Sequence[float], runs: int, seed: int | np.random.Generator) -> Array:
+    try:
+        deviations = np.broadcast_to(np.asarray(sigmas, dtype=float), (3,))
+    except (TypeError, ValueError):
+        raise ValueError(f"sigmas must be one number or three, got {sigmas!r}") from None
+    if not (np.isfinite(deviations).all() and deviations.min() >= 0):
+        raise ValueError(f"standard deviations must be finite and not negative, got {sigmas!r}")
+    if isinstance(runs, bool) or not isinstance(runs, int | np.integer) or runs < 1:
+        raise ValueError(f"runs must be a positive whole number, got {runs!r}")
+    noise = np.random.default_rng(seed).standard_normal((len(true), int(runs), 3))
+    return true[:, None, :] + deviations * noise
+
+
+def kinematic(
+    interval: float,
+    *,
+    dimensions: int = 3,
+    order: int = 1,
+    noise_sd: float = 1.0,
+    measurement_sd: float = 1.0,
+    prior: dict[str, Array] | None = None,
+) -> Model:
+    """Motion with a highest derivative that changes at random, its position measured.
+
+    order 1: velocity nearly constant.  The acceleration v_k is constant over an interval T, and independent of the last:
+
+        r' = r + T s + T^2/2 v,   s' = s + T v
+
+    order 2: acceleration nearly constant.  v_k is its increment:
+
+        r' = r + T s + T^2/2 (a + v),   s' = s + T (a + v),   a' = a + v
+
+    Parameters
+    ----------
+    interval : float
+        T, s.
+    dimensions : int
+        1, 2 or 3.  The state is (x, y, z, vx, vy, vz), then ax, ay, az.
+    order : int
+        1 or 2.
+    noise_sd, measurement_sd : float
+        Standard deviations of v_k, m/s^2, and of the measurements, m.
+    prior : dict, optional
+        Law of the first state, as in `Model.define`.
+    """
+    if dimensions not in (1, 2, 3) or order not in (1, 2):
+        raise ValueError(f"dimensions must be 1, 2 or 3 and order 1 or 2, got {dimensions} and {order}")
+    if not (np.isfinite(interval) and interval > 0):
+        raise ValueError(f"interval must be a positive number of seconds, got {interval}")
+    for name, value in (("noise_sd", noise_sd), ("measurement_sd", measurement_sd)):
+        if not (np.isfinite(value) and value >= 0):
+            raise ValueError(f"{name} must be finite and not negative, got {value}")
+    axes = "xyz"[:dimensions]
+    names = [prefix + axis for prefix in ("", "v", "a")[: order + 1] for axis in axes]
+    T, state = symbol("T"), [symbol(name) for name in names]
+    noises = [symbol(f"v{i + 1}") for i in range(dimensions)]
+    r, s = state[:dimensions], state[dimensions : 2 * dimensions]
+    acceleration = [a + v for a, v in zip(state[2 * dimensions :] or [0] * dimensions, noises, strict=True)]
+    equations = [
+        *(ri + T * si + T**2 / 2 * ai for ri, si, ai in zip(r, s, acceleration, strict=True)),
+        *(si + T * ai for si, ai in zip(s, acceleration, strict=True)),
+        *(acceleration if order == 2 else []),
+    ]
+    return Model.define(
+        equations,
+        [ri + symbol(f"w{i + 1}") for i, ri in enumerate(r)],
+        {"T": interval},
+        symbols={"x": names},
+        prior=prior,
+        state_noise={"variance": float(noise_sd) ** 2},
+        meter_noise={"variance": float(measurement_sd) ** 2},
+    )

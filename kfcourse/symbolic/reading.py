@@ -1,0 +1,123 @@
+"""What people write of a model, checked and read: names, numbers, formulas, laws.
+
+`Model` and `ContinuousModel` are built from these; whatever does not fit is a `ModelError` that says what to change.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+import sympy as sp
+
+from kfcourse.laws import Array, Gaussian
+from kfcourse.symbolic.formula import check_name, parse
+
+Formula: TypeAlias = str | sp.Expr
+Formulas: TypeAlias = Formula | Sequence[Formula] | sp.MatrixBase
+Names: TypeAlias = Sequence[str]
+
+
+class ModelError(ValueError):
+    """The description of a model is inconsistent; the message says what to change."""
+
+
+def by_name(*groups: tuple[sp.Symbol, ...]) -> dict[str, sp.Symbol]:
+    """Symbols by their names."""
+    return {s.name: s for group in groups for s in group}
+
+
+def table(what: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
+    """A table that may have been left out."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise ModelError(f"`{what}` must be a table such as {{'name': value}}, got {given!r}")
+    return dict(given)
+
+
+def checked_name(name: str) -> str:
+    """The name, if a symbol may have it."""
+    try:
+        return check_name(name)
+    except ValueError as error:
+        raise ModelError(str(error)) from None
+
+
+def exact_number(name: str, value: Any) -> sp.Rational:
+    """The decimal number a person typed, exactly: 0.9 is 9/10."""
+    if isinstance(value, sp.Rational):
+        return value
+    try:
+        number = float(value) if isinstance(value, int | float | np.integer | np.floating) else float("nan")
+    except OverflowError:
+        number = float("inf")
+    if isinstance(value, bool) or not np.isfinite(number):
+        raise ModelError(f"parameter {name} = {value!r}: expected a finite number")
+    if number and not 1e-100 < abs(number) < 1e100:
+        raise ModelError(f"parameter {name} = {value!r} is too large or too small; change the units")
+    return sp.Rational(str(value))
+
+
+def exact_matrix(array: Array) -> sp.ImmutableMatrix:
+    """Decimal numbers as exact rationals; a vector becomes a column."""
+    rows = array[:, None] if array.ndim == 1 else array
+    return sp.ImmutableMatrix([[sp.Rational(str(float(value))) for value in row] for row in rows])
+
+
+def formula_list(what: str, formulas: Formulas) -> list[Formula]:
+    """One formula or several as a list."""
+    if isinstance(formulas, str) or (isinstance(formulas, sp.Expr) and not isinstance(formulas, sp.MatrixBase)):
+        return [formulas]
+    result = list(formulas) if isinstance(formulas, Sequence | sp.MatrixBase) else [formulas]
+    if not result:
+        raise ModelError(f"`{what}` holds no formula")
+    for formula in result:
+        if not isinstance(formula, str | sp.Expr):
+            raise ModelError(f"`{what}` must be a formula or a list of formulas, got {formula!r}")
+    return result
+
+
+def names_in(formula: Formula) -> set[str]:
+    """Names that may be symbols in a formula."""
+    if isinstance(formula, str):
+        return set(re.findall(r"[A-Za-z][A-Za-z0-9_]*", formula))
+    return {s.name for s in formula.free_symbols if isinstance(s, sp.Symbol)}
+
+
+def read(formula: Formula, known: dict[str, sp.Symbol], what: str) -> sp.Expr:
+    """A formula as an expression in the known symbols."""
+    if isinstance(formula, str):
+        return parse(formula, known)
+    # Symbols of the caller are recognised by name, whatever their assumptions.
+    unknown = sorted(names_in(formula) - set(known))
+    if unknown:
+        raise ModelError(f"the {what} equation {formula} has unknown symbols {', '.join(unknown)}; known: {', '.join(known)}")
+    return formula.subs({s: known[s.name] for s in formula.free_symbols})
+
+
+def law(what: str, given: Mapping[str, Any] | None, size: int) -> Gaussian:
+    """A Gaussian from {"mean": ..., "variance": ...}; standard normal for what is left out."""
+    parts = table(what, given)
+    if set(parts) - {"mean", "variance"}:
+        raise ModelError(f"`{what}` has the keys mean and variance, not {', '.join(sorted(set(parts) - {'mean', 'variance'}))}")
+    try:
+        mean = np.broadcast_to(np.asarray(parts.get("mean", 0.0), dtype=float), (size,)).copy()
+        cov = np.asarray(parts.get("variance", 1.0), dtype=float)
+        cov = cov.copy() if cov.ndim == 2 else np.diag(np.broadcast_to(cov, (size,)))
+    except (TypeError, ValueError):
+        raise ModelError(
+            f"`{what}`: mean and variance must be numbers, or lists of {size} numbers (variance: or a matrix)"
+        ) from None
+    if cov.shape != (size, size):
+        raise ModelError(f"`{what}`: the covariance has shape {cov.shape}, expected ({size}, {size})")
+    if not (np.isfinite(mean).all() and np.isfinite(cov).all()):
+        raise ModelError(f"`{what}`: mean and variance must be finite, got {mean} and {cov.tolist()}")
+    if not np.array_equal(cov, cov.T):
+        raise ModelError(f"`{what}`: the covariance matrix must be symmetric, got {cov.tolist()}")
+    eigenvalues = np.linalg.eigvalsh(cov)
+    if eigenvalues.min() < -1e-12 * max(eigenvalues.max(), 0.0):  # rounding of eigvalsh
+        raise ModelError(f"`{what}`: negative variance in {cov.tolist()}")
+    return Gaussian(mean, cov)

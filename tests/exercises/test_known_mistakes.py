@@ -1,0 +1,151 @@
+"""Every answer of every set passes, every known mistake is recognised by its name, and no message gives an answer away."""
+
+import ast
+import random
+from collections import Counter
+from functools import cache
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from kfcourse.checks import engine, exercise, sets
+
+# Questions about the variant's model are asked for variants of all kinds.  The others are called with hidden functions, numbers:
+# two draws of them.  So are those of sets f and g, g's in the dimensions of the variant: a variant for each of them.
+MODELS = ("53", "7", "9", "12", "20", "21")
+DRAWS = ("53", "21")
+HIDDEN = {"f": DRAWS, "g": ("53", "12", "20", "21")} | {letter: DRAWS for letter, one in sets().items() if not one.about_variant}
+
+QUESTIONS = [pytest.param(letter, question, id=question.name) for letter, one in sets().items() for question in one.questions]
+CASES = [
+    pytest.param(letter, question, variant, id=f"{question.name}-{variant}")
+    for letter, one in sets().items()
+    for question in one.questions
+    for variant in HIDDEN.get(letter, MODELS)
+]
+
+
+@cache
+def opened(letter, variant):
+    return exercise(letter, variant)
+
+
+@pytest.fixture
+def each_mistake_once(monkeypatch):
+    """A check evaluates the whole catalogue; for all mistakes of a question in turn that is the same results again and again."""
+    wrong, found = engine._wrong, {}
+
+    def remembered(mistake, *arguments):
+        if id(mistake) not in found:
+            found[id(mistake)] = wrong(mistake, *arguments)
+        return found[id(mistake)]
+
+    monkeypatch.setattr(engine, "_wrong", remembered)
+
+
+def test_names_follow_the_set():
+    for letter, one in sets().items():
+        assert [question.name for question in one.questions] == [f"{letter}{i + 1}" for i in range(len(one.questions))]
+        assert {question.level for question in one.questions} <= {"warm-up", "core", "stretch"}
+
+
+@pytest.mark.parametrize(("letter", "question"), QUESTIONS)
+def test_core_questions_know_five_mistakes(letter, question):
+    for mistake in question.mistakes:
+        assert len(mistake.says) > 15, mistake.name
+    if question.level == "core":
+        assert len({mistake.name for mistake in question.mistakes}) >= 5
+
+
+@pytest.mark.usefixtures("each_mistake_once")
+@pytest.mark.parametrize(("letter", "question", "variant"), CASES)
+def test_every_answer_and_every_mistake(letter, question, variant):
+    """The right answer passes.  A mistake is diagnosed by its name, or it is the same as the right answer here, or impossible.
+
+    Hidden arguments tell every mistake from the answer: there none is the same.  No message gives the answer away.
+    """
+    lab = opened(letter, variant)
+    key, arguments = question.answer(lab), list(question.arguments(lab))
+    assert lab.check(question.name, key).passed
+    right = [key(*values) for values in arguments]
+    given_away = telling(right)
+    for mistake in question.mistakes:
+        try:
+            wrong = mistake.answer(lab)
+        except ValueError:
+            assert letter not in HIDDEN
+            continue
+        result = lab.check(question.name, wrong)
+        assert not [text for text in given_away if text in result.message.replace(" ", "")]
+        fact = equal_in_fact(wrong, arguments, right)
+        if letter in HIDDEN:
+            assert fact is not True
+        if mistake.name in result.diagnosis:
+            assert mistake.says in result.message
+            assert fact is not True
+        else:
+            expected = {True: "passed", None: "unusable", False: "diagnosed"}[fact]
+            assert result.status == expected, f"{mistake.name}: {result}"
+
+
+def equal_in_fact(wrong, arguments, right):
+    """Whether a mistake gives the right numbers, to rounding; None if its numbers have another shape, or there are none."""
+    try:
+        with np.errstate(all="ignore"):
+            theirs = [wrong(*values) for values in arguments]
+        pairs = [pair for found, expected in zip(theirs, right, strict=True) for pair in paired(found, expected)]
+    except Exception:  # a mistake that this variant does not allow
+        return None
+    if any(np.shape(a) != np.shape(b) for a, b in pairs):
+        return None
+    with np.errstate(all="ignore"):
+        # Formulas are evaluated in doubles, sums of some tens of terms: 1e-9 is far above their rounding.
+        return all(np.allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(b).max()) for a, b in pairs)
+
+
+def paired(found, expected):
+    """The parts of two results as arrays."""
+    return list(zip(numbers(found), numbers(expected), strict=True))
+
+
+def numbers(result):
+    """A result as arrays; formulas at a random point, the same for the same name."""
+    if isinstance(result, tuple | list):
+        return [array for part in result for array in numbers(part)]
+    if not isinstance(result, sp.Basic | sp.MatrixBase):
+        return [np.asarray(result, dtype=complex)]
+    point = {s: sp.Float(0.2 + random.Random(s.name).random()) for s in result.free_symbols}
+    entries = result.tolist() if isinstance(result, sp.MatrixBase) else result
+    return [
+        np.vectorize(lambda entry: complex(sp.sympify(entry).xreplace(point)), otypes=[complex])(np.array(entries, dtype=object))
+    ]
+
+
+def telling(right):
+    """The right formulas, in the usual ways of writing them."""
+    formulas = [formula for result in right for formula in flat(result) if isinstance(formula, sp.Expr)]
+    forms = {form(q) for q in formulas for form in (str, sp.latex, lambda q: str(sp.expand(q)))}
+    return [text for text in (form.replace(" ", "") for form in forms) if len(text) > 3]
+
+
+def flat(result):
+    return [entry for part in result for entry in flat(part)] if isinstance(result, tuple | list | sp.MatrixBase) else [result]
+
+
+def test_messages_of_the_package_are_not_code():
+    """What a student reads names the kind of mistake: no message is a Python expression."""
+    for one in sets().values():
+        for question in one.questions:
+            for mistake in question.mistakes:
+                with pytest.raises(SyntaxError):
+                    ast.parse(mistake.says)
+
+
+def test_no_message_is_typed_twice():
+    """What is said in more than one place has its home in exercises/messages.py."""
+    said = {mistake.says for one in sets().values() for question in one.questions for mistake in question.mistakes}
+    files = sorted(sets()["a"].folder.parent.rglob("*.py"))
+    nodes = [node for file in files for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))]
+    typed = Counter(node.value for node in nodes if isinstance(node, ast.Constant) and node.value in said)
+    assert [text for text, times in typed.items() if times > 1] == []

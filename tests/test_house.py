@@ -1,0 +1,54 @@
+"""The house keeps its order: imports run down its floors, no module hides behind a function, each room says what it is."""
+
+import inspect
+from graphlib import TopologicalSorter
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import kfcourse
+from kfcourse.pages.house import LAYERS, imported, imports, layer, modules, sentence
+
+MODULES = dict(modules())
+
+
+def test_imports_run_down_and_only_between_known_floors():
+    assert {layer(name) for name in MODULES} == set(LAYERS)
+    upwards = [pair for pair in imports() if LAYERS.index(pair[0]) > LAYERS.index(pair[1])]
+    assert upwards == []
+
+
+def test_no_circle():
+    graph = {name: {other for other in imported(path) if other in MODULES} - {name} for name, path in MODULES.items()}
+    folders = {name for name, path in MODULES.items() if path.name == "__init__.py"}
+    files = {name: others - folders for name, others in graph.items() if name not in folders}
+    assert len(list(TopologicalSorter(files).static_order())) >= len(files)  # CycleError if there is one
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_a_module_does_not_carry_the_name_of_what_it_exports(name):
+    module, last = import_module(f"kfcourse.{name}"), name.rpartition(".")[2]
+    assert inspect.ismodule(module)
+    assert last not in vars(module) or inspect.ismodule(vars(module)[last])
+    assert last not in kfcourse.__all__
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_a_module_says_what_it_is(name):
+    said = sentence(MODULES[name])
+    assert said.endswith((".", "?", "!", '"', "`")) and len(said) > 20, said
+
+
+def test_the_page_of_the_package_has_every_module():
+    page = (Path(__file__).parent.parent / "book" / "api.md").read_text(encoding="utf-8")
+    missing = [name for name in MODULES if f".. automodule:: kfcourse.{name}\n" not in page and layer(name) != "exercises"]
+    assert missing == []
+
+
+def test_what_notebooks_import_is_there():
+    for name in kfcourse.__all__:
+        assert hasattr(kfcourse, name)
+    from kfcourse.checks import exercise
+
+    assert exercise("a").check("a2", None).status == "unusable"
