@@ -79,6 +79,7 @@ def snapshot(folder):
 # --- listing
 
 
+@pytest.mark.quick
 def test_variants_are_listed_with_titles_and_equations(call):
     result = call("variants")
     assert result.exit_code == 0
@@ -155,6 +156,7 @@ def test_without_exact_runs_the_exact_filter_is_left_out(call, tmp_path):
     assert set(json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]) == {"duof"}
 
 
+@pytest.mark.quick
 def test_filters_can_be_chosen(call, no_report, tmp_path):
     result = call("lab", "53", *QUICK, "--filters", "fos3-gaussian, duof ,aof-unscented", "--json", "n.json")
     assert result.exit_code == 0, result.output
@@ -214,6 +216,7 @@ def test_designing_on_the_same_ensemble_is_another_result(call, no_report, tmp_p
 # --- mistakes
 
 
+@pytest.mark.quick
 def test_an_unknown_variant_names_the_known_ones(call, no_computation):
     refused(call("lab", "999", *QUICK), "'999'", "53, 1, 2")
 
@@ -260,6 +263,7 @@ def test_a_bad_json_is_refused_before_the_computation(call, no_computation, path
     refused(call("lab", "53", *QUICK, "--json", path), path, "--json")
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     "option",
     [("--runs", "1"), ("--runs", "many"), ("--steps", "0"), ("--seed", "-1"), ("--threads", "0"), ("--exact-runs", "-1")],

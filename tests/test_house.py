@@ -10,6 +10,8 @@ import pytest
 import kfcourse
 from kfcourse.pages.house import LAYERS, imported, imports, layer, modules, sentence
 
+pytestmark = pytest.mark.quick
+
 MODULES = dict(modules())
 
 

@@ -6,6 +6,8 @@ import pytest
 from kfcourse.filters.designed import Scatter
 from kfcourse.laws import Gaussian, Measurement, apply, correct, gain, product, square_root, symmetric, transpose
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.fixture
 def rng():

@@ -11,6 +11,8 @@ from tiny import FORMULA, SUM, asks, c, d, outcome, p, raises, x, y
 from kfcourse.checks.engine import check
 from kfcourse.checks.question import MIME, ForVariant, Mistake, Question, catalogue
 
+pytestmark = pytest.mark.quick
+
 
 def test_a_right_answer_passes_in_any_form():
     assert outcome(SUM, lambda a, b: a + b + b).passed

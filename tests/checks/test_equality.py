@@ -9,6 +9,8 @@ from tiny import c, p, z
 
 from kfcourse.checks.equality import Unusable, equal, equal_formulas, like
 
+pytestmark = pytest.mark.quick
+
 
 def test_like_keeps_numbers_and_shapes():
     assert like([1, 2], np.zeros(2)).dtype == float

@@ -11,6 +11,8 @@ from kfcourse.checks import engine
 from kfcourse.checks.question import Mistake
 from kfcourse.limits import OutOfTime, time_limit
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.mark.parametrize("answer", [endless, stubborn, very_stubborn], ids=lambda answer: answer.__name__)
 def test_endless_loops_end(answer):

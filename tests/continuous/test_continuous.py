@@ -29,6 +29,8 @@ from kfcourse.symbolic.formula import FormulaError
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import linearised
 
+pytestmark = pytest.mark.quick
+
 N_VECTOR = [[0.3, 0.1], [0.1, 0.2]]
 S_VECTOR = [[0.8, 0.2], [0.2, 0.5]]
 

@@ -28,6 +28,8 @@ from by_hand import (
 
 from kfcourse.checks import exercise, sets
 
+pytestmark = pytest.mark.quick
+
 FIRST = "abcde"
 x, y, z, p, m, d = sp.symbols("x y z p m d", real=True)
 c, e, g, f = sp.symbols("c e g f", real=True)

@@ -6,6 +6,8 @@ import sympy as sp
 from kfcourse.checks import ExerciseError, exercise
 from kfcourse.lab.variants import VariantError
 
+pytestmark = pytest.mark.quick
+
 
 def test_no_such_set_question_or_variant():
     with pytest.raises(ExerciseError, match="no exercise set 'zz'; there are a, b"):

@@ -9,6 +9,8 @@ import pytest
 from kfcourse.checks import exercise, sets
 from kfcourse.notebooks.master import read, render, without_solution
 
+pytestmark = pytest.mark.quick
+
 QUESTIONS = [pytest.param(letter, question, id=question.name) for letter, one in sets().items() for question in one.questions]
 
 

@@ -18,6 +18,8 @@ from kfcourse.linear import covariances
 from kfcourse.linear.system import linear_system
 from kfcourse.scenarios.radar import kinematic
 
+pytestmark = pytest.mark.quick
+
 T = 0.7
 ROUNDING = 1e-12  # relative, after some tens of steps of a stable recursion
 

@@ -29,6 +29,8 @@ from kfcourse.symbolic.quadrature import gauss_hermite, unscented
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import gaussian, linearised
 
+pytestmark = pytest.mark.quick
+
 STRUCTURES = {
     "linearised": linearised,
     "gaussian": gaussian,

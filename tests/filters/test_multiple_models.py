@@ -12,6 +12,8 @@ from kfcourse.filters.multiple_models import imm, log_likelihood, mixture
 from kfcourse.laws import Measurement
 from kfcourse.linear.system import linear_system
 
+pytestmark = pytest.mark.quick
+
 ROUNDING = 1e-10  # relative; some tens of steps, with likelihoods in between
 
 PRIOR = {"mean": [1.0, -0.5], "variance": [[2.0, 0.3], [0.3, 1.0]]}

@@ -6,6 +6,8 @@ import pytest
 from kfcourse import Model, ModelError, load_variants, run, simulate
 from kfcourse.filters import kalman_filter, particle, pointmass
 
+pytestmark = pytest.mark.quick
+
 PARTICLES, REPLICAS = 1000, 100
 
 

@@ -12,6 +12,8 @@ from kfcourse.lab import plots
 from kfcourse.lab.short_names import FILTERS, LAB, title
 from kfcourse.symbolic.structure import gaussian
 
+pytestmark = pytest.mark.quick
+
 DRAW = [plots.accuracy, plots.relative_accuracy, plots.ranking, plots.consistency]
 
 

@@ -7,6 +7,8 @@ from kfcourse.filters import Design, Filter
 from kfcourse.lab.short_names import FILTERS, LAB, has_exact, title
 from kfcourse.lab.variants import VariantError, find_variant
 
+pytestmark = pytest.mark.quick
+
 SHIPPED = load_variants()
 GOOD = 'state = "0.9*x + v"\nmeter = "x + w"\n'
 

@@ -22,6 +22,8 @@ from kfcourse.montecarlo.experiment import predictions, run
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import linearised
 
+pytestmark = pytest.mark.quick
+
 SIGMA = 4  # standard errors: one chance in 16 000 a comparison
 RUNS, STEPS = 2000, 12
 

@@ -16,6 +16,8 @@ from kfcourse.linear.consistency import innovations, nis
 from kfcourse.montecarlo.experiment import run as run_filter
 from kfcourse.symbolic.model import Model
 
+pytestmark = pytest.mark.quick
+
 # Conditions of the covariances below are up to 1e4: rounding of float64 (1e-16) times that, over a dozen steps.
 ROUNDING = {"rtol": 1e-10, "atol": 1e-10}
 

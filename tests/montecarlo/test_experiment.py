@@ -16,6 +16,8 @@ from kfcourse.montecarlo.experiment import compare, run
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import gaussian, linearised
 
+pytestmark = pytest.mark.quick
+
 SIGMA = 4  # standard errors: one chance in 16 000 a comparison
 
 

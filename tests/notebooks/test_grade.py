@@ -282,6 +282,7 @@ def test_a_solution_passes(graded):
     assert line.split()[1:] == ["b", "12", "2", "of", "5", "✓✓–––"]
 
 
+@pytest.mark.quick
 def test_wrong_answers_are_diagnosed(graded_here):
     _, marks, note = graded_here(wrong())
     assert marks == ("wrong", "wrong")
@@ -520,6 +521,7 @@ def test_broken_tables_are_refused(tmp_path, text):
         read_table(path)
 
 
+@pytest.mark.quick
 def test_the_table_comes_back_as_it_was(tmp_path):
     grades = [
         Grade("М-1/Иванов, И.ipynb", "graded", "b", "53", MARKS, 'b2: "sign"; look', "d1"),
@@ -583,6 +585,7 @@ def test_strange_claims_are_explained(claim):
         claimed(claim, [], None)
 
 
+@pytest.mark.quick
 def test_claimed_variants(tmp_path):
     table = {key: value for key, value in MINE.items() if key != "name"}
     claim, cells = {"set": "b", "variant": "mine"}, [Cell(1, "", "", f'task = exercise("b", {MINE!r})')]
@@ -624,6 +627,7 @@ def test_nothing_returned_is_the_notebook_handed_out():
     assert sources(cells_of(handed_out())) == (PLAIN, [])
 
 
+@pytest.mark.quick
 def test_cells_of_the_student_keep_their_places():
     notebook = solved()
     add(notebook, "first = 1", "import matplotlib")

@@ -94,6 +94,7 @@ def contents(folder):
 # -- masters
 
 
+@pytest.mark.quick
 def test_solution_and_stub():
     notebook = tiny()
     answer = code(student(notebook, {}))[1]
@@ -109,6 +110,7 @@ def test_solution_and_stub():
     assert "correct_name = correct.__name__" in texts[0]  # what stands behind the end marker stays
 
 
+@pytest.mark.quick
 def test_notebook_knows_its_set_and_variant():
     notebook = student(tiny("7"), {})
     assert notebook.metadata["kfcourse"] == {"set": "b", "variant": "7"}
@@ -131,6 +133,7 @@ def test_picture_to_reach_stands_before_its_cell():
 AFTER, WITHOUT = "END SOLUTION without BEGIN SOLUTION before it", "BEGIN SOLUTION without END SOLUTION"
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -153,6 +156,7 @@ def test_missing_master(tmp_path):
         read("b", tmp_path)
 
 
+@pytest.mark.quick
 def test_markers_in_code_and_text():
     text = "before\n  # BEGIN SOLUTION\n  secret\n  # END SOLUTION\nafter"
     assert without_solution(text, True) == f"before\n  {STUB}\n  raise NotImplementedError\nafter"
@@ -160,6 +164,7 @@ def test_markers_in_code_and_text():
     assert without_markers(text) == "before\n  secret\nafter"
 
 
+@pytest.mark.quick
 def test_statement_is_a_page_without_solutions():
     page = statement(tiny(), {})
     assert "secret" not in page and "solve" not in page and "SOLUTION" not in page
@@ -189,6 +194,7 @@ FORMULAS = [
 ]  # fmt: skip
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("formula", FORMULAS, ids=str)
 def test_printed_formula_is_the_formula(formula):
     assert sp.sympify(evaluated(python(formula))) == formula
@@ -223,6 +229,7 @@ def test_printed_matrix():
 # -- every set
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("variant", ["53", "21"])
 @pytest.mark.parametrize("letter", sets())
 def test_every_line_of_a_stub_is_in_the_solution(letter, variant):
@@ -426,6 +433,7 @@ def test_save_is_all_or_nothing(tmp_path):
     assert target.stat().st_mode & 0o777 == 0o644
 
 
+@pytest.mark.quick
 def test_a_solution_that_does_not_pass_is_not_handed_out(tmp_path, masters, monkeypatch):
     monkeypatch.setattr(jobs, "execute", execute_inside)
     (masters / "b_aof" / "statement.md").write_text(TINY.replace("cross = G @ Psi", "cross = 2 * G @ Psi"), encoding="utf-8")
@@ -592,6 +600,7 @@ def test_lists_of_spreadsheets_are_read(tmp_path, separator, encoding):
     assert (one.name, one.group) == ("Иванов, Иван", "М-1")
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("text", "message"),
     [

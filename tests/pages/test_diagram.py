@@ -8,6 +8,8 @@ from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 
 from kfcourse.pages.diagram import Arrow, Block, block_diagram, route
 
+pytestmark = pytest.mark.quick
+
 # A loop with every kind of block, corners, a sign, a dashed arrow and an oblique one; no two sizes are equal.
 BLOCKS = {
     "in": Block("$y$", 0, 3, 0.6, 0.5, kind="text"),

@@ -11,6 +11,8 @@ from kfcourse.scenarios.errors import rms_by_part, rms_difference
 from kfcourse.scenarios.flight import aircraft
 from kfcourse.scenarios.radar import CARTESIAN, SPHERICAL, cartesian, kinematic, measure_cartesian, measure_spherical, spherical
 
+pytestmark = pytest.mark.quick
+
 # Not the defaults: every number different, one turn to the right.
 OTHER = dict(
     start=(3_000.0, 40_000.0, 9_000.0),

@@ -18,6 +18,8 @@ from kfcourse.linear import LinearSystem, run
 from kfcourse.linear.consistency import nees
 from kfcourse.scenarios.navigation import Clock, Dynamics, Inputs, Observation, Path, Sensor, fuse, observe, sample
 
+pytestmark = pytest.mark.quick
+
 # Position and velocity driven by a known acceleration, with white noise of both; everything non-unit.
 A = np.array([[0.0, 1.0], [-0.04, -0.3]])
 QC = np.array([[0.02, 0.01], [0.01, 0.5]])

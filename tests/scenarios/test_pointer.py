@@ -17,6 +17,8 @@ from kfcourse.scenarios.pointer import (
     uniform_acceleration,
 )
 
+pytestmark = pytest.mark.quick
+
 # ---------------------------------------------------------------- the model
 
 

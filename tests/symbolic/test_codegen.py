@@ -8,6 +8,8 @@ import sympy as sp
 
 from kfcourse.symbolic.codegen import compile_function
 
+pytestmark = pytest.mark.quick
+
 x1, x2, p11, p12, p22 = sp.symbols("x1 x2 p11 p12 p22", real=True)
 ARGUMENTS = {"x": sp.Matrix([x1, x2]), "p": sp.Matrix([[p11, p12], [p12, p22]])}
 

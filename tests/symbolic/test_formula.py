@@ -9,6 +9,8 @@ import sympy as sp
 
 from kfcourse.symbolic.formula import FormulaError, check_name, parse, symbol
 
+pytestmark = pytest.mark.quick
+
 NAMES = {name: symbol(name) for name in ("x", "v", "w", "c", "f")}
 x, v, c = NAMES["x"], NAMES["v"], NAMES["c"]
 

@@ -8,6 +8,8 @@ from kfcourse.symbolic.formula import FormulaError, symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
+pytestmark = pytest.mark.quick
+
 
 def test_a_model_keeps_its_formulas_symbolic_and_its_parameters_exact(variant53):
     x, v, w, c, e, g, f = (symbol(name) for name in "xvwcegf")

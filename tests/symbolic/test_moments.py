@@ -9,6 +9,8 @@ import sympy as sp
 from kfcourse.symbolic.codegen import compile_function
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 
+pytestmark = pytest.mark.quick
+
 x, y, m, mu = sp.symbols("x y m mu", real=True)
 d, q = sp.symbols("d q", positive=True)
 scalar = GaussianMoments([x], [m], sp.Matrix([[d]]))

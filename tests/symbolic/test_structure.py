@@ -14,6 +14,8 @@ from kfcourse.symbolic.quadrature import gauss_hermite, unscented
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import gaussian, linearised
 
+pytestmark = pytest.mark.quick
+
 c, e, g, f, z, p, m, d = sp.symbols("c e g f z p m d", real=True)
 KINDS = {"linearised": linearised, "gaussian": gaussian, "unscented": unscented, "gauss-hermite": gauss_hermite}
 
