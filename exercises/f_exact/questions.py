@@ -108,4 +108,14 @@ QUESTIONS = (
     Question("f5", "how many nodes", "stretch", nodes_needed, nodes_arguments, catalogue(WRONG_NODES)),
 )
 
-SET = ExerciseSet("f", "The exact filter on a grid", Path(__file__).parent, QUESTIONS, companion_numbers)
+SET = ExerciseSet(
+    "f",
+    "The exact filter on a grid",
+    Path(__file__).parent,
+    QUESTIONS,
+    chapters=(
+        "stratonovich",
+        "checking-exact",
+    ),
+    numbers=companion_numbers,
+)

@@ -127,4 +127,12 @@ QUESTIONS = (
     Question("l7", "the clock from edges", "stretch", fit_clock, fit_arguments, catalogue(WRONG_FITS), ("rate", "shift")),
 )
 
-SET = ExerciseSet("l", "Rates and time tags", Path(__file__).parent, QUESTIONS, timing_numbers, about_variant=False)
+SET = ExerciseSet(
+    "l",
+    "Rates and time tags",
+    Path(__file__).parent,
+    QUESTIONS,
+    chapters=("time-tags",),
+    numbers=timing_numbers,
+    about_variant=False,
+)
