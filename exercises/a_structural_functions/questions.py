@@ -236,4 +236,13 @@ QUESTIONS = (
     ),
 )
 
-SET = ExerciseSet("a", "Structural functions", Path(__file__).parent, QUESTIONS)
+SET = ExerciseSet(
+    "a",
+    "Structural functions",
+    Path(__file__).parent,
+    QUESTIONS,
+    chapters=(
+        "structural-functions",
+        "linearisation",
+    ),
+)

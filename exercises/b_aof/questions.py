@@ -117,4 +117,13 @@ QUESTIONS = (
     ),
 )
 
-SET = ExerciseSet("b", "Approximations of the absolutely optimal filter", Path(__file__).parent, QUESTIONS)
+SET = ExerciseSet(
+    "b",
+    "Approximations of the absolutely optimal filter",
+    Path(__file__).parent,
+    QUESTIONS,
+    chapters=(
+        "lab-filters",
+        "extended-kalman",
+    ),
+)

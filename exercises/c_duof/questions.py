@@ -83,4 +83,4 @@ QUESTIONS = (
     ),
 )
 
-SET = ExerciseSet("c", "The two-step conditionally optimal filter", Path(__file__).parent, QUESTIONS)
+SET = ExerciseSet("c", "The two-step conditionally optimal filter", Path(__file__).parent, QUESTIONS, chapters=("lab-filters",))

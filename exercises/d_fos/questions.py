@@ -100,4 +100,4 @@ QUESTIONS = (
     ),
 )
 
-SET = ExerciseSet("d", "Filters of optimal structure", Path(__file__).parent, QUESTIONS)
+SET = ExerciseSet("d", "Filters of optimal structure", Path(__file__).parent, QUESTIONS, chapters=("lab-filters",))

@@ -158,6 +158,11 @@ def _object_at_rest(posterior: Array, x: Array, move: Law) -> Array:
 WRONG_PREDICTIONS: tuple[tuple[str, str, Answer], ...] = (
     *((name, says, prediction_with(kernel)) for name, says, kernel in WRONG_KERNELS),
     (
+        "normalised",
+        "The result is normalised; a prediction loses the mass that leaves the grid, and that should be seen.",
+        lambda posterior, x, move: predict(posterior, x, move) / ((x[1] - x[0]) * predict(posterior, x, move).sum()),
+    ),
+    (
         "transposed",
         "The matrix is transposed: the sum runs over the state after the step. Integrate over the state before it.",
         prediction_with(total=lambda P, p, h: h * P.T @ p),

@@ -61,9 +61,10 @@ def correction_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def prediction_arguments(exercise: Exercise) -> list[tuple]:
-    """A hidden density and law."""
+    """A hidden density and law; and the density with part of its mass lost, as beyond the ends of a grid."""
     x = nodes()
-    return [(normalised(hidden_density(exercise, "f3"), x), x, hidden_law(exercise, "f3"))]
+    posterior, law = normalised(hidden_density(exercise, "f3"), x), hidden_law(exercise, "f3")
+    return [(posterior, x, law), (0.8 * posterior, x, law)]
 
 
 # -- f4: a whole run
@@ -107,4 +108,14 @@ QUESTIONS = (
     Question("f5", "how many nodes", "stretch", nodes_needed, nodes_arguments, catalogue(WRONG_NODES)),
 )
 
-SET = ExerciseSet("f", "The exact filter on a grid", Path(__file__).parent, QUESTIONS, companion_numbers)
+SET = ExerciseSet(
+    "f",
+    "The exact filter on a grid",
+    Path(__file__).parent,
+    QUESTIONS,
+    chapters=(
+        "stratonovich",
+        "checking-exact",
+    ),
+    numbers=companion_numbers,
+)

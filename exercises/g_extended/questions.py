@@ -131,4 +131,6 @@ QUESTIONS = (
     ),
 )
 
-SET = ExerciseSet("g", "The extended Kalman filter and its consistency", Path(__file__).parent, QUESTIONS)
+SET = ExerciseSet(
+    "g", "The extended Kalman filter and its consistency", Path(__file__).parent, QUESTIONS, chapters=("extended-kalman",)
+)

@@ -141,4 +141,12 @@ QUESTIONS = (
     ),
 )
 
-SET = ExerciseSet("h", "The continuous-time filter", Path(__file__).parent, QUESTIONS, continuous_numbers, about_variant=False)
+SET = ExerciseSet(
+    "h",
+    "The continuous-time filter",
+    Path(__file__).parent,
+    QUESTIONS,
+    chapters=("continuous",),
+    numbers=continuous_numbers,
+    about_variant=False,
+)

@@ -104,5 +104,14 @@ QUESTIONS = (
 )
 
 SET = ExerciseSet(
-    "i", "A track in the plane, and numerical care", Path(__file__).parent, QUESTIONS, track_numbers, about_variant=False
+    "i",
+    "A track in the plane, and numerical care",
+    Path(__file__).parent,
+    QUESTIONS,
+    chapters=(
+        "track-2d",
+        "numerics",
+    ),
+    numbers=track_numbers,
+    about_variant=False,
 )

@@ -100,4 +100,15 @@ QUESTIONS = (
     Question("j6", "the noise that is left", "stretch", noise_left, share_arguments, catalogue(WRONG_SHARES)),
 )
 
-SET = ExerciseSet("j", "Alpha-beta filter and radar track", Path(__file__).parent, QUESTIONS, radar_numbers, about_variant=False)
+SET = ExerciseSet(
+    "j",
+    "Alpha-beta filter and radar track",
+    Path(__file__).parent,
+    QUESTIONS,
+    chapters=(
+        "radar-tracking",
+        "manoeuvres",
+    ),
+    numbers=radar_numbers,
+    about_variant=False,
+)

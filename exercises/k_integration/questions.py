@@ -89,5 +89,11 @@ QUESTIONS = (
 )
 
 SET = ExerciseSet(
-    "k", "Inertial system and satellite receiver", Path(__file__).parent, QUESTIONS, integration_numbers, about_variant=False
+    "k",
+    "Inertial system and satellite receiver",
+    Path(__file__).parent,
+    QUESTIONS,
+    chapters=("integration",),
+    numbers=integration_numbers,
+    about_variant=False,
 )

@@ -71,13 +71,13 @@ def move_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def fusion_arguments(exercise: Exercise) -> list[tuple]:
-    """Eight measurements: the third and fourth arrive in the reverse order, the last two after the moment of the estimate."""
+    """Eight measurements: the third and fourth arrive in the reverse order; of the last three the first has not arrived yet."""
     rng = exercise.rng("l5")
     tags = np.cumsum(rng.uniform(0.7, 1.3, 8))
     arrivals = tags + rng.uniform(0.2, 0.5, 8)
     arrivals[2] = arrivals[3] + rng.uniform(0.1, 0.3)
-    now = tags[7] + 0.1
-    arrivals[6] = now + 0.2
+    now = arrivals[7] + 0.1
+    arrivals[5] = now + 0.2
     m, P, q, r = np.array([2.0, 3.0]), covariance(rng, 2), float(rng.uniform(0.3, 0.6)), float(rng.uniform(0.5, 0.9))
     values = m[0] + m[1] * tags + 0.4 * tags**2 + rng.normal(size=8)
     order = np.argsort(arrivals)
@@ -127,4 +127,12 @@ QUESTIONS = (
     Question("l7", "the clock from edges", "stretch", fit_clock, fit_arguments, catalogue(WRONG_FITS), ("rate", "shift")),
 )
 
-SET = ExerciseSet("l", "Rates and time tags", Path(__file__).parent, QUESTIONS, timing_numbers, about_variant=False)
+SET = ExerciseSet(
+    "l",
+    "Rates and time tags",
+    Path(__file__).parent,
+    QUESTIONS,
+    chapters=("time-tags",),
+    numbers=timing_numbers,
+    about_variant=False,
+)

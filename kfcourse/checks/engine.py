@@ -193,15 +193,20 @@ def _diagnosis(
     return [], GENERAL
 
 
+def _each(value: Any, change: Callable[[Any], Any]) -> Any:
+    """A change of every entry; the power of a symbolic matrix would be another thing, and may take for ever."""
+    return value.applyfunc(change) if isinstance(value, sp.MatrixBase) else change(value)
+
+
 GENERAL = (
     "It does not look like one of the usual mistakes. Check each step of the derivation, and try a case whose answer you know."
 )
 TRANSFORMATIONS: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
     ("sign", "The size is right, the sign is not.", lambda v: -v),
     ("transposed", "It looks transposed.", lambda v: v.T if isinstance(v, sp.MatrixBase) else np.swapaxes(v, -1, -2)),
-    ("root", "It looks like a standard deviation where a variance belongs.", lambda v: v**2),
-    ("square", "It looks like a variance where a standard deviation belongs.", lambda v: v**0.5),
+    ("root", "It looks like a standard deviation where a variance belongs.", lambda v: _each(v, lambda entry: entry**2)),
+    ("square", "It looks like a variance where a standard deviation belongs.", lambda v: _each(v, lambda entry: entry**0.5)),
     ("factor-2", "It is half of what it should be.", lambda v: v * 2),
     ("factor-half", "It is twice what it should be.", lambda v: v / 2),
-    ("inverse", "It looks like the inverse of what it should be.", lambda v: 1 / v),
+    ("inverse", "It looks like the inverse of what it should be.", lambda v: _each(v, lambda entry: 1 / entry)),
 )

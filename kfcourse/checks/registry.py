@@ -24,6 +24,8 @@ class ExerciseSet:
     folder : Path
         Holds statement.md.
     questions : tuple of Question
+    chapters : tuple of str
+        Files of the book that the set belongs to.
     numbers : callable, optional
         Exercise -> personal numbers by name, for a set that needs others than the variant's.
     about_variant : bool
@@ -34,6 +36,7 @@ class ExerciseSet:
     title: str
     folder: Path
     questions: tuple[Question, ...]
+    chapters: tuple[str, ...] = ()
     numbers: Callable[[Any], dict[str, float]] | None = None
     about_variant: bool = True
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import html
+import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 
@@ -78,19 +80,25 @@ def sentence(path: Path) -> str:
 
 
 def contents() -> str:
-    """All modules with a sentence each, folder by folder: a table in Markdown."""
-    rows = [
-        f"| `{name}` | {sentence(path).replace('|', chr(92) + '|')} |"
-        for name, path in sorted(modules(), key=lambda row: (LAYERS.index(layer(row[0])), row[0]))
-        if layer(name) != "exercises"
-    ]
-    return "\n".join(["| module | what it is for |", "| --- | --- |", *rows])
+    """All modules with a sentence each, floor by floor: a table in HTML."""
+    rows = sorted(modules(), key=lambda row: (LAYERS.index(layer(row[0])), row[0]))
+    return _table("module", "what it is for", {name: sentence(path) for name, path in rows if layer(name) != "exercises"})
 
 
 def floors() -> str:
-    """The floors with a sentence each, from the top down: a table in Markdown."""
+    """The floors with a sentence each, from the top down: a table in HTML."""
     said = {name: sentence(path) for name, path in modules() if name in LAYERS}
-    return "\n".join(["| floor | what lives there |", "| --- | --- |", *(f"| `{name}` | {said[name]} |" for name in LAYERS)])
+    return _table("floor", "what lives there", {name: said[name] for name in LAYERS})
+
+
+def _table(first: str, second: str, rows: Mapping[str, str]) -> str:
+    """Names as code beside their sentences, in which `quoted` words are code too."""
+    body = "".join(f"<tr><td><code>{name}</code></td><td>{_coded(text)}</td></tr>" for name, text in rows.items())
+    return f'<table class="table"><thead><tr><th>{first}</th><th>{second}</th></tr></thead><tbody>{body}</tbody></table>'
+
+
+def _coded(text: str) -> str:
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text, quote=False))
 
 
 def drawing(ax: Axes) -> Axes:

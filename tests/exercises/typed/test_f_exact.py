@@ -57,6 +57,11 @@ def f3(law=normal, transposed=False, step=True, variance_of="before"):
     return answer
 
 
+def f3_normalised(posterior, x, move):
+    following = f3()(posterior, x, move)
+    return following / (following.sum() * (x[1] - x[0]))
+
+
 def f3_nodes_moved(posterior, x, move):
     return np.interp(x, move(x)[0], posterior)
 
@@ -166,6 +171,7 @@ WRONG = [
     ("f2", "likelihood-summed prediction-ignored", f2(joint=lambda weights, predicted: weights)),
     ("f2", "constant-inverted", f2(returned=lambda C: 1 / C)),
     ("f3", "transposed", f3(transposed=True)),
+    ("f3", "normalised", f3_normalised),
     ("f3", "step-forgotten", f3(step=False)),
     ("f3", "variance-of-target", f3(variance_of="after")),
     ("f3", "variance-for-deviation", f3(law=lambda u, m, v: norm.pdf(u, m, v))),

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from kfcourse.checks import exercise
-from kfcourse.exercises.g_extended.questions import linearisation
+from kfcourse.exercises.g_extended.companion import linearisation
 
 OWN = dict(zip(("f", "Phi", "g", "D_xi", "S", "H", "D_n"), linearisation(exercise("g", "53").model), strict=True))
 

@@ -106,6 +106,13 @@ def l5_late_ones_dropped(tags, arrivals, values, m, P, q, r, now):
     return l5()(tags[newest], arrivals[newest], values[newest], m, P, q, r, now)
 
 
+def l5_stops_at_the_first_not_arrived(tags, arrivals, values, m, P, q, r, now):
+    order = np.argsort(tags)
+    missing = [i for i, k in enumerate(order) if arrivals[k] > now]
+    used = order[: missing[0]]
+    return l5()(tags[used], arrivals[used], values[used], m, P, q, r, now)
+
+
 def in_order_of_arrival(tags, arrivals):
     return range(len(tags))
 
@@ -210,6 +217,7 @@ WRONG = [
         l5(order=lambda tags, arrivals: np.argsort(arrivals), moment=lambda tags, arrivals, i: arrivals[i]),
     ),
     ("l5", "arrival-for-tag", l5(moment=lambda tags, arrivals, i: arrivals[i], order=in_order_of_arrival)),
+    ("l5", "", l5_stops_at_the_first_not_arrived),
     ("l5", "time-runs-backwards", l5(order=in_order_of_arrival)),
     ("l5", "future-used", l5(use=lambda tags, arrivals, i, now: True)),
     ("l5", "future-used", l5(use=lambda tags, arrivals, i, now: tags[i] <= now)),
