@@ -9,6 +9,9 @@ ifndef PYTHON
   PYTHON := $(or $(if $(wildcard .venv/installed),$(shell $(BIN)/python -c "print('$(BIN)/python')" 2>/dev/null)),python3)
 endif
 
+# Small matrices: several threads in one process cost more than they gain, and processes share the machine.
+export OMP_NUM_THREADS := 1
+
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
 .PHONY: help book test quick lint unit notebooks lock lock-check clean distclean install figure benchmark
@@ -34,7 +37,7 @@ test: install
 	@$(BIN)/python .ci/cost.py "$(MAKE)" lint unit book notebooks
 
 quick: lint
-	$(BIN)/pytest -q -n auto -m quick --ignore tests/test_book.py
+	$(BIN)/pytest -q -n auto --dist loadscope -m quick --ignore tests/test_book.py
 
 lint: install
 	$(BIN)/ruff check .
@@ -42,7 +45,7 @@ lint: install
 	$(BIN)/mypy
 
 unit: install
-	$(BIN)/pytest -q -n auto --ignore tests/test_book.py
+	$(BIN)/pytest -q -n auto --dist loadscope --ignore tests/test_book.py
 
 # Executes every notebook of the built book once more and compares all outputs; so it does with the worked solutions of the
 # exercises, for variants of different kinds: multiplicative noises, a sine meter, a vector state.

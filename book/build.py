@@ -18,6 +18,8 @@ from pathlib import Path
 import chapters
 import manual
 
+from kfcourse.files import package_digest
+
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "_build"
 CACHE = BUILD / ".jupyter_cache"
@@ -28,14 +30,8 @@ NOT_BUILT = "\nThe book was NOT built: see the errors and warnings above."
 
 def fingerprint() -> str:
     """Hash of all that the outputs of the chapters depend on, besides their own cells."""
-    files = [
-        path for part in ("kfcourse", "exercises") for path in (ROOT / part).rglob("*") if path.suffix in (".py", ".toml", ".j2")
-    ]
-    digest = hashlib.sha256(sys.version.encode())
-    for path in [*sorted(files), ROOT / "requirements.txt"]:
-        name, content = path.relative_to(ROOT).as_posix().encode(), path.read_bytes()
-        digest.update(b"%d %d " % (len(name), len(content)) + name + content)
-    return digest.hexdigest()
+    parts = (sys.version.encode(), package_digest().encode(), (ROOT / "requirements.txt").read_bytes())
+    return hashlib.sha256(b"\n".join(parts)).hexdigest()
 
 
 def prepare() -> None:

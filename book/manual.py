@@ -1,7 +1,7 @@
 """The pages of the lab manual, made from the masters of the exercises for one variant.
 
 Into book/manual/ go, for every set, its page (questions, hints, no solutions), the pictures to reach, and the student's
-notebook to download.  The worked solutions, executed before, are kept in _build/solutions.
+notebook to download; and the table of all sets.  The worked solutions, executed before, are kept in _build/solutions.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ def write() -> None:
     """Write the pages; the solutions are there."""
     shutil.rmtree(PAGES, ignore_errors=True)
     (PAGES / "notebooks").mkdir(parents=True)
+    (PAGES / "sets.txt").write_text(table(), encoding="utf-8")
     for job in solutions():
         notebook = render(read(job.letter), exercise(job.letter, VARIANT))
         found = pictures(nbformat.read(job.target, as_version=4))
@@ -46,3 +47,12 @@ def write() -> None:
         heading, rest = statement(notebook, {name: f"{name}.png" for name in found}).split("\n", 1)
         (PAGES / f"{file}.md").write_text(f"{heading}\n{NOTE.format(variant=VARIANT, file=file)}{rest}", encoding="utf-8")
         nbformat.write(student(notebook, found), PAGES / "notebooks" / f"{file}.ipynb")
+
+
+def table() -> str:
+    """The sets and the chapters that they belong to, in Markdown."""
+    rows = [
+        f"| {letter}: {{doc}}`{one.title} <manual/{one.name}>` | {', '.join(f'{{doc}}`{chapter}`' for chapter in one.chapters)} |"
+        for letter, one in sets().items()
+    ]
+    return "\n".join(["| set | chapters |", "| --- | --- |", *rows, ""])
