@@ -564,6 +564,41 @@ def test_a_regression_cannot_make_its_own_step_worse(variant53, trajectories):
     assert abs(np.mean(x[0] - better)) < 1e-15 * 40  # unbiased on its ensemble, to rounding
 
 
+def test_the_duof_s_own_covariances_are_those_of_its_errors():
+    """On the ensemble of the design both covariances are the sample's: of x - z after the correction, of x' - lambda' ahead.
+
+    The residual of an affine regression with an offset is the covariance of target less fit, and the fit's mean is the
+    target's, so no bias hides in it.
+    """
+    model, steps = PRINTED["p=2"](), 3
+    x, y = simulate(model, 40, steps + 1, seed=14)
+    (filter_,) = design([duof(model)], [[Instant(x[k], y[k], x[k + 1])] for k in range(steps)])
+    state = filter_.init(40)
+    for k in range(steps):
+        state = filter_.step(state, y[k])
+        for law, truth in ((state.posterior, x[k]), (state.predicted, x[k + 1])):
+            error = truth - law.mean
+            # Cov(t) - matrix Cov(t, r)^T against the errors themselves: covariances of order 1, correlations below 0.99
+            np.testing.assert_allclose(error.mean(axis=0), 0, rtol=0, atol=1e-12)
+            np.testing.assert_allclose(law.cov, np.cov(error.T, bias=True), rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("family", [fos, mfos])
+def test_without_a_measurement_three_arguments_predict_from_the_prediction(family):
+    """In place of a missing y stands h = M[y | prediction], the value that leaves z = lambda; so u = lambda.
+
+    At k = 0 of a linear model z is an affine function of y, and the regression of x on (y, z) is exact wherever the pair
+    lies on that line: x ~ z.  (h, lambda) lies there, at innovation 0; (0, lambda) does not.
+    """
+    one = LINEAR["n=2, p=2"]
+    model = one.model()
+    (filter_,) = design([family(linearised(model), 3)], [[exact_ensemble(one, 1, seed=3)[0]]])
+    state = filter_.step(filter_.init(1), np.full((1, 2), np.nan))
+    expected = kalman_filter(model).step(kalman_filter(model).init(1), np.full((1, 2), np.nan))
+    # regressions on singular covariances, as in the theorem above
+    np.testing.assert_allclose(state.predicted.mean, expected.predicted.mean, rtol=1e-9, atol=1e-9)
+
+
 @pytest.mark.parametrize("arguments", [1, 4, "2", None])
 @pytest.mark.parametrize("family", [fos, mfos])
 def test_other_numbers_of_arguments_are_refused(variant53, family, arguments):

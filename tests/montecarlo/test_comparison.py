@@ -1,5 +1,6 @@
 """What a comparison reports: against direct per-trajectory formulas, theory, and the page's table."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +12,10 @@ from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.modified_structure import mfos
 from kfcourse.filters.optimal_structure import fos
+from kfcourse.montecarlo.comparison import Comparison, Subset
 from kfcourse.montecarlo.ensemble import BLOCK, Ensemble
 from kfcourse.montecarlo.experiment import compare, run
-from kfcourse.montecarlo.statistics import BATCHES, batch_mean
+from kfcourse.montecarlo.statistics import BATCHES, Sums, batch_mean
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import gaussian, linearised
 
@@ -166,6 +168,20 @@ def test_intervals_cover_the_truth_as_often_as_they_say(linear):
     assert abs(hits - 190) < SIGMA * np.sqrt(200 * 0.95 * 0.05)
 
 
+@pytest.mark.parametrize("size", [1, 2])
+def test_the_standard_error_squared_is_unbiased(size):
+    """Three batches of equal size: over all ensembles drawn from 0, 1 and 5 the mean of SE^2 is Var / N, Var = 14 / 3.
+
+    It is the divisor B - 1 that makes it so: the deviations are from the sample's own mean.
+    """
+    counts = np.full(3, float(size))
+    samples = np.array(list(itertools.product([0.0, 1.0, 5.0], repeat=3 * size)))
+    found = batch_mean(samples.reshape(len(samples), 3, size).sum(axis=-1), counts)
+    assert np.mean(found.standard_error**2) == pytest.approx(14 / 3 / (3 * size), rel=1e-12)
+    np.testing.assert_allclose(found.value, samples.mean(axis=1), rtol=1e-14)
+    assert found.freedom == 2
+
+
 def test_batches_of_unequal_size_are_weighed():
     rng = np.random.default_rng(0)
     counts = np.array([50.0] * 60 + [1.0, 20.0, 30.0])
@@ -234,6 +250,62 @@ def test_the_excess_over_the_optimal_filter_is_the_distance_from_it(linear):
     np.testing.assert_allclose(above.standard_error, actual.standard_error / bound, rtol=1e-9)
     optimal = result.above_bound("aof-gaussian")
     assert (abs(optimal.value) < SIGMA * optimal.standard_error).all()
+
+
+def test_a_subset_larger_than_the_ensemble_is_all_of_it(variant53):
+    """40 trajectories are all there are for a subset of 500: the slow filter has the fast one's numbers."""
+    control, fast = aof(gaussian(variant53)), aof(linearised(variant53))
+    slow = replace(fast, name="slow", slow=True)
+    result = compare([control, fast, slow], variant53, 40, 2, seed=3, subset_runs=500, progress=False)
+    assert result.subset_runs == 40
+    np.testing.assert_allclose(result.error_variance("slow").value, result.error_variance("aof-linearised").value, rtol=1e-11)
+
+
+def by_hand(model, squares, slow, subset, own=None):
+    """A comparison over one step, every trajectory a batch of its own.
+
+    squares, own : dict from name to the squared error and the claimed variance of each trajectory, (runs,); the filters
+    named in `slow` ran on the first `subset` of them.
+    """
+    fast = tuple(name for name in squares if name not in slow)
+
+    def sums(names, runs):
+        empty = Sums.empty(len(names), 1, 1, runs, runs)
+        for i, name in enumerate(names):
+            empty.square[i, 0, 0] = squares[name][:runs]
+            empty.own[i, 0, 0] = own[name][:runs] if own else 0
+        return empty
+
+    names = (*fast, *slow)
+    runs = len(squares[fast[0]])
+    return Comparison(model, names, fast, runs, 1, 0, sums(fast, runs), Subset(list(slow), sums(names, subset)))
+
+
+@pytest.mark.parametrize("ask", [lambda c: c.error_variance("slow"), lambda c: c.difference("slow", "other")])
+def test_the_variance_of_subset_and_whole_together_is_unbiased(variant53, ask):
+    """X is a mean over N = 4 trajectories, Y over the first n = 2: Var = Var X / N + Var Y / n + 2 Cov(X, Y) / N.
+
+    Drawn with replacement from three possible trajectories there are 81 ensembles, all equally likely.  Over all of them
+    the mean of SE^2 is the variance of the estimate, exactly: sample variances and covariances of independent draws with
+    the divisor n - 1 are unbiased.  X and Y grow together here, so that no estimate of Var is negative and cut at 0.
+    """
+    population = {"control": [0.0, 1, 4], "other": [0.0, 0.5, 1], "slow": [0.0, 2, 9]}
+    values, variances = [], []
+    for draw in itertools.product(range(3), repeat=4):
+        squares = {name: np.array(possible)[list(draw)] for name, possible in population.items()}
+        found = ask(by_hand(variant53, squares, ["slow"], subset=2))
+        values.append(found.value.item())
+        variances.append(found.standard_error.item() ** 2)
+    assert np.mean(variances) == pytest.approx(np.var(values), rel=1e-12)
+
+
+def test_above_the_bound_the_control_cancels_when_the_subset_is_everything(variant53):
+    """M(e^2 - p_control) - M(p_exact - p_control), over the same trajectories, is M e^2 - M p_exact for any p_control."""
+    squares = {"aof-gaussian": np.array([1.0, 3, 2]), "other": np.array([4.0, 2, 9]), "aof-exact": np.array([1.0, 2, 2])}
+    own = {"aof-gaussian": np.array([7.0, 5, 6]), "other": np.array([1.0, 1, 1]), "aof-exact": np.array([1.0, 2, 3])}
+    result = by_hand(variant53, squares, ["aof-exact"], subset=3, own=own)
+    assert result.bound().value.item() == pytest.approx(2, rel=1e-14)
+    assert result.above_bound("other").value.item() == pytest.approx(5 / 2 - 1, rel=1e-14)
 
 
 def test_without_a_subset_slow_filters_are_left_out(variant53):
