@@ -12,6 +12,7 @@ from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.modified_structure import mfos
 from kfcourse.filters.optimal_structure import fos
+from kfcourse.laws import Gaussian
 from kfcourse.montecarlo.comparison import Comparison, Subset
 from kfcourse.montecarlo.ensemble import BLOCK, Ensemble
 from kfcourse.montecarlo.experiment import compare, run
@@ -81,6 +82,39 @@ def test_the_statistics_are_those_of_the_trajectories(direct):
         normalised = np.einsum("kni,knij,knj->kn", error, np.linalg.inv(cov), error) / 2
         agree(result.normalised_error(name), normalised)
         np.testing.assert_allclose(result.own_variance(name).value, np.trace(cov, axis1=-2, axis2=-1).mean(axis=-1), rtol=1e-11)
+
+
+@pytest.mark.filterwarnings("error")
+def test_the_normalised_error_of_a_scalar_filter_is_the_mean_of_e2_over_p():
+    """Three ways to sum e^2 / p: a variance for each trajectory, one for all, and as a vector of one component beside another.
+
+    A claim of variance 0 is right if there is no error (0), and infinitely wrong if there is (infinity).
+    """
+    x = np.array([1.0, -2.0, 3.0, 0.5, -1.5])
+    p = np.array([0.5, 2.0, 4.0, 0.25, 1.0])
+    still = np.zeros_like(x)  # the estimate is 0: x is the error
+
+    def recorded(errors, cov):
+        sums = Sums.empty(1, 1, errors.shape[1], len(errors), 2)
+        sums.record(0, 0, errors, Gaussian(np.zeros_like(errors), cov))
+        assert sums.counts.tolist() == [2, 3]
+        return sums.normalised[0, 0]
+
+    def expected(quotients):
+        return [quotients[:2].sum(), quotients[2:].sum()]
+
+    np.testing.assert_allclose(recorded(x[:, None], p[:, None, None]), expected(x**2 / p), rtol=1e-14)
+    np.testing.assert_allclose(recorded(x[:, None], np.array([[2.0]])), expected(x**2 / 2), rtol=1e-14)
+    pairs, covs = np.stack([x, still], axis=1), p[:, None, None] * np.eye(2)
+    np.testing.assert_allclose(recorded(pairs, covs), expected(x**2 / p / 2), rtol=1e-14)
+
+    certain = np.array([0.0, 2.0, 0.0, 0.25, 1.0])
+    known = np.where(certain > 0, x, 0.0)
+    quotients = np.array([0.0, 2.0, 0.0, 1.0, 2.25])
+    np.testing.assert_allclose(recorded(known[:, None], certain[:, None, None]), expected(quotients), rtol=1e-14)
+    assert recorded(known[:, None], np.array([[0.0]])).tolist() == [np.inf, np.inf]
+    assert recorded(still[:, None], np.array([[0.0]])).tolist() == [0, 0]
+    assert recorded(x[:, None], certain[:, None, None]).tolist() == [np.inf, np.inf]
 
 
 def test_differences_and_ratios_are_paired(direct):
@@ -299,6 +333,16 @@ def test_the_variance_of_subset_and_whole_together_is_unbiased(variant53, ask):
     assert np.mean(variances) == pytest.approx(np.var(values), rel=1e-12)
 
 
+def test_a_variance_that_comes_out_negative_is_taken_as_zero(variant53):
+    """The covariance is known from the subset alone; where it says that Y undoes X, the sum may come out below 0.
+
+    X = 0, 4 and six times 2, Y = 1, 0:  Var X / 8 = 1/7,  Var Y / 2 = 1/4,  2 Cov / 8 = -1/2.
+    """
+    squares = {"control": np.array([0.0, 4, 2, 2, 2, 2, 2, 2]), "slow": np.array([1.0, 4])}
+    error = by_hand(variant53, squares, ["slow"], subset=2).error_variance("slow").standard_error
+    assert error.item() == 0
+
+
 def test_above_the_bound_the_control_cancels_when_the_subset_is_everything(variant53):
     """M(e^2 - p_control) - M(p_exact - p_control), over the same trajectories, is M e^2 - M p_exact for any p_control."""
     squares = {"aof-gaussian": np.array([1.0, 3, 2]), "other": np.array([4.0, 2, 9]), "aof-exact": np.array([1.0, 2, 2])}
@@ -312,6 +356,7 @@ def test_without_a_subset_slow_filters_are_left_out(variant53):
     slow = replace(aof(linearised(variant53)), name="slow", slow=True)
     result = compare([aof(gaussian(variant53)), slow], variant53, 50, 2, seed=3, subset_runs=0, progress=False)
     assert result.available == ("aof-gaussian",)
+    assert result.subset_runs == 0
     with pytest.raises(KeyError, match="slow"):
         result.error_variance("slow")
     for filters in ([slow], []):
