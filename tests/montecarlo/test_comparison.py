@@ -315,6 +315,21 @@ def by_hand(model, squares, slow, subset, own=None):
     return Comparison(model, names, fast, runs, 1, 0, sums(fast, runs), Subset(list(slow), sums(names, subset)))
 
 
+def test_each_filter_is_judged_by_the_trajectories_it_ran_on(variant53):
+    """The fast ones by all, a slow one by its subset; only D goes through the control, which is the first fast filter
+    where there is no Gaussian AOF."""
+    squares = {"first": np.array([1.0, 3, 5]), "second": np.array([2.0, 8, 2]), "slow": np.array([4.0, 2])}
+    own = {"first": np.array([1.0, 1, 4]), "second": np.array([2.0, 2, 5]), "slow": np.array([3.0, 1])}
+    result = by_hand(variant53, squares, ["slow"], subset=2, own=own)
+    assert result.control == "first"
+    assert result.error_variance("slow").value.item() == 3 + (3 - 2)  # M e^2 of the first over all; of both over the subset
+    for name, square, claimed in (("first", 3, 2), ("second", 4, 3), ("slow", 3, 2)):
+        assert result.component_variance(name).value.item() == square
+        assert result.own_variance(name).value.item() == claimed
+    squares["aof-gaussian"] = squares["second"]
+    assert by_hand(variant53, squares, ["slow"], subset=2).control == "aof-gaussian"
+
+
 @pytest.mark.parametrize("ask", [lambda c: c.error_variance("slow"), lambda c: c.difference("slow", "other")])
 def test_the_variance_of_subset_and_whole_together_is_unbiased(variant53, ask):
     """X is a mean over N = 4 trajectories, Y over the first n = 2: Var = Var X / N + Var Y / n + 2 Cov(X, Y) / N.
