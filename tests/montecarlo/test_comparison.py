@@ -131,6 +131,16 @@ def test_differences_and_ratios_are_paired(direct):
     assert float(result.score_difference("wrong", "aof-gaussian").value) == pytest.approx(ratio.value.mean() - 1, rel=1e-11)
 
 
+@pytest.mark.parametrize("steps", [slice(2, 3), slice(0, 2)])
+def test_a_score_is_over_the_steps_asked_for(direct, steps):
+    """Over one step it is the ratio of that step, with its standard error: there is nothing to average."""
+    result, _ = direct
+    score, by_step = result.score("wrong", steps), result.relative("wrong")
+    assert score.value == pytest.approx(by_step.value[steps].mean(), rel=1e-12)
+    if steps == slice(2, 3):
+        assert score.standard_error == pytest.approx(by_step.standard_error[2], rel=1e-9)
+
+
 def test_pairing_pays(direct):
     result, _ = direct
     paired = result.difference("duof", "aof-gaussian").standard_error
@@ -326,6 +336,8 @@ def test_each_filter_is_judged_by_the_trajectories_it_ran_on(variant53):
     for name, square, claimed in (("first", 3, 2), ("second", 4, 3), ("slow", 3, 2)):
         assert result.component_variance(name).value.item() == square
         assert result.own_variance(name).value.item() == claimed
+    assert result.error_variance("first").freedom == 3 - 1  # a subset beside it does not make it less certain
+    assert result.error_variance("slow").freedom == 2 - 1
     squares["aof-gaussian"] = squares["second"]
     assert by_hand(variant53, squares, ["slow"], subset=2).control == "aof-gaussian"
 
