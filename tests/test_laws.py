@@ -85,6 +85,23 @@ def test_the_correction_is_the_conditional_law(rng, n, p):
     assert np.array_equal(posterior.cov, transpose(posterior.cov))
 
 
+@pytest.mark.parametrize(("n", "p"), [(1, 1), (2, 1), (1, 2), (3, 2)])
+@pytest.mark.parametrize("gap", [False, True])
+def test_the_ensemble_may_have_several_axes(rng, n, p, gap):
+    """Leading axes only number the trajectories: 8 in a row, or 2 by 4, are corrected alike."""
+    prior = Gaussian(rng.normal(size=(8, n)), covariances(rng, 8, n))
+    meter, y = measurement(rng.normal(size=(8, p, n)), covariances(rng, 8, p), prior), rng.normal(size=(8, p))
+    if gap:
+        y[5, 0] = np.nan
+
+    def folded(arrays):
+        return [array.reshape(2, 4, *array.shape[1:]) for array in arrays]
+
+    found = correct(Gaussian(*folded(prior)), Measurement(*folded(meter)), *folded([y]))
+    for array, expected in zip(found, folded(correct(prior, meter, y)), strict=True):
+        np.testing.assert_allclose(array, expected, rtol=1e-13, atol=1e-14)  # the same products, perhaps added in another order
+
+
 @pytest.mark.parametrize(("n", "p"), [(1, 1), (2, 1), (2, 2)])
 def test_a_meter_that_sees_nothing_leaves_the_prior(rng, n, p):
     # No sensitivity and no variance either (a square meter linearised at 0): K = 0 and p = Psi.
