@@ -54,6 +54,15 @@ def test_a_singular_covariance_gets_its_pseudo_inverse(rng):
     np.testing.assert_allclose(K * [1, 2], np.full((1, 2), 0.5), rtol=1e-12)
 
 
+def test_beside_a_singular_trajectory_a_nearly_singular_one_keeps_its_solution():
+    """The pseudo-inverse takes the place of the solution for all of them, and drops rounding, not a correlation of 1 - 1e-9."""
+    cov = np.array([[[1.0, 1.0], [1.0, 1.0]], [[1.0, 1 - 1e-9], [1 - 1e-9, 1.0]]])
+    cross = np.array([[[1.0, 1.0]], [[1.0, 1 - 1e-9]]])
+    K = gain(cross, cov)
+    np.testing.assert_allclose(K[0], [[0.5, 0.5]], rtol=1e-12)
+    np.testing.assert_allclose(K[1], [[1.0, 0.0]], rtol=0, atol=1e-6)  # rounding, 1e-16, over the smaller eigenvalue, 1e-9
+
+
 @pytest.mark.parametrize("rounding", [0, 2e-15, 5e-15])
 def test_a_covariance_that_is_singular_but_for_rounding_is_singular(rounding):
     """y2 = 2 y1 with a few roundings between them: a difference that is noise must not carry the estimate.
