@@ -379,6 +379,22 @@ def test_above_the_bound_the_control_cancels_when_the_subset_is_everything(varia
     assert result.above_bound("other").value.item() == pytest.approx(5 / 2 - 1, rel=1e-14)
 
 
+def test_the_bound_adds_what_all_trajectories_and_the_subset_tell(variant53):
+    """M p_control over all, and M(p_exact - p_control) over the subset: two means, whose errors add in squares.
+
+    p_control = 2, 4, 6, 4: mean 4, SE^2 = (8/3)/4;  p_exact - p_control = -1, -3: mean -2, SE^2 = 2/2.
+    e^2 - p_control = 3, 1, 3, 1: mean 2, SE^2 = (4/3)/4.
+    """
+    squares = {"aof-gaussian": np.ones(4), "other": np.array([5.0, 5, 9, 5]), "aof-exact": np.ones(2)}
+    own = {"aof-gaussian": np.array([2.0, 4, 6, 4]), "other": np.ones(4), "aof-exact": np.array([1.0, 1])}
+    result = by_hand(variant53, squares, ["aof-exact"], subset=2, own=own)
+    bound, above = result.bound(), result.above_bound("other")
+    assert (bound.value.item(), bound.freedom) == (4 - 2, 1)
+    assert bound.standard_error.item() == pytest.approx(np.sqrt(2 / 3 + 1), rel=1e-14)
+    assert (above.value.item(), above.freedom) == ((2 + 2) / 2, 1)
+    assert above.standard_error.item() == pytest.approx(np.sqrt(1 / 3 + 1) / 2, rel=1e-14)
+
+
 def test_without_a_subset_slow_filters_are_left_out(variant53):
     slow = replace(aof(linearised(variant53)), name="slow", slow=True)
     result = compare([aof(gaussian(variant53)), slow], variant53, 50, 2, seed=3, subset_runs=0, progress=False)
