@@ -551,7 +551,7 @@ def test_repeated_measurements_are_used_once():
 
 def test_a_designed_filter_stops_where_its_design_does(variant53, trajectories):
     (filter_,) = designed_on([duof(variant53)], trajectories)
-    with pytest.raises(ValueError, match="designed for 8 steps.*to run step 9"):
+    with pytest.raises(ValueError, match=r"designed for 8 steps.*to run step 9"):
         run(filter_, np.zeros((9, 1, 1)))
 
 
