@@ -16,11 +16,15 @@ from kfcourse.filters.approximations import aof
 from kfcourse.filters.conditionally_optimal import EQUATIONS as DUOF_EQUATIONS
 from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.designed import Design
+from kfcourse.filters.exact import pointmass
+from kfcourse.filters.iterated_ekf import iterated
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.modified_structure import EQUATIONS as MFOS_EQUATIONS
 from kfcourse.filters.modified_structure import mfos
+from kfcourse.filters.multiple_models import imm
 from kfcourse.filters.optimal_structure import EQUATIONS as FOS_EQUATIONS
 from kfcourse.filters.optimal_structure import fos
+from kfcourse.filters.particles import particle
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Instant, simulate
 from kfcourse.montecarlo.experiment import run
@@ -610,6 +614,23 @@ def test_a_design_on_trajectories_that_diverge_says_so(variant53):
     broken = [[Instant(np.ones((3, 1)), np.full((3, 1), np.inf), np.ones((3, 1)))]]
     with pytest.raises(NotFinite, match=r"step 0.*trajectories become infinite"):
         design([duof(variant53)], broken)
+
+
+def test_every_filter_has_its_name_counts_its_measurements_and_says_if_it_is_slow(variant53, trajectories):
+    """Results are asked for by name, designs and random streams are looked up by step, and the slow run on a subset."""
+    filters = filters_of(variant53, trajectories)
+    designed = [f"{family}{a}-{kind}" for family in ("fos", "mfos") for kind in ("linearised", "gaussian") for a in ("", 3)]
+    assert [one.name for one in filters] == [*(f"aof-{kind}" for kind in STRUCTURES), "duof", *designed]
+    structure = linearised(variant53)
+    slow = [particle(variant53, 20), pointmass(variant53)]
+    filters += [iterated(structure), imm([structure], [[1.0]]), *slow, kalman_filter(LINEAR["scalar"].model())]
+    assert [one.name for one in filters[-5:]] == ["iterated-linearised", "imm", "particle", "aof-exact", "kalman"]
+    for one in filters:
+        state = one.init(2)
+        for k in range(3):
+            assert state.step == k, one.name
+            state = one.step(state, np.full((2, 1), 0.5))
+        assert one.slow == (one in slow), one.name
 
 
 def test_filters_are_values(variant53):
