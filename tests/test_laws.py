@@ -56,6 +56,27 @@ def test_a_singular_covariance_gets_its_pseudo_inverse(rng):
     np.testing.assert_allclose(K * [1, 2], np.full((1, 2), 0.5), rtol=1e-12)
 
 
+def test_beside_a_singular_trajectory_a_nearly_singular_one_keeps_its_solution():
+    """The pseudo-inverse takes the place of the solution for all of them, and drops rounding, not a correlation of 1 - 1e-9."""
+    cov = np.array([[[1.0, 1.0], [1.0, 1.0]], [[1.0, 1 - 1e-9], [1 - 1e-9, 1.0]]])
+    cross = np.array([[[1.0, 1.0]], [[1.0, 1 - 1e-9]]])
+    K = gain(cross, cov)
+    np.testing.assert_allclose(K[0], [[0.5, 0.5]], rtol=1e-12)
+    np.testing.assert_allclose(K[1], [[1.0, 0.0]], rtol=0, atol=1e-6)  # rounding, 1e-16, over the smaller eigenvalue, 1e-9
+
+
+@pytest.mark.parametrize("rounding", [0, 2e-15, 5e-15])
+def test_a_covariance_that_is_singular_but_for_rounding_is_singular(rounding):
+    """y2 = 2 y1 with a few roundings between them: a difference that is noise must not carry the estimate.
+
+    Solving would put all weight on one of the two, or a large weight of either sign on both; the pseudo-inverse shares it.
+    """
+    cov = np.array([[1.0, 2.0], [2.0, 4.0 * (1 + rounding)]])
+    K = gain(np.array([[1.0, 2.0]]), cov)
+    # The rounding, 5e-15, against the variance 2 of the sum of the standardised pair.
+    np.testing.assert_allclose(K * [1, 2], np.full((1, 2), 0.5), rtol=1e-12)
+
+
 def test_one_singular_trajectory_does_not_disturb_the_others(rng):
     cov, cross = covariances(rng, 6, 2), rng.normal(size=(6, 2, 2))
     expected = gain(cross, cov)
@@ -87,6 +108,23 @@ def test_the_correction_is_the_conditional_law(rng, n, p):
     assert np.array_equal(posterior.cov, transpose(posterior.cov))
 
 
+@pytest.mark.parametrize(("n", "p"), [(1, 1), (2, 1), (1, 2), (3, 2)])
+@pytest.mark.parametrize("gap", [False, True])
+def test_the_ensemble_may_have_several_axes(rng, n, p, gap):
+    """Leading axes only number the trajectories: 8 in a row, or 2 by 4, are corrected alike."""
+    prior = Gaussian(rng.normal(size=(8, n)), covariances(rng, 8, n))
+    meter, y = measurement(rng.normal(size=(8, p, n)), covariances(rng, 8, p), prior), rng.normal(size=(8, p))
+    if gap:
+        y[5, 0] = np.nan
+
+    def folded(arrays):
+        return [array.reshape(2, 4, *array.shape[1:]) for array in arrays]
+
+    found = correct(Gaussian(*folded(prior)), Measurement(*folded(meter)), *folded([y]))
+    for array, expected in zip(found, folded(correct(prior, meter, y)), strict=True):
+        np.testing.assert_allclose(array, expected, rtol=1e-13, atol=1e-14)  # the same products, perhaps added in another order
+
+
 @pytest.mark.parametrize(("n", "p"), [(1, 1), (2, 1), (2, 2)])
 def test_a_meter_that_sees_nothing_leaves_the_prior(rng, n, p):
     # No sensitivity and no variance either (a square meter linearised at 0): K = 0 and p = Psi.
@@ -95,6 +133,19 @@ def test_a_meter_that_sees_nothing_leaves_the_prior(rng, n, p):
     posterior = correct(prior, blind, np.ones((3, p)))
     np.testing.assert_array_equal(posterior.mean, prior.mean)
     np.testing.assert_allclose(posterior.cov, prior.cov, rtol=1e-15)
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_one_blind_trajectory_does_not_disturb_the_others(rng, n):
+    prior = Gaussian(rng.normal(size=(4, n)), covariances(rng, 4, n))
+    G, R, y = rng.normal(size=(4, 1, n)), covariances(rng, 4, 1), rng.normal(size=(4, 1))
+    expected = correct(prior, measurement(G, R, prior), y)
+    G[2], R[2] = 0, 0
+    found = correct(prior, measurement(G, R, prior), y)
+    others = [0, 1, 3]
+    for array, alone, before in zip(found, expected, prior, strict=True):
+        np.testing.assert_allclose(array[others], alone[others], rtol=1e-14)  # scalars multiply what they else divide
+        np.testing.assert_array_equal(array[2], before[2])
 
 
 def test_an_exact_meter_leaves_no_variance(rng):

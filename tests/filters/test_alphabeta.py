@@ -140,6 +140,9 @@ def test_the_start_from_three_measurements_is_the_parabola_through_them():
     for k in (3, 4):  # at the third measurement, and coasting
         expected = [parabola.deriv(d)(T * k) if d else parabola(T * k) for d in range(3)]
         np.testing.assert_allclose(found.mean[k, 0], expected, rtol=1e-11)
+    # Two do not tell the acceleration: it is still the prior's, 3, and the velocity is such that both lie on the parabola.
+    speed = (5.0 - 2.0) / (2 * T) + 3.0 * 2 * T / 2
+    np.testing.assert_allclose(found.mean[2, 0], [5.0, speed, 3.0], rtol=1e-11)
 
 
 # --- the covariance
@@ -194,7 +197,10 @@ def test_one_trajectory_is_an_ensemble_of_one():
 
 def test_it_can_be_built_for_a_model_written_by_hand():
     model = Model.define(["r + T*s + v", "s + w"], "r + n", {"T": 0.5}, symbols={"x": ["r", "s"], "v": ["v", "w"], "w": ["n"]})
-    assert isinstance(alpha_beta(model, 0.3, 0.1).init(2).posterior, Gaussian)
+    one = alpha_beta(model, 0.3, 0.1)
+    start = one.init(2)
+    assert isinstance(start.posterior, Gaussian)
+    assert one.step(one.step(start, np.ones((2, 1))), np.ones((2, 1))).step == 2
 
 
 # --- bad input
@@ -208,8 +214,10 @@ def test_other_models_are_refused():
         Model.define("x + v", "x + w"),
         Model.define(["x1 - x2", "x2 + v1"], "x1 + w1"),
     ):
-        with pytest.raises(ModelError, match="build it with kinematic"):
+        with pytest.raises(ModelError, match=r"not position, velocity on each axis.*build it with kinematic\(interval, order=1,"):
             alpha_beta(model, 0.3, 0.1)
+    with pytest.raises(ModelError, match=r"velocity and acceleration on each axis.*order=2,"):
+        alpha_beta_gamma(kinematic(T, order=1), 0.5, 0.3, 0.1)
     shifted = Model.define(["x1 + x2", "x2 + v1"], "x1 + w1", state_noise={"mean": 1.0})
     with pytest.raises(ModelError, match="mean other than 0"):
         alpha_beta(shifted, 0.3, 0.1)

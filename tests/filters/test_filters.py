@@ -16,11 +16,15 @@ from kfcourse.filters.approximations import aof
 from kfcourse.filters.conditionally_optimal import EQUATIONS as DUOF_EQUATIONS
 from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.designed import Design
+from kfcourse.filters.exact import pointmass
+from kfcourse.filters.iterated_ekf import iterated
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.modified_structure import EQUATIONS as MFOS_EQUATIONS
 from kfcourse.filters.modified_structure import mfos
+from kfcourse.filters.multiple_models import imm
 from kfcourse.filters.optimal_structure import EQUATIONS as FOS_EQUATIONS
 from kfcourse.filters.optimal_structure import fos
+from kfcourse.filters.particles import particle
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Instant, simulate
 from kfcourse.montecarlo.experiment import run
@@ -553,7 +557,7 @@ def test_repeated_measurements_are_used_once():
 
 def test_a_designed_filter_stops_where_its_design_does(variant53, trajectories):
     (filter_,) = designed_on([duof(variant53)], trajectories)
-    with pytest.raises(ValueError, match="designed for 8 steps"):
+    with pytest.raises(ValueError, match=r"designed for 8 steps.*to run step 9"):
         run(filter_, np.zeros((9, 1, 1)))
 
 
@@ -564,6 +568,41 @@ def test_a_regression_cannot_make_its_own_step_worse(variant53, trajectories):
     better = run(designed_on([mfos(gaussian(variant53))], trajectories)[0], y[..., None]).mean[0, :, 0]
     assert np.mean((x[0] - better) ** 2) <= np.mean((x[0] - plain) ** 2)
     assert abs(np.mean(x[0] - better)) < 1e-15 * 40  # unbiased on its ensemble, to rounding
+
+
+def test_the_duof_s_own_covariances_are_those_of_its_errors():
+    """On the ensemble of the design both covariances are the sample's: of x - z after the correction, of x' - lambda' ahead.
+
+    The residual of an affine regression with an offset is the covariance of target less fit, and the fit's mean is the
+    target's, so no bias hides in it.
+    """
+    model, steps = PRINTED["p=2"](), 3
+    x, y = simulate(model, 40, steps + 1, seed=14)
+    (filter_,) = design([duof(model)], [[Instant(x[k], y[k], x[k + 1])] for k in range(steps)])
+    state = filter_.init(40)
+    for k in range(steps):
+        state = filter_.step(state, y[k])
+        for law, truth in ((state.posterior, x[k]), (state.predicted, x[k + 1])):
+            error = truth - law.mean
+            # Cov(t) - matrix Cov(t, r)^T against the errors themselves: covariances of order 1, correlations below 0.99
+            np.testing.assert_allclose(error.mean(axis=0), 0, rtol=0, atol=1e-12)
+            np.testing.assert_allclose(law.cov, np.cov(error.T, bias=True), rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("family", [fos, mfos])
+def test_without_a_measurement_three_arguments_predict_from_the_prediction(family):
+    """In place of a missing y stands h = M[y | prediction], the value that leaves z = lambda; so u = lambda.
+
+    At k = 0 of a linear model z is an affine function of y, and the regression of x on (y, z) is exact wherever the pair
+    lies on that line: x ~ z.  (h, lambda) lies there, at innovation 0; (0, lambda) does not.
+    """
+    one = LINEAR["n=2, p=2"]
+    model = one.model()
+    (filter_,) = design([family(linearised(model), 3)], [[exact_ensemble(one, 1, seed=3)[0]]])
+    state = filter_.step(filter_.init(1), np.full((1, 2), np.nan))
+    expected = kalman_filter(model).step(kalman_filter(model).init(1), np.full((1, 2), np.nan))
+    # regressions on singular covariances, as in the theorem above
+    np.testing.assert_allclose(state.predicted.mean, expected.predicted.mean, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("arguments", [1, 4, "2", None])
@@ -577,6 +616,23 @@ def test_a_design_on_trajectories_that_diverge_says_so(variant53):
     broken = [[Instant(np.ones((3, 1)), np.full((3, 1), np.inf), np.ones((3, 1)))]]
     with pytest.raises(NotFinite, match=r"step 0.*trajectories become infinite"):
         design([duof(variant53)], broken)
+
+
+def test_every_filter_has_its_name_counts_its_measurements_and_says_if_it_is_slow(variant53, trajectories):
+    """Results are asked for by name, designs and random streams are looked up by step, and the slow run on a subset."""
+    filters = filters_of(variant53, trajectories)
+    designed = [f"{family}{a}-{kind}" for family in ("fos", "mfos") for kind in ("linearised", "gaussian") for a in ("", 3)]
+    assert [one.name for one in filters] == [*(f"aof-{kind}" for kind in STRUCTURES), "duof", *designed]
+    structure = linearised(variant53)
+    slow = [particle(variant53, 20), pointmass(variant53)]
+    filters += [iterated(structure), imm([structure], [[1.0]]), *slow, kalman_filter(LINEAR["scalar"].model())]
+    assert [one.name for one in filters[-5:]] == ["iterated-linearised", "imm", "particle", "aof-exact", "kalman"]
+    for one in filters:
+        state = one.init(2)
+        for k in range(3):
+            assert state.step == k, one.name
+            state = one.step(state, np.full((2, 1), 0.5))
+        assert one.slow == (one in slow), one.name
 
 
 def test_filters_are_values(variant53):

@@ -59,6 +59,16 @@ def test_on_a_linear_vector_model_it_is_the_kalman_filter_within_monte_carlo_err
     agree(own, variance, variance)
 
 
+def test_the_prediction_is_the_law_of_the_predicted_particles():
+    """Resampled, they all weigh the same: their mean, and their covariance with the divisor M."""
+    model = Model.define(["x1 + 0.2*x2 + 0.1*v1", "0.9*x2 + 0.3*v2 + 1"], "x1 + 0.5*w")
+    one = particle(model, 30)
+    state = one.step(one.init(2), np.array([[0.4], [-0.7]]))
+    for particles, mean, cov in zip(state.memory.x, *state.predicted, strict=True):
+        np.testing.assert_allclose(mean, particles.mean(axis=0), rtol=1e-13)
+        np.testing.assert_allclose(cov, np.cov(particles.T, bias=True), rtol=1e-12)
+
+
 def test_the_same_state_and_measurement_give_the_same_result(variants):
     one = particle(variants["2"], 50)
     _, y = simulate(variants["2"], 7, 2, seed=1)

@@ -1,5 +1,6 @@
 """What a comparison reports: against direct per-trajectory formulas, theory, and the page's table."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +12,11 @@ from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.modified_structure import mfos
 from kfcourse.filters.optimal_structure import fos
+from kfcourse.laws import Gaussian
+from kfcourse.montecarlo.comparison import Comparison, Subset
 from kfcourse.montecarlo.ensemble import BLOCK, Ensemble
 from kfcourse.montecarlo.experiment import compare, run
-from kfcourse.montecarlo.statistics import BATCHES, batch_mean
+from kfcourse.montecarlo.statistics import BATCHES, Sums, batch_mean
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import gaussian, linearised
 
@@ -81,6 +84,39 @@ def test_the_statistics_are_those_of_the_trajectories(direct):
         np.testing.assert_allclose(result.own_variance(name).value, np.trace(cov, axis1=-2, axis2=-1).mean(axis=-1), rtol=1e-11)
 
 
+@pytest.mark.filterwarnings("error")
+def test_the_normalised_error_of_a_scalar_filter_is_the_mean_of_e2_over_p():
+    """Three ways to sum e^2 / p: a variance for each trajectory, one for all, and as a vector of one component beside another.
+
+    A claim of variance 0 is right if there is no error (0), and infinitely wrong if there is (infinity).
+    """
+    x = np.array([1.0, -2.0, 3.0, 0.5, -1.5])
+    p = np.array([0.5, 2.0, 4.0, 0.25, 1.0])
+    still = np.zeros_like(x)  # the estimate is 0: x is the error
+
+    def recorded(errors, cov):
+        sums = Sums.empty(1, 1, errors.shape[1], len(errors), 2)
+        sums.record(0, 0, errors, Gaussian(np.zeros_like(errors), cov))
+        assert sums.counts.tolist() == [2, 3]
+        return sums.normalised[0, 0]
+
+    def expected(quotients):
+        return [quotients[:2].sum(), quotients[2:].sum()]
+
+    np.testing.assert_allclose(recorded(x[:, None], p[:, None, None]), expected(x**2 / p), rtol=1e-14)
+    np.testing.assert_allclose(recorded(x[:, None], np.array([[2.0]])), expected(x**2 / 2), rtol=1e-14)
+    pairs, covs = np.stack([x, still], axis=1), p[:, None, None] * np.eye(2)
+    np.testing.assert_allclose(recorded(pairs, covs), expected(x**2 / p / 2), rtol=1e-14)
+
+    certain = np.array([0.0, 2.0, 0.0, 0.25, 1.0])
+    known = np.where(certain > 0, x, 0.0)
+    quotients = np.array([0.0, 2.0, 0.0, 1.0, 2.25])
+    np.testing.assert_allclose(recorded(known[:, None], certain[:, None, None]), expected(quotients), rtol=1e-14)
+    assert recorded(known[:, None], np.array([[0.0]])).tolist() == [np.inf, np.inf]
+    assert recorded(still[:, None], np.array([[0.0]])).tolist() == [0, 0]
+    assert recorded(x[:, None], certain[:, None, None]).tolist() == [np.inf, np.inf]
+
+
 def test_differences_and_ratios_are_paired(direct):
     result, errors = direct
     ours, theirs = ((errors[name][0] ** 2).sum(axis=-1) for name in ("aof-gaussian", "wrong"))
@@ -93,6 +129,16 @@ def test_differences_and_ratios_are_paired(direct):
         np.testing.assert_allclose(score.standard_error, batch_mean(*batches(influence.mean(axis=0))).standard_error, rtol=1e-9)
     assert float(result.score("wrong").value) == pytest.approx(ratio.value.mean(), rel=1e-11)
     assert float(result.score_difference("wrong", "aof-gaussian").value) == pytest.approx(ratio.value.mean() - 1, rel=1e-11)
+
+
+@pytest.mark.parametrize("steps", [slice(2, 3), slice(0, 2)])
+def test_a_score_is_over_the_steps_asked_for(direct, steps):
+    """Over one step it is the ratio of that step, with its standard error: there is nothing to average."""
+    result, _ = direct
+    score, by_step = result.score("wrong", steps), result.relative("wrong")
+    assert score.value == pytest.approx(by_step.value[steps].mean(), rel=1e-12)
+    if steps == slice(2, 3):
+        assert score.standard_error == pytest.approx(by_step.standard_error[2], rel=1e-9)
 
 
 def test_pairing_pays(direct):
@@ -166,6 +212,20 @@ def test_intervals_cover_the_truth_as_often_as_they_say(linear):
     assert abs(hits - 190) < SIGMA * np.sqrt(200 * 0.95 * 0.05)
 
 
+@pytest.mark.parametrize("size", [1, 2])
+def test_the_standard_error_squared_is_unbiased(size):
+    """Three batches of equal size: over all ensembles drawn from 0, 1 and 5 the mean of SE^2 is Var / N, Var = 14 / 3.
+
+    It is the divisor B - 1 that makes it so: the deviations are from the sample's own mean.
+    """
+    counts = np.full(3, float(size))
+    samples = np.array(list(itertools.product([0.0, 1.0, 5.0], repeat=3 * size)))
+    found = batch_mean(samples.reshape(len(samples), 3, size).sum(axis=-1), counts)
+    assert np.mean(found.standard_error**2) == pytest.approx(14 / 3 / (3 * size), rel=1e-12)
+    np.testing.assert_allclose(found.value, samples.mean(axis=1), rtol=1e-14)
+    assert found.freedom == 2
+
+
 def test_batches_of_unequal_size_are_weighed():
     rng = np.random.default_rng(0)
     counts = np.array([50.0] * 60 + [1.0, 20.0, 30.0])
@@ -236,10 +296,110 @@ def test_the_excess_over_the_optimal_filter_is_the_distance_from_it(linear):
     assert (abs(optimal.value) < SIGMA * optimal.standard_error).all()
 
 
+def test_a_subset_larger_than_the_ensemble_is_all_of_it(variant53):
+    """40 trajectories are all there are for a subset of 500: the slow filter has the fast one's numbers."""
+    control, fast = aof(gaussian(variant53)), aof(linearised(variant53))
+    slow = replace(fast, name="slow", slow=True)
+    result = compare([control, fast, slow], variant53, 40, 2, seed=3, subset_runs=500, progress=False)
+    assert result.subset_runs == 40
+    np.testing.assert_allclose(result.error_variance("slow").value, result.error_variance("aof-linearised").value, rtol=1e-11)
+
+
+def by_hand(model, squares, slow, subset, own=None):
+    """A comparison over one step, every trajectory a batch of its own.
+
+    squares, own : dict from name to the squared error and the claimed variance of each trajectory, (runs,); the filters
+    named in `slow` ran on the first `subset` of them.
+    """
+    fast = tuple(name for name in squares if name not in slow)
+
+    def sums(names, runs):
+        empty = Sums.empty(len(names), 1, 1, runs, runs)
+        for i, name in enumerate(names):
+            empty.square[i, 0, 0] = squares[name][:runs]
+            empty.own[i, 0, 0] = own[name][:runs] if own else 0
+        return empty
+
+    names = (*fast, *slow)
+    runs = len(squares[fast[0]])
+    return Comparison(model, names, fast, runs, 1, 0, sums(fast, runs), Subset(list(slow), sums(names, subset)))
+
+
+def test_each_filter_is_judged_by_the_trajectories_it_ran_on(variant53):
+    """The fast ones by all, a slow one by its subset; only D goes through the control, which is the first fast filter
+    where there is no Gaussian AOF."""
+    squares = {"first": np.array([1.0, 3, 5]), "second": np.array([2.0, 8, 2]), "slow": np.array([4.0, 2])}
+    own = {"first": np.array([1.0, 1, 4]), "second": np.array([2.0, 2, 5]), "slow": np.array([3.0, 1])}
+    result = by_hand(variant53, squares, ["slow"], subset=2, own=own)
+    assert result.control == "first"
+    assert result.error_variance("slow").value.item() == 3 + (3 - 2)  # M e^2 of the first over all; of both over the subset
+    for name, square, claimed in (("first", 3, 2), ("second", 4, 3), ("slow", 3, 2)):
+        assert result.component_variance(name).value.item() == square
+        assert result.own_variance(name).value.item() == claimed
+    assert result.error_variance("first").freedom == 3 - 1  # a subset beside it does not make it less certain
+    assert result.error_variance("slow").freedom == 2 - 1
+    squares["aof-gaussian"] = squares["second"]
+    assert by_hand(variant53, squares, ["slow"], subset=2).control == "aof-gaussian"
+
+
+@pytest.mark.parametrize("ask", [lambda c: c.error_variance("slow"), lambda c: c.difference("slow", "other")])
+def test_the_variance_of_subset_and_whole_together_is_unbiased(variant53, ask):
+    """X is a mean over N = 4 trajectories, Y over the first n = 2: Var = Var X / N + Var Y / n + 2 Cov(X, Y) / N.
+
+    Drawn with replacement from three possible trajectories there are 81 ensembles, all equally likely.  Over all of them
+    the mean of SE^2 is the variance of the estimate, exactly: sample variances and covariances of independent draws with
+    the divisor n - 1 are unbiased.  X and Y grow together here, so that no estimate of Var is negative and cut at 0.
+    """
+    population = {"control": [0.0, 1, 4], "other": [0.0, 0.5, 1], "slow": [0.0, 2, 9]}
+    values, variances = [], []
+    for draw in itertools.product(range(3), repeat=4):
+        squares = {name: np.array(possible)[list(draw)] for name, possible in population.items()}
+        found = ask(by_hand(variant53, squares, ["slow"], subset=2))
+        values.append(found.value.item())
+        variances.append(found.standard_error.item() ** 2)
+    assert np.mean(variances) == pytest.approx(np.var(values), rel=1e-12)
+
+
+def test_a_variance_that_comes_out_negative_is_taken_as_zero(variant53):
+    """The covariance is known from the subset alone; where it says that Y undoes X, the sum may come out below 0.
+
+    X = 0, 4 and six times 2, Y = 1, 0:  Var X / 8 = 1/7,  Var Y / 2 = 1/4,  2 Cov / 8 = -1/2.
+    """
+    squares = {"control": np.array([0.0, 4, 2, 2, 2, 2, 2, 2]), "slow": np.array([1.0, 4])}
+    error = by_hand(variant53, squares, ["slow"], subset=2).error_variance("slow").standard_error
+    assert error.item() == 0
+
+
+def test_above_the_bound_the_control_cancels_when_the_subset_is_everything(variant53):
+    """M(e^2 - p_control) - M(p_exact - p_control), over the same trajectories, is M e^2 - M p_exact for any p_control."""
+    squares = {"aof-gaussian": np.array([1.0, 3, 2]), "other": np.array([4.0, 2, 9]), "aof-exact": np.array([1.0, 2, 2])}
+    own = {"aof-gaussian": np.array([7.0, 5, 6]), "other": np.array([1.0, 1, 1]), "aof-exact": np.array([1.0, 2, 3])}
+    result = by_hand(variant53, squares, ["aof-exact"], subset=3, own=own)
+    assert result.bound().value.item() == pytest.approx(2, rel=1e-14)
+    assert result.above_bound("other").value.item() == pytest.approx(5 / 2 - 1, rel=1e-14)
+
+
+def test_the_bound_adds_what_all_trajectories_and_the_subset_tell(variant53):
+    """M p_control over all, and M(p_exact - p_control) over the subset: two means, whose errors add in squares.
+
+    p_control = 2, 4, 6, 4: mean 4, SE^2 = (8/3)/4;  p_exact - p_control = -1, -3: mean -2, SE^2 = 2/2.
+    e^2 - p_control = 3, 1, 3, 1: mean 2, SE^2 = (4/3)/4.
+    """
+    squares = {"aof-gaussian": np.ones(4), "other": np.array([5.0, 5, 9, 5]), "aof-exact": np.ones(2)}
+    own = {"aof-gaussian": np.array([2.0, 4, 6, 4]), "other": np.ones(4), "aof-exact": np.array([1.0, 1])}
+    result = by_hand(variant53, squares, ["aof-exact"], subset=2, own=own)
+    bound, above = result.bound(), result.above_bound("other")
+    assert (bound.value.item(), bound.freedom) == (4 - 2, 1)
+    assert bound.standard_error.item() == pytest.approx(np.sqrt(2 / 3 + 1), rel=1e-14)
+    assert (above.value.item(), above.freedom) == ((2 + 2) / 2, 1)
+    assert above.standard_error.item() == pytest.approx(np.sqrt(1 / 3 + 1) / 2, rel=1e-14)
+
+
 def test_without_a_subset_slow_filters_are_left_out(variant53):
     slow = replace(aof(linearised(variant53)), name="slow", slow=True)
     result = compare([aof(gaussian(variant53)), slow], variant53, 50, 2, seed=3, subset_runs=0, progress=False)
     assert result.available == ("aof-gaussian",)
+    assert result.subset_runs == 0
     with pytest.raises(KeyError, match="slow"):
         result.error_variance("slow")
     for filters in ([slow], []):
