@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from statistics import NormalDist
 
 import numpy as np
-from scipy import stats
 
 from kfcourse.exercises import messages
 from kfcourse.exercises.g_extended.keys import Normalised, innovation_covariance, normalised_with
@@ -18,8 +18,20 @@ from kfcourse.linear.consistency import chi_squared_bounds, normalised_square
 Bounds = Callable[[int, int, float], tuple[float, float]]
 
 
+def _quantiles(probabilities: list[float], degrees: int) -> Array:
+    """Of a chi-squared law."""
+    from scipy import stats  # slow to import
+
+    return stats.chi2.ppf(probabilities, degrees)
+
+
+def _interval(confidence: float, degrees: int) -> Array:
+    """What lies between is as probable as the confidence says, the tails equally."""
+    return _quantiles([(1 - confidence) / 2, (1 + confidence) / 2], degrees)
+
+
 def _normal_bounds(degrees: int, runs: int, confidence: float) -> tuple[float, float]:
-    half = stats.norm.ppf((1 + confidence) / 2) * np.sqrt(2 * degrees / runs)
+    half = NormalDist().inv_cdf((1 + confidence) / 2) * np.sqrt(2 * degrees / runs)
     return degrees - half, degrees + half
 
 
@@ -27,17 +39,17 @@ WRONG_BOUNDS: tuple[tuple[str, str, Bounds], ...] = (
     (
         "one-value",
         "These are the bounds of a single value. The mean of many runs varies less: the degrees of freedom of a sum add up.",
-        lambda degrees, runs, confidence: stats.chi2.interval(confidence, degrees),
+        lambda degrees, runs, confidence: _interval(confidence, degrees),
     ),
     (
         "not-divided",
         "These are the bounds of the sum over the runs; those of the mean are asked for.",
-        lambda degrees, runs, confidence: stats.chi2.interval(confidence, degrees * runs),
+        lambda degrees, runs, confidence: _interval(confidence, degrees * runs),
     ),
     (
         "runs-only",
         "The degrees of freedom are not only the number of runs: each run adds as many as the vector has components.",
-        lambda degrees, runs, confidence: tuple(np.array(stats.chi2.interval(confidence, runs)) / runs),
+        lambda degrees, runs, confidence: tuple(np.array(_interval(confidence, runs)) / runs),
     ),
     (
         "per-component",
@@ -47,17 +59,17 @@ WRONG_BOUNDS: tuple[tuple[str, str, Bounds], ...] = (
     (
         "one-value-divided",
         "The sum of the runs has more degrees of freedom than one value: they add up.",
-        lambda degrees, runs, confidence: tuple(np.array(stats.chi2.interval(confidence, degrees)) / runs),
+        lambda degrees, runs, confidence: tuple(np.array(_interval(confidence, degrees)) / runs),
     ),
     (
         "one-sided",
         "Each bound leaves out the whole of the small probability; both together may leave it out, one half each.",
-        lambda degrees, runs, confidence: tuple(stats.chi2.ppf([1 - confidence, confidence], degrees * runs) / runs),
+        lambda degrees, runs, confidence: tuple(_quantiles([1 - confidence, confidence], degrees * runs) / runs),
     ),
     (
         "half-confidence",
         "Halve what lies outside, not the confidence.",
-        lambda degrees, runs, confidence: tuple(stats.chi2.ppf([confidence / 2, 1 - confidence / 2], degrees * runs) / runs),
+        lambda degrees, runs, confidence: tuple(_quantiles([confidence / 2, 1 - confidence / 2], degrees * runs) / runs),
     ),
     ("normal", "That is the normal approximation; the chi-squared law itself is not symmetric.", _normal_bounds),
 )
