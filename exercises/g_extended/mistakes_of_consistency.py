@@ -25,9 +25,10 @@ def _quantiles(probabilities: list[float], degrees: int) -> Array:
     return stats.chi2.ppf(probabilities, degrees)
 
 
-def _interval(confidence: float, degrees: int) -> Array:
+def _interval(confidence: float, degrees: int) -> tuple[float, float]:
     """What lies between is as probable as the confidence says, the tails equally."""
-    return _quantiles([(1 - confidence) / 2, (1 + confidence) / 2], degrees)
+    low, high = _quantiles([(1 - confidence) / 2, (1 + confidence) / 2], degrees)
+    return low, high
 
 
 def _normal_bounds(degrees: int, runs: int, confidence: float) -> tuple[float, float]:
