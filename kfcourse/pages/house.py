@@ -37,24 +37,29 @@ LAYERS = (
 def modules() -> Iterator[tuple[str, Path]]:
     """Name below `kfcourse`, such as "filters.kalman", and file of every module; a folder by its own name."""
     root, sets = (Path(str(resources.files(package))) for package in ("kfcourse", "kfcourse.exercises"))
-    for folder, above in ((root, ""), (sets, "exercises.")):
-        for path in sorted(folder.rglob("*.py")):
-            parts = path.relative_to(folder).with_suffix("").parts
-            name = above + ".".join(parts)
-            if not name.startswith("__"):
-                yield name.removesuffix(".__init__"), path
+    found = {path: path.relative_to(root.parent) for path in root.rglob("*.py")}
+    found |= {path: Path("kfcourse", "exercises", path.relative_to(sets)) for path in sets.rglob("*.py")}
+    for path, place in sorted(found.items(), key=lambda row: row[1]):
+        name = ".".join(place.with_suffix("").parts[1:])
+        if not name.startswith("__"):
+            yield name.removesuffix(".__init__"), path
 
 
 def imported(path: Path) -> set[str]:
     """Modules of this package that a file imports, below `kfcourse`; not those that only a type checker reads."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     typing = {id(node) for block in ast.walk(tree) if _for_types(block) for node in ast.walk(block)}
-    found = set()
+    found: set[str] = set()
     for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and id(node) not in typing and (node.module or "").split(".")[0] == "kfcourse":
-            module = (node.module or "").removeprefix("kfcourse").lstrip(".")
-            found |= {module} if module else {alias.name for alias in node.names}
-    return found
+        if id(node) in typing:
+            continue
+        if isinstance(node, ast.ImportFrom) and node.module == "kfcourse":
+            found |= {f"kfcourse.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found |= {node.module or ""}
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+    return {name.removeprefix("kfcourse.") for name in found if name.startswith("kfcourse.")}
 
 
 def _for_types(node: ast.AST) -> bool:
