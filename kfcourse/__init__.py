@@ -3,6 +3,9 @@
 model = Model.define("c*x + e*x*v", "g*x + f*x**2*w", dict(c=0.9, e=0.05, g=1, f=0.02))
 gaussian(model).latex()                            structural functions, derived
 compare(lab_filters(model), model, 100_000, 51, seed=1).ranking()
+
+A folder is a floor; each one's docstring says what lives there.  Below them all: `laws` (normal laws, gain with its
+pseudo-inverse, correction, missing measurements), `limits` (a time limit for a block of code), `files` (whole or not at all).
 """
 
 from kfcourse.lab import lab_filters, load_variants

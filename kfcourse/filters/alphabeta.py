@@ -76,7 +76,7 @@ def alpha_beta(model: Model, alpha: float, beta: float, start: str = "measuremen
     Parameters
     ----------
     model : Model
-        `kfcourse.scenarios.flight.kinematic(..., order=1)`, or equal to it in all but the noises.
+        `kfcourse.scenarios.radar.kinematic(..., order=1)`, or equal to it in all but the noises.
     alpha, beta : float
         The gain is (alpha, beta/T).
     start : {"measurements", "prior"}

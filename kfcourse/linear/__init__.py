@@ -2,7 +2,8 @@
 
 system        `LinearSystem`: A, H, Q, R, B, checked
 arithmetic    one correction and prediction in four forms: textbook, symmetrised, Joseph, square root
-runs          the filter along stored measurements, simulation, covariance analysis, steady state
+runs          the filter along stored measurements; simulation
+accuracy      covariances in advance, for any gains; the steady state of the Riccati equation
 consistency   NEES, NIS, whiteness: is a filter right about its own errors?
 """
 

@@ -12,10 +12,9 @@ import nbformat
 from nbformat import NotebookNode
 
 from kfcourse.checks import Exercise, exercise
+from kfcourse.notebooks.grading.running import MEMORY
 from kfcourse.notebooks.grading.submissions import Cell, syntax
 from kfcourse.notebooks.master import opened, render, student
-
-MEMORY = 4 * 2**30  # bytes of a kernel
 
 
 @lru_cache(maxsize=64)

@@ -24,6 +24,7 @@ from nbformat import NotebookNode
 from kfcourse.notebooks.grading.submissions import SECONDS
 
 WHOLE = 5  # times as long may a notebook take
+MEMORY = 4 * 2**30  # bytes of a kernel
 OUTPUT = 10 * 2**20  # characters that a notebook may print, pictures included
 
 
