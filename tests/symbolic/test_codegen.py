@@ -23,6 +23,7 @@ EXPRESSIONS = [
     -x1,
     2 / x1,
     1 / (x1 * x2**2),
+    x1 / p11 ** sp.Rational(3, 2) - x2 / sp.pi**2,
     x1 * sp.exp(sp.Rational(1, 200)) * sp.sqrt(2) * sp.sin(1),  # constants that are not rational
     sp.exp(sp.Rational(1, 200)) * sp.sin(1) + x2 * sp.pi * sp.sqrt(3),
     sp.sqrt(2 + sp.sqrt(3)) * x1 + sp.Rational(1, 3) * sp.pi,

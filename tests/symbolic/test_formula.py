@@ -37,6 +37,8 @@ def read(formula):
         ("abs(x)", sp.Abs(x)),
         ("sin(pi*x)", sp.sin(sp.pi * x)),
         ("exp(-x**2/2)", sp.exp(-(x**2) / 2)),
+        ("atan2(x, v)", sp.atan2(x, v)),
+        ("x + 0**2", x),
         ("tanh(x) + sinh(x) + cosh(x) + tan(x) + atan(x) + log(c) + cos(v)",
          sp.tanh(x) + sp.sinh(x) + sp.cosh(x) + sp.tan(x) + sp.atan(x) + sp.log(c) + sp.cos(v)),
     ],
@@ -149,6 +151,28 @@ def test_what_has_no_real_value_or_no_end_is_refused(formula):
 def test_only_strings_are_read(formula):
     with pytest.raises(FormulaError, match="must be a string"):
         read(formula)
+
+
+@pytest.mark.parametrize(
+    ("fits", "too_much", "message"),
+    [
+        (" " * 1999 + "x", " " * 2000 + "x", "2001 characters; at most 2000"),
+        ("x**16", "x**17", "larger than 16"),
+        ("(x**8)**3", "(x**5)**5", "above degree 24"),
+        ("x**8*v**16", "x**9*v**16", "above degree 24"),
+        ("(10**15)**2*x", "(10**16)**2*x", "too large or too small"),
+        ("(1/10**15)**2*x", "(1/10**16)**2*x", "too large or too small"),
+        ("sin(" * 5 + "x" + ")" * 5, "sin(" * 6 + "x" + ")" * 6, "more than 5 deep"),
+        ("exp(499)*x", "exp(500)*x", "argument of exp is too large"),
+        ("1e99*x", "1e100*x", "number is too large or too small"),
+        ("sin(x)", "sin(x, v)", "sin takes exactly one argument"),
+        ("atan2(x, v)", "atan2(x)", "atan2 takes exactly 2 arguments"),
+    ],
+)
+def test_a_limit_is_where_the_message_says(fits, too_much, message):
+    read(fits)
+    with pytest.raises(FormulaError, match=message):
+        read(too_much)
 
 
 def test_a_long_formula_is_cut_in_the_message():

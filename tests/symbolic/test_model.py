@@ -141,6 +141,25 @@ def test_a_model_prints_its_equations_and_values(variant53):
     assert repr(variant53) == "Model(x' = c*x + e*v*x, y = f*w*x**2 + g*x; c = 9/10, e = 1/20, g = 1, f = 1/50)"
 
 
+def test_a_vector_model_prints_every_component():
+    model = Model.define(["a*x1 + x2", "x2 + v"], ["x1 + w1", "2*x2 + w2"], {"a": 0.5})
+    assert repr(model) == "Model(x1' = a*x1 + x2, x2' = v + x2, y1 = w1 + x1, y2 = w2 + 2*x2; a = 1/2)"
+    equations = [
+        r"{x_{1}}_{k+1} &= a x_{1} + x_{2} \\",
+        r"{x_{2}}_{k+1} &= v + x_{2} \\",
+        r"{y_{1}}_k &= w_{1} + x_{1} \\",
+        r"{y_{2}}_k &= w_{2} + 2 x_{2}",
+    ]
+    assert model.latex(values=False).splitlines()[1:-1] == equations
+    assert model.latex().splitlines()[1:-1] == [*equations[:3], equations[3] + r" \\", "a &= 0.5"]
+
+
+def test_the_latex_of_a_scalar_model_has_no_indices(variant53):
+    lines = variant53.latex().splitlines()
+    assert lines[1:3] == [r"{x}_{k+1} &= c x + e v x \\", r"y_k &= f w x^{2} + g x \\"]
+    assert lines[-2] == "f &= 0.02"
+
+
 def test_equations_may_be_an_immutable_matrix():
     x1, x2, v = sp.symbols("x1 x2 v")
     model = Model.define(sp.ImmutableMatrix([x1 + x2, x2 + v]), sp.ImmutableMatrix([x1 + sp.Symbol("w")]))

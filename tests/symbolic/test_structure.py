@@ -262,6 +262,27 @@ def test_latex_prints_all_five_functions(variant53):
         assert left in text
 
 
+def test_latex_prints_every_entry_of_a_vector_model_and_symmetric_ones_once():
+    model = Model.define(["x1 + 2*x2", "x2 + v"], ["x1 + w1", "3*x2 + w2"])
+    lines = [line.rstrip("\\ ") for line in linearised(model).latex().splitlines()[1:-1]]
+    assert lines == [
+        r"\tau_{1}(z, p) &= z_{1} + 2 z_{2}",
+        r"\tau_{2}(z, p) &= z_{2}",
+        r"\Theta_{11}(z, p) &= p_{11} + 4 p_{12} + 4 p_{22}",
+        r"\Theta_{12}(z, p) &= p_{12} + 2 p_{22}",
+        r"\Theta_{22}(z, p) &= p_{22} + 1",
+        r"h_{1}(m, d) &= m_{1}",
+        r"h_{2}(m, d) &= 3 m_{2}",
+        r"G_{11}(m, d) &= 1",
+        r"G_{12}(m, d) &= 0",
+        r"G_{21}(m, d) &= 0",
+        r"G_{22}(m, d) &= 3",
+        r"F_{11}(m, d) &= d_{11} + 1",
+        r"F_{12}(m, d) &= 3 d_{12}",
+        r"F_{22}(m, d) &= 9 d_{22} + 1",
+    ]
+
+
 def test_the_noiseless_model_has_its_noises_at_their_means():
     model = vector_model()
     state, meter = compile_model(model)
