@@ -172,7 +172,8 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
 
 def _no_closed_form(factor: sp.Expr, function: sp.Expr) -> NoClosedForm:
     return NoClosedForm(
-        f"no closed-form Gaussian mean for the term {factor} in {function}; "
+        "no closed-form Gaussian mean that the package looks for (polynomials times exponentials, sines and cosines of linear "
+        f"arguments) for the term {factor} in {function}; "
         "use linearised(model), or a numerical structure: unscented(model) or gauss_hermite(model)"
     )
 
