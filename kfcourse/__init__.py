@@ -17,7 +17,7 @@ from kfcourse.montecarlo.experiment import compare, predictions, run
 from kfcourse.symbolic.formula import FormulaError
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
-from kfcourse.symbolic.quadrature import gauss_hermite, unscented
+from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite, unscented
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure, gaussian, linearised
 
@@ -31,6 +31,7 @@ __all__ = [
     "ModelError",
     "NoClosedForm",
     "NotFinite",
+    "QuadratureWarning",
     "Structure",
     "Trajectories",
     "compare",

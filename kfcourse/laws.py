@@ -69,7 +69,7 @@ def symmetric(matrix: Array) -> Array:
     return matrix if matrix.shape[-1] == 1 else 0.5 * (matrix + transpose(matrix))
 
 
-def gain(cross: Array, cov: Array) -> Array:
+def gain(cross: Array, cov: Array, rounding: Array | None = None) -> Array:
     """The regression gain cross cov^+, the solution K of K cov = cross of least norm.
 
     Parameters
@@ -78,15 +78,29 @@ def gain(cross: Array, cov: Array) -> Array:
         Cov(x, y).
     cov : (..., p, p)
         Cov(y), symmetric and non-negative; where it is singular the pseudo-inverse takes the place of
-        the inverse, so a measurement that cannot vary gets the gain 0.
+        the inverse, so a measurement that cannot vary gets the gain 0.  Where it is NaN the gain is NaN.
+    rounding : (..., p), optional
+        Variances that are no more than this are rounding, and their components cannot vary.  `cov` alone cannot tell: the
+        same 1e-32 is a rounded 0 in metres and a good variance in light years.  See `lost`.
+
+    Raises
+    ------
+    ValueError
+        A variance is negative (by more than rounding, where there are several).
     """
+    if cov.shape[-1] == 1 and rounding is None and np.minimum.reduce(cov, axis=None) > 0:
+        return cross / cov
+    variance = np.diagonal(cov, axis1=-2, axis2=-1)
+    if rounding is not None and (np.abs(variance) <= rounding).any():
+        varies = ~(np.abs(variance) <= rounding)
+        cross, cov = np.where(varies[..., None, :], cross, 0.0), np.where(varies[..., :, None] & varies[..., None, :], cov, 0.0)
+        variance = np.where(varies, variance, 0.0)
     if cov.shape[-1] == 1:
-        if np.minimum.reduce(cov, axis=None) > 0:
-            return cross / cov
+        _refuse_negative(np.nanmin(cov, initial=0.0), 0.0)
         zero = np.zeros(np.broadcast_shapes(cross.shape, cov.shape), dtype=np.result_type(cross, cov))
-        return np.divide(cross, cov, out=zero, where=cov > 0)
+        return np.divide(cross, cov, out=zero, where=cov != 0)
     # Scaling to correlations first: components may differ by orders of magnitude in size.
-    scale = np.sqrt(np.maximum(np.diagonal(cov, axis1=-2, axis2=-1), 0.0))
+    scale = np.sqrt(np.maximum(variance, 0.0))
     scale = np.where(scale > 0, scale, 1.0)
     correlation = cov / (scale[..., :, None] * scale[..., None, :])
     scaled_cross = cross / scale[..., None, :]
@@ -96,11 +110,42 @@ def gain(cross: Array, cov: Array) -> Array:
             return transpose(np.linalg.solve(correlation, transpose(scaled_cross))) / scale[..., None, :]
     except np.linalg.LinAlgError:
         pass
-    return scaled_cross @ np.linalg.pinv(correlation, rcond=singular**2, hermitian=True) / scale[..., None, :]
+    unknown = np.isnan(cov).any(axis=(-2, -1), keepdims=True)
+    _refuse_negative(np.nanmin(variance, initial=np.inf), singular**2 * np.nanmax(variance, initial=0.0))
+    inverse = np.linalg.pinv(np.where(unknown, 0.0, correlation), rcond=singular**2, hermitian=True)
+    return np.where(unknown, np.nan, scaled_cross @ inverse / scale[..., None, :])
 
 
 # A Cholesky pivot of a correlation matrix below this is rounding, in units of the root of the precision (1.5e-8 in float64).
 SINGULAR = 7.0
+
+
+def _refuse_negative(least: float, rounding: float) -> None:
+    if least < -rounding:
+        raise ValueError(
+            f"a covariance has the variance {least:.6g}, which must not be negative; "
+            "compute it in a form that cannot become so (Joseph's, or a square root)"
+        )
+
+
+def lost(G: Array, cov: Array) -> Array:
+    """What the rounding of cov = Cov(x) leaves open of Var(G x), (..., p): where Var(G x) is less, no digit of it is right.
+
+    Each entry of cov is known to some units of precision, so G cov G^T is known to that times (sum_j |G_ij| sd_j)^2, the
+    variance if all components were fully correlated, whatever units they have.  The units are 4 SINGULAR^2, about 200
+    (4e-14 of that variance): twice as many as `well_conditioned` adds.
+    """
+    sd = np.sqrt(np.maximum(np.diagonal(cov, axis1=-2, axis2=-1), 0.0))
+    return 4 * SINGULAR**2 * np.finfo(cov.dtype).eps * apply(np.abs(G), sd) ** 2
+
+
+def well_conditioned(cov: Array) -> Array:
+    """cov, its variances larger by 2 SINGULAR^2 units of precision (2e-14 of themselves): `gain` sees no singular matrix.
+
+    Variances that are 0 stay 0.
+    """
+    enlarged = 1 + 2 * SINGULAR**2 * np.finfo(cov.dtype).eps * np.eye(cov.shape[-1], dtype=cov.dtype)
+    return cov * enlarged
 
 
 def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
@@ -119,9 +164,9 @@ def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
         varies = np.minimum.reduce(F, axis=None) > 0
         share = prior.cov / F if varies else gain(prior.cov, F)
         K = share * G
-        cov = share * R if varies else np.where(F > 0, share * R, prior.cov)  # a meter that cannot vary tells nothing
+        cov = share * R if varies else np.where(F == 0, prior.cov, share * R)  # a meter that cannot vary tells nothing
     else:
-        K = gain(product(prior.cov, transpose(G)), F)
+        K = gain(product(prior.cov, transpose(G)), F, lost(G, prior.cov))
         rest = np.eye(prior.cov.shape[-1], dtype=prior.cov.dtype) - product(K, G)
         cov = symmetric(product(product(rest, prior.cov), transpose(rest)) + product(product(K, R), transpose(K)))
     return Gaussian(prior.mean + apply(K, innovation), cov)

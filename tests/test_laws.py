@@ -48,6 +48,55 @@ def test_where_nothing_can_vary_the_gain_is_zero():
     assert np.array_equal(gain(np.zeros((1, 2, 2)), np.zeros((1, 2, 2))), np.zeros((1, 2, 2)))
 
 
+@pytest.mark.parametrize("p", [1, 2])
+def test_a_gain_of_nan_is_nan_and_the_others_do_not_notice(rng, p):
+    cov, cross = covariances(rng, 5, p), rng.normal(size=(5, 2, p))
+    expected = gain(cross, cov)
+    cov[3, 0, 0] = np.nan
+    found = gain(cross, cov)
+    assert np.isnan(found[3]).all()
+    others = [0, 1, 2, 4]
+    np.testing.assert_allclose(found[others], expected[others], rtol=1e-11, atol=1e-11)  # condition numbers up to 1e3
+    assert np.isnan(gain(np.ones((1, 1)), np.array([[np.nan]]))).all()
+
+
+@pytest.mark.parametrize("cov", [[[-1.0]], [[1.0, 0.0], [0.0, -1.0]], [[[1.0]], [[-1e-300]]]])
+def test_a_negative_variance_is_refused(cov):
+    cov = np.array(cov)
+    with pytest.raises(ValueError, match="must not be negative"):
+        gain(np.ones((1, cov.shape[-1])), cov)
+
+
+def test_an_unknown_variance_gives_an_unknown_correction():
+    prior = Gaussian(np.zeros((2, 1)), np.ones((2, 1, 1)))
+    F = np.array([[[np.nan]], [[2.0]]])
+    posterior = correct(prior, Measurement(np.zeros((2, 1)), np.ones((2, 1, 1)), F, F - 1), np.ones((2, 1)))
+    assert np.isnan(posterior.mean[0, 0])
+    assert np.isnan(posterior.cov[0, 0, 0])
+    np.testing.assert_allclose((posterior.mean[1, 0], posterior.cov[1, 0, 0]), 0.5, rtol=1e-15)
+
+
+@pytest.mark.parametrize("p", [1, 2])
+def test_what_only_rounding_lets_vary_tells_nothing(p):
+    """x1 + x2 is known exactly and x1 vaguely: the variance of x1 + x2 is then rounding of 1e8, whatever the units."""
+    for units in (np.ones(2), np.array([1e-6, 1e9])):
+        cov = 1e8 / 3 * np.array([[1.0, -1.0], [-1.0, 1.0]]) / (units[:, None] * units)
+        cov[1, 1] *= 1 + 4e-16
+        prior = Gaussian(np.zeros((1, 2)), cov[None])
+        G = np.array([[1.0], [2.0]])[:p] * units
+        F = G @ cov @ G.T
+        posterior = correct(prior, Measurement(np.zeros((1, p)), G[None], F[None], np.zeros((1, p, p))), np.full((1, p), 1e-4))
+        np.testing.assert_array_equal(posterior.mean, prior.mean)
+        np.testing.assert_allclose(posterior.cov, prior.cov, rtol=1e-15)
+
+
+def test_a_variance_that_is_small_in_its_units_tells():
+    # Var = 1e-32 beside 1: 1e-16 in metres is 1 in other units, and only the caller knows what it is made of
+    cross, cov = np.array([[0.5, 1e-17]]), np.diag([1.0, 1e-32])
+    np.testing.assert_allclose(gain(cross, cov), [[0.5, 1e15]], rtol=1e-14)
+    np.testing.assert_allclose(gain(cross, cov, rounding=np.array([0.0, 1e-30])), [[0.5, 0.0]], rtol=1e-14)
+
+
 def test_a_singular_covariance_gets_its_pseudo_inverse(rng):
     # y2 = 2 y1: the gain of least norm in units of the standard deviations gives both the same weight.
     cov = np.array([[1.0, 2.0], [2.0, 4.0]])

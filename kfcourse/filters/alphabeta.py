@@ -1,4 +1,4 @@
-r"""Alpha-beta and alpha-beta-gamma filters: Kalman's prediction and correction with a gain that does not change.
+r"""Alpha-beta and alpha-beta-gamma filters: Kalman's prediction and correction with a gain that no covariance is needed for.
 
     x^- = A z,   z = x^- + K (y - H x^-),   K = (alpha, beta/T, gamma/(2 T^2)) on each axis
 
@@ -10,6 +10,12 @@ depend on the tracking index alone,
     the same beta,  gamma = beta^2 / alpha,                                 Lambda = gamma / (2 sqrt(1 - alpha))   (with gamma)
 
 Kalata (1984); Bar-Shalom, Li, Kirubarajan (2001), section 6.5.  The radar chapter derives them.
+
+A filter that starts from its measurements takes at the k-th of them the larger of these and of the gains of a least squares
+polynomial through all k (a memory that grows; Brookner, 1998, section 1.2.10),
+
+    alpha_k = 2 (2k - 1) / (k (k + 1)),  beta_k = 6 / (k (k + 1))                                     (a line)
+    alpha_k = 3 (3k^2 - 3k + 2) / (k (k + 1) (k + 2)),  beta_k = 18 (2k - 1) / (...),  gamma_k = 120 / (...)     (a parabola)
 """
 
 from __future__ import annotations
@@ -70,7 +76,7 @@ class Progress(NamedTuple):
     ages: Array
 
 
-def alpha_beta(model: Model, alpha: float, beta: float, start: str = "measurements") -> Filter:
+def alpha_beta(model: Model, alpha: float, beta: float, start: str = "measurements", gains: str | None = None) -> Filter:
     """The alpha-beta filter of a model r' = r + T s + noise, s' = s + noise, y = r + noise on each axis.
 
     Parameters
@@ -78,10 +84,14 @@ def alpha_beta(model: Model, alpha: float, beta: float, start: str = "measuremen
     model : Model
         `kfcourse.scenarios.radar.kinematic(..., order=1)`, or equal to it in all but the noises.
     alpha, beta : float
-        The gain is (alpha, beta/T).
+        The gain comes to (alpha, beta/T).
     start : {"measurements", "prior"}
-        "measurements": the first two of each axis give its position and velocity, whatever the model's prior says; then the
-        gain is constant.  "prior": constant from the first measurement on.
+        "measurements": the first two of each axis give its position and velocity, whatever the model's prior says.
+        "prior": what the model's prior says is predicted and corrected from the first measurement on.
+    gains : {"growing", "constant"}, optional
+        "growing", the default of a start from measurements: alpha_k = max(alpha, 2 (2k - 1) / (k (k + 1))) and
+        beta_k = max(beta, 6 / (k (k + 1))) at the k-th measurement of an axis, the line through all of them until it forgets
+        more slowly than (alpha, beta).  "constant", the default and only choice of a start from the prior.
 
     Returns
     -------
@@ -94,22 +104,35 @@ def alpha_beta(model: Model, alpha: float, beta: float, start: str = "measuremen
     ModelError
         The model is of another form.
     ValueError
-        Coefficients with which the errors grow.
+        Coefficients with which the errors grow; another start or other gains than these.
     """
-    return _fixed_gain("alpha-beta", model, (alpha, beta), start)
+    return _tabulated("alpha-beta", model, (alpha, beta), start, gains)
 
 
-def alpha_beta_gamma(model: Model, alpha: float, beta: float, gamma: float, start: str = "measurements") -> Filter:
+def alpha_beta_gamma(
+    model: Model, alpha: float, beta: float, gamma: float, start: str = "measurements", gains: str | None = None
+) -> Filter:
     """The alpha-beta-gamma filter, gain (alpha, beta/T, gamma/(2 T^2)), of `kinematic(..., order=2)`.
 
-    Arguments, result and errors as of `alpha_beta`; three measurements are needed for the start.
+    Arguments, result and errors as of `alpha_beta`; three measurements are needed for the start, and a parabola grows.
     """
-    return _fixed_gain("alpha-beta-gamma", model, (alpha, beta, gamma), start)
+    return _tabulated("alpha-beta-gamma", model, (alpha, beta, gamma), start, gains)
 
 
-def _fixed_gain(name: str, model: Model, coefficients: tuple[float, ...], start: str) -> Filter:
+def growing_memory(k: Array, size: int) -> Array:
+    """Coefficients (..., size) of the least squares line (size 2) or parabola (3) through k equally spaced measurements (...)."""
+    k = np.asarray(k, dtype=float)
+    if size == 2:
+        return np.stack([2 * (2 * k - 1), 6 + 0 * k], axis=-1) / (k * (k + 1))[..., None]
+    return np.stack([3 * (3 * k**2 - 3 * k + 2), 18 * (2 * k - 1), 120 + 0 * k], axis=-1) / (k * (k + 1) * (k + 2))[..., None]
+
+
+def _tabulated(name: str, model: Model, coefficients: tuple[float, ...], start: str, gains: str | None) -> Filter:
     if start not in ("measurements", "prior"):
         raise ValueError(f"start must be 'measurements' or 'prior', got {start!r}")
+    gains = gains or ("growing" if start == "measurements" else "constant")
+    if gains not in ("growing", "constant") or (gains == "growing" and start == "prior"):
+        raise ValueError(f"gains must be 'constant', or 'growing' with start='measurements'; got {gains!r} with start={start!r}")
     system, shift, offset = linear_system(model)
     size, axes = len(coefficients), model.p
     T = _interval(model, system.A, system.H, size)
@@ -132,7 +155,8 @@ def _fixed_gain(name: str, model: Model, coefficients: tuple[float, ...], start:
     def step(state: State, y: Array) -> State:
         used, ages = state.memory
         measured = ~np.isnan(y) if any_missing(y) else np.ones((1, axes), dtype=bool)
-        by_axis = np.where((used < size)[..., None], _starting(ages, size), constant) * measured[..., None]
+        later = constant if gains == "constant" else np.maximum(constant, scale * growing_memory(used + 1, size))
+        by_axis = np.where((used < size)[..., None], _starting(ages, size), later) * measured[..., None]
         K = _spread(by_axis, axes)
         prior = state.predicted
         innovation = np.where(measured, y - apply(system.H, prior.mean), 0.0)

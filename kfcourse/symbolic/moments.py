@@ -138,7 +138,8 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
     Raises
     ------
     NoClosedForm
-        For a term that is not a polynomial times exponentials, sines and cosines of linear arguments.
+        For a term that is not a polynomial times exponentials, sines and cosines of linear arguments: none other is looked
+        for, though some have a closed form (exp(-x**2), abs(x)).
     """
 
     # Hyperbolic and trigonometric functions of x become exponentials; those of parameters stay.
@@ -172,7 +173,7 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
 
 def _no_closed_form(factor: sp.Expr, function: sp.Expr) -> NoClosedForm:
     return NoClosedForm(
-        f"no closed-form Gaussian mean for the term {factor} in {function}; "
+        f"the package knows no closed-form Gaussian mean of the term {factor} in {function}; "
         "use linearised(model), or a numerical structure: unscented(model) or gauss_hermite(model)"
     )
 

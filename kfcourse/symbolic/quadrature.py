@@ -1,28 +1,59 @@
-"""Structural functions by quadrature over a normal law, for models without a closed form."""
+"""Structural functions by quadrature over a normal law, for models without a closed form.
+
+A noise that is added with a constant factor, and is correlated with no noise of another kind, needs no points: its mean
+and covariance are added.  The points spread over the state and over the other noises, s variables together.
+"""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from itertools import product as cartesian
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+import sympy as sp
 
-from kfcourse.laws import Array, Gaussian, Measurement, gain, square_root, symmetric, transpose
+from kfcourse.laws import Array, Gaussian, Measurement, gain, square_root, symmetric, transpose, well_conditioned
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure
 
+Rule: TypeAlias = Callable[[int], tuple[Array, Array]]
 
-def unscented(model: Model, kappa: float | None = None) -> Structure:
-    """Structural functions by the unscented transform over (x, v) and (x, w).
+MOST_POINTS = 100_000
 
-    2 s + 1 points at distance sqrt(s + kappa), s the joint dimension; exact for quadratic functions.
+
+class QuadratureWarning(UserWarning):
+    """The points do not integrate a function of the model at its prior law: the structural functions may be far off."""
+
+
+def unscented(model: Model, kappa: float | None = None, root: str = "cholesky", augmented: bool = False) -> Structure:
+    """Structural functions by the unscented transform.
+
+    2 s + 1 points, the mean and +-sqrt(s + kappa) times the columns of a root of the covariance.  Means are exact for
+    quadratic functions, covariances for linear ones only: no point lies off the axes, so a product like x^2 w is not seen.
 
     Parameters
     ----------
     kappa : float, optional
-        Spread; 3 - s by default (Julier and Uhlmann), but not below 0, so that no weight is negative.
+        The spread is s + kappa; kappa = 3 - s by default (Julier and Uhlmann), but not below 0, so that no weight is negative.
+    root : {"cholesky", "symmetric", "eigenvectors"}
+        Which root of the covariance: the lower triangular one, in which the order of the components counts; the symmetric
+        one; or the eigenvectors times the roots of the eigenvalues, the principal axes of the ellipsoid.
+    augmented : bool
+        Points for all noises, those too that are only added.
+
+    Raises
+    ------
+    ModelError
+        s + kappa is not positive, or there is no such root.
+
+    Warns
+    -----
+    QuadratureWarning
+        A function is not finite at a point of the prior law, or too rough for its moments there to be found by points.
     """
 
     def rule(size: int) -> tuple[Array, Array]:
@@ -34,56 +65,183 @@ def unscented(model: Model, kappa: float | None = None) -> Structure:
         weights[0] = k / (size + k)
         return np.concatenate([np.zeros((1, size)), axes, -axes]), weights
 
-    return _quadrature(model, "unscented", rule)
+    return _checked("unscented", model, rule, _Equations.of(model, augmented), root, order=5)
 
 
-def gauss_hermite(model: Model, order: int = 5) -> Structure:
+def gauss_hermite(model: Model, order: int = 5, root: str = "cholesky", augmented: bool = False) -> Structure:
     """Structural functions by the Gauss-Hermite product rule; exact for polynomials below degree 2*order.
 
-    `order` points an axis, so order**(n + number of noises) evaluations.
+    `order` points an axis, so order**s evaluations.  `root` and `augmented` as of `unscented`.
+
+    Raises
+    ------
+    ModelError
+        Fewer than two points an axis, too many points together, or there is no such root.
+
+    Warns
+    -----
+    QuadratureWarning
+        A function is not finite at a point of the prior law, or twice as many points an axis give other moments there.
     """
     if order < 2:
         raise ModelError(f"Gauss-Hermite quadrature needs an order of at least 2, got {order}")
+    return _checked("gauss-hermite", model, _product_rule(order), _Equations.of(model, augmented), root, order)
 
+
+def _product_rule(order: int) -> Rule:
     def rule(size: int) -> tuple[Array, Array]:
-        if order**size > 100_000:
+        if order**size > MOST_POINTS:
             raise ModelError(f"{order} points on each of {size} axes are too many; lower the order or use unscented(model)")
         nodes, weights = np.polynomial.hermite_e.hermegauss(order)
         weights = weights / weights.sum()
         points = np.array(list(cartesian(nodes, repeat=size)))
         return points, np.array([np.prod(c) for c in cartesian(weights, repeat=size)])
 
-    return _quadrature(model, "gauss-hermite", rule)
+    return rule
 
 
-def _quadrature(model: Model, name: str, rule: Callable[[int], tuple[Array, Array]]) -> Structure:
+class _Equation(NamedTuple):
+    """One equation of the model as f(x, other noises), and the covariance of what is only added."""
+
+    function: Callable[[Array, Array], Array]
+    size: int
+    noise: Gaussian  # all noises; the covariance of those that are only added set to 0
+    root: Array  # of that covariance, columns for the other noises only
+    added: Array
+
+
+class _Equations(NamedTuple):
+    state: _Equation
+    meter: _Equation
+
+    @classmethod
+    def of(cls, model: Model, augmented: bool) -> _Equations:
+        state, meter = compile_model(model)
+        return cls(
+            _equation(state, model.state_equation, (*model.x, *model.v), model.v, model.state_noise, model, augmented),
+            _equation(meter, model.meter_equation, (*model.x, *model.w), model.w, model.meter_noise, model, augmented),
+        )
+
+
+def _equation(function, formulas, variables, noises, law: Gaussian, model: Model, augmented: bool) -> _Equation:
+    factors = sp.Matrix(formulas).subs(model.values).jacobian(list(noises)) if noises else sp.zeros(len(formulas), 0)
+    constant = [not sp.Matrix(factors[:, j]).applyfunc(sp.simplify).has(*variables) for j in range(len(noises))]
+    other = np.array([augmented or not c for c in constant], dtype=bool)
+    while (correlated := ~other & (law.cov[:, other] != 0).any(axis=1)).any():
+        other |= correlated
+    matrix = np.array([[float(factors[i, j]) if not other[j] else 0.0 for j in range(len(noises))] for i in range(len(formulas))])
+    matrix = matrix.reshape(len(formulas), len(noises))
+    root = np.zeros((len(noises), int(other.sum())))
+    root[other] = square_root(law.cov[np.ix_(other, other)]) if other.any() else root[other]
+    return _Equation(function, len(formulas), law, root, symmetric(matrix @ law.cov @ matrix.T))
+
+
+def _checked(name: str, model: Model, rule: Rule, equations: _Equations, root: str, order: int) -> Structure:
+    """The structure, after a comparison at the prior law of Gauss-Hermite rules of this order and of twice the order."""
+    structure = _quadrature(name, model, rule, equations, root)
+    size = model.n + max(equation.root.shape[1] for equation in equations)
+    with np.errstate(all="ignore"):
+        found = _moments(structure)
+        if not all(np.isfinite(moment).all() for _, moment, _ in found):
+            _warn(f"{name}: a function of {model} is not finite at the points of the prior law", stacklevel=4)
+        elif (2 * order) ** size <= MOST_POINTS:
+            coarse = (
+                found if name == "gauss-hermite" else _moments(_quadrature(name, model, _product_rule(order), equations, root))
+            )
+            fine = _moments(_quadrature(name, model, _product_rule(2 * order), equations, root))
+            for (what, less, _), (_, more, scale) in zip(coarse, fine, strict=True):
+                if not (np.abs(more - less) <= CONVERGED * scale).all():
+                    worst = np.unravel_index(np.argmax(np.nan_to_num(np.abs(more - less) / scale, nan=np.inf)), less.shape)
+                    _warn(
+                        f"{name}: the {what} of {model} at the prior law is {less[worst]:.4g} with {order} points an axis and "
+                        f"{more[worst]:.4g} with {2 * order}: it may be infinite, or the function too rough for these points",
+                        stacklevel=4,
+                    )
+                    break
+    return structure
+
+
+# Means may change by this part of a standard deviation when the order is doubled, covariances by this part of themselves.
+CONVERGED = 0.1
+
+
+def _moments(structure: Structure) -> list[tuple[str, Array, Array]]:
+    """Name, value and natural size of the moments at the prior law."""
+    mean, cov = structure.model.prior
+    tau, theta = structure.predict(mean, cov)
+    h, _, F, _ = structure.measure(mean, cov)
+    moments = []
+    for what, centre, spread in (("next state", tau, theta), ("measurement", h, F)):
+        sd = np.sqrt(np.maximum(np.diagonal(spread), 0.0))
+        tiny = 1e-12 * (1 + np.abs(centre))  # rounding: what does not vary has no size of its own
+        moments.append((f"mean of the {what}", centre, sd + tiny))
+        moments.append((f"covariance of the {what}", spread, (sd + tiny)[:, None] * (sd + tiny)))
+    return moments
+
+
+def _warn(text: str, stacklevel: int) -> None:
+    warnings.warn(text, QuadratureWarning, stacklevel=stacklevel)
+
+
+def _lower_root(cov: Array) -> Array:
+    """The Cholesky factor; where cov is singular its column is 0 for a component that the earlier ones determine."""
+    try:
+        return np.linalg.cholesky(cov)
+    except np.linalg.LinAlgError:
+        pass
+    n = cov.shape[-1]
+    lower, rest = np.zeros_like(cov), cov.copy()
+    for j in range(n):
+        pivot = rest[..., j, j]
+        regular = pivot > n * np.finfo(cov.dtype).eps * cov[..., j, j]
+        column = rest[..., :, j] / np.sqrt(np.where(regular, pivot, 1.0))[..., None]
+        lower[..., :, j] = np.where(regular[..., None] & (np.arange(n) >= j), column, 0.0)
+        rest = rest - lower[..., :, j, None] * lower[..., None, :, j]
+    return lower
+
+
+def _symmetric_root(cov: Array) -> Array:
+    """V sqrt(Lambda) V^T."""
+    return symmetric(square_root(cov) @ transpose(np.linalg.eigh(cov)[1]))
+
+
+ROOTS: dict[str, Callable[[Array], Array]] = {"cholesky": _lower_root, "symmetric": _symmetric_root, "eigenvectors": square_root}
+
+
+def _quadrature(name: str, model: Model, rule: Rule, equations: _Equations, root: str) -> Structure:
     """A structure from standard normal points and weights: rule(size) -> (points (q, size), weights (q,))."""
+    if root not in ROOTS:
+        raise ModelError(f"root must be one of {', '.join(map(repr, ROOTS))}, got {root!r}")
     n = model.n
-    state, meter = compile_model(model)
+    rules = [rule(n + equation.root.shape[1]) for equation in equations]
 
-    def propagate(function, size, mean, cov, law: Gaussian, points: Array):
-        x = mean[..., None, :] + points[:, :n] @ transpose(square_root(cov))
-        noise = law.mean + points[:, n:] @ square_root(law.cov).T
-        values = function(x, np.broadcast_to(noise, x.shape[:-1] + noise.shape[-1:]))
-        return x, np.broadcast_to(values, (*x.shape[:-1], size))
-
-    state_points, state_weights = rule(n + len(model.v))
-    meter_points, meter_weights = rule(n + len(model.w))
+    def propagate(equation: _Equation, mean: Array, cov: Array, points: Array, weights: Array):
+        """Deviations of x, mean of the function, its deviations from that: 0 exactly for what does not vary."""
+        deviation = points[:, :n] @ transpose(ROOTS[root](cov))
+        x = mean[..., None, :] + deviation
+        noise = equation.noise.mean + points[:, n:] @ equation.root.T
+        values = equation.function(x, np.broadcast_to(noise, x.shape[:-1] + noise.shape[-1:]))
+        values = np.broadcast_to(values, (*x.shape[:-1], equation.size))
+        middle = values[..., np.argmin((points**2).sum(axis=1)), :]
+        values = values - middle[..., None, :]
+        shift = weights @ values
+        return deviation, middle + shift, values - shift[..., None, :]
 
     def predict(z: Array, p: Array) -> Gaussian:
-        _, following = propagate(state, n, z, p, model.state_noise, state_points)
-        tau = state_weights @ following
-        return Gaussian(tau, _weighted(state_weights, following - tau[..., None, :]))
+        points, weights = rules[0]
+        _, tau, following = propagate(equations.state, z, p, points, weights)
+        return Gaussian(tau, _weighted(weights, following) + equations.state.added)
 
     def measure(m: Array, d: Array) -> Measurement:
-        x, y = propagate(meter, model.p, m, d, model.meter_noise, meter_points)
-        h = meter_weights @ y
-        deviation = y - h[..., None, :]
-        cross = transpose(deviation * meter_weights[:, None]) @ (x - m[..., None, :])
-        G, F = gain(cross, np.broadcast_to(d, (*m.shape, n))), _weighted(meter_weights, deviation)
+        points, weights = rules[1]
+        # A singular covariance would hide how y depends on what the other components determine.
+        spread = well_conditioned(np.broadcast_to(d, (*m.shape, n)))
+        dx, h, dy = propagate(equations.meter, m, spread, points, weights)
+        dx = np.broadcast_to(dx, (*dy.shape[:-1], n))
+        G = gain(transpose(dy * weights[:, None]) @ dx, spread)
         # The part of y that is not linear in x: no difference of nearly equal matrices.
-        unexplained = deviation - (x - m[..., None, :]) @ transpose(G)
-        return Measurement(h, G, F, _weighted(meter_weights, unexplained))
+        added = equations.meter.added
+        return Measurement(h, G, _weighted(weights, dy) + added, _weighted(weights, dy - dx @ transpose(G)) + added)
 
     return Structure(name, model, predict, measure)
 

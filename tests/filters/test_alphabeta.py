@@ -9,6 +9,7 @@ from kfcourse import Gaussian, Model, ModelError, run, simulate
 from kfcourse.filters.alphabeta import (
     alpha_beta,
     alpha_beta_gamma,
+    growing_memory,
     steady_alpha,
     steady_beta,
     steady_gamma,
@@ -98,8 +99,8 @@ def test_alpha_beta_gamma_from_a_prior_is_filterpys():
             np.testing.assert_allclose(found[k, trajectory], expected, rtol=0, atol=100 * ROUNDING)
 
 
-def slow_alpha_beta(measurements, alpha, beta):
-    """One axis in plain floats: the first two measurements, at any distance, then constant gains; coasting over NaN."""
+def slow_alpha_beta(measurements, alpha, beta, growing):
+    """One axis in plain floats: the first two measurements, at any distance, then the gains; coasting over NaN."""
     known, last, estimates, position, speed = 0, None, [], None, 0.0
     for k, y in enumerate(measurements):
         if known:
@@ -110,22 +111,25 @@ def slow_alpha_beta(measurements, alpha, beta):
             elif known == 1:
                 position, speed = y, (y - last[1]) / (T * (k - last[0]))
             else:
-                innovation = y - position
-                position, speed = position + alpha * innovation, speed + beta / T * innovation
+                innovation, count = y - position, known + 1
+                a = max(alpha, 2 * (2 * count - 1) / (count * (count + 1))) if growing else alpha
+                b = max(beta, 6 / (count * (count + 1))) if growing else beta
+                position, speed = position + a * innovation, speed + b / T * innovation
             known, last = known + 1, (k, y)
         estimates.append((position, speed))
     return estimates
 
 
-def test_the_start_from_two_measurements_with_gaps_by_a_slow_loop():
+@pytest.mark.parametrize("gains", ["growing", "constant", None])
+def test_the_start_from_two_measurements_with_gaps_by_a_slow_loop(gains):
     model, alpha, beta = planar(prior={"variance": 1e4}), 0.3, 0.07
     y = simulate(model, 4, 20, seed=3).y
     y[1, 0] = y[5:8, 1] = y[0, 2] = y[1, 2] = np.nan  # gaps in the start and later, all components
     y[1, 3, 0] = y[6, 3, 1] = np.nan  # and one component alone
-    found = run(alpha_beta(model, alpha, beta), y).mean
+    found = run(alpha_beta(model, alpha, beta, gains=gains), y).mean
     for trajectory in range(4):
         for axis in range(2):
-            expected = slow_alpha_beta(y[:, trajectory, axis], alpha, beta)
+            expected = slow_alpha_beta(y[:, trajectory, axis], alpha, beta, growing=gains != "constant")
             for k, values in enumerate(expected):
                 if values[0] is not None:  # nothing is known before the first measurement
                     np.testing.assert_allclose(found[k, trajectory, axis::2], values, rtol=0, atol=1e3 * ROUNDING)
@@ -143,6 +147,46 @@ def test_the_start_from_three_measurements_is_the_parabola_through_them():
     # Two do not tell the acceleration: it is still the prior's, 3, and the velocity is such that both lie on the parabola.
     speed = (5.0 - 2.0) / (2 * T) + 3.0 * 2 * T / 2
     np.testing.assert_allclose(found.mean[2, 0], [5.0, speed, 3.0], rtol=1e-11)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_growing_memory_is_the_polynomial_through_all_measurements(order):
+    """Small coefficients leave the growing memory in force; NumPy's least squares."""
+    model = kinematic(T, dimensions=1, order=order, measurement_sd=5.0)
+    alpha = 1e-3
+    beta = steady_beta(alpha)
+    one = alpha_beta(model, alpha, beta) if order == 1 else alpha_beta_gamma(model, alpha, beta, steady_gamma(alpha))
+    y = simulate(model, 1, 30, seed=8).y
+    found = run(one, y).mean[:, 0]
+    for k in range(order, 30):
+        line = np.polynomial.Polynomial.fit(T * np.arange(k + 1), y[: k + 1, 0, 0], order)
+        expected = [line(T * k), *(line.deriv(d)(T * k) for d in range(1, order + 1))]
+        np.testing.assert_allclose(found[k], expected, rtol=1e-8, atol=1e-8)
+
+
+def test_growing_gains_come_to_the_constants_and_leave_the_kalman_filter_of_a_diffuse_prior_little():
+    model = planar(noise_sd=0.4, measurement_sd=50.0, prior={"mean": PRIOR["mean"], "variance": 1e8})
+    alpha = steady_alpha(0.4 * T**2 / 50.0)
+    one = alpha_beta(model, alpha, steady_beta(alpha))
+    y = simulate(model, 2, 300, seed=9).y
+    system, _, _ = linear_system(model)
+    best = covariances(system, model.prior.cov, 300).posterior[:, 0, 0]
+    growing, constant = (
+        run(alpha_beta(model, alpha, steady_beta(alpha), gains=g), y).cov[:, 0, 0, 0] for g in (None, "constant")
+    )
+    assert (growing[2:] >= best[2:] * (1 - 1e-6)).all()  # no gain does better than Kalman's
+    assert growing[2:].sum() < 1.15 * best[2:].sum()
+    assert constant[2:].sum() > 10 * best[2:].sum()
+    np.testing.assert_allclose(growing[-1], best[-1], rtol=1e-6)
+    assert one.name == "alpha-beta"
+
+
+@pytest.mark.parametrize(("size", "k"), [(2, 2), (3, 3)])
+def test_the_growing_memory_begins_with_the_polynomial_through_the_first_measurements(size, k):
+    expected = {2: [1, 1], 3: [1, 1.5, 2]}[
+        size
+    ]  # y_2 and y_2 - y_1; 3/2 y_3 - 2 y_2 + y_1/2 and the second difference, gamma/2 = 1
+    np.testing.assert_allclose(growing_memory(np.array(k), size), expected, rtol=1e-15)
 
 
 # --- the covariance
@@ -234,3 +278,9 @@ def test_coefficients_whose_errors_grow_are_refused(coefficients):
 def test_an_unknown_start_is_refused():
     with pytest.raises(ValueError, match="start must be"):
         alpha_beta(planar(), 0.3, 0.1, start="now")
+
+
+@pytest.mark.parametrize("arguments", [{"gains": "shrinking"}, {"start": "prior", "gains": "growing"}])
+def test_unknown_gains_are_refused(arguments):
+    with pytest.raises(ValueError, match="gains must be"):
+        alpha_beta(planar(), 0.3, 0.1, **arguments)

@@ -1,0 +1,204 @@
+"""Quadrature: published figures, points, what does not vary, and warnings where points cannot integrate."""
+
+import json
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kfcourse import Model, ModelError, gaussian, linearised, run, simulate
+from kfcourse.filters.approximations import aof
+from kfcourse.symbolic.quadrature import ROOTS, QuadratureWarning, gauss_hermite, unscented
+
+DATA = json.loads((Path(__file__).parents[1] / "data" / "pendulum.json").read_text(encoding="utf-8"))
+
+
+def pendulum():
+    """Särkkä and Svensson, Bayesian Filtering and Smoothing (2nd ed., 2023); data and figures from its notebooks."""
+    dt = 0.01
+    return Model.define(
+        ["x1 + dt*x2 + v1", "x2 - g*dt*sin(x1) + v2"],
+        "sin(x1) + w1",
+        {"dt": dt, "g": 9.81},
+        state_noise={"variance": 0.01 * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])},
+        meter_noise={"variance": 0.1},
+    )
+
+
+@pytest.mark.parametrize(
+    ("structure", "published"),
+    [
+        (linearised, 0.16830859061153763),
+        (unscented, 0.09524392125923083),  # alpha = 1, beta = 0, kappa = 3 - n
+        (lambda model: gauss_hermite(model, 5), 0.0998062421916222),
+    ],
+)
+def test_the_pendulum_has_its_published_errors(structure, published):
+    # The law N(0, I) is that before the first prediction: our order, correct first, has one measurement missing.
+    y = np.concatenate([[np.nan], np.ravel(DATA["Y"])])[:, None, None]
+    mean = run(aof(structure(pendulum())), y).mean[1:, 0, 0]
+    rms = np.sqrt(np.mean((mean - np.array(DATA["X"])[0]) ** 2))
+    # 500 steps of a filter round differently in another order of operations: some 1e-13
+    assert rms == pytest.approx(published, rel=1e-12)
+
+
+def test_other_points_give_other_errors():
+    y = np.concatenate([[np.nan], np.ravel(DATA["Y"])])[:, None, None]
+
+    def rms(**options):
+        mean = run(aof(unscented(pendulum(), **options)), y).mean[1:, 0, 0]
+        return np.sqrt(np.mean((mean - np.array(DATA["X"])[0]) ** 2))
+
+    assert len({round(rms(root=root, augmented=more), 6) for root in ROOTS for more in (False, True)}) == 6
+
+
+def two_states(state_noise_factor="1"):
+    return Model.define(
+        ["0.9*x1 + 0.2*sin(x2) + v1", f"0.8*x2 + {state_noise_factor}*v2 + 0.5*v1"],
+        ["x1*x2 + w1 + 2*w2", "x2 + 0.3*x1*w3"],
+        prior={"mean": [0.5, -0.4], "variance": [[0.4, 0.1], [0.1, 0.3]]},
+        state_noise={"mean": [0.1, 0.2], "variance": [[0.5, 0.2], [0.2, 0.4]]},
+        meter_noise={"mean": [0.3, -0.1, 0.2], "variance": [[0.3, 0.1, 0], [0.1, 0.2, 0.05], [0, 0.05, 0.4]]},
+    )
+
+
+@pytest.mark.parametrize("root", ROOTS)
+@pytest.mark.parametrize("factor", ["1", "x1"])
+def test_added_noise_apart_is_added_noise_among_the_points(root, factor):
+    """By Gauss-Hermite, which integrates these functions; w2 is only added, but correlated with w3, which is not."""
+    model = two_states(factor)
+    apart, together = (gauss_hermite(model, 6, root=root, augmented=a) for a in (False, True))
+    mean, cov = np.stack([model.prior.mean, model.prior.mean + 0.3]), np.stack([model.prior.cov, 2 * model.prior.cov])
+    for left, right in zip(
+        (*apart.predict(mean, cov), *apart.measure(mean, cov)),
+        (*together.predict(mean, cov), *together.measure(mean, cov)),
+        strict=True,
+    ):
+        np.testing.assert_allclose(left, right, rtol=1e-6)  # the sine by 6 points, over another number of axes
+
+
+@pytest.mark.parametrize("root", ROOTS)
+@pytest.mark.parametrize(
+    "cov",
+    [
+        [[2.0, 0.6], [0.6, 1.0]],
+        [[1.0, -2.0], [-2.0, 4.0]],
+        [[0.0, 0.0], [0.0, 3.0]],
+        [[4.0, 2.0, 2.0], [2.0, 1.0, 1.0], [2.0, 1.0, 5.0]],
+    ],
+)
+def test_roots_square_to_the_covariance(root, cov):
+    cov = np.array(cov)
+    regular = np.stack([cov, cov + np.eye(len(cov))])
+    for one in (cov, regular):
+        found = ROOTS[root](one)
+        # rounding of a singular matrix: its root is known to the root of the precision, its square to the precision
+        np.testing.assert_allclose(found @ np.swapaxes(found, -1, -2), one, atol=1e-14 * np.abs(cov).max())
+    np.testing.assert_allclose(ROOTS[root](regular)[1], ROOTS[root](regular[1]), rtol=1e-14, atol=1e-14)
+
+
+def test_an_unknown_root_is_refused(variant53):
+    with pytest.raises(ModelError, match="root must be one of"):
+        unscented(variant53, root="lower")
+
+
+# --- what does not vary
+
+
+def ungm(time_is_a_state):
+    x, noise = (["x1/2 + 25*x1/(1 + x1**2) + 8*cos(1.2*x2) + v1", "x2 + 1"], "x1**2/20 + w1")
+    if time_is_a_state:
+        return Model.define(x, noise, prior={"mean": [0, 0], "variance": [5.0, 0.0]}, state_noise={"variance": 10})
+    return Model.define("x/2 + 25*x/(1 + x**2) + v", "x**2/20 + w", prior={"variance": 5}, state_noise={"variance": 10})
+
+
+@pytest.mark.filterwarnings("ignore::kfcourse.symbolic.quadrature.QuadratureWarning")
+@pytest.mark.parametrize("kind", [lambda m: unscented(m), lambda m: gauss_hermite(m, 6)])
+@pytest.mark.parametrize("root", ROOTS)
+def test_time_as_a_state_changes_nothing(kind, root):
+    """The growth model: the filter of the scalar model, moved by 8 cos 1.2 k from outside, is the same to rounding."""
+    model, scalar = ungm(True), kind(ungm(False))
+    y = simulate(model, 20, 40, seed=1).y
+    found = run(aof(kind(model)), y)
+    assert not found.cov[..., 1, :].any()  # time has no variance, not even one of rounding
+    one, state = aof(scalar), aof(scalar).init(20)
+    for k in range(40):
+        state = one.step(state, y[k])
+        # errors of rounding grow where the filter doubts between x and -x: to some 1e-9 in these 40 steps
+        np.testing.assert_allclose(found.mean[k, :, :1], state.posterior.mean, rtol=1e-7, atol=1e-7)
+        np.testing.assert_allclose(found.cov[k, :, :1, :1], state.posterior.cov, rtol=1e-7, atol=1e-7)
+        predicted = state.predicted
+        state = state._replace(predicted=predicted._replace(mean=predicted.mean + 8 * np.cos(1.2 * k)))
+
+
+@pytest.mark.parametrize("kind", [unscented, gauss_hermite])
+def test_a_known_state_has_no_part_in_the_unexplained(kind):
+    model = Model.define(
+        ["0.9*x1 + v1", "x2 + 0.1"],
+        "exp(0.1*x1) + x1*x2 + w1",
+        prior={"mean": [0.3, 0.3], "variance": [1.0, 0.0]},
+        meter_noise={"variance": 1.5},
+    )
+    one, structure = aof(kind(model)), kind(model)
+    state = one.init(3)
+    for y in simulate(model, 3, 30, seed=2).y:
+        G, F, R = structure.measure(*state.predicted)[1:]
+        explained = G @ state.predicted.cov @ np.swapaxes(G, -1, -2)
+        np.testing.assert_allclose(F - explained, R, rtol=1e-12)
+        assert (R >= 1.5).all()
+        assert not G[..., 1].any()
+        state = one.step(state, y)
+
+
+@pytest.mark.parametrize("kind", [linearised, gaussian, unscented, gauss_hermite])
+@pytest.mark.parametrize("slopes", [(1, 1), (1, 0.3), (0.7, -0.21)])
+def test_two_collinear_exact_meters_of_a_constant_state(kind, slopes):
+    """y = (s^T x, 2 s^T x), no noises, prior variance 1e8: s^T x is known after a step, and later measurements tell nothing."""
+    a, b = slopes
+    model = Model.define(
+        ["x1", "x2"], [f"{a}*x1 + {b}*x2", f"{2 * a}*x1 + {2 * b}*x2"], prior={"mean": [0, 0], "variance": [1e8, 1e8]}
+    )
+    x, y = simulate(model, 200, 20, seed=2)
+    found = run(aof(kind(model)), y)
+    left = 1e8 * (np.eye(2) - np.outer(slopes, slopes) / np.dot(slopes, slopes))
+    np.testing.assert_allclose(np.broadcast_to(found.cov, (20, 200, 2, 2)), np.broadcast_to(left, (20, 200, 2, 2)), atol=1.0)
+    nees = ((x - found.mean) ** 2)[-1].mean(axis=0) / np.diagonal(left)
+    assert (np.abs(nees - 1) < 4 * np.sqrt(2 / 200)).all()  # of 200 squares of standard normal numbers
+
+
+# --- warnings
+
+
+@pytest.mark.parametrize("kind", [unscented, gauss_hermite])
+@pytest.mark.parametrize("term", ["exp(x**2)", "abs(x)", "exp(3*x)", "25*x/(1 + x**2)"])
+def test_what_the_points_do_not_integrate_is_said(kind, term):
+    for state, meter in ((f"{term} + v", "x + w"), ("0.5*x + v", f"{term} + w")):
+        with pytest.warns(QuadratureWarning, match="points an axis"):
+            kind(Model.define(state, meter))
+
+
+@pytest.mark.parametrize("kind", [unscented, gauss_hermite])
+@pytest.mark.parametrize("term", ["log(x)", "sqrt(x)", "exp(exp(exp(5*x)))"])
+def test_what_is_not_finite_at_the_points_is_said(kind, term):
+    with pytest.warns(QuadratureWarning, match="not finite"):
+        kind(Model.define(f"{term} + v", "x + w"))
+
+
+@pytest.mark.parametrize("kind", [unscented, gauss_hermite])
+@pytest.mark.parametrize("term", ["0", "7", "sin(x)", "x**3", "exp(0.5*x)", "sqrt(4 + x)", "x*v", "tanh(x/2)"])
+def test_where_the_points_do_nothing_is_said(kind, term):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        kind(Model.define(f"{term} + v", "x + w", prior={"variance": 0.5}))
+
+
+def test_on_variant_53_the_unscented_filter_is_the_extended_one(variant53):
+    """The points lie on the axes: off the mean either x or the noise moves, so of x^2 w and x v they see the tangents."""
+    y = simulate(variant53, 50, 30, seed=1).y
+    by_points, by_tangent = run(aof(unscented(variant53)), y), run(aof(linearised(variant53)), y)
+    # 30 steps of a stable recursion
+    np.testing.assert_allclose(by_points.mean, by_tangent.mean, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(by_points.cov, by_tangent.cov, rtol=1e-12, atol=1e-14)
+    exact = run(aof(gaussian(variant53)), y)
+    assert np.abs(exact.cov - by_points.cov).max() > 1e-4  # not for want of anything to see
