@@ -160,8 +160,8 @@ class _Wrong:
         if whole:
             return start + _said(whole), _named(whole)
         if not parts:
-            names, hint = self._diagnosis(None)
-            return start + (hint or GENERAL), names
+            seen, hint = self._diagnosis(None)
+            return start + (hint or GENERAL), seen
         if self._swapped():
             return "not right. All results are right, but in another order.", ["swapped"]
         names: list[str] = []

@@ -168,6 +168,13 @@ def transformed(case: Case) -> Said | None:
     return None
 
 
+def signs_lost(case: Case) -> Said | None:
+    """Right but for the signs of some entries."""
+    if case.numeric and case.agree([np.abs(a) for a in case.found], [np.abs(b) for b in case.expected]):
+        return "some-signs", "All sizes are right, some signs are not."
+    return None
+
+
 def confused(case: Case) -> Said | None:
     """Another of the results, or an argument as it came."""
     for name, expected in case.others:
@@ -198,7 +205,7 @@ def dependence(case: Case) -> Said | None:
             set().union(*({s.name for f in side[which] for s in f.free_symbols} for side in case.formulas)) for which in (0, 1)
         )
         given = {s.name for values in case.arguments for v in values if hasattr(v, "free_symbols") for s in v.free_symbols}
-        numbers = not (mine & (theirs - given))  # numbers stand for the parameters
+        numbers = any(not n.is_integer for side in case.formulas for f in side[0] for n in f.atoms(sp.Number))
         missing, extra = sorted((theirs & given if numbers else theirs) - mine), sorted(mine - theirs)
         form = "{}"
     if missing:
@@ -246,17 +253,22 @@ def first_step(case: Case) -> Said | None:
     return None
 
 
+TERM = "It is right but for a term that is the same everywhere."
+
+
 def scaled(case: Case) -> Said | None:
     """A factor, or a term, that is the same everywhere."""
     if not case.numeric:
         return None
+    if all(np.ndim(b) > 1 and len(b) > 2 and np.ptp(a - b, axis=0).max() < 1e-9 * np.abs(b).max() for a, b in case.pairs):
+        return "term", TERM
     a, b = (np.concatenate([np.ravel(pair[which]) for pair in case.pairs]) for which in (0, 1))
     if len(b) > 1 and np.ptp(b) > 1e-3 * np.abs(b).max():
         ratio = (a @ b) / (b @ b)
         if abs(ratio) > 1e-6 and np.allclose(a, ratio * b, rtol=1e-9, atol=1e-9 * np.abs(a).max()):
             return "factor", "It is right but for a factor that is the same everywhere."
         if len(b) > 2 and np.ptp(a - b) < 1e-9 * np.abs(b).max():
-            return "term", "It is right but for a constant term."
+            return "term", TERM
     return None
 
 
@@ -282,6 +294,7 @@ def entries(case: Case) -> Said | None:
 
 HINTS: tuple[Callable[[Case], Said | None], ...] = (
     transformed,
+    signs_lost,
     confused,
     rough,
     sometimes,
