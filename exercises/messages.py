@@ -30,6 +30,24 @@ GAIN_WITHOUT_PSI = "The covariance Psi of the prediction is missing in the gain:
 COVARIANCE_KEPT = "The covariance is that of the prediction: a measurement must make the filter surer."
 COVARIANCE_ADDED = "The covariance grows: what the measurement explains is subtracted."
 INFORMATION_FOR_COVARIANCE = "That is the information, not the covariance: invert the sum."
+SHARE_ONLY = "That is the share that remains, without units; multiply the covariance of the prediction by it."
+NOISE_INHERITED = "The estimate inherits noise from the measurement through the gain: a term is missing."
+EXPECTED_ADDED = "What was expected is added to the measurement; subtract it."
+EXPLAINED_ONLY = "That is what the measurement explains; subtract it from the covariance of the prediction."
+STATE_FOR_EXPECTED = "The prediction of the state is subtracted; what is expected of y is what the meter makes of it."
+NOISE_BY_DEVIATION = "A standard deviation stands where the covariance of the meter's noise belongs."
+NOISE_SQUARED = "The covariance of the meter's noise enters squared."
+GAIN_MULTIPLIED = "The gain is multiplied by the covariance of the innovation; it is divided by it."
+ONE_COVARIANCE_TOO_MANY = "A covariance is added that the prediction's function has taken into account already."
+CORRECTION_SUBTRACTED = "The correction is subtracted; it is added to the prediction."
+
+# -- regressions
+
+OFFSET_SIGN = "What the matrix makes of the regressor's mean enters the offset with the wrong sign."
+EXPLAINED_ADDED = "What the regression explains is added; it is subtracted from the covariance of the target."
+UNBIASED_RESIDUAL = "What is left is divided by N - 1, at least in part; use 1/N throughout."
+ERROR_FOR_RESIDUAL = "That is the covariance of x - z; what the regression leaves of x is asked for."
+SCALE_FORGOTTEN = "The matrix Gamma is missing: the regression changes the scale too, not only the offset."
 
 # -- a run
 

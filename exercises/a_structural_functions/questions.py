@@ -15,6 +15,16 @@ from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, ForVariant, Mistake, Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.exercises import messages
+from kfcourse.exercises.a_structural_functions.mistakes import (
+    CORRELATION_FORGOTTEN,
+    FUNCTION_FOR_DERIVATIVE,
+    SECOND_MOMENT,
+    WRONG_LINEARISED,
+    WRONG_NOISE_PARTS,
+    WRONG_STATE_PARTS,
+    exact_noise_part,
+    one,
+)
 from kfcourse.symbolic.sides import Side, plain
 
 Formula: TypeAlias = sp.Expr | sp.MatrixBase  # an expression for a scalar variant, a matrix for a vector one
@@ -72,11 +82,14 @@ def covariance_to_power(name: str, says: str, kind: str, side: str, exponent: sp
     return Mistake(name, says, constant(make))
 
 
-def scalar(matrix: sp.MatrixBase) -> sp.Expr:
-    """The entry of a one by one matrix; ValueError otherwise: some mistakes are possible for scalars only."""
-    if matrix.shape != (1, 1):
-        raise ValueError("only scalar variants allow this mistake")
-    return matrix[0]
+def wrong_slope(kind: str) -> Mistake:
+    """The function itself in the place of G."""
+
+    def make(exercise: Exercise) -> tuple:
+        h, _, F = right(kind, "meter")(exercise)
+        return one(sp.Matrix([h])), h, F
+
+    return Mistake("function-for-derivative", FUNCTION_FOR_DERIVATIVE, constant(make))
 
 
 def mistakes_of_variance(kind: str, side: str) -> tuple[Mistake, ...]:
@@ -114,8 +127,8 @@ def mistakes_of_linearised(side: str) -> tuple[Mistake, ...]:
         ),
         (
             "function-for-derivative",
-            "The function itself stands where its derivative belongs.",
-            lambda s: sp.Matrix([scalar(s.value) ** 2 * scalar(s.cov)]) + s.B * s.D * s.B.T,
+            FUNCTION_FOR_DERIVATIVE,
+            lambda s: sp.Matrix([one(s.value) ** 2 * one(s.cov)]) + s.B * s.D * s.B.T,
         ),
         (
             "transposed",
@@ -123,8 +136,15 @@ def mistakes_of_linearised(side: str) -> tuple[Mistake, ...]:
             lambda s: s.A.T * s.cov * s.A + s.B * s.D * s.B.T,
         ),
     )
-    named = tuple(wrong_covariance(name, says, "linearised", side, covariance) for name, says, covariance in catalogue)
-    return named + mistakes_of_variance("linearised", side)
+    rows = catalogue + WRONG_LINEARISED
+    named = tuple(wrong_covariance(name, says, "linearised", side, covariance) for name, says, covariance in rows)
+    exact = Mistake(
+        "exact",
+        "That is the exact function of the normal law. Here the tangent takes the place of the equation.",
+        constant(right("gaussian", side)),
+    )
+    slopes = (wrong_slope("linearised"),) if side == "meter" else ()
+    return (*named, *mistakes_of_variance("linearised", side), exact, *slopes)
 
 
 def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
@@ -135,7 +155,26 @@ def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
         mean, cov = (sp.Matrix([f]) for f in (functions[0], functions[-1]))
         return (*functions[:-1], plain(cov + mean * mean.T))
 
+    def changed(part: Callable[[Side], sp.MatrixBase], added: bool) -> ForVariant:
+        """The right functions with something in the place of the noise's part, or added to the covariance."""
+
+        def make(exercise: Exercise) -> tuple:
+            functions, s = right("gaussian", side)(exercise), Side.of(exercise.model, side)
+            cov = sp.Matrix([functions[-1]]) + part(s)
+            return (*functions[:-1], plain(cov if added else cov - exact_noise_part(s)))
+
+        return constant(make)
+
+    def uncorrelated(exercise: Exercise) -> tuple:
+        *functions, cov = right("gaussian", side)(exercise)
+        return (*functions, plain(sp.diag(*sp.Matrix([cov]).diagonal())))
+
+    slopes = (wrong_slope("gaussian"),) if side == "meter" else ()
     return (
+        *slopes,
+        *(Mistake(name, says, changed(part, added=False)) for name, says, part in WRONG_NOISE_PARTS),
+        *(Mistake(name, says, changed(part, added=True)) for name, says, part in WRONG_STATE_PARTS),
+        Mistake("correlation-forgotten", CORRELATION_FORGOTTEN, constant(uncorrelated)),
         wrong_covariance(
             "noise-not-averaged",
             "The noise's factor is taken at the mean. It depends on the state: its square has to be averaged over the law too.",
@@ -149,9 +188,7 @@ def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
             "That is the linearised function. Here the mean over the whole normal law is asked for.",
             constant(right("linearised", side)),
         ),
-        Mistake(
-            "second-moment", "It is a second moment: the product of the means has not been subtracted.", constant(second_moment)
-        ),
+        Mistake("second-moment", SECOND_MOMENT, constant(second_moment)),
         *mistakes_of_variance("gaussian", side),
     )
 
@@ -169,7 +206,17 @@ def jacobians(side: str, change: Callable[[sp.Matrix, sp.Matrix], tuple] = lambd
 def _unevaluated(exercise: Exercise) -> tuple:
     """Derivatives divided by the variable: the slope of a secant through 0, not of the tangent."""
     part = Side.of(exercise.model, "object")
-    return plain(sp.Matrix([scalar(part.value) / scalar(part.mean)])), plain(part.B)
+    return plain(sp.Matrix([one(part.value) / one(part.mean)])), plain(part.B)
+
+
+def unexplained_with(part: Callable[[Side], sp.MatrixBase]) -> ForVariant:
+    """R with something in the place of the noise's part."""
+
+    def make(exercise: Exercise) -> Formula:
+        s = Side.of(exercise.model, "meter")
+        return plain(sp.Matrix([unexplained(exercise)]) - exact_noise_part(s) + part(s))
+
+    return constant(make)
 
 
 def unexplained(exercise: Exercise) -> Formula:
@@ -202,6 +249,16 @@ QUESTIONS = (
                 "It looks transposed: row i holds the derivatives of equation i.",
                 jacobians("object", lambda a, b: (a.T, b.T)),
             ),
+            Mistake(
+                "identity-forgotten",
+                "The state itself is part of its equation: its own derivative is missing.",
+                jacobians("object", lambda a, b: (a - sp.eye(a.rows), b)),
+            ),
+            Mistake(
+                "wrong-row",
+                "A derivative by the noise stands in the row of another equation.",
+                jacobians("object", lambda a, b: (a, sp.Matrix(b.tolist()[::-1]))),
+            ),
             Mistake("secant", "The value was divided by the state; the derivative is asked for.", constant(_unevaluated)),
         ),
         ("a_x", "a_v"),
@@ -228,10 +285,11 @@ QUESTIONS = (
                 constant(
                     lambda e: plain(
                         sp.Matrix([right("gaussian", "meter")(e)[2]])
-                        - sp.Matrix([scalar(sp.Matrix([right("gaussian", "meter")(e)[1]])) * Side.of(e.model, "meter").cov[0]])
+                        - sp.Matrix([one(sp.Matrix([right("gaussian", "meter")(e)[1]])) * Side.of(e.model, "meter").cov[0]])
                     )
                 ),
             ),
+            *(Mistake(name, says, unexplained_with(part)) for name, says, part in WRONG_NOISE_PARTS),
         ),
     ),
 )

@@ -49,6 +49,17 @@ WRONG_GAINS: tuple[tuple[str, str, Gain], ...] = (
         "The gain is divided by the noise's part only; F is the whole variance of the measurement, the state's part included.",
         lambda Psi, G, F: laws.gain(Psi @ transpose(G), F - G @ Psi @ transpose(G)),
     ),
+    ("gain-multiplied", messages.GAIN_MULTIPLIED, lambda Psi, G, F: Psi @ transpose(G) @ F),
+    (
+        "state-twice",
+        "F is the whole covariance of the measurement already; the state's part is in it twice.",
+        lambda Psi, G, F: laws.gain(Psi @ transpose(G), F + G @ Psi @ transpose(G)),
+    ),
+    (
+        "one-for-all",
+        "There is one gain for all trajectories; each has its own.",
+        lambda Psi, G, F: np.tile(gain(Psi, G, F).mean(axis=0), (len(Psi), 1, 1)),
+    ),
 )
 
 
@@ -69,6 +80,21 @@ def correction_with(
     return answer
 
 
+def _state_expected(lam: Array, Psi: Array, h: Array, G: Array, F: Array, y: Array) -> tuple[Array, Array]:
+    if y.shape != lam.shape:
+        raise ValueError("only with as many measurements as states")
+    return correct(lam, Psi, lam, G, F, y)
+
+
+def _joseph_part(which: int) -> Answer:
+    def answer(Psi: Array, G: Array, F: Array, R: Array) -> Array:
+        K = gain(Psi, G, F)
+        rest = np.eye(Psi.shape[-1]) - K @ G
+        return rest @ Psi @ transpose(rest) if which == 0 else K @ R @ transpose(K)
+
+    return answer
+
+
 WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
     *((name, says, correction_with(of_gain=wrong)) for name, says, wrong in WRONG_GAINS),
     ("innovation-sign", messages.INNOVATION_SIGN, correction_with(innovation=lambda y, h: h - y)),
@@ -84,6 +110,15 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
         "covariance-of-gain",
         "G is missing in the covariance of the estimate.",
         correction_with(covariance=lambda Psi, K, G, F: Psi - K @ _only_square(G) @ Psi),
+    ),
+    ("innovation-plus", messages.EXPECTED_ADDED, correction_with(innovation=lambda y, h: y + h)),
+    ("innovation-of-state", messages.STATE_FOR_EXPECTED, _state_expected),
+    ("share-only", messages.SHARE_ONLY, correction_with(covariance=lambda Psi, K, G, F: np.eye(Psi.shape[-1]) - K @ G)),
+    ("covariance-explained", messages.EXPLAINED_ONLY, correction_with(covariance=lambda Psi, K, G, F: K @ G @ Psi)),
+    (
+        "noise-of-meter-missing",
+        messages.NOISE_INHERITED,
+        correction_with(covariance=lambda Psi, K, G, F: _joseph_part(0)(Psi, G, F, None)),
     ),
 )
 
@@ -137,6 +172,16 @@ WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
         step_with(following=lambda lam, Psi, z, p, predict: predict(z, Psi)),
     ),
     *((name, says, step_with(wrong)) for name, says, wrong in WRONG_CORRECTIONS if name.startswith(("innovation", "covariance"))),
+    (
+        "covariances-added",
+        messages.ONE_COVARIANCE_TOO_MANY,
+        step_with(following=lambda lam, Psi, z, p, predict: (predict(z, p)[0], predict(z, p)[1] + p)),
+    ),
+    (
+        "covariances-added",
+        messages.ONE_COVARIANCE_TOO_MANY,
+        step_with(following=lambda lam, Psi, z, p, predict: predict(z, Psi + p)),
+    ),
 )
 
 
@@ -180,19 +225,15 @@ WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
         for name, says, wrong in WRONG_CORRECTIONS
         if name in ("innovation-sign", "covariance-kept")
     ),
+    (
+        "first-not-used",
+        "The first measurement is not used; y_0 is a measurement of x_0 and corrects the prior.",
+        lambda y, *rest: run_filter(np.concatenate([np.full_like(y[:1], np.nan), y[1:]]), *rest),
+    ),
 )
 
 
 # -- b5: a covariance that rounding cannot make negative
-
-
-def _joseph_part(which: int) -> Answer:
-    def answer(Psi: Array, G: Array, F: Array, R: Array) -> Array:
-        K = gain(Psi, G, F)
-        rest = np.eye(Psi.shape[-1]) - K @ G
-        return (rest @ Psi @ transpose(rest), K @ R @ transpose(K))[which]
-
-    return answer
 
 
 WRONG_COVARIANCES: tuple[tuple[str, str, Answer], ...] = (
@@ -204,8 +245,28 @@ WRONG_COVARIANCES: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "noise-of-meter-missing",
-        "The estimate inherits noise from the measurement through the gain: a term is missing.",
+        messages.NOISE_INHERITED,
         _joseph_part(0),
     ),
     ("prior-part-missing", "Only the measurement's noise is there; part of the prediction's error remains too.", _joseph_part(1)),
+    (
+        "whole-covariance",
+        "F has the state's part too; in this sum the noise alone, R, comes through the gain.",
+        lambda Psi, G, F, R: _joseph_part(0)(Psi, G, F, R) + _joseph_part(1)(Psi, G, F, F),
+    ),
+    (
+        "prior-part-kept",
+        "The prediction's error is not reduced: what remains of it after the correction?",
+        lambda Psi, G, F, R: Psi + _joseph_part(1)(Psi, G, F, R),
+    ),
+    (
+        "noise-squared",
+        messages.NOISE_SQUARED,
+        lambda Psi, G, F, R: _joseph_part(0)(Psi, G, F, R) + _joseph_part(1)(Psi, G, F, R @ R),
+    ),
+    (
+        "one-side-only",
+        "What remains of the prediction's error enters once; a covariance has it on both sides.",
+        lambda Psi, G, F, R: Psi - gain(Psi, G, F) @ G @ Psi + _joseph_part(1)(Psi, G, F, R),
+    ),
 )

@@ -86,8 +86,9 @@ def run_arguments(exercise: Exercise) -> list[tuple]:
     y = exercise.simulate(runs=RUNS, steps=6, name="b4").y
     gaps = y.copy()
     gaps[2, 1] = gaps[4, :3] = np.nan
-    prior = exercise.model.prior
-    return [(values, prior.mean, prior.cov, *structure_functions(exercise)) for values in (y, gaps)]
+    prior = exercise.model.prior  # not quite: where its mean is zero, or its variance one, a mistake would not show
+    mean, cov = prior.mean + 0.3 * np.sqrt(np.diagonal(prior.cov)), 1.3 * prior.cov
+    return [(values, mean, cov, *structure_functions(exercise)) for values in (y, gaps)]
 
 
 # -- b5: a covariance that rounding cannot make negative

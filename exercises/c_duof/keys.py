@@ -57,7 +57,7 @@ def design_and_run(x: Array, y_design: Array, y: Array, mean: Array, a: Callable
 
 
 def duof_run_with(
-    without_offset: bool = False, one_gain: bool = False, predictions: bool = False, object_alone: bool = False
+    without_offset: bool = False, one_gain: bool = False, predictions: bool = False, object_alone: bool = False, sign: float = 1.0
 ) -> Answer:
     """Design over x, y (steps, N, ...), then filter other measurements; with one thing changed."""
 
@@ -73,7 +73,7 @@ def duof_run_with(
             z = lam + omega @ H.T + e
             if without_offset:
                 e = 0 * e
-            z_other = other + (y[k] - b(other)) @ H.T + e
+            z_other = other + sign * (y[k] - b(other)) @ H.T + e
             estimates.append(other if predictions else z_other)
             if k + 1 < len(x):
                 F, g, _ = regression(x[k + 1], a(z))

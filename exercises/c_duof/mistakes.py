@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from kfcourse.checks.question import Answer
 from kfcourse.exercises import messages
 from kfcourse.exercises.c_duof.keys import design_and_run, duof_run_with, duof_step_with
-from kfcourse.exercises.shared import MOMENTS_ABOUT_ZERO, WITHOUT_OFFSET, Fit, covariance_of, regression, regression_with
+from kfcourse.exercises.shared import (
+    MOMENTS_ABOUT_ZERO,
+    WITHOUT_OFFSET,
+    Fit,
+    covariance_of,
+    raw_moment,
+    regression,
+    regression_with,
+)
 from kfcourse.laws import Array
 
 # -- c1: the structure
+
+
+def _alike(y: Array, lam: Array) -> Array:
+    if y.shape != lam.shape:
+        raise ValueError("only with as many measurements as states")
+    return y
+
 
 WRONG_STRUCTURES: tuple[tuple[str, str, Answer], ...] = (
     ("omega-sign", messages.INNOVATION_SIGN, lambda lam, z, y, a, b: (b(lam) - y, a(z))),
@@ -26,6 +43,12 @@ WRONG_STRUCTURES: tuple[tuple[str, str, Answer], ...] = (
         lambda lam, z, y, a, b: (y - b(lam), a(lam)),
     ),
     ("alpha-is-z", "The object moves: alpha is the state equation at z.", lambda lam, z, y, a, b: (y - b(lam), z)),
+    ("omega-of-state", messages.STATE_FOR_EXPECTED, lambda lam, z, y, a, b: (_alike(y, lam) - lam, a(z))),
+    (
+        "equations-swapped",
+        "The equations of state and meter are swapped.",
+        lambda lam, z, y, a, b: (_alike(y, lam) - a(lam), b(z)),
+    ),
 )
 
 
@@ -35,6 +58,24 @@ WRONG_STRUCTURES: tuple[tuple[str, str, Answer], ...] = (
 def _over_components(a: Array, b: Array) -> Array:
     """Deviations from the mean over the components of each trajectory."""
     return (a - a.mean(axis=1, keepdims=True)).T @ (b - b.mean(axis=1, keepdims=True)) / len(a)
+
+
+def _residual(left: Callable[[Array, Array, Array], Array]) -> Fit:
+    """What is left made of the target's covariance, the explained part and the target."""
+
+    def fit(t: Array, r: Array) -> tuple[Array, Array, Array]:
+        matrix, offset, _ = regression(t, r)
+        return matrix, offset, left(covariance_of(t, t), matrix @ covariance_of(t, r).T, t)
+
+    return fit
+
+
+def _offset(of_means: Callable[[Array, Array], Array]) -> Fit:
+    def fit(t: Array, r: Array) -> tuple[Array, Array, Array]:
+        matrix, _, residual = regression(t, r)
+        return matrix, of_means(t.mean(axis=0), matrix @ r.mean(axis=0)), residual
+
+    return fit
 
 
 WRONG_REGRESSIONS: tuple[tuple[str, str, Fit], ...] = (
@@ -68,13 +109,45 @@ WRONG_REGRESSIONS: tuple[tuple[str, str, Fit], ...] = (
     ),
     (
         "unbiased-residual",
-        "The residual is divided by N - 1; use 1/N throughout, as for the coefficients.",
+        messages.UNBIASED_RESIDUAL,
         lambda t, r: (*regression(t, r)[:2], regression(t, r)[2] * len(t) / (len(t) - 1)),
+    ),
+    ("unbiased-residual", messages.UNBIASED_RESIDUAL, _residual(lambda all_, part, t: all_ * len(t) / (len(t) - 1) - part)),
+    ("explained-added", messages.EXPLAINED_ADDED, _residual(lambda all_, part, t: all_ + part)),
+    (
+        "explained-only",
+        "That is what the regression explains; what it leaves is asked for.",
+        _residual(lambda all_, part, t: part),
+    ),
+    ("about-zero", messages.ABOUT_ZERO, _residual(lambda all_, part, t: raw_moment(t, t) - part)),
+    (
+        "offset-not-removed",
+        "The offset is still in what is left.",
+        lambda t, r: (*regression(t, r)[:2], raw_moment(t - r @ regression(t, r)[0].T, t - r @ regression(t, r)[0].T)),
+    ),
+    (
+        "offset-sign",
+        messages.OFFSET_SIGN,
+        _offset(lambda t, explained: t + explained),
+    ),
+    ("target-mean-forgotten", "The mean of the target is missing in the offset.", _offset(lambda t, explained: explained)),
+    (
+        "not-divided",
+        "The matrix is not divided by the covariance of the regressor.",
+        lambda t, r: (covariance_of(t, r), *regression(t, r)[1:]),
     ),
 )
 
 
 # -- c3: one step of the design
+
+
+def _subtracted(lam: Array, x: Array, y: Array, x_next: Array, a: Callable, b: Callable) -> tuple[Array, Array]:
+    H, e, _ = regression(x - lam, y - b(lam))
+    z = lam - (y - b(lam)) @ H.T + e
+    F, g, _ = regression(x_next, a(z))
+    return z, a(z) @ F.T + g
+
 
 WRONG_DUOF_STEPS: tuple[tuple[str, str, Answer], ...] = (
     (
@@ -95,6 +168,17 @@ WRONG_DUOF_STEPS: tuple[tuple[str, str, Answer], ...] = (
     ("alpha-is-z", "The regressor of the prediction is alpha = a(z), not z itself.", duof_step_with(alpha=lambda z, lam, a: z)),
     ("means-not-subtracted", messages.MEANS_NOT_SUBTRACTED, duof_step_with(fit=MOMENTS_ABOUT_ZERO)),
     ("offset-forgotten", messages.OFFSET_FORGOTTEN, duof_step_with(fit=WITHOUT_OFFSET)),
+    ("correction-subtracted", messages.CORRECTION_SUBTRACTED, _subtracted),
+    (
+        "error-sign",
+        "The target has the wrong sign: the error that is estimated is the state less its prediction.",
+        duof_step_with(first=lambda x, lam: lam - x),
+    ),
+    (
+        "prediction-of-error",
+        "The target of the second regression is the next state itself.",
+        lambda lam, x, y, x_next, a, b: duof_step_with()(lam, x, y, x_next - lam, a, b),
+    ),
 )
 
 
@@ -116,4 +200,9 @@ WRONG_DUOF_RUNS: tuple[tuple[str, str, Answer], ...] = (
         duof_run_with(object_alone=True),
     ),
     ("offset-not-used", "The offset e is not used when the filter runs.", duof_run_with(without_offset=True)),
+    (
+        "innovation-sign",
+        messages.INNOVATION_SIGN,
+        duof_run_with(sign=-1.0),
+    ),
 )

@@ -11,6 +11,7 @@ from pathlib import Path
 from kfcourse.checks.exercises import Exercise, array_functions, full
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.exercises import messages
 from kfcourse.exercises.d_fos.keys import condition, condition_on_both, fos_step, mfos_step
 from kfcourse.exercises.d_fos.mistakes import WRONG_CONDITIONS, WRONG_FOS_STEPS, WRONG_MFOS_STEPS
 from kfcourse.exercises.shared import RUNS, covariance_of, ensemble, predicted
@@ -93,6 +94,24 @@ QUESTIONS = (
                     "estimate-unused",
                     "Only the measurement is used; the estimate knows the past.",
                     lambda x, y, z: condition(x, y),
+                ),
+                (
+                    "one-after-the-other",
+                    "What the estimate leaves is fitted on the measurement afterwards; they are correlated: fit them together.",
+                    lambda x, y, z: (
+                        condition(x, z)[0] + condition(x - condition(x, z)[0], y)[0],
+                        condition(x - condition(x, z)[0], y)[1],
+                    ),
+                ),
+                (
+                    "residual-of-one",
+                    "T is what the estimate alone leaves; both together leave less.",
+                    lambda x, y, z: (condition_on_both(x, y, z)[0], condition(x, z)[1]),
+                ),
+                (
+                    "unbiased-residual",
+                    messages.UNBIASED_RESIDUAL,
+                    lambda x, y, z: (condition_on_both(x, y, z)[0], condition_on_both(x, y, z)[1] * len(x) / (len(x) - 1)),
                 ),
             )
         ),

@@ -18,10 +18,15 @@ from kfcourse.laws import Array
 
 # -- e1: the error variance
 
+BIAS_INCLUDED = "The errors' mean is subtracted: D_k is the mean of the square, bias included."
+MEDIAN = "That is a median; the mean is asked for."
+DEVIATION_IS_NO_ERROR = "That is made of D_k alone; how much a mean varies follows from the spread of the squares."
+VARIANCE_OF_SQUARES = "That is a variance of the squared errors; a standard error has the units of D_k."
+
 WRONG_VARIANCES: tuple[tuple[str, str, Answer], ...] = (
     (
         "about-the-mean",
-        "The errors' mean is subtracted: D_k is the mean of the square, bias included.",
+        BIAS_INCLUDED,
         lambda x, z: np.sum((x - z).var(axis=1), axis=1),
     ),
     ("root", messages.DEVIATION_FOR_VARIANCE, lambda x, z: np.sqrt(error_variance(x, z))),
@@ -37,9 +42,29 @@ WRONG_VARIANCES: tuple[tuple[str, str, Answer], ...] = (
         "The squares of the components are averaged; D_k is their sum.",
         lambda x, z: ((x - z) ** 2).mean(axis=(1, 2)),
     ),
+    ("median", MEDIAN, lambda x, z: np.median(squared_error(x, z), axis=1)),
+    ("largest", "That is the largest of the squares; their mean is asked for.", lambda x, z: squared_error(x, z).max(axis=1)),
+    (
+        "mean-error",
+        "The mean of the error says only whether there is a bias; square first.",
+        lambda x, z: (x - z).mean(axis=1).sum(axis=1),
+    ),
+    (
+        "square-of-mean",
+        "The errors are averaged before they are squared; average the squares.",
+        lambda x, z: ((x - z).mean(axis=1) ** 2).sum(axis=1),
+    ),
+    (
+        "difference-of-squares",
+        "The squares of state and estimate are subtracted; square their difference.",
+        lambda x, z: (x**2 - z**2).mean(axis=1).sum(axis=1),
+    ),
+    ("about-the-mean", BIAS_INCLUDED, lambda x, z: np.sum((x - z).var(axis=1, ddof=1), axis=1)),
 )
 
 # -- e2: its standard error
+
+OF_ERROR = "That is the standard error of the mean error; here the mean of its square is estimated."
 
 WRONG_ERRORS: tuple[tuple[str, str, Answer], ...] = (
     (
@@ -59,7 +84,7 @@ WRONG_ERRORS: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "of-error",
-        "That is the standard error of the mean error; here the mean of its square is estimated.",
+        OF_ERROR,
         lambda x, z: (error_variance(x, z), spread_of_mean(np.sqrt(squared_error(x, z)))),
     ),
     (
@@ -72,9 +97,26 @@ WRONG_ERRORS: tuple[tuple[str, str, Answer], ...] = (
         "That formula, D times the root of 2/N, holds for normal errors only; use the spread of the squared errors themselves.",
         lambda x, z: (error_variance(x, z), error_variance(x, z) * np.sqrt(2 / x.shape[1])),
     ),
+    *(
+        (name, says, lambda x, z, wrong=wrong: (error_variance(x, z), wrong(squared_error(x, z))))
+        for name, says, wrong in (
+            ("from-value", DEVIATION_IS_NO_ERROR, lambda s: np.sqrt(s.mean(axis=1) / s.shape[1])),
+            ("from-value", DEVIATION_IS_NO_ERROR, lambda s: s.mean(axis=1) / np.sqrt(s.shape[1])),
+            ("from-value", DEVIATION_IS_NO_ERROR, lambda s: np.sqrt(s.mean(axis=1))),
+            ("variance-of-squares", VARIANCE_OF_SQUARES, lambda s: s.var(axis=1, ddof=1)),
+            ("variance-of-squares", VARIANCE_OF_SQUARES, lambda s: s.var(axis=1, ddof=1) / np.sqrt(s.shape[1])),
+        )
+    ),
+    (
+        "of-error",
+        OF_ERROR,
+        lambda x, z: (error_variance(x, z), spread_of_mean((x - z).sum(axis=2))),
+    ),
 )
 
 # -- e3: a paired difference
+
+ABSOLUTE = "The differences lose their signs before the mean is taken: it would never be zero."
 
 
 def _pairs(x: Array, z: Array, other: Array) -> tuple[Array, Array]:
@@ -114,6 +156,42 @@ WRONG_DIFFERENCES: tuple[tuple[str, str, Answer], ...] = (
         lambda x, z, o: (error_variance(z, o), spread_of_mean(squared_error(z, o))),
     ),
     ("order", "The difference is the first filter's D_k minus the second's.", lambda x, z, o: difference(x, o, z)),
+    *(
+        (name, says, lambda x, z, o, wrong=wrong: wrong(*_pairs(x, z, o)))
+        for name, says, wrong in (
+            (
+                "absolute-difference",
+                ABSOLUTE,
+                lambda a, b: (np.abs(a - b).mean(axis=1), spread_of_mean(np.abs(a - b))),
+            ),
+            (
+                "absolute-errors",
+                "Absolute errors are compared; D_k is made of squares.",
+                lambda a, b: (
+                    (np.sqrt(a) - np.sqrt(b)).mean(axis=1),
+                    spread_of_mean(np.sqrt(a) - np.sqrt(b)),
+                ),
+            ),
+            (
+                "ratio",
+                "That is a ratio; a difference is asked for.",
+                lambda a, b: (a.mean(axis=1) / b.mean(axis=1), spread_of_mean(a - b)),
+            ),
+            (
+                "of-deviations",
+                "That compares the roots of the D_k; compare the D_k themselves.",
+                lambda a, b: (np.sqrt(a.mean(axis=1)) - np.sqrt(b.mean(axis=1)), spread_of_mean(a - b)),
+            ),
+            (
+                "pooled",
+                "The spreads of both filters are pooled; take that of the difference, trajectory by trajectory.",
+                lambda a, b: (
+                    (a - b).mean(axis=1),
+                    np.sqrt((spread_of_mean(a) ** 2 + spread_of_mean(b) ** 2) / 2),
+                ),
+            ),
+        )
+    ),
 )
 
 # -- e4: a ratio
@@ -151,9 +229,36 @@ WRONG_RATIOS: tuple[tuple[str, str, Answer], ...] = (
         lambda x, z, o: (ratio(x, z, o)[0], spread_of_mean(squared_error(x, z)) / error_variance(x, o)),
     ),
     ("order", "The ratio is the first filter's D_k over the second's.", lambda x, z, o: ratio(x, o, z)),
+    *(
+        (name, says, lambda x, z, o, wrong=wrong: (ratio(x, z, o)[0], wrong(*_pairs(x, z, o), ratio(x, z, o)[0][:, None])))
+        for name, says, wrong in (
+            (
+                "ratio-of-errors",
+                "A ratio of standard errors is not the standard error of a ratio.",
+                lambda a, b, r: spread_of_mean(a) / spread_of_mean(b),
+            ),
+            (
+                "of-difference",
+                "That belongs to the difference; in the ratio the second filter's error counts r times.",
+                lambda a, b, r: spread_of_mean(a - b) / b.mean(axis=1),
+            ),
+            ("not-divided", "It is not divided by the denominator: check the units.", lambda a, b, r: spread_of_mean(a - r * b)),
+            (
+                "sign-of-denominator",
+                "A larger denominator makes the ratio smaller: check a sign.",
+                lambda a, b, r: spread_of_mean(a + r * b) / b.mean(axis=1),
+            ),
+        )
+    ),
 )
 
 # -- e5: does the filter know its own error?
+
+
+def _weighted(x: Array, z: Array, weight: Array) -> Array:
+    """The quadratic form of every error, over the number of components."""
+    return np.einsum("kni,knij,knj->kn", x - z, weight, x - z) / x.shape[2]
+
 
 WRONG_NORMALISED: tuple[tuple[str, str, Answer], ...] = (
     (
@@ -180,5 +285,36 @@ WRONG_NORMALISED: tuple[tuple[str, str, Answer], ...] = (
         "inverted",
         "It is upside down: the error over what the filter believes.",
         lambda x, z, p: np.mean(np.diagonal(p, axis1=-2, axis2=-1) / (x - z) ** 2, axis=(1, 2)),
+    ),
+    ("median", MEDIAN, lambda x, z, p: np.median(_weighted(x, z, np.linalg.inv(p)), axis=1)),
+    (
+        "inverse-forgotten",
+        "The covariance itself stands between the errors; its inverse belongs there.",
+        lambda x, z, p: _weighted(x, z, p).mean(axis=1),
+    ),
+    (
+        "covariance-squared",
+        "The covariance divides twice; it is a variance already.",
+        lambda x, z, p: _weighted(x, z, np.linalg.inv(p @ p)).mean(axis=1),
+    ),
+    (
+        "root-before-mean",
+        "A root is taken before the mean; the mean of the squares is asked for.",
+        lambda x, z, p: np.sqrt(_weighted(x, z, np.linalg.inv(p)) * x.shape[2]).mean(axis=1) / x.shape[2],
+    ),
+    (
+        "error-once",
+        "The error enters once; on both sides of the inverse there is one.",
+        lambda x, z, p: np.einsum("kni,knij->kn", x - z, np.linalg.inv(p)).mean(axis=1) / x.shape[2],
+    ),
+    (
+        "absolute",
+        "Absolute errors over standard deviations are averaged; square them first.",
+        lambda x, z, p: (np.abs(x - z) / np.sqrt(np.diagonal(p, axis1=-2, axis2=-1))).mean(axis=(1, 2)),
+    ),
+    (
+        "bias-removed",
+        "The mean error is taken off first; a bias is an error too.",
+        lambda x, z, p: normalised_error(x - (x - z).mean(axis=1, keepdims=True), z, p),
     ),
 )

@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import copy
 import traceback
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import permutations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +21,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.equality import Unusable, equal, like
+from kfcourse.checks.hints import Agree, Case, Sensitivity, general, names_of
 from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG, Answer, Mistake, Question, Result
 from kfcourse.checks.registry import folders
 from kfcourse.limits import OutOfTime, time_limit
@@ -50,7 +54,7 @@ def call(answer: Any, arguments: Sequence[tuple], expected: Sequence[Any], secon
     try:
         with time_limit(seconds), np.errstate(all="ignore"):
             for values, wanted in zip(arguments, expected, strict=True):
-                results.append(like(answer(*copy.deepcopy(values)), wanted))
+                results.append(_formed(answer(*copy.deepcopy(values)), wanted))
     except OutOfTime:
         raise Unusable(f"still running after {seconds:g} s: is there a loop that never ends?") from None
     except (Unusable, KeyboardInterrupt):  # whoever stops the kernel means the check too
@@ -62,6 +66,20 @@ def call(answer: Any, arguments: Sequence[tuple], expected: Sequence[Any], secon
             raise Missing from None
         raise Unusable(f"stops with {_told(error)}") from None
     return results
+
+
+def _formed(result: Any, wanted: Any) -> Any:
+    """The result in the form of the expected one; says so if only the order is another."""
+    try:
+        return like(result, wanted)
+    except Unusable as reason:
+        if not isinstance(wanted, tuple) or not isinstance(result, tuple | list) or len(result) != len(wanted):
+            raise
+        for order in permutations(result):
+            with suppress(Unusable):
+                like(order, wanted)
+                raise Unusable(f"{reason}: are the results in another order?") from None
+        raise
 
 
 def _frames(error: BaseException) -> list[traceback.FrameSummary]:
@@ -114,33 +132,95 @@ def check(question: Question, exercise: Exercise, answer: Any, seconds: float = 
         return result(UNUSABLE, f"cannot be compared within {seconds:g} s: simplify it")
     try:
         with time_limit(DIAGNOSIS), np.errstate(all="ignore"):
-            return result(WRONG, *_compared(question, exercise, arguments, found, expected, agree))
+            known = [(mistake, _wrong(mistake, exercise, arguments, expected)) for mistake in question.mistakes]
+            key = question.answer(exercise)
+            return result(WRONG, *_Wrong(question.parts, (key, answer), arguments, found, expected, known, agree).told())
     except OutOfTime:
         return result(WRONG, f"not right. {GENERAL}")
 
 
-Agree = Callable[[Sequence[Any], Sequence[Any]], bool]
+@dataclass(frozen=True)
+class _Wrong:
+    """A wrong answer beside what was expected."""
+
+    parts: tuple[str, ...]
+    answers: tuple[Answer, Answer]  # the right one, and the wrong one
+    arguments: Sequence[tuple]
+    found: list[Any]
+    expected: list[Any]
+    known: Sequence[tuple[Mistake, list[Any] | None]]  # mistakes with their results, None where impossible
+    agree: Agree
+
+    def told(self) -> tuple[str, list[str]]:
+        """What to say, and the names of the mistakes it looks like."""
+        parts = self.parts
+        right = [place for place in range(len(parts)) if self._agrees(place, self.expected)]
+        start = f"{', '.join(parts[place] for place in right)} right, the rest not. " if right else "not right. "
+        whole = [mistake for mistake, wrong in self.known if wrong is not None and self.agree(self.found, wrong)]
+        if whole:
+            return start + _said(whole), _named(whole)
+        if not parts:
+            seen, hint = self._diagnosis(None)
+            return start + (hint or GENERAL), seen
+        if self._swapped():
+            return "not right. All results are right, but in another order.", ["swapped"]
+        names: list[str] = []
+        hints: dict[str, list[str]] = {}
+        for place in range(len(parts)):
+            if place not in right:
+                seen, hint = self._diagnosis(place)
+                names += seen
+                hints.setdefault(hint, []).append(parts[place])
+        unknown = hints.pop("", [])
+        told = [f"{', '.join(where)}: {hint}" for hint, where in hints.items()]
+        if unknown:
+            told.append(f"{', '.join(unknown)} may be wrong for the same reason." if told else GENERAL)
+        return start + " ".join(told), list(dict.fromkeys(names))
+
+    def _agrees(self, place: int, wanted: Sequence[Any]) -> bool:
+        return self.agree(_part(self.found, place), _part(wanted, place))
+
+    def _swapped(self) -> bool:
+        orders = [order for order in permutations(range(len(self.parts))) if list(order) != sorted(order)]
+        return any(
+            all(self.agree(_part(self.found, i), _part(self.expected, j)) for i, j in enumerate(order)) for order in orders
+        )
+
+    def _diagnosis(self, place: int | None) -> tuple[list[str], str]:
+        """Names of the mistakes that one result looks like, and what to say: nothing if it looks like none."""
+
+        def of(results: Sequence[Any]) -> Sequence[Any]:
+            return results if place is None else _part(results, place)
+
+        mine, theirs = of(self.found), of(self.expected)
+        possible = [(mistake, of(wrong)) for mistake, wrong in self.known if wrong is not None]
+        seen = [mistake for mistake, wrong in possible if self.agree(mine, wrong)]
+        if seen:
+            return _named(seen), _said(seen)
+        apart = [[not self.agree([a], [b]) for a, b in zip(wrong, theirs, strict=True)] for _, wrong in possible]
+        apart = [row for row in apart if any(row)]
+        telling = [2 * sum(column) >= len(apart) for column in zip(*apart, strict=True)] or [True] * len(theirs)
+        others = [(name, _part(self.expected, i)) for i, name in enumerate(self.parts) if i != place]
+        said = general(
+            Case(mine, theirs, self.agree, self.arguments, self.sensitivity.names, place or 0, others, telling, self.sensitivity)
+        )
+        return ([said[0]], said[1]) if said else ([], "")
+
+    @cached_property
+    def sensitivity(self) -> Sensitivity:
+        """To the arguments of the first call that is not right."""
+        one = next(i for i, (a, b) in enumerate(zip(self.found, self.expected, strict=True)) if not self.agree([a], [b]))
+        names = names_of(self.answers[0], len(self.arguments[one]))
+        results = tuple(list(side[one]) if self.parts else [side[one]] for side in (self.expected, self.found))
+        return Sensitivity(names, self.answers, self.arguments[one], results, bool(self.parts))
 
 
-def _compared(
-    question: Question, exercise: Exercise, arguments: Sequence[tuple], found: list[Any], expected: list[Any], agree: Agree
-) -> tuple[str, list[str]]:
-    """What to say of a wrong answer, and the names of the mistakes it looks like."""
-    catalogue = [(m, _wrong(m, exercise, arguments, expected)) for m in question.mistakes]
-    if not question.parts:
-        names, hint = _diagnosis(found, expected, catalogue, agree)
-        return f"not right. {hint}", names
-    right, names, hints = [], [], []
-    for i, part in enumerate(question.parts):
-        mine, theirs = _part(found, i), _part(expected, i)
-        if agree(mine, theirs):
-            right.append(part)
-            continue
-        seen, hint = _diagnosis(mine, theirs, [(m, wrong and _part(wrong, i)) for m, wrong in catalogue], agree)
-        names += seen
-        hints.append(f"{part}: {hint}")
-    start = f"{', '.join(right)} right, the rest not. " if right else "not right. "
-    return start + " ".join(hints), list(dict.fromkeys(names))
+def _said(mistakes: Sequence[Mistake]) -> str:
+    return " Or: ".join(dict.fromkeys(mistake.says for mistake in mistakes))
+
+
+def _named(mistakes: Sequence[Mistake]) -> list[str]:
+    return list(dict.fromkeys(mistake.name for mistake in mistakes))
 
 
 def _part(results: Sequence[Any], place: int) -> list[Any]:
@@ -171,42 +251,6 @@ def _wrong(mistake: Mistake, exercise: Exercise, arguments: Sequence[tuple], exp
         return None
 
 
-def _diagnosis(
-    found: Sequence[Any],
-    expected: Sequence[Any],
-    catalogue: Sequence[tuple[Mistake, Sequence[Any] | None]],
-    agree: Agree,
-) -> tuple[list[str], str]:
-    """Names of the mistakes that a wrong answer looks like, and what to say."""
-    seen = [mistake for mistake, wrong in catalogue if wrong is not None and agree(found, wrong)]
-    if seen:
-        return [m.name for m in seen], " Or: ".join(dict.fromkeys(m.says for m in seen))
-    for name, hint, change in TRANSFORMATIONS:
-        try:
-            if agree([change(value) for value in found], expected):
-                return [name], hint
-        except Exception:  # this result cannot be changed so
-            continue
-    right = sum(agree([a], [b]) for a, b in zip(found, expected, strict=True))
-    if right:
-        return ["sometimes"], f"It is right for {right} of {len(expected)} hidden inputs: which case did you leave out?"
-    return [], GENERAL
-
-
-def _each(value: Any, change: Callable[[Any], Any]) -> Any:
-    """A change of every entry; the power of a symbolic matrix would be another thing, and may take for ever."""
-    return value.applyfunc(change) if isinstance(value, sp.MatrixBase) else change(value)
-
-
 GENERAL = (
     "It does not look like one of the usual mistakes. Check each step of the derivation, and try a case whose answer you know."
-)
-TRANSFORMATIONS: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
-    ("sign", "The size is right, the sign is not.", lambda v: -v),
-    ("transposed", "It looks transposed.", lambda v: v.T if isinstance(v, sp.MatrixBase) else np.swapaxes(v, -1, -2)),
-    ("root", "It looks like a standard deviation where a variance belongs.", lambda v: _each(v, lambda entry: entry**2)),
-    ("square", "It looks like a variance where a standard deviation belongs.", lambda v: _each(v, lambda entry: entry**0.5)),
-    ("factor-2", "It is half of what it should be.", lambda v: v * 2),
-    ("factor-half", "It is twice what it should be.", lambda v: v / 2),
-    ("inverse", "It looks like the inverse of what it should be.", lambda v: _each(v, lambda entry: 1 / entry)),
 )

@@ -18,6 +18,7 @@ from kfcourse.symbolic.formula import symbol
 DIGITS = 60  # of the values of formulas
 AGREE = sp.Float(10) ** -30  # relative difference of equal formulas: half of the digits may be lost by cancellation
 POINTS = 6
+ROUNDED = 1e-9  # relative size of an imaginary part that rounding explains
 
 
 class Unusable(Exception):
@@ -33,6 +34,10 @@ def like(answer: Any, expected: Any) -> Any:
         It has another form; says which, and what was expected.
     """
     if isinstance(expected, tuple):
+        if isinstance(answer, np.ndarray | sp.MatrixBase) and np.size(answer) == len(expected):
+            answer = [entry for entry in np.ravel(np.asarray(answer))]  # an array, or a column, of numbers or formulas
+        elif isinstance(answer, np.ndarray) and answer.ndim and len(answer) == len(expected):
+            answer = list(answer)
         if not isinstance(answer, tuple | list) or len(answer) != len(expected):
             raise Unusable(f"expected {len(expected)} results, `return a, b, ...`, got {describe(answer)}")
         parts = []
@@ -51,7 +56,7 @@ def like(answer: Any, expected: Any) -> Any:
 
 def _formula(answer: Any) -> sp.Expr:
     if isinstance(answer, sp.MatrixBase | np.ndarray) and getattr(answer, "size", len(answer)) == 1:
-        answer = answer[(0,) * np.ndim(answer)] if isinstance(answer, np.ndarray) else answer[0]
+        answer = np.asarray(answer).item() if isinstance(answer, np.ndarray) else answer[0]
     if isinstance(answer, bool | str) or not isinstance(answer, sp.Expr | int | float | np.number):
         raise Unusable(f"expected a formula in the symbols of the exercise, got {describe(answer)}")
     formula = sp.nsimplify(answer, rational=True) if isinstance(answer, float | np.floating) else sp.sympify(answer)
@@ -80,8 +85,16 @@ def _array(answer: Any, expected: np.ndarray) -> np.ndarray:
     if isinstance(answer, bool | np.bool_ | str) or answer is None:
         raise Unusable(f"expected {_wanted(expected)}, got {describe(answer)}")
     try:
+        if isinstance(answer, sp.MatrixBase) and expected.ndim < 2:
+            answer = list(answer)
         array = np.asarray(answer)
-        if array.dtype.kind == "b" or array.dtype.kind not in "iufO":
+        if array.dtype.kind == "c" and np.isfinite(array).all():
+            if np.abs(array.imag).max(initial=0.0) > ROUNDED * np.abs(array).max(initial=0.0):
+                raise Unusable("got complex numbers: was a root taken of something negative?")
+            array = array.real
+        if isinstance(answer, np.matrix) and array.size == 1 == expected.size:
+            array = array.reshape(expected.shape)
+        if array.dtype.kind not in "biufO":
             raise TypeError
         array = array.astype(float)
     except (TypeError, ValueError, AttributeError):

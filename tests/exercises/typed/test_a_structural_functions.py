@@ -1,0 +1,268 @@
+"""Set a, answers as a student would type them, for a scalar variant and for the pendulum."""
+
+import sympy as sp
+
+z, p, m, d, x, v = sp.symbols("z p m d x v", real=True)
+c, e, g, f = sp.symbols("c e g f", real=True)
+third = sp.Rational(1, 3)
+
+
+def a2(tau=c * z, Theta=c**2 * p + e**2 * z**2):
+    return lambda z, p: (tau, Theta)
+
+
+def a3(h=g * m, G=g, F=g**2 * d + f**2 * m**4):
+    return lambda m, d: (h, G, F)
+
+
+def a4(tau=c * z, noise=e**2 * (z**2 + p), state=c**2 * p):
+    return lambda z, p: (tau, state + noise)
+
+
+def a5(h=g * m, G=g, fourth=m**4 + 6 * m**2 * d + 3 * d**2, noise=f**2, state=g**2 * d):
+    return lambda m, d: (h, G, state + noise * fourth)
+
+
+def a6(R):
+    return lambda m, d: R
+
+
+# The pendulum: x1' = x1 + T x2, x2' = x2 - T (b x2 + k sin x1) + s v, y = (sin x1 + r w1, x2 + q w2).
+
+T, b, k, s, r, q = sp.symbols("T b k s r q", real=True)
+z1, z2, m1, m2 = sp.symbols("z1 z2 m1 m2", real=True)
+I2 = sp.eye(2)
+
+
+def slope(cosine):
+    return sp.Matrix([[1, T], [-T * k * cosine, 1 - T * b]])
+
+
+A = slope(sp.cos(z1))
+B = sp.Matrix([0, s])
+NOISE = sp.diag(0, s**2)
+METER_NOISE = sp.diag(r**2, q**2)
+
+
+def moved(sine):
+    return sp.Matrix([z1 + T * z2, z2 - T * (b * z2 + k * sine)])
+
+
+def p1(A=A, B=B):
+    return lambda z: (A, B)
+
+
+TAU, h, G = moved(sp.sin(z1)), sp.Matrix([sp.sin(m1), m2]), sp.diag(sp.cos(m1), 1)
+
+
+def p2(tau=TAU, A=A, noise=NOISE, law=lambda A, p: A * p * A.T):
+    return lambda z, p: (tau, law(A, p) + noise)
+
+
+def p3(h=h, G=G, noise=METER_NOISE, law=lambda G, d: G * d * G.T):
+    return lambda m, d: (h, G, law(G, d) + noise)
+
+
+def sine_variance(mean, variance):
+    return (1 - sp.cos(2 * mean) * sp.exp(-2 * variance)) / 2 - sp.sin(mean) ** 2 * sp.exp(-variance)
+
+
+def p4(shrink=lambda p: sp.exp(-p / 2), of_sine=sine_variance, noise=NOISE, cross=True, tau_shrink=None):
+    def answer(z, p):
+        mean = (tau_shrink or shrink)(p[0, 0])
+        A = slope(shrink(p[0, 0]) * sp.cos(z1))
+        Theta = A * p * A.T
+        if not cross:
+            Theta = sp.diag(Theta[0, 0], Theta[1, 1])
+        straight = A[1, 0] ** 2 * p[0, 0]
+        return moved(mean * sp.sin(z1)), Theta + sp.diag(0, T**2 * k**2 * of_sine(z1, p[0, 0]) - straight) + noise
+
+    return answer
+
+
+def p5(shrink=lambda d: sp.exp(-d / 2), of_sine=sine_variance, noise=METER_NOISE, cross=True, slope_shrink=None):
+    def answer(m, d):
+        mean = shrink(d[0, 0]) * sp.sin(m1)
+        G = sp.diag((slope_shrink or shrink)(d[0, 0]) * sp.cos(m1), 1)
+        cov = G[0, 0] * d[0, 1] if cross else 0
+        return sp.Matrix([mean, m2]), G, sp.Matrix([[of_sine(m1, d[0, 0]), cov], [cov, d[1, 1]]]) + noise
+
+    return answer
+
+
+def p6(F_minus=lambda F, G, d: F - G * d * G.T, **options):
+    def answer(m, d):
+        _, G, F = p5(**options)(m, d)
+        return F_minus(F, G, d)
+
+    return answer
+
+
+RIGHT = [
+    ("a1", lambda z: (c, e * z)),
+    ("a2", a2()),
+    ("a3", a3()),
+    ("a4", a4()),
+    ("a5", a5()),
+    ("a6", a6(f**2 * ((m**2 + 3 * d) ** 2 - 6 * d**2))),
+]
+RIGHT_OF_PENDULUM = [("a1", p1()), ("a2", p2()), ("a3", p3()), ("a4", p4()), ("a5", p5()), ("a6", p6())]
+
+WRONG = [
+    ("a1", "?", lambda z: (c, e)),
+    ("a1", "?", lambda z: (c, z)),
+    ("a1", "?", lambda z: (c * z, e * z)),
+    ("a1", "?", lambda z: (c + e, e * z)),
+    ("a1", "?", lambda z: (c + e * v, e * z)),
+    ("a1", "?", lambda z: (c, 0)),
+    ("a1", "?", lambda z: (c, e * x)),
+    ("a1", "?", lambda z: (1, e * z)),
+    ("a1", "?", lambda z: (e * z, c)),
+    ("a2", "?", a2(Theta=c**2 * p + e * z**2)),
+    ("a2", "?", a2(Theta=c**2 * p - e**2 * z**2)),
+    ("a2", "?", lambda z, p: (c**2 * p + e**2 * z**2, c * z)),
+    ("a2", "?", a2(Theta=c**2 * p + e**2)),
+    ("a2", "?", a2(Theta=c**2 * p + e**2 * z)),
+    ("a2", "?", a2(tau=c * z + e * z)),
+    ("a2", "?", a2(tau=z)),
+    ("a2", "?", a2(Theta=(c + e * z) ** 2 * p)),
+    ("a2", "?", a2(Theta=c**2 * p + 2 * c * e * z + e**2 * z**2)),
+    ("a2", "?", a2(Theta=sp.sqrt(c**2 * p + e**2 * z**2))),
+    ("a2", "?", a2(Theta=c**2 * p + e**2 * z**2 * p)),
+    ("a2", "?", a2(Theta=c**2 * (p + z**2) + e**2 * z**2)),
+    ("a2", "?", a2(Theta=c**2 * p + e**2 * (z**2 + p))),
+    ("a2", "?", a2(Theta=c**2 * p + e**2 * x**2)),
+    ("a2", "?", a2(Theta=p + e**2 * z**2)),
+    ("a2", "?", a2(Theta=c * sp.sqrt(p) + e * z)),
+    ("a3", "?", a3(G=g * m)),
+    ("a3", "?", a3(F=g**2 * d + f**2 * m**2)),
+    ("a3", "?", a3(F=g**2 * d - f**2 * m**4)),
+    ("a3", "?", a3(F=g**2 * d + f * m**4)),
+    ("a3", "?", a3(F=g**2 * d + f**2)),
+    ("a3", "?", a3(h=g * m + f * m**2)),
+    ("a3", "?", a3(G=g + 2 * f * m)),
+    ("a3", "?", a3(F=g**2 * d + 4 * f**2 * m**2 * d)),
+    ("a3", "?", lambda m, d: (g * m, g**2 * d + f**2 * m**4, g)),
+    ("a3", "?", a3(F=g**2 * d + f**2 * d**2)),
+    ("a3", "?", a3(F=(g + 2 * f * m) ** 2 * d + f**2 * m**4)),
+    ("a3", "?", a3(F=g**2 * d + f**2 * m**4 * d)),
+    ("a3", "?", a3(F=sp.sqrt(g**2 * d + f**2 * m**4))),
+    ("a3", "?", a3(F=g * d * g * m**2 + f**2 * m**4)),
+    ("a3", "?", a3(h=m)),
+    ("a4", "?", a4(noise=e**2 * p)),
+    ("a4", "?", a4(noise=e * (z**2 + p))),
+    ("a4", "?", a4(noise=-(e**2) * (z**2 + p))),
+    ("a4", "?", lambda z, p: (c**2 * p + e**2 * (z**2 + p), c * z)),
+    ("a4", "?", a4(noise=e**2 * (z + p) ** 2)),
+    ("a4", "?", a4(noise=e**2 * (z**2 + 2 * p))),
+    ("a4", "?", a4(noise=e**2 * (z**2 - p))),
+    ("a4", "?", a4(noise=e**2)),
+    ("a4", "?", a4(tau=c * z + e * z)),
+    ("a4", "?", a4(state=(c + e) ** 2 * p)),
+    ("a4", "?", a4(state=c**2 * (p + z**2), noise=e**2 * z**2)),
+    ("a4", "?", a4(state=c * p)),
+    ("a4", "?", a4(noise=e**2 * z**2 * p)),
+    ("a4", "?", a4(noise=3 * e**2 * (z**2 + p))),
+    ("a4", "?", a4(state=p)),
+    ("a5", "?", a5(fourth=(m**2 + d) ** 2)),
+    ("a5", "?", a5(fourth=3 * (m**2 + d) ** 2)),
+    ("a5", "?", a5(fourth=m**4 + 3 * m**2 * d + 3 * d**2)),
+    ("a5", "?", a5(fourth=4 * m**2 * d + 2 * d**2)),
+    ("a5", "?", a5(fourth=m**4 + 6 * m**2 * d + d**2)),
+    ("a5", "?", a5(fourth=m**4 + 6 * m**2 * d)),
+    ("a5", "?", a5(fourth=m**4 + 3 * d**2)),
+    ("a5", "?", a5(fourth=3 * d**2)),
+    ("a5", "?", a5(fourth=m**4 + 4 * m**2 * d + 3 * d**2)),
+    ("a5", "?", a5(fourth=m**2 + d)),
+    ("a5", "?", a5(noise=f)),
+    ("a5", "?", a5(noise=-(f**2))),
+    ("a5", "?", a5(G=g * m)),
+    ("a5", "?", a5(h=g * m + f * (m**2 + d))),
+    ("a5", "?", lambda m, d: (g * m, g**2 * d + f**2 * (m**4 + 6 * m**2 * d + 3 * d**2), g)),
+    ("a5", "?", a5(state=g * d)),
+    ("a5", "?", a5(fourth=1)),
+    ("a6", "?", a6(g**2 * d + f**2 * (m**4 + 6 * m**2 * d + 3 * d**2))),
+    ("a6", "?", a6(f**2 * m**4)),
+    ("a6", "?", a6(g**2 * d - g * d + f**2 * (m**4 + 6 * m**2 * d + 3 * d**2))),
+    ("a6", "?", a6(f**2 * (m**2 + d) ** 2)),
+    ("a6", "?", a6(f**2 * (m**4 + 3 * m**2 * d + 3 * d**2))),
+    ("a6", "?", a6(-(f**2) * (m**4 + 6 * m**2 * d + 3 * d**2))),
+    ("a6", "?", a6(2 * g**2 * d + f**2 * (m**4 + 6 * m**2 * d + 3 * d**2))),
+    ("a6", "?", a6(f * (m**4 + 6 * m**2 * d + 3 * d**2))),
+    ("a6", "?", a6(f**2)),
+]
+WRONG_OF_PENDULUM = [
+    ("a1", "?", p1(A=slope(sp.sin(z1)))),
+    ("a1", "?", p1(A=slope(-sp.cos(z1)))),
+    ("a1", "?", p1(A=A - I2)),
+    ("a1", "?", p1(A=A.T)),
+    ("a1", "?", p1(A=A.subs(b, 0))),
+    ("a1", "?", p1(A=slope(1))),
+    ("a1", "?", p1(B=sp.Matrix([s, 0]))),
+    ("a1", "?", p1(B=sp.Matrix([0, 1]))),
+    ("a1", "?", p1(B=sp.Matrix([0, T * s]))),
+    ("a2", "?", p2(law=lambda A, p: A.T * p * A)),
+    ("a2", "?", p2(law=lambda A, p: A * p)),
+    ("a2", "?", p2(law=lambda A, p: A * A.T * p)),
+    ("a2", "?", p2(law=lambda A, p: p)),
+    ("a2", "?", p2(noise=sp.diag(0, s))),
+    ("a2", "?", p2(noise=-NOISE)),
+    ("a2", "?", p2(noise=sp.diag(0, s**2 * T))),
+    ("a2", "?", p2(noise=sp.diag(s**2, s**2))),
+    ("a2", "?", p2(noise=sp.zeros(2))),
+    ("a2", "?", p2(noise=sp.diag(s**2, 0))),
+    ("a2", "?", p2(tau=A * sp.Matrix([z1, z2]))),
+    ("a2", "?", p2(A=slope(sp.sin(z1)))),
+    ("a2", "?", p2(A=slope(1))),
+    ("a2", "?", p2(law=lambda A, p: 0 * p)),
+    ("a3", "?", p3(noise=sp.diag(r, q))),
+    ("a3", "?", p3(noise=-METER_NOISE)),
+    ("a3", "?", p3(noise=sp.diag(q**2, r**2))),
+    ("a3", "?", p3(noise=sp.zeros(2))),
+    ("a3", "?", p3(h=sp.Matrix([sp.cos(m1) * m1, m2]))),
+    ("a3", "?", p3(h=sp.Matrix([m1, m2]))),
+    ("a3", "?", p3(G=sp.diag(-sp.cos(m1), 1))),
+    ("a3", "?", p3(G=sp.diag(sp.sin(m1), 1))),
+    ("a3", "?", p3(G=I2)),
+    ("a3", "?", p3(law=lambda G, d: G * d)),
+    ("a3", "?", p3(law=lambda G, d: G * G.T)),
+    ("a3", "?", p3(law=lambda G, d: sp.diag(*(G * d * G.T).diagonal()))),
+    ("a3", "?", lambda m, d: (p3()(m, d)[0], p3()(m, d)[2], p3()(m, d)[1])),
+    ("a4", "?", p4(shrink=lambda p: 1)),
+    ("a4", "?", p4(shrink=lambda p: sp.exp(p / 2))),
+    ("a4", "?", p4(shrink=lambda p: sp.exp(-p))),
+    ("a4", "?", p4(tau_shrink=lambda p: 1)),
+    ("a4", "?", p4(of_sine=lambda m, d: sp.exp(-d) * sp.cos(m) ** 2 * d)),
+    ("a4", "?", p4(of_sine=lambda m, d: (1 - sp.cos(2 * m) * sp.exp(-2 * d)) / 2)),
+    ("a4", "?", p4(of_sine=lambda m, d: (1 - sp.cos(2 * m) * sp.exp(-d)) / 2 - sp.sin(m) ** 2 * sp.exp(-d))),
+    ("a4", "?", p4(of_sine=lambda m, d: sp.cos(m) ** 2 * d)),
+    ("a4", "?", p4(noise=sp.diag(0, s))),
+    ("a4", "?", p4(noise=-NOISE)),
+    ("a4", "?", p4(noise=sp.zeros(2))),
+    ("a4", "?", p4(cross=False)),
+    ("a4", "?", lambda z, p: p4()(z, p)[::-1]),
+    ("a5", "?", p5(shrink=lambda d: 1)),
+    ("a5", "?", p5(shrink=lambda d: sp.exp(d / 2))),
+    ("a5", "?", p5(shrink=lambda d: sp.exp(-d))),
+    ("a5", "?", p5(slope_shrink=lambda d: 1)),
+    ("a5", "?", p5(of_sine=lambda m, d: sp.exp(-d) * sp.cos(m) ** 2 * d)),
+    ("a5", "?", p5(of_sine=lambda m, d: (1 - sp.cos(2 * m) * sp.exp(-2 * d)) / 2)),
+    ("a5", "?", p5(of_sine=lambda m, d: (1 + sp.cos(2 * m) * sp.exp(-2 * d)) / 2 - sp.sin(m) ** 2 * sp.exp(-d))),
+    ("a5", "?", p5(of_sine=lambda m, d: sp.cos(m) ** 2 * d)),
+    ("a5", "?", p5(noise=sp.diag(r, q))),
+    ("a5", "?", p5(noise=-METER_NOISE)),
+    ("a5", "?", p5(noise=sp.zeros(2))),
+    ("a5", "?", p5(cross=False)),
+    ("a6", "?", p6(F_minus=lambda F, G, d: F)),
+    ("a6", "?", p6(F_minus=lambda F, G, d: F - G * d)),
+    ("a6", "?", p6(F_minus=lambda F, G, d: F - G * G.T)),
+    ("a6", "?", p6(F_minus=lambda F, G, d: F + G * d * G.T)),
+    ("a6", "?", p6(F_minus=lambda F, G, d: METER_NOISE)),
+    ("a6", "?", p6(F_minus=lambda F, G, d: F - G.T * d * G, slope_shrink=lambda d: 1)),
+]
+UNUSABLE = [
+    ("a1", "expected 2 results", lambda z: c),
+    ("a2", "expected 2 results", lambda z, p: c**2 * p + e**2 * z**2),
+    ("a3", "expected 3 results", lambda m, d: (g * m, g**2 * d + f**2 * m**4)),
+    ("a6", "is `return` missing", lambda m, d: None),
+]

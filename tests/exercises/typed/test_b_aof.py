@@ -1,0 +1,233 @@
+"""Set b, answers as a student would type them: the right ones pass, the wrong ones are named."""
+
+from functools import cache
+
+import numpy as np
+
+from kfcourse.checks import exercise
+
+
+@cache
+def OWN(variant="53"):
+    """What the notebook calls measure and predict."""
+    return exercise("b", variant).functions("gaussian")
+
+
+def T(matrix):
+    return np.swapaxes(matrix, -1, -2)
+
+
+def times(matrix, vector):
+    return (matrix @ vector[..., None])[..., 0]
+
+
+def b1(change=lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(F)):
+    return change
+
+
+gain = b1()
+
+
+def b2(
+    gain=gain,
+    base=lambda lam, h: lam,
+    innovation=lambda y, h, lam, G: y - h,
+    cov=lambda Psi, K, G, F: Psi - K @ G @ Psi,
+):
+    def answer(lam, Psi, h, G, F, y):
+        K = gain(Psi, G, F)
+        return base(lam, h) + times(K, innovation(y, h, lam, G)), cov(Psi, K, G, F)
+
+    return answer
+
+
+correct = b2()
+
+
+def b3(measured=lambda measure, lam, Psi: measure(lam, Psi), correct=correct, carried=lambda z, p, lam, Psi: (z, p)):
+    def answer(lam, Psi, y, measure, predict):
+        z, p = correct(lam, Psi, *measured(measure, lam, Psi), y)
+        return z, p, *predict(*carried(z, p, lam, Psi))
+
+    return answer
+
+
+def b3_corrected_twice(lam, Psi, y, measure, predict):
+    z, p = correct(lam, Psi, *measure(lam, Psi), y)
+    z, p = correct(z, p, *measure(z, p), y)
+    return z, p, *predict(z, p)
+
+
+def b3_pairs_swapped(lam, Psi, y, measure, predict):
+    z, p, lam, Psi = b3()(lam, Psi, y, measure, predict)
+    return lam, Psi, z, p
+
+
+def b3_not_corrected(lam, Psi, y, measure, predict):
+    return lam, Psi, *predict(lam, Psi)
+
+
+def b3_added(lam, Psi, y, measure, predict):
+    z, p, lam, Theta = b3()(lam, Psi, y, measure, predict)
+    return z, p, lam, Theta + p
+
+
+def b3_nothing_predicted(lam, Psi, y, measure, predict):
+    z, p = correct(lam, Psi, *measure(lam, Psi), y)
+    return z, p, z, p
+
+
+def b4(
+    correct=correct,
+    start=lambda mean, cov: (mean, cov),
+    gone=lambda missing: missing,
+    estimate=lambda lam: lam,
+    covariance=lambda Psi, p: Psi,
+    carried=lambda z, p, lam, Psi, predict: predict(z, p),
+    own=None,
+    returned=lambda z, p, lam, y: z,
+    shift=0,
+):
+    def answer(y, mean, cov, measure, predict):
+        if own is not None:
+            measure, predict = own
+        N = y.shape[1]
+        mean, cov = start(mean, cov)
+        lam, Psi = np.tile(mean, (N, 1)), np.tile(cov, (N, 1, 1))
+        found = []
+        for y_k in y:
+            missing = gone(np.isnan(y_k).any(axis=1))
+            h, G, F = measure(lam, Psi)
+            z, p = correct(lam, Psi, h, G, F, np.where(np.isnan(y_k), h, y_k))
+            z = np.where(missing[:, None], estimate(lam), z)
+            p = np.where(missing[:, None, None], covariance(Psi, p), p)
+            found.append(returned(z, p, lam, y_k))
+            lam, Psi = carried(z, p, lam, Psi, predict)
+        return np.array(found)
+
+    return answer
+
+
+def b4_first_not_used(y, mean, cov, measure, predict):
+    y = y.copy()
+    y[0] = np.nan
+    return b4()(y, mean, cov, measure, predict)
+
+
+def b4_missing_not_predicted(y, mean, cov, measure, predict):
+    def carried(z, p, lam, Psi, predict):
+        lam_next, Psi_next = predict(z, p)
+        kept = (z == lam).all(axis=1)
+        return np.where(kept[:, None], z, lam_next), np.where(kept[:, None, None], p, Psi_next)
+
+    return b4(carried=carried)(y, mean, cov, measure, predict)
+
+
+def b4_last_measurement_kept(y, mean, cov, measure, predict):
+    y = y.copy()
+    for k in range(1, len(y)):
+        y[k] = np.where(np.isnan(y[k]), y[k - 1], y[k])
+    return b4()(y, mean, cov, measure, predict)
+
+
+def b5(
+    rest=lambda Psi, K, G: (np.eye(Psi.shape[-1]) - K @ G) @ Psi @ T(np.eye(Psi.shape[-1]) - K @ G),
+    noise=lambda K, R, F: K @ R @ T(K),
+):
+    def answer(Psi, G, F, R):
+        K = gain(Psi, G, F)
+        return rest(Psi, K, G) + noise(K, R, F)
+
+    return answer
+
+
+RIGHT = [
+    ("b1", b1()),
+    ("b1", lambda Psi, G, F: T(np.linalg.solve(F, G @ Psi))),
+    ("b2", b2()),
+    ("b2", b2(cov=lambda Psi, K, G, F: Psi - K @ F @ T(K))),
+    ("b3", b3()),
+    ("b4", b4()),
+    ("b5", b5()),
+]
+
+WRONG = [
+    ("b1", "?", b1(lambda Psi, G, F: Psi @ T(G))),
+    ("b1", "?", b1(lambda Psi, G, F: Psi @ T(G) @ F)),
+    ("b1", "?", b1(lambda Psi, G, F: T(G) @ np.linalg.inv(F))),
+    ("b1", "?", b1(lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(np.sqrt(np.abs(F))))),
+    ("b1", "?", b1(lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(F + G @ Psi @ T(G)))),
+    ("b1", "?", b1(lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(F - G @ Psi @ T(G)))),
+    ("b1", "?", b1(lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(G @ Psi @ T(G)))),
+    ("b1", "?", b1(lambda Psi, G, F: -gain(Psi, G, F))),
+    ("b1", "?", b1(lambda Psi, G, F: np.linalg.inv(gain(Psi, G, F)))),
+    ("b1", "?", b1(lambda Psi, G, F: np.tile(gain(Psi, G, F).mean(axis=0), (len(Psi), 1, 1)))),
+    ("b1", "?", b1(lambda Psi, G, F: Psi @ np.linalg.inv(F))),
+    ("b2", "?", b2(innovation=lambda y, h, lam, G: y - lam)),
+    ("b2", "?", b2(innovation=lambda y, h, lam, G: y - times(G, lam))),
+    ("b2", "?", b2(innovation=lambda y, h, lam, G: y + h)),
+    ("b2", "?", b2(base=lambda lam, h: 0)),
+    ("b2", "?", b2(base=lambda lam, h: h)),
+    ("b2", "?", b2(cov=lambda Psi, K, G, F: np.eye(Psi.shape[-1]) - K @ G)),
+    ("b2", "?", b2(cov=lambda Psi, K, G, F: Psi - K @ F)),
+    ("b2", "?", b2(cov=lambda Psi, K, G, F: Psi - K @ Psi)),
+    ("b2", "?", b2(cov=lambda Psi, K, G, F: Psi - Psi @ T(G) @ G @ Psi)),
+    ("b2", "?", b2(cov=lambda Psi, K, G, F: Psi - K @ T(K))),
+    ("b2", "?", b2(cov=lambda Psi, K, G, F: (np.eye(Psi.shape[-1]) - K @ G) @ Psi @ T(np.eye(Psi.shape[-1]) - K @ G))),
+    ("b2", "?", b2(gain=lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(F + G @ Psi @ T(G)))),
+    ("b2", "?", b2(gain=lambda Psi, G, F: np.broadcast_to(np.eye(Psi.shape[-1]), Psi.shape))),
+    ("b2", "?", b2(cov=lambda Psi, K, G, F: np.sqrt(np.abs(Psi - K @ G @ Psi)))),
+    ("b2", "?", b2(cov=lambda Psi, K, G, F: K @ G @ Psi)),
+    ("b2", "?", b2(innovation=lambda y, h, lam, G: (y - h) ** 2)),
+    ("b3", "?", b3(measured=lambda measure, lam, Psi: measure(lam * 0, Psi))),
+    ("b3", "?", b3_corrected_twice),
+    ("b3", "?", b3_pairs_swapped),
+    ("b3", "?", b3_not_corrected),
+    ("b3", "?", b3_added),
+    ("b3", "?", b3_nothing_predicted),
+    ("b3", "?", b3(carried=lambda z, p, lam, Psi: (lam, p))),
+    ("b3", "?", b3(carried=lambda z, p, lam, Psi: (z, Psi + p))),
+    ("b3", "?", b3(correct=b2(innovation=lambda y, h, lam, G: h - y))),
+    ("b3", "?", b3(correct=b2(cov=lambda Psi, K, G, F: Psi))),
+    ("b3", "?", b3(correct=b2(cov=lambda Psi, K, G, F: Psi + K @ G @ Psi))),
+    ("b3", "?", b3(correct=b2(innovation=lambda y, h, lam, G: y - lam))),
+    ("b3", "?", lambda lam, Psi, y, measure, predict: b3()(lam, Psi, y, *OWN())),
+    ("b3", "?", lambda lam, Psi, y, measure, predict: b3()(lam, Psi, y, measure, OWN()[1])),
+    ("b3", "?", lambda lam, Psi, y, measure, predict: b3()(lam, Psi, y, OWN()[0], predict)),
+    ("b4", "?", lambda *arguments: b4(own=OWN())(*arguments)),
+    ("b4", "?", lambda y, mean, cov, measure, predict: b4()(y, mean, cov, OWN()[0], predict)),
+    ("b4", "?", b4(covariance=lambda Psi, p: p)),
+    ("b4", "?", b4(estimate=lambda lam: 0 * lam)),
+    ("b4", "?", b4(gone=lambda missing: missing | missing.any())),
+    ("b4", "?", b4(start=lambda mean, cov: (0 * mean, cov))),
+    ("b4", "?", b4(start=lambda mean, cov: (mean, np.eye(len(cov))))),
+    ("b4", "?", b4(start=lambda mean, cov: (mean, 0 * cov))),
+    ("b4", "?", b4(carried=lambda z, p, lam, Psi, predict: (z, p))),
+    ("b4", "?", b4(carried=lambda z, p, lam, Psi, predict: predict(lam, Psi))),
+    ("b4", "?", b4(carried=lambda z, p, lam, Psi, predict: predict(z, Psi))),
+    ("b4", "?", b4(carried=lambda z, p, lam, Psi, predict: (predict(z, p)[0], p))),
+    ("b4", "?", b4(correct=b2(cov=lambda Psi, K, G, F: Psi + K @ G @ Psi))),
+    ("b4", "?", b4(correct=b2(innovation=lambda y, h, lam, G: y - lam))),
+    ("b4", "?", b4_first_not_used),
+    ("b4", "?", b4_missing_not_predicted),
+    ("b4", "?", b4_last_measurement_kept),
+    ("b5", "?", b5(noise=lambda K, R, F: 0)),
+    ("b5", "?", b5(noise=lambda K, R, F: K @ F @ T(K))),
+    ("b5", "?", b5(noise=lambda K, R, F: -K @ R @ T(K))),
+    ("b5", "?", b5(noise=lambda K, R, F: K @ T(K))),
+    ("b5", "?", b5(rest=lambda Psi, K, G: (np.eye(Psi.shape[-1]) - K @ G) @ Psi)),
+    ("b5", "?", b5(rest=lambda Psi, K, G: (np.eye(Psi.shape[-1]) - K @ G) @ Psi, noise=lambda K, R, F: 0)),
+    ("b5", "?", b5(rest=lambda Psi, K, G: np.maximum(Psi - K @ G @ Psi, 0), noise=lambda K, R, F: 0)),
+    ("b5", "?", b5(rest=lambda Psi, K, G: np.abs(Psi - K @ G @ Psi), noise=lambda K, R, F: 0)),
+    ("b5", "?", b5(rest=lambda Psi, K, G: (np.eye(Psi.shape[-1]) + K @ G) @ Psi @ T(np.eye(Psi.shape[-1]) + K @ G))),
+    ("b5", "?", b5(rest=lambda Psi, K, G: Psi)),
+    ("b5", "?", b5(noise=lambda K, R, F: K @ R @ R @ T(K))),
+]
+UNUSABLE = [
+    ("b1", "expected an array of shape (6, 1, 1)", lambda Psi, G, F: gain(Psi, G, F)[..., 0]),
+    ("b1", "complex numbers", lambda Psi, G, F: gain(Psi, G, F) * 1j),
+    ("b2", "expected 2 results", lambda *arguments: b2()(*arguments)[0]),
+    ("b3", "expected 4 results", lambda *arguments: b3()(*arguments)[2:]),
+    ("b4", "got the shape (5, 6, 1)", lambda *arguments: b4()(*arguments)[1:]),
+    ("b4", "NaN or infinity", b4(gone=lambda missing: missing & False, returned=lambda z, p, lam, y: z + 0 * y)),
+]

@@ -1,0 +1,211 @@
+"""Set c, answers as a student would type them: the right ones pass, the wrong ones are named."""
+
+from functools import cache
+
+import numpy as np
+
+from kfcourse.checks import exercise
+
+
+@cache
+def OWN(variant="53"):
+    """What the notebook calls a and b."""
+    return exercise("c", variant).noiseless
+
+
+def cov(a, b, N=None):
+    return (a - a.mean(axis=0)).T @ (b - b.mean(axis=0)) / (N or len(a))
+
+
+def c2(
+    cross=cov,
+    own=cov,
+    matrix=lambda C, R: C @ np.linalg.pinv(R),
+    offset=lambda t, r, A: t.mean(axis=0) - A @ r.mean(axis=0),
+    residual=lambda t, r, A, C, R: cov(t, t) - A @ C.T,
+):
+    def answer(target, regressor):
+        C, R = cross(target, regressor), own(regressor, regressor)
+        A = matrix(C, R)
+        return A, offset(target, regressor, A), residual(target, regressor, A, C, R)
+
+    return answer
+
+
+def c2_by_least_squares(target, regressor):
+    wide = np.column_stack([regressor, np.ones(len(regressor))])
+    found = np.linalg.lstsq(wide, target, rcond=None)[0]
+    return found[:-1].T, found[-1], cov(target, target) - found[:-1].T @ cov(target, regressor).T
+
+
+fit = c2()
+
+
+def c3(
+    omega=lambda y, b, lam: y - b(lam),
+    first=lambda x, lam: x - lam,
+    estimate=lambda lam, omega, H, e: lam + omega @ H.T + e,
+    alpha=lambda a, z, lam: a(z),
+    second=lambda x_next, lam, z, alpha: x_next,
+    prediction=lambda alpha, F, g: alpha @ F.T + g,
+    own=None,
+    returned=lambda z, lam: (z, lam),
+):
+    def answer(lam, x, y, x_next, a, b):
+        if own is not None:
+            a, b = own
+        w = omega(y, b, lam)
+        H, e, _ = fit(first(x, lam), w)
+        z = estimate(lam, w, H, e)
+        s = alpha(a, z, lam)
+        F, g, _ = fit(second(x_next, lam, z, s), s)
+        return returned(z, prediction(s, F, g))
+
+    return answer
+
+
+def c3_from_the_other_regressor(lam, x, y, x_next, a, b):
+    H, e, _ = fit(x, y)
+    z = y @ H.T + e
+    F, g, _ = fit(x_next, a(z))
+    return z, a(z) @ F.T + g
+
+
+def c3_estimate_carried(lam, x, y, x_next, a, b):
+    z, _ = c3()(lam, x, y, x_next, a, b)
+    F, g, _ = fit(x_next, z)
+    return z, z @ F.T + g
+
+
+def c4(
+    omega=lambda y, b, lam: y - b(lam),
+    use=lambda other, omega, H, e: other + omega @ H.T + e,
+    ahead=lambda a, z, F, g: a(z) @ F.T + g,
+    own=None,
+    data=lambda y_design, y: (y_design, y),
+    start=lambda mean: mean,
+    carried=lambda z, lam: z,
+    first=lambda x, lam: x - lam,
+    returned=lambda designed, used: used,
+    last=False,
+):
+    def answer(x, y_design, y, mean, a, b):
+        if own is not None:
+            a, b = own
+        y_design, y = data(y_design, y)
+        lam, other = np.tile(start(mean), (x.shape[1], 1)), np.tile(start(mean), (y.shape[1], 1))
+        designed, used = [], []
+        for k in range(len(x)):
+            H, e, _ = fit(first(x[k], lam), y_design[k] - b(lam))
+            z = lam + (y_design[k] - b(lam)) @ H.T + e
+            estimate = use(other, omega(y[k], b, other), H, e)
+            designed.append(z)
+            used.append(estimate)
+            if k + 1 < len(x):
+                F, g, _ = fit(x[k + 1], a(carried(z, lam)))
+                lam, other = a(carried(z, lam)) @ F.T + g, ahead(a, carried(estimate, other), F, g)
+        return np.array(returned(designed, used))
+
+    return answer
+
+
+def c4_not_predicted_by_fit(x, y_design, y, mean, a, b):
+    lam, other = np.tile(mean, (x.shape[1], 1)), np.tile(mean, (y.shape[1], 1))
+    found = []
+    for k in range(len(x)):
+        H, e, _ = fit(x[k] - lam, y_design[k] - b(lam))
+        z = lam + (y_design[k] - b(lam)) @ H.T + e
+        found.append(other + (y[k] - b(other)) @ H.T + e)
+        lam, other = a(z), a(found[-1])
+    return np.array(found)
+
+
+def c4_predicted_first(x, y_design, y, mean, a, b):
+    lam, other = np.tile(mean, (x.shape[1], 1)), np.tile(mean, (y.shape[1], 1))
+    found = []
+    for k in range(len(x)):
+        F, g, _ = fit(x[k], a(lam))
+        lam, other = a(lam) @ F.T + g, a(other) @ F.T + g
+        H, e, _ = fit(x[k] - lam, y_design[k] - b(lam))
+        lam = lam + (y_design[k] - b(lam)) @ H.T + e
+        other = other + (y[k] - b(other)) @ H.T + e
+        found.append(other)
+    return np.array(found)
+
+
+RIGHT = [
+    ("c1", lambda lam, z, y, a, b: (y - b(lam), a(z))),
+    ("c2", c2()),
+    ("c3", c3()),
+    ("c4", c4()),
+]
+
+WRONG = [
+    ("c1", "?", lambda lam, z, y, a, b: (y - lam, a(z))),
+    ("c1", "?", lambda lam, z, y, a, b: (y - b(z), a(z))),
+    ("c1", "?", lambda lam, z, y, a, b: (b(lam) - y, a(z))),
+    ("c1", "?", lambda lam, z, y, a, b: (y, a(z))),
+    ("c1", "?", lambda lam, z, y, a, b: (y - b(lam), a(lam))),
+    ("c1", "?", lambda lam, z, y, a, b: (y - b(lam), z)),
+    ("c1", "?", lambda lam, z, y, a, b: (a(z), y - b(lam))),
+    ("c1", "?", lambda lam, z, y, a, b: (y - OWN()[1](lam), OWN()[0](z))),
+    ("c1", "?", lambda lam, z, y, a, b: (y - b(a(z)), a(z))),
+    ("c1", "?", lambda lam, z, y, a, b: (y - b(lam), a(z) - lam)),
+    ("c1", "?", lambda lam, z, y, a, b: (y - a(lam), b(z))),
+    ("c2", "?", c2(cross=lambda a, b: cov(a, b, len(a) - 1))),
+    ("c2", "?", c2(own=lambda a, b: a.T @ b / len(a))),
+    ("c2", "?", c2(cross=lambda a, b: a.T @ b / len(a))),
+    ("c2", "?", c2(offset=lambda t, r, A: t.mean(axis=0) + A @ r.mean(axis=0))),
+    ("c2", "?", c2(offset=lambda t, r, A: 0 * t.mean(axis=0))),
+    ("c2", "?", c2(offset=lambda t, r, A: A @ r.mean(axis=0))),
+    ("c2", "?", c2(residual=lambda t, r, A, C, R: cov(t, t) + A @ C.T)),
+    ("c2", "?", c2(residual=lambda t, r, A, C, R: A @ C.T)),
+    ("c2", "?", c2(residual=lambda t, r, A, C, R: (t - r @ A.T).T @ (t - r @ A.T) / len(t))),
+    ("c2", "?", c2(residual=lambda t, r, A, C, R: np.diag(np.diag(cov(t, t) - A @ C.T)))),
+    ("c2", "?", c2(residual=lambda t, r, A, C, R: t.T @ t / len(t) - A @ C.T)),
+    ("c2", "?", c2(residual=lambda t, r, A, C, R: cov(t, t, len(t) - 1) - A @ C.T)),
+    ("c2", "?", c2(matrix=lambda C, R: C)),
+    ("c2", "?", c2(matrix=lambda C, R: C / np.where(np.diag(R) == 0, 1, np.diag(R)))),
+    ("c2", "?", c2(matrix=lambda C, R: np.linalg.pinv(C.T))),
+    ("c2", "?", c2(matrix=lambda C, R: C @ R)),
+    ("c2", "?", c2(matrix=lambda C, R: C @ np.linalg.pinv(np.sqrt(np.abs(R))))),
+    ("c3", "?", c3(omega=lambda y, b, lam: b(lam) - y, estimate=lambda lam, omega, H, e: lam - omega @ H.T + e)),
+    ("c3", "?", c3(omega=lambda y, b, lam: y - lam)),
+    ("c3", "?", c3(omega=lambda y, b, lam: y)),
+    ("c3", "?", c3(estimate=lambda lam, omega, H, e: lam + omega @ H.T)),
+    ("c3", "?", c3(estimate=lambda lam, omega, H, e: lam - omega @ H.T + e)),
+    ("c3", "?", c3(first=lambda x, lam: lam - x)),
+    ("c3", "?", c3(prediction=lambda alpha, F, g: alpha @ F.T)),
+    ("c3", "?", c3(prediction=lambda alpha, F, g: alpha)),
+    ("c3", "?", c3(alpha=lambda a, z, lam: z)),
+    ("c3", "?", c3(second=lambda x_next, lam, z, alpha: x_next - lam)),
+    ("c3", "?", c3(second=lambda x_next, lam, z, alpha: x_next - alpha)),
+    ("c3", "?", c3(second=lambda x_next, lam, z, alpha: x_next - alpha, prediction=lambda s, F, g: s - s @ F.T - g)),
+    ("c3", "?", c3(returned=lambda z, lam: (lam, z))),
+    ("c3", "?", lambda *arguments: c3(own=OWN())(*arguments)),
+    ("c3", "?", c3_from_the_other_regressor),
+    ("c3", "?", lambda lam, x, y, x_next, a, b: (c3()(lam, x, y, x_next, a, b)[0], a(c3()(lam, x, y, x_next, a, b)[0]))),
+    ("c4", "?", c4(omega=lambda y, b, lam: y - lam)),
+    ("c4", "?", c4(omega=lambda y, b, lam: b(lam) - y)),
+    ("c4", "?", c4(omega=lambda y, b, lam: y)),
+    ("c4", "?", c4(use=lambda other, omega, H, e: omega @ H.T + e)),
+    ("c4", "?", c4(ahead=lambda a, z, F, g: a(z))),
+    ("c4", "?", c4(ahead=lambda a, z, F, g: a(z) @ F.T)),
+    ("c4", "?", c4(ahead=lambda a, z, F, g: z @ F.T + g)),
+    ("c4", "?", lambda *arguments: c4(own=OWN())(*arguments)),
+    ("c4", "?", c4(start=lambda mean: 0 * mean)),
+    ("c4", "?", c4(carried=lambda z, lam: lam)),
+    ("c4", "?", c4(first=lambda x, lam: x)),
+    ("c4", "?", c4(first=lambda x, lam: x, use=lambda other, omega, H, e: omega @ H.T + e)),
+    ("c4", "?", c4_not_predicted_by_fit),
+    ("c4", "?", c4_predicted_first),
+    ("c4", "?", c4(ahead=lambda a, z, F, g: a(z) @ F.T + g - g)),
+]
+UNUSABLE = [
+    ("c1", "expected 2 results", lambda lam, z, y, a, b: y - b(lam)),
+    ("c2", "got the shape", c2(residual=lambda t, r, A, C, R: np.trace(cov(t, t) - A @ C.T))),
+    ("c2", "expected 3 results", lambda t, r: c2()(t, r)[:2]),
+    ("c2", "", c2(matrix=lambda C, R: C @ np.linalg.inv(R))),
+    ("c4", "expected an array of shape", c4(returned=lambda designed, used: designed)),
+    ("c4", "expected an array of shape", c4(returned=lambda designed, used: used[-1])),
+]
