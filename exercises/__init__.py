@@ -1,7 +1,7 @@
 """The exercise sets, a folder each.
 
     <letter>_<name>/statement.md    text, stubs and typed solution; Jinja fills in the variant
-    <letter>_<name>/questions.py    `SET`: what is asked, and the hidden arguments
+    <letter>_<name>/questions.py    `SET`: titles, levels, and the hidden arguments
                     keys.py         the right answers: plain functions with the student's names
                     mistakes.py     the known mistakes and what is said of each; several mistakes_of_*.py if there are many
                     companion.py    what the notebook itself imports, if it needs more than the package; never a key
