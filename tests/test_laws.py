@@ -239,7 +239,16 @@ def test_a_missing_component_is_a_meter_without_it(rng):
     np.testing.assert_allclose(posterior.cov, alone.cov, rtol=1e-12)
 
 
-@pytest.mark.parametrize("cov", [np.diag([2.0, 0.0]), np.ones((2, 2)), np.zeros((2, 2)), np.array([[2.0, 1e-5], [1e-5, 1e-9]])])
+@pytest.mark.parametrize(
+    "cov",
+    [
+        np.diag([2.0, 0.0]),
+        np.ones((2, 2)),
+        np.array([[1.0, 1 + 4e-16], [1 + 4e-16, 1.0]]),  # an eigenvalue of -4e-16: singular, but for rounding
+        np.zeros((2, 2)),
+        np.array([[2.0, 1e-5], [1e-5, 1e-9]]),
+    ],
+)
 def test_the_square_root_squares_to_the_covariance(cov):
     root = square_root(cov)
     np.testing.assert_allclose(root @ root.T, cov, atol=1e-15 * 2)  # rounding relative to the largest eigenvalue
@@ -299,6 +308,9 @@ def test_a_perfect_regression_leaves_no_negative_variance(rng):
     # Cov(t) - matrix Cov(t, r)^T is a difference of equal numbers, and its rounding must not become a variance below 0.
     for _ in range(50):
         regressor = rng.normal(size=(30, 2))
-        fit = Scatter.of(regressor @ rng.normal(size=(2, 2)), regressor).regression(2)
+        target = regressor @ rng.normal(size=(2, 2))
+        fit = Scatter.of(target, regressor).regression(2)
         assert (np.diagonal(fit.residual) >= 0).all()
+        # Rounding of sums of 30 products and of a solution whose condition is below 1e2.
+        assert abs(fit.residual).max() < 1e-13 * target.var(axis=0).sum()
         assert Scatter.of(0.7 * regressor[:, :1], regressor[:, :1]).regression(1).residual.item() >= 0

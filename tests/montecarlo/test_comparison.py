@@ -372,6 +372,22 @@ def test_a_variance_that_comes_out_negative_is_taken_as_zero(variant53):
     assert error.item() == 0
 
 
+def test_the_ranking_does_not_keep_the_order_given(variant53):
+    squares = {name: np.array([d, d + 1]) for name, d in (("worst", 9.0), ("best", 1.0), ("middle", 4.0), ("slow", 2.0))}
+    result = by_hand(variant53, squares, ["slow"], subset=2)
+    assert [name for name, _ in result.ranking()] == ["best", "slow", "middle", "worst"]
+
+
+def test_without_the_exact_filter_there_is_no_bound(variant53):
+    """Whether no slow filter ran, or only others: not a distance of 0 from nothing."""
+    squares = {"aof-gaussian": np.ones(3), "slow": np.ones(2)}
+    with_another = by_hand(variant53, squares, ["slow"], subset=2)
+    for result in (with_another, replace(with_another, subset=None)):
+        for ask in (result.bound, lambda r=result: r.excess("aof-gaussian"), lambda r=result: r.above_bound("aof-gaussian")):
+            with pytest.raises(KeyError, match="the bound needs aof-exact"):
+                ask()
+
+
 def test_above_the_bound_the_control_cancels_when_the_subset_is_everything(variant53):
     """M(e^2 - p_control) - M(p_exact - p_control), over the same trajectories, is M e^2 - M p_exact for any p_control."""
     squares = {"aof-gaussian": np.array([1.0, 3, 2]), "other": np.array([4.0, 2, 9]), "aof-exact": np.array([1.0, 2, 2])}
