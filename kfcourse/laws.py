@@ -69,7 +69,7 @@ def symmetric(matrix: Array) -> Array:
     return matrix if matrix.shape[-1] == 1 else 0.5 * (matrix + transpose(matrix))
 
 
-def gain(cross: Array, cov: Array, rounding: Array | None = None) -> Array:
+def gain(cross: Array, cov: Array, broken: bool = False) -> Array:
     """The regression gain cross cov^+, the solution K of K cov = cross of least norm.
 
     Parameters
@@ -79,27 +79,26 @@ def gain(cross: Array, cov: Array, rounding: Array | None = None) -> Array:
     cov : (..., p, p)
         Cov(y), symmetric and non-negative; where it is singular the pseudo-inverse takes the place of
         the inverse, so a measurement that cannot vary gets the gain 0.  Where it is NaN the gain is NaN.
-    rounding : (..., p), optional
-        Variances that are no more than this are rounding, and their components cannot vary.  `cov` alone cannot tell: the
-        same 1e-32 is a rounded 0 in metres and a good variance in light years.  See `lost`.
+        How small a variance may be depends on its units, which are free: 1e-32 is a good variance.  A variance that is only
+        rounding must therefore be made 0 where it arises.
+    broken : bool
+        Whether `cov` comes from a filter whose covariance may have broken down: the component of a negative variance then
+        gets the gain 0, as if it could not vary.
 
     Raises
     ------
     ValueError
-        A variance is negative (by more than rounding, where there are several).
+        A variance is negative (beside others, by more than rounding), and not `broken`.
     """
-    if cov.shape[-1] == 1 and rounding is None and np.minimum.reduce(cov, axis=None) > 0:
-        return cross / cov
-    variance = np.diagonal(cov, axis1=-2, axis2=-1)
-    if rounding is not None and (np.abs(variance) <= rounding).any():
-        varies = ~(np.abs(variance) <= rounding)
-        cross, cov = np.where(varies[..., None, :], cross, 0.0), np.where(varies[..., :, None] & varies[..., None, :], cov, 0.0)
-        variance = np.where(varies, variance, 0.0)
     if cov.shape[-1] == 1:
-        _refuse_negative(np.nanmin(cov, initial=0.0), 0.0)
+        if np.minimum.reduce(cov, axis=None) > 0:
+            return cross / cov
+        if not broken:
+            _refuse_negative(cov, 0.0)
         zero = np.zeros(np.broadcast_shapes(cross.shape, cov.shape), dtype=np.result_type(cross, cov))
-        return np.divide(cross, cov, out=zero, where=cov != 0)
+        return np.divide(cross, cov, out=zero, where=~(cov <= 0))
     # Scaling to correlations first: components may differ by orders of magnitude in size.
+    variance = np.diagonal(cov, axis1=-2, axis2=-1)
     scale = np.sqrt(np.maximum(variance, 0.0))
     scale = np.where(scale > 0, scale, 1.0)
     correlation = cov / (scale[..., :, None] * scale[..., None, :])
@@ -110,9 +109,12 @@ def gain(cross: Array, cov: Array, rounding: Array | None = None) -> Array:
             return transpose(np.linalg.solve(correlation, transpose(scaled_cross))) / scale[..., None, :]
     except np.linalg.LinAlgError:
         pass
+    if not broken:
+        _refuse_negative(variance, singular**2)
     unknown = np.isnan(cov).any(axis=(-2, -1), keepdims=True)
-    _refuse_negative(np.nanmin(variance, initial=np.inf), singular**2 * np.nanmax(variance, initial=0.0))
-    inverse = np.linalg.pinv(np.where(unknown, 0.0, correlation), rcond=singular**2, hermitian=True)
+    usable = ~(variance < 0)
+    correlation = np.where(usable[..., :, None] & usable[..., None, :] & ~unknown, correlation, 0.0)
+    inverse = np.linalg.pinv(correlation, rcond=singular**2, hermitian=True)
     return np.where(unknown, np.nan, scaled_cross @ inverse / scale[..., None, :])
 
 
@@ -120,32 +122,13 @@ def gain(cross: Array, cov: Array, rounding: Array | None = None) -> Array:
 SINGULAR = 7.0
 
 
-def _refuse_negative(least: float, rounding: float) -> None:
-    if least < -rounding:
+def _refuse_negative(variance: Array, rounding: float) -> None:
+    """ValueError if a variance is negative by more than this part of the largest."""
+    if (variance < -rounding * np.nanmax(variance, initial=0.0)).any():
         raise ValueError(
-            f"a covariance has the variance {least:.6g}, which must not be negative; "
-            "compute it in a form that cannot become so (Joseph's, or a square root)"
+            f"a covariance has the variance {np.nanmin(variance):.6g}, which must not be negative: "
+            "check the formula that it comes from, or give its square root to be multiplied out"
         )
-
-
-def lost(G: Array, cov: Array) -> Array:
-    """What the rounding of cov = Cov(x) leaves open of Var(G x), (..., p): where Var(G x) is less, no digit of it is right.
-
-    Each entry of cov is known to some units of precision, so G cov G^T is known to that times (sum_j |G_ij| sd_j)^2, the
-    variance if all components were fully correlated, whatever units they have.  The units are 4 SINGULAR^2, about 200
-    (4e-14 of that variance): twice as many as `well_conditioned` adds.
-    """
-    sd = np.sqrt(np.maximum(np.diagonal(cov, axis1=-2, axis2=-1), 0.0))
-    return 4 * SINGULAR**2 * np.finfo(cov.dtype).eps * apply(np.abs(G), sd) ** 2
-
-
-def well_conditioned(cov: Array) -> Array:
-    """cov, its variances larger by 2 SINGULAR^2 units of precision (2e-14 of themselves): `gain` sees no singular matrix.
-
-    Variances that are 0 stay 0.
-    """
-    enlarged = 1 + 2 * SINGULAR**2 * np.finfo(cov.dtype).eps * np.eye(cov.shape[-1], dtype=cov.dtype)
-    return cov * enlarged
 
 
 def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
@@ -155,18 +138,19 @@ def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
 
     The last is evaluated as (I - K G) Psi (I - K G)^T + K R K^T (Joseph's form, with R = F - G Psi G^T), for
     scalars as Psi R / F: equal, but never negative.  A trajectory with a missing measurement (NaN) keeps
-    its prior for the missing components.
+    its prior for the missing components.  F may be negative where the prior covariance has broken down by rounding; such a
+    component corrects nothing.
     """
     innovation, G, F, R = y - measurement.h, measurement.G, measurement.F, measurement.R
     if any_missing(innovation):
         innovation, G, F, R = without_missing(innovation, G, F, R)
     if G.shape[-2:] == (1, 1):
         varies = np.minimum.reduce(F, axis=None) > 0
-        share = prior.cov / F if varies else gain(prior.cov, F)
+        share = prior.cov / F if varies else gain(prior.cov, F, broken=True)
         K = share * G
-        cov = share * R if varies else np.where(F == 0, prior.cov, share * R)  # a meter that cannot vary tells nothing
+        cov = share * R if varies else np.where(F <= 0, prior.cov, share * R)  # a meter that cannot vary tells nothing
     else:
-        K = gain(product(prior.cov, transpose(G)), F, lost(G, prior.cov))
+        K = gain(product(prior.cov, transpose(G)), F, broken=True)
         rest = np.eye(prior.cov.shape[-1], dtype=prior.cov.dtype) - product(K, G)
         cov = symmetric(product(product(rest, prior.cov), transpose(rest)) + product(product(K, R), transpose(K)))
     return Gaussian(prior.mean + apply(K, innovation), cov)

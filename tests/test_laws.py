@@ -76,25 +76,19 @@ def test_an_unknown_variance_gives_an_unknown_correction():
     np.testing.assert_allclose((posterior.mean[1, 0], posterior.cov[1, 0, 0]), 0.5, rtol=1e-15)
 
 
-@pytest.mark.parametrize("p", [1, 2])
-def test_what_only_rounding_lets_vary_tells_nothing(p):
-    """x1 + x2 is known exactly and x1 vaguely: the variance of x1 + x2 is then rounding of 1e8, whatever the units."""
-    for units in (np.ones(2), np.array([1e-6, 1e9])):
-        cov = 1e8 / 3 * np.array([[1.0, -1.0], [-1.0, 1.0]]) / (units[:, None] * units)
-        cov[1, 1] *= 1 + 4e-16
-        prior = Gaussian(np.zeros((1, 2)), cov[None])
-        G = np.array([[1.0], [2.0]])[:p] * units
-        F = G @ cov @ G.T
-        posterior = correct(prior, Measurement(np.zeros((1, p)), G[None], F[None], np.zeros((1, p, p))), np.full((1, p), 1e-4))
-        np.testing.assert_array_equal(posterior.mean, prior.mean)
-        np.testing.assert_allclose(posterior.cov, prior.cov, rtol=1e-15)
+def test_where_a_filter_has_broken_down_a_negative_variance_gets_no_gain(rng):
+    cov = covariances(rng, 3, 2)
+    cross = rng.normal(size=(3, 2, 2))
+    cov[1, 1, 1] = -1.0
+    found = gain(cross, cov, broken=True)
+    np.testing.assert_allclose(found[[0, 2]], gain(cross[[0, 2]], cov[[0, 2]]), rtol=1e-11, atol=1e-11)  # as above
+    np.testing.assert_allclose(found[1], np.column_stack([cross[1, :, 0] / cov[1, 0, 0], np.zeros(2)]), rtol=1e-12)
+    np.testing.assert_array_equal(gain(np.ones((2, 1, 1)), np.array([[[-1.0]], [[2.0]]]), broken=True)[:, 0, 0], [0.0, 0.5])
 
 
 def test_a_variance_that_is_small_in_its_units_tells():
-    # Var = 1e-32 beside 1: 1e-16 in metres is 1 in other units, and only the caller knows what it is made of
-    cross, cov = np.array([[0.5, 1e-17]]), np.diag([1.0, 1e-32])
-    np.testing.assert_allclose(gain(cross, cov), [[0.5, 1e15]], rtol=1e-14)
-    np.testing.assert_allclose(gain(cross, cov, rounding=np.array([0.0, 1e-30])), [[0.5, 0.0]], rtol=1e-14)
+    # Var = 1e-32 beside 1: 1e-16 of a unit is much of another, and only the maker of the covariance knows which
+    np.testing.assert_allclose(gain(np.array([[0.5, 1e-17]]), np.diag([1.0, 1e-32])), [[0.5, 1e15]], rtol=1e-14)
 
 
 def test_a_singular_covariance_gets_its_pseudo_inverse(rng):

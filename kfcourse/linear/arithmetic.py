@@ -59,7 +59,7 @@ def _correct_textbook(system: LinearSystem, law: Gaussian, y: Array) -> Gaussian
     """K = P H^T (H P H^T + R)^-1,  m + K (y - H m),  (I - K H) P."""
     innovation, H, R = _measured(system, y - apply(system.H, law.mean))
     cross = law.cov @ transpose(H)
-    K = gain(cross, H @ cross + R)
+    K = gain(cross, H @ cross + R, broken=True)
     return Gaussian(law.mean + apply(K, innovation), (np.eye(len(system.A), dtype=law.cov.dtype) - K @ H) @ law.cov)
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 import sympy as sp
 
-from kfcourse.laws import Array, Gaussian, Measurement, gain, square_root, symmetric, transpose, well_conditioned
+from kfcourse.laws import SINGULAR, Array, Gaussian, Measurement, apply, square_root, symmetric, transpose
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
@@ -216,8 +216,9 @@ def _quadrature(name: str, model: Model, rule: Rule, equations: _Equations, root
     rules = [rule(n + equation.root.shape[1]) for equation in equations]
 
     def propagate(equation: _Equation, mean: Array, cov: Array, points: Array, weights: Array):
-        """Deviations of x, mean of the function, its deviations from that: 0 exactly for what does not vary."""
-        deviation = points[:, :n] @ transpose(ROOTS[root](cov))
+        """Root of cov, deviations of x, mean of the function, its deviations from that: 0 exactly for what does not vary."""
+        scale = ROOTS[root](cov)
+        deviation = points[:, :n] @ transpose(scale)
         x = mean[..., None, :] + deviation
         noise = equation.noise.mean + points[:, n:] @ equation.root.T
         values = equation.function(x, np.broadcast_to(noise, x.shape[:-1] + noise.shape[-1:]))
@@ -225,25 +226,63 @@ def _quadrature(name: str, model: Model, rule: Rule, equations: _Equations, root
         middle = values[..., np.argmin((points**2).sum(axis=1)), :]
         values = values - middle[..., None, :]
         shift = weights @ values
-        return deviation, middle + shift, values - shift[..., None, :]
+        return scale, deviation, middle + shift, values - shift[..., None, :]
 
     def predict(z: Array, p: Array) -> Gaussian:
         points, weights = rules[0]
-        _, tau, following = propagate(equations.state, z, p, points, weights)
+        _, _, tau, following = propagate(equations.state, z, p, points, weights)
         return Gaussian(tau, _weighted(weights, following) + equations.state.added)
 
     def measure(m: Array, d: Array) -> Measurement:
         points, weights = rules[1]
-        # A singular covariance would hide how y depends on what the other components determine.
-        spread = well_conditioned(np.broadcast_to(d, (*m.shape, n)))
-        dx, h, dy = propagate(equations.meter, m, spread, points, weights)
+        d = np.broadcast_to(d, (*m.shape, n))
+        # In directions that a singular covariance knows exactly there would be no points, and no slope.
+        spread = d if n == 1 else d * (1 + UNSEEN * np.finfo(float).eps * np.eye(n))
+        scale, dx, h, dy = propagate(equations.meter, m, spread, points, weights)
         dx = np.broadcast_to(dx, (*dy.shape[:-1], n))
-        G = gain(transpose(dy * weights[:, None]) @ dx, spread)
+        G = _slopes(transpose(dy * weights[:, None]) @ points[:, :n], scale)
         # The part of y that is not linear in x: no difference of nearly equal matrices.
         added = equations.meter.added
-        return Measurement(h, G, _weighted(weights, dy) + added, _weighted(weights, dy - dx @ transpose(G)) + added)
+        R = _weighted(weights, dy - dx @ transpose(G)) + added
+        if n == 1:
+            return Measurement(h, G, _weighted(weights, dy) + added, R)
+        F = symmetric(G @ d @ transpose(G)) + R
+        return Measurement(h, *_without_rounding(G, d, F, R))
 
     return Structure(name, model, predict, measure)
+
+
+# Variances are enlarged by this many units of precision (2e-14 of themselves), so that a root has pivots of 1e-7 at least and
+# its inverse half of the digits; a variance that is 0 stays 0.
+UNSEEN = 2 * SINGULAR**2
+
+
+def _slopes(cross: Array, root: Array) -> Array:
+    """cross root^+, for cross = Cov(y, u) and x = root u, Cov(u) = I: the regression of y on x, without squaring the root."""
+    size = np.sqrt((root**2).sum(axis=-1))
+    size = np.where(size > 0, size, 1.0)
+    regular = root / size[..., None]
+    try:
+        slopes = transpose(np.linalg.solve(transpose(regular), transpose(cross)))
+    except np.linalg.LinAlgError:
+        slopes = cross @ np.linalg.pinv(regular, rcond=root.shape[-1] * np.finfo(float).eps)
+    return slopes / size[..., None, :]
+
+
+# d is known to some units of precision, so G d G^T to as many times (sum_j |G_ij| sd_j)^2, the variance if all components were
+# fully correlated, in whatever units.  Where F is not above that it has no right digit.
+LOST = 4
+
+
+def _without_rounding(G: Array, d: Array, F: Array, R: Array) -> tuple[Array, Array, Array]:
+    """G, F, R with rows of 0 for measurements of what is known to the last digit: they cannot vary, and tell nothing."""
+    sd = np.sqrt(np.maximum(np.diagonal(d, axis1=-2, axis2=-1), 0.0))
+    left = LOST * np.finfo(float).eps * apply(np.abs(G), sd) ** 2
+    varies = ~(np.diagonal(F, axis1=-2, axis2=-1) <= left)
+    if varies.all():
+        return G, F, R
+    both = varies[..., :, None] & varies[..., None, :]
+    return np.where(varies[..., None], G, 0.0), np.where(both, F, 0.0), np.where(both, R, 0.0)
 
 
 def _weighted(weights: Array, deviation: Array) -> Array:

@@ -167,6 +167,21 @@ def test_two_collinear_exact_meters_of_a_constant_state(kind, slopes):
     assert (np.abs(nees - 1) < 4 * np.sqrt(2 / 200)).all()  # of 200 squares of standard normal numbers
 
 
+@pytest.mark.parametrize("kind", [unscented, gauss_hermite])
+@pytest.mark.parametrize("units", [(1.0, 1.0), (1e-6, 1e9)])
+def test_slopes_are_seen_in_directions_without_variance(kind, units):
+    """x1 + x2 is known exactly, yet its meter has the slopes (1, 1), in any units; noise makes it a measurement again."""
+    a, b = units
+    model = Model.define(["x1", "x2"], [f"{a}*x1 + {b}*x2", f"{a}*x1 - {b}*x2", f"{a}*x1 + {b}*x2 + w1"])
+    cov = 1e8 * np.array([[1.0, -1.0], [-1.0, 1.0]]) / np.outer(units, units)
+    G, F, R = kind(model).measure(np.array([3.0, 4.0]) / units, cov)[1:]
+    # the enlarged variances are 2e-14 of 1e8, so slopes have half of the digits
+    np.testing.assert_allclose(G[1:], np.array([[1, -1], [1, 1]]) * units, rtol=1e-6)
+    np.testing.assert_allclose(np.diagonal(F), [0, 4e8, 1], rtol=1e-6)
+    assert not G[0].any()
+    assert not R[0].any()
+
+
 # --- warnings
 
 
