@@ -64,7 +64,9 @@ DENSITIES_FOR_INTENSITIES = "Both densities are one-sided; the equation wants in
 PROCESS_ONE_SIDED = "The density of the process noise is one-sided; its intensity is not the whole of it."
 METER_ONE_SIDED = "The density of the meter's noise is one-sided; its intensity is not the whole of it."
 GAIN_ONE_SIDED = "The gain is divided by the one-sided density; the intensity belongs there."
+DISCRETE_GAIN = "That is the gain of a discrete filter; beside the noise of an instant the state's part is negligible."
 GAIN_WITHOUT_SLOPE = "The slope of the signal is missing in the gain."
+NOISE_SIGN = "The noise of the process is subtracted; it makes the covariance larger."
 RICCATI_SIGN = "The sign of the last term: what is measured makes D smaller."
 PROCESS_NOISE_FORGOTTEN = "The noise of the process is missing."
 NOISE_POWER = "The factor of the noise enters the equation of the variance squared."
@@ -73,11 +75,14 @@ SLOPE_POWER = "The slope of the signal enters the equation of the variance squar
 # -- motion, radar, navigation
 
 HALF_MISSING = "A factor is missing where the acceleration acts on the position: integrate twice."
+POWER_OF_T = "A power of T is missing: check the units."
 POWER_OF_DT = "A power of dt is missing: check the units."
 ORDER_OF_COMPONENTS = "The order of the components is another: the state is (x, y, vx, vy), both positions first."
 WHITE_IN_CONTINUOUS_TIME = (
     "That is for an acceleration that is white noise in continuous time; here it is constant over each interval."
 )
+SQUARES_NOT_MEANS = "The errors are averaged before they are squared; average the squares."
+INVERSE_FORGOTTEN = "The covariance itself stands between the errors; its inverse belongs there: an unsure filter may err."
 AZIMUTH_FROM_Y = "The azimuth is counted from the y axis; here it goes from x towards y."
 GAINS_SWAPPED = "alpha and beta are swapped."
 SMALL_DRIFT = "That is the limit for a drift much smaller than the noise; the exact value is asked for."

@@ -223,7 +223,7 @@ WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
     *(
         (name, says, lambda *a, wrong=wrong: run_with(step_with(wrong), *a))
         for name, says, wrong in WRONG_CORRECTIONS
-        if name in ("innovation-sign", "covariance-kept")
+        if name in ("innovation-sign", "innovation-of-state", "covariance-kept")
     ),
     (
         "first-not-used",

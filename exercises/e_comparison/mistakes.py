@@ -51,7 +51,7 @@ WRONG_VARIANCES: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "square-of-mean",
-        "The errors are averaged before they are squared; average the squares.",
+        messages.SQUARES_NOT_MEANS,
         lambda x, z: ((x - z).mean(axis=1) ** 2).sum(axis=1),
     ),
     (
@@ -289,7 +289,7 @@ WRONG_NORMALISED: tuple[tuple[str, str, Answer], ...] = (
     ("median", MEDIAN, lambda x, z, p: np.median(_weighted(x, z, np.linalg.inv(p)), axis=1)),
     (
         "inverse-forgotten",
-        "The covariance itself stands between the errors; its inverse belongs there.",
+        messages.INVERSE_FORGOTTEN,
         lambda x, z, p: _weighted(x, z, p).mean(axis=1),
     ),
     (

@@ -126,4 +126,14 @@ WRONG_NODES: tuple[tuple[str, str, Answer], ...] = (
         "That is one node for each standard deviation, whatever the error asked for.",
         nodes_with(lambda sigma, error: sigma),
     ),
+    (
+        "not-rounded",
+        "A part of an interval needs a whole one: a number of nodes is a whole number.",
+        nodes_with(rounded=lambda intervals: np.asarray(intervals)),
+    ),
+    (
+        "logarithm-not-rooted",
+        "The logarithm stands under the root too: the step enters the exponent squared.",
+        nodes_with(lambda sigma, error: np.pi * sigma * np.sqrt(2) / np.log(2 / error)),
+    ),
 )

@@ -62,7 +62,12 @@ WRONG_MOMENTS: tuple[tuple[str, str, Answer], ...] = (
     (
         "mode",
         "That is where the density is highest, not its mean.",
-        lambda density, x: (density / density.max(), x[np.argmax(density)], moments(density, x)[2]),
+        lambda density, x: (normalised(density, x), x[np.argmax(density)], moments(density, x)[2]),
+    ),
+    (
+        "highest-is-one",
+        "The density is divided by its highest value; it is the integral that has to be one.",
+        lambda density, x: _not_normalised(density / density.max(), x),
     ),
 )
 
@@ -95,6 +100,16 @@ WRONG_KERNELS: tuple[tuple[str, str, Kernel], ...] = (
         "half-forgotten",
         "The exponent of the normal density lacks its factor one half.",
         lambda value, mean, variance: np.exp(-((value - mean) ** 2) / variance) / np.sqrt(2 * np.pi * variance),
+    ),
+    (
+        "variance-in-factor",
+        "The factor before the exponential has a standard deviation below, not a variance.",
+        lambda value, mean, variance: normal(value, mean, variance) / np.sqrt(variance),
+    ),
+    (
+        "half-a-factor",
+        "The factor before the exponential is not complete: the variance depends on the state, and belongs there too.",
+        lambda value, mean, variance: normal(value, mean, variance) * np.sqrt(variance),
     ),
 )
 
@@ -139,6 +154,16 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
         "likelihood-summed",
         "The integral of the likelihood alone is no probability; it has to be weighed by the prediction.",
         lambda predicted, y, x, see: (correct(predicted, y, x, see)[0], (x[1] - x[0]) * normal(np.asarray(y), *see(x)).sum()),
+    ),
+    (
+        "logarithm",
+        "That is the logarithm of the density of the measurement; the density itself is asked for.",
+        correction_with(finish=lambda joint, h: (joint / (h * joint.sum()), np.log(h * joint.sum()))),
+    ),
+    (
+        "signal-forgotten",
+        "The measurement is compared with the state itself; its mean is what the meter makes of the state.",
+        lambda predicted, y, x, see: correct(predicted, y, x, lambda nodes: (nodes, see(nodes)[1])),
     ),
 )
 
@@ -188,4 +213,14 @@ WRONG_PREDICTIONS: tuple[tuple[str, str, Answer], ...] = (
         _variance_of_target,
     ),
     ("object-at-rest", "Each node spreads around itself; it spreads around where the object takes it.", _object_at_rest),
+    (
+        "node-by-node",
+        "Each node is weighed with itself; every node before the step can lead to every node after it: sum over them.",
+        lambda posterior, x, move: normal(x, *move(x)) * posterior,
+    ),
+    (
+        "not-spread",
+        "The nodes are moved, but the noise of the object does not spread them.",
+        lambda posterior, x, move: np.interp(x, move(x)[0], posterior),
+    ),
 )

@@ -73,6 +73,16 @@ WRONG_BOUNDS: tuple[tuple[str, str, Bounds], ...] = (
         lambda degrees, runs, confidence: tuple(_quantiles([confidence / 2, 1 - confidence / 2], degrees * runs) / runs),
     ),
     ("normal", "That is the normal approximation; the chi-squared law itself is not symmetric.", _normal_bounds),
+    (
+        "one-less",
+        "One degree of freedom is taken off; nothing is estimated here: all of them count.",
+        lambda degrees, runs, confidence: tuple(np.array(stats.chi2.interval(confidence, degrees * runs - 1)) / runs),
+    ),
+    (
+        "divided-by-root",
+        "The bounds of the sum are divided by a root; a mean is a sum over the number of runs.",
+        lambda degrees, runs, confidence: tuple(np.array(stats.chi2.interval(confidence, degrees * runs)) / np.sqrt(runs)),
+    ),
 )
 
 
@@ -98,10 +108,20 @@ def _mean_first(x: Array, z: Array, p: Array, y: Array, lam: Array, Psi: Array, 
     return normalised_square(*state), normalised_square(*measured)
 
 
+def _over(statistic: Callable[..., Array]) -> Normalised:
+    """Another statistic over the trajectories than the mean."""
+
+    def answer(x: Array, z: Array, p: Array, y: Array, lam: Array, Psi: Array, S: Map, H: Map, D_n: Map) -> tuple[Array, Array]:
+        F = innovation_covariance(Psi, H(lam), D_n(lam))
+        return statistic(normalised_square(x - z, p), axis=1), statistic(normalised_square(y - S(lam), F), axis=1)
+
+    return answer
+
+
 WRONG_NORMALISED: tuple[tuple[str, str, Normalised], ...] = (
     (
         "inverse-forgotten",
-        "The covariance itself stands between the errors; its inverse belongs there: an unsure filter may err.",
+        messages.INVERSE_FORGOTTEN,
         normalised_with(_without_inverse),
     ),
     (
@@ -139,5 +159,7 @@ WRONG_NORMALISED: tuple[tuple[str, str, Normalised], ...] = (
         "Divided by the number of components; the plain mean is asked for: it should be n, or p.",
         normalised_with(per_component=True),
     ),
-    ("mean-first", "The errors are averaged before they are squared; average the squares.", _mean_first),
+    ("mean-first", messages.SQUARES_NOT_MEANS, _mean_first),
+    ("median", "That is a median over the trajectories; the mean is asked for.", _over(np.median)),
+    ("spread", "That is the spread over the trajectories; the mean is asked for.", _over(np.var)),
 )

@@ -44,6 +44,13 @@ WRONG_JACOBIANS: tuple[tuple[str, str, Answer], ...] = (
         "It is transposed: row i holds the derivatives of component i of the function.",
         lambda function, x, step: np.swapaxes(jacobian(function, x, step), -1, -2),
     ),
+    (
+        "multiplied-by-step",
+        "The distance of the points multiplies; it divides.",
+        jacobian_with(divisor=lambda step: 1 / (2 * step)),
+    ),
+    ("multiplied-by-step", "The distance of the points is upside down.", jacobian_with(divisor=lambda step: 2 / step)),
+    ("one-sided", messages.ONE_SIDED_DIFFERENCE, jacobian_with(backward=0.0)),
 )
 
 
@@ -111,6 +118,12 @@ WRONG_PREDICTIONS: tuple[tuple[str, str, Answer], ...] = (
         prediction_with(mean=lambda z, f, Phi: apply(Phi(z), z)),
     ),
     ("mean-kept", "The prediction is not the estimate: the object moves.", prediction_with(mean=lambda z, f, Phi: z)),
+    (
+        "noise-by-deviation",
+        "A root of the noise's covariance stands between its factors; the covariance itself belongs there.",
+        prediction_with(lambda Phi, p, g, D: spread(Phi, p, g, np.sqrt(np.abs(D)))),
+    ),
+    ("noise-sign", messages.NOISE_SIGN, prediction_with(lambda Phi, p, g, D: spread(Phi, p, g, -D))),
 )
 
 
@@ -150,7 +163,7 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "noise-by-deviation",
-        "A standard deviation stands where the covariance of the meter's noise belongs.",
+        messages.NOISE_BY_DEVIATION,
         correction_with(lambda Psi, G, R: gain(Psi @ transpose(G), G @ Psi @ transpose(G) + root(R))),
     ),
     (
@@ -179,8 +192,30 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "share-only",
-        "I - K H is the share that remains; multiply Psi by it.",
+        messages.SHARE_ONLY,
         correction_with(covariance=lambda Psi, K, G: np.eye(Psi.shape[-1]) - K @ G),
+    ),
+    (
+        "noise-by-deviation",
+        messages.NOISE_BY_DEVIATION,
+        correction_with(lambda Psi, G, R: gain(Psi @ transpose(G), G @ Psi @ transpose(G) + np.sqrt(np.abs(R)))),
+    ),
+    (
+        "noise-squared",
+        messages.NOISE_SQUARED,
+        correction_with(lambda Psi, G, R: gain(Psi @ transpose(G), G @ Psi @ transpose(G) + R @ R)),
+    ),
+    (
+        "noise-inherited",
+        messages.NOISE_INHERITED,
+        correction_with(
+            covariance=lambda Psi, K, G: (np.eye(Psi.shape[-1]) - K @ G) @ Psi @ transpose(np.eye(Psi.shape[-1]) - K @ G)
+        ),
+    ),
+    (
+        "gain-multiplied",
+        messages.GAIN_MULTIPLIED,
+        correction_with(lambda Psi, G, R: Psi @ transpose(G) @ (G @ Psi @ transpose(G) + R)),
     ),
 )
 
@@ -190,6 +225,12 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
 
 def _gain_from_prior(p: Array, W: Array, H: Array, D_n: Array) -> Array:
     return gain(np.linalg.pinv(W) @ transpose(H), D_n)
+
+
+def _through_inverse(W: Array, H: Array, D_n: Array) -> tuple[Array, Array]:
+    Psi = np.linalg.pinv(W)
+    K = of_gain(Psi, H, D_n)
+    return Psi - K @ H @ Psi, K
 
 
 WRONG_INFORMATION: tuple[tuple[str, str, Information], ...] = (
@@ -234,4 +275,10 @@ WRONG_INFORMATION: tuple[tuple[str, str, Information], ...] = (
         "The gain is multiplied by the information; the covariance, its inverse, belongs there.",
         lambda W, H, D_n: (information(W, H, D_n)[0], information_with(inverted=False)(W, H, D_n)[1]),
     ),
+    (
+        "gain-multiplied",
+        "The gain is multiplied by the covariance of the noise; it is divided by it.",
+        information_with(K_of=lambda p, W, H, D_n: p @ transpose(H) @ D_n),
+    ),
+    ("through-the-inverse", "The inverse of W is taken; where nothing is known before there is none.", _through_inverse),
 )

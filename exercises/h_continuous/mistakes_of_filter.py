@@ -11,6 +11,10 @@ from kfcourse.checks.question import Answer
 from kfcourse.exercises import messages
 from kfcourse.exercises.h_continuous.keys import Rate, rate_with, step_with
 
+FACTOR_WRONG_WAY = "The factor between a one-sided density and an intensity goes the other way."
+GAIN_NOT_DIVIDED = "The gain is not divided by the intensity of the meter's noise."
+NOISE_INVERTED = "The intensity of the meter's noise is upside down."
+
 # -- h3: the Riccati equation
 
 WRONG_RATES: tuple[tuple[str, str, Rate], ...] = (
@@ -54,6 +58,14 @@ WRONG_RATES: tuple[tuple[str, str, Rate], ...] = (
         "Nothing is learnt from the measurement: a term is missing.",
         rate_with(learnt=lambda D, H, N: 0 * D),
     ),
+    ("noise-sign", messages.NOISE_SIGN, rate_with(shaken=lambda G, S_xi: -G @ S_xi @ G.T / 2)),
+    ("noise-squared", "The intensity of the noise enters squared.", rate_with(shaken=lambda G, S_xi: G @ S_xi @ S_xi @ G.T / 4)),
+    ("factor-wrong-way", FACTOR_WRONG_WAY, rate_with(learnt=lambda D, H, N: D @ H.T @ np.linalg.solve(2 * N, H @ D))),
+    (
+        "discrete-gain",
+        messages.DISCRETE_GAIN,
+        rate_with(learnt=lambda D, H, N: D @ H.T @ np.linalg.solve(H @ D @ H.T + N / 2, H @ D)),
+    ),
 )
 
 
@@ -75,6 +87,12 @@ def steady_with(
         return D, gain(D, h, N)
 
     return answer
+
+
+def _root_forgotten(a: float, s: float, h: float, S_xi: float, N: float) -> tuple[float, float]:
+    c = 2 * h**2 / N
+    D = (a**2 + c * s**2 * S_xi / 2 - a) / c
+    return D, 2 * D * h / N
 
 
 WRONG_STEADY: tuple[tuple[str, str, Answer], ...] = (
@@ -104,9 +122,18 @@ WRONG_STEADY: tuple[tuple[str, str, Answer], ...] = (
     ("gain-without-slope", messages.GAIN_WITHOUT_SLOPE, steady_with(gain=lambda D, h, N: 2 * D / N)),
     (
         "gain-discrete",
-        "That is the gain of a discrete filter; beside the noise of an instant the state's part is negligible.",
+        messages.DISCRETE_GAIN,
         steady_with(gain=lambda D, h, N: D * h / (h**2 * D + N / 2)),
     ),
+    ("gain-not-divided", GAIN_NOT_DIVIDED, steady_with(gain=lambda D, h, N: D * h)),
+    ("gain-not-divided", GAIN_NOT_DIVIDED, steady_with(gain=lambda D, h, N: D * h * N / 2)),
+    ("gain-with-slope-squared", "The slope enters the gain once.", steady_with(gain=lambda D, h, N: 2 * D * h**2 / N)),
+    (
+        "noise-inverted",
+        NOISE_INVERTED,
+        steady_with(c=lambda h, N: h**2 * N / 2, gain=lambda D, h, N: D * h * N / 2),
+    ),
+    ("root-forgotten", "A square root is missing in the solution of the quadratic equation.", _root_forgotten),
 )
 
 
@@ -160,6 +187,11 @@ WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
         "D-first",
         "The gain is made of the new variance; both rates belong to the beginning of the step.",
         step_with(order="D-first"),
+    ),
+    (
+        "noise-inverted",
+        NOISE_INVERTED,
+        step_with(gain=lambda D, S_x, N: D * S_x * N / 2, learnt=lambda D, S_x, N: D**2 * S_x**2 * N / 2),
     ),
 )
 
@@ -217,5 +249,10 @@ WRONG_DERIVATIVES: tuple[tuple[str, str, Answer], ...] = (
         "gain-without-slope",
         "The slope of the signal is missing: the chain rule.",
         derivatives_with(lambda S, S1, S2, y, k: (k * (y - S), -k * S1)),
+    ),
+    (
+        "noise-inverted",
+        NOISE_INVERTED,
+        derivatives_with(lambda S, S1, S2, y, k: (S1 * (y - S) / k, (S2 * (y - S) - S1**2) / k)),
     ),
 )

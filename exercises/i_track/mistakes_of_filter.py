@@ -22,13 +22,14 @@ def step_with(
     gain: Part = lambda p, Psi, H, R: np.linalg.solve(H @ Psi @ H.T + R, H @ Psi).T,
     innovation: Part = lambda y, H, lam, z: y - H @ lam,
     corrected: Part = lambda p, Psi, K, H: Psi - K @ H @ Psi,
+    base: Part = lambda lam, z, B, u: lam,
 ) -> Answer:
     """A step with one thing changed."""
 
     def answer(z: Array, p: Array, u: Array, y: Array, A: Array, B: Array, H: Array, Q: Array, R: Array) -> tuple[Array, ...]:
         lam, Psi = mean(z, u, A, B), predicted(p, A, Q)
         K = gain(p, Psi, H, R)
-        return lam, Psi, lam + K @ innovation(y, H, lam, z), corrected(p, Psi, K, H)
+        return lam, Psi, base(lam, z, B, u) + K @ innovation(y, H, lam, z), corrected(p, Psi, K, H)
 
     return answer
 
@@ -79,6 +80,45 @@ WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
         "The covariance p of the old estimate is corrected; correct that of the prediction.",
         step_with(corrected=lambda p, Psi, K, H: p - K @ H @ p),
     ),
+    (
+        "transition-transposed",
+        "A is transposed in the prediction of the mean.",
+        step_with(mean=lambda z, u, A, B: A.T @ z + B @ u),
+    ),
+    ("correction-of-estimate", "The old estimate is corrected; correct the prediction.", step_with(base=lambda lam, z, B, u: z)),
+    (
+        "input-twice",
+        "The known input is added once more; the prediction has it already.",
+        step_with(base=lambda lam, z, B, u: lam + B @ u),
+    ),
+    ("covariance-added", messages.COVARIANCE_ADDED, step_with(corrected=lambda p, Psi, K, H: Psi + K @ H @ Psi)),
+    (
+        "noise-by-deviation",
+        messages.NOISE_BY_DEVIATION,
+        step_with(gain=lambda p, Psi, H, R: np.linalg.solve(H @ Psi @ H.T + np.sqrt(np.abs(R)), H @ Psi).T),
+    ),
+    (
+        "noise-squared",
+        messages.NOISE_SQUARED,
+        step_with(gain=lambda p, Psi, H, R: np.linalg.solve(H @ Psi @ H.T + R @ R, H @ Psi).T),
+    ),
+    (
+        "divided-by-one-entry",
+        "The gain is divided by one entry of the innovation's covariance; multiply by the inverse of the whole matrix.",
+        step_with(gain=lambda p, Psi, H, R: Psi @ H.T / (H @ Psi @ H.T + R)[0, 0]),
+    ),
+    (
+        "gain-not-divided",
+        "The gain is not divided by the covariance of the innovation, or not by all of it.",
+        step_with(gain=lambda p, Psi, H, R: Psi @ H.T),
+    ),
+    (
+        "gain-not-divided",
+        "The gain is divided by the meter's noise alone; the prediction's error belongs to the innovation too.",
+        step_with(gain=lambda p, Psi, H, R: np.linalg.solve(R, H @ Psi).T),
+    ),
+    ("noise-sign", messages.NOISE_SIGN, step_with(predicted=lambda p, A, Q: A @ p @ A.T - Q)),
+    ("share-only", messages.SHARE_ONLY, step_with(corrected=lambda p, Psi, K, H: np.eye(len(Psi)) - K @ H)),
 )
 
 
@@ -120,6 +160,22 @@ def _through_covariance(lam: Array, S: Array, y: Array, H: Array, R: Array) -> t
     return lam + K @ (y - H @ lam), lower * np.where(np.diag(lower) < 0, -1, 1)
 
 
+def _other_gain(step: Callable[[Array, Array, Array], Array]) -> Answer:
+    """The right root, and another correction made of the array."""
+
+    def answer(lam: Array, S: Array, y: Array, H: Array, R: Array) -> tuple[Array, Array]:
+        p = len(y)
+        lower = triangular(np.block([[np.linalg.cholesky(R), H @ S], [np.zeros((len(S), p)), S]]))
+        return lam + step(lower[:p, :p], lower[p:, :p], y - H @ lam), correct_root(lam, S, y, H, R)[1]
+
+    return answer
+
+
+def _share_of_root(lam: Array, S: Array, y: Array, H: Array, R: Array) -> tuple[Array, Array]:
+    K = np.linalg.solve(H @ S @ S.T @ H.T + R, H @ S @ S.T).T
+    return correct_root(lam, S, y, H, R)[0], (np.eye(len(S)) - K @ H) @ S
+
+
 WRONG_ROOTS: tuple[tuple[str, str, Answer], ...] = (
     (
         "through-the-covariance",
@@ -152,5 +208,22 @@ WRONG_ROOTS: tuple[tuple[str, str, Answer], ...] = (
         "root-kept",
         "The root is that of the prediction: a measurement must make it smaller.",
         lambda lam, S, y, H, R: (correct_root(lam, S, y, H, R)[0], S),
+    ),
+    ("covariance-returned", "That is the covariance; its root is asked for.", root_with(change=lambda root: root @ root.T)),
+    (
+        "gain-multiplied",
+        "The block below is multiplied by the block above it; it has to be divided.",
+        _other_gain(lambda top, cross, e: cross @ (top @ e)),
+    ),
+    (
+        "divided-twice",
+        "The block below is divided by the covariance of the innovation; it holds one root of it already.",
+        _other_gain(lambda top, cross, e: cross @ np.linalg.solve(top @ top.T, e)),
+    ),
+    ("gain-sign", messages.CORRECTION_SUBTRACTED, _other_gain(lambda top, cross, e: -cross @ np.linalg.solve(top, e))),
+    (
+        "share-of-root",
+        "I - K H times the root is no root of the new covariance: the noise that comes through the gain is missing.",
+        _share_of_root,
     ),
 )

@@ -58,6 +58,16 @@ WRONG_MATRICES: tuple[tuple[str, str, Answer], ...] = (
         "H takes the velocities out of the state; the meter gives the positions.",
         lambda dt: (*matrices(dt)[:2], SENSITIVITY.extract([0, 1], [2, 3, 0, 1])),
     ),
+    (
+        "blocks-swapped",
+        "The effects on position and velocity stand in each other's place.",
+        with_input(lambda dt: dt, lambda dt: dt**2 / 2),
+    ),
+    (
+        "velocity-measured",
+        "H adds the velocities to the positions; the meter gives the positions alone.",
+        lambda dt: (*matrices(dt)[:2], sp.ImmutableMatrix(SENSITIVITY + SENSITIVITY.extract([0, 1], [2, 3, 0, 1]))),
+    ),
 )
 
 
@@ -99,6 +109,16 @@ WRONG_NOISES: tuple[tuple[str, str, Answer], ...] = (
         lambda dt, sigma_a: plane(sigma_a**2 * sp.diag(dt**2 / 2, dt)),
     ),
     ("order-of-components", messages.ORDER_OF_COMPONENTS, lambda dt, sigma_a: interleaved(process_noise(dt, sigma_a))),
+    (
+        "correlation-sign",
+        "Position and velocity are pushed the same way: their covariance is positive.",
+        noise_by(lambda dt: [dt**2 / 2, -dt]),
+    ),
+    (
+        "half-missing",
+        "A factor is wrong where the acceleration acts on the position: in its variance it is squared.",
+        lambda dt, sigma_a: plane(sigma_a**2 * sp.Matrix([[dt**4 / 2, dt**3 / 2], [dt**3 / 2, dt**2]])),
+    ),
 )
 
 
@@ -146,5 +166,10 @@ WRONG_STARTS: tuple[tuple[str, str, Answer], ...] = (
         "averaged",
         "The mean of the samples is no estimate of the last position: the object moves.",
         lambda y0, y1, y2, dt: ((y0 + y1 + y2) / 3, *start_up(y0, y1, y2, dt)[1:]),
+    ),
+    (
+        "power-of-dt",
+        messages.POWER_OF_DT,
+        lambda y0, y1, y2, dt: (y2, y2 - y1 + second_difference(y0, y1, y2) / (2 * dt**2), second_difference(y0, y1, y2) / dt**2),
     ),
 )

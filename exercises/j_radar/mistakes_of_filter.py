@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import scipy.linalg
 import sympy as sp
 
 from kfcourse.checks.question import Answer
@@ -15,6 +16,8 @@ from kfcourse.filters.alphabeta import steady_beta, tracking_index
 from kfcourse.laws import Array
 
 # -- j3: the constant gain
+
+INDEX_ROOT = "The root in the tracking index stands in another place: over which part of the fraction, above or below?"
 
 WRONG_GAINS: tuple[tuple[str, str, Answer], ...] = (
     (
@@ -58,6 +61,14 @@ WRONG_GAINS: tuple[tuple[str, str, Answer], ...] = (
         "The tracking index is upside down: the noise of the object stands above, that of the meter below.",
         lambda alpha: (steady_beta(alpha), 1 / tracking_index(alpha)),
     ),
+    ("small-alpha", "That holds for small alpha only.", lambda alpha: (alpha**2 / 4, alpha**2 / 4 / np.sqrt(1 - alpha))),
+    (
+        "coefficient-of-root",
+        "The coefficient of the root in beta is wrong.",
+        lambda alpha: (2 * (2 - alpha) - 2 * np.sqrt(1 - alpha), (2 * (2 - alpha) - 2 * np.sqrt(1 - alpha)) / np.sqrt(1 - alpha)),
+    ),
+    ("index-rooted", INDEX_ROOT, lambda alpha: (steady_beta(alpha), np.sqrt(steady_beta(alpha) / (1 - alpha)))),
+    ("index-rooted", INDEX_ROOT, lambda alpha: (steady_beta(alpha), steady_beta(alpha) * np.sqrt(1 - alpha))),
 )
 
 
@@ -91,6 +102,11 @@ def filter_with(
 def _position_first(r: Array, v: Array, y: Array, T: float, alpha: float, beta: float) -> tuple[Array, Array]:
     r = r + alpha * (y - r)
     return r, v + beta / T * (y - r)
+
+
+def _differences(y: Array, T: float, alpha: float, beta: float, r: Array, v: Array) -> tuple[Array, Array]:
+    positions = filter_with()(y, T, alpha, beta, r, v)[0]
+    return positions, np.diff(positions, axis=0, prepend=np.broadcast_to(r, positions[:1].shape)) / T
 
 
 WRONG_FILTERS: tuple[tuple[str, str, Answer], ...] = (
@@ -137,6 +153,12 @@ WRONG_FILTERS: tuple[tuple[str, str, Answer], ...] = (
     ),
     ("predictions-returned", messages.PREDICTIONS_RETURNED, filter_with(predictions=True)),
     ("velocity-kept", "The velocity is never corrected.", filter_with(lambda r, v, y, T, alpha, beta: (r + alpha * (y - r), v))),
+    (
+        "beta-over-T-squared",
+        "The gain of the velocity is divided by T once too often: check its units.",
+        filter_with(lambda r, v, y, T, alpha, beta: (r + alpha * (y - r), v + beta / T**2 * (y - r))),
+    ),
+    ("differences", "The velocity is a difference of positions; it has a gain of its own.", _differences),
 )
 
 
@@ -185,7 +207,20 @@ WRONG_LAGS: tuple[tuple[str, str, Answer], ...] = (
             )
         ),
     ),
+    ("time-missing", messages.POWER_OF_T, lambda a, T, alpha, beta: (lag(a, T, alpha, beta)[0] / T, lag(a, T, alpha, beta)[1])),
+    ("time-missing", messages.POWER_OF_T, lambda a, T, alpha, beta: (lag(a, T, alpha, beta)[0], lag(a, T, alpha, beta)[1] / T)),
+    (
+        "half-forgotten",
+        "Between measurements the velocity changes as well: half an interval's acceleration is counted otherwise.",
+        lambda a, T, alpha, beta: (lag(a, T, alpha, beta)[0], lag(a, T, alpha, beta)[1] - a * T / 2),
+    ),
 )
+
+
+def _uncorrelated(alpha: float, beta: float) -> float:
+    rest, A = (np.array(matrix, dtype=float) for matrix in closed_loop(1, alpha, beta))
+    return float(scipy.linalg.solve_discrete_lyapunov(rest @ A, np.diag([alpha**2, beta**2]))[0, 0])
+
 
 WRONG_SHARES: tuple[tuple[str, str, Answer], ...] = (
     (
@@ -210,4 +245,10 @@ WRONG_SHARES: tuple[tuple[str, str, Answer], ...] = (
         lambda alpha, beta: float(_stationary(alpha, beta)[0][1, 1]),
     ),
     ("gains-swapped", messages.GAINS_SWAPPED, lambda alpha, beta: noise_left(beta, alpha)),
+    (
+        "covariance-with-velocity",
+        "That is a covariance of position and velocity; the variance of the position is asked for.",
+        lambda alpha, beta: float(_stationary(alpha, beta)[0][0, 1]),
+    ),
+    ("correlation-forgotten", "One and the same noise enters position and velocity: it is correlated.", _uncorrelated),
 )

@@ -39,6 +39,16 @@ WRONG_CARTESIANS: tuple[tuple[str, str, Answer], ...] = (
 
 SLANT, GROUND = sp.sqrt(X**2 + Y**2 + Z**2), sp.sqrt(X**2 + Y**2)
 
+
+def _with_row(place: int, row: list[sp.Expr]) -> sp.Matrix:
+    """The derivatives with another row."""
+    matrix = sp.Matrix([[SLANT.diff(v) for v in POSITION]])
+    rows = [*SPHERICAL[1:]]
+    matrix = matrix.col_join(sp.Matrix(rows).jacobian(POSITION))
+    matrix[place, :] = sp.Matrix([row])
+    return matrix
+
+
 WRONG_JACOBIANS: tuple[tuple[str, str, Answer], ...] = (
     (
         "transposed",
@@ -50,7 +60,51 @@ WRONG_JACOBIANS: tuple[tuple[str, str, Answer], ...] = (
         "These are the derivatives of the position by range and angles; the meter goes the other way.",
         substituted(CARTESIAN.jacobian(MEASURED).subs(dict(zip(MEASURED, SPHERICAL, strict=True)), simultaneous=True), POSITION),
     ),
-    ("azimuth-from-y", messages.AZIMUTH_FROM_Y, jacobian_of([SPHERICAL[0], sp.atan2(X, Y), SPHERICAL[2]])),
+    (
+        "azimuth-reversed",
+        "All signs in the row of the azimuth are reversed: it is counted from x towards y.",
+        jacobian_of([SPHERICAL[0], sp.atan2(X, Y), SPHERICAL[2]]),
+    ),
+    (
+        "elevation-reversed",
+        "All signs in the row of the elevation are reversed: it grows with the height.",
+        jacobian_of([*SPHERICAL[:2], -SPHERICAL[2]]),
+    ),
+    (
+        "height-over-slant",
+        "The tangent of the elevation is the height over the distance along the ground.",
+        jacobian_of([*SPHERICAL[:2], sp.atan(Z / SLANT)]),
+    ),
+    ("height-over-x", "The distance along the ground is made of x and y both.", jacobian_of([*SPHERICAL[:2], sp.atan(Z / X)])),
+    ("range-squared", "The square of the range is differentiated, not the range.", jacobian_of([SLANT**2, *SPHERICAL[1:]])),
+    (
+        "degrees",
+        "The angles are in degrees; radians are asked for.",
+        jacobian_of([SPHERICAL[0], SPHERICAL[1] * 180 / sp.pi, SPHERICAL[2] * 180 / sp.pi]),
+    ),
+    (
+        "root-forgotten",
+        "A power of a distance is wrong in the row of the azimuth: an angle's derivative is one over a length.",
+        substituted(_with_row(1, [-Y / GROUND, X / GROUND, 0]), POSITION),
+    ),
+    (
+        "root-forgotten",
+        "A power of a distance is wrong in the row of the elevation: an angle's derivative is one over a length.",
+        substituted(_with_row(2, [-X * Z / SLANT**2, -Y * Z / SLANT**2, GROUND / SLANT**2]), POSITION),
+    ),
+    (
+        "sine-and-cosine-swapped",
+        "x and y are swapped in the row of the azimuth: the derivative by x has y above.",
+        substituted(_with_row(1, [X / GROUND**2, -Y / GROUND**2, 0]), POSITION),
+    ),
+    *(
+        (
+            "order",
+            "The rows are in another order: range, azimuth, elevation.",
+            jacobian_of([SPHERICAL[i] for i in order]),
+        )
+        for order in ((0, 2, 1), (1, 2, 0), (1, 0, 2))
+    ),
     (
         "tangent-for-angle",
         "The tangents of the angles are differentiated, not the angles.",

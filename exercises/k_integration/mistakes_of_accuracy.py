@@ -9,6 +9,7 @@ import sympy as sp
 from kfcourse.checks.question import Answer
 from kfcourse.exercises import messages
 from kfcourse.exercises.k_integration.keys import gained, lost, steady_state
+from kfcourse.exercises.k_integration.mistakes_of_filter import GAIN_BY_NOISE
 
 # -- k2, k4: the steady state
 
@@ -28,6 +29,9 @@ def steady_with(change: Callable[..., tuple]) -> Answer:
     return lambda sigma_xi, sigma_n: change(*steady_state(sigma_xi, sigma_n), sigma_xi, sigma_n)
 
 
+DEVIATIONS = "Standard deviations stand where variances belong: check the units."
+TIME = "The time constant is another function of what is left of an error after a step."
+
 WRONG_STEADY: tuple[tuple[str, str, Answer], ...] = (
     ("minus-root", messages.NEGATIVE_ROOT, steady_from(lambda xi, n: (xi**2 - sp.sqrt(xi**4 + 4 * xi**2 * n**2)) / 2)),
     (
@@ -37,7 +41,7 @@ WRONG_STEADY: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "deviation-for-variance",
-        "Standard deviations stand where variances belong: check the units.",
+        DEVIATIONS,
         steady_from(lambda xi, n: (xi + sp.sqrt(xi**2 + 4 * xi * n)) / 2),
     ),
     (
@@ -68,8 +72,38 @@ WRONG_STEADY: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "gain-by-noise-alone",
-        "The gain is divided by the receiver's noise alone; the prediction's error belongs to the innovation too.",
+        GAIN_BY_NOISE,
         steady_with(lambda Psi, p, K, xi, n: (Psi, p, -Psi / n**2)),
+    ),
+    (
+        "deviation-for-variance",
+        DEVIATIONS,
+        lambda xi, n: (
+            (xi**2 + sp.sqrt(xi**4 + 4 * xi**2 * n)) / 2,
+            (sp.sqrt(xi**4 + 4 * xi**2 * n) - xi**2) / 2,
+            -(xi**2 + sp.sqrt(xi**4 + 4 * xi**2 * n)) / (xi**2 + sp.sqrt(xi**4 + 4 * xi**2 * n) + 2 * n),
+        ),
+    ),
+    ("deviation-for-variance", DEVIATIONS, steady_with(lambda Psi, p, K, xi, n: (Psi, p, -Psi / (Psi + n)))),
+    (
+        "noise-for-prediction",
+        "The gain has the receiver's noise above; the uncertainty of the prediction belongs there.",
+        steady_with(lambda Psi, p, K, xi, n: (Psi, p, -(n**2) / (Psi + n**2))),
+    ),
+    (
+        "drift-added",
+        "The drift makes Psi larger than p, not the other way round.",
+        steady_with(lambda Psi, p, K, xi, n: (Psi, Psi + xi**2, K)),
+    ),
+    (
+        "share-sign",
+        "The share that a correction leaves is less than one, and K is negative: check a sign.",
+        steady_with(lambda Psi, p, K, xi, n: (Psi, (1 - K) * Psi, K)),
+    ),
+    (
+        "root-forgotten",
+        "The square root of the discriminant is missing.",
+        steady_from(lambda xi, n: (xi**2 + xi**4 + 4 * xi**2 * n**2) / 2),
     ),
 )
 
@@ -129,6 +163,30 @@ WRONG_IMPROVEMENTS: tuple[tuple[str, str, Answer], ...] = (
         "That is the time after which a half is left; a time constant is that to one e-th.",
         improvement_with(time=lambda K, T: -T * sp.log(2) / sp.log(1 + K)),
     ),
+    (
+        "deviation-for-variance",
+        "The root is taken of a standard deviation: check the units.",
+        improvement_with(lambda Psi, p, xi, n: sp.sqrt(n) / sp.sqrt(p)),
+    ),
+    (
+        "difference",
+        "That is a difference; how many times surer is a ratio.",
+        improvement_with(lambda Psi, p, xi, n: n - sp.sqrt(p)),
+    ),
+    *(
+        ("other-time-constant", TIME, improvement_with(time=wrong))
+        for wrong in (
+            lambda K, T: -T / sp.log(-K),
+            lambda K, T: T / K,
+            lambda K, T: -T * sp.log(1 + K),
+            lambda K, T: -T / sp.log(1 - K),
+        )
+    ),
+    (
+        "decimal-logarithm",
+        "A decimal logarithm stands in the place of the natural one.",
+        improvement_with(time=lambda K, T: -T * sp.log(10) / sp.log(1 + K)),
+    ),
 )
 
 
@@ -147,6 +205,8 @@ def growth_with(sd: Callable | None = None, until: Callable | None = None) -> An
 
     return answer
 
+
+SQUARED = "sigma_xi has to be squared: check the units."
 
 WRONG_GROWTHS: tuple[tuple[str, str, Answer], ...] = (
     (
@@ -176,7 +236,7 @@ WRONG_GROWTHS: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "deviation-for-variance",
-        "sigma_xi has to be squared: check the units.",
+        SQUARED,
         growth_with(lambda p, xi, s, n: sp.sqrt(p + n * xi), lambda p, xi, s, T: T * (s - p) / xi),
     ),
     (
@@ -193,6 +253,26 @@ WRONG_GROWTHS: tuple[tuple[str, str, Answer], ...] = (
         "start-added",
         "The variance at the beginning is added; part of the way is gone already when the gap begins.",
         growth_with(until=lambda p, xi, s, T: T * (s**2 + p) / xi**2),
+    ),
+    (
+        "variance-squared",
+        "p is a variance already; it seems to enter squared.",
+        growth_with(lambda p, xi, s, n: sp.sqrt(p**2 + n * xi**2)),
+    ),
+    (
+        "one-period-more",
+        "One period too many is counted.",
+        growth_with(lambda p, xi, s, n: sp.sqrt(p + (n + 1) * xi**2)),
+    ),
+    (
+        "deviation-for-variance",
+        SQUARED,
+        growth_with(until=lambda p, xi, s, T: T * (s**2 - p) / xi),
+    ),
+    (
+        "divided-by-period",
+        "The number of periods is divided by T; a time is the number times T.",
+        growth_with(until=lambda p, xi, s, T: (s**2 - p) / (T * xi**2)),
     ),
 )
 
@@ -219,5 +299,10 @@ WRONG_BIASES: tuple[tuple[str, str, Answer], ...] = (
         "one-step-early",
         "It is one step early: after no biased measurement the error is zero.",
         lambda beta, K, j: beta * (1 - (1 + K) ** (j + 1)),
+    ),
+    (
+        "power-of-K",
+        "What is left after a step is not K: take what has not passed yet to the power.",
+        lambda beta, K, j: beta * (1 - K**j),
     ),
 )

@@ -94,6 +94,19 @@ def _predicted_first(y_ins: Array, y_sr: Array, sigma_xi: float, sigma_n: float,
     return integrate(y_ins, y_sr, sigma_xi, sigma_n, p0 + sigma_xi**2)
 
 
+def _shrinks_in_gap(y_ins: Array, y_sr: Array, sigma_xi: float, sigma_n: float, p0: float) -> tuple[Array, Array]:
+    without_gaps = filter_with()(y_ins, np.nan_to_num(y_sr), sigma_xi, sigma_n, p0)[1]
+    eps, Psi, rows = np.zeros(y_ins.shape[1:]), p0, []
+    for ins, sr in zip(y_ins, y_sr, strict=True):
+        K = -Psi / (Psi + sigma_n**2)
+        eps = eps + K * np.nan_to_num(sr - (ins - eps))
+        rows.append(ins - eps)
+        Psi = (1 + K) * Psi + sigma_xi**2
+    return np.array(rows), without_gaps
+
+
+GAIN_BY_NOISE = "The gain is divided by the receiver's noise alone; the prediction's error belongs to the innovation too."
+
 WRONG_FILTERS: tuple[tuple[str, str, Answer], ...] = (
     (
         "error-added",
@@ -151,5 +164,20 @@ WRONG_FILTERS: tuple[tuple[str, str, Answer], ...] = (
         "variance-before",
         "That is the variance before the correction; return the one after it.",
         lambda *a: (integrate(*a)[0], np.concatenate([[a[4]], integrate(*a)[1][:-1] + a[2] ** 2])),
+    ),
+    (
+        "gain-by-noise-alone",
+        GAIN_BY_NOISE,
+        filter_with(gain=lambda Psi, n: -Psi / n**2),
+    ),
+    (
+        "missing-shrinks",
+        "Where a measurement is missing the variance shrinks all the same: nothing has been learnt there.",
+        _shrinks_in_gap,
+    ),
+    (
+        "innovation-plus",
+        "The estimated error is added to the reading in the innovation; it has to be taken off.",
+        filter_with(innovation=lambda sr, ins, eps: sr - (ins + eps)),
     ),
 )

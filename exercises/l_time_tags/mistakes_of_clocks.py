@@ -72,6 +72,11 @@ def _least_squares(x: Array, y: Array) -> tuple[float, float]:
     return float(slope), float(y.mean() - slope * x.mean())
 
 
+def _mean_of_ratios(edges: Array, stamps: Array) -> tuple[float, float]:
+    rate = float(np.mean(np.diff(stamps) / np.diff(edges)))
+    return rate, float(np.mean(stamps - rate * edges))
+
+
 WRONG_FITS: tuple[tuple[str, str, Answer], ...] = (
     (
         "regression-other-way",
@@ -102,4 +107,18 @@ WRONG_FITS: tuple[tuple[str, str, Answer], ...] = (
         "The shift is in the filter's time and has the other sign: what does the clock show when the filter's time is 0?",
         lambda edges, stamps: (fit_clock(edges, stamps)[0], _least_squares(stamps, edges)[1]),
     ),
+    (
+        "not-divided",
+        "The intercept of the inverse map has to be divided by its slope.",
+        lambda edges, stamps: (fit_clock(edges, stamps)[0], -_least_squares(stamps, edges)[1]),
+    ),
+    (
+        "coefficients-swapped",
+        "Slope and intercept are taken for each other.",
+        lambda edges, stamps: (
+            1 / _least_squares(stamps, edges)[1],
+            -_least_squares(stamps, edges)[0] / _least_squares(stamps, edges)[1],
+        ),
+    ),
+    ("mean-of-ratios", "The rate is a mean of ratios of neighbours: short intervals rule it.", _mean_of_ratios),
 )

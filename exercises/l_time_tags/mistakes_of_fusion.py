@@ -52,6 +52,21 @@ WRONG_DIMENSIONS: tuple[tuple[str, str, Answer], ...] = (
         lambda *a: dimension(*a) - 1,
     ),
     ("always-both", "The dimension is that of a full vector at every step.", dimension_where(lambda k, ratio, first: k >= 0)),
+    (
+        "reversed",
+        "It is the other way round: the vector is longer where the receiver measures.",
+        lambda *a: 3 - dimension(*a),
+    ),
+    (
+        "first-left-out",
+        "The receiver's first measurement counts too.",
+        dimension_where(lambda k, ratio, first: (k > first) & ((k - first) % ratio == 0)),
+    ),
+    (
+        "receiver-only",
+        "That says only whether the receiver is there; the number of components is asked for.",
+        dimension_where(lambda k, ratio, first: (k % ratio == 0) & (k >= first), 0, 1),
+    ),
 )
 
 
@@ -75,6 +90,23 @@ def correction_with(change: Callable[[Array, Array, Array, Array, Array], tuple[
 
 def _whole_dropped(m: Array, P: Array, y: Array, H: Array, R: Array) -> tuple[Array, Array]:
     return (m, P) if np.isnan(y).any() else _textbook(m, P, y - H @ m, H, R)
+
+
+def _other_end(
+    cov: Callable[[Array, Array, Array, Array], Array] = lambda P, K, H, R: P - K @ H @ P,
+    F: Callable[[Array, Array, Array], Array] = lambda H, P, R: H @ P @ H.T + R,
+) -> Answer:
+    """The right choice of components, but another covariance, or another gain."""
+
+    def answer(m: Array, P: Array, y: Array, H: Array, R: Array) -> tuple[Array, Array]:
+        there = np.isfinite(y)
+        if not there.any():
+            return m, P
+        y, H, R = y[there], H[there], R[np.ix_(there, there)]
+        K = np.linalg.solve(F(H, P, R).T, H @ P).T
+        return m + K @ (y - H @ m), cov(P, K, H, R)
+
+    return answer
 
 
 WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
@@ -113,6 +145,21 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
         messages.INNOVATION_SIGN,
         correction_with(lambda m, y, H, R, there: ((H @ m - y)[there], H[there], R[np.ix_(there, there)])),
     ),
+    ("covariance-added", messages.COVARIANCE_ADDED, _other_end(lambda P, K, H, R: P + K @ H @ P)),
+    ("covariance-kept", messages.COVARIANCE_KEPT, _other_end(lambda P, K, H, R: P)),
+    ("share-only", messages.SHARE_ONLY, _other_end(lambda P, K, H, R: np.eye(len(P)) - K @ H)),
+    (
+        "noise-squared",
+        messages.NOISE_SQUARED,
+        _other_end(F=lambda H, P, R: H @ P @ H.T + R @ R),
+    ),
+    ("noise-by-deviation", messages.NOISE_BY_DEVIATION, _other_end(F=lambda H, P, R: H @ P @ H.T + np.sqrt(np.abs(R)))),
+    ("noise-forgotten", "The noise of the meter is missing in the gain.", _other_end(F=lambda H, P, R: H @ P @ H.T)),
+    (
+        "gain-by-noise-alone",
+        "The gain is divided by the meter's noise alone; the prediction's error belongs to the innovation too.",
+        _other_end(F=lambda H, P, R: R),
+    ),
 )
 
 
@@ -131,6 +178,13 @@ def move_with(
         return moved(A, m), carried(A, P) + q * np.array(Q(dt))
 
     return answer
+
+
+INTENSITY = "The intensity of the noise enters with another power."
+
+
+def _noise_scaled(scale: Callable[[float], float]) -> Answer:
+    return lambda m, P, dt, q: move_with()(m, P, dt, scale(q))
 
 
 WRONG_MOVES: tuple[tuple[str, str, Answer], ...] = (
@@ -168,6 +222,44 @@ WRONG_MOVES: tuple[tuple[str, str, Answer], ...] = (
         move_with(carried=lambda A, P: A @ P),
     ),
     ("mean-not-moved", "The mean stays where it is; the object moves on.", move_with(moved=lambda A, m: m)),
+    ("intensity-power", INTENSITY, _noise_scaled(lambda q: q**2)),
+    ("intensity-power", INTENSITY, _noise_scaled(lambda q: q**0.5)),
+    ("intensity-halved", "The intensity q is given; it is not a one-sided density.", _noise_scaled(lambda q: q / 2)),
+    (
+        "factors-forgotten",
+        "The factors from the integration are missing in the noise.",
+        move_with(lambda dt: [[dt**3, dt**2], [dt**2, dt]]),
+    ),
+    (
+        "noise-of-fixed-step",
+        "The noise of the velocity does not depend on the interval, and that of the position is missing.",
+        move_with(lambda dt: [[0, 0], [0, 1]]),
+    ),
+    (
+        "correlation-sign",
+        "Position and velocity are pushed the same way: their covariance is positive.",
+        move_with(lambda dt: [[dt**3 / 3, -(dt**2) / 2], [-(dt**2) / 2, dt]]),
+    ),
+    (
+        "same-on-both",
+        "The same noise is added to position and velocity; the position gets it by integration.",
+        move_with(lambda dt: [[dt, 0], [0, dt]]),
+    ),
+    (
+        "transition-transposed",
+        "A is transposed: in A P A^T the transposed one stands on the right.",
+        move_with(carried=lambda A, P: A.T @ P @ A),
+    ),
+    (
+        "transition-transposed",
+        "The transition is transposed: it is the position that moves by the velocity.",
+        move_with(carried=lambda A, P: A.T @ P @ A, moved=lambda A, m: A.T @ m),
+    ),
+    (
+        "backwards",
+        "The sign of dt: that goes backwards in time.",
+        move_with(carried=lambda A, P: np.linalg.inv(A) @ P @ np.linalg.inv(A).T, moved=lambda A, m: np.linalg.inv(A) @ m),
+    ),
 )
 
 
@@ -244,5 +336,19 @@ WRONG_FUSIONS: tuple[tuple[str, str, Answer], ...] = (
         "not-predicted-to-now",
         "The estimate belongs to the last measurement's moment; predict it to the moment asked for.",
         _fusion_with(by_tag, to_now=False),
+    ),
+    ("noise-squared", messages.NOISE_SQUARED, lambda *a: _fusion_with(by_tag)(*a[:6], a[6] ** 2, a[7])),
+    ("noise-by-deviation", messages.NOISE_BY_DEVIATION, lambda *a: _fusion_with(by_tag)(*a[:6], a[6] ** 0.5, a[7])),
+    (
+        "start-moved",
+        "The law at the start belongs to the moment 0, not to the first tag.",
+        lambda tags, arrivals, values, m, P, q, r, now: _fusion_with(by_tag)(
+            tags - tags.min(), arrivals - tags.min(), values, m, P, q, r, now - tags.min()
+        ),
+    ),
+    (
+        "values-reordered",
+        "The tags are sorted, but not the values with them.",
+        lambda tags, arrivals, values, *rest: _fusion_with(by_tag)(np.sort(tags), arrivals[np.argsort(tags)], values, *rest),
     ),
 )
