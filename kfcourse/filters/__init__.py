@@ -6,7 +6,8 @@ approximations          approximations of the absolutely optimal filter (AOF): E
 conditionally_optimal   Pugachev's two-step conditionally optimal filter (DUOF)
 optimal_structure       Rudenko's filter of optimal structure (FOS)
 modified_structure      its modification (MFOS)
-exact                   the AOF itself, on a grid;  particles: by sampling;  densities: what both need
+exact                   the AOF itself, on a grid (exact_kernels, exact_places, exact_batch; exact_adaptive checks it)
+particles               the same by sampling;  densities: what both need
 iterated_ekf            the meter linearised again at the estimate
 alphabeta               constant gains
 multiple_models         several ways of moving (IMM)
@@ -21,6 +22,7 @@ from kfcourse.filters.conditionally_optimal import EQUATIONS as _DUOF
 from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.designed import Design
 from kfcourse.filters.exact import pointmass
+from kfcourse.filters.exact_adaptive import adaptive_pointmass
 from kfcourse.filters.iterated_ekf import iterated
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.modified_structure import EQUATIONS as _MFOS
@@ -39,6 +41,7 @@ __all__ = [
     "Design",
     "Filter",
     "State",
+    "adaptive_pointmass",
     "alpha_beta",
     "alpha_beta_gamma",
     "aof",

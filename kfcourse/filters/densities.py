@@ -6,6 +6,7 @@ x_{k+1} | x_k ~ N(a(x, m_v), a_v D_v a_v^T),    y_k | x_k ~ N(b(x, m_w), b_w D_w
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import sympy as sp
@@ -39,6 +40,56 @@ def likelihood(model: Model) -> Callable[[Array, Array], Array]:
         return np.where(np.isnan(y).any(axis=-1), 0.0, value)
 
     return log_likelihood
+
+
+class ScalarDensities(NamedTuple):
+    """What the exact filter must know of a scalar model; all functions are elementwise.
+
+    Attributes
+    ----------
+    kernel : x -> mean and standard deviation of the next state, given x
+    log_likelihood : (y, x) -> log p(y | x); 0 where y is missing (NaN)
+    signal, slope : x -> b(x, m_w) and its derivative
+    meter_width : x -> standard deviation of the meter's noise over |slope|: how well y tells x
+    """
+
+    kernel: Callable[[Array], tuple[Array, Array]]
+    log_likelihood: Callable[[Array, Array], Array]
+    signal: Callable[[Array], Array]
+    slope: Callable[[Array], Array]
+    meter_width: Callable[[Array], Array]
+
+
+def scalar_densities(model: Model) -> ScalarDensities:
+    """The densities of a model of one state and one measurement; ModelError if a noise enters nonlinearly."""
+    next_state = transition(model)
+    meter = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model)
+    derivative = model.meter_equation.subs(dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True)))
+    slopes = compile_function(
+        "slope", {"x": sp.Matrix(model.x)}, {"slope": derivative.subs(model.values).diff(model.x[0])}, ["x", "slope"]
+    ).function
+
+    def moments(law: Callable[[Array], Gaussian], x: Array) -> tuple[Array, Array]:
+        mean, variance = law(x[..., None])
+        return np.broadcast_to(mean[..., 0], x.shape), np.broadcast_to(variance[..., 0, 0], x.shape)
+
+    def kernel(x: Array) -> tuple[Array, Array]:
+        mean, variance = moments(next_state, x)
+        return mean, np.maximum(np.sqrt(variance), 1e-150)
+
+    def log_likelihood(y: Array, x: Array) -> Array:
+        mean, variance = moments(meter, x)
+        value = _log_normal(y - mean, variance)
+        missing = np.isnan(y)
+        return np.where(missing, 0.0, value) if missing.any() else value
+
+    def slope(x: Array) -> Array:
+        return np.broadcast_to(slopes(x[..., None])[0][..., 0], x.shape)
+
+    def meter_width(x: Array) -> Array:
+        return np.sqrt(moments(meter, x)[1]) / np.abs(slope(x))
+
+    return ScalarDensities(kernel, log_likelihood, lambda x: moments(meter, x)[0], slope, meter_width)
 
 
 def _log_normal(deviation: Array, variance: Array) -> Array:

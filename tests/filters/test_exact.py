@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from kfcourse import Model, ModelError, compare, lab_filters, load_variants, run, simulate
-from kfcourse.filters import aof, kalman_filter, pointmass
+from kfcourse.filters import adaptive_pointmass, aof, kalman_filter, pointmass
 from kfcourse.lab.short_names import LAB, has_exact
 from kfcourse.symbolic.structure import gaussian
 
@@ -16,7 +16,7 @@ RESOLVED = 100 * 1e-5**2
 
 def follow(model, y, **options):
     """Means, standard deviations and reported errors (steps, runs) of the exact filter along measurements y (steps, runs, 1)."""
-    exact = pointmass(model, **options)
+    exact = adaptive_pointmass(model, **options) if options else pointmass(model)
     state, found = exact.init(y.shape[1]), []
     for measurement in y:
         state = exact.step(state, measurement)
@@ -290,7 +290,13 @@ def test_a_model_without_noise_is_refused_with_advice(state, meter, options):
 @pytest.mark.parametrize("options", [{"order": 5}, {"tolerance": 0}, {"tolerance": 1}, {"tolerance": float("nan")}])
 def test_impossible_rules_are_refused(variants, options):
     with pytest.raises(ModelError, match="order >= 6 and 0 < tolerance < 1"):
-        pointmass(variants["53"], **options)
+        adaptive_pointmass(variants["53"], **options)
+
+
+@pytest.mark.parametrize("accuracy", [0, 1, -1e-3, float("nan")])
+def test_an_impossible_accuracy_is_refused(variants, accuracy):
+    with pytest.raises(ModelError, match="0 < accuracy < 1"):
+        pointmass(variants["53"], accuracy)
 
 
 def test_its_state_is_never_changed(variants):
@@ -303,13 +309,14 @@ def test_its_state_is_never_changed(variants):
     assert np.array_equal(exact.step(before, y[1]).posterior.mean, first.posterior.mean)
 
 
-def test_the_masses_are_a_distribution(variants):
-    exact = pointmass(variants["53"])
+@pytest.mark.parametrize("filter_of", [pointmass, adaptive_pointmass])
+def test_the_masses_are_a_distribution(variants, filter_of):
+    exact = filter_of(variants["53"])
     _, y = simulate(variants["53"], 3, 3, seed=1)
     state = exact.init(3)
     for measurement in y:
         state = exact.step(state, measurement)
-        for grid in (*state.memory.fine, *state.memory.coarse):
+        for grid in state.memory.fine:
             assert (np.diff(grid.x) >= 0).all()
             assert (grid.mass >= 0).all()
             assert abs(grid.mass.sum() - 1) <= len(grid.mass) * np.finfo(float).eps

@@ -1,0 +1,61 @@
+"""Speed and errors of the exact filter, against the adaptive filter that checks it, side by side in one run.
+
+    .venv/bin/python benchmarks/exact.py [--runs 512] [--steps 51] [--checked 8] [--variants 53 2]
+
+For every scalar variant that is shipped, and variant 53 with a meter ten times worse: microseconds a trajectory-step of one
+thread, how many times faster than the adaptive filter, nodes of a posterior, the share of steps left to the adaptive filter,
+and the estimated errors, in posterior standard deviations: 50 %, 99 % and the worst of all steps.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import numpy as np
+
+from kfcourse import load_variants, simulate
+from kfcourse.filters import Filter, adaptive_pointmass, pointmass
+from kfcourse.symbolic.model import Model
+
+
+def seconds(one: Filter, y: np.ndarray) -> tuple[float, list]:
+    """Processor time of a filter over measurements y (steps, runs, 1), and what it remembered after each."""
+    state, memories = one.init(y.shape[1]), []
+    start = time.process_time()
+    for measurement in y:
+        state = one.step(state, measurement)
+        memories.append(state.memory)
+    return time.process_time() - start, memories
+
+
+def line(name: str, model: Model, runs: int, steps: int, checked: int) -> str:
+    y = simulate(model, runs, steps, seed=1).y
+    seconds(pointmass(model), y[:2])  # what is imported or allocated once
+    fast, memories = seconds(pointmass(model), y)
+    slow, _ = seconds(adaptive_pointmass(model), y[:, :checked])
+    rate, slow_rate = fast / (runs * steps), slow / (checked * steps)
+    nodes = np.mean([len(grid.x) for memory in memories for grid in memory.fine])
+    share = np.mean([memory.adaptive for memory in memories])
+    errors = np.quantile([memory.error for memory in memories], [0.5, 0.99, 1])
+    return f"{name:>8} {1e6 * rate:8.0f} {slow_rate / rate:8.1f} {nodes:8.0f} {100 * share:9.3f} %" + "".join(
+        f"{error:10.0e}" for error in errors
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--runs", type=int, default=512)
+    parser.add_argument("--steps", type=int, default=51)
+    parser.add_argument("--checked", type=int, default=8, help="trajectories of the adaptive filter")
+    parser.add_argument("--variants", nargs="*")
+    options = parser.parse_args()
+    models = {name: variant.model for name, variant in load_variants().items() if variant.model.n == variant.model.p == 1}
+    models["53/f=.2"] = models["53"].replace(f=0.2)
+    print(f"{'variant':>8} {'us':>8} {'times':>8} {'nodes':>8} {'adaptive':>11}{'error 50 %':>10}{'99 %':>10}{'worst':>10}")
+    for name in options.variants or models:
+        print(line(name, models[name], options.runs, options.steps, options.checked), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,230 @@
+"""The Stratonovich equation on panels that are halved until they resolve the posterior: slow, and takes anything.
+
+One trajectory at a time.  Panels cover the support of the prediction, geometrically finer towards the states that would explain
+the measurement without noise; they are split until a Gauss-Legendre rule resolves the posterior on each of them.
+
+`estimated` does one step, where equidistant nodes do not resolve it.  `adaptive_pointmass` is a filter of nothing but such steps:
+it shares neither nodes nor rules with `kfcourse.filters.exact`, and so checks it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import logsumexp
+
+from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.filters.densities import ScalarDensities, scalar_densities
+from kfcourse.filters.exact_kernels import NEGLIGIBLE, ROOT, WIDTH, Grid, Kernels, Unresolved
+from kfcourse.filters.exact_panels import MOST, SPLITS, Rule, resolve
+from kfcourse.laws import Array, Gaussian
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import ModelError
+
+FAR = 37.0  # sigmas covered where a measurement contradicts the prediction: exp(-37^2 / 2) is the smallest number
+KERNEL = 3.0  # a panel is at most so many sigmas of the transition kernel wide, that the integral be smooth on it
+SECTIONS = np.linspace(0, 1, 257)  # of a bracket, in the search for a zero
+SCALES = (0.5, 2.0, WIDTH)  # distances, in kernel sigmas, of panel borders from the prediction's own centres
+QUANTILES = np.array([0.02, 0.25, 0.5, 0.75, 0.98])  # of the posterior, where those centres are
+BORDER = 1e-10  # of the density at the ends of the support, relative: beyond them there must be nothing
+WORK = 2e8  # nodes times kernels of a step: some seconds
+ELEMENTS = 2**20  # of the largest array, 8 MB
+
+
+class Panels(NamedTuple):
+    """What the filter remembers of each trajectory: the posterior, and the same by a coarser rule."""
+
+    fine: list[Grid]
+    coarse: list[Grid]
+
+    def discretisation_error(self) -> Array:
+        """Estimated error of the posterior means, (runs,): the change from the coarser rule.
+
+        The fine rule converges faster, so this overestimates its error.
+        """
+        return np.array([abs(fine.mean() - coarse.mean()) for fine, coarse in zip(self.fine, self.coarse, strict=True)])
+
+
+STEPWISE = Rule.of_order(12, 1e-7), Rule.of_order(9, 1e-5)  # of `estimated`: the result, and what tells its error
+
+
+def check_scalar(model: Model) -> None:
+    """ModelError unless the model has one state and one measurement."""
+    if model.n != 1 or model.p != 1:
+        raise ModelError(
+            f"the point-mass filter is for scalar models; this one has {model.n} states and {model.p} measurements: "
+            "use particle(model)"
+        )
+
+
+def estimated(kernels: Kernels, y: float, law: ScalarDensities) -> tuple[Grid, float]:
+    """The posterior of one trajectory, from the kernels of its prediction, (1, M), and y.
+
+    Also the estimated error of its mean in posterior standard deviations: the change from a coarser rule; infinite if y
+    contradicts the prediction so much that the posterior lies beyond its support.
+    """
+    mu, sigma, mass = (array[0] for array in kernels[:3])
+    bayes = _Bayes(law, _wider_than_kernels(law))
+    (fine, complete), (coarse, _) = (bayes.corrected(mu, sigma, mass, y, rule) for rule in STEPWISE)
+    difference, deviation = abs(fine.mean() - coarse.mean()), np.sqrt(fine.variance())
+    return fine, (float(difference / deviation) if difference else 0.0) if complete else np.inf
+
+
+def adaptive_pointmass(model: Model, order: int = 8, tolerance: float = 1e-5) -> Filter:
+    """The exact AOF of a scalar model, every step of it on panels.
+
+    Parameters
+    ----------
+    model : Model
+        One state, one measurement, noises entering linearly (with any functions of x as factors).
+    order : int
+        Nodes on a panel; the error estimate uses order - 3.
+    tolerance : float
+        Unresolved part of the posterior that a panel may have.  `state.memory.discretisation_error()` tells
+        what it leads to.
+
+    Raises
+    ------
+    ModelError
+        The model is not scalar, or a noise enters nonlinearly.
+    Unresolved
+        When it runs: a step would need more nodes than the budget has.
+    """
+    check_scalar(model)
+    if order < 6 or not 0 < tolerance < 1:
+        raise ModelError(f"the point-mass filter needs order >= 6 and 0 < tolerance < 1, got {order} and {tolerance}")
+    law = scalar_densities(model)
+    bayes = _Bayes(law, _wider_than_kernels(law))
+    rules = Rule.of_order(order, tolerance), Rule.of_order(order - 3, 30 * tolerance)
+    init = initial_state(model)
+    prior = model.prior.mean, np.maximum(np.sqrt(model.prior.cov[0]), 1e-150), np.ones(1)
+
+    def kernels(before: Grid | None) -> tuple[Array, Array, Array]:
+        return prior if before is None else (*law.kernel(before.x), before.mass)
+
+    def step(state: State, y: Array) -> State:
+        before = state.memory or ([None] * len(y), [None] * len(y))
+        try:
+            after = Panels(
+                *(
+                    [bayes.corrected(*kernels(grid), float(value), rule)[0] for grid, value in zip(grids, y[:, 0], strict=True)]
+                    for grids, rule in zip(before, rules, strict=True)
+                )
+            )
+        except Unresolved as error:
+            raise Unresolved(f"step {state.step} of {model}: {error}") from None
+        posterior = Gaussian(np.array([[g.mean()] for g in after.fine]), np.array([[[g.variance()]] for g in after.fine]))
+        return State(state.step + 1, posterior, _predicted_moments(map(kernels, after.fine)), after)
+
+    return Filter("aof-exact", model, init, step, slow=True)
+
+
+def _predicted_moments(predictions: Iterable[tuple[Array, Array, Array]]) -> Gaussian:
+    """Mean (runs, 1) and variance (runs, 1, 1) of the next state: those of a mixture."""
+    means, variances = [], []
+    for mu, sigma, mass in predictions:
+        means.append(mass @ mu)
+        variances.append(mass @ (sigma**2 + (mu - means[-1]) ** 2))
+    return Gaussian(np.array(means)[:, None], np.array(variances)[:, None, None])
+
+
+def _wider_than_kernels(law: ScalarDensities) -> Callable[[Array, Array], Array]:
+    """Panels on which the next prediction's kernel would not be a smooth function of its centre."""
+
+    def too_wide(left: Array, right: Array) -> Array:
+        (a, _), (b, _), (_, sigma) = law.kernel(left), law.kernel(right), law.kernel(0.5 * (left + right))
+        return np.abs(b - a) > KERNEL * sigma
+
+    return too_wide
+
+
+class _Bayes:
+    """One step of the Stratonovich equation for one trajectory."""
+
+    def __init__(self, law: ScalarDensities, too_wide: Callable[[Array, Array], Array]):
+        self.meter, self.too_wide = law.signal, too_wide
+        self.log_likelihood: Callable[[float, Array], Array] = lambda y, x: law.log_likelihood(np.array([y]), x)
+
+    def corrected(self, mu: Array, sigma: Array, mass: Array, y: float, rule: Rule) -> tuple[Grid, bool]:
+        """The posterior: a prediction that is a sum of normal kernels (M,), corrected with y; and whether it is complete.
+
+        It is not where the measurement contradicts the prediction by more than `FAR` sigmas.
+        """
+
+        def log_density(x: Array) -> Array:
+            if x.size > MOST or x.size * mu.size > WORK:
+                raise Unresolved(
+                    f"the posterior needs more than {x.size:,} nodes, the prediction is a sum of {mu.size:,} kernels"
+                )
+            return _log_mixture(x, mu, sigma, mass) + self.log_likelihood(y, x)
+
+        def between(borders: Array) -> tuple[Grid, bool]:
+            if not np.isnan(y):
+                borders = np.union1d(borders, self._explanations(borders, y))
+            grid = resolve(borders, log_density, self.too_wide, rule)
+            return grid, not _cut_off(grid, borders)
+
+        near, complete = between(_prediction_borders(mu, sigma, mass, WIDTH))
+        if complete:
+            return near, True
+        far, complete = between(_prediction_borders(mu, sigma, mass, FAR))
+        return (far, True) if complete else (near, False)
+
+    def _explanations(self, borders: Array, y: float) -> Array:
+        """Panel borders that approach, by halves, every state that explains y without noise."""
+        x = np.unique(np.concatenate([borders, 0.5 * (borders[1:] + borders[:-1])]))
+        residual = y - self.meter(x)
+        result = []
+        for i in np.flatnonzero(np.signbit(residual[1:]) != np.signbit(residual[:-1])):
+            low, high = x[i], x[i + 1]
+            while True:  # shrink the bracket 256 times at each pass, to the last bit
+                inner = low + (high - low) * SECTIONS
+                j = int(np.argmax(np.signbit(y - self.meter(inner)[1:]) != np.signbit(residual[i])))
+                if not inner[j + 1] - inner[j] < high - low:
+                    break
+                low, high = inner[j], inner[j + 1]
+            offsets = (borders[-1] - borders[0]) * 0.5 ** np.arange(SPLITS)
+            near = np.concatenate([low - offsets, low + offsets])
+            # Stop approaching where the log-likelihood has become flat.
+            drop = self.log_likelihood(y, np.array([low])) - self.log_likelihood(y, near)
+            flat = (drop < 0.5).reshape(2, -1).all(axis=0)
+            last = int(np.argmax(flat)) + 1 if flat.any() else SPLITS
+            result += [low - offsets[:last], low + offsets[:last]]
+        found = np.concatenate([*result, np.empty(0)])
+        return found[(found > borders[0]) & (found < borders[-1])]
+
+
+def _cut_off(grid: Grid, borders: Array) -> bool:
+    """Whether the posterior goes on beyond the support."""
+    at_border = np.array([grid.x[0] < borders[1], grid.x[-1] > borders[-2]])
+    return bool((at_border & (grid.density[[0, -1]] * (grid.x[-1] - grid.x[0]) > BORDER)).any())
+
+
+def _prediction_borders(mu: Array, sigma: Array, mass: Array, width: float) -> Array:
+    """Panel borders for a mixture of normal kernels: over its support, and around its centres."""
+    matters = mass > NEGLIGIBLE
+    low, high = (mu - width * sigma)[matters].min(), (mu + width * sigma)[matters].max()
+    chosen = np.minimum(np.searchsorted(np.cumsum(mass), QUANTILES), len(mass) - 1)
+    around = [mu[chosen] + sign * scale * sigma[chosen] for scale in SCALES for sign in (-1, 1)]
+    return np.unique(np.clip(np.concatenate([np.linspace(low, high, 13), *around]), low, high))
+
+
+def _log_mixture(x: Array, mu: Array, sigma: Array, mass: Array) -> Array:
+    """log sum_j mass_j N(x; mu_j, sigma_j^2): the integral of the Stratonovich equation."""
+    if len(x) * len(mu) > ELEMENTS:
+        size = max(1, ELEMENTS // len(mu))
+        return np.concatenate([_log_mixture(x[i : i + size], mu, sigma, mass) for i in range(0, len(x), size)])
+    kernel = x[:, None] - mu
+    kernel /= sigma
+    kernel *= kernel
+    kernel *= -0.5
+    np.exp(kernel, out=kernel)
+    total = kernel @ (mass / (sigma * ROOT))
+    with np.errstate(divide="ignore"):
+        logs = np.log(total)
+        far = np.flatnonzero(total == 0)  # so far out that the exponentials underflow
+        if len(far):
+            logs[far] = logsumexp(-0.5 * ((x[far, None] - mu) / sigma) ** 2 + np.log(mass / (sigma * ROOT)), axis=1)
+    return logs

@@ -1,0 +1,147 @@
+"""From a posterior to the next prediction: a sum of normal kernels, one for each node.
+
+    p(x') = Integral p(x) N(x'; m(x), sigma^2(x)) dx  =  sum_j mass_j N(x'; m(x_j), sigma^2(x_j))
+
+The sum is as good as the integral where the kernels of neighbouring nodes overlap.  Where they do not, `exact_narrow` puts more
+nodes between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from kfcourse.filters.densities import ScalarDensities
+from kfcourse.laws import Array, Gaussian
+from kfcourse.symbolic.reading import ModelError
+
+WIDTH = 8.0  # sigmas covered: 1e-15 of a normal law lies outside
+NEGLIGIBLE = 1e-14  # mass that may be left out
+ROOT = np.sqrt(2 * np.pi)
+# Sigmas of a kernel, in distances of the centres: a sum over every second node errs by exp(-pi^2 / 2 OVERLAP^2) = 6e-5.
+OVERLAP = 1.4
+SEEN = 1e-9  # mass of a node whose kernel must overlap with its neighbours'
+CACHED = 2**15  # elements of the largest array, 256 kB: it stays in the processor's cache
+
+
+def chunks(rows: int, elements: int, most: int) -> Iterator[slice]:
+    """Slices of so many rows, of so many elements each, that no array has more than `most` elements, but at least one row."""
+    size = max(1, most // elements)
+    return (slice(start, start + size) for start in range(0, rows, size))
+
+
+class Unresolved(ModelError):
+    """A posterior or a prediction needs more nodes than the budget has; the message says where."""
+
+
+class Grid(NamedTuple):
+    """A posterior as point masses: nodes x (M,), ascending, their masses (M,), and the density there (M,).
+
+    `uniform` is true if the nodes are equidistant in a smooth variable, and every second one is a rule of its own.
+    """
+
+    x: Array
+    mass: Array
+    density: Array
+    uniform: bool = False
+
+    def mean(self) -> float:
+        return float(self.mass @ self.x)
+
+    def variance(self) -> float:
+        return float(self.mass @ (self.x - self.mean()) ** 2)
+
+
+class Kernels(NamedTuple):
+    """Predicted densities, one a row: sums of M normal kernels.
+
+    Attributes
+    ----------
+    mu, sigma, mass : ndarray (T, M)
+    even : ndarray (T, M)
+        Masses by half the information, every second node of the posterior before: they tell the error of the sum.
+    centre, width : ndarray (T, 1)
+        Roughly where the mass is.
+    spectral : ndarray (T,)
+        True where the error falls exponentially with the nodes, false where the posterior was interpolated.
+    """
+
+    mu: Array
+    sigma: Array
+    mass: Array
+    even: Array
+    centre: Array
+    width: Array
+    spectral: Array
+
+    def support(self, sigmas: float = WIDTH) -> tuple[Array, Array]:
+        """Lower and upper limit, (T, 1) each: so many sigmas around every kernel that counts."""
+        counts = self.mass > NEGLIGIBLE
+        low = np.where(counts, self.mu - sigmas * self.sigma, np.inf).min(axis=1, keepdims=True)
+        high = np.where(counts, self.mu + sigmas * self.sigma, -np.inf).max(axis=1, keepdims=True)
+        return low, high
+
+    def thinned(self) -> Kernels:
+        """Every second kernel, if they are many: a rough prediction for half the cost."""
+        if self.mu.shape[1] < 8 or not self.spectral.all():
+            return self
+        mu, sigma, _, even = (array[:, ::2] for array in self[:4])
+        return self._replace(mu=mu, sigma=sigma, mass=even, even=even)
+
+    def density(self, x: Array, *masses: Array) -> Array:
+        """sum_j mass_j N(x; mu_j, sigma_j^2) at x (T, N) for each of the masses (T, M): (T, N, number of them)."""
+        rate = np.sqrt(0.5) / self.sigma
+        centre, weights = self.mu * rate, np.stack([mass * rate for mass in masses], axis=2)
+        result = np.empty((*x.shape, len(masses)))
+        for i in chunks(len(x), x.shape[1] * self.mu.shape[1], CACHED):
+            kernel = x[i, :, None] * rate[i, None, :]
+            kernel -= centre[i, None, :]
+            kernel *= kernel
+            np.negative(kernel, out=kernel)
+            np.exp(kernel, out=kernel)
+            np.matmul(kernel, weights[i], out=result[i])
+        return result / np.sqrt(np.pi)
+
+    def moments(self) -> tuple[Array, Array]:
+        """Mean and variance (T,) of the predictions: those of mixtures."""
+        mean = (self.mass * self.mu).sum(axis=1)
+        deviation = self.mu - mean[:, None]
+        return mean, (self.mass * (self.sigma * self.sigma + deviation * deviation)).sum(axis=1)
+
+    def rows(self, chosen: Array | slice) -> Kernels:
+        return Kernels(*(array[chosen] for array in self))
+
+
+def of_prior(prior: Gaussian) -> Kernels:
+    """The prior of one trajectory as a single kernel."""
+    mean, sigma = prior.mean[0], max(float(np.sqrt(prior.cov[0, 0])), 1e-150)
+    one = np.ones((1, 1))
+    return Kernels(mean * one, sigma * one, one, one, mean * one, sigma * one, np.array([True]))
+
+
+def apart(mu: Array, sigma: Array, mass: Array) -> Array:
+    """How far apart the kernels (T, M) of neighbouring nodes lie, (T,): up to 1, their sum is as good as the integral."""
+    distance = np.abs(np.diff(mu, axis=1))
+    gap = np.maximum(distance[:, 1:], distance[:, :-1]) / sigma[:, 1:-1]
+    return OVERLAP * (gap * (mass[:, 1:-1] > SEEN)).max(axis=1)
+
+
+def overlapping(x: Array, mass: Array, density: Array, uniform: bool, law: ScalarDensities) -> Kernels:
+    """A kernel for each node (T, M)."""
+    mu, sigma = law.kernel(x)
+    even = mass
+    if uniform:
+        even = np.zeros_like(mass)
+        even[:, ::2] = mass[:, ::2]
+        even /= even.sum(axis=1, keepdims=True)
+    top = np.clip(density.argmax(axis=1), 1, x.shape[1] - 2)[:, None]
+
+    def at_top(array: Array, offset: int = 0) -> Array:
+        return np.take_along_axis(array, top + offset, axis=1)
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = (at_top(mu, 1) - at_top(mu, -1)) / (at_top(x, 1) - at_top(x, -1))
+        width = np.hypot(np.where(np.isfinite(slope), slope, 0.0) / (ROOT * at_top(density)), at_top(sigma))
+    return Kernels(mu, sigma, mass, even, at_top(mu), width, np.full(len(x), uniform))
