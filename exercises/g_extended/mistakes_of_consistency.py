@@ -22,7 +22,7 @@ def _quantiles(probabilities: list[float], degrees: int) -> Array:
     """Of a chi-squared law."""
     from scipy import stats  # slow to import
 
-    return stats.chi2.ppf(probabilities, degrees)
+    return _quantiles(probabilities, degrees)
 
 
 def _interval(confidence: float, degrees: int) -> tuple[float, float]:
@@ -76,12 +76,12 @@ WRONG_BOUNDS: tuple[tuple[str, str, Bounds], ...] = (
     (
         "one-less",
         "One degree of freedom is taken off; nothing is estimated here: all of them count.",
-        lambda degrees, runs, confidence: tuple(np.array(stats.chi2.interval(confidence, degrees * runs - 1)) / runs),
+        lambda degrees, runs, confidence: tuple(np.array(_interval(confidence, degrees * runs - 1)) / runs),
     ),
     (
         "divided-by-root",
         "The bounds of the sum are divided by a root; a mean is a sum over the number of runs.",
-        lambda degrees, runs, confidence: tuple(np.array(stats.chi2.interval(confidence, degrees * runs)) / np.sqrt(runs)),
+        lambda degrees, runs, confidence: tuple(np.array(_interval(confidence, degrees * runs)) / np.sqrt(runs)),
     ),
 )
 
