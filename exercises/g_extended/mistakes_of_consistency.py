@@ -22,7 +22,7 @@ def _quantiles(probabilities: list[float], degrees: int) -> Array:
     """Of a chi-squared law."""
     from scipy import stats  # slow to import
 
-    return _quantiles(probabilities, degrees)
+    return stats.chi2.ppf(probabilities, degrees)
 
 
 def _interval(confidence: float, degrees: int) -> tuple[float, float]:
