@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from kfcourse import Model, ModelError, load_variants, run, simulate
 from kfcourse.filters import kalman_filter, particle, pointmass
+from kfcourse.filters.densities import likelihood
 
 pytestmark = pytest.mark.quick
 
@@ -57,6 +59,20 @@ def test_on_a_linear_vector_model_it_is_the_kalman_filter_within_monte_carlo_err
     mean, own = replicas(model, y)
     agree(mean, expected.mean, np.sqrt(variance))
     agree(own, variance, variance)
+
+
+def test_the_likelihood_is_the_normal_density_with_its_constant():
+    x = np.array([[0.3, -1.0], [2.0, 0.5]])
+    for meter, y in ((["x1*x2 + (1 + x2**2)*w1"], [0.7]), (["x1 + 0.5*w1", "x2**2 + x1*w2 + 0.2*w1"], [0.7, -0.4])):
+        model = Model.define(["x1 + v1", "x2 + v2"], meter, meter_noise={"mean": 0.2, "variance": 1.5})
+        found = likelihood(model)(np.array(y), x)
+        for one, value in zip(x, found, strict=True):
+            if len(y) == 1:
+                mean, B = np.array([one[0] * one[1]]), np.array([[1 + one[1] ** 2]])
+            else:
+                mean, B = np.array([one[0], one[1] ** 2]), np.array([[0.5, 0], [0.2, one[0]]])
+            expected = stats.multivariate_normal(mean + B @ np.full(len(B), 0.2), 1.5 * B @ B.T).logpdf(y)
+            assert value == pytest.approx(expected, rel=1e-12)
 
 
 def test_the_prediction_is_the_law_of_the_predicted_particles():
