@@ -8,7 +8,7 @@ optimal_structure       Rudenko's filter of optimal structure (FOS)
 modified_structure      its modification (MFOS)
 exact                   the AOF itself, on a grid;  particles: by sampling;  densities: what both need
 iterated_ekf            the meter linearised again at the estimate
-alphabeta               constant gains
+alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving (IMM)
 notation                symbols in which the equations are printed
 """
