@@ -9,7 +9,7 @@ modified_structure      its modification (MFOS)
 exact                   the AOF itself, on a grid (exact_kernels, exact_places, exact_batch; exact_adaptive checks it)
 particles               the same by sampling;  densities: what both need
 iterated_ekf            the meter linearised again at the estimate
-alphabeta               constant gains
+alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving (IMM)
 notation                symbols in which the equations are printed
 """
