@@ -30,6 +30,7 @@ GAIN_WITHOUT_PSI = "The covariance Psi of the prediction is missing in the gain:
 COVARIANCE_KEPT = "The covariance is that of the prediction: a measurement must make the filter surer."
 COVARIANCE_ADDED = "The covariance grows: what the measurement explains is subtracted."
 INFORMATION_FOR_COVARIANCE = "That is the information, not the covariance: invert the sum."
+GAIN_BY_NOISE_ALONE = "The gain is divided by the meter's noise alone; the prediction's error belongs to the innovation too."
 SHARE_ONLY = "That is the share that remains, without units; multiply the covariance of the prediction by it."
 NOISE_INHERITED = "The estimate inherits noise from the measurement through the gain: a term is missing."
 EXPECTED_ADDED = "What was expected is added to the measurement; subtract it."
@@ -75,6 +76,9 @@ SLOPE_POWER = "The slope of the signal enters the equation of the variance squar
 # -- motion, radar, navigation
 
 HALF_MISSING = "A factor is missing where the acceleration acts on the position: integrate twice."
+CORRELATION_SIGN = "Position and velocity are pushed the same way: their covariance is positive."
+SMALL_ALPHA = "That holds for small alpha only."
+DECIMAL_LOGARITHM = "A decimal logarithm stands in the place of the natural one."
 POWER_OF_T = "A power of T is missing: check the units."
 POWER_OF_DT = "A power of dt is missing: check the units."
 ORDER_OF_COMPONENTS = "The order of the components is another: the state is (x, y, vx, vy), both positions first."

@@ -113,7 +113,7 @@ WRONG_NODES: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "decimal-logarithm",
-        "A decimal logarithm stands in the place of the natural one.",
+        messages.DECIMAL_LOGARITHM,
         nodes_with(lambda sigma, error: np.pi * sigma * np.sqrt(2 / np.log10(2 / error))),
     ),
     (

@@ -114,7 +114,7 @@ WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "gain-not-divided",
-        "The gain is divided by the meter's noise alone; the prediction's error belongs to the innovation too.",
+        messages.GAIN_BY_NOISE_ALONE,
         step_with(gain=lambda p, Psi, H, R: np.linalg.solve(R, H @ Psi).T),
     ),
     ("noise-sign", messages.NOISE_SIGN, step_with(predicted=lambda p, A, Q: A @ p @ A.T - Q)),

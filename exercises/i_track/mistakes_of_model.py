@@ -111,7 +111,7 @@ WRONG_NOISES: tuple[tuple[str, str, Answer], ...] = (
     ("order-of-components", messages.ORDER_OF_COMPONENTS, lambda dt, sigma_a: interleaved(process_noise(dt, sigma_a))),
     (
         "correlation-sign",
-        "Position and velocity are pushed the same way: their covariance is positive.",
+        messages.CORRELATION_SIGN,
         noise_by(lambda dt: [dt**2 / 2, -dt]),
     ),
     (

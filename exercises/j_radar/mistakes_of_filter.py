@@ -30,7 +30,7 @@ WRONG_GAINS: tuple[tuple[str, str, Answer], ...] = (
         "That is Benedict and Bordner's relation, from another criterion; take the stationary Kalman filter's.",
         lambda alpha: (alpha**2 / (2 - alpha), alpha**2 / (2 - alpha) / np.sqrt(1 - alpha)),
     ),
-    ("small-alpha", "That holds for small alpha only.", lambda alpha: (alpha**2 / 2, alpha**2 / 2 / np.sqrt(1 - alpha))),
+    ("small-alpha", messages.SMALL_ALPHA, lambda alpha: (alpha**2 / 2, alpha**2 / 2 / np.sqrt(1 - alpha))),
     (
         "white-in-continuous-time",
         messages.WHITE_IN_CONTINUOUS_TIME,
@@ -61,7 +61,7 @@ WRONG_GAINS: tuple[tuple[str, str, Answer], ...] = (
         "The tracking index is upside down: the noise of the object stands above, that of the meter below.",
         lambda alpha: (steady_beta(alpha), 1 / tracking_index(alpha)),
     ),
-    ("small-alpha", "That holds for small alpha only.", lambda alpha: (alpha**2 / 4, alpha**2 / 4 / np.sqrt(1 - alpha))),
+    ("small-alpha", messages.SMALL_ALPHA, lambda alpha: (alpha**2 / 4, alpha**2 / 4 / np.sqrt(1 - alpha))),
     (
         "coefficient-of-root",
         "The coefficient of the root in beta is wrong.",

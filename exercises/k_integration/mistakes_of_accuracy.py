@@ -184,7 +184,7 @@ WRONG_IMPROVEMENTS: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "decimal-logarithm",
-        "A decimal logarithm stands in the place of the natural one.",
+        messages.DECIMAL_LOGARITHM,
         improvement_with(time=lambda K, T: -T * sp.log(10) / sp.log(1 + K)),
     ),
 )

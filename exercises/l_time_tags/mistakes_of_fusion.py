@@ -157,7 +157,7 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
     ("noise-forgotten", "The noise of the meter is missing in the gain.", _other_end(F=lambda H, P, R: H @ P @ H.T)),
     (
         "gain-by-noise-alone",
-        "The gain is divided by the meter's noise alone; the prediction's error belongs to the innovation too.",
+        messages.GAIN_BY_NOISE_ALONE,
         _other_end(F=lambda H, P, R: R),
     ),
 )
@@ -237,7 +237,7 @@ WRONG_MOVES: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "correlation-sign",
-        "Position and velocity are pushed the same way: their covariance is positive.",
+        messages.CORRELATION_SIGN,
         move_with(lambda dt: [[dt**3 / 3, -(dt**2) / 2], [-(dt**2) / 2, dt]]),
     ),
     (

@@ -3,6 +3,7 @@
 from functools import cache
 
 import numpy as np
+import pytest
 
 from kfcourse.checks import exercise
 
@@ -152,76 +153,78 @@ RIGHT = [
 ]
 
 WRONG = [
-    ("b1", "?", b1(lambda Psi, G, F: Psi @ T(G))),
-    ("b1", "?", b1(lambda Psi, G, F: Psi @ T(G) @ F)),
-    ("b1", "?", b1(lambda Psi, G, F: T(G) @ np.linalg.inv(F))),
-    ("b1", "?", b1(lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(np.sqrt(np.abs(F))))),
-    ("b1", "?", b1(lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(F + G @ Psi @ T(G)))),
-    ("b1", "?", b1(lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(F - G @ Psi @ T(G)))),
-    ("b1", "?", b1(lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(G @ Psi @ T(G)))),
-    ("b1", "?", b1(lambda Psi, G, F: -gain(Psi, G, F))),
-    ("b1", "?", b1(lambda Psi, G, F: np.linalg.inv(gain(Psi, G, F)))),
-    ("b1", "?", b1(lambda Psi, G, F: np.tile(gain(Psi, G, F).mean(axis=0), (len(Psi), 1, 1)))),
-    ("b1", "?", b1(lambda Psi, G, F: Psi @ np.linalg.inv(F))),
-    ("b2", "?", b2(innovation=lambda y, h, lam, G: y - lam)),
-    ("b2", "?", b2(innovation=lambda y, h, lam, G: y - times(G, lam))),
-    ("b2", "?", b2(innovation=lambda y, h, lam, G: y + h)),
-    ("b2", "?", b2(base=lambda lam, h: 0)),
-    ("b2", "?", b2(base=lambda lam, h: h)),
-    ("b2", "?", b2(cov=lambda Psi, K, G, F: np.eye(Psi.shape[-1]) - K @ G)),
-    ("b2", "?", b2(cov=lambda Psi, K, G, F: Psi - K @ F)),
-    ("b2", "?", b2(cov=lambda Psi, K, G, F: Psi - K @ Psi)),
-    ("b2", "?", b2(cov=lambda Psi, K, G, F: Psi - Psi @ T(G) @ G @ Psi)),
-    ("b2", "?", b2(cov=lambda Psi, K, G, F: Psi - K @ T(K))),
-    ("b2", "?", b2(cov=lambda Psi, K, G, F: (np.eye(Psi.shape[-1]) - K @ G) @ Psi @ T(np.eye(Psi.shape[-1]) - K @ G))),
-    ("b2", "?", b2(gain=lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(F + G @ Psi @ T(G)))),
-    ("b2", "?", b2(gain=lambda Psi, G, F: np.broadcast_to(np.eye(Psi.shape[-1]), Psi.shape))),
-    ("b2", "?", b2(cov=lambda Psi, K, G, F: np.sqrt(np.abs(Psi - K @ G @ Psi)))),
-    ("b2", "?", b2(cov=lambda Psi, K, G, F: K @ G @ Psi)),
-    ("b2", "?", b2(innovation=lambda y, h, lam, G: (y - h) ** 2)),
-    ("b3", "?", b3(measured=lambda measure, lam, Psi: measure(lam * 0, Psi))),
-    ("b3", "?", b3_corrected_twice),
-    ("b3", "?", b3_pairs_swapped),
-    ("b3", "?", b3_not_corrected),
-    ("b3", "?", b3_added),
-    ("b3", "?", b3_nothing_predicted),
-    ("b3", "?", b3(carried=lambda z, p, lam, Psi: (lam, p))),
-    ("b3", "?", b3(carried=lambda z, p, lam, Psi: (z, Psi + p))),
-    ("b3", "?", b3(correct=b2(innovation=lambda y, h, lam, G: h - y))),
-    ("b3", "?", b3(correct=b2(cov=lambda Psi, K, G, F: Psi))),
-    ("b3", "?", b3(correct=b2(cov=lambda Psi, K, G, F: Psi + K @ G @ Psi))),
-    ("b3", "?", b3(correct=b2(innovation=lambda y, h, lam, G: y - lam))),
-    ("b3", "?", lambda lam, Psi, y, measure, predict: b3()(lam, Psi, y, *OWN())),
-    ("b3", "?", lambda lam, Psi, y, measure, predict: b3()(lam, Psi, y, measure, OWN()[1])),
-    ("b3", "?", lambda lam, Psi, y, measure, predict: b3()(lam, Psi, y, OWN()[0], predict)),
-    ("b4", "?", lambda *arguments: b4(own=OWN())(*arguments)),
-    ("b4", "?", lambda y, mean, cov, measure, predict: b4()(y, mean, cov, OWN()[0], predict)),
-    ("b4", "?", b4(covariance=lambda Psi, p: p)),
-    ("b4", "?", b4(estimate=lambda lam: 0 * lam)),
-    ("b4", "?", b4(gone=lambda missing: missing | missing.any())),
-    ("b4", "?", b4(start=lambda mean, cov: (0 * mean, cov))),
-    ("b4", "?", b4(start=lambda mean, cov: (mean, np.eye(len(cov))))),
-    ("b4", "?", b4(start=lambda mean, cov: (mean, 0 * cov))),
-    ("b4", "?", b4(carried=lambda z, p, lam, Psi, predict: (z, p))),
-    ("b4", "?", b4(carried=lambda z, p, lam, Psi, predict: predict(lam, Psi))),
-    ("b4", "?", b4(carried=lambda z, p, lam, Psi, predict: predict(z, Psi))),
-    ("b4", "?", b4(carried=lambda z, p, lam, Psi, predict: (predict(z, p)[0], p))),
-    ("b4", "?", b4(correct=b2(cov=lambda Psi, K, G, F: Psi + K @ G @ Psi))),
-    ("b4", "?", b4(correct=b2(innovation=lambda y, h, lam, G: y - lam))),
-    ("b4", "?", b4_first_not_used),
-    ("b4", "?", b4_missing_not_predicted),
-    ("b4", "?", b4_last_measurement_kept),
-    ("b5", "?", b5(noise=lambda K, R, F: 0)),
-    ("b5", "?", b5(noise=lambda K, R, F: K @ F @ T(K))),
-    ("b5", "?", b5(noise=lambda K, R, F: -K @ R @ T(K))),
-    ("b5", "?", b5(noise=lambda K, R, F: K @ T(K))),
-    ("b5", "?", b5(rest=lambda Psi, K, G: (np.eye(Psi.shape[-1]) - K @ G) @ Psi)),
-    ("b5", "?", b5(rest=lambda Psi, K, G: (np.eye(Psi.shape[-1]) - K @ G) @ Psi, noise=lambda K, R, F: 0)),
-    ("b5", "?", b5(rest=lambda Psi, K, G: np.maximum(Psi - K @ G @ Psi, 0), noise=lambda K, R, F: 0)),
-    ("b5", "?", b5(rest=lambda Psi, K, G: np.abs(Psi - K @ G @ Psi), noise=lambda K, R, F: 0)),
-    ("b5", "?", b5(rest=lambda Psi, K, G: (np.eye(Psi.shape[-1]) + K @ G) @ Psi @ T(np.eye(Psi.shape[-1]) + K @ G))),
-    ("b5", "?", b5(rest=lambda Psi, K, G: Psi)),
-    ("b5", "?", b5(noise=lambda K, R, F: K @ R @ R @ T(K))),
+    ("b1", "gain-not-divided", b1(lambda Psi, G, F: Psi @ T(G))),
+    ("b1", "gain-multiplied", b1(lambda Psi, G, F: Psi @ T(G) @ F)),
+    ("b1", "gain-without-Psi", b1(lambda Psi, G, F: T(G) @ np.linalg.inv(F))),
+    ("b1", "gain-by-standard-deviation", b1(lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(np.sqrt(np.abs(F))))),
+    ("b1", "state-twice", b1(lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(F + G @ Psi @ T(G)))),
+    ("b1", "gain-of-noise", b1(lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(F - G @ Psi @ T(G)))),
+    ("b1", "unused", b1(lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(G @ Psi @ T(G)))),
+    ("b1", "sign", b1(lambda Psi, G, F: -gain(Psi, G, F))),
+    ("b1", "inverse", b1(lambda Psi, G, F: np.linalg.inv(gain(Psi, G, F)))),
+    ("b1", "one-for-all", b1(lambda Psi, G, F: np.tile(gain(Psi, G, F).mean(axis=0), (len(Psi), 1, 1)))),
+    ("b1", "gain-without-G", b1(lambda Psi, G, F: Psi @ np.linalg.inv(F))),
+    ("b2", "innovation-of-state", b2(innovation=lambda y, h, lam, G: y - lam)),
+    ("b2", "innovation-plus", b2(innovation=lambda y, h, lam, G: y + h)),
+    ("b2", "unused", b2(base=lambda lam, h: 0)),
+    ("b2", "unused", b2(base=lambda lam, h: h)),
+    ("b2", "share-only", b2(cov=lambda Psi, K, G, F: np.eye(Psi.shape[-1]) - K @ G)),
+    ("b2", "unused", b2(cov=lambda Psi, K, G, F: Psi - K @ F)),
+    ("b2", "covariance-of-gain", b2(cov=lambda Psi, K, G, F: Psi - K @ Psi)),
+    ("b2", "gain-not-divided", b2(cov=lambda Psi, K, G, F: Psi - Psi @ T(G) @ G @ Psi)),
+    ("b2", "negative-variance", b2(cov=lambda Psi, K, G, F: Psi - K @ T(K))),
+    (
+        "b2",
+        "noise-of-meter-missing",
+        b2(cov=lambda Psi, K, G, F: (np.eye(Psi.shape[-1]) - K @ G) @ Psi @ T(np.eye(Psi.shape[-1]) - K @ G)),
+    ),
+    ("b2", "state-twice", b2(gain=lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(F + G @ Psi @ T(G)))),
+    ("b2", "unused", b2(gain=lambda Psi, G, F: np.broadcast_to(np.eye(Psi.shape[-1]), Psi.shape))),
+    ("b2", "root", b2(cov=lambda Psi, K, G, F: np.sqrt(np.abs(Psi - K @ G @ Psi)))),
+    ("b2", "covariance-explained", b2(cov=lambda Psi, K, G, F: K @ G @ Psi)),
+    ("b3", "unused", b3(measured=lambda measure, lam, Psi: measure(lam * 0, Psi))),
+    ("b3", "superfluous", b3_corrected_twice),
+    ("b3", "swapped", b3_pairs_swapped),
+    ("b3", "unchanged covariance-kept beats-swapped predicted-from-prediction", b3_not_corrected),
+    ("b3", "covariances-added", b3_added),
+    ("b3", "mean-not-predicted covariance-not-predicted", b3_nothing_predicted),
+    ("b3", "beats-swapped predicted-from-prediction unused", b3(carried=lambda z, p, lam, Psi: (lam, p))),
+    ("b3", "covariances-added", b3(carried=lambda z, p, lam, Psi: (z, Psi + p))),
+    ("b3", "innovation-sign", b3(correct=b2(innovation=lambda y, h, lam, G: h - y))),
+    ("b3", "covariance-kept", b3(correct=b2(cov=lambda Psi, K, G, F: Psi))),
+    ("b3", "covariance-added", b3(correct=b2(cov=lambda Psi, K, G, F: Psi + K @ G @ Psi))),
+    ("b3", "innovation-of-state", b3(correct=b2(innovation=lambda y, h, lam, G: y - lam))),
+    ("b3", "unused", lambda lam, Psi, y, measure, predict: b3()(lam, Psi, y, *OWN())),
+    ("b3", "unused", lambda lam, Psi, y, measure, predict: b3()(lam, Psi, y, measure, OWN()[1])),
+    ("b3", "unused", lambda lam, Psi, y, measure, predict: b3()(lam, Psi, y, OWN()[0], predict)),
+    ("b4", "unused", lambda *arguments: b4(own=OWN())(*arguments)),
+    ("b4", "unused", lambda y, mean, cov, measure, predict: b4()(y, mean, cov, OWN()[0], predict)),
+    ("b4", "sometimes", b4(covariance=lambda Psi, p: p)),
+    ("b4", "sometimes", b4(estimate=lambda lam: 0 * lam)),
+    ("b4", "sometimes", b4(gone=lambda missing: missing | missing.any())),
+    ("b4", "unused", b4(start=lambda mean, cov: (0 * mean, cov))),
+    ("b4", "unused", b4(start=lambda mean, cov: (mean, np.eye(len(cov))))),
+    ("b4", "unused", b4(start=lambda mean, cov: (mean, 0 * cov))),
+    ("b4", "unused", b4(carried=lambda z, p, lam, Psi, predict: (z, p))),
+    ("b4", "from-second-step", b4(carried=lambda z, p, lam, Psi, predict: predict(lam, Psi))),
+    ("b4", "covariance-kept", b4(carried=lambda z, p, lam, Psi, predict: predict(z, Psi))),
+    ("b4", "from-second-step", b4(carried=lambda z, p, lam, Psi, predict: (predict(z, p)[0], p))),
+    ("b4", "from-second-step", b4(correct=b2(cov=lambda Psi, K, G, F: Psi + K @ G @ Psi))),
+    ("b4", "innovation-of-state", b4(correct=b2(innovation=lambda y, h, lam, G: y - lam))),
+    ("b4", "first-not-used", b4_first_not_used),
+    ("b4", "sometimes", b4_missing_not_predicted),
+    ("b4", "sometimes", b4_last_measurement_kept),
+    ("b5", "noise-of-meter-missing", b5(noise=lambda K, R, F: 0)),
+    ("b5", "whole-covariance", b5(noise=lambda K, R, F: K @ F @ T(K))),
+    ("b5", "superfluous", b5(noise=lambda K, R, F: -K @ R @ T(K))),
+    ("b5", "unused", b5(noise=lambda K, R, F: K @ T(K))),
+    ("b5", "superfluous", b5(rest=lambda Psi, K, G: (np.eye(Psi.shape[-1]) - K @ G) @ Psi)),
+    ("b5", "sometimes", b5(rest=lambda Psi, K, G: (np.eye(Psi.shape[-1]) - K @ G) @ Psi, noise=lambda K, R, F: 0)),
+    ("b5", "sometimes", b5(rest=lambda Psi, K, G: np.maximum(Psi - K @ G @ Psi, 0), noise=lambda K, R, F: 0)),
+    ("b5", "sometimes", b5(rest=lambda Psi, K, G: np.abs(Psi - K @ G @ Psi), noise=lambda K, R, F: 0)),
+    ("b5", "superfluous", b5(rest=lambda Psi, K, G: (np.eye(Psi.shape[-1]) + K @ G) @ Psi @ T(np.eye(Psi.shape[-1]) + K @ G))),
+    ("b5", "prior-part-kept", b5(rest=lambda Psi, K, G: Psi)),
+    ("b5", "noise-squared", b5(noise=lambda K, R, F: K @ R @ R @ T(K))),
 ]
 UNUSABLE = [
     ("b1", "expected an array of shape (6, 1, 1)", lambda Psi, G, F: gain(Psi, G, F)[..., 0]),
@@ -231,3 +234,24 @@ UNUSABLE = [
     ("b4", "got the shape (5, 6, 1)", lambda *arguments: b4()(*arguments)[1:]),
     ("b4", "NaN or infinity", b4(gone=lambda missing: missing & False, returned=lambda z, p, lam, y: z + 0 * y)),
 ]
+
+
+@pytest.mark.parametrize(("name", "answer"), RIGHT)
+def test_right_answers_pass(told, name, answer):
+    assert told(name, answer).passed
+
+
+@pytest.mark.parametrize(("name", "kinds", "answer"), WRONG)
+def test_no_wrong_kind_of_mistake_is_named(told, name, kinds, answer):
+    """`kinds`: all names that are true of the mistake; none where none is expected."""
+    result = told(name, answer)
+    assert result.status == "wrong"
+    assert set(result.diagnosis) <= set(kinds.split()), result
+    assert result.diagnosis or not kinds
+
+
+@pytest.mark.parametrize(("name", "words", "answer"), UNUSABLE)
+def test_what_cannot_be_compared_is_explained(told, name, words, answer):
+    result = told(name, answer)
+    assert result.status == "unusable"
+    assert words in result.message

@@ -3,6 +3,7 @@
 from functools import cache
 
 import numpy as np
+import pytest
 
 from kfcourse.checks import exercise
 
@@ -141,71 +142,91 @@ RIGHT = [
 ]
 
 WRONG = [
-    ("c1", "?", lambda lam, z, y, a, b: (y - lam, a(z))),
-    ("c1", "?", lambda lam, z, y, a, b: (y - b(z), a(z))),
-    ("c1", "?", lambda lam, z, y, a, b: (b(lam) - y, a(z))),
-    ("c1", "?", lambda lam, z, y, a, b: (y, a(z))),
-    ("c1", "?", lambda lam, z, y, a, b: (y - b(lam), a(lam))),
-    ("c1", "?", lambda lam, z, y, a, b: (y - b(lam), z)),
-    ("c1", "?", lambda lam, z, y, a, b: (a(z), y - b(lam))),
-    ("c1", "?", lambda lam, z, y, a, b: (y - OWN()[1](lam), OWN()[0](z))),
-    ("c1", "?", lambda lam, z, y, a, b: (y - b(a(z)), a(z))),
-    ("c1", "?", lambda lam, z, y, a, b: (y - b(lam), a(z) - lam)),
-    ("c1", "?", lambda lam, z, y, a, b: (y - a(lam), b(z))),
-    ("c2", "?", c2(cross=lambda a, b: cov(a, b, len(a) - 1))),
-    ("c2", "?", c2(own=lambda a, b: a.T @ b / len(a))),
-    ("c2", "?", c2(cross=lambda a, b: a.T @ b / len(a))),
-    ("c2", "?", c2(offset=lambda t, r, A: t.mean(axis=0) + A @ r.mean(axis=0))),
-    ("c2", "?", c2(offset=lambda t, r, A: 0 * t.mean(axis=0))),
-    ("c2", "?", c2(offset=lambda t, r, A: A @ r.mean(axis=0))),
-    ("c2", "?", c2(residual=lambda t, r, A, C, R: cov(t, t) + A @ C.T)),
-    ("c2", "?", c2(residual=lambda t, r, A, C, R: A @ C.T)),
-    ("c2", "?", c2(residual=lambda t, r, A, C, R: (t - r @ A.T).T @ (t - r @ A.T) / len(t))),
-    ("c2", "?", c2(residual=lambda t, r, A, C, R: np.diag(np.diag(cov(t, t) - A @ C.T)))),
-    ("c2", "?", c2(residual=lambda t, r, A, C, R: t.T @ t / len(t) - A @ C.T)),
-    ("c2", "?", c2(residual=lambda t, r, A, C, R: cov(t, t, len(t) - 1) - A @ C.T)),
-    ("c2", "?", c2(matrix=lambda C, R: C)),
-    ("c2", "?", c2(matrix=lambda C, R: C / np.where(np.diag(R) == 0, 1, np.diag(R)))),
-    ("c2", "?", c2(matrix=lambda C, R: np.linalg.pinv(C.T))),
-    ("c2", "?", c2(matrix=lambda C, R: C @ R)),
-    ("c2", "?", c2(matrix=lambda C, R: C @ np.linalg.pinv(np.sqrt(np.abs(R))))),
-    ("c3", "?", c3(omega=lambda y, b, lam: b(lam) - y, estimate=lambda lam, omega, H, e: lam - omega @ H.T + e)),
-    ("c3", "?", c3(omega=lambda y, b, lam: y - lam)),
-    ("c3", "?", c3(omega=lambda y, b, lam: y)),
-    ("c3", "?", c3(estimate=lambda lam, omega, H, e: lam + omega @ H.T)),
-    ("c3", "?", c3(estimate=lambda lam, omega, H, e: lam - omega @ H.T + e)),
-    ("c3", "?", c3(first=lambda x, lam: lam - x)),
-    ("c3", "?", c3(prediction=lambda alpha, F, g: alpha @ F.T)),
-    ("c3", "?", c3(prediction=lambda alpha, F, g: alpha)),
-    ("c3", "?", c3(alpha=lambda a, z, lam: z)),
-    ("c3", "?", c3(second=lambda x_next, lam, z, alpha: x_next - lam)),
-    ("c3", "?", c3(second=lambda x_next, lam, z, alpha: x_next - alpha)),
-    ("c3", "?", c3(second=lambda x_next, lam, z, alpha: x_next - alpha, prediction=lambda s, F, g: s - s @ F.T - g)),
-    ("c3", "?", c3(returned=lambda z, lam: (lam, z))),
-    ("c3", "?", lambda *arguments: c3(own=OWN())(*arguments)),
-    ("c3", "?", c3_from_the_other_regressor),
-    ("c3", "?", lambda lam, x, y, x_next, a, b: (c3()(lam, x, y, x_next, a, b)[0], a(c3()(lam, x, y, x_next, a, b)[0]))),
-    ("c4", "?", c4(omega=lambda y, b, lam: y - lam)),
-    ("c4", "?", c4(omega=lambda y, b, lam: b(lam) - y)),
-    ("c4", "?", c4(omega=lambda y, b, lam: y)),
-    ("c4", "?", c4(use=lambda other, omega, H, e: omega @ H.T + e)),
-    ("c4", "?", c4(ahead=lambda a, z, F, g: a(z))),
-    ("c4", "?", c4(ahead=lambda a, z, F, g: a(z) @ F.T)),
-    ("c4", "?", c4(ahead=lambda a, z, F, g: z @ F.T + g)),
-    ("c4", "?", lambda *arguments: c4(own=OWN())(*arguments)),
-    ("c4", "?", c4(start=lambda mean: 0 * mean)),
-    ("c4", "?", c4(carried=lambda z, lam: lam)),
-    ("c4", "?", c4(first=lambda x, lam: x)),
-    ("c4", "?", c4(first=lambda x, lam: x, use=lambda other, omega, H, e: omega @ H.T + e)),
-    ("c4", "?", c4_not_predicted_by_fit),
-    ("c4", "?", c4_predicted_first),
-    ("c4", "?", c4(ahead=lambda a, z, F, g: a(z) @ F.T + g - g)),
+    ("c1", "omega-of-state", lambda lam, z, y, a, b: (y - lam, a(z))),
+    ("c1", "omega-from-estimate", lambda lam, z, y, a, b: (y - b(z), a(z))),
+    ("c1", "omega-sign", lambda lam, z, y, a, b: (b(lam) - y, a(z))),
+    ("c1", "omega-is-y", lambda lam, z, y, a, b: (y, a(z))),
+    ("c1", "alpha-from-prediction", lambda lam, z, y, a, b: (y - b(lam), a(lam))),
+    ("c1", "alpha-is-z", lambda lam, z, y, a, b: (y - b(lam), z)),
+    ("c1", "swapped", lambda lam, z, y, a, b: (a(z), y - b(lam))),
+    ("c1", "omega-of-state unused", lambda lam, z, y, a, b: (y - OWN()[1](lam), OWN()[0](z))),
+    ("c1", "unused", lambda lam, z, y, a, b: (y - b(a(z)), a(z))),
+    ("c1", "superfluous", lambda lam, z, y, a, b: (y - b(lam), a(z) - lam)),
+    ("c1", "equations-swapped", lambda lam, z, y, a, b: (y - a(lam), b(z))),
+    ("c2", "biased", c2(cross=lambda a, b: cov(a, b, len(a) - 1))),
+    ("c2", "sometimes", c2(own=lambda a, b: a.T @ b / len(a))),
+    ("c2", "factor negative-variance", c2(cross=lambda a, b: a.T @ b / len(a))),
+    ("c2", "offset-sign", c2(offset=lambda t, r, A: t.mean(axis=0) + A @ r.mean(axis=0))),
+    ("c2", "unused", c2(offset=lambda t, r, A: 0 * t.mean(axis=0))),
+    ("c2", "target-mean-forgotten", c2(offset=lambda t, r, A: A @ r.mean(axis=0))),
+    ("c2", "explained-added", c2(residual=lambda t, r, A, C, R: cov(t, t) + A @ C.T)),
+    ("c2", "explained-only", c2(residual=lambda t, r, A, C, R: A @ C.T)),
+    ("c2", "offset-not-removed", c2(residual=lambda t, r, A, C, R: (t - r @ A.T).T @ (t - r @ A.T) / len(t))),
+    ("c2", "about-zero", c2(residual=lambda t, r, A, C, R: t.T @ t / len(t) - A @ C.T)),
+    ("c2", "unbiased-residual", c2(residual=lambda t, r, A, C, R: cov(t, t, len(t) - 1) - A @ C.T)),
+    ("c2", "not-divided", c2(matrix=lambda C, R: C)),
+    ("c2", "factor unused", c2(matrix=lambda C, R: np.linalg.pinv(C.T))),
+    ("c2", "factor", c2(matrix=lambda C, R: C @ R)),
+    ("c2", "factor", c2(matrix=lambda C, R: C @ np.linalg.pinv(np.sqrt(np.abs(R))))),
+    (
+        "c3",
+        "correction-subtracted",
+        c3(omega=lambda y, b, lam: b(lam) - y, estimate=lambda lam, omega, H, e: lam - omega @ H.T + e),
+    ),
+    ("c3", "unused", c3(omega=lambda y, b, lam: y - lam)),
+    ("c3", "unused", c3(omega=lambda y, b, lam: y)),
+    ("c3", "term", c3(estimate=lambda lam, omega, H, e: lam + omega @ H.T)),
+    ("c3", "correction-subtracted", c3(estimate=lambda lam, omega, H, e: lam - omega @ H.T + e)),
+    ("c3", "error-sign", c3(first=lambda x, lam: lam - x)),
+    ("c3", "term", c3(prediction=lambda alpha, F, g: alpha @ F.T)),
+    ("c3", "unused", c3(prediction=lambda alpha, F, g: alpha)),
+    ("c3", "prediction-of-error", c3(second=lambda x_next, lam, z, alpha: x_next - lam)),
+    ("c3", "superfluous", c3(second=lambda x_next, lam, z, alpha: x_next - alpha)),
+    ("c3", "superfluous", c3(second=lambda x_next, lam, z, alpha: x_next - alpha, prediction=lambda s, F, g: s - s @ F.T - g)),
+    ("c3", "swapped", c3(returned=lambda z, lam: (lam, z))),
+    ("c3", "unused", lambda *arguments: c3(own=OWN())(*arguments)),
+    ("c3", "unused", c3_from_the_other_regressor),
+    ("c3", "unused", lambda lam, x, y, x_next, a, b: (c3()(lam, x, y, x_next, a, b)[0], a(c3()(lam, x, y, x_next, a, b)[0]))),
+    ("c4", "from-second-step", c4(omega=lambda y, b, lam: y - lam)),
+    ("c4", "innovation-sign", c4(omega=lambda y, b, lam: b(lam) - y)),
+    ("c4", "from-second-step", c4(omega=lambda y, b, lam: y)),
+    ("c4", "from-second-step", c4(use=lambda other, omega, H, e: omega @ H.T + e)),
+    ("c4", "prediction-not-fitted", c4(ahead=lambda a, z, F, g: a(z))),
+    ("c4", "from-second-step", c4(ahead=lambda a, z, F, g: a(z) @ F.T)),
+    ("c4", "superfluous", c4(ahead=lambda a, z, F, g: z @ F.T + g)),
+    ("c4", "unused", lambda *arguments: c4(own=OWN())(*arguments)),
+    ("c4", "unused", c4(carried=lambda z, lam: lam)),
+    ("c4", "from-second-step", c4(first=lambda x, lam: x)),
+    ("c4", "from-second-step", c4(first=lambda x, lam: x, use=lambda other, omega, H, e: omega @ H.T + e)),
+    ("c4", "superfluous", c4_not_predicted_by_fit),
+    ("c4", "from-second-step", c4(ahead=lambda a, z, F, g: a(z) @ F.T + g - g)),
 ]
 UNUSABLE = [
     ("c1", "expected 2 results", lambda lam, z, y, a, b: y - b(lam)),
     ("c2", "got the shape", c2(residual=lambda t, r, A, C, R: np.trace(cov(t, t) - A @ C.T))),
     ("c2", "expected 3 results", lambda t, r: c2()(t, r)[:2]),
-    ("c2", "", c2(matrix=lambda C, R: C @ np.linalg.inv(R))),
+    ("c2", "Singular matrix", c2(matrix=lambda C, R: C @ np.linalg.inv(R))),
     ("c4", "expected an array of shape", c4(returned=lambda designed, used: designed)),
     ("c4", "expected an array of shape", c4(returned=lambda designed, used: used[-1])),
 ]
+
+
+@pytest.mark.parametrize(("name", "answer"), RIGHT)
+def test_right_answers_pass(told, name, answer):
+    assert told(name, answer).passed
+
+
+@pytest.mark.parametrize(("name", "kinds", "answer"), WRONG)
+def test_no_wrong_kind_of_mistake_is_named(told, name, kinds, answer):
+    """`kinds`: all names that are true of the mistake; none where none is expected."""
+    result = told(name, answer)
+    assert result.status == "wrong"
+    assert set(result.diagnosis) <= set(kinds.split()), result
+    assert result.diagnosis or not kinds
+
+
+@pytest.mark.parametrize(("name", "words", "answer"), UNUSABLE)
+def test_what_cannot_be_compared_is_explained(told, name, words, answer):
+    result = told(name, answer)
+    assert result.status == "unusable"
+    assert words in result.message

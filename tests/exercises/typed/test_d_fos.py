@@ -3,6 +3,7 @@
 from functools import cache
 
 import numpy as np
+import pytest
 
 from kfcourse.checks import exercise
 
@@ -115,61 +116,64 @@ RIGHT = [
 ]
 
 WRONG = [
-    ("d1", "?", d1(u=lambda x, z, Gamma, chi: z)),
-    ("d1", "?", d1(u=lambda x, z, Gamma, chi: z @ Gamma.T)),
-    ("d1", "?", d1(u=lambda x, z, Gamma, chi: z + chi)),
-    ("d1", "?", d1(u=lambda x, z, Gamma, chi: z @ Gamma.T - chi)),
-    ("d1", "?", d1(u=lambda x, z, Gamma, chi: np.broadcast_to(x.mean(axis=0), x.shape))),
-    ("d1", "?", d1(left=lambda x, z, Gamma, rest: cov(x, x))),
-    ("d1", "?", d1(left=lambda x, z, Gamma, rest: cov(x - z, x - z))),
-    ("d1", "?", d1(left=lambda x, z, Gamma, rest: (x - z).T @ (x - z) / len(x))),
-    ("d1", "?", d1(left=lambda x, z, Gamma, rest: cov(x, x) - Gamma @ cov(z, z))),
-    ("d1", "?", d1(left=lambda x, z, Gamma, rest: cov(x, x) - cov(z, z))),
-    ("d1", "?", d1(left=lambda x, z, Gamma, rest: rest * len(x) / (len(x) - 1))),
-    ("d1", "?", d1(left=lambda x, z, Gamma, rest: cov(x, x) + Gamma @ cov(x, z).T)),
-    ("d1", "?", d1(left=lambda x, z, Gamma, rest: np.sqrt(np.abs(rest)))),
-    ("d1", "?", lambda x, z: condition(z, x)),
-    ("d2", "?", d2(what=lambda x, lam, z, y: (x, lam))),
-    ("d2", "?", d2(what=lambda x, lam, z, y: (x, y))),
-    ("d2", "?", d2(law=lambda u, left, lam, Psi, z, p: (u, Psi))),
-    ("d2", "?", d2(law=lambda u, left, lam, Psi, z, p: (lam, left))),
-    ("d2", "?", d2(law=lambda u, left, lam, Psi, z, p: (lam, Psi))),
-    ("d2", "?", d2(returned=lambda z, lam, Psi, u: (u, lam, Psi))),
-    ("d2", "?", d2(returned=lambda z, lam, Psi, u: (lam, z, Psi))),
-    ("d2", "?", d2(correct=lambda lam, Psi, y, measure: correct(lam, Psi, y, measure, -1))),
-    ("d2", "?", lambda *arguments: d2(own=OWN())(*arguments)),
-    ("d2", "?", lambda lam, Psi, x, y, measure, predict: d2(own=(measure, OWN()[1]))(lam, Psi, x, y, measure, predict)),
-    ("d2", "?", d2(condition=d1(left=lambda x, z, Gamma, rest: cov(x - z, x - z)))),
-    ("d2", "?", d2(condition=d1(left=lambda x, z, Gamma, rest: rest * len(x) / (len(x) - 1)))),
-    ("d2", "?", d2(law=lambda u, left, lam, Psi, z, p: (u, p + left))),
-    ("d2", "?", d2(condition=d1(u=lambda x, z, Gamma, chi: z + chi))),
-    ("d2", "?", d2(correct=lambda lam, Psi, y, measure: (lam, Psi))),
-    ("d3", "?", d3(of=lambda z, raw: raw)),
-    ("d3", "?", d3(returned=lambda z, raw, lam, Psi, u: (raw, lam, Psi))),
-    ("d3", "?", d3(returned=lambda z, raw, lam, Psi, u: (u, lam, Psi))),
-    ("d3", "?", d3(fitted=lambda lam, sigma, H, e: lam + sigma @ H.T)),
-    ("d3", "?", d3(fitted=lambda lam, sigma, H, e: sigma @ H.T + e)),
-    ("d3", "?", d3(fitted=lambda lam, sigma, H, e: lam + sigma + e)),
-    ("d3", "?", d3(predicted=lambda s, F, g: s @ F.T)),
-    ("d3", "?", d3(predicted=lambda s, F, g: s + g)),
-    ("d3", "?", d3(second=lambda x_next, s, u: (x_next - s, s))),
-    ("d3", "?", d3(second=lambda x_next, s, u: (x_next - s, s), predicted=lambda s, F, g: s + s @ F.T + g)),
-    ("d3", "?", d3(law=lambda u, left, z, p, Psi: (z, left))),
-    ("d3", "?", d3(law=lambda u, left, z, p, Psi: (z, p))),
-    ("d3", "?", d3(law=lambda u, left, z, p, Psi: (u, Psi))),
-    ("d3", "?", d3(first=lambda x, lam, sigma: (x - lam, sigma + lam))),
-    ("d3", "?", d3(first=lambda x, lam, sigma: (x, sigma + lam), fitted=lambda lam, sigma, H, e: (lam + sigma) @ H.T + e)),
-    ("d3", "?", lambda *arguments: d3(own=OWN())(*arguments)),
-    ("d3", "?", d3(returned=lambda z, raw, lam, Psi, u: (lam, z, Psi))),
-    ("d4", "?", lambda x, y, z: condition(x, z)),
-    ("d4", "?", lambda x, y, z: condition(x, y)),
-    ("d4", "?", d4(u=lambda both, Gamma, chi: both @ Gamma.T)),
-    ("d4", "?", d4(left=lambda x, y, z, rest: condition(x, z)[1])),
-    ("d4", "?", d4(left=lambda x, y, z, rest: cov(x, x))),
-    ("d4", "?", d4(left=lambda x, y, z, rest: rest * len(x) / (len(x) - 1))),
-    ("d4", "?", d4_one_after_the_other),
-    ("d4", "?", lambda x, y, z: (condition(x, y)[0] + condition(x, z)[0], condition(x, z)[1])),
-    ("d4", "?", lambda x, y, z: d4()(x, y - z, z * 0)),
+    ("d1", "estimate-itself", d1(u=lambda x, z, Gamma, chi: z)),
+    ("d1", "term", d1(u=lambda x, z, Gamma, chi: z @ Gamma.T)),
+    ("d1", "scale-forgotten", d1(u=lambda x, z, Gamma, chi: z + chi)),
+    ("d1", "term", d1(u=lambda x, z, Gamma, chi: z @ Gamma.T - chi)),
+    ("d1", "unused", d1(u=lambda x, z, Gamma, chi: np.broadcast_to(x.mean(axis=0), x.shape))),
+    ("d1", "residual-is-variance", d1(left=lambda x, z, Gamma, rest: cov(x, x))),
+    ("d1", "error-for-residual", d1(left=lambda x, z, Gamma, rest: cov(x - z, x - z))),
+    ("d1", "error-for-residual", d1(left=lambda x, z, Gamma, rest: (x - z).T @ (x - z) / len(x))),
+    ("d1", "negative-variance", d1(left=lambda x, z, Gamma, rest: cov(x, x) - Gamma @ cov(z, z))),
+    ("d1", "negative-variance", d1(left=lambda x, z, Gamma, rest: cov(x, x) - cov(z, z))),
+    ("d1", "unbiased-residual", d1(left=lambda x, z, Gamma, rest: rest * len(x) / (len(x) - 1))),
+    ("d1", "explained-added", d1(left=lambda x, z, Gamma, rest: cov(x, x) + Gamma @ cov(x, z).T)),
+    ("d1", "deviation-for-variance", d1(left=lambda x, z, Gamma, rest: np.sqrt(np.abs(rest)))),
+    ("d1", "regressed-the-other-way", lambda x, z: condition(z, x)),
+    ("d2", "unused", d2(what=lambda x, lam, z, y: (x, lam))),
+    ("d2", "unused", d2(what=lambda x, lam, z, y: (x, y))),
+    ("d2", "variance-from-prediction", d2(law=lambda u, left, lam, Psi, z, p: (u, Psi))),
+    ("d2", "unused", d2(law=lambda u, left, lam, Psi, z, p: (lam, left))),
+    ("d2", "unused", d2(law=lambda u, left, lam, Psi, z, p: (lam, Psi))),
+    ("d2", "superfluous", d2(returned=lambda z, lam, Psi, u: (u, lam, Psi))),
+    ("d2", "swapped", d2(returned=lambda z, lam, Psi, u: (lam, z, Psi))),
+    ("d2", "innovation-sign", d2(correct=lambda lam, Psi, y, measure: correct(lam, Psi, y, measure, -1))),
+    ("d2", "unused", lambda *arguments: d2(own=OWN())(*arguments)),
+    ("d2", "unused", lambda lam, Psi, x, y, measure, predict: d2(own=(measure, OWN()[1]))(lam, Psi, x, y, measure, predict)),
+    ("d2", "error-for-residual", d2(condition=d1(left=lambda x, z, Gamma, rest: cov(x - z, x - z)))),
+    ("d2", "unbiased-residual", d2(condition=d1(left=lambda x, z, Gamma, rest: rest * len(x) / (len(x) - 1)))),
+    ("d2", "covariances-added", d2(law=lambda u, left, lam, Psi, z, p: (u, p + left))),
+    ("d2", "scale-forgotten", d2(condition=d1(u=lambda x, z, Gamma, chi: z + chi))),
+    ("d2", "unchanged unused", d2(correct=lambda lam, Psi, y, measure: (lam, Psi))),
+    ("d3", "correction-not-fitted", d3(of=lambda z, raw: raw)),
+    ("d3", "correction-not-fitted", d3(returned=lambda z, raw, lam, Psi, u: (raw, lam, Psi))),
+    ("d3", "estimate-conditioned", d3(returned=lambda z, raw, lam, Psi, u: (u, lam, Psi))),
+    ("d3", "term", d3(fitted=lambda lam, sigma, H, e: lam + sigma @ H.T)),
+    ("d3", "unused", d3(fitted=lambda lam, sigma, H, e: sigma @ H.T + e)),
+    ("d3", "correction-not-fitted", d3(fitted=lambda lam, sigma, H, e: lam + sigma + e)),
+    ("d3", "term", d3(predicted=lambda s, F, g: s @ F.T)),
+    ("d3", "superfluous", d3(predicted=lambda s, F, g: s + g)),
+    ("d3", "superfluous", d3(second=lambda x_next, s, u: (x_next - s, s))),
+    ("d3", "estimate-itself mean-from-estimate", d3(law=lambda u, left, z, p, Psi: (z, left))),
+    ("d3", "predicted-as-aof", d3(law=lambda u, left, z, p, Psi: (z, p))),
+    ("d3", "variance-from-prediction", d3(law=lambda u, left, z, p, Psi: (u, Psi))),
+    ("d3", "state-for-correction", d3(first=lambda x, lam, sigma: (x - lam, sigma + lam))),
+    (
+        "d3",
+        "correction-not-fitted",
+        d3(first=lambda x, lam, sigma: (x, sigma + lam), fitted=lambda lam, sigma, H, e: (lam + sigma) @ H.T + e),
+    ),
+    ("d3", "unused", lambda *arguments: d3(own=OWN())(*arguments)),
+    ("d3", "swapped", d3(returned=lambda z, raw, lam, Psi, u: (lam, z, Psi))),
+    ("d4", "measurement-unused", lambda x, y, z: condition(x, z)),
+    ("d4", "estimate-unused", lambda x, y, z: condition(x, y)),
+    ("d4", "term", d4(u=lambda both, Gamma, chi: both @ Gamma.T)),
+    ("d4", "residual-of-one", d4(left=lambda x, y, z, rest: condition(x, z)[1])),
+    ("d4", "unused", d4(left=lambda x, y, z, rest: cov(x, x))),
+    ("d4", "unbiased-residual", d4(left=lambda x, y, z, rest: rest * len(x) / (len(x) - 1))),
+    ("d4", "one-after-the-other", d4_one_after_the_other),
+    ("d4", "measurement-unused residual-of-one", lambda x, y, z: (condition(x, y)[0] + condition(x, z)[0], condition(x, z)[1])),
+    ("d4", "", lambda x, y, z: d4()(x, y - z, z * 0)),
 ]
 UNUSABLE = [
     ("d1", "result 2 of 2", d1(left=lambda x, z, Gamma, rest: np.tile(rest, (len(x), 1, 1)))),
@@ -177,3 +181,24 @@ UNUSABLE = [
     ("d3", "expected 3 results", lambda *arguments: d3()(*arguments)[:2]),
     ("d4", "result 1 of 2", d4(both=lambda y, z: np.column_stack([y, z]).ravel()[:, None])),
 ]
+
+
+@pytest.mark.parametrize(("name", "answer"), RIGHT)
+def test_right_answers_pass(told, name, answer):
+    assert told(name, answer).passed
+
+
+@pytest.mark.parametrize(("name", "kinds", "answer"), WRONG)
+def test_no_wrong_kind_of_mistake_is_named(told, name, kinds, answer):
+    """`kinds`: all names that are true of the mistake; none where none is expected."""
+    result = told(name, answer)
+    assert result.status == "wrong"
+    assert set(result.diagnosis) <= set(kinds.split()), result
+    assert result.diagnosis or not kinds
+
+
+@pytest.mark.parametrize(("name", "words", "answer"), UNUSABLE)
+def test_what_cannot_be_compared_is_explained(told, name, words, answer):
+    result = told(name, answer)
+    assert result.status == "unusable"
+    assert words in result.message
