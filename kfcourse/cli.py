@@ -134,9 +134,16 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
 @click.option(
     "--exact-runs",
     type=click.IntRange(min=0),
-    default=300,
+    default=10_000,
     show_default=True,
-    help="Trajectories for the slow filters; 0 leaves them out.",
+    help="Trajectories for the slow filters, if the time allows; 0 leaves them out.",
+)
+@click.option(
+    "--exact-seconds",
+    type=click.FloatRange(min=0, min_open=True),
+    default=30.0,
+    show_default=True,
+    help="Time for the slow filters: what fits is computed, and the report says on how many trajectories.",
 )
 @click.option("--same-ensemble", is_flag=True, help="Design DUOF, FOS and MFOS on the trajectories they are compared on.")
 @click.option("--threads", type=click.IntRange(min=1), default=2, show_default=True, help="Does not change the numbers.")
@@ -150,6 +157,7 @@ def lab(
     seed: int,
     names: str | None,
     exact_runs: int,
+    exact_seconds: float,
     same_ensemble: bool,
     threads: int,
     out: Path | None,
@@ -168,13 +176,27 @@ def lab(
     folder = out or Path("lab-" + re.sub(r"[^\w.-]+", "-", chosen.name))  # no folder but this one
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
-    result = compare(filters, model, runs, steps, seed, subset_runs=exact_runs, same_ensemble=same_ensemble, threads=threads)
+    result = compare(
+        filters,
+        model,
+        runs,
+        steps,
+        seed,
+        subset_runs=exact_runs,
+        subset_seconds=exact_seconds,
+        same_ensemble=same_ensemble,
+        threads=threads,
+    )
+    for name, reason in result.left_out.items():
+        click.echo(f"{title(name)} left out: {reason}", err=True)
     if json_file:
         write_json(chosen, result, json_file)
     write_report(chosen, result, folder)
     click.echo("filter       score   (mean over steps of D_k relative to " + title(result.control) + ")")
     for name, score in result.ranking():
         click.echo(f"{title(name):<10} {float(score.value):8.5f} ± {float(score.standard_error):.5f}")
+    if result.subset_runs:
+        click.echo(f"Slow filters: on {result.subset_runs} of {result.runs} trajectories")
     for sentence in conclusions(result):
         click.echo(sentence)
     click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""))

@@ -128,6 +128,7 @@ def test_the_lab_of_variant_53(call, tmp_path):
         assert (tmp_path / "report" / image).is_file()
     assert (tmp_path / "report" / "report.tex").is_file()
     assert str(Path("report") / "report.html") in result.output
+    assert "on 20 of 4000 trajectories" in result.output
 
 
 def test_a_real_process_does_it_too(tmp_path):
@@ -154,6 +155,19 @@ def test_without_exact_runs_the_exact_filter_is_left_out(call, tmp_path):
     assert data["exact_runs"] == 0
     assert call("lab", "53", *QUICK, "--filters", "duof,aof-exact,particle", "--json", "n.json").exit_code == 0
     assert set(json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]) == {"duof"}
+
+
+def test_an_exact_filter_without_time_is_left_out_and_the_others_reported(call, tmp_path):
+    options = ("--runs", "400", "--steps", "4", "--exact-runs", "400", "--exact-seconds", "0.001")
+    result = call("lab", "53", *options, "--json", "n.json")
+    assert result.exit_code == 0, result.output
+    reason = "8 trajectories take more than 0.001 s"
+    assert f"exact AOF left out: {reason}" in result.output
+    data = json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))
+    assert set(data["error_variance"]) == set(LAB)
+    assert data["exact_runs"] == 0
+    assert data["left_out"] == {"aof-exact": reason}
+    assert f"exact AOF left out: {reason}" in (tmp_path / "lab-53" / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.quick
@@ -266,7 +280,15 @@ def test_a_bad_json_is_refused_before_the_computation(call, no_computation, path
 @pytest.mark.quick
 @pytest.mark.parametrize(
     "option",
-    [("--runs", "1"), ("--runs", "many"), ("--steps", "0"), ("--seed", "-1"), ("--threads", "0"), ("--exact-runs", "-1")],
+    [
+        ("--runs", "1"),
+        ("--runs", "many"),
+        ("--steps", "0"),
+        ("--seed", "-1"),
+        ("--threads", "0"),
+        ("--exact-runs", "-1"),
+        ("--exact-seconds", "0"),
+    ],
 )
 def test_impossible_numbers_are_refused(call, no_computation, option):
     result = call("lab", "53", *option)

@@ -107,6 +107,7 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
         "steps": result.steps,
         "seed": result.seed,
         "exact_runs": result.subset_runs,
+        "left_out": dict(result.left_out),
         "error_variance": {name: e.value.tolist() for name, e in estimates.items()},
         "standard_error": {name: e.standard_error.tolist() for name, e in estimates.items()},
         "error_mean": {name: result.error_mean(name).value.tolist() for name in result.available},
@@ -140,6 +141,7 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
     return {
         "variant": variant,
         "result": result,
+        "left_out": [(title(name), reason) for name, reason in result.left_out.items()],
         "model": Section.of("Model", result.model.latex()),
         "structures": _structure_sections(result.model, names),
         "equations": _equation_sections(names),

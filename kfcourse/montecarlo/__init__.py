@@ -3,6 +3,7 @@
 ensemble     the trajectories that a seed stands for, drawn in blocks
 designing    coefficients of DUOF, FOS, MFOS: regressions over an ensemble
 experiment   `run`, `predictions`, `compare`: splits the seed into designing and comparing, runs all filters together
+subset       the slow filters, on as many of the trajectories as a budget allows
 statistics   means over batches of trajectories, standard errors
 comparison   `Comparison`: error variances, paired differences, ranking, distance from the exact filter
 """

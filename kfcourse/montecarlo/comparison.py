@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +38,8 @@ class Comparison:
     fast : tuple of str
         Those that ran on every trajectory; the others ran on a subset of them.
     runs, steps, seed : int
+    left_out : dict
+        Slow filters without results although they were wanted: name to the reason.
     """
 
     model: Model
@@ -47,10 +50,11 @@ class Comparison:
     seed: int
     sums: Sums
     subset: Subset | None
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def available(self) -> tuple[str, ...]:
-        """Names with results: all, or without the slow ones if their subset was 0."""
+        """Names with results: all, or without the slow ones if their subset was 0 or they were left out."""
         return tuple(name for name in self.names if name in self.fast or self._is_slow(name))
 
     @property

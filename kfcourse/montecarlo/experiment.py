@@ -8,24 +8,22 @@ batches of trajectories, never the trajectories themselves.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from itertools import accumulate
 from typing import TypeVar
 
 import numpy as np
-from tqdm import tqdm
 
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
 from kfcourse.laws import Array, Gaussian, stacked
-from kfcourse.montecarlo.comparison import EXACT, Comparison, Subset
-from kfcourse.montecarlo.designing import NotFinite, design
-from kfcourse.montecarlo.ensemble import Ensemble, Instant, workers
+from kfcourse.montecarlo.comparison import Comparison
+from kfcourse.montecarlo.designing import design
+from kfcourse.montecarlo.ensemble import Ensemble, workers
 from kfcourse.montecarlo.statistics import BATCHES, Sums
+from kfcourse.montecarlo.subset import progress_bar, run_block, run_subset
 from kfcourse.symbolic.model import Model
-
-SUBSET_CHUNK = 32  # trajectories a slow filter takes at once
 
 T = TypeVar("T")
 
@@ -74,6 +72,7 @@ def compare(
     design_runs: int | None = None,
     same_ensemble: bool = False,
     subset_runs: int = 500,
+    subset_seconds: float | None = None,
     threads: int = 2,
     progress: bool | None = None,
 ) -> Comparison:
@@ -96,6 +95,10 @@ def compare(
     subset_runs : int
         Slow filters (exact, particle) run on this many of the common trajectories; their error variance
         is found through the paired difference from the Gaussian AOF (or else the first fast filter).  0 leaves them out.
+    subset_seconds : float, optional
+        The slow filters stop after so long, on fewer trajectories; `Comparison.subset_runs` tells on how many.  With
+        the same seed, as many trajectories give the same numbers.  A slow filter that fails, or that does not come through
+        the first few in this time, is left out, and `Comparison.left_out` tells why.
     threads : int
         Threads that share the blocks of trajectories.
     progress : bool, optional
@@ -108,7 +111,7 @@ def compare(
     NotFinite
         A trajectory or a filter left the finite numbers.
     """
-    _check_arguments(filters, model, seed, subset_runs)
+    _check_arguments(filters, model, seed, subset_runs, subset_seconds)
     names = [one.name for one in filters]
     slow = [one for one in filters if one.slow and subset_runs]
     fast = [one for one in filters if not one.slow]
@@ -120,15 +123,16 @@ def compare(
     with workers(threads) as pool:
         ready = _designed(fast, design_ensemble, pool, progress)
         sums = _run_blocks(ready, common, pool, progress)
-        subset = None
+        subset, left_out = None, dict[str, str]()
         if slow:
-            ready += _designed(slow, design_ensemble, pool, progress)
-            size = min(subset_runs, runs)
-            subset = Subset([one.name for one in slow], _run_subset(ready, common, size, progress))
-    return Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset)
+            slow_ready = _designed(slow, design_ensemble, pool, progress)
+            subset, left_out = run_subset(ready, slow_ready, common, min(subset_runs, runs), subset_seconds, progress)
+    return Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset, left_out)
 
 
-def _check_arguments(filters: Sequence[Filter | Design], model: Model, seed: int, subset_runs: int) -> None:
+def _check_arguments(
+    filters: Sequence[Filter | Design], model: Model, seed: int, subset_runs: int, subset_seconds: float | None
+) -> None:
     """ValueError for what `compare` cannot do with these arguments."""
     names = [one.name for one in filters]
     if len(set(names)) < len(names) or not names:
@@ -137,6 +141,8 @@ def _check_arguments(filters: Sequence[Filter | Design], model: Model, seed: int
         raise ValueError(f"{names[0]} is found through its difference from a fast filter; add one, such as aof-gaussian")
     if subset_runs < 0:
         raise ValueError(f"subset_runs must not be negative, got {subset_runs}")
+    if subset_seconds is not None and not subset_seconds > 0:
+        raise ValueError(f"subset_seconds must be positive, got {subset_seconds}; subset_runs=0 leaves the slow filters out")
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise ValueError(f"the seed must be a non-negative whole number, got {seed!r}")
     for one in filters:
@@ -152,7 +158,7 @@ def _designed(filters: Sequence[Filter | Design], ensemble: Ensemble, pool: Exec
     designs = [one for one in filters if isinstance(one, Design)]
     fitted: dict[str, Filter] = {}
     if designs:
-        steps = _progress(ensemble.by_step(pool), "designing", ensemble.steps, "step", progress)
+        steps = progress_bar(ensemble.by_step(pool), "designing", ensemble.steps, "step", progress)
         fitted = {one.name: one for one in design(designs, steps, pool)}
     return [fitted[one.name] if isinstance(one, Design) else one for one in filters]
 
@@ -163,76 +169,8 @@ def _run_blocks(filters: Sequence[Filter], ensemble: Ensemble, pool: Executor, p
     def block(index: int) -> Sums:
         size = ensemble.sizes[index]
         sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, size, max(1, round(BATCHES * size / ensemble.runs)))
-        _run_block(filters, ensemble.block(index), sums)
+        run_block(filters, ensemble.block(index), sums)
         return sums
 
     indices = range(len(ensemble.sizes))
-    return Sums.concatenate(list(_progress(pool.map(block, indices), "comparing", len(indices), "block", progress)))
-
-
-def _run_block(filters: Sequence[Filter], instants: Iterable[Instant], sums: Sums, reference: int | None = None) -> None:
-    """Advance all filters together over the steps of one block of trajectories.
-
-    With a reference filter, the distance of every other estimate from its own is recorded too.
-    """
-    size = int(sums.counts.sum())
-    states = [one.init(size) for one in filters]
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
-        for k, instant in enumerate(instants):
-            for i, one in enumerate(filters):
-                states[i] = one.step(states[i], instant.y)
-                sums.record(i, k, instant.x, states[i].posterior)
-            if reference is not None:
-                for i, state in enumerate(states):
-                    sums.record_distance(i, k, state.posterior.mean, states[reference].posterior.mean)
-    _check_finite(filters, sums)
-
-
-def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
-    finite = np.asarray(np.isfinite(sums.square).all(axis=(2, 3)))
-    if finite.all():
-        return
-    step = int(np.argmin(finite.all(axis=0)))
-    if not finite[:, step].any():
-        raise NotFinite(
-            f"step {step}: every filter fails; the model's trajectories become infinite, check its equations and parameters"
-        )
-    name = filters[int(np.argmin(finite[:, step]))].name
-    raise NotFinite(
-        f"step {step}: {name} became infinite or NaN although the trajectories are finite; leave it out or check the model"
-    )
-
-
-def _run_subset(filters: Sequence[Filter], ensemble: Ensemble, size: int, progress: bool | None) -> Sums:
-    """All filters on the first `size` trajectories, in chunks; one thread, as short operations gain nothing from more."""
-    starts = range(0, size, SUBSET_CHUNK)
-    x, y, x_next = _first(ensemble, size)
-    names = [one.name for one in filters]
-    reference = names.index(EXACT) if EXACT in names else None
-
-    def chunk(start: int) -> Sums:
-        rows = slice(start, min(start + SUBSET_CHUNK, size))
-        instants = [Instant(x[k, rows], y[k, rows], x_next[k, rows]) for k in range(ensemble.steps)]
-        count = rows.stop - rows.start
-        sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, count, max(1, round(BATCHES * count / size)))
-        _run_block(filters, instants, sums, reference)
-        return sums
-
-    return Sums.concatenate(list(_progress(map(chunk, starts), "slow filters", len(starts), "chunk", progress)))
-
-
-def _first(ensemble: Ensemble, size: int) -> tuple[Array, Array, Array]:
-    """The first `size` of the ensemble's trajectories: x, y and the following x, (steps, size, ...)."""
-    parts: list[list[Instant]] = []
-    left = size
-    for index, block in enumerate(ensemble.sizes):
-        if left > 0:
-            parts.append([Instant(*(a[:left].copy() for a in instant)) for instant in ensemble.block(index)])
-            left -= block
-    x, y, x_next = (np.stack([np.concatenate([part[k][i] for part in parts]) for k in range(ensemble.steps)]) for i in range(3))
-    return x, y, x_next
-
-
-def _progress(items: Iterable[T], what: str, total: int, unit: str, progress: bool | None) -> Iterable[T]:
-    # tqdm: disable=None means "unless standard error is a terminal"
-    return tqdm(items, desc=what, total=total, unit=unit, disable=None if progress is None else not progress, delay=0.5)
+    return Sums.concatenate(list(progress_bar(pool.map(block, indices), "comparing", len(indices), "block", progress)))

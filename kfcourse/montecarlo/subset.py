@@ -1,0 +1,164 @@
+"""The slow filters of a comparison: on the first of the common trajectories, as many as a budget of time allows.
+
+Chunks of trajectories grow from a few to hundreds, always the same ones.  So the time decides after which chunk the work
+stops, and nothing else.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import TypeVar
+
+import numpy as np
+from tqdm import tqdm
+
+from kfcourse.filters.base import Filter, State
+from kfcourse.laws import Array
+from kfcourse.limits import OutOfTime, time_limit
+from kfcourse.montecarlo.comparison import EXACT, Subset
+from kfcourse.montecarlo.designing import NotFinite
+from kfcourse.montecarlo.ensemble import Ensemble, Instant
+from kfcourse.montecarlo.statistics import Sums
+
+CHUNKS = (8, 8, 16, 32, 64, 128, 256)  # trajectories taken at once; after these always as many as the last
+BATCH = 4  # trajectories of a batch
+MARGIN = 1.3  # how much longer than the chunks before the next one may take, for each trajectory
+
+T = TypeVar("T")
+
+
+class _Failed(Exception):
+    """A slow filter failed: its name, and why."""
+
+    def __init__(self, name: str, reason: str):
+        super().__init__(name, reason)
+        self.name, self.reason = name, reason
+
+
+def run_subset(
+    fast: Sequence[Filter], slow: Sequence[Filter], ensemble: Ensemble, size: int, seconds: float | None, progress: bool | None
+) -> tuple[Subset | None, dict[str, str]]:
+    """All filters on at most `size` of the trajectories, one thread, as short operations gain nothing from more.
+
+    Also, by name, why slow filters were left out; the others then start again without them.
+    """
+    end = None if seconds is None else time.monotonic() + seconds
+    data = _first(ensemble, size)
+    left_out: dict[str, str] = {}
+    while running := [one for one in slow if one.name not in left_out]:
+        names = [one.name for one in running]
+        try:
+            sums = _chunks_in_time([*fast, *running], data, end, progress)
+        except _Failed as failed:
+            left_out[failed.name] = failed.reason
+            continue
+        if sums:
+            return Subset(names, Sums.concatenate(sums)), left_out
+        reason = f"{min(size, CHUNKS[0])} trajectories take more than {seconds:g} s"
+        left_out |= dict.fromkeys(names, reason)
+    return None, left_out
+
+
+def _chunks_in_time(
+    filters: Sequence[Filter], data: tuple[Array, Array, Array], end: float | None, progress: bool | None
+) -> list[Sums]:
+    """Sums over the chunks that are done in time."""
+    names = [one.name for one in filters]
+    reference = names.index(EXACT) if EXACT in names else None
+    steps, size, n = data[0].shape
+    rows = list(_rows(size))
+    found: list[Sums] = []
+    start = time.monotonic()
+    for chunk in progress_bar(rows, "slow filters", len(rows), "chunk", progress):
+        count = chunk.stop - chunk.start
+        now = time.monotonic()
+        if end is not None and found and MARGIN * (now - start) / chunk.start * count > end - now:
+            break
+        instants = [Instant(*(array[k, chunk] for array in data)) for k in range(steps)]
+        sums = Sums.empty(len(filters), steps, n, count, max(1, count // BATCH))
+        try:
+            with _until(end):
+                run_block(filters, instants, sums, reference)
+        except OutOfTime:
+            break
+        found.append(sums)
+    return found
+
+
+def _until(end: float | None) -> AbstractContextManager[None]:
+    return nullcontext() if end is None else time_limit(max(end - time.monotonic(), 1e-3))
+
+
+def _rows(size: int) -> Iterator[slice]:
+    """Rows of each chunk."""
+    start = index = 0
+    while start < size:
+        stop = min(start + CHUNKS[min(index, len(CHUNKS) - 1)], size)
+        yield slice(start, stop)
+        start, index = stop, index + 1
+
+
+def run_block(filters: Sequence[Filter], instants: Iterable[Instant], sums: Sums, reference: int | None = None) -> None:
+    """Advance all filters together over the steps of one block of trajectories.
+
+    With a reference filter, the distance of every other estimate from its own is recorded too.
+    """
+    size = int(sums.counts.sum())
+    states = [one.init(size) for one in filters]
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
+        for k, instant in enumerate(instants):
+            for i, one in enumerate(filters):
+                states[i] = _step(one, states[i], instant.y)
+                sums.record(i, k, instant.x, states[i].posterior)
+            if reference is not None:
+                for i, state in enumerate(states):
+                    sums.record_distance(i, k, state.posterior.mean, states[reference].posterior.mean)
+    _check_finite(filters, sums)
+
+
+def _step(one: Filter, state: State, y: Array) -> State:
+    """The filter's step; what goes wrong in a slow filter is only its own affair."""
+    if not one.slow:
+        return one.step(state, y)
+    try:
+        return one.step(state, y)
+    except MemoryError:
+        raise _Failed(one.name, f"step {state.step} needs more memory than there is") from None
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+        raise _Failed(one.name, str(error)) from None
+
+
+def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
+    finite = np.asarray(np.isfinite(sums.square).all(axis=(2, 3)))
+    if finite.all():
+        return
+    step = int(np.argmin(finite.all(axis=0)))
+    if not finite[:, step].any():
+        raise NotFinite(
+            f"step {step}: every filter fails; the model's trajectories become infinite, check its equations and parameters"
+        )
+    one = filters[int(np.argmin(finite[:, step]))]
+    reason = f"step {step}: {one.name} became infinite or NaN although the trajectories are finite"
+    if one.slow:
+        raise _Failed(one.name, reason)
+    raise NotFinite(f"{reason}; leave it out or check the model")
+
+
+def _first(ensemble: Ensemble, size: int) -> tuple[Array, Array, Array]:
+    """The first `size` of the ensemble's trajectories: x, y and the following x, (steps, size, ...)."""
+    parts: list[list[Instant]] = []
+    left = size
+    for index, block in enumerate(ensemble.sizes):
+        if left > 0:
+            parts.append([Instant(*(a[:left].copy() for a in instant)) for instant in ensemble.block(index)])
+            left -= block
+    x, y, x_next = (np.stack([np.concatenate([part[k][i] for part in parts]) for k in range(ensemble.steps)]) for i in range(3))
+    return x, y, x_next
+
+
+def progress_bar(items: Iterable[T], what: str, total: int, unit: str, progress: bool | None) -> Iterable[T]:
+    """A progress bar around the items."""
+    # tqdm: disable=None means "unless standard error is a terminal"
+    return tqdm(items, desc=what, total=total, unit=unit, disable=None if progress is None else not progress, delay=0.5)

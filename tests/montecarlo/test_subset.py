@@ -1,0 +1,109 @@
+"""The slow filters of a comparison: their budget of time, and what happens when one fails."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kfcourse import Model, compare, gaussian, linearised
+from kfcourse.filters import aof, pointmass
+from kfcourse.symbolic.reading import ModelError
+
+STEPS = 3
+
+
+@pytest.fixture(scope="module")
+def model():
+    return Model.define("c*x + e*x*v", "g*x + f*x**2*w", {"c": 0.9, "e": 0.05, "g": 1, "f": 0.02})
+
+
+@pytest.fixture(scope="module")
+def control(model):
+    return aof(gaussian(model))
+
+
+def slow(one, name, seconds=0.0, error=None, at=0):
+    """A slow filter that is like another; takes so long for a trajectory-step, and fails at a step if told to."""
+
+    def step(state, y):
+        if error is not None and state.step == at:
+            raise error
+        time.sleep(seconds * len(y))
+        return one.step(state, y)
+
+    return replace(one, name=name, slow=True, step=step)
+
+
+def same(one, other):
+    """Whether two comparisons found the same numbers, bit by bit."""
+    for kind in ("error_variance", "own_variance", "normalised_error"):
+        for name in set(one.available) & set(other.available):
+            a, b = getattr(one, kind)(name), getattr(other, kind)(name)
+            if not all(
+                np.array_equal(getattr(a, part), getattr(b, part), equal_nan=True) for part in ("value", "standard_error")
+            ):
+                return False
+    return one.available == other.available and one.subset_runs == other.subset_runs
+
+
+def test_the_time_decides_on_the_number_of_trajectories_and_on_nothing_else(model, control):
+    sluggish = slow(aof(linearised(model)), "sluggish", seconds=1e-3)  # 3 ms a trajectory
+    start = time.monotonic()
+    result = compare([control, sluggish], model, 600, STEPS, 1, subset_runs=600, subset_seconds=0.3, progress=False)
+    # 100 trajectories fit; on a busy machine fewer, but not more.  The fast filters and the design take fractions of a second.
+    assert time.monotonic() - start < 3
+    assert 8 <= result.subset_runs <= 100
+    again = compare([control, sluggish], model, 600, STEPS, 1, subset_runs=result.subset_runs, progress=False)
+    assert same(result, again)
+    assert not result.left_out
+
+
+def test_a_chunk_that_does_not_end_in_time_is_given_up(model, control):
+    stuck = slow(aof(linearised(model)), "stuck", seconds=10.0)
+    start = time.monotonic()
+    result = compare([control, stuck], model, 50, STEPS, 1, subset_runs=50, subset_seconds=0.2, progress=False)
+    assert time.monotonic() - start < 3
+    assert result.left_out == {"stuck": "8 trajectories take more than 0.2 s"}
+    assert result.available == ("aof-gaussian",)
+    assert result.subset_runs == 0
+
+
+@pytest.mark.parametrize("error", [ModelError("step 1: too narrow"), MemoryError(), FloatingPointError("overflow")])
+def test_a_slow_filter_that_fails_leaves_the_others_as_they_are(model, control, error):
+    other, failing = slow(aof(linearised(model)), "other"), slow(control, "failing", error=error, at=1)
+    result = compare([control, failing, other], model, 60, STEPS, 1, subset_runs=60, progress=False)
+    assert list(result.left_out) == ["failing"]
+    assert (str(error) or "step 1 needs more memory") in result.left_out["failing"]
+    assert same(result, compare([control, other], model, 60, STEPS, 1, subset_runs=60, progress=False))
+
+
+def test_a_slow_filter_that_is_not_finite_is_left_out(model, control):
+    def step(state, y):
+        after = control.step(state, y)
+        return after._replace(posterior=after.posterior._replace(mean=np.full(y.shape, np.nan)))
+
+    result = compare([control, replace(control, name="nan", slow=True, step=step)], model, 20, STEPS, 1, progress=False)
+    assert "step 0: nan became infinite or NaN" in result.left_out["nan"]
+    assert result.available == ("aof-gaussian",)
+
+
+def test_a_fast_filter_that_fails_is_still_an_error(model, control):
+    failing = replace(slow(control, "failing", error=ModelError("no")), slow=False)
+    with pytest.raises(ModelError, match="no"):
+        compare([control, failing], model, 20, STEPS, 1, progress=False)
+
+
+def test_the_exact_filter_on_a_model_beyond_its_budget_is_left_out_within_seconds():
+    model = Model.define("x**3 + 1e-6*v", "x + w")
+    start = time.monotonic()
+    filters = [aof(linearised(model)), pointmass(model)]
+    result = compare(filters, model, 16, 2, 1, subset_runs=16, subset_seconds=5, progress=False)
+    assert time.monotonic() - start < 10
+    assert "step 0" in result.left_out["aof-exact"] and "--exact-runs 0" in result.left_out["aof-exact"]
+
+
+@pytest.mark.parametrize("seconds", [0, -1, float("nan")])
+def test_no_time_at_all_is_refused(model, control, seconds):
+    with pytest.raises(ValueError, match="subset_seconds must be positive"):
+        compare([control], model, 20, STEPS, 1, subset_seconds=seconds)
