@@ -15,8 +15,9 @@ from kfcourse.filters.optimal_structure import fos
 from kfcourse.laws import Gaussian
 from kfcourse.montecarlo.comparison import Comparison, Subset
 from kfcourse.montecarlo.ensemble import BLOCK, Ensemble
-from kfcourse.montecarlo.experiment import SUBSET_CHUNK, compare, run
+from kfcourse.montecarlo.experiment import compare, run
 from kfcourse.montecarlo.statistics import BATCHES, Sums, batch_mean
+from kfcourse.montecarlo.subset import BATCH
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import gaussian, linearised
 
@@ -264,8 +265,8 @@ def test_a_slow_filter_is_found_through_its_difference_from_the_control(variant5
     difference = result.difference("slow", "aof-gaussian")
     found = difference.standard_error
     assert (found > 0).all()
-    assert abs(difference.freedom + 1 - BATCHES) <= -(-500 // SUBSET_CHUNK) / 2  # each chunk's share of the batches is rounded
-    # from about 16 x 8 batches of 4 heavy-tailed values: not better than a factor 2
+    assert difference.freedom + 1 == 500 // BATCH
+    # from 125 batches of 4 heavy-tailed values: not better than a factor 2
     assert ((found > exact / 2) & (found < 2 * exact)).all()
 
 
