@@ -65,7 +65,7 @@ WRONG_DIMENSIONS: tuple[tuple[str, str, Answer], ...] = (
     (
         "receiver-only",
         "That says only whether the receiver is there; the number of components is asked for.",
-        dimension_where(lambda k, ratio, first: (k % ratio == 0) & (k >= first), 0, 1),
+        dimension_where(lambda k, ratio, first: k % ratio == first % ratio, 0, 1),
     ),
 )
 

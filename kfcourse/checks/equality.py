@@ -7,7 +7,8 @@ passes, and no simplification has to succeed.
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -147,12 +148,13 @@ def equal_formulas(first: Sequence[sp.Expr], second: Sequence[sp.Expr], values: 
     try:
         sides = [_by_name(formulas) for formulas in (first, second)]
         parameters = {symbol(s.name): value for s, value in values.items()}
-        if any(set(parameters).isdisjoint(_symbols(side)) for side in sides):
+        if parameters and any(set(parameters).isdisjoint(_symbols(side)) for side in sides):
             sides = [[f.subs(parameters) for f in side] for side in sides]
         signs = {s: -1 if value < 0 else 1 for s, value in parameters.items()}
-        for point in _points(sorted(_symbols(sides[0]) | _symbols(sides[1]), key=str), signs, all(map(_entire, sides[1]))):
+        known, both = frozenset(signs.items()), all(map(_entire, sides[1]))
+        for number in range(POINTS):
             for a, b in zip(*sides, strict=True):
-                left, right = (sp.N(f.xreplace(point), DIGITS) for f in (a, b))
+                left, right = (_value(f, number, known, both) for f in (a, b))
                 if not (left.is_number and right.is_number) or not abs(left - right) <= AGREE * (1 + abs(right)):
                     return False
     except Exception:  # SymPy has many ways to stop at a formula that makes no sense
@@ -160,18 +162,18 @@ def equal_formulas(first: Sequence[sp.Expr], second: Sequence[sp.Expr], values: 
     return True
 
 
-def _points(symbols: Sequence[sp.Symbol], signs: Mapping[sp.Symbol, int], both: bool) -> Iterator[dict[sp.Symbol, sp.Float]]:
-    """Random points: parameters with their own sign, other symbols of both signs, or positive only.
+@lru_cache(maxsize=20_000)  # an answer is compared with many mistakes, and a mistake with many answers
+def _value(formula: sp.Expr, number: int, signs: frozenset[tuple[sp.Symbol, int]], both: bool) -> sp.Expr:
+    """The value at a random point: parameters with their own sign, other symbols of both signs, or positive only.
 
     Floats: powers of fractions would grow without bound.
     """
-    source = random.Random(2701)
-    for number in range(POINTS):
-        point = {}
-        for s in symbols:
-            sign = signs.get(s, (1, -1, source.choice((1, -1)))[min(number, 2)] if both else 1)
-            point[s] = sp.Float(sp.Rational(sign * source.randint(101, 397), source.randint(101, 397)), DIGITS)
-        yield point
+    point = {}
+    for s in formula.free_symbols:
+        source = random.Random(f"{s.name}/{number}")
+        sign = dict(signs).get(s, (1, -1, source.choice((1, -1)))[min(number, 2)] if both else 1)
+        point[s] = sp.Float(sp.Rational(sign * source.randint(101, 397), source.randint(101, 397)), DIGITS)
+    return sp.N(formula.xreplace(point), DIGITS)
 
 
 def _entire(formula: sp.Expr) -> bool:
@@ -180,7 +182,12 @@ def _entire(formula: sp.Expr) -> bool:
 
 
 def _by_name(formulas: Sequence[sp.Expr]) -> list[sp.Expr]:
-    return [f.xreplace({s: symbol(s.name) for s in f.free_symbols}) for f in formulas]
+    return [_renamed(f) for f in formulas]
+
+
+@lru_cache(maxsize=20_000)
+def _renamed(formula: sp.Expr) -> sp.Expr:
+    return formula.xreplace({s: symbol(s.name) for s in formula.free_symbols})
 
 
 def _symbols(formulas: Sequence[sp.Expr]) -> set[sp.Symbol]:

@@ -22,6 +22,11 @@ def times(matrix, vector):
     return (matrix @ vector[..., None])[..., 0]
 
 
+def reduced(Psi, K, G):
+    rest = np.eye(Psi.shape[-1]) - K @ G
+    return rest @ Psi @ T(rest)
+
+
 def b1(change=lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(F)):
     return change
 
@@ -132,7 +137,7 @@ def b4_last_measurement_kept(y, mean, cov, measure, predict):
 
 
 def b5(
-    rest=lambda Psi, K, G: (np.eye(Psi.shape[-1]) - K @ G) @ Psi @ T(np.eye(Psi.shape[-1]) - K @ G),
+    rest=reduced,
     noise=lambda K, R, F: K @ R @ T(K),
 ):
     def answer(Psi, G, F, R):
@@ -176,7 +181,7 @@ WRONG = [
     (
         "b2",
         "noise-of-meter-missing",
-        b2(cov=lambda Psi, K, G, F: (np.eye(Psi.shape[-1]) - K @ G) @ Psi @ T(np.eye(Psi.shape[-1]) - K @ G)),
+        b2(cov=lambda Psi, K, G, F: reduced(Psi, K, G)),
     ),
     ("b2", "state-twice", b2(gain=lambda Psi, G, F: Psi @ T(G) @ np.linalg.inv(F + G @ Psi @ T(G)))),
     ("b2", "unused", b2(gain=lambda Psi, G, F: np.broadcast_to(np.eye(Psi.shape[-1]), Psi.shape))),

@@ -179,7 +179,7 @@ UNUSABLE = [
     ("d1", "result 2 of 2", d1(left=lambda x, z, Gamma, rest: np.tile(rest, (len(x), 1, 1)))),
     ("d2", "expected 3 results", lambda *arguments: d2()(*arguments)[1:]),
     ("d3", "expected 3 results", lambda *arguments: d3()(*arguments)[:2]),
-    ("d4", "result 1 of 2", d4(both=lambda y, z: np.column_stack([y, z]).ravel()[:, None])),
+    ("d4", "result 1 of 2", d4(u=lambda both, Gamma, chi: Gamma @ both.T + chi[:, None])),
 ]
 
 

@@ -186,6 +186,7 @@ WRONG = [
     ("l1", "held", l1(lambda k, ratio, first: k >= first)),
     ("l1", "one-step-off", l1(lambda k, ratio, first: k + 1 >= first and (k + 1 - first) % ratio == 0)),
     ("l1", "reversed", l1(lambda k, ratio, first: not (k >= first and (k - first) % ratio == 0))),
+    ("l1", "receiver-only", lambda steps, ratio, first: (np.arange(steps) - first) % ratio == 0),
     ("l2", "other-way", lambda reading, rate, shift: rate * reading + shift),
     ("l2", "shift-not-divided", lambda reading, rate, shift: reading / rate - shift),
     ("l2", "rate-forgotten", lambda reading, rate, shift: reading - shift),
@@ -242,7 +243,6 @@ WRONG = [
 UNUSABLE = [
     ("l3", "a missing measurement used", l3(there=np.isnan)),
     ("l1", "expected an array of shape", lambda steps, ratio, first: 1 + (first % ratio == 0)),
-    ("l1", "expected an array of shape", lambda steps, ratio, first: (np.arange(steps) - first) % ratio == 0),
     ("l3", "a missing measurement used", l3(there=lambda y: np.ones(len(y)))),
 ]
 

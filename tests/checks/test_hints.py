@@ -1,0 +1,88 @@
+"""What is said of any wrong answer, and right answers in other forms."""
+
+import numpy as np
+import pytest
+import sympy as sp
+from tiny import asks, c, e, outcome, p, z
+
+from kfcourse.checks.equality import Unusable, like
+
+RNG = np.random.default_rng(3)
+A, B = RNG.normal(size=(2, 3, 3))
+P = A @ A.T
+RUN = RNG.normal(size=(6, 4, 2))
+
+
+def carried(A, P):
+    return A @ P @ A.T
+
+
+def filtered(y, gain):
+    z, found = 0 * y[0], []
+    for one in y:
+        z = 0.9 * z + gain * (one - 0.9 * z)
+        found.append(z)
+    return np.array(found)
+
+
+CARRIED = asks(carried, [(A, P), (np.array([[1.3]]), np.array([[0.7]]))])
+FILTERED = asks(filtered, [(RUN, 0.4)])
+PAIR = asks(lambda a, b: (a + b, a * b), [(2.5, 1.5), (0.5, 3.0)], parts=("sum", "product"))
+FORMULAS = asks(lambda z, p: (c * z, c**2 * p + e**2), [(z, p)], parts=("tau", "Theta"))
+
+
+@pytest.mark.parametrize(
+    ("question", "name", "answer"),
+    [
+        (CARRIED, "scalars-only", lambda A, P: A.T @ P @ A),
+        (CARRIED, "unused", lambda A, P: A @ A.T),
+        (CARRIED, "not-symmetric", lambda A, P: A @ P @ A.T + A),
+        (CARRIED, "unchanged", lambda A, P: P),
+        (CARRIED, "negative-variance", lambda A, P: A @ P @ A.T - 50 * P),
+        (CARRIED, "precision", lambda A, P: carried(A, P).astype(np.float32)),
+        (FILTERED, "from-second-step", lambda y, gain: gain * y),
+        (FILTERED, "unused", lambda y, gain: filtered(y, 0.3)),
+        (FILTERED, "factor", lambda y, gain: 3 * filtered(y, gain)),
+        (FILTERED, "term", lambda y, gain: 3 + filtered(y, gain)),
+        (FILTERED, "some-signs", lambda y, gain: np.abs(filtered(y, gain))),
+        (PAIR, "swapped", lambda a, b: (a * b, a + b)),
+        (PAIR, "another-result", lambda a, b: (a + b, a + b)),
+        (asks(lambda a, b: a**2, [(2.0, 3.0), (4.0, 5.0)]), "superfluous", lambda a, b: a**2 + b),
+        (FORMULAS, "swapped", lambda z, p: (c**2 * p + e**2, c * z)),
+        (FORMULAS, "unused", lambda z, p: (c * z, c**2 + e**2)),
+        (FORMULAS, "unused", lambda z, p: (c * z, p + e**2)),
+        (FORMULAS, "superfluous", lambda z, p: (c * z, c**2 * p + e**2 * z)),
+        (asks(lambda z: sp.Matrix([[z, 1], [0, z]]), [(z,)]), "entry", lambda z: sp.Matrix([[z, 1], [0, 2 * z]])),
+        (asks(lambda z: sp.Matrix([[z, 1], [0, z]]), [(z,)]), "rows", lambda z: sp.Matrix([[z, 1], [z, 2 * z]])),
+    ],
+)
+def test_hints(question, name, answer):
+    result = outcome(question, answer)
+    assert (result.status, result.diagnosis) == ("wrong", (name,)), result
+
+
+def test_the_same_is_said_once():
+    message = outcome(PAIR, lambda a, b: (2 * (a + b), 2 * a * b)).message
+    assert message == "not right. sum, product: It is twice what it should be."
+
+
+def test_results_in_another_order_may_have_other_shapes():
+    question = asks(lambda a: (a[0], a), [(np.ones((2, 2)),)], parts=("row", "all"))
+    assert "another order" in outcome(question, lambda a: (a, a[0])).message
+
+
+def test_other_forms_are_right():
+    assert outcome(PAIR, lambda a, b: np.array([a + b, a * b])).passed
+    assert outcome(PAIR, lambda a, b: sp.Matrix([a + b, a * b])).passed
+    assert outcome(FORMULAS, lambda z, p: sp.Matrix([c * z, c**2 * p + e**2])).passed
+    number = asks(lambda a: a, [(2.0,)])
+    assert outcome(number, np.matrix).passed
+    assert outcome(number, lambda a: np.array([[a]])).status == "unusable"
+    assert outcome(number, complex).passed
+    assert outcome(asks(lambda a: np.array([0.0, 1.0]), [(1.0,)]), lambda a: np.array([False, True])).passed
+    assert like(np.matrix([[1.0]]), z) == 1
+
+
+def test_complex_numbers_are_told():
+    with pytest.raises(Unusable, match="complex"):
+        like(np.array([1j]), np.zeros(1))
