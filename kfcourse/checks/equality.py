@@ -149,7 +149,8 @@ def equal_formulas(first: Sequence[sp.Expr], second: Sequence[sp.Expr], values: 
         sides = [_by_name(formulas) for formulas in (first, second)]
         parameters = {symbol(s.name): value for s, value in values.items()}
         if parameters and any(set(parameters).isdisjoint(_symbols(side)) for side in sides):
-            sides = [[f.subs(parameters) for f in side] for side in sides]
+            numbers = frozenset(parameters.items())
+            sides = [[_with_numbers(f, numbers) for f in side] for side in sides]
         signs = {s: -1 if value < 0 else 1 for s, value in parameters.items()}
         known, both = frozenset(signs.items()), all(map(_entire, sides[1]))
         for number in range(POINTS):
@@ -188,6 +189,11 @@ def _by_name(formulas: Sequence[sp.Expr]) -> list[sp.Expr]:
 @lru_cache(maxsize=20_000)
 def _renamed(formula: sp.Expr) -> sp.Expr:
     return formula.xreplace({s: symbol(s.name) for s in formula.free_symbols})
+
+
+@lru_cache(maxsize=20_000)
+def _with_numbers(formula: sp.Expr, numbers: frozenset[tuple[sp.Symbol, Any]]) -> sp.Expr:
+    return formula.subs(dict(numbers))
 
 
 def _symbols(formulas: Sequence[sp.Expr]) -> set[sp.Symbol]:

@@ -71,6 +71,7 @@ def test_results_in_another_order_may_have_other_shapes():
     assert "another order" in outcome(question, lambda a: (a, a[0])).message
 
 
+@pytest.mark.filterwarnings("ignore:the matrix subclass")
 def test_other_forms_are_right():
     assert outcome(PAIR, lambda a, b: np.array([a + b, a * b])).passed
     assert outcome(PAIR, lambda a, b: sp.Matrix([a + b, a * b])).passed
