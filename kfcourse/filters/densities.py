@@ -48,26 +48,40 @@ class ScalarDensities(NamedTuple):
     Attributes
     ----------
     kernel : x -> mean and standard deviation of the next state, given x
+    kernel_slope : x -> the derivatives of both
     log_likelihood : (y, x) -> log p(y | x); 0 where y is missing (NaN)
-    signal, slope : x -> b(x, m_w) and its derivative
+    signal, slope : x -> b(x, m_w) and its derivative; the noise's standard deviation and its, if b(x, m_w) lacks x
+    explained : y -> the signal that explains y: y itself; |y - b| if the signal is the noise's deviation
     meter_width : x -> standard deviation of the meter's noise over |slope|: how well y tells x
     """
 
     kernel: Callable[[Array], tuple[Array, Array]]
+    kernel_slope: Callable[[Array], tuple[Array, Array]]
     log_likelihood: Callable[[Array, Array], Array]
     signal: Callable[[Array], Array]
     slope: Callable[[Array], Array]
+    explained: Callable[[Array], Array]
     meter_width: Callable[[Array], Array]
 
 
 def scalar_densities(model: Model) -> ScalarDensities:
     """The densities of a model of one state and one measurement; ModelError if a noise enters nonlinearly."""
-    next_state = transition(model)
+    next_state = _conditional("transition", model.state_equation, model.v, model.state_noise, model, noiseless=True)
     meter = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model)
-    derivative = model.meter_equation.subs(dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True)))
-    slopes = compile_function(
-        "slope", {"x": sp.Matrix(model.x)}, {"slope": derivative.subs(model.values).diff(model.x[0])}, ["x", "slope"]
-    ).function
+    x, B = model.x[0], model.state_equation.jacobian(sp.Matrix(model.v))
+    mean, b = (
+        equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True))).subs(model.values)
+        for equation, noise, law in (
+            (model.state_equation, model.v, model.state_noise),
+            (model.meter_equation, model.w, model.meter_noise),
+        )
+    )
+    variance = (B * exact_matrix(model.state_noise.cov) * B.T).subs(model.values)
+    B_w = model.meter_equation.jacobian(sp.Matrix(model.w))
+    meter_variance = (B_w * exact_matrix(model.meter_noise.cov) * B_w.T).subs(model.values)
+    outputs = {"state": mean.diff(x), "variance": variance.diff(x), "meter": b.diff(x), "meter_variance": meter_variance.diff(x)}
+    lacks_x = not b.has(x)
+    slopes = compile_function("slopes", {"x": sp.Matrix(model.x)}, outputs, ["x", "state", "meter"]).function
 
     def moments(law: Callable[[Array], Gaussian], x: Array) -> tuple[Array, Array]:
         mean, variance = law(x[..., None])
@@ -83,13 +97,29 @@ def scalar_densities(model: Model) -> ScalarDensities:
         missing = np.isnan(y)
         return np.where(missing, 0.0, value) if missing.any() else value
 
+    def kernel_slope(x: Array) -> tuple[Array, Array]:
+        of_mean, of_variance, _, _ = slopes(x[..., None])
+        twice = 2 * kernel(x)[1]
+        return np.broadcast_to(of_mean[..., 0], x.shape), np.broadcast_to(of_variance[..., 0, 0], x.shape) / twice
+
+    def signal(x: Array) -> Array:
+        of_mean, of_variance = moments(meter, x)
+        return np.sqrt(of_variance) if lacks_x else of_mean
+
     def slope(x: Array) -> Array:
-        return np.broadcast_to(slopes(x[..., None])[0][..., 0], x.shape)
+        _, _, of_mean, of_variance = slopes(x[..., None])
+        if lacks_x:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                return np.broadcast_to(of_variance[..., 0, 0], x.shape) / (2 * signal(x))
+        return np.broadcast_to(of_mean[..., 0], x.shape)
+
+    def explained(y: Array) -> Array:
+        return np.abs(y - float(b[0])) if lacks_x else y
 
     def meter_width(x: Array) -> Array:
         return np.sqrt(moments(meter, x)[1]) / np.abs(slope(x))
 
-    return ScalarDensities(kernel, log_likelihood, lambda x: moments(meter, x)[0], slope, meter_width)
+    return ScalarDensities(kernel, kernel_slope, log_likelihood, signal, slope, explained, meter_width)
 
 
 def _log_normal(deviation: Array, variance: Array) -> Array:
@@ -99,7 +129,7 @@ def _log_normal(deviation: Array, variance: Array) -> Array:
 
 
 def _conditional(
-    name: str, equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian, model: Model
+    name: str, equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian, model: Model, *, noiseless: bool = False
 ) -> Callable[[Array], Gaussian]:
     B = equation.jacobian(sp.Matrix(noise))
     if B.has(*noise):
@@ -107,7 +137,7 @@ def _conditional(
             f"{list(equation)}: the noise enters nonlinearly, so there is no simple {name} density; "
             "the Gaussian filters (gaussian, unscented, gauss_hermite) do not need one"
         )
-    if (B * exact_matrix(law.cov) * B.T).subs(model.values).is_zero_matrix:
+    if not noiseless and (B * exact_matrix(law.cov) * B.T).subs(model.values).is_zero_matrix:
         raise ModelError(
             f"{list(equation)}: without noise there is no {name} density; "
             "use the Gaussian filters (gaussian, unscented, gauss_hermite)"

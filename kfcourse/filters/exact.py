@@ -9,10 +9,11 @@ The lab's noises are multiplicative: densities are many orders of magnitude narr
 beginning, and within one step the posterior may be thousands of times narrower than the prediction, far narrower than any
 fixed grid would see.  So each trajectory gets its own nodes at every step.  A step takes these ways, read in this order:
 
-exact_kernels   from a posterior to the next prediction, a sum of normal kernels; exact_narrow: where these do not overlap
-exact_places    where the new posterior lies: the states that explain the measurement
-exact_batch     nodes x = c + s sinh t there, Bayes' rule, and an estimate of the error: for many trajectories at once
-exact_adaptive  for what they do not resolve, one trajectory at a time: panels that are halved until they resolve it
+exact_predictions  from a posterior to the next prediction: a sum of normal kernels (exact_kernels), also between the nodes
+                   (exact_narrow), or an integral over the noise (exact_noise)
+exact_places       where the new posterior lies: the states that explain the measurement
+exact_batch        nodes x = c + s sinh t there, Bayes' rule, and an estimate of the error: for many trajectories at once
+exact_adaptive     for what they do not resolve, one trajectory at a time: panels that are halved until they do (exact_panels)
 """
 
 from __future__ import annotations
@@ -27,13 +28,14 @@ from kfcourse.filters.densities import ScalarDensities, scalar_densities
 from kfcourse.filters.exact_adaptive import check_scalar, estimated
 from kfcourse.filters.exact_batch import Posteriors, posteriors, settled
 from kfcourse.filters.exact_kernels import Grid, Kernels, Unresolved, apart, chunks, of_prior
-from kfcourse.filters.exact_narrow import predictions
 from kfcourse.filters.exact_places import hidden, likeliest
+from kfcourse.filters.exact_predictions import predictions
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
 ACCURACY = 1e-6  # of the mean and the deviation at a step, in posterior standard deviations
+TOLERABLE = 1e-3  # error of a step that no way resolves better, before the filter gives up
 NODES = (33, 65, 129, 257)  # tried one after the other
 LOOKED = 25  # nodes of the look that finds the place
 FINE = 129  # nodes of a posterior that must be interpolated
@@ -113,15 +115,20 @@ def _step(
     for rows, kernels in groups:
         for chunk in chunks(len(rows), NODES[0] * kernels.mu.shape[1], ELEMENTS):
             left = rows[chunk]
-            for done, found in _in_batch(left, kernels.rows(chunk), y[left], law, accuracy):
+            for done, found, good in _in_batch(left, kernels.rows(chunk), y[left], law, accuracy):
                 mean[done], variance[done], error[done] = found.mean, found.variance, found.error + found.inherited
                 for place, x, mass, density in zip(done.tolist(), found.x, found.mass, found.density, strict=True):
                     grids[place] = Grid(x, mass, density, uniform=True)
-                left = np.setdiff1d(left, done, assume_unique=True)
+                left = np.setdiff1d(left, done[good], assume_unique=True)
             for place in left.tolist():
-                one = kernels.rows(rows == place)
-                grids[place], error[place] = estimated(one, float(y[place, 0]), law)
-                mean[place], variance[place], adaptive[place] = grids[place].mean(), grids[place].variance(), True
+                try:
+                    grid, error_there = estimated(kernels.rows(rows == place), float(y[place, 0]), law)
+                except Unresolved:
+                    if not error[place] <= TOLERABLE:
+                        raise
+                else:
+                    grids[place], error[place], adaptive[place] = grid, error_there, True
+                    mean[place], variance[place] = grid.mean(), grid.variance()
     fine = [grids[place] for place in range(len(y))]
     following = predictions(fine, law)
     predicted = np.empty((2, len(y)))
@@ -133,8 +140,8 @@ def _step(
 
 def _in_batch(
     rows: Array, kernels: Kernels, y: Array, law: ScalarDensities, accuracy: float
-) -> Iterator[tuple[Array, Posteriors]]:
-    """Posteriors of the trajectories that some number of nodes resolves, and the places of these trajectories."""
+) -> Iterator[tuple[Array, Posteriors, Array]]:
+    """Places of trajectories, their posteriors, and whether these are resolved; on the finest grid also those that are not."""
     place, candidates = likeliest(kernels, y, law)
     left, least = np.arange(len(rows)), np.zeros(len(rows))  # trajectories to do, and the nodes they need
     for count in NODES:
@@ -144,8 +151,10 @@ def _in_batch(
             there = settled(kernels.rows(i), y[i], law, place.rows(i), LOOKED, count)
             found = posteriors(kernels.rows(i), y[i], law, there, count)
             least[i] = nodes_for_kernels(law, found, count)
-            good = (found.error <= accuracy) & ~hidden(candidates.rows(i), there, count) & (least[i] <= count)
-            yield rows[i[good]], Posteriors(*(array[good] for array in found))
+            found = found._replace(error=np.where(hidden(candidates.rows(i), there, count), np.inf, found.error))
+            good = (found.error <= accuracy) & (least[i] <= count)
+            told = good | (count == NODES[-1])
+            yield rows[i[told]], Posteriors(*(array[told] for array in found)), good[told]
             done.append(i[good])
         left = np.setdiff1d(left, np.concatenate([*done, np.empty(0, dtype=int)]), assume_unique=True)
         if not len(left):

@@ -29,6 +29,7 @@ SECTIONS = np.linspace(0, 1, 257)  # of a bracket, in the search for a zero
 SCALES = (0.5, 2.0, WIDTH)  # distances, in kernel sigmas, of panel borders from the prediction's own centres
 QUANTILES = np.array([0.02, 0.25, 0.5, 0.75, 0.98])  # of the posterior, where those centres are
 BORDER = 1e-10  # of the density at the ends of the support, relative: beyond them there must be nothing
+PUSHED = 100_000  # kernels of as much work as an integral over the noise
 WORK = 2e8  # nodes times kernels of a step: some seconds
 ELEMENTS = 2**20  # of the largest array, 8 MB
 
@@ -67,7 +68,15 @@ def estimated(kernels: Kernels, y: float, law: ScalarDensities) -> tuple[Grid, f
     """
     mu, sigma, mass = (array[0] for array in kernels[:3])
     bayes = _Bayes(law, _wider_than_kernels(law))
-    (fine, complete), (coarse, _) = (bayes.corrected(mu, sigma, mass, y, rule) for rule in STEPWISE)
+    pushed = kernels.pushed
+
+    def interpolated(x: Array) -> Array:
+        assert pushed is not None
+        with np.errstate(divide="ignore"):
+            return np.log(pushed(x[None])[0, :, 0])
+
+    log_prediction = None if pushed is None else interpolated
+    (fine, complete), (coarse, _) = (bayes.corrected(mu, sigma, mass, y, rule, log_prediction) for rule in STEPWISE)
     difference, deviation = abs(fine.mean() - coarse.mean()), np.sqrt(fine.variance())
     return fine, (float(difference / deviation) if difference else 0.0) if complete else np.inf
 
@@ -144,21 +153,33 @@ class _Bayes:
     """One step of the Stratonovich equation for one trajectory."""
 
     def __init__(self, law: ScalarDensities, too_wide: Callable[[Array, Array], Array]):
-        self.meter, self.too_wide = law.signal, too_wide
+        self.signal, self.too_wide = law.signal, too_wide
+        self.explained: Callable[[float], float] = lambda y: float(law.explained(np.array(y)))
         self.log_likelihood: Callable[[float, Array], Array] = lambda y, x: law.log_likelihood(np.array([y]), x)
 
-    def corrected(self, mu: Array, sigma: Array, mass: Array, y: float, rule: Rule) -> tuple[Grid, bool]:
+    def corrected(
+        self,
+        mu: Array,
+        sigma: Array,
+        mass: Array,
+        y: float,
+        rule: Rule,
+        log_prediction: Callable[[Array], Array] | None = None,
+    ) -> tuple[Grid, bool]:
         """The posterior: a prediction that is a sum of normal kernels (M,), corrected with y; and whether it is complete.
+
+        If there is a `log_prediction`, the kernels tell only roughly where it lies.
 
         It is not where the measurement contradicts the prediction by more than `FAR` sigmas.
         """
 
         def log_density(x: Array) -> Array:
-            if x.size > MOST or x.size * mu.size > WORK:
+            if x.size > MOST or x.size * (mu.size if log_prediction is None else PUSHED) > WORK:
                 raise Unresolved(
                     f"the posterior needs more than {x.size:,} nodes, the prediction is a sum of {mu.size:,} kernels"
                 )
-            return _log_mixture(x, mu, sigma, mass) + self.log_likelihood(y, x)
+            prediction = _log_mixture(x, mu, sigma, mass) if log_prediction is None else log_prediction(x)
+            return prediction + self.log_likelihood(y, x)
 
         def between(borders: Array) -> tuple[Grid, bool]:
             if not np.isnan(y):
@@ -175,13 +196,14 @@ class _Bayes:
     def _explanations(self, borders: Array, y: float) -> Array:
         """Panel borders that approach, by halves, every state that explains y without noise."""
         x = np.unique(np.concatenate([borders, 0.5 * (borders[1:] + borders[:-1])]))
-        residual = y - self.meter(x)
+        wanted = self.explained(y)
+        residual = wanted - self.signal(x)
         result = []
         for i in np.flatnonzero(np.signbit(residual[1:]) != np.signbit(residual[:-1])):
             low, high = x[i], x[i + 1]
             while True:  # shrink the bracket 256 times at each pass, to the last bit
                 inner = low + (high - low) * SECTIONS
-                j = int(np.argmax(np.signbit(y - self.meter(inner)[1:]) != np.signbit(residual[i])))
+                j = int(np.argmax(np.signbit(wanted - self.signal(inner)[1:]) != np.signbit(residual[i])))
                 if not inner[j + 1] - inner[j] < high - low:
                     break
                 low, high = inner[j], inner[j + 1]

@@ -22,6 +22,7 @@ from kfcourse.laws import Array
 
 TAIL = 1e-20  # mass at a node that is beyond the end of a posterior
 SPACING = 0.4  # of nodes at the highest hump, in its width
+ROUNDING = 10 * np.finfo(float).eps  # of a node and its density, relative to x
 INTERPOLATED = 64.0  # interpolation of order 8 at twice the distance errs 2^8 times as much; a factor 4 is safety
 
 
@@ -61,7 +62,7 @@ class Posteriors(NamedTuple):
     error : ndarray (T,)
         Estimated error of mean and deviation by these nodes, in posterior standard deviations; infinite if nothing is seen.
     inherited : ndarray (T,)
-        The same by the sum of kernels, that is, by the nodes of the posterior before.
+        The same by the sum of kernels, that is, by the nodes of the posterior before, and by rounding.
     """
 
     x: Array
@@ -77,7 +78,7 @@ def settled(kernels: Kernels, y: Array, law: ScalarDensities, place: Place, look
     """A better place for `count` nodes, from a look at the posterior with `looked` nodes.
 
     The centre is the highest point.  The scale is the largest with which the hump there is resolved: its width is that of a
-    normal hump as high.  The support ends where the posterior is negligible.
+    normal hump as high, or less if the posterior falls off faster.  The support ends where the posterior is negligible.
     """
     coarse = kernels.thinned()
     x, length = place.nodes(looked)
@@ -95,7 +96,8 @@ def settled(kernels: Kernels, y: Array, law: ScalarDensities, place: Place, look
     low = np.where(seen, np.take_along_axis(x, first, axis=1), place.low)
     high = np.where(seen, np.take_along_axis(x, last, axis=1), place.high)
     centre = np.where(seen, np.take_along_axis(x, top, axis=1), place.centre)
-    width = np.where(seen, area / ROOT, place.scale)
+    fallen = np.where(logs < np.take_along_axis(logs, top, axis=1) - 0.5, np.abs(x - centre), np.inf).min(axis=1, keepdims=True)
+    width = np.where(seen, np.minimum(area / ROOT, 2 * fallen), place.scale)
     scale, wanted = width, SPACING * np.sqrt(32 * (count - 1)) * width
     for _ in range(6):  # of the equation: distance of the nodes at the centre = wanted
         span = np.arcsinh((high - centre) / scale) + np.arcsinh((centre - low) / scale)
@@ -119,8 +121,10 @@ def posteriors(kernels: Kernels, y: Array, law: ScalarDensities, place: Place, c
         nested = whole.distance(Summary.of(x[:, ::2], 2 * full[:, ::2]))
         inherited = whole.distance(Summary.of(x, by_even))
         beyond = (mass[:, 0] + mass[:, -1]) * np.maximum(mean - x[:, 0], x[:, -1] - mean) / np.sqrt(variance)
+        rounding = ROUNDING * np.abs(mean) / np.sqrt(variance)
+        nested, inherited = (np.maximum(change - rounding, 0.0) for change in (nested, inherited))
         error = nested * nested + beyond
-        inherited = np.where(kernels.spectral, inherited * inherited, inherited / INTERPOLATED)
+        inherited = rounding + np.where(kernels.spectral, inherited * inherited, inherited / INTERPOLATED)
         density = mass / length
     return Posteriors(x, mass, density, mean, variance, *(np.where(np.isfinite(e), e, np.inf) for e in (error, inherited)))
 

@@ -8,7 +8,7 @@ nodes between them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -66,6 +66,8 @@ class Kernels(NamedTuple):
         Roughly where the mass is.
     spectral : ndarray (T,)
         True where the error falls exponentially with the nodes, false where the posterior was interpolated.
+    pushed : callable, optional
+        For T = 1: x (1, N) -> the density and that of `even`, (1, N, 2), if the sum of kernels is too rough for it.
     """
 
     mu: Array
@@ -75,6 +77,7 @@ class Kernels(NamedTuple):
     centre: Array
     width: Array
     spectral: Array
+    pushed: Callable[[Array], Array] | None = None
 
     def support(self, sigmas: float = WIDTH) -> tuple[Array, Array]:
         """Lower and upper limit, (T, 1) each: so many sigmas around every kernel that counts."""
@@ -92,6 +95,8 @@ class Kernels(NamedTuple):
 
     def density(self, x: Array, *masses: Array) -> Array:
         """sum_j mass_j N(x; mu_j, sigma_j^2) at x (T, N) for each of the masses (T, M): (T, N, number of them)."""
+        if self.pushed is not None:
+            return self.pushed(x)[:, :, : len(masses)]
         rate = np.sqrt(0.5) / self.sigma
         centre, weights = self.mu * rate, np.stack([mass * rate for mass in masses], axis=2)
         result = np.empty((*x.shape, len(masses)))
@@ -111,7 +116,8 @@ class Kernels(NamedTuple):
         return mean, (self.mass * (self.sigma * self.sigma + deviation * deviation)).sum(axis=1)
 
     def rows(self, chosen: Array | slice) -> Kernels:
-        return Kernels(*(array[chosen] for array in self))
+        mu, sigma, mass, even, centre, width, spectral = (array[chosen] for array in self[:7])
+        return Kernels(mu, sigma, mass, even, centre, width, spectral, self.pushed)
 
 
 def of_prior(prior: Gaussian) -> Kernels:

@@ -7,14 +7,13 @@ the kernels need.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import comb
 
 import numpy as np
 from numpy.polynomial import legendre
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_kernels import Grid, Kernels, Unresolved, apart, overlapping
+from kfcourse.filters.exact_kernels import Grid, Kernels, Unresolved
 from kfcourse.laws import Array
 
 STEP = 3.0  # largest distance, in sigmas, that the centres of a panel of new nodes may cover
@@ -25,46 +24,9 @@ DEAD = 700.0  # a logarithm this far below 0 is that of nothing
 LIGHT = 1e-20  # mass of a kernel that may be left out
 TINY = 1e-14  # keeps a node's own number from dividing by zero
 UNSEEN = 1e-10  # mass of a panel whose kernels need not overlap
-MOST = 24_576  # nodes of a refined posterior: with them and 257 new nodes the largest array has 50 MB, and a step takes 50 ms
 
 
-def predictions(grids: Sequence[Grid], law: ScalarDensities) -> list[tuple[Array, Kernels]]:
-    """The predictions of all posteriors, those of equally many kernels together: (places of the posteriors, kernels)."""
-    groups: dict[tuple[int, bool], list[int]] = {}
-    for i, grid in enumerate(grids):
-        size = len(grid.x) if grid.uniform else 64 * -(-len(grid.x) // 64)
-        groups.setdefault((size, grid.uniform), []).append(i)
-    result = []
-    finer: dict[int, list[tuple[int, Kernels]]] = {}
-    for (size, uniform), members in groups.items():
-        rows = np.array(members)
-        x, mass, density = _stacked([grids[i][:3] for i in members], size, 1)
-        kernels = overlapping(x, mass, density, uniform, law)
-        narrow = uniform & (apart(kernels.mu, kernels.sigma, mass) > 1)
-        if not narrow.all():
-            result.append((rows[~narrow], kernels.rows(~narrow)))
-        for i in np.flatnonzero(narrow).tolist():
-            one = refined(grids[members[i]], law, kernels.rows(slice(i, i + 1)))
-            finer.setdefault(128 * -(-one.mu.shape[1] // 128), []).append((members[i], one))
-    for size, several in finer.items():
-        mu, sigma, mass, even = _stacked([[array[0] for array in one[:4]] for _, one in several], size, 2)
-        rest = (np.concatenate([one[i] for _, one in several]) for i in range(4, 7))
-        result.append((np.array([i for i, _ in several]), Kernels(mu, sigma, mass, even, *rest)))
-    return result
-
-
-def _stacked(rows: Sequence[Sequence[Array]], size: int, places: int) -> Array:
-    """Arrays (size,) of each row, (number of arrays, rows, size): the first are places, filled up with the last; then 0."""
-    found = np.zeros((len(rows[0]), len(rows), size))
-    for i, row in enumerate(rows):
-        for j, array in enumerate(row):
-            found[j, i, : len(array)] = array
-            if j < places:
-                found[j, i, len(array) :] = array[-1]
-    return found
-
-
-def refined(grid: Grid, law: ScalarDensities, rough: Kernels) -> Kernels:
+def refined(grid: Grid, law: ScalarDensities, rough: Kernels, most: int) -> Kernels:
     """The kernels of one posterior, (1, M), on panels so short that neighbouring kernels overlap.
 
     Parameters
@@ -74,6 +36,8 @@ def refined(grid: Grid, law: ScalarDensities, rough: Kernels) -> Kernels:
     law : ScalarDensities
     rough : Kernels
         Those of the grid's own nodes, for `centre` and `width`.
+    most : int
+        Nodes that there may be.
 
     Raises
     ------
@@ -82,17 +46,17 @@ def refined(grid: Grid, law: ScalarDensities, rough: Kernels) -> Kernels:
     """
     with np.errstate(divide="ignore"):
         logs = np.maximum(np.log(grid.mass), -DEAD)
-    i, weight = _panels(grid.x, grid.mass, law)
+    i, weight = _panels(grid.x, grid.mass, law, most)
     (x, full), (_, even) = interpolated(np.stack([grid.x, logs]), i), interpolated(np.stack([grid.x, logs])[:, ::2], 0.5 * i)
     mass, other = (values / values.sum() for values in (weight * np.exp(full), weight * np.exp(even)))
     kept = np.maximum(mass, other) > LIGHT
     mu, sigma = law.kernel(x)
-    new = (array[None, kept] for array in (mu, sigma, mass, other))
-    return rough._replace(**dict(zip(("mu", "sigma", "mass", "even"), new, strict=True)), spectral=np.array([False]))
+    mu, sigma, mass, other = (array[None, kept] for array in (mu, sigma, mass, other))
+    return rough._replace(mu=mu, sigma=sigma, mass=mass, even=other, spectral=np.array([False]))
 
 
 def interpolated(values: Array, at: Array) -> Array:
-    """Functions given at the numbers 0, 1, 2..., (2, N), between these: (2, M).
+    """Functions given at the numbers 0, 1, 2..., (n, N), between these: (n, M).
 
     By the polynomials through the eight nearest; the second function, a logarithm, by lines where it falls steeply.
     """
@@ -109,7 +73,7 @@ def interpolated(values: Array, at: Array) -> Array:
     return result
 
 
-def _panels(x: Array, mass: Array, law: ScalarDensities) -> tuple[Array, Array]:
+def _panels(x: Array, mass: Array, law: ScalarDensities, most: int) -> tuple[Array, Array]:
     """Gauss nodes and weights over the numbers of the nodes, on panels halved until kernels overlap."""
     numbers = np.arange(len(x))
     left, right = numbers[:-1:2].astype(float), numbers[2::2].astype(float)
@@ -122,7 +86,7 @@ def _panels(x: Array, mass: Array, law: ScalarDensities) -> tuple[Array, Array]:
         split = matters & (np.abs(b - a) > STEP * np.minimum(np.minimum(s, u), t)) & (middle > left) & (middle < right)
         done.append((left[~split], right[~split]))
         total += int(np.count_nonzero(~split))
-        if total + 2 * np.count_nonzero(split) > MOST // len(PANEL[0]):
+        if total + 2 * np.count_nonzero(split) > most // len(PANEL[0]):
             raise Unresolved("the transition kernel is far narrower than the posterior")
         left, right = np.concatenate([left[split], middle[split]]), np.concatenate([middle[split], right[split]])
     left, right = (np.concatenate(side)[:, None] for side in zip(*done, strict=True))

@@ -59,7 +59,8 @@ def hidden(candidates: Candidates, place: Place, count: int) -> Array:
 def explanations(kernels: Kernels, y: Array, law: ScalarDensities, low: Array, high: Array) -> Array:
     """Roots (T, 3) of b(x, m_w) = y in the support, those nearest to the middle; NaN where there are fewer."""
     x, _ = Place(kernels.centre, kernels.width, low, high).nodes(SEARCHED)
-    negative = law.signal(x) < y
+    wanted = law.explained(y)
+    negative = law.signal(x) < wanted
     change = negative[:, 1:] != negative[:, :-1]
     if np.isnan(y).any():
         change &= ~np.isnan(y)
@@ -70,13 +71,13 @@ def explanations(kernels: Kernels, y: Array, law: ScalarDensities, low: Array, h
     left_negative = np.take_along_axis(negative, places, axis=1)
     for _ in range(2):
         inner = left[:, :, None] + (right - left)[:, :, None] * SECTIONS
-        same = (law.signal(inner) < y[:, :, None]) == left_negative[:, :, None]
+        same = (law.signal(inner) < wanted[:, :, None]) == left_negative[:, :, None]
         last = np.minimum(np.argmin(same, axis=2), len(SECTIONS) - 1)[:, :, None]
         last = np.maximum(last, 1)
         left, right = np.take_along_axis(inner, last - 1, axis=2)[:, :, 0], np.take_along_axis(inner, last, axis=2)[:, :, 0]
     root = 0.5 * (left + right)
     for _ in range(2):
         with np.errstate(divide="ignore", invalid="ignore"):
-            newton = root - (law.signal(root) - y) / law.slope(root)
+            newton = root - (law.signal(root) - wanted) / law.slope(root)
         root = np.where((newton > left) & (newton < right), newton, root)
     return np.where(found, root, np.nan)

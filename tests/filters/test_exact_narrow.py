@@ -1,0 +1,84 @@
+"""The exact AOF where the noise is small, vanishes at a state or everywhere, and where only the noise tells of the state."""
+
+import time
+
+import numpy as np
+import pytest
+
+from kfcourse import Model, ModelError, simulate
+from kfcourse.filters import adaptive_pointmass, kalman_filter, pointmass
+from kfcourse.filters.exact import ACCURACY
+
+# Interpolation over 129 nodes, 8 of them at a time, has an error of about 1e-9 where a posterior is nearly normal.
+INTERPOLATED = 1e-8
+
+
+@pytest.mark.parametrize(
+    ("state", "options"),
+    [
+        ("0.9*x + 0.001*v", {}),
+        ("31*x + 0.1*v", {}),
+        ("-0.9*x + 1e-6*v + 2", {}),
+        ("0.9*x", {}),  # no noise: the density is only stretched
+        ("x", {"prior": {"mean": 3.0, "variance": 4.0}}),  # a constant is estimated
+        ("c*x + e*v", {"parameters": {"c": 0.9, "e": 0.0}}),
+        ("0.9*x + v", {"state_noise": {"variance": 0.0}}),
+    ],
+)
+def test_narrow_kernels_give_the_kalman_filter(state, options):
+    model = Model.define(state, "x + 0.5*w", **options)
+    _, y = simulate(model, 3, 5, seed=1)
+    exact, kalman = pointmass(model), kalman_filter(model)
+    a, b = exact.init(3), kalman.init(3)
+    for measurement in y:
+        a, b = exact.step(a, measurement), kalman.step(b, measurement)
+        sigma = np.sqrt(b.posterior.cov[..., 0, 0])
+        allowed = INTERPOLATED + a.memory.error
+        assert (a.memory.error < 10 * ACCURACY).all()
+        assert (np.abs(a.posterior.mean - b.posterior.mean)[:, 0] <= allowed * sigma).all()
+        assert (np.abs(a.posterior.cov[:, 0, 0] / b.posterior.cov[..., 0, 0] - 1) <= allowed).all()
+
+
+@pytest.mark.parametrize(("c", "e"), [(1.05, 0.01), (1.0, 0.001)])
+def test_a_noise_that_vanishes_at_a_state_has_the_moments_of_the_closed_form(c, e):
+    # x' = c x + e x^2 v.  Without measurements M x' = 0, M x'^2 = c^2 M x^2 + e^2 M x^4, and of x_1 ~ c x + e x^2 v
+    # M x_1^4 = c^4 M x^4 + 6 c^2 e^2 M x^6 + 3 e^4 M x^8, where M x^2, x^4, x^6, x^8 = 1, 3, 15, 105.
+    model = Model.define("c*x + e*x**2*v", "x + w", {"c": c, "e": e})
+    exact = pointmass(model)
+    first = exact.step(exact.init(1), np.full((1, 1), np.nan))
+    second = exact.step(first, np.full((1, 1), np.nan))
+    square = c**2 + 3 * e**2
+    fourth = 3 * c**4 + 90 * c**2 * e**2 + 315 * e**4
+    np.testing.assert_allclose(first.predicted.cov[0, 0, 0], square, rtol=INTERPOLATED)
+    # The noises that fold the state, up to 1e-7 of the mass, are left out, and far in the tails they count: x^2 = 50 there.
+    np.testing.assert_allclose(second.posterior.cov[0, 0, 0], square, rtol=50 * 1e-7)
+    np.testing.assert_allclose(second.predicted.cov[0, 0, 0], c**2 * square + e**2 * fourth, rtol=50 * 1e-7)
+
+
+@pytest.mark.parametrize("meter", ["exp(x/2)*w", "x*w + 1", "(1 + x**2)*w"])
+def test_a_meter_whose_signal_lacks_the_state(meter):
+    # Stochastic volatility and its like: only the size of the measurement tells.
+    model = Model.define("0.95*x + 0.3*v", meter)
+    _, y = simulate(model, 2, 4, seed=3)
+    ours, theirs = pointmass(model), adaptive_pointmass(model, order=12, tolerance=1e-9)
+    a, b = ours.init(2), theirs.init(2)
+    for measurement in y:
+        a, b = ours.step(a, measurement), theirs.step(b, measurement)
+        sigma = np.sqrt(b.posterior.cov[:, 0, 0])
+        allowed = a.memory.error + b.memory.discretisation_error() / sigma + INTERPOLATED
+        assert (a.memory.error < 100 * ACCURACY).all()
+        assert (np.abs(a.posterior.mean - b.posterior.mean)[:, 0] <= allowed * sigma).all()
+
+
+@pytest.mark.parametrize(
+    ("state", "meter"), [("0.9*x + 0.3*v", "sin(1000*x) + 0.01*w"), ("x**3 + 1e-6*v", "x + w"), ("1e5*x + 0.1*v", "x + w")]
+)
+def test_beyond_the_budget_there_is_a_message_within_seconds(state, meter):
+    model = Model.define(state, meter)
+    _, y = simulate(model, 4, 6, seed=1)
+    exact = pointmass(model)
+    state, start = exact.init(4), time.process_time()
+    with pytest.raises(ModelError, match=r"step \d of Model.*narrow|step \d of Model.*nodes"):
+        for measurement in y:
+            state = exact.step(state, measurement)
+    assert time.process_time() - start < 5
