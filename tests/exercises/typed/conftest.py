@@ -6,6 +6,8 @@ import pytest
 
 from kfcourse.checks import engine, exercise
 
+pytest.register_assert_rewrite("answers")
+
 _wrong, _found = engine._wrong, {}
 
 
@@ -27,3 +29,17 @@ def told(monkeypatch):
     """What the check says to an answer: told("g4", function)."""
     monkeypatch.setattr(engine, "_wrong", _remembered)
     return lambda name, answer, variant="53": opened(name[0], variant).check(name, answer)
+
+
+ROWS = {
+    "test_right_answers_pass": ("RIGHT", ("name", "answer")),
+    "test_no_wrong_kind_of_mistake_is_named": ("WRONG", ("name", "kinds", "answer")),
+    "test_what_cannot_be_compared_is_explained": ("UNUSABLE", ("name", "words", "answer")),
+}
+
+
+def pytest_generate_tests(metafunc):
+    """The tests of answers.py get the rows of the file that imports them."""
+    if metafunc.function.__module__ == "answers":
+        rows, arguments = ROWS[metafunc.function.__name__]
+        metafunc.parametrize(arguments, getattr(metafunc.module, rows))

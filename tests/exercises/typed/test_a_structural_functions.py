@@ -2,6 +2,7 @@
 
 import pytest
 import sympy as sp
+from answers import test_no_wrong_kind_of_mistake_is_named, test_right_answers_pass, test_what_cannot_be_compared_is_explained  # noqa: F401
 
 z, p, m, d, x, v = sp.symbols("z p m d x v", real=True)
 c, e, g, f = sp.symbols("c e g f", real=True)
@@ -265,27 +266,6 @@ UNUSABLE = [
     ("a3", "expected 3 results", lambda m, d: (g * m, g**2 * d + f**2 * m**4)),
     ("a6", "is `return` missing", lambda m, d: None),
 ]
-
-
-@pytest.mark.parametrize(("name", "answer"), RIGHT)
-def test_right_answers_pass(told, name, answer):
-    assert told(name, answer).passed
-
-
-@pytest.mark.parametrize(("name", "kinds", "answer"), WRONG)
-def test_no_wrong_kind_of_mistake_is_named(told, name, kinds, answer):
-    """`kinds`: all names that are true of the mistake; none where none is expected."""
-    result = told(name, answer)
-    assert result.status == "wrong"
-    assert set(result.diagnosis) <= set(kinds.split()), result
-    assert result.diagnosis or not kinds
-
-
-@pytest.mark.parametrize(("name", "words", "answer"), UNUSABLE)
-def test_what_cannot_be_compared_is_explained(told, name, words, answer):
-    result = told(name, answer)
-    assert result.status == "unusable"
-    assert words in result.message
 
 
 @pytest.mark.parametrize(("name", "answer"), RIGHT_OF_PENDULUM)

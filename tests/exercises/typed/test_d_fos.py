@@ -3,7 +3,7 @@
 from functools import cache
 
 import numpy as np
-import pytest
+from answers import test_no_wrong_kind_of_mistake_is_named, test_right_answers_pass, test_what_cannot_be_compared_is_explained  # noqa: F401
 
 from kfcourse.checks import exercise
 
@@ -181,24 +181,3 @@ UNUSABLE = [
     ("d3", "expected 3 results", lambda *arguments: d3()(*arguments)[:2]),
     ("d4", "result 1 of 2", d4(u=lambda both, Gamma, chi: Gamma @ both.T + chi[:, None])),
 ]
-
-
-@pytest.mark.parametrize(("name", "answer"), RIGHT)
-def test_right_answers_pass(told, name, answer):
-    assert told(name, answer).passed
-
-
-@pytest.mark.parametrize(("name", "kinds", "answer"), WRONG)
-def test_no_wrong_kind_of_mistake_is_named(told, name, kinds, answer):
-    """`kinds`: all names that are true of the mistake; none where none is expected."""
-    result = told(name, answer)
-    assert result.status == "wrong"
-    assert set(result.diagnosis) <= set(kinds.split()), result
-    assert result.diagnosis or not kinds
-
-
-@pytest.mark.parametrize(("name", "words", "answer"), UNUSABLE)
-def test_what_cannot_be_compared_is_explained(told, name, words, answer):
-    result = told(name, answer)
-    assert result.status == "unusable"
-    assert words in result.message

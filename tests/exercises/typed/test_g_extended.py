@@ -1,7 +1,7 @@
 """Set g, answers as a student would type them: the right ones pass, the wrong ones are told apart or not named at all."""
 
 import numpy as np
-import pytest
+from answers import test_no_wrong_kind_of_mistake_is_named, test_right_answers_pass, test_what_cannot_be_compared_is_explained  # noqa: F401
 from scipy import stats
 
 from kfcourse.checks import exercise
@@ -267,24 +267,3 @@ UNUSABLE = [
     ("g6", "expected an array of shape", g6(over=lambda values, x, y: values)),
     ("g7", "Singular matrix", g7_by_the_gain_form),
 ]
-
-
-@pytest.mark.parametrize(("name", "answer"), RIGHT)
-def test_right_answers_pass(told, name, answer):
-    assert told(name, answer).passed
-
-
-@pytest.mark.parametrize(("name", "kinds", "answer"), WRONG)
-def test_no_wrong_kind_of_mistake_is_named(told, name, kinds, answer):
-    """`kinds`: all names that are true of the mistake; none where none is expected."""
-    result = told(name, answer)
-    assert result.status == "wrong"
-    assert set(result.diagnosis) <= set(kinds.split()), result
-    assert result.diagnosis or not kinds
-
-
-@pytest.mark.parametrize(("name", "words", "answer"), UNUSABLE)
-def test_what_cannot_be_compared_is_explained(told, name, words, answer):
-    result = told(name, answer)
-    assert result.status == "unusable"
-    assert words in result.message

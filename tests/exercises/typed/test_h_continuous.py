@@ -1,8 +1,8 @@
 """Set h, answers as a student would type them: the right ones pass, the wrong ones are told apart or not named at all."""
 
 import numpy as np
-import pytest
 import sympy as sp
+from answers import test_no_wrong_kind_of_mistake_is_named, test_right_answers_pass, test_what_cannot_be_compared_is_explained  # noqa: F401
 
 
 def h2(
@@ -209,24 +209,3 @@ UNUSABLE = [
     ("h4", "expected 2 results", lambda a, s, h, S_xi, N: (np.sqrt(a**2 + h**2 * s**2 * S_xi / N) - a) * N / 2 / h**2),
     ("h6", "stops with ValueError", lambda S, x, y, N: (np.gradient(S), np.gradient(np.gradient(S)))),
 ]
-
-
-@pytest.mark.parametrize(("name", "answer"), RIGHT)
-def test_right_answers_pass(told, name, answer):
-    assert told(name, answer).passed
-
-
-@pytest.mark.parametrize(("name", "kinds", "answer"), WRONG)
-def test_no_wrong_kind_of_mistake_is_named(told, name, kinds, answer):
-    """`kinds`: all names that are true of the mistake; none where none is expected."""
-    result = told(name, answer)
-    assert result.status == "wrong"
-    assert set(result.diagnosis) <= set(kinds.split()), result
-    assert result.diagnosis or not kinds
-
-
-@pytest.mark.parametrize(("name", "words", "answer"), UNUSABLE)
-def test_what_cannot_be_compared_is_explained(told, name, words, answer):
-    result = told(name, answer)
-    assert result.status == "unusable"
-    assert words in result.message

@@ -1,8 +1,8 @@
 """Set j, answers as a student would type them: the right ones pass, the wrong ones are told apart or not named at all."""
 
 import numpy as np
-import pytest
 import sympy as sp
+from answers import test_no_wrong_kind_of_mistake_is_named, test_right_answers_pass, test_what_cannot_be_compared_is_explained  # noqa: F401
 from scipy.linalg import solve_discrete_are
 
 cos, sin, tan = sp.cos, sp.sin, sp.tan
@@ -239,24 +239,3 @@ UNUSABLE = [
     ),
     ("j4", "expected 2 results", lambda y, T, alpha, beta, r, v: j4()(y, T, alpha, beta, r, v)[0]),
 ]
-
-
-@pytest.mark.parametrize(("name", "answer"), RIGHT)
-def test_right_answers_pass(told, name, answer):
-    assert told(name, answer).passed
-
-
-@pytest.mark.parametrize(("name", "kinds", "answer"), WRONG)
-def test_no_wrong_kind_of_mistake_is_named(told, name, kinds, answer):
-    """`kinds`: all names that are true of the mistake; none where none is expected."""
-    result = told(name, answer)
-    assert result.status == "wrong"
-    assert set(result.diagnosis) <= set(kinds.split()), result
-    assert result.diagnosis or not kinds
-
-
-@pytest.mark.parametrize(("name", "words", "answer"), UNUSABLE)
-def test_what_cannot_be_compared_is_explained(told, name, words, answer):
-    result = told(name, answer)
-    assert result.status == "unusable"
-    assert words in result.message

@@ -1,8 +1,8 @@
 """Set k, answers as a student would type them: the right ones pass, the wrong ones are told apart or not named at all."""
 
 import numpy as np
-import pytest
 import sympy as sp
+from answers import test_no_wrong_kind_of_mistake_is_named, test_right_answers_pass, test_what_cannot_be_compared_is_explained  # noqa: F401
 
 
 def k1(velocity=lambda y, eps: y - eps, by=-1):
@@ -201,24 +201,3 @@ UNUSABLE = [
     ("k3", "expected an array of shape", k3(spread=lambda p: p * np.ones(3))),
     ("k4", "functions of symbols", lambda sigma_xi, sigma_n, T: sigma_n / np.sqrt(k2()(sigma_xi, sigma_n)[1])),
 ]
-
-
-@pytest.mark.parametrize(("name", "answer"), RIGHT)
-def test_right_answers_pass(told, name, answer):
-    assert told(name, answer).passed
-
-
-@pytest.mark.parametrize(("name", "kinds", "answer"), WRONG)
-def test_no_wrong_kind_of_mistake_is_named(told, name, kinds, answer):
-    """`kinds`: all names that are true of the mistake; none where none is expected."""
-    result = told(name, answer)
-    assert result.status == "wrong"
-    assert set(result.diagnosis) <= set(kinds.split()), result
-    assert result.diagnosis or not kinds
-
-
-@pytest.mark.parametrize(("name", "words", "answer"), UNUSABLE)
-def test_what_cannot_be_compared_is_explained(told, name, words, answer):
-    result = told(name, answer)
-    assert result.status == "unusable"
-    assert words in result.message

@@ -1,0 +1,19 @@
+"""What is tested of the answers typed in a file of this folder: its lists RIGHT, WRONG and UNUSABLE, a test for each row."""
+
+
+def test_right_answers_pass(told, name, answer):
+    assert told(name, answer).passed
+
+
+def test_no_wrong_kind_of_mistake_is_named(told, name, kinds, answer):
+    """`kinds`: all names that are true of the mistake; none where none is expected."""
+    result = told(name, answer)
+    assert result.status == "wrong"
+    assert set(result.diagnosis) <= set(kinds.split()), result
+    assert result.diagnosis or not kinds
+
+
+def test_what_cannot_be_compared_is_explained(told, name, words, answer):
+    result = told(name, answer)
+    assert result.status == "unusable"
+    assert words in result.message
