@@ -184,6 +184,8 @@ class _Bayes:
         def between(borders: Array) -> tuple[Grid, bool]:
             if not np.isnan(y):
                 borders = np.union1d(borders, self._explanations(borders, y))
+            if len(borders) < 2:  # a prior without variance, or a support narrower than rounding: the state is known
+                return Grid(borders, np.ones(1), np.full(1, 1e300)), True
             grid = resolve(borders, log_density, self.too_wide, rule)
             return grid, not _cut_off(grid, borders)
 

@@ -100,7 +100,8 @@ def settled(kernels: Kernels, y: Array, law: ScalarDensities, place: Place, look
     width = np.where(seen, np.minimum(area / ROOT, 2 * fallen), place.scale)
     scale, wanted = width, SPACING * np.sqrt(32 * (count - 1)) * width
     for _ in range(6):  # of the equation: distance of the nodes at the centre = wanted
-        span = np.arcsinh((high - centre) / scale) + np.arcsinh((centre - low) / scale)
+        with np.errstate(invalid="ignore"):  # a support that is a single point: its error will be infinite
+            span = np.arcsinh((high - centre) / scale) + np.arcsinh((centre - low) / scale)
         scale = np.minimum(wanted / span, high - low)
     return Place(centre, scale, low, high)
 

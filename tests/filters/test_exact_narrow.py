@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from kfcourse import Model, ModelError, simulate
+from kfcourse import Model, ModelError, run, simulate
 from kfcourse.filters import adaptive_pointmass, kalman_filter, pointmass
 from kfcourse.filters.exact import ACCURACY
 
@@ -37,6 +37,15 @@ def test_narrow_kernels_give_the_kalman_filter(state, options):
         assert (a.memory.error < 10 * ACCURACY).all()
         assert (np.abs(a.posterior.mean - b.posterior.mean)[:, 0] <= allowed * sigma).all()
         assert (np.abs(a.posterior.cov[:, 0, 0] / b.posterior.cov[..., 0, 0] - 1) <= allowed).all()
+
+
+def test_a_state_that_is_known_at_first_stays_known_until_noise_comes():
+    model = Model.define("0.9*x + 0.3*v", "x + 0.5*w", prior={"mean": 2.0, "variance": 0.0})
+    _, y = simulate(model, 3, 4, seed=1)
+    ours, theirs = run(pointmass(model), y), run(kalman_filter(model), y)
+    np.testing.assert_allclose(ours.mean, theirs.mean, rtol=0, atol=INTERPOLATED)
+    np.testing.assert_allclose(ours.cov[1:], theirs.cov[1:], rtol=INTERPOLATED)
+    assert (ours.cov[0] == 0).all()
 
 
 @pytest.mark.parametrize(("c", "e"), [(1.05, 0.01), (1.0, 0.001)])
@@ -75,7 +84,8 @@ def test_a_meter_whose_signal_lacks_the_state(meter):
 )
 def test_beyond_the_budget_there_is_a_message_within_seconds(state, meter):
     model = Model.define(state, meter)
-    _, y = simulate(model, 4, 6, seed=1)
+    with np.errstate(over="ignore"):  # a cube six times over
+        _, y = simulate(model, 4, 6, seed=1)
     exact = pointmass(model)
     state, start = exact.init(4), time.process_time()
     with pytest.raises(ModelError, match=r"step \d of Model.*narrow|step \d of Model.*nodes"):
