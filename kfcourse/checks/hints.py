@@ -17,6 +17,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.equality import equal
+from kfcourse.limits import OutOfTime
 
 Agree: TypeAlias = Callable[[Sequence[Any], Sequence[Any]], bool]
 Said: TypeAlias = tuple[str, str]
@@ -53,7 +54,9 @@ class Sensitivity:
                     [not _same(a, b) for a, b in zip(self._parts(answer, values), before, strict=True)]
                     for answer, before in zip(self.answers, self.results, strict=True)
                 )
-            except Exception:  # the answer does not work for such an argument
+            except (OutOfTime, KeyboardInterrupt):
+                raise
+            except BaseException:  # the answer does not work for such an argument, or ends the program
                 continue
             rows.append((name, right, mine))
         return rows

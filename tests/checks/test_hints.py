@@ -87,3 +87,12 @@ def test_other_forms_are_right():
 def test_complex_numbers_are_told():
     with pytest.raises(Unusable, match="complex"):
         like(np.array([1j]), np.zeros(1))
+
+
+def test_an_answer_that_ends_the_program_for_other_arguments_does_not_end_the_check():
+    def touchy(y, gain):
+        if gain != 0.4:  # the search for hints changes the arguments a little
+            raise SystemExit
+        return gain * y + y[::-1]
+
+    assert outcome(FILTERED, touchy).status == "wrong"
