@@ -235,9 +235,11 @@ def graded(tmp_path_factory):
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("KFCOURSE_SECRET", "x")
-        result = CliRunner().invoke(
-            cli.main, ["grade", str(folder), "--masters", str(FIXTURES), "--seconds", str(SECONDS), "--sandbox", "none"]
-        )
+        course = folder.parent / "list.csv"
+        course.write_text("name,group,variant\nИванов Иван,М-1,53\nПетров,М-1,53\nСидоров,М-1,7\n", encoding="utf-8")
+        options = ["--masters", str(FIXTURES), "--seconds", str(SECONDS), "--sandbox", "none"]
+        options += ["--students", str(course), "--report", str(folder.parent / "report")]
+        result = CliRunner().invoke(cli.main, ["grade", str(folder), *options])
     after = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     assert after.pop(folder / "grades.csv", None), result.output
     assert after == before
@@ -389,6 +391,13 @@ def test_what_cannot_be_graded_is_named(graded):
         assert words in status[name][1]
         assert status[name][2] == ""  # tried again next time
     assert "\x1b" not in graded.output
+
+
+def test_a_course_list_tells_what_to_look_at(graded):
+    told = [line for line in graded.output.splitlines() if line.startswith("look at")]
+    assert told == ["look at Петров: set b: variant 12, was given 53", "look at Сидоров: missing: b"]
+    assert (graded.folder.parent / "report" / "feedback" / "М-1" / "Петров.html").exists()
+    assert "Sandbox: none: notebooks run with your rights" in graded.output
 
 
 def test_a_second_run_does_only_what_is_new(graded, tmp_path, monkeypatch):

@@ -50,6 +50,10 @@ class Grade:
         Empty if it was not graded.
     told : dict
         Question to what was said of the answer.
+    student : str
+        Whom the notebook was handed out to, as it says itself.
+    work : str
+        Hash of the student's code, empty if there is none: the same code has the same.
     """
 
     name: str
@@ -60,6 +64,8 @@ class Grade:
     note: str = ""
     digest: str = ""
     told: Mapping[str, Told] = field(default_factory=dict)
+    student: str = ""
+    work: str = ""
 
     @property
     def passed(self) -> int:
@@ -67,7 +73,7 @@ class Grade:
 
 
 FIRST = ("notebook", "status", "set", "variant")
-LAST = ("passed", "of", "note", "digest", "details")
+LAST = ("passed", "of", "note", "digest", "student", "work", "details")
 
 
 def columns() -> list[str]:
@@ -81,25 +87,25 @@ def write_table(grades: Iterable[Grade], path: Path) -> None:
     writer = csv.DictWriter(text, columns(), restval="", lineterminator="\n")
     writer.writeheader()
     for one in sorted(grades, key=lambda one: one.name):
-        row: dict[str, Any] = dict(zip(FIRST, (_cautious(one.name), one.status, one.letter, _cautious(one.variant)), strict=True))
+        row: dict[str, Any] = dict(zip(FIRST, (cautious(one.name), one.status, one.letter, cautious(one.variant)), strict=True))
         row |= {f"q{i + 1}": mark for i, mark in enumerate(one.marks.values())}
-        count = (one.passed, len(one.marks)) if one.status == GRADED else ("", "")
-        writer.writerow(row | dict(zip(LAST, (*count, _cautious(one.note), one.digest, details(one.told)), strict=True)))
+        passed, of = (one.passed, len(one.marks)) if one.status == GRADED else ("", "")
+        last = (passed, of, cautious(one.note), one.digest, cautious(one.student), one.work, details(one.told))
+        writer.writerow(row | dict(zip(LAST, last, strict=True)))
     save("\ufeff" + text.getvalue(), path)
 
 
 def details(told: Mapping[str, Told]) -> str:
     """What was said of all answers, as one cell of the table."""
-    return (
-        json.dumps({name: [one.says, one.mistakes, one.code] for name, one in told.items()}, ensure_ascii=False) if told else ""
-    )
+    rows = {name: [one.says, one.mistakes, one.code] for name, one in told.items()}
+    return json.dumps(rows, ensure_ascii=False) if rows else ""
 
 
 def _told(text: str) -> dict[str, Told]:
     return {name: Told(says, tuple(mistakes), code) for name, (says, mistakes, code) in json.loads(text or "{}").items()}
 
 
-def _cautious(text: str) -> str:
+def cautious(text: str) -> str:
     """A spreadsheet takes what begins so for a formula."""
     return f" {text}" if text[:1] in ("=", "+", "-", "@") else text
 
@@ -120,11 +126,11 @@ def read_table(path: Path) -> dict[str, Grade]:
         rows = [{}]
     found = {}
     for row in rows:
-        if not set((*FIRST, *LAST)) <= set(row):
+        if not {*FIRST, "passed", "of", "note", "digest"} <= set(row):
             raise ValueError(
                 f"{path} is not a table of grades (or a spreadsheet has changed it); move it, or choose another --out"
             )
-        values = {key: (row[key] or "").strip() for key in (*FIRST, *LAST)}
+        values = {key: (row.get(key) or "").strip() for key in (*FIRST, *LAST)}
         letter = values["set"]
         questions = [question.name for question in sets()[letter].questions] if letter in sets() else []
         marks = {name: row.get(f"q{i + 1}") or "" for i, name in enumerate(questions)}
@@ -132,7 +138,8 @@ def read_table(path: Path) -> dict[str, Grade]:
             name, status, _, variant = (values[key] for key in FIRST)
             with suppress(ValueError, TypeError, AttributeError):  # a spreadsheet has cut it: graded again
                 told = _told(values["details"])
-                found[values["digest"]] = Grade(name, status, letter, variant, marks, values["note"], values["digest"], told)
+                more = (values["note"], values["digest"], told, values["student"], values["work"])
+                found[values["digest"]] = Grade(name, status, letter, variant, marks, *more)
     return found
 
 
