@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from typing import Any, TypeAlias
 
 import sympy as sp
@@ -35,8 +36,8 @@ _WITHOUT_WIDTH = {
 
 
 def equation_latex(equation: Equation, width: int = WIDTH, names: Mapping[Any, str] | None = None) -> str:
-    """LaTeX of side = side = ..., for an aligned environment: `&` before each sign, further lines where it is long."""
-    first, *others = (side_lines(side, width - 6, names) for side in equation)
+    """LaTeX of side = side = ..., for an aligned environment: `&` before each sign, further lines where it is long; a side printed like the one before only once."""
+    first, *others = (lines for lines, _ in groupby(side_lines(side, width - 6, names) for side in equation))
     if len(first) > 1:
         raise ValueError(
             "the left side of an equation is too long for one line: give it a name, and the formula as the right side"
@@ -46,7 +47,7 @@ def equation_latex(equation: Equation, width: int = WIDTH, names: Mapping[Any, s
     for number, side in enumerate(others):
         if number and (len(side) > 1 or symbols(side[0]) + 3 > room):
             lines, line, room = [*lines, line], "", width - symbols(first[0])
-        line += ("&" if not number or not line else "") + "= " + side[0]
+        line += ("&= " if not number or not line else " = ") + side[0]
         room -= symbols(side[0]) + 3
         for continued in side[1:]:
             lines, line, room = [*lines, line], rf"&\quad {continued}", 0
