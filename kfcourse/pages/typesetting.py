@@ -36,7 +36,10 @@ _WITHOUT_WIDTH = {
 
 
 def equation_latex(equation: Equation, width: int = WIDTH, names: Mapping[Any, str] | None = None) -> str:
-    """LaTeX of side = side = ..., for an aligned environment: `&` before each sign, further lines where it is long; a side printed like the one before only once."""
+    """LaTeX of side = side = ..., with `&` for an aligned environment, in several lines where it is long.
+
+    Sides that print alike are printed once.
+    """
     first, *others = (lines for lines, _ in groupby(side_lines(side, width - 6, names) for side in equation))
     if len(first) > 1:
         raise ValueError(
