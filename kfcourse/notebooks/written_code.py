@@ -13,7 +13,6 @@ from kfcourse.checks import Exercise
 from kfcourse.symbolic.sides import Side, plain
 from kfcourse.symbolic.structure import Structure
 
-
 COLUMNS = 70  # of the page's 78, less the indents of a function and of its brackets
 
 
