@@ -25,13 +25,13 @@ class Estimate:
     Attributes
     ----------
     value, standard_error : ndarray, any shape
-    freedom : int
-        Degrees of freedom of the standard error (batches - 1).
+    freedom : int or ndarray
+        Degrees of freedom of the standard error (batches - 1; fewer where it was found from few designs).
     """
 
     value: Array
     standard_error: Array
-    freedom: int
+    freedom: int | Array
 
     def interval(self, confidence: float = 0.95) -> tuple[Array, Array]:
         """Lower and upper limit of the confidence interval (Student's t)."""
@@ -46,7 +46,8 @@ class Estimate:
         return stats.t.ppf(0.5 + confidence / 2, self.freedom) * self.standard_error
 
     def __getitem__(self, index) -> Estimate:
-        return Estimate(self.value[index], self.standard_error[index], self.freedom)
+        freedom = self.freedom[index] if isinstance(self.freedom, np.ndarray) and self.freedom.ndim else self.freedom
+        return Estimate(self.value[index], self.standard_error[index], freedom)
 
 
 def batch_mean(sums: Array, counts: Array) -> Estimate:
@@ -107,6 +108,10 @@ class Sums:
     def concatenate(cls, parts: Sequence[Sums]) -> Sums:
         """Sums over the batches of all parts."""
         return cls(*(np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in cls.__dataclass_fields__))
+
+    def of_filters(self, chosen: slice | list[int]) -> Sums:
+        """Those of some of the filters."""
+        return Sums(self.counts, *(getattr(self, name)[chosen] for name in list(self.__dataclass_fields__)[1:]))
 
     def record(self, filter_index: int, step: int, x: Array, estimate: Gaussian) -> None:
         """Add one step of one filter: true states x (N, n) and its estimate."""
