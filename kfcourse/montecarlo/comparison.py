@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from kfcourse.laws import Array
 from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean, ratio
 from kfcourse.montecarlo.two_phase import Replicas, Terms, batch_sums, estimate, with_design
 from kfcourse.symbolic.model import Model
@@ -74,6 +73,11 @@ class Comparison:
     def has_bound(self) -> bool:
         """Whether the exact AOF ran."""
         return self._is_slow(EXACT)
+
+    @property
+    def designs(self) -> int:
+        """Ensembles that each of the designed filters was designed on; 0 if there is no such filter or one design only."""
+        return len(self.replicas.sums) if self.replicas else 0
 
     @property
     def subset_runs(self) -> int:
