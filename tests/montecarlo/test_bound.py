@@ -169,8 +169,8 @@ def test_the_variance_between_designs_is_found_below_that_of_the_trajectories():
 def test_standard_errors_hold_the_variance_of_the_design(variant53):
     """Designed on few trajectories, a DUOF varies: the scatter of independent comparisons must be in the standard error of one.
 
-    Mean of SE^2 against the variance of the results, 60 of them: 4 standard errors of that ratio, sqrt(2/60) for a normal law, and
-    as much for the mean, as a variance from 4 designs has 3 degrees of freedom, and errors have tails.
+    Mean of SE^2 against the variance of the results, 60 of them: 4 standard errors of that ratio, sqrt(2/60) for a normal law,
+    and as much for the mean, as a variance from 4 designs has 3 degrees of freedom, and errors have tails.
     """
     with_design, without, values = [], [], []
     for seed in range(60):
