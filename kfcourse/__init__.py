@@ -5,7 +5,8 @@ gaussian(model).latex()                            structural functions, derived
 compare(lab_filters(model), model, 100_000, 51, seed=1).ranking()
 
 A folder is a floor; each one's docstring says what lives there.  Below them all: `laws` (normal laws, gain with its
-pseudo-inverse, correction, missing measurements), `limits` (a time limit for a block of code), `files` (whole or not at all).
+pseudo-inverse, correction, missing measurements), `limits` (a time limit for a block of code), `files` (whole or not at all),
+`seeds` (a number, or a generator that draws one).
 """
 
 from kfcourse.lab import lab_filters, load_variants

@@ -13,6 +13,7 @@ import numpy as np
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
 from kfcourse.laws import Array, Gaussian, square_root
+from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
@@ -26,7 +27,7 @@ class Particles(NamedTuple):
     seed: np.random.SeedSequence
 
 
-def particle(model: Model, particles: int = 1000, seed: int = 0) -> Filter:
+def particle(model: Model, particles: int = 1000, seed: Seed = 0) -> Filter:
     """The bootstrap particle filter (Gordon, Salmond and Smith), resampled systematically at each step.
 
     Parameters
@@ -35,12 +36,12 @@ def particle(model: Model, particles: int = 1000, seed: int = 0) -> Filter:
         Any dimension; the meter's noise must enter linearly, so that p(y | x) is known.
     particles : int
         Particles per trajectory; `state.memory.effective` tells how many of them count.
-    seed : int
+    seed : int or numpy.random.Generator
         Steps are reproducible: the same state and measurement give the same result.
     """
     if particles < 2:
         raise ModelError(f"a particle filter needs at least 2 particles, got {particles}")
-    log_likelihood = likelihood(model)
+    number, log_likelihood = seed_number(seed), likelihood(model)
     state_equation, _ = compile_model(model)
     gaussian_init = initial_state(model)
 
@@ -49,7 +50,7 @@ def particle(model: Model, particles: int = 1000, seed: int = 0) -> Filter:
         return law.mean + standard @ square_root(law.cov).T
 
     def init(runs: int) -> State:
-        root = np.random.SeedSequence([seed, runs])
+        root = np.random.SeedSequence([number, runs])
         x = sample(_stream(root, 0), model.prior, runs)
         return gaussian_init(runs)._replace(memory=Particles(x, np.full(runs, float(particles)), root))
 

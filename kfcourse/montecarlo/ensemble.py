@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kfcourse.laws import Array, Gaussian, Trajectories, square_root
+from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 
@@ -44,6 +45,7 @@ class Ensemble:
     runs, steps : int
         Trajectories, and measurements y_0 ... y_{steps-1} of each.
     seed : numpy.random.SeedSequence
+        A number or a `numpy.random.Generator` becomes one.
     """
 
     model: Model
@@ -52,6 +54,8 @@ class Ensemble:
     seed: np.random.SeedSequence
 
     def __post_init__(self) -> None:
+        if not isinstance(self.seed, np.random.SeedSequence):
+            object.__setattr__(self, "seed", np.random.SeedSequence(seed_number(self.seed)))
         for name in ("runs", "steps"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
@@ -152,9 +156,9 @@ def workers(threads: int) -> Iterator[Executor]:
         pool.shutdown(cancel_futures=True)
 
 
-def simulate(model: Model, runs: int, steps: int, seed: int) -> Trajectories:
+def simulate(model: Model, runs: int, steps: int, seed: Seed) -> Trajectories:
     """Trajectories to look at: x (steps, runs, n) and y (steps, runs, p), the same for the same seed."""
-    ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(seed))
+    ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(seed_number(seed)))
     x, y = np.empty((steps, runs, model.n)), np.empty((steps, runs, model.p))
     start = 0
     for index, size in enumerate(ensemble.sizes):

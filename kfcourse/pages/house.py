@@ -31,6 +31,7 @@ LAYERS = (
     "laws",
     "limits",
     "files",
+    "seeds",
 )
 
 
