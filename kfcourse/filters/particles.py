@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.angles import Components, difference, moments_on_circle, on_circle
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
 from kfcourse.laws import Array, Gaussian, square_root
@@ -62,10 +63,12 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0) -> Filter:
         weights = np.exp(logs - np.where(np.isfinite(peak), peak, 0.0))
         total = weights.sum(axis=1, keepdims=True)
         weights = np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / particles)
-        posterior = _weighted(x, weights)
+        posterior = _weighted(x, weights, model.angles.x)
         chosen = np.take_along_axis(x, _systematic(weights, rng)[..., None], axis=1)
-        following = np.broadcast_to(state_equation(chosen, sample(rng, model.state_noise, len(x))), x.shape)
-        predicted = _weighted(following, np.full(weights.shape, 1.0 / particles))
+        following = on_circle(
+            np.broadcast_to(state_equation(chosen, sample(rng, model.state_noise, len(x))), x.shape), model.angles.x
+        )
+        predicted = _weighted(following, np.full(weights.shape, 1.0 / particles), model.angles.x)
         return State(state.step + 1, posterior, predicted, Particles(following, 1 / (weights**2).sum(axis=1), root))
 
     return Filter("particle", model, init, step, slow=True)
@@ -75,10 +78,12 @@ def _stream(root: np.random.SeedSequence, step: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(root.entropy, spawn_key=(step,)))
 
 
-def _weighted(x: Array, weights: Array) -> Gaussian:
+def _weighted(x: Array, weights: Array, angles: Components) -> Gaussian:
     """Mean (runs, n) and covariance (runs, n, n) of weighted particles."""
     mean = np.einsum("rm,rmi->ri", weights, x)
-    deviation = x - mean[:, None, :]
+    for i in angles:
+        mean[:, i], _ = moments_on_circle(x[..., i], weights)
+    deviation = difference(x, mean[:, None, :], angles)
     return Gaussian(mean, np.einsum("rm,rmi,rmj->rij", weights, deviation, deviation))
 
 

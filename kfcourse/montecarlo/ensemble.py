@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from kfcourse.angles import on_circle
 from kfcourse.laws import Array, Gaussian, Trajectories, square_root
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
@@ -104,7 +105,7 @@ class Ensemble:
         return np.random.Generator(np.random.SFC64(spawned))
 
     def _initial(self, block: int) -> Array:
-        return _draw(self._stream(block, 0), self.model.prior, 1, self.sizes[block])[0]
+        return on_circle(_draw(self._stream(block, 0), self.model.prior, 1, self.sizes[block])[0], self.model.angles.x)
 
     def _draw(self, block: int, chunk: int) -> tuple[Array, Array]:
         """Noises of a few steps of a block: v and w, (steps, size, r)."""
@@ -118,12 +119,13 @@ class _Simulator:
 
     def __init__(self, model: Model):
         self.state, self.meter = compile_model(model)
-        self.n, self.p = model.n, model.p
+        self.n, self.p, self.angles = model.n, model.p, model.angles
 
     def __call__(self, x: Array, v: Array, w: Array) -> Instant:
         y, x_next = self.meter(x, w), self.state(x, v)
         # A formula without noise and state is one constant for all trajectories.
-        return Instant(x, np.broadcast_to(y, (len(x), self.p)), np.broadcast_to(x_next, (len(x), self.n)))
+        y, x_next = np.broadcast_to(y, (len(x), self.p)), np.broadcast_to(x_next, (len(x), self.n))
+        return Instant(x, on_circle(y, self.angles.y), on_circle(x_next, self.angles.x))
 
 
 def _draw(rng: np.random.Generator, law: Gaussian, steps: int, size: int) -> Array:

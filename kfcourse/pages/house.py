@@ -29,6 +29,7 @@ LAYERS = (
     "linear",
     "symbolic",
     "laws",
+    "angles",
     "limits",
     "files",
     "seeds",
