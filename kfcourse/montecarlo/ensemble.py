@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kfcourse.angles import on_circle
-from kfcourse.laws import Array, Gaussian, Trajectories, square_root
+from kfcourse.laws import Array, Gaussian, Trajectories, normalised_square, square_root
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
@@ -47,16 +47,23 @@ class Ensemble:
         Trajectories, and measurements y_0 ... y_{steps-1} of each.
     seed : numpy.random.SeedSequence
         A number or a `numpy.random.Generator` becomes one.
+    wide : float
+        The initial states are drawn from a law so many times as wide as the prior; `weight` makes up for it.
     """
 
     model: Model
     runs: int
     steps: int
     seed: np.random.SeedSequence
+    wide: float = 1.0
 
     def __post_init__(self) -> None:
         if not isinstance(self.seed, np.random.SeedSequence):
             object.__setattr__(self, "seed", np.random.SeedSequence(seed_number(self.seed)))
+        if not self.wide >= 1:
+            raise ValueError(f"a prior can be drawn wider, not narrower: wide must be at least 1, got {self.wide!r}")
+        if self.wide > 1 and self.model.angles.x:
+            raise ValueError("initial states that are angles cannot be drawn from a wider law; leave wide=1")
         for name in ("runs", "steps"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
@@ -105,7 +112,20 @@ class Ensemble:
         return np.random.Generator(np.random.SFC64(spawned))
 
     def _initial(self, block: int) -> Array:
-        return on_circle(_draw(self._stream(block, 0), self.model.prior, 1, self.sizes[block])[0], self.model.angles.x)
+        mean, cov = self.model.prior
+        x = _draw(self._stream(block, 0), Gaussian(mean, self.wide**2 * cov), 1, self.sizes[block])[0]
+        return on_circle(x, self.model.angles.x)
+
+    def weight(self, x: Array) -> Array | None:
+        """Prior over the law drawn from, at initial states x (N, n): (N,); None if they are the same.
+
+        N(x; m, d) / N(x; m, w^2 d) = w^r exp(-(1 - w^-2) (x - m)^T d^+ (x - m) / 2), r the rank of d.
+        """
+        if self.wide == 1:
+            return None
+        mean, cov = self.model.prior
+        rank = np.linalg.matrix_rank(cov, hermitian=True)
+        return self.wide**rank * np.exp(-0.5 * (1 - self.wide**-2) * normalised_square(x - mean, cov))
 
     def _draw(self, block: int, chunk: int) -> tuple[Array, Array]:
         """Noises of a few steps of a block: v and w, (steps, size, r)."""
