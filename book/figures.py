@@ -24,7 +24,6 @@ TO_DO = frozenset(
         "numerics",
         "radar-tracking",
         "stratonovich",
-        "structural-functions",
         "time-tags",
         "track-2d",
         "manual/a-structural-functions",

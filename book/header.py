@@ -7,7 +7,7 @@
     ```
 
 prints how long the chapter takes, what it needs, its exercise sets, a link that downloads it as a notebook, and how many
-equations were verified when it was executed: outputs that verify equations say so in their data (`VERIFIED`).
+equations were verified when it was executed: outputs that verify equations say so in their data (equations.py).
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ import nbformat
 from docutils import nodes
 from docutils.parsers.rst import directives
 from downloads import plain
+from equations import records
 from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
 
 from kfcourse.checks import sets
 
-VERIFIED = "application/vnd.kfcourse.verified+json"
 NOTEBOOKS = "notebooks"
 log = logging.getLogger(__name__)
 
@@ -78,14 +78,8 @@ def _items(app, name: str, line: chapter_line):
         to = app.builder.get_relative_uri(name, "index").removesuffix("index.html") + f"{NOTEBOOKS}/{name}.ipynb"
         _write(plain(notebook), Path(app.outdir) / NOTEBOOKS / f"{name}.ipynb")
         yield f'<a download href="{to}">↓ notebook</a>'
-        count = verified(notebook)
+        count = sum(one["equations"] for one in records(notebook))
         yield count and f'<span class="kf-count">✓ {count} equation{"s" * (count > 1)} verified</span>'
-
-
-def verified(notebook: nbformat.NotebookNode) -> int:
-    """How many equations the outputs of an executed notebook say were verified."""
-    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
-    return sum(int(output.get("data", {}).get(VERIFIED, {}).get("equations", 0)) for output in outputs)
 
 
 def _link(app, name: str, other: str, line: chapter_line, text: str = "") -> str:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kfcourse.laws import Array, Gaussian, Trajectories, square_root
+from kfcourse.laws import Array, Gaussian, Trajectories, normalised_square, square_root
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 
@@ -44,14 +44,19 @@ class Ensemble:
     runs, steps : int
         Trajectories, and measurements y_0 ... y_{steps-1} of each.
     seed : numpy.random.SeedSequence
+    wide : float
+        The initial states are drawn from a law so many times as wide as the prior; `weight` makes up for it.
     """
 
     model: Model
     runs: int
     steps: int
     seed: np.random.SeedSequence
+    wide: float = 1.0
 
     def __post_init__(self) -> None:
+        if not self.wide >= 1:
+            raise ValueError(f"a prior can be drawn wider, not narrower: wide must be at least 1, got {self.wide!r}")
         for name in ("runs", "steps"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
@@ -100,7 +105,19 @@ class Ensemble:
         return np.random.Generator(np.random.SFC64(spawned))
 
     def _initial(self, block: int) -> Array:
-        return _draw(self._stream(block, 0), self.model.prior, 1, self.sizes[block])[0]
+        mean, cov = self.model.prior
+        return _draw(self._stream(block, 0), Gaussian(mean, self.wide**2 * cov), 1, self.sizes[block])[0]
+
+    def weight(self, x: Array) -> Array | None:
+        """Prior over the law drawn from, at initial states x (N, n): (N,); None if they are the same.
+
+        N(x; m, d) / N(x; m, w^2 d) = w^r exp(-(1 - w^-2) (x - m)^T d^+ (x - m) / 2), r the rank of d.
+        """
+        if self.wide == 1:
+            return None
+        mean, cov = self.model.prior
+        rank = np.linalg.matrix_rank(cov, hermitian=True)
+        return self.wide**rank * np.exp(-0.5 * (1 - self.wide**-2) * normalised_square(x - mean, cov))
 
     def _draw(self, block: int, chunk: int) -> tuple[Array, Array]:
         """Noises of a few steps of a block: v and w, (steps, size, r)."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from itertools import accumulate
+from itertools import accumulate, chain
 from typing import TypeVar
 
 import numpy as np
@@ -23,6 +23,7 @@ from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble, workers
 from kfcourse.montecarlo.statistics import BATCHES, Sums
 from kfcourse.montecarlo.subset import progress_bar, run_block, run_subset
+from kfcourse.montecarlo.two_phase import Replicas
 from kfcourse.symbolic.model import Model
 
 T = TypeVar("T")
@@ -70,7 +71,9 @@ def compare(
     seed: int,
     *,
     design_runs: int | None = None,
+    designs: int = 1,
     same_ensemble: bool = False,
+    wide: float = 1.0,
     subset_runs: int = 500,
     subset_seconds: float | None = None,
     threads: int = 2,
@@ -89,9 +92,16 @@ def compare(
         The same seed gives the same numbers, whatever the number of threads.
     design_runs : int, optional
         Size of the design ensemble; `runs` by default.
+    designs : int
+        Designed filters are designed on so many ensembles.  The first design is reported; how the others differ from it on the
+        common trajectories goes into the standard errors.  With 1 these hold for the filters just as they were designed.
     same_ensemble : bool
         Design on the very trajectories of the comparison, as the lab does: optimistic for the designed
         filters, by about the number of coefficients over `runs`.
+    wide : float
+        Draw the initial states of the comparison from a law so many times as wide as the prior, and weight every trajectory with
+        the ratio of the two densities (importance sampling).  Where rare far starts dominate the error, 1.5 or 2 gives the
+        standard errors of many times the trajectories.
     subset_runs : int
         Slow filters (exact, particle) run on this many of the common trajectories; their error variance
         is found through the paired difference from the Gaussian AOF (or else the first fast filter).  0 leaves them out.
@@ -112,22 +122,25 @@ def compare(
         A trajectory or a filter left the finite numbers.
     """
     _check_arguments(filters, model, seed, subset_runs, subset_seconds)
+    _check_designs(designs, same_ensemble, wide)
     names = [one.name for one in filters]
     slow = [one for one in filters if one.slow and subset_runs]
     fast = [one for one in filters if not one.slow]
-    run_seed, design_seed = np.random.SeedSequence(seed).spawn(2)
-    common = Ensemble(model, runs, steps, run_seed)
-    design_ensemble = (
-        common if same_ensemble else Ensemble(model, runs if design_runs is None else design_runs, steps, design_seed)
-    )
+    run_seed, *design_seeds = np.random.SeedSequence(seed).spawn(1 + designs)
+    common = Ensemble(model, runs, steps, run_seed, wide)
+    size = runs if design_runs is None else design_runs
+    design_ensemble, *others = [common] if same_ensemble else [Ensemble(model, size, steps, one) for one in design_seeds]
+    to_design = [one for one in fast if isinstance(one, Design)]
     with workers(threads) as pool:
         ready = _designed(fast, design_ensemble, pool, progress)
-        sums = _run_blocks(ready, common, pool, progress)
+        again = [_designed(to_design, one, pool, progress) for one in others]
+        everything = _run_blocks([*ready, *chain(*again)], common, pool, progress)
+        sums, replicas = _split(everything, fast, len(others))
         subset, left_out = None, dict[str, str]()
         if slow:
             slow_ready = _designed(slow, design_ensemble, pool, progress)
             subset, left_out = run_subset(ready, slow_ready, common, min(subset_runs, runs), subset_seconds, progress)
-    return Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset, left_out)
+    return Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset, left_out, replicas)
 
 
 def _check_arguments(
@@ -153,6 +166,26 @@ def _check_arguments(
             )
 
 
+def _check_designs(designs: int, same_ensemble: bool, wide: float) -> None:
+    if isinstance(designs, bool) or not isinstance(designs, int | np.integer) or designs < 1:
+        raise ValueError(f"designs must be a positive whole number, got {designs!r}")
+    if designs > 1 and same_ensemble:
+        raise ValueError("there is one ensemble of the comparison: same_ensemble=True goes with designs=1 only")
+    if same_ensemble and wide != 1:
+        raise ValueError("a design weighs all its trajectories alike: same_ensemble=True goes with wide=1 only")
+
+
+def _split(sums: Sums, fast: Sequence[Filter | Design], again: int) -> tuple[Sums, Replicas | None]:
+    """Sums of the fast filters, and of the designed ones for each of their designs."""
+    own = sums.of_filters(slice(len(fast)))
+    designed = [i for i, one in enumerate(fast) if isinstance(one, Design)]
+    if not designed or not again:
+        return own, None
+    starts = [len(fast) + len(designed) * i for i in range(again)]
+    others = (sums.of_filters(slice(start, start + len(designed))) for start in starts)
+    return own, Replicas(tuple(fast[i].name for i in designed), (own.of_filters(designed), *others))
+
+
 def _designed(filters: Sequence[Filter | Design], ensemble: Ensemble, pool: Executor, progress: bool | None) -> list[Filter]:
     """The filters in their order, those that need it designed on the ensemble."""
     designs = [one for one in filters if isinstance(one, Design)]
@@ -169,7 +202,7 @@ def _run_blocks(filters: Sequence[Filter], ensemble: Ensemble, pool: Executor, p
     def block(index: int) -> Sums:
         size = ensemble.sizes[index]
         sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, size, max(1, round(BATCHES * size / ensemble.runs)))
-        run_block(filters, ensemble.block(index), sums)
+        run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight)
         return sums
 
     indices = range(len(ensemble.sizes))
