@@ -15,8 +15,8 @@ HEAD = """\
 (all-equations)=
 # All equations of this book
 
-Each equation on this page was verified when the book was built: where its chapter prints it, SymPy has shown that the difference of the two
-sides vanishes, or numbers have been compared to the digits that are named. If one did not hold, there would be no book.
+Each equation on this page was verified when the book was built. Where its chapter prints it, SymPy has shown that the two
+sides are equal, or numbers have been compared to the digits that are named. If one did not hold, there would be no book.
 
 {total} equations in {chapters} chapters, and {claims} statements in words whose conditions were evaluated.
 """

@@ -11,7 +11,7 @@ from typing import Any
 
 from kfcourse.symbolic.model import Model
 
-VARIANT_KEYS = {"title", "state", "meter", "parameters", "symbols", "prior", "state_noise", "meter_noise"}
+VARIANT_KEYS = {"title", "state", "meter", "parameters", "symbols", "prior", "state_noise", "meter_noise", "angles"}
 
 
 class VariantError(ValueError):
@@ -35,7 +35,7 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     ----------
     path : path, optional
         A file with tables ``[variants.NAME]``: `state`, `meter`, `parameters`, and optionally `title`,
-        `symbols`, `prior`, `state_noise`, `meter_noise` (see `Model.define`).
+        `symbols`, `prior`, `state_noise`, `meter_noise`, `angles` (see `Model.define`).
 
     Raises
     ------

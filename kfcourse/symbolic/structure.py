@@ -20,7 +20,8 @@ from itertools import product as cartesian
 import numpy as np
 import sympy as sp
 
-from kfcourse.laws import Array, Gaussian, Measurement
+from kfcourse.angles import Components, on_circle
+from kfcourse.laws import Array, Gaussian, Measurement, measurement_of
 from kfcourse.symbolic.codegen import Compiled, compile_function
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
@@ -152,18 +153,20 @@ class StructuralFormulas:
 
     def structure(self) -> Structure:
         predict, measure = self.compiled_predict.function, self.compiled_measure.function
+        angles, measurement = self.model.angles, measurement_of(self.model.angles.y)
         return Structure(
             self.name,
             self.model,
-            lambda z, p: _spread(Gaussian(*predict(z, p)), z),
-            lambda m, d: Measurement(*measure(m, d)),
+            lambda z, p: _spread(Gaussian(*predict(z, p)), z, angles.x),
+            lambda m, d: measurement(*measure(m, d)),
             self,
         )
 
 
-def _spread(law: Gaussian, over: Array) -> Gaussian:
-    """A mean that no argument enters is still one for each trajectory."""
-    return law if law.mean.ndim == over.ndim else Gaussian(np.broadcast_to(law.mean, over.shape), law.cov)
+def _spread(law: Gaussian, over: Array, angles: Components) -> Gaussian:
+    """A mean that no argument enters is still one for each trajectory; angles lie between -pi and pi."""
+    mean = law.mean if law.mean.ndim == over.ndim else np.broadcast_to(law.mean, over.shape)
+    return Gaussian(on_circle(mean, angles), law.cov)
 
 
 def _distinct(mean: sp.MatrixBase, cov: sp.MatrixBase) -> list[sp.Symbol]:
