@@ -27,6 +27,7 @@ from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 from kfcourse.symbolic.reading import exact_matrix
+from kfcourse.symbolic.writing import formula_latex
 
 FUNCTION_LATEX = {"tau": r"\tau", "Theta": r"\Theta", "h": "h", "G": "G", "F": "F"}
 
@@ -74,7 +75,7 @@ class Structure:
                 if name in ("Theta", "F") and i > j:
                     continue  # symmetric
                 index = "" if len(matrix) == 1 else f"_{{{i + 1}}}" if matrix.cols == 1 else f"_{{{i + 1}{j + 1}}}"
-                lines.append(rf"{FUNCTION_LATEX[name]}{index}({names}) &= {sp.latex(matrix[i, j])}")
+                lines.append(rf"{FUNCTION_LATEX[name]}{index}({names}) &= {formula_latex(matrix[i, j], arguments)}")
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
     def source(self) -> str:
