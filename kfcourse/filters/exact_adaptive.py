@@ -153,8 +153,8 @@ class _Bayes:
     """One step of the Stratonovich equation for one trajectory."""
 
     def __init__(self, law: ScalarDensities, too_wide: Callable[[Array, Array], Array]):
-        self.signal, self.too_wide = law.signal, too_wide
-        self.explained: Callable[[float], float] = lambda y: float(law.explained(np.array(y)))
+        self.too_wide = too_wide
+        self.residual: Callable[[float, Array], Array] = lambda y, x: law.residual(np.array(y), x)
         self.log_likelihood: Callable[[float, Array], Array] = lambda y, x: law.log_likelihood(np.array([y]), x)
 
     def corrected(
@@ -198,14 +198,13 @@ class _Bayes:
     def _explanations(self, borders: Array, y: float) -> Array:
         """Panel borders that approach, by halves, every state that explains y without noise."""
         x = np.unique(np.concatenate([borders, 0.5 * (borders[1:] + borders[:-1])]))
-        wanted = self.explained(y)
-        residual = wanted - self.signal(x)
+        residual = self.residual(y, x)
         result = []
         for i in np.flatnonzero(np.signbit(residual[1:]) != np.signbit(residual[:-1])):
             low, high = x[i], x[i + 1]
             while True:  # shrink the bracket 256 times at each pass, to the last bit
                 inner = low + (high - low) * SECTIONS
-                j = int(np.argmax(np.signbit(wanted - self.signal(inner)[1:]) != np.signbit(residual[i])))
+                j = int(np.argmax(np.signbit(self.residual(y, inner[1:])) != np.signbit(residual[i])))
                 if not inner[j + 1] - inner[j] < high - low:
                     break
                 low, high = inner[j], inner[j + 1]

@@ -10,6 +10,7 @@ the step, and the forms that stand it better, is in `kfcourse.linear.arithmetic`
 
 from __future__ import annotations
 
+from kfcourse.angles import near
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.laws import Array, Gaussian, any_missing, apply, gain, transpose, without_missing
 from kfcourse.linear.system import LinearSystem, linear_system
@@ -47,7 +48,8 @@ def kalman_filter(model: Model) -> Filter:
     system, shift, offset = linear_system(model)  # constants of the object and of the meter
 
     def step(state: State, y: Array) -> State:
-        posterior = correct(system, state.predicted, y - offset)
+        expected = apply(system.H, state.predicted.mean)
+        posterior = correct(system, state.predicted, near(y - offset, expected, model.angles.y))
         mean, cov = predict(system, posterior)
         return State(state.step + 1, posterior, Gaussian(mean + shift, cov))
 

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.angles import Components, difference
 from kfcourse.laws import Array, Gaussian, Measurement, normalised_square
 
 
@@ -38,18 +39,20 @@ def innovations(measure: Callable[[Array, Array], Measurement], predicted: Gauss
         NaN where missing.
     """
     measurement = measure(*predicted)
-    return Innovations(y - measurement.h, measurement.F)
+    return Innovations(measurement.innovation(y), measurement.F)
 
 
-def nees(x: Array, posterior: Gaussian) -> Array:
+def nees(x: Array, posterior: Gaussian, angles: Components = ()) -> Array:
     """Normalised estimation error squared, (..., n) -> (...): mean n for a filter that is right.
+
+    `angles` are the components of x that are, `model.angles.x`.
 
     Raises
     ------
     ValueError
         A covariance is singular: some component is claimed to be known exactly.
     """
-    return normalised_square(x - posterior.mean, _regular(posterior.cov))
+    return normalised_square(difference(x, posterior.mean, angles), _regular(posterior.cov))
 
 
 def nis(found: Innovations) -> Array:

@@ -16,7 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kfcourse.laws import Array, Gaussian, Trajectories, square_root
+from kfcourse.angles import on_circle
+from kfcourse.laws import Array, Gaussian, Trajectories, normalised_square, square_root
+from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 
@@ -44,14 +46,24 @@ class Ensemble:
     runs, steps : int
         Trajectories, and measurements y_0 ... y_{steps-1} of each.
     seed : numpy.random.SeedSequence
+        A number or a `numpy.random.Generator` becomes one.
+    wide : float
+        The initial states are drawn from a law so many times as wide as the prior; `weight` makes up for it.
     """
 
     model: Model
     runs: int
     steps: int
     seed: np.random.SeedSequence
+    wide: float = 1.0
 
     def __post_init__(self) -> None:
+        if not isinstance(self.seed, np.random.SeedSequence):
+            object.__setattr__(self, "seed", np.random.SeedSequence(seed_number(self.seed)))
+        if not self.wide >= 1:
+            raise ValueError(f"a prior can be drawn wider, not narrower: wide must be at least 1, got {self.wide!r}")
+        if self.wide > 1 and self.model.angles.x:
+            raise ValueError("initial states that are angles cannot be drawn from a wider law; leave wide=1")
         for name in ("runs", "steps"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
@@ -100,7 +112,20 @@ class Ensemble:
         return np.random.Generator(np.random.SFC64(spawned))
 
     def _initial(self, block: int) -> Array:
-        return _draw(self._stream(block, 0), self.model.prior, 1, self.sizes[block])[0]
+        mean, cov = self.model.prior
+        x = _draw(self._stream(block, 0), Gaussian(mean, self.wide**2 * cov), 1, self.sizes[block])[0]
+        return on_circle(x, self.model.angles.x)
+
+    def weight(self, x: Array) -> Array | None:
+        """Prior over the law drawn from, at initial states x (N, n): (N,); None if they are the same.
+
+        N(x; m, d) / N(x; m, w^2 d) = w^r exp(-(1 - w^-2) (x - m)^T d^+ (x - m) / 2), r the rank of d.
+        """
+        if self.wide == 1:
+            return None
+        mean, cov = self.model.prior
+        rank = np.linalg.matrix_rank(cov, hermitian=True)
+        return self.wide**rank * np.exp(-0.5 * (1 - self.wide**-2) * normalised_square(x - mean, cov))
 
     def _draw(self, block: int, chunk: int) -> tuple[Array, Array]:
         """Noises of a few steps of a block: v and w, (steps, size, r)."""
@@ -114,12 +139,13 @@ class _Simulator:
 
     def __init__(self, model: Model):
         self.state, self.meter = compile_model(model)
-        self.n, self.p = model.n, model.p
+        self.n, self.p, self.angles = model.n, model.p, model.angles
 
     def __call__(self, x: Array, v: Array, w: Array) -> Instant:
         y, x_next = self.meter(x, w), self.state(x, v)
         # A formula without noise and state is one constant for all trajectories.
-        return Instant(x, np.broadcast_to(y, (len(x), self.p)), np.broadcast_to(x_next, (len(x), self.n)))
+        y, x_next = np.broadcast_to(y, (len(x), self.p)), np.broadcast_to(x_next, (len(x), self.n))
+        return Instant(x, on_circle(y, self.angles.y), on_circle(x_next, self.angles.x))
 
 
 def _draw(rng: np.random.Generator, law: Gaussian, steps: int, size: int) -> Array:
@@ -152,9 +178,9 @@ def workers(threads: int) -> Iterator[Executor]:
         pool.shutdown(cancel_futures=True)
 
 
-def simulate(model: Model, runs: int, steps: int, seed: int) -> Trajectories:
+def simulate(model: Model, runs: int, steps: int, seed: Seed) -> Trajectories:
     """Trajectories to look at: x (steps, runs, n) and y (steps, runs, p), the same for the same seed."""
-    ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(seed))
+    ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(seed_number(seed)))
     x, y = np.empty((steps, runs, model.n)), np.empty((steps, runs, model.p))
     start = 0
     for index, size in enumerate(ensemble.sizes):

@@ -12,14 +12,16 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import sympy as sp
 
+from kfcourse.angles import Angles
 from kfcourse.laws import Gaussian
+from kfcourse.symbolic.angular import read_angles, warn_of_angles
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.reading import (
     Formulas,
@@ -34,6 +36,8 @@ from kfcourse.symbolic.reading import (
     read,
     table,
 )
+from kfcourse.symbolic.sense import not_computable
+from kfcourse.symbolic.writing import formula_latex
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,8 @@ class Model:
         Parameter name to value (exact rational numbers).
     prior, state_noise, meter_noise : Gaussian
         Laws of x_0, v_k, w_k: mean (n,) and covariance (n, n).
+    angles : Angles
+        Numbers of the components of x and of y that are angles, kept between -pi and pi.
     """
 
     state_equation: sp.ImmutableMatrix
@@ -61,6 +67,7 @@ class Model:
     prior: Gaussian = field(compare=False)
     state_noise: Gaussian = field(compare=False)
     meter_noise: Gaussian = field(compare=False)
+    angles: Angles = field(default_factory=Angles)
 
     @classmethod
     def define(
@@ -73,6 +80,7 @@ class Model:
         prior: Mapping[str, Any] | None = None,
         state_noise: Mapping[str, Any] | None = None,
         meter_noise: Mapping[str, Any] | None = None,
+        angles: Names | Mapping[str, Names] | None = None,
     ) -> Model:
         """Build a model from formulas.
 
@@ -88,6 +96,9 @@ class Model:
         prior, state_noise, meter_noise : dict, optional
             Keys "mean" and "variance" (number, list of variances, or covariance matrix).  Standard
             normal by default.
+        angles : list of names, or dict, optional
+            Components that are angles in radians, such as ["y2"], or {"x": ["psi"], "y": ["y2"]}: they are kept between -pi and
+            pi, and every filter takes their innovations, means and errors the short way round.  [] says that there are none.
 
         Raises
         ------
@@ -95,6 +106,11 @@ class Model:
             A formula string cannot be read (points at the place).
         ModelError
             The parts do not fit together.
+
+        Warns
+        -----
+        AngleWarning
+            A formula finds an angle by atan2, which jumps by a turn, and `angles` is not given.
 
         Examples
         --------
@@ -119,12 +135,14 @@ class Model:
             law("prior", prior, len(x)),
             law("state_noise", state_noise, len(v)),
             law("meter_noise", meter_noise, len(w)),
+            read_angles(angles, [s.name for s in x], _measured(len(b))),
         )
-        for equation in (*model.state_equation.subs(model.values), *model.meter_equation.subs(model.values)):
-            if equation.has(sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I) or any(
-                e.is_number and e.is_real is False for e in sp.preorder_traversal(equation)
-            ):
-                raise ModelError(f"with these parameters {model} has no finite real value: {equation}")
+        if angles is None:
+            warn_of_angles(dict(zip((s.name for s in x), model.state_equation, strict=True)))
+            warn_of_angles(dict(zip(model.measured, model.meter_equation, strict=True)))
+        for what, equation in {"state": model.state_equation, "meter": model.meter_equation}.items():
+            if problem := not_computable(equation, model.values):
+                raise ModelError(f"the {what} equation {problem}")
         if not model.meter_equation.has(*x):
             raise ModelError(f"the meter {list(model.meter_equation)} does not depend on the state {list(x)}: nothing to filter")
         return model
@@ -144,6 +162,11 @@ class Model:
         """Parameter symbols and their values, for `subs`."""
         return {symbol(name): value for name, value in self.parameters.items()}
 
+    @property
+    def measured(self) -> list[str]:
+        """Names of the measurement's components: y, or y1, y2, ..."""
+        return _measured(self.p)
+
     def replace(self, **parameters: float) -> Model:
         """The same model with some parameters changed: ``model.replace(f=0.2)``."""
         unknown = sorted(set(parameters) - set(self.parameters))
@@ -156,18 +179,28 @@ class Model:
         """The two equations, and the parameters' values unless they are not wanted, as a LaTeX `aligned` block."""
         state = ["{" + sp.latex(x) + "}" for x in self.x]  # braces: a name may have an index of its own
         meter = ["y"] if self.p == 1 else [f"{{y_{{{i + 1}}}}}" for i in range(self.p)]
-        lines = [rf"{x}_{{k+1}} &= {sp.latex(formula)}" for x, formula in zip(state, self.state_equation, strict=True)]
-        lines += [rf"{y}_k &= {sp.latex(formula)}" for y, formula in zip(meter, self.meter_equation, strict=True)]
+        lines = [
+            rf"{x}_{{k+1}} &= {formula_latex(formula, self.x, self.v)}"
+            for x, formula in zip(state, self.state_equation, strict=True)
+        ]
+        lines += [
+            rf"{y}_k &= {formula_latex(formula, self.x, self.w)}" for y, formula in zip(meter, self.meter_equation, strict=True)
+        ]
+        lines += [rf"{name}_k &\in [-\pi, \pi]" for name in [state[i] for i in self.angles.x] + [meter[i] for i in self.angles.y]]
         if values:
             lines += [rf"{sp.latex(name)} &= {float(value):g}" for name, value in self.values.items()]
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
     def __repr__(self) -> str:
         a = ", ".join(f"{name}' = {formula}" for name, formula in zip(self.x, self.state_equation, strict=True))
-        names = ["y"] if self.p == 1 else [f"y{i + 1}" for i in range(self.p)]
-        b = ", ".join(f"{name} = {formula}" for name, formula in zip(names, self.meter_equation, strict=True))
+        b = ", ".join(f"{name} = {formula}" for name, formula in zip(self.measured, self.meter_equation, strict=True))
         values = ", ".join(f"{name} = {value}" for name, value in self.parameters.items())
-        return f"Model({a}, {b}{'; ' if values else ''}{values})"
+        angles = ", ".join([self.x[i].name for i in self.angles.x] + [self.measured[i] for i in self.angles.y])
+        return f"Model({a}, {b}{'; ' if values else ''}{values}{'; angles ' if angles else ''}{angles})"
+
+
+def _measured(p: int) -> list[str]:
+    return ["y"] if p == 1 else [f"y{i + 1}" for i in range(p)]
 
 
 def _symbols(symbols: Mapping[str, Names] | None, values: Mapping[str, Any], used: set[str], n: int) -> dict[str, list[str]]:
@@ -178,7 +211,12 @@ def _symbols(symbols: Mapping[str, Names] | None, values: Mapping[str, Any], use
     result = {}
     for key in "xvw":
         if key in given:
-            names: list[str] = [*([given[key]] if isinstance(given[key], str) else given[key])]
+            listed = [given[key]] if isinstance(given[key], str) else given[key]
+            if not isinstance(listed, Sequence):
+                raise ModelError(
+                    f'`symbols`: {key} must be a name or a list of names, such as ["{key}1", "{key}2"], got {listed!r}'
+                )
+            names: list[str] = [*listed]
         elif key == "x":
             names = ["x"] if n == 1 and "x1" not in used else [f"x{i + 1}" for i in range(n)]
         else:

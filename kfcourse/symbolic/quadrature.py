@@ -14,7 +14,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 import sympy as sp
 
-from kfcourse.laws import SINGULAR, Array, Gaussian, Measurement, apply, square_root, symmetric, transpose
+from kfcourse.angles import Components, difference, near, on_circle
+from kfcourse.laws import SINGULAR, Array, Gaussian, Measurement, apply, measurement_of, square_root, symmetric, transpose
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
@@ -108,6 +109,7 @@ class _Equation(NamedTuple):
     noise: Gaussian  # all noises; the covariance of those that are only added set to 0
     root: Array  # of that covariance, columns for the other noises only
     added: Array
+    angles: Components  # components of the function's value
 
 
 class _Equations(NamedTuple):
@@ -118,12 +120,16 @@ class _Equations(NamedTuple):
     def of(cls, model: Model, augmented: bool) -> _Equations:
         state, meter = compile_model(model)
         return cls(
-            _equation(state, model.state_equation, (*model.x, *model.v), model.v, model.state_noise, model, augmented),
-            _equation(meter, model.meter_equation, (*model.x, *model.w), model.w, model.meter_noise, model, augmented),
+            _equation(
+                state, model.state_equation, (*model.x, *model.v), model.v, model.state_noise, model, augmented, model.angles.x
+            ),
+            _equation(
+                meter, model.meter_equation, (*model.x, *model.w), model.w, model.meter_noise, model, augmented, model.angles.y
+            ),
         )
 
 
-def _equation(function, formulas, variables, noises, law: Gaussian, model: Model, augmented: bool) -> _Equation:
+def _equation(function, formulas, variables, noises, law: Gaussian, model: Model, augmented: bool, angles: Components):
     factors = sp.Matrix(formulas).subs(model.values).jacobian(list(noises)) if noises else sp.zeros(len(formulas), 0)
     constant = [not sp.Matrix(factors[:, j]).applyfunc(sp.simplify).has(*variables) for j in range(len(noises))]
     other = np.array([augmented or not c for c in constant], dtype=bool)
@@ -133,7 +139,7 @@ def _equation(function, formulas, variables, noises, law: Gaussian, model: Model
     matrix = matrix.reshape(len(formulas), len(noises))
     root = np.zeros((len(noises), int(other.sum())))
     root[other] = square_root(law.cov[np.ix_(other, other)]) if other.any() else root[other]
-    return _Equation(function, len(formulas), law, root, symmetric(matrix @ law.cov @ matrix.T))
+    return _Equation(function, len(formulas), law, root, symmetric(matrix @ law.cov @ matrix.T), angles)
 
 
 def _checked(name: str, model: Model, rule: Rule, equations: _Equations, root: str, order: int) -> Structure:
@@ -142,14 +148,15 @@ def _checked(name: str, model: Model, rule: Rule, equations: _Equations, root: s
     size = model.n + max(equation.root.shape[1] for equation in equations)
     with np.errstate(all="ignore"):
         found = _moments(structure)
-        if not all(np.isfinite(moment).all() for _, moment, _ in found):
+        if not all(np.isfinite(moment).all() for _, moment, *_ in found):
             _warn(f"{name}: a function of {model} is not finite at the points of the prior law", stacklevel=4)
         elif (2 * order) ** size <= MOST_POINTS:
             coarse = (
                 found if name == "gauss-hermite" else _moments(_quadrature(name, model, _product_rule(order), equations, root))
             )
             fine = _moments(_quadrature(name, model, _product_rule(2 * order), equations, root))
-            for (what, less, _), (_, more, scale) in zip(coarse, fine, strict=True):
+            for (what, less, *_), (_, more, scale, angles) in zip(coarse, fine, strict=True):
+                more = near(more, less, angles)
                 if not (np.abs(more - less) <= CONVERGED * scale).all():
                     worst = np.unravel_index(np.argmax(np.nan_to_num(np.abs(more - less) / scale, nan=np.inf)), less.shape)
                     _warn(
@@ -165,17 +172,18 @@ def _checked(name: str, model: Model, rule: Rule, equations: _Equations, root: s
 CONVERGED = 0.1
 
 
-def _moments(structure: Structure) -> list[tuple[str, Array, Array]]:
-    """Name, value and natural size of the moments at the prior law."""
+def _moments(structure: Structure) -> list[tuple[str, Array, Array, Components]]:
+    """Name, value and natural size of the moments at the prior law, and which components are angles."""
     mean, cov = structure.model.prior
     tau, theta = structure.predict(mean, cov)
     h, _, F, _ = structure.measure(mean, cov)
     moments = []
-    for what, centre, spread in (("next state", tau, theta), ("measurement", h, F)):
+    angles = structure.model.angles
+    for what, centre, spread, which in (("next state", tau, theta, angles.x), ("measurement", h, F, angles.y)):
         sd = np.sqrt(np.maximum(np.diagonal(spread), 0.0))
         tiny = 1e-12 * (1 + np.abs(centre))  # rounding: what does not vary has no size of its own
-        moments.append((f"mean of the {what}", centre, sd + tiny))
-        moments.append((f"covariance of the {what}", spread, (sd + tiny)[:, None] * (sd + tiny)))
+        moments.append((f"mean of the {what}", centre, sd + tiny, which))
+        moments.append((f"covariance of the {what}", spread, (sd + tiny)[:, None] * (sd + tiny), ()))
     return moments
 
 
@@ -212,7 +220,7 @@ def _quadrature(name: str, model: Model, rule: Rule, equations: _Equations, root
     """A structure from standard normal points and weights: rule(size) -> (points (q, size), weights (q,))."""
     if root not in ROOTS:
         raise ModelError(f"root must be one of {', '.join(map(repr, ROOTS))}, got {root!r}")
-    n = model.n
+    n, measurement = model.n, measurement_of(model.angles.y)
     rules = [rule(n + equation.root.shape[1]) for equation in equations]
 
     def propagate(equation: _Equation, mean: Array, cov: Array, points: Array, weights: Array):
@@ -224,9 +232,9 @@ def _quadrature(name: str, model: Model, rule: Rule, equations: _Equations, root
         values = equation.function(x, np.broadcast_to(noise, x.shape[:-1] + noise.shape[-1:]))
         values = np.broadcast_to(values, (*x.shape[:-1], equation.size))
         middle = values[..., np.argmin((points**2).sum(axis=1)), :]
-        values = values - middle[..., None, :]
+        values = difference(values, middle[..., None, :], equation.angles)
         shift = weights @ values
-        return scale, deviation, middle + shift, values - shift[..., None, :]
+        return scale, deviation, on_circle(middle + shift, equation.angles), values - shift[..., None, :]
 
     def predict(z: Array, p: Array) -> Gaussian:
         points, weights = rules[0]
@@ -245,9 +253,9 @@ def _quadrature(name: str, model: Model, rule: Rule, equations: _Equations, root
         added = equations.meter.added
         R = _weighted(weights, dy - dx @ transpose(G)) + added
         if n == 1:
-            return Measurement(h, G, _weighted(weights, dy) + added, R)
+            return measurement(h, G, _weighted(weights, dy) + added, R)
         F = symmetric(G @ d @ transpose(G)) + R
-        return Measurement(h, *_without_rounding(G, d, F, R))
+        return measurement(h, *_without_rounding(G, d, F, R))
 
     return Structure(name, model, predict, measure)
 

@@ -20,12 +20,14 @@ from itertools import product as cartesian
 import numpy as np
 import sympy as sp
 
-from kfcourse.laws import Array, Gaussian, Measurement
+from kfcourse.angles import Components, on_circle
+from kfcourse.laws import Array, Gaussian, Measurement, measurement_of
 from kfcourse.symbolic.codegen import Compiled, compile_function
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 from kfcourse.symbolic.reading import exact_matrix
+from kfcourse.symbolic.writing import formula_latex
 
 FUNCTION_LATEX = {"tau": r"\tau", "Theta": r"\Theta", "h": "h", "G": "G", "F": "F"}
 
@@ -73,7 +75,7 @@ class Structure:
                 if name in ("Theta", "F") and i > j:
                     continue  # symmetric
                 index = "" if len(matrix) == 1 else f"_{{{i + 1}}}" if matrix.cols == 1 else f"_{{{i + 1}{j + 1}}}"
-                lines.append(rf"{FUNCTION_LATEX[name]}{index}({names}) &= {sp.latex(matrix[i, j])}")
+                lines.append(rf"{FUNCTION_LATEX[name]}{index}({names}) &= {formula_latex(matrix[i, j], arguments)}")
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
     def source(self) -> str:
@@ -152,18 +154,20 @@ class StructuralFormulas:
 
     def structure(self) -> Structure:
         predict, measure = self.compiled_predict.function, self.compiled_measure.function
+        angles, measurement = self.model.angles, measurement_of(self.model.angles.y)
         return Structure(
             self.name,
             self.model,
-            lambda z, p: _spread(Gaussian(*predict(z, p)), z),
-            lambda m, d: Measurement(*measure(m, d)),
+            lambda z, p: _spread(Gaussian(*predict(z, p)), z, angles.x),
+            lambda m, d: measurement(*measure(m, d)),
             self,
         )
 
 
-def _spread(law: Gaussian, over: Array) -> Gaussian:
-    """A mean that no argument enters is still one for each trajectory."""
-    return law if law.mean.ndim == over.ndim else Gaussian(np.broadcast_to(law.mean, over.shape), law.cov)
+def _spread(law: Gaussian, over: Array, angles: Components) -> Gaussian:
+    """A mean that no argument enters is still one for each trajectory; angles lie between -pi and pi."""
+    mean = law.mean if law.mean.ndim == over.ndim else np.broadcast_to(law.mean, over.shape)
+    return Gaussian(on_circle(mean, angles), law.cov)
 
 
 def _distinct(mean: sp.MatrixBase, cov: sp.MatrixBase) -> list[sp.Symbol]:
