@@ -1,6 +1,17 @@
 """What only the pages of the book call.
 
-diagram   block diagrams from a description
-live      the page on which a reader moves the pointer
-house     the structure of this package, read from its imports
+verification equations, sentences and numbers that are checked where they are printed; a check that fails stops the build
+exponents    squares completed in the exponents of normal laws
+typesetting  equations as LaTeX that fits the column
+tables       tables of numbers
+figures      the style of the figures, labels at the ends of curves
+diagram      block diagrams from a description
+live         the page on which a reader moves the pointer
+house        the structure of this package, read from its imports
 """
+
+from kfcourse.pages.figures import COLOURS, book_style, label_ends
+from kfcourse.pages.tables import table
+from kfcourse.pages.verification import Unverified, agree, claim, typeset, verified
+
+__all__ = ["COLOURS", "Unverified", "agree", "book_style", "claim", "label_ends", "table", "typeset", "verified"]

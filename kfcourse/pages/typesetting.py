@@ -1,0 +1,130 @@
+"""Equations as LaTeX that fits a column: one line an equation where it fits, else broken between the terms of its sums."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from typing import Any, TypeAlias
+
+import sympy as sp
+from sympy.printing.latex import LatexPrinter
+
+# One side of an equation: an expression, a matrix, or LaTeX that is printed as it stands.
+Side: TypeAlias = Any
+Equation: TypeAlias = Sequence[Side]
+
+WIDTH = 62  # symbols in a line of the page's column
+
+_OPERATORS = {"+", "-", "=", r"\cdot", r"\approx", r"\le", r"\ge"}  # with the space around them
+_TOKEN = re.compile(r"\\[a-zA-Z]+|\\.|.", re.DOTALL)
+_WITHOUT_WIDTH = {
+    r"\left",
+    r"\right",
+    r"\,",
+    r"\!",
+    "{",
+    "}",
+    "^",
+    "_",
+    "&",
+    " ",
+    r"\mathrm",
+    r"\operatorname",
+    r"\tilde",
+    r"\hat",
+}
+
+
+def equation_latex(equation: Equation, width: int = WIDTH, names: Mapping[Any, str] | None = None) -> str:
+    """LaTeX of side = side = ..., with `&` for an aligned environment, in several lines where it is long.
+
+    Sides that print alike are printed once.
+    """
+    first, *others = (lines for lines, _ in groupby(side_lines(side, width - 6, names) for side in equation))
+    if len(first) > 1:
+        raise ValueError(
+            "the left side of an equation is too long for one line: give it a name, and the formula as the right side"
+        )
+    lines: list[str] = []
+    line, room = first[0] + " ", width - symbols(first[0])
+    for number, side in enumerate(others):
+        if number and (len(side) > 1 or symbols(side[0]) + 3 > room):
+            lines, line, room = [*lines, line], "", width - symbols(first[0])
+        line += ("&= " if not number or not line else " = ") + side[0]
+        room -= symbols(side[0]) + 3
+        for continued in side[1:]:
+            lines, line, room = [*lines, line], rf"&\quad {continued}", 0
+    return "\\\\\n".join([*lines, line])
+
+
+def side_lines(side: Side, width: int = WIDTH, names: Mapping[Any, str] | None = None) -> list[str]:
+    """LaTeX of one side of an equation, in as many lines as it takes; only sums are broken."""
+    if isinstance(side, str):
+        return [side]
+    whole = latex(side, names)
+    if symbols(whole) <= width or not isinstance(side, sp.Add):
+        return [whole]
+    lines = [""]
+    for term in _ordered(side, side.as_ordered_terms()):
+        printed = latex(term, names)
+        signed = printed if printed.startswith("-") or lines == [""] else "+ " + printed
+        if lines[-1] and symbols(lines[-1] + signed) > width:
+            lines.append("")
+        lines[-1] += (" " if lines[-1] else "") + signed
+    return lines
+
+
+def latex(expression: Any, names: Mapping[Any, str] | None = None) -> str:
+    """LaTeX of an expression in the conventions of the book: transposes as T, no brackets around derivatives."""
+    settings = {"symbol_names": dict(names or {}), "diff_operator": "d", "mat_delim": "(", "fold_short_frac": False}
+    return str(_Printer(settings).doprint(expression))
+
+
+class _Printer(LatexPrinter):
+    def _as_ordered_terms(self, expr: sp.Add, order: str | None = None) -> list[sp.Expr]:
+        return _ordered(expr, super()._as_ordered_terms(expr, order=order))
+
+
+def _ordered(total: sp.Add, terms: Sequence[sp.Expr]) -> list[sp.Expr]:
+    """Terms in the order people write them: lambda + K(y - S), not K(-S + y) + lambda.
+
+    Negative terms come last; a symbol that no other term contains comes first.
+    """
+
+    def rank(term: sp.Expr) -> tuple[bool, bool]:
+        alone = term.is_Symbol and not any(other.has(term) for other in total.args if other != term)
+        return term.could_extract_minus_sign(), not alone
+
+    return sorted(terms, key=rank)
+
+
+def symbols(latex: str) -> float:
+    """How wide a formula is, counted in symbols; of a fraction the wider part, of matrices the widest row."""
+    start = latex.find(r"\frac{")
+    if start >= 0:
+        above, after = _braced(latex, start + len(r"\frac"))
+        below, after = _braced(latex, after)
+        return symbols(latex[:start]) + max(symbols(above), symbols(below)) + symbols(latex[after:])
+    matrix = re.search(r"\\begin\{(\w*matrix)\}(.*?)\\end\{\1\}", latex, re.DOTALL)
+    if matrix:
+        widest = max(symbols(row.replace("&", "  ")) for row in matrix[2].split(r"\\"))
+        return symbols(latex[: matrix.start()]) + widest + 2 + symbols(latex[matrix.end() :])
+    raised = re.findall(r"[\^_]\{([^{}]*)\}", latex)
+    flat = re.sub(r"[\^_]\{[^{}]*\}", "", latex)
+    return _width(flat) + 0.6 * sum(map(_width, raised))
+
+
+def _width(flat: str) -> float:
+    tokens = [token for token in _TOKEN.findall(flat) if token not in _WITHOUT_WIDTH]
+    return len(tokens) + 1.2 * sum(token in _OPERATORS for token in tokens)
+
+
+def _braced(latex: str, start: int) -> tuple[str, int]:
+    """What stands between the brace at `start` and its partner, and where it ends."""
+    depth = 0
+    for place in range(start, len(latex)):
+        depth += {"{": 1, "}": -1}.get(latex[place], 0)
+        if depth == 0:
+            return latex[start + 1 : place], place + 1
+    raise ValueError(f"a brace is not closed in {latex!r}")

@@ -1,0 +1,224 @@
+"""Statements that are verified where they are printed: the check is the print, and it raises.
+
+    verified((p, Psi - K*S*Psi), where={p: p_k, K: K_k})     equations: printed, and shown to hold
+    claim("The gain tends to 0.62.", abs(K - 0.62) < 0.005)  a sentence, printed if its conditions hold
+    agree("Formula and filter agree.", a, b, within=1e-12)   a sentence about numbers that are equal within a tolerance
+    typeset((p, p_k))                                        equations that define something: printed only
+
+A printed equation carries a mark that says how it was verified.  The build of the book counts the marks and lists them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from kfcourse.pages.typesetting import Equation, Side, equation_latex
+
+VERIFIED = "application/vnd.kfcourse.verified+json"  # what the build collects
+BY_IDENTITY = "identity, by SymPy"
+_SEED = 53
+_GUARD = 15  # further digits with which numbers are computed
+
+
+class Unverified(AssertionError):
+    """A statement of a page does not hold; the message says what is left."""
+
+
+class Shown:
+    """What a cell displays: Markdown with formulas, and the record of what was verified."""
+
+    def __init__(self, markdown: str, record: Mapping[str, Any] | None = None) -> None:
+        self.markdown = markdown
+        self.record = record
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, Any]:
+        shown: dict[str, Any] = {"text/markdown": self.markdown, "text/plain": self.markdown}
+        return shown | ({VERIFIED: dict(self.record)} if self.record else {})
+
+
+def verified(
+    *equations: Equation,
+    where: Mapping[Any, Any] | None = None,
+    digits: int | None = None,
+    at: Sequence[Mapping[Any, float]] | None = None,
+    label: str | None = None,
+    how: str | None = None,
+    names: Mapping[Any, str] | None = None,
+) -> Shown:
+    """Equations, printed as they stand, each shown to hold: left - right = 0.
+
+    Parameters
+    ----------
+    *equations : (left, right, ...)
+        Sides that are equal: expressions or matrices of SymPy.  A side that is a string of LaTeX is printed and not checked,
+        so at least two others are needed then.  `sympy.Eq` is taken too, unless SymPy has already made it true or false.
+    where : mapping of symbols to expressions
+        What printed symbols stand for; put in before the difference is taken, as often as it takes.
+    digits : int, optional
+        Compare numbers instead, at the points `at`, to so many digits: for integrals and sums that SymPy does not take.
+    at : sequence of mappings of symbols to numbers, optional
+        Three points are drawn if there are none, positive for positive symbols.
+    label : str, optional
+        The equations get a number, and {eq}`label` refers to it.
+    how : str, optional
+        What the mark says besides, for instance "for every S".
+    names : mapping of symbols to LaTeX, optional
+        How symbols are printed.
+
+    Raises
+    ------
+    Unverified
+        If a difference does not vanish; the message shows it.
+    """
+    if not equations:
+        raise ValueError("verified() needs an equation: verified((left, right))")
+    given = [_sides(equation) for equation in equations]
+    for sides in given:
+        expressions = [sp.sympify(side) for side in sides if not isinstance(side, str)]
+        if len(expressions) < 2:
+            raise ValueError(
+                f"nothing to verify in {sides}: two sides that are not strings are needed; to print a definition, typeset()"
+            )
+        for left, right in pairwise(expressions):
+            if digits is None:
+                _must_vanish(left, right, where or {})
+            else:
+                _must_agree(left, right, where or {}, digits, at)
+    evidence = BY_IDENTITY if digits is None else f"to {digits} digits, at {3 if at is None else len(at)} points"
+    mark = f"{evidence}; {how}" if how else evidence
+    body = _display(given, label, names)
+    record = {"label": label, "latex": _block(given, names), "how": mark, "equations": len(given)}
+    return Shown(f'{body}\n\n<p class="kf-verified">✓ {mark}</p>', record)
+
+
+def typeset(*equations: Equation | str, label: str | None = None, names: Mapping[Any, str] | None = None) -> Shown:
+    """Equations that define something, printed as `verified` prints them but without a mark."""
+    return Shown(_display([_sides(equation) for equation in equations], label, names))
+
+
+def claim(sentence: str, *conditions: Any) -> Shown:
+    """A sentence (Markdown), printed if every condition holds; arrays hold when all their entries do.
+
+    Raises
+    ------
+    Unverified
+        If one does not: the sentence, and which condition.
+    """
+    if not conditions:
+        raise ValueError("claim() needs a condition besides its sentence")
+    for number, condition in enumerate(conditions, start=1):
+        if not np.all(condition):
+            which = f" (condition {number} of {len(conditions)})" if len(conditions) > 1 else ""
+            raise Unverified(f"this does not hold{which}: {sentence}")
+    return Shown(f'{sentence} <span class="kf-claim">✓</span>', {"sentence": sentence, "equations": 0})
+
+
+def agree(sentence: str, computed: Any, expected: Any, within: float, relative: bool = True) -> Shown:
+    """A sentence (Markdown), printed if two arrays of numbers agree within a tolerance.
+
+    |computed - expected| <= within * max|expected|,  or <= within if not `relative`
+
+    Raises
+    ------
+    Unverified
+        If they do not, or are not finite, or have different shapes: the sentence, and the largest difference.
+    """
+    computed, expected = np.asarray(computed, dtype=float), np.asarray(expected, dtype=float)
+    if computed.shape != expected.shape and 1 not in (computed.size, expected.size):
+        raise Unverified(f"arrays of shapes {computed.shape} and {expected.shape} are compared: {sentence}")
+    difference = np.max(np.abs(computed - expected))
+    bound = within * (np.max(np.abs(expected)) if relative else 1)
+    if not difference <= bound:  # a NaN is no agreement
+        raise Unverified(f"differs by {difference:.3g}, more than {bound:.3g}: {sentence}")
+    return Shown(f'{sentence} <span class="kf-claim">✓</span>', {"sentence": sentence, "equations": 0})
+
+
+def _sides(equation: Any) -> tuple[Side, ...]:
+    if isinstance(equation, sp.logic.boolalg.BooleanAtom | bool):
+        raise Unverified(
+            f"SymPy has already made this equation {equation}: nothing is left to print.  Give its sides: verified((left, right))"
+        )
+    if isinstance(equation, sp.Equality):
+        return equation.lhs, equation.rhs
+    if isinstance(equation, str):
+        return (equation,)
+    return tuple(equation)
+
+
+def _must_vanish(left: Any, right: Any, where: Mapping[Any, Any]) -> None:
+    rest = difference(left, right, where)
+    if any(entry != 0 for entry in rest):
+        remains = rest[0] if len(rest) == 1 else rest
+        raise Unverified(f"the two sides differ\n  left:  {left}\n  right: {right}\n  left - right = {remains}")
+
+
+def _must_agree(left: Any, right: Any, where: Mapping[Any, Any], digits: int, at: Sequence[Mapping[Any, float]] | None) -> None:
+    left, right = _substituted(left, where), _substituted(right, where)
+    free = sorted((left.free_symbols | right.free_symbols), key=str)
+    for point in _points(free) if at is None else at:
+        one, other = (sp.N(side.subs(point).doit(), digits + _GUARD) for side in (left, right))
+        if not (one.is_number and other.is_number):
+            raise ValueError(f"at {point} no number is left but {one} and {other}: `at` gives every symbol a value")
+        if not abs(one - other) <= sp.Float(10) ** -digits * max(abs(one), abs(other), sp.Float(10) ** -digits):
+            numbers = f"the left side is {sp.N(one, digits)}, the right {sp.N(other, digits)}"
+            raise Unverified(f"at {point} {numbers}\n  left:  {left}\n  right: {right}")
+
+
+def difference(left: Any, right: Any, where: Mapping[Any, Any] | None = None) -> list[sp.Expr]:
+    """left - right, entry by entry, with the symbols of `where` replaced, as simple as SymPy makes it."""
+    left, right = _substituted(left, where or {}), _substituted(right, where or {})
+    if getattr(left, "shape", ()) != getattr(right, "shape", ()):
+        raise Unverified(f"a side of shape {getattr(left, 'shape', ())} cannot equal one of shape {getattr(right, 'shape', ())}")
+    rest = left - right
+    return [_simple(entry) for entry in (rest.as_explicit() if hasattr(rest, "as_explicit") else [rest])]
+
+
+def _substituted(side: Any, where: Mapping[Any, Any]) -> Any:
+    side = sp.sympify(side)
+    matrices = {name: sp.sympify(value).as_explicit() for name, value in where.items() if isinstance(name, sp.MatrixSymbol)}
+    others = {name: value for name, value in where.items() if name not in matrices}
+    for _ in range(len(where)):  # definitions may use each other
+        replaced = side.xreplace(matrices).subs(others, simultaneous=True)  # subs takes no matrices all at once
+        if replaced == side:
+            break
+        side = replaced
+    return side.doit()
+
+
+def _simple(expression: sp.Expr) -> sp.Expr:
+    """Zero if SymPy can show it; sums of logarithms vanish when the product under them is one."""
+    if expression.is_rational_function():
+        return sp.cancel(expression)
+    rest = sp.expand(expression)
+    if rest != 0:
+        rest = sp.simplify(rest)
+    if rest != 0 and rest.has(sp.log):
+        others, logarithms = sp.expand_log(sp.expand(rest), force=True).as_independent(sp.log, as_Add=True)
+        if sp.simplify(sp.exp(2 * logarithms)) == 1:
+            rest = sp.simplify(others)
+    return rest
+
+
+def _points(symbols: Sequence[sp.Symbol]) -> list[dict[sp.Symbol, sp.Rational]]:
+    draw = np.random.default_rng(_SEED)
+    return [
+        {
+            symbol: sp.Rational(int(draw.integers(3, 30)) * (1 if symbol.is_positive else draw.choice([-1, 1])), 16)
+            for symbol in symbols
+        }
+        for _ in range(3)
+    ]
+
+
+def _block(equations: Sequence[Equation], names: Mapping[Any, str] | None) -> str:
+    lines = " \\\\\n".join(equation_latex(sides, names=names) for sides in equations)
+    return f"\\begin{{aligned}}\n{lines}\n\\end{{aligned}}"
+
+
+def _display(equations: Sequence[Equation], label: str | None, names: Mapping[Any, str] | None) -> str:
+    return f"$$\n{_block(equations, names)}\n$$" + (f" ({label})" if label else "")

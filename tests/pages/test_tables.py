@@ -1,0 +1,67 @@
+"""Tables, typeset equations and labels of curves."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import sympy as sp
+
+from kfcourse.pages.figures import label_ends
+from kfcourse.pages.tables import table
+from kfcourse.pages.typesetting import WIDTH, equation_latex, symbols
+
+pytestmark = pytest.mark.quick
+
+
+def test_a_table_aligns_numbers_and_marks_what_is_not_there() -> None:
+    shown = table({"filter": ["a", "b"], "$D$, m²": [1.0, -2.25], "e": [(1.0, 0.125), np.nan]}, ".2f", caption="Errors")
+    assert shown.markdown == (
+        '<span class="kf-caption">Errors</span>\n\n'
+        "| filter | $D$, m² | e |\n| :-- | --: | --: |\n| a | 1.00 | 1.00 ± 0.12 |\n| b | −2.25 | – |"
+    )
+    assert "| +1.0 |" in table({"D": [1.0]}, {"D": "+.1f"}).markdown
+
+
+def test_columns_of_a_table_have_one_length() -> None:
+    for columns in ({}, {"a": [1], "b": [1, 2]}):
+        with pytest.raises(ValueError, match="columns of one length"):
+            table(columns)
+
+
+def test_long_equations_are_broken_between_terms() -> None:
+    a, b = sp.symbols("a b")
+    lines = equation_latex((sp.Symbol("f"), sp.expand((a + b) ** 9))).split("\\\\\n")
+    assert len(lines) > 1 and all(symbols(line) < WIDTH + 8 for line in lines)
+    assert all(line.startswith(r"&\quad ") for line in lines[1:])
+    again = sp.sympify(
+        " ".join(lines)
+        .split("= ", 1)[1]
+        .replace(r"&\quad ", "")
+        .replace("{", "(")
+        .replace("}", ")")
+        .replace(" + ", "+")
+        .replace("^", "**")
+        .replace(" ", "*")
+    )
+    assert sp.expand(again - (a + b) ** 9) == 0
+
+
+def test_a_side_that_prints_like_the_one_before_is_printed_once() -> None:
+    a, b = sp.symbols("a b")
+    assert equation_latex(("f", a * b, b * a, 2 * a)) == "f &= a b = 2 a"
+
+
+def test_width_of_a_fraction_is_that_of_its_wider_part() -> None:
+    assert symbols(r"\frac{a}{b c d}") == symbols("b c d") == 3
+    assert symbols(r"x^{2}") == 1.6
+    assert symbols(r"\begin{matrix}a & b\\c & d\end{matrix}") == symbols("ab") + 2
+
+
+def test_labels_at_the_ends_are_apart_and_in_order() -> None:
+    _, ax = plt.subplots()
+    for end, name in ((1.0, "low"), (1.01, "middle"), (1.02, "high"), (5.0, "far")):
+        ax.plot([0, 1], [0, end], label=name)
+    label_ends(ax, least=0.1)
+    heights = {text.get_text(): text.get_position()[1] for text in ax.texts}
+    assert list(sorted(heights, key=heights.__getitem__)) == ["low", "middle", "high", "far"]
+    assert np.diff(sorted(heights.values())).min() > 0.1 - 1e-9
+    plt.close()

@@ -1,0 +1,118 @@
+"""Statements on pages raise when they do not hold; and are printed as they should be."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from kfcourse.pages.verification import VERIFIED, Unverified, agree, claim, typeset, verified
+
+pytestmark = pytest.mark.quick
+
+x, z = sp.symbols("x z", real=True)
+p = sp.Symbol("p", positive=True)
+K = sp.Symbol("K")
+
+
+def test_an_identity_is_printed_with_its_mark_and_its_label() -> None:
+    shown = verified(((x + z) ** 2, x**2 + 2 * x * z + z**2), label="eq-square", how="for every x")
+    assert shown.markdown.startswith("$$\n\\begin{aligned}\n\\left(x + z\\right)^{2} &= x^{2} + 2 x z + z^{2}\n")
+    assert "$$ (eq-square)\n" in shown.markdown
+    assert "✓ identity, by SymPy; for every x" in shown.markdown
+    record = shown._repr_mimebundle_()[VERIFIED]
+    assert (record["label"], record["equations"]) == ("eq-square", 1)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ((x + z) ** 2, x**2 - 2 * x * z + z**2),
+        (sp.Matrix([[1, x]]), sp.Matrix([[1, -x]])),
+        (sp.Matrix([[1, x]]), sp.Matrix([[1], [x]])),
+        (sp.log(x**2), sp.log(x**2) + sp.log(2)),
+        (r"\text{three sides}", x, x, z),
+        sp.Eq(x, z, evaluate=False),
+        sp.Eq(x, x + 1),
+    ],
+)
+def test_a_false_equation_raises(wrong) -> None:
+    with pytest.raises(Unverified):
+        verified(wrong)
+
+
+def test_the_message_says_what_is_left() -> None:
+    with pytest.raises(Unverified, match=r"left - right = 2\*x"):
+        verified((x + z, z - x))
+
+
+def test_one_false_equation_among_true_ones_raises() -> None:
+    with pytest.raises(Unverified):
+        verified((x + x, 2 * x), (x + x, 3 * x))
+
+
+def test_definitions_are_put_in_for_printed_symbols_and_into_each_other() -> None:
+    h = sp.Symbol("h")
+    shown = verified((p, x - K), where={p: h + x, h: -K})
+    assert "p &= x - K" in shown.markdown
+    with pytest.raises(Unverified):
+        verified((p, x - K), where={p: h + x, h: K})
+
+
+def test_logarithms_and_matrices() -> None:
+    verified((sp.log(2 * sp.pi * p) / 2, sp.log(sp.sqrt(2 * sp.pi)) + sp.log(p) / 2))
+    rotation = sp.Matrix([[sp.cos(x), -sp.sin(x)], [sp.sin(x), sp.cos(x)]])
+    verified((rotation * rotation.T, sp.eye(2)))
+
+
+def test_letters_of_matrices_stand_for_their_entries() -> None:
+    A, B, C = (sp.MatrixSymbol(name, 2, 2) for name in "ABC")
+    entries = {A: sp.Matrix([[x, z], [0, 1]]), B: sp.Matrix([[1, 0], [x, z]]), C: A * B}
+    shown = verified((C.T, B.T * A.T), where=entries)
+    assert "C^{T} &= B^{T} A^{T}" in shown.markdown
+    with pytest.raises(Unverified):
+        verified((C.T, A.T * B.T), where=entries)
+
+
+def test_numbers_to_so_many_digits() -> None:
+    fourier = sp.Integral(sp.exp(-(x**2) / (2 * p)) * sp.cos(x), (x, -sp.oo, sp.oo))
+    right = sp.sqrt(2 * sp.pi * p) * sp.exp(-p / 2)
+    assert "to 10 digits, at 3 points" in verified((fourier, right), digits=10).markdown
+    with pytest.raises(Unverified, match="the left side is"):
+        verified((fourier, right * (1 + sp.Rational(1, 10**9))), digits=10)
+    with pytest.raises(ValueError, match="`at` gives every symbol a value"):
+        verified((fourier, right), digits=5, at=[{x: 1}])
+
+
+def test_there_must_be_something_to_verify() -> None:
+    for nothing in ((), ((r"\tau", x),), ("x = 1",)):
+        with pytest.raises(ValueError, match=r"nothing to verify|needs an equation"):
+            verified(*nothing)
+    with pytest.raises(ValueError, match="condition"):
+        claim("Everything is well.")
+
+
+def test_definitions_have_no_mark() -> None:
+    shown = typeset((sp.Symbol("K"), p / (p + 1)), label="eq-gain")
+    assert "kf-verified" not in shown.markdown and VERIFIED not in shown._repr_mimebundle_()
+
+
+def test_claims_hold_or_raise() -> None:
+    assert claim("The gain is below **0.7**.", 0.6 < 0.7, np.array([True, True])).markdown.startswith(
+        "The gain is below **0.7**. <span"
+    )
+    with pytest.raises(Unverified, match=r"condition 2 of 2.*The gain"):
+        claim("The gain is below 0.7.", True, np.array([True, False]))
+
+
+def test_agreement_within_a_tolerance() -> None:
+    agree("They agree.", [1.0, 2.0], [1.0, 2.0 + 1e-13], within=1e-12)
+    for other in ([1.0, 2.1], [1.0, np.nan], [1.0, 2.0, 3.0]):
+        with pytest.raises(Unverified, match="They agree"):
+            agree("They agree.", [1.0, 2.0], other, within=1e-12)
+    with pytest.raises(Unverified):
+        agree("They agree.", 1e-3, 0.0, within=1e-6, relative=False)
+
+
+def test_sums_are_printed_in_the_order_people_write_them():
+    lam, K, S, x, y = sp.symbols("lambda K S x y")
+    assert "\\lambda + K \\left(y - S\\right)" in typeset((x, lam + K * (y - S))).markdown
+    assert "x^{2} + x + 1" in typeset((y, x + 1 + x**2)).markdown  # powers descend
