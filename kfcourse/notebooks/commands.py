@@ -193,11 +193,11 @@ def grade(
     """Run the returned notebooks in FOLDER and write a table of what passed.
 
     The notebook of each set and variant is made again from the master, and the student's cells are put into it: checks that a
-    student changed or deleted do not count.  Each notebook runs in a process and an empty folder of its own, with limits of time,
-    output and memory (4 GB, where the system can limit it), and cannot disturb the others.
+    student changed or deleted do not count.  Each notebook runs in a process and an empty folder of its own, with limits of time
+    and memory (4 GB, where the system can limit it).  That process has no answers: it is asked for values, and another one
+    compares them.  With --sandbox none it runs with your rights.
 
-    The table is for your eye, not for a judge.  Notebooks run with your rights: use a container, or a user of its own, if
-    somebody may mean harm.  The right answers are in the package; the note names notebooks that reach for them.
+    What reaches for more than an exercise needs is noted: look at it.
 
     Marks: a tick is passed, a cross is wrong or not usable, a dash is not implemented or not run.  Unchanged notebooks are not
     run again.  Exit status: 0 if every exercise notebook could be graded, however badly; 1 if some could not.

@@ -99,7 +99,7 @@ def _grade(
         exercise, notes = claimed(claim, cells, work.variants_file)
         master = generated(read(exercise.letter, work.masters), exercise.letter, opened(exercise))
         elsewhere = opened_elsewhere(call for cell in cells for call in openings(cell.source))
-        opening = Opening(exercise.letter, opened(exercise), personal_numbers([exercise, *elsewhere]))
+        opening = Opening(exercise.letter, opened(exercise), personal_numbers(exercise, elsewhere))
     steps, own = assembled(master, cells)
     asked = Exercise(exercise.letter, exercise.variant, setting.salt)
     marking = Marking(asked, skip, progress)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -18,7 +19,7 @@ from kfcourse.notebooks.grading.submissions import Returned
 
 NOT_RUN = "not run"
 GRADED, OTHER, FAILED = "graded", "not an exercise notebook", "not graded"
-RUNNING = "the run ended while this one was graded"
+WAITING, RUNNING = "the run ended before its turn", "the run ended while this one was graded"
 SIGNS = {PASSED: "✓", WRONG: "✗", UNUSABLE: "✗", MISSING: "–", NOT_RUN: "–"}
 
 
@@ -155,9 +156,11 @@ def unchanged(work: Sequence[Returned], table: Mapping[str, Grade]) -> tuple[lis
     return old, new
 
 
-def grade_all(
-    work: Sequence[Returned], path: Path, again: bool, run_all: Callable[[Sequence[Returned]], Iterable[Grade]]
-) -> tuple[list[Grade], int]:
+Started = Callable[[Returned], None]
+RunAll = Callable[[Sequence[Returned], Started], Iterable[Grade]]
+
+
+def grade_all(work: Sequence[Returned], path: Path, again: bool, run_all: RunAll) -> tuple[list[Grade], int]:
     """Grade what is new, and write the table after each notebook, so that an interrupted run goes on where it was.
 
     What is still to be graded stands in the table too: if the run is ended, it says which notebooks were in it.
@@ -170,12 +173,18 @@ def grade_all(
     table = read_table(path)
     grades, new = unchanged(work, {} if again else table)
     old = len(grades)
-    waiting = {one.name: Grade(one.name, FAILED, note=RUNNING) for one in new}
-    if waiting:
-        write_table([*grades, *waiting.values()], path)
-    for one in run_all(new):
-        grades.append(one)
-        waiting.pop(one.name, None)
-        write_table([*grades, *waiting.values()], path)
+    waiting = {one.name: Grade(one.name, FAILED, note=WAITING) for one in new}
+    lock = threading.Lock()
+
+    def started(one: Returned) -> None:
+        with lock:
+            waiting[one.name] = Grade(one.name, FAILED, note=RUNNING)
+            write_table([*grades, *waiting.values()], path)
+
+    for one in run_all(new, started):
+        with lock:
+            grades.append(one)
+            waiting.pop(one.name, None)
+            write_table([*grades, *waiting.values()], path)
     write_table(grades, path)
     return sorted(grades, key=lambda one: one.name), old
