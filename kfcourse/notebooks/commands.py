@@ -215,11 +215,12 @@ def grade(
         staged = stage(place / "stage")
         hidden = [Path(str(resources.files("kfcourse"))), *answers(), folder.resolve(), *([masters] if masters else [])]
         held = chosen(sandbox, hidden, place, packages_of(staged))
-        with grading(Setting(Place(staged, held), seed or secrets.token_hex(8)), workers) as graded:
+        salt = seed or secrets.token_hex(8)
+        with grading(Setting(Place(staged, held), salt), workers) as graded:
             grades, old = grade_all(work, table, again, graded)
     _grades(grades)
     click.echo(f"\n{len(grades) - old} run, {old} unchanged since the last table. Table: {table}")
-    click.echo(f"Sandbox: {HELD[held.kind]}")
+    click.echo(f"Sandbox: {HELD[held.kind]}\nHidden arguments: --seed {salt} repeats them")
     if students or report:
         _report(write_report(grades, course, report or folder / "report", HELD[held.kind]), report or folder / "report")
     if any(one.status == FAILED for one in grades):
