@@ -26,6 +26,7 @@ from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
 from kfcourse.lab.short_names import FILTERS, Structures, title
 from kfcourse.lab.variants import Variant
+from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.statistics import Estimate, ratio
 from kfcourse.symbolic.model import Model
@@ -47,6 +48,8 @@ _FIGURES: dict[str, tuple[str, Callable[[Comparison, Axes], Axes]]] = {
 }
 
 
+FORMULAS = 60.0  # seconds that each kind of structural functions may take
+LONGEST = 40_000  # characters of LaTeX: some ten pages
 _GAP_STEPS = (0, 1, 5)  # where the report says how far the filters are above the exact bound
 
 
@@ -180,7 +183,17 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
 def _structure_sections(model: Model, names: tuple[str, ...]) -> list[Section]:
     structures = Structures(model)
     kinds = [kind for kind in ("gaussian", "linearised") if any(name.endswith(kind) for name in names)]
-    return [Section.of(kind.capitalize(), getattr(structures, kind).latex()) for kind in kinds]
+    return [Section.of(kind.capitalize(), _printed(structures, kind)) for kind in kinds]
+
+
+def _printed(structures: Structures, kind: str) -> str:
+    """The formulas in LaTeX, if they can be found and read."""
+    try:
+        with time_limit(FORMULAS):
+            block = getattr(structures, kind).latex()
+    except OutOfTime:
+        return rf"\text{{They are not written within {FORMULAS:g} s.}}"
+    return block if len(block) <= LONGEST else rf"\text{{They are too long to print: {len(block)} characters of LaTeX.}}"
 
 
 def _equation_sections(names: tuple[str, ...]) -> list[Section]:
