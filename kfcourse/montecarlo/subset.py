@@ -15,6 +15,7 @@ import numpy as np
 from tqdm import tqdm
 
 from kfcourse.filters.base import Filter, State
+from kfcourse.filters.particles import Particles
 from kfcourse.laws import Array
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Subset
@@ -121,9 +122,19 @@ def run_block(
                 states[i] = _step(one, states[i], instant.y)
                 sums.record(i, k, instant.x, states[i].posterior, weight)
             if reference is not None:
+                twice = _twice(states[reference])
                 for i, state in enumerate(states):
-                    sums.record_distance(i, k, state.posterior.mean, states[reference].posterior.mean, weight)
+                    if i != reference:
+                        sums.record_distance(i, k, state.posterior.mean, twice, weight)
     _check_finite(filters, sums)
+
+
+def _twice(state: State) -> tuple[Array, Array]:
+    """Two estimates of the reference whose errors, if it has any, are independent: those of both clouds of particles."""
+    if isinstance(state.memory, Particles):
+        first, second = state.memory.halves
+        return first, second
+    return state.posterior.mean, state.posterior.mean
 
 
 def _step(one: Filter, state: State, y: Array) -> State:
