@@ -105,7 +105,8 @@ def particle(model: Model, particles: int = 1000, seed: int = 0, *, guided: bool
             found = ahead.proposal(x, y[:, None, None, :], np.zeros((1, s.shape[-1])))
             s, logs = _where_measured(y, ahead.draw_each(found, rng), s)
         after = np.broadcast_to(state_equation(x, ahead.noise_of(s)), x.shape)
-        lost: Array = ~np.asarray((np.abs(after) < LARGEST).all(axis=-1))
+        small: Array = np.abs(after) < LARGEST
+        lost: Array = ~small.all(axis=-1)
         return np.where(lost[..., None], x, after), np.where(lost, -np.inf, logs)
 
     def step(state: State, y: Array) -> State:
