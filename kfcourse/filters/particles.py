@@ -19,10 +19,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.angles import Components, difference, moments_on_circle, on_circle
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
 from kfcourse.filters.proposals import Look
 from kfcourse.laws import Array, Gaussian
+from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
@@ -50,7 +52,7 @@ class Particles(NamedTuple):
     seed: np.random.SeedSequence
 
 
-def particle(model: Model, particles: int = 1000, seed: int = 0, *, guided: bool = True, name: str = "particle") -> Filter:
+def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: bool = True, name: str = "particle") -> Filter:
     """The particle filter (Gordon, Salmond and Smith, 1993; guided as by Doucet, Godsill and Andrieu, 2000).
 
     Resampled systematically at each step, each cloud for itself.
@@ -61,7 +63,7 @@ def particle(model: Model, particles: int = 1000, seed: int = 0, *, guided: bool
         Any dimension; the meter's noise must enter linearly, so that p(y | x) is known.
     particles : int
         Particles per trajectory, even, half of them in each cloud; `state.memory.effective` tells how many of them count.
-    seed : int
+    seed : int or numpy.random.Generator
         Steps are reproducible: the same state and measurement give the same result.
     guided : bool
         Whether the proposal looks at the measurement.  Without, it is the bootstrap filter.
@@ -75,7 +77,7 @@ def particle(model: Model, particles: int = 1000, seed: int = 0, *, guided: bool
     """
     if particles < 2 or particles % 2:
         raise ModelError(f"a particle filter needs an even number of at least 2 particles, got {particles}")
-    log_likelihood = likelihood(model)
+    number, log_likelihood, angles = seed_number(seed), likelihood(model), model.angles.x
     state_equation, _ = compile_model(model)
     gaussian_init = initial_state(model)
     start, ahead = Look.at_start(model), Look.ahead(model)
@@ -84,47 +86,52 @@ def particle(model: Model, particles: int = 1000, seed: int = 0, *, guided: bool
     def init(runs: int) -> State:
         state = gaussian_init(runs)
         both = np.stack([state.posterior.mean] * 2)
-        root = np.random.SeedSequence([seed, runs])
+        root = np.random.SeedSequence([number, runs])
         return state._replace(memory=Particles(None, both, np.full(runs, float(particles)), root))
 
     def first(rng: np.random.Generator, y: Array) -> tuple[Array, Array]:
         """x_0 (runs, 2, M/2, n), and the logarithms of p / q."""
         s, logs = _plain(rng, (len(y), 2, size), start)
         if guided and not start.blind:
-            found = start.proposal(np.zeros((len(y), model.n)), y, start.starts())
-            heights = log_likelihood(y[:, None, :], start.noise_of(found.mean)) - 0.5 * (found.mean**2).sum(axis=-1)
+            found = start.proposal(np.zeros((len(y), model.n)), y, start.starts(), 0)
+            heights = log_likelihood(y[:, None, :], start.noise_of(found.mean), 0) - 0.5 * (found.mean**2).sum(axis=-1)
             heights += np.log(np.diagonal(found.root, axis1=-2, axis2=-1)).sum(axis=-1)
             for_both = found._replace(share=_normalised(heights)).of_clouds(2)
             s, logs = _where_measured(y, start.draw(for_both, rng, size), s)
-        return start.noise_of(s), logs
+        return on_circle(start.noise_of(s), angles), logs
 
-    def following(rng: np.random.Generator, x: Array, y: Array) -> tuple[Array, Array]:
+    def following(rng: np.random.Generator, x: Array, y: Array, k: int) -> tuple[Array, Array]:
         """x_k (runs, 2, M/2, n) from the particles of the step before, and the logarithms of p / q."""
         s, logs = _plain(rng, x.shape[:-1], ahead)
         if guided and not ahead.blind:
-            found = ahead.proposal(x, y[:, None, None, :], np.zeros((1, s.shape[-1])))
+            found = ahead.proposal(x, y[:, None, None, :], np.zeros((1, s.shape[-1])), k)
             s, logs = _where_measured(y, ahead.draw_each(found, rng), s)
-        after = np.broadcast_to(state_equation(x, ahead.noise_of(s)), x.shape)
-        small: Array = np.abs(after) < LARGEST
-        lost: Array = ~small.all(axis=-1)
+        after = moved(x, s, k - 1)
+        lost = ~np.logical_and.reduce(np.abs(after) < LARGEST, axis=-1)
         return np.where(lost[..., None], x, after), np.where(lost, -np.inf, logs)
+
+    def moved(x: Array, s: Array, k: int) -> Array:
+        """The states after step k."""
+        return on_circle(np.broadcast_to(state_equation(x, ahead.noise_of(s), k), x.shape), angles)
 
     def step(state: State, y: Array) -> State:
         before, _, _, root = state.memory
         rng = _stream(root, state.step)
         with np.errstate(over="ignore", invalid="ignore"):  # what lies beyond the largest number has no weight
-            x, logs = first(rng, y) if before is None else following(rng, before, y)
-            weights = _normalised(logs + log_likelihood(y[:, None, None, :], x))
-            mean, cov = _weighted(x, weights)
-            apart = mean[:, 0] - mean[:, 1]
-            posterior = Gaussian(mean.mean(axis=1), cov.mean(axis=1) + 0.5 * apart[:, :, None] * apart[:, None, :])
+            x, logs = first(rng, y) if before is None else following(rng, before, y, state.step)
+            weights = _normalised(logs + log_likelihood(y[:, None, None, :], x, state.step))
+            mean, cov = _weighted(x, weights, angles)
+            apart = difference(mean[:, 0], mean[:, 1], angles)
+            posterior = Gaussian(
+                on_circle(mean[:, 1] + 0.5 * apart, angles), cov.mean(axis=1) + 0.5 * apart[:, :, None] * apart[:, None, :]
+            )
         flat, chosen = x.reshape(-1, size, model.n), _systematic(weights.reshape(-1, size), rng)
         kept = np.take_along_axis(flat, chosen[..., None], axis=1).reshape(x.shape)
         effective = (1 / (weights**2).sum(axis=-1)).sum(axis=1)
         s, _ = _plain(rng, x.shape[:-1], ahead)
         with np.errstate(over="ignore", invalid="ignore"):
-            moved = np.broadcast_to(state_equation(kept, ahead.noise_of(s)), x.shape).reshape(len(y), particles, model.n)
-            predicted = _weighted(moved, np.full(moved.shape[:-1], 1.0 / particles))
+            following_ones = moved(kept, s, state.step).reshape(len(y), particles, model.n)
+            predicted = _weighted(following_ones, np.full(following_ones.shape[:-1], 1.0 / particles), angles)
         return State(state.step + 1, posterior, predicted, Particles(kept, np.moveaxis(mean, 1, 0), effective, root))
 
     return Filter(name, model, init, step, slow=True)
@@ -137,7 +144,7 @@ def _plain(rng: np.random.Generator, shape: tuple[int, ...], look: Look) -> tupl
 
 def _where_measured(y: Array, guided: tuple[Array, Array], plain: Array) -> tuple[Array, Array]:
     """The proposal's s and logarithms, but the law itself for trajectories whose measurement is missing."""
-    missing = np.isnan(y).all(axis=-1)[:, None, None]
+    missing = np.logical_and.reduce(np.isnan(y), axis=-1)[:, None, None]
     return np.where(missing[..., None], plain, guided[0]), np.where(missing, 0.0, guided[1])
 
 
@@ -154,10 +161,12 @@ def _normalised(logs: Array) -> Array:
     return np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / logs.shape[-1])
 
 
-def _weighted(x: Array, weights: Array) -> Gaussian:
+def _weighted(x: Array, weights: Array, angles: Components) -> Gaussian:
     """Mean (..., n) and covariance (..., n, n) of weighted particles (..., M, n)."""
     mean = np.einsum("...m,...mi->...i", weights, x)
-    deviation = x - mean[..., None, :]
+    for i in angles:
+        mean[..., i], _ = moments_on_circle(x[..., i], weights)
+    deviation = difference(x, mean[..., None, :], angles)
     return Gaussian(mean, np.einsum("...m,...mi,...mj->...ij", weights, deviation, deviation))
 
 

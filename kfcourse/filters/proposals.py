@@ -19,8 +19,9 @@ import numpy as np
 import sympy as sp
 from scipy.special import gammaln
 
+from kfcourse.angles import Components, near
 from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, product, square_root, transpose
-from kfcourse.symbolic.codegen import compile_function
+from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import exact_matrix
 
@@ -59,8 +60,11 @@ class Look:
 
     Attributes
     ----------
-    functions : callable
-        (x (..., n), u (..., r)) -> g (..., p), dg/du (..., p, r), R (..., p, p).
+    state, meter : callable
+        (x (..., n), u (..., r), k) -> the next state (..., n) and its derivatives by u (..., n, r), from step k on;
+        (x, k) -> b(x, m_w) (..., p), its derivatives (..., p, n), and R (..., p, p).
+    angles : tuple of int
+        Components of y that are angles.
     noise : Gaussian
         N(m, D) of u.
     blind : bool
@@ -69,7 +73,9 @@ class Look:
         g is affine in u and R does not depend on it: one step finds the posterior itself.
     """
 
-    functions: Callable[[Array, Array], tuple[Array, Array, Array]]
+    state: Callable[[Array, Array, int], tuple[Array, Array]]
+    meter: Callable[[Array, int], tuple[Array, Array, Array]]
+    angles: Components
     noise: Gaussian
     blind: bool
     affine: bool
@@ -77,46 +83,60 @@ class Look:
     @classmethod
     def at_start(cls, model: Model) -> Look:
         """x_0 = u."""
-        u = sp.Matrix(sp.symbols(f"u1:{model.n + 1}", real=True))
-        return cls._of(model, u, u, model.prior, "start")
+        return cls._of(model, sp.Matrix(model.x), model.x, model.prior, lambda x, u, k: (u, np.eye(model.n)))
 
     @classmethod
     def ahead(cls, model: Model) -> Look:
         """x' = a(x, u)."""
-        return cls._of(model, model.state_equation.subs(model.values), sp.Matrix(model.v), model.state_noise, "next state")
+        equation = model.state_equation.subs(model.values)
+        outputs = {"after": equation, "slope": equation.jacobian(sp.Matrix(model.v))}
+        arguments = {"x": sp.Matrix(model.x), "u": sp.Matrix(model.v)}
+        state = Stepwise.compile(model.known, "next_state", arguments, outputs, ["x", "u", "after"])
+        return cls._of(model, equation, model.v, model.state_noise, lambda x, u, k: state.at(k)(x, u))
 
     @classmethod
-    def _of(cls, model: Model, state: sp.MatrixBase, u: sp.MatrixBase, noise: Gaussian, name: str) -> Look:
-        there = dict(zip(model.x, state, strict=True))
-        mean = model.meter_equation.subs(dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True)))
+    def _of(
+        cls,
+        model: Model,
+        equation: sp.MatrixBase,
+        u: tuple[sp.Symbol, ...],
+        noise: Gaussian,
+        state: Callable[[Array, Array, int], tuple[Array, Array]],
+    ) -> Look:
+        mean = model.meter_equation.subs(dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True))).subs(model.values)
         B = model.meter_equation.jacobian(sp.Matrix(model.w))
-        cov = B * exact_matrix(model.meter_noise.cov) * B.T
-        g, R = (expression.subs(model.values).subs(there, simultaneous=True) for expression in (mean, cov))
-        H = g.jacobian(u)
-        arguments = {"x": sp.Matrix(model.x), "u": u}
-        function = compile_function(
-            f"look {name}".replace(" ", "_"), arguments, {"g": g, "H": H, "R": R}, ["x", "u", "g"]
-        ).function
-        symbols = set(u)
-        still = not R.free_symbols & symbols
-        return cls(function, noise, still and H.is_zero_matrix is True, still and not H.free_symbols & symbols)
+        cov = (B * exact_matrix(model.meter_noise.cov) * B.T).subs(model.values)
+        outputs = {"signal": mean, "slope": mean.jacobian(sp.Matrix(model.x)), "noise": cov}
+        meter = Stepwise.compile(model.known, "seen", {"x": sp.Matrix(model.x)}, outputs, ["x", "signal"])
+        there = dict(zip(model.x, equation, strict=True))
+        H = mean.subs(there, simultaneous=True).jacobian(sp.Matrix(u))
+        still = not model.timed and not cov.subs(there, simultaneous=True).free_symbols & set(u)
+        affine = still and not H.free_symbols & set(u)
+        return cls(
+            state,
+            lambda x, k: meter.at(k)(x),
+            model.angles.y,
+            noise,
+            affine and H.is_zero_matrix is True,
+            affine and not model.angles.y,
+        )
 
     def noise_of(self, s: Array) -> Array:
         """u = m + L s."""
         return self.noise.mean + s @ square_root(self.noise.cov).T
 
-    def proposal(self, x: Array, y: Array, starts: Array) -> Proposal:
-        """One normal law (..., J) for each start (J, r), at x (..., n) and with y (..., p), which may be missing (NaN)."""
+    def proposal(self, x: Array, y: Array, starts: Array, k: int) -> Proposal:
+        """One normal law (..., J) for each start (J, r), at x (..., n) and with y_k (..., p), which may be missing (NaN)."""
         r = starts.shape[-1]
         standard = Gaussian(np.broadcast_to(starts, (*x.shape[:-1], *starts.shape)), np.eye(r))
         law, L = standard, square_root(self.noise.cov)
         for _ in range(1 if self.affine else ROUNDS):
-            g, slope, R = self.functions(x[..., None, :], self.noise_of(law.mean))
-            H = product(slope, L)
+            after, by_noise = self.state(x[..., None, :], self.noise_of(law.mean), k - 1)
+            signal, by_state, R = self.meter(after, k)
+            H = product(product(by_state, by_noise), L)
             F = product(H, transpose(H)) + R
-            law = correct(
-                Gaussian(np.zeros_like(law.mean), np.eye(r)), Measurement(g - apply(H, law.mean), H, F, R), y[..., None, :]
-            )
+            meter = Measurement(signal - apply(H, law.mean), H, F, R)
+            law = correct(Gaussian(np.zeros_like(law.mean), np.eye(r)), meter, near(y[..., None, :], signal, self.angles))
         mean = np.where(np.isfinite(law.mean), law.mean, 0.0)
         cov = np.broadcast_to(law.cov, (*mean.shape, r))
         root = _lower(np.where(np.isfinite(cov), cov, np.eye(r)))

@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 from tqdm import tqdm
 
+from kfcourse.angles import near
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.particles import Particles
 from kfcourse.laws import Array
@@ -120,12 +121,15 @@ def run_block(
             weight = weight_of(instant.x) if k == 0 else weight
             for i, one in enumerate(filters):
                 states[i] = _step(one, states[i], instant.y)
-                sums.record(i, k, instant.x, states[i].posterior, weight)
+                estimate = states[i].posterior
+                sums.record(i, k, near(instant.x, estimate.mean, one.model.angles.x), estimate, weight)
             if reference is not None:
                 twice = _twice(states[reference])
                 for i, state in enumerate(states):
                     if i != reference:
-                        sums.record_distance(i, k, state.posterior.mean, twice, weight)
+                        mean, angles = state.posterior.mean, filters[i].model.angles.x
+                        first, second = (near(one, mean, angles) for one in twice)
+                        sums.record_distance(i, k, mean, (first, second), weight)
     _check_finite(filters, sums)
 
 
