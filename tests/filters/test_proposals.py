@@ -174,7 +174,7 @@ def test_the_variance_claimed_is_unbiased(linear):
 
 
 def test_it_is_guided_in_models_that_depend_on_the_step_too():
-    """Meter and noise change with k: the Kalman filter's estimates within 4 of the sampling's errors, and most particles count."""
+    """Meter and noise change with k: the Kalman filter's estimates within 4 errors of the sampling; most particles count."""
     model = Model.define("0.9*x + (1 + 0.2*k)*v", "(2 - 0.3*k)*x + 0.05*(1 + k)*w")
     _, y = simulate(model, 50, 4, 1)
     expected = run(kalman_filter(model), y)
