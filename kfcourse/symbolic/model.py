@@ -37,6 +37,7 @@ from kfcourse.symbolic.reading import (
     read,
     table,
 )
+from kfcourse.symbolic.writing import formula_latex
 
 
 @dataclass(frozen=True)
@@ -202,8 +203,13 @@ class Model:
         """The two equations, and the parameters' values unless they are not wanted, as a LaTeX `aligned` block."""
         state = ["{" + sp.latex(x) + "}" for x in self.x]  # braces: a name may have an index of its own
         meter = ["y"] if self.p == 1 else [f"{{y_{{{i + 1}}}}}" for i in range(self.p)]
-        lines = [rf"{x}_{{k+1}} &= {sp.latex(formula)}" for x, formula in zip(state, self.state_equation, strict=True)]
-        lines += [rf"{y}_k &= {sp.latex(formula)}" for y, formula in zip(meter, self.meter_equation, strict=True)]
+        lines = [
+            rf"{x}_{{k+1}} &= {formula_latex(formula, self.x, self.v)}"
+            for x, formula in zip(state, self.state_equation, strict=True)
+        ]
+        lines += [
+            rf"{y}_k &= {formula_latex(formula, self.x, self.w)}" for y, formula in zip(meter, self.meter_equation, strict=True)
+        ]
         lines += [rf"{name}_k &\in [-\pi, \pi]" for name in [state[i] for i in self.angles.x] + [meter[i] for i in self.angles.y]]
         if values:
             lines += [rf"{sp.latex(name)} &= {float(value):g}" for name, value in self.values.items()] + self.known.latex()
