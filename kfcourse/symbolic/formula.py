@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import ast
 import keyword
-import math
 import re
+import unicodedata
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -46,6 +46,7 @@ COMPARISONS: dict[type[ast.cmpop], Callable[[sp.Expr, sp.Expr], Boolean]] = {
     ast.NotEq: sp.Ne,
 }
 
+LARGEST = 1e100  # numbers beyond it, or below 1/LARGEST: products of some would leave the floats
 MAX_LENGTH = 2000
 MAX_EXPONENT = 16
 MAX_DEGREE = 24
@@ -58,7 +59,7 @@ class FormulaError(ValueError):
     """A formula cannot be read; the message shows the formula and points at the place."""
 
     def __init__(self, formula: str, problem: str, column: int = 0):
-        line = " ".join(formula.split("\n"))
+        line = "".join(c if c.isprintable() else " " for c in formula)
         shown = line if len(line) <= 100 else line[:97] + "..."
         pointer = f"\n    {' ' * column}^" if column < 100 else ""
         super().__init__(f"{problem}\n    {shown}{pointer}")
@@ -109,8 +110,8 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
         raise FormulaError(formula, "the formula is empty")
     if len(formula) > MAX_LENGTH:
         raise FormulaError(formula, f"the formula has {len(formula)} characters; at most {MAX_LENGTH} are read")
-    if "^" in formula:
-        raise FormulaError(formula, "^ is not a power here; write ** (x**2)", formula.index("^"))
+    formula = re.sub(r"[\t\n\r]", " ", formula)  # of a text over several lines
+    _check_characters(formula)
     offset = len(formula) - len(formula.lstrip())
     try:
         tree = ast.parse(formula.strip(), mode="eval").body
@@ -129,6 +130,26 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
     if expression.has(sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I):
         raise FormulaError(formula, "the formula has no finite real value (division by zero or root of a negative?)")
     return expression
+
+
+# Typed for what formulas are made of: Cyrillic letters that look Latin, and signs of printed mathematics.
+_LOOKS_LIKE = dict(zip("асеорхуАВСЕНКМОРТХ−–·×⋅∙÷", "aceopxyABCEHKMOPTX--****/", strict=True))
+_INSTEAD = {"^": "** for a power (x**2)", "#": "comments elsewhere"}
+
+
+def _check_characters(formula: str) -> None:
+    """FormulaError at the first character that formulas have not: Python would take ſ for s, and end at #."""
+    for column, character in enumerate(formula):
+        if character.isascii() and character.isprintable() and character not in "^#":
+            continue
+        plain = _LOOKS_LIKE.get(character, unicodedata.normalize("NFKC", character))
+        plain = f"**{plain}" if unicodedata.category(character) == "No" else plain  # x²
+        instead = _INSTEAD.get(character) or (
+            f"{plain} of the English keyboard" if plain.isascii() and plain.isprintable() else ""
+        )
+        name = unicodedata.name(character, f"U+{ord(character):04X}").lower()
+        shown = character if character.isprintable() else "a character"
+        raise FormulaError(formula, f"{shown} ({name}) has no meaning in a formula{'; write ' * bool(instead)}{instead}", column)
 
 
 class _Reader:
@@ -171,10 +192,12 @@ class _Reader:
 
     def number(self, node: ast.Constant) -> sp.Expr:
         value = node.value
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise self.fail(node, f"{value!r} is not a finite real number")
-        if value and not 1e-100 < abs(value) < 1e100:
-            raise self.fail(node, "the number is too large or too small")
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.fail(node, f"{value!r} is not a real number")
+        written = ast.get_source_segment(self.formula[self.offset :], node) or ""
+        lost = not value and not written.startswith(("0x", "0o", "0b")) and re.match(r"[0._]*[1-9]", written)  # 1e-400 is 0.0
+        if lost or (value and not 1 / LARGEST < abs(value) < LARGEST):
+            raise self.fail(node, "the number is too large or too small (1e-100 to 1e100 are read): change the units")
         return sp.Rational(str(value))
 
     def name(self, node: ast.Name) -> sp.Expr:

@@ -37,6 +37,7 @@ from kfcourse.symbolic.reading import (
     read,
     table,
 )
+from kfcourse.symbolic.sense import not_computable
 from kfcourse.symbolic.writing import formula_latex
 
 
@@ -157,11 +158,9 @@ class Model:
         if angles is None:
             warn_of_angles(dict(zip((s.name for s in x), model.state_equation, strict=True)))
             warn_of_angles(dict(zip(model.measured, model.meter_equation, strict=True)))
-        for equation in (*model.state_equation.subs(model.values), *model.meter_equation.subs(model.values)):
-            if equation.has(sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I) or any(
-                e.is_number and e.is_real is False for e in sp.preorder_traversal(equation)
-            ):
-                raise ModelError(f"with these parameters {model} has no finite real value: {equation}")
+        for what, equation in {"state": model.state_equation, "meter": model.meter_equation}.items():
+            if problem := not_computable(equation, model.values):
+                raise ModelError(f"the {what} equation {problem}")
         if not model.meter_equation.has(*x):
             raise ModelError(f"the meter {list(model.meter_equation)} does not depend on the state {list(x)}: nothing to filter")
         return model
@@ -237,7 +236,12 @@ def _symbols(symbols: Mapping[str, Names] | None, values: Sequence[str], used: s
     result = {}
     for key in "xvw":
         if key in given:
-            names: list[str] = [*([given[key]] if isinstance(given[key], str) else given[key])]
+            listed = [given[key]] if isinstance(given[key], str) else given[key]
+            if not isinstance(listed, Sequence):
+                raise ModelError(
+                    f'`symbols`: {key} must be a name or a list of names, such as ["{key}1", "{key}2"], got {listed!r}'
+                )
+            names: list[str] = [*listed]
         elif key == "x":
             names = ["x"] if n == 1 and "x1" not in used else [f"x{i + 1}" for i in range(n)]
         else:
