@@ -10,9 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.angles import Components, difference, moments_on_circle, on_circle
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
 from kfcourse.laws import Array, Gaussian, square_root
+from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
@@ -26,7 +28,7 @@ class Particles(NamedTuple):
     seed: np.random.SeedSequence
 
 
-def particle(model: Model, particles: int = 1000, seed: int = 0) -> Filter:
+def particle(model: Model, particles: int = 1000, seed: Seed = 0) -> Filter:
     """The bootstrap particle filter (Gordon, Salmond and Smith), resampled systematically at each step.
 
     Parameters
@@ -35,12 +37,12 @@ def particle(model: Model, particles: int = 1000, seed: int = 0) -> Filter:
         Any dimension; the meter's noise must enter linearly, so that p(y | x) is known.
     particles : int
         Particles per trajectory; `state.memory.effective` tells how many of them count.
-    seed : int
+    seed : int or numpy.random.Generator
         Steps are reproducible: the same state and measurement give the same result.
     """
     if particles < 2:
         raise ModelError(f"a particle filter needs at least 2 particles, got {particles}")
-    log_likelihood = likelihood(model)
+    number, log_likelihood = seed_number(seed), likelihood(model)
     state_equation, _ = compile_model(model)
     gaussian_init = initial_state(model)
 
@@ -49,22 +51,23 @@ def particle(model: Model, particles: int = 1000, seed: int = 0) -> Filter:
         return law.mean + standard @ square_root(law.cov).T
 
     def init(runs: int) -> State:
-        root = np.random.SeedSequence([seed, runs])
+        root = np.random.SeedSequence([number, runs])
         x = sample(_stream(root, 0), model.prior, runs)
         return gaussian_init(runs)._replace(memory=Particles(x, np.full(runs, float(particles)), root))
 
     def step(state: State, y: Array) -> State:
         x, _, root = state.memory
         rng = _stream(root, state.step + 1)
-        logs = log_likelihood(y[:, None, :], x)
+        logs = log_likelihood(y[:, None, :], x, state.step)
         peak = logs.max(axis=1, keepdims=True)
         weights = np.exp(logs - np.where(np.isfinite(peak), peak, 0.0))
         total = weights.sum(axis=1, keepdims=True)
         weights = np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / particles)
-        posterior = _weighted(x, weights)
+        posterior = _weighted(x, weights, model.angles.x)
         chosen = np.take_along_axis(x, _systematic(weights, rng)[..., None], axis=1)
-        following = np.broadcast_to(state_equation(chosen, sample(rng, model.state_noise, len(x))), x.shape)
-        predicted = _weighted(following, np.full(weights.shape, 1.0 / particles))
+        noise = sample(rng, model.state_noise, len(x))
+        following = on_circle(np.broadcast_to(state_equation(chosen, noise, state.step), x.shape), model.angles.x)
+        predicted = _weighted(following, np.full(weights.shape, 1.0 / particles), model.angles.x)
         return State(state.step + 1, posterior, predicted, Particles(following, 1 / (weights**2).sum(axis=1), root))
 
     return Filter("particle", model, init, step, slow=True)
@@ -74,10 +77,12 @@ def _stream(root: np.random.SeedSequence, step: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(root.entropy, spawn_key=(step,)))
 
 
-def _weighted(x: Array, weights: Array) -> Gaussian:
+def _weighted(x: Array, weights: Array, angles: Components) -> Gaussian:
     """Mean (runs, n) and covariance (runs, n, n) of weighted particles."""
     mean = np.einsum("rm,rmi->ri", weights, x)
-    deviation = x - mean[:, None, :]
+    for i in angles:
+        mean[:, i], _ = moments_on_circle(x[..., i], weights)
+    deviation = difference(x, mean[:, None, :], angles)
     return Gaussian(mean, np.einsum("rm,rmi,rmj->rij", weights, deviation, deviation))
 
 

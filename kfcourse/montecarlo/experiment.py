@@ -24,6 +24,7 @@ from kfcourse.montecarlo.ensemble import Ensemble, workers
 from kfcourse.montecarlo.statistics import BATCHES, Sums
 from kfcourse.montecarlo.subset import progress_bar, run_block, run_subset
 from kfcourse.montecarlo.two_phase import Replicas
+from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.model import Model
 
 T = TypeVar("T")
@@ -36,12 +37,19 @@ def run(one: Filter, y: Array) -> Gaussian:
     ----------
     one : Filter
     y : ndarray (steps, runs, p)
-        NaN where a measurement is missing.
+        NaN where a measurement is missing.  One trajectory of a scalar meter may come as (steps,), and counts as runs = 1.
 
     Returns
     -------
     Gaussian
         Estimates (steps, runs, n) and the filter's covariances (steps, runs, n, n).
+
+    Raises
+    ------
+    ValueError
+        Measurements of another shape.
+    TypeError
+        A `Design`, whose coefficients are still to be found.
     """
     return stacked([state.posterior for state in _states(one, y)[1:]])
 
@@ -56,11 +64,28 @@ def predictions(one: Filter, y: Array) -> Gaussian:
 
 def _states(one: Filter, y: Array) -> list[State]:
     """The filter's states: before the first measurement, and after each."""
+    if isinstance(one, Design):
+        raise TypeError(
+            f"{one.name} is a Design, whose coefficients are still to be found over an ensemble: "
+            f"run(design([it], Ensemble(model, 100_000, {len(y)}, seed=1).by_step())[0], y), or compare([it], model, ...)"
+        )
+    y, p = np.asarray(y, dtype=float), one.model.p
+    if y.ndim == 1 and p == 1:
+        y = y[:, None, None]
     if y.ndim != 3:
-        raise ValueError(f"measurements must have the shape (steps, runs, p), got {y.shape}; one trajectory is y[:, None, :]")
-    if y.shape[2] != one.model.p:
-        raise ValueError(f"{one.name} expects {one.model.p} measurement component(s), got {y.shape[2]}")
+        raise ValueError(f"measurements must have the shape (steps, runs, {p}), got {y.shape}{_reshaped(y, p)}")
+    if y.shape[2] != p:
+        raise ValueError(f"{one.name} expects {p} measurement component(s), got {y.shape[2]}")
     return list(accumulate(y, one.step, initial=one.init(y.shape[1])))
+
+
+def _reshaped(y: Array, p: int) -> str:
+    """How measurements of two axes may be meant."""
+    if y.ndim != 2:
+        return ""
+    ways = ["y[:, None, :] if the columns are components of one trajectory"] if y.shape[1] == p else []
+    ways += ["y[:, :, None] if they are trajectories"] if p == 1 else []
+    return ": give " + " or ".join(ways) if ways else ""
 
 
 def compare(
@@ -68,7 +93,7 @@ def compare(
     model: Model,
     runs: int,
     steps: int,
-    seed: int,
+    seed: Seed,
     *,
     design_runs: int | None = None,
     designs: int = 1,
@@ -88,7 +113,7 @@ def compare(
     model : Model
     runs, steps : int
         Trajectories, and measurements of each.
-    seed : int
+    seed : int or numpy.random.Generator
         The same seed gives the same numbers, whatever the number of threads.
     design_runs : int, optional
         Size of the design ensemble; `runs` by default.
@@ -121,8 +146,9 @@ def compare(
     NotFinite
         A trajectory or a filter left the finite numbers.
     """
-    _check_arguments(filters, model, seed, subset_runs, subset_seconds)
+    _check_arguments(filters, model, subset_runs, subset_seconds)
     _check_designs(designs, same_ensemble, wide)
+    seed = seed_number(seed)
     names = [one.name for one in filters]
     slow = [one for one in filters if one.slow and subset_runs]
     fast = [one for one in filters if not one.slow]
@@ -143,9 +169,7 @@ def compare(
     return Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset, left_out, replicas)
 
 
-def _check_arguments(
-    filters: Sequence[Filter | Design], model: Model, seed: int, subset_runs: int, subset_seconds: float | None
-) -> None:
+def _check_arguments(filters: Sequence[Filter | Design], model: Model, subset_runs: int, subset_seconds: float | None) -> None:
     """ValueError for what `compare` cannot do with these arguments."""
     names = [one.name for one in filters]
     if len(set(names)) < len(names) or not names:
@@ -156,8 +180,6 @@ def _check_arguments(
         raise ValueError(f"subset_runs must not be negative, got {subset_runs}")
     if subset_seconds is not None and not subset_seconds > 0:
         raise ValueError(f"subset_seconds must be positive, got {subset_seconds}; subset_runs=0 leaves the slow filters out")
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise ValueError(f"the seed must be a non-negative whole number, got {seed!r}")
     for one in filters:
         if (one.model.n, one.model.p) != (model.n, model.p):
             raise ValueError(

@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 from tqdm import tqdm
 
+from kfcourse.angles import near
 from kfcourse.filters.base import Filter, State
 from kfcourse.laws import Array
 from kfcourse.limits import OutOfTime, time_limit
@@ -119,10 +120,12 @@ def run_block(
             weight = weight_of(instant.x) if k == 0 else weight
             for i, one in enumerate(filters):
                 states[i] = _step(one, states[i], instant.y)
-                sums.record(i, k, instant.x, states[i].posterior, weight)
+                estimate = states[i].posterior
+                sums.record(i, k, near(instant.x, estimate.mean, one.model.angles.x), estimate, weight)
             if reference is not None:
+                exact = states[reference].posterior.mean
                 for i, state in enumerate(states):
-                    sums.record_distance(i, k, state.posterior.mean, states[reference].posterior.mean, weight)
+                    sums.record_distance(i, k, near(state.posterior.mean, exact, filters[i].model.angles.x), exact, weight)
     _check_finite(filters, sums)
 
 

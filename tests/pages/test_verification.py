@@ -52,7 +52,7 @@ def test_one_false_equation_among_true_ones_raises() -> None:
 def test_definitions_are_put_in_for_printed_symbols_and_into_each_other() -> None:
     h = sp.Symbol("h")
     shown = verified((p, x - K), where={p: h + x, h: -K})
-    assert "p &= - K + x" in shown.markdown
+    assert "p &= x - K" in shown.markdown
     with pytest.raises(Unverified):
         verified((p, x - K), where={p: h + x, h: K})
 
@@ -61,6 +61,15 @@ def test_logarithms_and_matrices() -> None:
     verified((sp.log(2 * sp.pi * p) / 2, sp.log(sp.sqrt(2 * sp.pi)) + sp.log(p) / 2))
     rotation = sp.Matrix([[sp.cos(x), -sp.sin(x)], [sp.sin(x), sp.cos(x)]])
     verified((rotation * rotation.T, sp.eye(2)))
+
+
+def test_letters_of_matrices_stand_for_their_entries() -> None:
+    A, B, C = (sp.MatrixSymbol(name, 2, 2) for name in "ABC")
+    entries = {A: sp.Matrix([[x, z], [0, 1]]), B: sp.Matrix([[1, 0], [x, z]]), C: A * B}
+    shown = verified((C.T, B.T * A.T), where=entries)
+    assert "C^{T} &= B^{T} A^{T}" in shown.markdown
+    with pytest.raises(Unverified):
+        verified((C.T, A.T * B.T), where=entries)
 
 
 def test_numbers_to_so_many_digits() -> None:
@@ -101,3 +110,9 @@ def test_agreement_within_a_tolerance() -> None:
             agree("They agree.", [1.0, 2.0], other, within=1e-12)
     with pytest.raises(Unverified):
         agree("They agree.", 1e-3, 0.0, within=1e-6, relative=False)
+
+
+def test_sums_are_printed_in_the_order_people_write_them():
+    lam, K, S, x, y = sp.symbols("lambda K S x y")
+    assert "\\lambda + K \\left(y - S\\right)" in typeset((x, lam + K * (y - S))).markdown
+    assert "x^{2} + x + 1" in typeset((y, x + 1 + x**2)).markdown  # powers descend
