@@ -89,12 +89,12 @@ class _Printer(LatexPrinter):
 def _ordered(total: sp.Add, terms: Sequence[sp.Expr]) -> list[sp.Expr]:
     """Terms in the order people write them: lambda + K(y - S), not K(-S + y) + lambda.
 
-    Negative terms come last; a symbol that no other term contains comes first.
+    Negative terms come last; a symbol that no other term contains comes first, and so does the number of 1 + x^2.
     """
 
     def rank(term: sp.Expr) -> tuple[bool, bool]:
         alone = term.is_Symbol and not any(other.has(term) for other in total.args if other != term)
-        return term.could_extract_minus_sign(), not alone
+        return term.could_extract_minus_sign(), not (alone or (term.is_Number and len(total.args) == 2))
 
     return sorted(terms, key=rank)
 
