@@ -3,6 +3,7 @@
 variants     `Variant`, read from variants.toml or a file like it
 short_names  the lab's filters: "duof" -> how to build it, "DUOF" in tables
 quality      is a variant well posed?  criteria: each criterion;  difficulty: how hard;  grammar: new ones
+maps         who leads, and how far from the bound, over two parameters
 plots        figures of a comparison, one colour and name for each filter
 report       what `kfcourse lab` writes
 """

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.sense import nothing_random
 
 VARIANT_KEYS = {"title", "state", "meter", "parameters", "symbols", "prior", "state_noise", "meter_noise", "angles"}
 
@@ -75,6 +76,8 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
         model = Model.define(table["state"], table["meter"], table.get("parameters"), **options)
     except (ValueError, TypeError, OverflowError) as error:  # FormulaError and ModelError are ValueErrors
         raise VariantError(f"{prefix}{error}") from None
+    if problem := nothing_random(model):
+        raise VariantError(f"{prefix}{problem}")
     return Variant(name, str(table.get("title", "")), model, dict(table))
 
 

@@ -171,6 +171,12 @@ class Comparison:
         found = [(name, self.mean_gap(name, steps)) for name in self.entrants]
         return sorted(found, key=lambda item: float(item[1].value))
 
+    def leaders(self, step: int, confidence: float = 0.95) -> list[str]:
+        """The most accurate entrant at a step, then those that are not significantly worse, each by its own paired interval."""
+        gaps = {name: float(self.gap(name).value[step]) for name in self.entrants}
+        best, *others = sorted(gaps, key=lambda name: gaps[name])
+        return [best, *(name for name in others if self.gap_difference(name, best)[step].interval(confidence)[0] <= 0)]
+
     def design_error(self, name: str) -> Estimate:
         """Standard deviation of D_k from one design of the filter to another, (steps,); 0 for filters that need none.
 

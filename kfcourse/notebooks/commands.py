@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import functools
+import secrets
 import sys
+import tempfile
 from collections import Counter
 from collections.abc import Callable, Sequence
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +16,11 @@ import click
 
 from kfcourse.checks import sets
 from kfcourse.notebooks.course_list import assign, chosen_variants
-from kfcourse.notebooks.grading.marking import grade as mark
+from kfcourse.notebooks.grading.marking import Setting
+from kfcourse.notebooks.grading.pool import grading
+from kfcourse.notebooks.grading.running import Place, packages_of
+from kfcourse.notebooks.grading.sandbox import HELD, KINDS, chosen
+from kfcourse.notebooks.grading.staging import answers, stage
 from kfcourse.notebooks.grading.submissions import SECONDS, clean, returned
 from kfcourse.notebooks.grading.table import FAILED, GRADED, SIGNS, Grade, grade_all
 from kfcourse.notebooks.jobs import Job, Outcome, make, plan, run_all, safe
@@ -147,8 +154,18 @@ def _table(outcomes: Sequence[Outcome], work: Sequence[Job]) -> None:
     help="Time limit of a cell; a notebook may take five times as long.",
 )
 @click.option("--again", is_flag=True, help="Grade those too that have not changed since the last table.")
+@click.option("--sandbox", type=click.Choice(KINDS), default="auto", show_default=True, help="Where the notebooks run.")
+@click.option("--seed", help="Text that the hidden arguments come from.  [default: another each time]")
 def grade(
-    folder: Path, out: Path | None, variants_file: Path | None, masters: Path | None, workers: int, seconds: float, again: bool
+    folder: Path,
+    out: Path | None,
+    variants_file: Path | None,
+    masters: Path | None,
+    workers: int,
+    seconds: float,
+    again: bool,
+    sandbox: str,
+    seed: str | None,
 ) -> None:
     """Run the returned notebooks in FOLDER and write a table of what passed.
 
@@ -166,9 +183,17 @@ def grade(
     if not work:
         raise ValueError(f"no notebooks (*.ipynb) in {folder}")
     table = out or folder / "grades.csv"
-    grades, old = grade_all(work, table, again, lambda new: run_all(new, mark, workers, "grade"))
+    with tempfile.TemporaryDirectory(prefix="kfcourse-") as made:
+        place = Path(made).resolve()
+        (place / "stage").mkdir()
+        staged = stage(place / "stage")
+        hidden = [Path(str(resources.files("kfcourse"))), *answers(), folder.resolve(), *([masters] if masters else [])]
+        held = chosen(sandbox, hidden, place, packages_of(staged))
+        with grading(Setting(Place(staged, held), seed or secrets.token_hex(8)), workers) as graded:
+            grades, old = grade_all(work, table, again, graded)
     _grades(grades)
     click.echo(f"\n{len(grades) - old} run, {old} unchanged since the last table. Table: {table}")
+    click.echo(f"Sandbox: {HELD[held.kind]}")
     if any(one.status == FAILED for one in grades):
         sys.exit(1)
 

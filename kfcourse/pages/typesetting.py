@@ -8,6 +8,7 @@ from itertools import groupby
 from typing import Any, TypeAlias
 
 import sympy as sp
+from sympy.printing.latex import LatexPrinter
 
 # One side of an equation: an expression, a matrix, or LaTeX that is printed as it stands.
 Side: TypeAlias = Any
@@ -65,7 +66,7 @@ def side_lines(side: Side, width: int = WIDTH, names: Mapping[Any, str] | None =
     if symbols(whole) <= width or not isinstance(side, sp.Add):
         return [whole]
     lines = [""]
-    for term in side.as_ordered_terms():
+    for term in _ordered(side, side.as_ordered_terms()):
         printed = latex(term, names)
         signed = printed if printed.startswith("-") or lines == [""] else "+ " + printed
         if lines[-1] and symbols(lines[-1] + signed) > width:
@@ -76,7 +77,26 @@ def side_lines(side: Side, width: int = WIDTH, names: Mapping[Any, str] | None =
 
 def latex(expression: Any, names: Mapping[Any, str] | None = None) -> str:
     """LaTeX of an expression in the conventions of the book: transposes as T, no brackets around derivatives."""
-    return sp.latex(expression, symbol_names=dict(names or {}), diff_operator="d", mat_delim="(", fold_short_frac=False)
+    settings = {"symbol_names": dict(names or {}), "diff_operator": "d", "mat_delim": "(", "fold_short_frac": False}
+    return str(_Printer(settings).doprint(expression))
+
+
+class _Printer(LatexPrinter):
+    def _as_ordered_terms(self, expr: sp.Add, order: str | None = None) -> list[sp.Expr]:
+        return _ordered(expr, super()._as_ordered_terms(expr, order=order))
+
+
+def _ordered(total: sp.Add, terms: Sequence[sp.Expr]) -> list[sp.Expr]:
+    """Terms in the order people write them: lambda + K(y - S), not K(-S + y) + lambda.
+
+    Negative terms come last; a symbol that no other term contains comes first.
+    """
+
+    def rank(term: sp.Expr) -> tuple[bool, bool]:
+        alone = term.is_Symbol and not any(other.has(term) for other in total.args if other != term)
+        return term.could_extract_minus_sign(), not alone
+
+    return sorted(terms, key=rank)
 
 
 def symbols(latex: str) -> float:

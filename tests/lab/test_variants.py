@@ -156,7 +156,19 @@ BAD_VARIANTS = {
     "parameters in a list": (GOOD + "parameters = [1]", "parameters"),
     "negative variance": (GOOD + "prior = { variance = -1.0 }", "negative variance"),
     "variance nan": (GOOD + "prior = { variance = nan }", "finite"),
-    "mean huge": (GOOD + "prior = { mean = " + "9" * 400 + " }", ""),
+    "mean huge": (GOOD + "prior = { mean = " + "9" * 400 + " }", "`prior`: mean and variance must be numbers"),
+    "mean that hides the variance": (GOOD + "prior = { mean = 6e23 }", "`prior`: the variance 1 is lost beside the mean 6e+23"),
+    "variance huge": (GOOD + "prior = { variance = 1e200 }", "`prior`: the variance 1e+200 is beyond"),
+    "variance tiny": (GOOD + "meter_noise = { variance = 1e-300 }", "`meter_noise`: the variance 1e-300 is beyond"),
+    "a product beyond the floats": (
+        'state = "a*a*a*a*a*x + v"\nmeter = "x + w"\nparameters = { a = 1e99 }',
+        "the state equation a**5*x + v holds the number 1.00E+495 with these parameters",
+    ),
+    "a product below the floats": ('state = "0.9*x + v"\nmeter = "1e-99*1e-99*x + w"', "the meter equation"),
+    "an exponential beyond the floats": ('state = "x + exp(400)*v"\nmeter = "x + w"', "5.22E+173"),
+    "the end in a comment": ('state = "0.9*x # + v"\nmeter = "x + w"', "number sign"),
+    "no noise": ('state = "0.9*x"\nmeter = "x"', "no noise enters the state equation"),
+    "a state known exactly": (GOOD + "prior = { variance = 0 }\nstate_noise = { variance = 0 }", "known exactly"),
     "mean of the wrong shape": (GOOD + "prior = { mean = [1, 2] }", "`prior`"),
     "covariance of the wrong shape": (GOOD + "state_noise = { variance = [[1, 0], [0, 1]] }", "`state_noise`"),
     "covariance not symmetric": (
@@ -168,7 +180,7 @@ BAD_VARIANTS = {
     "law of other keys": (GOOD + "prior = { sigma = 1 }", "sigma"),
     "law without a table": (GOOD + "prior = 3", "`prior`"),
     "symbols of other keys": (GOOD + 'symbols = { z = ["x"] }', "z"),
-    "symbols not named": (GOOD + "symbols = { x = 5 }", ""),
+    "symbols not named": (GOOD + "symbols = { x = 5 }", "x must be a name or a list of names"),
     "one symbol for two": ('state = ["x1 + v1", "x2"]\nmeter = ["x1 + w1"]\nsymbols = { x = ["x1"] }', ""),
 }
 

@@ -52,7 +52,7 @@ def test_one_false_equation_among_true_ones_raises() -> None:
 def test_definitions_are_put_in_for_printed_symbols_and_into_each_other() -> None:
     h = sp.Symbol("h")
     shown = verified((p, x - K), where={p: h + x, h: -K})
-    assert "p &= - K + x" in shown.markdown
+    assert "p &= x - K" in shown.markdown
     with pytest.raises(Unverified):
         verified((p, x - K), where={p: h + x, h: K})
 
@@ -110,3 +110,9 @@ def test_agreement_within_a_tolerance() -> None:
             agree("They agree.", [1.0, 2.0], other, within=1e-12)
     with pytest.raises(Unverified):
         agree("They agree.", 1e-3, 0.0, within=1e-6, relative=False)
+
+
+def test_sums_are_printed_in_the_order_people_write_them():
+    lam, K, S, x, y = sp.symbols("lambda K S x y")
+    assert "\\lambda + K \\left(y - S\\right)" in typeset((x, lam + K * (y - S))).markdown
+    assert "x^{2} + x + 1" in typeset((y, x + 1 + x**2)).markdown  # powers descend

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +18,17 @@ from kfcourse.notebooks.grading.submissions import Returned
 
 NOT_RUN = "not run"
 GRADED, OTHER, FAILED = "graded", "not an exercise notebook", "not graded"
+RUNNING = "the run ended while this one was graded"
 SIGNS = {PASSED: "✓", WRONG: "✗", UNUSABLE: "✗", MISSING: "–", NOT_RUN: "–"}
+
+
+@dataclass(frozen=True)
+class Told:
+    """What was said of an answer: the sentences, the names of the mistakes, and the code if the mistake has no name."""
+
+    says: str
+    mistakes: tuple[str, ...] = ()
+    code: str = ""
 
 
 @dataclass(frozen=True)
@@ -36,6 +48,8 @@ class Grade:
         Where it stopped, what the wrong answers look like, what to look at.
     digest : str
         Empty if it was not graded.
+    told : dict
+        Question to what was said of the answer.
     """
 
     name: str
@@ -45,6 +59,7 @@ class Grade:
     marks: Mapping[str, str] = field(default_factory=dict)
     note: str = ""
     digest: str = ""
+    told: Mapping[str, Told] = field(default_factory=dict)
 
     @property
     def passed(self) -> int:
@@ -52,7 +67,7 @@ class Grade:
 
 
 FIRST = ("notebook", "status", "set", "variant")
-LAST = ("passed", "of", "note", "digest")
+LAST = ("passed", "of", "note", "digest", "details")
 
 
 def columns() -> list[str]:
@@ -69,8 +84,19 @@ def write_table(grades: Iterable[Grade], path: Path) -> None:
         row: dict[str, Any] = dict(zip(FIRST, (_cautious(one.name), one.status, one.letter, _cautious(one.variant)), strict=True))
         row |= {f"q{i + 1}": mark for i, mark in enumerate(one.marks.values())}
         count = (one.passed, len(one.marks)) if one.status == GRADED else ("", "")
-        writer.writerow(row | dict(zip(LAST, (*count, _cautious(one.note), one.digest), strict=True)))
+        writer.writerow(row | dict(zip(LAST, (*count, _cautious(one.note), one.digest, details(one.told)), strict=True)))
     save("\ufeff" + text.getvalue(), path)
+
+
+def details(told: Mapping[str, Told]) -> str:
+    """What was said of all answers, as one cell of the table."""
+    return (
+        json.dumps({name: [one.says, one.mistakes, one.code] for name, one in told.items()}, ensure_ascii=False) if told else ""
+    )
+
+
+def _told(text: str) -> dict[str, Told]:
+    return {name: Told(says, tuple(mistakes), code) for name, (says, mistakes, code) in json.loads(text or "{}").items()}
 
 
 def _cautious(text: str) -> str:
@@ -104,7 +130,9 @@ def read_table(path: Path) -> dict[str, Grade]:
         marks = {name: row.get(f"q{i + 1}") or "" for i, name in enumerate(questions)}
         if values["digest"] and all(mark in SIGNS for mark in marks.values()):
             name, status, _, variant = (values[key] for key in FIRST)
-            found[values["digest"]] = Grade(name, status, letter, variant, marks, values["note"], values["digest"])
+            with suppress(ValueError, TypeError, AttributeError):  # a spreadsheet has cut it: graded again
+                told = _told(values["details"])
+                found[values["digest"]] = Grade(name, status, letter, variant, marks, values["note"], values["digest"], told)
     return found
 
 
@@ -125,6 +153,8 @@ def grade_all(
 ) -> tuple[list[Grade], int]:
     """Grade what is new, and write the table after each notebook, so that an interrupted run goes on where it was.
 
+    What is still to be graded stands in the table too: if the run is ended, it says which notebooks were in it.
+
     Returns
     -------
     grades, old : list of Grade, int
@@ -133,8 +163,12 @@ def grade_all(
     table = read_table(path)
     grades, new = unchanged(work, {} if again else table)
     old = len(grades)
+    waiting = {one.name: Grade(one.name, FAILED, note=RUNNING) for one in new}
+    if waiting:
+        write_table([*grades, *waiting.values()], path)
     for one in run_all(new):
         grades.append(one)
-        write_table(grades, path)
+        waiting.pop(one.name, None)
+        write_table([*grades, *waiting.values()], path)
     write_table(grades, path)
     return sorted(grades, key=lambda one: one.name), old
