@@ -58,16 +58,15 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0) -> Filter:
     def step(state: State, y: Array) -> State:
         x, _, root = state.memory
         rng = _stream(root, state.step + 1)
-        logs = log_likelihood(y[:, None, :], x)
+        logs = log_likelihood(y[:, None, :], x, state.step)
         peak = logs.max(axis=1, keepdims=True)
         weights = np.exp(logs - np.where(np.isfinite(peak), peak, 0.0))
         total = weights.sum(axis=1, keepdims=True)
         weights = np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / particles)
         posterior = _weighted(x, weights, model.angles.x)
         chosen = np.take_along_axis(x, _systematic(weights, rng)[..., None], axis=1)
-        following = on_circle(
-            np.broadcast_to(state_equation(chosen, sample(rng, model.state_noise, len(x))), x.shape), model.angles.x
-        )
+        noise = sample(rng, model.state_noise, len(x))
+        following = on_circle(np.broadcast_to(state_equation(chosen, noise, state.step), x.shape), model.angles.x)
         predicted = _weighted(following, np.full(weights.shape, 1.0 / particles), model.angles.x)
         return State(state.step + 1, posterior, predicted, Particles(following, 1 / (weights**2).sum(axis=1), root))
 
