@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -54,10 +54,21 @@ class Exercise:
     ----------
     letter : str
     variant : Variant
+    salt : str
+        Changes the hidden arguments, and nothing that a student sees: `kfcourse grade` asks with arguments of its own.
     """
 
     letter: str
     variant: Variant
+    salt: str = ""
+
+    def __post_init__(self) -> None:
+        asked = self.letter in sets() and sets()[self.letter].about_variant
+        if asked and (self.model.timed or any(self.model.angles)):
+            raise ExerciseError(
+                f"set {self.letter} asks about a model without time, inputs and angles, and variant {self.variant.name} has "
+                f"them: {self.model}; take another variant"
+            )
 
     @property
     def questions(self) -> dict[str, Question]:
@@ -67,7 +78,7 @@ class Exercise:
     def numbers(self) -> dict[str, float]:
         """Personal numbers of this set and variant, by name; none for a set that asks about the variant's model only."""
         of_set = sets()[self.letter].numbers
-        return {} if of_set is None else of_set(self)
+        return {} if of_set is None else of_set(replace(self, salt=""))
 
     @property
     def model(self) -> Model:
@@ -132,7 +143,7 @@ class Exercise:
 
     def rng(self, name: str) -> np.random.Generator:
         """Random numbers that belong to this variant and name: for personal numbers and hidden arguments."""
-        return np.random.default_rng(zlib.crc32(f"{self.variant.name}/{name}".encode()))
+        return np.random.default_rng(zlib.crc32(f"{self.salt}{self.variant.name}/{name}".encode()))
 
     def check(self, name: str, answer: Any) -> Result:
         """Check the answer to a question: right, or what kind of mistake it looks like."""
@@ -154,7 +165,7 @@ def exercise(letter: str, variant: str | Mapping[str, Any] = "53") -> Exercise:
     Raises
     ------
     ExerciseError, VariantError
-        No such set; no such variant.
+        No such set, or its questions cannot be asked about the variant; no such variant.
     """
     if letter not in sets():
         raise ExerciseError(f"no exercise set {letter!r}; there are {', '.join(sets())}")

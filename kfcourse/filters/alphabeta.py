@@ -26,8 +26,8 @@ import numpy as np
 
 from kfcourse.angles import difference
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.filters.kalman import linear_system
 from kfcourse.laws import Array, Gaussian, any_missing, apply, symmetric, transpose
+from kfcourse.linear.system import linear_system
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 

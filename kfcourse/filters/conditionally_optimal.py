@@ -42,13 +42,13 @@ def duof(model: Model) -> Design:
     """
     (a, b), angles = compile_noiseless(model), model.angles
 
-    def equations(predicted: Gaussian, y: Array) -> Equations:
+    def equations(predicted: Gaussian, y: Array, k: int) -> Equations:
         lam = predicted.mean
-        omega = difference(y, b(lam), angles.y)
+        omega = difference(y, b(lam, k), angles.y)
         fit = yield Regression(lambda x, x_next: difference(x, lam, angles.x), omega)
         posterior = Gaussian(lam + where_measured(y, fit(omega)), fit.residual)
 
-        alpha = np.broadcast_to(a(posterior.mean), lam.shape)
+        alpha = np.broadcast_to(a(posterior.mean, k), lam.shape)
         fit = yield Regression(lambda x, x_next: near(x_next, alpha, angles.x), alpha)
         return Step(posterior, Gaussian(fit(alpha), fit.residual))
 

@@ -7,14 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import product as cartesian
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import sympy as sp
 
 from kfcourse.angles import TURN, Components, difference, wrapped
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.codegen import compile_function
+from kfcourse.symbolic.choices import jumps
+from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
 
@@ -22,20 +23,31 @@ TINY = 1e-300  # in place of a variance of exactly 0
 MOST_TURNS = 50  # of an angle whose noise is so large that it tells nothing
 
 
-def transition(model: Model) -> Callable[[Array], Gaussian]:
-    """x (..., n) -> law of the next state given x; ModelError if the noise enters nonlinearly."""
-    return _conditional("transition", model.state_equation, model.v, model.state_noise, model)
+class LogLikelihood(Protocol):
+    """(y (..., p), x (..., n)) -> log p(y | x) (...); of a model that depends on the step, at step k."""
+
+    def __call__(self, y: Array, x: Array, k: int | None = None) -> Array: ...
 
 
-def likelihood(model: Model) -> Callable[[Array, Array], Array]:
+def transition(model: Model) -> Callable[..., Gaussian]:
+    """x (..., n), and the step if the model has one -> law of the next state; ModelError if the noise enters nonlinearly."""
+    law = _conditional("transition", model.state_equation, model.v, model.state_noise, model)
+
+    def transition_law(x: Array, k: int | None = None) -> Gaussian:
+        return Gaussian(*law.at(k)(x))
+
+    return transition_law
+
+
+def likelihood(model: Model) -> LogLikelihood:
     """(y (..., p), x (..., n)) -> log p(y | x) (...); 0 where y is missing (NaN).
 
     The law of a component that is an angle is wound around the circle: the densities of y and of y plus whole turns add up.
     """
     law = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model)
 
-    def log_likelihood(y: Array, x: Array) -> Array:
-        mean, cov = law(x)
+    def log_likelihood(y: Array, x: Array, k: int | None = None) -> Array:
+        mean, cov = law.at(k)(x)
         innovation = difference(y, mean, model.angles.y)
         sd = np.sqrt(np.diagonal(cov, axis1=-2, axis2=-1).reshape(-1, model.p).max(axis=0))
         value = wound(lambda turns: log_normal(innovation + turns, cov), sd, model.angles.y)
@@ -66,7 +78,7 @@ def wound(log_density: Callable[[Array], Array], sd: Array, angles: Components) 
 
 
 class ScalarDensities(NamedTuple):
-    """What the exact filter must know of a scalar model; all functions are elementwise.
+    """What the exact filter must know of a scalar model at a step; all functions are elementwise.
 
     Attributes
     ----------
@@ -88,10 +100,18 @@ class ScalarDensities(NamedTuple):
     residual: Callable[[Array, Array], Array]
     meter_width: Callable[[Array], Array]
     jump: float = np.inf
+    at_step: Callable[[int], ScalarDensities] | None = None
+
+    def at(self, k: int) -> ScalarDensities:
+        """Those of step k: kernels from k to k + 1, the likelihood of y_k."""
+        return self if self.at_step is None else self.at_step(k)
 
 
 def scalar_densities(model: Model) -> ScalarDensities:
-    """The densities of a model of one state and one measurement; ModelError if a noise enters nonlinearly."""
+    """The densities of a model of one state and one measurement; ModelError if a noise enters nonlinearly.
+
+    Of a model that depends on the step they are those of step 0, and `at(k)` those of step k.
+    """
     next_state = _conditional("transition", model.state_equation, model.v, model.state_noise, model, noiseless=True)
     meter = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model)
     x, B = model.x[0], model.state_equation.jacobian(sp.Matrix(model.v))
@@ -106,10 +126,35 @@ def scalar_densities(model: Model) -> ScalarDensities:
     B_w = model.meter_equation.jacobian(sp.Matrix(model.w))
     meter_variance = (B_w * exact_matrix(model.meter_noise.cov) * B_w.T).subs(model.values)
     outputs = {"state": mean.diff(x), "variance": variance.diff(x), "meter": b.diff(x), "meter_variance": meter_variance.diff(x)}
+    choices = {*model.state_equation.atoms(sp.Piecewise), *model.meter_equation.atoms(sp.Piecewise)}
+    rough = any(part.has(sp.Derivative, sp.DiracDelta) for part in outputs.values())
+    if rough or any(jumps(one, model.x) for one in choices):
+        raise ModelError(
+            f"{model} jumps at a state, and the point-mass filter needs smooth equations; use particle(model), or a Gaussian "
+            "filter, unscented(model)"
+        )
     lacks_x = not b.has(x)
-    slopes = compile_function("slopes", {"x": sp.Matrix(model.x)}, outputs, ["x", "state", "meter"]).function
+    slopes = Stepwise.compile(model.known, "slopes", {"x": sp.Matrix(model.x)}, outputs, ["x", "state", "meter"])
 
-    def moments(law: Callable[[Array], Gaussian], x: Array) -> tuple[Array, Array]:
+    def at(k: int) -> ScalarDensities:
+        functions = (one.at(k) for one in (next_state, meter, slopes))
+        return _elementwise(model, *functions, lacks_x=lacks_x, at_step=at if model.timed else None)
+
+    return at(0)
+
+
+def _elementwise(
+    model: Model,
+    next_state: Callable[[Array], tuple[Array, Array]],
+    meter: Callable[[Array], tuple[Array, Array]],
+    slopes: Callable[[Array], tuple[Array, Array, Array, Array]],
+    *,
+    lacks_x: bool,
+    at_step: Callable[[int], ScalarDensities] | None,
+) -> ScalarDensities:
+    """The densities of one step, from its laws of the next state and of y, and the derivatives of their moments."""
+
+    def moments(law: Callable[[Array], tuple[Array, Array]], x: Array) -> tuple[Array, Array]:
         mean, variance = law(x[..., None])
         return np.broadcast_to(mean[..., 0], x.shape), np.broadcast_to(variance[..., 0, 0], x.shape)
 
@@ -145,14 +190,13 @@ def scalar_densities(model: Model) -> ScalarDensities:
 
     def residual(y: Array, x: Array) -> Array:
         around = wrapped if model.angles.y else np.asarray
-        return np.abs(around(y - float(b[0]))) - signal(x) if lacks_x else around(y - signal(x))
+        return np.abs(around(y - moments(meter, x)[0])) - signal(x) if lacks_x else around(y - signal(x))
 
     def meter_width(x: Array) -> Array:
         return np.sqrt(moments(meter, x)[1]) / np.abs(slope(x))
 
-    return ScalarDensities(
-        kernel, kernel_slope, log_likelihood, signal, slope, residual, meter_width, np.pi if model.angles.y else np.inf
-    )
+    jump = np.pi if model.angles.y else np.inf
+    return ScalarDensities(kernel, kernel_slope, log_likelihood, signal, slope, residual, meter_width, jump, at_step)
 
 
 def _log_normal(deviation: Array, variance: Array) -> Array:
@@ -163,7 +207,7 @@ def _log_normal(deviation: Array, variance: Array) -> Array:
 
 def _conditional(
     name: str, equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian, model: Model, *, noiseless: bool = False
-) -> Callable[[Array], Gaussian]:
+) -> Stepwise:
     B = equation.jacobian(sp.Matrix(noise))
     if B.has(*noise):
         raise ModelError(
@@ -178,5 +222,5 @@ def _conditional(
     mean = equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True)))
     cov = B * exact_matrix(law.cov) * B.T
     outputs = {"mean": mean.subs(model.values), "cov": cov.subs(model.values)}
-    function = compile_function(name, {"x": sp.Matrix(model.x)}, outputs, ["x", "mean"], f"{name} law of {model}").function
-    return lambda x: Gaussian(*function(x))
+    x = sp.Matrix(model.x)
+    return Stepwise.compile(model.known, name, {"x": x}, outputs, ["x", "mean"], f"{name} law of {model}")

@@ -90,13 +90,13 @@ def pointmass(model: Model, accuracy: float = ACCURACY) -> Filter:
     check_scalar(model)
     if not 0 < accuracy < 1:
         raise ModelError(f"the point-mass filter needs 0 < accuracy < 1, got {accuracy}")
-    law, init, prior = scalar_densities(model), initial_state(model), of_prior(model.prior)
+    densities, init, prior = scalar_densities(model), initial_state(model), of_prior(model.prior)
 
     def step(state: State, y: Array) -> State:
         first = np.zeros(len(y), dtype=int)
         groups = state.memory.groups if state.memory else [(np.arange(len(y)), prior.rows(first))]
         try:
-            posterior, predicted, memory = _step(groups, y, law, accuracy)
+            posterior, predicted, memory = _step(groups, y, densities.at(state.step), accuracy)
         except Unresolved as error:
             raise Unresolved(f"step {state.step} of {model}: {error}; leave the exact filter out (--exact-runs 0)") from None
         if model.angles.x:

@@ -81,11 +81,11 @@ def iterated(structure: Structure, iterations: int = 5) -> Filter:
         raise ValueError(f"iterations must be a whole number, at least 1 (which is aof(structure)); got {iterations!r}")
 
     def step(state: State, y: Array) -> State:
-        prior = state.predicted
-        posterior = correct(prior, structure.measure(*prior), y)
+        prior, now = state.predicted, structure.at(state.step)
+        posterior = correct(prior, now.measure(*prior), y)
         for _ in range(iterations - 1):
-            posterior = correct(prior, *affine_meter(structure, posterior, prior, y))
-        return State(state.step + 1, posterior, structure.predict(*posterior))
+            posterior = correct(prior, *affine_meter(now, posterior, prior, y))
+        return State(state.step + 1, posterior, now.predict(*posterior))
 
     return Filter(f"iterated-{structure.name}", structure.model, initial_state(structure.model), step)
 

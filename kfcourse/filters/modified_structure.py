@@ -48,9 +48,9 @@ def mfos(structure: Structure, arguments: int = 2) -> Design:
     check_arguments(arguments)
     angles = structure.model.angles
 
-    def equations(predicted: Gaussian, y: Array) -> Equations:
-        lam, Psi = predicted
-        measurement = structure.measure(lam, Psi)
+    def equations(predicted: Gaussian, y: Array, k: int) -> Equations:
+        (lam, Psi), now = predicted, structure.at(k)
+        measurement = now.measure(lam, Psi)
         K = gain(product(Psi, transpose(measurement.G)), measurement.F)
         sigma = apply(K, measurement.innovation(y))
         fit = yield Regression(lambda x, x_next: difference(x, lam, angles.x), sigma)
@@ -58,7 +58,7 @@ def mfos(structure: Structure, arguments: int = 2) -> Design:
 
         regressor = posterior.mean if arguments == 2 else with_measurement(y, measurement, posterior.mean, angles.y)
         fit = yield Regression(lambda x, x_next: near(x, posterior.mean, angles.x), regressor)
-        s_next, Psi_next = structure.predict(fit(regressor), fit.residual)
+        s_next, Psi_next = now.predict(fit(regressor), fit.residual)
         fit = yield Regression(lambda x, x_next: near(x_next, s_next, angles.x), s_next)
         return Step(posterior, Gaussian(fit(s_next), Psi_next))
 

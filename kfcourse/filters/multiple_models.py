@@ -82,7 +82,8 @@ def imm(structures: Sequence[Structure], transition: Array, probabilities: Array
     def step(state: State, y: Array) -> State:
         memory: Modes = state.memory
         corrected, likelihoods = [], []
-        for structure, prior in zip(structures, memory.predicted, strict=True):
+        now = [structure.at(state.step) for structure in structures]
+        for structure, prior in zip(now, memory.predicted, strict=True):
             measurement = structure.measure(*prior)
             corrected.append(correct(prior, measurement, y))
             likelihoods.append(log_likelihood(measurement, y))
@@ -90,7 +91,7 @@ def imm(structures: Sequence[Structure], transition: Array, probabilities: Array
 
         expected = mu @ pi
         predicted = []
-        for j, structure in enumerate(structures):
+        for j, structure in enumerate(now):
             joint = mu * pi[:, j]
             # a mode that cannot come next starts from the combined law; nothing uses it
             weights = np.where(expected[:, j, None] > 0, joint, mu)

@@ -51,12 +51,13 @@ def fos(structure: Structure, arguments: int = 2) -> Design:
     check_arguments(arguments)
     angles = structure.model.angles
 
-    def equations(predicted: Gaussian, y: Array) -> Equations:
-        measurement = structure.measure(*predicted)
+    def equations(predicted: Gaussian, y: Array, k: int) -> Equations:
+        now = structure.at(k)
+        measurement = now.measure(*predicted)
         posterior = correct(predicted, measurement, y)
         regressor = posterior.mean if arguments == 2 else with_measurement(y, measurement, posterior.mean, angles.y)
         fit = yield Regression(lambda x, x_next: near(x, posterior.mean, angles.x), regressor)
-        return Step(posterior, structure.predict(fit(regressor), fit.residual))
+        return Step(posterior, now.predict(fit(regressor), fit.residual))
 
     return Design(f"{'fos' if arguments == 2 else 'fos3'}-{structure.name}", structure.model, equations)
 

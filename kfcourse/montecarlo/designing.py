@@ -49,7 +49,7 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: E
     for k, blocks in enumerate(ensemble):
         if not predicted:
             predicted = [[initial_state(d.model)(len(b.x)).predicted for d in designs] for b in blocks]
-        runs = [_BlockStep(designs, before, block) for before, block in zip(predicted, blocks, strict=True)]
+        runs = [_BlockStep(designs, before, block, k) for before, block in zip(predicted, blocks, strict=True)]
         fits = _fit_step(designs, runs, k, pool or Serial())
         predicted = [run.predictions() for run in runs]
         for table, row in zip(coefficients, fits, strict=True):
@@ -60,10 +60,10 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: E
 class _BlockStep:
     """The equations of all designs over one step of one block of trajectories."""
 
-    def __init__(self, designs: Sequence[Design], predicted: Sequence[Gaussian], block: Instant):
+    def __init__(self, designs: Sequence[Design], predicted: Sequence[Gaussian], block: Instant, k: int):
         self.block = block
         self.angles = [one.model.angles.x for one in designs]
-        self.running = [one.equations(before, block.y) for one, before in zip(designs, predicted, strict=True)]
+        self.running = [one.equations(before, block.y, k) for one, before in zip(designs, predicted, strict=True)]
         self.results: list[Step | None] = [None] * len(designs)
 
     def advance(self, answers: dict[int, Affine | None]) -> list[Scatter | None]:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -82,9 +82,9 @@ class Ensemble:
     def block(self, index: int) -> Iterator[Instant]:
         """The steps of one block of trajectories."""
         x = self._initial(index)
-        for chunk in range(len(self._chunks)):
-            for v, w in zip(*self._draw(index, chunk), strict=True):
-                instant = self._simulator(x, v, w)
+        for chunk, steps in enumerate(self._chunks):
+            for k, v, w in zip(steps, *self._draw(index, chunk), strict=True):
+                instant = self._simulator(k, x, v, w)
                 yield instant
                 x = instant.x_next
 
@@ -98,8 +98,9 @@ class Ensemble:
             noises = [future.result() for future in drawn]
             if chunk + 1 < len(self._chunks):
                 drawn = [pool.submit(self._draw, b, chunk + 1) for b in blocks]  # ahead of time
-            for k in range(len(steps)):
-                instants = list(pool.map(self._simulator, x, [v[k] for v, _ in noises], [w[k] for _, w in noises]))
+            for i, k in enumerate(steps):
+                simulator = partial(self._simulator, k)
+                instants = list(pool.map(simulator, x, [v[i] for v, _ in noises], [w[i] for _, w in noises]))
                 yield instants
                 x = [instant.x_next for instant in instants]
 
@@ -135,14 +136,14 @@ class Ensemble:
 
 
 class _Simulator:
-    """One step of the model: (x, v, w) -> x, y = b(x, w), x' = a(x, v)."""
+    """One step of the model: (k, x, v, w) -> x, y = b(x, w), x' = a(x, v)."""
 
     def __init__(self, model: Model):
         self.state, self.meter = compile_model(model)
         self.n, self.p, self.angles = model.n, model.p, model.angles
 
-    def __call__(self, x: Array, v: Array, w: Array) -> Instant:
-        y, x_next = self.meter(x, w), self.state(x, v)
+    def __call__(self, k: int, x: Array, v: Array, w: Array) -> Instant:
+        y, x_next = self.meter(x, w, k), self.state(x, v, k)
         # A formula without noise and state is one constant for all trajectories.
         y, x_next = np.broadcast_to(y, (len(x), self.p)), np.broadcast_to(x_next, (len(x), self.n))
         return Instant(x, on_circle(y, self.angles.y), on_circle(x_next, self.angles.x))

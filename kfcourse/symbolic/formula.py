@@ -11,8 +11,11 @@ import ast
 import keyword
 import re
 import unicodedata
+from collections.abc import Callable
+from itertools import pairwise
 
 import sympy as sp
+from sympy.logic.boolalg import Boolean
 
 FUNCTIONS = {
     "sin": sp.sin,
@@ -27,9 +30,21 @@ FUNCTIONS = {
     "sinh": sp.sinh,
     "cosh": sp.cosh,
     "abs": sp.Abs,
+    "Abs": sp.Abs,
+    "sign": sp.sign,
+    "Heaviside": sp.Heaviside,
 }
 ARGUMENTS = {"atan2": 2}  # how many a function takes; 1 if not named here.  atan2(y, x) is the angle of the point (x, y)
 CONSTANTS = {"pi": sp.pi}
+PIECEWISE = "Piecewise"  # Piecewise((x, x < 1), (1, True)), which may also be typed as x if x < 1 else 1
+COMPARISONS: dict[type[ast.cmpop], Callable[[sp.Expr, sp.Expr], Boolean]] = {
+    ast.Lt: sp.Lt,
+    ast.LtE: sp.Le,
+    ast.Gt: sp.Gt,
+    ast.GtE: sp.Ge,
+    ast.Eq: sp.Eq,
+    ast.NotEq: sp.Ne,
+}
 
 LARGEST = 1e100  # numbers beyond it, or below 1/LARGEST: products of some would leave the floats
 MAX_LENGTH = 2000
@@ -62,7 +77,7 @@ def check_name(name: str) -> str:
         raise ValueError(f"{name!r} cannot name a symbol: use letters, digits and _, a letter first")
     if keyword.iskeyword(name):
         raise ValueError(f"{name!r} is a reserved word of Python; choose another name, such as {name}_")
-    if name in FUNCTIONS or name in CONSTANTS:
+    if name in FUNCTIONS or name in CONSTANTS or name == PIECEWISE:
         raise ValueError(f"{name!r} already means a function or constant in formulas; choose another name")
     return name
 
@@ -73,7 +88,8 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
     Parameters
     ----------
     formula : str
-        Arithmetic (``+ - * / **``), numbers, the functions of `FUNCTIONS`, ``pi`` and the names in `symbols`.
+        Arithmetic (``+ - * / **``), numbers, the functions of `FUNCTIONS`, ``pi``, the names in `symbols`, and choices:
+        ``2 if t < 45 else 0``, or ``Piecewise((2, t < 45), (0, True))``.
     symbols : dict
         Name to SymPy symbol; any other name is an error.
 
@@ -166,8 +182,12 @@ class _Reader:
                 return self.read(node.left) / self.read(node.right)
             case ast.BinOp(op=ast.Pow()):
                 return self.power(node)
+            case ast.Call(func=ast.Name(id="Piecewise")):
+                return self.piecewise(node)
             case ast.Call():
                 return self.call(node)
+            case ast.IfExp():
+                return sp.Piecewise((self.read(node.body), self.condition(node.test)), (self.read(node.orelse), True))
         raise self.fail(node, f"{type(node).__name__} is not allowed in a formula; only + - * / ** numbers, names, functions")
 
     def number(self, node: ast.Constant) -> sp.Expr:
@@ -203,6 +223,29 @@ class _Reader:
         if _degree(result) > MAX_DEGREE:
             raise self.fail(node, f"powers of powers above degree {MAX_DEGREE}; simplify the formula")
         return result
+
+    def piecewise(self, node: ast.Call) -> sp.Expr:
+        pairs = [arg.elts for arg in node.args if isinstance(arg, ast.Tuple) and len(arg.elts) == 2]
+        if node.keywords or not pairs or len(pairs) < len(node.args):
+            raise self.fail(node, "Piecewise takes pairs (formula, condition), as in Piecewise((x, x < 1), (1, True))")
+        read = [(self.read(formula), self.condition(condition)) for formula, condition in pairs]
+        if read[-1][1] is not sp.true:
+            raise self.fail(node, "the last pair of Piecewise holds for the rest and must have the condition True")
+        return sp.Piecewise(*read)
+
+    def condition(self, node: ast.expr) -> Boolean:
+        match node:
+            case ast.Constant(value=bool()):
+                return sp.true if node.value else sp.false
+            case ast.Compare() if all(type(one) in COMPARISONS for one in node.ops):
+                sides = [self.read(one) for one in (node.left, *node.comparators)]
+                found = [COMPARISONS[type(one)](*both) for one, both in zip(node.ops, pairwise(sides), strict=True)]
+                return sp.And(*found)
+            case ast.BoolOp():
+                return (sp.And if isinstance(node.op, ast.And) else sp.Or)(*map(self.condition, node.values))
+            case ast.UnaryOp(op=ast.Not()):
+                return sp.Not(self.condition(node.operand))
+        raise self.fail(node, "a condition compares: x < 1, 30 <= t < 45, k == 20, joined by `and`, `or`, `not`")
 
     def call(self, node: ast.Call) -> sp.Expr:
         if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:

@@ -23,6 +23,7 @@ from kfcourse.angles import Angles
 from kfcourse.laws import Gaussian
 from kfcourse.symbolic.angular import read_angles, warn_of_angles
 from kfcourse.symbolic.formula import symbol
+from kfcourse.symbolic.known import Known, varying_law
 from kfcourse.symbolic.reading import (
     Formulas,
     ModelError,
@@ -54,6 +55,8 @@ class Model:
         Parameter name to value (exact rational numbers).
     prior, state_noise, meter_noise : Gaussian
         Laws of x_0, v_k, w_k: mean (n,) and covariance (n, n).
+    known : Known
+        What is known of every step: its number k, its time t, and the inputs that the equations contain.
     angles : Angles
         Numbers of the components of x and of y that are angles, kept between -pi and pi.
     """
@@ -68,6 +71,7 @@ class Model:
     state_noise: Gaussian = field(compare=False)
     meter_noise: Gaussian = field(compare=False)
     angles: Angles = field(default_factory=Angles)
+    known: Known = field(default_factory=Known)
 
     @classmethod
     def define(
@@ -81,24 +85,31 @@ class Model:
         state_noise: Mapping[str, Any] | None = None,
         meter_noise: Mapping[str, Any] | None = None,
         angles: Names | Mapping[str, Names] | None = None,
+        inputs: Mapping[str, Sequence[float]] | None = None,
+        interval: float = 1,
     ) -> Model:
         """Build a model from formulas.
 
         Parameters
         ----------
         state, meter : str, sympy expression, or a list of them
-            a(x, v) and b(x, w).  A single formula is a scalar model in x, v, w; lists of formulas use
-            x1, x2, ..., v1, ..., w1, ... unless `symbols` names them.
+            a(x, v) and b(x, w), which may contain the step's number k, its time t, and inputs.  A single formula is a
+            scalar model in x, v, w; lists of formulas use x1, x2, ..., v1, ..., w1, ... unless `symbols` names them.
         parameters : dict
             Name to number, for every other symbol in the formulas.
         symbols : dict, optional
             Keys "x", "v", "w": lists of names.
         prior, state_noise, meter_noise : dict, optional
             Keys "mean" and "variance" (number, list of variances, or covariance matrix).  Standard
-            normal by default.
+            normal by default.  Means and variances of noises may be formulas of k, t, the inputs and the parameters, such as
+            "0.1 + 0.02*k": the noises are then standard, and these formulas go into the equations.
         angles : list of names, or dict, optional
             Components that are angles in radians, such as ["y2"], or {"x": ["psi"], "y": ["y2"]}: they are kept between -pi and
             pi, and every filter takes their innovations, means and errors the short way round.  [] says that there are none.
+        inputs : dict, optional
+            Name to a list of values, those at the steps 0, 1, 2...: one sequence for all trajectories.
+        interval : float
+            Time between two steps, in the unit of t: t = interval * k.  Where k and t name something else, they mean that.
 
         Raises
         ------
@@ -118,16 +129,22 @@ class Model:
         Model(x' = c*x + e*v*x, y = f*w*x**2 + g*x; c = 9/10, e = 1/20, g = 1, f = 1/50)
         """
         values = {checked_name(name): exact_number(name, value) for name, value in table("parameters", parameters).items()}
-        a, b = formula_list("state", state), formula_list("meter", meter)
+        a, b, known = formula_list("state", state), formula_list("meter", meter), Known.read(interval, inputs)
         used = {name for formula in (*a, *b) for name in names_in(formula)}
-        named = _symbols(symbols, values, used, len(a))
+        named = _symbols(symbols, [*values, *known.inputs], used, len(a))
         x, v, w = (tuple(symbol(name) for name in named[key]) for key in "xvw")
         if len(x) != len(a):
             raise ModelError(f"{len(a)} state equation(s) but {len(x)} state symbol(s) {named['x']}; there must be one each")
-        constants = {name: symbol(name) for name in values}
+        of_step = known.names([*values, *by_name(x, v, w)])
+        constants = {name: symbol(name) for name in values} | of_step
+        numbers = {symbol(name): value for name, value in values.items()}
+        change_v, state_noise = varying_law("state_noise", state_noise, v, constants, known, numbers)
+        change_w, meter_noise = varying_law("meter_noise", meter_noise, w, constants, known, numbers)
+        state_equation = sp.ImmutableMatrix([read(f, constants | by_name(x, v), "state") for f in a]).subs(change_v)
+        meter_equation = sp.ImmutableMatrix([read(f, constants | by_name(x, w), "meter") for f in b]).subs(change_w)
         model = cls(
-            sp.ImmutableMatrix([read(f, constants | by_name(x, v), "state") for f in a]),
-            sp.ImmutableMatrix([read(f, constants | by_name(x, w), "meter") for f in b]),
+            state_equation,
+            meter_equation,
             x,
             v,
             w,
@@ -136,6 +153,7 @@ class Model:
             law("state_noise", state_noise, len(v)),
             law("meter_noise", meter_noise, len(w)),
             read_angles(angles, [s.name for s in x], _measured(len(b))),
+            known.used(sp.Matrix([*state_equation, *meter_equation]), of_step),
         )
         if angles is None:
             warn_of_angles(dict(zip((s.name for s in x), model.state_equation, strict=True)))
@@ -163,6 +181,11 @@ class Model:
         return {symbol(name): value for name, value in self.parameters.items()}
 
     @property
+    def timed(self) -> bool:
+        """Whether the equations depend on the step: on its number k, its time t or an input."""
+        return bool(self.known.symbols)
+
+    @property
     def measured(self) -> list[str]:
         """Names of the measurement's components: y, or y1, y2, ..."""
         return _measured(self.p)
@@ -188,7 +211,7 @@ class Model:
         ]
         lines += [rf"{name}_k &\in [-\pi, \pi]" for name in [state[i] for i in self.angles.x] + [meter[i] for i in self.angles.y]]
         if values:
-            lines += [rf"{sp.latex(name)} &= {float(value):g}" for name, value in self.values.items()]
+            lines += [rf"{sp.latex(name)} &= {float(value):g}" for name, value in self.values.items()] + self.known.latex()
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
     def __repr__(self) -> str:
@@ -196,14 +219,16 @@ class Model:
         b = ", ".join(f"{name} = {formula}" for name, formula in zip(self.measured, self.meter_equation, strict=True))
         values = ", ".join(f"{name} = {value}" for name, value in self.parameters.items())
         angles = ", ".join([self.x[i].name for i in self.angles.x] + [self.measured[i] for i in self.angles.y])
-        return f"Model({a}, {b}{'; ' if values else ''}{values}{'; angles ' if angles else ''}{angles})"
+        inputs = ", ".join(f"{name} ({len(sequence)} values)" for name, sequence in self.known.inputs.items())
+        parts = [values, f"angles {angles}" if angles else "", f"inputs {inputs}" if inputs else ""]
+        return f"Model({a}, {b}{''.join(f'; {part}' for part in parts if part)})"
 
 
 def _measured(p: int) -> list[str]:
     return ["y"] if p == 1 else [f"y{i + 1}" for i in range(p)]
 
 
-def _symbols(symbols: Mapping[str, Names] | None, values: Mapping[str, Any], used: set[str], n: int) -> dict[str, list[str]]:
+def _symbols(symbols: Mapping[str, Names] | None, values: Sequence[str], used: set[str], n: int) -> dict[str, list[str]]:
     """Names of the state components and noises: given, or x, v, w with numbers as the formulas use them."""
     given = table("symbols", symbols)
     if set(given) - set("xvw"):
@@ -225,8 +250,8 @@ def _symbols(symbols: Mapping[str, Names] | None, values: Mapping[str, Any], use
         if not names and key != "x":
             raise ModelError(f"`symbols` names no {key}; leave the key out, or give at least one name")
         result[key] = [checked_name(name) for name in names]
-    every = [name for names in result.values() for name in names] + list(values)
+    every = [name for names in result.values() for name in names] + [*values]
     twice = sorted({name for name in every if every.count(name) > 1})
     if twice:
-        raise ModelError(f"{', '.join(twice)} named twice: state, noises and parameters need different names")
+        raise ModelError(f"{', '.join(twice)} named twice: state, noises, parameters and inputs need different names")
     return result

@@ -7,7 +7,8 @@ and covariance are added.  The points spread over the state and over the other n
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import product as cartesian
 from typing import NamedTuple, TypeAlias
 
@@ -17,9 +18,10 @@ import sympy as sp
 from kfcourse.angles import Components, difference, near, on_circle
 from kfcourse.laws import SINGULAR, Array, Gaussian, Measurement, apply, measurement_of, square_root, symmetric, transpose
 from kfcourse.symbolic.equations import compile_model
+from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import Structure
+from kfcourse.symbolic.structure import Structure, of_steps
 
 Rule: TypeAlias = Callable[[int], tuple[Array, Array]]
 
@@ -104,12 +106,19 @@ def _product_rule(order: int) -> Rule:
 class _Equation(NamedTuple):
     """One equation of the model as f(x, other noises), and the covariance of what is only added."""
 
-    function: Callable[[Array, Array], Array]
+    function: Callable[..., Array]
     size: int
     noise: Gaussian  # all noises; the covariance of those that are only added set to 0
     root: Array  # of that covariance, columns for the other noises only
-    added: Array
+    factors: Stepwise  # of the noises that are only added
     angles: Components  # components of the function's value
+    added: Array
+
+    def at(self, k: int | None) -> _Equation:
+        """That of step k, if the model depends on it."""
+        (matrix,) = self.factors.at(k)()
+        added = symmetric(matrix @ self.noise.cov @ matrix.T)
+        return self._replace(function=partial(self.function, k=k), added=added)
 
 
 class _Equations(NamedTuple):
@@ -135,11 +144,11 @@ def _equation(function, formulas, variables, noises, law: Gaussian, model: Model
     other = np.array([augmented or not c for c in constant], dtype=bool)
     while (correlated := ~other & (law.cov[:, other] != 0).any(axis=1)).any():
         other |= correlated
-    matrix = np.array([[float(factors[i, j]) if not other[j] else 0.0 for j in range(len(noises))] for i in range(len(formulas))])
-    matrix = matrix.reshape(len(formulas), len(noises))
+    added = sp.Matrix(len(formulas), len(noises), lambda i, j: 0 if other[j] else factors[i, j])
+    stepwise = Stepwise.compile(model.known, "factors", {}, {"factors": added}, [])
     root = np.zeros((len(noises), int(other.sum())))
     root[other] = square_root(law.cov[np.ix_(other, other)]) if other.any() else root[other]
-    return _Equation(function, len(formulas), law, root, symmetric(matrix @ law.cov @ matrix.T), angles)
+    return _Equation(function, len(formulas), law, root, stepwise, angles, np.empty(0))
 
 
 def _checked(name: str, model: Model, rule: Rule, equations: _Equations, root: str, order: int) -> Structure:
@@ -175,8 +184,9 @@ CONVERGED = 0.1
 def _moments(structure: Structure) -> list[tuple[str, Array, Array, Components]]:
     """Name, value and natural size of the moments at the prior law, and which components are angles."""
     mean, cov = structure.model.prior
-    tau, theta = structure.predict(mean, cov)
-    h, _, F, _ = structure.measure(mean, cov)
+    first = structure.at(0)
+    tau, theta = first.predict(mean, cov)
+    h, _, F, _ = first.measure(mean, cov)
     moments = []
     angles = structure.model.angles
     for what, centre, spread, which in (("next state", tau, theta, angles.x), ("measurement", h, F, angles.y)):
@@ -220,8 +230,12 @@ def _quadrature(name: str, model: Model, rule: Rule, equations: _Equations, root
     """A structure from standard normal points and weights: rule(size) -> (points (q, size), weights (q,))."""
     if root not in ROOTS:
         raise ModelError(f"root must be one of {', '.join(map(repr, ROOTS))}, got {root!r}")
+    rules = [rule(model.n + equation.root.shape[1]) for equation in equations]
+    return of_steps(name, model, lambda k: _of_step(name, model, rules, _Equations(*(one.at(k) for one in equations)), root))
+
+
+def _of_step(name: str, model: Model, rules: Sequence[tuple[Array, Array]], equations: _Equations, root: str) -> Structure:
     n, measurement = model.n, measurement_of(model.angles.y)
-    rules = [rule(n + equation.root.shape[1]) for equation in equations]
 
     def propagate(equation: _Equation, mean: Array, cov: Array, points: Array, weights: Array):
         """Root of cov, deviations of x, mean of the function, its deviations from that: 0 exactly for what does not vary."""

@@ -105,7 +105,7 @@ HOSTILE = [
     ("x + True", 4),
     ("x + ...", 4),
     ("x + 2j", 4),
-    ("x if v else c", 0),
+    ("x if v else c", 5),
     ("x < v", 0),
     ("x and v", 0),
     ("not x", 0),

@@ -108,7 +108,7 @@ def test_a_covariance_is_symmetric_and_not_negative(variance):
 @pytest.mark.parametrize(
     ("state", "meter", "error"),
     [
-        ("x + v + k", "x + w", FormulaError),
+        ("x + v + q", "x + w", FormulaError),
         ("x + w", "x + w", FormulaError),  # the meter's noise in the object
         ("x + v", "x + v", FormulaError),
         ("x + v", "w", ModelError),
@@ -118,7 +118,7 @@ def test_a_covariance_is_symmetric_and_not_negative(variance):
         ([3], "x + w", ModelError),
         (1, "x + w", ModelError),
         (None, "x + w", ModelError),
-        (sp.Symbol("x") + sp.Symbol("k"), "x + w", ModelError),
+        (sp.Symbol("x") + sp.Symbol("q"), "x + w", ModelError),
     ],
 )
 def test_equations_that_do_not_fit_are_refused(state, meter, error):
