@@ -13,10 +13,12 @@ import click
 
 from kfcourse.checks.posing import unposed
 from kfcourse.files import save
+from kfcourse.lab.admission import admissions, on_trial, without_failing
+from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.grammar import generate
 from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
 from kfcourse.lab.report import conclusions, write_json, write_report
-from kfcourse.lab.short_names import FILTERS, LAB, has_exact, lab_filters, title
+from kfcourse.lab.short_names import FILTERS, LAB, has_exact, title
 from kfcourse.lab.variants import VariantError, find_variant
 from kfcourse.montecarlo.comparison import EXACT
 from kfcourse.montecarlo.designing import NotFinite
@@ -183,21 +185,31 @@ def lab(
         wanted = [*LAB, "aof-exact"] if has_exact(model) and exact_runs else list(LAB)
     else:
         wanted = [name.strip() for name in names.split(",") if name.strip()]
-    filters = lab_filters(model, wanted)
+    found = admissions(model, wanted)
+    refused = {one.name: one.reason for one in found if one.one is None}
+    if len(refused) == len(found):
+        raise click.ClickException(
+            "; ".join(f"{name}: {reason}" for name, reason in refused.items())
+            or "give at least one filter: --filters duof,aof-gaussian"
+        )
     folder = out or Path("lab-" + re.sub(r"[^\w.-]+", "-", chosen.name))  # no folder but this one
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
-    result = compare(
-        filters,
-        model,
-        runs,
-        steps,
-        seed,
-        subset_runs=exact_runs,
-        subset_seconds=exact_seconds,
-        designs=1 if same_ensemble else designs or DESIGNS,
-        same_ensemble=same_ensemble,
-        threads=threads,
+    result = without_failing(
+        [one.one for one in found if one.one],
+        lambda filters: compare(
+            filters,
+            model,
+            runs,
+            steps,
+            seed,
+            subset_runs=exact_runs,
+            subset_seconds=exact_seconds,
+            designs=1 if same_ensemble else designs or DESIGNS,
+            same_ensemble=same_ensemble,
+            threads=threads,
+        ),
+        refused,
     )
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
@@ -213,6 +225,20 @@ def lab(
     for sentence in conclusions(result):
         click.echo(sentence)
     click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""))
+
+
+@main.command()
+@click.argument("places", nargs=-1, required=True, metavar="[FILE] VARIANT")
+@_VARIANTS
+@click.option("--trial/--no-trial", default=True, show_default=True, help="Also run each filter on a few hundred trajectories.")
+def filters(places: tuple[str, ...], variants_file: Path | None, trial: bool) -> None:
+    """Say of each filter whether VARIANT, of FILE or of the lab, admits it, and why not."""
+    if len(places) > 2 or (len(places) == 2 and variants_file):
+        raise click.UsageError("give a VARIANT, or a FILE of variants and a VARIANT of it")
+    chosen = find_variant(places[-1], Path(places[0]) if len(places) == 2 else variants_file)
+    found = admissions(chosen.model)
+    click.echo(f"Variant {chosen.name}: {chosen.title or chosen.model}", err=True)
+    click.echo(table_of_filters(on_trial(chosen.model, found) if trial else found))
 
 
 def _check_places(folder: Path, json_file: Path | None) -> None:
