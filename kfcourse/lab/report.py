@@ -24,6 +24,7 @@ from kfcourse.files import replacing, save
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
+from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import FILTERS, Structures, title
 from kfcourse.lab.variants import Variant
 from kfcourse.limits import OutOfTime, time_limit
@@ -156,6 +157,7 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
         "variant": variant,
         "result": result,
         "left_out": [(title(name), reason) for name, reason in result.left_out.items()],
+        "admissions": [(title(one.name), one.verdict, one.says) for one in admissions(result.model)],
         "model": Section.of("Model", result.model.latex()),
         "structures": _structure_sections(result.model, names),
         "equations": _equation_sections(names),
