@@ -20,7 +20,7 @@ help:
 	@echo "make book        execute the chapters and build the book in _build/html"
 	@echo "make test        lint, types, unit tests, documentation examples, the book, nbval on its notebooks"
 	@echo "make quick       lint, types and the tests marked quick, before a commit"
-	@echo "make lint        ruff check, ruff format --check, mypy"
+	@echo "make lint        ruff check, ruff format --check, mypy, the columns of the pages"
 	@echo "make unit        unit tests and documentation examples only"
 	@echo "make install     the virtual environment .venv only"
 	@echo "make benchmark   speed of the engine, as ratios"
@@ -43,6 +43,7 @@ lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/python .ci/columns.py exercises/*/statement.md
 
 unit: install
 	$(BIN)/pytest -q -n auto --dist loadscope --ignore tests/test_book.py

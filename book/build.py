@@ -16,6 +16,7 @@ import sys
 from pathlib import Path
 
 import chapters
+import equations
 import manual
 
 from kfcourse.files import package_digest
@@ -59,6 +60,8 @@ def main() -> int:
         print(NOT_BUILT, file=sys.stderr)
         return 1
     manual.write()
+    made = chapters.executed(CACHE)
+    equations.PAGE.write_text(equations.page((name, equations.records(notebook)) for name, notebook in made), encoding="utf-8")
     jupyter_book = [sys.executable, "-c", "from jupyter_book.cli.main import main; main()"]
     options = ["--config", "_config.yml", "--path-output", ".", "-W", "--keep-going", "-n"]
     result = subprocess.run([*jupyter_book, "build", "book", *options], cwd=ROOT)

@@ -5,7 +5,7 @@ Sphinx would execute them one after another.  The worked solutions of the lab ma
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -42,7 +42,8 @@ def notebooks() -> list[Path]:
     toc = yaml.safe_load((BOOK / "_toc.yml").read_text(encoding="utf-8"))
     pages = [toc["root"], *(chapter["file"] for part in toc["parts"] for chapter in part["chapters"])]
     paths = [BOOK / f"{page}.md" for page in pages if not page.startswith("manual/")]
-    return [path for path in paths if is_myst_markdown_notebook(path.read_text(encoding="utf-8"))]
+    made = [path for path in paths if path.exists()]  # the build writes a page of its own
+    return [path for path in made if is_myst_markdown_notebook(path.read_text(encoding="utf-8"))]
 
 
 def execute(chapter: Path) -> Executed:
@@ -81,6 +82,14 @@ def execute_all(folder: Path, solutions: Sequence[Job]) -> list[str]:
             bundle = CacheBundleIn(done.notebook, str(done.path), data={"execution_seconds": done.seconds})
             cache.cache_notebook_bundle(bundle, check_validity=False, overwrite=True)
     return failures
+
+
+def executed(folder: Path) -> Iterator[tuple[str, NotebookNode]]:
+    """The documents of the chapters with code, in the order of the book, each with its outputs from the cache."""
+    cache = get_cache(folder)
+    for path in notebooks():
+        _, notebook = cache.merge_match_into_notebook(myst_nb_reader_plugin(str(path)))
+        yield path.stem, notebook
 
 
 def _cached(cache, path: Path) -> bool:

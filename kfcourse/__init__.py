@@ -5,7 +5,8 @@ gaussian(model).latex()                            structural functions, derived
 compare(lab_filters(model), model, 100_000, 51, seed=1).ranking()
 
 A folder is a floor; each one's docstring says what lives there.  Below them all: `laws` (normal laws, gain with its
-pseudo-inverse, correction, missing measurements), `limits` (a time limit for a block of code), `files` (whole or not at all).
+pseudo-inverse, correction, missing measurements), `angles` (the short way round), `limits` (a time limit for a block of
+code), `files` (whole or not at all), `seeds` (a number, or a generator that draws one).
 """
 
 from kfcourse.lab import lab_filters, load_variants
@@ -14,6 +15,7 @@ from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, Trajectories, simulate
 from kfcourse.montecarlo.experiment import compare, predictions, run
+from kfcourse.symbolic.angular import AngleWarning
 from kfcourse.symbolic.formula import FormulaError
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
@@ -22,6 +24,7 @@ from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure, gaussian, linearised
 
 __all__ = [
+    "AngleWarning",
     "Comparison",
     "Ensemble",
     "FormulaError",

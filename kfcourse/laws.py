@@ -8,10 +8,13 @@ for them the products below are plain multiplications, which is what makes the e
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+from kfcourse.angles import Components, difference
 
 Array: TypeAlias = NDArray[Any]
 
@@ -43,6 +46,25 @@ class Measurement(NamedTuple):
     G: Array
     F: Array
     R: Array
+
+    def innovation(self, y: Array) -> Array:
+        """y - h, (..., p); for components that are angles the short way round."""
+        return y - self.h
+
+
+@cache
+def measurement_of(angles: Components) -> type[Measurement]:
+    """`Measurement`, or one whose innovations know which components are angles."""
+    if not angles:
+        return Measurement
+
+    class AngularMeasurement(Measurement):
+        __slots__ = ()
+
+        def innovation(self, y: Array) -> Array:
+            return difference(y, self.h, angles)
+
+    return AngularMeasurement
 
 
 def apply(matrix: Array, vector: Array) -> Array:
@@ -141,7 +163,7 @@ def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
     its prior for the missing components.  F may be negative where the prior covariance has broken down by rounding; such a
     component corrects nothing.
     """
-    innovation, G, F, R = y - measurement.h, measurement.G, measurement.F, measurement.R
+    innovation, (_, G, F, R) = measurement.innovation(y), measurement
     if any_missing(innovation):
         innovation, G, F, R = without_missing(innovation, G, F, R)
     if G.shape[-2:] == (1, 1):

@@ -1,12 +1,26 @@
-"""A time limit for a block of code."""
+"""A time limit for a block of code, in any thread and on any system.
+
+Two ways to stop code that does not ask whether it should:
+
+* in a main thread that has alarms (Linux, macOS): the alarm signal.  It ends waits such as `time.sleep`, and operations of
+  compiled code that look for signals, such as the product of huge integers;
+* elsewhere (Windows; other threads): a watching thread, which has the interpreter raise the exception in the watched one at its
+  next step of Python code.  What is under way in compiled code, a wait too, ends first.
+
+A process of its own could be killed whatever it does.  But an answer to a check is a function of the student's kernel, and
+without fork no other process can call it.  So in either way one long operation of a library, such as the decomposition of a
+huge matrix, ends before it is stopped; where that must not be, as in grading, the kernel is a process that is killed.
+"""
 
 from __future__ import annotations
 
+import ctypes
 import signal
+import sys
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any
+import time
+from types import FrameType, TracebackType
+from typing import Any, ClassVar
 
 AGAIN = 0.01  # seconds after which a loop that survived its end is stopped again
 
@@ -15,28 +29,103 @@ class OutOfTime(BaseException):
     """Not an Exception, so that `except Exception` of a student's loop does not swallow it."""
 
 
-@contextmanager
-def time_limit(seconds: float) -> Iterator[None]:
+class time_limit:
     """Raise OutOfTime in this block after so many seconds, and again and again while it goes on.
 
-    By the alarm signal; elsewhere than in a main thread with signals (Windows) there is no limit.  One long operation of
-    compiled code, such as the power of two huge integers, is not stopped before its end.
+    Blocks may stand one in the other, and each keeps its own limit.
+
+    Examples
+    --------
+    >>> try:
+    ...     with time_limit(0.1):
+    ...         while True:
+    ...             pass
+    ... except OutOfTime:
+    ...     print("stopped")
+    stopped
     """
-    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
-        yield
-        return
 
-    running = True
+    def __init__(self, seconds: float):
+        self.seconds = seconds
 
-    def stop(number: int, frame: Any) -> None:
-        if running:
+    def __enter__(self) -> None:
+        main = threading.current_thread() is threading.main_thread()
+        self._stopper = _Alarm() if main and hasattr(signal, "setitimer") else _Watcher()
+        try:
+            self._stopper.start(time.monotonic() + self.seconds)
+        except BaseException:  # the end of a block around this one
+            self._stopper.stop()
+            raise
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        while True:
+            try:
+                return self._stopper.stop()
+            except OutOfTime:  # too late, or of a block around this one: then it comes again
+                continue
+
+
+def _inside(frame: FrameType | None) -> bool:
+    """Whether a thread is in this module: beginning a block or leaving it, where it must not be stopped."""
+    return frame is not None and frame.f_code.co_filename == __file__
+
+
+class _Alarm:
+    """Stops the main thread by SIGALRM: one timer for all blocks, set to the first end."""
+
+    ends: ClassVar[dict[_Alarm, float]] = {}  # of all blocks of the main thread
+    before: ClassVar[Any] = None  # the handler that was there
+
+    def start(self, end: float) -> None:
+        if not self.ends:
+            _Alarm.before = signal.signal(signal.SIGALRM, self.ring)
+        self.ends[self] = end
+        self.wind()
+
+    def stop(self) -> None:
+        self.ends.pop(self, None)
+        self.wind()
+        if not self.ends:
+            signal.signal(signal.SIGALRM, signal.SIG_IGN)  # drops an alarm that is on its way, perhaps by another thread
+            signal.signal(signal.SIGALRM, _Alarm.before)
+
+    @classmethod
+    def wind(cls) -> None:
+        left = max(min(cls.ends.values()) - time.monotonic(), AGAIN) if cls.ends else 0.0
+        signal.setitimer(signal.ITIMER_REAL, left, AGAIN)
+
+    @classmethod
+    def ring(cls, number: int, frame: FrameType | None) -> None:
+        if cls.ends and min(cls.ends.values()) <= time.monotonic() and not _inside(frame):
             raise OutOfTime
 
-    previous = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds, AGAIN)
-    try:
-        yield
-    finally:
-        running = False  # an alarm between here and the next line does nothing
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, previous)
+
+class _Watcher:
+    """Stops any thread from another one, by an exception that the interpreter raises in it."""
+
+    def __init__(self) -> None:
+        self.running = True
+        self.switch = threading.Lock()
+        self.alive = threading.Lock()  # held as long as the block goes on
+        self.alive.acquire()
+
+    def start(self, end: float) -> None:
+        self.watched = threading.get_ident()
+        threading.Thread(target=self.watch, args=(end,), name="time limit", daemon=True).start()
+
+    def watch(self, end: float) -> None:
+        while not self.alive.acquire(timeout=min(max(end - time.monotonic(), AGAIN), threading.TIMEOUT_MAX)):
+            with self.switch:
+                over = self.running and end <= time.monotonic()
+                if over and not _inside(sys._current_frames().get(self.watched)):
+                    _set_exception(ctypes.c_ulong(self.watched), ctypes.py_object(OutOfTime))
+
+    def stop(self) -> None:
+        with self.switch:
+            if self.running:
+                self.running = False
+                self.alive.release()
+        _set_exception(ctypes.c_ulong(threading.get_ident()), None)  # what was raised, but has not come yet
+
+
+_set_exception = ctypes.pythonapi.PyThreadState_SetAsyncExc

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 import sympy as sp
 
-from kfcourse.exercises.shared import Map
 from kfcourse.laws import Array
 from kfcourse.symbolic.codegen import compile_function
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import exact_matrix
+
+Map = Callable[[Array], Array]
 
 
 class Functions(NamedTuple):

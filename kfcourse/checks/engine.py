@@ -56,14 +56,14 @@ def call(answer: Any, arguments: Sequence[tuple], expected: Sequence[Any], secon
                 results.append(_formed(answer(*copy.deepcopy(values)), wanted))
     except OutOfTime:
         raise Unusable(f"still running after {seconds:g} s: is there a loop that never ends?") from None
-    except (Unusable, KeyboardInterrupt):  # whoever stops the kernel means the check too
+    except (Missing, Unusable, KeyboardInterrupt):  # whoever stops the kernel means the check too
         raise
     except RecursionError:
         raise Unusable("calls itself without end (RecursionError)") from None
     except BaseException as error:
-        if isinstance(error, NotImplementedError) and not _in_library(error):
+        if isinstance(error, NotImplementedError) and not in_library(error):
             raise Missing from None
-        raise Unusable(f"stops with {_told(error)}") from None
+        raise Unusable(f"stops with {told(error)}") from None
     return results
 
 
@@ -97,11 +97,11 @@ def _foreign(frame: traceback.FrameSummary) -> bool:
     return "site-packages" in frame.filename or any(own.is_relative_to(folder) for folder in (PACKAGE, *folders()))
 
 
-def _in_library(error: BaseException) -> bool:
+def in_library(error: BaseException) -> bool:
     return _foreign(_frames(error)[-1])
 
 
-def _told(error: BaseException) -> str:
+def told(error: BaseException) -> str:
     """The error in one line, with the student's own line of code."""
     try:
         text = " ".join(str(error).split())[:200]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -54,10 +54,13 @@ class Exercise:
     ----------
     letter : str
     variant : Variant
+    salt : str
+        Changes the hidden arguments, and nothing that a student sees: `kfcourse grade` asks with arguments of its own.
     """
 
     letter: str
     variant: Variant
+    salt: str = ""
 
     @property
     def questions(self) -> dict[str, Question]:
@@ -67,7 +70,7 @@ class Exercise:
     def numbers(self) -> dict[str, float]:
         """Personal numbers of this set and variant, by name; none for a set that asks about the variant's model only."""
         of_set = sets()[self.letter].numbers
-        return {} if of_set is None else of_set(self)
+        return {} if of_set is None else of_set(replace(self, salt=""))
 
     @property
     def model(self) -> Model:
@@ -132,7 +135,7 @@ class Exercise:
 
     def rng(self, name: str) -> np.random.Generator:
         """Random numbers that belong to this variant and name: for personal numbers and hidden arguments."""
-        return np.random.default_rng(zlib.crc32(f"{self.variant.name}/{name}".encode()))
+        return np.random.default_rng(zlib.crc32(f"{self.salt}{self.variant.name}/{name}".encode()))
 
     def check(self, name: str, answer: Any) -> Result:
         """Check the answer to a question: right, or what kind of mistake it looks like."""

@@ -24,9 +24,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.angles import difference
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.filters.kalman import linear_system
 from kfcourse.laws import Array, Gaussian, any_missing, apply, symmetric, transpose
+from kfcourse.linear.system import linear_system
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
@@ -159,7 +160,7 @@ def _tabulated(name: str, model: Model, coefficients: tuple[float, ...], start: 
         by_axis = np.where((used < size)[..., None], _starting(ages, size), later) * measured[..., None]
         K = _spread(by_axis, axes)
         prior = state.predicted
-        innovation = np.where(measured, y - apply(system.H, prior.mean), 0.0)
+        innovation = np.where(measured, difference(y, apply(system.H, prior.mean), model.angles.y), 0.0)
         rest = np.eye(model.n) - K @ system.H
         cov = symmetric(rest @ prior.cov @ transpose(rest) + K @ system.R @ transpose(K))
         posterior = Gaussian(prior.mean + apply(K, innovation), cov)

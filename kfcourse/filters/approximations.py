@@ -38,7 +38,8 @@ def aof(structure: Structure) -> Filter:
     """
 
     def step(state: State, y: Array) -> State:
-        posterior = correct(state.predicted, structure.measure(*state.predicted), y)
-        return State(state.step + 1, posterior, structure.predict(*posterior))
+        now = structure.at(state.step)
+        posterior = correct(state.predicted, now.measure(*state.predicted), y)
+        return State(state.step + 1, posterior, now.predict(*posterior))
 
     return Filter(f"aof-{structure.name}", structure.model, initial_state(structure.model), step)

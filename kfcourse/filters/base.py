@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from kfcourse.angles import Components, on_circle
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.model import Model
 
@@ -67,6 +68,21 @@ class Filter:
     init: Init
     step: Advance
     slow: bool = False
+
+    def __post_init__(self) -> None:
+        if self.model.angles.x:
+            object.__setattr__(self, "step", _on_circle(self.step, self.model.angles.x))
+
+
+def _on_circle(step: Advance, angles: Components) -> Advance:
+    """The step with estimates and predictions of angles between -pi and pi."""
+
+    def advance(state: State, y: Array) -> State:
+        after = step(state, y)
+        posterior, predicted = (Gaussian(on_circle(law.mean, angles), law.cov) for law in (after.posterior, after.predicted))
+        return after._replace(posterior=posterior, predicted=predicted)
+
+    return advance
 
 
 def initial_state(model: Model) -> Init:

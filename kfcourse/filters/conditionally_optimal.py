@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
+from kfcourse.angles import difference, near
 from kfcourse.filters import notation as s
 from kfcourse.filters.designed import Design, Equations, Regression, Step
 from kfcourse.laws import Array, Gaussian, where_measured
@@ -39,16 +40,16 @@ def duof(model: Model) -> Design:
 
     Its own covariance is the residual of each regression, (n, n): one for the whole ensemble.
     """
-    a, b = compile_noiseless(model)
+    (a, b), angles = compile_noiseless(model), model.angles
 
-    def equations(predicted: Gaussian, y: Array) -> Equations:
+    def equations(predicted: Gaussian, y: Array, k: int) -> Equations:
         lam = predicted.mean
-        omega = y - b(lam)
-        fit = yield Regression(lambda x, x_next: x - lam, omega)
+        omega = difference(y, b(lam, k), angles.y)
+        fit = yield Regression(lambda x, x_next: difference(x, lam, angles.x), omega)
         posterior = Gaussian(lam + where_measured(y, fit(omega)), fit.residual)
 
-        alpha = np.broadcast_to(a(posterior.mean), lam.shape)
-        fit = yield Regression(lambda x, x_next: x_next, alpha)
+        alpha = np.broadcast_to(a(posterior.mean, k), lam.shape)
+        fit = yield Regression(lambda x, x_next: near(x_next, alpha, angles.x), alpha)
         return Step(posterior, Gaussian(fit(alpha), fit.residual))
 
     return Design("duof", model, equations)

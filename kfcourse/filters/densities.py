@@ -6,44 +6,78 @@ x_{k+1} | x_k ~ N(a(x, m_v), a_v D_v a_v^T),    y_k | x_k ~ N(b(x, m_w), b_w D_w
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from itertools import product as cartesian
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import sympy as sp
 
+from kfcourse.angles import TURN, Components, difference, wrapped
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.codegen import compile_function
+from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
 
 TINY = 1e-300  # in place of a variance of exactly 0
+MOST_TURNS = 50  # of an angle whose noise is so large that it tells nothing
 
 
-def transition(model: Model) -> Callable[[Array], Gaussian]:
-    """x (..., n) -> law of the next state given x; ModelError if the noise enters nonlinearly."""
-    return _conditional("transition", model.state_equation, model.v, model.state_noise, model)
+class LogLikelihood(Protocol):
+    """(y (..., p), x (..., n)) -> log p(y | x) (...); of a model that depends on the step, at step k."""
+
+    def __call__(self, y: Array, x: Array, k: int | None = None) -> Array: ...
 
 
-def likelihood(model: Model) -> Callable[[Array, Array], Array]:
-    """(y (..., p), x (..., n)) -> log p(y | x) (...); 0 where y is missing (NaN)."""
+def transition(model: Model) -> Callable[..., Gaussian]:
+    """x (..., n), and the step if the model has one -> law of the next state; ModelError if the noise enters nonlinearly."""
+    law = _conditional("transition", model.state_equation, model.v, model.state_noise, model)
+
+    def transition_law(x: Array, k: int | None = None) -> Gaussian:
+        return Gaussian(*law.at(k)(x))
+
+    return transition_law
+
+
+def likelihood(model: Model) -> LogLikelihood:
+    """(y (..., p), x (..., n)) -> log p(y | x) (...); 0 where y is missing (NaN).
+
+    The law of a component that is an angle is wound around the circle: the densities of y and of y plus whole turns add up.
+    """
     law = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model)
 
-    def log_likelihood(y: Array, x: Array) -> Array:
-        mean, cov = law(x)
-        innovation = y - mean
-        if model.p == 1:
-            value = _log_normal(innovation[..., 0], cov[..., 0, 0])
-        else:
-            _, logdet = np.linalg.slogdet(cov)
-            weighted = np.linalg.solve(cov, innovation[..., None])[..., 0]
-            value = -0.5 * ((innovation * weighted).sum(axis=-1) + logdet + model.p * np.log(2 * np.pi))
+    def log_likelihood(y: Array, x: Array, k: int | None = None) -> Array:
+        mean, cov = law.at(k)(x)
+        innovation = difference(y, mean, model.angles.y)
+        sd = np.sqrt(np.diagonal(cov, axis1=-2, axis2=-1).reshape(-1, model.p).max(axis=0))
+        value = wound(lambda turns: log_normal(innovation + turns, cov), sd, model.angles.y)
         return np.where(np.isnan(y).any(axis=-1), 0.0, value)
+
+    def log_normal(innovation: Array, cov: Array) -> Array:
+        if model.p == 1:
+            return _log_normal(innovation[..., 0], cov[..., 0, 0])
+        _, logdet = np.linalg.slogdet(cov)
+        weighted = np.linalg.solve(cov, innovation[..., None])[..., 0]
+        return -0.5 * ((innovation * weighted).sum(axis=-1) + logdet + model.p * np.log(2 * np.pi))
 
     return log_likelihood
 
 
+def wound(log_density: Callable[[Array], Array], sd: Array, angles: Components) -> Array:
+    """log of the density of angles: the sum over all turns (p,) of the density of what was measured plus these turns.
+
+    Eight standard deviations (p,) are covered, and one turn at least.
+    """
+    if not angles:
+        return log_density(np.zeros(len(sd)))
+    most = np.clip(np.ceil((8 * sd + np.pi) / TURN), 1, MOST_TURNS).astype(int)
+    total = np.array(-np.inf)
+    for numbers in cartesian(*(range(-most[i], most[i] + 1) if i in angles else (0,) for i in range(len(sd)))):
+        total = np.logaddexp(total, log_density(TURN * np.array(numbers)))
+    return total
+
+
 class ScalarDensities(NamedTuple):
-    """What the exact filter must know of a scalar model; all functions are elementwise.
+    """What the exact filter must know of a scalar model at a step; all functions are elementwise.
 
     Attributes
     ----------
@@ -51,8 +85,10 @@ class ScalarDensities(NamedTuple):
     kernel_slope : x -> the derivatives of both
     log_likelihood : (y, x) -> log p(y | x); 0 where y is missing (NaN)
     signal, slope : x -> b(x, m_w) and its derivative; the noise's standard deviation and its, if b(x, m_w) lacks x
-    explained : y -> the signal that explains y: y itself; |y - b| if the signal is the noise's deviation
+    residual : (y, x) -> the signal that explains y, minus the signal at x, for an angle the short way round.  What explains y
+        is y itself; |y - b| if the signal is the noise's deviation
     meter_width : x -> standard deviation of the meter's noise over |slope|: how well y tells x
+    jump : pi for an angle, whose residual changes its sign on the far side of the circle too, by a jump; otherwise infinite
     """
 
     kernel: Callable[[Array], tuple[Array, Array]]
@@ -60,12 +96,21 @@ class ScalarDensities(NamedTuple):
     log_likelihood: Callable[[Array, Array], Array]
     signal: Callable[[Array], Array]
     slope: Callable[[Array], Array]
-    explained: Callable[[Array], Array]
+    residual: Callable[[Array, Array], Array]
     meter_width: Callable[[Array], Array]
+    jump: float = np.inf
+    at_step: Callable[[int], ScalarDensities] | None = None
+
+    def at(self, k: int) -> ScalarDensities:
+        """Those of step k: kernels from k to k + 1, the likelihood of y_k."""
+        return self if self.at_step is None else self.at_step(k)
 
 
 def scalar_densities(model: Model) -> ScalarDensities:
-    """The densities of a model of one state and one measurement; ModelError if a noise enters nonlinearly."""
+    """The densities of a model of one state and one measurement; ModelError if a noise enters nonlinearly.
+
+    Of a model that depends on the step they are those of step 0, and `at(k)` those of step k.
+    """
     next_state = _conditional("transition", model.state_equation, model.v, model.state_noise, model, noiseless=True)
     meter = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model)
     x, B = model.x[0], model.state_equation.jacobian(sp.Matrix(model.v))
@@ -80,10 +125,33 @@ def scalar_densities(model: Model) -> ScalarDensities:
     B_w = model.meter_equation.jacobian(sp.Matrix(model.w))
     meter_variance = (B_w * exact_matrix(model.meter_noise.cov) * B_w.T).subs(model.values)
     outputs = {"state": mean.diff(x), "variance": variance.diff(x), "meter": b.diff(x), "meter_variance": meter_variance.diff(x)}
+    if any(part.has(sp.Derivative, sp.DiracDelta) for part in outputs.values()):
+        raise ModelError(
+            f"{model} jumps at a state, and the point-mass filter needs smooth equations; use particle(model), or a Gaussian "
+            "filter, unscented(model)"
+        )
     lacks_x = not b.has(x)
-    slopes = compile_function("slopes", {"x": sp.Matrix(model.x)}, outputs, ["x", "state", "meter"]).function
+    slopes = Stepwise.compile(model.known, "slopes", {"x": sp.Matrix(model.x)}, outputs, ["x", "state", "meter"])
 
-    def moments(law: Callable[[Array], Gaussian], x: Array) -> tuple[Array, Array]:
+    def at(k: int) -> ScalarDensities:
+        functions = (one.at(k) for one in (next_state, meter, slopes))
+        return _elementwise(model, *functions, lacks_x=lacks_x, at_step=at if model.timed else None)
+
+    return at(0)
+
+
+def _elementwise(
+    model: Model,
+    next_state: Callable[[Array], tuple[Array, Array]],
+    meter: Callable[[Array], tuple[Array, Array]],
+    slopes: Callable[[Array], tuple[Array, Array, Array, Array]],
+    *,
+    lacks_x: bool,
+    at_step: Callable[[int], ScalarDensities] | None,
+) -> ScalarDensities:
+    """The densities of one step, from its laws of the next state and of y, and the derivatives of their moments."""
+
+    def moments(law: Callable[[Array], tuple[Array, Array]], x: Array) -> tuple[Array, Array]:
         mean, variance = law(x[..., None])
         return np.broadcast_to(mean[..., 0], x.shape), np.broadcast_to(variance[..., 0, 0], x.shape)
 
@@ -93,7 +161,11 @@ def scalar_densities(model: Model) -> ScalarDensities:
 
     def log_likelihood(y: Array, x: Array) -> Array:
         mean, variance = moments(meter, x)
-        value = _log_normal(y - mean, variance)
+        if model.angles.y:
+            innovation, sd = wrapped(y - mean), np.sqrt(variance.max(keepdims=True)).reshape(1)
+            value = wound(lambda turns: _log_normal(innovation + turns[0], variance), sd, model.angles.y)
+        else:
+            value = _log_normal(y - mean, variance)
         missing = np.isnan(y)
         return np.where(missing, 0.0, value) if missing.any() else value
 
@@ -113,13 +185,15 @@ def scalar_densities(model: Model) -> ScalarDensities:
                 return np.broadcast_to(of_variance[..., 0, 0], x.shape) / (2 * signal(x))
         return np.broadcast_to(of_mean[..., 0], x.shape)
 
-    def explained(y: Array) -> Array:
-        return np.abs(y - float(b[0])) if lacks_x else y
+    def residual(y: Array, x: Array) -> Array:
+        around = wrapped if model.angles.y else np.asarray
+        return np.abs(around(y - moments(meter, x)[0])) - signal(x) if lacks_x else around(y - signal(x))
 
     def meter_width(x: Array) -> Array:
         return np.sqrt(moments(meter, x)[1]) / np.abs(slope(x))
 
-    return ScalarDensities(kernel, kernel_slope, log_likelihood, signal, slope, explained, meter_width)
+    jump = np.pi if model.angles.y else np.inf
+    return ScalarDensities(kernel, kernel_slope, log_likelihood, signal, slope, residual, meter_width, jump, at_step)
 
 
 def _log_normal(deviation: Array, variance: Array) -> Array:
@@ -130,7 +204,7 @@ def _log_normal(deviation: Array, variance: Array) -> Array:
 
 def _conditional(
     name: str, equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian, model: Model, *, noiseless: bool = False
-) -> Callable[[Array], Gaussian]:
+) -> Stepwise:
     B = equation.jacobian(sp.Matrix(noise))
     if B.has(*noise):
         raise ModelError(
@@ -145,5 +219,5 @@ def _conditional(
     mean = equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True)))
     cov = B * exact_matrix(law.cov) * B.T
     outputs = {"mean": mean.subs(model.values), "cov": cov.subs(model.values)}
-    function = compile_function(name, {"x": sp.Matrix(model.x)}, outputs, ["x", "mean"], f"{name} law of {model}").function
-    return lambda x: Gaussian(*function(x))
+    x = sp.Matrix(model.x)
+    return Stepwise.compile(model.known, name, {"x": x}, outputs, ["x", "mean"], f"{name} law of {model}")

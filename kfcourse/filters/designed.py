@@ -124,12 +124,12 @@ class Design:
     name : str
     model : Model
     equations : callable
-        (predicted: Gaussian, y) -> generator of one step: yields `Regression`, receives `Affine`, returns `Step`.
+        (predicted: Gaussian, y, step) -> generator of one step: yields `Regression`, receives `Affine`, returns `Step`.
     """
 
     name: str
     model: Model
-    equations: Callable[[Gaussian, Array], Equations]
+    equations: Callable[[Gaussian, Array, int], Equations]
     slow: bool = False
 
     def with_coefficients(self, coefficients: Sequence[Sequence[Affine]]) -> Filter:
@@ -141,7 +141,7 @@ class Design:
                 raise ValueError(
                     f"{self.name} was designed for {len(table)} steps; design it with more to run step {state.step + 1}"
                 )
-            result = _answer(self.equations(state.predicted, y), table[state.step])
+            result = _answer(self.equations(state.predicted, y, state.step), table[state.step])
             return State(state.step + 1, result.posterior, result.predicted)
 
         return Filter(self.name, self.model, initial_state(self.model), step)

@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.angles import moments_on_circle
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
 from kfcourse.filters.exact_adaptive import check_scalar, estimated
@@ -89,20 +90,34 @@ def pointmass(model: Model, accuracy: float = ACCURACY) -> Filter:
     check_scalar(model)
     if not 0 < accuracy < 1:
         raise ModelError(f"the point-mass filter needs 0 < accuracy < 1, got {accuracy}")
-    law, init, prior = scalar_densities(model), initial_state(model), of_prior(model.prior)
+    densities, init, prior = scalar_densities(model), initial_state(model), of_prior(model.prior)
 
     def step(state: State, y: Array) -> State:
         first = np.zeros(len(y), dtype=int)
         groups = state.memory.groups if state.memory else [(np.arange(len(y)), prior.rows(first))]
         try:
-            posterior, predicted, memory = _step(groups, y, law, accuracy)
+            posterior, predicted, memory = _step(groups, y, densities.at(state.step), accuracy)
         except Unresolved as error:
             raise Unresolved(f"step {state.step} of {model}: {error}; leave the exact filter out (--exact-runs 0)") from None
+        if model.angles.x:
+            posterior, predicted = _on_circle(memory)
         if state.memory:
             memory = memory._replace(error=memory.error + state.memory.error)
         return State(state.step + 1, posterior, predicted, memory)
 
     return Filter("aof-exact", model, init, step, slow=True)
+
+
+def _on_circle(memory: PointMass) -> tuple[Gaussian, Gaussian]:
+    """Posterior and prediction of a state that is an angle: the filter works on the line, whole turns are dropped at the end."""
+    after, before = np.empty((2, len(memory.fine))), np.empty((2, len(memory.fine)))
+    for place, grid in enumerate(memory.fine):
+        after[:, place] = moments_on_circle(grid.x, grid.mass)
+    for rows, kernels in memory.groups:
+        mean, variance = moments_on_circle(kernels.mu, kernels.mass)
+        before[:, rows] = mean, variance + (kernels.mass * kernels.sigma**2).sum(axis=1)
+    posterior, predicted = (Gaussian(mean[:, None], variance[:, None, None]) for mean, variance in (after, before))
+    return posterior, predicted
 
 
 def _step(

@@ -104,28 +104,33 @@ def adaptive_pointmass(model: Model, order: int = 8, tolerance: float = 1e-5) ->
     check_scalar(model)
     if order < 6 or not 0 < tolerance < 1:
         raise ModelError(f"the point-mass filter needs order >= 6 and 0 < tolerance < 1, got {order} and {tolerance}")
-    law = scalar_densities(model)
-    bayes = _Bayes(law, _wider_than_kernels(law))
+    densities = scalar_densities(model)
     rules = Rule.of_order(order, tolerance), Rule.of_order(order - 3, 30 * tolerance)
     init = initial_state(model)
     prior = model.prior.mean, np.maximum(np.sqrt(model.prior.cov[0]), 1e-150), np.ones(1)
 
-    def kernels(before: Grid | None) -> tuple[Array, Array, Array]:
-        return prior if before is None else (*law.kernel(before.x), before.mass)
+    def kernels(before: Grid | None, k: int) -> tuple[Array, Array, Array]:
+        """Those of the prediction of step k, from the posterior of step k - 1: the object's input is that of k - 1."""
+        return prior if before is None else (*densities.at(k - 1).kernel(before.x), before.mass)
 
     def step(state: State, y: Array) -> State:
+        law = densities.at(state.step)
+        bayes = _Bayes(law, _wider_than_kernels(law))
         before = state.memory or ([None] * len(y), [None] * len(y))
         try:
             after = Panels(
                 *(
-                    [bayes.corrected(*kernels(grid), float(value), rule)[0] for grid, value in zip(grids, y[:, 0], strict=True)]
+                    [
+                        bayes.corrected(*kernels(grid, state.step), float(value), rule)[0]
+                        for grid, value in zip(grids, y[:, 0], strict=True)
+                    ]
                     for grids, rule in zip(before, rules, strict=True)
                 )
             )
         except Unresolved as error:
             raise Unresolved(f"step {state.step} of {model}: {error}") from None
         posterior = Gaussian(np.array([[g.mean()] for g in after.fine]), np.array([[[g.variance()]] for g in after.fine]))
-        return State(state.step + 1, posterior, _predicted_moments(map(kernels, after.fine)), after)
+        return State(state.step + 1, posterior, _predicted_moments(kernels(grid, state.step + 1) for grid in after.fine), after)
 
     return Filter("aof-exact", model, init, step, slow=True)
 
@@ -153,8 +158,8 @@ class _Bayes:
     """One step of the Stratonovich equation for one trajectory."""
 
     def __init__(self, law: ScalarDensities, too_wide: Callable[[Array, Array], Array]):
-        self.signal, self.too_wide = law.signal, too_wide
-        self.explained: Callable[[float], float] = lambda y: float(law.explained(np.array(y)))
+        self.too_wide = too_wide
+        self.residual: Callable[[float, Array], Array] = lambda y, x: law.residual(np.array(y), x)
         self.log_likelihood: Callable[[float, Array], Array] = lambda y, x: law.log_likelihood(np.array([y]), x)
 
     def corrected(
@@ -198,14 +203,13 @@ class _Bayes:
     def _explanations(self, borders: Array, y: float) -> Array:
         """Panel borders that approach, by halves, every state that explains y without noise."""
         x = np.unique(np.concatenate([borders, 0.5 * (borders[1:] + borders[:-1])]))
-        wanted = self.explained(y)
-        residual = wanted - self.signal(x)
+        residual = self.residual(y, x)
         result = []
         for i in np.flatnonzero(np.signbit(residual[1:]) != np.signbit(residual[:-1])):
             low, high = x[i], x[i + 1]
             while True:  # shrink the bracket 256 times at each pass, to the last bit
                 inner = low + (high - low) * SECTIONS
-                j = int(np.argmax(np.signbit(wanted - self.signal(inner)[1:]) != np.signbit(residual[i])))
+                j = int(np.argmax(np.signbit(self.residual(y, inner[1:])) != np.signbit(residual[i])))
                 if not inner[j + 1] - inner[j] < high - low:
                     break
                 low, high = inner[j], inner[j + 1]

@@ -59,9 +59,9 @@ def hidden(candidates: Candidates, place: Place, count: int) -> Array:
 def explanations(kernels: Kernels, y: Array, law: ScalarDensities, low: Array, high: Array) -> Array:
     """Roots (T, 3) of b(x, m_w) = y in the support, those nearest to the middle; NaN where there are fewer."""
     x, _ = Place(kernels.centre, kernels.width, low, high).nodes(SEARCHED)
-    wanted = law.explained(y)
-    negative = law.signal(x) < wanted
-    change = negative[:, 1:] != negative[:, :-1]
+    residual = law.residual(y, x)
+    negative = residual > 0
+    change = (negative[:, 1:] != negative[:, :-1]) & (np.abs(residual[:, 1:] - residual[:, :-1]) < law.jump)
     if np.isnan(y).any():
         change &= ~np.isnan(y)
     middle = np.abs(0.5 * (x[:, 1:] + x[:, :-1]) - kernels.centre)
@@ -71,13 +71,13 @@ def explanations(kernels: Kernels, y: Array, law: ScalarDensities, low: Array, h
     left_negative = np.take_along_axis(negative, places, axis=1)
     for _ in range(2):
         inner = left[:, :, None] + (right - left)[:, :, None] * SECTIONS
-        same = (law.signal(inner) < wanted[:, :, None]) == left_negative[:, :, None]
+        same = (law.residual(y[:, :, None], inner) > 0) == left_negative[:, :, None]
         last = np.minimum(np.argmin(same, axis=2), len(SECTIONS) - 1)[:, :, None]
         last = np.maximum(last, 1)
         left, right = np.take_along_axis(inner, last - 1, axis=2)[:, :, 0], np.take_along_axis(inner, last, axis=2)[:, :, 0]
     root = 0.5 * (left + right)
     for _ in range(2):
         with np.errstate(divide="ignore", invalid="ignore"):
-            newton = root - (law.signal(root) - wanted) / law.slope(root)
+            newton = root + law.residual(y, root) / law.slope(root)
         root = np.where((newton > left) & (newton < right), newton, root)
     return np.where(found, root, np.nan)

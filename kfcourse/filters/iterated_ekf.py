@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
+from kfcourse.angles import difference
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, product, symmetric, transpose
@@ -80,20 +81,24 @@ def iterated(structure: Structure, iterations: int = 5) -> Filter:
         raise ValueError(f"iterations must be a whole number, at least 1 (which is aof(structure)); got {iterations!r}")
 
     def step(state: State, y: Array) -> State:
-        prior = state.predicted
-        posterior = correct(prior, structure.measure(*prior), y)
+        prior, now = state.predicted, structure.at(state.step)
+        posterior = correct(prior, now.measure(*prior), y)
         for _ in range(iterations - 1):
-            posterior = correct(prior, affine_meter(structure, posterior, prior), y)
-        return State(state.step + 1, posterior, structure.predict(*posterior))
+            posterior = correct(prior, *affine_meter(now, posterior, prior, y))
+        return State(state.step + 1, posterior, now.predict(*posterior))
 
     return Filter(f"iterated-{structure.name}", structure.model, initial_state(structure.model), step)
 
 
-def affine_meter(structure: Structure, at: Gaussian, prior: Gaussian) -> Measurement:
-    """The meter's structural functions at the law `at`, as those of an affine meter seen from the law `prior`.
+def affine_meter(structure: Structure, at: Gaussian, prior: Gaussian, y: Array) -> tuple[Measurement, Array]:
+    """The meter's structural functions at the law `at`, as those of an affine meter seen from the law `prior`; and y.
 
     h + G (lambda - z),  G,  G Psi G^T + R,  R
+
+    Components of y that are angles get the turns that bring them near h: at z, where the meter is affine, not at lambda.
     """
-    h, G, _, R = structure.measure(*at)
+    there = structure.measure(*at)
+    h, G, _, R = there
     F = symmetric(product(product(G, prior.cov), transpose(G))) + R
-    return Measurement(h + apply(G, prior.mean - at.mean), G, F, R)
+    shift = difference(prior.mean, at.mean, structure.model.angles.x)
+    return Measurement(h + apply(G, shift), G, F, R), h + there.innovation(y) if structure.model.angles.y else y

@@ -10,9 +10,10 @@ the step, and the forms that stand it better, is in `kfcourse.linear.arithmetic`
 
 from __future__ import annotations
 
+from kfcourse.angles import near
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.laws import Array, Gaussian, any_missing, apply, gain, transpose, without_missing
-from kfcourse.linear.system import LinearSystem, linear_system
+from kfcourse.linear.system import LinearSystem, linear_systems
 from kfcourse.symbolic.model import Model
 
 
@@ -37,17 +38,21 @@ def predict(system: LinearSystem, posterior: Gaussian) -> Gaussian:
 
 
 def kalman_filter(model: Model) -> Filter:
-    """The Kalman filter of a linear model; as long as no measurement is missing, one covariance (n, n) for all runs.
+    """The Kalman filter of a linear model, whose matrices may depend on the step.
+
+    As long as no measurement is missing, there is one covariance (n, n) for all runs.
 
     Raises
     ------
     ModelError
         The model is not linear.
     """
-    system, shift, offset = linear_system(model)  # constants of the object and of the meter
+    system_at = linear_systems(model)
 
     def step(state: State, y: Array) -> State:
-        posterior = correct(system, state.predicted, y - offset)
+        system, shift, offset = system_at(state.step)  # and the constants of the object and of the meter
+        expected = apply(system.H, state.predicted.mean)
+        posterior = correct(system, state.predicted, near(y - offset, expected, model.angles.y))
         mean, cov = predict(system, posterior)
         return State(state.step + 1, posterior, Gaussian(mean + shift, cov))
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sympy as sp
 
+from kfcourse.angles import difference, near
 from kfcourse.filters import notation as s
 from kfcourse.filters.designed import Design, Equations, Regression, Step
 from kfcourse.filters.optimal_structure import CONDITION, check_arguments, with_measurement
@@ -45,18 +46,20 @@ def mfos(structure: Structure, arguments: int = 2) -> Design:
     Its own covariance is the residual of the first regression, (n, n).
     """
     check_arguments(arguments)
+    angles = structure.model.angles
 
-    def equations(predicted: Gaussian, y: Array) -> Equations:
-        lam, Psi = predicted
-        h, G, F, _ = structure.measure(lam, Psi)
-        sigma = apply(gain(product(Psi, transpose(G)), F), y - h)
-        fit = yield Regression(lambda x, x_next: x - lam, sigma)
+    def equations(predicted: Gaussian, y: Array, k: int) -> Equations:
+        (lam, Psi), now = predicted, structure.at(k)
+        measurement = now.measure(lam, Psi)
+        K = gain(product(Psi, transpose(measurement.G)), measurement.F)
+        sigma = apply(K, measurement.innovation(y))
+        fit = yield Regression(lambda x, x_next: difference(x, lam, angles.x), sigma)
         posterior = Gaussian(lam + where_measured(y, fit(sigma)), fit.residual)
 
-        regressor = posterior.mean if arguments == 2 else with_measurement(y, h, posterior.mean)
-        fit = yield Regression(lambda x, x_next: x, regressor)
-        s_next, Psi_next = structure.predict(fit(regressor), fit.residual)
-        fit = yield Regression(lambda x, x_next: x_next, s_next)
+        regressor = posterior.mean if arguments == 2 else with_measurement(y, measurement, posterior.mean, angles.y)
+        fit = yield Regression(lambda x, x_next: near(x, posterior.mean, angles.x), regressor)
+        s_next, Psi_next = now.predict(fit(regressor), fit.residual)
+        fit = yield Regression(lambda x, x_next: near(x_next, s_next, angles.x), s_next)
         return Step(posterior, Gaussian(fit(s_next), Psi_next))
 
     return Design(f"{'mfos' if arguments == 2 else 'mfos3'}-{structure.name}", structure.model, equations)

@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.angles import Components, near, on_circle
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.laws import Array, Gaussian, Measurement, any_missing, correct, normalised_square, without_missing
 from kfcourse.symbolic.structure import Structure
@@ -70,6 +71,7 @@ def imm(structures: Sequence[Structure], transition: Array, probabilities: Array
         Models that do not fit together, or numbers that are no probabilities.
     """
     models = [structure.model for structure in structures]
+    angles = models[0].angles.x if models else ()
     pi, first = _checked(structures, transition, probabilities)
 
     def init(runs: int) -> State:
@@ -80,7 +82,8 @@ def imm(structures: Sequence[Structure], transition: Array, probabilities: Array
     def step(state: State, y: Array) -> State:
         memory: Modes = state.memory
         corrected, likelihoods = [], []
-        for structure, prior in zip(structures, memory.predicted, strict=True):
+        now = [structure.at(state.step) for structure in structures]
+        for structure, prior in zip(now, memory.predicted, strict=True):
             measurement = structure.measure(*prior)
             corrected.append(correct(prior, measurement, y))
             likelihoods.append(log_likelihood(measurement, y))
@@ -88,16 +91,16 @@ def imm(structures: Sequence[Structure], transition: Array, probabilities: Array
 
         expected = mu @ pi
         predicted = []
-        for j, structure in enumerate(structures):
+        for j, structure in enumerate(now):
             joint = mu * pi[:, j]
             # a mode that cannot come next starts from the combined law; nothing uses it
             weights = np.where(expected[:, j, None] > 0, joint, mu)
-            mixed = mixture(corrected, weights / weights.sum(axis=-1, keepdims=True))
+            mixed = mixture(corrected, weights / weights.sum(axis=-1, keepdims=True), angles)
             predicted.append(structure.predict(*mixed))
         return State(
             state.step + 1,
-            mixture(corrected, mu),
-            mixture(predicted, expected),
+            mixture(corrected, mu, angles),
+            mixture(predicted, expected, angles),
             Modes(mu, expected, tuple(predicted)),
         )
 
@@ -117,6 +120,8 @@ def _checked(structures: Sequence[Structure], transition: Array, probabilities: 
                 f"all modes need the same state and measurement: {[s.name for s in first.x]} with {first.p} component(s) "
                 f"and {[s.name for s in model.x]} with {model.p} differ"
             )
+        if model.angles != first.angles:
+            raise ValueError("all modes need the same components declared as angles")
         if not all(np.array_equal(ours, theirs) for ours, theirs in zip(model.prior, first.prior, strict=True)):
             raise ValueError("all modes need the same prior: before the first measurement there is one law of the state")
     pi = np.asarray(transition, dtype=float)
@@ -144,21 +149,27 @@ def log_likelihood(measurement: Measurement, y: Array) -> Array:
 
     -1/2 nu^T F^-1 nu - 1/2 ln det F
     """
-    innovation, F = y - measurement.h, measurement.F
+    innovation, F = measurement.innovation(y), measurement.F
     if any_missing(innovation):
         innovation, _, F, _ = without_missing(innovation, measurement.G, F, measurement.R)
     return -0.5 * (normalised_square(innovation, F) + np.linalg.slogdet(F).logabsdet)
 
 
-def mixture(laws: Sequence[Gaussian], weights: Array) -> Gaussian:
+def mixture(laws: Sequence[Gaussian], weights: Array, angles: Components = ()) -> Gaussian:
     """Mean and covariance of a mixture of normal laws, weights (runs, M).
 
     m = sum w_j m_j,   P = sum w_j (P_j + (m_j - m)(m_j - m)^T)
+
+    Of components that are angles the mean is near the most probable law's.
     """
     columns = [weights[:, j, None] for j in range(len(laws))]
-    mean = sum(w * law.mean for w, law in zip(columns, laws, strict=True))
+    means = [law.mean for law in laws]
+    if angles:
+        likeliest = np.take_along_axis(np.stack(means, axis=1), weights.argmax(axis=1)[:, None, None], axis=1)[:, 0]
+        means = [near(one, likeliest, angles) for one in means]
+    mean = sum(w * one for w, one in zip(columns, means, strict=True))
     cov: Array | float = 0.0
-    for w, law in zip(columns, laws, strict=True):
-        deviation = law.mean - mean
+    for w, one, law in zip(columns, means, laws, strict=True):
+        deviation = one - mean
         cov = cov + w[..., None] * (law.cov + deviation[..., :, None] * deviation[..., None, :])
-    return Gaussian(np.asarray(mean), np.asarray(cov))
+    return Gaussian(on_circle(np.asarray(mean), angles), np.asarray(cov))

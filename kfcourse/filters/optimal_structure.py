@@ -14,9 +14,10 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
+from kfcourse.angles import Components, near
 from kfcourse.filters import notation as s
 from kfcourse.filters.designed import Design, Equations, Regression, Step
-from kfcourse.laws import Array, Gaussian, correct
+from kfcourse.laws import Array, Gaussian, Measurement, correct
 from kfcourse.symbolic.structure import Structure
 
 CONDITION = (
@@ -48,13 +49,15 @@ def fos(structure: Structure, arguments: int = 2) -> Design:
         2: x is regressed on z alone.  3: on (y, z).
     """
     check_arguments(arguments)
+    angles = structure.model.angles
 
-    def equations(predicted: Gaussian, y: Array) -> Equations:
-        measurement = structure.measure(*predicted)
+    def equations(predicted: Gaussian, y: Array, k: int) -> Equations:
+        now = structure.at(k)
+        measurement = now.measure(*predicted)
         posterior = correct(predicted, measurement, y)
-        regressor = posterior.mean if arguments == 2 else with_measurement(y, measurement.h, posterior.mean)
-        fit = yield Regression(lambda x, x_next: x, regressor)
-        return Step(posterior, structure.predict(fit(regressor), fit.residual))
+        regressor = posterior.mean if arguments == 2 else with_measurement(y, measurement, posterior.mean, angles.y)
+        fit = yield Regression(lambda x, x_next: near(x, posterior.mean, angles.x), regressor)
+        return Step(posterior, now.predict(fit(regressor), fit.residual))
 
     return Design(f"{'fos' if arguments == 2 else 'fos3'}-{structure.name}", structure.model, equations)
 
@@ -64,6 +67,13 @@ def check_arguments(arguments: int) -> None:
         raise ValueError(f"the filter of optimal structure has 2 or 3 arguments, not {arguments!r}")
 
 
-def with_measurement(y: Array, h: Array, z: Array) -> Array:
-    """The regressor (y, z) of the three-argument form; a missing measurement is replaced by its prediction."""
+def with_measurement(y: Array, measurement: Measurement, z: Array, angles: Components) -> Array:
+    """The regressor (y, z) of the three-argument form; a missing measurement is replaced by its prediction.
+
+    In the place of components of y that are angles stand their innovations, which do not jump.
+    """
+    h = measurement.h
+    if angles:
+        turning = np.isin(np.arange(y.shape[-1]), angles)
+        y, h = np.where(turning, measurement.innovation(y), y), np.where(turning, 0.0, h)
     return np.concatenate([np.where(np.isnan(y), h, y), z], axis=-1)

@@ -22,6 +22,7 @@ from tqdm import tqdm
 
 from kfcourse.lab.quality import FEWEST, RUNS, Ask, Quality, examine
 from kfcourse.lab.variants import Variant, read_variant
+from kfcourse.seeds import Seed, seed_number
 
 VECTORS = 0.1  # probability of a vector model
 SCREEN = 10  # a candidate is first tried on that many times fewer trajectories
@@ -170,13 +171,13 @@ def _value(value: Any) -> str:
     return json.dumps(value)  # strings, numbers and lists of them are written alike in JSON and TOML
 
 
-def generate(wanted: int, seed: int = 1, runs: int = RUNS, jobs: int = 2, ask: Ask | None = None) -> Generated:
+def generate(wanted: int, seed: Seed = 1, runs: int = RUNS, jobs: int = 2, ask: Ask | None = None) -> Generated:
     """Well-posed variants g1, g2, ...: candidates in order, without those that fail a criterion or repeat formulas.
 
     Parameters
     ----------
     wanted : int
-    seed : int
+    seed : int or numpy.random.Generator
     runs : int
         Trajectories of each check, see `kfcourse.lab.quality.examine`; a tenth of them for a first one.
     jobs : int
@@ -194,11 +195,9 @@ def generate(wanted: int, seed: int = 1, runs: int = RUNS, jobs: int = 2, ask: A
     ValueError
         Numbers that are not positive, a negative seed, too few trajectories.
     """
-    if wanted < 1 or seed < 0 or jobs < 1 or runs < FEWEST:
-        raise ValueError(
-            f"expected at least 1 variant, 1 job, {FEWEST} trajectories and a seed of at least 0, "
-            f"got {wanted}, {jobs}, {runs} and {seed}"
-        )
+    seed = seed_number(seed)
+    if wanted < 1 or jobs < 1 or runs < FEWEST:
+        raise ValueError(f"expected at least 1 variant, 1 job and {FEWEST} trajectories, got {wanted}, {jobs} and {runs}")
     found: list[tuple[Variant, Quality]] = []
     rejected: Counter[str] = Counter()
     shapes: Counter[str] = Counter()

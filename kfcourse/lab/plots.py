@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from kfcourse.lab.short_names import title
 from kfcourse.laws import Array
-from kfcourse.montecarlo.comparison import Comparison
+from kfcourse.montecarlo.comparison import EXACT, Comparison
 
 # Okabe and Ito's colours, distinguishable by the colour-blind; linearised forms are dashed.
 _FAMILIES = {
@@ -58,34 +58,38 @@ def accuracy(result: Comparison, ax: Axes, names: Sequence[str] | None = None) -
 def relative_accuracy(
     result: Comparison, ax: Axes, names: Sequence[str] | None = None, steps: slice = slice(None), confidence: float = 0.95
 ) -> Axes:
-    """D_k of every filter relative to the Gaussian AOF's, in per cent, with bands of paired confidence."""
+    """How far D_k of every filter is above the exact AOF's, the zero line, in per cent, with bands of confidence.
+
+    Without the exact AOF the control (the Gaussian AOF) is the zero line.
+    """
     k = np.arange(result.steps)[steps]
-    names = [n for n in result.available if n != result.control] if names is None else names
-    for name in names:
-        ratio = result.relative(name)[steps]
-        middle, half = 100 * (ratio.value - 1), 100 * ratio.half_width(confidence)
+    zero = EXACT if result.has_bound else result.control
+    for name in result.entrants if names is None else names:
+        if name == zero:
+            continue
+        gap = result.gap(name)[steps]
+        middle, half = 100 * gap.value, 100 * gap.half_width(confidence)
         line = style(name)
         ax.plot(k, middle, markersize=4, markevery=max(1, len(k) // 12), **line)
         ax.fill_between(k, middle - half, middle + half, color=line["color"], alpha=0.15, linewidth=0)
-    ax.axhline(0, color="black", linewidth=0.8)
+    ax.axhline(0, color="black", linewidth=0.8, label=title(zero))
     ax.set_xlabel("step $k$")
-    ax.set_ylabel(f"$D_k$ relative to {title(result.control)}, %")
+    ax.set_ylabel(f"$D_k$ above {title(zero)}, %")
     ax.grid(True, alpha=0.3)
-    if names:
-        ax.legend(fontsize="small", ncols=2)
+    ax.legend(fontsize="small", ncols=2)
     return ax
 
 
 def ranking(result: Comparison, ax: Axes, steps: slice = slice(None), confidence: float = 0.95) -> Axes:
-    """Mean over steps of D_k relative to the Gaussian AOF's, best filter on top, with confidence intervals."""
+    """Mean over steps of how far D_k is above the exact AOF's (without it, the control's), the best on top, with intervals."""
     ranked = result.ranking(steps)[::-1]
-    for row, (name, score) in enumerate(ranked):
+    for row, (name, gap) in enumerate(ranked):
         line = style(name)
-        half = 100 * float(score.half_width(confidence))
-        ax.errorbar(100 * (float(score.value) - 1), row, xerr=half, fmt=line["marker"], color=line["color"], capsize=3)
+        half = 100 * float(gap.half_width(confidence))
+        ax.errorbar(100 * float(gap.value), row, xerr=half, fmt=line["marker"], color=line["color"], capsize=3)
     ax.set_yticks(range(len(ranked)), [title(name) for name, _ in ranked])
     ax.axvline(0, color="black", linewidth=0.8)
-    ax.set_xlabel(f"mean of $D_k$ relative to {title(result.control)}, %")
+    ax.set_xlabel(f"mean of $D_k$ above {title(EXACT if result.has_bound else result.control)}, %")
     ax.grid(True, axis="x", alpha=0.3)
     return ax
 

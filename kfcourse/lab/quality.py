@@ -47,6 +47,7 @@ from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.statistics import BATCHES
+from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.reading import ModelError
@@ -104,7 +105,7 @@ class Quality:
         return not self.faults
 
 
-def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None = None) -> Quality:
+def examine(variant: Variant, runs: int = RUNS, seed: Seed = 1, ask: Ask | None = None) -> Quality:
     """Check a variant.
 
     Parameters
@@ -112,7 +113,7 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None =
     variant : Variant
     runs : int
         Trajectories, at least 256; a vector model gets an eighth of them.
-    seed : int
+    seed : int or numpy.random.Generator
     ask : callable, optional
         Variant -> the question of the exercises that cannot be posed, as a `Finding`, or None; `kfcourse.checks.posing.unposed`.
 
@@ -123,7 +124,7 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None =
     """
     if runs < FEWEST:
         raise ValueError(f"standard errors need at least {FEWEST} trajectories, got {runs}")
-    structures = Structures(variant.model)
+    seed, structures = seed_number(seed), Structures(variant.model)
     try:
         with time_limit(SECONDS):
             answers = solvable(structures)

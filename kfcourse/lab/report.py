@@ -27,7 +27,7 @@ from kfcourse.lab import plots
 from kfcourse.lab.short_names import FILTERS, Structures, title
 from kfcourse.lab.variants import Variant
 from kfcourse.montecarlo.comparison import EXACT, Comparison
-from kfcourse.montecarlo.statistics import Estimate
+from kfcourse.montecarlo.statistics import Estimate, ratio
 from kfcourse.symbolic.model import Model
 
 _FAMILIES = {
@@ -39,10 +39,10 @@ _FAMILIES = {
 _FIGURES: dict[str, tuple[str, Callable[[Comparison, Axes], Axes]]] = {
     "accuracy": ("Error variance of each filter against the step.", plots.accuracy),
     "relative": (
-        "Error variance relative to the control filter, with 95 % bands of the paired difference.",
+        "How far the error variance is above the exact filter's (if that was left out, the control's), with 95 % bands.",
         plots.relative_accuracy,
     ),
-    "ranking": ("Mean over the steps of the relative error variance, with 95 % confidence intervals.", plots.ranking),
+    "ranking": ("The mean of the same over the steps, with 95 % confidence intervals.", plots.ranking),
     "consistency": ("Normalised squared error: 1 if the filter's own covariance is right.", plots.consistency),
 }
 
@@ -112,19 +112,30 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
         "standard_error": {name: e.standard_error.tolist() for name, e in estimates.items()},
         "error_mean": {name: result.error_mean(name).value.tolist() for name in result.available},
         "own_variance": {name: result.own_variance(name).value.tolist() for name in result.available},
-        "score": {name: {"value": float(e.value), "standard_error": float(e.standard_error)} for name, e in result.ranking()},
+        "score": {name: _number(result.score(name)) for name, _ in result.ranking()},
+        "designs": result.designs,
     }
+    if result.has_bound:
+        above = {name: result.gap(name) for name in result.entrants}
+        data["above_bound"] = {name: e.value.tolist() for name, e in above.items()}
+        data["above_bound_standard_error"] = {name: e.standard_error.tolist() for name, e in above.items()}
+        data["mean_above_bound"] = {name: _number(gap) for name, gap in result.ranking()}
+    if result.replicas:
+        data["design_deviation"] = {name: result.design_error(name).value.tolist() for name in result.replicas.names}
     text = json.dumps(_finite(data), indent=1, allow_nan=False)
     save(text, path)
     return path
 
 
 def conclusions(result: Comparison, confidence: float = 0.95) -> list[str]:
-    """The ranking in sentences: each filter against the next, significant or not at the confidence."""
+    """The ranking in sentences: each filter against the next, significant or not at the confidence.
+
+    In per cent of the bound, the exact AOF's error variance; without it, of the control's.
+    """
     ranked = [name for name, _ in result.ranking()]
     sentences = []
     for better, worse in pairwise(ranked):
-        difference = result.score_difference(worse, better)
+        difference = result.mean_gap_difference(worse, better)
         low, high = (100 * float(limit) for limit in difference.interval(confidence))
         # Filters that coincide, as on a linear model, differ by rounding: 1e-14 %.
         verdict = "is more accurate than" if low > 1e-10 else "is not significantly different from"
@@ -137,7 +148,7 @@ def conclusions(result: Comparison, confidence: float = 0.95) -> list[str]:
 
 def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
     names = result.available
-    gap_steps = [k for k in _GAP_STEPS if k < result.steps] if EXACT in names else []
+    gap_steps = [k for k in _GAP_STEPS if k < result.steps] if result.has_bound else []
     return {
         "variant": variant,
         "result": result,
@@ -145,17 +156,20 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
         "model": Section.of("Model", result.model.latex()),
         "structures": _structure_sections(result.model, names),
         "equations": _equation_sections(names),
-        "names": [(name, title(name), FILTERS[name].russian if name in FILTERS else "") for name in names],
+        "names": [
+            (name, title(name) + (", the bound" if name == EXACT else ""), FILTERS[name].russian if name in FILTERS else "")
+            for name in names
+        ],
         "table": _table(result, names),
         "ranking": [
             (
                 title(name),
-                f"{float(score.value):.5f}",
-                f"{float(score.standard_error):.5f}",
-                [_gap(result, name, k) for k in gap_steps],
+                [_percent(mean), *(_percent(result.gap(name)[k]) for k in gap_steps)],
+                _between_designs(result, name),
             )
-            for name, score in result.ranking()
+            for name, mean in result.ranking()
         ],
+        "reference": title(EXACT if result.has_bound else result.control),
         "gap_steps": gap_steps,
         "conclusions": conclusions(result),
         "figures": [(name, caption) for name, (caption, _) in _FIGURES.items()],
@@ -174,12 +188,23 @@ def _equation_sections(names: tuple[str, ...]) -> list[Section]:
     return [Section.of(_FAMILIES[family], equations_latex(EQUATIONS[family])) for family in families if family in EQUATIONS]
 
 
-def _gap(result: Comparison, name: str, step: int) -> str:
-    """How far a filter is above the exact bound at a step, in per cent; empty for the slow ones."""
-    if name not in result.fast:
+def _percent(part: Estimate) -> str:
+    """A part and its standard error in per cent, the latter with two digits: "1.19 ± 0.40"."""
+    value, error = 100 * float(part.value), 100 * float(part.standard_error)
+    places = int(np.clip(1 - np.floor(np.log10(error)), 0, 6)) if np.isfinite(error) and error > 0 else 2
+    return f"{value:.{places}f} ± {error:.{places}f}"
+
+
+def _between_designs(result: Comparison, name: str) -> str:
+    """How much D_k varies from one design to another: mean over the steps of its deviation, in per cent of D_k."""
+    if not result.replicas or name not in result.replicas.names:
         return ""
-    above = result.above_bound(name)[step]
-    return f"{100 * float(above.value):.2f} ± {100 * float(above.standard_error):.2f}"
+    variance = result.error_variance(name).value
+    return f"{100 * float(np.mean(ratio(result.design_error(name).value, variance, 0.0))):.2g}"
+
+
+def _number(estimate: Estimate) -> dict[str, float]:
+    return {"value": float(estimate.value), "standard_error": float(estimate.standard_error)}
 
 
 def _table(result: Comparison, names: tuple[str, ...]) -> list[tuple[int, list[str]]]:

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.sense import nothing_random
 
-VARIANT_KEYS = {"title", "state", "meter", "parameters", "symbols", "prior", "state_noise", "meter_noise"}
+VARIANT_KEYS = {"title", "state", "meter", "parameters", "symbols", "prior", "state_noise", "meter_noise", "angles"}
 
 
 class VariantError(ValueError):
@@ -35,7 +36,7 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     ----------
     path : path, optional
         A file with tables ``[variants.NAME]``: `state`, `meter`, `parameters`, and optionally `title`,
-        `symbols`, `prior`, `state_noise`, `meter_noise` (see `Model.define`).
+        `symbols`, `prior`, `state_noise`, `meter_noise`, `angles` (see `Model.define`).
 
     Raises
     ------
@@ -75,6 +76,8 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
         model = Model.define(table["state"], table["meter"], table.get("parameters"), **options)
     except (ValueError, TypeError, OverflowError) as error:  # FormulaError and ModelError are ValueErrors
         raise VariantError(f"{prefix}{error}") from None
+    if problem := nothing_random(model):
+        raise VariantError(f"{prefix}{problem}")
     return Variant(name, str(table.get("title", "")), model, dict(table))
 
 

@@ -1,7 +1,8 @@
-"""Linear systems given by matrices: the Kalman filter in four arithmetic forms, and tests of consistency.
+"""Linear systems given by matrices: the Kalman filter in five arithmetic forms, and tests of consistency.
 
 system        `LinearSystem`: A, H, Q, R, B, checked
-arithmetic    one correction and prediction in four forms: textbook, symmetrised, Joseph, square root
+arithmetic    one correction and prediction in five forms: textbook, symmetrised, Joseph, square root, UD
+factored      the UD form: factors of the covariance instead of it
 runs          the filter along stored measurements; simulation
 accuracy      covariances in advance, for any gains; the steady state of the Riccati equation
 consistency   NEES, NIS, whiteness: is a filter right about its own errors?

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.angles import Components, difference
 from kfcourse.laws import Array, Gaussian, Measurement, normalised_square
 
 
@@ -38,18 +39,20 @@ def innovations(measure: Callable[[Array, Array], Measurement], predicted: Gauss
         NaN where missing.
     """
     measurement = measure(*predicted)
-    return Innovations(y - measurement.h, measurement.F)
+    return Innovations(measurement.innovation(y), measurement.F)
 
 
-def nees(x: Array, posterior: Gaussian) -> Array:
+def nees(x: Array, posterior: Gaussian, angles: Components = ()) -> Array:
     """Normalised estimation error squared, (..., n) -> (...): mean n for a filter that is right.
+
+    `angles` are the components of x that are, `model.angles.x`.
 
     Raises
     ------
     ValueError
         A covariance is singular: some component is claimed to be known exactly.
     """
-    return normalised_square(x - posterior.mean, _regular(posterior.cov))
+    return normalised_square(difference(x, posterior.mean, angles), _regular(posterior.cov))
 
 
 def nis(found: Innovations) -> Array:
@@ -83,6 +86,47 @@ def chi_squared_bounds(degrees: int, runs: int, confidence: float = 0.95) -> tup
     return float(low) / runs, float(high) / runs
 
 
+def alarms(found: Innovations, confidence: float = 0.95) -> Array:
+    """Which records fail the three tests of innovations: size, mean, whiteness; (3, runs) of bool.
+
+    With N steps, p components and s_k = F^(-1/2) nu_k, a right filter makes
+
+        sum of |s_k|^2                              chi-squared with p N degrees of freedom
+        |sum of s_k|^2 / N                          chi-squared with p
+        (sum of s_k^T s_{k+1})^2 / (p (N - 1))      chi-squared with 1, for large N
+
+    Size is suspect on both sides, the others only above.  For these, s_k is divided by its root mean square in the record: a
+    wrong size alone is no alarm of theirs.
+
+    Raises
+    ------
+    ValueError
+        Measurements are missing, or there are fewer than two steps.
+    """
+    white = _white(found)
+    steps, _, p = white.shape
+    if steps < 2:
+        raise ValueError(f"neighbours take at least 2 steps, got {steps}")
+    size = (white**2).mean(axis=(0, 2))  # (runs,)
+    white = white / np.sqrt(size)[:, None]
+    neighbours = (white[:-1] * white[1:]).sum(axis=(0, 2))
+    low, high = chi_squared_bounds(p, steps, confidence)
+    return np.stack(
+        [
+            (p * size < low) | (p * size > high),
+            (white.sum(axis=0) ** 2).sum(axis=-1) / steps > chi_squared_bounds(p, 1, 2 * confidence - 1)[1],
+            neighbours**2 / (p * (steps - 1)) > chi_squared_bounds(1, 1, 2 * confidence - 1)[1],
+        ]
+    )
+
+
+def _white(found: Innovations) -> Array:
+    """s_k = F^(-1/2) nu_k, (steps, runs, p)."""
+    if np.isnan(found.value).any():
+        raise ValueError("this test needs measurements at every step; select the steps at which they are there")
+    return np.linalg.solve(np.linalg.cholesky(found.cov), found.value[..., None])[..., 0]
+
+
 class Autocorrelation(NamedTuple):
     """Correlation of innovations `lag` steps apart, (lags,), and its standard deviation for a filter that is right."""
 
@@ -98,10 +142,7 @@ def autocorrelation(found: Innovations, lags: int) -> Autocorrelation:
     steps, runs, p = found.value.shape
     if not 0 < lags < steps:
         raise ValueError(f"lags must be between 1 and {steps - 1}, got {lags}")
-    if np.isnan(found.value).any():
-        raise ValueError("the autocorrelation needs measurements at every step; select the steps at which they are there")
-    root = np.linalg.cholesky(found.cov)
-    white = np.linalg.solve(root, found.value[..., None])[..., 0]
+    white = _white(found)
     value = [np.mean(np.sum(white[:-lag] * white[lag:], axis=-1)) / p for lag in range(1, lags + 1)]
     deviation = [1 / np.sqrt(p * runs * (steps - lag)) for lag in range(1, lags + 1)]
     return Autocorrelation(np.array(value), np.array(deviation))

@@ -15,6 +15,7 @@ import numpy as np
 from kfcourse.laws import Array, Gaussian, Trajectories, apply, square_root, stacked
 from kfcourse.linear.arithmetic import form
 from kfcourse.linear.system import LinearSystem
+from kfcourse.seeds import Seed
 
 
 class Run(NamedTuple):
@@ -36,7 +37,7 @@ def run(system: LinearSystem, prior: Gaussian, y: Array, u: Array | None = None,
         NaN where a measurement, or a component of it, is missing.
     u : ndarray (steps, runs, m) or (steps, 1, m), optional
         Known input; u[k] acts between y[k] and y[k+1].
-    arithmetic : {"joseph", "covariance", "symmetrised", "square-root"}
+    arithmetic : {"joseph", "covariance", "symmetrised", "square-root", "ud"}
         All of it runs in the precision of the system's matrices, but for the gain from p > 1 measurements at once: NumPy
         solves float32 equations in double and rounds the solution.
 
@@ -91,7 +92,7 @@ def _check_prior(prior: Gaussian, runs: int, n: int) -> None:
         raise ValueError("the prior must be finite: for an unknown state give a large variance, or start from measurements")
 
 
-def simulate(system: LinearSystem, prior: Gaussian, steps: int, runs: int, seed: int, u: Array | None = None) -> Trajectories:
+def simulate(system: LinearSystem, prior: Gaussian, steps: int, runs: int, seed: Seed, u: Array | None = None) -> Trajectories:
     """Trajectories of the system with normal noises, from x_0 drawn from the prior.
 
     Parameters
@@ -99,7 +100,8 @@ def simulate(system: LinearSystem, prior: Gaussian, steps: int, runs: int, seed:
     system : LinearSystem
     prior : Gaussian
         Law of x_0: mean (n,) or (runs, n), covariance (n, n).
-    steps, runs, seed : int
+    steps, runs : int
+    seed : int or numpy.random.Generator
     u : ndarray (steps, runs, m) or (steps, 1, m), optional
         Known input; u[k] acts between x[k] and x[k+1].
     """

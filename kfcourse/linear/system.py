@@ -6,7 +6,7 @@ y_k     = H x_k + w_k,          w ~ N(0, R)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.laws import Array, Measurement, apply, symmetric
+from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
@@ -98,10 +99,29 @@ def linear_system(model: Model) -> tuple[LinearSystem, Array, Array]:
     Raises
     ------
     ModelError
+        The model is not linear, or depends on the step: see `linear_systems`.
+    """
+    return linear_systems(model)(None)
+
+
+def linear_systems(model: Model) -> Callable[[int | None], tuple[LinearSystem, Array, Array]]:
+    """Step to the matrices and constants, as of `linear_system`, of a linear model that may depend on the step.
+
+    Raises
+    ------
+    ModelError
         The model is not linear.
     """
-    A, B, a0 = _affine(model.state_equation, model.x, model.v, model)
-    H, C, b0 = _affine(model.meter_equation, model.x, model.w, model)
+    state = _affine(model.state_equation, model.x, model.v, model)
+    meter = _affine(model.meter_equation, model.x, model.w, model)
+    if not model.timed:
+        system = _system(model, state.at(None)(), meter.at(None)())
+        return lambda k: system
+    return lambda k: _system(model, state.at(k)(), meter.at(k)())
+
+
+def _system(model: Model, state: Sequence[Array], meter: Sequence[Array]) -> tuple[LinearSystem, Array, Array]:
+    (A, B, a0), (H, C, b0) = state, meter
     Q, R = (M @ law.cov @ M.T for M, law in ((B, model.state_noise), (C, model.meter_noise)))
     system = LinearSystem(A, H, symmetric(Q), symmetric(R))
     return system, a0 + B @ model.state_noise.mean, b0 + C @ model.meter_noise.mean
@@ -117,13 +137,11 @@ def _slopes(equation: sp.MatrixBase, symbols: Sequence[sp.Symbol], model: Model)
     return equation.subs(model.values).jacobian(sp.Matrix(symbols)).applyfunc(sp.expand)
 
 
-def _affine(
-    equation: sp.MatrixBase, x: Sequence[sp.Symbol], noise: Sequence[sp.Symbol], model: Model
-) -> tuple[Array, Array, Array]:
-    """Matrices of equation = A x + B noise + constant."""
+def _affine(equation: sp.MatrixBase, x: Sequence[sp.Symbol], noise: Sequence[sp.Symbol], model: Model) -> Stepwise:
+    """Matrices of equation = A x + B noise + constant, as a function of the step."""
     slopes = _slopes(equation, [*x, *noise], model)
     if slopes.has(*x, *noise):
         raise ModelError(f"{list(equation)} is not linear, so the Kalman filter does not apply; use aof(linearised(model))")
     constant = equation.subs(model.values).subs(dict.fromkeys([*x, *noise], 0))
-    matrix = np.array(slopes, dtype=float)
-    return matrix[:, : len(x)], matrix[:, len(x) :], np.array(constant, dtype=float)[:, 0]
+    outputs = {"A": slopes[:, : len(x)], "B": slopes[:, len(x) :], "constant": constant}
+    return Stepwise.compile(model.known, "matrices", {}, outputs, ["constant"], f"matrices of {model}")

@@ -5,5 +5,6 @@ designing    coefficients of DUOF, FOS, MFOS: regressions over an ensemble
 experiment   `run`, `predictions`, `compare`: splits the seed into designing and comparing, runs all filters together
 subset       the slow filters, on as many of the trajectories as a budget allows
 statistics   means over batches of trajectories, standard errors
+two_phase    the same where slow filters ran on a part of them, and where filters were designed several times
 comparison   `Comparison`: error variances, paired differences, ranking, distance from the exact filter
 """

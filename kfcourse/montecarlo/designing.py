@@ -12,6 +12,7 @@ from concurrent.futures import Executor
 
 import numpy as np
 
+from kfcourse.angles import on_circle
 from kfcourse.filters.base import Filter, initial_state
 from kfcourse.filters.designed import Affine, Design, Scatter, Step
 from kfcourse.laws import Gaussian
@@ -48,9 +49,9 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: E
     for k, blocks in enumerate(ensemble):
         if not predicted:
             predicted = [[initial_state(d.model)(len(b.x)).predicted for d in designs] for b in blocks]
-        runs = [_BlockStep(designs, before, block) for before, block in zip(predicted, blocks, strict=True)]
+        runs = [_BlockStep(designs, before, block, k) for before, block in zip(predicted, blocks, strict=True)]
         fits = _fit_step(designs, runs, k, pool or Serial())
-        predicted = [[step.predicted for step in run.finished()] for run in runs]
+        predicted = [run.predictions() for run in runs]
         for table, row in zip(coefficients, fits, strict=True):
             table.append(row)
     return [one.with_coefficients(table) for one, table in zip(designs, coefficients, strict=True)]
@@ -59,9 +60,10 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: E
 class _BlockStep:
     """The equations of all designs over one step of one block of trajectories."""
 
-    def __init__(self, designs: Sequence[Design], predicted: Sequence[Gaussian], block: Instant):
+    def __init__(self, designs: Sequence[Design], predicted: Sequence[Gaussian], block: Instant, k: int):
         self.block = block
-        self.running = [one.equations(before, block.y) for one, before in zip(designs, predicted, strict=True)]
+        self.angles = [one.model.angles.x for one in designs]
+        self.running = [one.equations(before, block.y, k) for one, before in zip(designs, predicted, strict=True)]
         self.results: list[Step | None] = [None] * len(designs)
 
     def advance(self, answers: dict[int, Affine | None]) -> list[Scatter | None]:
@@ -77,8 +79,13 @@ class _BlockStep:
             return None
         return Scatter.of(request.target(self.block.x, self.block.x_next), request.regressor)
 
-    def finished(self) -> list[Step]:
-        return [step for step in self.results if step is not None]
+    def predictions(self) -> list[Gaussian]:
+        """What the designs, which are all through, predict: angles between -pi and pi, as when they run."""
+        done = [step for step in self.results if step is not None]
+        return [
+            Gaussian(on_circle(step.predicted.mean, angles), step.predicted.cov)
+            for step, angles in zip(done, self.angles, strict=True)
+        ]
 
 
 def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int, pool: Executor) -> list[list[Affine]]:

@@ -11,12 +11,14 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from kfcourse.laws import Array, Gaussian, Trajectories, square_root
+from kfcourse.angles import on_circle
+from kfcourse.laws import Array, Gaussian, Trajectories, normalised_square, square_root
+from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 
@@ -44,14 +46,24 @@ class Ensemble:
     runs, steps : int
         Trajectories, and measurements y_0 ... y_{steps-1} of each.
     seed : numpy.random.SeedSequence
+        A number or a `numpy.random.Generator` becomes one.
+    wide : float
+        The initial states are drawn from a law so many times as wide as the prior; `weight` makes up for it.
     """
 
     model: Model
     runs: int
     steps: int
     seed: np.random.SeedSequence
+    wide: float = 1.0
 
     def __post_init__(self) -> None:
+        if not isinstance(self.seed, np.random.SeedSequence):
+            object.__setattr__(self, "seed", np.random.SeedSequence(seed_number(self.seed)))
+        if not self.wide >= 1:
+            raise ValueError(f"a prior can be drawn wider, not narrower: wide must be at least 1, got {self.wide!r}")
+        if self.wide > 1 and self.model.angles.x:
+            raise ValueError("initial states that are angles cannot be drawn from a wider law; leave wide=1")
         for name in ("runs", "steps"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
@@ -70,9 +82,9 @@ class Ensemble:
     def block(self, index: int) -> Iterator[Instant]:
         """The steps of one block of trajectories."""
         x = self._initial(index)
-        for chunk in range(len(self._chunks)):
-            for v, w in zip(*self._draw(index, chunk), strict=True):
-                instant = self._simulator(x, v, w)
+        for chunk, steps in enumerate(self._chunks):
+            for k, v, w in zip(steps, *self._draw(index, chunk), strict=True):
+                instant = self._simulator(k, x, v, w)
                 yield instant
                 x = instant.x_next
 
@@ -86,8 +98,9 @@ class Ensemble:
             noises = [future.result() for future in drawn]
             if chunk + 1 < len(self._chunks):
                 drawn = [pool.submit(self._draw, b, chunk + 1) for b in blocks]  # ahead of time
-            for k in range(len(steps)):
-                instants = list(pool.map(self._simulator, x, [v[k] for v, _ in noises], [w[k] for _, w in noises]))
+            for i, k in enumerate(steps):
+                simulator = partial(self._simulator, k)
+                instants = list(pool.map(simulator, x, [v[i] for v, _ in noises], [w[i] for _, w in noises]))
                 yield instants
                 x = [instant.x_next for instant in instants]
 
@@ -100,7 +113,20 @@ class Ensemble:
         return np.random.Generator(np.random.SFC64(spawned))
 
     def _initial(self, block: int) -> Array:
-        return _draw(self._stream(block, 0), self.model.prior, 1, self.sizes[block])[0]
+        mean, cov = self.model.prior
+        x = _draw(self._stream(block, 0), Gaussian(mean, self.wide**2 * cov), 1, self.sizes[block])[0]
+        return on_circle(x, self.model.angles.x)
+
+    def weight(self, x: Array) -> Array | None:
+        """Prior over the law drawn from, at initial states x (N, n): (N,); None if they are the same.
+
+        N(x; m, d) / N(x; m, w^2 d) = w^r exp(-(1 - w^-2) (x - m)^T d^+ (x - m) / 2), r the rank of d.
+        """
+        if self.wide == 1:
+            return None
+        mean, cov = self.model.prior
+        rank = np.linalg.matrix_rank(cov, hermitian=True)
+        return self.wide**rank * np.exp(-0.5 * (1 - self.wide**-2) * normalised_square(x - mean, cov))
 
     def _draw(self, block: int, chunk: int) -> tuple[Array, Array]:
         """Noises of a few steps of a block: v and w, (steps, size, r)."""
@@ -110,16 +136,17 @@ class Ensemble:
 
 
 class _Simulator:
-    """One step of the model: (x, v, w) -> x, y = b(x, w), x' = a(x, v)."""
+    """One step of the model: (k, x, v, w) -> x, y = b(x, w), x' = a(x, v)."""
 
     def __init__(self, model: Model):
         self.state, self.meter = compile_model(model)
-        self.n, self.p = model.n, model.p
+        self.n, self.p, self.angles = model.n, model.p, model.angles
 
-    def __call__(self, x: Array, v: Array, w: Array) -> Instant:
-        y, x_next = self.meter(x, w), self.state(x, v)
+    def __call__(self, k: int, x: Array, v: Array, w: Array) -> Instant:
+        y, x_next = self.meter(x, w, k), self.state(x, v, k)
         # A formula without noise and state is one constant for all trajectories.
-        return Instant(x, np.broadcast_to(y, (len(x), self.p)), np.broadcast_to(x_next, (len(x), self.n)))
+        y, x_next = np.broadcast_to(y, (len(x), self.p)), np.broadcast_to(x_next, (len(x), self.n))
+        return Instant(x, on_circle(y, self.angles.y), on_circle(x_next, self.angles.x))
 
 
 def _draw(rng: np.random.Generator, law: Gaussian, steps: int, size: int) -> Array:
@@ -152,9 +179,9 @@ def workers(threads: int) -> Iterator[Executor]:
         pool.shutdown(cancel_futures=True)
 
 
-def simulate(model: Model, runs: int, steps: int, seed: int) -> Trajectories:
+def simulate(model: Model, runs: int, steps: int, seed: Seed) -> Trajectories:
     """Trajectories to look at: x (steps, runs, n) and y (steps, runs, p), the same for the same seed."""
-    ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(seed))
+    ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(seed_number(seed)))
     x, y = np.empty((steps, runs, model.n)), np.empty((steps, runs, model.p))
     start = 0
     for index, size in enumerate(ensemble.sizes):

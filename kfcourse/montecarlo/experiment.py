@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from itertools import accumulate
+from itertools import accumulate, chain
 from typing import TypeVar
 
 import numpy as np
@@ -23,6 +23,8 @@ from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble, workers
 from kfcourse.montecarlo.statistics import BATCHES, Sums
 from kfcourse.montecarlo.subset import progress_bar, run_block, run_subset
+from kfcourse.montecarlo.two_phase import Replicas
+from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.model import Model
 
 T = TypeVar("T")
@@ -35,12 +37,19 @@ def run(one: Filter, y: Array) -> Gaussian:
     ----------
     one : Filter
     y : ndarray (steps, runs, p)
-        NaN where a measurement is missing.
+        NaN where a measurement is missing.  One trajectory of a scalar meter may come as (steps,), and counts as runs = 1.
 
     Returns
     -------
     Gaussian
         Estimates (steps, runs, n) and the filter's covariances (steps, runs, n, n).
+
+    Raises
+    ------
+    ValueError
+        Measurements of another shape.
+    TypeError
+        A `Design`, whose coefficients are still to be found.
     """
     return stacked([state.posterior for state in _states(one, y)[1:]])
 
@@ -55,11 +64,28 @@ def predictions(one: Filter, y: Array) -> Gaussian:
 
 def _states(one: Filter, y: Array) -> list[State]:
     """The filter's states: before the first measurement, and after each."""
+    if isinstance(one, Design):
+        raise TypeError(
+            f"{one.name} is a Design, whose coefficients are still to be found over an ensemble: "
+            f"run(design([it], Ensemble(model, 100_000, {len(y)}, seed=1).by_step())[0], y), or compare([it], model, ...)"
+        )
+    y, p = np.asarray(y, dtype=float), one.model.p
+    if y.ndim == 1 and p == 1:
+        y = y[:, None, None]
     if y.ndim != 3:
-        raise ValueError(f"measurements must have the shape (steps, runs, p), got {y.shape}; one trajectory is y[:, None, :]")
-    if y.shape[2] != one.model.p:
-        raise ValueError(f"{one.name} expects {one.model.p} measurement component(s), got {y.shape[2]}")
+        raise ValueError(f"measurements must have the shape (steps, runs, {p}), got {y.shape}{_reshaped(y, p)}")
+    if y.shape[2] != p:
+        raise ValueError(f"{one.name} expects {p} measurement component(s), got {y.shape[2]}")
     return list(accumulate(y, one.step, initial=one.init(y.shape[1])))
+
+
+def _reshaped(y: Array, p: int) -> str:
+    """How measurements of two axes may be meant."""
+    if y.ndim != 2:
+        return ""
+    ways = ["y[:, None, :] if the columns are components of one trajectory"] if y.shape[1] == p else []
+    ways += ["y[:, :, None] if they are trajectories"] if p == 1 else []
+    return ": give " + " or ".join(ways) if ways else ""
 
 
 def compare(
@@ -67,10 +93,12 @@ def compare(
     model: Model,
     runs: int,
     steps: int,
-    seed: int,
+    seed: Seed,
     *,
     design_runs: int | None = None,
+    designs: int = 1,
     same_ensemble: bool = False,
+    wide: float = 1.0,
     subset_runs: int = 500,
     subset_seconds: float | None = None,
     threads: int = 2,
@@ -85,13 +113,20 @@ def compare(
     model : Model
     runs, steps : int
         Trajectories, and measurements of each.
-    seed : int
+    seed : int or numpy.random.Generator
         The same seed gives the same numbers, whatever the number of threads.
     design_runs : int, optional
         Size of the design ensemble; `runs` by default.
+    designs : int
+        Designed filters are designed on so many ensembles.  The first design is reported; how the others differ from it on the
+        common trajectories goes into the standard errors.  With 1 these hold for the filters just as they were designed.
     same_ensemble : bool
         Design on the very trajectories of the comparison, as the lab does: optimistic for the designed
         filters, by about the number of coefficients over `runs`.
+    wide : float
+        Draw the initial states of the comparison from a law so many times as wide as the prior, and weight every trajectory with
+        the ratio of the two densities (importance sampling).  Where rare far starts dominate the error, 1.5 or 2 gives the
+        standard errors of many times the trajectories.
     subset_runs : int
         Slow filters (exact, particle) run on this many of the common trajectories; their error variance
         is found through the paired difference from the Gaussian AOF (or else the first fast filter).  0 leaves them out.
@@ -111,28 +146,30 @@ def compare(
     NotFinite
         A trajectory or a filter left the finite numbers.
     """
-    _check_arguments(filters, model, seed, subset_runs, subset_seconds)
+    _check_arguments(filters, model, subset_runs, subset_seconds)
+    _check_designs(designs, same_ensemble, wide)
+    seed = seed_number(seed)
     names = [one.name for one in filters]
     slow = [one for one in filters if one.slow and subset_runs]
     fast = [one for one in filters if not one.slow]
-    run_seed, design_seed = np.random.SeedSequence(seed).spawn(2)
-    common = Ensemble(model, runs, steps, run_seed)
-    design_ensemble = (
-        common if same_ensemble else Ensemble(model, runs if design_runs is None else design_runs, steps, design_seed)
-    )
+    run_seed, *design_seeds = np.random.SeedSequence(seed).spawn(1 + designs)
+    common = Ensemble(model, runs, steps, run_seed, wide)
+    size = runs if design_runs is None else design_runs
+    design_ensemble, *others = [common] if same_ensemble else [Ensemble(model, size, steps, one) for one in design_seeds]
+    to_design = [one for one in fast if isinstance(one, Design)]
     with workers(threads) as pool:
         ready = _designed(fast, design_ensemble, pool, progress)
-        sums = _run_blocks(ready, common, pool, progress)
+        again = [_designed(to_design, one, pool, progress) for one in others]
+        everything = _run_blocks([*ready, *chain(*again)], common, pool, progress)
+        sums, replicas = _split(everything, fast, len(others))
         subset, left_out = None, dict[str, str]()
         if slow:
             slow_ready = _designed(slow, design_ensemble, pool, progress)
             subset, left_out = run_subset(ready, slow_ready, common, min(subset_runs, runs), subset_seconds, progress)
-    return Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset, left_out)
+    return Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset, left_out, replicas)
 
 
-def _check_arguments(
-    filters: Sequence[Filter | Design], model: Model, seed: int, subset_runs: int, subset_seconds: float | None
-) -> None:
+def _check_arguments(filters: Sequence[Filter | Design], model: Model, subset_runs: int, subset_seconds: float | None) -> None:
     """ValueError for what `compare` cannot do with these arguments."""
     names = [one.name for one in filters]
     if len(set(names)) < len(names) or not names:
@@ -143,14 +180,32 @@ def _check_arguments(
         raise ValueError(f"subset_runs must not be negative, got {subset_runs}")
     if subset_seconds is not None and not subset_seconds > 0:
         raise ValueError(f"subset_seconds must be positive, got {subset_seconds}; subset_runs=0 leaves the slow filters out")
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise ValueError(f"the seed must be a non-negative whole number, got {seed!r}")
     for one in filters:
         if (one.model.n, one.model.p) != (model.n, model.p):
             raise ValueError(
                 f"{one.name} was built for a model with {one.model.n} states and {one.model.p} measurements; "
                 f"this one has {model.n} and {model.p}"
             )
+
+
+def _check_designs(designs: int, same_ensemble: bool, wide: float) -> None:
+    if isinstance(designs, bool) or not isinstance(designs, int | np.integer) or designs < 1:
+        raise ValueError(f"designs must be a positive whole number, got {designs!r}")
+    if designs > 1 and same_ensemble:
+        raise ValueError("there is one ensemble of the comparison: same_ensemble=True goes with designs=1 only")
+    if same_ensemble and wide != 1:
+        raise ValueError("a design weighs all its trajectories alike: same_ensemble=True goes with wide=1 only")
+
+
+def _split(sums: Sums, fast: Sequence[Filter | Design], again: int) -> tuple[Sums, Replicas | None]:
+    """Sums of the fast filters, and of the designed ones for each of their designs."""
+    own = sums.of_filters(slice(len(fast)))
+    designed = [i for i, one in enumerate(fast) if isinstance(one, Design)]
+    if not designed or not again:
+        return own, None
+    starts = [len(fast) + len(designed) * i for i in range(again)]
+    others = (sums.of_filters(slice(start, start + len(designed))) for start in starts)
+    return own, Replicas(tuple(fast[i].name for i in designed), (own.of_filters(designed), *others))
 
 
 def _designed(filters: Sequence[Filter | Design], ensemble: Ensemble, pool: Executor, progress: bool | None) -> list[Filter]:
@@ -169,7 +224,7 @@ def _run_blocks(filters: Sequence[Filter], ensemble: Ensemble, pool: Executor, p
     def block(index: int) -> Sums:
         size = ensemble.sizes[index]
         sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, size, max(1, round(BATCHES * size / ensemble.runs)))
-        run_block(filters, ensemble.block(index), sums)
+        run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight)
         return sums
 
     indices = range(len(ensemble.sizes))

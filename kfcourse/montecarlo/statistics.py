@@ -25,13 +25,13 @@ class Estimate:
     Attributes
     ----------
     value, standard_error : ndarray, any shape
-    freedom : int
-        Degrees of freedom of the standard error (batches - 1).
+    freedom : int or ndarray
+        Degrees of freedom of the standard error (batches - 1; fewer where it was found from few designs).
     """
 
     value: Array
     standard_error: Array
-    freedom: int
+    freedom: int | Array
 
     def interval(self, confidence: float = 0.95) -> tuple[Array, Array]:
         """Lower and upper limit of the confidence interval (Student's t)."""
@@ -46,7 +46,8 @@ class Estimate:
         return stats.t.ppf(0.5 + confidence / 2, self.freedom) * self.standard_error
 
     def __getitem__(self, index) -> Estimate:
-        return Estimate(self.value[index], self.standard_error[index], self.freedom)
+        freedom = self.freedom[index] if isinstance(self.freedom, np.ndarray) and self.freedom.ndim else self.freedom
+        return Estimate(self.value[index], self.standard_error[index], freedom)
 
 
 def batch_mean(sums: Array, counts: Array) -> Estimate:
@@ -108,35 +109,52 @@ class Sums:
         """Sums over the batches of all parts."""
         return cls(*(np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in cls.__dataclass_fields__))
 
-    def record(self, filter_index: int, step: int, x: Array, estimate: Gaussian) -> None:
-        """Add one step of one filter: true states x (N, n) and its estimate."""
+    def of_filters(self, chosen: slice | list[int]) -> Sums:
+        """Those of some of the filters."""
+        return Sums(self.counts, *(getattr(self, name)[chosen] for name in list(self.__dataclass_fields__)[1:]))
+
+    def record(self, filter_index: int, step: int, x: Array, estimate: Gaussian, weight: Array | None = None) -> None:
+        """Add one step of one filter: true states x (N, n) and its estimate; with a weight (N,) of each trajectory."""
         mean, cov = estimate
-        starts = self._starts
         error = x - mean
         own = np.diagonal(cov, axis1=-2, axis2=-1)
         for i in range(error.shape[1]):
-            self.error[filter_index, step, i] = np.add.reduceat(error[:, i], starts)
+            self.error[filter_index, step, i] = self._sums(error[:, i], weight)
             square = error[:, i] * error[:, i]
-            self.square[filter_index, step, i] = np.add.reduceat(square, starts)
-            self.own[filter_index, step, i] = np.add.reduceat(own[:, i], starts) if own.ndim == 2 else own[i] * self.counts
+            self.square[filter_index, step, i] = self._sums(square, weight)
+            alike = own.ndim == 1 and weight is None
+            self.own[filter_index, step, i] = own[i] * self.counts if alike else self._sums(_spread(own, len(x))[:, i], weight)
         if error.shape[1] > 1:
-            self.normalised[filter_index, step] = np.add.reduceat(normalised_square(error, cov), starts) / error.shape[1]
+            self.normalised[filter_index, step] = self._sums(normalised_square(error, cov), weight) / error.shape[1]
         elif own.ndim == 2:
             with np.errstate(divide="ignore", invalid="ignore"):
-                quotients = np.add.reduceat(square / own[:, 0], starts)
+                quotients = self._sums(square / own[:, 0], weight)
             if np.isnan(quotients).any():
-                quotients = np.add.reduceat(_quotient(square, own[:, 0]), starts)
+                quotients = self._sums(_quotient(square, own[:, 0]), weight)
             self.normalised[filter_index, step] = quotients
         else:  # one variance for the whole ensemble: the sums of squares are there already
             self.normalised[filter_index, step] = _quotient(self.square[filter_index, step, 0], own)
 
-    def record_distance(self, filter_index: int, step: int, mean: Array, reference: Array) -> None:
-        """Add one step of squared distances between two filters' estimates (N, n)."""
-        self.distance[filter_index, step] = np.add.reduceat(((mean - reference) ** 2).sum(axis=1), self._starts)
+    def record_distance(
+        self, filter_index: int, step: int, mean: Array, reference: tuple[Array, Array], weight: Array | None = None
+    ) -> None:
+        """Add one step of (z - z_a)^T (z - z_b), z a filter's estimate (N, n), z_a and z_b two of the reference.
+
+        A squared distance if these are the same; else its mean does not hold their errors, if those are independent.
+        """
+        first, second = reference
+        self.distance[filter_index, step] = self._sums(((mean - first) * (mean - second)).sum(axis=1), weight)
+
+    def _sums(self, values: Array, weight: Array | None) -> Array:
+        return np.add.reduceat(values if weight is None else values * weight, self._starts)
 
     @cached_property
     def _starts(self) -> Array:
         return np.concatenate([[0], np.cumsum(self.counts[:-1])]).astype(int)
+
+
+def _spread(own: Array, runs: int) -> Array:
+    return np.broadcast_to(own, (runs, own.shape[-1]))
 
 
 def _quotient(square: Array, variance: Array) -> Array:

@@ -7,14 +7,16 @@ stops, and nothing else.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import TypeVar
 
 import numpy as np
 from tqdm import tqdm
 
+from kfcourse.angles import near
 from kfcourse.filters.base import Filter, State
+from kfcourse.filters.particles import Particles
 from kfcourse.laws import Array
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Subset
@@ -50,7 +52,7 @@ def run_subset(
     while running := [one for one in slow if one.name not in left_out]:
         names = [one.name for one in running]
         try:
-            sums = _chunks_in_time([*fast, *running], data, end, progress)
+            sums = _chunks_in_time([*fast, *running], ensemble, data, end, progress)
         except _Failed as failed:
             left_out[failed.name] = failed.reason
             continue
@@ -62,7 +64,7 @@ def run_subset(
 
 
 def _chunks_in_time(
-    filters: Sequence[Filter], data: tuple[Array, Array, Array], end: float | None, progress: bool | None
+    filters: Sequence[Filter], ensemble: Ensemble, data: tuple[Array, Array, Array], end: float | None, progress: bool | None
 ) -> list[Sums]:
     """Sums over the chunks that are done in time."""
     names = [one.name for one in filters]
@@ -80,7 +82,7 @@ def _chunks_in_time(
         sums = Sums.empty(len(filters), steps, n, count, max(1, count // BATCH))
         try:
             with _until(end):
-                run_block(filters, instants, sums, reference)
+                run_block(filters, instants, sums, reference, ensemble.weight)
         except OutOfTime:
             break
         found.append(sums)
@@ -100,22 +102,43 @@ def _rows(size: int) -> Iterator[slice]:
         start, index = stop, index + 1
 
 
-def run_block(filters: Sequence[Filter], instants: Iterable[Instant], sums: Sums, reference: int | None = None) -> None:
+def run_block(
+    filters: Sequence[Filter],
+    instants: Iterable[Instant],
+    sums: Sums,
+    reference: int | None = None,
+    weight_of: Callable[[Array], Array | None] = lambda x: None,
+) -> None:
     """Advance all filters together over the steps of one block of trajectories.
 
-    With a reference filter, the distance of every other estimate from its own is recorded too.
+    With a reference filter, the distance of every other estimate from its own is recorded too.  The initial states tell the
+    weights of the trajectories.
     """
-    size = int(sums.counts.sum())
+    size, weight = int(sums.counts.sum()), None
     states = [one.init(size) for one in filters]
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
         for k, instant in enumerate(instants):
+            weight = weight_of(instant.x) if k == 0 else weight
             for i, one in enumerate(filters):
                 states[i] = _step(one, states[i], instant.y)
-                sums.record(i, k, instant.x, states[i].posterior)
+                estimate = states[i].posterior
+                sums.record(i, k, near(instant.x, estimate.mean, one.model.angles.x), estimate, weight)
             if reference is not None:
+                twice = _twice(states[reference])
                 for i, state in enumerate(states):
-                    sums.record_distance(i, k, state.posterior.mean, states[reference].posterior.mean)
+                    if i != reference:
+                        mean, angles = state.posterior.mean, filters[i].model.angles.x
+                        first, second = (near(one, mean, angles) for one in twice)
+                        sums.record_distance(i, k, mean, (first, second), weight)
     _check_finite(filters, sums)
+
+
+def _twice(state: State) -> tuple[Array, Array]:
+    """Two estimates of the reference whose errors, if it has any, are independent: those of both clouds of particles."""
+    if isinstance(state.memory, Particles):
+        first, second = state.memory.halves
+        return first, second
+    return state.posterior.mean, state.posterior.mean
 
 
 def _step(one: Filter, state: State, y: Array) -> State:

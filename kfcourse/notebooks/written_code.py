@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,6 +12,8 @@ from sympy.printing.str import StrPrinter
 from kfcourse.checks import Exercise
 from kfcourse.symbolic.sides import Side, plain
 from kfcourse.symbolic.structure import Structure
+
+COLUMNS = 70  # of the page's 78, less the indents of a function and of its brackets
 
 
 class Solutions:
@@ -47,10 +50,26 @@ class Solutions:
                 entries = ", ".join(f"{cov_name}[{i}, {j}]" for i, j in upper)
                 lines.append(f"{', '.join(str(part.cov[i, j]) for i, j in upper)} = {entries}")
         if len(formulas) == 1:
-            lines += [f"return {python(formula)}" for formula in formulas.values()]
+            lines += returned(python(*formulas.values()))
         else:
-            lines += ["return (", *(f"    {python(formula)},  # {name}" for name, formula in formulas.items()), ")"]
+            values = (folded(f"{python(formula)},  # {name}") for name, formula in formulas.items())
+            lines += ["return (", *("    " + line for value in values for line in value), ")"]
         return "\n".join(lines)
+
+
+def returned(code: str) -> list[str]:
+    """A return statement, in brackets where it takes several lines."""
+    lines = folded(code)
+    return [f"return {code}"] if len(lines) == 1 else ["return (", *("    " + line for line in lines), ")"]
+
+
+def folded(code: str) -> list[str]:
+    """Code that stands in brackets, in lines that fit the page; a comment at its end gets a line of its own above."""
+    if len(code) <= COLUMNS:
+        return [code]
+    code, *comment = code.split("  # ")
+    lines = textwrap.wrap(code, COLUMNS, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+    return ["# " + name for name in comment] + lines
 
 
 def python(formula: Any) -> str:

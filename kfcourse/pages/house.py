@@ -29,8 +29,10 @@ LAYERS = (
     "linear",
     "symbolic",
     "laws",
+    "angles",
     "limits",
     "files",
+    "seeds",
 )
 
 

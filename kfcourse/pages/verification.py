@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.pages.typesetting import Equation, Side, equation_latex
+from kfcourse.symbolic.typesetting import Equation, Side, equation_latex
 
 VERIFIED = "application/vnd.kfcourse.verified+json"  # what the build collects
 BY_IDENTITY = "identity, by SymPy"
@@ -180,8 +180,10 @@ def difference(left: Any, right: Any, where: Mapping[Any, Any] | None = None) ->
 
 def _substituted(side: Any, where: Mapping[Any, Any]) -> Any:
     side = sp.sympify(side)
+    matrices = {name: sp.sympify(value).as_explicit() for name, value in where.items() if isinstance(name, sp.MatrixSymbol)}
+    others = {name: value for name, value in where.items() if name not in matrices}
     for _ in range(len(where)):  # definitions may use each other
-        replaced = side.subs(where, simultaneous=True)
+        replaced = side.xreplace(matrices).subs(others, simultaneous=True)  # subs takes no matrices all at once
         if replaced == side:
             break
         side = replaced
@@ -190,6 +192,8 @@ def _substituted(side: Any, where: Mapping[Any, Any]) -> Any:
 
 def _simple(expression: sp.Expr) -> sp.Expr:
     """Zero if SymPy can show it; sums of logarithms vanish when the product under them is one."""
+    if expression.is_rational_function():
+        return sp.cancel(expression)
     rest = sp.expand(expression)
     if rest != 0:
         rest = sp.simplify(rest)

@@ -28,6 +28,7 @@ from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.arithmetic import predict_law
 from kfcourse.linear.runs import Run, run
 from kfcourse.linear.system import LinearSystem
+from kfcourse.seeds import Seed
 
 DT = sp.Symbol("Delta", positive=True)
 _AXES = sp.eye(2)
@@ -204,12 +205,12 @@ class HandTrack:
 SHORTEST, FITTS, OVERLAP, PAUSE = 100.0, (0.1, 0.15, 20.0), 0.4, 0.3
 
 
-def hand_track(seed: int, strokes: int = 14, screen: tuple[float, float] = (640.0, 400.0)) -> HandTrack:
+def hand_track(seed: Seed, strokes: int = 14, screen: tuple[float, float] = (640.0, 400.0)) -> HandTrack:
     """A track like that of a hand: strokes between random targets on a screen, with pauses and overlaps.
 
     Parameters
     ----------
-    seed : int
+    seed : int or numpy.random.Generator
     strokes : int
         A stroke takes about 0.7 s.
     screen : tuple of float
@@ -253,7 +254,7 @@ class Samples(NamedTuple):
     y: Array
 
 
-def sample(track: HandTrack, interval: float, measurement_sd: float, runs: int, seed: int) -> Samples:
+def sample(track: HandTrack, interval: float, measurement_sd: float, runs: int, seed: Seed) -> Samples:
     """The track every `interval` seconds from its start to its end, with `runs` realisations of white noise added."""
     _positive(interval=interval)
     if not (np.isfinite(measurement_sd) and measurement_sd >= 0):

@@ -2,6 +2,7 @@
 
 formula      formulas typed by people, read without executing them
 reading      the other things that people write of a model: names, numbers, laws
+angular      which components are angles
 model        `Model`: object, meter, noises, prior
 equations    its two equations as functions of arrays
 moments      exact moments of functions of normal variables

@@ -16,6 +16,8 @@ import sympy as sp
 from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.precedence import PRECEDENCE
 
+from kfcourse.symbolic.reading import ModelError
+
 
 @dataclass(frozen=True)
 class Program:
@@ -159,7 +161,12 @@ class _Printer(NumPyPrinter):
     _print_Dummy = _print_Symbol
 
     def _print_Rational(self, expr: sp.Rational) -> str:
-        return repr(float(expr))
+        value = float(expr) if abs(expr) < 2**1023 else np.inf
+        if not np.isfinite(value) or (expr and not value):
+            raise ModelError(
+                f"the derived functions hold the number {sp.N(expr, 3)}, beyond what a float can be; change the units"
+            )
+        return repr(value)
 
     _print_Integer = _print_Rational
     _print_Half = _print_Rational
@@ -171,7 +178,7 @@ class _Printer(NumPyPrinter):
         numerators = [a for a in others if a not in denominators]
         factors = [self.parenthesize(a, PRECEDENCE["Mul"]) for a in numerators]
         if rational not in (1, -1) or not factors:
-            factors.insert(0, repr(float(rational)))
+            factors.insert(0, self._print_Rational(rational))
             rational = sp.S.One
         text = ("-" if rational == -1 else "") + "*".join(factors)
         for d in denominators:

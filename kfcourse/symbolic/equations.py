@@ -2,35 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Protocol
 
 import sympy as sp
 
 from kfcourse.laws import Array
-from kfcourse.symbolic.codegen import compile_function
+from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import exact_matrix
 
 
-def compile_model(model: Model) -> tuple[Callable[[Array, Array], Array], Callable[[Array, Array], Array]]:
-    """The state and meter equations as functions of arrays: (x (..., n), v (..., r)) -> (..., n)."""
-    state = _compile_equation("state", model.state_equation, {"x": model.x, "v": model.v}, model)
-    meter = _compile_equation("meter", model.meter_equation, {"x": model.x, "w": model.w}, model)
-    return lambda x, v: state(x, v)[0], lambda x, w: meter(x, w)[0]
+class Equation(Protocol):
+    """a(x, v) or b(x, w), (x (..., n), v (..., r)) -> (..., n) or (..., p); of a model that depends on the step, at step k."""
+
+    def __call__(self, x: Array, noise: Array, k: int | None = None) -> Array: ...
 
 
-def compile_noiseless(model: Model) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
+class Noiseless(Protocol):
+    """a(x, m_v) or b(x, m_w), x (..., n) -> (..., n) or (..., p); of a model that depends on the step, at step k."""
+
+    def __call__(self, x: Array, k: int | None = None) -> Array: ...
+
+
+def compile_model(model: Model) -> tuple[Equation, Equation]:
+    """The state and meter equations as functions of arrays: (x (..., n), v (..., r)) -> (..., n).
+
+    Those of a model that depends on the step need it: `state(x, v, k)`.
+    """
+    state = _compiled("state", model.state_equation, {"x": model.x, "v": model.v}, model)
+    meter = _compiled("meter", model.meter_equation, {"x": model.x, "w": model.w}, model)
+    return lambda x, v, k=None: state.at(k)(x, v)[0], lambda x, w, k=None: meter.at(k)(x, w)[0]
+
+
+def compile_noiseless(model: Model) -> tuple[Noiseless, Noiseless]:
     """a(x, m_v) and b(x, m_w), the equations with the noises at their means: x (..., n) -> (..., n), (..., p)."""
     state_equation = model.state_equation.subs(dict(zip(model.v, exact_matrix(model.state_noise.mean), strict=True)))
     meter_equation = model.meter_equation.subs(dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True)))
-    state = _compile_equation("state", state_equation, {"x": model.x}, model)
-    meter = _compile_equation("meter", meter_equation, {"x": model.x}, model)
-    return lambda x: state(x)[0], lambda x: meter(x)[0]
+    state = _compiled("state", state_equation, {"x": model.x}, model)
+    meter = _compiled("meter", meter_equation, {"x": model.x}, model)
+    return lambda x, k=None: state.at(k)(x)[0], lambda x, k=None: meter.at(k)(x)[0]
 
 
-def _compile_equation(
-    name: str, equation: sp.MatrixBase, arguments: dict[str, tuple[sp.Symbol, ...]], model: Model
-) -> Callable[..., tuple[Array]]:
+def _compiled(name: str, equation: sp.MatrixBase, arguments: dict[str, tuple[sp.Symbol, ...]], model: Model) -> Stepwise:
     matrices = {key: sp.Matrix(symbols) for key, symbols in arguments.items()}
     numeric = equation.subs(model.values)
-    return compile_function(name, matrices, {name: numeric}, [*arguments, name], f"{name} equation of {model}").function
+    return Stepwise.compile(model.known, name, matrices, {name: numeric}, [*arguments, name], f"{name} equation of {model}")

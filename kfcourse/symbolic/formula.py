@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import ast
 import keyword
-import math
 import re
+import unicodedata
+from collections.abc import Callable
+from itertools import pairwise
 
 import sympy as sp
+from sympy.logic.boolalg import Boolean
 
 FUNCTIONS = {
     "sin": sp.sin,
@@ -27,10 +30,23 @@ FUNCTIONS = {
     "sinh": sp.sinh,
     "cosh": sp.cosh,
     "abs": sp.Abs,
+    "Abs": sp.Abs,
+    "sign": sp.sign,
+    "Heaviside": sp.Heaviside,
 }
 ARGUMENTS = {"atan2": 2}  # how many a function takes; 1 if not named here.  atan2(y, x) is the angle of the point (x, y)
 CONSTANTS = {"pi": sp.pi}
+PIECEWISE = "Piecewise"  # Piecewise((x, x < 1), (1, True)), which may also be typed as x if x < 1 else 1
+COMPARISONS: dict[type[ast.cmpop], Callable[[sp.Expr, sp.Expr], Boolean]] = {
+    ast.Lt: sp.Lt,
+    ast.LtE: sp.Le,
+    ast.Gt: sp.Gt,
+    ast.GtE: sp.Ge,
+    ast.Eq: sp.Eq,
+    ast.NotEq: sp.Ne,
+}
 
+LARGEST = 1e100  # numbers beyond it, or below 1/LARGEST: products of some would leave the floats
 MAX_LENGTH = 2000
 MAX_EXPONENT = 16
 MAX_DEGREE = 24
@@ -43,7 +59,7 @@ class FormulaError(ValueError):
     """A formula cannot be read; the message shows the formula and points at the place."""
 
     def __init__(self, formula: str, problem: str, column: int = 0):
-        line = " ".join(formula.split("\n"))
+        line = "".join(c if c.isprintable() else " " for c in formula)
         shown = line if len(line) <= 100 else line[:97] + "..."
         pointer = f"\n    {' ' * column}^" if column < 100 else ""
         super().__init__(f"{problem}\n    {shown}{pointer}")
@@ -61,7 +77,7 @@ def check_name(name: str) -> str:
         raise ValueError(f"{name!r} cannot name a symbol: use letters, digits and _, a letter first")
     if keyword.iskeyword(name):
         raise ValueError(f"{name!r} is a reserved word of Python; choose another name, such as {name}_")
-    if name in FUNCTIONS or name in CONSTANTS:
+    if name in FUNCTIONS or name in CONSTANTS or name == PIECEWISE:
         raise ValueError(f"{name!r} already means a function or constant in formulas; choose another name")
     return name
 
@@ -72,7 +88,8 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
     Parameters
     ----------
     formula : str
-        Arithmetic (``+ - * / **``), numbers, the functions of `FUNCTIONS`, ``pi`` and the names in `symbols`.
+        Arithmetic (``+ - * / **``), numbers, the functions of `FUNCTIONS`, ``pi``, the names in `symbols`, and choices:
+        ``2 if t < 45 else 0``, or ``Piecewise((2, t < 45), (0, True))``.
     symbols : dict
         Name to SymPy symbol; any other name is an error.
 
@@ -93,8 +110,8 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
         raise FormulaError(formula, "the formula is empty")
     if len(formula) > MAX_LENGTH:
         raise FormulaError(formula, f"the formula has {len(formula)} characters; at most {MAX_LENGTH} are read")
-    if "^" in formula:
-        raise FormulaError(formula, "^ is not a power here; write ** (x**2)", formula.index("^"))
+    formula = re.sub(r"[\t\n\r]", " ", formula)  # of a text over several lines
+    _check_characters(formula)
     offset = len(formula) - len(formula.lstrip())
     try:
         tree = ast.parse(formula.strip(), mode="eval").body
@@ -113,6 +130,26 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
     if expression.has(sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I):
         raise FormulaError(formula, "the formula has no finite real value (division by zero or root of a negative?)")
     return expression
+
+
+# Typed for what formulas are made of: Cyrillic letters that look Latin, and signs of printed mathematics.
+_LOOKS_LIKE = dict(zip("асеорхуАВСЕНКМОРТХ−–·×⋅∙÷", "aceopxyABCEHKMOPTX--****/", strict=True))
+_INSTEAD = {"^": "** for a power (x**2)", "#": "comments elsewhere"}
+
+
+def _check_characters(formula: str) -> None:
+    """FormulaError at the first character that formulas have not: Python would take ſ for s, and end at #."""
+    for column, character in enumerate(formula):
+        if character.isascii() and character.isprintable() and character not in "^#":
+            continue
+        plain = _LOOKS_LIKE.get(character, unicodedata.normalize("NFKC", character))
+        plain = f"**{plain}" if unicodedata.category(character) == "No" else plain  # x²
+        instead = _INSTEAD.get(character) or (
+            f"{plain} of the English keyboard" if plain.isascii() and plain.isprintable() else ""
+        )
+        name = unicodedata.name(character, f"U+{ord(character):04X}").lower()
+        shown = character if character.isprintable() else "a character"
+        raise FormulaError(formula, f"{shown} ({name}) has no meaning in a formula{'; write ' * bool(instead)}{instead}", column)
 
 
 class _Reader:
@@ -145,16 +182,22 @@ class _Reader:
                 return self.read(node.left) / self.read(node.right)
             case ast.BinOp(op=ast.Pow()):
                 return self.power(node)
+            case ast.Call(func=ast.Name(id="Piecewise")):
+                return self.piecewise(node)
             case ast.Call():
                 return self.call(node)
+            case ast.IfExp():
+                return sp.Piecewise((self.read(node.body), self.condition(node.test)), (self.read(node.orelse), True))
         raise self.fail(node, f"{type(node).__name__} is not allowed in a formula; only + - * / ** numbers, names, functions")
 
     def number(self, node: ast.Constant) -> sp.Expr:
         value = node.value
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise self.fail(node, f"{value!r} is not a finite real number")
-        if value and not 1e-100 < abs(value) < 1e100:
-            raise self.fail(node, "the number is too large or too small")
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.fail(node, f"{value!r} is not a real number")
+        written = ast.get_source_segment(self.formula[self.offset :], node) or ""
+        lost = not value and not written.startswith(("0x", "0o", "0b")) and re.match(r"[0._]*[1-9]", written)  # 1e-400 is 0.0
+        if lost or (value and not 1 / LARGEST < abs(value) < LARGEST):
+            raise self.fail(node, "the number is too large or too small (1e-100 to 1e100 are read): change the units")
         return sp.Rational(str(value))
 
     def name(self, node: ast.Name) -> sp.Expr:
@@ -180,6 +223,29 @@ class _Reader:
         if _degree(result) > MAX_DEGREE:
             raise self.fail(node, f"powers of powers above degree {MAX_DEGREE}; simplify the formula")
         return result
+
+    def piecewise(self, node: ast.Call) -> sp.Expr:
+        pairs = [arg.elts for arg in node.args if isinstance(arg, ast.Tuple) and len(arg.elts) == 2]
+        if node.keywords or not pairs or len(pairs) < len(node.args):
+            raise self.fail(node, "Piecewise takes pairs (formula, condition), as in Piecewise((x, x < 1), (1, True))")
+        read = [(self.read(formula), self.condition(condition)) for formula, condition in pairs]
+        if read[-1][1] is not sp.true:
+            raise self.fail(node, "the last pair of Piecewise holds for the rest and must have the condition True")
+        return sp.Piecewise(*read)
+
+    def condition(self, node: ast.expr) -> Boolean:
+        match node:
+            case ast.Constant(value=bool()):
+                return sp.true if node.value else sp.false
+            case ast.Compare() if all(type(one) in COMPARISONS for one in node.ops):
+                sides = [self.read(one) for one in (node.left, *node.comparators)]
+                found = [COMPARISONS[type(one)](*both) for one, both in zip(node.ops, pairwise(sides), strict=True)]
+                return sp.And(*found)
+            case ast.BoolOp():
+                return (sp.And if isinstance(node.op, ast.And) else sp.Or)(*map(self.condition, node.values))
+            case ast.UnaryOp(op=ast.Not()):
+                return sp.Not(self.condition(node.operand))
+        raise self.fail(node, "a condition compares: x < 1, 30 <= t < 45, k == 20, joined by `and`, `or`, `not`")
 
     def call(self, node: ast.Call) -> sp.Expr:
         if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:

@@ -12,15 +12,18 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import sympy as sp
 
+from kfcourse.angles import Angles
 from kfcourse.laws import Gaussian
+from kfcourse.symbolic.angular import read_angles, warn_of_angles
 from kfcourse.symbolic.formula import symbol
+from kfcourse.symbolic.known import Known, varying_law
 from kfcourse.symbolic.reading import (
     Formulas,
     ModelError,
@@ -34,6 +37,8 @@ from kfcourse.symbolic.reading import (
     read,
     table,
 )
+from kfcourse.symbolic.sense import not_computable
+from kfcourse.symbolic.writing import formula_latex
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,10 @@ class Model:
         Parameter name to value (exact rational numbers).
     prior, state_noise, meter_noise : Gaussian
         Laws of x_0, v_k, w_k: mean (n,) and covariance (n, n).
+    known : Known
+        What is known of every step: its number k, its time t, and the inputs that the equations contain.
+    angles : Angles
+        Numbers of the components of x and of y that are angles, kept between -pi and pi.
     """
 
     state_equation: sp.ImmutableMatrix
@@ -61,6 +70,8 @@ class Model:
     prior: Gaussian = field(compare=False)
     state_noise: Gaussian = field(compare=False)
     meter_noise: Gaussian = field(compare=False)
+    angles: Angles = field(default_factory=Angles)
+    known: Known = field(default_factory=Known)
 
     @classmethod
     def define(
@@ -73,21 +84,32 @@ class Model:
         prior: Mapping[str, Any] | None = None,
         state_noise: Mapping[str, Any] | None = None,
         meter_noise: Mapping[str, Any] | None = None,
+        angles: Names | Mapping[str, Names] | None = None,
+        inputs: Mapping[str, Sequence[float]] | None = None,
+        interval: float = 1,
     ) -> Model:
         """Build a model from formulas.
 
         Parameters
         ----------
         state, meter : str, sympy expression, or a list of them
-            a(x, v) and b(x, w).  A single formula is a scalar model in x, v, w; lists of formulas use
-            x1, x2, ..., v1, ..., w1, ... unless `symbols` names them.
+            a(x, v) and b(x, w), which may contain the step's number k, its time t, and inputs.  A single formula is a
+            scalar model in x, v, w; lists of formulas use x1, x2, ..., v1, ..., w1, ... unless `symbols` names them.
         parameters : dict
             Name to number, for every other symbol in the formulas.
         symbols : dict, optional
             Keys "x", "v", "w": lists of names.
         prior, state_noise, meter_noise : dict, optional
             Keys "mean" and "variance" (number, list of variances, or covariance matrix).  Standard
-            normal by default.
+            normal by default.  Means and variances of noises may be formulas of k, t, the inputs and the parameters, such as
+            "0.1 + 0.02*k": the noises are then standard, and these formulas go into the equations.
+        angles : list of names, or dict, optional
+            Components that are angles in radians, such as ["y2"], or {"x": ["psi"], "y": ["y2"]}: they are kept between -pi and
+            pi, and every filter takes their innovations, means and errors the short way round.  [] says that there are none.
+        inputs : dict, optional
+            Name to a list of values, those at the steps 0, 1, 2...: one sequence for all trajectories.
+        interval : float
+            Time between two steps, in the unit of t: t = interval * k.  Where k and t name something else, they mean that.
 
         Raises
         ------
@@ -96,22 +118,33 @@ class Model:
         ModelError
             The parts do not fit together.
 
+        Warns
+        -----
+        AngleWarning
+            A formula finds an angle by atan2, which jumps by a turn, and `angles` is not given.
+
         Examples
         --------
         >>> Model.define("c*x + e*x*v", "g*x + f*x**2*w", dict(c=0.9, e=0.05, g=1, f=0.02))
         Model(x' = c*x + e*v*x, y = f*w*x**2 + g*x; c = 9/10, e = 1/20, g = 1, f = 1/50)
         """
         values = {checked_name(name): exact_number(name, value) for name, value in table("parameters", parameters).items()}
-        a, b = formula_list("state", state), formula_list("meter", meter)
+        a, b, known = formula_list("state", state), formula_list("meter", meter), Known.read(interval, inputs)
         used = {name for formula in (*a, *b) for name in names_in(formula)}
-        named = _symbols(symbols, values, used, len(a))
+        named = _symbols(symbols, [*values, *known.inputs], used, len(a))
         x, v, w = (tuple(symbol(name) for name in named[key]) for key in "xvw")
         if len(x) != len(a):
             raise ModelError(f"{len(a)} state equation(s) but {len(x)} state symbol(s) {named['x']}; there must be one each")
-        constants = {name: symbol(name) for name in values}
+        of_step = known.names([*values, *by_name(x, v, w)])
+        constants = {name: symbol(name) for name in values} | of_step
+        numbers = {symbol(name): value for name, value in values.items()}
+        change_v, state_noise = varying_law("state_noise", state_noise, v, constants, known, numbers)
+        change_w, meter_noise = varying_law("meter_noise", meter_noise, w, constants, known, numbers)
+        state_equation = sp.ImmutableMatrix([read(f, constants | by_name(x, v), "state") for f in a]).subs(change_v)
+        meter_equation = sp.ImmutableMatrix([read(f, constants | by_name(x, w), "meter") for f in b]).subs(change_w)
         model = cls(
-            sp.ImmutableMatrix([read(f, constants | by_name(x, v), "state") for f in a]),
-            sp.ImmutableMatrix([read(f, constants | by_name(x, w), "meter") for f in b]),
+            state_equation,
+            meter_equation,
             x,
             v,
             w,
@@ -119,12 +152,15 @@ class Model:
             law("prior", prior, len(x)),
             law("state_noise", state_noise, len(v)),
             law("meter_noise", meter_noise, len(w)),
+            read_angles(angles, [s.name for s in x], _measured(len(b))),
+            known.used(sp.Matrix([*state_equation, *meter_equation]), of_step),
         )
-        for equation in (*model.state_equation.subs(model.values), *model.meter_equation.subs(model.values)):
-            if equation.has(sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I) or any(
-                e.is_number and e.is_real is False for e in sp.preorder_traversal(equation)
-            ):
-                raise ModelError(f"with these parameters {model} has no finite real value: {equation}")
+        if angles is None:
+            warn_of_angles(dict(zip((s.name for s in x), model.state_equation, strict=True)))
+            warn_of_angles(dict(zip(model.measured, model.meter_equation, strict=True)))
+        for what, equation in {"state": model.state_equation, "meter": model.meter_equation}.items():
+            if problem := not_computable(equation, model.values):
+                raise ModelError(f"the {what} equation {problem}")
         if not model.meter_equation.has(*x):
             raise ModelError(f"the meter {list(model.meter_equation)} does not depend on the state {list(x)}: nothing to filter")
         return model
@@ -144,6 +180,16 @@ class Model:
         """Parameter symbols and their values, for `subs`."""
         return {symbol(name): value for name, value in self.parameters.items()}
 
+    @property
+    def timed(self) -> bool:
+        """Whether the equations depend on the step: on its number k, its time t or an input."""
+        return bool(self.known.symbols)
+
+    @property
+    def measured(self) -> list[str]:
+        """Names of the measurement's components: y, or y1, y2, ..."""
+        return _measured(self.p)
+
     def replace(self, **parameters: float) -> Model:
         """The same model with some parameters changed: ``model.replace(f=0.2)``."""
         unknown = sorted(set(parameters) - set(self.parameters))
@@ -156,21 +202,33 @@ class Model:
         """The two equations, and the parameters' values unless they are not wanted, as a LaTeX `aligned` block."""
         state = ["{" + sp.latex(x) + "}" for x in self.x]  # braces: a name may have an index of its own
         meter = ["y"] if self.p == 1 else [f"{{y_{{{i + 1}}}}}" for i in range(self.p)]
-        lines = [rf"{x}_{{k+1}} &= {sp.latex(formula)}" for x, formula in zip(state, self.state_equation, strict=True)]
-        lines += [rf"{y}_k &= {sp.latex(formula)}" for y, formula in zip(meter, self.meter_equation, strict=True)]
+        lines = [
+            rf"{x}_{{k+1}} &= {formula_latex(formula, self.x, self.v)}"
+            for x, formula in zip(state, self.state_equation, strict=True)
+        ]
+        lines += [
+            rf"{y}_k &= {formula_latex(formula, self.x, self.w)}" for y, formula in zip(meter, self.meter_equation, strict=True)
+        ]
+        lines += [rf"{name}_k &\in [-\pi, \pi]" for name in [state[i] for i in self.angles.x] + [meter[i] for i in self.angles.y]]
         if values:
-            lines += [rf"{sp.latex(name)} &= {float(value):g}" for name, value in self.values.items()]
+            lines += [rf"{sp.latex(name)} &= {float(value):g}" for name, value in self.values.items()] + self.known.latex()
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
     def __repr__(self) -> str:
         a = ", ".join(f"{name}' = {formula}" for name, formula in zip(self.x, self.state_equation, strict=True))
-        names = ["y"] if self.p == 1 else [f"y{i + 1}" for i in range(self.p)]
-        b = ", ".join(f"{name} = {formula}" for name, formula in zip(names, self.meter_equation, strict=True))
+        b = ", ".join(f"{name} = {formula}" for name, formula in zip(self.measured, self.meter_equation, strict=True))
         values = ", ".join(f"{name} = {value}" for name, value in self.parameters.items())
-        return f"Model({a}, {b}{'; ' if values else ''}{values})"
+        angles = ", ".join([self.x[i].name for i in self.angles.x] + [self.measured[i] for i in self.angles.y])
+        inputs = ", ".join(f"{name} ({len(sequence)} values)" for name, sequence in self.known.inputs.items())
+        parts = [values, f"angles {angles}" if angles else "", f"inputs {inputs}" if inputs else ""]
+        return f"Model({a}, {b}{''.join(f'; {part}' for part in parts if part)})"
 
 
-def _symbols(symbols: Mapping[str, Names] | None, values: Mapping[str, Any], used: set[str], n: int) -> dict[str, list[str]]:
+def _measured(p: int) -> list[str]:
+    return ["y"] if p == 1 else [f"y{i + 1}" for i in range(p)]
+
+
+def _symbols(symbols: Mapping[str, Names] | None, values: Sequence[str], used: set[str], n: int) -> dict[str, list[str]]:
     """Names of the state components and noises: given, or x, v, w with numbers as the formulas use them."""
     given = table("symbols", symbols)
     if set(given) - set("xvw"):
@@ -178,7 +236,12 @@ def _symbols(symbols: Mapping[str, Names] | None, values: Mapping[str, Any], use
     result = {}
     for key in "xvw":
         if key in given:
-            names: list[str] = [*([given[key]] if isinstance(given[key], str) else given[key])]
+            listed = [given[key]] if isinstance(given[key], str) else given[key]
+            if not isinstance(listed, Sequence):
+                raise ModelError(
+                    f'`symbols`: {key} must be a name or a list of names, such as ["{key}1", "{key}2"], got {listed!r}'
+                )
+            names: list[str] = [*listed]
         elif key == "x":
             names = ["x"] if n == 1 and "x1" not in used else [f"x{i + 1}" for i in range(n)]
         else:
@@ -187,8 +250,8 @@ def _symbols(symbols: Mapping[str, Names] | None, values: Mapping[str, Any], use
         if not names and key != "x":
             raise ModelError(f"`symbols` names no {key}; leave the key out, or give at least one name")
         result[key] = [checked_name(name) for name in names]
-    every = [name for names in result.values() for name in names] + list(values)
+    every = [name for names in result.values() for name in names] + [*values]
     twice = sorted({name for name in every if every.count(name) > 1})
     if twice:
-        raise ModelError(f"{', '.join(twice)} named twice: state, noises and parameters need different names")
+        raise ModelError(f"{', '.join(twice)} named twice: state, noises, parameters and inputs need different names")
     return result

@@ -152,6 +152,13 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
             f"the degree of {function} is above {MAX_DEGREE}: its exact moments would be too long; "
             "use a numerical structure, unscented(model) or gauss_hermite(model)"
         )
+    # Sums of parameters in a denominator are one symbol while the products are multiplied out.
+    quotients: dict[sp.Basic, sp.Symbol] = {}
+    rewritten = rewritten.replace(
+        lambda e: isinstance(e, sp.Pow) and isinstance(e.base, sp.Add) and not e.has(*variables),
+        lambda e: quotients.setdefault(e, sp.Dummy(real=True)),
+    )
+    originals = {symbol: quotient for quotient, symbol in quotients.items()}
     expanded = sp.expand(rewritten)
     collected: dict[tuple[sp.Expr, ...], sp.Expr] = {}
     for term in sp.Add.make_args(expanded):
@@ -168,7 +175,10 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
             raise _no_closed_form(sp.exp(exponent), function)
         constant = sp.expand(exponent - sum((r * x for r, x in zip(rate, variables, strict=True)), sp.S.Zero))
         collected[rate] = collected.get(rate, sp.S.Zero) + polynomial * _cis(constant)
-    return [Term(polynomial, rate) for rate, polynomial in collected.items()]
+    return [
+        Term(polynomial.xreplace(originals), tuple(one.xreplace(originals) for one in rate))
+        for rate, polynomial in collected.items()
+    ]
 
 
 def _no_closed_form(factor: sp.Expr, function: sp.Expr) -> NoClosedForm:

@@ -7,18 +7,21 @@ and covariance are added.  The points spread over the state and over the other n
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import product as cartesian
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import sympy as sp
 
-from kfcourse.laws import SINGULAR, Array, Gaussian, Measurement, apply, square_root, symmetric, transpose
+from kfcourse.angles import Components, difference, near, on_circle
+from kfcourse.laws import SINGULAR, Array, Gaussian, Measurement, apply, measurement_of, square_root, symmetric, transpose
 from kfcourse.symbolic.equations import compile_model
+from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import Structure
+from kfcourse.symbolic.structure import Structure, of_steps
 
 Rule: TypeAlias = Callable[[int], tuple[Array, Array]]
 
@@ -103,11 +106,19 @@ def _product_rule(order: int) -> Rule:
 class _Equation(NamedTuple):
     """One equation of the model as f(x, other noises), and the covariance of what is only added."""
 
-    function: Callable[[Array, Array], Array]
+    function: Callable[..., Array]
     size: int
     noise: Gaussian  # all noises; the covariance of those that are only added set to 0
     root: Array  # of that covariance, columns for the other noises only
+    factors: Stepwise  # of the noises that are only added
+    angles: Components  # components of the function's value
     added: Array
+
+    def at(self, k: int | None) -> _Equation:
+        """That of step k, if the model depends on it."""
+        (matrix,) = self.factors.at(k)()
+        added = symmetric(matrix @ self.noise.cov @ matrix.T)
+        return self._replace(function=partial(self.function, k=k), added=added)
 
 
 class _Equations(NamedTuple):
@@ -118,22 +129,26 @@ class _Equations(NamedTuple):
     def of(cls, model: Model, augmented: bool) -> _Equations:
         state, meter = compile_model(model)
         return cls(
-            _equation(state, model.state_equation, (*model.x, *model.v), model.v, model.state_noise, model, augmented),
-            _equation(meter, model.meter_equation, (*model.x, *model.w), model.w, model.meter_noise, model, augmented),
+            _equation(
+                state, model.state_equation, (*model.x, *model.v), model.v, model.state_noise, model, augmented, model.angles.x
+            ),
+            _equation(
+                meter, model.meter_equation, (*model.x, *model.w), model.w, model.meter_noise, model, augmented, model.angles.y
+            ),
         )
 
 
-def _equation(function, formulas, variables, noises, law: Gaussian, model: Model, augmented: bool) -> _Equation:
+def _equation(function, formulas, variables, noises, law: Gaussian, model: Model, augmented: bool, angles: Components):
     factors = sp.Matrix(formulas).subs(model.values).jacobian(list(noises)) if noises else sp.zeros(len(formulas), 0)
     constant = [not sp.Matrix(factors[:, j]).applyfunc(sp.simplify).has(*variables) for j in range(len(noises))]
     other = np.array([augmented or not c for c in constant], dtype=bool)
     while (correlated := ~other & (law.cov[:, other] != 0).any(axis=1)).any():
         other |= correlated
-    matrix = np.array([[float(factors[i, j]) if not other[j] else 0.0 for j in range(len(noises))] for i in range(len(formulas))])
-    matrix = matrix.reshape(len(formulas), len(noises))
+    added = sp.Matrix(len(formulas), len(noises), lambda i, j: 0 if other[j] else factors[i, j])
+    stepwise = Stepwise.compile(model.known, "factors", {}, {"factors": added}, [])
     root = np.zeros((len(noises), int(other.sum())))
     root[other] = square_root(law.cov[np.ix_(other, other)]) if other.any() else root[other]
-    return _Equation(function, len(formulas), law, root, symmetric(matrix @ law.cov @ matrix.T))
+    return _Equation(function, len(formulas), law, root, stepwise, angles, np.empty(0))
 
 
 def _checked(name: str, model: Model, rule: Rule, equations: _Equations, root: str, order: int) -> Structure:
@@ -142,14 +157,15 @@ def _checked(name: str, model: Model, rule: Rule, equations: _Equations, root: s
     size = model.n + max(equation.root.shape[1] for equation in equations)
     with np.errstate(all="ignore"):
         found = _moments(structure)
-        if not all(np.isfinite(moment).all() for _, moment, _ in found):
+        if not all(np.isfinite(moment).all() for _, moment, *_ in found):
             _warn(f"{name}: a function of {model} is not finite at the points of the prior law", stacklevel=4)
         elif (2 * order) ** size <= MOST_POINTS:
             coarse = (
                 found if name == "gauss-hermite" else _moments(_quadrature(name, model, _product_rule(order), equations, root))
             )
             fine = _moments(_quadrature(name, model, _product_rule(2 * order), equations, root))
-            for (what, less, _), (_, more, scale) in zip(coarse, fine, strict=True):
+            for (what, less, *_), (_, more, scale, angles) in zip(coarse, fine, strict=True):
+                more = near(more, less, angles)
                 if not (np.abs(more - less) <= CONVERGED * scale).all():
                     worst = np.unravel_index(np.argmax(np.nan_to_num(np.abs(more - less) / scale, nan=np.inf)), less.shape)
                     _warn(
@@ -165,17 +181,19 @@ def _checked(name: str, model: Model, rule: Rule, equations: _Equations, root: s
 CONVERGED = 0.1
 
 
-def _moments(structure: Structure) -> list[tuple[str, Array, Array]]:
-    """Name, value and natural size of the moments at the prior law."""
+def _moments(structure: Structure) -> list[tuple[str, Array, Array, Components]]:
+    """Name, value and natural size of the moments at the prior law, and which components are angles."""
     mean, cov = structure.model.prior
-    tau, theta = structure.predict(mean, cov)
-    h, _, F, _ = structure.measure(mean, cov)
+    first = structure.at(0)
+    tau, theta = first.predict(mean, cov)
+    h, _, F, _ = first.measure(mean, cov)
     moments = []
-    for what, centre, spread in (("next state", tau, theta), ("measurement", h, F)):
+    angles = structure.model.angles
+    for what, centre, spread, which in (("next state", tau, theta, angles.x), ("measurement", h, F, angles.y)):
         sd = np.sqrt(np.maximum(np.diagonal(spread), 0.0))
         tiny = 1e-12 * (1 + np.abs(centre))  # rounding: what does not vary has no size of its own
-        moments.append((f"mean of the {what}", centre, sd + tiny))
-        moments.append((f"covariance of the {what}", spread, (sd + tiny)[:, None] * (sd + tiny)))
+        moments.append((f"mean of the {what}", centre, sd + tiny, which))
+        moments.append((f"covariance of the {what}", spread, (sd + tiny)[:, None] * (sd + tiny), ()))
     return moments
 
 
@@ -212,8 +230,12 @@ def _quadrature(name: str, model: Model, rule: Rule, equations: _Equations, root
     """A structure from standard normal points and weights: rule(size) -> (points (q, size), weights (q,))."""
     if root not in ROOTS:
         raise ModelError(f"root must be one of {', '.join(map(repr, ROOTS))}, got {root!r}")
-    n = model.n
-    rules = [rule(n + equation.root.shape[1]) for equation in equations]
+    rules = [rule(model.n + equation.root.shape[1]) for equation in equations]
+    return of_steps(name, model, lambda k: _of_step(name, model, rules, _Equations(*(one.at(k) for one in equations)), root))
+
+
+def _of_step(name: str, model: Model, rules: Sequence[tuple[Array, Array]], equations: _Equations, root: str) -> Structure:
+    n, measurement = model.n, measurement_of(model.angles.y)
 
     def propagate(equation: _Equation, mean: Array, cov: Array, points: Array, weights: Array):
         """Root of cov, deviations of x, mean of the function, its deviations from that: 0 exactly for what does not vary."""
@@ -224,9 +246,9 @@ def _quadrature(name: str, model: Model, rule: Rule, equations: _Equations, root
         values = equation.function(x, np.broadcast_to(noise, x.shape[:-1] + noise.shape[-1:]))
         values = np.broadcast_to(values, (*x.shape[:-1], equation.size))
         middle = values[..., np.argmin((points**2).sum(axis=1)), :]
-        values = values - middle[..., None, :]
+        values = difference(values, middle[..., None, :], equation.angles)
         shift = weights @ values
-        return scale, deviation, middle + shift, values - shift[..., None, :]
+        return scale, deviation, on_circle(middle + shift, equation.angles), values - shift[..., None, :]
 
     def predict(z: Array, p: Array) -> Gaussian:
         points, weights = rules[0]
@@ -245,9 +267,9 @@ def _quadrature(name: str, model: Model, rule: Rule, equations: _Equations, root
         added = equations.meter.added
         R = _weighted(weights, dy - dx @ transpose(G)) + added
         if n == 1:
-            return Measurement(h, G, _weighted(weights, dy) + added, R)
+            return measurement(h, G, _weighted(weights, dy) + added, R)
         F = symmetric(G @ d @ transpose(G)) + R
-        return Measurement(h, *_without_rounding(G, d, F, R))
+        return measurement(h, *_without_rounding(G, d, F, R))
 
     return Structure(name, model, predict, measure)
 

@@ -14,6 +14,7 @@ import sympy as sp
 
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.formula import check_name, parse
+from kfcourse.symbolic.sense import is_covariance, unfit
 
 Formula: TypeAlias = str | sp.Expr
 Formulas: TypeAlias = Formula | Sequence[Formula] | sp.MatrixBase
@@ -48,17 +49,15 @@ def checked_name(name: str) -> str:
 
 def exact_number(name: str, value: Any) -> sp.Rational:
     """The decimal number a person typed, exactly: 0.9 is 9/10."""
-    if isinstance(value, sp.Rational):
-        return value
     try:
-        number = float(value) if isinstance(value, int | float | np.integer | np.floating) else float("nan")
+        number = float(value) if isinstance(value, int | float | np.integer | np.floating | sp.Rational) else float("nan")
     except OverflowError:
         number = float("inf")
     if isinstance(value, bool) or not np.isfinite(number):
         raise ModelError(f"parameter {name} = {value!r}: expected a finite number")
     if number and not 1e-100 < abs(number) < 1e100:
         raise ModelError(f"parameter {name} = {value!r} is too large or too small; change the units")
-    return sp.Rational(str(value))
+    return value if isinstance(value, sp.Rational) else sp.Rational(str(value))
 
 
 def exact_matrix(array: Array) -> sp.ImmutableMatrix:
@@ -107,7 +106,7 @@ def law(what: str, given: Mapping[str, Any] | None, size: int) -> Gaussian:
         mean = np.broadcast_to(np.asarray(parts.get("mean", 0.0), dtype=float), (size,)).copy()
         cov = np.asarray(parts.get("variance", 1.0), dtype=float)
         cov = cov.copy() if cov.ndim == 2 else np.diag(np.broadcast_to(cov, (size,)))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ModelError(
             f"`{what}`: mean and variance must be numbers, or lists of {size} numbers (variance: or a matrix)"
         ) from None
@@ -117,7 +116,8 @@ def law(what: str, given: Mapping[str, Any] | None, size: int) -> Gaussian:
         raise ModelError(f"`{what}`: mean and variance must be finite, got {mean} and {cov.tolist()}")
     if not np.array_equal(cov, cov.T):
         raise ModelError(f"`{what}`: the covariance matrix must be symmetric, got {cov.tolist()}")
-    eigenvalues = np.linalg.eigvalsh(cov)
-    if eigenvalues.min() < -1e-12 * max(eigenvalues.max(), 0.0):  # rounding of eigvalsh
+    if not is_covariance(cov):
         raise ModelError(f"`{what}`: negative variance in {cov.tolist()}")
+    if problem := unfit(mean, cov.diagonal()):
+        raise ModelError(f"`{what}`: {problem}")
     return Gaussian(mean, cov)

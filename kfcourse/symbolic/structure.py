@@ -15,17 +15,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from itertools import product as cartesian
+from typing import NoReturn
 
 import numpy as np
 import sympy as sp
 
-from kfcourse.laws import Array, Gaussian, Measurement
-from kfcourse.symbolic.codegen import Compiled, compile_function
+from kfcourse.angles import Components, on_circle
+from kfcourse.laws import Array, Gaussian, Measurement, measurement_of
 from kfcourse.symbolic.formula import symbol
+from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
-from kfcourse.symbolic.reading import exact_matrix
+from kfcourse.symbolic.reading import ModelError, exact_matrix
+from kfcourse.symbolic.writing import formula_lines
 
 FUNCTION_LATEX = {"tau": r"\tau", "Theta": r"\Theta", "h": "h", "G": "G", "F": "F"}
 
@@ -45,6 +49,8 @@ class Structure:
         (m (..., n), d (..., n, n)) -> Measurement(h (..., p), G (..., p, n), F (..., p, p), R).
     formulas : StructuralFormulas or None
         The symbolic functions; None for the numerical structures.
+    at_step : callable, optional
+        Step to the structure of that step, if the model depends on it; see `at`.
 
     Covariances, G and h that do not depend on the trajectory may come without the leading axes.
     """
@@ -54,6 +60,15 @@ class Structure:
     predict: Callable[[Array, Array], Gaussian]
     measure: Callable[[Array, Array], Measurement]
     formulas: StructuralFormulas | None = None
+    at_step: Callable[[int], Structure] | None = None
+
+    def at(self, k: int) -> Structure:
+        """The structural functions of step k: tau and Theta from k to k + 1; h, G, F of y_k.
+
+        Those of a model that does not depend on the step are the same at every step; those of one that does cannot be called
+        without it.
+        """
+        return self if self.at_step is None else self.at_step(k)
 
     def __getitem__(self, function: str) -> sp.Expr | sp.MatrixBase:
         """The formula of "tau", "Theta", "h", "G", "F" or "R": an expression if scalar, else a matrix."""
@@ -69,17 +84,19 @@ class Structure:
             before_state = name in ("tau", "Theta")
             arguments = formulas.state_arguments if before_state else formulas.meter_arguments
             names = ", ".join(sp.latex(a) for a in arguments) if self.model.n == 1 else ("z, p" if before_state else "m, d")
+            names += ", k" if self.model.timed else ""
             for i, j in cartesian(range(matrix.rows), range(matrix.cols)):
                 if name in ("Theta", "F") and i > j:
                     continue  # symmetric
                 index = "" if len(matrix) == 1 else f"_{{{i + 1}}}" if matrix.cols == 1 else f"_{{{i + 1}{j + 1}}}"
-                lines.append(rf"{FUNCTION_LATEX[name]}{index}({names}) &= {sp.latex(matrix[i, j])}")
+                first, *further = formula_lines(matrix[i, j], arguments)
+                lines += [rf"{FUNCTION_LATEX[name]}{index}({names}) &= {first}", *(rf"&\quad {line}" for line in further)]
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
     def source(self) -> str:
         """The generated NumPy code that runs."""
         formulas = self._derived()
-        return formulas.compiled_predict.source + "\n\n" + formulas.compiled_measure.source
+        return formulas.compiled_predict.compiled.source + "\n\n" + formulas.compiled_measure.compiled.source
 
     def _derived(self) -> StructuralFormulas:
         if self.formulas is None:
@@ -125,13 +142,13 @@ class StructuralFormulas:
         return sp.ImmutableMatrix(F - G * self.d * G.T).applyfunc(sp.expand)
 
     @cached_property
-    def compiled_predict(self) -> Compiled:
+    def compiled_predict(self) -> Stepwise:
         return self._compile(
             "predict", {"z": self.z, "p": self.p}, {key: self.functions[key].subs(self.model.values) for key in ("tau", "Theta")}
         )
 
     @cached_property
-    def compiled_measure(self) -> Compiled:
+    def compiled_measure(self) -> Stepwise:
         h, G, R = (part.subs(self.model.values) for part in (self.functions["h"], self.functions["G"], self.R))
         explained = G * self.d * G.T
         # F is computed as G d G^T + R: R enters both outputs, and is found once.
@@ -146,24 +163,43 @@ class StructuralFormulas:
         arguments: dict[str, sp.MatrixBase],
         outputs: dict[str, sp.MatrixBase],
         definitions: dict[sp.Symbol, sp.Expr] | None = None,
-    ) -> Compiled:
+    ) -> Stepwise:
         doc = f"{', '.join(outputs)}: {self.name} structural functions of {self.model}"
-        return compile_function(name, arguments, outputs, ["z", "m", "tau", "h"], doc, definitions)
+        return Stepwise.compile(self.model.known, name, arguments, outputs, ["z", "m", "tau", "h"], doc, definitions)
 
     def structure(self) -> Structure:
-        predict, measure = self.compiled_predict.function, self.compiled_measure.function
+        """The structure; of a model that depends on the step, one that must be told which."""
+        return of_steps(self.name, self.model, self._at, self)
+
+    def _at(self, k: int | None) -> Structure:
+        predict, measure = self.compiled_predict.at(k), self.compiled_measure.at(k)
+        angles, measurement = self.model.angles, measurement_of(self.model.angles.y)
         return Structure(
             self.name,
             self.model,
-            lambda z, p: _spread(Gaussian(*predict(z, p)), z),
-            lambda m, d: Measurement(*measure(m, d)),
+            lambda z, p: _spread(Gaussian(*predict(z, p)), z, angles.x),
+            lambda m, d: measurement(*measure(m, d)),
             self,
         )
 
 
-def _spread(law: Gaussian, over: Array) -> Gaussian:
-    """A mean that no argument enters is still one for each trajectory."""
-    return law if law.mean.ndim == over.ndim else Gaussian(np.broadcast_to(law.mean, over.shape), law.cov)
+def of_steps(
+    name: str, model: Model, at: Callable[[int | None], Structure], formulas: StructuralFormulas | None = None
+) -> Structure:
+    """The structure at every step, or for a model that depends on it the one that `Structure.at` makes those of."""
+    if not model.timed:
+        return at(None)
+
+    def refused(mean: Array, cov: Array) -> NoReturn:
+        raise ModelError(f"{model} depends on the step: say which, as in structure.at(k).predict(z, p)")
+
+    return Structure(name, model, refused, refused, formulas, at)
+
+
+def _spread(law: Gaussian, over: Array, angles: Components) -> Gaussian:
+    """A mean that no argument enters is still one for each trajectory; angles lie between -pi and pi."""
+    mean = law.mean if law.mean.ndim == over.ndim else np.broadcast_to(law.mean, over.shape)
+    return Gaussian(on_circle(mean, angles), law.cov)
 
 
 def _distinct(mean: sp.MatrixBase, cov: sp.MatrixBase) -> list[sp.Symbol]:
@@ -175,7 +211,7 @@ def gaussian_symbols(model: Model, mean: str, cov: str) -> tuple[sp.ImmutableMat
 
     A name that the model already uses gets a trailing underscore.
     """
-    taken = set(model.parameters) | {s.name for s in (*model.x, *model.v, *model.w)}
+    taken = set(model.parameters) | {s.name for s in (*model.x, *model.v, *model.w, *model.known.symbols)}
 
     def fresh(name: str) -> sp.Symbol:
         while name in taken:
@@ -219,11 +255,25 @@ def _taylor(equation, x, mean, noise, noise_mean):
     point = dict(zip(x, mean, strict=True)) | dict(zip(noise, noise_mean, strict=True))
     parts = [equation, equation.jacobian(sp.Matrix(x)), equation.jacobian(sp.Matrix(noise))]
     for part in parts:
-        if part.has(sp.Derivative, sp.DiracDelta):
+        if part.has(sp.Derivative, sp.DiracDelta) or any(_jumps(one, x) for one in equation.atoms(sp.Piecewise)):
             raise NoClosedForm(
                 f"{list(equation)} is not differentiable and cannot be linearised; use unscented(model) or gauss_hermite(model)"
             )
     return [part.subs(point, simultaneous=True) for part in parts]
+
+
+def _jumps(choice: sp.Piecewise, x: tuple[sp.Symbol, ...]) -> bool:
+    """Whether a choice that depends on the state may jump where one formula takes over from the next."""
+    for (formula, condition), (following, _) in pairwise(choice.args):
+        if not condition.has(*x):
+            continue
+        if not isinstance(condition, sp.core.relational.Relational):
+            return True  # several thresholds: not looked into
+        border = next(s for s in x if condition.has(s))
+        places = sp.solve(condition.lhs - condition.rhs, border)
+        if not places or any(sp.simplify((formula - following).subs(border, place)) != 0 for place in places):
+            return True
+    return False
 
 
 def gaussian(model: Model) -> Structure:
@@ -237,24 +287,43 @@ def gaussian(model: Model) -> Structure:
         If a term has no closed-form Gaussian mean: use `unscented` or `gauss_hermite`.
     """
     (z, p), (m, d) = gaussian_symbols(model, "z", "p"), gaussian_symbols(model, "m", "d")
-    tau, Theta = _moments(model.state_equation, model.x, z, p, model.v, model.state_noise)
-    h, F = _moments(model.meter_equation, model.x, m, d, model.w, model.meter_noise)
+    known = model.known.symbols
+    tau, Theta = _moments(model.state_equation, model.x, z, p, model.v, model.state_noise, known)
+    h, F = _moments(model.meter_equation, model.x, m, d, model.w, model.meter_noise, known)
     functions = {"tau": tau, "Theta": Theta, "h": h, "G": h.jacobian(m), "F": F}
     return StructuralFormulas(model, "gaussian", z, p, m, d, _expanded(functions)).structure()
 
 
-def _moments(equation, x, mean, cov, noise, law: Gaussian):
+def _moments(equation, x, mean, cov, noise, law: Gaussian, known: tuple[sp.Symbol, ...]):
     """Mean and covariance of equation(x, noise), x ~ N(mean, cov) and the noise independent."""
     joint = GaussianMoments(
         [*x, *noise], [*mean, *exact_matrix(law.mean)], sp.diag(sp.Matrix(cov), sp.Matrix(exact_matrix(law.cov)))
     )
     size = len(equation)
+    equation, masks = _masked(equation, known, [*x, *noise])
     means = sp.Matrix([joint.mean_of(formula) for formula in equation])
     covs = sp.zeros(size, size)
     for i in range(size):
         for j in range(i, size):
             covs[i, j] = covs[j, i] = joint.covariance(equation[i], equation[j])
-    return means, covs
+    return (matrix.xreplace(masks) for matrix in (means, covs))
+
+
+def _masked(
+    equation: sp.MatrixBase, known: tuple[sp.Symbol, ...], variables: list[sp.Symbol]
+) -> tuple[sp.MatrixBase, dict[sp.Dummy, sp.Expr]]:
+    """The equation with a symbol in the place of each function of what is known, such as Heaviside(t - 45): constants."""
+    masks: dict[sp.Dummy, sp.Expr] = {}
+
+    def mask(formula: sp.Expr) -> sp.Expr:
+        if not (known and formula.has(*known)):
+            return formula
+        if isinstance(formula, sp.Function) and not formula.has(*variables):
+            masks[found := sp.Dummy(real=True)] = formula
+            return found
+        return formula.func(*map(mask, formula.args)) if formula.args else formula
+
+    return equation.applyfunc(mask), masks
 
 
 def _expanded(functions) -> dict[str, sp.ImmutableMatrix]:

@@ -3,13 +3,14 @@
 import signal
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from tiny import SUM, asks, endless, outcome, raises, stubborn, very_stubborn
 
 from kfcourse.checks import engine
 from kfcourse.checks.question import Mistake
-from kfcourse.limits import OutOfTime, time_limit
+from kfcourse.limits import AGAIN, OutOfTime, time_limit
 
 pytestmark = pytest.mark.quick
 
@@ -22,7 +23,6 @@ def test_endless_loops_end(answer):
     assert "still running after 0.2 s" in result.message
     # The last one is stopped only where the alarm finds it outside of its try, by one alarm of some tens, 100 a second.
     assert time.monotonic() - start < 30
-    assert signal.getitimer(signal.ITIMER_REAL) == (0, 0)
 
 
 def test_comparing_is_limited_in_time_too(monkeypatch):
@@ -38,6 +38,96 @@ def test_a_long_search_for_the_mistake_still_says_wrong(monkeypatch):
     assert (result.status, result.diagnosis) == ("wrong", ())
 
 
+@pytest.fixture(params=["alarm", "no alarm", "other thread"])
+def somewhere(request, monkeypatch):
+    """Calls a function in the main thread, there without alarms, as on Windows, or in another thread."""
+    if request.param == "alarm" and not hasattr(signal, "setitimer"):
+        pytest.skip("no alarms here")
+    if request.param == "no alarm":
+        monkeypatch.delattr(signal, "setitimer", raising=False)
+    if request.param != "other thread":
+        return lambda function: function()
+
+    def call(function):
+        with ThreadPoolExecutor(1) as pool:
+            return pool.submit(function).result()
+
+    return call
+
+
+def busy(seconds):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        pass
+
+
+def test_a_block_ends_in_time_anywhere(somewhere):
+    def stopped():
+        start = time.monotonic()
+        with pytest.raises(OutOfTime), time_limit(0.2):
+            stubborn()
+        return time.monotonic() - start
+
+    assert 0.2 <= somewhere(stopped) < 10
+
+
+def test_a_check_ends_in_time_anywhere(somewhere):
+    result = somewhere(lambda: outcome(SUM, endless, seconds=0.2))
+    assert (result.status, "still running after 0.2 s" in result.message) == ("unusable", True)
+
+
+def test_after_a_block_nothing_comes(somewhere):
+    """Blocks that end in time and blocks that end with it, as close as can be: no limit strikes outside of its block."""
+
+    def many():
+        late = 0
+        for i in range(200):
+            try:
+                with time_limit(0.0005 * (i % 5) + 1e-4):
+                    busy(0.001)
+            except OutOfTime:
+                late += 1
+        busy(5 * AGAIN)  # what was left would come now
+        return late
+
+    assert 0 <= somewhere(many) <= 200
+    assert not [thread for thread in threading.enumerate() if thread.name == "time limit" and thread.join(1)]
+
+
+def test_blocks_in_blocks_keep_their_own_limits(somewhere):
+    def outer_ends():
+        inner = 0
+        with pytest.raises(OutOfTime), time_limit(0.3):
+            while True:
+                try:
+                    with time_limit(0.05):
+                        endless()
+                except OutOfTime:
+                    inner += 1
+                busy(3 * AGAIN)
+        return inner
+
+    def inner_ends():
+        with time_limit(30):
+            with pytest.raises(OutOfTime), time_limit(0.05):
+                endless()
+            return "went on"
+
+    assert somewhere(outer_ends) >= 2
+    assert somewhere(inner_ends) == "went on"
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no alarms here")
+def test_the_alarm_ends_what_only_looks_for_signals():
+    """A wait, and the product of huge integers; without alarms these end by themselves first."""
+    for long in (lambda: time.sleep(60), lambda: (7**2_000_000) ** 40):
+        start = time.monotonic()
+        with pytest.raises(OutOfTime), time_limit(0.2):
+            long()
+        assert time.monotonic() - start < 20
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no alarms here")
 def test_time_limit_restores_the_alarm():
     before = signal.getsignal(signal.SIGALRM)
     with pytest.raises(OutOfTime), time_limit(0.05):
@@ -45,15 +135,8 @@ def test_time_limit_restores_the_alarm():
     with time_limit(5.0):
         pass
     assert signal.getsignal(signal.SIGALRM) is before
+    assert signal.getitimer(signal.ITIMER_REAL) == (0, 0)
     time.sleep(0.05)  # a left alarm would come now
-
-
-def test_outside_the_main_thread_there_is_no_limit_but_a_result():
-    found = []
-    thread = threading.Thread(target=lambda: found.append(outcome(SUM, lambda a, b: a + 2 * b)))
-    thread.start()
-    thread.join()
-    assert found[0].passed
 
 
 def test_the_stop_button_works():

@@ -38,6 +38,7 @@ def radar() -> Model:
         prior={"mean": MEAN, "variance": COV},
         state_noise={"variance": D_XI},
         meter_noise={"variance": D_N},
+        angles=["y2"],
     )
 
 
@@ -173,14 +174,14 @@ def test_atan2_is_the_angle_of_the_point():
     assert parse("atan2(y, x)", {"x": x, "y": other}) == sp.atan2(other, x)
     assert parse("2*atan2(3*y, -x)", {"x": x, "y": other}) == 2 * sp.atan2(3 * other, -x)
     assert parse("atan2(1, 1)", {}) == sp.pi / 4
-    model = Model.define(["x1 + v1", "x2 + v2"], ["atan2(x2, x1) + w1", "atan2(2*x2, 1) + atan2(1, x1) + w2"])
+    model = Model.define(["x1 + v1", "x2 + v2"], ["atan2(x2, x1) + w1", "atan2(2*x2, 1) + atan2(1, x1) + w2"], angles=[])
     angles = compile_noiseless(model)[1](np.array(POINTS))
     expected = [[math.atan2(b, a), math.atan2(2 * b, 1) + math.atan2(1, a)] for a, b in POINTS]
     np.testing.assert_allclose(angles, expected, rtol=1e-15)
 
 
 def test_its_derivative_is_right_in_every_quadrant():
-    model = Model.define(["x1 + v1", "x2 + v2"], ["atan2(x2, x1) + w"])
+    model = Model.define(["x1 + v1", "x2 + v2"], ["atan2(x2, x1) + w"], angles=["y"])
     points, step = np.array(POINTS[:4]), 1e-6
     found = linearised(model).measure(points, np.eye(2)).G[:, 0]
     for j in range(2):
@@ -232,7 +233,7 @@ def test_calls_of_two_arguments_nest_no_deeper_than_others():
 
 def test_an_angle_has_no_gaussian_moments_in_closed_form(radar, y):
     with pytest.raises(NoClosedForm, match="unscented"):
-        gaussian(Model.define(["x1 + v1", "x2 + v2"], ["atan2(x2, x1) + w"]))
+        gaussian(Model.define(["x1 + v1", "x2 + v2"], ["atan2(x2, x1) + w"], angles=["y"]))
     # and the quadrature that the message advises runs: within a tenth of a standard deviation here
     by_points, by_tangent = run(aof(unscented(radar)), y), run(aof(linearised(radar)), y)
     sd = np.sqrt(np.diagonal(by_tangent.cov, axis1=-2, axis2=-1))

@@ -153,7 +153,7 @@ def test_the_gradient_of_the_posterior_vanishes_there(ranges):
 def test_it_is_more_accurate_where_the_meter_is_sharp_and_curved():
     model = Model.define(
         ["x1 + 0.01*v1", "x2 + 0.01*v2"], ["sqrt(x1**2 + x2**2) + 0.01*w1", "atan2(x2, x1) + 0.001*w2"],
-        prior={"mean": [10, 4], "variance": 1.0},
+        prior={"mean": [10, 4], "variance": 1.0}, angles=["y2"],
     )  # fmt: skip
     x, y = simulate(model, 4000, 1, seed=6)
     once, settled = (((run(iterated(linearised(model), rounds), y).mean - x) ** 2).sum(axis=-1)[0] for rounds in (1, 6))

@@ -58,8 +58,10 @@ def test_every_filter_with_results_is_drawn_in_its_own_style(results, ax, draw, 
     result = results[kind]
     draw(result, ax)
     lines = {line.get_label(): line for line in ax.lines if not line.get_label().startswith("_")}
-    expected = [n for n in result.available if draw is not plots.relative_accuracy or n != result.control]
-    assert list(lines) == [title(name) for name in expected]
+    zero = "aof-exact" if result.has_bound else result.control
+    expected = [n for n in result.available if draw is not plots.relative_accuracy or n != zero]
+    axis = [title(zero)] if draw is plots.relative_accuracy else []
+    assert list(lines) == [title(name) for name in expected] + axis
     for name in expected:
         line, style = lines[title(name)], plots.style(name)
         assert to_hex(line.get_color()) == to_hex(style["color"])
@@ -109,6 +111,10 @@ def test_the_bands_are_confidence_intervals(results, confidence):
     for i, name in enumerate(["duof", "particle"]):
         low, high = result.relative(name).interval(confidence)
         np.testing.assert_allclose(band(ax, i), [100 * (low - 1), 100 * (high - 1)], rtol=1e-9, atol=1e-9)
+    ax = plots.relative_accuracy(results["scalar"], Figure().add_subplot(), ["duof", "aof-exact"], confidence=confidence)
+    low, high = results["scalar"].gap("duof").interval(confidence)
+    np.testing.assert_allclose(band(ax, 0), [100 * low, 100 * high], rtol=1e-9, atol=1e-9)
+    assert len(ax.collections) == 1  # the exact filter is the axis
     ax = plots.consistency(result, Figure().add_subplot(), ["duof"], confidence=confidence)
     np.testing.assert_allclose(band(ax, 0), result.normalised_error("duof").interval(confidence), rtol=1e-12)
 
@@ -118,7 +124,7 @@ def test_the_bars_of_the_ranking_are_confidence_intervals(results, ax):
     plots.ranking(result, ax)
     for bars, (_, score) in zip(ax.containers, result.ranking()[::-1], strict=True):
         (segment,) = bars.lines[2][0].get_segments()
-        np.testing.assert_allclose(segment[:, 0], [100 * (limit - 1) for limit in score.interval(0.95)], rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(segment[:, 0], [100 * limit for limit in score.interval(0.95)], rtol=1e-9, atol=1e-12)
 
 
 def test_the_lines_are_the_numbers(results, ax):

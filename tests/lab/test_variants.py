@@ -2,7 +2,7 @@
 
 import pytest
 
-from kfcourse import ModelError, NoClosedForm, gaussian, lab_filters, load_variants
+from kfcourse import Model, ModelError, NoClosedForm, gaussian, lab_filters, load_variants
 from kfcourse.filters import Design, Filter
 from kfcourse.lab.short_names import FILTERS, LAB, has_exact, title
 from kfcourse.lab.variants import VariantError, find_variant
@@ -87,8 +87,9 @@ def test_a_filter_that_a_model_does_not_admit_is_named_with_advice(tmp_path):
     model = load_variants(path)["t"].model
     with pytest.raises(NoClosedForm, match=r"^fos-gaussian: .*tan\(x\).*unscented"):
         lab_filters(model, ["duof", "fos-gaussian"])
-    with pytest.raises(ModelError, match=r"^aof-exact: .*scalar"):
-        lab_filters(SHIPPED["20"].model, ["aof-exact"])
+    with pytest.raises(ModelError, match=r"^aof-exact: .*noise enters nonlinearly"):
+        lab_filters(Model.define("0.9*x + v", "x + w**2"), ["aof-exact"])
+    assert lab_filters(SHIPPED["20"].model, ["aof-exact"])[0].name == "aof-exact"
     assert len(lab_filters(model, ["aof-linearised", "aof-unscented", "aof-gauss-hermite", "duof"])) == 4
 
 
@@ -113,7 +114,7 @@ def test_all_keys_of_a_vector_variant_are_read(tmp_path):
     path.write_text(
         '[variants.v]\ntitle = "two"\nstate = ["a + k*b", "b + q"]\nmeter = ["a + r"]\nparameters = { k = 0.1 }\n'
         'symbols = { x = ["a", "b"], v = ["q"], w = ["r"] }\nprior = { mean = [1, 2], variance = [[2, 1], [1, 3]] }\n'
-        "state_noise = { variance = 0.25 }\nmeter_noise = { mean = 0.5, variance = 4 }\n",
+        "state_noise = { variance = 0.25 }\nmeter_noise = { mean = 0.5, variance = 4 }\nangles = ['y']\n",
         encoding="utf-8",
     )
     model = find_variant("v", path).model
@@ -121,6 +122,7 @@ def test_all_keys_of_a_vector_variant_are_read(tmp_path):
     assert model.prior.mean.tolist() == [1, 2]
     assert model.prior.cov.tolist() == [[2, 1], [1, 3]]
     assert model.state_noise.cov.tolist() == [[0.25]]
+    assert model.angles.y == (0,)
     assert (model.meter_noise.mean.tolist(), model.meter_noise.cov.tolist()) == ([0.5], [[4.0]])
 
 
@@ -155,7 +157,19 @@ BAD_VARIANTS = {
     "parameters in a list": (GOOD + "parameters = [1]", "parameters"),
     "negative variance": (GOOD + "prior = { variance = -1.0 }", "negative variance"),
     "variance nan": (GOOD + "prior = { variance = nan }", "finite"),
-    "mean huge": (GOOD + "prior = { mean = " + "9" * 400 + " }", ""),
+    "mean huge": (GOOD + "prior = { mean = " + "9" * 400 + " }", "`prior`: mean and variance must be numbers"),
+    "mean that hides the variance": (GOOD + "prior = { mean = 6e23 }", "`prior`: the variance 1 is lost beside the mean 6e+23"),
+    "variance huge": (GOOD + "prior = { variance = 1e200 }", "`prior`: the variance 1e+200 is beyond"),
+    "variance tiny": (GOOD + "meter_noise = { variance = 1e-300 }", "`meter_noise`: the variance 1e-300 is beyond"),
+    "a product beyond the floats": (
+        'state = "a*a*a*a*a*x + v"\nmeter = "x + w"\nparameters = { a = 1e99 }',
+        "the state equation a**5*x + v holds the number 1.00E+495 with these parameters",
+    ),
+    "a product below the floats": ('state = "0.9*x + v"\nmeter = "1e-99*1e-99*x + w"', "the meter equation"),
+    "an exponential beyond the floats": ('state = "x + exp(400)*v"\nmeter = "x + w"', "5.22E+173"),
+    "the end in a comment": ('state = "0.9*x # + v"\nmeter = "x + w"', "number sign"),
+    "no noise": ('state = "0.9*x"\nmeter = "x"', "no noise enters the state equation"),
+    "a state known exactly": (GOOD + "prior = { variance = 0 }\nstate_noise = { variance = 0 }", "known exactly"),
     "mean of the wrong shape": (GOOD + "prior = { mean = [1, 2] }", "`prior`"),
     "covariance of the wrong shape": (GOOD + "state_noise = { variance = [[1, 0], [0, 1]] }", "`state_noise`"),
     "covariance not symmetric": (
@@ -167,7 +181,7 @@ BAD_VARIANTS = {
     "law of other keys": (GOOD + "prior = { sigma = 1 }", "sigma"),
     "law without a table": (GOOD + "prior = 3", "`prior`"),
     "symbols of other keys": (GOOD + 'symbols = { z = ["x"] }', "z"),
-    "symbols not named": (GOOD + "symbols = { x = 5 }", ""),
+    "symbols not named": (GOOD + "symbols = { x = 5 }", "x must be a name or a list of names"),
     "one symbol for two": ('state = ["x1 + v1", "x2"]\nmeter = ["x1 + w1"]\nsymbols = { x = ["x1"] }', ""),
 }
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy.linalg
+import scipy.stats
 
 from kfcourse import linear
 from kfcourse.filters.approximations import aof
@@ -10,6 +11,7 @@ from kfcourse.filters.kalman import kalman_filter
 from kfcourse.laws import Gaussian, normalised_square
 from kfcourse.linear.consistency import (
     Innovations,
+    alarms,
     autocorrelation,
     chi_squared_bounds,
     innovations,
@@ -231,6 +233,56 @@ def test_the_autocorrelation_of_a_record_with_gaps_is_refused():
         autocorrelation(Innovations(value, np.ones((1, 1))), 1)
 
 
+# ---------------------------------------------------------------- alarms
+
+
+@pytest.mark.parametrize("p", [1, 2])
+def test_a_right_filter_raises_as_many_alarms_as_allowed(p):
+    rng = np.random.default_rng(8)
+    cov = np.array([[4.0, 1.5], [1.5, 3.0]])[:p, :p]
+    nu = rng.normal(size=(100, 4000, p)) @ np.linalg.cholesky(cov).T
+    share = alarms(Innovations(nu, cov), 0.9).mean(axis=1)
+    # four standard errors of a share of 4000 records, and 0.01 because the law for neighbours is a limit
+    assert (abs(share - 0.1) < SIGMA * np.sqrt(0.09 / 4000) + 0.01).all()
+
+
+def test_each_alarm_answers_to_its_own_fault():
+    rng = np.random.default_rng(9)
+    white = rng.normal(size=(300, 500, 2))
+    slow = white.copy()
+    slow[1:] += 0.5 * white[:-1]
+    faults = {"size": 1.5 * white, "mean": white + 0.5, "whiteness": slow / np.sqrt(1.25)}
+    shares = {name: alarms(Innovations(value, np.eye(2))).mean(axis=1) for name, value in faults.items()}
+    assert (shares["size"] > 0.99).tolist() == [True, False, False]
+    assert shares["size"][1:].max() < 0.1  # a factor is no bias and no correlation: about 5 %
+    assert shares["mean"][1] > 0.99 and shares["whiteness"][2] > 0.99
+
+
+def test_the_alarms_are_the_sums_of_the_page():
+    rng = np.random.default_rng(10)
+    nu, steps = rng.normal(size=(40, 30, 2)), 40
+    found = alarms(Innovations(1.1 * nu, np.eye(2)), 0.8)
+    expected = np.zeros((3, 30), dtype=bool)
+    for i in range(30):
+        s = 1.1 * nu[:, i]
+        total = sum(float(one @ one) for one in s)
+        s = s / np.sqrt(total / (2 * steps))
+        neighbours = sum(s[k] @ s[k + 1] for k in range(steps - 1))
+        expected[0, i] = not scipy.stats.chi2.ppf(0.1, 2 * steps) <= total <= scipy.stats.chi2.ppf(0.9, 2 * steps)
+        expected[1, i] = s.sum(axis=0) @ s.sum(axis=0) / steps > scipy.stats.chi2.ppf(0.8, 2)
+        expected[2, i] = neighbours**2 / (2 * (steps - 1)) > scipy.stats.chi2.ppf(0.8, 1)
+    assert np.array_equal(found, expected) and expected.any(axis=1).all() and not expected.all(axis=1).any()
+
+
+def test_alarms_refuse_records_with_gaps_and_single_steps():
+    value = np.zeros((4, 2, 1))
+    with pytest.raises(ValueError, match="at least 2 steps"):
+        alarms(Innovations(value[:1], np.ones((1, 1))))
+    value[2, 0] = np.nan
+    with pytest.raises(ValueError, match="measurements at every step"):
+        alarms(Innovations(value, np.ones((1, 1))))
+
+
 # ---------------------------------------------------------------- predictions
 
 
@@ -251,7 +303,7 @@ def test_predictions_are_the_hand_loop(variant53):
     np.testing.assert_array_equal(predictions(one, y).mean, result.mean)
 
 
-@pytest.mark.parametrize("shape", [(5,), (5, 3), (5, 3, 2)])
+@pytest.mark.parametrize("shape", [(5, 3), (5, 3, 2)])
 def test_predictions_for_measurements_of_another_shape_are_refused(variant53, shape):
     with pytest.raises(ValueError, match="measurement"):
         predictions(aof(linearised(variant53)), np.zeros(shape))

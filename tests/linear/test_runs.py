@@ -1,4 +1,4 @@
-"""The linear Kalman filter in four arithmetic forms, covariance analysis and steady state, against independent references."""
+"""The linear Kalman filter in five arithmetic forms, covariance analysis and steady state, against independent references."""
 
 from fractions import Fraction
 
@@ -13,6 +13,7 @@ from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem, covariances, run, simulate, steady_state
 from kfcourse.linear.arithmetic import FORMS, _triangular, form, predict_law
 from kfcourse.linear.consistency import innovations, nis
+from kfcourse.linear.factored import bierman, factors, product
 from kfcourse.montecarlo.experiment import run as run_filter
 from kfcourse.symbolic.model import Model
 
@@ -343,9 +344,10 @@ def test_short_words_break_the_forms_with_covariances(arithmetic, ill_conditione
     assert symmetric_always == (arithmetic != "covariance")
 
 
-def test_short_words_do_not_break_the_square_root(ill_conditioned):
+@pytest.mark.parametrize("arithmetic", ["square-root", "ud"])
+def test_short_words_do_not_break_the_factored_forms(arithmetic, ill_conditioned):
     short, prior, y, right = ill_conditioned
-    laws = run(short, prior, y, arithmetic="square-root").posterior
+    laws = run(short, prior, y, arithmetic=arithmetic).posterior
     assert lost(laws, right) == 0
     # The condition number of the root is 1e6: with rounding of 6e-8 and 40 steps, below 0.3 for all 300 starts.
     np.testing.assert_allclose(laws.cov[5:], right.cov[5:], rtol=0.3, atol=0.3 * abs(right.cov[5:]).max())
@@ -374,18 +376,25 @@ def test_bierman_s_case_against_rational_numbers():
         P = P - P @ H.T @ H @ P / (H @ P @ H.T + R)[0, 0]
 
     def error(arithmetic, dtype):
-        """Relative error of the variance of x1 + x2, found from the root where there is one."""
+        """Relative error of the variance of x1 + x2, found from the factors where there are some."""
         system, chosen = one.astype(dtype), form(arithmetic, one)
         state = chosen.start(Gaussian(np.zeros((1, 2), dtype), np.eye(2, dtype=dtype)))
         state = chosen.correct(system, state, np.zeros((1, 1), dtype))
         state = chosen.correct(system, chosen.predict(system, state, 0.0), np.zeros((1, 1), dtype))
-        root = exact(state.root.reshape(2, 2)) if arithmetic == "square-root" else None
-        cov = exact(state.cov.reshape(2, 2)) if root is None else root @ root.T
+        if arithmetic == "square-root":
+            root = exact(state.root.reshape(2, 2))
+            cov = root @ root.T
+        elif arithmetic == "ud":
+            unit = exact(state.unit.reshape(2, 2))
+            cov = unit @ np.diag(exact(state.diagonal.reshape(2))) @ unit.T
+        else:
+            cov = exact(state.cov.reshape(2, 2))
         return abs(float((cov.sum() - P.sum()) / P.sum()))
 
     # Rounding 6e-8 or 1e-16; the root's condition number is 2e4, the covariance's 3e8.  A factor of 10 for the dozen operations.
-    assert error("square-root", np.float32) < 6e-8 * 2e4 * 10
-    assert error("square-root", float) < 1.1e-16 * 2e4 * 10
+    for name in ("square-root", "ud"):
+        assert error(name, np.float32) < 6e-8 * 2e4 * 10
+        assert error(name, float) < 1.1e-16 * 2e4 * 10
     assert all(error(name, np.float32) > 1 for name in ("covariance", "symmetrised", "joseph"))
     assert error("covariance", float) > error("square-root", float)
 
@@ -421,6 +430,36 @@ def test_the_triangular_root_is_that_of_a_library():
     short = wide.astype(np.float32)
     long = scipy.linalg.qr(short.astype(float).T, mode="economic")[1].T
     assert not np.array_equal(abs(_triangular(short)), abs(long).astype(np.float32))
+
+
+# ---------------------------------------------------------------- the pieces of the UD form
+
+
+@pytest.mark.parametrize("rank", [0, 1, 3, 4])
+def test_the_factors_are_triangular_and_give_the_covariance(rank):
+    root = np.random.default_rng(5).normal(size=(6, 4, rank))
+    cov = root @ root.swapaxes(1, 2)
+    unit, diagonal = factors(cov)
+    assert np.array_equal(unit, np.triu(unit)) and (np.einsum("kii->ki", unit) == 1).all() and (diagonal >= 0).all()
+    # what rounding leaves of the directions without variance: sixteen digits of the largest entry, times their growth
+    np.testing.assert_allclose(product(unit, diagonal), cov, atol=1e-11 * max(1.0, abs(cov).max()))
+
+
+def test_bierman_s_update_is_the_correction_of_the_page():
+    rng = np.random.default_rng(6)
+    root, h, noise = rng.normal(size=(4, 4)), rng.normal(size=4), 0.7
+    P = root @ root.T
+    unit, diagonal, K = bierman(*factors(P), h, np.array(noise))
+    expected = P @ h / (h @ P @ h + noise)
+    np.testing.assert_allclose(K, expected, rtol=1e-10)
+    np.testing.assert_allclose(product(unit, diagonal), P - np.outer(expected, h @ P), rtol=1e-9, atol=1e-11)
+
+
+def test_the_ud_form_takes_a_meter_without_noise():
+    silent = LinearSystem(**(GOOD | {"R": np.zeros((1, 1)), "Q": np.zeros((2, 2))}))
+    laws = run(silent, GOOD_PRIOR, np.ones((3, 1, 1)), arithmetic="ud").posterior  # the same measurement three times
+    np.testing.assert_allclose(laws.mean[:, 0], 0.5, rtol=1e-14)
+    np.testing.assert_allclose(laws.cov[:, 0], [[[0.5, -0.5], [-0.5, 0.5]]] * 3, rtol=1e-14)
 
 
 # ---------------------------------------------------------------- errors

@@ -399,19 +399,20 @@ def test_above_the_bound_the_control_cancels_when_the_subset_is_everything(varia
 
 
 def test_the_bound_adds_what_all_trajectories_and_the_subset_tell(variant53):
-    """M p_control over all, and M(p_exact - p_control) over the subset: two means, whose errors add in squares.
+    """M p_control over all, and M(p_exact - p_control) over the subset, which is part of all: Var X / N + Var Y / n + 2 Cov / N.
 
-    p_control = 2, 4, 6, 4: mean 4, SE^2 = (8/3)/4;  p_exact - p_control = -1, -3: mean -2, SE^2 = 2/2.
-    e^2 - p_control = 3, 1, 3, 1: mean 2, SE^2 = (4/3)/4.
+    p_control = 2, 4, 6, 4: mean 4, SE^2 = (8/3)/4;  p_exact - p_control = -1, -3: mean -2, SE^2 = 2/2, Cov = -2.
+    The ratio 6/2 of e^2 to the bound varies as (e^2 - 3 bound) / 2: over all as -1/2, -7/2, -9/2, -7/2, SE^2 = 3/4,
+    on the subset as 3/2, 9/2, SE^2 = 4.5/2, Cov = -4.5.
     """
     squares = {"aof-gaussian": np.ones(4), "other": np.array([5.0, 5, 9, 5]), "aof-exact": np.ones(2)}
     own = {"aof-gaussian": np.array([2.0, 4, 6, 4]), "other": np.ones(4), "aof-exact": np.array([1.0, 1])}
     result = by_hand(variant53, squares, ["aof-exact"], subset=2, own=own)
     bound, above = result.bound(), result.above_bound("other")
     assert (bound.value.item(), bound.freedom) == (4 - 2, 1)
-    assert bound.standard_error.item() == pytest.approx(np.sqrt(2 / 3 + 1), rel=1e-14)
-    assert (above.value.item(), above.freedom) == ((2 + 2) / 2, 1)
-    assert above.standard_error.item() == pytest.approx(np.sqrt(1 / 3 + 1) / 2, rel=1e-14)
+    assert bound.standard_error.item() == pytest.approx(np.sqrt(2 / 3 + 1 - 1), rel=1e-14)
+    assert (above.value.item(), above.freedom) == (6 / 2 - 1, 1)
+    assert above.standard_error.item() == pytest.approx(np.sqrt(3 / 4 + 4.5 / 2 - 2 * 4.5 / 4), rel=1e-14)
 
 
 def test_without_a_subset_slow_filters_are_left_out(variant53):

@@ -10,7 +10,8 @@ from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.modified_structure import mfos
 from kfcourse.filters.optimal_structure import fos
-from kfcourse.montecarlo.designing import NotFinite
+from kfcourse.filters.particles import particle
+from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import BLOCK, SMALL_BLOCK, Ensemble, simulate, workers
 from kfcourse.montecarlo.experiment import compare, run
 from kfcourse.symbolic.model import Model
@@ -116,12 +117,6 @@ def test_one_trajectory_gets_the_numbers_it_gets_in_the_ensemble(kind, request):
             # the library's matrix products may add in another order: a few roundings a step
             np.testing.assert_allclose(alone.mean[:, 0], together.mean[:, i], rtol=1e-12, atol=1e-14)
             np.testing.assert_allclose(alone.cov[:, 0], together.cov[:, i], rtol=1e-12, atol=1e-14)
-
-
-@pytest.mark.parametrize("shape", [(5,), (5, 3), (5, 3, 1, 1)])
-def test_measurements_of_another_shape_are_refused(variant53, shape):
-    with pytest.raises(ValueError, match=r"shape \(steps, runs, p\)"):
-        run(aof(linearised(variant53)), np.zeros(shape))
 
 
 @pytest.mark.parametrize("kind", ["variant53", "vector"])
@@ -244,3 +239,75 @@ def test_a_diverging_filter_is_named():
     bad = type(good)("bad", model, good.init, lambda state, y: good.step(state, np.where(state.step == 2, np.inf, y)))
     with pytest.raises(NotFinite, match="step 2: bad became infinite or NaN although the trajectories are finite"):
         compare([good, bad], model, 50, 4, seed=1, progress=False)
+
+
+# ---------------------------------------------------------------- seeds and shapes
+
+
+def test_a_generator_is_a_seed_everywhere(variant53):
+    """A generator draws the seed: equal states give equal numbers, and a second call with the same one gives others."""
+
+    def numbers(make):
+        rng = np.random.default_rng(7)
+        return simulate(variant53, 3, 2, make(rng)).y, simulate(variant53, 3, 2, make(rng)).y
+
+    (first, second), (again, _) = numbers(lambda rng: rng), numbers(lambda rng: rng)
+    np.testing.assert_array_equal(first, again)
+    assert not np.isin(first, second).any()
+
+    filters = [aof(gaussian(variant53)), duof(variant53)]
+    seed = int(np.random.default_rng(7).integers(2**63))
+    by_generator = compare(filters, variant53, 300, 2, np.random.default_rng(7), threads=1)
+    assert by_generator.seed == seed  # so the report can name it
+    by_number = compare(filters, variant53, 300, 2, seed, threads=1)
+    np.testing.assert_array_equal(by_generator.error_variance("duof").value, by_number.error_variance("duof").value)
+
+    for makes in (lambda rng: Ensemble(variant53, 3, 2, rng), lambda rng: Ensemble(variant53, 3, 2, seed)):
+        np.testing.assert_array_equal(next(makes(np.random.default_rng(7)).block(0)).y, simulate(variant53, 3, 2, seed).y[0])
+    y = simulate(variant53, 3, 2, 1).y
+    particles = [run(particle(variant53, 50, chosen), y).mean for chosen in (np.random.default_rng(7), seed, seed + 1)]
+    np.testing.assert_array_equal(particles[0], particles[1])
+    assert (particles[0] != particles[2]).all()
+
+
+@pytest.mark.parametrize("seed", [-1, True, 1.0, None, "1"])
+def test_what_is_no_seed_is_refused(variant53, seed):
+    for use in (
+        lambda: simulate(variant53, 3, 2, seed),
+        lambda: compare([duof(variant53)], variant53, 3, 2, seed),
+        lambda: particle(variant53, 50, seed),
+        lambda: Ensemble(variant53, 3, 2, seed),
+    ):
+        with pytest.raises(ValueError, match=r"non-negative whole number or a numpy\.random\.Generator"):
+            use()
+
+
+def test_one_trajectory_of_a_scalar_meter_may_be_a_vector(variant53, vector):
+    y, one = simulate(variant53, 1, 5, seed=1).y, aof(gaussian(variant53))
+    for given in (y[:, 0, 0], y[:, 0, 0].tolist()):
+        for found, expected in zip(run(one, given), run(one, y), strict=True):
+            np.testing.assert_array_equal(found, expected)
+    missing = np.where(np.arange(5) == 2, np.nan, y[:, 0, 0])
+    np.testing.assert_array_equal(run(one, missing).mean, run(one, missing[:, None, None]).mean)
+
+    both, pair = r"y\[:, None, :\] .* or y\[:, :, None\]", aof(gaussian(vector))
+    for filter_, measurements, message in (
+        (one, np.zeros((5, 1)), both),
+        (one, np.zeros((5, 4)), r"\(5, 4\): give y\[:, :, None\] if they are trajectories$"),
+        (pair, np.zeros((5, 2)), r"give y\[:, None, :\] if the columns are components of one trajectory$"),
+        (pair, np.zeros(5), r"must have the shape \(steps, runs, 2\), got \(5,\)$"),
+        (pair, np.zeros((5, 3)), r"got \(5, 3\)$"),
+        (one, np.zeros((5, 1, 2)), "expects 1 measurement component"),
+        (one, 1.0, r"got \(\)$"),
+        (one, np.zeros((5, 3, 1, 1)), r"got \(5, 3, 1, 1\)$"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            run(filter_, measurements)
+
+
+def test_a_design_that_is_run_says_what_to_do(variant53):
+    y = simulate(variant53, 2, 3, seed=1).y
+    with pytest.raises(TypeError, match=r"duof is a Design.*design\(\[it\], Ensemble\(model, 100_000, 3, seed=1\)\.by_step"):
+        run(duof(variant53), y)
+    one = design([duof(variant53)], Ensemble(variant53, 1000, 3, seed=1).by_step())[0]  # what the message says
+    assert np.isfinite(run(one, y).mean).all()

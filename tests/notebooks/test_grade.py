@@ -6,28 +6,31 @@ import json
 import os
 import shutil
 import time
+from contextlib import nullcontext
 from pathlib import Path
 from typing import NamedTuple
 
 import nbformat
-import numpy as np
 import pytest
 from click.testing import CliRunner
-from inside import execute_inside
+from inside import InsideKernel
 
 from kfcourse import cli
-from kfcourse.checks import Exercise, engine, exercise
+from kfcourse.checks import Exercise, exercise
 from kfcourse.checks.question import MIME
 from kfcourse.notebooks import commands
-from kfcourse.notebooks.grading import marking, running, submissions, watch
+from kfcourse.notebooks.grading import marking, running, submissions
 from kfcourse.notebooks.grading.assembly import assembled
+from kfcourse.notebooks.grading.running import Place
+from kfcourse.notebooks.grading.sandbox import Sandbox
 from kfcourse.notebooks.grading.submissions import Cell, Unreadable, cells_of, claimed, clean
-from kfcourse.notebooks.grading.table import Grade, grade_all, read_table, write_table
-from kfcourse.notebooks.master import opened, render, solution, student
+from kfcourse.notebooks.grading.table import RUNNING, WAITING, Grade, Told, grade_all, read_table, write_table
+from kfcourse.notebooks.master import render, solution, student
 
 FIXTURES = Path(__file__).parent / "fixtures"
 TINY = (FIXTURES / "b_aof" / "statement.md").read_text(encoding="utf-8")
 SECONDS = 15  # of a cell; the endless loop below takes so long
+SETTING = marking.Setting(Place(Path("stage"), Sandbox("none")), "salt")
 MARKS = {f"b{i}": mark for i, mark in enumerate(("passed", "wrong", "unusable", "not implemented", "not run"), 1)}
 NEW = ("not implemented", "not implemented")
 
@@ -156,7 +159,7 @@ def leaves(flag):
 
 
 def floods():
-    return add(solved(), "while True:\n    print('x' * 10_000)", "def correct")
+    return add(solved(), "for _ in range(2_000):\n    print('x' * 10_000)", "def correct")
 
 
 def careless():
@@ -189,6 +192,7 @@ def fill(folder):
     """Write the returned notebooks."""
     foreign = solved()
     del foreign.metadata["kfcourse"]
+    foreign.cells = [nbformat.v4.new_code_cell("x = 1")]
     notebooks = {
         "М-1/Иванов Иван/b-aof": handed_out(),
         "М-1/Петров/b-aof": solved("12"),
@@ -231,7 +235,11 @@ def graded(tmp_path_factory):
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("KFCOURSE_SECRET", "x")
-        result = CliRunner().invoke(cli.main, ["grade", str(folder), "--masters", str(FIXTURES), "--seconds", str(SECONDS)])
+        course = folder.parent / "list.csv"
+        course.write_text("name,group,variant\nИванов Иван,М-1,53\nПетров,М-1,53\nСидоров,М-1,7\n", encoding="utf-8")
+        options = ["--masters", str(FIXTURES), "--seconds", str(SECONDS), "--sandbox", "none"]
+        options += ["--students", str(course), "--report", str(folder.parent / "report")]
+        result = CliRunner().invoke(cli.main, ["grade", str(folder), *options])
     after = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     assert after.pop(folder / "grades.csv", None), result.output
     assert after == before
@@ -246,15 +254,13 @@ def row(graded, name):
 
 
 @pytest.fixture
-def graded_here(tmp_path, monkeypatch):
+def graded_here(tmp_path):
     """Grades a notebook that does nothing to its process in this one: its grade, two marks and note."""
-    monkeypatch.setattr(watch, "limit", lambda _: None)
-    monkeypatch.setattr(marking, "run", lambda notebook, _: (execute_inside(notebook), ""))
 
     def graded(notebook):
         path = tmp_path / "x.ipynb"
         path.write_text(json.dumps(notebook), encoding="utf-8")  # as it is: nbformat would mend some of them
-        found = marking.grade(submissions.returned(tmp_path, masters=FIXTURES)[0])
+        found = marking.grade(submissions.returned(tmp_path, masters=FIXTURES)[0], SETTING, start=InsideKernel)
         assert found.status == "graded", found.note
         return found, (found.marks["b1"], found.marks["b2"]), found.note
 
@@ -294,10 +300,9 @@ def test_faked_results_do_not_count(graded, graded_here):
     assert graded_here(fakes_checks())[1] == ("wrong", "wrong")
 
 
-def test_a_patched_package_is_noticed(graded):
+def test_a_patched_package_changes_nothing_and_is_noticed(graded):
     marks, note = row(graded, "patches")
-    assert marks == ("not run", "not run")
-    assert "b1, b2: Changed: the notebook replaces kfcourse.checks.exercises.Exercise.check" in note
+    assert marks == NEW
     assert "look at cell" in note
 
 
@@ -336,7 +341,7 @@ def test_an_endless_loop_is_ended(graded):
 def test_a_dead_kernel_is_reported_and_its_children_are_ended(graded):
     marks, note = row(graded, "leaves")
     assert marks == ("passed", "not run")
-    assert "the kernel died" in note
+    assert "its process ended" in note
     pid = int((graded.folder.parent / "pid").read_text())
     for _ in range(100):  # a killed process stays as a zombie until somebody waits for it
         status = Path(f"/proc/{pid}/stat")
@@ -353,10 +358,8 @@ def test_memory_is_limited_and_exit_is_an_error_like_others(graded):
     assert "SystemExit: 1" in note
 
 
-def test_output_is_limited(graded):
-    marks, note = row(graded, "floods")
-    assert marks == ("passed", "not run")
-    assert "printed more than 10 MB" in note
+def test_output_goes_nowhere(graded):
+    assert row(graded, "floods") == (("passed", "passed"), "")
 
 
 def test_notebooks_do_not_see_each_other(graded):
@@ -390,17 +393,24 @@ def test_what_cannot_be_graded_is_named(graded):
     assert "\x1b" not in graded.output
 
 
+def test_a_course_list_tells_what_to_look_at(graded):
+    told = [line for line in graded.output.splitlines() if line.startswith("look at")]
+    assert told == ["look at Петров: set b: variant 12, was given 53", "look at Сидоров: missing: b"]
+    assert (graded.folder.parent / "report" / "feedback" / "М-1" / "Петров.html").exists()
+    assert "Sandbox: none: notebooks run with your rights" in graded.output
+
+
 def test_a_second_run_does_only_what_is_new(graded, tmp_path, monkeypatch):
     copied = tmp_path / "copy"
     shutil.copytree(graded.folder, copied)
     options = ["grade", str(copied), "--masters", str(FIXTURES), "--jobs", "1"]
     ran = []
 
-    def instead(work):
-        ran.append(work.name)
-        return Grade(work.name, "graded", "b", "53", MARKS, "anew", work.digest)
+    def instead(works, started):
+        ran.extend(work.name for work in works)
+        return [Grade(work.name, "graded", "b", "53", MARKS, "anew", work.digest) for work in works]
 
-    monkeypatch.setattr(commands, "mark", instead)
+    monkeypatch.setattr(commands, "grading", lambda *_: nullcontext(instead))
     failed = ["cut.ipynb", "list.ipynb", "unknown-set.ipynb", "unknown-variant.ipynb"]
     again = CliRunner().invoke(cli.main, [*options, "--seconds", str(SECONDS)])
     assert again.exit_code == 0
@@ -443,16 +453,19 @@ def test_an_interrupted_run_goes_on_where_it_was(three):
     work = submissions.returned(three, masters=FIXTURES)
     table = three / "table.csv"
 
-    def interrupted(new):
+    def interrupted(new, started):
+        started(new[1])
         yield Grade(new[0].name, "graded", "b", "53", MARKS, "", new[0].digest)
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         grade_all(work, table, False, interrupted)
     assert [one.name for one in read_table(table).values()] == ["a.ipynb"]
+    rows = csv.DictReader(io.StringIO(table.read_text(encoding="utf-8-sig")))
+    assert [row["note"] for row in rows] == ["", RUNNING, WAITING]
     assert sorted(path.name for path in three.iterdir()) == ["a.ipynb", "b.ipynb", "c.ipynb", "table.csv"]
 
-    def rest(new):
+    def rest(new, started):
         return [Grade(one.name, "graded", "b", "53", MARKS, "", one.digest) for one in new]
 
     grades, old = grade_all(work, table, False, rest)
@@ -476,12 +489,11 @@ def test_the_digest_knows_all_that_a_grade_depends_on(three, tmp_path):
     assert not set(digests()) & set(before)
 
 
-def test_a_kernel_that_does_not_start_is_a_row(three, monkeypatch):
+def test_a_kernel_that_does_not_start_is_a_row(three):
     def fails(*_, **__):
         raise RuntimeError("Kernel didn't respond in 60 seconds")
 
-    monkeypatch.setattr(marking, "run", fails)
-    found = marking.grade(submissions.returned(three, masters=FIXTURES)[0])
+    found = marking.grade(submissions.returned(three, masters=FIXTURES)[0], SETTING, start=fails)
     assert found == Grade("a.ipynb", "not graded", note="Kernel didn't respond in 60 seconds")
 
 
@@ -492,12 +504,12 @@ def test_a_notebook_that_takes_too_long_to_make_is_a_row(three, monkeypatch):
 
     monkeypatch.setattr(marking, "claimed", endless)
     work = submissions.returned(three, seconds=0.02, masters=FIXTURES)[0]
-    assert "cannot be made in time" in marking.grade(work).note
+    assert "cannot be made in time" in marking.grade(work, SETTING).note
 
 
 def test_too_large_files_are_not_read(three, monkeypatch):
     monkeypatch.setattr(submissions, "LARGEST", 100)
-    assert "larger than" in marking.grade(submissions.returned(three, masters=FIXTURES)[0]).note
+    assert "larger than" in marking.grade(submissions.returned(three, masters=FIXTURES)[0], SETTING).note
 
 
 def test_no_notebooks_is_an_error(tmp_path):
@@ -524,7 +536,16 @@ def test_broken_tables_are_refused(tmp_path, text):
 @pytest.mark.quick
 def test_the_table_comes_back_as_it_was(tmp_path):
     grades = [
-        Grade("М-1/Иванов, И.ipynb", "graded", "b", "53", MARKS, 'b2: "sign"; look', "d1"),
+        Grade(
+            "М-1/Иванов, И.ipynb",
+            "graded",
+            "b",
+            "53",
+            MARKS,
+            'b2: "sign"; look',
+            "d1",
+            {"b2": Told('"no"', ("sign",), "x = 1\n")},
+        ),
         Grade("=1+1.ipynb", "not an exercise notebook", digest="d2"),
         Grade("x.ipynb", "not graded", note="+cmd"),
     ]
@@ -606,18 +627,16 @@ def test_claimed_variants(tmp_path):
 
 def sources(cells, notebook=None):
     """Sources of the assembled notebook's cells, shortened to their first lines."""
-    made, own = assembled(notebook or handed_out(), cells, exercise("b", "53"))
-    assert made.cells[0].source.startswith("from kfcourse.notebooks.grading.watch import Watch")
-    nbformat.validate(made)
-    return [cell.source.splitlines()[0] for cell in made.cells[1:]], own
+    steps, own = assembled(notebook or handed_out(), cells)
+    return [step.source.splitlines()[0] for step in steps], own
 
 
 PLAIN = [
     "import matplotlib.pyplot as plt",
     "def gain(Psi, G, F):",
-    "task = kfcourse_watch()",
+    'task.check("b1", gain)',
     "def correct(lam, Psi, h, G, F, y):",
-    "task = kfcourse_watch()",
+    'task.check("b2", correct)',
     "one = np.ones((1, 1, 1))",
 ]
 
@@ -671,8 +690,8 @@ def test_a_copy_of_an_answer_for_trials_does_not_replace_it():
     trial = nbformat.from_dict(cell(notebook, "def gain"))
     trial.source, trial.id = trial.source.replace("cross = G @ Psi", "cross = 0"), "copy"  # its metadata are copied too
     notebook.cells.append(trial)
-    made, _ = assembled(handed_out(), cells_of(notebook), exercise("b", "53"))
-    assert ["cross = 0" in cell.source for cell in made.cells] == [False] * 7 + [True]
+    steps, _ = assembled(handed_out(), cells_of(notebook))
+    assert ["cross = 0" in step.source for step in steps] == [False] * 6 + [True]
 
 
 def test_answers_are_known_by_name_when_the_master_has_moved_on():
@@ -681,7 +700,7 @@ def test_answers_are_known_by_name_when_the_master_has_moved_on():
     master = student(render(added, exercise("b", "53")), {})
     found, _ = sources(cells_of(solved()), master)
     assert [line for line in found if line.startswith("def")] == ["def gain(Psi, G, F):", "def correct(lam, Psi, h, G, F, y):"]
-    assert found.index("task = kfcourse_watch()") > found.index("def gain(Psi, G, F):")
+    assert found.index('task.check("b1", gain)') > found.index("def gain(Psi, G, F):")
 
 
 def test_an_answer_with_an_error_is_known_by_its_cell():
@@ -695,69 +714,9 @@ def test_an_answer_with_an_error_is_known_by_its_cell():
 
 def test_the_kernels_environment(tmp_path, monkeypatch):
     monkeypatch.setenv("MY_TOKEN", "x")
-    found = running.environment(tmp_path)
+    found = running.environment(tmp_path, ["stage"])
     assert "MY_TOKEN" not in found
     assert found["PATH"] == os.environ["PATH"]
     assert found["HOME"] == str(tmp_path)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(("here", "", str(tmp_path))))
-    (tmp_path / "other").mkdir()
-    assert running.environment(tmp_path / "other")["PYTHONPATH"] == os.pathsep.join((str(Path("here").absolute()), str(tmp_path)))
-
-
-@pytest.fixture
-def watched(monkeypatch):
-    monkeypatch.setattr(watch, "limit", lambda _: None)  # this process must not be limited
-    return watch.Watch("b", "53", memory=2**32)
-
-
-def test_watch_gives_the_exercise(watched):
-    assert watched() is watched()
-    assert (watched().letter, opened(watched())) == ("b", '"53"')
-    watched().check("b1", lambda Psi, G, F: Psi)
-    watched()  # checking changes nothing
-
-
-@pytest.mark.parametrize(
-    ("where", "name", "told"),
-    [
-        (np, "allclose", "numpy.allclose"),
-        (engine, "check", "kfcourse.checks.engine.check"),
-        (Exercise, "questions", "kfcourse.checks.exercises.Exercise.questions"),
-    ],
-)
-def test_watch_notices_replaced_functions(watched, monkeypatch, where, name, told):
-    monkeypatch.setattr(where, name, lambda *_, **__: True)
-    with pytest.raises(watch.Changed, match=told):
-        watched()
-
-
-def test_watch_notices_replaced_code(watched, monkeypatch):
-    monkeypatch.setattr(engine._agree, "__code__", (lambda found, expected, values, tolerance: True).__code__)
-    with pytest.raises(watch.Changed, match=r"kfcourse\.checks\.engine\._agree\.__code__"):
-        watched()
-
-
-def test_results_count_only_from_the_cell_that_asked():
-    def made(*outputs):
-        return nbformat.v4.new_code_cell("x", outputs=list(outputs))
-
-    def value(kind="execute_result", question="b1", status="passed", **more):
-        data = {MIME: {"question": question, "status": status} | more, "text/plain": ""}
-        return nbformat.v4.new_output(kind, data)
-
-    result = marking._result
-    assert result(made(value()), "b1") == ("passed", "")
-    assert result(made(value(status="wrong", diagnosis=["sign"])), "b1") == ("wrong", "sign")
-    assert result(made(value(status="unusable", message="why")), "b1") == ("unusable", "why")
-    assert result(made(value("display_data")), "b1") == (None, "")
-    assert result(made(), "b1") == (None, "")
-    for strange in (
-        [value(question="b2")],
-        [value(), value()],
-        [value(status="excellent")],
-        [nbformat.v4.new_output("execute_result", {MIME: "passed"})],
-        [nbformat.v4.new_output("execute_result", {MIME: [1]})],
-    ):
-        assert result(made(*strange), "b1") == (None, "the check's result was tampered with")
-    error = nbformat.v4.new_output("error", ename="NameError", evalue="gain")
-    assert result(made(value(), error), "b1") == (None, "NameError: gain")
+    assert running.packages_of(Path("stage")) == ["stage", str(Path("here").absolute()), str(tmp_path)]

@@ -63,6 +63,15 @@ def test_logarithms_and_matrices() -> None:
     verified((rotation * rotation.T, sp.eye(2)))
 
 
+def test_letters_of_matrices_stand_for_their_entries() -> None:
+    A, B, C = (sp.MatrixSymbol(name, 2, 2) for name in "ABC")
+    entries = {A: sp.Matrix([[x, z], [0, 1]]), B: sp.Matrix([[1, 0], [x, z]]), C: A * B}
+    shown = verified((C.T, B.T * A.T), where=entries)
+    assert "C^{T} &= B^{T} A^{T}" in shown.markdown
+    with pytest.raises(Unverified):
+        verified((C.T, A.T * B.T), where=entries)
+
+
 def test_numbers_to_so_many_digits() -> None:
     fourier = sp.Integral(sp.exp(-(x**2) / (2 * p)) * sp.cos(x), (x, -sp.oo, sp.oo))
     right = sp.sqrt(2 * sp.pi * p) * sp.exp(-p / 2)

@@ -107,7 +107,7 @@ def test_accelerations_of_a_parabola_are_found():
 # ---------------------------------------------------------------- the filter
 
 
-@pytest.mark.parametrize("arithmetic", ["covariance", "symmetrised", "joseph", "square-root"])
+@pytest.mark.parametrize("arithmetic", ["covariance", "symmetrised", "joseph", "square-root", "ud"])
 def test_a_uniformly_accelerated_track_without_noise_is_followed_exactly(arithmetic):
     dt, a = 0.1, np.array([30.0, -20.0])
     t = dt * np.arange(20)[:, None, None]

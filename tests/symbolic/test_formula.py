@@ -1,6 +1,7 @@
 """Formulas typed by people: what is read is right, and nothing else is read."""
 
 import json
+import re
 import subprocess
 import sys
 
@@ -47,6 +48,38 @@ def test_a_formula_means_what_it_says(formula, expected):
     assert sp.simplify(read(formula) - expected) == 0
 
 
+@pytest.mark.parametrize(
+    ("formula", "cure"),
+    [
+        ("c*х", "write x of"),  # Cyrillic
+        ("x − v", "write - of"),
+        ("2·x", "write * of"),
+        ("2×x", "write * of"),
+        ("x²", "write **2"),
+        ("x^2", "write ** for a power"),
+        ("x + 1e-400*v", "change the units"),
+    ],
+)
+def test_what_is_typed_by_habit_is_told_how_to_write(formula, cure):
+    with pytest.raises(FormulaError, match=re.escape(cure)):
+        read(formula)
+
+
+def test_a_formula_may_have_several_lines_and_zeros_of_any_form():
+    assert read("c*x\n\t+ v\r\n") == c * x + v
+    assert read("x + 0.0e-5*v + 0x0*v + 00*v + .0e9*c") == x
+
+
+def test_a_message_shows_no_control_characters():
+    with pytest.raises(FormulaError) as caught:
+        read("x + \x1b[31m\x07\0v")
+    assert caught.value.column == 4
+    assert all(character.isprintable() or character == "\n" for character in str(caught.value))
+    with pytest.raises(FormulaError) as caught:
+        read("x + " + chr(0xDC80))  # half of a pair
+    assert str(caught.value).encode("utf-8")
+
+
 def test_decimals_are_exact():
     assert read("0.1 + 0.2") == sp.Rational(3, 10)
 
@@ -72,7 +105,7 @@ HOSTILE = [
     ("x + True", 4),
     ("x + ...", 4),
     ("x + 2j", 4),
-    ("x if v else c", 0),
+    ("x if v else c", 5),
     ("x < v", 0),
     ("x and v", 0),
     ("not x", 0),
@@ -103,6 +136,11 @@ HOSTILE = [
     ("x + v(2)", 4),
     ("x + 1e400", 4),
     ("x + 1e-300", 4),
+    ("x + 1e-400", 4),
+    ("x + 0.00_1e-400*v", 4),
+    ("x # + v", 2),
+    ("c*ｘ", 2),
+    ("x + ſin(v)", 4),
     ("x**v", 3),
     ("2**x", 3),
     ("x**17", 3),

@@ -155,3 +155,11 @@ def test_variance_of_a_sine_is_finite_for_any_variance():
     variance = sp.lambdify([m, d], GaussianMoments([x], [m], sp.Matrix([[d]])).covariance(sp.sin(x), sp.sin(x)), "numpy")
     with np.errstate(all="raise", under="ignore"):
         assert variance(0.3, 5000.0) == pytest.approx(0.5, rel=1e-12)
+
+
+def test_sums_of_parameters_in_a_denominator_stay_together():
+    s, T = sp.symbols("s T", real=True)
+    found = GaussianMoments([x], [m], sp.Matrix([[d]])).mean_of(T * sp.sin(x) / (1 + s**2) + sp.exp(x / (1 + s)) / (1 + T))
+    by_hand = T * sp.exp(-d / 2) * sp.sin(m) / (1 + s**2) + sp.exp(m / (1 + s) + d / (1 + s) ** 2 / 2) / (1 + T)
+    at = {s: sp.Rational(3, 10), T: 2, m: sp.Rational(1, 2), d: sp.Rational(1, 4)}
+    assert abs(sp.N((found - by_hand).subs(at), 30)) < 1e-25

@@ -1,9 +1,19 @@
 """Grading a folder of returned notebooks.
 
 submissions   what was returned: notebooks, their cells, the exercise each claims to be
-assembly      the notebook that is run: the master's, with the student's cells in it
-running       a kernel and a folder of its own, with limits of time, memory and output
-watch         in that kernel: the exercise as it was handed out
+assembly      the cells that are run: the master's, with the student's in them
+session       in a notebook's process: runs cells, calls functions, knows no answers
+values        what may leave that process: numbers, arrays, formulas, as JSON
+channel       messages between processes
+staging       the package without the right answers, for that process
+sandbox       where that process runs: in bubblewrap's sandbox, or below a keeper
+keeper        its parent otherwise: ends what it leaves behind
+running       its cells and answers, with limits of time and memory
 marking       one notebook -> its marks and notes
+worker        the grading process, which compares
+pool          several of them, started anew when one ends
+owners        whose notebook it is, and what to look at
+weights       what an answer is worth
+report        tables and pages for students and lecturers
 table         all marks as a CSV table, resumed where it was interrupted
 """

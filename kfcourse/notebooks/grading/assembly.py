@@ -8,13 +8,11 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
-import nbformat
 from nbformat import NotebookNode
 
-from kfcourse.checks import Exercise, exercise
-from kfcourse.notebooks.grading.running import MEMORY
+from kfcourse.checks import exercise
 from kfcourse.notebooks.grading.submissions import Cell, syntax
-from kfcourse.notebooks.master import opened, render, student
+from kfcourse.notebooks.master import render, student
 
 
 @lru_cache(maxsize=64)
@@ -35,8 +33,22 @@ def _asked(source: str) -> list[str]:
     return [question for _, question in CHECK.findall(source)]
 
 
-def assembled(master: NotebookNode, cells: Sequence[Cell], exercise: Exercise) -> tuple[NotebookNode, list[Cell]]:
-    """The master's notebook with the student's cells in it, and those cells.
+class Step(NamedTuple):
+    """A cell to run.
+
+    where: what a note calls it;  own: whether the student wrote it;  names, questions: by which names a check cell calls the
+    exercise, and what it asks.
+    """
+
+    source: str
+    where: str
+    own: bool = False
+    names: tuple[str, ...] = ()
+    questions: tuple[str, ...] = ()
+
+
+def assembled(master: NotebookNode, cells: Sequence[Cell]) -> tuple[list[Step], list[Cell]]:
+    """The master's cells with the student's in them, and those.
 
     A cell that defines an asked function takes the place of its stub, wherever it stands; a changed cell of the master, known by
     its id, takes that cell's place; other cells follow what they followed in the returned notebook.  The master's check cells
@@ -45,28 +57,17 @@ def assembled(master: NotebookNode, cells: Sequence[Cell], exercise: Exercise) -
     code = [(index, cell) for index, cell in enumerate(master.cells) if cell.cell_type == "code"]
     checks = check_cells(master)
     place = _places(code, checks, cells)
-    ordered = []  # (place, number, cell)
+    ordered = []  # (place, number, step)
     for index, cell in code:
-        source = cell.source
+        where = f"the master's cell {cell.id}"
         if cell.id in checks:
-            names = dict.fromkeys(name for name, _ in CHECK.findall(source))
-            source = "".join(f"{name} = kfcourse_watch()\n" for name in names) + source
-        elif index in place.taken:
-            continue
-        ordered.append((index, 0, _cell(cell.id, source, f"the master's cell {cell.id}")))
+            names = tuple(dict.fromkeys(name for name, _ in CHECK.findall(cell.source)))
+            ordered.append((index, 0, Step(cell.source, where, False, names, tuple(checks[cell.id]))))
+        elif index not in place.taken:
+            ordered.append((index, 0, Step(cell.source, where)))
     own = [cell for cell in cells if cell.number in place.of]
-    for cell in own:
-        ordered.append((place.of[cell.number], cell.number, _cell(f"returned-{cell.number}", cell.source, cell.name)))
-    opening = (
-        "from kfcourse.notebooks.grading.watch import Watch\n"
-        f"kfcourse_watch = Watch({exercise.letter!r}, {opened(exercise)}, memory={MEMORY})"
-    )
-    ordered.sort(key=lambda row: row[:2])
-    return nbformat.v4.new_notebook(cells=[_cell("watch", opening, "the first cell"), *(cell for *_, cell in ordered)]), own
-
-
-def _cell(name: str, source: str, where: str) -> NotebookNode:
-    return nbformat.v4.new_code_cell(source, id=name, metadata={"where": where})
+    ordered += [(place.of[cell.number], cell.number, Step(cell.source, cell.name, True)) for cell in own]
+    return [step for *_, step in sorted(ordered, key=lambda row: row[:2])], own
 
 
 class Places(NamedTuple):

@@ -1,108 +1,206 @@
-"""Marking one returned notebook: what passed, for the instructor's eye.
+"""Marking one returned notebook: what passed, and what the wrong answers look like.
 
 Nothing of a returned notebook is trusted but the student's own cells.  The notebook of its set and variant is made again from the
-master, the student's cells are put into it, it runs in a kernel of its own, and only what the master's check cells report counts.
-
-This keeps honest notebooks from harming one another and notices the usual accidents and shortcuts.  It is no defence against a
-student who means harm: the notebooks run with your rights.  A notebook that looks strange is named in the table; look at it.
+master, and the student's cells are put into it.  It runs in a process of its own, which has neither keys nor questions: it is
+asked for the values of the student's functions, at arguments that nobody has seen before, and this process compares them.
 """
 
 from __future__ import annotations
 
+import ast
+import hashlib
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from nbformat import NotebookNode
 
-from kfcourse.checks import Exercise
-from kfcourse.checks.question import MIME, UNUSABLE, WRONG
+from kfcourse.checks import Exercise, Result
+from kfcourse.checks.engine import SECONDS as CHECK
+from kfcourse.checks.engine import check
+from kfcourse.checks.question import UNUSABLE, WRONG
 from kfcourse.limits import OutOfTime, time_limit
-from kfcourse.notebooks.grading.assembly import assembled, check_cells, generated
-from kfcourse.notebooks.grading.running import WHOLE, run
-from kfcourse.notebooks.grading.submissions import Cell, Returned, cells_of, claimed, clean, read_document
-from kfcourse.notebooks.grading.table import FAILED, GRADED, NOT_RUN, OTHER, SIGNS, Grade
+from kfcourse.notebooks.grading.assembly import Step, assembled, generated
+from kfcourse.notebooks.grading.running import WHOLE, Answer, Kernel, Killed, Opening, Place, Stopped
+from kfcourse.notebooks.grading.staging import opened_elsewhere, personal_numbers
+from kfcourse.notebooks.grading.submissions import Cell, Returned, cells_of, claimed, clean, openings, read_document, syntax
+from kfcourse.notebooks.grading.table import FAILED, GRADED, NOT_RUN, OTHER, Grade, Told
+from kfcourse.notebooks.grading.values import Other
 from kfcourse.notebooks.master import opened, read
 
+TOO_LARGE = "cannot be compared: too large, or too slow"
+CODE = 4000  # characters of an answer that are kept
 
-def grade(work: Returned) -> Grade:
-    """Grade one notebook; never raises, what went wrong is in the row."""
+
+@dataclass(frozen=True)
+class Setting:
+    """Where and how notebooks are graded.
+
+    Attributes
+    ----------
+    place : Place
+    salt : str
+        Of the hidden arguments.
+    """
+
+    place: Place
+    salt: str
+
+
+Progress = Callable[[str], None]  # is told the question that is compared now, "" while the notebook runs
+
+
+def grade(
+    work: Returned, setting: Setting, skip: Sequence[str] = (), progress: Progress = lambda _: None, start: Any = Kernel
+) -> Grade:
+    """Grade one notebook; never raises, what went wrong is in the row.
+
+    Parameters
+    ----------
+    work : Returned
+    setting : Setting
+    skip : sequence of str
+        Questions whose answers this process could not compare: they count as unusable.
+    progress : callable
+    start : type
+        Of the notebook's process.
+    """
     try:
+        progress("")
         document = read_document(work.path)
-        claim = document.get("metadata", {}).get("kfcourse")
+        cells = cells_of(document)
+        claim = document.get("metadata", {}).get("kfcourse") or _claim(cells)
         if claim is None:
             return Grade(work.name, OTHER, digest=work.digest)
-        return _grade(work, cells_of(document), claim)
+        return _grade(work, cells, claim, setting, skip, progress, start)
     except OutOfTime:
         problem = "the notebook of its variant cannot be made in time"
+    except Killed as reason:
+        problem = str(reason)
     except Exception as error:  # also of libraries: one notebook must not stop the others
         problem = clean(str(error) or type(error).__name__)
     return Grade(work.name, FAILED, note=problem)
 
 
-def _grade(work: Returned, cells: Sequence[Cell], claim: Any) -> Grade:
+def _claim(cells: Sequence[Cell]) -> dict[str, str] | None:
+    """Set and variant that a notebook without metadata opens."""
+    for cell in cells:
+        for letter, variant in openings(cell.source):
+            name = variant.get("name") if isinstance(variant, dict) else variant
+            return {"set": str(letter), "variant": str(name or "53")}
+    return None
+
+
+def _grade(
+    work: Returned, cells: Sequence[Cell], claim: Any, setting: Setting, skip: Sequence[str], progress: Progress, start: Any
+) -> Grade:
     with time_limit(WHOLE * work.seconds):
         exercise, notes = claimed(claim, cells, work.variants_file)
         master = generated(read(exercise.letter, work.masters), exercise.letter, opened(exercise))
-    notebook, own = assembled(master, cells, exercise)
-    executed, stopped = run(notebook, work.seconds)
-    marks, reasons = marks_of(executed, exercise, check_cells(master))
-    notes = [*([stopped] if stopped else []), *errors_of(executed), *reasons, *notes, *strange_lines(own, master)]
-    return Grade(work.name, GRADED, exercise.letter, exercise.variant.name, marks, "; ".join(dict.fromkeys(notes)), work.digest)
+        elsewhere = opened_elsewhere(call for cell in cells for call in openings(cell.source))
+        opening = Opening(exercise.letter, opened(exercise), personal_numbers(exercise, elsewhere))
+    steps, own = assembled(master, cells)
+    asked = Exercise(exercise.letter, exercise.variant, setting.salt)
+    marking = Marking(asked, skip, progress)
+    with start(setting.place, opening, work.seconds) as kernel:
+        stopped = marking.run(kernel, steps)
+    notes = [*stopped, *marking.errors[:2], *marking.reasons(), *notes, *_noted(kernel.notes), *strange_lines(own, master)]
+    code = {question.name: question.function for question in exercise.questions.values()}
+    told = {
+        name: Told(one.message, one.diagnosis, _code(own, code[name]) if one.status == WRONG and not one.diagnosis else "")
+        for name, one in marking.results.items()
+    }
+    variant, note = exercise.variant.name, "; ".join(dict.fromkeys(notes))
+    whom = clean(str(claim.get("student", ""))) if isinstance(claim, dict) else ""
+    done = code_of(own, set(code.values()))
+    return Grade(work.name, GRADED, exercise.letter, variant, marking.marks, note, work.digest, told, whom, done)
 
 
-# -- what came of it
+def _noted(notes: Iterable[str]) -> list[str]:
+    return [f"look: it {note}" for note in list(dict.fromkeys(notes))[:5]]
 
 
-def marks_of(executed: NotebookNode, exercise: Exercise, checks: Mapping[str, list[str]]) -> tuple[dict[str, str], list[str]]:
-    """Question to mark, and what the wrong answers look like."""
-    marks = dict.fromkeys(exercise.questions, NOT_RUN)
-    reasons: dict[str, list[str]] = {}
-    for cell in executed.cells:
-        for question in checks.get(cell.id, []):
-            found, reason = _result(cell, question)
-            marks[question] = found or NOT_RUN
-            if reason:
-                reasons.setdefault(reason, []).append(question)
-    return marks, [clean(f"{', '.join(questions)}: {reason}") for reason, questions in reasons.items()]
-
-
-def _result(cell: NotebookNode, question: str) -> tuple[str | None, str]:
-    """Status of a question in its check cell, and what to say of it.
-
-    What the student's function shows by itself is display_data; the check's result is the cell's value.
-    """
-    values = [output.data[MIME] for output in cell.outputs if output.output_type == "execute_result" and MIME in output.data]
-    errors = [output for output in cell.outputs if output.output_type == "error"]
-    if errors:
-        return None, f"{errors[-1].ename}: {errors[-1].evalue}"
-    if not values:
-        return None, ""
-    value = values[0] if len(values) == 1 and isinstance(values[0], dict) else {}
-    status = value.get("status")
-    if value.get("question") != question or status not in SIGNS:
-        return None, "the check's result was tampered with"
-    if status == UNUSABLE:
-        return status, str(value.get("message", ""))
-    diagnosis = value.get("diagnosis")
-    return status, ", ".join(map(str, diagnosis)) if status == WRONG and isinstance(diagnosis, list) else ""
-
-
-def errors_of(executed: NotebookNode) -> list[str]:
-    """The first errors of the student's cells; those of stubs are no news."""
+def code_of(own: Iterable[Cell], functions: Container[str]) -> str:
+    """Hash of the answers as Python reads them, so without comments; empty if there is none but stubs."""
     found = []
-    for cell in executed.cells:
-        for output in cell.outputs if cell.id.startswith("returned-") else []:
-            if output.output_type == "error" and output.ename != "NotImplementedError":
-                found.append(clean(f"{cell.metadata['where']}: {output.ename}: {output.evalue}"))
-    return found[:2]
+    for cell in own:
+        for node in (syntax(cell.source) or ast.Module([], [])).body:
+            if isinstance(node, ast.FunctionDef) and node.name in functions:
+                found.append(ast.dump(node))
+    return hashlib.sha256("\n".join(sorted(found)).encode()).hexdigest()[:16] if found else ""
 
 
-STRANGE = re.compile(r"kfcourse|\.questions\b|\.structures\b|_getframe|__code__|\.hidden")
+def _code(own: Iterable[Cell], function: str) -> str:
+    """The cell in which a student defines a function."""
+    found = [cell.source for cell in own if re.search(rf"^(def {function}\b|{function}\s*=)", cell.source, re.MULTILINE)]
+    return "\n".join(found)[:CODE]
+
+
+class Marking:
+    """Marks of a notebook while it runs.
+
+    Attributes
+    ----------
+    marks : dict
+        Question to mark.
+    results : dict
+        Question to what the check said.
+    errors : list of str
+        Errors of the student's cells; those of stubs are no news.
+    """
+
+    def __init__(self, exercise: Exercise, skip: Sequence[str], progress: Progress):
+        self._exercise, self._skip, self._progress = exercise, skip, progress
+        self.marks = dict.fromkeys(exercise.questions, NOT_RUN)
+        self.results: dict[str, Result] = {}
+        self.errors: list[str] = []
+        self._reasons: dict[str, list[str]] = {}
+
+    def run(self, kernel: Kernel, steps: Iterable[Step]) -> list[str]:
+        """Run all cells and ask for all answers; says where and why it did not come to its end, if it did not."""
+        for step in steps:
+            self._progress("")
+            try:
+                ran = kernel.cell(step.source, step.names)
+            except Stopped as reason:
+                return [f"{step.where}: {reason}"]
+            if ran.error and step.own and ran.error[0] != "NotImplementedError":
+                self.errors.append(clean(f"{step.where}: {': '.join(ran.error)}"))
+            for name in step.questions:
+                if ran.error:
+                    self._reason(": ".join(ran.error), name)
+                elif name in ran.answers and name in self.marks:
+                    self._check(name, kernel, ran.answers[name])
+        return []
+
+    def _check(self, name: str, kernel: Kernel, kind: str) -> None:
+        question = self._exercise.questions[name]
+        if name in self._skip:
+            result = Result(name, question.title, UNUSABLE, TOO_LARGE)
+        else:
+            self._progress(name)
+            answer: Any = type(kind, (Other,), {})() if kind else Answer(kernel, name)
+            result = check(question, self._exercise, answer, CHECK)
+        self.results[name], self.marks[name] = result, result.status
+        if result.status == UNUSABLE:
+            self._reason(result.message, name)
+        elif result.status == WRONG and result.diagnosis:
+            self._reason(", ".join(result.diagnosis), name)
+
+    def _reason(self, reason: str, question: str) -> None:
+        self._reasons.setdefault(reason, []).append(question)
+
+    def reasons(self) -> list[str]:
+        """What the wrong answers look like."""
+        return [clean(f"{', '.join(questions)}: {reason}") for reason, questions in self._reasons.items()]
+
+
+STRANGE = re.compile(r"kfcourse|\.questions\b|\.structures\b|_getframe|currentframe|__code__|__traceback__|\.hidden|__setattr__")
 
 
 def strange_lines(own: Iterable[Cell], master: NotebookNode) -> list[str]:
-    """Lines of the student's that reach for more than an exercise needs, such as the right answers in the package."""
+    """Lines of the student's that reach for more than an exercise needs, such as what the package computes."""
     usual = {line.strip() for cell in master.cells for line in cell.source.splitlines()}
     found = [
         clean(f"look at {cell.name}: {line.strip()}")

@@ -1,123 +1,255 @@
-"""Running a notebook in a kernel and a folder of its own, with limits of time, output and memory."""
+"""Running a notebook's cells and calling its functions, in a process of its own with limits of time and memory."""
 
 from __future__ import annotations
 
-import asyncio
-import logging
 import os
 import re
+import secrets
 import shutil
-import signal
 import site
-import subprocess
+import sys
 import tempfile
 import time
-from contextlib import suppress
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib
-from nbclient import NotebookClient
-from nbclient.exceptions import CellTimeoutError, DeadKernelError
-from nbformat import NotebookNode
 
-from kfcourse.notebooks.grading.submissions import SECONDS
+from kfcourse.checks.engine import Missing
+from kfcourse.checks.equality import Unusable
+from kfcourse.limits import OutOfTime
+from kfcourse.notebooks.grading.channel import Closed, Late, Patient
+from kfcourse.notebooks.grading.sandbox import Process, Sandbox
+from kfcourse.notebooks.grading.submissions import SECONDS, clean
+from kfcourse.notebooks.grading.values import Strange, decode, encode
 
 WHOLE = 5  # times as long may a notebook take
-MEMORY = 4 * 2**30  # bytes of a kernel
-OUTPUT = 10 * 2**20  # characters that a notebook may print, pictures included
+MEMORY = 4 * 2**30  # bytes of a notebook's process
+START = 60.0  # seconds until a process answers
+GRACE = 3.0  # seconds after which a process that stops nothing is stopped
+ANSWER = 18.0  # seconds that one call of an answer may take
+ANSWERS = 45.0  # all calls of it, those of the search for the kind of mistake included
 
 
-class _Client(NotebookClient):
-    """Executes a notebook as far as it goes; remembers where it is, and stops one that prints without end."""
-
-    def __init__(self, notebook: NotebookNode, seconds: float):
-        self.at = 0
-        self.group = 0
-        self.printed = 0
-        self.deadline: float | None = None
-        super().__init__(
-            notebook,
-            kernel_name="python3",
-            timeout_func=lambda _: self._left(seconds),
-            allow_errors=True,
-            record_timing=False,
-            shutdown_kernel="immediate",
-            extra_arguments=["--log-level=CRITICAL"],
-            on_notebook_start=self._started,
-            on_cell_start=self._reached,
-        )
-        self.log = logging.getLogger("kfcourse.grade")  # what it would log is told in the table
-        self.log.setLevel(logging.CRITICAL + 1)
-
-    def _left(self, seconds: float) -> int:
-        if self.deadline is None:
-            self.deadline = time.monotonic() + WHOLE * seconds
-        return max(1, round(min(seconds, self.deadline - time.monotonic())))
-
-    def _started(self, notebook: NotebookNode) -> None:
-        assert self.km is not None
-        self.group = getattr(self.km.provisioner, "pgid", None) or 0
-
-    def _reached(self, cell: NotebookNode, cell_index: int) -> None:
-        self.at = cell_index
-
-    def process_message(self, msg: dict[str, Any], cell: NotebookNode, cell_index: int) -> NotebookNode | None:
-        self.printed += len(str(msg["content"]))
-        if self.printed > OUTPUT:
-            kill(self.group)
-            return None
-        return super().process_message(msg, cell, cell_index)
+class Stopped(Exception):
+    """The notebook does not go on; the message says why."""
 
 
-def run(notebook: NotebookNode, seconds: float = SECONDS) -> tuple[NotebookNode, str]:
-    """Run a notebook in a new kernel and an empty folder, errors kept as outputs.
+class Killed(Exception):
+    """The notebook has killed the process that keeps its own."""
+
+
+class Opening(NamedTuple):
+    """The exercise as the notebook opens it: its letter, the variant as code, personal numbers by "letter variant"."""
+
+    letter: str
+    variant: str
+    numbers: Mapping[str, Mapping[str, float]]
+
+
+class Ran(NamedTuple):
+    """What came of a cell: name and text of its error; question to the type of what was handed in, "" for a function."""
+
+    error: tuple[str, str] | None
+    answers: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where notebooks run.
+
+    Attributes
+    ----------
+    stage : Path
+        The package as they see it.
+    sandbox : Sandbox
+    """
+
+    stage: Path
+    sandbox: Sandbox
+
+
+class Kernel:
+    """A notebook's process.  What it sends are values, and notes on what it does: nothing of it is believed.
 
     Parameters
     ----------
-    notebook : NotebookNode
-        Its outputs are filled in.
+    place : Place
+    opening : Opening
     seconds : float
-        Time limit of each cell; the notebook's is five times that.
-
-    Returns
-    -------
-    notebook, stopped : NotebookNode, str
-        `stopped` says where and why it did not come to its end; empty if it did.
-
-    Raises
-    ------
-    RuntimeError
-        No kernel starts.
+        Time limit of a cell; all cells may take five times as long.
     """
-    client = _Client(notebook, seconds)
-    reason = ""
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        work = Path(folder) / "work"
-        work.mkdir()
+
+    def __init__(self, place: Place, opening: Opening, seconds: float = SECONDS):
+        self.notes: list[str] = []
+        self._place, self._opening, self._seconds = place, opening, seconds
+        self._deadline = float("inf")
+        self._done: list[tuple[str, tuple[str, ...]]] = []  # cells, to be run again
+        self._process: Process | None = None
+        self._pending = False
+
+    def __enter__(self) -> Kernel:
+        self._start()
+        self._deadline = time.monotonic() + WHOLE * self._seconds
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _start(self) -> None:
+        self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        folder = Path(os.path.realpath(self._folder.name))
+        (folder / "work").mkdir()
+        packages, hidden = packages_of(self._place.stage), self._place.sandbox.hidden
+        command = [sys.executable, "-m", "kfcourse.notebooks.grading.session", *hidden, str(MEMORY)]
+        self._process = self._place.sandbox.start(command, folder, packages, environment(folder, packages))
+        assert self._process.popen.stdin and self._process.popen.stdout
+        self._channel = Patient(self._process.popen.stdout, self._process.popen.stdin)
+        self._pending = False
+        letter, variant, numbers = self._opening
+        message = {"do": "open", "letter": letter, "opening": variant, "numbers": numbers}
         try:
-            asyncio.run(
-                client.async_execute(
-                    cwd=str(work), env=environment(Path(folder)), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-                )
-            )
-        except CellTimeoutError:
-            late = client.deadline is not None and time.monotonic() > client.deadline - 1
-            reason = f"the notebook takes longer than {WHOLE * seconds:g} s" if late else f"still running after {seconds:g} s"
-        except DeadKernelError:
-            reason = "the kernel died (out of memory, or ended by the notebook itself)"
+            self._request(message, time.monotonic() + START, [])
+        except (Stopped, OutOfTime):
+            raise RuntimeError("the process of the notebook does not start") from None
+
+    def close(self) -> None:
+        """End the process and all that it started.
+
+        Raises
+        ------
+        Killed
+            It had killed what keeps it.
+        """
+        process, self._process = self._process, None
+        if process is not None:
+            killed = process.end()
+            self._folder.cleanup()
+            if killed:
+                raise Killed("it killed its process")
+
+    def cell(self, source: str, names: Sequence[str] = ()) -> Ran:
+        """Run a cell; `names` are those by which a check cell calls the exercise.
+
+        Raises
+        ------
+        Stopped, Killed
+        """
+        self._revive()
+        until = min(time.monotonic() + self._seconds, self._deadline)
+        try:
+            reply = self._request({"do": "cell", "source": source, "names": list(names)}, until, [])
+        except OutOfTime:
+            late = time.monotonic() >= self._deadline
+            long = f"the notebook takes longer than {WHOLE * self._seconds:g} s" if late else ""
+            raise Stopped(long or f"still running after {self._seconds:g} s") from None
+        self._done.append((source, tuple(names)))
+        error, answers = reply.get("error"), reply.get("answers")
+        told = (clean(str(error[0]), 60), clean(str(error[1]))) if isinstance(error, list) and len(error) == 2 else None
+        types = {str(name): str(kind or "") for name, kind in answers.items()} if isinstance(answers, dict) else {}
+        return Ran(told, types)
+
+    def ask(self, question: str, arguments: tuple, seconds: float) -> Any:
+        """The value of the function handed in for a question.
+
+        Raises
+        ------
+        Missing, Unusable, OutOfTime
+            As an answer that is called here would make `kfcourse.checks.engine.call` say.
+        """
+        self._revive()
+        functions: list[Callable] = []
+
+        def number(function: Callable) -> int:
+            functions.append(function)
+            return len(functions) - 1
+
+        sent = encode(arguments, number)
+        message = {"do": "ask", "question": question, "arguments": sent, "seconds": seconds}
+        try:
+            reply = self._request(message, time.monotonic() + seconds + GRACE, functions)
+        except Stopped as reason:
+            raise Unusable(str(reason)) from None
+        try:
+            if "value" in reply:
+                return decode(reply["value"])
+        except Strange as reason:
+            raise Unusable(f"returns what cannot be read: {clean(str(reason))}") from None
+        if reply.get("fails") == "missing":
+            raise Missing
+        if reply.get("fails") == "late":
+            raise OutOfTime
+        raise Unusable(clean(str(reply.get("says")), 300))
+
+    def _revive(self) -> None:
+        """Start anew, and run all cells again, if the process was ended in the midst of a question."""
+        if self._process is not None and not self._pending:
+            return
+        self.close()
+        self._start()
+        for source, names in self._done:
+            until = min(time.monotonic() + self._seconds, self._deadline)
+            try:
+                self._request({"do": "cell", "source": source, "names": list(names)}, until, [])
+            except OutOfTime:
+                raise Stopped("the cells before it, run once more, take too long") from None
+
+    def _request(self, message: dict[str, Any], until: float, functions: Sequence[Callable]) -> dict[str, Any]:
+        """What the process replies; functions of ours are called when it asks for it."""
+        self._pending = True
+        number = secrets.token_hex(4)  # a reply to nothing is no reply
+        try:
+            self._channel.send(message | {"id": number})
+            while True:
+                reply = self._channel.wait(until, self._keeper_lives)
+                if "note" in reply:
+                    self.notes += [clean(str(reply["note"]))] * (len(self.notes) < 20)
+                elif "call" in reply:
+                    self._channel.send(_called(reply, functions))
+                elif reply.get("id") == number:
+                    self._pending = False
+                    return reply
+        except Late:
+            self.close()
+            raise OutOfTime from None
+        except (Closed, Strange, ValueError) as error:
+            self.close()
+            died = "its process ended (out of memory, or ended by the notebook itself)"
+            raise Stopped(died if isinstance(error, Closed) else f"sends what is no answer: {clean(str(error))}") from None
+
+    def _keeper_lives(self) -> None:
+        if self._process is not None and self._process.keeper_killed:
+            self.close()
+
+
+def _called(reply: Mapping[str, Any], functions: Sequence[Callable]) -> dict[str, Any]:
+    """What a function of ours makes of the notebook's values."""
+    try:
+        values, named = decode(reply.get("values")), reply.get("named") or {}
+        number = reply["call"]
+        if type(number) is not int or not 0 <= number < len(functions) or not isinstance(values, tuple):
+            raise Strange("a call of nothing")
+        return {"value": encode(functions[number](*values, **{str(key): decode(one) for key, one in named.items()}))}
+    except Exception as error:  # of values of the student's
+        return {"raises": type(error).__name__, "says": clean(str(error), 300)}
+
+
+class Answer:
+    """A function of a notebook's, called in its process."""
+
+    def __init__(self, kernel: Kernel, question: str):
+        self._kernel, self._question, self._left = kernel, question, ANSWERS
+
+    def __call__(self, *arguments: Any) -> Any:
+        if self._left <= 0:
+            raise OutOfTime
+        start = time.monotonic()
+        try:
+            return self._kernel.ask(self._question, arguments, min(ANSWER, self._left))
         finally:
-            kill(client.group)  # what it may have left running
-        if client.printed > OUTPUT:
-            reason = f"printed more than {OUTPUT // 2**20} MB"
-    return notebook, f"{notebook.cells[client.at].metadata['where']}: {reason}" if reason else ""
-
-
-def kill(group: int) -> None:
-    """End all processes of a kernel's group."""
-    if group and hasattr(os, "killpg"):
-        with suppress(ProcessLookupError, PermissionError):
-            os.killpg(group, signal.SIGKILL)
+            self._left -= time.monotonic() - start
 
 
 KEPT = re.compile(
@@ -125,19 +257,26 @@ KEPT = re.compile(
 )
 
 
-def environment(folder: Path) -> dict[str, str]:
-    """Environment variables of a kernel: few of ours, and a home of its own."""
+def packages_of(stage: Path) -> list[str]:
+    """What is on the path of a notebook's process: the package as notebooks see it goes before yours."""
+    own = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    return [str(stage), *(os.path.abspath(path) for path in own if path)]
+
+
+def environment(folder: Path, packages: Sequence[str]) -> dict[str, str]:
+    """Environment variables of a notebook's process: few of ours, and a home of its own."""
     fonts = folder / "matplotlib"
     fonts.mkdir()
-    for path in Path(matplotlib.get_cachedir()).glob("fontlist*.json"):  # otherwise each kernel searches for fonts again
+    for path in Path(matplotlib.get_cachedir()).glob("fontlist*.json"):  # otherwise each process searches for fonts again
         shutil.copy(path, fonts)
-    packages = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     return {name: value for name, value in os.environ.items() if KEPT.fullmatch(name)} | {
-        "PYTHONPATH": os.pathsep.join(os.path.abspath(path) for path in packages if path),
+        "PYTHONPATH": os.pathsep.join(packages),
+        "PYTHONDONTWRITEBYTECODE": "1",
         "HOME": str(folder),
         "USERPROFILE": str(folder),
         "IPYTHONDIR": str(folder / "ipython"),
         "MPLCONFIGDIR": str(fonts),
+        "MPLBACKEND": "agg",
         "TMPDIR": str(folder),
         "TEMP": str(folder),
         "PYTHONUSERBASE": site.getuserbase(),

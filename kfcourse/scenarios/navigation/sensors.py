@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from kfcourse.angles import on_circle
 from kfcourse.laws import Array, Measurement, square_root
 from kfcourse.scenarios.navigation.dynamics import ROUNDING
 from kfcourse.symbolic.equations import compile_model
@@ -113,6 +114,7 @@ class Sensor:
         period: float,
         *,
         parameters: Mapping[str, float] | None = None,
+        angles: Sequence[str] | None = None,
         **timing: Any,
     ) -> Sensor:
         """A sensor from the formulas of its meter.
@@ -128,6 +130,8 @@ class Sensor:
             Of the noise.
         period : float
         parameters : dict, optional
+        angles : list of names, optional
+            Components of the measurement, y or y1, y2, ..., that are angles.
         **timing
             Other attributes of `Sensor`.
 
@@ -147,6 +151,7 @@ class Sensor:
             parameters,
             symbols={"x": list(states), "v": ["not_used"]},
             meter_noise={"variance": variance},
+            angles=None if angles is None else {"y": angles},
         )
         return cls(name, model, period, **timing)
 
@@ -226,7 +231,7 @@ def observe(
         arrivals = times + sensor.delays(len(times), rng)
         law = model.meter_noise
         w = law.mean + rng.standard_normal((*x.shape[:2], len(law.mean))) @ square_root(law.cov).T
-        values = np.broadcast_to(compile_model(model)[1](x, w), (*x.shape[:2], model.p))
+        values = on_circle(np.broadcast_to(compile_model(model)[1](x, w), (*x.shape[:2], model.p)), model.angles.y)
         tags = sensor.clock.reading(times)
         messages += [
             Observation(sensor.name, float(tag), float(arrival), value)

@@ -65,9 +65,13 @@ def side_lines(side: Side, width: int = WIDTH, names: Mapping[Any, str] | None =
     whole = latex(side, names)
     if symbols(whole) <= width or not isinstance(side, sp.Add):
         return [whole]
+    return joined([latex(term, names) for term in _ordered(side.as_ordered_terms())], width)
+
+
+def joined(terms: Sequence[str], width: float = WIDTH) -> list[str]:
+    """The LaTeX of a sum, from that of its terms, in lines."""
     lines = [""]
-    for term in _ordered(side.as_ordered_terms()):
-        printed = latex(term, names)
+    for printed in terms:
         signed = printed if printed.startswith("-") or lines == [""] else "+ " + printed
         if lines[-1] and symbols(lines[-1] + signed) > width:
             lines.append("")

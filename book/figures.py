@@ -1,0 +1,68 @@
+"""Sphinx extension: no figure without a number, a caption, and a text that says what is seen.
+
+A warning, and warnings are errors, names every picture that lacks one of them.
+"""
+
+from __future__ import annotations
+
+from docutils import nodes
+from sphinx.util import logging
+
+# Pages written before this rule; the list only ever gets shorter.
+TO_DO = frozenset(
+    {
+        "architecture",
+        "checking-exact",
+        "comparison",
+        "continuous",
+        "discriminator",
+        "extended-kalman",
+        "integration",
+        "lab-filters",
+        "linearisation",
+        "manoeuvres",
+        "numerics",
+        "radar-tracking",
+        "stratonovich",
+        "time-tags",
+        "track-2d",
+        "manual/a-structural-functions",
+        "manual/b-aof",
+        "manual/c-duof",
+        "manual/d-fos",
+        "manual/e-comparison",
+        "manual/f-exact",
+        "manual/g-extended",
+        "manual/h-continuous",
+        "manual/i-track",
+        "manual/j-radar",
+        "manual/k-integration",
+        "manual/l-time-tags",
+    }
+)
+CELL = "use a {figure}, or give the metadata `mystnb` of its cell"
+log = logging.getLogger(__name__)
+
+
+def check(app, doctree, name: str) -> None:
+    """Warn of each picture of the page that is no figure, or that nobody who cannot see it would know."""
+    if app.builder.format != "html" or name in TO_DO:
+        return
+    for image in doctree.findall(nodes.image):
+        above = list(_ancestors(image))
+        place = next((node for node in (image, *above) if node.line), name)
+        figure = next((node for node in above if isinstance(node, nodes.figure)), nodes.figure())
+        if not any(isinstance(child, nodes.caption) and child.astext().strip() for child in figure):
+            log.warning("a picture without a caption: %s `figure: {caption: ..., name: fig-...}`", CELL, location=place)
+        if not image.get("alt", "").strip():
+            log.warning("a picture without words for those who cannot see it: %s `image: {alt: ...}`", CELL, location=place)
+
+
+def _ancestors(node: nodes.Node):
+    while (node := node.parent) is not None:
+        yield node
+
+
+def setup(app) -> dict[str, bool]:
+    app.connect("doctree-resolved", check)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,107 @@
+"""Sphinx extension: the line under a chapter's title, `{chapter}`.
+
+    ```{chapter}
+    :needs: stratonovich, notation
+    :minutes: 40
+    :exercises: b, g
+    ```
+
+prints how long the chapter takes, what it needs, its exercise sets, a link that downloads it as a notebook, and how many
+equations were verified when it was executed: outputs that verify equations say so in their data (equations.py).
+"""
+
+from __future__ import annotations
+
+import html
+from pathlib import Path
+from typing import ClassVar
+
+import contents
+import nbformat
+from docutils import nodes
+from docutils.parsers.rst import directives
+from downloads import plain
+from equations import records
+from sphinx.util import logging
+from sphinx.util.docutils import SphinxDirective
+
+from kfcourse.checks import sets
+
+NOTEBOOKS = "notebooks"
+log = logging.getLogger(__name__)
+
+
+class chapter_line(nodes.General, nodes.Element):
+    """Stands for the line until all pages are known."""
+
+
+class Chapter(SphinxDirective):
+    option_spec: ClassVar = {"needs": directives.unchanged, "minutes": directives.positive_int, "exercises": directives.unchanged}
+
+    def run(self) -> list[nodes.Node]:
+        node = chapter_line("", **self.options)
+        self.set_source_info(node)
+        return [node]
+
+
+def behind_the_lead(app, doctree) -> None:
+    """The line stands below the sentence under the title, in whatever order they are written."""
+    for line in list(doctree.findall(chapter_line)):
+        place, siblings = line.parent.index(line), line.parent
+        if place + 1 < len(siblings) and "lead" in siblings[place + 1].get("classes", []):
+            siblings[place : place + 2] = [siblings[place + 1], line]
+
+
+def print_line(app, doctree, name: str) -> None:
+    """Put the line in the place of its directive."""
+    for line in list(doctree.findall(chapter_line)):
+        items = [item for item in _items(app, name, line) if item]
+        text = "".join(f"<li>{item}</li>" for item in items)
+        line.replace_self(nodes.raw("", f'<ul class="kf-chapter" aria-label="About this chapter">{text}</ul>', format="html"))
+
+
+def _items(app, name: str, line: chapter_line):
+    if "minutes" in line:
+        yield f"{line['minutes']} min"
+    needed = [_link(app, name, other, line) for other in _words(line.get("needs", ""))]
+    yield needed and f"needs {', '.join(needed)}"
+    known = sets()
+    letters = _words(line.get("exercises", ""))
+    for letter in letters:
+        if letter not in known:
+            log.warning("no exercise set %r; there are %s", letter, ", ".join(known), location=line)
+    chosen = [_link(app, name, f"manual/{known[x].name}", line, f"set {x}") for x in letters if x in known]
+    yield chosen and f"exercises {', '.join(chosen)}"
+    executed = Path(app.outdir).parent / "jupyter_execute" / f"{name}.ipynb"
+    if executed.exists():
+        notebook = nbformat.read(executed, as_version=4)
+        to = app.builder.get_relative_uri(name, "index").removesuffix("index.html") + f"{NOTEBOOKS}/{name}.ipynb"
+        _write(plain(notebook), Path(app.outdir) / NOTEBOOKS / f"{name}.ipynb")
+        yield f'<a download href="{to}">↓ notebook</a>'
+        count = sum(one["equations"] for one in records(notebook))
+        yield count and f'<span class="kf-count">✓ {count} equation{"s" * (count > 1)} verified</span>'
+
+
+def _link(app, name: str, other: str, line: chapter_line, text: str = "") -> str:
+    found = contents.page(app.env, other)
+    if found is None:
+        log.warning("no page %r in _toc.yml", other, location=line)
+        return html.escape(other)
+    return f'<a href="{app.builder.get_relative_uri(name, other)}">{html.escape(text or found[1].title)}</a>'
+
+
+def _words(text: str) -> list[str]:
+    return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def _write(notebook: nbformat.NotebookNode, path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    nbformat.write(notebook, path)
+
+
+def setup(app) -> dict[str, bool]:
+    app.add_node(chapter_line)
+    app.add_directive("chapter", Chapter)
+    app.connect("doctree-read", behind_the_lead)
+    app.connect("doctree-resolved", print_line)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

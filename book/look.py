@@ -1,0 +1,93 @@
+"""Sphinx extension: what the theme leaves to the book.
+
+The folding side bar with short titles, the line above a title, descriptions for search engines and previews, formulas
+that the keyboard reaches, small stars, and a page for addresses that do not exist.
+"""
+
+from __future__ import annotations
+
+import html
+import re
+from pathlib import Path
+
+import contents
+from docutils import nodes
+
+HERE = Path(__file__).resolve().parent
+STAR = re.compile(r"(<h\d[^>]*>(?:<span[^>]*>[^<]*</span>)?|<a[^>]*>)\s*★\s*")
+FORMULA = re.compile(r'<div class="math notranslate nohighlight"( id="[^"]*")?>\s*(<span class="eqno">\(([^)]*)\))?')
+NUMBER = re.compile(r"(?:(?<=>)|^)\s*\d+(\.\d+)*\.\s")  # of a section
+FIGURE = re.compile(r'(<span class="caption-number">[^<]*\d) </span>')
+TICK = re.compile(r'(<p class="kf-claim">)\s*✓')
+SMALL_TICK = r'\1<span class="kf-tick">✓</span>'
+SMALL_STAR = r'\1<span class="kf-star">★</span> '
+
+
+def use_templates(app, config) -> None:
+    config.templates_path.insert(0, str(HERE / "_templates"))
+
+
+def complete(app, pagename: str, templatename: str, context: dict, doctree) -> None:
+    """Everything a page of the book has besides its text."""
+    context["kf_parts"] = [_part(part, pagename, context["pathto"]) for part in contents.parts(app.env)]
+    context["kf_home"] = {"href": context["pathto"](app.config.root_doc), "current": pagename == app.config.root_doc}
+    context["kf_small_stars"] = lambda toc: NUMBER.sub("", toc).replace("★", '<span class="kf-star">★</span>')
+    for step in ("prev", "next"):
+        if context.get(step):
+            context[step] = {**context[step], "title": NUMBER.sub("", context[step]["title"])}
+    if doctree is None or "body" not in context:
+        return
+    body = context["body"]
+    for pattern, replacement in ((FORMULA, _reachable), (FIGURE, r"\1.</span> "), (TICK, SMALL_TICK), (STAR, SMALL_STAR)):
+        body = pattern.sub(replacement, body)
+    found = contents.page(app.env, pagename)
+    if found and found[0].caption:
+        part, page = found
+        number = f" · {page.number}" if page.number else ""
+        body = body.replace("<h1>", f'<p class="kf-part">{html.escape(part.caption)}{number}</p>\n<h1>', 1)
+    context["body"] = body
+    context["metatags"] = context.get("metatags", "") + _described(app, pagename, context, doctree)
+
+
+def _part(part: contents.Part, pagename: str, pathto) -> dict:
+    pages = [{"href": pathto(page.name), "title": page.title, "current": page.name == pagename} for page in part.pages]
+    return {"caption": part.caption, "pages": pages, "current": any(page["current"] for page in pages)}
+
+
+def _reachable(match: re.Match) -> str:
+    """A displayed formula takes the focus, so that the keyboard can scroll it, and has a name."""
+    identity, number = match[1] or "", match[2] or ""
+    name = f"Formula {match[3]}" if match[3] else "Formula"
+    return f'<div class="math notranslate nohighlight"{identity} tabindex="0" role="group" aria-label="{name}">\n{number}'
+
+
+def _described(app, pagename: str, context: dict, doctree) -> str:
+    """Title and description of a page for search engines and for previews of links to it."""
+    title = app.env.titles[pagename].astext() if pagename in app.env.titles else app.config.html_title
+    text = next((p.astext() for p in doctree.findall(nodes.paragraph) if len(p.astext()) > 40 and not _boxed(p)), title)
+    text = re.sub(r"\s+", " ", text)
+    text = text if len(text) <= 200 else text[:197].rsplit(" ", 1)[0] + " ..."
+    rows = {
+        ("name", "description"): text,
+        ("property", "og:title"): title,
+        ("property", "og:description"): text,
+        ("property", "og:type"): "website" if pagename == app.config.root_doc else "article",
+        ("property", "og:site_name"): app.config.html_title,
+    }
+    return "".join(f'\n  <meta {kind}="{name}" content="{html.escape(value)}" />' for (kind, name), value in rows.items())
+
+
+def _boxed(node: nodes.Node) -> bool:
+    while node is not None:
+        if isinstance(node, (nodes.Admonition, nodes.table, nodes.figure, nodes.list_item)) or node.get("classes", []) == [
+            "cell"
+        ]:
+            return True
+        node = node.parent
+    return False
+
+
+def setup(app) -> dict[str, bool]:
+    app.connect("config-inited", use_templates, priority=900)
+    app.connect("html-page-context", complete, priority=300)  # before the theme, which tries the templates
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

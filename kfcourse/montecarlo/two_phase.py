@@ -1,0 +1,110 @@
+"""Means that are known in part from all trajectories and in part from a subset of them, and what the design adds to their error.
+
+Fast filters ran on all N trajectories, slow ones on the first n.  A quantity is X, of what ran everywhere, plus Y, of what ran
+on the subset:
+
+    estimate = M_N X + M_n Y,    Var = Var X / N + Var Y / n + 2 Cov(X, Y) / N
+
+Filters with coefficients from an ensemble vary with that ensemble, too.  So they are designed several times, and run on common
+trajectories: the variance of their results, less what it would be for equal coefficients, is the variance of the design.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from kfcourse.laws import Array
+from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean
+
+Weights: TypeAlias = Mapping[tuple[str, str], Array | float]  # (field of Sums, filter) -> weight, one for each step or for all
+
+
+class Terms(NamedTuple):
+    """X and Y as weighted sums of the statistics of filters."""
+
+    everywhere: Weights
+    on_subset: Weights
+
+    def plus(self, other: Terms) -> Terms:
+        return Terms(*(_added(mine, theirs) for mine, theirs in zip(self, other, strict=True)))
+
+    def times(self, factor: Array | float) -> Terms:
+        return Terms(*({key: weight * factor for key, weight in weights.items()} for weights in self))
+
+
+def _added(first: Weights, second: Weights) -> Weights:
+    result = dict(first)
+    for key, weight in second.items():
+        result[key] = result.get(key, 0.0) + weight
+    return result
+
+
+@dataclass(frozen=True)
+class Replicas:
+    """The designed filters, each designed on several ensembles, on the common trajectories.
+
+    Attributes
+    ----------
+    names : tuple of str
+    sums : tuple of Sums
+        One for each design, its filters in the order of `names`; the first is the design that the comparison reports.
+    """
+
+    names: tuple[str, ...]
+    sums: tuple[Sums, ...]
+
+    def variance(self, terms: Terms, total: bool) -> tuple[Array, int]:
+        """Variance between designs of the mean of X + Y, and its degrees of freedom.
+
+        The scatter of the designs' means also holds that of the trajectories, which are the same for all; it is subtracted.
+        A distance from the exact filter varies as the square of the error does: their difference is that filter's own.
+        """
+        weights = dict[str, Array | float]()
+        for (kind, name), weight in (*terms.everywhere.items(), *terms.on_subset.items()):
+            if kind in ("square", "distance") and name in self.names:
+                weights[name] = weights.get(name, 0.0) + weight
+        values = np.stack(
+            [batch_sums(sums, self.names, {("square", n): w for n, w in weights.items()}, total) for sums in self.sums]
+        )
+        designs, counts = len(values), self.sums[0].counts
+        means = values.sum(axis=-1) / counts.sum()
+        by_chance = batch_mean(values - values.mean(axis=0), counts).standard_error ** 2
+        return np.maximum(means.var(axis=0, ddof=1) - by_chance.sum(axis=0) / (designs - 1), 0.0), designs - 1
+
+
+def batch_sums(sums: Sums, names: tuple[str, ...], weights: Weights, total: bool) -> Array:
+    """Weighted sums over batches, (steps, batches), or (batches,) over all steps."""
+    steps, batches = sums.normalised.shape[1:]
+    result = np.zeros((steps, batches))
+    for (kind, name), weight in weights.items():
+        values = getattr(sums, kind)[names.index(name)]
+        result += np.broadcast_to(weight, steps)[:, None] * (values if values.ndim == 2 else values.sum(axis=1))
+    return result.sum(axis=0) if total else result
+
+
+def estimate(
+    full: Array, counts: Array, x: Array | None = None, y: Array | None = None, of_subset: Array | None = None
+) -> Estimate:
+    """M_N X + M_n Y from batch sums of X over all trajectories, and of X and Y over the subset, if there is a Y."""
+    everywhere = batch_mean(full, counts)
+    if x is None or y is None or of_subset is None:
+        return everywhere
+    correction = batch_mean(y, of_subset)
+    # Var(x + y) - Var(x - y) = 4 Cov(x, y), each a variance of means over the n of the subset
+    plus, minus = (batch_mean(x + sign * y, of_subset).standard_error ** 2 for sign in (1, -1))
+    covariance = (plus - minus) / 4 * of_subset.sum() / counts.sum()
+    variance = everywhere.standard_error**2 + correction.standard_error**2 + 2 * covariance
+    return Estimate(everywhere.value + correction.value, np.sqrt(np.maximum(variance, 0.0)), correction.freedom)
+
+
+def with_design(one: Estimate, variance: Array, freedom: int) -> Estimate:
+    """An estimate whose error varies with the design, too; freedom by Welch and Satterthwaite."""
+    trajectories = one.standard_error**2
+    total = trajectories + variance
+    with np.errstate(divide="ignore", invalid="ignore"):
+        together = total**2 / (trajectories**2 / one.freedom + variance**2 / freedom)
+    return Estimate(one.value, np.sqrt(total), np.where(variance > 0, together, one.freedom))

@@ -1,0 +1,96 @@
+"""The package as a returned notebook sees it: a copy without the right answers, and personal numbers in their place."""
+
+from __future__ import annotations
+
+import ast
+import compileall
+import shutil
+from collections.abc import Iterable
+from contextlib import suppress
+from importlib import resources
+from pathlib import Path
+
+from kfcourse.checks import Exercise, ExerciseError, exercise, sets
+
+LEFT_OUT = ("notebooks", "pages", "exercises", "cli.py", "__main__.py")  # what a student's notebook has no use for
+NEEDED = ("__init__.py", "grading/__init__.py", "grading/channel.py", "grading/session.py", "grading/values.py")  # of notebooks
+COMPANIONS = "companion.py"  # what the notebooks of a set import; never a key
+
+REGISTRY = '''"""The exercise sets without their questions: what a notebook is graded with."""
+
+from pathlib import Path
+
+from kfcourse.checks.registry import ExerciseSet, register
+
+NUMBERS = {}  # "letter variant" to personal numbers
+
+
+def _numbers(task):
+    try:
+        return dict(NUMBERS[f"{task.letter} {task.variant.name}"])
+    except KeyError:
+        raise ValueError(f"personal numbers of set {task.letter}, variant {task.variant.name} are not yours") from None
+
+
+for _letter, _title, _name, _about in {rows!r}:
+    _folder = Path(__file__).parent / _name
+    register(ExerciseSet(_letter, _title, _folder, (), numbers=_numbers, about_variant=_about))
+'''
+
+
+def stage(folder: Path) -> Path:
+    """Write the package into a folder for graded notebooks: a copy without keys, questions, mistakes and masters.
+
+    Only that copy is on the path where a returned notebook runs.
+
+    Returns
+    -------
+    Path
+        What belongs on the path.
+    """
+    own = Path(str(resources.files("kfcourse")))
+    target = folder / "kfcourse"
+    shutil.copytree(own, target, ignore=lambda at, names: LEFT_OUT if Path(at) == own else ())
+    for name in NEEDED:
+        copied = target / "notebooks" / name
+        copied.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(own / "notebooks" / name, copied)
+    registered = list(sets().values())
+    (target / "exercises").mkdir()
+    for one in registered:
+        if (one.folder / COMPANIONS).exists():
+            (target / "exercises" / one.folder.name).mkdir()
+            shutil.copy2(one.folder / COMPANIONS, target / "exercises" / one.folder.name)
+    rows = [(one.letter, one.title, one.folder.name, one.about_variant) for one in registered]
+    (target / "exercises" / "__init__.py").write_text(REGISTRY.replace("{rows!r}", repr(rows)), encoding="utf-8")
+    compileall.compile_dir(target, quiet=2)
+    return folder
+
+
+def answers() -> list[Path]:
+    """Folders that hold the right answers: no notebook may read them."""
+    return sorted({one.folder.parent for one in sets().values()} | {Path(str(resources.files("kfcourse.exercises")))})
+
+
+def personal_numbers(own: Exercise, others: Iterable[Exercise] = ()) -> dict[str, dict[str, float]]:
+    """Personal numbers of an exercise, and of the others that a notebook opens so far as they have any, by "letter variant"."""
+    found = {_key(own): own.numbers}
+    for one in others:
+        with suppress(Exception):  # of tables of the student's
+            found[_key(one)] = one.numbers
+    return found
+
+
+def _key(one: Exercise) -> str:
+    return f"{one.letter} {one.variant.name}"
+
+
+def opened_elsewhere(calls: Iterable[tuple[object, object]]) -> list[Exercise]:
+    """The exercises that a notebook opens besides its own, so far as there are such."""
+    found = []
+    for letter, variant in calls:
+        try:
+            found.append(exercise(letter, ast.literal_eval(repr(variant))))  # type: ignore[arg-type]
+        except (ExerciseError, ValueError, TypeError, KeyError):
+            continue
+    return found

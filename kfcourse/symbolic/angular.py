@@ -1,0 +1,59 @@
+"""Which components of a model are angles, as people say it; and a warning where they should."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+
+import sympy as sp
+
+from kfcourse.angles import Angles
+from kfcourse.symbolic.reading import ModelError, Names
+
+
+class AngleWarning(UserWarning):
+    """A formula finds an angle by atan2, and the model does not say that the result is one."""
+
+
+def read_angles(given: Names | Mapping[str, Names] | None, x: list[str], y: list[str]) -> Angles:
+    """The components named, in a list or under the keys x and y."""
+    known = {"x": x, "y": y}
+    if isinstance(given, Mapping):
+        if set(given) - set(known):
+            raise ModelError(f"`angles` has the keys x and y, not {', '.join(map(str, set(given) - set(known)))}")
+        chosen = {key: [names] if isinstance(names, str) else [*names] for key, names in given.items()}
+    else:
+        names = [given] if isinstance(given, str) else [*(given or [])]
+        if both := [name for name in names if name in x and name in y]:
+            raise ModelError(
+                f"{both[0]} is the name of a state and of a measurement: say which is an angle, "
+                f"angles={{'x': ['{both[0]}']}} or angles={{'y': ['{both[0]}']}}"
+            )
+        chosen = {key: [name for name in names if name in known[key]] for key in known}
+        chosen["y"] += [name for name in names if name not in x + y]
+    for key, names in chosen.items():
+        if unknown := [name for name in names if name not in known[key]]:
+            raise ModelError(f"`angles` names {', '.join(map(str, unknown))}; components are {', '.join(x)} and {', '.join(y)}")
+    return Angles(*(tuple(i for i, name in enumerate(known[key]) if name in chosen.get(key, ())) for key in known))
+
+
+def warn_of_angles(equations: Mapping[str, sp.Expr]) -> None:
+    """AngleWarning for components that are found by atan2 and may pass from pi to -pi."""
+    found = [name for name, equation in equations.items() if _jumps(equation)]
+    if found:
+        names = ", ".join(f'"{name}"' for name in found)
+        warnings.warn(
+            f"{' and '.join(found)}: atan2 jumps from pi to -pi, and a filter takes the jump for an innovation of a turn; "
+            f"say angles=[{names}], or angles=[] if it is no angle or never comes near pi",
+            AngleWarning,
+            stacklevel=3,  # where Model.define was called
+        )
+
+
+def _jumps(formula: sp.Expr) -> bool:
+    """Whether an atan2 in it may pass from pi to -pi: not of a point to the right, nor inside a sine."""
+    if isinstance(formula, sp.sin | sp.cos | sp.tan):
+        return False
+    if isinstance(formula, sp.atan2) and not formula.args[1].is_nonnegative:
+        return True
+    return any(_jumps(argument) for argument in formula.args)

@@ -1,0 +1,196 @@
+"""What is known of every step: its number k, its time t = interval * k, and the inputs; and functions that depend on it.
+
+A model without them pays nothing: a `Stepwise` function is then the generated function itself, at every step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+import sympy as sp
+
+from kfcourse.laws import Array
+from kfcourse.symbolic.codegen import Compiled, compile_function
+from kfcourse.symbolic.formula import symbol
+from kfcourse.symbolic.reading import ModelError, checked_name, exact_number, read, table
+
+CHECKED = 1000  # steps for which a variance is tried out
+
+
+@dataclass(frozen=True)
+class Known:
+    """What a model knows of every step.
+
+    Attributes
+    ----------
+    symbols : tuple of sympy.Symbol
+        Those of k, t and the inputs that its equations contain.
+    interval : sympy.Rational
+        Time between two steps, t = interval * k.
+    inputs : dict
+        Name to its values at the steps 0, 1, 2...
+    """
+
+    symbols: tuple[sp.Symbol, ...] = ()
+    interval: sp.Rational = sp.S.One
+    inputs: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+    @classmethod
+    def read(cls, interval: Any, inputs: Mapping[str, Sequence[float]] | None) -> Known:
+        """The interval and the inputs as people give them; ModelError if they are none."""
+        length = exact_number("interval", interval)
+        if not length > 0:
+            raise ModelError(f"the interval between two steps must be positive, got {interval!r}")
+        values = {checked_name(name): _sequence(name, given) for name, given in table("inputs", inputs).items()}
+        return cls((), length, values)
+
+    def names(self, taken: Sequence[str]) -> dict[str, sp.Symbol]:
+        """Symbols that formulas may use: k and t, where they name nothing else, and the inputs."""
+        return {name: symbol(name) for name in ("k", "t", *self.inputs) if name in self.inputs or name not in taken}
+
+    def used(self, equations: sp.MatrixBase, known: Mapping[str, sp.Symbol]) -> Known:
+        """The same with the symbols of these equations."""
+        return Known(tuple(s for s in known.values() if equations.has(s)), self.interval, self.inputs)
+
+    def at(self, k: int) -> Array:
+        """Values of `symbols` at step k, (m,); ModelError if an input ends before."""
+        return np.array([self._value(s.name, k) for s in self.symbols])
+
+    def _value(self, name: str, k: int) -> float:
+        if name in self.inputs:
+            values = self.inputs[name]
+            if k >= len(values):
+                raise ModelError(
+                    f"the input {name} has {len(values)} value(s), for the steps 0 to {len(values) - 1}, but step {k} needs one; "
+                    "give a value for every step"
+                )
+            return values[k]
+        return float(k if name == "k" else self.interval * k)
+
+    def latex(self) -> list[str]:
+        """Lines of an `aligned` block: the time, and the first values of the inputs."""
+        lines = [rf"t &= {sp.latex(self.interval * symbol('k'))}"] if symbol("t") in self.symbols else []
+        for name, values in self.inputs.items():
+            shown = ", ".join(f"{value:g}" for value in values[:6]) + (r", \ldots" if len(values) > 6 else "")
+            lines.append(rf"{sp.latex(symbol(name))}_0, {sp.latex(symbol(name))}_1, \ldots &= {shown}")
+        return lines
+
+
+def _sequence(name: str, given: Any) -> tuple[float, ...]:
+    try:
+        values = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        values = np.array(np.nan)
+    if values.ndim != 1 or not len(values) or not np.isfinite(values).all():
+        raise ModelError(f"the input {name} must be a list of finite numbers, one for every step; got {given!r:.80}")
+    return tuple(values.tolist())
+
+
+class Stepwise(NamedTuple):
+    """A generated function, and what is known of every step: the function's last argument, if its formulas contain any of it."""
+
+    compiled: Compiled
+    known: Known
+
+    @classmethod
+    def compile(
+        cls,
+        known: Known,
+        name: str,
+        arguments: Mapping[str, sp.MatrixBase],
+        outputs: Mapping[str, sp.MatrixBase],
+        vectors: Sequence[str],
+        doc: str = "",
+        definitions: Mapping[sp.Symbol, sp.Expr] | None = None,
+    ) -> Stepwise:
+        """Arguments as of `compile_function`."""
+        if known.symbols:
+            arguments = {**arguments, "known": sp.Matrix(known.symbols)}
+        return cls(compile_function(name, arguments, outputs, [*vectors, "known"], doc, definitions), known)
+
+    def at(self, k: int | None) -> Callable[..., Any]:
+        """The function at step k."""
+        function = self.compiled.function
+        if not self.known.symbols:
+            return function
+        values = self.known.at(needed(k))
+        return lambda *arrays: function(*arrays, values)
+
+
+def needed(k: int | None) -> int:
+    """The step; ModelError if it is not given."""
+    if k is None:
+        raise ModelError("the model depends on the step: say which, as in structure.at(k) or equation(x, v, k)")
+    return k
+
+
+def varying_law(
+    what: str,
+    given: Mapping[str, Any] | None,
+    noises: Sequence[sp.Symbol],
+    symbols: dict[str, sp.Symbol],
+    known: Known,
+    parameters: Mapping[sp.Symbol, sp.Rational],
+) -> tuple[dict[sp.Symbol, sp.Expr], dict[str, Any]]:
+    """A law of noises in which means and variances may be formulas of the step.
+
+    A noise with the mean m_k and the variance D_k is m_k + sqrt(D_k) v with a standard one: these go into the equations.
+
+    Returns
+    -------
+    dict, dict
+        What takes the place of each noise in the equations, and the law that is left for it.
+    """
+    law = table(what, given)
+    scale, shift = (_formulas(what, law.get(key), len(noises), symbols) for key in ("variance", "mean"))
+    if scale:
+        law["variance"] = _without(scale, law["variance"], 1.0)
+        for i, variance in scale.items():
+            _check_variance(what, noises[i], variance, known, symbols, parameters)
+    if shift:
+        law["mean"] = _without(shift, law["mean"], 0.0)
+    changed = {noises[i]: shift.get(i, 0) + sp.sqrt(scale.get(i, 1)) * noises[i] for i in {**scale, **shift}}
+    return changed, law
+
+
+def _without(formulas: Mapping[int, sp.Expr], given: Any, instead: float) -> Any:
+    """What was given, with a number in the place of each formula."""
+    return instead if _is_formula(given) else [instead if i in formulas else one for i, one in enumerate(given)]
+
+
+def _formulas(what: str, given: Any, size: int, symbols: dict[str, sp.Symbol]) -> dict[int, sp.Expr]:
+    """The formulas among numbers, by the number of the component; one formula holds for all."""
+    entries = [given] * size if _is_formula(given) else [*given] if isinstance(given, Sequence) else []
+    if any(any(map(_is_formula, row)) for row in entries if isinstance(row, Sequence) and not isinstance(row, str)):
+        raise ModelError(
+            f"`{what}`: a covariance matrix cannot have formulas; write correlated noises that change with time into the "
+            "equation, as in (1 + k)*v1 + k*v2"
+        )
+    return {i: read(one, symbols, what) for i, one in enumerate(entries) if _is_formula(one)}
+
+
+def _is_formula(one: Any) -> bool:
+    return isinstance(one, str) or (isinstance(one, sp.Expr) and bool(one.free_symbols))
+
+
+def _check_variance(
+    what: str,
+    noise: sp.Symbol,
+    variance: sp.Expr,
+    known: Known,
+    symbols: Mapping[str, sp.Symbol],
+    parameters: Mapping[sp.Symbol, sp.Rational],
+) -> None:
+    """ModelError if a variance is negative or not finite at one of the first steps."""
+    numeric = sp.Matrix([variance.subs(parameters)])
+    used = known.used(numeric, {name: s for name, s in symbols.items() if s not in parameters})
+    steps = min([CHECKED, *(len(values) for name, values in known.inputs.items() if symbol(name) in used.symbols)])
+    variance_at = Stepwise.compile(used, "variance", {}, {"variance": numeric}, [])
+    with np.errstate(all="ignore"):
+        for k in range(steps):
+            value = float(np.squeeze(variance_at.at(k)()[0]))
+            if not 0 <= value < np.inf:
+                raise ModelError(f"`{what}`: the variance of {noise} is {value:g} at step {k}; it must not be negative")

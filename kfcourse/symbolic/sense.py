@@ -1,0 +1,91 @@
+"""Whether numbers and laws make sense: sizes that floats can hold, variances that are any, something random to filter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import sympy as sp
+
+from kfcourse.laws import Array
+
+if TYPE_CHECKING:
+    from kfcourse.symbolic.model import Model
+
+LARGEST = 1e100  # of numbers and variances, the smallest 1/LARGEST: products of some of them stay within the floats
+DIGITS = 1e-13  # a deviation below this part of the mean keeps less than three of a float's 16 digits
+
+
+def is_covariance(cov: Array) -> bool:
+    """Whether a symmetric matrix has no negative eigenvalue, in whatever units its components are."""
+    variances = cov.diagonal()
+    scale = 1 / np.sqrt(np.where(variances > 0, variances, 1.0))
+    correlations = cov * scale[:, None] * scale
+    rounding = 1e-12 * len(cov)  # of eigvalsh, and of a covariance that was itself computed
+    return bool((variances >= 0).all() and np.linalg.eigvalsh(correlations).min() >= -rounding)
+
+
+def unfit(mean: Array, variances: Array) -> str:
+    """What is wrong with the sizes of a law's mean and variances; empty if nothing."""
+    for value in variances:
+        if value and not 1 / LARGEST <= value <= LARGEST:
+            return f"the variance {value:g} is beyond {1 / LARGEST:g} to {LARGEST:g}; change the units, or write 0 for no noise"
+    for middle, variance in zip(mean, variances, strict=True):
+        if middle and not LARGEST**-0.5 <= abs(middle) <= LARGEST**0.5:
+            return f"the mean {middle:g} is beyond {LARGEST**-0.5:g} to {LARGEST**0.5:g}; change the units"
+        if 0 < variance < (DIGITS * middle) ** 2:
+            return (
+                f"the variance {variance:g} is lost beside the mean {middle:g}, as numbers have 16 digits; "
+                "count from another zero, or write variance 0 for what is known exactly"
+            )
+    return ""
+
+
+def not_computable(equation: sp.MatrixBase, values: Mapping[sp.Symbol, sp.Expr]) -> str:
+    """Why an equation with the parameters' values in it cannot be computed with; empty if it can."""
+    for formula in equation:
+        if problem := _unusable(formula.subs(values)):
+            return f"{_short(formula)} {problem}"
+    return ""
+
+
+def nothing_random(model: Model) -> str:
+    """Why there is nothing to filter in a model: too little of it is random; empty if there is enough."""
+    moving = _noisy(model.state_equation.subs(model.values), model.v, model.state_noise.cov)
+    if not moving and not model.prior.cov.any():
+        return (
+            f"the state is known exactly: neither the prior nor a noise of the state equation {list(model.state_equation)} "
+            "has a variance; give one of them a variance above 0"
+        )
+    if not moving and not _noisy(model.meter_equation.subs(model.values), model.w, model.meter_noise.cov):
+        return (
+            f"no noise enters the state equation {list(model.state_equation)} or the meter {list(model.meter_equation)}: "
+            "after some measurements nothing would be left to estimate; add a noise to one of them"
+        )
+    return ""
+
+
+def _unusable(formula: sp.Expr) -> str:
+    infinite = (sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I)
+    if formula.has(*infinite):
+        return "has no finite real value with these parameters"
+    for part in sp.preorder_traversal(formula):
+        if not part.is_number:
+            continue
+        size = abs(part if part.is_Rational else part.evalf(15))
+        if part.is_real is False or not (size.is_Rational or size.is_Float):
+            return f"has no finite real value with these parameters: {_short(part)}"
+        if size and not 1 / LARGEST <= size <= LARGEST:
+            return f"holds the number {sp.N(part, 3)} with these parameters, beyond 1e-100 to 1e100; change the units"
+    return ""
+
+
+def _short(formula: sp.Expr) -> str:
+    text = str(formula)
+    return text if len(text) <= 100 else f"{text[:97]}..."
+
+
+def _noisy(equation: sp.MatrixBase, noises: Sequence[sp.Symbol], cov: Array) -> bool:
+    """Whether a noise that has a variance enters an equation."""
+    return any(equation.has(noise) for noise, variance in zip(noises, cov.diagonal(), strict=True) if variance)

@@ -1,0 +1,94 @@
+"""Formulas as people write them: parameters before variables before noises, short terms before long ones.
+
+SymPy orders by the alphabet and prints f w x^2 + g x; the course writes g x + f x^2 w.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+
+import sympy as sp
+from sympy.printing.latex import LatexPrinter
+
+from kfcourse.symbolic.typesetting import WIDTH, joined, symbols
+
+
+def formula_latex(expression: sp.Expr, variables: Sequence[sp.Symbol], noises: Sequence[sp.Symbol] = ()) -> str:
+    """LaTeX of a formula.
+
+    Parameters
+    ----------
+    expression : sympy expression
+    variables : sequence of symbols
+        What the formula is a function of, in the order in which factors are written; all other symbols are parameters.
+    noises : sequence of symbols
+        Variables that are written last in a product, and whose terms are written last in a sum.
+    """
+    printer = LatexPrinter({"order": "none", "fold_func_brackets": True})
+    return str(printer.doprint(_Writer([*variables, *noises], noises).arranged(sp.sympify(expression))))
+
+
+def formula_lines(expression: sp.Expr, variables: Sequence[sp.Symbol], noises: Sequence[sp.Symbol] = ()) -> list[str]:
+    """The same in as many lines as a page is wide; only sums are broken."""
+    whole = formula_latex(expression, variables, noises)
+    writer = _Writer([*variables, *noises], noises)
+    if symbols(whole) <= WIDTH or not isinstance(expression, sp.Add):
+        return [whole]
+    return joined([formula_latex(term, variables, noises) for term in writer.terms(expression)])
+
+
+class _Writer:
+    """Rebuilds an expression with its sums and products in a given order, which the printer keeps."""
+
+    def __init__(self, variables: Sequence[sp.Symbol], noises: Sequence[sp.Symbol]) -> None:
+        self.rank = {symbol: place for place, symbol in enumerate(variables)}
+        self.noises = set(noises)
+
+    def arranged(self, expression: sp.Expr) -> sp.Expr:
+        if isinstance(expression, sp.Add):
+            return sp.Add(*map(self.arranged, self.terms(expression)), evaluate=False)
+        if isinstance(expression, sp.Mul):
+            return sp.Mul(*map(self.arranged, sorted(expression.args, key=self.factor_key)), evaluate=False)
+        if isinstance(expression, sp.Pow) and not expression.base.is_Atom:
+            return sp.Pow(self.arranged(expression.base), expression.exp, evaluate=False)
+        if isinstance(expression, sp.Function):
+            return expression.func(*map(self.arranged, expression.args), evaluate=False)
+        return expression
+
+    def factor_key(self, factor: sp.Expr) -> tuple[int, int, str]:
+        ranks = [self.rank[symbol] for symbol in factor.free_symbols if symbol in self.rank]
+        kind = 0 if factor.is_number else 1 if not ranks else 2
+        return kind, max(ranks, default=0), str(factor)
+
+    def terms(self, total: sp.Add) -> list[sp.Expr]:
+        """Terms with the same parameters together: first the group with the shortest, earliest term; in it powers fall."""
+        ordered = []
+        for parameters, group in groupby(sorted(total.args, key=self.parameters), self.parameters):
+            members = sorted(group, key=lambda term: [-self.degree(term, symbol) for symbol in self.rank])
+            first = min((self.noisiness(term), self.length(term), self.place(term)) for term in members)
+            ordered.append((first, parameters, members))
+        return [term for _, _, members in sorted(ordered, key=lambda item: item[:2]) for term in members]
+
+    def parameters(self, term: sp.Expr) -> str:
+        return str(sp.Mul(*[factor for factor in sp.Mul.make_args(term) if not self.varies(factor) and not factor.is_number]))
+
+    def varies(self, factor: sp.Expr) -> bool:
+        return any(symbol in self.rank for symbol in factor.free_symbols)
+
+    def noisiness(self, term: sp.Expr) -> int:
+        return len(term.free_symbols & self.noises)
+
+    def length(self, term: sp.Expr) -> float:
+        """Degree of the term in its variables; a function of them counts as one."""
+        return float(sum(self.power(factor) for factor in sp.Mul.make_args(term) if self.varies(factor)))
+
+    def place(self, term: sp.Expr) -> int:
+        return min((self.rank[symbol] for symbol in term.free_symbols if symbol in self.rank), default=len(self.rank))
+
+    def degree(self, term: sp.Expr, symbol: sp.Symbol) -> float:
+        return float(sum(self.power(factor) for factor in sp.Mul.make_args(term) if symbol in factor.free_symbols))
+
+    def power(self, factor: sp.Expr) -> float:
+        exponent = factor.as_base_exp()[1]
+        return float(exponent) if exponent.is_number and exponent.is_real and not isinstance(factor, sp.exp) else 1.0

@@ -1,0 +1,396 @@
+"""Angles: filters near the place where pi becomes -pi give what they give elsewhere."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from kfcourse.angles import difference, moments_on_circle, near, on_circle, wrapped
+from kfcourse.filters import (
+    adaptive_pointmass,
+    alpha_beta,
+    aof,
+    duof,
+    fos,
+    imm,
+    iterated,
+    kalman_filter,
+    mfos,
+    particle,
+    pointmass,
+)
+from kfcourse.filters.densities import likelihood, scalar_densities
+from kfcourse.laws import Gaussian
+from kfcourse.linear.consistency import innovations, nees
+from kfcourse.montecarlo.designing import design
+from kfcourse.montecarlo.ensemble import Ensemble, Instant, simulate
+from kfcourse.montecarlo.experiment import compare, predictions, run
+from kfcourse.scenarios.navigation import Dynamics, Sensor, fuse, observe
+from kfcourse.scenarios.radar import kinematic
+from kfcourse.symbolic.angular import AngleWarning
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.quadrature import gauss_hermite, unscented
+from kfcourse.symbolic.reading import ModelError
+from kfcourse.symbolic.structure import gaussian, linearised
+
+pytestmark = pytest.mark.quick
+
+PI = np.pi
+
+
+def radar(side=1, angles=("y2",), speed=150.0, spread=1.0):
+    """A target 10 km off, on the positive x axis (side 1) or the negative one (-1), which it crosses; range and bearing."""
+    prior = side * np.array([10_000.0, -3_000.0, -20.0, speed])
+    return Model.define(
+        ["x + T*vx", "y + T*vy", "vx + s*v1", "vy + s*v2"], ["sqrt(x**2 + y**2) + 50*w1", "atan2(y, x) + 0.01*w2"],
+        {"T": 1.0, "s": 1.0}, symbols={"x": ["x", "y", "vx", "vy"]}, angles=list(angles),
+        prior={"mean": prior, "variance": np.square([100 * spread, 100 * spread, 15, 15])},
+    )  # fmt: skip
+
+
+# ---------------------------------------------------------------- what is said of a model
+
+
+def test_components_are_named_in_a_list_or_by_x_and_y():
+    state, meter = ["psi + om", "om + v"], ["psi + w1", "om + w2"]
+    names = {"x": ["psi", "om"]}
+
+    def angles(given, names=names, meter=meter):
+        return Model.define(state, meter, symbols=names, angles=given).angles
+
+    assert angles(["y1", "psi"]) == ((0,), (0,)) == angles({"x": "psi", "y": ["y1"]})
+    assert angles("om") == ((1,), ()) and angles([]) == ((), ()) == angles(None)
+    assert angles({"y": ["y2", "y1"]}) == ((), (0, 1))
+    with pytest.raises(ModelError, match=r"y is the name of a state and of a measurement.*angles=\{'y': \['y'\]\}"):
+        Model.define(["x", "y + v"], "x + w", symbols={"x": ["x", "y"]}, angles=["y"])
+    assert Model.define(["x", "y + v"], "x + w", symbols={"x": ["x", "y"]}, angles={"y": ["y"]}).angles == ((), (0,))
+    for given, message in ((["y3"], "names y3; components are psi, om and y1, y2"), ({"z": ["psi"]}, "keys x and y, not z")):
+        with pytest.raises(ModelError, match=message):
+            angles(given)
+    model = Model.define(state, meter, symbols=names, angles=["y1", "psi"])
+    assert repr(model).endswith("angles psi, y1)")
+    assert r"{\psi}_k &\in [-\pi, \pi]" in model.latex() and r"{y_{1}}_k &\in [-\pi, \pi]" in model.latex()
+    assert model.replace().angles == model.angles
+
+
+@pytest.mark.parametrize(
+    ("meter", "warns"),
+    [
+        ("atan2(x2, x1) + w", True),
+        ("w*(1 + 2*atan2(x2, x1 - 3))", True),
+        ("cos(atan2(x2, x1) + w)", False),
+        ("atan2(x2, sqrt(x1**2 + x2**2)) + w", False),  # an elevation: the ground distance is not negative
+        ("atan(x2/x1) + w", False),
+    ],
+)
+def test_an_atan2_that_is_not_said_to_be_an_angle_warns_and_names_the_cure(meter, warns):
+    state = ["x1 + v1", "x2 + v2"]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        Model.define(state, ["x1 + w", meter])
+    assert [type(one.message) for one in caught] == [AngleWarning] * warns
+    if warns:
+        assert 'angles=["y2"], or angles=[]' in str(caught[0].message)
+        assert caught[0].filename == __file__  # where the model was defined
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        Model.define(state, ["x1 + w", meter], angles=["y2"])
+        Model.define(state, ["x1 + w", meter], angles=[])
+
+
+def test_wrapping_leaves_what_needs_none_and_finds_the_short_way():
+    inside = np.linspace(-PI, PI, 1001)
+    np.testing.assert_array_equal(wrapped(inside), inside)
+    turns = np.arange(-3, 4)[:, None] * 2 * PI
+    # rounding of a number of size 20
+    np.testing.assert_allclose(wrapped(inside[1:-1] + turns), np.tile(inside[1:-1], (7, 1)), atol=20 * np.finfo(float).eps)
+    left, right = np.array([[3.1, 5.0]]), np.array([[-3.1, 1.0]])
+    np.testing.assert_allclose(difference(left, right, (0,)), [[6.2 - 2 * PI, 4.0]], rtol=1e-14)
+    np.testing.assert_allclose(near(left, right, (0,)), [[3.1 - 2 * PI, 5.0]], rtol=1e-14)
+    assert near(left, right, ()) is left and on_circle(left, ()) is left
+    mean, variance = moments_on_circle(np.array([PI - 0.1, -PI + 0.3]), np.array([0.25, 0.75]))
+    assert (mean, variance) == (pytest.approx(-PI + 0.2), pytest.approx(0.25 * 0.75 * 0.4**2))
+
+
+# ---------------------------------------------------------------- a bearing that passes from pi to -pi
+
+
+def filters_of(model):
+    """Filters without design, the same for the scene and its mirror image."""
+    faster = Model.define(
+        list(model.state_equation), list(model.meter_equation), model.replace(s=5).parameters,
+        symbols={"x": [s.name for s in model.x]}, prior={"mean": model.prior.mean, "variance": model.prior.cov},
+        angles={"x": [model.x[i].name for i in model.angles.x], "y": [model.measured[i] for i in model.angles.y]},
+    )  # fmt: skip
+    tangent, points = linearised(model), unscented(model)
+    return [
+        aof(tangent),
+        aof(points),
+        aof(gauss_hermite(model, 3)),
+        iterated(tangent, 3),
+        iterated(points, 3),
+        imm([tangent, linearised(faster)], [[0.9, 0.1], [0.2, 0.8]]),
+    ]
+
+
+def designs_of(model):
+    tangent = linearised(model)
+    return [duof(model), *(family(tangent, arguments) for family in (fos, mfos) for arguments in (2, 3))]
+
+
+@pytest.fixture(scope="module")
+def scenes():
+    """A scene across the positive x axis, where bearings are small, and the same scene turned by half a turn."""
+    plain, turned = radar(1, angles=()), radar(-1)
+    x, y = simulate(plain, 150, 41, seed=3)
+    assert (np.abs(y[..., 1]) < 1).all() and (y[..., 1].min(axis=0) < 0).all() and (y[..., 1].max(axis=0) > 0).all()
+    other = np.stack([y[..., 0], wrapped(y[..., 1] + PI)], axis=-1)
+    return plain, turned, x, y, other
+
+
+def test_filters_on_the_far_side_of_the_circle_give_the_mirror_image(scenes):
+    """Turning the scene by half a turn changes the signs of the state and nothing else.
+
+    On the side where no angle is near pi the models without declared angles are right, and tested elsewhere.
+    The tolerance is the rounding of a bearing near pi, 4e-16, over its deviation of 0.01, times positions of 1e4 and many steps.
+    """
+    plain, turned, _, y, other = scenes
+    missing = np.zeros(y.shape, dtype=bool)
+    missing[3, :20, 1] = True
+    y, other = np.where(missing, np.nan, y), np.where(missing, np.nan, other)
+    for here, there in zip(filters_of(plain), filters_of(turned), strict=True):
+        expected, found = run(here, y), run(there, other)
+        np.testing.assert_allclose(found.mean, -expected.mean, atol=1e-5, err_msg=here.name)
+        np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-7, atol=1e-4, err_msg=here.name)
+        again = run(there, other + 2 * PI * np.array([0, 3]))  # whole turns do not matter, as an instrument may count to 360
+        np.testing.assert_allclose(again.mean, found.mean, atol=1e-5, err_msg=here.name)
+
+
+def test_designed_filters_too(scenes):
+    plain, turned, x, y, other = scenes
+    steps = len(y) - 1
+    plain = radar(1)  # declared here too: the filters with three arguments take the innovation of an angle as regressor
+    here = design(designs_of(plain), ([Instant(x[k], y[k], x[k + 1])] for k in range(steps)))
+    there = design(designs_of(turned), ([Instant(-x[k], other[k], -x[k + 1])] for k in range(steps)))
+    for one, two in zip(here, there, strict=True):
+        # coefficients are regressions over 150 trajectories of states that hardly differ: some digits more are lost
+        np.testing.assert_allclose(run(two, other[:-1]).mean, -run(one, y[:-1]).mean, atol=1e-2, err_msg=one.name)
+
+
+def test_the_trial_fails_without_and_is_cured_by_the_declaration():
+    """A fifth of the trajectories is lost, kilometres away, where the bearing is not known to be one."""
+    worst = {}
+    for angles in ((), ("y2",)):
+        model = radar(-1, angles)
+        x, y = simulate(model, 100, 40, seed=1)
+        for one in filters_of(model)[:2] + filters_of(model)[3:4]:
+            distance = np.linalg.norm((run(one, y).mean - x)[..., :2], axis=-1)
+            worst[one.name, bool(angles)] = distance.max(axis=0)
+    for name in ("aof-linearised", "iterated-linearised"):
+        assert (worst[name, False] > 5000).mean() > 0.1
+    for name in ("aof-linearised", "aof-unscented", "iterated-linearised"):
+        # a range sd of 50 m and a cross-range sd of 100 m: no position is known worse than about 100 m, 5 sd are 500 m
+        assert worst[name, True].max() < 500
+
+
+def test_innovations_and_normalised_errors_go_the_short_way(scenes):
+    _, turned, x, _, other = scenes
+    structure = linearised(turned)
+    before = predictions(aof(structure), other)
+    found = innovations(structure.measure, before, other)
+    squares = found.value[..., 1] ** 2 / found.cov[..., 1, 1]
+    assert np.nanmax(squares) < 30  # 6,000 normal numbers: 30 is passed with a chance of 1e-3; a turn would be 1e5
+    assert innovations(linearised(radar(-1, ())).measure, before, other).value[..., 1].max() > 6
+
+    angle = Model.define("x + 0.1*v", "x + 0.1*w", prior={"mean": 3, "variance": 0.01}, angles=["x", "y"])
+    x, y = simulate(angle, 500, 20, seed=1)
+    assert np.abs(np.diff(x, axis=0)).max() > 6  # it jumps
+    posterior = run(kalman_filter(angle), y)
+    assert nees(x, posterior, angle.angles.x).mean() == pytest.approx(1, abs=4 * np.sqrt(2 / 500))  # of one step; 20 are more
+    assert nees(x, posterior).mean() > 10
+
+
+def test_the_first_point_that_is_looked_at_does_not_decide_the_mean():
+    """Sigma points on both sides of the jump: mean and covariance are those of the scene turned to where there is none."""
+    mean, cov = np.array([[2.0, 0.1]]), np.array([[0.3, 0.1], [0.1, 0.4]])
+    state, meter = ["x1 + v1", "x2 + v2"], ["atan2(x2, x1) + 0.1*w"]
+    for build in (unscented, lambda m: gauss_hermite(m, 5)):
+        options = {"prior": {"mean": mean[0], "variance": cov}}
+        plain, turned = (build(Model.define(state, meter, angles=angles, **options)) for angles in ([], ["y"]))
+        expected, found = plain.measure(mean, cov), turned.measure(-mean, cov)
+        np.testing.assert_allclose(found.h, wrapped(expected.h + PI), rtol=1e-13)
+        np.testing.assert_allclose(found.G, -expected.G, rtol=1e-12)
+        np.testing.assert_allclose(found.F, expected.F, rtol=1e-12)
+        assert plain.measure(-mean, cov).F.item() > 10 * found.F.item()
+
+
+def test_sensors_of_bearings_are_fused_across_the_jump():
+    states = ["x", "y", "vx", "vy"]
+    A = np.zeros((4, 4))
+    A[0, 2] = A[1, 3] = 1.0
+    dynamics = Dynamics(A, np.diag([0, 0, 1.0, 1.0]))
+    prior = Gaussian(np.array([-10_000.0, 3_000.0, 20.0, -150.0]), np.diag(np.square([100, 100, 15, 15.0])))
+    rng = np.random.default_rng(5)
+    start = prior.mean + rng.standard_normal((100, 4)) * np.sqrt(np.diag(prior.cov))
+
+    def truth(times):
+        x = np.tile(start, (len(times), 1, 1))
+        x[..., :2] += np.asarray(times)[:, None, None] * x[..., 2:]
+        return x
+
+    errors = []
+    for angles in ([], ["y2"]):
+        meter = ["sqrt(x**2 + y**2) + w1", "atan2(y, x) + w2"]
+        sensor = Sensor.define("radar", states, meter, [2500, 1e-4], 1.0, latency=0.3, angles=angles)
+        times = np.arange(1.0, 40.0, 5.0)
+        law = fuse(dynamics, [sensor], prior, observe([sensor], truth, 39.0, seed=6), times)
+        errors.append(np.linalg.norm((law.mean - truth(times))[..., :2], axis=-1).max())
+    assert errors[0] > 5000 and errors[1] < 500
+
+
+# ---------------------------------------------------------------- a state that is an angle
+
+
+def phase(angles, n=2):
+    """A phase and its rate; over 40 steps it turns several times."""
+    return Model.define(
+        ["psi + 0.5*om + 0.1*v1", "om + 0.05*v2"], ["psi + 0.3*w"], symbols={"x": ["psi", "om"]}, angles=angles,
+        prior={"mean": [2.0, 1.0], "variance": [0.1, 0.05]},
+    )  # fmt: skip
+
+
+def test_a_phase_is_filtered_on_the_circle_as_on_the_line():
+    """Differences of 2 pi are the only difference: with them dropped, every filter of the linear model is Kalman's on the line.
+
+    The measurement's deviation of 0.3 and the prediction's make an innovation of half a turn a matter of 7 sd.
+    """
+    line, circle = phase([]), phase(["psi", "y"])
+    x, y = simulate(line, 300, 40, seed=2)
+    around_x, around_y = simulate(circle, 300, 40, seed=2)
+    assert np.abs(x[..., 0]).max() > 15 and np.abs(around_x[..., 0]).max() <= PI and np.abs(around_y).max() <= PI
+    np.testing.assert_allclose(wrapped(x - around_x)[..., 0], 0, atol=1e-12)  # rounding of 40 steps
+    np.testing.assert_allclose(wrapped(y - around_y), 0, atol=1e-12)
+    np.testing.assert_allclose(x[..., 1], around_x[..., 1], rtol=1e-12)
+    expected = run(kalman_filter(line), y)
+    structures = [linearised(circle), gaussian(circle), unscented(circle), gauss_hermite(circle, 3)]
+    filters = [kalman_filter(circle), *(aof(s) for s in structures), iterated(structures[0], 3)]
+    filters += [imm([structures[0], structures[1]], [[0.9, 0.1], [0.1, 0.9]])]
+    for one in filters:
+        found = run(one, around_y)
+        assert np.abs(found.mean[..., 0]).max() <= PI
+        np.testing.assert_allclose(difference(found.mean, expected.mean, (0,)), 0, atol=1e-9, err_msg=one.name)
+        np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-9, err_msg=one.name)
+
+
+def test_errors_of_a_comparison_go_the_short_way():
+    """With equal draws the errors are those on the line; the designed filters regress angles on angles, and lose little."""
+
+    def filters(model):
+        s = linearised(model)
+        return [kalman_filter(model), aof(s), duof(model), fos(s), mfos(s), fos(s, arguments=3)]
+
+    line, circle = (compare(filters(m), m, 2000, 30, seed=4, threads=1) for m in (phase([]), phase(["psi", "y"])))
+    np.testing.assert_allclose(circle.error_variance("kalman").value, line.error_variance("kalman").value, rtol=1e-9)
+    for name in circle.names:
+        ratio = circle.error_variance(name).value / line.error_variance("kalman").value
+        # Coefficients fitted over 2000 trajectories cost some parts in a thousand; a single lost turn would cost 4 pi^2 / 2000
+        # of an error variance of 0.03, two thirds of it.
+        assert ratio.max() < 1.1, name
+
+
+def test_alpha_beta_follows_an_angle():
+    model = kinematic(1.0, order=1, dimensions=1, noise_sd=0.05, measurement_sd=0.1)
+    names = [s.name for s in model.x]
+
+    def built(angles):
+        return Model.define(
+            list(model.state_equation), list(model.meter_equation), model.parameters, symbols={"x": names}, angles=angles,
+            prior={"mean": model.prior.mean, "variance": model.prior.cov},
+            state_noise={"variance": model.state_noise.cov}, meter_noise={"variance": model.meter_noise.cov},
+        )  # fmt: skip
+
+    times = np.arange(60.0)[:, None, None]
+    y = 0.7 * times + 0.1 * np.random.default_rng(1).standard_normal((60, 50, 1))
+    line = run(alpha_beta(built([]), 0.5, 0.2), y).mean
+    circle = run(alpha_beta(built([names[0], "y"]), 0.5, 0.2), wrapped(y)).mean
+    np.testing.assert_allclose(difference(circle, line, (0,)), 0, atol=1e-11)
+
+
+# ---------------------------------------------------------------- densities on the circle
+
+
+@pytest.mark.parametrize("sd", [0.05, 0.8, 3.0, 40.0])
+def test_the_density_of_a_measured_angle_is_one_over_the_circle(sd):
+    grid = np.linspace(-PI, PI, 4001)[:-1]
+    model = Model.define("x + v", f"x + {sd}*w", angles=["y"])
+    for log_likelihood in (
+        lambda y, x: likelihood(model)(y[:, None], np.full((len(y), 1), x)),
+        lambda y, x: scalar_densities(model).log_likelihood(y, np.full(len(y), x)),
+    ):
+        for x in (0.0, 3.1, 40.0):
+            density = np.exp(log_likelihood(grid, x))
+            # the trapezoidal rule of a smooth periodic function
+            assert density.sum() * (grid[1] - grid[0]) == pytest.approx(1, rel=1e-12)
+    both = Model.define(
+        ["x1 + v1", "x2 + v2"], ["x1 + w1", "x2 + w2"], meter_noise={"variance": [[sd**2, 0.3], [0.3, 400]]}, angles=["y1"]
+    )
+    y = np.stack([grid, np.full(len(grid), 2.0)], axis=-1)
+    density = np.exp(likelihood(both)(y, np.array([[3.0, 1.0]])))
+    marginal = np.exp(-0.5 / 400) / np.sqrt(2 * PI * 400)  # of the second component
+    assert density.sum() * (grid[1] - grid[0]) == pytest.approx(marginal, rel=1e-9)
+
+
+def by_grid(model_sd, meter_sd, prior, y, signal=lambda x: x):
+    """Posterior means and variances on a fine grid of the line: random walk, measured angle with a wound normal law."""
+    x = np.linspace(-40, 40, 16_001)
+    step = x[1] - x[0]
+    density = np.exp(-0.5 * (x - prior[0]) ** 2 / prior[1])
+    kernel = np.exp(-0.5 * (np.arange(-600, 601) * step / model_sd) ** 2)
+    found = []
+    for value in y:
+        wound = sum(np.exp(-0.5 * ((value - signal(x) + 2 * PI * j) / meter_sd) ** 2) for j in range(-12, 13))
+        density = density * wound
+        density /= density.sum()
+        mean = density @ x
+        found.append((mean, density @ (x - mean) ** 2, density))
+        density = np.convolve(density, kernel, mode="same")
+    return found, x
+
+
+@pytest.mark.parametrize("build", [pointmass, adaptive_pointmass])
+@pytest.mark.parametrize(("prior", "meter_sd"), [((3.0, 0.16), 0.3), ((1.0, 9.0), 0.5), ((0.0, 4.0), 0.05)])
+def test_the_exact_filter_of_a_measured_angle(build, prior, meter_sd):
+    """Against a fine grid: a narrow prior near the jump, a wide one that leaves several turns possible, a sharp meter.
+
+    The grid's sums are exact to rounding; the filters promise 1e-6 and 1e-5 posterior deviations a step.
+    """
+    law = {"mean": prior[0], "variance": prior[1]}
+    model = Model.define("x + 0.3*v", f"x + {meter_sd}*w", prior=law, angles=["y"])
+    y = np.array([3.1, -3.0, 2.9, -2.7, -2.2])
+    expected, _ = by_grid(0.3, meter_sd, prior, y)
+    found = run(build(model), y)
+    for k, (mean, variance, _) in enumerate(expected):
+        assert found.mean[k].item() == pytest.approx(mean, abs=1e-4 * np.sqrt(variance))
+        assert found.cov[k].item() == pytest.approx(variance, rel=1e-4)
+
+
+@pytest.mark.parametrize("build", [pointmass, lambda m: particle(m, 20_000)])
+def test_the_estimate_of_a_state_that_is_an_angle_does_not_count_turns(build):
+    prior, meter_sd = (1.0, 9.0), 0.5
+    model = Model.define("x + 0.3*v", f"x + {meter_sd}*w", prior={"mean": prior[0], "variance": prior[1]}, angles=["x", "y"])
+    y = np.array([3.1, -3.0, 2.9, -2.7, -2.2])
+    expected, x = by_grid(0.3, meter_sd, prior, y)
+    found = run(build(model), y)
+    for k, (_, _, density) in enumerate(expected):
+        mean, variance = moments_on_circle(x, density)
+        allowed = 1e-4 if build is pointmass else 5 / np.sqrt(20_000 / 10)  # a tenth of the particles counts
+        assert abs(wrapped(found.mean[k].item() - mean)) < allowed * np.sqrt(variance)
+        assert found.cov[k].item() == pytest.approx(variance, rel=max(1e-4, 2 * allowed) if allowed > 1e-3 else 1e-4)
+
+
+def test_the_ensemble_is_drawn_on_the_circle():
+    model = phase(["psi", "y"])
+    ensemble = Ensemble(model, 200, 30, seed=1)
+    for block in ensemble.by_step():
+        for instant in block:
+            assert np.abs(instant.x[:, 0]).max() <= PI and np.abs(instant.x_next[:, 0]).max() <= PI

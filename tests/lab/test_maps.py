@@ -1,0 +1,67 @@
+"""The map over two parameters: each cell is its own comparison, and says what that says."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from kfcourse import load_variants
+from kfcourse.lab.maps import draw, parameter_map
+from kfcourse.lab.short_names import title
+
+
+@pytest.fixture(scope="module")
+def found():
+    model = load_variants()["53"].model
+    return parameter_map(model, {"e": (0.02, 0.05), "f": (0.02, 0.05)}, exact_runs=300, design_runs=5000, runs=3000)
+
+
+def test_each_cell_has_its_parameters(found):
+    assert found.parameters == ("e", "f")
+    for (e, f), result in found.cells.items():
+        assert float(result.model.parameters["e"]) == e
+        assert float(result.model.parameters["f"]) == f
+        assert result.subset_runs == 300
+        assert result.designs == 2
+        assert found[e, f] is result
+
+
+def test_leaders_are_those_not_significantly_worse_than_the_best(found):
+    result = found[0.05, 0.02]
+    several = 0
+    for k in range(result.steps):
+        best, *others = result.leaders(k)
+        assert result.gap(best).value[k] == min(result.gap(name).value[k] for name in result.entrants)
+        several += bool(others)
+        for name in set(result.entrants) - {best}:
+            low, _ = result.gap_difference(name, best)[k].interval(0.95)
+            assert (low <= 0) == (name in others)
+        assert set(result.leaders(k, 0.5)) <= set(result.leaders(k, 0.999))
+    assert several
+
+
+def test_where_the_meter_is_poor_and_the_object_quiet_the_duof_leads(found):
+    """The lab's conclusion is turned round; by how much: the GAOF is 100 % above the bound, the DUOF 10 %."""
+    assert found[0.02, 0.05].leaders(2) == ["duof"]
+    assert found[0.05, 0.02].leaders(2)[0] == "aof-gaussian"
+
+
+def test_the_map_is_drawn(found):
+    ax = Figure().add_subplot()
+    assert draw(found, 2, ax) is ax
+    texts = [text.get_text() for text in ax.texts]
+    assert len(texts) == len(ax.patches) == 4
+    for text, result in zip(texts, found.cells.values(), strict=True):
+        best, *others = result.leaders(2)
+        assert text.startswith(title(best) + (f" and {len(others)} more\n" if others else "\n"))
+        assert f"{100 * float(result.gap(best).value[2]):.3g} ±" in text
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$f$", "$e$")
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["0.02", "0.05"]
+    np.testing.assert_array_equal(ax.get_xlim(), (-0.5, 1.5))
+    ax.figure.canvas.draw()
+
+
+def test_other_than_two_parameters_are_refused():
+    model = load_variants()["53"].model
+    for values in ({"e": (0.1,)}, {"e": (0.1,), "q": (1,)}, {"c": (1,), "e": (1,), "f": (1,)}):
+        with pytest.raises(ValueError, match="two of the parameters c, e, g, f"):
+            parameter_map(model, values)

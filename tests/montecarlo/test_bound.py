@@ -1,0 +1,207 @@
+"""The exact filter as the bound, and the variance between designs: by hand, against theory, on the lab's model."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kfcourse import Model, compare, lab_filters
+from kfcourse.filters import duof, kalman_filter
+from kfcourse.lab import LAB
+from kfcourse.montecarlo.comparison import Comparison, Subset
+from kfcourse.montecarlo.statistics import Sums, batch_mean
+from kfcourse.montecarlo.two_phase import Replicas, Terms
+
+SIGMA = 4
+
+
+def sums_of(runs, **fields):
+    """Sums over one step, every trajectory a batch of its own; fields (filters, runs)."""
+    filters = len(next(iter(fields.values())))
+    empty = Sums.empty(filters, 1, 1, runs, runs)
+    for name, values in fields.items():
+        getattr(empty, name)[:] = np.reshape(values, getattr(empty, name).shape)
+    return empty
+
+
+@pytest.fixture
+def counted():
+    """Control and other on four trajectories, the exact filter on two of them."""
+    model = Model.define("0.9*x + v", "x + w")
+    everywhere = sums_of(4, square=[[2, 4, 6, 8], [3, 5, 4, 12]], own=[[4, 5, 5, 6], [1, 1, 1, 1]])
+    part = sums_of(2, square=[[2, 4], [3, 5], [9, 9]], own=[[4, 5], [1, 1], [3.5, 4.5]], distance=[[0.25, 0.75], [1, 2], [0, 0]])
+    names = ("aof-gaussian", "other", "aof-exact")
+    return Comparison(model, names, names[:2], 4, 1, 0, everywhere, Subset(["aof-exact"], part))
+
+
+def test_its_error_variance_is_the_control_s_less_the_distance(counted):
+    """D = M e_control^2 - M|z_control - z_exact|^2; its own squares of the error, 9, are never looked at."""
+    found = counted.error_variance("aof-exact")
+    assert found.value.item() == 5 - 0.5
+    # x = 2, 4 and y = -0.25, -0.75 on the subset: Var X / 4 + Var Y / 2 + 2 Cov / 4
+    assert found.standard_error.item() ** 2 == pytest.approx(20 / 3 / 4 + 0.125 / 2 + 2 * -0.5 / 4, rel=1e-12)
+    assert counted.difference("other", "aof-exact").value.item() == 6 - 4.5
+
+
+def test_the_gap_is_the_distance_over_the_bound(counted):
+    """Bound = M p_control + M(p_exact - p_control) = 5 - 0.5; half of it is not reached, so distances count."""
+    assert counted.bound().value.item() == 4.5
+    assert counted.gap("aof-gaussian").value.item() == pytest.approx(0.5 / 4.5, rel=1e-14)
+    assert counted.gap("other").value.item() == pytest.approx(1.5 / 4.5, rel=1e-14)
+    difference = counted.gap_difference("other", "aof-gaussian")
+    assert difference.value.item() == pytest.approx(1 / 4.5, rel=1e-14)
+    # (1 - 0.25, 2 - 0.75) / 4.5 on the subset, and the bound's own part, -value / 4.5 times that of `bound`
+    value = 1 / 4.5
+    x, y = -value / 4.5 * np.array([4.0, 5, 5, 6]), np.array([0.75 + value * 0.5, 1.25 + value * 0.5]) / 4.5
+    variance = x.var(ddof=1) / 4 + y.var(ddof=1) / 2 + 2 * np.cov(x[:2], y)[0, 1] / 4
+    assert difference.standard_error.item() == pytest.approx(np.sqrt(variance), rel=1e-12)
+
+
+def test_far_from_the_bound_the_errors_themselves_count(counted):
+    far = replace(counted, sums=sums_of(4, square=[[2, 4, 6, 8], [9, 5, 14, 12]], own=[[4, 5, 5, 6], [1, 1, 1, 1]]))
+    assert far.gap("other").value.item() == pytest.approx(10 / 4.5 - 1, rel=1e-14)
+    assert far.gap("other").standard_error == far.above_bound("other").standard_error
+    assert far.gap_difference("other", "aof-gaussian").value.item() == pytest.approx((10 - 5) / 4.5, rel=1e-14)
+    assert far.gap("aof-gaussian").value.item() == pytest.approx(0.5 / 4.5, rel=1e-14)
+
+
+def test_the_exact_filter_is_no_entrant(counted):
+    assert counted.entrants == ("aof-gaussian", "other")
+    assert [name for name, _ in counted.ranking()] == ["aof-gaussian", "other"]
+    assert counted.available[-1] == "aof-exact"
+
+
+def test_without_it_the_control_is_the_reference(counted):
+    alone = replace(counted, subset=None)
+    assert not alone.has_bound
+    assert alone.gap("other").value.item() == pytest.approx(6 / 5 - 1, rel=1e-14)
+    assert alone.gap("other").standard_error == pytest.approx(alone.relative("other").standard_error, rel=1e-14)
+    assert alone.mean_gap("aof-gaussian").value.item() == 0
+
+
+def test_intervals_of_the_gap_cover_the_truth_as_often_as_they_say():
+    """A filter with a wrong prior: z = K y has D = (1 - K)^2 P + K^2 R, and the Kalman filter bounds it.
+
+    95 % intervals of 200 comparisons: the binomial's 4 standard errors around 190.  The squared distance is chi-squared with
+    1 degree, so the t interval of 300 trajectories covers 94 %, that is 2 fewer.
+    """
+    model, wrong = (Model.define("0.9*x + v", "x + w", prior={"variance": P}) for P in (1.0, 0.5))
+    K, least = 0.5 / 1.5, 0.5
+    truth = ((1 - K) ** 2 + K**2) / least - 1
+    assert truth < 0.5 / 2  # near the bound: distances count
+    filters = [
+        replace(kalman_filter(model), name="aof-gaussian"),
+        replace(kalman_filter(wrong), name="wrong"),
+        replace(kalman_filter(model), name="aof-exact", slow=True),
+    ]
+    hits = 0
+    for seed in range(200):
+        result = compare(filters, model, 1000, 1, seed, subset_runs=300, threads=1, progress=False)
+        low, high = result.gap("wrong").interval(0.95)
+        hits += bool(low[0] < truth < high[0])
+    assert abs(hits - 188) < SIGMA * np.sqrt(200 * 0.95 * 0.05)
+
+
+@pytest.fixture(scope="module")
+def lab53(variant53):
+    filters = lab_filters(variant53, [*LAB, "aof-exact"])
+    return compare(filters, variant53, 20_000, 8, 7, subset_runs=600, designs=4, progress=False)
+
+
+def test_no_filter_stands_below_the_bound(lab53):
+    bound = lab53.error_variance("aof-exact")
+    assert (bound.value > 0).all()
+    for name in lab53.entrants:
+        above = lab53.difference(name, "aof-exact")
+        assert (above.value > -SIGMA * above.standard_error).all(), name
+        assert (lab53.gap(name).value > 0).all(), name
+
+
+def test_distances_and_errors_tell_the_same_and_distances_tell_it_better(lab53):
+    for name in lab53.entrants:
+        near, far = lab53.gap(name), lab53.above_bound(name)
+        # Var(a - b) <= (sd a + sd b)^2
+        assert (abs(near.value - far.value) < SIGMA * (near.standard_error + far.standard_error)).all(), name
+        assert np.median(far.standard_error / near.standard_error) > 2, name
+
+
+def test_the_two_ways_to_the_bound_agree(lab53):
+    """D(GAOF) - M|z - z_exact|^2 from errors, and M p_exact, in which no error enters."""
+    errors, own = lab53.error_variance("aof-exact"), lab53.bound()
+    assert (abs(errors.value - own.value) < SIGMA * np.hypot(errors.standard_error, own.standard_error)).all()
+
+
+def test_mean_gaps_are_means_of_gaps(lab53):
+    for steps in (slice(None), slice(2, 5)):
+        assert float(lab53.mean_gap("duof", steps).value) == pytest.approx(lab53.gap("duof").value[steps].mean(), rel=1e-12)
+        difference = lab53.mean_gap_difference("duof", "aof-gaussian", steps)
+        expected = lab53.gap_difference("duof", "aof-gaussian").value[steps].mean()
+        assert float(difference.value) == pytest.approx(expected, rel=1e-12)
+        apart = np.hypot(lab53.mean_gap("duof").standard_error, lab53.mean_gap("aof-gaussian").standard_error)
+        assert difference.standard_error < 1.5 * apart
+    one = lab53.mean_gap_difference("duof", "fos-gaussian", slice(3, 4))
+    assert float(one.standard_error) == pytest.approx(lab53.gap_difference("duof", "fos-gaussian")[3].standard_error, rel=1e-12)
+
+
+# --- several designs
+
+
+def test_equal_designs_have_no_variance():
+    squares = [[[1.0, 5, 2, 2]]] * 3
+    replicas = Replicas(("duof",), tuple(sums_of(4, square=one) for one in squares))
+    variance, freedom = replicas.variance(Terms({("square", "duof"): 2.0}, {}), total=False)
+    assert (variance.item(), freedom) == (0, 2)
+
+
+def test_the_variance_between_designs_is_found_below_that_of_the_trajectories():
+    """Design r on trajectory b: theta_r + n_b + epsilon_rb, with variances 1, 9 and 4.  Over 400 repetitions the mean of the
+    variance found is 1, within 4 of its standard errors (the root of 2/3 for 4 designs, a tenth more for epsilon's part)."""
+    rng, found = np.random.default_rng(3), []
+    for _ in range(400):
+        values = rng.normal(size=(4, 1)) + 3 * rng.normal(size=64) + 2 * rng.normal(size=(4, 64))
+        replicas = Replicas(("duof",), tuple(sums_of(64, square=[row]) for row in values))
+        # the weight of a distance counts as that of the square: together 3 - 2
+        terms = Terms({("square", "duof"): 3.0, ("square", "other"): 5.0}, {("distance", "duof"): -2.0})
+        found.append(replicas.variance(terms, total=False)[0].item())
+    assert abs(np.mean(found) - 1) < SIGMA * 1.1 * np.sqrt(2 / 3 / 400)
+
+
+def test_standard_errors_hold_the_variance_of_the_design(variant53):
+    """Designed on few trajectories, a DUOF varies: the scatter of independent comparisons must be in the standard error of one.
+
+    Mean of SE^2 against the variance of the results, 60 of them: 4 standard errors of that ratio, sqrt(2/60) for a normal law,
+    and as much for the mean, as a variance from 4 designs has 3 degrees of freedom, and errors have tails.
+    """
+    with_design, without, values = [], [], []
+    for seed in range(60):
+        result = compare([duof(variant53)], variant53, 2000, 3, seed, design_runs=60, designs=4, threads=1, progress=False)
+        one = replace(result, replicas=None)
+        score = [r.error_variance("duof")[1] for r in (result, one)]
+        values.append(float(score[0].value))
+        with_design.append(float(score[0].standard_error) ** 2)
+        without.append(float(score[1].standard_error) ** 2)
+        assert score[0].freedom <= 127 + 3
+    assert abs(np.mean(with_design) / np.var(values, ddof=1) - 1) < 2 * SIGMA * np.sqrt(2 / 60)
+    assert np.mean(without) < np.mean(with_design)
+
+
+def test_the_first_of_several_designs_is_the_only_one_of_one(variant53):
+    one, four = (compare([duof(variant53)], variant53, 500, 3, 1, designs=designs, progress=False) for designs in (1, 4))
+    np.testing.assert_array_equal(one.error_variance("duof").value, four.error_variance("duof").value)
+    np.testing.assert_array_equal(four.replicas.sums[0].square, four.sums.square)
+    assert four.designs == 4
+    assert one.designs == 0
+    variance = four.replicas.variance(Terms({("square", "duof"): 1.0}, {}), total=False)[0]
+    np.testing.assert_allclose(four.design_error("duof").value, np.sqrt(variance), rtol=1e-14)
+    mean = batch_mean(four.sums.square[0, :, 0], four.sums.counts)
+    np.testing.assert_allclose(four.error_variance("duof").standard_error, np.sqrt(mean.standard_error**2 + variance), rtol=1e-12)
+    with pytest.raises(KeyError, match="designs=4"):
+        one.design_error("duof")
+
+
+def test_a_wrong_number_of_designs_is_refused(variant53):
+    for designs in (0, -1, 2.5, True):
+        with pytest.raises(ValueError, match="designs must be a positive whole number"):
+            compare([duof(variant53)], variant53, 50, 2, 1, designs=designs, progress=False)
+    with pytest.raises(ValueError, match="same_ensemble"):
+        compare([duof(variant53)], variant53, 50, 2, 1, designs=2, same_ensemble=True, progress=False)

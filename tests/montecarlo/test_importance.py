@@ -1,0 +1,80 @@
+"""Initial states drawn wider than the prior, and weighted: the same means, with smaller errors where far starts dominate."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from kfcourse import Ensemble, Model, compare, lab_filters
+from kfcourse.filters import aof, kalman_filter
+from kfcourse.lab import LAB
+from kfcourse.symbolic.structure import gaussian
+
+SIGMA = 4
+
+
+@pytest.fixture(scope="module")
+def vector():
+    return Model.define(
+        ["0.9*x1 + 0.2*x2 + 0.3*v1", "0.8*x2 + v2"], ["x1 + w1", "x2 - x1 + 0.5*w2"],
+        prior={"mean": [1, -2], "variance": [[2, 0.5], [0.5, 1]]},
+    )  # fmt: skip
+
+
+def test_the_weight_is_the_ratio_of_the_two_densities(vector):
+    ensemble = Ensemble(vector, 5, 1, np.random.SeedSequence(1), wide=1.7)
+    x = next(ensemble.block(0)).x
+    mean, cov = vector.prior
+    prior, wide = (stats.multivariate_normal(mean, factor * cov).pdf(x) for factor in (1, 1.7**2))
+    np.testing.assert_allclose(ensemble.weight(x), prior / wide, rtol=1e-12)
+
+
+def test_a_component_that_is_known_has_no_weight():
+    known = Model.define(["x1 + v", "x2"], "x1 + w", prior={"mean": [0, 3], "variance": [[4, 0], [0, 0]]})
+    one = Model.define("x + v", "x + w", prior={"variance": 4})
+    states = np.array([[0.5, 3.0], [-4.0, 3.0]])
+    weights = [Ensemble(m, 2, 1, np.random.SeedSequence(1), wide=2).weight(x) for m, x in ((known, states), (one, states[:, :1]))]
+    np.testing.assert_allclose(*weights, rtol=1e-14)
+
+
+def test_without_widening_nothing_changes(vector):
+    assert Ensemble(vector, 5, 1, np.random.SeedSequence(1)).weight(np.zeros((5, 2))) is None
+    for wide in (0.5, float("nan")):
+        with pytest.raises(ValueError, match="wide must be at least 1"):
+            Ensemble(vector, 5, 1, np.random.SeedSequence(1), wide=wide)
+    with pytest.raises(ValueError, match="same_ensemble"):
+        compare([kalman_filter(vector)], vector, 50, 2, 1, same_ensemble=True, wide=2, progress=False)
+
+
+def test_every_statistic_is_a_mean_over_the_prior(vector):
+    """The Kalman filter's variance is known: error, claim, normalised error and bias, each within 4 standard errors."""
+    result = compare([kalman_filter(vector)], vector, 40_000, 3, 2, wide=1.5, progress=False)
+    state, expected = kalman_filter(vector).init(1), []
+    for _ in range(3):
+        state = kalman_filter(vector).step(state, np.zeros((1, 2)))
+        expected.append(np.trace(state.posterior.cov))
+    found = result.error_variance("kalman"), result.own_variance("kalman"), result.normalised_error("kalman")
+    for estimate, truth in zip(found, (expected, expected, np.ones(3)), strict=True):
+        assert (abs(estimate.value - truth) < SIGMA * estimate.standard_error).all()
+    bias = result.error_mean("kalman")
+    assert (abs(bias.value) < SIGMA * bias.standard_error).all()
+
+
+def test_on_variant_53_it_tells_the_same_with_less_error(variant53):
+    filters = lab_filters(variant53, [*LAB, "aof-exact"])
+    plain, wide = (
+        compare(filters, variant53, 30_000, 4, 3, design_runs=50_000, subset_runs=2000, wide=factor, progress=False)
+        for factor in (1, 2)
+    )
+    for name in ("aof-linearised", "mfos-gaussian"):  # designed on the same ensemble: the same filters
+        for ask in ("gap", "error_variance"):
+            a, b = (getattr(result, ask)(name) for result in (plain, wide))
+            assert (abs(a.value - b.value) < SIGMA * np.hypot(a.standard_error, b.standard_error)).all(), (name, ask)
+            assert np.median(a.standard_error / b.standard_error) > 1.5, (name, ask)
+
+
+def test_a_variance_that_serves_all_trajectories_is_weighted_too():
+    model = Model.define("0.9*x + v", "x + w")
+    one, each = aof(gaussian(model)), kalman_filter(model)
+    result = compare([one, each], model, 2000, 2, 1, wide=2, progress=False)
+    for k in range(2):
+        assert result.own_variance("aof-gaussian").value[k] == pytest.approx(result.own_variance("kalman").value[k], rel=1e-12)

@@ -1,0 +1,203 @@
+"""Notebooks that mean harm: they are marked as their answers deserve, and end neither the run nor another notebook."""
+
+import json
+import os
+import socket
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from test_grade import FIXTURES, cell, solved
+from tricks import CELLS, FUNCTIONS, PROCESSES
+
+from kfcourse.checks import Exercise, exercise
+from kfcourse.notebooks.grading import marking, running
+from kfcourse.notebooks.grading.assembly import Step
+from kfcourse.notebooks.grading.marking import Marking
+from kfcourse.notebooks.grading.pool import Family, Worker
+from kfcourse.notebooks.grading.running import Kernel, Opening, Place, packages_of
+from kfcourse.notebooks.grading.sandbox import Sandbox, chosen
+from kfcourse.notebooks.grading.staging import answers, personal_numbers, stage
+from kfcourse.notebooks.grading.submissions import returned
+from kfcourse.notebooks.master import opened
+
+TASK = exercise("b", "53")
+B1 = next(question for question in TASK.questions.values() if question.name == "b1")
+SALT = "hidden"
+CHECK = Step('task.check("b1", gain)', "check", names=("task",), questions=("b1",))
+POSIX = pytest.mark.skipif(os.name != "posix", reason="processes are kept by a keeper on POSIX only")
+
+
+def known():
+    """What a student can learn by heart: the arguments of the immediate check, and the right answers."""
+    return [(values[0].ravel()[:3].tolist(), B1.answer(TASK)(*values).tolist()) for values in B1.arguments(TASK)]
+
+
+def filled(code, **values):
+    for name, value in ({"MEMORY": known()} | values).items():
+        code = code.replace(f"{{{name}!r}}", repr(value)).replace(f"{{{name}}}", repr(value))
+    return code
+
+
+@pytest.fixture(scope="module")
+def staged(tmp_path_factory):
+    return stage(tmp_path_factory.mktemp("stage"))
+
+
+def kernel_in(sandbox, staged, seconds=15.0, task=TASK):
+    opening = Opening(task.letter, opened(task), personal_numbers(task))
+    return Kernel(Place(staged, sandbox), opening, seconds)
+
+
+OPEN = Step("import numpy as np\nfrom kfcourse.checks import exercise\ntask = exercise('b', '53')", "opening")
+
+
+@pytest.fixture(scope="module")
+def outside(tmp_path_factory):
+    """A folder with another notebook, which no notebook has any business in."""
+    folder = tmp_path_factory.mktemp("outside")
+    (folder / "other.ipynb").write_text(json.dumps(solved()), encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def kernel(staged, outside):
+    """One process for all tricks that leave it alive; the others end it, and it is started anew."""
+    with kernel_in(Sandbox("none", tuple(map(str, [*answers(), outside]))), staged) as started:
+        assert Marking(Exercise("b", TASK.variant, SALT), (), print).run(started, [OPEN]) == []
+        yield started
+
+
+def marked(kernel, *steps):
+    """The result of b1 after these cells, and where they stopped."""
+    marking = Marking(Exercise("b", TASK.variant, SALT), (), lambda _: None)
+    stopped = marking.run(kernel, steps)
+    return marking.results.get("b1"), stopped
+
+
+RIGHT = "def gain(Psi, G, F):\n    return np.swapaxes(np.linalg.solve(F, G @ Psi), -1, -2)"
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_no_function_gets_more_than_it_deserves(kernel, name, monkeypatch):
+    monkeypatch.setattr(running, "ANSWER", 1.0)
+    monkeypatch.setattr(running, "ANSWERS", 2.0)
+    monkeypatch.setattr(running, "GRACE", 1.0)
+    result, _ = marked(kernel, Step(filled(FUNCTIONS[name]), "trick"), CHECK)
+    assert result.status in ("wrong", "unusable"), result
+    # and what comes after it is marked as if nothing had been
+    kernel._done = [done for done in kernel._done if "gain" not in done[0]]
+    result, stopped = marked(kernel, Step(RIGHT, "answer"), CHECK)
+    assert result and result.passed, (result, stopped)
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_no_cell_lets_a_wrong_answer_pass(kernel, name):
+    """One after the other in the same process: what the earlier ones have changed stays changed."""
+    wrong_gain = Step("def gain(Psi, G, F):\n    return G @ Psi", "answer")
+    result, _ = marked(kernel, wrong_gain, Step(CELLS[name], "trick"), CHECK)
+    assert result is None or result.status in ("wrong", "unusable")
+
+
+def test_arguments_learned_by_heart_would_pass_without_a_salt():
+    """The trick is real: it fails because the grader asks with arguments of its own."""
+    namespace = {}
+    exec(filled(FUNCTIONS["answers learned by heart"]), namespace)
+    assert TASK.check("b1", namespace["gain"]).passed
+    assert Exercise("b", TASK.variant, SALT).check("b1", namespace["gain"]).status == "wrong"
+
+
+def test_the_salt_changes_no_personal_number():
+    for letter in "bfhijkl":
+        salted = Exercise(letter, exercise("b", "20").variant, SALT)
+        assert salted.numbers == exercise(letter, "20").numbers
+
+
+# -- what the notebook's process can see
+
+
+def test_no_key_is_on_the_stage(staged):
+    names = {path.name for path in staged.rglob("*") if path.suffix != ".pyc"}
+    assert {"companion.py", "exercises.py", "session.py"} <= names
+    assert not {
+        name for name in names if name.startswith(("keys", "questions", "mistakes", "hidden", "messages", "shared", "statement"))
+    }
+    of_answers = {B1.answer(TASK).__module__.rpartition(".")[2]}
+    assert not {name for name in names if name.removesuffix(".py") in of_answers}
+    texts = [path.read_text(encoding="utf-8") for path in staged.rglob("*.py")]
+    assert not [text for text in texts if "from kfcourse.exercises.b_aof" in text]
+
+
+def bubblewrap(staged, folder, hidden):
+    try:
+        return chosen("bwrap", hidden, folder, packages_of(staged))
+    except ValueError as reason:
+        pytest.skip(str(reason))
+
+
+@pytest.fixture
+def port():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield server.getsockname()[1]
+
+
+def test_a_sandbox_holds(staged, outside, tmp_path, port):
+    """Everything at once, then a right answer: it passes, and nothing has happened outside."""
+    flag, written = tmp_path / "flag", outside / "written"
+    sandbox = bubblewrap(staged, tmp_path, [*answers(), outside])
+    values = {"OTHER": str(outside / "other.ipynb"), "OUTSIDE": str(written), "FLAG": str(flag), "PORT": port}
+    steps = [Step(filled(code, **values), name, own=True) for name, code in PROCESSES.items()]
+    listed = f"import os\nassert not os.path.exists({str(answers()[0])!r}) or not os.listdir({str(answers()[0])!r})"
+    marking = Marking(Exercise("b", TASK.variant, SALT), (), lambda _: None)
+    with kernel_in(sandbox, staged) as kernel:
+        assert marking.run(kernel, [OPEN, *steps, Step(listed, "keys", own=True), Step(RIGHT, "answer"), CHECK]) == []
+    assert marking.marks["b1"] == "passed"
+    told = " ".join(marking.errors)
+    assert not [word for word in ("has read", "has written", "has connected", "keys") if word in told], told
+    assert not written.exists() and not flag.exists()
+    assert {"sends signals to processes", "starts processes", "uses the network"} <= set(kernel.notes)
+
+
+@POSIX
+def test_without_a_sandbox_it_is_noted(kernel, outside, tmp_path, port):
+    values = {"OTHER": str(outside / "other.ipynb"), "OUTSIDE": str(tmp_path / "x"), "FLAG": str(tmp_path / "flag"), "PORT": port}
+    names = ("leaves a daemon", "reads another notebook", "writes outside", "uses the network")
+    marked(kernel, *(Step(filled(PROCESSES[name], **values), name) for name in names))
+    assert f"reads {outside / 'other.ipynb'}" in kernel.notes
+    assert f"writes {tmp_path / 'x'}" in kernel.notes
+    assert {"starts processes", "uses the network"} <= set(kernel.notes)
+    left = int((tmp_path / "flag").read_text())
+    assert os.path.exists(f"/proc/{left}") or sys.platform != "linux"
+    kernel.close()  # the daemon, in a session of its own, is gone with it
+    if sys.platform == "linux":
+        assert gone(left)
+
+
+def gone(pid):
+    for _ in range(100):  # a killed process stays as a zombie until somebody waits for it
+        status = Path(f"/proc/{pid}/stat")
+        if not status.exists() or status.read_text().split()[2] == "Z":
+            return True
+        time.sleep(0.05)
+    return False
+
+
+@POSIX
+def test_who_kills_its_process_is_named_and_the_next_is_graded(staged, tmp_path):
+    """Without a sandbox: the keeper, then the grading process itself; the same worker goes on with the next notebook."""
+    for name, trick in (("1", "kills its parent"), ("2", "kills all above it"), ("3", None)):
+        notebook = solved()
+        if trick:
+            daemon = filled(PROCESSES["leaves a daemon"], FLAG=str(tmp_path / f"flag{name}"))
+            cell(notebook, "import matplotlib").source += "\n" + daemon + PROCESSES[trick]
+        (tmp_path / f"{name}.ipynb").write_text(json.dumps(notebook), encoding="utf-8")
+    worker = Worker(marking.Setting(Place(staged, Sandbox("none")), SALT), Family())
+    try:
+        grades = [worker(work) for work in returned(tmp_path, masters=FIXTURES)]
+    finally:
+        worker.end()
+    assert [(grade.status, grade.note) for grade in grades[:2]] == [("not graded", "it killed its process")] * 2
+    assert grades[2].passed == 2
+    if sys.platform == "linux":
+        assert all(gone(int((tmp_path / f"flag{name}").read_text())) for name in "12")

@@ -1,0 +1,104 @@
+"""Numbers and laws that no computation could use are refused where a model is defined, with the place and the cure."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from kfcourse import Model, ModelError, gaussian
+from kfcourse.symbolic.sense import is_covariance, nothing_random, unfit
+
+pytestmark = pytest.mark.quick
+
+
+@pytest.mark.parametrize(
+    ("cov", "right"),
+    [
+        ([[1.0, 0.5], [0.5, 1.0]], True),
+        ([[1.0, 1.0], [1.0, 1.0]], True),  # singular
+        ([[0.0, 0.0], [0.0, 1.0]], True),
+        ([[1.0, 1.5], [1.5, 1.0]], False),
+        ([[0.0, 0.1], [0.1, 1.0]], False),  # what does not vary is correlated with nothing
+        ([[1e10, 0.0], [0.0, -1e-3]], False),  # not to be taken for rounding of the other component
+        ([[1e10, 1.001], [1.001, 1e-10]], False),  # a correlation above 1, in very different units
+        ([[1e10, 1.0], [1.0, 1e-10]], True),
+    ],
+)
+def test_a_covariance_is_one_in_any_units(cov, right):
+    assert is_covariance(np.array(cov)) is right
+
+
+def test_products_of_a_random_root_are_covariances():
+    rng = np.random.default_rng(1)
+    for size in range(1, 8):
+        root = rng.standard_normal((size, max(size - 1, 1))) * 10.0 ** rng.uniform(-20, 20, (size, 1))
+        assert is_covariance(root @ root.T)
+
+
+@pytest.mark.parametrize(
+    ("mean", "variance", "problem"),
+    [
+        (0.0, 1.0, ""),
+        (6e23, 0.0, ""),
+        (6e23, 1e24, ""),
+        (6e23, 1.0, "lost beside the mean"),
+        (1e6, 1e-10, ""),  # a deviation of 1e-5: eleven digits below the mean, five are left
+        (0.0, 1e101, "the variance 1e+101 is beyond"),
+        (0.0, 1e-101, "the variance 1e-101 is beyond"),
+        (1e51, 1e100, "the mean 1e+51 is beyond"),
+        (-1e-51, 1.0, "the mean -1e-51 is beyond"),
+    ],
+)
+def test_sizes_of_a_law(mean, variance, problem):
+    found = unfit(np.array([mean]), np.array([variance]))
+    assert problem in found and bool(problem) == bool(found)
+
+
+@pytest.mark.parametrize(
+    ("state", "meter", "parameters", "place"),
+    [
+        ("a*a*x + v", "x + w", {"a": 1e60}, "state"),
+        ("x + v", "x + a*a*w", {"a": 1e-60}, "meter"),
+        ("x + exp(a)*exp(a)*v", "x + w", {"a": 300}, "state"),
+        ("x + v*log(a)", "x + w", {"a": -1}, "state"),
+        ("x + v", "sqrt(a)*x + w", {"a": -1}, "meter"),
+        ("x + v/(a - 1)", "x + w", {"a": 1}, "state"),
+    ],
+)
+def test_numbers_out_of_all_sizes_are_refused_with_their_place(state, meter, parameters, place):
+    with pytest.raises(ModelError, match=f"the {place} equation .* with these parameters"):
+        Model.define(state, meter, parameters)
+
+
+def test_a_parameter_s_exact_value_has_a_size_too():
+    with pytest.raises(ModelError, match="parameter a = 1000"):
+        Model.define("a*x + v", "x + w", {"a": sp.Integer(10) ** 400})
+
+
+def test_a_long_formula_is_shown_shortened():
+    with pytest.raises(ModelError) as caught:
+        Model.define("1e99*1e99*x + v", "x + w")
+    assert len(str(caught.value)) < 250
+
+
+def test_derived_numbers_beyond_the_floats_are_refused_not_printed_as_names():
+    """Each number is within its limits, their product in the moments is not: generated code would hold the name `inf`."""
+    with pytest.raises(ModelError, match=r"derived functions hold the number .*E"):
+        gaussian(Model.define("(1e90*x + v)**4", "x + w"))
+
+
+@pytest.mark.parametrize(
+    ("state", "meter", "laws", "problem"),
+    [
+        ("0.9*x + v", "x + w", {}, ""),
+        ("0.9*x", "x + w", {}, ""),  # an unknown start
+        ("0.9*x + v", "x", {}, ""),
+        ("0.9*x + v", "x + w", {"prior": {"variance": 0}}, ""),
+        ("0.9*x", "x", {}, "no noise enters"),
+        ("0.9*x + v", "x + w", {"state_noise": {"variance": 0}, "meter_noise": {"variance": 0}}, "no noise enters"),
+        ("0.9*x + e*v", "x", {}, "no noise enters"),  # e = 0
+        ("0.9*x", "x + w", {"prior": {"variance": 0}}, "known exactly"),
+    ],
+)
+def test_something_must_be_random(state, meter, laws, problem):
+    found = nothing_random(Model.define(state, meter, {"e": 0} if "e*" in state else {}, **laws))
+    assert problem in found and bool(problem) == bool(found)

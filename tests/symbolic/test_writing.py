@@ -1,0 +1,43 @@
+"""Formulas are written in the order in which people write them, and stay what they are."""
+
+import pytest
+import sympy as sp
+
+from kfcourse.symbolic.writing import _Writer, formula_latex
+
+pytestmark = pytest.mark.quick
+
+x, v, w, z, p, m, d = sp.symbols("x v w z p m d", real=True)
+c, e, f, g, h, s, T = sp.symbols("c e f g h s T", real=True)
+
+
+@pytest.mark.parametrize(
+    ("expression", "variables", "noises", "latex"),
+    [
+        (c * x + e * x * v, [x], [v], "c x + e x v"),
+        (g * x + f * x**2 * w, [x], [w], "g x + f x^{2} w"),
+        (c**2 * p + e**2 * z**2 + e**2 * p, [z, p], [], "c^{2} p + e^{2} z^{2} + e^{2} p"),
+        (
+            g**2 * d + f**2 * (m**4 + 6 * m**2 * d + 3 * d**2).expand(),
+            [m, d],
+            [],
+            "g^{2} d + f^{2} m^{4} + 6 f^{2} m^{2} d + 3 f^{2} d^{2}",
+        ),
+        (x + T * sp.sin(x) + s * v, [x], [v], r"x + T \sin {x} + s v"),
+        (h * sp.sin(x) + w, [x], [w], r"h \sin {x} + w"),
+        (sp.S.Zero, [x], [], "0"),
+        (-c * x, [x], [], "- c x"),
+    ],
+)
+def test_order(expression, variables, noises, latex) -> None:
+    assert formula_latex(sp.expand(expression), variables, noises) == latex
+
+
+@pytest.mark.parametrize("name", ["tau", "Theta", "h", "G", "F"])
+def test_what_is_written_is_what_was_given(name) -> None:
+    from kfcourse import Model, gaussian
+
+    model = Model.define("x + T*sin(x)/s + s*exp(-x)*v", "sqrt(2)*x**2*cos(x) - w/3", dict(T=0.1, s=0.2))
+    formula = gaussian(model)[name]
+    arranged = _Writer(sorted(formula.free_symbols, key=str), []).arranged(formula)
+    assert sp.simplify(arranged.doit() - formula) == 0
