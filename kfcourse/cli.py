@@ -16,7 +16,7 @@ from kfcourse.files import save
 from kfcourse.lab.grammar import generate
 from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
 from kfcourse.lab.report import conclusions, write_json, write_report
-from kfcourse.lab.short_names import FILTERS, LAB, has_exact, lab_filters, title
+from kfcourse.lab.short_names import FILTERS, LAB, has_bound, lab_filters, title
 from kfcourse.lab.variants import VariantError, find_variant
 from kfcourse.montecarlo.comparison import EXACT
 from kfcourse.montecarlo.designing import NotFinite
@@ -153,6 +153,13 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
     type=click.IntRange(min=1),
     help="Ensembles to design DUOF, FOS and MFOS on: how much they differ goes into the standard errors.  [default: 4]",
 )
+@click.option(
+    "--wide",
+    type=click.FloatRange(min=1),
+    default=1.0,
+    show_default=True,
+    help="Draw initial states from a law so many times as wide, and weight the trajectories: 2 where rare far starts dominate.",
+)
 @click.option("--same-ensemble", is_flag=True, help="Design DUOF, FOS and MFOS on the trajectories they are compared on, once.")
 @click.option("--threads", type=click.IntRange(min=1), default=2, show_default=True, help="Does not change the numbers.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]")
@@ -167,6 +174,7 @@ def lab(
     exact_runs: int,
     exact_seconds: float,
     designs: int | None,
+    wide: float,
     same_ensemble: bool,
     threads: int,
     out: Path | None,
@@ -180,7 +188,7 @@ def lab(
     chosen = find_variant(variant, variants_file)
     model = chosen.model
     if names is None:
-        wanted = [*LAB, "aof-exact"] if has_exact(model) and exact_runs else list(LAB)
+        wanted = [*LAB, "aof-exact"] if exact_runs and has_bound(model) else list(LAB)
     else:
         wanted = [name.strip() for name in names.split(",") if name.strip()]
     filters = lab_filters(model, wanted)
@@ -197,6 +205,7 @@ def lab(
         subset_seconds=exact_seconds,
         designs=1 if same_ensemble else designs or DESIGNS,
         same_ensemble=same_ensemble,
+        wide=wide,
         threads=threads,
     )
     for name, reason in result.left_out.items():

@@ -8,7 +8,7 @@ plots        figures of a comparison, one colour and name for each filter
 report       what `kfcourse lab` writes
 """
 
-from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_exact, lab_filters, title
+from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_bound, has_exact, lab_filters, title
 from kfcourse.lab.variants import Variant, VariantError, find_variant, load_variants, read_variant
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "Variant",
     "VariantError",
     "find_variant",
+    "has_bound",
     "has_exact",
     "lab_filters",
     "load_variants",

@@ -12,7 +12,8 @@ from typing import Any
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.sense import nothing_random
 
-VARIANT_KEYS = {"title", "state", "meter", "parameters", "symbols", "prior", "state_noise", "meter_noise", "angles"}
+MODEL_KEYS = {"parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs", "interval", "angles"}
+VARIANT_KEYS = {"title", "state", "meter"} | MODEL_KEYS
 
 
 class VariantError(ValueError):
@@ -36,7 +37,7 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     ----------
     path : path, optional
         A file with tables ``[variants.NAME]``: `state`, `meter`, `parameters`, and optionally `title`,
-        `symbols`, `prior`, `state_noise`, `meter_noise`, `angles` (see `Model.define`).
+        `symbols`, `prior`, `state_noise`, `meter_noise`, `inputs`, `interval`, `angles` (see `Model.define`).
 
     Raises
     ------
@@ -68,7 +69,7 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
     if unknown or missing:
         problem = f"unknown key {', '.join(unknown)}" if unknown else f"no {' and no '.join(missing)}"
         raise VariantError(f"{prefix}{problem}; the keys are {', '.join(sorted(VARIANT_KEYS))}")
-    for key in ("parameters", "symbols", "prior", "state_noise", "meter_noise"):
+    for key in ("parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs"):
         if key in table and not isinstance(table[key], Mapping):
             raise VariantError(f"{prefix}`{key}` must be a table such as {{ c = 0.9 }}, got {table[key]!r}")
     options = {key: value for key, value in table.items() if key not in ("title", "state", "meter", "parameters")}

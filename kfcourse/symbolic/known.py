@@ -147,6 +147,10 @@ def varying_law(
     law = table(what, given)
     scale, shift = (_formulas(what, law.get(key), len(noises), symbols) for key in ("variance", "mean"))
     if scale:
+        # A mean that is a number moves into the equations too, as the law's own is multiplied by the deviation.
+        means = _numbers(law.get("mean", 0.0), len(noises))
+        shift = {i: means[i] for i in scale if i < len(means)} | shift
+        law["mean"] = [0.0 if i in scale else one for i, one in enumerate(means)] if means else law.get("mean", 0.0)
         law["variance"] = _without(scale, law["variance"], 1.0)
         for i, variance in scale.items():
             _check_variance(what, noises[i], variance, known, symbols, parameters)
@@ -154,6 +158,15 @@ def varying_law(
         law["mean"] = _without(shift, law["mean"], 0.0)
     changed = {noises[i]: shift.get(i, 0) + sp.sqrt(scale.get(i, 1)) * noises[i] for i in {**scale, **shift}}
     return changed, law
+
+
+def _numbers(given: Any, size: int) -> list[Any]:
+    """The entries of a list, or one number for all, exactly; formulas as they are; none if they do not fit, which `law` tells."""
+    entries = [given] * size if np.ndim(given) == 0 else [*given]
+    try:
+        return [one if _is_formula(one) else sp.Rational(str(float(one))) for one in entries]
+    except (TypeError, ValueError):
+        return []
 
 
 def _without(formulas: Mapping[int, sp.Expr], given: Any, instead: float) -> Any:
