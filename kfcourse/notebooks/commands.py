@@ -49,9 +49,12 @@ def _options(command: Callable) -> Callable:
 
 @click.command()
 @_options
-def exercises(**options: Any) -> None:
+@click.option("--nbgrader", is_flag=True, help="Write source notebooks of nbgrader instead: a folder for each variant.")
+def exercises(nbgrader: bool, **options: Any) -> None:
     """Write the students' notebooks, ready to run."""
-    _make("exercises", **options)
+    if nbgrader and options["students"]:
+        raise click.UsageError("--nbgrader hands the same notebooks to all students: name a --variant instead of --students")
+    _make("nbgrader" if nbgrader else "exercises", **options)
 
 
 @click.command()

@@ -45,7 +45,7 @@ def staged(tmp_path_factory):
     return stage(tmp_path_factory.mktemp("stage"))
 
 
-def kernel_in(sandbox, staged, seconds=15.0, task=TASK):
+def kernel_in(sandbox, staged, seconds=120.0, task=TASK):
     opening = Opening(task.letter, opened(task), personal_numbers(task))
     return Kernel(Place(staged, sandbox), opening, seconds)
 
