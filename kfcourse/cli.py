@@ -18,10 +18,13 @@ import click
 
 from kfcourse.checks.posing import unposed
 from kfcourse.files import is_standard_output, read_only, save
+from kfcourse.lab.admission import admissions, on_trial, without_failing
+from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.grammar import generate
+from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
 from kfcourse.lab.report import conclusions, write_json, write_report
-from kfcourse.lab.short_names import FILTERS, LAB, has_bound, lab_filters, title
+from kfcourse.lab.short_names import FILTERS, LAB, has_bound, title
 from kfcourse.lab.variants import VariantError, find_variant
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.designing import NotFinite
@@ -203,6 +206,9 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
 @click.option("--threads", type=click.IntRange(min=1), default=2, show_default=True, help="Does not change the numbers.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]")
 @click.option(
+    "--report", "language", type=click.Choice(LANGUAGES), help="Also write the student's report, handin.html and handin.tex."
+)
+@click.option(
     "--json", "json_file", type=click.Path(path_type=Path), help="Also write the numbers to this file; - is standard output."
 )
 def lab(
@@ -219,6 +225,7 @@ def lab(
     same_ensemble: bool,
     threads: int,
     out: Path | None,
+    language: str | None,
     json_file: Path | None,
 ) -> None:
     """Compare the filters on VARIANT (such as 53) and write the report."""
@@ -232,22 +239,32 @@ def lab(
         wanted = [*LAB, "aof-exact"] if exact_runs and has_bound(model) else list(LAB)
     else:
         wanted = [name.strip() for name in names.split(",") if name.strip()]
-    filters = lab_filters(model, wanted, seconds=DERIVATION)
+    found = admissions(model, wanted, seconds=DERIVATION)
+    refused = {one.name: one.reason for one in found if one.one is None}
+    if len(refused) == len(found):
+        raise click.ClickException(
+            "; ".join(f"{name}: {reason}" for name, reason in refused.items())
+            or "give at least one filter: --filters duof,aof-gaussian"
+        )
     folder = out or Path("lab-" + re.sub(r"[^\w.-]+", "-", chosen.name))  # no folder but this one
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
-    result = compare(
-        filters,
-        model,
-        runs,
-        steps,
-        seed,
-        subset_runs=exact_runs,
-        subset_seconds=exact_seconds,
-        designs=1 if same_ensemble else designs or DESIGNS,
-        same_ensemble=same_ensemble,
-        wide=wide,
-        threads=threads,
+    result = without_failing(
+        [one.one for one in found if one.one],
+        lambda filters: compare(
+            filters,
+            model,
+            runs,
+            steps,
+            seed,
+            subset_runs=exact_runs,
+            subset_seconds=exact_seconds,
+            designs=1 if same_ensemble else designs or DESIGNS,
+            same_ensemble=same_ensemble,
+            wide=wide,
+            threads=threads,
+        ),
+        refused,
     )
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
@@ -257,6 +274,8 @@ def lab(
         write_json(chosen, result, json_file)
     with _kept(folder):
         write_report(chosen, result, folder)
+        if language:
+            write_handin(chosen, result, folder, language)
     click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""), err=to_error)
 
 
@@ -286,6 +305,20 @@ def _kept(folder: Path) -> Iterator[None]:
     finally:
         if folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
+
+
+@main.command()
+@click.argument("places", nargs=-1, required=True, metavar="[FILE] VARIANT")
+@_VARIANTS
+@click.option("--trial/--no-trial", default=True, show_default=True, help="Also run each filter on a few hundred trajectories.")
+def filters(places: tuple[str, ...], variants_file: Path | None, trial: bool) -> None:
+    """Say of each filter whether VARIANT, of FILE or of the lab, admits it, and why not."""
+    if len(places) > 2 or (len(places) == 2 and variants_file):
+        raise click.UsageError("give a VARIANT, or a FILE of variants and a VARIANT of it")
+    chosen = find_variant(places[-1], Path(places[0]) if len(places) == 2 else variants_file)
+    found = admissions(chosen.model)
+    click.echo(f"Variant {chosen.name}: {chosen.title or chosen.model}", err=True)
+    click.echo(table_of_filters(on_trial(chosen.model, found) if trial else found))
 
 
 def _check_places(folder: Path, json_file: Path | None) -> None:

@@ -257,8 +257,36 @@ def test_the_exact_filter_alone_asks_for_a_fast_one(call):
 
 
 def test_a_model_without_closed_form_names_the_term_and_the_way_out(call, no_computation):
-    line = refused(call("lab", "tan", *QUICK, "--variants", "mine.toml"), "tan(x)", "aof-gaussian")
+    names = "aof-gaussian,fos-gaussian"
+    line = refused(call("lab", "tan", *QUICK, "--variants", "mine.toml", "--filters", names), "tan(x)", "aof-gaussian")
     assert "unscented" in line or "gauss_hermite" in line
+
+
+def test_filters_that_the_model_does_not_admit_are_left_out_with_the_reason(call, tmp_path):
+    result = call("lab", "tan", *QUICK, "--variants", "mine.toml", "--out", "r", "--json", "r.json")
+    assert result.exit_code == 0
+    for name in ("GAOF", "GFOS", "GMFOS"):
+        assert f"{name} left out: the package knows no closed-form Gaussian mean of the term tan(x)" in result.output
+    numbers = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))
+    assert set(numbers["left_out"]) == {"aof-gaussian", "fos-gaussian", "mfos-gaussian"}
+    assert set(numbers["error_variance"]) == {"aof-linearised", "duof", "fos-linearised", "mfos-linearised"}
+    page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
+    assert "GAOF left out:" in page and "Which of them this model admits" in page
+    assert "<td>UKF</td><td>poor</td>" in page and "<td>GHKF</td>" in page
+    assert call("lab", "20", *QUICK, "--filters", "duof,aof-exact", "--out", "s").exit_code == 0
+
+
+def test_filters_lists_which_are_admissible(call):
+    result = call("filters", "mine.toml", "tan", "--no-trial")
+    assert result.exit_code == 0
+    lines = {line.split()[0]: line for line in result.output.splitlines() if line.split()[0] in FILTERS}
+    assert list(lines) == list(FILTERS)
+    assert " no " in lines["aof-gaussian"] and "tan(x)" in lines["aof-gaussian"] and lines["duof"].split()[-1] == "yes"
+    assert call("filters", "tan", "--variants", "mine.toml", "--no-trial").output == result.output
+    assert "aof-exact" in call("filters", "53", "--no-trial").output
+    refused(call("filters", "nothing.toml", "tan"), "nothing.toml")
+    refused(call("filters", "mine.toml", "none"), "no variant 'none'")
+    assert call("filters", "a", "b", "c").exit_code == call("filters").exit_code == 2
 
 
 def test_the_way_out_is_open(call, no_report):
@@ -354,7 +382,8 @@ def test_formulas_that_are_not_found_in_time_are_refused_with_a_way_out(call, no
     (tmp_path / "long.toml").write_text(table, encoding="utf-8")
     monkeypatch.setattr(cli, "DERIVATION", 0.5)
     start = time.monotonic()
-    line = refused(call("lab", "long", *QUICK, "--variants", "long.toml"), "aof-gaussian: its formulas", "0.5 s", "aof-unscented")
+    arguments = ("lab", "long", *QUICK, "--variants", "long.toml", "--filters", "aof-gaussian")
+    line = refused(call(*arguments), "aof-gaussian: its formulas", "aof-unscented")
     assert time.monotonic() - start < 20
     assert "simplify" in line
 
@@ -480,3 +509,19 @@ def test_a_noiseless_meter_warns_of_nothing(call, tmp_path):
 
 def test_one_exact_run_has_no_standard_error_and_is_refused(call):
     refused(call("lab", "53", "--runs", 100, "--steps", 2, "--exact-runs", 1), "at least 2")
+
+
+def test_designs_and_a_wider_start_can_be_chosen(call, no_report, tmp_path):
+    for name, options in {"a": (), "b": ("--designs", 1), "c": ("--wide", 2), "d": ("--same-ensemble",)}.items():
+        assert call("lab", "53", *QUICK, *options, "--json", f"{name}.json").exit_code == 0
+    a, b, c, d = (json.loads((tmp_path / f"{name}.json").read_text(encoding="utf-8")) for name in "abcd")
+    assert (a["designs"], b["designs"], d["designs"]) == (4, 0, 0)
+    assert a["error_variance"] == b["error_variance"]
+    assert all(x >= y for name in LAB for x, y in zip(a["standard_error"][name], b["standard_error"][name], strict=True))
+    assert a["error_variance"] != c["error_variance"]
+
+
+def test_one_ensemble_cannot_be_several(call, no_computation):
+    result = call("lab", "53", *QUICK, "--same-ensemble", "--designs", 3)
+    assert result.exit_code == 2
+    assert "--same-ensemble" in result.output

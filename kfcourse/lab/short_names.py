@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from functools import cached_property
 from typing import NamedTuple
 
 from kfcourse.filters import Design, Filter, aof, duof, fos, mfos, particle, pointmass
-from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.quadrature import gauss_hermite, unscented
@@ -76,8 +73,8 @@ def title(name: str) -> str:
     return FILTERS[name].title if name in FILTERS else TITLES.get(name, name)
 
 
-def lab_filters(model: Model, names: Sequence[str] = LAB, seconds: float | None = None) -> list[Filter | Design]:
-    """Filters of the lab for a model, by short names; with `seconds`, their formulas must be derived in that time.
+def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Design]:
+    """Filters of the lab for a model, by short names.
 
     Raises
     ------
@@ -91,16 +88,9 @@ def lab_filters(model: Model, names: Sequence[str] = LAB, seconds: float | None 
         raise ValueError(f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(FILTERS)}")
     structures = Structures(model)
     built = []
-    end = None if seconds is None else time.monotonic() + seconds
     for name in dict.fromkeys(names):
         try:
-            with nullcontext() if end is None else time_limit(max(end - time.monotonic(), 1e-3)):
-                built.append(FILTERS[name].build(structures))
-        except OutOfTime:
-            raise ModelError(
-                f"{name}: its formulas are not derived within {seconds:g} s, as the model's are too long; simplify them, "
-                "or take filters without formulas, aof-unscented and duof"
-            ) from None
+            built.append(FILTERS[name].build(structures))
         except (NoClosedForm, ModelError) as error:
             raise type(error)(f"{name}: {error}") from None
     return built
