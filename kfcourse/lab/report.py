@@ -24,8 +24,10 @@ from kfcourse.files import replacing, save
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
+from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import FILTERS, Structures, title
 from kfcourse.lab.variants import Variant
+from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.statistics import Estimate, ratio
 from kfcourse.symbolic.model import Model
@@ -45,6 +47,10 @@ _FIGURES: dict[str, tuple[str, Callable[[Comparison, Axes], Axes]]] = {
     "ranking": ("The mean of the same over the steps, with 95 % confidence intervals.", plots.ranking),
     "consistency": ("Normalised squared error: 1 if the filter's own covariance is right.", plots.consistency),
 }
+
+
+FORMULAS = 60.0  # seconds that each kind of structural functions may take
+LONGEST = 40_000  # characters of LaTeX: some ten pages
 
 
 @dataclass(frozen=True)
@@ -151,6 +157,7 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
         "variant": variant,
         "result": result,
         "left_out": [(title(name), reason) for name, reason in result.left_out.items()],
+        "admissions": [(title(one.name), one.verdict, one.says) for one in admissions(result.model)],
         "model": Section.of("Model", result.model.latex()),
         "structures": _structure_sections(result.model, names),
         "equations": _equation_sections(names),
@@ -179,7 +186,17 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
 def _structure_sections(model: Model, names: tuple[str, ...]) -> list[Section]:
     structures = Structures(model)
     kinds = [kind for kind in ("gaussian", "linearised") if any(name.endswith(kind) for name in names)]
-    return [Section.of(kind.capitalize(), getattr(structures, kind).latex()) for kind in kinds]
+    return [Section.of(kind.capitalize(), _printed(structures, kind)) for kind in kinds]
+
+
+def _printed(structures: Structures, kind: str) -> str:
+    """The formulas in LaTeX, if they can be found and read."""
+    try:
+        with time_limit(FORMULAS):
+            block = getattr(structures, kind).latex()
+    except OutOfTime:
+        return rf"\text{{They are not written within {FORMULAS:g} s.}}"
+    return block if len(block) <= LONGEST else rf"\text{{They are too long to print: {len(block)} characters of LaTeX.}}"
 
 
 def _equation_sections(names: tuple[str, ...]) -> list[Section]:
