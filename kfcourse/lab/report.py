@@ -27,6 +27,7 @@ from kfcourse.lab import plots
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import FILTERS, Structures, title
 from kfcourse.lab.variants import Variant
+from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.statistics import Estimate, ratio
 from kfcourse.symbolic.model import Model
@@ -48,6 +49,8 @@ _FIGURES: dict[str, tuple[str, Callable[[Comparison, Axes], Axes]]] = {
 }
 
 
+FORMULAS = 60.0  # seconds that each kind of structural functions may take
+LONGEST = 40_000  # characters of LaTeX: some ten pages
 _GAP_STEPS = (0, 1, 5)  # where the report says how far the filters are above the exact bound
 
 
@@ -154,7 +157,7 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
         "variant": variant,
         "result": result,
         "left_out": [(title(name), reason) for name, reason in result.left_out.items()],
-        "admissions": [(title(one.name), one.verdict, one.says) for one in admissions(result.model)],
+        "admissions": [(title(one.name), one.verdict, one.says) for one in admissions(result.model, seconds=60.0)],
         "model": Section.of("Model", result.model.latex()),
         "structures": _structure_sections(result.model, names),
         "equations": _equation_sections(names),
@@ -182,7 +185,17 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
 def _structure_sections(model: Model, names: tuple[str, ...]) -> list[Section]:
     structures = Structures(model)
     kinds = [kind for kind in ("gaussian", "linearised") if any(name.endswith(kind) for name in names)]
-    return [Section.of(kind.capitalize(), getattr(structures, kind).latex()) for kind in kinds]
+    return [Section.of(kind.capitalize(), _printed(structures, kind)) for kind in kinds]
+
+
+def _printed(structures: Structures, kind: str) -> str:
+    """The formulas in LaTeX, if they can be found and read."""
+    try:
+        with time_limit(FORMULAS):
+            block = getattr(structures, kind).latex()
+    except OutOfTime:
+        return rf"\text{{They are not written within {FORMULAS:g} s.}}"
+    return block if len(block) <= LONGEST else rf"\text{{They are too long to print: {len(block)} characters of LaTeX.}}"
 
 
 def _equation_sections(names: tuple[str, ...]) -> list[Section]:

@@ -29,7 +29,7 @@ from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 from kfcourse.symbolic.reading import ModelError, exact_matrix
-from kfcourse.symbolic.writing import formula_latex
+from kfcourse.symbolic.writing import formula_lines
 
 FUNCTION_LATEX = {"tau": r"\tau", "Theta": r"\Theta", "h": "h", "G": "G", "F": "F"}
 
@@ -89,7 +89,8 @@ class Structure:
                 if name in ("Theta", "F") and i > j:
                     continue  # symmetric
                 index = "" if len(matrix) == 1 else f"_{{{i + 1}}}" if matrix.cols == 1 else f"_{{{i + 1}{j + 1}}}"
-                lines.append(rf"{FUNCTION_LATEX[name]}{index}({names}) &= {formula_latex(matrix[i, j], arguments)}")
+                first, *further = formula_lines(matrix[i, j], arguments)
+                lines += [rf"{FUNCTION_LATEX[name]}{index}({names}) &= {first}", *(rf"&\quad {line}" for line in further)]
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
     def source(self) -> str:

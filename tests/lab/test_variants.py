@@ -4,7 +4,7 @@ import tomllib
 
 import pytest
 
-from kfcourse import ModelError, NoClosedForm, gaussian, lab_filters, load_variants
+from kfcourse import Model, ModelError, NoClosedForm, gaussian, lab_filters, load_variants
 from kfcourse.checks import exercise
 from kfcourse.checks.exercises import ExerciseError
 from kfcourse.checks.posing import unposed
@@ -92,8 +92,9 @@ def test_a_filter_that_a_model_does_not_admit_is_named_with_advice(tmp_path):
     model = load_variants(path)["t"].model
     with pytest.raises(NoClosedForm, match=r"^fos-gaussian: .*tan\(x\).*unscented"):
         lab_filters(model, ["duof", "fos-gaussian"])
-    with pytest.raises(ModelError, match=r"^aof-exact: .*scalar"):
-        lab_filters(SHIPPED["20"].model, ["aof-exact"])
+    with pytest.raises(ModelError, match=r"^aof-exact: .*noise enters nonlinearly"):
+        lab_filters(Model.define("0.9*x + v", "x + w**2"), ["aof-exact"])
+    assert lab_filters(SHIPPED["20"].model, ["aof-exact"])[0].name == "aof-exact"
     assert len(lab_filters(model, ["aof-linearised", "aof-unscented", "aof-gauss-hermite", "duof"])) == 4
 
 
