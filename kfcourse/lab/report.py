@@ -106,6 +106,8 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
             "state": [str(f) for f in result.model.state_equation],
             "meter": [str(f) for f in result.model.meter_equation],
             "parameters": {name: float(value) for name, value in result.model.parameters.items()},
+            "inputs": {name: list(values) for name, values in result.model.known.inputs.items()},
+            "interval": float(result.model.known.interval),
         },
         "runs": result.runs,
         "steps": result.steps,
