@@ -21,6 +21,7 @@ from kfcourse.files import is_standard_output, read_only, save
 from kfcourse.lab.admission import admissions, on_trial, without_failing
 from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.grammar import generate
+from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
 from kfcourse.lab.report import conclusions, write_json, write_report
 from kfcourse.lab.short_names import FILTERS, LAB, has_bound, title
@@ -205,6 +206,9 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
 @click.option("--threads", type=click.IntRange(min=1), default=2, show_default=True, help="Does not change the numbers.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]")
 @click.option(
+    "--report", "language", type=click.Choice(LANGUAGES), help="Also write the student's report, handin.html and handin.tex."
+)
+@click.option(
     "--json", "json_file", type=click.Path(path_type=Path), help="Also write the numbers to this file; - is standard output."
 )
 def lab(
@@ -221,6 +225,7 @@ def lab(
     same_ensemble: bool,
     threads: int,
     out: Path | None,
+    language: str | None,
     json_file: Path | None,
 ) -> None:
     """Compare the filters on VARIANT (such as 53) and write the report."""
@@ -272,6 +277,8 @@ def lab(
         write_json(chosen, result, json_file)
     with _kept(folder):
         write_report(chosen, result, folder)
+        if language:
+            write_handin(chosen, result, folder, language)
     click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""), err=to_error)
 
 

@@ -510,3 +510,19 @@ def test_a_noiseless_meter_warns_of_nothing(call, tmp_path):
 
 def test_one_exact_run_has_no_standard_error_and_is_refused(call):
     refused(call("lab", "53", "--runs", 100, "--steps", 2, "--exact-runs", 1), "at least 2")
+
+
+def test_designs_and_a_wider_start_can_be_chosen(call, no_report, tmp_path):
+    for name, options in {"a": (), "b": ("--designs", 1), "c": ("--wide", 2), "d": ("--same-ensemble",)}.items():
+        assert call("lab", "53", *QUICK, *options, "--json", f"{name}.json").exit_code == 0
+    a, b, c, d = (json.loads((tmp_path / f"{name}.json").read_text(encoding="utf-8")) for name in "abcd")
+    assert (a["designs"], b["designs"], d["designs"]) == (4, 0, 0)
+    assert a["error_variance"] == b["error_variance"]
+    assert all(x >= y for name in LAB for x, y in zip(a["standard_error"][name], b["standard_error"][name], strict=True))
+    assert a["error_variance"] != c["error_variance"]
+
+
+def test_one_ensemble_cannot_be_several(call, no_computation):
+    result = call("lab", "53", *QUICK, "--same-ensemble", "--designs", 3)
+    assert result.exit_code == 2
+    assert "--same-ensemble" in result.output
