@@ -37,7 +37,9 @@ def complete(app, pagename: str, templatename: str, context: dict, doctree) -> N
     context["kf_small_stars"] = lambda toc: NUMBER.sub("", toc).replace("★", '<span class="kf-star">★</span>')
     for step in ("prev", "next"):
         if context.get(step):
-            context[step] = {**context[step], "title": NUMBER.sub("", context[step]["title"])}
+            first = context[step]["link"] == context["pathto"](app.config.root_doc)
+            title = "Start here" if first else NUMBER.sub("", context[step]["title"])
+            context[step] = {**context[step], "title": title}
     if doctree is None or "body" not in context:
         return
     body = context["body"]
@@ -101,7 +103,20 @@ def _boxed(node: nodes.Node) -> bool:
     return False
 
 
+def write_not_found(app, exception) -> None:
+    """The page that a server shows for an address that does not exist; it needs no other file."""
+    if exception or app.builder.format != "html":
+        return
+    parts = contents.parts(app.env)
+    folders = sorted(
+        {page.name.split("/")[0] for part in parts for page in part.pages if "/" in page.name} | {"_static", "_sources"}
+    )
+    page = app.builder.templates.render("404.html", {"title": app.config.html_title, "parts": parts, "folders": folders})
+    (Path(app.outdir) / "404.html").write_text(page, encoding="utf-8")
+
+
 def setup(app) -> dict[str, bool]:
     app.connect("config-inited", use_templates, priority=900)
+    app.connect("build-finished", write_not_found)
     app.connect("html-page-context", complete, priority=300)  # before the theme, which tries the templates
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -68,11 +68,12 @@ def _box(app, name: str, page: contents.Page, routes: dict[str, list[str]]) -> s
     on = [(i, route) for i, (route, pages) in enumerate(routes.items(), 1) if page.name in pages]
     bars = "".join(f'<i class="kf-route-{i}"></i>' for i, _ in on)
     minutes = app.env.metadata[page.name].get("minutes")
-    told = " · ".join(text for text in (f"{minutes} min" if minutes else "", ", ".join(route for _, route in on)) if text)
+    names = ", ".join(route for _, route in on)
     number = f"{page.number}. " if page.number else ""
     link = app.builder.get_relative_uri(name, page.name)
-    text = f"<b>{number}{html.escape(page.title)}</b><small>{html.escape(told) or '&nbsp;'}</small>"
-    return f'<a class="{" ".join(f"on-{i}" for i, _ in on)}" href="{link}">{text}<span aria-hidden="true">{bars}</span></a>'
+    text = f"<b>{number}{html.escape(page.title)}</b><small>{f'{minutes} min' if minutes else '&nbsp;'}</small>"
+    classes = " ".join(f"on-{i}" for i, _ in on)
+    return f'<a class="{classes}" href="{link}">{text}<span title="{html.escape(names)}">{bars}</span></a>'
 
 
 def setup(app) -> dict[str, bool]:
