@@ -62,6 +62,14 @@ class Exercise:
     variant: Variant
     salt: str = ""
 
+    def __post_init__(self) -> None:
+        asked = self.letter in sets() and sets()[self.letter].about_variant
+        if asked and (self.model.timed or any(self.model.angles)):
+            raise ExerciseError(
+                f"set {self.letter} asks about a model without time, inputs and angles, and variant {self.variant.name} has "
+                f"them: {self.model}; take another variant"
+            )
+
     @property
     def questions(self) -> dict[str, Question]:
         return {question.name: question for question in sets()[self.letter].questions}
@@ -157,7 +165,7 @@ def exercise(letter: str, variant: str | Mapping[str, Any] = "53") -> Exercise:
     Raises
     ------
     ExerciseError, VariantError
-        No such set; no such variant.
+        No such set, or its questions cannot be asked about the variant; no such variant.
     """
     if letter not in sets():
         raise ExerciseError(f"no exercise set {letter!r}; there are {', '.join(sets())}")

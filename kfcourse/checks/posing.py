@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kfcourse.checks.exercises import Exercise
+from kfcourse.checks.exercises import Exercise, ExerciseError
 from kfcourse.checks.registry import sets
 from kfcourse.lab.criteria import Finding
 from kfcourse.lab.variants import Variant
@@ -16,7 +16,10 @@ def unposed(variant: Variant) -> Finding | None:
     for letter, one in sets().items():
         if not one.about_variant:
             continue
-        exercise = Exercise(letter, variant)
+        try:
+            exercise = Exercise(letter, variant)
+        except ExerciseError as error:
+            return Finding(False, str(error))
         for name, question in exercise.questions.items():
             try:
                 result = exercise.check(name, question.answer(exercise))

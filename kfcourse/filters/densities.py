@@ -14,6 +14,7 @@ import sympy as sp
 
 from kfcourse.angles import TURN, Components, difference, wrapped
 from kfcourse.laws import Array, Gaussian
+from kfcourse.symbolic.choices import jumps
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
@@ -125,7 +126,9 @@ def scalar_densities(model: Model) -> ScalarDensities:
     B_w = model.meter_equation.jacobian(sp.Matrix(model.w))
     meter_variance = (B_w * exact_matrix(model.meter_noise.cov) * B_w.T).subs(model.values)
     outputs = {"state": mean.diff(x), "variance": variance.diff(x), "meter": b.diff(x), "meter_variance": meter_variance.diff(x)}
-    if any(part.has(sp.Derivative, sp.DiracDelta) for part in outputs.values()):
+    choices = {*model.state_equation.atoms(sp.Piecewise), *model.meter_equation.atoms(sp.Piecewise)}
+    rough = any(part.has(sp.Derivative, sp.DiracDelta) for part in outputs.values())
+    if rough or any(jumps(one, model.x) for one in choices):
         raise ModelError(
             f"{model} jumps at a state, and the point-mass filter needs smooth equations; use particle(model), or a Gaussian "
             "filter, unscented(model)"

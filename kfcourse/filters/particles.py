@@ -1,7 +1,16 @@
-"""The bootstrap particle filter: the Stratonovich equation by sampling, for models of any dimension.
+"""The particle filter: the Stratonovich equation by sampling, for models of any dimension.
 
-A cross-check of the exact filter where that does not reach.  Its weakness is the lab's own case: where
-the meter is hundreds of times sharper than the prediction, few particles fall where the posterior is.
+    x_k^i ~ q(x | x_{k-1}^i, y_k),    weight  p(y_k | x_k^i) p(x_k^i | x_{k-1}^i) / q(x_k^i | x_{k-1}^i, y_k)
+
+Without looking at the measurement (q = p(x | x_{k-1}), the bootstrap filter) it fails in the lab's own case: where the meter is
+hundreds of times sharper than the prediction, few particles fall where the posterior is.  So the proposal q looks at it
+(`proposals`).
+
+The particles are two clouds that know nothing of each other.  Their estimates z_a and z_b err independently, so that
+
+    M|z - z*|^2 = M (z - z_a)^T (z - z_b),      z* the exact estimate, z that of any filter,
+
+without any contribution of the sampling: that is how particles bound other filters where `exact` does not reach.
 """
 
 from __future__ import annotations
@@ -13,85 +22,160 @@ import numpy as np
 from kfcourse.angles import Components, difference, moments_on_circle, on_circle
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
-from kfcourse.laws import Array, Gaussian, square_root
+from kfcourse.filters.proposals import Look
+from kfcourse.laws import Array, Gaussian
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
+LARGEST = 1e150  # the squares of larger states are infinite
+
 
 class Particles(NamedTuple):
-    """Predicted particles (runs, M, n), the effective number (runs,) at the last correction, and the seed."""
+    """What the filter remembers.
 
-    x: Array
+    Attributes
+    ----------
+    x : ndarray (runs, 2, M/2, n), or None before the first measurement
+        Both clouds, all particles of equal weight.
+    halves : ndarray (2, runs, n)
+        The estimate of each cloud.
+    effective : ndarray (runs,)
+        How many particles counted.
+    seed : numpy.random.SeedSequence
+    """
+
+    x: Array | None
+    halves: Array
     effective: Array
     seed: np.random.SeedSequence
 
 
-def particle(model: Model, particles: int = 1000, seed: Seed = 0) -> Filter:
-    """The bootstrap particle filter (Gordon, Salmond and Smith), resampled systematically at each step.
+def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: bool = True, name: str = "particle") -> Filter:
+    """The particle filter (Gordon, Salmond and Smith, 1993; guided as by Doucet, Godsill and Andrieu, 2000).
+
+    Resampled systematically at each step, each cloud for itself.
 
     Parameters
     ----------
     model : Model
         Any dimension; the meter's noise must enter linearly, so that p(y | x) is known.
     particles : int
-        Particles per trajectory; `state.memory.effective` tells how many of them count.
+        Particles per trajectory, even, half of them in each cloud; `state.memory.effective` tells how many of them count.
     seed : int or numpy.random.Generator
         Steps are reproducible: the same state and measurement give the same result.
+    guided : bool
+        Whether the proposal looks at the measurement.  Without, it is the bootstrap filter.
+    name : str
+        Of the filter: "aof-exact" where it stands for the exact one.
+
+    Returns
+    -------
+    Filter
+        Its covariance is an unbiased estimate of the posterior's.
     """
-    if particles < 2:
-        raise ModelError(f"a particle filter needs at least 2 particles, got {particles}")
-    number, log_likelihood = seed_number(seed), likelihood(model)
+    if particles < 2 or particles % 2:
+        raise ModelError(f"a particle filter needs an even number of at least 2 particles, got {particles}")
+    number, log_likelihood, angles = seed_number(seed), likelihood(model), model.angles.x
     state_equation, _ = compile_model(model)
     gaussian_init = initial_state(model)
-
-    def sample(rng: np.random.Generator, law: Gaussian, runs: int) -> Array:
-        standard = rng.standard_normal((runs, particles, len(law.mean)))
-        return law.mean + standard @ square_root(law.cov).T
+    start, ahead = Look.at_start(model), Look.ahead(model)
+    size = particles // 2
 
     def init(runs: int) -> State:
+        state = gaussian_init(runs)
+        both = np.stack([state.posterior.mean] * 2)
         root = np.random.SeedSequence([number, runs])
-        x = sample(_stream(root, 0), model.prior, runs)
-        return gaussian_init(runs)._replace(memory=Particles(x, np.full(runs, float(particles)), root))
+        return state._replace(memory=Particles(None, both, np.full(runs, float(particles)), root))
+
+    def first(rng: np.random.Generator, y: Array) -> tuple[Array, Array]:
+        """x_0 (runs, 2, M/2, n), and the logarithms of p / q."""
+        s, logs = _plain(rng, (len(y), 2, size), start)
+        if guided and not start.blind:
+            found = start.proposal(np.zeros((len(y), model.n)), y, start.starts(), 0)
+            heights = log_likelihood(y[:, None, :], start.noise_of(found.mean), 0) - 0.5 * (found.mean**2).sum(axis=-1)
+            heights += np.log(np.diagonal(found.root, axis1=-2, axis2=-1)).sum(axis=-1)
+            for_both = found._replace(share=_normalised(heights)).of_clouds(2)
+            s, logs = _where_measured(y, start.draw(for_both, rng, size), s)
+        return on_circle(start.noise_of(s), angles), logs
+
+    def following(rng: np.random.Generator, x: Array, y: Array, k: int) -> tuple[Array, Array]:
+        """x_k (runs, 2, M/2, n) from the particles of the step before, and the logarithms of p / q."""
+        s, logs = _plain(rng, x.shape[:-1], ahead)
+        if guided and not ahead.blind:
+            found = ahead.proposal(x, y[:, None, None, :], np.zeros((1, s.shape[-1])), k)
+            s, logs = _where_measured(y, ahead.draw_each(found, rng), s)
+        after = moved(x, s, k - 1)
+        lost = ~np.logical_and.reduce(np.abs(after) < LARGEST, axis=-1)
+        return np.where(lost[..., None], x, after), np.where(lost, -np.inf, logs)
+
+    def moved(x: Array, s: Array, k: int) -> Array:
+        """The states after step k."""
+        return on_circle(np.broadcast_to(state_equation(x, ahead.noise_of(s), k), x.shape), angles)
 
     def step(state: State, y: Array) -> State:
-        x, _, root = state.memory
-        rng = _stream(root, state.step + 1)
-        logs = log_likelihood(y[:, None, :], x, state.step)
-        peak = logs.max(axis=1, keepdims=True)
-        weights = np.exp(logs - np.where(np.isfinite(peak), peak, 0.0))
-        total = weights.sum(axis=1, keepdims=True)
-        weights = np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / particles)
-        posterior = _weighted(x, weights, model.angles.x)
-        chosen = np.take_along_axis(x, _systematic(weights, rng)[..., None], axis=1)
-        noise = sample(rng, model.state_noise, len(x))
-        following = on_circle(np.broadcast_to(state_equation(chosen, noise, state.step), x.shape), model.angles.x)
-        predicted = _weighted(following, np.full(weights.shape, 1.0 / particles), model.angles.x)
-        return State(state.step + 1, posterior, predicted, Particles(following, 1 / (weights**2).sum(axis=1), root))
+        before, _, _, root = state.memory
+        rng = _stream(root, state.step)
+        with np.errstate(over="ignore", invalid="ignore"):  # what lies beyond the largest number has no weight
+            x, logs = first(rng, y) if before is None else following(rng, before, y, state.step)
+            weights = _normalised(logs + log_likelihood(y[:, None, None, :], x, state.step))
+            mean, cov = _weighted(x, weights, angles)
+            apart = difference(mean[:, 0], mean[:, 1], angles)
+            posterior = Gaussian(
+                on_circle(mean[:, 1] + 0.5 * apart, angles), cov.mean(axis=1) + 0.5 * apart[:, :, None] * apart[:, None, :]
+            )
+        flat, chosen = x.reshape(-1, size, model.n), _systematic(weights.reshape(-1, size), rng)
+        kept = np.take_along_axis(flat, chosen[..., None], axis=1).reshape(x.shape)
+        effective = (1 / (weights**2).sum(axis=-1)).sum(axis=1)
+        s, _ = _plain(rng, x.shape[:-1], ahead)
+        with np.errstate(over="ignore", invalid="ignore"):
+            following_ones = moved(kept, s, state.step).reshape(len(y), particles, model.n)
+            predicted = _weighted(following_ones, np.full(following_ones.shape[:-1], 1.0 / particles), angles)
+        return State(state.step + 1, posterior, predicted, Particles(kept, np.moveaxis(mean, 1, 0), effective, root))
 
-    return Filter("particle", model, init, step, slow=True)
+    return Filter(name, model, init, step, slow=True)
+
+
+def _plain(rng: np.random.Generator, shape: tuple[int, ...], look: Look) -> tuple[Array, Array]:
+    """Standard normal numbers (..., r): a proposal that is the law itself."""
+    return rng.standard_normal((*shape, len(look.noise.mean))), np.zeros(shape)
+
+
+def _where_measured(y: Array, guided: tuple[Array, Array], plain: Array) -> tuple[Array, Array]:
+    """The proposal's s and logarithms, but the law itself for trajectories whose measurement is missing."""
+    missing = np.logical_and.reduce(np.isnan(y), axis=-1)[:, None, None]
+    return np.where(missing[..., None], plain, guided[0]), np.where(missing, 0.0, guided[1])
 
 
 def _stream(root: np.random.SeedSequence, step: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(root.entropy, spawn_key=(step,)))
 
 
+def _normalised(logs: Array) -> Array:
+    """Weights (..., M) that sum to 1, all equal where nothing is left of them."""
+    peak = logs.max(axis=-1, keepdims=True)
+    weights = np.exp(logs - np.where(np.isfinite(peak), peak, 0.0))
+    weights = np.where(np.isfinite(weights), weights, 0.0)
+    total = weights.sum(axis=-1, keepdims=True)
+    return np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / logs.shape[-1])
+
+
 def _weighted(x: Array, weights: Array, angles: Components) -> Gaussian:
-    """Mean (runs, n) and covariance (runs, n, n) of weighted particles."""
-    mean = np.einsum("rm,rmi->ri", weights, x)
+    """Mean (..., n) and covariance (..., n, n) of weighted particles (..., M, n)."""
+    mean = np.einsum("...m,...mi->...i", weights, x)
     for i in angles:
-        mean[:, i], _ = moments_on_circle(x[..., i], weights)
-    deviation = difference(x, mean[:, None, :], angles)
-    return Gaussian(mean, np.einsum("rm,rmi,rmj->rij", weights, deviation, deviation))
+        mean[..., i], _ = moments_on_circle(x[..., i], weights)
+    deviation = difference(x, mean[..., None, :], angles)
+    return Gaussian(mean, np.einsum("...m,...mi,...mj->...ij", weights, deviation, deviation))
 
 
 def _systematic(weights: Array, rng: np.random.Generator) -> Array:
-    """Indices (runs, M) of systematic resampling: one uniform number a trajectory, M equal steps."""
-    runs, m = weights.shape
+    """Indices (clouds, M) of systematic resampling: one uniform number a cloud, M equal steps."""
+    clouds, m = weights.shape
     cumulative = np.cumsum(weights, axis=1)
     cumulative /= cumulative[:, -1:]
-    wanted = (np.arange(m) + rng.random((runs, 1))) / m
-    shift = 2.0 * np.arange(runs)[:, None]
-    flat = np.searchsorted((cumulative + shift).ravel(), (wanted + shift).ravel()).reshape(runs, m)
-    return np.minimum(flat - np.arange(runs)[:, None] * m, m - 1)
+    wanted = (np.arange(m) + rng.random((clouds, 1))) / m
+    shift = 2.0 * np.arange(clouds)[:, None]
+    flat = np.searchsorted((cumulative + shift).ravel(), (wanted + shift).ravel()).reshape(clouds, m)
+    return np.minimum(flat - np.arange(clouds)[:, None] * m, m - 1)

@@ -1,6 +1,7 @@
 """The lab: its variants, its filters by short name, whether a variant is well posed, figures and report.
 
 variants     `Variant`, read from variants.toml or a file like it
+admission    which filters a model admits, and why not
 short_names  the lab's filters: "duof" -> how to build it, "DUOF" in tables
 quality      is a variant well posed?  criteria: each criterion;  difficulty: how hard;  grammar: new ones
 maps         who leads, and how far from the bound, over two parameters
@@ -8,7 +9,7 @@ plots        figures of a comparison, one colour and name for each filter
 report       what `kfcourse lab` writes
 """
 
-from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_exact, lab_filters, title
+from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_bound, has_exact, lab_filters, title
 from kfcourse.lab.variants import Variant, VariantError, find_variant, load_variants, read_variant
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "Variant",
     "VariantError",
     "find_variant",
+    "has_bound",
     "has_exact",
     "lab_filters",
     "load_variants",

@@ -19,7 +19,7 @@ from kfcourse.lab.short_names import Structures, title
 from kfcourse.laws import Array, Gaussian
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.statistics import Estimate, batch_mean, ratio
-from kfcourse.symbolic.codegen import compile_function
+from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.reading import exact_matrix
@@ -171,11 +171,11 @@ def observable_share(model: Model, x: Array) -> float:
     slopes = {name: part.subs(model.values).jacobian(sp.Matrix(model.x)) for name, part in (("A", state), ("C", meter))}
     if any(slope.has(sp.Derivative, sp.DiracDelta) for slope in slopes.values()):
         return 1.0
-    function = compile_function("slopes", {"x": sp.Matrix(model.x)}, slopes, ["x"], f"slopes of {model}").function
+    function = Stepwise.compile(model.known, "slopes", {"x": sp.Matrix(model.x)}, slopes, ["x"], f"slopes of {model}")
     path = np.broadcast_to(np.diag(x.std(axis=1).max(axis=0)), (x.shape[1], model.n, model.n))
     rows = []
-    for position in x[: 4 * model.n]:
-        A, C = function(position)
+    for k, position in enumerate(x[: 4 * model.n]):
+        A, C = function.at(k)(position)
         rows.append(C @ path)
         path = A @ path
     values = np.linalg.svd(np.concatenate(rows, axis=1), compute_uv=False)

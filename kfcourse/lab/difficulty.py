@@ -81,8 +81,9 @@ def nonlinearity(structures: Structures) -> float:
 
 def _laws(structure: Structure, mean: Array, cov: Array) -> Iterator[Gaussian]:
     """Laws of the next state and of the measurement."""
-    yield structure.predict(mean, cov)
-    measurement = structure.measure(mean, cov)
+    first = structure.at(0)
+    yield first.predict(mean, cov)
+    measurement = first.measure(mean, cov)
     yield Gaussian(measurement.h, measurement.F)
 
 

@@ -52,7 +52,7 @@ FILTERS: dict[str, Entry] = {
     "mfos3-linearised": Entry("LMFOS3", "ЛМФОС, 3 арг.", lambda s: mfos(s.linearised, arguments=3)),
     "aof-unscented": Entry("UKF", "АОФ, unscented", lambda s: aof(unscented(s.model))),
     "aof-gauss-hermite": Entry("GHKF", "АОФ, Гаусс–Эрмит", lambda s: aof(gauss_hermite(s.model))),
-    "aof-exact": Entry("exact AOF", "АОФ", lambda s: pointmass(s.model)),
+    "aof-exact": Entry("exact AOF", "АОФ", lambda s: exact(s.model)),
     "particle": Entry("particle", "АОФ, частицы", lambda s: particle(s.model)),
 }
 # Printed names of filters that are not among the lab's.
@@ -64,6 +64,7 @@ TITLES = {
     "alpha-beta-gamma": "alpha-beta-gamma",
     "imm": "IMM",
 }
+BOUND = 1000  # particles of the exact AOF where there are no point masses
 LAB = ("aof-gaussian", "aof-linearised", "duof", "fos-gaussian", "fos-linearised", "mfos-gaussian", "mfos-linearised")
 
 
@@ -95,10 +96,33 @@ def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Desig
     return built
 
 
+def exact(model: Model) -> Filter:
+    """The exact AOF, by point masses where they reach, else by particles, whose own error does not enter the bound.
+
+    Raises
+    ------
+    ModelError
+        Neither can be had: there is no density of y given x.
+    """
+    try:
+        return pointmass(model)
+    except ModelError:
+        return particle(model, BOUND, name="aof-exact")
+
+
 def has_exact(model: Model) -> bool:
-    """Whether the exact AOF can be computed for the model: scalar, noises entering linearly."""
+    """Whether the exact AOF can be computed for the model by point masses: scalar, noises entering linearly."""
     try:
         pointmass(model)
+    except ModelError:
+        return False
+    return True
+
+
+def has_bound(model: Model) -> bool:
+    """Whether the exact AOF can be computed for the model, by point masses or by particles."""
+    try:
+        exact(model)
     except ModelError:
         return False
     return True

@@ -12,7 +12,10 @@ from typing import Any
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.sense import nothing_random
 
-VARIANT_KEYS = {"title", "state", "meter", "parameters", "symbols", "prior", "state_noise", "meter_noise", "angles"}
+MODEL_KEYS = {"parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs", "interval", "angles"}
+VARIANT_KEYS = {"title", "state", "meter"} | MODEL_KEYS
+
+LARGEST_FILE = 1_000_000  # bytes; thousands of variants.  /dev/zero never ends
 
 
 class VariantError(ValueError):
@@ -36,7 +39,7 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     ----------
     path : path, optional
         A file with tables ``[variants.NAME]``: `state`, `meter`, `parameters`, and optionally `title`,
-        `symbols`, `prior`, `state_noise`, `meter_noise`, `angles` (see `Model.define`).
+        `symbols`, `prior`, `state_noise`, `meter_noise`, `inputs`, `interval`, `angles` (see `Model.define`).
 
     Raises
     ------
@@ -45,7 +48,11 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     """
     where = "the shipped variants" if path is None else str(path)
     try:
-        text = (resources.files("kfcourse.lab") / "variants.toml" if path is None else Path(path)).read_text(encoding="utf-8")
+        with (resources.files("kfcourse.lab") / "variants.toml" if path is None else Path(path)).open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
+        if len(content) > LARGEST_FILE:
+            raise VariantError(f"{where} has more than {LARGEST_FILE:,} bytes: it is no file of variants; check the path")
+        text = content.decode("utf-8").replace("\r\n", "\n")
     except FileNotFoundError:
         raise VariantError(f"no file of variants at {where}; check the path") from None
     except (OSError, UnicodeDecodeError) as error:
@@ -68,7 +75,7 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
     if unknown or missing:
         problem = f"unknown key {', '.join(unknown)}" if unknown else f"no {' and no '.join(missing)}"
         raise VariantError(f"{prefix}{problem}; the keys are {', '.join(sorted(VARIANT_KEYS))}")
-    for key in ("parameters", "symbols", "prior", "state_noise", "meter_noise"):
+    for key in ("parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs"):
         if key in table and not isinstance(table[key], Mapping):
             raise VariantError(f"{prefix}`{key}` must be a table such as {{ c = 0.9 }}, got {table[key]!r}")
     options = {key: value for key, value in table.items() if key not in ("title", "state", "meter", "parameters")}

@@ -7,7 +7,7 @@ common trajectories and any average over steps, and nothing is kept per trajecto
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -44,6 +44,10 @@ class Estimate:
         from scipy import stats  # slow to import
 
         return stats.t.ppf(0.5 + confidence / 2, self.freedom) * self.standard_error
+
+    def __iter__(self) -> Iterator[Estimate]:
+        """Along the first axis: the steps, one after the other."""
+        return (self[k] for k in range(len(self.value)))
 
     def __getitem__(self, index) -> Estimate:
         freedom = self.freedom[index] if isinstance(self.freedom, np.ndarray) and self.freedom.ndim else self.freedom
@@ -135,9 +139,15 @@ class Sums:
         else:  # one variance for the whole ensemble: the sums of squares are there already
             self.normalised[filter_index, step] = _quotient(self.square[filter_index, step, 0], own)
 
-    def record_distance(self, filter_index: int, step: int, mean: Array, reference: Array, weight: Array | None = None) -> None:
-        """Add one step of squared distances between two filters' estimates (N, n)."""
-        self.distance[filter_index, step] = self._sums(((mean - reference) ** 2).sum(axis=1), weight)
+    def record_distance(
+        self, filter_index: int, step: int, mean: Array, reference: tuple[Array, Array], weight: Array | None = None
+    ) -> None:
+        """Add one step of (z - z_a)^T (z - z_b), z a filter's estimate (N, n), z_a and z_b two of the reference.
+
+        A squared distance if these are the same; else its mean does not hold their errors, if those are independent.
+        """
+        first, second = reference
+        self.distance[filter_index, step] = self._sums(((mean - first) * (mean - second)).sum(axis=1), weight)
 
     def _sums(self, values: Array, weight: Array | None) -> Array:
         return np.add.reduceat(values if weight is None else values * weight, self._starts)

@@ -8,6 +8,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -15,15 +16,19 @@ from typing import Any
 import click
 
 from kfcourse.checks import sets
-from kfcourse.notebooks.course_list import assign, chosen_variants
+from kfcourse.notebooks.course_list import assign, chosen_variants, read_assignment, save_assignment
 from kfcourse.notebooks.grading.marking import Setting
+from kfcourse.notebooks.grading.owners import Person
 from kfcourse.notebooks.grading.pool import grading
+from kfcourse.notebooks.grading.report import write_report
 from kfcourse.notebooks.grading.running import Place, packages_of
 from kfcourse.notebooks.grading.sandbox import HELD, KINDS, chosen
 from kfcourse.notebooks.grading.staging import answers, stage
 from kfcourse.notebooks.grading.submissions import SECONDS, clean, returned
 from kfcourse.notebooks.grading.table import FAILED, GRADED, SIGNS, Grade, grade_all
-from kfcourse.notebooks.jobs import Job, Outcome, make, plan, run_all, safe
+from kfcourse.notebooks.jobs import Job, Outcome, make, plan, run_all
+
+ASSIGNMENT = "assignment.csv"
 
 
 def _options(command: Callable) -> Callable:
@@ -110,8 +115,14 @@ def _for_students(
     click.echo("group       variant   name")
     for one in given:
         click.echo(f"{one.group:<11} {one.variant:<9} {one.name}")
-        folder = out / safe(one.group) / safe(one.name)
-        work += [Job(letter, one.variant, folder, kind, variants_file, masters, with_pdf) for letter in letters]
+        work += [
+            Job(letter, one.variant, out / one.folder, kind, variants_file, masters, with_pdf, f"{one.name}, {one.group}")
+            for letter in letters
+        ]
+    if kind == "exercises":
+        out.mkdir(parents=True, exist_ok=True)
+        save_assignment([replace(one, sets=" ".join(letters)) for one in given], out / ASSIGNMENT)
+        click.echo(f"\nWho has which variant: {out / ASSIGNMENT}, for `kfcourse grade --students`")
     return work
 
 
@@ -155,6 +166,16 @@ def _table(outcomes: Sequence[Outcome], work: Sequence[Job]) -> None:
 )
 @click.option("--again", is_flag=True, help="Grade those too that have not changed since the last table.")
 @click.option("--sandbox", type=click.Choice(KINDS), default="auto", show_default=True, help="Where the notebooks run.")
+@click.option(
+    "--students",
+    type=click.Path(path_type=Path),
+    help="The assignment that `exercises --students` wrote, or the course list: says who has which variant.",
+)
+@click.option(
+    "--report",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Folder of points, feedback for each student and an overview.  [default with --students: FOLDER/report]",
+)
 @click.option("--seed", help="Text that the hidden arguments come from.  [default: another each time]")
 def grade(
     folder: Path,
@@ -165,20 +186,25 @@ def grade(
     seconds: float,
     again: bool,
     sandbox: str,
+    students: Path | None,
+    report: Path | None,
     seed: str | None,
 ) -> None:
     """Run the returned notebooks in FOLDER and write a table of what passed.
 
     The notebook of each set and variant is made again from the master, and the student's cells are put into it: checks that a
-    student changed or deleted do not count.  Each notebook runs in a process and an empty folder of its own, with limits of time,
-    output and memory (4 GB, where the system can limit it), and cannot disturb the others.
+    student changed or deleted do not count.  Each notebook runs in a process and an empty folder of its own, with limits of time
+    and memory (4 GB, where the system can limit it).  That process has no answers: it is asked for values, and another one
+    compares them.  With --sandbox none it runs with your rights.
 
-    The table is for your eye, not for a judge.  Notebooks run with your rights: use a container, or a user of its own, if
-    somebody may mean harm.  The right answers are in the package; the note names notebooks that reach for them.
+    What reaches for more than an exercise needs is noted: look at it.
 
     Marks: a tick is passed, a cross is wrong or not usable, a dash is not implemented or not run.  Unchanged notebooks are not
     run again.  Exit status: 0 if every exercise notebook could be graded, however badly; 1 if some could not.
     """
+    course = (
+        None if students is None else read_assignment(students, [one.name for one in chosen_variants([], True, variants_file)])
+    )
     work = returned(folder, seconds, variants_file, masters)
     if not work:
         raise ValueError(f"no notebooks (*.ipynb) in {folder}")
@@ -194,8 +220,18 @@ def grade(
     _grades(grades)
     click.echo(f"\n{len(grades) - old} run, {old} unchanged since the last table. Table: {table}")
     click.echo(f"Sandbox: {HELD[held.kind]}")
+    if students or report:
+        _report(write_report(grades, course, report or folder / "report", HELD[held.kind]), report or folder / "report")
     if any(one.status == FAILED for one in grades):
         sys.exit(1)
+
+
+def _report(persons: Sequence[Person], folder: Path) -> None:
+    """What to look at, and where the rest is."""
+    flagged = [person for person in persons if person.flags]
+    click.echo(f"\nReport of {len(persons)} students: {folder / 'overview.html'}")
+    for person in flagged:
+        click.echo(f"look at {person.student.name}: {clean('; '.join(person.flags), 200)}")
 
 
 def _grades(grades: Sequence[Grade]) -> None:

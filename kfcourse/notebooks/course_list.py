@@ -4,20 +4,43 @@ from __future__ import annotations
 
 import csv
 import hashlib
-from collections.abc import Iterator, Sequence
+import io
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NamedTuple
 
+from kfcourse.files import save
 from kfcourse.lab.variants import Variant, load_variants
+from kfcourse.notebooks.jobs import safe
+
+LONGEST = 100  # characters of a name: it becomes the name of a folder
 
 
 @dataclass(frozen=True)
 class Student:
-    """A line of the course list, and the variant it was given."""
+    """A line of the course list, the variant it was given, and the sets handed out, if that is known."""
 
     name: str
     group: str
     variant: str
+    sets: str = ""
+
+    @property
+    def folder(self) -> Path:
+        """Of the student's notebooks, in the folder of all."""
+        return Path(safe(self.group), safe(self.name))
+
+
+class Row(NamedTuple):
+    """A line of a course list: its number, name and group, and what an assignment adds."""
+
+    line: int
+    name: str
+    group: str
+    variant: str = ""
+    sets: str = ""
 
 
 def assign(path: Path, variants: Sequence[str]) -> list[Student]:
@@ -40,44 +63,107 @@ def assign(path: Path, variants: Sequence[str]) -> list[Student]:
     """
     taken: dict[str, list[str]] = {}
     students: list[Student] = []
-    for line, name, group in read_course_list(path):
-        if any((s.name, s.group) == (name, group) for s in students):
-            raise ValueError(f"{path}, line {line}: {name}, {group} stands there twice; add a middle name")
-        used = taken.setdefault(group, [])
+    for row in _distinct(path):
+        used = taken.setdefault(row.group, [])
         if len(used) == len(variants):
             used.clear()
         free = [variant for variant in variants if variant not in used]
-        best = max(free, key=lambda variant: hashlib.sha256(f"{name}/{group}/{variant}".encode()).digest())
+        best = max(free, key=lambda variant: hashlib.sha256(f"{row.name}/{row.group}/{variant}".encode()).digest())
         used.append(best)
-        students.append(Student(name, group, best))
-    if not students:
-        raise ValueError(f"{path} names no student")
+        students.append(Student(row.name, row.group, best))
     return students
 
 
-def read_course_list(path: Path) -> Iterator[tuple[int, str, str]]:
-    """Line number, name and group of every student in a CSV file."""
+def save_assignment(students: Iterable[Student], path: Path) -> None:
+    """Write who has which variant, and which sets: `read_assignment` reads it."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("name", "group", "variant", "sets"))
+    writer.writerows((one.name, one.group, one.variant, one.sets) for one in students)
+    save("\ufeff" + text.getvalue(), path)
+
+
+def read_assignment(path: Path, variants: Sequence[str]) -> list[Student]:
+    """The students of a saved assignment; of a course list without variants, as `assign` gives them.
+
+    Raises
+    ------
+    ValueError
+        As `assign`; or a variant is missing in some lines only.
+    """
+    rows = list(_distinct(path))
+    if not any(row.variant for row in rows):
+        return assign(path, variants)
+    for row in rows:
+        if not row.variant:
+            raise ValueError(f"{path}, line {row.line}: {row.name} has no variant, and others have")
+    return [Student(row.name, row.group, row.variant, row.sets) for row in rows]
+
+
+def _distinct(path: Path) -> Iterator[Row]:
+    """The lines of a course list; ValueError if two students would share a folder, or there is none."""
+    seen: dict[str, Row] = {}
+    for row in read_course_list(path):
+        folder = Student(row.name, row.group, "").folder.as_posix()
+        other = seen.setdefault(folder.casefold(), row)
+        if other is row:
+            yield row
+        elif (other.name, other.group) == (row.name, row.group):
+            raise ValueError(f"{path}, line {row.line}: {row.name}, {row.group} stands there twice; add a middle name")
+        else:
+            raise ValueError(
+                f"{path}, line {row.line}: the folder of {row.name}, {row.group} would be {folder}, as that of {other.name}, "
+                f"{other.group} in line {other.line} (some systems take large and small letters for the same); change one name"
+            )
+    if not seen:
+        raise ValueError(f"{path} names no student")
+
+
+def read_course_list(path: Path) -> Iterator[Row]:
+    """Every student in a CSV file with the columns name and group; an assignment has variant and sets, too."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise ValueError(f"no course list {path}; it is a CSV file with the columns name and group") from None
+    except (IsADirectoryError, PermissionError) as error:
+        raise ValueError(f"{path} cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise ValueError(f"{path} is not UTF-8; save it as CSV UTF-8") from None
-    delimiter = ";" if text.partition("\n")[0].count(";") else ","
-    reader = csv.DictReader(text.splitlines(), delimiter=delimiter, skipinitialspace=True)
-    columns = [(column or "").strip().lower() for column in reader.fieldnames or []]
-    if not {"name", "group"} <= set(columns):
-        raise ValueError(f"{path}: the first line must name the columns name and group, got {', '.join(columns) or 'nothing'}")
-    reader.fieldnames = columns
+    first = text.partition("\n")[0]
+    delimiter = max(",;\t", key=first.count)
+    reader = csv.DictReader(io.StringIO(text), delimiter=delimiter, skipinitialspace=True, strict=True)
+    line = 1
     try:
-        for row in reader:
-            name, group = ((row[key] or "").strip() for key in ("name", "group"))
-            if name:
-                yield reader.line_num, name, group
-            elif group:
-                raise ValueError(f"{path}, line {reader.line_num}: a student without a name")
+        columns = [(column or "").strip().lower() for column in reader.fieldnames or []]
+        if not {"name", "group"} <= set(columns):
+            raise ValueError(
+                f"{path}: the first line must name the columns name and group, got {', '.join(columns) or 'nothing'}"
+            )
+        reader.fieldnames = columns
+        for values in reader:
+            line, before = reader.line_num, line
+            yield from _row(path, before + 1, values)
     except csv.Error as error:
-        raise ValueError(f"{path}, line {reader.line_num + 1}: {error}") from None
+        quoted = "; is a quote opened and not closed?" if "data" in str(error) or "expected" in str(error) else ""
+        raise ValueError(f"{path}, line {line + 1}: {error}{quoted}") from None
+
+
+def _row(path: Path, line: int, values: Mapping[str | None, Any]) -> Iterator[Row]:
+    """The row, or none of an empty line; ValueError if it cannot be right."""
+    where = f"{path}, line {line}"
+    if any("\n" in str(value) for value in values.values()):
+        raise ValueError(f"{where}: a quote is opened and not closed on the line; remove it, or write it twice")
+    found = {key: (values.get(key) or "").strip() for key in ("name", "group", "variant", "sets")}
+    if any(str(value).strip() for value in values.get(None) or []):
+        raise ValueError(f"{where}: more values than columns; put a name that has a comma in it into quotes")
+    if not found["name"] and not found["group"]:
+        return
+    for key, of in (("name", "a student"), ("group", found["name"])):
+        if not re.search(r"\w", found[key]):
+            raise ValueError(f"{where}: {of} without a {key}" + (f" (got {found[key]!r})" if found[key] else ""))
+        if len(found[key]) > LONGEST:
+            raise ValueError(f"{where}: a {key} of more than {LONGEST} characters; is a quote or a line break missing?")
+    yield Row(line, **found)
 
 
 def chosen_variants(names: Sequence[str], everything: bool, variants_file: Path | None) -> list[Variant]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -43,6 +44,8 @@ class Job:
     masters : Path or None
         A folder like exercises/, in place of the shipped one.
     with_pdf : bool
+    student : str
+        Whose the notebook is; it says so in its metadata.
     """
 
     letter: str
@@ -52,6 +55,7 @@ class Job:
     variants_file: Path | None = None
     masters: Path | None = None
     with_pdf: bool = False
+    student: str = ""
 
     def __post_init__(self) -> None:
         for path in ("folder", "variants_file", "masters"):  # a worker process may have another working directory
@@ -83,6 +87,8 @@ def make(job: Job) -> Outcome:
         text = read(job.letter, job.masters)
         notebook = render(text, Exercise(job.letter, find_variant(job.variant, job.variants_file)))
         notebook.metadata["kfcourse"]["fingerprint"] = fingerprint(notebook)
+        if job.student:
+            notebook.metadata["kfcourse"]["student"] = job.student
         wanted = [job.target]
         if job.kind == "solutions":
             wanted += [job.target.with_suffix(".html"), *([job.target.with_suffix(".pdf")] if job.with_pdf else [])]
@@ -193,5 +199,7 @@ def plan(
 
 
 def safe(name: str) -> str:
-    """A name as one component of a path."""
-    return re.sub(r"[^\w.-]+", "-", name).strip(".-") or "unnamed"
+    """A name as one component of a path, on every system: Windows keeps CON and others for devices."""
+    found = re.sub(r"[^\w.-]+", "-", unicodedata.normalize("NFC", name)).strip(".-") or "unnamed"
+    stem, *rest = found.split(".", 1)
+    return ".".join((f"{stem}_", *rest)) if re.fullmatch(r"(?i)con|prn|aux|nul|com\d|lpt\d", stem) else found

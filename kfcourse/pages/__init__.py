@@ -2,7 +2,6 @@
 
 verification equations, sentences and numbers that are checked where they are printed; a check that fails stops the build
 exponents    squares completed in the exponents of normal laws
-typesetting  equations as LaTeX that fits the column
 tables       tables of numbers
 figures      the style of the figures, labels at the ends of curves
 diagram      block diagrams from a description

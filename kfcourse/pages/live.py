@@ -3,10 +3,10 @@
     recording = record(hand_track(seed=10), seed=6)      a track and its noise, every 10 ms
     HTML(page(recording))                                the page, one piece of HTML that loads nothing
 
-The page runs the filter itself, in JavaScript (templates/live.js.j2).  The matrices A, B, H and those of the start-up are
-printed from the SymPy expressions of `kfcourse.scenarios.pointer`; predict and correct are written there, in Joseph's
-form, and a test compares them in a browser with `kfcourse.linear`.  The page samples the recording, or the reader's own
-track, at the interval that a slider says, with noise of the standard deviation sigma that another says.
+The page runs the filter itself, in JavaScript (templates/live-filter.js.j2).  The matrices A, B, H and those of the
+start-up are printed from the SymPy expressions of `kfcourse.scenarios.pointer`; predict and correct are written there, in
+Joseph's form, and a test compares them in a browser with `kfcourse.linear`.  The page samples the recording, or the
+reader's own track, at the interval that a slider says, with noise of the standard deviation sigma that another says.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from kfcourse.seeds import Seed
 
 GRID = 0.01  # s between the points of a recording; sampling intervals are multiples of it
 SCREEN = (640, 400)  # px, the field of the page
+RUNS = (100, 10)  # ms, the sampling intervals of the paper's two runs
 _DECIMALS = 3
 
 
@@ -122,6 +123,7 @@ def page(recording: Recording, interval: int = 20, sigma: int = 8, decibels: int
     )
     content = {
         "sliders": SLIDERS,
+        "runs": list(RUNS),
         "settings": settings,
         "screen": SCREEN,
         "grid": GRID,

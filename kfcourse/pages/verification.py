@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.pages.typesetting import Equation, Side, equation_latex
+from kfcourse.symbolic.typesetting import Equation, Side, equation_latex
 
 VERIFIED = "application/vnd.kfcourse.verified+json"  # what the build collects
 BY_IDENTITY = "identity, by SymPy"

@@ -55,6 +55,11 @@ class Known:
         """The same with the symbols of these equations."""
         return Known(tuple(s for s in known.values() if equations.has(s)), self.interval, self.inputs)
 
+    @property
+    def steps(self) -> float:
+        """For how many steps the inputs have values; infinite if the equations contain none."""
+        return min((len(values) for name, values in self.inputs.items() if symbol(name) in self.symbols), default=np.inf)
+
     def at(self, k: int) -> Array:
         """Values of `symbols` at step k, (m,); ModelError if an input ends before."""
         return np.array([self._value(s.name, k) for s in self.symbols])
@@ -147,6 +152,10 @@ def varying_law(
     law = table(what, given)
     scale, shift = (_formulas(what, law.get(key), len(noises), symbols) for key in ("variance", "mean"))
     if scale:
+        # A mean that is a number moves into the equations too, as the law's own is multiplied by the deviation.
+        means = _numbers(law.get("mean", 0.0), len(noises))
+        shift = {i: means[i] for i in scale if i < len(means)} | shift
+        law["mean"] = [0.0 if i in scale else one for i, one in enumerate(means)] if means else law.get("mean", 0.0)
         law["variance"] = _without(scale, law["variance"], 1.0)
         for i, variance in scale.items():
             _check_variance(what, noises[i], variance, known, symbols, parameters)
@@ -154,6 +163,15 @@ def varying_law(
         law["mean"] = _without(shift, law["mean"], 0.0)
     changed = {noises[i]: shift.get(i, 0) + sp.sqrt(scale.get(i, 1)) * noises[i] for i in {**scale, **shift}}
     return changed, law
+
+
+def _numbers(given: Any, size: int) -> list[Any]:
+    """The entries of a list, or one number for all, exactly; formulas as they are; none if they do not fit, which `law` tells."""
+    entries = [given] * size if np.ndim(given) == 0 else [*given]
+    try:
+        return [one if _is_formula(one) else sp.Rational(str(float(one))) for one in entries]
+    except (TypeError, ValueError):
+        return []
 
 
 def _without(formulas: Mapping[int, sp.Expr], given: Any, instead: float) -> Any:
@@ -187,7 +205,7 @@ def _check_variance(
     """ModelError if a variance is negative or not finite at one of the first steps."""
     numeric = sp.Matrix([variance.subs(parameters)])
     used = known.used(numeric, {name: s for name, s in symbols.items() if s not in parameters})
-    steps = min([CHECKED, *(len(values) for name, values in known.inputs.items() if symbol(name) in used.symbols)])
+    steps = int(min(CHECKED, used.steps))
     variance_at = Stepwise.compile(used, "variance", {}, {"variance": numeric}, [])
     with np.errstate(all="ignore"):
         for k in range(steps):

@@ -14,8 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
+from functools import cached_property, reduce
 from itertools import product as cartesian
 from typing import NoReturn
 
@@ -24,12 +23,13 @@ import sympy as sp
 
 from kfcourse.angles import Components, on_circle
 from kfcourse.laws import Array, Gaussian, Measurement, measurement_of
+from kfcourse.symbolic.choices import jumps, masked
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 from kfcourse.symbolic.reading import ModelError, exact_matrix
-from kfcourse.symbolic.writing import formula_latex
+from kfcourse.symbolic.writing import formula_lines
 
 FUNCTION_LATEX = {"tau": r"\tau", "Theta": r"\Theta", "h": "h", "G": "G", "F": "F"}
 
@@ -89,7 +89,8 @@ class Structure:
                 if name in ("Theta", "F") and i > j:
                     continue  # symmetric
                 index = "" if len(matrix) == 1 else f"_{{{i + 1}}}" if matrix.cols == 1 else f"_{{{i + 1}{j + 1}}}"
-                lines.append(rf"{FUNCTION_LATEX[name]}{index}({names}) &= {formula_latex(matrix[i, j], arguments)}")
+                first, *further = formula_lines(matrix[i, j], arguments)
+                lines += [rf"{FUNCTION_LATEX[name]}{index}({names}) &= {first}", *(rf"&\quad {line}" for line in further)]
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
     def source(self) -> str:
@@ -254,25 +255,11 @@ def _taylor(equation, x, mean, noise, noise_mean):
     point = dict(zip(x, mean, strict=True)) | dict(zip(noise, noise_mean, strict=True))
     parts = [equation, equation.jacobian(sp.Matrix(x)), equation.jacobian(sp.Matrix(noise))]
     for part in parts:
-        if part.has(sp.Derivative, sp.DiracDelta) or any(_jumps(one, x) for one in equation.atoms(sp.Piecewise)):
+        if part.has(sp.Derivative, sp.DiracDelta) or any(jumps(one, x) for one in equation.atoms(sp.Piecewise)):
             raise NoClosedForm(
                 f"{list(equation)} is not differentiable and cannot be linearised; use unscented(model) or gauss_hermite(model)"
             )
     return [part.subs(point, simultaneous=True) for part in parts]
-
-
-def _jumps(choice: sp.Piecewise, x: tuple[sp.Symbol, ...]) -> bool:
-    """Whether a choice that depends on the state may jump where one formula takes over from the next."""
-    for (formula, condition), (following, _) in pairwise(choice.args):
-        if not condition.has(*x):
-            continue
-        if not isinstance(condition, sp.core.relational.Relational):
-            return True  # several thresholds: not looked into
-        border = next(s for s in x if condition.has(s))
-        places = sp.solve(condition.lhs - condition.rhs, border)
-        if not places or any(sp.simplify((formula - following).subs(border, place)) != 0 for place in places):
-            return True
-    return False
 
 
 def gaussian(model: Model) -> Structure:
@@ -299,30 +286,16 @@ def _moments(equation, x, mean, cov, noise, law: Gaussian, known: tuple[sp.Symbo
         [*x, *noise], [*mean, *exact_matrix(law.mean)], sp.diag(sp.Matrix(cov), sp.Matrix(exact_matrix(law.cov)))
     )
     size = len(equation)
-    equation, masks = _masked(equation, known, [*x, *noise])
-    means = sp.Matrix([joint.mean_of(formula) for formula in equation])
+    equation, masks = masked(equation, known, [*x, *noise])
+    try:
+        means = sp.Matrix([joint.mean_of(formula) for formula in equation])
+    except NoClosedForm as error:
+        raise NoClosedForm(reduce(lambda text, mask: text.replace(str(mask), str(masks[mask])), masks, str(error))) from None
     covs = sp.zeros(size, size)
     for i in range(size):
         for j in range(i, size):
             covs[i, j] = covs[j, i] = joint.covariance(equation[i], equation[j])
     return (matrix.xreplace(masks) for matrix in (means, covs))
-
-
-def _masked(
-    equation: sp.MatrixBase, known: tuple[sp.Symbol, ...], variables: list[sp.Symbol]
-) -> tuple[sp.MatrixBase, dict[sp.Dummy, sp.Expr]]:
-    """The equation with a symbol in the place of each function of what is known, such as Heaviside(t - 45): constants."""
-    masks: dict[sp.Dummy, sp.Expr] = {}
-
-    def mask(formula: sp.Expr) -> sp.Expr:
-        if not (known and formula.has(*known)):
-            return formula
-        if isinstance(formula, sp.Function) and not formula.has(*variables):
-            masks[found := sp.Dummy(real=True)] = formula
-            return found
-        return formula.func(*map(mask, formula.args)) if formula.args else formula
-
-    return equation.applyfunc(mask), masks
 
 
 def _expanded(functions) -> dict[str, sp.ImmutableMatrix]:

@@ -11,6 +11,8 @@ from itertools import groupby
 import sympy as sp
 from sympy.printing.latex import LatexPrinter
 
+from kfcourse.symbolic.typesetting import WIDTH, joined, symbols
+
 
 def formula_latex(expression: sp.Expr, variables: Sequence[sp.Symbol], noises: Sequence[sp.Symbol] = ()) -> str:
     """LaTeX of a formula.
@@ -25,6 +27,15 @@ def formula_latex(expression: sp.Expr, variables: Sequence[sp.Symbol], noises: S
     """
     printer = LatexPrinter({"order": "none", "fold_func_brackets": True})
     return str(printer.doprint(_Writer([*variables, *noises], noises).arranged(sp.sympify(expression))))
+
+
+def formula_lines(expression: sp.Expr, variables: Sequence[sp.Symbol], noises: Sequence[sp.Symbol] = ()) -> list[str]:
+    """The same in as many lines as a page is wide; only sums are broken."""
+    whole = formula_latex(expression, variables, noises)
+    writer = _Writer([*variables, *noises], noises)
+    if symbols(whole) <= WIDTH or not isinstance(expression, sp.Add):
+        return [whole]
+    return joined([formula_latex(term, variables, noises) for term in writer.terms(expression)])
 
 
 class _Writer:

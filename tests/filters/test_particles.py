@@ -77,10 +77,11 @@ def test_the_likelihood_is_the_normal_density_with_its_constant():
 
 def test_the_prediction_is_the_law_of_the_predicted_particles():
     """Resampled, they all weigh the same: their mean, and their covariance with the divisor M."""
-    model = Model.define(["x1 + 0.2*x2 + 0.1*v1", "0.9*x2 + 0.3*v2 + 1"], "x1 + 0.5*w")
+    model = Model.define(["x1 + 0.2*x2 + v1", "0.9*x2 + 1 + v2"], "x1 + 0.5*w", state_noise={"variance": [[0, 0], [0, 0]]})
     one = particle(model, 30)
     state = one.step(one.init(2), np.array([[0.4], [-0.7]]))
-    for particles, mean, cov in zip(state.memory.x, *state.predicted, strict=True):
+    for both, mean, cov in zip(state.memory.x, *state.predicted, strict=True):
+        particles = both.reshape(30, 2) @ np.array([[1, 0.2], [0, 0.9]]).T + [0, 1]
         np.testing.assert_allclose(mean, particles.mean(axis=0), rtol=1e-13)
         np.testing.assert_allclose(cov, np.cov(particles.T, bias=True), rtol=1e-12)
 
@@ -126,7 +127,10 @@ def test_a_missing_measurement_weighs_nothing(variants):
     one = particle(variants["2"], 64)
     state = one.step(one.init(3), np.full((3, 1), np.nan))
     np.testing.assert_allclose(state.memory.effective, 64, rtol=64 * np.finfo(float).eps)
-    np.testing.assert_allclose(state.posterior.mean, one.init(3).memory.x.mean(axis=1), rtol=0, atol=1e-14)
+    # equal weights: systematic resampling keeps every particle once
+    np.testing.assert_allclose(state.posterior.mean, state.memory.x.mean(axis=(1, 2)), rtol=0, atol=1e-14)
+    after = one.step(state, np.full((3, 1), np.nan))
+    np.testing.assert_allclose(after.memory.effective, 64, rtol=64 * np.finfo(float).eps)
 
 
 @pytest.mark.parametrize("value", [0.0, 1e3, -1e3, 1e150])

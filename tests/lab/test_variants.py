@@ -1,8 +1,13 @@
 """The lab's variants and filters by name; hostile ones are refused.  That the shipped ones are well posed: test_quality."""
 
+import tomllib
+
 import pytest
 
-from kfcourse import ModelError, NoClosedForm, gaussian, lab_filters, load_variants
+from kfcourse import Model, ModelError, NoClosedForm, gaussian, lab_filters, load_variants
+from kfcourse.checks import exercise
+from kfcourse.checks.exercises import ExerciseError
+from kfcourse.checks.posing import unposed
 from kfcourse.filters import Design, Filter
 from kfcourse.lab.short_names import FILTERS, LAB, has_exact, title
 from kfcourse.lab.variants import VariantError, find_variant
@@ -87,8 +92,9 @@ def test_a_filter_that_a_model_does_not_admit_is_named_with_advice(tmp_path):
     model = load_variants(path)["t"].model
     with pytest.raises(NoClosedForm, match=r"^fos-gaussian: .*tan\(x\).*unscented"):
         lab_filters(model, ["duof", "fos-gaussian"])
-    with pytest.raises(ModelError, match=r"^aof-exact: .*scalar"):
-        lab_filters(SHIPPED["20"].model, ["aof-exact"])
+    with pytest.raises(ModelError, match=r"^aof-exact: .*noise enters nonlinearly"):
+        lab_filters(Model.define("0.9*x + v", "x + w**2"), ["aof-exact"])
+    assert lab_filters(SHIPPED["20"].model, ["aof-exact"])[0].name == "aof-exact"
     assert len(lab_filters(model, ["aof-linearised", "aof-unscented", "aof-gauss-hermite", "duof"])) == 4
 
 
@@ -248,3 +254,23 @@ def test_a_missing_file_and_a_folder_are_refused_by_name(tmp_path):
         load_variants(tmp_path / "nothing.toml")
     with pytest.raises(VariantError, match=f"{tmp_path}.*cannot be read"):
         load_variants(tmp_path)
+
+
+def test_time_inputs_and_angles_are_read_and_the_exercises_say_why_they_do_not_ask_about_them(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        '[variants.drive]\nstate = "0.9*x + u + 0.3*v + (1 if t < 1 else 0)"\nmeter = "x + w"\n'
+        'inputs = { u = [0, 1, -1] }\ninterval = 0.5\nmeter_noise = { variance = "1 + k/10" }\nangles = ["y"]\n',
+        encoding="utf-8",
+    )
+    model = find_variant("drive", path).model
+    assert model.known.inputs == {"u": (0.0, 1.0, -1.0)} and model.known.at(2).tolist() == [2.0, 1.0, -1.0]
+    assert model.angles.y == (0,)
+    finding = unposed(find_variant("drive", path))
+    assert finding is not None and finding.ok is False
+    assert "asks about a model without time, inputs and angles, and variant drive has them" in finding.says
+    with pytest.raises(ExerciseError, match="take another variant"):
+        exercise("a", tomllib.loads(path.read_text(encoding="utf-8"))["variants"]["drive"])
+    path.write_text('[variants.v]\nstate = "x + u + v"\nmeter = "x + w"\ninputs = 3\n', encoding="utf-8")
+    with pytest.raises(VariantError, match="`inputs` must be a table"):
+        find_variant("v", path)

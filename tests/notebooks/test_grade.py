@@ -24,7 +24,7 @@ from kfcourse.notebooks.grading.assembly import assembled
 from kfcourse.notebooks.grading.running import Place
 from kfcourse.notebooks.grading.sandbox import Sandbox
 from kfcourse.notebooks.grading.submissions import Cell, Unreadable, cells_of, claimed, clean
-from kfcourse.notebooks.grading.table import Grade, Told, grade_all, read_table, write_table
+from kfcourse.notebooks.grading.table import RUNNING, WAITING, Grade, Told, grade_all, read_table, write_table
 from kfcourse.notebooks.master import render, solution, student
 
 FIXTURES = Path(__file__).parent / "fixtures"
@@ -235,9 +235,11 @@ def graded(tmp_path_factory):
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("KFCOURSE_SECRET", "x")
-        result = CliRunner().invoke(
-            cli.main, ["grade", str(folder), "--masters", str(FIXTURES), "--seconds", str(SECONDS), "--sandbox", "none"]
-        )
+        course = folder.parent / "list.csv"
+        course.write_text("name,group,variant\nИванов Иван,М-1,53\nПетров,М-1,53\nСидоров,М-1,7\n", encoding="utf-8")
+        options = ["--masters", str(FIXTURES), "--seconds", str(SECONDS), "--sandbox", "none"]
+        options += ["--students", str(course), "--report", str(folder.parent / "report")]
+        result = CliRunner().invoke(cli.main, ["grade", str(folder), *options])
     after = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     assert after.pop(folder / "grades.csv", None), result.output
     assert after == before
@@ -391,13 +393,20 @@ def test_what_cannot_be_graded_is_named(graded):
     assert "\x1b" not in graded.output
 
 
+def test_a_course_list_tells_what_to_look_at(graded):
+    told = [line for line in graded.output.splitlines() if line.startswith("look at")]
+    assert told == ["look at Петров: set b: variant 12, was given 53", "look at Сидоров: missing: b"]
+    assert (graded.folder.parent / "report" / "feedback" / "М-1" / "Петров.html").exists()
+    assert "Sandbox: none: notebooks run with your rights" in graded.output
+
+
 def test_a_second_run_does_only_what_is_new(graded, tmp_path, monkeypatch):
     copied = tmp_path / "copy"
     shutil.copytree(graded.folder, copied)
     options = ["grade", str(copied), "--masters", str(FIXTURES), "--jobs", "1"]
     ran = []
 
-    def instead(works):
+    def instead(works, started):
         ran.extend(work.name for work in works)
         return [Grade(work.name, "graded", "b", "53", MARKS, "anew", work.digest) for work in works]
 
@@ -444,16 +453,19 @@ def test_an_interrupted_run_goes_on_where_it_was(three):
     work = submissions.returned(three, masters=FIXTURES)
     table = three / "table.csv"
 
-    def interrupted(new):
+    def interrupted(new, started):
+        started(new[1])
         yield Grade(new[0].name, "graded", "b", "53", MARKS, "", new[0].digest)
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         grade_all(work, table, False, interrupted)
     assert [one.name for one in read_table(table).values()] == ["a.ipynb"]
+    rows = csv.DictReader(io.StringIO(table.read_text(encoding="utf-8-sig")))
+    assert [row["note"] for row in rows] == ["", RUNNING, WAITING]
     assert sorted(path.name for path in three.iterdir()) == ["a.ipynb", "b.ipynb", "c.ipynb", "table.csv"]
 
-    def rest(new):
+    def rest(new, started):
         return [Grade(one.name, "graded", "b", "53", MARKS, "", one.digest) for one in new]
 
     grades, old = grade_all(work, table, False, rest)

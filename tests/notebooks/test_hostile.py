@@ -11,11 +11,11 @@ import pytest
 from test_grade import FIXTURES, cell, solved
 from tricks import CELLS, FUNCTIONS, PROCESSES
 
-from kfcourse.checks import Exercise, exercise
+from kfcourse.checks import Exercise, exercise, sets
 from kfcourse.notebooks.grading import marking, running
 from kfcourse.notebooks.grading.assembly import Step
 from kfcourse.notebooks.grading.marking import Marking
-from kfcourse.notebooks.grading.pool import Worker
+from kfcourse.notebooks.grading.pool import Family, Worker
 from kfcourse.notebooks.grading.running import Kernel, Opening, Place, packages_of
 from kfcourse.notebooks.grading.sandbox import Sandbox, chosen
 from kfcourse.notebooks.grading.staging import answers, personal_numbers, stage
@@ -46,7 +46,7 @@ def staged(tmp_path_factory):
 
 
 def kernel_in(sandbox, staged, seconds=15.0, task=TASK):
-    opening = Opening(task.letter, opened(task), personal_numbers([task]))
+    opening = Opening(task.letter, opened(task), personal_numbers(task))
     return Kernel(Place(staged, sandbox), opening, seconds)
 
 
@@ -129,6 +129,18 @@ def test_no_key_is_on_the_stage(staged):
     assert not [text for text in texts if "from kfcourse.exercises.b_aof" in text]
 
 
+def test_what_the_masters_import_is_on_the_stage(staged):
+    lines = {
+        line
+        for one in sets().values()
+        for line in (one.folder / "statement.md").read_text(encoding="utf-8").splitlines()
+        if line.startswith(("import ", "from "))
+    }
+    assert len(lines) > 10
+    with kernel_in(Sandbox("none", tuple(map(str, answers()))), staged) as kernel:
+        assert {line: error for line in lines if (error := kernel.cell(line).error)} == {}
+
+
 def bubblewrap(staged, folder, hidden):
     try:
         return chosen("bwrap", hidden, folder, packages_of(staged))
@@ -189,12 +201,15 @@ def test_who_kills_its_process_is_named_and_the_next_is_graded(staged, tmp_path)
     for name, trick in (("1", "kills its parent"), ("2", "kills all above it"), ("3", None)):
         notebook = solved()
         if trick:
-            cell(notebook, "import matplotlib").source += "\n" + PROCESSES[trick]
+            daemon = filled(PROCESSES["leaves a daemon"], FLAG=str(tmp_path / f"flag{name}"))
+            cell(notebook, "import matplotlib").source += "\n" + daemon + PROCESSES[trick]
         (tmp_path / f"{name}.ipynb").write_text(json.dumps(notebook), encoding="utf-8")
-    worker = Worker(marking.Setting(Place(staged, Sandbox("none")), SALT))
+    worker = Worker(marking.Setting(Place(staged, Sandbox("none")), SALT), Family())
     try:
         grades = [worker(work) for work in returned(tmp_path, masters=FIXTURES)]
     finally:
         worker.end()
     assert [(grade.status, grade.note) for grade in grades[:2]] == [("not graded", "it killed its process")] * 2
     assert grades[2].passed == 2
+    if sys.platform == "linux":
+        assert all(gone(int((tmp_path / f"flag{name}").read_text())) for name in "12")

@@ -534,7 +534,7 @@ def test_unknown_names_are_refused(call, tmp_path):
 
 def test_two_notebooks_never_share_a_file(call, tmp_path):
     (tmp_path / "list.csv").write_text("name,group\nИванов И.,1\nИванов И,1\n", encoding="utf-8")
-    refused(call("exercises", "--out", "o", "--students", "list.csv", "--sets", "b"), "two notebooks would be", "Иванов-И")
+    refused(call("exercises", "--out", "o", "--students", "list.csv", "--sets", "b"), "line 3", "Иванов-И", "in line 2")
     (tmp_path / "my.toml").write_text(
         "".join(f'[variants."{name}"]\nstate = "x + v"\nmeter = "x + w"\n' for name in ("A/b", "a-B")), encoding="utf-8"
     )
@@ -546,11 +546,11 @@ def test_a_course_list_makes_a_folder_for_each_student(call, tmp_path, masters, 
     from kfcourse.notebooks import commands
 
     monkeypatch.setattr(commands, "run_all", lambda work, *_: [Outcome(job, "written") for job in work])
-    (tmp_path / "list.csv").write_text("name;group\nИванов Иван;М-1\n../../evil;..\n", encoding="utf-8-sig")
+    (tmp_path / "list.csv").write_text("name;group\nИванов Иван;М-1\n../../evil;M\n", encoding="utf-8-sig")
     result = call("exercises", "--students", "list.csv", "--out", "o", "--sets", "b,c", "--masters", masters)
     assert result.exit_code == 0
     folders = [line.split()[0] for line in result.output.splitlines() if line.startswith("o/")]
-    assert folders == ["o/М-1/Иванов-Иван", "o/unnamed/evil"]
+    assert folders == ["o/М-1/Иванов-Иван", "o/M/evil"]
 
 
 # -- course lists
@@ -610,6 +610,16 @@ def test_lists_of_spreadsheets_are_read(tmp_path, separator, encoding):
         ("name,group\n", "names no student"),
         ("name,group\nA,1\n,1\n", "line 3: a student without a name"),
         ("name,group\nA,1\nB,1\nA,1\n", "line 4: A, 1 stands there twice"),
+        ("name,group\nA,1\na,1\n", "line 3: the folder of a, 1 would be 1/a, as that of A, 1 in line 2"),
+        ("name,group\nИванов,1\nИванов\u0438\u0306,1\nИвановй,1\n", "line 4: the folder of Ивановй, 1"),
+        ('name,group\n"A,1\nB,1\n', "line 2: unexpected end of data; is a quote opened and not closed?"),
+        ('name,group\n"A,1\nB",1\nC,1\n', "line 2: a quote is opened and not closed on the line"),
+        ('name,group\nA,1\n"B" b,1\n', "line 3: ',' expected after '\"'; is a quote"),
+        ("name,group\nA\nB,1\n", "line 2: A without a group"),
+        ("name,group\nA,...\n", "line 2: A without a group (got '...')"),
+        ("name,group\nA,1\n?!,1\n", "line 3: a student without a name (got '?!')"),
+        ("name,group\nIvanov, Ivan,1\n", "line 2: more values than columns"),
+        ("name,group\n" + "a" * 101 + ",1\n", "line 2: a name of more than 100 characters"),
         ("name,group\nA" + "a" * 200_000 + ",1\n", "line 2: field larger than field limit"),
     ],
 )
@@ -626,6 +636,13 @@ def test_other_encodings_are_explained(tmp_path):
 @pytest.mark.parametrize("name", ["..", "../a", "a/b", ".hidden", "a\\b", " ", "con:", "a\nb"])
 def test_safe_names_stay_in_their_folder(name):
     assert re.fullmatch(r"\w[\w.-]*", safe(name))
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"), [("CON", "CON_"), ("nul", "nul_"), ("Lpt1.txt", "Lpt1_.txt"), ("Conrad", "Conrad")]
+)
+def test_names_that_windows_keeps_for_devices_are_changed(name, expected):
+    assert safe(name) == expected
 
 
 def test_context_of_a_variant_without_parameters():

@@ -219,6 +219,34 @@ def test_estimates_covariances_and_gains(opened, interval, sigma, decibels):
     assert found["measures"]["nis"] == pytest.approx(expected["nis"], rel=1e-9)
 
 
+@pytest.mark.parametrize("interval", [10, 100])
+@pytest.mark.parametrize(("dropouts", "accelerated"), [(True, False), (False, True), (True, True)])
+def test_lost_samples_and_an_input(opened, interval, dropouts, accelerated):
+    found = opened().evaluate(
+        "([recording, settings]) => kfcourseLive.run(recording, settings)",
+        [
+            {"position": RECORDING.position.tolist(), "noise": RECORDING.noise.tolist()},
+            {"interval": interval / 1000, "sigma": 8, "intensity": 5e5, "dropouts": dropouts, "input": accelerated},
+        ],
+    )["samples"]
+    y = RECORDING.sampled(interval / 1000, 8)[1]
+    lost = np.array([one["y"] is None for one in found])
+    assert not lost[:3].any()
+    # a share of 0.3 of independent samples, within four standard errors
+    assert abs(lost[3:].mean() - 0.3 * dropouts) <= 4 * np.sqrt(0.3 * 0.7 / len(lost[3:])) * dropouts
+    y[lost] = np.nan
+    u = np.nan_to_num(pointer.acceleration_from(y, interval / 1000)) if accelerated else None
+    system = pointer.uniform_acceleration(interval / 1000, np.sqrt(5e5 / (interval / 1000)), 8)
+    laws = pointer.follow(system, y, interval / 1000, u)
+    for name, expected in (("law", laws.posterior), ("predicted", laws.predicted)):
+        mean, cov = (np.array([one[name][part] for one in found[3:]]) for part in ("mean", "cov"))
+        sd = np.sqrt(np.diagonal(expected.cov[:, 0], axis1=1, axis2=2))
+        # as in the test above; an input multiplies a rounding error by 6 at most
+        assert np.max(np.abs(mean[..., 0] - expected.mean[:, 0]) / sd) < 1e-8
+        assert np.max(np.abs(cov - expected.cov[:, 0]) / (sd[:, :, None] * sd[:, None, :])) < 1e-9
+    assert [("gain" in one["law"]) for one in found[3:]] == (~lost[3:]).tolist()
+
+
 @pytest.mark.parametrize(
     "change",
     [{"interval": None}, {"interval": 0.015}, {"interval": 0}, {"sigma": None}, {"sigma": 0}, {"sigma": -1}, {"intensity": None}],
@@ -287,12 +315,13 @@ def test_the_recorded_track_by_keyboard(opened):
     tab = opened()
     focus = "document.activeElement.textContent + document.activeElement.tagName"
     order = []
-    for _ in range(8):
+    for _ in range(13):
         tab.keyboard.press("Tab")
         order.append(tab.evaluate(focus))
     assert [stop[-6:] for stop in order[:1]] == ["CANVAS"]
-    assert order[1:] == ["Play the recorded trackBUTTON", "StepBUTTON", "ClearBUTTON", "INPUT", "INPUT", "INPUT", "INPUT"]
-    for _ in range(6):
+    buttons = ["Play the recorded track", "Step", "Clear", "100 ms", "10 ms", "both"]
+    assert order[1:] == [*(name + "BUTTON" for name in buttons), *["INPUT"] * 6]
+    for _ in range(11):
         tab.keyboard.press("Shift+Tab")
     tab.keyboard.press("Enter")
     assert status(tab) == "Playing."
@@ -330,7 +359,8 @@ def test_start_up_step_by_step(opened):
         step.press("Space")
         phases.append(text(tab, "phase"))
         assert text(tab, "count") == f"{k + 1} in {0.02 * k:.2f} s"
-        assert status(tab) == f"Sample {k + 1} at {0.02 * k:.2f} s."
+        lesson = ["one position", "two positions", "the parabola gives position and velocity"][k : k + 1]
+        assert status(tab).startswith(f"Sample {k + 1} at {0.02 * k:.2f} s" + (f": {lesson[0]}" if lesson else "."))
         if k >= 3:
             assert text(tab, "gain") == f"{found.gains[k - 3, 0, 0]:.3f}"
             assert text(tab, "gain-velocity") == f"{found.gains[k - 3, 2, 0]:.2f} s⁻¹"
@@ -371,6 +401,56 @@ def test_sliders_filter_the_same_track_anew(opened):
         assert tab.locator(f"input[data-set={name}]").get_attribute("aria-valuetext") == value
 
 
+def test_the_two_runs_of_the_paper_side_by_side(opened):
+    tab = opened(viewport={"width": 1100, "height": 768})
+    runs = tab.get_by_role("group", name="The paper's two runs")
+    for interval in live.RUNS:
+        runs.get_by_role("button", name=f"{interval} ms", exact=True).press("Enter")
+        assert text(tab, "interval") == f"{interval} ms"
+        assert runs.locator("[aria-pressed=true]").all_inner_texts() == [f"{interval} ms"]
+    play_to_the_end(tab)
+    assert shown(tab) == written(reference(10, 8, 57))
+    runs.get_by_role("button", name="both").press("Enter")
+    assert tab.locator("canvas").count() == 2 and text(tab, "interval") == "100 and 10 ms"
+    assert tab.get_by_role("columnheader").all_inner_texts() == ["100 ms", "10 ms"]
+    assert shown(tab, "recent") == written(reference(100, 8, 57)) and shown(tab) == written(reference(10, 8, 57))
+    counts = [len(RECORDING.position[:: interval // 10]) for interval in live.RUNS]
+    assert text(tab, "count") == f"{counts[0]} | {counts[1]} in {SECONDS:.2f} s"
+    set_slider(tab, "interval", 50)
+    assert tab.locator("canvas").count() == 1
+    assert tab.get_by_role("columnheader").all_inner_texts() == ["last 3 s", "whole track"]
+    assert shown(tab) == written(reference(50, 8, 57))
+
+
+def test_what_the_field_and_the_strip_show(opened):
+    tab = opened()
+    set_slider(tab, "interval", 100)
+    system = system_of(100, 8, 57)
+    y = RECORDING.sampled(0.1, 8)[1]
+    laws = pointer.follow(system, y, 0.1)
+    box = tab.locator("canvas").bounding_box()
+    scale = box["width"] / live.SCREEN[0]
+    for _ in range(9):
+        tab.get_by_role("button", name="Step").press("Enter")
+    expected = laws.predicted.mean[6, 0, :2]  # of the tenth sample, when nine have come: a cross
+    near = [pixel(tab, box["x"] + scale * (expected[0] + dx), box["y"] + scale * expected[1]) for dx in (-0.7, 0, 0.7)]
+    assert np.abs(np.array(near) - [213, 94, 0]).sum(axis=1).min() <= 4  # the colour of the filter; drawn with rounding
+    dots = tab.locator("[data-line=nis]").get_attribute("d")
+    heights = [102 - float(place.split()[1].split("h")[0]) for place in dots.split("M")[1:]]
+    found = nis(innovations(system.measure, laws.predicted, y[3:]))[:6, 0]
+    # 46 px for NIS 12, written with one decimal
+    np.testing.assert_allclose(heights, 46 * np.minimum(found / 12, 1), atol=0.051)
+    line = tab.locator("[data-line=filtered]").get_attribute("d")
+    assert line.count("L") == 5
+
+
+def test_field_and_controls_fit_a_screen(opened):
+    tab = opened(viewport={"width": 1100, "height": 600})
+    panel, field = (tab.locator(one).bounding_box() for one in (".kf-panel", "canvas"))
+    assert panel["x"] >= field["x"] + field["width"] and field["width"] >= 620
+    assert tab.evaluate("document.documentElement.scrollHeight <= innerHeight")
+
+
 def test_extreme_settings_and_nonsense(opened):
     tab = opened()
     play_to_the_end(tab)
@@ -403,14 +483,15 @@ def test_a_pointer_moved_by_arrow_keys(opened):
     assert status(tab) == "Your track, {:.2f} s: noisy {noisy}, filtered {filtered}.".format(seconds, **shown(tab))
     tab.clock.run_for(500)
     assert float(text(tab, "count").split()[2]) == seconds
-    # the sliders filter the reader's track too; leaving the field ends a track
+    # the sliders filter the reader's track too; leaving the field ends a stretch of it, and coming back goes on
     set_slider(tab, "interval", 50)
     assert text(tab, "count").startswith(f"{int(seconds / 0.05 + 1e-9) + 1} in")
     tab.locator("canvas").focus()
     tab.keyboard.press("ArrowLeft")
     tab.clock.run_for(300)
     tab.keyboard.press("Tab")
-    assert status(tab).startswith("Your track, 0.2")
+    longer = float(text(tab, "count").split()[2])
+    assert 0.2 < longer - seconds <= 0.3 and status(tab).startswith(f"Your track, {longer:.2f}")
 
 
 # ---------------------------------------------------------------- by mouse and finger
@@ -460,6 +541,15 @@ def test_the_mouse_is_followed_and_its_track_cleaned(opened):
     assert found["filtered"] < found["noisy"]
     tab.clock.run_for(2000)
     assert text(tab, "count") == f"{count} in {seconds} s"  # ended when the mouse left
+    # back in the field: the track is kept, and the filter starts anew for the new stretch
+    circle(tab, tab.mouse.move, seconds=0.035)
+    assert status(tab) == "The filter collects three samples."
+    circle(tab, tab.mouse.move, seconds=0.5)
+    tab.mouse.move(5, 5)
+    assert 0.4 < float(text(tab, "count").split()[2]) - float(seconds) <= 0.6
+    assert text(tab, "phase") == "ready"
+    press(tab, "Clear")
+    assert text(tab, "count") == "–"
 
 
 @pytest.mark.parametrize("options", [{}, {"viewport": {"width": 400, "height": 900}, "device_scale_factor": 2}])
@@ -550,10 +640,13 @@ def test_every_control_has_a_name(opened):
     for name in ("Sampling interval Δ", "Noise of the meter σ", "Noise of the object S"):
         slider = tab.get_by_role("slider", name=name, exact=True)
         assert slider.count() == 1 and slider.get_attribute("aria-valuetext")
-    assert tab.get_by_role("checkbox", name=re.compile("whole track")).count() == 1
-    assert tab.get_by_role("button").all_inner_texts() == ["Play the recorded track", "Step", "Clear"]
+    for name in ("whole track", "lose 30 %", "acceleration by three samples"):
+        assert tab.get_by_role("checkbox", name=re.compile(name)).count() == 1
+    assert tab.get_by_role("button").all_inner_texts() == ["Play the recorded track", "Step", "Clear", "100 ms", "10 ms", "both"]
+    assert tab.get_by_role("group", name="The paper's two runs").get_by_role("button").count() == 3
+    assert tab.get_by_role("img", name=re.compile("Strip chart")).count() == 1
     assert tab.get_by_role("status").count() == 1
-    assert tab.locator("input, button, canvas").count() == 8
+    assert tab.locator("input, button, canvas").count() == 13
     assert tab.get_by_role("columnheader").all_inner_texts() == ["last 3 s", "whole track"]
     assert tab.get_by_role("rowheader").count() == 4
 

@@ -7,7 +7,7 @@ import sympy as sp
 
 from kfcourse.pages.figures import label_ends
 from kfcourse.pages.tables import table
-from kfcourse.pages.typesetting import WIDTH, equation_latex, symbols
+from kfcourse.symbolic.typesetting import WIDTH, equation_latex, symbols
 
 pytestmark = pytest.mark.quick
 

@@ -115,4 +115,6 @@ def test_agreement_within_a_tolerance() -> None:
 def test_sums_are_printed_in_the_order_people_write_them():
     lam, K, S, x, y = sp.symbols("lambda K S x y")
     assert "\\lambda + K \\left(y - S\\right)" in typeset((x, lam + K * (y - S))).markdown
+    assert "\\lambda + K \\left(y - S \\lambda\\right)" in typeset((x, lam + K * (y - S * lam))).markdown
+    assert "1 + x^{2}" in typeset((y, x**2 + 1)).markdown
     assert "x^{2} + x + 1" in typeset((y, x + 1 + x**2)).markdown  # powers descend

@@ -12,5 +12,8 @@ running       its cells and answers, with limits of time and memory
 marking       one notebook -> its marks and notes
 worker        the grading process, which compares
 pool          several of them, started anew when one ends
+owners        whose notebook it is, and what to look at
+weights       what an answer is worth
+report        tables and pages for students and lecturers
 table         all marks as a CSV table, resumed where it was interrupted
 """

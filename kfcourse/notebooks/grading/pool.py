@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
 from queue import SimpleQueue
@@ -19,7 +19,7 @@ from kfcourse.notebooks.grading.channel import Closed, Late, Patient
 from kfcourse.notebooks.grading.marking import Setting
 from kfcourse.notebooks.grading.running import START
 from kfcourse.notebooks.grading.submissions import Returned
-from kfcourse.notebooks.grading.table import FAILED, Grade
+from kfcourse.notebooks.grading.table import FAILED, Grade, RunAll, Started
 from kfcourse.notebooks.grading.values import Strange
 from kfcourse.notebooks.grading.worker import grade_of, packed
 
@@ -27,11 +27,40 @@ QUIET = 150.0  # seconds that a comparison, with the search for the kind of mist
 AGAIN = 3  # answers of a notebook that may end, or stop, the grading process before the notebook is given up
 
 
+class Family:
+    """The processes of this one: those that were there, the grading processes, and what a notebook has left, which is ended."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._ours = frozenset(keeper.below(os.getpid())) if os.name == "posix" else frozenset()
+        keeper.adopt()
+
+    def start(self, command: Sequence[str]) -> subprocess.Popen:
+        """Start a grading process."""
+        with self._lock:
+            # Ctrl-C is for the command
+            session = os.name == "posix"
+            process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=session)
+            self._ours |= {process.pid}
+            return process
+
+    def end(self, process: subprocess.Popen) -> None:
+        """End a grading process, all below it, and what a notebook has left that had ended it."""
+        with self._lock:
+            if os.name == "posix":
+                keeper.end(process.pid)
+            process.kill()
+            process.wait()
+            self._ours -= {process.pid}
+            if os.name == "posix":
+                keeper.end(os.getpid(), self._ours)
+
+
 class Worker:
     """A grading process."""
 
-    def __init__(self, setting: Setting):
-        self._setting = setting
+    def __init__(self, setting: Setting, family: Family):
+        self._setting, self._family = setting, family
         self._process: subprocess.Popen | None = None
 
     def __call__(self, work: Returned) -> Grade:
@@ -61,12 +90,7 @@ class Worker:
             self._question = message["at"]
 
     def _start(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "kfcourse.notebooks.grading.worker"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            start_new_session=os.name == "posix",  # Ctrl-C is for the command
-        )
+        self._process = self._family.start([sys.executable, "-m", "kfcourse.notebooks.grading.worker"])
         assert self._process.stdin and self._process.stdout
         self._channel = Patient(self._process.stdout, self._process.stdin)
         self._channel.send(packed(self._setting))
@@ -76,35 +100,31 @@ class Worker:
         process, self._process = self._process, None
         if process is None:
             return
-        if os.name == "posix":
-            keeper.end(process.pid)
-            with suppress(OSError):
-                os.killpg(process.pid, signal.SIGKILL)
-        with suppress(OSError):
-            process.kill()
-        process.wait()
+        self._family.end(process)
         for pipe in (process.stdin, process.stdout):
             with suppress(OSError):
                 pipe.close()  # type: ignore[union-attr]
 
 
 @contextmanager
-def grading(setting: Setting, workers: int) -> Iterator[Callable[[Sequence[Returned]], Iterator[Grade]]]:
-    """A function that grades notebooks in so many processes, and yields the grades as they come, with a progress bar."""
+def grading(setting: Setting, workers: int) -> Iterator[RunAll]:
+    """A function that grades notebooks in so many processes, says when it begins with one, and yields the grades as they come."""
     free: SimpleQueue[Worker] = SimpleQueue()
-    made = [Worker(setting) for _ in range(workers)]
+    family = Family()
+    made = [Worker(setting, family) for _ in range(workers)]
     for worker in made:
         free.put(worker)
 
-    def one(work: Returned) -> Grade:
+    def one(work: Returned, started: Started) -> Grade:
         worker = free.get()
         try:
+            started(work)
             return worker(work)
         finally:
             free.put(worker)
 
-    def run(works: Sequence[Returned]) -> Iterator[Grade]:
-        tasks = [threads.submit(one, work) for work in works]
+    def run(works: Sequence[Returned], started: Started) -> Iterator[Grade]:
+        tasks = [threads.submit(one, work, started) for work in works]
         for task in tqdm(as_completed(tasks), desc="grade", total=len(tasks), unit="notebook", disable=None):
             yield task.result()
 

@@ -110,8 +110,9 @@ class Process:
             with suppress(subprocess.TimeoutExpired):
                 self.popen.wait(3)
         if os.name == "posix":
-            with suppress(ProcessLookupError, PermissionError):
-                os.killpg(self.popen.pid, signal.SIGKILL)
+            if self.popen.poll() is None:
+                with suppress(ProcessLookupError, PermissionError):
+                    os.killpg(self.popen.pid, signal.SIGKILL)
             keeper.end(os.getpid(), self._others)
         elif shutil.which("taskkill"):
             subprocess.run(["taskkill", "/F", "/T", "/PID", str(self.popen.pid)], capture_output=True)

@@ -6,12 +6,13 @@ import ast
 import compileall
 import shutil
 from collections.abc import Iterable
+from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 
 from kfcourse.checks import Exercise, ExerciseError, exercise, sets
 
-LEFT_OUT = ("notebooks", "pages", "exercises", "cli.py", "__main__.py")  # what a student's notebook has no use for
+LEFT_OUT = ("notebooks", "exercises", "cli.py", "__main__.py")  # what a student's notebook has no use for
 NEEDED = ("__init__.py", "grading/__init__.py", "grading/channel.py", "grading/session.py", "grading/values.py")  # of notebooks
 COMPANIONS = "companion.py"  # what the notebooks of a set import; never a key
 
@@ -71,15 +72,17 @@ def answers() -> list[Path]:
     return sorted({one.folder.parent for one in sets().values()} | {Path(str(resources.files("kfcourse.exercises")))})
 
 
-def personal_numbers(wanted: Iterable[Exercise]) -> dict[str, dict[str, float]]:
-    """Personal numbers of all sets for the variants of these exercises, by "letter variant"."""
-    variants = {one.variant.name: one.variant for one in wanted}
-    return {
-        f"{letter} {name}": Exercise(letter, variant).numbers
-        for name, variant in variants.items()
-        for letter, one in sets().items()
-        if one.numbers is not None
-    }
+def personal_numbers(own: Exercise, others: Iterable[Exercise] = ()) -> dict[str, dict[str, float]]:
+    """Personal numbers of an exercise, and of the others that a notebook opens so far as they have any, by "letter variant"."""
+    found = {_key(own): own.numbers}
+    for one in others:
+        with suppress(Exception):  # of tables of the student's
+            found[_key(one)] = one.numbers
+    return found
+
+
+def _key(one: Exercise) -> str:
+    return f"{one.letter} {one.variant.name}"
 
 
 def opened_elsewhere(calls: Iterable[tuple[object, object]]) -> list[Exercise]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -18,7 +19,7 @@ from kfcourse.notebooks.grading.submissions import Returned
 
 NOT_RUN = "not run"
 GRADED, OTHER, FAILED = "graded", "not an exercise notebook", "not graded"
-RUNNING = "the run ended while this one was graded"
+WAITING, RUNNING = "the run ended before its turn", "the run ended while this one was graded"
 SIGNS = {PASSED: "✓", WRONG: "✗", UNUSABLE: "✗", MISSING: "–", NOT_RUN: "–"}
 
 
@@ -50,6 +51,10 @@ class Grade:
         Empty if it was not graded.
     told : dict
         Question to what was said of the answer.
+    student : str
+        Whom the notebook was handed out to, as it says itself.
+    work : str
+        Hash of the student's code, empty if there is none: the same code has the same.
     """
 
     name: str
@@ -60,6 +65,8 @@ class Grade:
     note: str = ""
     digest: str = ""
     told: Mapping[str, Told] = field(default_factory=dict)
+    student: str = ""
+    work: str = ""
 
     @property
     def passed(self) -> int:
@@ -67,7 +74,7 @@ class Grade:
 
 
 FIRST = ("notebook", "status", "set", "variant")
-LAST = ("passed", "of", "note", "digest", "details")
+LAST = ("passed", "of", "note", "digest", "student", "work", "details")
 
 
 def columns() -> list[str]:
@@ -81,25 +88,25 @@ def write_table(grades: Iterable[Grade], path: Path) -> None:
     writer = csv.DictWriter(text, columns(), restval="", lineterminator="\n")
     writer.writeheader()
     for one in sorted(grades, key=lambda one: one.name):
-        row: dict[str, Any] = dict(zip(FIRST, (_cautious(one.name), one.status, one.letter, _cautious(one.variant)), strict=True))
+        row: dict[str, Any] = dict(zip(FIRST, (cautious(one.name), one.status, one.letter, cautious(one.variant)), strict=True))
         row |= {f"q{i + 1}": mark for i, mark in enumerate(one.marks.values())}
-        count = (one.passed, len(one.marks)) if one.status == GRADED else ("", "")
-        writer.writerow(row | dict(zip(LAST, (*count, _cautious(one.note), one.digest, details(one.told)), strict=True)))
+        passed, of = (one.passed, len(one.marks)) if one.status == GRADED else ("", "")
+        last = (passed, of, cautious(one.note), one.digest, cautious(one.student), one.work, details(one.told))
+        writer.writerow(row | dict(zip(LAST, last, strict=True)))
     save("\ufeff" + text.getvalue(), path)
 
 
 def details(told: Mapping[str, Told]) -> str:
     """What was said of all answers, as one cell of the table."""
-    return (
-        json.dumps({name: [one.says, one.mistakes, one.code] for name, one in told.items()}, ensure_ascii=False) if told else ""
-    )
+    rows = {name: [one.says, one.mistakes, one.code] for name, one in told.items()}
+    return json.dumps(rows, ensure_ascii=False) if rows else ""
 
 
 def _told(text: str) -> dict[str, Told]:
     return {name: Told(says, tuple(mistakes), code) for name, (says, mistakes, code) in json.loads(text or "{}").items()}
 
 
-def _cautious(text: str) -> str:
+def cautious(text: str) -> str:
     """A spreadsheet takes what begins so for a formula."""
     return f" {text}" if text[:1] in ("=", "+", "-", "@") else text
 
@@ -120,11 +127,11 @@ def read_table(path: Path) -> dict[str, Grade]:
         rows = [{}]
     found = {}
     for row in rows:
-        if not set((*FIRST, *LAST)) <= set(row):
+        if not {*FIRST, "passed", "of", "note", "digest"} <= set(row):
             raise ValueError(
                 f"{path} is not a table of grades (or a spreadsheet has changed it); move it, or choose another --out"
             )
-        values = {key: (row[key] or "").strip() for key in (*FIRST, *LAST)}
+        values = {key: (row.get(key) or "").strip() for key in (*FIRST, *LAST)}
         letter = values["set"]
         questions = [question.name for question in sets()[letter].questions] if letter in sets() else []
         marks = {name: row.get(f"q{i + 1}") or "" for i, name in enumerate(questions)}
@@ -132,7 +139,8 @@ def read_table(path: Path) -> dict[str, Grade]:
             name, status, _, variant = (values[key] for key in FIRST)
             with suppress(ValueError, TypeError, AttributeError):  # a spreadsheet has cut it: graded again
                 told = _told(values["details"])
-                found[values["digest"]] = Grade(name, status, letter, variant, marks, values["note"], values["digest"], told)
+                more = (values["note"], values["digest"], told, values["student"], values["work"])
+                found[values["digest"]] = Grade(name, status, letter, variant, marks, *more)
     return found
 
 
@@ -148,9 +156,11 @@ def unchanged(work: Sequence[Returned], table: Mapping[str, Grade]) -> tuple[lis
     return old, new
 
 
-def grade_all(
-    work: Sequence[Returned], path: Path, again: bool, run_all: Callable[[Sequence[Returned]], Iterable[Grade]]
-) -> tuple[list[Grade], int]:
+Started = Callable[[Returned], None]
+RunAll = Callable[[Sequence[Returned], Started], Iterable[Grade]]
+
+
+def grade_all(work: Sequence[Returned], path: Path, again: bool, run_all: RunAll) -> tuple[list[Grade], int]:
     """Grade what is new, and write the table after each notebook, so that an interrupted run goes on where it was.
 
     What is still to be graded stands in the table too: if the run is ended, it says which notebooks were in it.
@@ -163,12 +173,18 @@ def grade_all(
     table = read_table(path)
     grades, new = unchanged(work, {} if again else table)
     old = len(grades)
-    waiting = {one.name: Grade(one.name, FAILED, note=RUNNING) for one in new}
-    if waiting:
-        write_table([*grades, *waiting.values()], path)
-    for one in run_all(new):
-        grades.append(one)
-        waiting.pop(one.name, None)
-        write_table([*grades, *waiting.values()], path)
+    waiting = {one.name: Grade(one.name, FAILED, note=WAITING) for one in new}
+    lock = threading.Lock()
+
+    def started(one: Returned) -> None:
+        with lock:
+            waiting[one.name] = Grade(one.name, FAILED, note=RUNNING)
+            write_table([*grades, *waiting.values()], path)
+
+    for one in run_all(new, started):
+        with lock:
+            grades.append(one)
+            waiting.pop(one.name, None)
+            write_table([*grades, *waiting.values()], path)
     write_table(grades, path)
     return sorted(grades, key=lambda one: one.name), old

@@ -20,7 +20,7 @@ from kfcourse.laws import Array, Measurement, square_root
 from kfcourse.scenarios.navigation.dynamics import ROUNDING
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.reading import Formula
+from kfcourse.symbolic.reading import Formula, ModelError
 from kfcourse.symbolic.structure import Structure, linearised
 
 
@@ -100,6 +100,11 @@ class Sensor:
             raise ValueError(
                 f"{self.name}: data cannot arrive before they are captured; latency and jitter must not be negative, "
                 f"got {self.latency} and {self.jitter}"
+            )
+        if self.model.timed:
+            raise ModelError(
+                f"{self.name}: the meter depends on the step, {self.model.known.symbols}, but a sensor has moments of its own; "
+                "write what changes into the state"
             )
         if not (math.isfinite(self.clock.rate) and math.isfinite(self.clock.shift) and self.clock.rate > 0):
             raise ValueError(f"{self.name}: the clock must have a positive finite rate and a finite shift, got {self.clock}")

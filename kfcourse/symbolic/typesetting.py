@@ -65,9 +65,13 @@ def side_lines(side: Side, width: int = WIDTH, names: Mapping[Any, str] | None =
     whole = latex(side, names)
     if symbols(whole) <= width or not isinstance(side, sp.Add):
         return [whole]
+    return joined([latex(term, names) for term in _ordered(side.as_ordered_terms())], width)
+
+
+def joined(terms: Sequence[str], width: float = WIDTH) -> list[str]:
+    """The LaTeX of a sum, from that of its terms, in lines."""
     lines = [""]
-    for term in _ordered(side, side.as_ordered_terms()):
-        printed = latex(term, names)
+    for printed in terms:
         signed = printed if printed.startswith("-") or lines == [""] else "+ " + printed
         if lines[-1] and symbols(lines[-1] + signed) > width:
             lines.append("")
@@ -83,17 +87,18 @@ def latex(expression: Any, names: Mapping[Any, str] | None = None) -> str:
 
 class _Printer(LatexPrinter):
     def _as_ordered_terms(self, expr: sp.Add, order: str | None = None) -> list[sp.Expr]:
-        return _ordered(expr, super()._as_ordered_terms(expr, order=order))
+        return _ordered(super()._as_ordered_terms(expr, order=order))
 
 
-def _ordered(total: sp.Add, terms: Sequence[sp.Expr]) -> list[sp.Expr]:
+def _ordered(terms: Sequence[sp.Expr]) -> list[sp.Expr]:
     """Terms in the order people write them: lambda + K(y - S), not K(-S + y) + lambda.
 
-    Negative terms come last; a symbol that no other term contains comes first.
+    Negative terms come last; a symbol that is no factor of another term comes first, and so does the number of 1 + x^2.
     """
 
     def rank(term: sp.Expr) -> tuple[bool, bool]:
-        alone = term.is_Symbol and not any(other.has(term) for other in total.args if other != term)
+        bases = {factor.as_base_exp()[0] for other in terms if other != term for factor in sp.Mul.make_args(other)}
+        alone = (term.is_Symbol and term not in bases) or (term.is_Number and len(terms) == 2)
         return term.could_extract_minus_sign(), not alone
 
     return sorted(terms, key=rank)

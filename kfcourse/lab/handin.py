@@ -1,0 +1,332 @@
+"""The student's report (отчёт по лабораторной работе), in English or Russian: from the task to the conclusion.
+
+`write_handin` writes handin.tex and handin.html beside the figures of `write_report`.  The words of both languages are in
+handin.toml; formulas, numbers and verdicts come from the model and the comparison.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+
+import jinja2
+import numpy as np
+import sympy as sp
+from latex2mathml.converter import convert
+from matplotlib.figure import Figure
+
+from kfcourse.files import replacing, save
+from kfcourse.filters import EQUATIONS
+from kfcourse.filters import latex as equations_latex
+from kfcourse.lab import plots
+from kfcourse.lab.short_names import FILTERS, Structures
+from kfcourse.lab.variants import Variant
+from kfcourse.laws import Gaussian
+from kfcourse.montecarlo.comparison import EXACT, Comparison
+from kfcourse.montecarlo.statistics import Estimate
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
+from kfcourse.symbolic.structure import FUNCTION_LATEX, Structure
+from kfcourse.symbolic.writing import formula_latex
+
+LANGUAGES = ("en", "ru")
+STEPS = (0, 1, 2, 3, 5, 7, 10, 15, 20, 30, 50)  # of the tables
+COLUMNS = 4  # filters side by side in a table, so that it fits a page
+FIGURES = ("accuracy", "relative", "ranking", "consistency")
+
+# Numbers in the school's catalogue of structural functions, for the forms whose numbers the course gives.
+CATALOGUE = {
+    ("tau", "c*z"): 2,
+    ("Theta", "c**2*p + e**2*z**2"): 15,
+    ("Theta", "c**2*p + e**2*p + e**2*z**2"): 22,
+    ("h", "g*m"): 5,
+    ("G", "g"): 8,
+    ("F", "d*g**2 + f**2*m**4"): 16,
+    ("F", "3*d**2*f**2 + 6*d*f**2*m**2 + d*g**2 + f**2*m**4"): 20,
+}
+
+
+@dataclass(frozen=True)
+class Block:
+    """A piece of the report, of a kind: section, subsection, text, items, formulas, table or figure."""
+
+    kind: str
+    text: str = ""
+    lines: list[str] = field(default_factory=list)
+    rows: list[list[str]] = field(default_factory=list)
+
+
+def write_handin(variant: Variant, result: Comparison, folder: Path, language: str) -> list[Path]:
+    """Write handin.tex, handin.html and the figure that only they show; the other figures are those of `write_report`.
+
+    Raises
+    ------
+    ValueError
+        An unknown language.
+    """
+    if language not in LANGUAGES:
+        raise ValueError(f"the report is written in {' or '.join(LANGUAGES)}, not {language!r}")
+    words = tomllib.loads((resources.files("kfcourse.lab") / "handin.toml").read_text(encoding="utf-8"))[language]
+    blocks = list(_Report(variant, result, words).blocks())
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("kfcourse.lab"), trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    environment.filters |= {"mathml": lambda line: convert(line.replace("&", ""), display="block"), "inline": _inline_html}
+    written = [*_known_errors(result, folder)]
+    for name in ("handin.html", "handin.tex"):
+        text = environment.get_template(name + ".j2").render(blocks=blocks, words=words, variant=variant, language=language)
+        written.append(folder / name)
+        save(text, written[-1])
+    return written
+
+
+def _known_errors(result: Comparison, folder: Path) -> Iterator[Path]:
+    """The figure of the normalised errors, between a half and two: rare far trajectories reach beyond."""
+    figure = Figure(figsize=(7, 4.2), layout="constrained")
+    ax = plots.consistency(result, figure.add_subplot(), names=result.entrants)
+    ax.set_ylim(0.5, 2)
+    for kind, metadata in {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.items():
+        path = folder / f"handin-consistency.{kind}"
+        with replacing(path) as place:
+            figure.savefig(place, format=kind, metadata=metadata)
+        yield path
+
+
+class _Report:
+    """The blocks of the report, section by section."""
+
+    def __init__(self, variant: Variant, result: Comparison, words: dict[str, str]) -> None:
+        self.variant, self.result, self.words = variant, result, words
+        self.model: Model = result.model
+        self.structures = Structures(self.model)
+        self.kinds = [kind for kind in ("linearised", "gaussian") if any(name.endswith(kind) for name in result.available)]
+
+    def blocks(self) -> Iterator[Block]:
+        yield from self.task()
+        yield Block("section", self.words["functions"])
+        for kind in self.kinds:
+            yield from getattr(self, kind)(getattr(self.structures, kind))
+        yield from self.filters()
+        yield from self.experiment()
+        yield from self.conclusion()
+
+    def task(self) -> Iterator[Block]:
+        model, words = self.model, self.words
+        yield Block("section", words["task"])
+        yield Block("text", words["task_text"])
+        yield Block("formulas", lines=_lines(model.latex(values=False)))
+        values = ", ".join(f"${sp.latex(name)} = {float(value):g}$" for name, value in model.values.items())
+        if values:
+            yield Block("text", _filled(words["parameters"], values=values))
+        laws = (("x_0", model.prior), ("v_k", model.state_noise), ("w_k", model.meter_noise))
+        yield Block("formulas", lines=[rf"{name} &\sim {_law(law)}" for name, law in laws])
+        yield Block("text", words["independent"])
+        yield Block("text", _filled(words["find"], filters=", ".join(self.title(name) for name in self.result.entrants)))
+
+    def linearised(self, structure: Structure) -> Iterator[Block]:
+        model, words = self.model, self.words
+        yield Block("subsection", words["linearised"])
+        yield Block("text", words["linearised_text"])
+        yield Block("formulas", lines=words["linearised_formulas"].split("\n"))
+        if model.n == model.p == 1:
+            sides = ((model.state_equation[0], model.v, "a", "v"), (model.meter_equation[0], model.w, "b", "w"))
+            derivatives = [
+                rf"\frac{{\partial {letter}}}{{\partial {by}}} &= {formula_latex(formula.diff(symbol), model.x, noises)}"
+                for formula, noises, letter, noise in sides
+                for by, symbol in [("x", model.x[0]), *([(noise, noises[0])] if len(noises) == 1 else [])]
+            ]
+            yield Block("text", words["derivatives"])
+            yield Block("formulas", lines=derivatives)
+        yield from self.derived(structure)
+
+    def gaussian(self, structure: Structure) -> Iterator[Block]:
+        model, words = self.model, self.words
+        yield Block("subsection", words["gaussian"])
+        yield Block("text", words["gaussian_text"])
+        yield Block("formulas", lines=words["gaussian_formulas"].split("\n"))
+        if model.n == model.p == 1:
+            yield Block("text", words["conditional"])
+            yield Block("formulas", lines=self.conditional())
+            yield Block("text", words["recursion"])
+            yield Block("formulas", lines=[r"q_0 &= 1,\quad q_1 = m,\quad q_{n+1} = m\,q_n + n\,d\,q_{n-1}", *self.moments()])
+        yield from self.derived(structure)
+
+    def conditional(self) -> list[str]:
+        """Means of a, a^2, b, b^2 over their noise, at a fixed state."""
+        model, lines = self.model, []
+        for formula, noises, law, first, second in (
+            (model.state_equation[0], model.v, model.state_noise, r"\alpha", r"\gamma"),
+            (model.meter_equation[0], model.w, model.meter_noise, r"\beta", r"\eta"),
+        ):
+            over = GaussianMoments(
+                list(noises), [sp.nsimplify(value) for value in law.mean], sp.Matrix(law.cov).applyfunc(sp.nsimplify)
+            )
+            for letter, power in ((first, 1), (second, 2)):
+                try:
+                    mean = sp.expand(over.mean_of(formula**power))
+                except NoClosedForm:
+                    continue  # the mean over noise and state together has a closed form, this one has none
+                lines.append(f"{letter}(x) &= {formula_latex(mean, model.x)}")
+        return lines
+
+    def moments(self) -> list[str]:
+        """The moments q_2 ... that the meter and the object need, if they are polynomials."""
+        model = self.model
+        sides = (model.state_equation[0] ** 2, model.meter_equation[0] ** 2)
+        if not all(side.is_polynomial(model.x[0]) for side in sides):
+            return []
+        m, d = sp.symbols("m d", real=True)
+        highest = min(max(int(sp.degree(sp.expand(side), model.x[0])) for side in sides), 8)
+        q = [sp.S.One, m]
+        for n in range(1, highest):
+            q.append(sp.expand(m * q[n] + n * d * q[n - 1]))
+        return [f"q_{n} &= {formula_latex(q[n], (m, d))}" for n in range(2, highest + 1)]
+
+    def derived(self, structure: Structure) -> Iterator[Block]:
+        """The five functions, with their numbers in the catalogue where it has them."""
+        lines = _lines(structure.latex())
+        yield Block("text", self.words["result"])
+        yield Block("formulas", lines=lines)
+        numbers = [
+            f"${FUNCTION_LATEX[name]}$: {CATALOGUE[key]}"
+            for name in FUNCTION_LATEX
+            if self.model.n == self.model.p == 1
+            for key in [(name, str(sp.expand(structure[name])))]
+            if key in CATALOGUE
+        ]
+        if numbers:
+            yield Block("text", _filled(self.words["catalogue"], numbers=", ".join(numbers)))
+
+    def filters(self) -> Iterator[Block]:
+        words = self.words
+        yield Block("section", words["filters"])
+        yield Block("text", words["start"])
+        yield Block("formulas", lines=[r"\lambda_0 &= m_0,\qquad \Psi_0 = D_0"])
+        families = dict.fromkeys(name.split("-")[0].removesuffix("3") for name in self.result.entrants)
+        for family in (family for family in families if family in EQUATIONS):
+            yield Block("subsection", words[family])
+            if family == "duof":
+                yield Block("text", words["criteria"])
+                yield Block("formulas", lines=words["criteria_formulas"].split("\n"))
+            yield Block("formulas", lines=_lines(equations_latex(EQUATIONS[family])))
+
+    def experiment(self) -> Iterator[Block]:
+        result, words = self.result, self.words
+        yield Block("section", words["experiment"])
+        designs = _filled(words["designs"], designs=result.designs) if result.designs else ""
+        exact = _filled(words["exact"], runs=result.subset_runs) if result.has_bound else ""
+        yield Block(
+            "text", _filled(words["experiment_text"], runs=result.runs, steps=result.steps, seed=result.seed) + designs + exact
+        )
+        steps = [k for k in STEPS if k < result.steps]
+        for start in range(0, len(result.available), COLUMNS):
+            names = result.available[start : start + COLUMNS]
+            estimates = [result.error_variance(name) for name in names]
+            rows = [[f"${k}$", *(_power(one[k]) for one in estimates)] for k in steps]
+            yield Block("table", words["table"], ["$k$", *map(self.title, names)], rows)
+        for name in FIGURES:
+            yield Block("figure", words[f"figure_{name}"], ["handin-consistency" if name == "consistency" else name])
+
+    def conclusion(self) -> Iterator[Block]:
+        result, words = self.result, self.words
+        steps = [k for k in STEPS if k < result.steps]
+        verdicts = {k: self.verdict(k) for k in steps}
+        yield Block("section", words["conclusion"])
+        yield Block("text", words["verdict_text"])
+        heading = [words[key] for key in ("step", "best", "not_worse", "worst")]
+        rows = [
+            [f"${k}$", self.title(best), ", ".join(map(self.title, others)) or "–", self.title(worst)]
+            for k, (best, others, worst) in verdicts.items()
+        ]
+        yield Block("table", words["verdict_table"], heading, rows)
+        yield Block("items", lines=list(self.sentences()))
+
+    def verdict(self, k: int) -> tuple[str, list[str], str]:
+        """The most accurate at step k, those not significantly worse, and the least accurate."""
+        best, *others = self.result.leaders(k)
+        return best, others, max(self.result.entrants, key=lambda name: float(self.result.gap(name)[k].value))
+
+    def sentences(self) -> Iterator[str]:
+        """The conclusion: who leads and who is last, on how many steps, and how far from the bound."""
+        result, words = self.result, self.words
+        verdicts = [self.verdict(k) for k in range(result.steps)]
+        alone = [best for best, others, _ in verdicts if not others]
+        for name in sorted(set(alone), key=lambda one: -alone.count(one)):
+            where = _ranges([k for k, (best, others, _) in enumerate(verdicts) if best == name and not others])
+            yield _filled(words["leads"], name=self.title(name), where=where)
+        if not alone:
+            yield words["nobody_leads"]
+        unsure = [k for k, (_, others, _) in enumerate(verdicts) if others]
+        if unsure:
+            yield _filled(words["together"], where=_ranges(unsure))
+        last = [worst for _, _, worst in verdicts]
+        name = max(set(last), key=lambda one: (last.count(one), one))
+        yield _filled(words["last"], name=self.title(name), steps=last.count(name), all=result.steps)
+        (first, gap), *_, (final, largest) = result.ranking()
+        key = "mean_bound" if result.has_bound else "mean_control"
+        yield _filled(
+            words[key],
+            first=self.title(first),
+            gap=_percent(gap),
+            last=self.title(final),
+            largest=_percent(largest),
+            control=self.title(result.control),
+        )
+
+    def title(self, name: str) -> str:
+        entry = FILTERS[name]
+        exact = self.words["exact_title"] if name == EXACT else ""
+        return exact or (entry.russian if self.words["language"] == "ru" else entry.title)
+
+
+def _filled(text: str, **values: object) -> str:
+    """The text with {name} replaced by what the name stands for; braces of LaTeX stay."""
+    return re.sub("|".join(rf"\{{{name}\}}" for name in values), lambda found: str(values[found[0][1:-1]]), text)
+
+
+def _lines(block: str) -> list[str]:
+    body = re.sub(r"\\(begin|end)\{aligned\}", "", block)
+    return [line.strip() for line in body.split("\\\\\n")]
+
+
+def _law(law: Gaussian) -> str:
+    """N(0, 1); N(mean, covariance) with matrices for vectors."""
+    if law.mean.size == 1:
+        return rf"\mathcal{{N}}({law.mean.item():g},\; {law.cov.item():g})"
+    column = r" \\ ".join(f"{value:g}" for value in law.mean)
+    rows = r" \\ ".join(" & ".join(f"{value:g}" for value in row) for row in law.cov)
+    return rf"\mathcal{{N}}\left(\begin{{pmatrix}}{column}\end{{pmatrix}},\; \begin{{pmatrix}}{rows}\end{{pmatrix}}\right)"
+
+
+def _power(estimate: Estimate) -> str:
+    """A value and its standard error on one power of ten: (6.51 ± 0.07)·10^-4."""
+    value, error = float(estimate.value), float(estimate.standard_error)
+    if not (np.isfinite(value) and value):
+        return f"${value:g}$" if np.isfinite(value) else r"$\infty$"
+    power = int(np.floor(np.log10(abs(value))))
+    return rf"$({value / 10.0**power:.3f} \pm {error / 10.0**power:.3f})\cdot 10^{{{power}}}$"
+
+
+def _percent(estimate: Estimate) -> str:
+    return rf"${100 * float(estimate.value):.2f} \pm {100 * float(estimate.standard_error):.2f}$"
+
+
+def _ranges(steps: list[int]) -> str:
+    """1, 3-5, 8: runs of steps joined."""
+    parts: list[list[int]] = []
+    for k in steps:
+        if parts and k == parts[-1][1] + 1:
+            parts[-1][1] = k
+        else:
+            parts.append([k, k])
+    return ", ".join(f"${a}$" if a == b else f"${a}$–${b}$" for a, b in parts)
+
+
+def _inline_html(text: str) -> str:
+    """Text for HTML: special characters escaped, $formulas$ as MathML."""
+    pieces = re.split(r"\$([^$]+)\$", text)
+    return "".join(convert(piece) if i % 2 else str(jinja2.filters.do_forceescape(piece)) for i, piece in enumerate(pieces))

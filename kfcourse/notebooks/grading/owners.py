@@ -1,0 +1,130 @@
+"""Whose notebook is it?  And what a lecturer should look at: another variant, missing work, the same code twice."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import PurePosixPath
+
+from kfcourse.checks import sets
+from kfcourse.notebooks.course_list import Student
+from kfcourse.notebooks.grading.table import GRADED, OTHER, Grade
+from kfcourse.notebooks.grading.weights import points
+
+
+@dataclass
+class Person:
+    """A student, and what came back.
+
+    Attributes
+    ----------
+    student : Student
+    grades : dict
+        Letter of a set to the notebook that counts.
+    flags : list of str
+        What to look at.
+    failed : list of Grade
+        Notebooks that could not be graded.
+    """
+
+    student: Student
+    grades: dict[str, Grade] = field(default_factory=dict)
+    flags: list[str] = field(default_factory=list)
+    failed: list[Grade] = field(default_factory=list)
+
+
+def words(text: str) -> list[str]:
+    """Words of a name or path in small letters; how they are written apart does not matter."""
+    return re.sub(r"[\W_]+", " ", unicodedata.normalize("NFC", text)).casefold().split()
+
+
+def owner(grade: Grade, students: Sequence[Student]) -> Student | None:
+    """Whose notebook it is: by the names in its path, else by whom it was handed out to; None if that is not clear.
+
+    A student is found in a folder or file that has all words of the name, in any order: `group/Name`, or the folders of a
+    learning platform.  Of several, those whose group is in the path go first, then those with the longest names.
+    """
+    parts = [set(words(part)) for part in PurePosixPath(grade.name).with_suffix("").parts]
+    everything = set().union(*parts)
+    found = [one for one in students if any(set(words(one.name)) <= part for part in parts)]
+    if not found:
+        found = [one for one in students if grade.student == f"{one.name}, {one.group}"]
+    ranked = sorted(found, key=lambda one: (set(words(one.group)) <= everything, len(words(one.name))), reverse=True)
+    if len(ranked) > 1:
+        rank = [(set(words(one.group)) <= everything, len(words(one.name))) for one in ranked[:2]]
+        if rank[0] == rank[1]:
+            return None
+    return ranked[0] if ranked else None
+
+
+def of_folder(grade: Grade) -> Student:
+    """Whose notebook it is where there is no list: a folder is a student, or a file beside no other."""
+    path = PurePosixPath(grade.name)
+    if not path.parent.name:
+        return Student(path.stem, "", "")
+    group = path.parent.parent.as_posix()
+    return Student(path.parent.name, "" if group == "." else group, "")
+
+
+def people(grades: Sequence[Grade], students: Sequence[Student] | None = None) -> tuple[list[Person], list[Grade]]:
+    """Every student with the notebooks that came back, and the notebooks that belong to nobody.
+
+    `students` is the course list; without it every folder is a student.
+    """
+    persons = {one: Person(one) for one in students or ()}
+    strangers = []
+    for grade in sorted(grades, key=lambda one: one.name):
+        if grade.status == OTHER:
+            continue
+        whose = of_folder(grade) if students is None else owner(grade, students)
+        if whose is None:
+            strangers.append(grade)
+        else:
+            _hand_in(persons.setdefault(whose, Person(whose)), grade)
+    for person in persons.values():
+        asked = person.student.sets.split() or sorted({letter for one in persons.values() for letter in one.grades})
+        missing = [letter for letter in asked if letter not in person.grades]
+        if missing:
+            person.flags.append(f"missing: {', '.join(missing)}")
+    _same_code(persons.values())
+    return list(persons.values()), strangers
+
+
+def _hand_in(person: Person, grade: Grade) -> None:
+    student = person.student
+    if grade.status != GRADED:
+        person.failed.append(grade)
+        person.flags.append(f"{grade.name}: not graded: {grade.note}")
+        return
+    if student.variant and grade.variant != student.variant:
+        person.flags.append(f"set {grade.letter}: variant {grade.variant}, was given {student.variant}")
+    if grade.student and grade.student != f"{student.name}, {student.group}" and student.variant:
+        person.flags.append(f"set {grade.letter}: the notebook was handed out to {grade.student}")
+    if any(part.startswith(("look", "its variant")) for part in grade.note.split("; ")):
+        person.flags.append(f"set {grade.letter}: see the notes in the table of notebooks")
+    other = person.grades.get(grade.letter)
+    if other is not None:
+        person.flags.append(f"set {grade.letter}: came back more than once, the best counts")
+    if other is None or points(grade.marks) > points(other.marks):
+        person.grades[grade.letter] = grade
+
+
+def _same_code(persons: Iterable[Person]) -> None:
+    """Flag notebooks of different students whose code differs in nothing but comments and spaces."""
+    code: dict[tuple[str, str], list[Person]] = {}
+    for person in persons:
+        for letter, grade in person.grades.items():
+            if grade.work:
+                code.setdefault((letter, grade.work), []).append(person)
+    for (letter, _), same in code.items():
+        for person in same if len(same) > 1 else []:
+            others = ", ".join(one.student.name for one in same if one is not person)
+            person.flags.append(f"set {letter}: the same code as {others}")
+
+
+def known_sets(persons: Iterable[Person]) -> list[str]:
+    """Letters of the sets that came back, or should have."""
+    found = {letter for one in persons for letter in (*one.grades, *one.student.sets.split())}
+    return [letter for letter in sets() if letter in found]

@@ -1,0 +1,236 @@
+"""What comes of a course: tables of students and questions, a page for each student, and an overview with a picture."""
+
+from __future__ import annotations
+
+import ast
+import base64
+import csv
+import hashlib
+import io
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import markupsafe
+from matplotlib.figure import Figure
+
+from kfcourse.checks import sets
+from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG
+from kfcourse.files import save
+from kfcourse.notebooks.course_list import Student
+from kfcourse.notebooks.grading.owners import Person, known_sets, people, words
+from kfcourse.notebooks.grading.table import NOT_RUN, SIGNS, Grade, Told, cautious
+from kfcourse.notebooks.grading.weights import WEIGHTS, points, possible, questions
+
+KINDS = {  # of marks, as the picture has them: name and colour
+    PASSED: ("right", "#0072b2"),
+    WRONG: ("wrong", "#d55e00"),
+    UNUSABLE: ("not usable", "#e69f00"),
+    MISSING: ("not done", "#cccccc"),
+}
+# How students write Russian names in code.
+_LETTERS = "a b v g d e zh z i y k l m n o p r s t u f kh ts ch sh shch _ y _ e yu ya".replace("_", "").split(" ")
+LATIN = dict(zip(range(ord("а"), ord("я") + 1), _LETTERS, strict=True)) | {ord("ё"): "e"}
+MOST = 12  # mistakes in the picture
+
+
+def write_report(grades: Sequence[Grade], students: Sequence[Student] | None, folder: Path, held: str) -> list[Person]:
+    """Write students.csv, questions.csv, overview.html, unnamed.md and feedback/<group>/<name>.html.
+
+    Parameters
+    ----------
+    grades : sequence of Grade
+    students : sequence of Student or None
+        The course list; without it every folder is a student.
+    folder : Path
+    held : str
+        What kept the notebooks from doing harm.
+
+    Returns
+    -------
+    list of Person
+    """
+    persons, strangers = people(grades, students)
+    letters = known_sets(persons)
+    folder.mkdir(parents=True, exist_ok=True)
+    _table(student_rows(persons, letters), folder / "students.csv")
+    rows = question_rows(persons, letters)
+    _table(rows, folder / "questions.csv")
+    save(unnamed(persons, letters), folder / "unnamed.md")
+    for person in persons:
+        page = folder / "feedback" / person.student.folder.parent / f"{person.student.folder.name}.html"
+        page.parent.mkdir(parents=True, exist_ok=True)
+        save(feedback(person, letters), page)
+    save(overview(persons, strangers, letters, held), folder / "overview.html")
+    return persons
+
+
+def _table(rows: Sequence[dict[str, Any]], path: Path) -> None:
+    text = io.StringIO()
+    if rows:
+        writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(
+            {key: cautious(value) if isinstance(value, str) else value for key, value in row.items()} for row in rows
+        )
+    save("\ufeff" + text.getvalue(), path)
+
+
+def student_rows(persons: Iterable[Person], letters: Sequence[str]) -> list[dict[str, Any]]:
+    """A row for each student: points of each set, of each level, and in all; what to look at."""
+    rows = []
+    for person in persons:
+        marks = _marks(person)
+        row: dict[str, Any] = {"name": person.student.name, "group": person.student.group, "variant": person.student.variant}
+        row |= {f"set {letter}": points(person.grades[letter].marks) if letter in person.grades else "" for letter in letters}
+        row |= {level: points(marks, level) for level in WEIGHTS}
+        rows.append(row | {"points": points(marks), "of": possible(letters), "look at": "; ".join(person.flags)})
+    return rows
+
+
+def _marks(person: Person) -> dict[str, str]:
+    return {name: mark for grade in person.grades.values() for name, mark in grade.marks.items()}
+
+
+def question_rows(persons: Sequence[Person], letters: Sequence[str]) -> list[dict[str, Any]]:
+    """A row for each question: how many were right, wrong, not usable, not done; the mistakes, commonest first."""
+    rows = []
+    for name, question in questions(letters).items():
+        counts = _counts(persons, name)
+        told = [one for asked, one in _told(persons) if asked == name]
+        mistakes = Counter(mistake for one in told for mistake in one.mistakes).most_common()
+        row: dict[str, Any] = {"question": name, "title": question.title, "level": question.level}
+        row |= {label: counts[kind] for kind, (label, _) in KINDS.items()}
+        row["unnamed"] = sum(bool(one.code) for one in told)
+        rows.append(row | {"mistakes": ", ".join(f"{mistake} {count}" for mistake, count in mistakes)})
+    return rows
+
+
+def _told(persons: Iterable[Person]) -> Iterator[tuple[str, Told]]:
+    """Questions and what was said of the answers, of all students."""
+    for person in persons:
+        for grade in person.grades.values():
+            yield from grade.told.items()
+
+
+def _counts(persons: Iterable[Person], name: str) -> Counter[str]:
+    """Marks of a question; what was not run, or did not come, is not done."""
+    marks = (_marks(person).get(name, MISSING) for person in persons)
+    return Counter(MISSING if mark == NOT_RUN else mark for mark in marks)
+
+
+def feedback(person: Person, letters: Sequence[str]) -> str:
+    """The page of a student: every question with its mark, points, and what the check says; no solutions."""
+    found = []
+    for letter in letters:
+        grade = person.grades.get(letter)
+        rows = []
+        for question in sets()[letter].questions:
+            mark = grade.marks.get(question.name, NOT_RUN) if grade else NOT_RUN
+            told = grade.told.get(question.name) if grade else None
+            says = told.says if told else "" if grade is None else "not run: is there an error in a cell before it?"
+            rows.append((question, mark, WEIGHTS[question.level] * (mark == PASSED), WEIGHTS[question.level], says))
+        marks = grade.marks if grade else {}
+        found.append((sets()[letter], grade, rows, points(marks), possible([letter])))
+    marks = _marks(person)
+    levels = [(level, points(marks, level), possible(letters, level)) for level in WEIGHTS]
+    failed = [(one.name, one.note) for one in person.failed]
+    totals = {"points": points(marks), "of": possible(letters)}
+    return _page("feedback", person=person, sets=found, levels=levels, failed=failed, signs=SIGNS, **totals)
+
+
+def overview(persons: Sequence[Person], strangers: Sequence[Grade], letters: Sequence[str], held: str) -> str:
+    """The lecturer's page: picture, students with what to look at, questions with their mistakes."""
+    rows = question_rows(persons, letters)
+    students = sorted(
+        zip(student_rows(persons, letters), persons, strict=True), key=lambda row: (row[0]["group"], row[0]["name"])
+    )
+    picture = base64.b64encode(drawing(persons, letters)).decode() if letters else ""
+    pages = [f"feedback/{person.student.folder.as_posix()}.html" for _, person in students]
+    flagged = [(row["name"], person.flags) for row, person in students if person.flags]
+    return _page(
+        "overview",
+        students=[(row, page) for (row, _), page in zip(students, pages, strict=True)],
+        flagged=flagged,
+        strangers=strangers,
+        letters=letters,
+        questions=rows,
+        levels=list(WEIGHTS),
+        kinds=[label for label, _ in KINDS.values()],
+        weights=WEIGHTS,
+        picture=picture,
+        held=held,
+    )
+
+
+def _page(name: str, **values: Any) -> str:
+    environment = jinja2.Environment(loader=jinja2.PackageLoader("kfcourse.notebooks"), autoescape=True, trim_blocks=True)
+    environment.filters["coded"] = _coded
+    return environment.get_template(f"{name}.html.j2").render(**values)
+
+
+def _coded(text: str) -> markupsafe.Markup:
+    """What stands in backquotes as code."""
+    return markupsafe.Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(markupsafe.escape(text))))
+
+
+def drawing(persons: Sequence[Person], letters: Sequence[str]) -> bytes:
+    """PNG: how many got each question right, and the commonest mistakes."""
+    names = list(questions(letters))
+    counts = {name: _counts(persons, name) for name in names}
+    mistakes = Counter(f"{name} {one}" for name, told in _told(persons) for one in told.mistakes).most_common(MOST)
+    figure = Figure(figsize=(max(7, 0.22 * len(names) + 5), 3.8), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=(max(2.5, len(names) / 9), 2))
+    bottom = [0] * len(names)
+    for kind, (label, colour) in KINDS.items():
+        heights = [counts[name][kind] for name in names]
+        left.bar(range(len(names)), heights, 0.8, bottom, color=colour, label=label)
+        bottom = [low + height for low, height in zip(bottom, heights, strict=True)]
+    left.set_xticks(range(len(names)), names, rotation=90 if len(names) > 20 else 0)
+    left.set(ylabel="students", xlim=(-0.6, len(names) - 0.4))
+    left.yaxis.get_major_locator().set_params(integer=True)
+    figure.legend(*left.get_legend_handles_labels(), ncols=len(KINDS), loc="outside upper left", frameon=False)
+    labels, sizes = [label for label, _ in mistakes][::-1], [count for _, count in mistakes][::-1]
+    right.barh(range(len(sizes)), sizes, color=KINDS[WRONG][1])
+    right.set_yticks(range(len(sizes)), labels)
+    right.set_xlabel("students" if sizes else "no mistakes that have a name")
+    right.xaxis.get_major_locator().set_params(integer=True)
+    for axes in (left, right):
+        axes.spines[["top", "right"]].set_visible(False)
+    data = io.BytesIO()
+    figure.savefig(data, format="png", dpi=130)
+    return data.getvalue()
+
+
+def unnamed(persons: Sequence[Person], letters: Sequence[str]) -> str:
+    """Wrong answers that no known mistake explains, in an order that tells nothing, without names or comments."""
+    named = [f"{person.student.name} {person.student.group}".casefold() for person in persons]
+    written = [word for name in named for word in words(f"{name} {name.translate(LATIN)}")]
+    private = {word for word in written if len(word) > 2}
+    parts = ["# Wrong answers without a name", "For new known mistakes: names, comments and texts are taken out."]
+    for name, question in questions(letters).items():
+        found = {anonymous(told.code, private) for asked, told in _told(persons) if asked == name and told.code}
+        answers = sorted(filter(None, found), key=lambda code: hashlib.sha256(code.encode()).digest())
+        if answers:
+            parts += [f"## {name} {question.title}", *(f"```python\n{code}\n```" for code in answers)]
+    return "\n\n".join(parts) + "\n"
+
+
+def anonymous(code: str, private: Iterable[str]) -> str:
+    """The definitions of a cell without comments, texts and names of people; nothing if it is not Python."""
+    try:
+        tree = ast.parse(code)
+    except (SyntaxError, ValueError, RecursionError):
+        return ""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            node.value = "..."
+    kept: list[ast.stmt] = [
+        node for node in tree.body if isinstance(node, ast.FunctionDef | ast.Assign | ast.Import | ast.ImportFrom)
+    ]
+    text = ast.unparse(ast.Module(list[ast.stmt](kept), []))
+    pattern = "|".join(sorted(map(re.escape, private), key=len, reverse=True))
+    return re.sub(rf"(?i)(?<![^\W_])({pattern})(?![^\W_])", "somebody", text) if pattern else text

@@ -1,0 +1,189 @@
+"""Whose notebook it is, what it is worth, and the pages for students and lecturers."""
+
+import csv
+import io
+import re
+import zlib
+
+import pytest
+
+from kfcourse.checks import sets
+from kfcourse.checks.question import PASSED, UNUSABLE, WRONG
+from kfcourse.notebooks.course_list import Student, read_assignment, save_assignment
+from kfcourse.notebooks.grading.owners import of_folder, owner, people
+from kfcourse.notebooks.grading.report import anonymous, drawing, feedback, question_rows, student_rows, unnamed, write_report
+from kfcourse.notebooks.grading.table import NOT_RUN, Grade, Told
+from kfcourse.notebooks.grading.weights import WEIGHTS, points, possible
+
+IVANOV = Student("Иванов Иван", "РТ-1", "53", "b c")
+PETROVA = Student("Петрова Анна", "РТ-1", "20", "b c")
+OTHER = Student("Иванов Иван", "РТ-2", "7", "b c")
+COURSE = [IVANOV, PETROVA, OTHER]
+
+
+def graded(name, letter="b", variant="53", passed=(), student="", work="", note="", **told):
+    marks = {one.name: PASSED if one.name in passed else NOT_RUN for one in sets()[letter].questions}
+    told |= {one: Told("right") for one in passed}
+    marks |= {one: WRONG for one, said in told.items() if said.says != "right"}
+    return Grade(name, "graded", letter, variant, marks, note, name, told, student, work)
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(
+    ("name", "student", "expected"),
+    [
+        ("РТ-1/Иванов-Иван/b-aof.ipynb", "", IVANOV),
+        ("РТ-2/Иванов-Иван/b-aof.ipynb", "", OTHER),
+        ("rt/Иван Иванов_1234_assignsubmission_file_/x.ipynb", "", None),  # two of that name, and no group
+        ("Анна ПЕТРОВА_77_assignsubmission_file_/x.ipynb", "", PETROVA),
+        ("b-Петрова-Анна.ipynb", "", PETROVA),
+        ("b-aof.ipynb", "Петрова Анна, РТ-1", PETROVA),
+        ("Петрова/b.ipynb", "", None),
+        ("b-aof.ipynb", "Nobody, РТ-1", None),
+    ],
+)
+def test_whose_notebook(name, student, expected):
+    assert owner(graded(name, student=student), COURSE) == expected
+
+
+def test_flags():
+    grades = [
+        graded("РТ-1/Иванов Иван/b.ipynb", variant="7", work="x"),
+        graded(
+            "РТ-1/Петрова Анна/b.ipynb", variant="20", work="x", student="Иванов Иван, РТ-1", note="look at cell 3: import os"
+        ),
+        graded("РТ-1/Петрова Анна/c.ipynb", "c", variant="20", passed=["c1"]),
+        graded("РТ-1/Петрова Анна/c (1).ipynb", "c", variant="20", passed=["c1", "c2"]),
+        Grade("РТ-2/Иванов Иван/b.ipynb", "not graded", note="it killed its process"),
+        Grade("x.ipynb", "not graded", note="not JSON"),
+        Grade("notes.ipynb", "not an exercise notebook"),
+    ]
+    (one, two, three), strangers = people(grades, COURSE)
+    assert one.flags == ["set b: variant 7, was given 53", "missing: c", "set b: the same code as Петрова Анна"]
+    assert two.flags == [
+        "set b: the notebook was handed out to Иванов Иван, РТ-1",
+        "set b: see the notes in the table of notebooks",
+        "set c: came back more than once, the best counts",
+        "set b: the same code as Иванов Иван",
+    ]
+    assert points(two.grades["c"].marks) == 3
+    assert three.flags == ["РТ-2/Иванов Иван/b.ipynb: not graded: it killed its process", "missing: b, c"]
+    assert [grade.name for grade in strangers] == ["x.ipynb"]
+
+
+def test_without_a_list_a_folder_is_a_student():
+    grades = [graded("РТ-1/A/b.ipynb"), graded("РТ-1/A/c.ipynb", "c"), graded("B.ipynb")]
+    assert [of_folder(one) for one in grades] == [Student("A", "РТ-1", "")] * 2 + [Student("B", "", "")]
+    persons, strangers = people([*grades, Grade("n.ipynb", "not an exercise notebook")])
+    found = [(one.student.name, sorted(one.grades), one.flags) for one in persons]
+    assert found == [("B", ["b"], ["missing: c"]), ("A", ["b", "c"], [])]
+    assert strangers == []
+
+
+@pytest.mark.quick
+def test_points_are_the_weights_of_the_levels():
+    assert possible("b") == sum(WEIGHTS[one.level] for one in sets()["b"].questions)
+    assert possible("abc") == sum(possible(letter) for letter in "abc") == sum(possible("abc", level) for level in WEIGHTS)
+    everything = {one.name: PASSED for one in sets()["b"].questions}
+    assert points(everything) == possible("b")
+    assert points(everything | {"b1": WRONG, "b2": UNUSABLE}) == possible("b") - WEIGHTS["warm-up"] - WEIGHTS["core"]
+    assert {one.level for one in sets().values() for one in one.questions} <= set(WEIGHTS)
+
+
+@pytest.fixture
+def written(tmp_path):
+    wrong = {
+        "b2": Told("not right. The `sign`: <b>look</b>", ("innovation-sign",)),
+        "b3": Told("not right.", (), "def step():\n    return 1"),
+    }
+    grades = [
+        graded("РТ-1/Иванов Иван/b.ipynb", passed=["b1", "b5"], **wrong),
+        graded("РТ-1/Петрова Анна/b.ipynb", variant="20", passed=["b1"], b2=wrong["b2"]),
+    ]
+    persons = write_report(grades, COURSE, tmp_path, "bubblewrap")
+    return tmp_path, persons
+
+
+def table(path):
+    return list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8-sig"))))
+
+
+def test_a_row_for_each_student_and_question(written):
+    folder, _ = written
+    rows = table(folder / "students.csv")
+    assert [(row["name"], row["set b"], row["warm-up"], row["core"], row["stretch"], row["points"]) for row in rows] == [
+        ("Иванов Иван", "4", "1", "0", "3", "4"),
+        ("Петрова Анна", "1", "1", "0", "0", "1"),
+        ("Иванов Иван", "", "0", "0", "0", "0"),
+    ]
+    assert {row["of"] for row in rows} == {str(possible("bc"))}
+    rows = {row["question"]: row for row in table(folder / "questions.csv")}
+    assert [rows["b1"][key] for key in ("right", "wrong", "not done")] == ["2", "0", "1"]
+    assert [rows["b2"][key] for key in ("right", "wrong", "mistakes")] == ["0", "2", "innovation-sign 2"]
+    assert (rows["b3"]["unnamed"], rows["b3"]["mistakes"]) == ("1", "")
+    assert len(rows) == len(sets()["b"].questions) + len(sets()["c"].questions)
+
+
+def test_pages(written):
+    folder, _ = written
+    page = (folder / "feedback" / "РТ-1" / "Иванов-Иван.html").read_text(encoding="utf-8")
+    assert "<b>4</b> of 17 points" in page
+    assert "The <code>sign</code>: &lt;b&gt;look&lt;/b&gt;" in page  # nothing of a student's becomes HTML
+    assert "Nothing came back." in page  # of set c
+    assert (folder / "feedback" / "РТ-2" / "Иванов-Иван.html").exists()
+    page = (folder / "overview.html").read_text(encoding="utf-8")
+    links = re.findall(r'href="([^"]+)"', page)
+    assert len(links) == 3 and all(link.isascii() for link in links)
+    assert "Sandbox: bubblewrap" in page and 'src="data:image/png;base64,' in page
+    assert "missing: c" in page
+
+
+def test_the_page_of_a_student_says_nothing_of_others(written):
+    _, persons = written
+    persons[0].flags.append("set b: the same code as Петрова Анна")
+    assert "Петрова" not in feedback(persons[0], "b")
+
+
+def test_unnamed_answers_are_anonymous(written):
+    folder, _ = written
+    assert "def step():\n    return 1" in (folder / "unnamed.md").read_text(encoding="utf-8")
+    code = """import numpy as np
+# Иванов
+def gain(x):
+    'Иванов'
+    ivanov_ivan, petr = 1, 2  # mine
+    return ivanov_ivan
+print("Ivanov")
+"""
+    told = {"b1": Told("no", (), code)}
+    persons, _ = people([graded("РТ-1/Иванов Иван/b.ipynb", **told)], COURSE)
+    text = unnamed(persons, "b")
+    assert not re.search("иван|ivanov|mine|print", text, re.IGNORECASE)
+    assert "somebody_somebody, petr = (1, 2)" in text
+    assert anonymous("%matplotlib inline", []) == ""
+
+
+def test_the_picture_shows_the_counts(written):
+    """Twice as many students, the same picture but for the axis; another mark, another picture."""
+    _, persons = written
+    data = drawing(persons, "b")
+    assert data.startswith(b"\x89PNG")
+    persons[0].grades["b"].marks["b3"] = PASSED
+    assert zlib.crc32(drawing(persons, "b")) != zlib.crc32(data)
+    assert drawing([], "b").startswith(b"\x89PNG")
+
+
+def test_rows_of_nobody():
+    assert student_rows([], "b") == []
+    assert [row["not done"] for row in question_rows([], "b")] == [0] * 5
+
+
+def test_an_assignment_comes_back_as_it_was(tmp_path):
+    path = tmp_path / "assignment.csv"
+    save_assignment(COURSE, path)
+    assert read_assignment(path, ["1"]) == COURSE
+    path.write_text("name,group,variant\nA,1,53\nB,1,\n", encoding="utf-8")
+    with pytest.raises(ValueError, match="line 3: B has no variant"):
+        read_assignment(path, ["1"])
+    path.write_text("name,group\nA,1\n", encoding="utf-8")
+    assert [one.variant for one in read_assignment(path, ["7"])] == ["7"]
