@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
+import signal
 import sys
-from collections.abc import Iterator
+import threading
+import warnings
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 
 import click
 
 from kfcourse.checks.posing import unposed
-from kfcourse.files import save
+from kfcourse.files import is_standard_output, read_only, save
+from kfcourse.lab.admission import admissions, on_trial, without_failing
+from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.grammar import generate
+from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
 from kfcourse.lab.report import conclusions, write_json, write_report
-from kfcourse.lab.short_names import FILTERS, LAB, has_bound, lab_filters, title
+from kfcourse.lab.short_names import FILTERS, LAB, has_bound, title
 from kfcourse.lab.variants import VariantError, find_variant
-from kfcourse.montecarlo.comparison import EXACT
+from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.notebooks import commands
@@ -27,25 +35,59 @@ from kfcourse.symbolic.formula import FormulaError
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.reading import ModelError
 
+DERIVATION = 60.0  # seconds for the formulas of the filters
+
 _VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")
 
 DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with more, the lab takes longer
 
 
+class _Ended(BaseException):
+    """A signal asks this process to end."""
+
+
 @contextmanager
 def _clear_errors() -> Iterator[None]:
-    """What a user did wrong is said in a sentence, not in a traceback."""
+    """What went wrong is said in a sentence, not in a traceback; an end by a signal leaves no half files."""
     try:
-        yield
+        with _ended_by({signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)}), warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # NumPy's: what became infinite is reported by name
+            warnings.showwarning = lambda message, *_: click.echo(f"Warning: {message}", err=True)
+            yield
     except (VariantError, FormulaError, ModelError, NoClosedForm, NotFinite, ValueError) as error:
         raise click.ClickException(str(error)) from None
+    except MemoryError:
+        raise click.ClickException("this needs more memory than there is; take fewer --runs, --steps or --threads") from None
     except BrokenPipeError:
         raise
     except OSError as error:
-        raise click.ClickException(f"{error.strerror or error}: {error.filename}") from None
+        where = f": {error.filename}" if error.filename else ""
+        remedy = "; make room, and run it again" if error.errno == errno.ENOSPC else ""
+        raise click.ClickException(f"{error.strerror or error}{where}{remedy}") from None
     except KeyboardInterrupt:
         click.echo("Interrupted; files written before are as they were.", err=True)
         sys.exit(130)
+    except _Ended as ended:
+        click.echo("Ended by a signal; files written before are as they were.", err=True)
+        sys.exit(128 + ended.args[0])
+
+
+@contextmanager
+def _ended_by(numbers: Iterable[int]) -> Iterator[None]:
+    """Signals that end a process as errors, so that what was begun is cleared away."""
+
+    def end(number: int, _: FrameType | None) -> None:
+        raise _Ended(number)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, end) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 class _Group(click.Group):
@@ -163,7 +205,12 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
 @click.option("--same-ensemble", is_flag=True, help="Design DUOF, FOS and MFOS on the trajectories they are compared on, once.")
 @click.option("--threads", type=click.IntRange(min=1), default=2, show_default=True, help="Does not change the numbers.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]")
-@click.option("--json", "json_file", type=click.Path(path_type=Path), help="Also write the numbers to this file.")
+@click.option(
+    "--report", "language", type=click.Choice(LANGUAGES), help="Also write the student's report, handin.html and handin.tex."
+)
+@click.option(
+    "--json", "json_file", type=click.Path(path_type=Path), help="Also write the numbers to this file; - is standard output."
+)
 def lab(
     variant: str,
     variants_file: Path | None,
@@ -178,6 +225,7 @@ def lab(
     same_ensemble: bool,
     threads: int,
     out: Path | None,
+    language: str | None,
     json_file: Path | None,
 ) -> None:
     """Compare the filters on VARIANT (such as 53) and write the report."""
@@ -191,48 +239,107 @@ def lab(
         wanted = [*LAB, "aof-exact"] if exact_runs and has_bound(model) else list(LAB)
     else:
         wanted = [name.strip() for name in names.split(",") if name.strip()]
-    filters = lab_filters(model, wanted)
+    found = admissions(model, wanted, seconds=DERIVATION)
+    refused = {one.name: one.reason for one in found if one.one is None}
+    if len(refused) == len(found):
+        raise click.ClickException(
+            "; ".join(f"{name}: {reason}" for name, reason in refused.items())
+            or "give at least one filter: --filters duof,aof-gaussian"
+        )
     folder = out or Path("lab-" + re.sub(r"[^\w.-]+", "-", chosen.name))  # no folder but this one
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
-    result = compare(
-        filters,
-        model,
-        runs,
-        steps,
-        seed,
-        subset_runs=exact_runs,
-        subset_seconds=exact_seconds,
-        designs=1 if same_ensemble else designs or DESIGNS,
-        same_ensemble=same_ensemble,
-        wide=wide,
-        threads=threads,
+    result = without_failing(
+        [one.one for one in found if one.one],
+        lambda filters: compare(
+            filters,
+            model,
+            runs,
+            steps,
+            seed,
+            subset_runs=exact_runs,
+            subset_seconds=exact_seconds,
+            designs=1 if same_ensemble else designs or DESIGNS,
+            same_ensemble=same_ensemble,
+            wide=wide,
+            threads=threads,
+        ),
+        refused,
     )
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
+    to_error = json_file is not None and is_standard_output(json_file)
+    _tell(result, to_error)
     if json_file:
         write_json(chosen, result, json_file)
-    write_report(chosen, result, folder)
+    with _kept(folder):
+        write_report(chosen, result, folder)
+        if language:
+            write_handin(chosen, result, folder, language)
+    click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""), err=to_error)
+
+
+def _tell(result: Comparison, to_error: bool) -> None:
+    """The ranking; to standard error if standard output takes the numbers."""
     reference = EXACT if result.has_bound else result.control
-    click.echo(f"D_k above that of {title(reference)}, %, mean over the steps:")
+    lines = [f"D_k above that of {title(reference)}, %, mean over the steps:"]
     for name, gap in result.ranking():
-        click.echo(f"{title(name):<10} {100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}")
+        lines.append(f"{title(name):<10} {100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}")
     if result.subset_runs:
-        click.echo(f"Slow filters: on {result.subset_runs} of {result.runs} trajectories")
-    for sentence in conclusions(result):
-        click.echo(sentence)
-    click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""))
+        lines.append(f"Slow filters: on {result.subset_runs} of {result.runs} trajectories")
+    click.echo("\n".join([*lines, *conclusions(result)]), err=to_error)
+
+
+@contextmanager
+def _kept(folder: Path) -> Iterator[None]:
+    """What a report that fails leaves: its finished files, and no empty folder."""
+    try:
+        yield
+    except (OSError, MemoryError):
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split())[:200] or "no reason given"
+        raise click.ClickException(
+            f"the report in {folder} is not complete ({type(error).__name__}: {reason}); the ranking and the files written hold"
+        ) from None
+    finally:
+        if folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
+
+
+@main.command()
+@click.argument("places", nargs=-1, required=True, metavar="[FILE] VARIANT")
+@_VARIANTS
+@click.option("--trial/--no-trial", default=True, show_default=True, help="Also run each filter on a few hundred trajectories.")
+def filters(places: tuple[str, ...], variants_file: Path | None, trial: bool) -> None:
+    """Say of each filter whether VARIANT, of FILE or of the lab, admits it, and why not."""
+    if len(places) > 2 or (len(places) == 2 and variants_file):
+        raise click.UsageError("give a VARIANT, or a FILE of variants and a VARIANT of it")
+    chosen = find_variant(places[-1], Path(places[0]) if len(places) == 2 else variants_file)
+    found = admissions(chosen.model)
+    click.echo(f"Variant {chosen.name}: {chosen.title or chosen.model}", err=True)
+    click.echo(table_of_filters(on_trial(chosen.model, found) if trial else found))
 
 
 def _check_places(folder: Path, json_file: Path | None) -> None:
+    """ClickException if the report or the numbers cannot be written where they should; leaves nothing there."""
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise click.ClickException(
             f"the report cannot go to {folder}: {error.strerror}; choose another folder with --out"
         ) from None
-    if json_file and (json_file.is_dir() or not json_file.parent.is_dir()):
+    finally:
+        for place in made:
+            if place.is_dir():
+                place.rmdir()
+    if json_file is None or is_standard_output(json_file):
+        return
+    if json_file.is_dir() or not json_file.parent.is_dir():
         raise click.ClickException(f"the numbers cannot go to {json_file}: name a file in an existing folder with --json")
+    if read_only(json_file):
+        raise click.ClickException(f"{json_file} is read-only, and is not replaced: name another file with --json")
 
 
 main.add_command(commands.exercises)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,26 +18,57 @@ from pathlib import Path
 def replacing(target: Path) -> Iterator[Path]:
     """A path beside the target; what is written there becomes the target if the block ends well, and until then nothing changes.
 
-    What is no plain file, such as /dev/stdout or a pipe, is written to, not replaced.
+    What is no plain file, such as a pipe, is written to, not replaced.  A file that may not be written is not replaced either.
+
+    Raises
+    ------
+    OSError
+        The target is read-only, the disk is full, ...; its `filename` is the target.
     """
-    if target.is_symlink() or (target.exists() and not target.is_file()):
-        yield target
-        return
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix)
-    os.close(handle)
-    path = Path(name)
+    path = None
     try:
+        if target.is_symlink() or (target.exists() and not target.is_file()):
+            yield target
+            return
+        if read_only(target):
+            raise PermissionError(errno.EACCES, "is read-only, and is not replaced")
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix)
+        path = Path(name)
+        os.close(handle)
         yield path
-        path.chmod(0o644)
+        path.chmod(target.stat().st_mode & 0o777 if target.exists() else 0o644)
         path.replace(target)
+    except OSError as error:
+        error.filename = str(target)  # a full disk has no name, and that of the other file helps nobody
+        raise
     finally:
-        path.unlink(missing_ok=True)
+        if path is not None:
+            path.unlink(missing_ok=True)
+
+
+def read_only(target: Path) -> bool:
+    """Whether a file is there that may not be written; an administrator's rights do not count against its mode."""
+    return target.is_file() and (not target.stat().st_mode & 0o222 or not os.access(target, os.W_OK))
 
 
 def save(text: str, target: Path) -> None:
-    """Write a text file completely or not at all."""
+    """Write a text file completely or not at all; to standard output if that is what the target is."""
+    if is_standard_output(target):
+        print(text, flush=True)  # a second way to the same file would write over what is printed
+        return
     with replacing(target) as path:
         path.write_text(text, encoding="utf-8")
+
+
+def is_standard_output(target: Path) -> bool:
+    """Whether a path leads to where this process prints: "-", /dev/stdout, or the file that its output is directed to."""
+    if str(target) == "-":
+        return True
+    try:
+        there, here = target.stat(), os.fstat(sys.stdout.fileno())
+    except (OSError, ValueError, AttributeError):  # no such file; or no real output, as in a notebook
+        return False
+    return os.path.samestat(there, here) and not os.path.samestat(there, os.stat(os.devnull))
 
 
 @lru_cache(maxsize=1)

@@ -1,18 +1,25 @@
 """The command line, as a student uses it and misuses it."""
 
+import errno
 import json
 import math
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import time
+import warnings
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
-from kfcourse import cli
-from kfcourse.lab.short_names import FILTERS, LAB
+from kfcourse import cli, compare
+from kfcourse.files import save
+from kfcourse.lab import report
+from kfcourse.lab.short_names import FILTERS, LAB, lab_filters
+from kfcourse.lab.variants import find_variant
 
 QUICK = ("--runs", "400", "--steps", "4", "--exact-runs", "0")
 EXAMPLE = """
@@ -250,8 +257,36 @@ def test_the_exact_filter_alone_asks_for_a_fast_one(call):
 
 
 def test_a_model_without_closed_form_names_the_term_and_the_way_out(call, no_computation):
-    line = refused(call("lab", "tan", *QUICK, "--variants", "mine.toml"), "tan(x)", "aof-gaussian")
+    names = "aof-gaussian,fos-gaussian"
+    line = refused(call("lab", "tan", *QUICK, "--variants", "mine.toml", "--filters", names), "tan(x)", "aof-gaussian")
     assert "unscented" in line or "gauss_hermite" in line
+
+
+def test_filters_that_the_model_does_not_admit_are_left_out_with_the_reason(call, tmp_path):
+    result = call("lab", "tan", *QUICK, "--variants", "mine.toml", "--out", "r", "--json", "r.json")
+    assert result.exit_code == 0
+    for name in ("GAOF", "GFOS", "GMFOS"):
+        assert f"{name} left out: the package knows no closed-form Gaussian mean of the term tan(x)" in result.output
+    numbers = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))
+    assert set(numbers["left_out"]) == {"aof-gaussian", "fos-gaussian", "mfos-gaussian"}
+    assert set(numbers["error_variance"]) == {"aof-linearised", "duof", "fos-linearised", "mfos-linearised"}
+    page = (tmp_path / "r" / "report.html").read_text(encoding="utf-8")
+    assert "GAOF left out:" in page and "Which of them this model admits" in page
+    assert "<td>UKF</td><td>poor</td>" in page and "<td>GHKF</td>" in page
+    assert call("lab", "20", *QUICK, "--filters", "duof,aof-exact", "--out", "s").exit_code == 0
+
+
+def test_filters_lists_which_are_admissible(call):
+    result = call("filters", "mine.toml", "tan", "--no-trial")
+    assert result.exit_code == 0
+    lines = {line.split()[0]: line for line in result.output.splitlines() if line.split()[0] in FILTERS}
+    assert list(lines) == list(FILTERS)
+    assert " no " in lines["aof-gaussian"] and "tan(x)" in lines["aof-gaussian"] and lines["duof"].split()[-1] == "yes"
+    assert call("filters", "tan", "--variants", "mine.toml", "--no-trial").output == result.output
+    assert "aof-exact" in call("filters", "53", "--no-trial").output
+    refused(call("filters", "nothing.toml", "tan"), "nothing.toml")
+    refused(call("filters", "mine.toml", "none"), "no variant 'none'")
+    assert call("filters", "a", "b", "c").exit_code == call("filters").exit_code == 2
 
 
 def test_the_way_out_is_open(call, no_report):
@@ -297,7 +332,6 @@ def test_impossible_numbers_are_refused(call, no_computation, option):
     assert "Traceback" not in result.output
 
 
-@pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")  # the overflow is the point
 def test_a_failing_run_leaves_the_report_that_was_there(call, tmp_path):
     assert call("lab", "53", *QUICK, "--out", "report", "--json", "n.json").exit_code == 0
     before = snapshot(tmp_path)
@@ -307,19 +341,187 @@ def test_a_failing_run_leaves_the_report_that_was_there(call, tmp_path):
     assert snapshot(tmp_path) == before
 
 
-def test_an_interrupt_leaves_the_report_that_was_there(call, tmp_path, monkeypatch):
+@pytest.fixture(params=["interrupt", "signal"])
+def end_by(request, monkeypatch):
+    """Have the computation ended by the stop key or by a signal; the exit code of that."""
+    number = signal.SIGINT if request.param == "interrupt" else signal.SIGTERM
+
+    def arranged():
+        monkeypatch.setattr(cli, "compare", lambda *_, **__: signal.raise_signal(number))
+        return 128 + number
+
+    return arranged
+
+
+def test_an_end_leaves_the_report_that_was_there(call, tmp_path, end_by):
     assert call("lab", "53", *QUICK, "--out", "report", "--json", "n.json").exit_code == 0
     before = snapshot(tmp_path)
-
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(cli, "compare", interrupted)
+    code = end_by()
     result = call("lab", "53", *QUICK, "--out", "report", "--json", "n.json")
-    assert result.exit_code == 130
-    assert "Interrupted" in result.output
+    assert result.exit_code == code
+    assert "files written before are as they were" in result.output
     assert snapshot(tmp_path) == before
+
+
+def test_an_end_leaves_no_folder(call, tmp_path, end_by):
+    code = end_by()
+    before = sorted(tmp_path.iterdir())
+    assert call("lab", "53", *QUICK, "--out", "some/where/new").exit_code == code
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_the_way_signals_are_met_is_restored(call):
+    before = signal.getsignal(signal.SIGTERM)
+    assert call("variants").exit_code == 0
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_formulas_that_are_not_found_in_time_are_refused_with_a_way_out(call, no_computation, monkeypatch, tmp_path):
+    product = "*".join(f"(x + {k})" for k in range(23))
+    table = f'[variants.long]\nstate = "1e-30*{product} + v"\nmeter = "x + w"\n'
+    (tmp_path / "long.toml").write_text(table, encoding="utf-8")
+    monkeypatch.setattr(cli, "DERIVATION", 0.5)
+    start = time.monotonic()
+    arguments = ("lab", "long", *QUICK, "--variants", "long.toml", "--filters", "aof-gaussian")
+    line = refused(call(*arguments), "aof-gaussian: its formulas", "aof-unscented")
+    assert time.monotonic() - start < 20
+    assert "simplify" in line
+
+
+def spaced(page):
+    """The page's text with plain spaces, as MathML has others."""
+    return page.read_text(encoding="utf-8").replace("&#x000A0;", " ")
+
+
+def test_formulas_too_long_to_print_are_left_out_of_the_report(call, tmp_path, monkeypatch):
+    monkeypatch.setattr(report, "LONGEST", 100)
+    assert call("lab", "53", *QUICK, "--filters", "aof-gaussian,duof", "--out", "a").exit_code == 0
+    html = spaced(tmp_path / "a" / "report.html")
+    assert re.search(r"They are too long to print: \d\d\d+ characters of LaTeX", html)
+    monkeypatch.setattr(report, "FORMULAS", 0.0)
+    assert call("lab", "53", *QUICK, "--filters", "aof-gaussian,duof", "--out", "b").exit_code == 0
+    assert "They are not written within 0 s" in spaced(tmp_path / "b" / "report.html")
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (MemoryError(), ("more memory than there is", "--runs")),
+        (OSError(errno.ENOSPC, "No space left on device", "here"), ("No space left on device: here", "make room")),
+        (OSError(errno.ENOSPC, "No space left on device"), ("No space left on device; make room",)),
+    ],
+)
+def test_what_the_machine_has_not_is_said_in_a_line(call, monkeypatch, error, words):
+    def failing(*_, **__):
+        raise error
+
+    monkeypatch.setattr(cli, "compare", failing)
+    refused(call("lab", "53", *QUICK), *words)
+
+
+@pytest.mark.parametrize("error", [RuntimeError("double\nsubscript"), OSError(errno.ENOSPC, "No space left on device", "f")])
+def test_a_report_that_fails_keeps_ranking_and_numbers(call, tmp_path, monkeypatch, error):
+    def failing(variant, result, folder):
+        folder.mkdir()
+        (folder / "accuracy.svg").write_text("finished", encoding="utf-8")
+        raise error
+
+    monkeypatch.setattr(cli, "write_report", failing)
+    result = call("lab", "53", *QUICK, "--json", "n.json", "--filters", "aof-gaussian,duof")
+    line = refused(result)
+    assert ("RuntimeError: double subscript" in line) or ("No space left" in line)
+    assert "GAOF is" in result.output
+    assert set(json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]) == {"aof-gaussian", "duof"}
+    assert (tmp_path / "lab-53" / "accuracy.svg").read_text(encoding="utf-8") == "finished"
+
+
+def test_a_report_that_fails_at_once_leaves_no_empty_folder(call, tmp_path, monkeypatch):
+    def failing(variant, result, folder):
+        folder.mkdir()
+        raise RuntimeError
+
+    monkeypatch.setattr(cli, "write_report", failing)
+    refused(call("lab", "53", *QUICK), "is not complete")
+    assert not (tmp_path / "lab-53").exists()
+
+
+@pytest.mark.parametrize("target", ["-", "/dev/stdout", "same.json"])
+@pytest.mark.skipif(sys.platform == "win32", reason="no /dev/stdout")
+def test_numbers_and_ranking_to_one_place_lose_nothing(tmp_path, target):
+    """Standard output is a file, and takes the numbers: the file has them and nothing else."""
+    lab = [sys.executable, "-m", "kfcourse", "lab", "53", *QUICK, "--filters", "aof-gaussian,duof", "--json", target]
+    with (tmp_path / "same.json").open("w", encoding="utf-8") as out:
+        done = subprocess.run(lab, cwd=tmp_path, stdout=out, stderr=subprocess.PIPE, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    assert set(json.loads((tmp_path / "same.json").read_text(encoding="utf-8"))["error_variance"]) == {"aof-gaussian", "duof"}
+    assert "GAOF is" in done.stderr and "Report: " in done.stderr
+
+
+def test_a_read_only_file_of_numbers_is_not_replaced(call, no_computation, tmp_path):
+    (tmp_path / "n.json").write_text("mine", encoding="utf-8")
+    (tmp_path / "n.json").chmod(0o444)
+    refused(call("lab", "53", *QUICK, "--json", "n.json"), "n.json is read-only", "--json")
+    assert (tmp_path / "n.json").read_text(encoding="utf-8") == "mine"
+    with pytest.raises(PermissionError, match="read-only"):
+        save("other", tmp_path / "n.json")
+    assert (tmp_path / "n.json").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no modes")
+def test_a_replaced_file_keeps_its_mode(tmp_path):
+    (tmp_path / "n.json").write_text("old", encoding="utf-8")
+    (tmp_path / "n.json").chmod(0o600)
+    save("new", tmp_path / "n.json")
+    assert ((tmp_path / "n.json").read_text(encoding="utf-8"), (tmp_path / "n.json").stat().st_mode & 0o777) == ("new", 0o600)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_full_disk_is_named(call, no_report):
+    result = call("lab", "53", *QUICK, "--filters", "aof-gaussian,duof", "--json", "/dev/full")
+    refused(result, "No space left on device: /dev/full; make room")
+    assert "GAOF is" in result.output
+
+
+def test_a_file_without_end_is_no_file_of_variants(call, no_computation, tmp_path):
+    (tmp_path / "zeros.toml").write_bytes(bytes(2_000_000))
+    refused(call("lab", "53", *QUICK, "--variants", "zeros.toml"), "zeros.toml", "no file of variants")
+    if Path("/dev/zero").exists():
+        refused(call("lab", "53", *QUICK, "--variants", "/dev/zero"), "/dev/zero", "no file of variants")
+
+
+def test_a_warning_is_one_line_and_numpy_s_are_none(call, no_report):
+    result = call("lab", "tan", *QUICK, "--variants", "mine.toml", "--filters", "aof-unscented,duof")
+    (line,) = [line for line in result.output.splitlines() if "may be infinite" in line]
+    assert line.startswith("Warning: unscented: ")
+
+
+def test_a_noiseless_meter_warns_of_nothing(call, tmp_path):
+    table = '[variants.exact]\nstate = "0.9*x + 0.3*v"\nmeter = "x"\n'
+    (tmp_path / "exact.toml").write_text(table, encoding="utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model = find_variant("exact", tmp_path / "exact.toml").model
+        result = compare(lab_filters(model), model, 400, 5, seed=1, progress=False)
+    assert all(result.error_variance(name).value.max() < 1e-25 for name in LAB)  # rounding of a state of size 1
+    done = call("lab", "exact", *QUICK, "--variants", "exact.toml")
+    assert done.exit_code == 0 and "arning" not in done.output
 
 
 def test_one_exact_run_has_no_standard_error_and_is_refused(call):
     refused(call("lab", "53", "--runs", 100, "--steps", 2, "--exact-runs", 1), "at least 2")
+
+
+def test_designs_and_a_wider_start_can_be_chosen(call, no_report, tmp_path):
+    for name, options in {"a": (), "b": ("--designs", 1), "c": ("--wide", 2), "d": ("--same-ensemble",)}.items():
+        assert call("lab", "53", *QUICK, *options, "--json", f"{name}.json").exit_code == 0
+    a, b, c, d = (json.loads((tmp_path / f"{name}.json").read_text(encoding="utf-8")) for name in "abcd")
+    assert (a["designs"], b["designs"], d["designs"]) == (4, 0, 0)
+    assert a["error_variance"] == b["error_variance"]
+    assert all(x >= y for name in LAB for x, y in zip(a["standard_error"][name], b["standard_error"][name], strict=True))
+    assert a["error_variance"] != c["error_variance"]
+
+
+def test_one_ensemble_cannot_be_several(call, no_computation):
+    result = call("lab", "53", *QUICK, "--same-ensemble", "--designs", 3)
+    assert result.exit_code == 2
+    assert "--same-ensemble" in result.output

@@ -1,6 +1,7 @@
 """The lab: its variants, its filters by short name, whether a variant is well posed, figures and report.
 
 variants     `Variant`, read from variants.toml or a file like it
+admission    which filters a model admits, and why not
 short_names  the lab's filters: "duof" -> how to build it, "DUOF" in tables
 quality      is a variant well posed?  criteria: each criterion;  difficulty: how hard;  grammar: new ones
 maps         who leads, and how far from the bound, over two parameters

@@ -24,8 +24,10 @@ from kfcourse.files import replacing, save
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
+from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import FILTERS, Structures, title
 from kfcourse.lab.variants import Variant
+from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.statistics import Estimate, ratio
 from kfcourse.symbolic.model import Model
@@ -47,7 +49,8 @@ _FIGURES: dict[str, tuple[str, Callable[[Comparison, Axes], Axes]]] = {
 }
 
 
-_GAP_STEPS = (0, 1, 5)  # where the report says how far the filters are above the exact bound
+FORMULAS = 60.0  # seconds that each kind of structural functions may take
+LONGEST = 40_000  # characters of LaTeX: some ten pages
 
 
 @dataclass(frozen=True)
@@ -147,12 +150,14 @@ def conclusions(result: Comparison, confidence: float = 0.95) -> list[str]:
 
 
 def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
-    names = result.available
-    gap_steps = [k for k in _GAP_STEPS if k < result.steps] if result.has_bound else []
+    # the bound before those that it bounds
+    names = tuple(sorted(result.available, key=lambda name: name != EXACT))
+    compared = [name for name in result.entrants if result.has_bound or name != result.control]
     return {
         "variant": variant,
         "result": result,
         "left_out": [(title(name), reason) for name, reason in result.left_out.items()],
+        "admissions": [(title(one.name), one.verdict, one.says) for one in admissions(result.model)],
         "model": Section.of("Model", result.model.latex()),
         "structures": _structure_sections(result.model, names),
         "equations": _equation_sections(names),
@@ -160,17 +165,18 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
             (name, title(name) + (", the bound" if name == EXACT else ""), FILTERS[name].russian if name in FILTERS else "")
             for name in names
         ],
-        "table": _table(result, names),
+        "table": _table(result, [[_cell(one) for one in result.error_variance(name)] for name in names]),
+        "compared": [title(name) for name in compared],
+        "gaps": _table(result, [[_percent(one) for one in result.gap(name)] for name in compared]) if compared else [],
         "ranking": [
             (
                 title(name),
-                [_percent(mean), *(_percent(result.gap(name)[k]) for k in gap_steps)],
+                _percent(mean),
                 _between_designs(result, name),
             )
             for name, mean in result.ranking()
         ],
         "reference": title(EXACT if result.has_bound else result.control),
-        "gap_steps": gap_steps,
         "conclusions": conclusions(result),
         "figures": [(name, caption) for name, (caption, _) in _FIGURES.items()],
         "control": title(result.control),
@@ -180,7 +186,17 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
 def _structure_sections(model: Model, names: tuple[str, ...]) -> list[Section]:
     structures = Structures(model)
     kinds = [kind for kind in ("gaussian", "linearised") if any(name.endswith(kind) for name in names)]
-    return [Section.of(kind.capitalize(), getattr(structures, kind).latex()) for kind in kinds]
+    return [Section.of(kind.capitalize(), _printed(structures, kind)) for kind in kinds]
+
+
+def _printed(structures: Structures, kind: str) -> str:
+    """The formulas in LaTeX, if they can be found and read."""
+    try:
+        with time_limit(FORMULAS):
+            block = getattr(structures, kind).latex()
+    except OutOfTime:
+        return rf"\text{{They are not written within {FORMULAS:g} s.}}"
+    return block if len(block) <= LONGEST else rf"\text{{They are too long to print: {len(block)} characters of LaTeX.}}"
 
 
 def _equation_sections(names: tuple[str, ...]) -> list[Section]:
@@ -207,13 +223,12 @@ def _number(estimate: Estimate) -> dict[str, float]:
     return {"value": float(estimate.value), "standard_error": float(estimate.standard_error)}
 
 
-def _table(result: Comparison, names: tuple[str, ...]) -> list[tuple[int, list[str]]]:
-    """Rows (step, cells) of D_k with its standard error, for the first steps and then some."""
+def _table(result: Comparison, columns: list[list[str]]) -> list[tuple[int, list[str]]]:
+    """Rows (step, cells) of columns (steps,), for the first steps and then some."""
     steps = [k for k in (0, 1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 50, 100, 200, 500, 1000) if k < result.steps]
     if steps[-1] != result.steps - 1:
         steps.append(result.steps - 1)
-    estimates = [result.error_variance(name) for name in names]
-    return [(k, [_cell(estimate[k]) for estimate in estimates]) for k in steps]
+    return [(k, [column[k] for column in columns]) for k in steps]
 
 
 def _cell(estimate: Estimate) -> str:

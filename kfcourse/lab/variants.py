@@ -15,6 +15,8 @@ from kfcourse.symbolic.sense import nothing_random
 MODEL_KEYS = {"parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs", "interval", "angles"}
 VARIANT_KEYS = {"title", "state", "meter"} | MODEL_KEYS
 
+LARGEST_FILE = 1_000_000  # bytes; thousands of variants.  /dev/zero never ends
+
 
 class VariantError(ValueError):
     """A file of variants, or a variant in it, cannot be used; the message names the file and variant."""
@@ -46,7 +48,11 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     """
     where = "the shipped variants" if path is None else str(path)
     try:
-        text = (resources.files("kfcourse.lab") / "variants.toml" if path is None else Path(path)).read_text(encoding="utf-8")
+        with (resources.files("kfcourse.lab") / "variants.toml" if path is None else Path(path)).open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
+        if len(content) > LARGEST_FILE:
+            raise VariantError(f"{where} has more than {LARGEST_FILE:,} bytes: it is no file of variants; check the path")
+        text = content.decode("utf-8").replace("\r\n", "\n")
     except FileNotFoundError:
         raise VariantError(f"no file of variants at {where}; check the path") from None
     except (OSError, UnicodeDecodeError) as error:

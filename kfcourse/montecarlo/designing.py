@@ -20,7 +20,17 @@ from kfcourse.montecarlo.ensemble import Instant, Serial
 
 
 class NotFinite(ArithmeticError):
-    """A filter or trajectory left the finite numbers."""
+    """A filter or trajectory left the finite numbers.
+
+    Attributes
+    ----------
+    filter_name : str
+        Of the filter; empty if it was the model's trajectories.
+    """
+
+    def __init__(self, message: str, filter_name: str = ""):
+        super().__init__(message)
+        self.filter_name = filter_name
 
 
 def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: Executor | None = None) -> list[Filter]:
@@ -105,7 +115,8 @@ def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int, poo
                 if not all(np.isfinite(run.block.x_next).all() and np.isfinite(run.block.y).all() for run in runs):
                     raise NotFinite(f"step {k}: the model's trajectories become infinite, check its equations and parameters")
                 raise NotFinite(
-                    f"{designs[i].name}, step {k}: the design met infinite or NaN values; the model or this filter diverges"
+                    f"{designs[i].name}, step {k}: the design met infinite or NaN values; the model or this filter diverges",
+                    designs[i].name,
                 )
             fits[i].append(merged.regression(designs[i].model.n))
             asked.append(i)

@@ -7,7 +7,7 @@ common trajectories and any average over steps, and nothing is kept per trajecto
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -44,6 +44,10 @@ class Estimate:
         from scipy import stats  # slow to import
 
         return stats.t.ppf(0.5 + confidence / 2, self.freedom) * self.standard_error
+
+    def __iter__(self) -> Iterator[Estimate]:
+        """Along the first axis: the steps, one after the other."""
+        return (self[k] for k in range(len(self.value)))
 
     def __getitem__(self, index) -> Estimate:
         freedom = self.freedom[index] if isinstance(self.freedom, np.ndarray) and self.freedom.ndim else self.freedom

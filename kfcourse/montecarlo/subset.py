@@ -166,7 +166,7 @@ def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
     reason = f"step {step}: {one.name} became infinite or NaN although the trajectories are finite"
     if one.slow:
         raise _Failed(one.name, reason)
-    raise NotFinite(f"{reason}; leave it out or check the model")
+    raise NotFinite(f"{reason}; leave it out or check the model", one.name)
 
 
 def _first(ensemble: Ensemble, size: int) -> tuple[Array, Array, Array]:

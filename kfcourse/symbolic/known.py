@@ -55,6 +55,11 @@ class Known:
         """The same with the symbols of these equations."""
         return Known(tuple(s for s in known.values() if equations.has(s)), self.interval, self.inputs)
 
+    @property
+    def steps(self) -> float:
+        """For how many steps the inputs have values; infinite if the equations contain none."""
+        return min((len(values) for name, values in self.inputs.items() if symbol(name) in self.symbols), default=np.inf)
+
     def at(self, k: int) -> Array:
         """Values of `symbols` at step k, (m,); ModelError if an input ends before."""
         return np.array([self._value(s.name, k) for s in self.symbols])
@@ -200,7 +205,7 @@ def _check_variance(
     """ModelError if a variance is negative or not finite at one of the first steps."""
     numeric = sp.Matrix([variance.subs(parameters)])
     used = known.used(numeric, {name: s for name, s in symbols.items() if s not in parameters})
-    steps = min([CHECKED, *(len(values) for name, values in known.inputs.items() if symbol(name) in used.symbols)])
+    steps = int(min(CHECKED, used.steps))
     variance_at = Stepwise.compile(used, "variance", {}, {"variance": numeric}, [])
     with np.errstate(all="ignore"):
         for k in range(steps):

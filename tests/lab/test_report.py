@@ -285,3 +285,54 @@ def test_a_link_is_written_through_not_replaced(variants, result53, tmp_path):
     write_json(variants["53"], result53, link)
     assert link.is_symlink()
     assert json.loads((tmp_path / "target").read_text(encoding="utf-8"))["variant"] == "53"
+
+
+# --- the bound
+
+
+def test_the_exact_filter_is_reported_as_the_bound(variants, result53, no_figures, tmp_path):
+    data = json.loads(write_json(variants["53"], result53, tmp_path / "n.json").read_text(encoding="utf-8"))
+    for key in ("above_bound", "above_bound_standard_error", "mean_above_bound", "score"):
+        assert set(data[key]) == set(LAB), key
+    for name in LAB:
+        gap, mean = result53.gap(name), result53.mean_gap(name)
+        assert data["above_bound"][name] == gap.value.tolist()
+        assert data["above_bound_standard_error"][name] == gap.standard_error.tolist()
+        assert data["mean_above_bound"][name] == {"value": float(mean.value), "standard_error": float(mean.standard_error)}
+    write_report(variants["53"], result53, tmp_path)
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    tables = re.findall(r"<table>.*?</table>", html, re.DOTALL)
+    heads = [re.findall(r"<th>([^<]*)", table) for table in tables]
+    assert heads[0][:2] == ["k", "exact AOF, the bound"]
+    assert heads[1] == ["k", *map(title, LAB)]
+    cells = [re.findall(r"<td>([^<]*)</td>", row) for row in re.findall(r"<tr>(.*?)</tr>", tables[1], re.DOTALL)[1:]]
+    assert [int(row[0]) for row in cells] == [0, 1, 2, 3, 4, 5]
+    for row in cells:
+        for name, cell in zip(LAB, row[1:], strict=True):
+            value, error = map(float, cell.split(" ± "))
+            gap = result53.gap(name)[int(row[0])]
+            # two digits of the error are printed, and as many places of the value
+            assert error == pytest.approx(100 * float(gap.standard_error), rel=0.05)
+            assert abs(value - 100 * float(gap.value)) <= 0.05 * error
+    assert not re.search(r"<td>exact AOF</td>", tables[2])
+
+
+def test_without_it_the_control_is_the_zero_line(variants, result20, written, tmp_path):
+    data = json.loads(write_json(variants["20"], result20, tmp_path / "n.json").read_text(encoding="utf-8"))
+    assert "above_bound" not in data
+    html = (written["20"] / "report.html").read_text(encoding="utf-8")
+    assert "above that of GAOF" in html
+    assert "exact AOF" not in html
+
+
+def test_the_variance_between_designs_is_reported(variants, no_figures, tmp_path):
+    model = variants["53"].model
+    result = compare(lab_filters(model, ["aof-gaussian", "duof"]), model, 2000, 4, 1, design_runs=100, designs=3, progress=False)
+    data = json.loads(write_json(variants["53"], result, tmp_path / "n.json").read_text(encoding="utf-8"))
+    assert data["designs"] == 3
+    assert data["design_deviation"] == {"duof": result.design_error("duof").value.tolist()}
+    write_report(variants["53"], result, tmp_path)
+    for name in ("report.html", "report.tex"):
+        text = (tmp_path / name).read_text(encoding="utf-8")
+        assert "designed on 3 ensembles" in text
+        assert "between designs" in text

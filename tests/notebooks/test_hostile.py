@@ -11,7 +11,7 @@ import pytest
 from test_grade import FIXTURES, cell, solved
 from tricks import CELLS, FUNCTIONS, PROCESSES
 
-from kfcourse.checks import Exercise, exercise
+from kfcourse.checks import Exercise, exercise, sets
 from kfcourse.notebooks.grading import marking, running
 from kfcourse.notebooks.grading.assembly import Step
 from kfcourse.notebooks.grading.marking import Marking
@@ -127,6 +127,18 @@ def test_no_key_is_on_the_stage(staged):
     assert not {name for name in names if name.removesuffix(".py") in of_answers}
     texts = [path.read_text(encoding="utf-8") for path in staged.rglob("*.py")]
     assert not [text for text in texts if "from kfcourse.exercises.b_aof" in text]
+
+
+def test_what_the_masters_import_is_on_the_stage(staged):
+    lines = {
+        line
+        for one in sets().values()
+        for line in (one.folder / "statement.md").read_text(encoding="utf-8").splitlines()
+        if line.startswith(("import ", "from "))
+    }
+    assert len(lines) > 10
+    with kernel_in(Sandbox("none", tuple(map(str, answers()))), staged) as kernel:
+        assert {line: error for line in lines if (error := kernel.cell(line).error)} == {}
 
 
 def bubblewrap(staged, folder, hidden):

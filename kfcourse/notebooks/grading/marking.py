@@ -165,7 +165,7 @@ class Marking:
                 ran = kernel.cell(step.source, step.names)
             except Stopped as reason:
                 return [f"{step.where}: {reason}"]
-            if ran.error and step.own and ran.error[0] != "NotImplementedError":
+            if ran.error and (step.own or "import " in step.source) and ran.error[0] != "NotImplementedError":
                 self.errors.append(clean(f"{step.where}: {': '.join(ran.error)}"))
             for name in step.questions:
                 if ran.error:

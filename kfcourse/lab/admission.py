@@ -1,0 +1,236 @@
+"""Which filter may I use?  For a model and each filter: whether it can be built, and what is known of it before any comparison.
+
+A filter is refused if it cannot be built: no closed form, equations that cannot be differentiated, a vector state.  It is
+warned of if it can be built and will not do: points that do not integrate the equations or do not see a noise, a slope that is
+zero, a meter so sharp that hardly a particle survives, and what leaves the finite numbers on a trial.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+
+import numpy as np
+
+from kfcourse.filters import Design, Filter
+from kfcourse.filters.particles import particle
+from kfcourse.lab.short_names import FILTERS, Structures, title
+from kfcourse.limits import OutOfTime, time_limit
+from kfcourse.montecarlo.comparison import Comparison
+from kfcourse.montecarlo.designing import NotFinite
+from kfcourse.montecarlo.ensemble import simulate
+from kfcourse.montecarlo.experiment import compare
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.moments import NoClosedForm
+from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite, unscented
+from kfcourse.symbolic.reading import ModelError
+from kfcourse.symbolic.structure import Structure
+
+RUNS, STEPS, SLOW = 512, 20, 16  # of a trial; trajectories of the slow filters
+SECONDS = 10.0  # for them
+PARTICLES, FEW, OFTEN = 1000, 10.0, 0.05  # fewer effective particles than FEW at so many corrections are too few
+BLIND = 0.5  # of the unexplained variance, that must be seen
+TOO_LONG = (
+    "its formulas are not derived in the time they have, as the model's are too long; simplify them, or take filters without "
+    "formulas, aof-unscented and duof"
+)
+
+
+@dataclass(frozen=True)
+class Admission:
+    """What is known of a filter for a model.
+
+    Attributes
+    ----------
+    name : str
+        Short name.
+    one : Filter or Design or None
+        None if it cannot be built.
+    reason : str
+        Why not; empty if it can.
+    warnings : tuple of str
+        Why it will not do well, or not at all.
+    """
+
+    name: str
+    one: Filter | Design | None
+    reason: str = ""
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """ "no", "poor" (it can be built, and there are warnings) or "yes"."""
+        return "no" if self.one is None else "poor" if self.warnings else "yes"
+
+    @property
+    def says(self) -> str:
+        return "; ".join([self.reason] if self.reason else self.warnings)
+
+
+def admissions(model: Model, names: Sequence[str] = tuple(FILTERS), seconds: float | None = None) -> list[Admission]:
+    """Which of the filters can be built for the model, and what to know of them; each as the lab builds it.
+
+    With `seconds`, a filter whose formulas are not derived in that time, all together, is refused; each has a second at least.
+
+    Raises
+    ------
+    ValueError
+        An unknown name; the message lists the known ones.
+    """
+    unknown = [name for name in names if name not in FILTERS]
+    if unknown:
+        raise ValueError(f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(FILTERS)}")
+    structures = Structures(model)
+    end = None if seconds is None else time.monotonic() + seconds
+    return [_admitted(name, structures, end) for name in dict.fromkeys(names)]
+
+
+def _admitted(name: str, structures: Structures, end: float | None) -> Admission:
+    limit = nullcontext() if end is None else time_limit(max(end - time.monotonic(), 1.0))
+    with limit, warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", QuadratureWarning)
+        try:
+            one = FILTERS[name].build(structures)
+        except OutOfTime:
+            return Admission(name, None, TOO_LONG)
+        except (NoClosedForm, ModelError) as error:
+            return Admission(name, None, str(error))
+    found = [str(warning.message) for warning in caught]
+    with np.errstate(all="ignore"):
+        found += [text for kind, look in _LOOKS.items() if kind in name for text in look(structures)]
+    return Admission(name, one, "", tuple(found))
+
+
+def on_trial(model: Model, found: Sequence[Admission], seed: int = 1) -> list[Admission]:
+    """The same after a small comparison: a filter that leaves the finite numbers, or a slow one that fails, is warned of."""
+    last = int(min(STEPS, model.known.steps))
+    tried = []
+    for one in found:
+        failure = _failure(model, one.one, last, seed) if one.one else ""
+        tried.append(_warned(one, failure) if failure else one)
+    return tried
+
+
+def _warned(one: Admission, text: str) -> Admission:
+    return dataclasses.replace(one, warnings=(*one.warnings, text))
+
+
+def _failure(model: Model, one: Filter | Design, steps: int, seed: int) -> str:
+    """What goes wrong on a few hundred trajectories; empty if nothing."""
+    fast = [FILTERS["duof"].build(Structures(model))] if one.slow else []
+    try:
+        found = compare(
+            [*fast, one], model, RUNS, steps, seed, subset_runs=SLOW, subset_seconds=SECONDS, threads=1, progress=False
+        )
+    except (NotFinite, np.linalg.LinAlgError) as error:
+        with np.errstate(all="ignore"):
+            finite = np.isfinite(simulate(model, RUNS, steps, seed).x).all()
+        return f"on a trial of {RUNS} trajectories it left the finite numbers" if finite else str(error)
+    return found.left_out.get(one.name, "")
+
+
+def without_failing(
+    filters: Sequence[Filter | Design],
+    compared: Callable[[Sequence[Filter | Design]], Comparison],
+    left_out: Mapping[str, str],
+) -> Comparison:
+    """The comparison of the filters that do not fail, which names the others in `left_out`, beside those given.
+
+    A filter that leaves the finite numbers is taken out, and the comparison starts again.
+
+    Raises
+    ------
+    NotFinite
+        The model's trajectories become infinite, or no filter is left.
+    """
+    reasons = dict(left_out)
+    while True:
+        try:
+            found = compared(filters)
+        except NotFinite as error:
+            rest = [one for one in filters if one.name != error.filter_name]
+            if not error.filter_name or not [one for one in rest if not one.slow]:
+                raise
+            filters, reasons[error.filter_name] = rest, str(error)
+        else:
+            return dataclasses.replace(found, left_out={**reasons, **found.left_out})
+
+
+# ---------------------------------------------------------------- what can be seen without a trial
+
+
+def _flat(structures: Structures) -> Iterator[str]:
+    """A meter whose tangent at the prior's mean is level."""
+    model = structures.model
+    slope = structures.linearised.at(0).measure(model.prior.mean, model.prior.cov).G
+    for name, row in zip(model.measured, np.broadcast_to(slope, (model.p, model.n)), strict=True):
+        if not row.any():
+            yield f"the tangent of {name} at the prior's mean is level: the first measurement tells it nothing"
+
+
+def _blind(structures: Structures) -> Iterator[str]:
+    """Points on the axes, which see no product of state and noise, nor of two components."""
+    model = structures.model
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", QuadratureWarning)
+        try:
+            points, better = unscented(model), _reference(structures)
+        except ModelError:
+            return
+    mean, cov = model.prior
+    (_, theta), (_, _, _, R) = points.at(0).predict(mean, cov), points.at(0).measure(mean, cov)
+    (_, theta_of_all), (_, _, _, R_of_all) = better.at(0).predict(mean, cov), better.at(0).measure(mean, cov)
+    sides = (
+        ("the measurement that the state does not explain", R, R_of_all),
+        ("the next state", theta, theta_of_all),
+    )
+    for what, seen, there in sides:
+        share = np.diagonal(np.broadcast_to(seen, there.shape)) / np.diagonal(there)
+        if (worst := np.nanmin(share, initial=1.0)) < BLIND:
+            yield (
+                f"its points lie on the axes and see {100 * max(worst, 0.0):.0f} % of the variance of {what} at the prior law: "
+                "products such as x**2*w are 0 on them; aof-gauss-hermite sees them"
+            )
+
+
+def _reference(structures: Structures) -> Structure:
+    try:
+        return structures.gaussian
+    except NoClosedForm:
+        return gauss_hermite(structures.model, 7)
+
+
+def _starved(structures: Structures) -> Iterator[str]:
+    """A meter much sharper than the prediction: the bootstrap draws where the measurement says that nothing is."""
+    model = structures.model
+    steps = int(min(STEPS, model.known.steps))
+    one, y = particle(model, PARTICLES), simulate(model, SLOW, steps, seed=1).y
+    state, effective = one.init(SLOW), np.empty((steps, SLOW))
+    for k, measured in enumerate(y):
+        state = one.step(state, measured)
+        effective[k] = state.memory.effective
+    starved = (effective < FEW).mean()
+    if starved > OFTEN:
+        yield (
+            f"the meter is sharp: at {100 * starved:.0f} % of the corrections fewer than {FEW:.0f} of {PARTICLES} particles count"
+            + ("; use aof-exact" if model.n == model.p == 1 else "")
+        )
+
+
+# By a part of the short name.
+_LOOKS: dict[str, Callable[[Structures], Iterator[str]]] = {
+    "linearised": _flat,
+    "unscented": _blind,
+    "particle": _starved,
+}
+
+
+def table(found: Sequence[Admission]) -> str:
+    """What `kfcourse filters` prints: a line for each filter."""
+    rows = [(one.name, title(one.name), one.verdict, one.says) for one in found]
+    widths = [max(map(len, column)) for column in list(zip(*rows, strict=True))[:3]]
+    return "\n".join("  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[3]]).rstrip() for row in rows)

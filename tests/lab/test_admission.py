@@ -1,0 +1,129 @@
+"""Which filter may I use?  Refusals and warnings against what is known of the models, and the lab without the refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kfcourse.filters import aof, duof
+from kfcourse.lab.admission import admissions, on_trial, table, without_failing
+from kfcourse.lab.short_names import FILTERS, LAB
+from kfcourse.montecarlo.designing import NotFinite
+from kfcourse.montecarlo.experiment import compare
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.structure import gaussian
+
+pytestmark = pytest.mark.quick
+
+
+def verdicts(model, names=tuple(FILTERS)):
+    return {one.name: one for one in admissions(model, names)}
+
+
+def kinds(found, verdict):
+    return {name for name, one in found.items() if one.verdict == verdict}
+
+
+def test_a_linear_model_admits_all():
+    found = verdicts(Model.define("0.9*x + v", "x + w"))
+    assert kinds(found, "yes") == set(FILTERS) and all(one.says == "" for one in found.values())
+
+
+def test_variant_53_warns_of_points_on_the_axes_and_of_particles(variant53):
+    """UKF: x^2 w is 0 on both axes, so nothing of f^2 3 d^2 is seen.  Particles: near x = 0 the noise is f x^2."""
+    found = verdicts(variant53)
+    assert kinds(found, "no") == set() and kinds(found, "poor") == {"aof-unscented", "particle"}
+    assert "see 0 % of the variance of the measurement that the state does not explain" in found["aof-unscented"].says
+    assert found["particle"].says.startswith("the meter is sharp") and "use aof-exact" in found["particle"].says
+
+
+def test_what_has_no_closed_form_no_derivative_or_several_components_is_refused_with_the_reason():
+    found = verdicts(Model.define("0.9*x + v", "tan(x)/10 + w", prior={"variance": 0.01}))
+    gaussians = {name for name in FILTERS if name.endswith("gaussian")}
+    assert kinds(found, "no") == gaussians and "no closed-form Gaussian mean of the term tan(x)" in found["aof-gaussian"].says
+
+    found = verdicts(Model.define("0.9*x + v", "sign(x) + w"))
+    assert kinds(found, "no") == gaussians | {name for name in FILTERS if name.endswith("linearised")} | {"aof-exact"}
+    assert "not differentiable" in found["aof-linearised"].says and "jumps at a state" in found["aof-exact"].says
+    assert found["duof"].verdict == "yes"
+
+    found = verdicts(Model.define(["x1 + 0.1*x2", "x2 + v1"], "x1 + w1"))
+    assert kinds(found, "no") == {"aof-exact"} and "for scalar models" in found["aof-exact"].says
+
+    found = verdicts(Model.define("0.9*x + v", "x + w + w**2"))
+    assert kinds(found, "no") == {"aof-exact", "particle"} and "enters nonlinearly" in found["particle"].says
+
+
+def test_what_can_be_built_and_will_not_do_is_warned_of():
+    found = verdicts(Model.define("0.9*x + v", "x**2 + w"))
+    level = {name for name in FILTERS if name.endswith("linearised")}
+    assert level <= kinds(found, "poor") and "tangent of y at the prior's mean is level" in found["fos3-linearised"].says
+    growth = Model.define("x/2 + 25*x/(1 + x**2) + 8*cos(1.2*k) + v", "x**2/20 + w", prior={"variance": 5})
+    assert "with 5 points an axis" in verdicts(growth)["aof-gauss-hermite"].says
+    sharp = Model.define(["x1 + v1", "x2 + v2"], ["x1 + 0.001*w1", "x2 + w2"])
+    assert verdicts(sharp)["particle"].verdict == "poor" and "aof-exact" not in verdicts(sharp)["particle"].says
+
+
+def test_a_trial_finds_what_leaves_the_finite_numbers():
+    model = Model.define("0.9*x + 0.3*v", "x + x**3 + w")
+    found = on_trial(model, admissions(model, ["duof", "aof-exact"]))
+    assert [one.verdict for one in found] == ["yes", "yes"]
+    endless = Model.define("x**3 + v", "x + w")
+    (one,) = on_trial(endless, admissions(endless, ["duof"]))
+    assert one.verdict == "poor" and "trajectories become infinite" in one.says
+    short = Model.define("0.9*x + u + v", "x + w", inputs={"u": [1, 2, 3]})
+    assert [one.verdict for one in on_trial(short, admissions(short))] == ["yes"] * len(FILTERS)  # no longer than the input
+
+
+def test_a_trial_tells_a_filter_from_the_model():
+    model = Model.define("0.9*x + v", "x + w")
+    good = admissions(model, ["aof-gaussian"])[0]
+
+    def step(state, y):
+        return good.one.step(state, y * np.inf)
+
+    broken = replace(good, one=replace(good.one, step=step))
+    (one,) = on_trial(model, [broken])
+    assert one.verdict == "poor" and one.says == "on a trial of 512 trajectories it left the finite numbers"
+
+
+def test_an_unknown_filter_is_refused():
+    with pytest.raises(ValueError, match="unknown filter 'ekf'; known: aof-gaussian, "):
+        admissions(Model.define("x + v", "x + w"), ["ekf"])
+
+
+def test_a_line_for_each_filter():
+    found = admissions(Model.define("0.9*x + v", "sign(x) + w"), ["duof", "aof-exact"])
+    lines = table(found).splitlines()
+    assert lines[0].split() == ["duof", "DUOF", "yes"]
+    assert lines[1].startswith("aof-exact  exact AOF  no   Model(") and lines[1].endswith("unscented(model)")
+
+
+def test_a_comparison_goes_on_without_the_filters_that_fail():
+    """A filter that becomes infinite is named, and the comparison is that of the others."""
+    model = Model.define("0.9*x + 0.3*v", "x + w")
+
+    def broken(name):
+        good = aof(gaussian(model))
+
+        def step(state, y):
+            after = good.step(state, y)
+            mean = after.posterior.mean * (np.inf if state.step == 2 else 1.0)
+            return after._replace(posterior=after.posterior._replace(mean=mean))
+
+        return type(good)(name, model, good.init, step)
+
+    def compared(filters):
+        return compare(filters, model, 300, 4, 1, threads=1, progress=False)
+
+    good = [duof(model), aof(gaussian(model))]
+    found = without_failing([broken("one"), good[0], broken("two"), good[1]], compared, {"aof-exact": "reason"})
+    assert found.names == ("duof", "aof-gaussian") and list(found.left_out) == ["aof-exact", "one", "two"]
+    assert "one became infinite or NaN" in found.left_out["one"]
+    np.testing.assert_array_equal(found.error_variance("duof").value, compared(good).error_variance("duof").value)
+    with pytest.raises(NotFinite, match="every filter fails"):
+        without_failing([broken("two")], compared, {})
+    endless = Model.define("x**3 + v", "x + w")
+    with pytest.raises(NotFinite, match="trajectories become infinite"):
+        without_failing([duof(endless)], lambda f: compare(f, endless, 300, 20, 1, threads=1, progress=False), {})
+    assert set(LAB) <= set(FILTERS)
