@@ -91,10 +91,11 @@ def admissions(model: Model, names: Sequence[str] = tuple(FILTERS), seconds: flo
 
 def _admitted(name: str, structures: Structures, end: float | None) -> Admission:
     limit = nullcontext() if end is None else time_limit(max(end - time.monotonic(), 1.0))
-    with limit, warnings.catch_warnings(record=True) as caught:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", QuadratureWarning)
         try:
-            one = FILTERS[name].build(structures)
+            with limit:
+                one = FILTERS[name].build(structures)
         except OutOfTime:
             return Admission(name, None, TOO_LONG)
         except (NoClosedForm, ModelError) as error:

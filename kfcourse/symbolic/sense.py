@@ -42,10 +42,15 @@ def unfit(mean: Array, variances: Array) -> str:
     return ""
 
 
-def not_computable(equation: sp.MatrixBase, values: Mapping[sp.Symbol, sp.Expr]) -> str:
+def not_computable(equation: sp.MatrixBase, values: Mapping[sp.Symbol, sp.Expr], noise_means: Mapping[sp.Symbol, sp.Expr]) -> str:
     """Why an equation with the parameters' values in it cannot be computed with; empty if it can."""
     for formula in equation:
-        if problem := _unusable(formula.subs(values)):
+        try:
+            problem = _unusable(formula.subs(values))
+            formula.subs(values).subs(noise_means)  # as filters need it
+        except TypeError:  # SymPy's
+            problem = "compares what has no real value, with these parameters or where the noises are at their means"
+        if problem:
             return f"{_short(formula)} {problem}"
     return ""
 
@@ -76,7 +81,7 @@ def _unusable(formula: sp.Expr) -> str:
         if part.is_real is False or not (size.is_Rational or size.is_Float):
             return f"has no finite real value with these parameters: {_short(part)}"
         if size and not 1 / LARGEST <= size <= LARGEST:
-            return f"holds the number {sp.N(part, 3)} with these parameters, beyond 1e-100 to 1e100; change the units"
+            return f"holds the number {sp.N(part, 3)!s} with these parameters, beyond 1e-100 to 1e100; change the units"
     return ""
 
 
