@@ -61,6 +61,7 @@ def test_sizes_of_a_law(mean, variance, problem):
         ("x + exp(a)*exp(a)*v", "x + w", {"a": 300}, "state"),
         ("x + v*exp(a)", "x + w", {"a": 1e60}, "state"),
         ("x + v*log(a)", "x + w", {"a": -1}, "state"),
+        ("x + v*tan(a)", "x + w", {"a": 1e9}, "state"),
         ("x + v", "sqrt(a)*x + w", {"a": -1}, "meter"),
         ("x + v/(a - 1)", "x + w", {"a": 1}, "state"),
     ],
