@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import NamedTuple
@@ -99,15 +100,21 @@ def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Desig
 def exact(model: Model) -> Filter:
     """The exact AOF, by point masses where they reach, else by particles, whose own error does not enter the bound.
 
+    Where point masses fail in the middle of a comparison, particles take over (`Filter.instead`).
+
     Raises
     ------
     ModelError
         Neither can be had: there is no density of y given x.
     """
+    sampled = None
     try:
-        return pointmass(model)
+        sampled = particle(model, BOUND, name="aof-exact")
+        return dataclasses.replace(pointmass(model), instead=sampled)
     except ModelError:
-        return particle(model, BOUND, name="aof-exact")
+        if sampled is None:
+            raise
+        return sampled
 
 
 def has_exact(model: Model) -> bool:

@@ -18,10 +18,14 @@ FAR = 0.5  # excess over the bound, relative to it, from which on its tails are 
 
 @dataclass(frozen=True)
 class Subset:
-    """Sums of all filters, the slow ones last, over the first of the common trajectories."""
+    """Sums of all filters, the slow ones last, over the first of the common trajectories.
+
+    `replaced` tells why another filter ran instead of a slow one that failed: name to the reason.
+    """
 
     slow: list[str]
     sums: Sums
+    replaced: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,11 @@ class Comparison:
     def designs(self) -> int:
         """Ensembles that each of the designed filters was designed on; 0 if there is no such filter or one design only."""
         return len(self.replicas.sums) if self.replicas else 0
+
+    @property
+    def replaced(self) -> Mapping[str, str]:
+        """Slow filters that failed, and for which another one ran (`Filter.instead`): name to the reason."""
+        return {} if self.subset is None else self.subset.replaced
 
     @property
     def subset_runs(self) -> int:
