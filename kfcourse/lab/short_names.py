@@ -107,14 +107,14 @@ def exact(model: Model) -> Filter:
     ModelError
         Neither can be had: there is no density of y given x.
     """
-    sampled = None
     try:
-        sampled = particle(model, BOUND, name="aof-exact")
-        return dataclasses.replace(pointmass(model), instead=sampled)
+        found = pointmass(model)
     except ModelError:
-        if sampled is None:
-            raise
-        return sampled
+        return particle(model, BOUND, name="aof-exact")
+    try:
+        return dataclasses.replace(found, instead=particle(model, BOUND, name="aof-exact"))
+    except ModelError:  # without noise in the meter there are no weights
+        return found
 
 
 def has_exact(model: Model) -> bool:

@@ -292,10 +292,13 @@ class Comparison:
             counted = np.zeros(self.steps, dtype=bool)
             counted[steps] = below[steps] > 0
             share = counted / max(np.count_nonzero(counted), 1)
-        values = share * ratio(self._estimate(numerator).value, below, 0.0)
+        above = self._estimate(numerator).value
+        values = share * ratio(above, below, 0.0)
         inverse = ratio(np.ones_like(below), below, 0.0)
         linear = numerator.times(share * inverse).plus(denominator.times(-values * inverse))
         deviation = self._estimate(linear, total=steps is not None)
+        if steps is None:  # of nothing any part is infinitely much
+            values = np.where((below <= 0) & (above > 0), np.inf, values)
         return Estimate(values if steps is None else values.sum(), deviation.standard_error, deviation.freedom)
 
     def _estimate(self, terms: Terms, total: bool = False) -> Estimate:
