@@ -275,6 +275,8 @@ def lab(
     )
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
+    for name, reason in result.replaced.items():
+        click.echo(f"{title(name)} by particles: {reason}", err=True)
     to_error = json_file is not None and is_standard_output(json_file)
     _tell(result, to_error)
     if json_file:
