@@ -14,7 +14,7 @@ import sympy as sp
 
 from kfcourse.angles import TURN, Components, difference, wrapped
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.choices import jumps
+from kfcourse.symbolic.choices import decides, jumps
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
@@ -214,7 +214,7 @@ def _conditional(
     name: str, equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian, model: Model, *, noiseless: bool = False
 ) -> Stepwise:
     B = equation.jacobian(sp.Matrix(noise))
-    if B.has(*noise):
+    if B.has(*noise) or decides(equation, noise):
         raise ModelError(
             f"{list(equation)}: the noise enters nonlinearly, so there is no simple {name} density; "
             "the Gaussian filters (gaussian, unscented, gauss_hermite) do not need one"
