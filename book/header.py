@@ -41,6 +41,7 @@ class Chapter(SphinxDirective):
     def run(self) -> list[nodes.Node]:
         node = chapter_line("", **self.options)
         self.set_source_info(node)
+        self.env.metadata[self.env.docname]["minutes"] = self.options.get("minutes")
         return [node]
 
 

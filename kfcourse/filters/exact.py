@@ -179,7 +179,9 @@ def _in_batch(
 def nodes_for_kernels(law: ScalarDensities, found: Posteriors, count: int) -> Array:
     """How many nodes a posterior needs, (T,), that the next prediction be a sum of kernels that overlap.
 
-    If they are too many even for the finest grid, `FINE`: it will be interpolated.
+    If they are too many even for the finest grid, `FINE`: it will be interpolated.  The finest where some kernels overlap, and
+    others do not, as `exact_noise` then shares the mass.
     """
-    wanted = (count - 1) * apart(*law.kernel(found.x), found.mass) + 1
-    return np.where(wanted <= NODES[-1], wanted, FINE)
+    most, least = apart(*law.kernel(found.x), found.mass)
+    wanted = (count - 1) * most + 1
+    return np.where(wanted <= NODES[-1], wanted, np.where(least > 1, FINE, NODES[-1]))

@@ -29,8 +29,8 @@ SECTIONS = np.linspace(0, 1, 257)  # of a bracket, in the search for a zero
 SCALES = (0.5, 2.0, WIDTH)  # distances, in kernel sigmas, of panel borders from the prediction's own centres
 QUANTILES = np.array([0.02, 0.25, 0.5, 0.75, 0.98])  # of the posterior, where those centres are
 BORDER = 1e-10  # of the density at the ends of the support, relative: beyond them there must be nothing
-PUSHED = 100_000  # kernels of as much work as an integral over the noise
-WORK = 2e8  # nodes times kernels of a step: some seconds
+PUSHED = 20_000  # kernels of as much work as an integral over the noise
+WORK = 4e7  # nodes times kernels of a step: half a second
 ELEMENTS = 2**20  # of the largest array, 8 MB
 
 

@@ -58,7 +58,8 @@ def verified(
         Sides that are equal: expressions or matrices of SymPy.  A side that is a string of LaTeX is printed and not checked,
         so at least two others are needed then.  `sympy.Eq` is taken too, unless SymPy has already made it true or false.
     where : mapping of symbols to expressions
-        What printed symbols stand for; put in before the difference is taken, as often as it takes.
+        What printed symbols stand for (a `MatrixSymbol`: its entries); put in before the difference is taken, as often as it
+        takes.
     digits : int, optional
         Compare numbers instead, at the points `at`, to so many digits: for integrals and sums that SymPy does not take.
     at : sequence of mappings of symbols to numbers, optional

@@ -16,6 +16,7 @@ import sympy as sp
 from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.precedence import PRECEDENCE
 
+from kfcourse.symbolic.formula import NO_NUMBERS
 from kfcourse.symbolic.reading import ModelError
 
 
@@ -76,6 +77,12 @@ def compile_function(
         `function(*arrays)`: leading axes broadcast.  An output that no argument enters comes back
         without leading axes, the same for every trajectory.
     """
+    for expression in (*outputs.values(), *(definitions or {}).values()):
+        if expression.has(*NO_NUMBERS):
+            raise ModelError(
+                f"{name}: no finite real value, as at the mean of a noise something is divided by 0, or the root of a negative "
+                "number taken; use unscented(model) or gauss_hermite(model), or another mean of the noise"
+            )
     program = lower(outputs, vectors, definitions or {})
     source = numpy_source(name, arguments, program, doc)
     namespace: dict[str, Any] = {"np": np}

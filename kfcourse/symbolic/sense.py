@@ -9,11 +9,11 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.laws import Array
+from kfcourse.symbolic.formula import LARGEST, NO_NUMBERS
 
 if TYPE_CHECKING:
     from kfcourse.symbolic.model import Model
 
-LARGEST = 1e100  # of numbers and variances, the smallest 1/LARGEST: products of some of them stay within the floats
 DIGITS = 1e-13  # a deviation below this part of the mean keeps less than three of a float's 16 digits
 
 
@@ -67,8 +67,7 @@ def nothing_random(model: Model) -> str:
 
 
 def _unusable(formula: sp.Expr) -> str:
-    infinite = (sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I)
-    if formula.has(*infinite):
+    if formula.has(*NO_NUMBERS):
         return "has no finite real value with these parameters"
     for part in sp.preorder_traversal(formula):
         if not part.is_number:
