@@ -14,7 +14,7 @@ export OMP_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help book test quick lint unit notebooks lock lock-check clean distclean install figure benchmark fuzz
+.PHONY: help literature book test quick lint unit notebooks lock lock-check clean distclean install figure benchmark fuzz
 
 help:
 	@echo "make book        execute the chapters and build the book in _build/html"
@@ -25,6 +25,7 @@ help:
 	@echo "make install     the virtual environment .venv only"
 	@echo "make fuzz        20,000 generated formulas, models and files of variants; 1,000 are part of make unit"
 	@echo "make benchmark   speed of the engine, as ratios"
+	@echo "make literature  the figures of the literature beside ours"
 	@echo "make figure      the figure of README.md"
 	@echo "make lock        compile requirements.txt from pyproject.toml; all versions anew: make UPGRADE=--upgrade lock"
 	@echo "make lock-check  does requirements.txt fit pyproject.toml, and every Python and system?"
@@ -44,7 +45,7 @@ lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python .ci/columns.py exercises/*/statement.md
+	$(BIN)/python .ci/columns.py
 
 unit: install
 	$(BIN)/pytest -q -n auto --dist loadscope --ignore tests/test_book.py
@@ -60,6 +61,9 @@ CHECKED := --variant 53 --variant 5 --variant 20
 notebooks: install
 	$(BIN)/kfcourse solutions $(CHECKED) --out _build/solutions
 	KFCOURSE_BOOK=required $(BIN)/pytest -q -n 2 --dist loadscope --nbval --nbval-current-env tests/test_book.py _build/jupyter_execute _build/solutions
+
+literature: install
+	$(BIN)/python book/chapters.py literature
 
 figure: install
 	$(BIN)/python book/readme_figure.py

@@ -4,6 +4,8 @@
     y_k     = b(x_k, w_k)        meter equation
     x_0 ~ N(m, d),  v_k ~ N(m_v, D_v),  w_k ~ N(m_w, D_w),   all independent
 
+Both equations may contain what is known of the step: its number k, its time t, inputs u_k.
+
 `Model` holds the two equations as SymPy expressions with their parameters as symbols.  Everything
 else (structural functions, filters, simulation, the printed equations) is derived from it.
 """
