@@ -77,7 +77,8 @@ def pointmass(model: Model, accuracy: float = ACCURACY) -> Filter:
     Parameters
     ----------
     model : Model
-        One state, one measurement, noises entering linearly (with any functions of x as factors).
+        One state, one measurement, noises entering linearly (with any functions of x as factors); the meter's may be solved
+        for (`inverted`), or be nothing.
     accuracy : float
         Largest estimated error of a step, in posterior standard deviations; a step with a larger one is left to the
         adaptive filter.
@@ -85,7 +86,7 @@ def pointmass(model: Model, accuracy: float = ACCURACY) -> Filter:
     Raises
     ------
     ModelError
-        The model is not scalar, or a noise enters nonlinearly.
+        The model is not scalar, or a noise enters nonlinearly and cannot be solved for.
     Unresolved
         When it runs: a step would need more nodes than the budget has.
     """
