@@ -15,7 +15,7 @@ import sympy as sp
 from kfcourse.angles import TURN, Components, difference, wrapped
 from kfcourse.filters.inverted import by_change_of_variable
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.choices import jumps
+from kfcourse.symbolic.choices import decides, jumps
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
@@ -239,7 +239,7 @@ def _conditional(
     B = equation.jacobian(sp.Matrix(noise))
     if solved:  # the density is known otherwise; what is linear in the noise tells where it lies
         B = _at_mean(B, noise, law)
-    if B.has(*noise):
+    elif B.has(*noise) or decides(equation, noise):
         raise ModelError(
             f"{list(equation)}: the noise enters nonlinearly, so there is no simple {name} density; "
             "the Gaussian filters (gaussian, unscented, gauss_hermite) do not need one"

@@ -75,7 +75,7 @@ def title(name: str) -> str:
 
 
 def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Design]:
-    """Filters of the lab for a model, by short names.
+    """Filters of the lab for a model, by short names; `kfcourse.lab.admission` tells of each whether it can be had.
 
     Raises
     ------
@@ -84,9 +84,7 @@ def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Desig
     NoClosedForm, ModelError
         A filter that this model does not admit; the message names the filter and says what to use instead.
     """
-    unknown = [name for name in names if name not in FILTERS]
-    if unknown:
-        raise ValueError(f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(FILTERS)}")
+    check_names(names)
     structures = Structures(model)
     built = []
     for name in dict.fromkeys(names):
@@ -95,6 +93,13 @@ def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Desig
         except (NoClosedForm, ModelError) as error:
             raise type(error)(f"{name}: {error}") from None
     return built
+
+
+def check_names(names: Sequence[str]) -> None:
+    """ValueError, which lists the known names, if a short name is not among them."""
+    unknown = [name for name in names if name not in FILTERS]
+    if unknown:
+        raise ValueError(f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(FILTERS)}")
 
 
 def exact(model: Model) -> Filter:

@@ -322,7 +322,9 @@ def test_without_it_the_control_is_the_zero_line(variants, result20, written, tm
     assert "above_bound" not in data
     html = (written["20"] / "report.html").read_text(encoding="utf-8").partition("<h2>Accuracy</h2>")[2]
     assert "above that of GAOF" in html
-    assert "exact AOF" not in html
+    results, admitted = html.split("Which filters this model admits")
+    assert "exact AOF" not in results
+    assert "<td>exact AOF</td><td>yes</td>" in admitted  # it would be by particles
 
 
 def test_the_variance_between_designs_is_reported(variants, no_figures, tmp_path):
