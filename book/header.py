@@ -92,7 +92,7 @@ def _link(app, name: str, other: str, line: chapter_line, text: str = "") -> str
 
 
 def _words(text: str) -> list[str]:
-    return [word.strip() for word in text.split(",") if word.strip()]
+    return text.replace(",", " ").split()
 
 
 def _write(notebook: nbformat.NotebookNode, path: Path) -> None:
