@@ -41,6 +41,7 @@ class Chapter(SphinxDirective):
     def run(self) -> list[nodes.Node]:
         node = chapter_line("", **self.options)
         self.set_source_info(node)
+        self.env.metadata[self.env.docname]["minutes"] = self.options.get("minutes")
         return [node]
 
 
@@ -91,7 +92,7 @@ def _link(app, name: str, other: str, line: chapter_line, text: str = "") -> str
 
 
 def _words(text: str) -> list[str]:
-    return [word.strip() for word in text.split(",") if word.strip()]
+    return text.replace(",", " ").split()
 
 
 def _write(notebook: nbformat.NotebookNode, path: Path) -> None:

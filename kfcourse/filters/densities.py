@@ -14,7 +14,7 @@ import sympy as sp
 
 from kfcourse.angles import TURN, Components, difference, wrapped
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.choices import jumps
+from kfcourse.symbolic.choices import decides, jumps
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
@@ -89,6 +89,7 @@ class ScalarDensities(NamedTuple):
     residual : (y, x) -> the signal that explains y, minus the signal at x, for an angle the short way round.  What explains y
         is y itself; |y - b| if the signal is the noise's deviation
     meter_width : x -> standard deviation of the meter's noise over |slope|: how well y tells x
+    noiseless : whether the meter has no noise: there is no density of y, and log_likelihood must not be asked
     jump : pi for an angle, whose residual changes its sign on the far side of the circle too, by a jump; otherwise infinite
     """
 
@@ -100,6 +101,7 @@ class ScalarDensities(NamedTuple):
     residual: Callable[[Array, Array], Array]
     meter_width: Callable[[Array], Array]
     jump: float = np.inf
+    noiseless: bool = False
     at_step: Callable[[int], ScalarDensities] | None = None
 
     def at(self, k: int) -> ScalarDensities:
@@ -113,7 +115,7 @@ def scalar_densities(model: Model) -> ScalarDensities:
     Of a model that depends on the step they are those of step 0, and `at(k)` those of step k.
     """
     next_state = _conditional("transition", model.state_equation, model.v, model.state_noise, model, noiseless=True)
-    meter = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model)
+    meter = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model, noiseless=True)
     x, B = model.x[0], model.state_equation.jacobian(sp.Matrix(model.v))
     mean, b = (
         equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True))).subs(model.values)
@@ -134,11 +136,14 @@ def scalar_densities(model: Model) -> ScalarDensities:
             "filter, unscented(model)"
         )
     lacks_x = not b.has(x)
+    if lacks_x and meter_variance.is_zero_matrix:
+        raise ModelError(f"{list(model.meter_equation)}: the meter shows neither the state nor any noise")
     slopes = Stepwise.compile(model.known, "slopes", {"x": sp.Matrix(model.x)}, outputs, ["x", "state", "meter"])
 
     def at(k: int) -> ScalarDensities:
         functions = (one.at(k) for one in (next_state, meter, slopes))
-        return _elementwise(model, *functions, lacks_x=lacks_x, at_step=at if model.timed else None)
+        found = _elementwise(model, *functions, lacks_x=lacks_x, at_step=at if model.timed else None)
+        return found._replace(noiseless=meter_variance.is_zero_matrix is True)
 
     return at(0)
 
@@ -196,7 +201,7 @@ def _elementwise(
         return np.sqrt(moments(meter, x)[1]) / np.abs(slope(x))
 
     jump = np.pi if model.angles.y else np.inf
-    return ScalarDensities(kernel, kernel_slope, log_likelihood, signal, slope, residual, meter_width, jump, at_step)
+    return ScalarDensities(kernel, kernel_slope, log_likelihood, signal, slope, residual, meter_width, jump, at_step=at_step)
 
 
 def _log_normal(deviation: Array, variance: Array) -> Array:
@@ -209,7 +214,7 @@ def _conditional(
     name: str, equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian, model: Model, *, noiseless: bool = False
 ) -> Stepwise:
     B = equation.jacobian(sp.Matrix(noise))
-    if B.has(*noise):
+    if B.has(*noise) or decides(equation, noise):
         raise ModelError(
             f"{list(equation)}: the noise enters nonlinearly, so there is no simple {name} density; "
             "the Gaussian filters (gaussian, unscented, gauss_hermite) do not need one"

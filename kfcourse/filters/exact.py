@@ -13,6 +13,7 @@ exact_predictions  from a posterior to the next prediction: a sum of normal kern
                    (exact_narrow), or an integral over the noise (exact_noise)
 exact_places       where the new posterior lies: the states that explain the measurement
 exact_batch        nodes x = c + s sinh t there, Bayes' rule, and an estimate of the error: for many trajectories at once
+exact_roots        or, for a meter without noise, the few states that explain it
 exact_adaptive     for what they do not resolve, one trajectory at a time: panels that are halved until they do (exact_panels)
 """
 
@@ -31,6 +32,7 @@ from kfcourse.filters.exact_batch import Posteriors, posteriors, settled
 from kfcourse.filters.exact_kernels import Grid, Kernels, Unresolved, apart, chunks, of_prior
 from kfcourse.filters.exact_places import hidden, likeliest
 from kfcourse.filters.exact_predictions import predictions
+from kfcourse.filters.exact_roots import at_roots
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
@@ -128,6 +130,11 @@ def _step(
     mean, variance, error = np.empty((3, len(y)))
     adaptive = np.zeros(len(y), dtype=bool)
     for rows, kernels in groups:
+        if law.noiseless and not np.isnan(y[rows]).any():
+            for place, grid in zip(rows.tolist(), at_roots(kernels, y[rows], law), strict=True):
+                grids[place], error[place] = grid, 0.0
+                mean[place], variance[place] = grid.mean(), grid.variance()
+            continue
         for chunk in chunks(len(rows), NODES[0] * kernels.mu.shape[1], ELEMENTS):
             left = rows[chunk]
             for done, found, good in _in_batch(left, kernels.rows(chunk), y[left], law, accuracy):
@@ -179,7 +186,9 @@ def _in_batch(
 def nodes_for_kernels(law: ScalarDensities, found: Posteriors, count: int) -> Array:
     """How many nodes a posterior needs, (T,), that the next prediction be a sum of kernels that overlap.
 
-    If they are too many even for the finest grid, `FINE`: it will be interpolated.
+    If they are too many even for the finest grid, `FINE`: it will be interpolated.  The finest where some kernels overlap, and
+    others do not, as `exact_noise` then shares the mass.
     """
-    wanted = (count - 1) * apart(*law.kernel(found.x), found.mass) + 1
-    return np.where(wanted <= NODES[-1], wanted, FINE)
+    most, least = apart(*law.kernel(found.x), found.mass)
+    wanted = (count - 1) * most + 1
+    return np.where(wanted <= NODES[-1], wanted, np.where(least > 1, FINE, NODES[-1]))

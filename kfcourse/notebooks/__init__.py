@@ -1,6 +1,7 @@
 """Exercise notebooks, and the instructor's commands.
 
 master         statement.md -> the complete notebook, the student's, the book's page
+nbgrader       the same in nbgrader's format
 written_code   formulas as the code of a solution
 execution      a notebook in a kernel of its own; pictures, checks, HTML, PDF
 jobs           every set for every variant, in parallel, resumed

@@ -49,9 +49,12 @@ def _options(command: Callable) -> Callable:
 
 @click.command()
 @_options
-def exercises(**options: Any) -> None:
+@click.option("--nbgrader", is_flag=True, help="Write source notebooks of nbgrader instead: a folder for each variant.")
+def exercises(nbgrader: bool, **options: Any) -> None:
     """Write the students' notebooks, ready to run."""
-    _make("exercises", **options)
+    if nbgrader and options["students"]:
+        raise click.UsageError("--nbgrader hands the same notebooks to all students: name a --variant instead of --students")
+    _make("nbgrader" if nbgrader else "exercises", **options)
 
 
 @click.command()
@@ -215,11 +218,12 @@ def grade(
         staged = stage(place / "stage")
         hidden = [Path(str(resources.files("kfcourse"))), *answers(), folder.resolve(), *([masters] if masters else [])]
         held = chosen(sandbox, hidden, place, packages_of(staged))
-        with grading(Setting(Place(staged, held), seed or secrets.token_hex(8)), workers) as graded:
+        salt = seed or secrets.token_hex(8)
+        with grading(Setting(Place(staged, held), salt), workers) as graded:
             grades, old = grade_all(work, table, again, graded)
     _grades(grades)
     click.echo(f"\n{len(grades) - old} run, {old} unchanged since the last table. Table: {table}")
-    click.echo(f"Sandbox: {HELD[held.kind]}")
+    click.echo(f"Sandbox: {HELD[held.kind]}\nHidden arguments: --seed {salt} repeats them")
     if students or report:
         _report(write_report(grades, course, report or folder / "report", HELD[held.kind]), report or folder / "report")
     if any(one.status == FAILED for one in grades):

@@ -28,6 +28,7 @@ from kfcourse.files import package_digest, replacing, save
 from kfcourse.lab.variants import find_variant
 from kfcourse.notebooks.execution import NotebookFailed, execute, html, pdf, pictures, results
 from kfcourse.notebooks.master import read, render, solution, student
+from kfcourse.notebooks.nbgrader import source_notebook
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Job:
     letter, variant : str
     folder : Path
         Where the files go.
-    kind : {"exercises", "solutions"}
+    kind : {"exercises", "nbgrader", "solutions"}
     variants_file : Path or None
     masters : Path or None
         A folder like exercises/, in place of the shipped one.
@@ -111,6 +112,9 @@ def _write(job: Job, notebook: NotebookNode, executed: NotebookNode) -> None:
     job.folder.mkdir(parents=True, exist_ok=True)
     if job.kind == "exercises":
         save(nbformat.writes(student(notebook, pictures(executed))), job.target)
+        return
+    if job.kind == "nbgrader":
+        save(nbformat.writes(source_notebook(notebook)), job.target)
         return
     page, printed = job.target.with_suffix(".html"), job.target.with_suffix(".pdf")
     save(html(executed, job.name), page)

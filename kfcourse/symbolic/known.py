@@ -70,7 +70,7 @@ class Known:
             if k >= len(values):
                 raise ModelError(
                     f"the input {name} has {len(values)} value(s), for the steps 0 to {len(values) - 1}, but step {k} needs one; "
-                    "give a value for every step"
+                    "give a value for every step, or run fewer"
                 )
             return values[k]
         return float(k if name == "k" else self.interval * k)

@@ -12,7 +12,7 @@ from test_grade import FIXTURES, cell, solved
 from tricks import CELLS, FUNCTIONS, PROCESSES
 
 from kfcourse.checks import Exercise, exercise, sets
-from kfcourse.notebooks.grading import marking, running
+from kfcourse.notebooks.grading import marking, pool, running
 from kfcourse.notebooks.grading.assembly import Step
 from kfcourse.notebooks.grading.marking import Marking
 from kfcourse.notebooks.grading.pool import Family, Worker
@@ -45,7 +45,7 @@ def staged(tmp_path_factory):
     return stage(tmp_path_factory.mktemp("stage"))
 
 
-def kernel_in(sandbox, staged, seconds=15.0, task=TASK):
+def kernel_in(sandbox, staged, seconds=120.0, task=TASK):
     opening = Opening(task.letter, opened(task), personal_numbers(task))
     return Kernel(Place(staged, sandbox), opening, seconds)
 
@@ -137,7 +137,9 @@ def test_what_the_masters_import_is_on_the_stage(staged):
         if line.startswith(("import ", "from "))
     }
     assert len(lines) > 10
-    with kernel_in(Sandbox("none", tuple(map(str, answers()))), staged) as kernel:
+    project = Path(sys.prefix).parent  # somebody may keep the returned notebooks and .venv in one folder
+    with kernel_in(Sandbox("none", tuple(map(str, [*answers(), project]))), staged) as kernel:
+        assert kernel.cell(f"open({str(project / 'notes.txt')!r})").error[0] == "PermissionError"
         assert {line: error for line in lines if (error := kernel.cell(line).error)} == {}
 
 
@@ -213,3 +215,51 @@ def test_who_kills_its_process_is_named_and_the_next_is_graded(staged, tmp_path)
     assert grades[2].passed == 2
     if sys.platform == "linux":
         assert all(gone(int((tmp_path / f"flag{name}").read_text())) for name in "12")
+
+
+# -- the grading process itself hangs or ends
+
+
+SCRIPT = """
+import json, os, struct, time
+
+def receive():
+    return json.loads(os.read(0, struct.unpack('>Q', os.read(0, 8))[0]))
+
+def send(message):
+    data = json.dumps(message).encode()
+    os.write(1, struct.pack('>Q', len(data)) + data)
+
+receive()
+while True:
+    skip = receive()['skip']
+    for question in ('b1', 'b2'):
+        send({'at': question})
+        if question not in skip:
+            {fate}
+    fields = dict(name='x', status='graded', letter='b', variant='53', marks={'b1': ','.join(skip)}, note='', digest='')
+    send({'grade': fields | dict(told={}, student='', work='')})
+"""
+
+
+@pytest.mark.parametrize("fate", ["time.sleep(60)", "os.abort()", "os.write(1, b'x' * 99)"])
+def test_an_answer_that_stops_or_ends_the_grading_process_is_left_out(tmp_path, monkeypatch, staged, fate):
+    """As a comparison in compiled code might that no alarm interrupts, or that takes all memory."""
+
+    class Fake(Family):
+        def start(self, command):
+            return super().start([sys.executable, "-S", "-c", SCRIPT.replace("{fate}", fate)])
+
+    monkeypatch.setattr(pool, "START", 3.0)
+    monkeypatch.setattr(pool, "QUIET", 0.0)
+    (tmp_path / "x.ipynb").write_text("{}", encoding="utf-8")
+    worker = Worker(marking.Setting(Place(staged, Sandbox("none")), SALT), Fake())
+    (work,) = returned(tmp_path, seconds=0.0)
+    try:
+        assert worker(work).marks == {"b1": "b1,b2"}
+        monkeypatch.setattr(pool, "AGAIN", 1)
+        grade = worker(work)
+    finally:
+        worker.end()
+    told = "the grading process hung" if "sleep" in fate else "it killed its process"
+    assert (grade.status, grade.note) == ("not graded", f"{told}, or its answer to b2 cannot be compared")

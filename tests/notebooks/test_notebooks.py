@@ -529,6 +529,7 @@ def test_unknown_names_are_refused(call, tmp_path):
     refused(call("solutions", "--out", "o", "--variant", "53", "--sets", ","), "no exercise set")
     refused(call("exercises", "--out", "o", "--variant", "53", "--variants", "no.toml"), "no file of variants at no.toml")
     refused(call("exercises", "--out", "o", "--students", "no.csv"), "no course list no.csv")
+    refused(call("exercises", "--out", "o", "--students", "no.csv", "--nbgrader"), "the same notebooks to all students")
     assert not (tmp_path / "o").exists()
 
 

@@ -74,6 +74,8 @@ class Worker:
                 problem = "the grading process hung"
             except (Closed, Strange):
                 problem = "it killed its process"
+            if self._question:
+                problem += f", or its answer to {self._question} cannot be compared"
             self.end()
             if not self._question or self._question in skip or len(skip) == AGAIN:
                 return Grade(work.name, FAILED, note=problem)

@@ -1,0 +1,217 @@
+"""Values come over as they were; nothing else is read, and nothing runs when it is."""
+
+import io
+import json
+import struct
+import time
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from kfcourse.checks import Exercise, exercise, sets
+from kfcourse.notebooks.grading.channel import Channel, Closed, Late, Patient
+from kfcourse.notebooks.grading.values import HEADS, Other, Strange, Unsent, decode, encode
+
+x, y = sp.Symbol("x", positive=True), sp.Symbol("y", real=True)
+
+
+def sent(value):
+    return decode(json.loads(json.dumps(encode(value))))
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(
+    "value",
+    [
+        None,
+        True,
+        "text",
+        7,
+        -(10**50),
+        0.1,
+        float("inf"),
+        2 - 3j,
+        [1, (2.0, [None])],
+        (),
+        sp.Integer(1),
+        sp.Float(1),
+        sp.oo,
+        sp.pi,
+    ],
+)
+def test_plain_values(value):
+    found = sent(value)
+    assert (found, type(found)) == (value, type(value))
+
+
+def test_nan():
+    assert np.isnan(sent(float("nan")))
+    assert sent(sp.nan) is sp.nan
+
+
+@pytest.mark.parametrize("kind", ["?", "i1", "<u2", ">i8", "f2", "f4", "f8", "c8", "c16"])
+@pytest.mark.parametrize("shape", [(), (3,), (2, 0), (2, 3, 4)])
+def test_arrays(kind, shape):
+    array = np.random.default_rng(1).normal(size=shape).astype(kind)
+    found = sent(array)
+    assert found.shape == shape and found.dtype == array.dtype.newbyteorder("=")
+    np.testing.assert_array_equal(found, array)
+    assert found.flags.writeable
+    if shape == ():
+        assert type(sent(array[()])) is type(array[()])
+    assert (
+        sent(array[..., ::-1] if shape else array).tobytes()
+        == np.ascontiguousarray(array[..., ::-1] if shape else array).astype(array.dtype.newbyteorder("=")).tobytes()
+    )
+
+
+@pytest.mark.filterwarnings("ignore:the matrix subclass")
+def test_arrays_of_formulas_and_matrices():
+    found = sent(np.array([[x, 1.5], [None, [1]]], dtype=object))
+    assert found.tolist() == [[x, 1.5], [None, [1]]]
+    assert isinstance(sent(np.asmatrix([[1.0]])), np.matrix)
+    assert sent(np.ma.masked_array([1.0, 2.0])).tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        sp.Float("0.9") * x + sp.sqrt(x) / 3 - sp.Rational(10**30, 7),
+        sp.exp(x) * sp.erf(y) + sp.atan2(x, y) + sp.Max(x, y) + sp.Abs(y),
+        sp.Integral(x**2, (x, 0, y)) + sp.Derivative(sp.sin(x) * y, x),
+        sp.Piecewise((x, x > y), (y, True)),
+        sp.I * x + sp.E**y + sp.Symbol("x"),
+        sp.Float("0.1", 50) * x,
+        sp.Heaviside(x) * sp.KroneckerDelta(1, sp.Symbol("n", integer=True)),
+    ],
+)
+def test_formulas(value):
+    assert sp.srepr(sent(value)) == sp.srepr(value)
+
+
+def test_matrices_of_formulas_share_their_parts():
+    matrix = sp.Matrix([[x, sp.sin(x)], [sp.sin(x) ** 2, 1]])
+    assert sent(matrix) == sp.ImmutableMatrix(matrix)
+    long = x
+    for _ in range(60):  # a sum of 2^60 terms, if parts were not shared
+        long = sp.Add(long, sp.Pow(long, 2, evaluate=False), evaluate=False)
+    assert len(json.dumps(encode(long))) < 10_000
+
+
+@pytest.mark.parametrize(
+    ("value", "name"),
+    [
+        ({1: 2}, "dict"),
+        ({1}, "set"),
+        (len, "builtin_function_or_method"),
+        (sp.Function("f")(x), "formula with f"),
+        (object(), "object"),
+    ],
+)
+def test_anything_else_is_its_type_only(value, name):
+    found = sent(value)
+    assert isinstance(found, Other)
+    assert type(found).__name__ == name
+
+
+def test_functions_are_called_on_the_other_side():
+    functions = []
+    data = encode([len], lambda function: functions.append(function) or 0)
+    assert functions == [len]
+    assert decode(data, lambda number: functions[number]) == [len]
+    with pytest.raises(Strange):
+        decode(data)
+
+
+def test_what_is_too_large_is_not_sent():
+    with pytest.raises(Unsent, match="digits"):
+        encode(1 << 20_000)
+    assert type(sent(sp.Add(*(sp.Symbol(f"x{i}") for i in range(60_000))))).__name__.startswith("a formula of more than")
+
+
+def formula(*nodes, places=(0,)):
+    return ["formula", [list(nodes), list(places)]]
+
+
+X = ["Symbol", "x", {}]
+STRANGE = [
+    {}, [], ["list"], ["list", 3], ["array", "O", [1], "AAAA"], ["array", "f8", [10**9], "AAAA"], ["array", "f8", [1], "???"],
+    ["array", "V8", [1], "AAAAAAAAAAA="], ["array", "f8,f8", [1], "AA=="], ["int", "1" * 5000], ["int", "0x1"],
+    ["complex", "1", 2], ["formulas", 2, 2, [[], []]], ["function", 0], ["objects", [2], [1]], ["exec", "1"], [["list"]],
+    formula(X, places=(1,)), formula(X, places=(-1,)), formula(["Lambda", 0]), formula(["__import__", "os"]), formula(["Add", 0]),
+    formula(["Function", "f"]), formula(["sympify", "1"]), formula(["Symbol", "x", {"real": "yes"}]), formula(["constant", "S"]),
+    formula(["Float", "1e9999999", 53]), formula(["Float", "__import__('os')", 53]), formula(["Rational", "1", "a"]),
+]  # fmt: skip
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("data", STRANGE, ids=lambda data: str(data)[:40])
+def test_strange_messages_are_refused(data):
+    with pytest.raises(Strange):
+        decode(data)
+
+
+def test_only_functions_of_sympy_are_made():
+    assert {"sin", "exp", "Add", "Pow"} <= set(HEADS)
+    assert all(one.__module__.startswith("sympy.") and issubclass(one, sp.Basic) for one in HEADS.values())
+    assert not {"Lambda", "Function", "sympify", "Symbol", "UndefinedFunction", "AppliedUndef"} & set(HEADS)
+
+
+def test_arguments_of_all_questions_can_be_sent():
+    for letter, one in sets().items():
+        task = Exercise(letter, exercise(letter, "53").variant, "salt")
+        for question in one.questions:
+            for values in question.arguments(task):
+                functions = [value for value in values if callable(value)]
+                data = encode(tuple(values), functions.index)
+                found = decode(json.loads(json.dumps(data)), functions.__getitem__)
+                assert not [value for value in found if isinstance(value, Other)], question.name
+                assert [type(a) for a in found] == [type(b) for b in values], question.name
+
+
+def test_the_grader_asks_with_numbers_of_its_own():
+    """Every question that has numbers or functions among its arguments; formulas in fixed symbols hide nothing."""
+    asked = 0
+    for letter, one in sets().items():
+        task = exercise(letter, "53")
+        salted = Exercise(letter, task.variant, "salt")
+        for question in one.questions:
+            seen, hidden = (json.dumps([encode(tuple(values)) for values in question.arguments(each)]) for each in (task, salted))
+            if any(word in seen for word in ("array", "function", ".")):
+                asked += 1
+                assert seen != hidden or "function" in seen, question.name
+    assert asked > 40
+
+
+# -- messages
+
+
+def channel(data):
+    return Channel(io.BytesIO(data), io.BytesIO())
+
+
+def frame(text):
+    return struct.pack(">Q", len(text)) + text
+
+
+def test_messages():
+    assert channel(frame(b'{"a": 1}')).receive() == {"a": 1}
+    for data in (b"", b"\0\0", frame(b'{"a": 1}')[:-1]):
+        with pytest.raises(Closed):
+            channel(data).receive()
+    for data in (struct.pack(">Q", 2**40), frame(b"[1]"), frame(b"{"), frame(b"[" * 100_000), frame(b"\xff")):
+        with pytest.raises(Strange):
+            channel(data).receive()
+    sink = io.BytesIO()
+    Channel(io.BytesIO(), sink).send({"b": [1.5]})
+    assert channel(sink.getvalue()).receive() == {"b": [1.5]}
+
+
+def test_waiting_ends():
+    patient = Patient(io.BytesIO(frame(b"{}")), io.BytesIO())
+    assert patient.wait(time.monotonic() + 5) == {}
+    with pytest.raises(Closed):
+        patient.wait(time.monotonic() + 5)
+    with pytest.raises(Late):
+        patient.wait(time.monotonic() - 1)
