@@ -14,7 +14,7 @@ export OMP_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help book test quick lint unit notebooks lock lock-check clean distclean install figure benchmark
+.PHONY: help literature book test quick lint unit notebooks lock lock-check clean distclean install figure benchmark fuzz
 
 help:
 	@echo "make book        execute the chapters and build the book in _build/html"
@@ -23,7 +23,9 @@ help:
 	@echo "make lint        ruff check, ruff format --check, mypy, the columns of the pages"
 	@echo "make unit        unit tests and documentation examples only"
 	@echo "make install     the virtual environment .venv only"
+	@echo "make fuzz        20,000 generated formulas, models and files of variants; 1,000 are part of make unit"
 	@echo "make benchmark   speed of the engine, as ratios"
+	@echo "make literature  the figures of the literature beside ours"
 	@echo "make figure      the figure of README.md"
 	@echo "make lock        compile requirements.txt from pyproject.toml; all versions anew: make UPGRADE=--upgrade lock"
 	@echo "make lock-check  does requirements.txt fit pyproject.toml, and every Python and system?"
@@ -43,10 +45,15 @@ lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python .ci/columns.py exercises/*/statement.md
+	$(BIN)/python .ci/columns.py
 
 unit: install
 	$(BIN)/pytest -q -n auto --dist loadscope --ignore tests/test_book.py
+
+# Other cases each time; what fails is shown with the case, as small as can be.
+CASES := 20000
+fuzz: install
+	KFCOURSE_CASES=$(CASES) $(BIN)/pytest -q -n auto --hypothesis-show-statistics tests/test_generated.py
 
 # Executes every notebook of the built book once more and compares all outputs; so it does with the worked solutions of the
 # exercises, for variants of different kinds: multiplicative noises, a sine meter, a vector state.
@@ -54,6 +61,9 @@ CHECKED := --variant 53 --variant 5 --variant 20
 notebooks: install
 	$(BIN)/kfcourse solutions $(CHECKED) --out _build/solutions
 	KFCOURSE_BOOK=required $(BIN)/pytest -q -n 2 --dist loadscope --nbval --nbval-current-env tests/test_book.py _build/jupyter_execute _build/solutions
+
+literature: install
+	$(BIN)/python book/chapters.py literature
 
 figure: install
 	$(BIN)/python book/readme_figure.py

@@ -1,10 +1,14 @@
 """The chapters, executed several at once into the cache from which Sphinx takes their outputs.
 
 Sphinx would execute them one after another.  The worked solutions of the lab manual run in the same processes.
+
+    python book/chapters.py literature      execute one chapter, and print what its cells print
 """
 
 from __future__ import annotations
 
+import re
+import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -92,9 +96,26 @@ def executed(folder: Path) -> Iterator[tuple[str, NotebookNode]]:
         yield path.stem, notebook
 
 
+def show(name: str) -> int:
+    """Execute a chapter and print the texts that its cells display."""
+    done = execute(BOOK / f"{name}.md")
+    for cell in done.notebook.cells:
+        for output in cell.get("outputs", []):
+            text = output.get("text") or output.get("data", {}).get("text/markdown")
+            if text:
+                print(re.sub(r"</?(p|span)[^>]*>", "", text), end="\n\n")
+    if done.failure:
+        print(done.failure, file=sys.stderr)
+    return bool(done.failure)
+
+
 def _cached(cache, path: Path) -> bool:
     try:
         cache.match_cache_notebook(myst_nb_reader_plugin(str(path)))
     except KeyError:
         return False
     return True
+
+
+if __name__ == "__main__":
+    sys.exit(show(sys.argv[1]))

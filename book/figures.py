@@ -22,18 +22,6 @@ TO_DO = frozenset(
         "linearisation",
         "stratonovich",
         "time-tags",
-        "manual/a-structural-functions",
-        "manual/b-aof",
-        "manual/c-duof",
-        "manual/d-fos",
-        "manual/e-comparison",
-        "manual/f-exact",
-        "manual/g-extended",
-        "manual/h-continuous",
-        "manual/i-track",
-        "manual/j-radar",
-        "manual/k-integration",
-        "manual/l-time-tags",
     }
 )
 CELL = "use a {figure}, or give the metadata `mystnb` of its cell"

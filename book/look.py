@@ -16,7 +16,12 @@ from docutils import nodes
 HERE = Path(__file__).resolve().parent
 STAR = re.compile(r"(<h\d[^>]*>(?:<span[^>]*>[^<]*</span>)?|<a[^>]*>)\s*★\s*")
 FORMULA = re.compile(r'<div class="math notranslate nohighlight"( id="[^"]*")?>\s*(<span class="eqno">\(([^)]*)\))?')
+CAPTION = re.compile(
+    r'<p><span class="kf-caption">(.*?)</span></p>\s*(<div class="pst-scrollable-table-container">)?\s*<table class="([^"]*)">'
+)
 NUMBER = re.compile(r"(?:(?<=>)|^)\s*\d+(\.\d+)*\.\s")  # of a section
+NO_MEANING = re.compile(r"</dt>\s*</dl>")  # of a parameter, say
+ROLES = re.compile(r' role="(?:list|doc-biblioentry)"')  # of a bibliography, not those of today's HTML
 FIGURE = re.compile(r'(<span class="caption-number">[^<]*\d) </span>')
 TICK = re.compile(r'(<p class="kf-claim">)\s*✓')
 SMALL_TICK = r'\1<span class="kf-tick">✓</span>'
@@ -34,19 +39,32 @@ def complete(app, pagename: str, templatename: str, context: dict, doctree) -> N
     context["kf_small_stars"] = lambda toc: NUMBER.sub("", toc).replace("★", '<span class="kf-star">★</span>')
     for step in ("prev", "next"):
         if context.get(step):
-            context[step] = {**context[step], "title": NUMBER.sub("", context[step]["title"])}
+            first = context[step]["link"] == context["pathto"](app.config.root_doc)
+            title = "Start here" if first else NUMBER.sub("", context[step]["title"])
+            context[step] = {**context[step], "title": title}
     if doctree is None or "body" not in context:
         return
     body = context["body"]
-    for pattern, replacement in ((FORMULA, _reachable), (FIGURE, r"\1.</span> "), (TICK, SMALL_TICK), (STAR, SMALL_STAR)):
+    for pattern, replacement in (
+        (FORMULA, _reachable),
+        (FIGURE, r"\1.</span> "),
+        (CAPTION, r'\2<table class="kf-table \3"><caption>\1</caption>'),
+        (TICK, SMALL_TICK),
+        (STAR, SMALL_STAR),
+    ):
         body = pattern.sub(replacement, body)
-    found = contents.page(app.env, pagename)
-    if found and found[0].caption:
-        part, page = found
-        number = f" · {page.number}" if page.number else ""
-        body = body.replace("<h1>", f'<p class="kf-part">{html.escape(part.caption)}{number}</p>\n<h1>', 1)
+    if above := _above(app, pagename):
+        body = body.replace("<h1>", f'<p class="kf-part">{html.escape(above)}</p>\n<h1>', 1)
     context["body"] = body
     context["metatags"] = context.get("metatags", "") + _described(app, pagename, context, doctree)
+
+
+def _above(app, pagename: str) -> str:
+    """The words above a title: the part of the book, and the chapter's number."""
+    if pagename == app.config.root_doc:
+        return "A course companion"
+    part, page = contents.page(app.env, pagename) or (contents.Part("", []), None)
+    return f"{part.caption} · {page.number}" if page and page.number else part.caption
 
 
 def _part(part: contents.Part, pagename: str, pathto) -> dict:
@@ -55,7 +73,7 @@ def _part(part: contents.Part, pagename: str, pathto) -> dict:
 
 
 def _reachable(match: re.Match) -> str:
-    """A displayed formula takes the focus, so that the keyboard can scroll it, and has a name."""
+    """A displayed formula takes the focus and has a name (page.js hands both to the box that MathJax makes)."""
     identity, number = match[1] or "", match[2] or ""
     name = f"Formula {match[3]}" if match[3] else "Formula"
     return f'<div class="math notranslate nohighlight"{identity} tabindex="0" role="group" aria-label="{name}">\n{number}'
@@ -87,7 +105,28 @@ def _boxed(node: nodes.Node) -> bool:
     return False
 
 
+def only_where_needed(app, pagename: str, templatename: str, context: dict, doctree) -> None:
+    """Sphinx takes the front page for one with formulas because its contents lead to such pages."""
+    if 'class="math' not in context.get("body", ""):
+        scripts = context.get("script_files", [])
+        context["script_files"] = [one for one in scripts if "mathjax" not in f"{one.filename} {one.attributes}".lower()]
+
+
+def write_not_found(app, exception) -> None:
+    """The page that a server shows for an address that does not exist; it needs no other file."""
+    if exception or app.builder.format != "html":
+        return
+    parts = contents.parts(app.env)
+    folders = sorted(
+        {page.name.split("/")[0] for part in parts for page in part.pages if "/" in page.name} | {"_static", "_sources"}
+    )
+    page = app.builder.templates.render("404.html", {"title": app.config.html_title, "parts": parts, "folders": folders})
+    (Path(app.outdir) / "404.html").write_text(page, encoding="utf-8")
+
+
 def setup(app) -> dict[str, bool]:
     app.connect("config-inited", use_templates, priority=900)
+    app.connect("html-page-context", only_where_needed, priority=950)
+    app.connect("build-finished", write_not_found)
     app.connect("html-page-context", complete, priority=300)  # before the theme, which tries the templates
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -228,7 +228,11 @@ def lab(
     language: str | None,
     json_file: Path | None,
 ) -> None:
-    """Compare the filters on VARIANT (such as 53) and write the report."""
+    """Compare the filters on VARIANT (such as 53) and write the report.
+
+    The same seed gives the same numbers, bit by bit on one machine; another one's linear algebra (BLAS) may round
+    otherwise, by 1e-13 or so.
+    """
     if exact_runs == 1:
         raise click.ClickException("one trajectory has no standard error: give --exact-runs 0, or at least 2")
     if same_ensemble and designs not in (None, 1):
@@ -239,8 +243,11 @@ def lab(
         wanted = [*LAB, "aof-exact"] if exact_runs and has_bound(model) else list(LAB)
     else:
         wanted = [name.strip() for name in names.split(",") if name.strip()]
-    found = admissions(model, wanted, seconds=DERIVATION)
+    found = admissions(model, wanted, DERIVATION)
     refused = {one.name: one.reason for one in found if one.one is None}
+    for one in found:
+        for warning in one.warnings:
+            click.echo(f"Warning: {title(one.name)}: {warning}", err=True)
     if len(refused) == len(found):
         raise click.ClickException(
             "; ".join(f"{name}: {reason}" for name, reason in refused.items())
@@ -268,6 +275,8 @@ def lab(
     )
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
+    for name, reason in result.replaced.items():
+        click.echo(f"{title(name)} by particles: {reason}", err=True)
     to_error = json_file is not None and is_standard_output(json_file)
     _tell(result, to_error)
     if json_file:
@@ -316,7 +325,7 @@ def filters(places: tuple[str, ...], variants_file: Path | None, trial: bool) ->
     if len(places) > 2 or (len(places) == 2 and variants_file):
         raise click.UsageError("give a VARIANT, or a FILE of variants and a VARIANT of it")
     chosen = find_variant(places[-1], Path(places[0]) if len(places) == 2 else variants_file)
-    found = admissions(chosen.model)
+    found = admissions(chosen.model, seconds=DERIVATION)
     click.echo(f"Variant {chosen.name}: {chosen.title or chosen.model}", err=True)
     click.echo(table_of_filters(on_trial(chosen.model, found) if trial else found))
 

@@ -9,7 +9,9 @@ import os
 import re
 import shutil
 from html.parser import HTMLParser
+from importlib import resources
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 import nbformat
 import pytest
@@ -94,9 +96,9 @@ def browser():
         browser.close()
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_page_in_a_browser_without_network(browser, page: str) -> None:
-    path = HTML / f"{page}.html"
+@pytest.fixture(scope="module")
+def window(browser):
+    """One tab for all pages, without a network, and what it complained of since the last look."""
     problems: list[str] = []
     with browser.new_context(offline=True) as context:
         tab = context.new_page()
@@ -104,20 +106,130 @@ def test_page_in_a_browser_without_network(browser, page: str) -> None:
         tab.on("pageerror", lambda error: problems.append(str(error)))
         tab.on("requestfailed", lambda request: problems.append(f"failed: {request.url}"))
         tab.on("request", lambda request: request.url.startswith(LOCAL) or problems.append(f"external: {request.url}"))
-        tab.goto(path.as_uri(), wait_until="load")
-        if 'class="math' in path.read_text(encoding="utf-8"):
-            tab.wait_for_function("window.MathJax?.startup?.promise")
-            tab.evaluate("MathJax.startup.promise")
-            assert tab.locator("mjx-container").count() > 0
-            assert tab.locator("mjx-merror, [data-mjx-error]").count() == 0, "a formula that MathJax cannot read"
-        tab.wait_for_load_state("networkidle")
+        yield tab, problems
+
+
+# What sticks out of the page, or out of its own box, and by how much.
+FIT = """() => {
+    const width = document.documentElement.clientWidth;
+    const out = (selector) => [...document.querySelectorAll(selector)]
+        .filter((e) => e.checkVisibility() && e.scrollWidth > e.clientWidth + 1)
+        .map((e) => `${e.textContent.trim().slice(0, 60)} (+${e.scrollWidth - e.clientWidth})`);
+    return {
+        page: document.documentElement.scrollWidth - width,
+        code: out(".cell_input pre, section > [class*=highlight-] pre"),
+        boxes: out("div.math, .pst-scrollable-table-container, pre, .cell_output .output"),
+        pictures: [...document.querySelectorAll(".bd-article :is(img, svg, table, mjx-math)")]
+            .filter((e) => e.checkVisibility() && e.getBoundingClientRect().right > width + 1)
+            .map((e) => e.outerHTML.slice(0, 80)),
+    };
+}"""
+# A sheet of A4 less its margins, in px of CSS.
+PAPER = 673
+AXE = resources.files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
+FOUND = """async ([theme, rules]) => {
+    document.documentElement.dataset.theme = document.documentElement.dataset.mode = theme;
+    await new Promise((done) => setTimeout(done, 300));  // colours that change slowly
+    const { violations } = await axe.run(document, { resultTypes: ["violations"], ...rules });
+    const serious = violations.filter(({ impact }) => impact !== "minor");
+    return serious.flatMap(({ id, impact, nodes }) => nodes.map((one) => `${impact} ${id}: ${one.html.slice(0, 200)}`));
+}"""
+
+
+@pytest.mark.parametrize("page", [*PAGES, "search"])
+def test_page_in_a_browser_without_network(window, page: str) -> None:
+    """Loads without a complaint; fits screens and paper; axe-core finds nothing, light and dark; formulas are formulas."""
+    tab, problems = window
+    path = HTML / f"{page}.html"
+    problems.clear()
+    tab.set_viewport_size({"width": 1280, "height": 1000})
+    tab.goto(path.as_uri(), wait_until="load")
+    if 'class="math' in path.read_text(encoding="utf-8"):
+        tab.wait_for_function("window.MathJax?.startup?.promise")
+        tab.wait_for_selector("html[data-formulas=ready]")
+        assert tab.locator("mjx-container").count() > 0
+        assert tab.locator("mjx-merror, [data-mjx-error]").count() == 0, "a formula that MathJax cannot read"
+    else:
+        assert not tab.evaluate("Boolean(window.MathJax)"), "a page without formulas loads MathJax"
+    tab.wait_for_load_state("networkidle")
     assert problems == []
+
+    wide = tab.evaluate(FIT)
+    assert wide["page"] <= 0 and wide["code"] == [], "at 1280 px a page scrolls, or a code cell"
+    for width in (768, 390):
+        tab.set_viewport_size({"width": width, "height": 1000})
+        assert tab.evaluate(FIT)["page"] <= 0, f"the page scrolls sideways at {width} px"
+    tab.set_viewport_size({"width": PAPER, "height": 1000})
+    tab.emulate_media(media="print")
+    printed = tab.evaluate(FIT)
+    tab.emulate_media(media="screen")
+    assert printed["boxes"] == [] and printed["pictures"] == [], "cut on paper"
+
+    tab.set_viewport_size({"width": 1280, "height": 1000})
+    tab.evaluate(AXE)
+    contrast = {"runOnly": ["color-contrast"]}
+    assert [*tab.evaluate(FOUND, ["light", {}]), *tab.evaluate(FOUND, ["dark", contrast])] == []
+
+
+def test_the_keyboard_reaches_the_text_first(window):
+    tab, _ = window
+    tab.goto((HTML / "notation.html").as_uri())
+    tab.keyboard.press("Tab")
+    assert tab.evaluate("document.activeElement.getAttribute('href')") == "#main-content"
+    assert tab.evaluate("document.activeElement.checkVisibility()")
+    assert tab.locator("main#main-content").count() == 1
+    tab.wait_for_selector("html[data-formulas=ready]")
+    formulas = tab.locator("div.math")
+    assert formulas.count() == tab.locator("div.math mjx-container[tabindex='0'][aria-label]").count() > 0
+
+
+def test_a_chapter_is_downloaded_as_a_notebook(window):
+    tab, _ = window
+    tab.goto((HTML / "ten-minutes.html").as_uri())
+    with tab.expect_download() as started:
+        tab.get_by_role("link", name="notebook").click()
+    notebook = nbformat.read(started.value.path(), as_version=4)
+    nbformat.validate(notebook)
+    assert started.value.suggested_filename == "ten-minutes.ipynb"
+    text = "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
+    assert text.startswith("# Ten minutes") and not re.search(r"\{[a-z.][\w:-]*\}|^:\w+:", text, re.MULTILINE), (
+        "words only the book knows"
+    )
+    code = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
+    assert code == [cell.source for cell in nbformat.read(EXECUTED / "ten-minutes.ipynb", 4).cells if cell.cell_type == "code"]
+
+
+def test_search_finds_chapters(window):
+    tab, problems = window
+    problems.clear()
+    tab.goto((HTML / "search.html").as_uri() + "?q=stratonovich")
+    tab.wait_for_selector("#search-results li a")
+    assert any(text.endswith("The Stratonovich equation") for text in tab.locator("#search-results li a").all_inner_texts())
+    assert problems == []
+
+
+def test_an_address_that_does_not_exist(window):
+    tab, _ = window
+    tab.goto((HTML / "404.html").as_uri())
+    links = tab.locator("nav a")
+    assert links.count() == len(PAGES) - 1
+    for address in links.evaluate_all("links => links.map((link) => link.href)"):
+        assert Path(unquote(urlsplit(address).path)).exists(), address
+
+
+def test_descriptions_and_icon(window):
+    tab, _ = window
+    for page in ("intro", "stratonovich", "manual/b-aof"):
+        tab.goto((HTML / f"{page}.html").as_uri())
+        for name in ("description", "og:title", "og:description", "og:type"):
+            assert tab.locator(f"meta[name='{name}'], meta[property='{name}']").count() == 1, (page, name)
+        assert tab.locator("link[rel~=icon]").count() == 1
 
 
 def test_the_live_chapter_prints_what_its_page_shows(browser):
     notebook = nbformat.read(EXECUTED / "live-track.ipynb", as_version=4)
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
-    printed = "\n".join(output.text for output in outputs if output.output_type == "stream")
+    printed = next(text for one in outputs if "whole track" in (text := one.get("data", {}).get("text/markdown", "")))
     with browser.new_context(offline=True) as context:
         tab = context.new_page()
         tab.clock.install(time=0)  # time stands still but for run_for(ms)
@@ -126,5 +238,6 @@ def test_the_live_chapter_prints_what_its_page_shows(browser):
         tab.get_by_role("button", name="Play the recorded track").press("Enter")
         tab.clock.run_for(60_000)
         for name in ("noisy", "filtered", "inside", "nis"):
-            value = tab.locator(f"[data-show={name}-all]").inner_text()
-            assert re.search(rf"^{name} +{re.escape(value)}$", printed, re.MULTILINE), (name, value, printed)
+            row = tab.locator(f"tr:has([data-show={name}-all])")
+            label, value = row.locator("th").inner_text(), row.locator(f"[data-show={name}-all]").inner_text()
+            assert f"| {label} | {value} |".replace("\u00a0", " ") in printed, (label, value, printed)

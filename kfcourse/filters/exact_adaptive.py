@@ -29,8 +29,8 @@ SECTIONS = np.linspace(0, 1, 257)  # of a bracket, in the search for a zero
 SCALES = (0.5, 2.0, WIDTH)  # distances, in kernel sigmas, of panel borders from the prediction's own centres
 QUANTILES = np.array([0.02, 0.25, 0.5, 0.75, 0.98])  # of the posterior, where those centres are
 BORDER = 1e-10  # of the density at the ends of the support, relative: beyond them there must be nothing
-PUSHED = 100_000  # kernels of as much work as an integral over the noise
-WORK = 2e8  # nodes times kernels of a step: some seconds
+PUSHED = 20_000  # kernels of as much work as an integral over the noise
+WORK = 4e7  # nodes times kernels of a step: half a second
 ELEMENTS = 2**20  # of the largest array, 8 MB
 
 
@@ -105,6 +105,8 @@ def adaptive_pointmass(model: Model, order: int = 8, tolerance: float = 1e-5) ->
     if order < 6 or not 0 < tolerance < 1:
         raise ModelError(f"the point-mass filter needs order >= 6 and 0 < tolerance < 1, got {order} and {tolerance}")
     densities = scalar_densities(model)
+    if densities.noiseless:
+        raise ModelError(f"{list(model.meter_equation)}: without noise there is no likelihood density; use pointmass(model)")
     rules = Rule.of_order(order, tolerance), Rule.of_order(order - 3, 30 * tolerance)
     init = initial_state(model)
     prior = model.prior.mean, np.maximum(np.sqrt(model.prior.cov[0]), 1e-150), np.ones(1)

@@ -46,7 +46,7 @@ def refined(grid: Grid, law: ScalarDensities, rough: Kernels, most: int) -> Kern
     """
     with np.errstate(divide="ignore"):
         logs = np.maximum(np.log(grid.mass), -DEAD)
-    i, weight = _panels(grid.x, grid.mass, law, most)
+    i, weight = panels(grid.x, grid.mass, law, most)
     (x, full), (_, even) = interpolated(np.stack([grid.x, logs]), i), interpolated(np.stack([grid.x, logs])[:, ::2], 0.5 * i)
     mass, other = (values / values.sum() for values in (weight * np.exp(full), weight * np.exp(even)))
     kept = np.maximum(mass, other) > LIGHT
@@ -73,7 +73,7 @@ def interpolated(values: Array, at: Array) -> Array:
     return result
 
 
-def _panels(x: Array, mass: Array, law: ScalarDensities, most: int) -> tuple[Array, Array]:
+def panels(x: Array, mass: Array, law: ScalarDensities, most: int) -> tuple[Array, Array]:
     """Gauss nodes and weights over the numbers of the nodes, on panels halved until kernels overlap."""
     numbers = np.arange(len(x))
     left, right = numbers[:-1:2].astype(float), numbers[2::2].astype(float)

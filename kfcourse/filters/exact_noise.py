@@ -6,6 +6,10 @@ With the next state x' = f(x, u) = m(x) + sigma(x) u and u ~ N(0, 1), where f(.,
 
 The narrower the kernel, the smoother the integrand; without noise it is constant.  The posterior is interpolated over the numbers
 of its nodes, of which x is a smooth function: so psi is found by Newton's method as a number between two nodes.
+
+Where f(., u) turns back, d psi / d x' has a pole; where the kernel is wide, the integrand is rough.  There the sum of kernels is
+better, with more nodes if it needs them.  So the mass is shared by a smooth function chi of the node's number: chi p is summed,
+(1 - chi) p integrated over the noise, on every branch of f(., u) that is left.
 """
 
 from __future__ import annotations
@@ -13,19 +17,48 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import binary_dilation, binary_erosion
+from scipy.special import erf
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_kernels import ROOT, Grid, Kernels, Unresolved
-from kfcourse.filters.exact_narrow import DEAD, interpolated
+from kfcourse.filters.exact_kernels import CACHED, OVERLAP, ROOT, Grid, Kernels, Unresolved, chunks
+from kfcourse.filters.exact_narrow import DEAD, interpolated, panels
 from kfcourse.laws import Array
 
 STEP = 0.8  # of the trapezoidal rule in u: errs by 2 exp(-2 pi^2 / STEP^2) = 8e-14 where only phi varies
-NOISE = STEP * np.arange(-10, 11) + 0.137  # shifted, that no u be one at which f(., u) is constant by design
-SHARE = STEP * np.exp(-0.5 * NOISE**2) / ROOT
+FINE = 0.5  # the same where the mass is shared, as the kernels there are not much narrower than the nodes' distance
+SHIFT = 0.137  # of the rule, that no u be one at which f(., u) is constant by design
+DENSE = np.linspace(-8, 8, 161)  # noises for which turning points are looked for
 FINER = 8  # numbers between two nodes in the table that Newton's method starts from
 NEWTON = 2  # steps, each of which squares the error of a start good to 1e-3
-FOLDED = 1e-7  # mass of states and noises beyond a turning point of f(., u) that may be left out
 LOWEST = 37.0  # states and noises that together have a density lower than exp(-LOWEST) are taken for nothing
+TURNS = 25.0  # the same for turning points: exp(-25) = 1e-11
+SOFT = 1.4  # nodes over which chi rises, as an error function: summed over the nodes, it errs by exp(-(pi SOFT)^2) = 4e-9
+EDGE = 6  # nodes from the middle of the rise to where chi is 0 or 1, up to 1e-9
+MOST = 6144  # nodes of the sum
+POLES = 1e-7  # mass at turning points that may be left to the integral
+ROUGH = 1e-4  # the same where the error is all that is wanted
+
+
+@dataclass(frozen=True)
+class Chi:
+    """chi(i) of a node's number: 1 in the middle of some intervals, 0 outside of them."""
+
+    begin: Array
+    end: Array
+
+    @classmethod
+    def of(cls, mask: Array) -> Chi:
+        """The intervals where the mask holds; at the ends of the nodes there is nothing to share."""
+        edges = np.diff(np.concatenate([[0], mask.astype(int), [0]]))
+        first, last = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1
+        begin, end = np.where(first == 0, -np.inf, first + EDGE), np.where(last == len(mask) - 1, np.inf, last - EDGE)
+        kept = end > begin
+        return cls(begin[kept], end[kept])
+
+    def __call__(self, number: Array) -> Array:
+        rise, fall = (erf((number[..., None] - place) / SOFT) for place in (self.begin, self.end))
+        return 0.5 * (rise - fall).sum(axis=-1)
 
 
 @dataclass(frozen=True)
@@ -37,61 +70,111 @@ class Pushed:
     values : ndarray (3, N)
         At the nodes: x, log mass, and dx for a change of the node's number by one.
     law : ScalarDensities
+    chi : Chi
     table : ndarray (M,)
         Numbers between the nodes.
-    images : list of (first, last, ndarray)
-        For each noise: where in the table f(., u) is monotone and state and noise together have a density that counts, and
-        f(x, u) there.
+    step : float
+        Of the trapezoidal rule in u.
+    images : list of (u, first, ndarray)
+        Where in the table a monotone branch of f(., u) begins, on which state and noise together have a density that
+        counts, and f(x, u) there.
+    mu, sigma, mass : ndarray (K,)
+        The sum of kernels.
     """
 
     values: Array
     law: ScalarDensities
+    chi: Chi
     table: Array
-    images: list[tuple[int, int, Array]]
+    step: float
+    images: list[tuple[float, int, Array]]
+    mu: Array
+    sigma: Array
+    mass: Array
 
     @classmethod
-    def of(cls, x: Array, mass: Array, length: Array, law: ScalarDensities) -> Pushed:
-        """Raises `Unresolved` if the state is folded."""
+    def of(cls, x: Array, mass: Array, length: Array, law: ScalarDensities, poles: float) -> Pushed:
+        """Raises `Unresolved` if there is more mass than `poles` at turning points, or the sum needs too many nodes."""
         with np.errstate(divide="ignore"):
             logs = np.maximum(np.log(mass / mass.sum()), -DEAD)
         values = np.stack([x, logs, length])
         table = np.linspace(0, len(x) - 1, FINER * (len(x) - 1) + 1)
         states, heights, _ = interpolated(values, table)
         mu, sigma = law.kernel(states)
-        weight, top = np.exp(heights), int(heights.argmax())
-        images, folded = [], 0.0
-        for u, share in zip(NOISE, SHARE, strict=True):
-            image = mu + sigma * u
-            turns = np.flatnonzero(np.diff(np.sign(np.diff(image)))) + 1
-            counts = np.flatnonzero(heights - 0.5 * u * u > -LOWEST)
-            begin, end = (int(counts[0]), int(counts[-1]) + 1) if len(counts) else (0, 0)
-            first = max(begin, int(turns[turns <= top].max(initial=begin)))
-            last = min(end, int(turns[turns > top].min(initial=end)) + 1)
-            folded += float(share * (weight[begin:first].sum() + weight[last:end].sum()) / weight.sum())
-            images.append((first, last, image[first:last]))
-        if folded > FOLDED:
+        numbers = np.arange(len(x))
+        turning, density = _turning(mu, sigma, heights)
+        distance = np.abs(np.diff(mu[::FINER], prepend=np.nan, append=np.nan))
+        wide = OVERLAP * np.fmax(distance[1:], distance[:-1]) <= sigma[::FINER]
+        at_turns = np.zeros(len(x), dtype=bool)
+        at_turns[np.unique(np.round(table[turning]).astype(int))] = True
+        grown = binary_dilation(at_turns, iterations=2 * EDGE) if at_turns.any() else at_turns
+        chi = Chi.of(binary_erosion(wide, iterations=1, border_value=1) | grown)
+        rest = 1 - chi(table)
+        if (rest[turning] * density).sum() / np.exp(heights).sum() > poles:
             raise Unresolved("the transition kernel is far narrower than the posterior, and folds the state")
-        return cls(values, law, table, images)
+        with np.errstate(divide="ignore"):
+            left = heights + np.log(np.maximum(rest, 0.0))
+        step = FINE if len(chi.begin) else STEP
+        noise = step * np.arange(-round(8 / step), round(8 / step) + 1) + SHIFT
+        images = []
+        for u in noise.tolist():
+            image = mu + sigma * u
+            counts = left - 0.5 * u * u > -LOWEST
+            cuts = np.flatnonzero(np.diff(np.sign(np.diff(image)))) + 1
+            for first, last in zip([0, *cuts.tolist()], [*(cuts + 1).tolist(), len(image)], strict=True):
+                inside = np.flatnonzero(counts[first:last])
+                if len(inside) > 1:
+                    branch = slice(first + int(inside[0]), first + int(inside[-1]) + 1)
+                    images.append((u, branch.start, image[branch]))
+        return cls(values, law, chi, table, step, images, *_summed(values, chi, numbers, law))
 
     def density(self, wanted: Array) -> Array:
         """p(x') at (N',)."""
+        result = np.zeros(len(wanted))
+        for rows in chunks(len(wanted), max(len(self.mu), 1), CACHED):
+            kernel = np.exp(-0.5 * ((wanted[rows, None] - self.mu) / self.sigma) ** 2)
+            result[rows] = kernel @ (self.mass / (self.sigma * ROOT))
         places, noises, starts = [], [], []
-        for number, (first, end, image) in enumerate(self.images):
-            if end - first > 1:
-                order = slice(None) if image[-1] > image[0] else slice(None, None, -1)
-                inside = np.flatnonzero((wanted >= image.min()) & (wanted <= image.max()))
-                places.append(inside)
-                noises.append(np.full(len(inside), number))
-                starts.append(np.interp(wanted[inside], image[order], self.table[first:end][order]))
-        i, k, at = np.concatenate(places), np.concatenate(noises), np.concatenate(starts)
-        u, last = NOISE[k], self.values.shape[1] - 1
+        for noise, first, image in self.images:
+            order = slice(None) if image[-1] > image[0] else slice(None, None, -1)
+            inside = np.flatnonzero((wanted >= image.min()) & (wanted <= image.max()))
+            places.append(inside)
+            noises.append(np.full(len(inside), noise))
+            starts.append(np.interp(wanted[inside], image[order], self.table[first : first + len(image)][order]))
+        if not places:
+            return result
+        i, u, at = np.concatenate(places), np.concatenate(noises), np.concatenate(starts)
+        last = self.values.shape[1] - 1
         for _ in range(NEWTON):
             x, _, length = interpolated(self.values, at)
             (mu, sigma), (mu_slope, sigma_slope) = self.law.kernel(x), self.law.kernel_slope(x)
             slope = (mu_slope + sigma_slope * u) * length
-            at = np.clip(at - (mu + sigma * u - wanted[i]) / slope, 0, last)
-        terms = SHARE[k] * np.exp(interpolated(self.values, at)[1]) / np.abs(slope)
-        return np.bincount(i, terms, len(wanted))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                moved = at - (mu + sigma * u - wanted[i]) / slope
+            at = np.where(np.abs(moved - at) < 1, np.clip(moved, 0, last), at)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            terms = np.exp(interpolated(self.values, at)[1] - 0.5 * u * u) * (1 - self.chi(at)) / np.abs(slope)
+        return result + self.step / ROOT * np.bincount(i, np.where(np.isfinite(terms), terms, 0.0), len(wanted))
+
+
+def _turning(mu: Array, sigma: Array, heights: Array) -> tuple[Array, Array]:
+    """Places in the table where f(., u) turns back, and the density there of the likeliest noise that makes it turn."""
+    images = mu + sigma * DENSE[:, None]
+    turns = np.diff(np.sign(np.diff(images, axis=1)), axis=1) != 0
+    together = np.where(turns, heights[1:-1] - 0.5 * DENSE[:, None] ** 2, -np.inf).max(axis=0)
+    places = np.flatnonzero(together > -TURNS)
+    return places + 1, np.exp(together[places])
+
+
+def _summed(values: Array, chi: Chi, numbers: Array, law: ScalarDensities) -> tuple[Array, Array, Array]:
+    """The kernels of chi p."""
+    if not len(chi.begin):
+        return np.empty(0), np.empty(0), np.empty(0)
+    at, weight = panels(values[0], np.exp(values[1]) * chi(numbers), law, MOST)
+    x, logs, _ = interpolated(values, at)
+    mass = weight * np.exp(logs) * chi(at)
+    kept = mass > POLES**2
+    return (*(array[kept] for array in law.kernel(x)), mass[kept])
 
 
 def by_noise(grid: Grid, law: ScalarDensities, rough: Kernels) -> Kernels:
@@ -100,11 +183,12 @@ def by_noise(grid: Grid, law: ScalarDensities, rough: Kernels) -> Kernels:
     Raises
     ------
     Unresolved
-        The state is folded: f(., u) is not monotone.
+        f(., u) turns back where there are too few nodes.
     """
     seen = grid.density > 0  # elsewhere there is no mass, and the length does not matter
     length = np.where(seen, grid.mass / np.where(seen, grid.density, 1.0), np.gradient(grid.x))
-    full, even = Pushed.of(grid.x, grid.mass, length, law), Pushed.of(grid.x[::2], grid.mass[::2], 2 * length[::2], law)
+    full = Pushed.of(grid.x, grid.mass, length, law, POLES)
+    even = Pushed.of(grid.x[::2], grid.mass[::2], 2 * length[::2], law, ROUGH)
 
     def both(x: Array) -> Array:
         return np.stack([full.density(x[0]), even.density(x[0])], axis=-1)[None]

@@ -54,6 +54,11 @@ class Proposal(NamedTuple):
         return Proposal(*(np.repeat(array[:, None], clouds, axis=1) for array in self))
 
 
+def _slopes(equation: sp.MatrixBase, by: tuple[sp.Symbol, ...]) -> sp.MatrixBase:
+    """Derivatives, with those of a jump left out: where to look needs not be exact."""
+    return equation.jacobian(sp.Matrix(by)).replace(sp.DiracDelta, lambda *place: sp.S.Zero)
+
+
 @dataclass(frozen=True)
 class Look:
     """What the measurement tells of the noise that makes the next state.
@@ -89,7 +94,7 @@ class Look:
     def ahead(cls, model: Model) -> Look:
         """x' = a(x, u)."""
         equation = model.state_equation.subs(model.values)
-        outputs = {"after": equation, "slope": equation.jacobian(sp.Matrix(model.v))}
+        outputs = {"after": equation, "slope": _slopes(equation, model.v)}
         arguments = {"x": sp.Matrix(model.x), "u": sp.Matrix(model.v)}
         state = Stepwise.compile(model.known, "next_state", arguments, outputs, ["x", "u", "after"])
         return cls._of(model, equation, model.v, model.state_noise, lambda x, u, k: state.at(k)(x, u))
@@ -104,9 +109,10 @@ class Look:
         state: Callable[[Array, Array, int], tuple[Array, Array]],
     ) -> Look:
         mean = model.meter_equation.subs(dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True))).subs(model.values)
-        B = model.meter_equation.jacobian(sp.Matrix(model.w))
+        means = dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True))
+        B = model.meter_equation.jacobian(sp.Matrix(model.w)).subs(means)  # where the noise enters nonlinearly: only a proposal
         cov = (B * exact_matrix(model.meter_noise.cov) * B.T).subs(model.values)
-        outputs = {"signal": mean, "slope": mean.jacobian(sp.Matrix(model.x)), "noise": cov}
+        outputs = {"signal": mean, "slope": _slopes(mean, model.x), "noise": cov}
         meter = Stepwise.compile(model.known, "seen", {"x": sp.Matrix(model.x)}, outputs, ["x", "signal"])
         there = dict(zip(model.x, equation, strict=True))
         H = mean.subs(there, simultaneous=True).jacobian(sp.Matrix(u))

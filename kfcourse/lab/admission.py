@@ -8,7 +8,6 @@ zero, a meter so sharp that hardly a particle survives, and what leaves the fini
 from __future__ import annotations
 
 import dataclasses
-import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
@@ -16,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kfcourse.filters import Design, Filter
+from kfcourse.filters import Design, Filter, pointmass
 from kfcourse.filters.particles import particle
-from kfcourse.lab.short_names import FILTERS, Structures, title
+from kfcourse.lab.short_names import FILTERS, Structures, check_names, has_exact, title
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite
@@ -34,10 +33,6 @@ RUNS, STEPS, SLOW = 512, 20, 16  # of a trial; trajectories of the slow filters
 SECONDS = 10.0  # for them
 PARTICLES, FEW, OFTEN = 1000, 10.0, 0.05  # fewer effective particles than FEW at so many corrections are too few
 BLIND = 0.5  # of the unexplained variance, that must be seen
-TOO_LONG = (
-    "its formulas are not derived in the time they have, as the model's are too long; simplify them, or take filters without "
-    "formulas, aof-unscented and duof"
-)
 
 
 @dataclass(frozen=True)
@@ -54,55 +49,70 @@ class Admission:
         Why not; empty if it can.
     warnings : tuple of str
         Why it will not do well, or not at all.
+    remarks : tuple of str
+        Worth knowing.
     """
 
     name: str
     one: Filter | Design | None
     reason: str = ""
     warnings: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> str:
-        """ "no", "poor" (it can be built, and there are warnings) or "yes"."""
+        """Whether it may be used: "yes", "no", or "poor" if it can be built, but there are warnings."""
         return "no" if self.one is None else "poor" if self.warnings else "yes"
 
     @property
     def says(self) -> str:
-        return "; ".join([self.reason] if self.reason else self.warnings)
+        return "; ".join([self.reason] if self.reason else [*self.warnings, *self.remarks])
 
 
 def admissions(model: Model, names: Sequence[str] = tuple(FILTERS), seconds: float | None = None) -> list[Admission]:
     """Which of the filters can be built for the model, and what to know of them; each as the lab builds it.
 
-    With `seconds`, a filter whose formulas are not derived in that time, all together, is refused; each has a second at least.
+    With `seconds`, the formulas of each must be derived in that time.
 
     Raises
     ------
     ValueError
         An unknown name; the message lists the known ones.
     """
-    unknown = [name for name in names if name not in FILTERS]
-    if unknown:
-        raise ValueError(f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(FILTERS)}")
+    check_names(names)
     structures = Structures(model)
-    end = None if seconds is None else time.monotonic() + seconds
-    return [_admitted(name, structures, end) for name in dict.fromkeys(names)]
+    found, too_long = [], set[str]()
+    for name in dict.fromkeys(names):
+        kind = name.split("-")[-1]  # filters with the same structural functions share the time
+        try:
+            if kind in too_long:
+                raise OutOfTime
+            with nullcontext() if seconds is None else time_limit(seconds):
+                found.append(_admitted(name, structures))
+        except OutOfTime:
+            too_long.add(kind)
+            found.append(Admission(name, None, _TOO_LONG.format(seconds)))
+    return found
 
 
-def _admitted(name: str, structures: Structures, end: float | None) -> Admission:
-    limit = nullcontext() if end is None else time_limit(max(end - time.monotonic(), 1.0))
-    with limit, warnings.catch_warnings(record=True) as caught:
+_TOO_LONG = (
+    "its formulas are not derived within {:g} s, as the model's are too long; simplify them, or take filters without formulas, "
+    "aof-unscented and duof"
+)
+
+
+def _admitted(name: str, structures: Structures) -> Admission:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", QuadratureWarning)
         try:
             one = FILTERS[name].build(structures)
-        except OutOfTime:
-            return Admission(name, None, TOO_LONG)
         except (NoClosedForm, ModelError) as error:
             return Admission(name, None, str(error))
     found = [str(warning.message) for warning in caught]
     with np.errstate(all="ignore"):
         found += [text for kind, look in _LOOKS.items() if kind in name for text in look(structures)]
-    return Admission(name, one, "", tuple(found))
+        remarks = [text for kind, look in _REMARKS.items() if kind == name and not found for text in look(structures)]
+    return Admission(name, one, "", tuple(found), tuple(remarks))
 
 
 def on_trial(model: Model, found: Sequence[Admission], seed: int = 1) -> list[Admission]:
@@ -205,20 +215,48 @@ def _reference(structures: Structures) -> Structure:
 
 
 def _starved(structures: Structures) -> Iterator[str]:
-    """A meter much sharper than the prediction: the bootstrap draws where the measurement says that nothing is."""
+    """A meter so much sharper than the prediction that hardly a particle falls where the measurement says."""
     model = structures.model
+    if (share := _share_starved(model, guided=True)) > OFTEN:
+        instead = "; use aof-exact" if has_exact(model) else ""
+        yield f"the meter is sharp: at {100 * share:.0f} % of the corrections {_TOO_FEW}{instead}"
+
+
+def _bootstrap(structures: Structures) -> Iterator[str]:
+    """The same for particles that do not look at the measurement."""
+    if (share := _share_starved(structures.model, guided=False)) > OFTEN:
+        yield (
+            f"a bootstrap filter, guided=False, would fail: the meter is sharp, and at {100 * share:.0f} % of the corrections "
+            f"{_TOO_FEW}"
+        )
+
+
+_TOO_FEW = f"fewer than {FEW:.0f} of {PARTICLES} particles count"
+
+
+def _share_starved(model: Model, guided: bool) -> float:
+    """Share of the corrections of some trajectories after which too few particles count."""
     steps = int(min(STEPS, model.known.steps))
-    one, y = particle(model, PARTICLES), simulate(model, SLOW, steps, seed=1).y
+    one, y = particle(model, PARTICLES, guided=guided), simulate(model, SLOW, steps, seed=1).y
     state, effective = one.init(SLOW), np.empty((steps, SLOW))
     for k, measured in enumerate(y):
         state = one.step(state, measured)
         effective[k] = state.memory.effective
-    starved = (effective < FEW).mean()
-    if starved > OFTEN:
-        yield (
-            f"the meter is sharp: at {100 * starved:.0f} % of the corrections fewer than {FEW:.0f} of {PARTICLES} particles count"
-            + ("; use aof-exact" if model.n == model.p == 1 else "")
-        )
+    return float((effective < FEW).mean())
+
+
+def _by_particles(structures: Structures) -> Iterator[str]:
+    """The exact filter where point masses do not reach."""
+    if not has_exact(structures.model):
+        yield from _starved(structures)
+
+
+def _not_by_points(structures: Structures) -> Iterator[str]:
+    """Why the exact filter is one of particles."""
+    try:
+        pointmass(structures.model)
+    except ModelError as error:
+        yield f"by particles: {error}"
 
 
 # By a part of the short name.
@@ -226,7 +264,9 @@ _LOOKS: dict[str, Callable[[Structures], Iterator[str]]] = {
     "linearised": _flat,
     "unscented": _blind,
     "particle": _starved,
+    "aof-exact": _by_particles,
 }
+_REMARKS: dict[str, Callable[[Structures], Iterator[str]]] = {"particle": _bootstrap, "aof-exact": _not_by_points}
 
 
 def table(found: Sequence[Admission]) -> str:

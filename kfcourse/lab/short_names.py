@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import NamedTuple
@@ -74,7 +75,7 @@ def title(name: str) -> str:
 
 
 def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Design]:
-    """Filters of the lab for a model, by short names.
+    """Filters of the lab for a model, by short names; `kfcourse.lab.admission` tells of each whether it can be had.
 
     Raises
     ------
@@ -83,9 +84,7 @@ def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Desig
     NoClosedForm, ModelError
         A filter that this model does not admit; the message names the filter and says what to use instead.
     """
-    unknown = [name for name in names if name not in FILTERS]
-    if unknown:
-        raise ValueError(f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(FILTERS)}")
+    check_names(names)
     structures = Structures(model)
     built = []
     for name in dict.fromkeys(names):
@@ -96,8 +95,17 @@ def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Desig
     return built
 
 
+def check_names(names: Sequence[str]) -> None:
+    """ValueError, which lists the known names, if a short name is not among them."""
+    unknown = [name for name in names if name not in FILTERS]
+    if unknown:
+        raise ValueError(f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(FILTERS)}")
+
+
 def exact(model: Model) -> Filter:
     """The exact AOF, by point masses where they reach, else by particles, whose own error does not enter the bound.
+
+    Where point masses fail in the middle of a comparison, particles take over (`Filter.instead`).
 
     Raises
     ------
@@ -105,9 +113,13 @@ def exact(model: Model) -> Filter:
         Neither can be had: there is no density of y given x.
     """
     try:
-        return pointmass(model)
+        found = pointmass(model)
     except ModelError:
         return particle(model, BOUND, name="aof-exact")
+    try:
+        return dataclasses.replace(found, instead=particle(model, BOUND, name="aof-exact"))
+    except ModelError:  # without noise in the meter there are no weights
+        return found
 
 
 def has_exact(model: Model) -> bool:

@@ -153,15 +153,16 @@ def student(notebook: NotebookNode, pictures: Mapping[str, bytes]) -> NotebookNo
         if cell.cell_type == "code":
             cell.outputs, cell.execution_count = [], None
             if cell.id in pictures:
-                cells.append(_picture(cell.id, pictures[cell.id]))
+                cells.append(_picture(cell, pictures[cell.id]))
         if cell.source.strip():
             cells.append(cell)
     result.cells = cells
     return result
 
 
-def _picture(name: str, png: bytes) -> NotebookNode:
-    cell = nbformat.v4.new_markdown_cell(f"The picture to reach:\n\n![The picture to reach](attachment:{name}.png)")
+def _picture(drawn_by: NotebookNode, png: bytes) -> NotebookNode:
+    name, seen = drawn_by.id, drawn_by.metadata.get("alt", "The picture to reach")
+    cell = nbformat.v4.new_markdown_cell(f"The picture to reach:\n\n![{seen}](attachment:{name}.png)")
     cell.id = f"{name}-goal"
     cell["attachments"] = {f"{name}.png": {"image/png": base64.b64encode(png).decode()}}
     return cell
@@ -176,7 +177,8 @@ def statement(notebook: NotebookNode, pictures: Mapping[str, str]) -> str:
             continue
         if cell.cell_type == "code":
             if cell.id in pictures:
-                parts.append(f"The picture to reach:\n\n![The picture to reach]({pictures[cell.id]})")
+                seen = cell.metadata.get("alt", "")
+                parts.append(f"```{{figure}} {pictures[cell.id]}\n:alt: {seen}\n\nThe picture to reach.\n```")
             source = f"```python\n{source}\n```"
         parts.append(source)
     return "\n\n".join(parts) + "\n"

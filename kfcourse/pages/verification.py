@@ -58,7 +58,8 @@ def verified(
         Sides that are equal: expressions or matrices of SymPy.  A side that is a string of LaTeX is printed and not checked,
         so at least two others are needed then.  `sympy.Eq` is taken too, unless SymPy has already made it true or false.
     where : mapping of symbols to expressions
-        What printed symbols stand for; put in before the difference is taken, as often as it takes.
+        What printed symbols stand for (a `MatrixSymbol`: its entries); put in before the difference is taken, as often as it
+        takes.
     digits : int, optional
         Compare numbers instead, at the points `at`, to so many digits: for integrals and sums that SymPy does not take.
     at : sequence of mappings of symbols to numbers, optional
@@ -216,7 +217,7 @@ def _points(symbols: Sequence[sp.Symbol]) -> list[dict[sp.Symbol, sp.Rational]]:
 
 
 def _block(equations: Sequence[Equation], names: Mapping[Any, str] | None) -> str:
-    lines = " \\\\\n".join(equation_latex(sides, names=names) for sides in equations)
+    lines = " \\\\[3pt]\n".join(equation_latex(sides, names=names) for sides in equations)
     return f"\\begin{{aligned}}\n{lines}\n\\end{{aligned}}"
 
 

@@ -16,6 +16,7 @@ import sympy as sp
 from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.precedence import PRECEDENCE
 
+from kfcourse.symbolic.formula import NO_NUMBERS
 from kfcourse.symbolic.reading import ModelError
 
 
@@ -76,6 +77,12 @@ def compile_function(
         `function(*arrays)`: leading axes broadcast.  An output that no argument enters comes back
         without leading axes, the same for every trajectory.
     """
+    for expression in (*outputs.values(), *(definitions or {}).values()):
+        if expression.has(*NO_NUMBERS):
+            raise ModelError(
+                f"{name}: no finite real value, as at the mean of a noise something is divided by 0, or the root of a negative "
+                "number taken; use unscented(model) or gauss_hermite(model), or another mean of the noise"
+            )
     program = lower(outputs, vectors, definitions or {})
     source = numpy_source(name, arguments, program, doc)
     namespace: dict[str, Any] = {"np": np}
@@ -164,7 +171,7 @@ class _Printer(NumPyPrinter):
         value = float(expr) if abs(expr) < 2**1023 else np.inf
         if not np.isfinite(value) or (expr and not value):
             raise ModelError(
-                f"the derived functions hold the number {sp.N(expr, 3)}, beyond what a float can be; change the units"
+                f"the derived functions hold the number {sp.N(expr, 3)!s}, beyond what a float can be; change the units"
             )
         return repr(value)
 

@@ -11,6 +11,7 @@ import ast
 import keyword
 import re
 import unicodedata
+import warnings
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -46,6 +47,7 @@ COMPARISONS: dict[type[ast.cmpop], Callable[[sp.Expr, sp.Expr], Boolean]] = {
     ast.NotEq: sp.Ne,
 }
 
+NO_NUMBERS = (sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I)
 LARGEST = 1e100  # numbers beyond it, or below 1/LARGEST: products of some would leave the floats
 MAX_LENGTH = 2000
 MAX_EXPONENT = 16
@@ -114,7 +116,9 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
     _check_characters(formula)
     offset = len(formula) - len(formula.lstrip())
     try:
-        tree = ast.parse(formula.strip(), mode="eval").body
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # Python's, of what it reads in two ways: 1if x
+            tree = ast.parse(formula.strip(), mode="eval").body
     except SyntaxError as error:
         column = offset + max((error.offset or 1) - 1, 0)
         hint = "; a product needs *, as in 2*x" if re.search(r"[0-9)]\s*[A-Za-z(]", formula) else ""
@@ -125,9 +129,11 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
         expression = _Reader(formula, symbols, offset).read(tree)
     except RecursionError:
         raise FormulaError(formula, "the formula is nested too deeply; split it up") from None
+    except TypeError:  # SymPy's, where numbers that are not real are compared
+        raise FormulaError(formula, "the formula compares what has no real value") from None
     if _degree(expression) > MAX_DEGREE:
         raise FormulaError(formula, f"the formula has products of powers above degree {MAX_DEGREE}; simplify it")
-    if expression.has(sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I):
+    if expression.has(*NO_NUMBERS):
         raise FormulaError(formula, "the formula has no finite real value (division by zero or root of a negative?)")
     return expression
 
@@ -259,6 +265,8 @@ class _Reader:
         self.nested += 1
         arguments = [self.read(argument) for argument in node.args]
         self.nested -= 1
+        if any(argument.has(*NO_NUMBERS) for argument in arguments):
+            raise self.fail(node, f"the argument of {node.func.id} has no finite real value")
         if any(argument.is_number and abs(argument) >= MAX_ARGUMENT for argument in arguments):
             raise self.fail(node, f"the argument of {node.func.id} is too large")
         return FUNCTIONS[node.func.id](*arguments)

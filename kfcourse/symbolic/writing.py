@@ -64,14 +64,17 @@ class _Writer:
     def terms(self, total: sp.Add) -> list[sp.Expr]:
         """Terms with the same parameters together: first the group with the shortest, earliest term; in it powers fall."""
         ordered = []
-        for parameters, group in groupby(sorted(total.args, key=self.parameters), self.parameters):
+        for parameters, group in groupby(sorted(total.args, key=self.kind), self.kind):
             members = sorted(group, key=lambda term: [-self.degree(term, symbol) for symbol in self.rank])
-            first = min((self.noisiness(term), self.length(term), self.place(term)) for term in members)
-            ordered.append((first, parameters, members))
-        return [term for _, _, members in sorted(ordered, key=lambda item: item[:2]) for term in members]
+            first = min((term.could_extract_minus_sign(), self.length(term), self.place(term)) for term in members)
+            ordered.append((parameters[0], first, parameters[1], members))
+        return [term for *_, members in sorted(ordered, key=lambda item: item[:3]) for term in members]
 
-    def parameters(self, term: sp.Expr) -> str:
-        return str(sp.Mul(*[factor for factor in sp.Mul.make_args(term) if not self.varies(factor) and not factor.is_number]))
+    def kind(self, term: sp.Expr) -> tuple[int, str]:
+        """How many noises are in a term, and its parameters."""
+        return self.noisiness(term), str(
+            sp.Mul(*[factor for factor in sp.Mul.make_args(term) if not self.varies(factor) and not factor.is_number])
+        )
 
     def varies(self, factor: sp.Expr) -> bool:
         return any(symbol in self.rank for symbol in factor.free_symbols)

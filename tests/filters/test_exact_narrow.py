@@ -92,3 +92,34 @@ def test_beyond_the_budget_there_is_a_message_within_seconds(state, meter):
         for measurement in y:
             state = exact.step(state, measurement)
     assert time.process_time() - start < 5
+
+
+@pytest.mark.parametrize("state", ["x**2 - 1 + 0.01*v", "x**2 + 0.01*v", "31*x + 0.1*v", "sin(5*x) + 0.01*v"])
+def test_a_step_without_measurement_keeps_the_moments(state):
+    """The prediction's moments are sums over the masses; the next posterior has gone through kernels, folds and new nodes."""
+    exact, nothing = pointmass(Model.define(state, "x + w")), np.full((1, 1), np.nan)
+    first = exact.step(exact.init(1), nothing)
+    second = exact.step(first, nothing)
+    sigma = np.sqrt(first.predicted.cov[0, 0, 0])
+    assert abs(second.posterior.mean - first.predicted.mean)[0, 0] < INTERPOLATED * sigma
+    assert abs(second.posterior.cov[0, 0, 0] / sigma**2 - 1) < INTERPOLATED
+
+
+def test_a_kernel_that_is_narrow_here_and_folds_there():
+    """x' = 0.9 x + 0.05 x^2 v: narrow near 0, and far out the noise turns f(., v) back.  Against a sum over a million states."""
+    model = Model.define("0.9*x + 0.05*x**2*v", "x + 0.5*w")
+    exact, y = pointmass(model), np.array([[0.4], [1.3]])
+    state = exact.init(1)
+    state = exact.step(state, y[:1])
+    state = exact.step(state, y[1:])
+    # The second posterior's moments: x' = f(x, u), over x of the first posterior, N(0.32, 0.2), and u; trapezoidal in both.
+    x = 0.32 + np.sqrt(0.2) * np.linspace(-9, 9, 2001)[:, None]
+    u = np.linspace(-8, 8, 801)
+    weight = np.exp(-0.5 * ((x - 0.32) ** 2 / 0.2 + u**2))
+    after = 0.9 * x + 0.05 * x**2 * u
+    weight *= np.exp(-0.5 * ((1.3 - after) / 0.5) ** 2)
+    mean = (weight * after).sum() / weight.sum()
+    variance = (weight * (after - mean) ** 2).sum() / weight.sum()
+    assert abs(state.posterior.mean[0, 0] - mean) < 10 * INTERPOLATED * np.sqrt(variance)
+    assert abs(state.posterior.cov[0, 0, 0] / variance - 1) < 10 * INTERPOLATED
+    assert state.memory.error[0] < 10 * INTERPOLATED

@@ -1,54 +1,38 @@
 """Quadrature: published figures, points, what does not vary, and warnings where points cannot integrate."""
 
-import json
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from kfcourse import Model, ModelError, gaussian, linearised, run, simulate
 from kfcourse.filters.approximations import aof
+from kfcourse.scenarios.benchmarks import PENDULUM_ERRORS, pendulum, pendulum_data
 from kfcourse.symbolic.quadrature import ROOTS, QuadratureWarning, gauss_hermite, unscented
-
-DATA = json.loads((Path(__file__).parents[1] / "data" / "pendulum.json").read_text(encoding="utf-8"))
-
-
-def pendulum():
-    """Särkkä and Svensson, Bayesian Filtering and Smoothing (2nd ed., 2023); data and figures from its notebooks."""
-    dt = 0.01
-    return Model.define(
-        ["x1 + dt*x2 + v1", "x2 - g*dt*sin(x1) + v2"],
-        "sin(x1) + w1",
-        {"dt": dt, "g": 9.81},
-        state_noise={"variance": 0.01 * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])},
-        meter_noise={"variance": 0.1},
-    )
 
 
 @pytest.mark.parametrize(
     ("structure", "published"),
     [
-        (linearised, 0.16830859061153763),
-        (unscented, 0.09524392125923083),  # alpha = 1, beta = 0, kappa = 3 - n
-        (lambda model: gauss_hermite(model, 5), 0.0998062421916222),
+        (linearised, PENDULUM_ERRORS["EKF"]),
+        (unscented, PENDULUM_ERRORS["UKF"]),  # alpha = 1, beta = 0, kappa = 3 - n
+        (lambda model: gauss_hermite(model, 5), PENDULUM_ERRORS["Gauss-Hermite 5"]),
     ],
 )
 def test_the_pendulum_has_its_published_errors(structure, published):
-    # The law N(0, I) is that before the first prediction: our order, correct first, has one measurement missing.
-    y = np.concatenate([[np.nan], np.ravel(DATA["Y"])])[:, None, None]
+    x, y = pendulum_data()
     mean = run(aof(structure(pendulum())), y).mean[1:, 0, 0]
-    rms = np.sqrt(np.mean((mean - np.array(DATA["X"])[0]) ** 2))
+    rms = np.sqrt(np.mean((mean - x[:, 0]) ** 2))
     # 500 steps of a filter round differently in another order of operations: some 1e-13
     assert rms == pytest.approx(published, rel=1e-12)
 
 
 def test_other_points_give_other_errors():
-    y = np.concatenate([[np.nan], np.ravel(DATA["Y"])])[:, None, None]
+    x, y = pendulum_data()
 
     def rms(**options):
         mean = run(aof(unscented(pendulum(), **options)), y).mean[1:, 0, 0]
-        return np.sqrt(np.mean((mean - np.array(DATA["X"])[0]) ** 2))
+        return np.sqrt(np.mean((mean - x[:, 0]) ** 2))
 
     assert len({round(rms(root=root, augmented=more), 6) for root in ROOTS for more in (False, True)}) == 6
 

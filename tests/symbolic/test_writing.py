@@ -25,6 +25,8 @@ c, e, f, g, h, s, T = sp.symbols("c e f g h s T", real=True)
         ),
         (x + T * sp.sin(x) + s * v, [x], [v], r"x + T \sin {x} + s v"),
         (h * sp.sin(x) + w, [x], [w], r"h \sin {x} + w"),
+        (x + T * z + v, [x, z], [v], "x + T z + v"),
+        (z - T * g * sp.sin(x) + v, [x, z], [v], r"z - T g \sin {x} + v"),
         (sp.S.Zero, [x], [], "0"),
         (-c * x, [x], [], "- c x"),
     ],
