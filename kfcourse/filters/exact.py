@@ -29,7 +29,7 @@ from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
 from kfcourse.filters.exact_adaptive import check_scalar, estimated
 from kfcourse.filters.exact_batch import Posteriors, posteriors, settled
-from kfcourse.filters.exact_kernels import Grid, Kernels, Unresolved, apart, chunks, of_prior
+from kfcourse.filters.exact_kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, of_prior
 from kfcourse.filters.exact_places import hidden, likeliest
 from kfcourse.filters.exact_predictions import predictions
 from kfcourse.filters.exact_roots import at_roots
@@ -102,7 +102,7 @@ def pointmass(model: Model, accuracy: float = ACCURACY) -> Filter:
         try:
             try:
                 posterior, predicted, memory = _step(groups, y, law, accuracy, FINE[0])
-            except Unresolved:
+            except TooNarrow:
                 posterior, predicted, memory = _step(groups, y, law, accuracy, FINE[1])
         except Unresolved as error:
             raise Unresolved(f"step {state.step} of {model}: {error}; leave the exact filter out (--exact-runs 0)") from None

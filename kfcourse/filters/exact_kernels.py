@@ -36,6 +36,10 @@ class Unresolved(ModelError):
     """A posterior or a prediction needs more nodes than the budget has; the message says where."""
 
 
+class TooNarrow(Unresolved):
+    """The transition kernel is far narrower than the distance of a posterior's nodes."""
+
+
 class Grid(NamedTuple):
     """A posterior as point masses: nodes x (M,), ascending, their masses (M,), and the density there (M,).
 
