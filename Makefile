@@ -14,7 +14,7 @@ export OMP_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help literature book test quick lint unit notebooks lock lock-check clean distclean install figure benchmark
+.PHONY: help literature book test quick lint unit notebooks lock lock-check clean distclean install figure benchmark fuzz
 
 help:
 	@echo "make book        execute the chapters and build the book in _build/html"
@@ -23,6 +23,7 @@ help:
 	@echo "make lint        ruff check, ruff format --check, mypy, the columns of the pages"
 	@echo "make unit        unit tests and documentation examples only"
 	@echo "make install     the virtual environment .venv only"
+	@echo "make fuzz        20,000 generated formulas, models and files of variants; 1,000 are part of make unit"
 	@echo "make benchmark   speed of the engine, as ratios"
 	@echo "make literature  the figures of the literature beside ours"
 	@echo "make figure      the figure of README.md"
@@ -44,10 +45,15 @@ lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python .ci/columns.py exercises/*/statement.md
+	$(BIN)/python .ci/columns.py
 
 unit: install
 	$(BIN)/pytest -q -n auto --dist loadscope --ignore tests/test_book.py
+
+# Other cases each time; what fails is shown with the case, as small as can be.
+CASES := 20000
+fuzz: install
+	KFCOURSE_CASES=$(CASES) $(BIN)/pytest -q -n auto --hypothesis-show-statistics tests/test_generated.py
 
 # Executes every notebook of the built book once more and compares all outputs; so it does with the worked solutions of the
 # exercises, for variants of different kinds: multiplicative noises, a sine meter, a vector state.

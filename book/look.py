@@ -20,6 +20,8 @@ CAPTION = re.compile(
     r'<p><span class="kf-caption">(.*?)</span></p>\s*(<div class="pst-scrollable-table-container">)?\s*<table class="([^"]*)">'
 )
 NUMBER = re.compile(r"(?:(?<=>)|^)\s*\d+(\.\d+)*\.\s")  # of a section
+NO_MEANING = re.compile(r"</dt>\s*</dl>")  # of a parameter, say
+ROLES = re.compile(r' role="(?:list|doc-biblioentry)"')  # of a bibliography, not those of today's HTML
 FIGURE = re.compile(r'(<span class="caption-number">[^<]*\d) </span>')
 TICK = re.compile(r'(<p class="kf-claim">)\s*✓')
 SMALL_TICK = r'\1<span class="kf-tick">✓</span>'
@@ -71,7 +73,7 @@ def _part(part: contents.Part, pagename: str, pathto) -> dict:
 
 
 def _reachable(match: re.Match) -> str:
-    """A displayed formula takes the focus, so that the keyboard can scroll it, and has a name."""
+    """A displayed formula takes the focus and has a name (page.js hands both to the box that MathJax makes)."""
     identity, number = match[1] or "", match[2] or ""
     name = f"Formula {match[3]}" if match[3] else "Formula"
     return f'<div class="math notranslate nohighlight"{identity} tabindex="0" role="group" aria-label="{name}">\n{number}'
@@ -103,6 +105,13 @@ def _boxed(node: nodes.Node) -> bool:
     return False
 
 
+def only_where_needed(app, pagename: str, templatename: str, context: dict, doctree) -> None:
+    """Sphinx takes the front page for one with formulas because its contents lead to such pages."""
+    if 'class="math' not in context.get("body", ""):
+        scripts = context.get("script_files", [])
+        context["script_files"] = [one for one in scripts if "mathjax" not in f"{one.filename} {one.attributes}".lower()]
+
+
 def write_not_found(app, exception) -> None:
     """The page that a server shows for an address that does not exist; it needs no other file."""
     if exception or app.builder.format != "html":
@@ -117,6 +126,7 @@ def write_not_found(app, exception) -> None:
 
 def setup(app) -> dict[str, bool]:
     app.connect("config-inited", use_templates, priority=900)
+    app.connect("html-page-context", only_where_needed, priority=950)
     app.connect("build-finished", write_not_found)
     app.connect("html-page-context", complete, priority=300)  # before the theme, which tries the templates
     return {"parallel_read_safe": True, "parallel_write_safe": True}

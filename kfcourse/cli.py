@@ -228,7 +228,11 @@ def lab(
     language: str | None,
     json_file: Path | None,
 ) -> None:
-    """Compare the filters on VARIANT (such as 53) and write the report."""
+    """Compare the filters on VARIANT (such as 53) and write the report.
+
+    The same seed gives the same numbers, bit by bit on one machine; another one's linear algebra (BLAS) may round
+    otherwise, by 1e-13 or so.
+    """
     if exact_runs == 1:
         raise click.ClickException("one trajectory has no standard error: give --exact-runs 0, or at least 2")
     if same_ensemble and designs not in (None, 1):
@@ -271,6 +275,8 @@ def lab(
     )
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
+    for name, reason in result.replaced.items():
+        click.echo(f"{title(name)} by particles: {reason}", err=True)
     to_error = json_file is not None and is_standard_output(json_file)
     _tell(result, to_error)
     if json_file:

@@ -26,14 +26,13 @@ from kfcourse import (
     FormulaError,
     Model,
     ModelError,
-    NoClosedForm,
     NotFinite,
     QuadratureWarning,
     compare,
-    lab_filters,
     simulate,
 )
 from kfcourse.lab import plots
+from kfcourse.lab.admission import admissions
 from kfcourse.lab.report import conclusions, write_json
 from kfcourse.lab.short_names import LAB
 from kfcourse.lab.variants import VARIANT_KEYS, Variant, VariantError, load_variants, read_variant
@@ -76,22 +75,28 @@ UNARY = sorted(set(FUNCTIONS) - {"atan2"})
 COMPARE = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
 
 
-def trees(names, numbers=NUMBERS):
-    leaves = st.one_of(
-        st.sampled_from(names).map(lambda name: ("name", name)), st.sampled_from(numbers).map(lambda n: ("number", n))
+def grown(inner):
+    return st.one_of(
+        st.tuples(st.sampled_from("+-*/"), inner, inner),
+        st.tuples(st.just("neg"), inner),
+        st.tuples(st.just("pow"), inner, st.sampled_from(EXPONENTS)),
+        st.tuples(st.sampled_from(UNARY), inner),
+        st.tuples(st.just("atan2"), inner, inner),
+        st.tuples(st.just("if"), st.sampled_from(sorted(COMPARE)), inner, inner, inner, inner),
     )
 
-    def grown(inner):
-        return st.one_of(
-            st.tuples(st.sampled_from("+-*/"), inner, inner),
-            st.tuples(st.just("neg"), inner),
-            st.tuples(st.just("pow"), inner, st.sampled_from(EXPONENTS)),
-            st.tuples(st.sampled_from(UNARY), inner),
-            st.tuples(st.just("atan2"), inner, inner),
-            st.tuples(st.just("if"), st.sampled_from(sorted(COMPARE)), inner, inner, inner, inner),
-        )
 
-    return st.recursive(leaves, grown, max_leaves=7)
+# Built once, as that takes longer than to draw from it: leaves are the places of names and numbers in lists.
+TREES = st.recursive(st.tuples(st.sampled_from(["name", "name", "number"]), st.integers(0, 59)), grown, max_leaves=7)
+
+
+def named(tree, names, numbers=NUMBERS):
+    """The tree with names and numbers at its leaves."""
+    kind, *parts = tree
+    if kind in ("name", "number"):
+        known = names if kind == "name" else numbers
+        return kind, known[parts[0] % len(known)]
+    return kind, *(named(part, names, numbers) if isinstance(part, tuple) else part for part in parts)
 
 
 STRENGTH = {"+": 1, "-": 1, "neg": 2, "*": 2, "/": 2, "pow": 4}
@@ -149,9 +154,10 @@ NAMES = {name: symbol(name) for name in ("x", "v", "c")}
 POINT = {"x": "1.37", "v": "-0.59", "c": "0.83"}
 
 
-@cases(0.3)
-@given(trees([*NAMES, "pi"]))
+@cases(0.36)
+@given(TREES)
 def test_a_formula_has_the_value_that_its_text_has(tree):
+    tree = named(tree, [*NAMES, "pi"])
     try:
         with soon():
             found = parse(text(tree), NAMES)
@@ -162,7 +168,7 @@ def test_a_formula_has_the_value_that_its_text_has(tree):
         point = {name: mpmath.mpf(number) for name, number in POINT.items()} | {"pi": mpmath.pi}
         try:
             expected = value(tree, point)
-        except (ZeroDivisionError, ValueError, OverflowError, TypeError):
+        except (ArithmeticError, ValueError, TypeError, AttributeError):  # the last of complex arguments
             expected = mpmath.nan
         # No real number there, or one in whose sines 60 digits are not enough:
         assume(isinstance(expected, mpmath.mpf) and mpmath.isfinite(expected) and abs(expected) < 1e150)
@@ -205,8 +211,8 @@ def mangled(draw, original):
     return "".join(characters)
 
 
-@cases(0.25)
-@given(mangled(trees([*NAMES, "pi", "q"], NUMBERS + WILD).map(text)))
+@cases(0.3)
+@given(mangled(TREES.map(lambda tree: text(named(tree, [*NAMES, "pi", "q"], NUMBERS + WILD)))))
 def test_any_text_is_a_formula_or_refused_with_its_place(formula):
     with soon():
         try:
@@ -216,7 +222,7 @@ def test_any_text_is_a_formula_or_refused_with_its_place(formula):
             assert all(character.isprintable() or character == "\n" for character in str(error))
             return
     assert found.free_symbols <= set(NAMES.values())
-    assert {type(call) for call in found.atoms(sp.Function)} <= {*FUNCTIONS.values()} | {sp.sec, sp.csc, sp.cot, sp.sign, sp.exp}
+    assert {type(call) for call in found.atoms(sp.Function)} <= {*FUNCTIONS.values()} | {sp.sec, sp.csc, sp.cot, sp.Piecewise}
     assert formula.isascii() and "#" not in formula
 
 
@@ -267,7 +273,7 @@ def models(draw, tame=False):
     names = [*x, *parameters]
 
     def formulas(noise, count):
-        body = [text(draw(trees([*names, noise], numbers))) for _ in range(count)]
+        body = [text(named(draw(TREES), [*names, noise], numbers)) for _ in range(count)]
         return [f"{formula} + 0.3*{noise}" if draw(st.booleans()) else formula for formula in body]
 
     meters = formulas("w", draw(st.integers(1, 2)))
@@ -290,7 +296,7 @@ def defined(given):
             return None
 
 
-@cases(0.25)
+@cases(0.14)
 @given(models())
 def test_a_model_is_refused_or_computes_what_its_formulas_say(given):
     model = defined(given)
@@ -305,7 +311,10 @@ def test_a_model_is_refused_or_computes_what_its_formulas_say(given):
         for function, noise, equation in ((state, v, model.state_equation), (meter, w, model.meter_equation)):
             found = np.broadcast_to(function(x, noise), (len(equation),))
             for one, formula in zip(found, equation, strict=True):
-                exact = formula.subs(model.values).subs({s: sp.Rational(str(p)) for s, p in point.items()}).evalf(20)
+                try:
+                    exact = formula.subs(model.values).subs({s: sp.Rational(str(p)) for s, p in point.items()}).evalf(20)
+                except TypeError:  # a comparison of what is not real there
+                    continue
                 if not exact.is_Float or not 1e-250 < abs(exact) < 1e250 or not np.isfinite(one):
                     continue
                 # Terms that cancel cost digits: compared with the size of the terms.
@@ -316,21 +325,15 @@ def test_a_model_is_refused_or_computes_what_its_formulas_say(given):
     assert tracks.x.shape == (3, 4, model.n) and tracks.y.shape == (3, 4, model.p)
 
 
-@cases(0.02)
+@cases(0.01)
 @given(models(tame=True), st.sampled_from(["accuracy", "relative_accuracy", "ranking", "consistency"]))
 def test_the_lab_of_a_model_has_finite_results_or_says_why_not(given, figure):
     model = defined(given)
     assume(model is not None and not nothing_random(model))
+    filters = [one.one for one in admissions(model, LAB, seconds=5) if one.one]
+    assume(filters)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", QuadratureWarning)
-        try:
-            filters = lab_filters(model, LAB, seconds=5)
-        except (NoClosedForm, ModelError):
-            try:
-                filters = lab_filters(model, ["aof-unscented", "duof"], seconds=5)
-            except (NoClosedForm, ModelError):
-                event("no filter")
-                return
         try:
             result = compare(filters, model, 256, 3, seed=1, designs=2, threads=1, progress=False)
         except NotFinite as error:
@@ -384,7 +387,7 @@ ANYTHING = st.recursive(
 SOUND = {"state": "c*x + 0.1*v", "meter": "x + w", "parameters": {"c": 0.9}}
 
 
-@cases(0.09)
+@cases(0.1)
 @given(st.dictionaries(st.sampled_from([*sorted(VARIANT_KEYS), "speed"]), ANYTHING, min_size=1, max_size=3), st.booleans())
 def test_any_table_is_a_variant_or_refused_by_its_name(table, completed):
     with soon(), warnings.catch_warnings():

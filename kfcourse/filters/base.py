@@ -61,6 +61,8 @@ class Filter:
         (State, y (runs, p)) -> State.  The estimate and the filter's own error covariance are its `posterior`.
     slow : bool
         Thousands of times the cost of the others: comparisons run it on a subset of the trajectories.
+    instead : Filter, optional
+        Of the same name: what comparisons run where a slow filter fails.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Filter:
     init: Init
     step: Advance
     slow: bool = False
+    instead: Filter | None = None
 
     def __post_init__(self) -> None:
         if self.model.angles.x:

@@ -13,8 +13,9 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import TURN, Components, difference, wrapped
+from kfcourse.filters.inverted import by_change_of_variable
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.choices import jumps
+from kfcourse.symbolic.choices import decides, jumps
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
@@ -44,6 +45,8 @@ def likelihood(model: Model) -> LogLikelihood:
 
     The law of a component that is an angle is wound around the circle: the densities of y and of y plus whole turns add up.
     """
+    if _nonlinear(model) and (solved := by_change_of_variable(model)):
+        return lambda y, x, k=None: solved(y, x)
     law = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model)
 
     def log_likelihood(y: Array, x: Array, k: int | None = None) -> Array:
@@ -89,6 +92,7 @@ class ScalarDensities(NamedTuple):
     residual : (y, x) -> the signal that explains y, minus the signal at x, for an angle the short way round.  What explains y
         is y itself; |y - b| if the signal is the noise's deviation
     meter_width : x -> standard deviation of the meter's noise over |slope|: how well y tells x
+    noiseless : whether the meter has no noise: there is no density of y, and log_likelihood must not be asked
     jump : pi for an angle, whose residual changes its sign on the far side of the circle too, by a jump; otherwise infinite
     """
 
@@ -100,6 +104,7 @@ class ScalarDensities(NamedTuple):
     residual: Callable[[Array, Array], Array]
     meter_width: Callable[[Array], Array]
     jump: float = np.inf
+    noiseless: bool = False
     at_step: Callable[[int], ScalarDensities] | None = None
 
     def at(self, k: int) -> ScalarDensities:
@@ -113,7 +118,10 @@ def scalar_densities(model: Model) -> ScalarDensities:
     Of a model that depends on the step they are those of step 0, and `at(k)` those of step k.
     """
     next_state = _conditional("transition", model.state_equation, model.v, model.state_noise, model, noiseless=True)
-    meter = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model)
+    solved = by_change_of_variable(model) if _nonlinear(model) else None
+    meter = _conditional(
+        "likelihood", model.meter_equation, model.w, model.meter_noise, model, noiseless=True, solved=bool(solved)
+    )
     x, B = model.x[0], model.state_equation.jacobian(sp.Matrix(model.v))
     mean, b = (
         equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True))).subs(model.values)
@@ -123,7 +131,7 @@ def scalar_densities(model: Model) -> ScalarDensities:
         )
     )
     variance = (B * exact_matrix(model.state_noise.cov) * B.T).subs(model.values)
-    B_w = model.meter_equation.jacobian(sp.Matrix(model.w))
+    B_w = _at_mean(model.meter_equation.jacobian(sp.Matrix(model.w)), model.w, model.meter_noise)
     meter_variance = (B_w * exact_matrix(model.meter_noise.cov) * B_w.T).subs(model.values)
     outputs = {"state": mean.diff(x), "variance": variance.diff(x), "meter": b.diff(x), "meter_variance": meter_variance.diff(x)}
     choices = {*model.state_equation.atoms(sp.Piecewise), *model.meter_equation.atoms(sp.Piecewise)}
@@ -134,11 +142,16 @@ def scalar_densities(model: Model) -> ScalarDensities:
             "filter, unscented(model)"
         )
     lacks_x = not b.has(x)
+    if lacks_x and meter_variance.is_zero_matrix:
+        raise ModelError(f"{list(model.meter_equation)}: the meter shows neither the state nor any noise")
     slopes = Stepwise.compile(model.known, "slopes", {"x": sp.Matrix(model.x)}, outputs, ["x", "state", "meter"])
 
     def at(k: int) -> ScalarDensities:
         functions = (one.at(k) for one in (next_state, meter, slopes))
-        return _elementwise(model, *functions, lacks_x=lacks_x, at_step=at if model.timed else None)
+        found = _elementwise(model, *functions, lacks_x=lacks_x, at_step=at if model.timed else None)
+        if solved is not None:
+            found = found._replace(log_likelihood=lambda y, x: solved(y[..., None], x[..., None]))
+        return found._replace(noiseless=meter_variance.is_zero_matrix is True)
 
     return at(0)
 
@@ -196,7 +209,15 @@ def _elementwise(
         return np.sqrt(moments(meter, x)[1]) / np.abs(slope(x))
 
     jump = np.pi if model.angles.y else np.inf
-    return ScalarDensities(kernel, kernel_slope, log_likelihood, signal, slope, residual, meter_width, jump, at_step)
+    return ScalarDensities(kernel, kernel_slope, log_likelihood, signal, slope, residual, meter_width, jump, at_step=at_step)
+
+
+def _nonlinear(model: Model) -> bool:
+    return model.meter_equation.jacobian(sp.Matrix(model.w)).has(*model.w)
+
+
+def _at_mean(matrix: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian) -> sp.MatrixBase:
+    return matrix.subs(dict(zip(noise, exact_matrix(law.mean), strict=True)))
 
 
 def _log_normal(deviation: Array, variance: Array) -> Array:
@@ -206,10 +227,19 @@ def _log_normal(deviation: Array, variance: Array) -> Array:
 
 
 def _conditional(
-    name: str, equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian, model: Model, *, noiseless: bool = False
+    name: str,
+    equation: sp.MatrixBase,
+    noise: tuple[sp.Symbol, ...],
+    law: Gaussian,
+    model: Model,
+    *,
+    noiseless: bool = False,
+    solved: bool = False,
 ) -> Stepwise:
     B = equation.jacobian(sp.Matrix(noise))
-    if B.has(*noise):
+    if solved:  # the density is known otherwise; what is linear in the noise tells where it lies
+        B = _at_mean(B, noise, law)
+    elif B.has(*noise) or decides(equation, noise):
         raise ModelError(
             f"{list(equation)}: the noise enters nonlinearly, so there is no simple {name} density; "
             "the Gaussian filters (gaussian, unscented, gauss_hermite) do not need one"

@@ -105,6 +105,8 @@ def adaptive_pointmass(model: Model, order: int = 8, tolerance: float = 1e-5) ->
     if order < 6 or not 0 < tolerance < 1:
         raise ModelError(f"the point-mass filter needs order >= 6 and 0 < tolerance < 1, got {order} and {tolerance}")
     densities = scalar_densities(model)
+    if densities.noiseless:
+        raise ModelError(f"{list(model.meter_equation)}: without noise there is no likelihood density; use pointmass(model)")
     rules = Rule.of_order(order, tolerance), Rule.of_order(order - 3, 30 * tolerance)
     init = initial_state(model)
     prior = model.prior.mean, np.maximum(np.sqrt(model.prior.cov[0]), 1e-150), np.ones(1)

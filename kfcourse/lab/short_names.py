@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import NamedTuple
@@ -104,15 +105,21 @@ def check_names(names: Sequence[str]) -> None:
 def exact(model: Model) -> Filter:
     """The exact AOF, by point masses where they reach, else by particles, whose own error does not enter the bound.
 
+    Where point masses fail in the middle of a comparison, particles take over (`Filter.instead`).
+
     Raises
     ------
     ModelError
         Neither can be had: there is no density of y given x.
     """
     try:
-        return pointmass(model)
+        found = pointmass(model)
     except ModelError:
         return particle(model, BOUND, name="aof-exact")
+    try:
+        return dataclasses.replace(found, instead=particle(model, BOUND, name="aof-exact"))
+    except ModelError:  # without noise in the meter there are no weights
+        return found
 
 
 def has_exact(model: Model) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.laws import Array, Measurement, apply, symmetric
+from kfcourse.symbolic.choices import decides
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
@@ -130,7 +131,12 @@ def _system(model: Model, state: Sequence[Array], meter: Sequence[Array]) -> tup
 def is_linear(model: Model) -> bool:
     """Whether both equations are linear in state and noise, so that the Kalman filter is exact."""
     sides = (model.state_equation, model.v), (model.meter_equation, model.w)
-    return not any(_slopes(equation, [*model.x, *noise], model).has(*model.x, *noise) for equation, noise in sides)
+    return all(_constant(_slopes(equation, [*model.x, *noise], model), equation, [*model.x, *noise]) for equation, noise in sides)
+
+
+def _constant(slopes: sp.MatrixBase, equation: sp.MatrixBase, variables: Sequence[sp.Symbol]) -> bool:
+    """Whether the equation has the same slopes everywhere, and no jumps."""
+    return not slopes.has(*variables, sp.DiracDelta) and not decides(equation, variables)
 
 
 def _slopes(equation: sp.MatrixBase, symbols: Sequence[sp.Symbol], model: Model) -> sp.MatrixBase:
@@ -140,7 +146,7 @@ def _slopes(equation: sp.MatrixBase, symbols: Sequence[sp.Symbol], model: Model)
 def _affine(equation: sp.MatrixBase, x: Sequence[sp.Symbol], noise: Sequence[sp.Symbol], model: Model) -> Stepwise:
     """Matrices of equation = A x + B noise + constant, as a function of the step."""
     slopes = _slopes(equation, [*x, *noise], model)
-    if slopes.has(*x, *noise):
+    if not _constant(slopes, equation, [*x, *noise]):
         raise ModelError(f"{list(equation)} is not linear, so the Kalman filter does not apply; use aof(linearised(model))")
     constant = equation.subs(model.values).subs(dict.fromkeys([*x, *noise], 0))
     outputs = {"A": slopes[:, : len(x)], "B": slopes[:, len(x) :], "constant": constant}

@@ -18,10 +18,14 @@ FAR = 0.5  # excess over the bound, relative to it, from which on its tails are 
 
 @dataclass(frozen=True)
 class Subset:
-    """Sums of all filters, the slow ones last, over the first of the common trajectories."""
+    """Sums of all filters, the slow ones last, over the first of the common trajectories.
+
+    `replaced` tells why another filter ran instead of a slow one that failed: name to the reason.
+    """
 
     slow: list[str]
     sums: Sums
+    replaced: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,11 @@ class Comparison:
     def designs(self) -> int:
         """Ensembles that each of the designed filters was designed on; 0 if there is no such filter or one design only."""
         return len(self.replicas.sums) if self.replicas else 0
+
+    @property
+    def replaced(self) -> Mapping[str, str]:
+        """Slow filters that failed, and for which another one ran (`Filter.instead`): name to the reason."""
+        return {} if self.subset is None else self.subset.replaced
 
     @property
     def subset_runs(self) -> int:
@@ -283,10 +292,13 @@ class Comparison:
             counted = np.zeros(self.steps, dtype=bool)
             counted[steps] = below[steps] > 0
             share = counted / max(np.count_nonzero(counted), 1)
-        values = share * ratio(self._estimate(numerator).value, below, 0.0)
+        above = self._estimate(numerator).value
+        values = share * ratio(above, below, 0.0)
         inverse = ratio(np.ones_like(below), below, 0.0)
         linear = numerator.times(share * inverse).plus(denominator.times(-values * inverse))
         deviation = self._estimate(linear, total=steps is not None)
+        if steps is None:  # of nothing any part is infinitely much
+            values = np.where((below <= 0) & (above > 0), np.inf, values)
         return Estimate(values if steps is None else values.sum(), deviation.standard_error, deviation.freedom)
 
     def _estimate(self, terms: Terms, total: bool = False) -> Estimate:

@@ -2,6 +2,7 @@
 
 Every block of trajectories and every few steps draw from a stream of their own, spawned from the seed,
 so the numbers depend neither on the number of threads nor on the order in which blocks are computed.
+They are equal to the last bit with the same kernels of linear algebra (BLAS); another processor's may round otherwise.
 NumPy releases the interpreter while it works on a block, so blocks run in parallel threads.
 """
 

@@ -114,7 +114,8 @@ def compare(
     runs, steps : int
         Trajectories, and measurements of each.
     seed : int or numpy.random.Generator
-        The same seed gives the same numbers, whatever the number of threads.
+        The same seed gives the same numbers, bit by bit, whatever the number of threads.  Another NumPy or processor may do
+        linear algebra by another kernel (BLAS): then vector models differ by rounding, 1e-13 or so, and scalar ones hardly.
     design_runs : int, optional
         Size of the design ensemble; `runs` by default.
     designs : int

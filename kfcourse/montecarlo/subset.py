@@ -44,20 +44,24 @@ def run_subset(
 ) -> tuple[Subset | None, dict[str, str]]:
     """All filters on at most `size` of the trajectories, one thread, as short operations gain nothing from more.
 
-    Also, by name, why slow filters were left out; the others then start again without them.
+    Also, by name, why slow filters were left out; the others then start again without them, or with what runs instead.
     """
     end = None if seconds is None else time.monotonic() + seconds
     data = _first(ensemble, size)
     left_out: dict[str, str] = {}
-    while running := [one for one in slow if one.name not in left_out]:
+    replaced: dict[str, str] = {}
+    chosen = {one.name: one for one in slow}
+    while running := [one for name, one in chosen.items() if name not in left_out]:
         names = [one.name for one in running]
         try:
             sums = _chunks_in_time([*fast, *running], ensemble, data, end, progress)
         except _Failed as failed:
-            left_out[failed.name] = failed.reason
+            other = chosen[failed.name].instead
+            (left_out if other is None else replaced)[failed.name] = failed.reason
+            chosen[failed.name] = other or chosen[failed.name]
             continue
         if sums:
-            return Subset(names, Sums.concatenate(sums)), left_out
+            return Subset(names, Sums.concatenate(sums), replaced), left_out
         reason = f"{min(size, CHUNKS[0])} trajectories take more than {seconds:g} s"
         left_out |= dict.fromkeys(names, reason)
     return None, left_out

@@ -217,7 +217,7 @@ def _points(symbols: Sequence[sp.Symbol]) -> list[dict[sp.Symbol, sp.Rational]]:
 
 
 def _block(equations: Sequence[Equation], names: Mapping[Any, str] | None) -> str:
-    lines = " \\\\\n".join(equation_latex(sides, names=names) for sides in equations)
+    lines = " \\\\[3pt]\n".join(equation_latex(sides, names=names) for sides in equations)
     return f"\\begin{{aligned}}\n{lines}\n\\end{{aligned}}"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import sympy as sp
@@ -20,13 +21,29 @@ def masked(
         if isinstance(formula, sp.Function) and not formula.has(*variables):
             masks[found := sp.Dummy(real=True)] = formula
             return found
+        if isinstance(formula, sp.Piecewise) and not decides(formula, variables):
+            return sp.Add(*(mask(branch) * mask(indicator) for branch, indicator in _by_indicators(formula)))
         return formula.func(*map(mask, formula.args)) if formula.args else formula
 
     return equation.applyfunc(mask), masks
 
 
-def jumps(choice: sp.Piecewise, x: tuple[sp.Symbol, ...]) -> bool:
-    """Whether a choice that depends on the state may jump where one formula takes over from the next."""
+def _by_indicators(choice: sp.Piecewise) -> list[tuple[sp.Expr, sp.Expr]]:
+    """The formulas of a choice, and for each what is 1 where it holds and 0 elsewhere."""
+    conditions = [condition for _, condition in choice.args]
+    return [
+        (branch, sp.Piecewise(*((sp.Integer(i == j), condition) for j, condition in enumerate(conditions))))
+        for i, (branch, _) in enumerate(choice.args)
+    ]
+
+
+def decides(formula: sp.Basic, variables: Sequence[sp.Symbol]) -> bool:
+    """Whether a choice between formulas depends on one of the variables: derivatives by it do not tell."""
+    return any(condition.has(*variables) for choice in formula.atoms(sp.Piecewise) for _, condition in choice.args)
+
+
+def jumps(choice: sp.Piecewise, x: Sequence[sp.Symbol]) -> bool:
+    """Whether a choice that depends on these variables may jump where one formula takes over from the next."""
     for (formula, condition), (following, _) in pairwise(choice.args):
         if not condition.has(*x):
             continue

@@ -171,7 +171,7 @@ class _Printer(NumPyPrinter):
         value = float(expr) if abs(expr) < 2**1023 else np.inf
         if not np.isfinite(value) or (expr and not value):
             raise ModelError(
-                f"the derived functions hold the number {sp.N(expr, 3)}, beyond what a float can be; change the units"
+                f"the derived functions hold the number {sp.N(expr, 3)!s}, beyond what a float can be; change the units"
             )
         return repr(value)
 

@@ -11,6 +11,7 @@ import ast
 import keyword
 import re
 import unicodedata
+import warnings
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -115,7 +116,9 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
     _check_characters(formula)
     offset = len(formula) - len(formula.lstrip())
     try:
-        tree = ast.parse(formula.strip(), mode="eval").body
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # Python's, of what it reads in two ways: 1if x
+            tree = ast.parse(formula.strip(), mode="eval").body
     except SyntaxError as error:
         column = offset + max((error.offset or 1) - 1, 0)
         hint = "; a product needs *, as in 2*x" if re.search(r"[0-9)]\s*[A-Za-z(]", formula) else ""

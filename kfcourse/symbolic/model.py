@@ -4,6 +4,8 @@
     y_k     = b(x_k, w_k)        meter equation
     x_0 ~ N(m, d),  v_k ~ N(m_v, D_v),  w_k ~ N(m_w, D_w),   all independent
 
+Both equations may contain what is known of the step: its number k, its time t, inputs u_k.
+
 `Model` holds the two equations as SymPy expressions with their parameters as symbols.  Everything
 else (structural functions, filters, simulation, the printed equations) is derived from it.
 """
@@ -30,6 +32,7 @@ from kfcourse.symbolic.reading import (
     Names,
     by_name,
     checked_name,
+    exact_matrix,
     exact_number,
     formula_list,
     law,
@@ -158,8 +161,12 @@ class Model:
         if angles is None:
             warn_of_angles(dict(zip((s.name for s in x), model.state_equation, strict=True)))
             warn_of_angles(dict(zip(model.measured, model.meter_equation, strict=True)))
-        for what, equation in {"state": model.state_equation, "meter": model.meter_equation}.items():
-            if problem := not_computable(equation, model.values):
+        for what, equation, noise, noise_law in (
+            ("state", model.state_equation, v, model.state_noise),
+            ("meter", model.meter_equation, w, model.meter_noise),
+        ):
+            means = dict(zip(noise, exact_matrix(noise_law.mean), strict=True))
+            if problem := not_computable(equation, model.values, means):
                 raise ModelError(f"the {what} equation {problem}")
         if not model.meter_equation.has(*x):
             raise ModelError(f"the meter {list(model.meter_equation)} does not depend on the state {list(x)}: nothing to filter")

@@ -17,6 +17,7 @@ import sympy as sp
 
 from kfcourse.angles import Components, difference, near, on_circle
 from kfcourse.laws import SINGULAR, Array, Gaussian, Measurement, apply, measurement_of, square_root, symmetric, transpose
+from kfcourse.symbolic.choices import decides
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
@@ -140,7 +141,10 @@ class _Equations(NamedTuple):
 
 def _equation(function, formulas, variables, noises, law: Gaussian, model: Model, augmented: bool, angles: Components):
     factors = sp.Matrix(formulas).subs(model.values).jacobian(list(noises)) if noises else sp.zeros(len(formulas), 0)
-    constant = [not sp.Matrix(factors[:, j]).applyfunc(sp.simplify).has(*variables) for j in range(len(noises))]
+    constant = [
+        not sp.Matrix(factors[:, j]).applyfunc(sp.simplify).has(*variables) and not decides(formulas, [noise])
+        for j, noise in enumerate(noises)
+    ]
     other = np.array([augmented or not c for c in constant], dtype=bool)
     while (correlated := ~other & (law.cov[:, other] != 0).any(axis=1)).any():
         other |= correlated

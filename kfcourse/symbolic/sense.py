@@ -14,6 +14,7 @@ from kfcourse.symbolic.formula import LARGEST, NO_NUMBERS
 if TYPE_CHECKING:
     from kfcourse.symbolic.model import Model
 
+ANGLE = 1e8  # radians; of a larger one a float keeps less than eight digits after the point
 DIGITS = 1e-13  # a deviation below this part of the mean keeps less than three of a float's 16 digits
 
 
@@ -42,10 +43,15 @@ def unfit(mean: Array, variances: Array) -> str:
     return ""
 
 
-def not_computable(equation: sp.MatrixBase, values: Mapping[sp.Symbol, sp.Expr]) -> str:
+def not_computable(equation: sp.MatrixBase, values: Mapping[sp.Symbol, sp.Expr], noise_means: Mapping[sp.Symbol, sp.Expr]) -> str:
     """Why an equation with the parameters' values in it cannot be computed with; empty if it can."""
     for formula in equation:
-        if problem := _unusable(formula.subs(values)):
+        try:
+            problem = _unusable(formula.subs(values))
+            formula.subs(values).subs(noise_means)  # as filters need it
+        except TypeError:  # SymPy's
+            problem = "compares what has no real value, with these parameters or where the noises are at their means"
+        if problem:
             return f"{_short(formula)} {problem}"
     return ""
 
@@ -75,8 +81,10 @@ def _unusable(formula: sp.Expr) -> str:
         size = abs(part if part.is_Rational else part.evalf(15))
         if part.is_real is False or not (size.is_Rational or size.is_Float):
             return f"has no finite real value with these parameters: {_short(part)}"
+        if isinstance(part, sp.sin | sp.cos | sp.tan) and abs(part.args[0]) > ANGLE:
+            return f"holds {_short(part)} with these parameters, an angle of so many turns that no digit of it is left"
         if size and not 1 / LARGEST <= size <= LARGEST:
-            return f"holds the number {sp.N(part, 3)} with these parameters, beyond 1e-100 to 1e100; change the units"
+            return f"holds the number {sp.N(part, 3)!s} with these parameters, beyond 1e-100 to 1e100; change the units"
     return ""
 
 

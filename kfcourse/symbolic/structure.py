@@ -255,7 +255,7 @@ def _taylor(equation, x, mean, noise, noise_mean):
     point = dict(zip(x, mean, strict=True)) | dict(zip(noise, noise_mean, strict=True))
     parts = [equation, equation.jacobian(sp.Matrix(x)), equation.jacobian(sp.Matrix(noise))]
     for part in parts:
-        if part.has(sp.Derivative, sp.DiracDelta) or any(jumps(one, x) for one in equation.atoms(sp.Piecewise)):
+        if part.has(sp.Derivative, sp.DiracDelta) or any(jumps(one, [*x, *noise]) for one in equation.atoms(sp.Piecewise)):
             raise NoClosedForm(
                 f"{list(equation)} is not differentiable and cannot be linearised; use unscented(model) or gauss_hermite(model)"
             )

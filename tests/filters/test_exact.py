@@ -273,11 +273,11 @@ def test_a_nonlinear_noise_is_refused_with_advice(state, meter):
     assert not has_exact(model)
 
 
-def test_a_meter_without_noise_is_refused_with_advice():
+def test_a_meter_without_noise_has_no_density_but_an_exact_filter():
     model = Model.define("0.9*x + v", "x**2")
-    with pytest.raises(ModelError, match="noise"):
-        pointmass(model)
-    assert not has_exact(model)
+    assert has_exact(model)
+    with pytest.raises(ModelError, match=r"without noise.*pointmass"):
+        adaptive_pointmass(model)
 
 
 @pytest.mark.parametrize("options", [{"order": 5}, {"tolerance": 0}, {"tolerance": 1}, {"tolerance": float("nan")}])

@@ -439,6 +439,8 @@ def test_what_is_printed_names_the_step():
         ({"state_noise": {"variance": "1/(k - 2)"}}, ModelError, "at step 0"),
         ({"state_noise": {"variance": "x"}}, FormulaError, "unknown symbol 'x'; known here: k, pi, t"),
         ({"state_noise": {"variance": [["k"]]}}, ModelError, "write correlated noises that change with time into the equation"),
+        ({"state_noise": {"variance": ["k", 1]}}, ModelError, r"2 entries for 1 noise\(s\)"),
+        ({"meter_noise": {"mean": ["k", "t"], "variance": 2}}, ModelError, r"2 entries for 1 noise\(s\)"),
         ({"prior": {"variance": "k"}}, ModelError, "`prior`: mean and variance must be numbers"),
     ],
 )
@@ -543,3 +545,46 @@ def test_where_there_is_no_closed_form_sampling_and_regressions_do(formula):
     fitted = design([duof(model)], Ensemble(model, 20_000, 1, seed=1).by_step())[0]
     slope, offset = np.polyfit(y[0, :, 0], x[0, :, 0], 1)
     np.testing.assert_allclose(run(fitted, y).mean[0, :, 0], offset + slope * y[0, :, 0], rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("state", "meter"),
+    [
+        ("0.9*x + v", "(1 if x > 0 else 2) + w"),
+        ("0.9*x + v", "x + (1 if w > 0 else 2)"),
+        ("0.9*x + (1 if v > 0 else -1)", "x + w"),
+        ("0.9*x + (1 if v > x else -1)", "x + w"),
+        ("0.9*x + v*(1 if x > 0 else 2)", "x + w"),
+        ("0.9*x + sign(v)", "x + w"),
+    ],
+)
+def test_a_choice_that_the_state_or_a_noise_makes_is_no_constant(state, meter):
+    """Derivatives of 1 if v > 0 else -1 are 0 almost everywhere, but it is not a constant, and no filter may take it for one."""
+    model = Model.define(state, meter)
+    assert not is_linear(model)
+    for refuses in (kalman_filter, linearised, gaussian, pointmass):
+        with pytest.raises((ModelError, NoClosedForm)):
+            refuses(model)
+    x, y = simulate(model, 200_000, 2, seed=1)
+    mean, variance = model.prior.mean, model.prior.cov
+    found = gauss_hermite(model, 60)  # the error of a rule at a jump is the weight of a point, 0.05 at most here
+    tau, theta = found.predict(mean, variance)
+    h, _, F, _ = found.measure(mean, variance)
+    for moment, sample in ((tau, x[1].mean()), (theta, x[1].var()), (h, y[0].mean()), (F, y[0].var())):
+        assert np.squeeze(moment) == pytest.approx(sample, abs=0.15)
+
+
+@pytest.mark.parametrize("build", [linearised, gaussian, unscented])
+def test_a_choice_between_noises_by_the_step_is_one_of_constants(build):
+    chosen = Model.define("0.9*x + (2*v if k < 2 else x*v)", "x + (w if 1 <= k < 3 else 3*w + x**2)")
+    for k in range(4):
+        plain = build(Model.define("0.9*x + " + ("2*v" if k < 2 else "x*v"), "x + " + ("w" if 1 <= k < 3 else "3*w + x**2")))
+        law = np.array([[0.3]]), np.array([[[0.7]]])
+        now = build(chosen).at(k)
+        if build is unscented:  # a noise that is only added at some steps gets points at all
+            np.testing.assert_allclose(now.predict(*law).mean, plain.predict(*law).mean, rtol=1e-12)
+            continue
+        for one, other in zip(
+            (*now.predict(*law), *now.measure(*law)), (*plain.predict(*law), *plain.measure(*law)), strict=True
+        ):
+            np.testing.assert_allclose(*np.broadcast_arrays(one, other), rtol=1e-12, atol=1e-14)

@@ -168,10 +168,10 @@ BAD_VARIANTS = {
     "variance tiny": (GOOD + "meter_noise = { variance = 1e-300 }", "`meter_noise`: the variance 1e-300 is beyond"),
     "a product beyond the floats": (
         'state = "a*a*a*a*a*x + v"\nmeter = "x + w"\nparameters = { a = 1e99 }',
-        "the state equation a**5*x + v holds the number 1.00E+495 with these parameters",
+        "the state equation a**5*x + v holds the number 1.00e+495 with these parameters",
     ),
     "a product below the floats": ('state = "0.9*x + v"\nmeter = "1e-99*1e-99*x + w"', "the meter equation"),
-    "an exponential beyond the floats": ('state = "x + exp(400)*v"\nmeter = "x + w"', "5.22E+173"),
+    "an exponential beyond the floats": ('state = "x + exp(400)*v"\nmeter = "x + w"', "5.22e+173"),
     "the end in a comment": ('state = "0.9*x # + v"\nmeter = "x + w"', "number sign"),
     "no noise": ('state = "0.9*x"\nmeter = "x"', "no noise enters the state equation"),
     "a state known exactly": (GOOD + "prior = { variance = 0 }\nstate_noise = { variance = 0 }", "known exactly"),

@@ -9,6 +9,7 @@ import pytest
 
 from kfcourse import Model, compare, gaussian, linearised
 from kfcourse.filters import aof, pointmass
+from kfcourse.lab.short_names import exact
 from kfcourse.symbolic.reading import ModelError
 
 STEPS = 3
@@ -108,3 +109,27 @@ def test_the_exact_filter_on_a_model_beyond_its_budget_is_left_out_within_second
 def test_no_time_at_all_is_refused(model, control, seconds):
     with pytest.raises(ValueError, match="subset_seconds must be positive"):
         compare([control], model, 20, STEPS, 1, subset_seconds=seconds)
+
+
+def test_another_filter_runs_instead_of_one_that_fails(model, control):
+    other = slow(control, "failing")
+    failing = replace(slow(control, "failing", error=ModelError("no")), instead=other)
+    result = compare([control, failing], model, 40, STEPS, 1, subset_runs=20, progress=False)
+    assert dict(result.replaced) == {"failing": "no"}
+    assert not result.left_out
+    expected = compare([control, other], model, 40, STEPS, 1, subset_runs=20, progress=False)
+    np.testing.assert_array_equal(result.error_variance("failing").value, expected.error_variance("failing").value)
+    assert not expected.replaced
+
+
+def test_where_point_masses_fail_the_bound_is_found_by_particles():
+    """A meter with thousands of humps is beyond the nodes; as a measurement it tells next to nothing."""
+    model = Model.define("0.9*x + 0.1*v", "sin(1000*x) + w")
+    result = compare([aof(linearised(model)), exact(model)], model, 400, 4, 1, subset_runs=60, progress=False)
+    assert "nodes" in result.replaced["aof-exact"]
+    assert result.has_bound
+    bound = result.bound()
+    spread = [1.0]
+    for _ in range(3):
+        spread.append(0.81 * spread[-1] + 0.01)
+    assert (abs(bound.value - spread) < 5 * bound.standard_error + 0.01).all()

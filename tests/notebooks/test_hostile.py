@@ -137,7 +137,9 @@ def test_what_the_masters_import_is_on_the_stage(staged):
         if line.startswith(("import ", "from "))
     }
     assert len(lines) > 10
-    with kernel_in(Sandbox("none", tuple(map(str, answers()))), staged) as kernel:
+    project = Path(sys.prefix).parent  # somebody may keep the returned notebooks and .venv in one folder
+    with kernel_in(Sandbox("none", tuple(map(str, [*answers(), project]))), staged) as kernel:
+        assert kernel.cell(f"open({str(project / 'notes.txt')!r})").error[0] == "PermissionError"
         assert {line: error for line in lines if (error := kernel.cell(line).error)} == {}
 
 

@@ -170,6 +170,20 @@ def test_arguments_of_all_questions_can_be_sent():
                 assert [type(a) for a in found] == [type(b) for b in values], question.name
 
 
+def test_the_grader_asks_with_numbers_of_its_own():
+    """Every question that has numbers or functions among its arguments; formulas in fixed symbols hide nothing."""
+    asked = 0
+    for letter, one in sets().items():
+        task = exercise(letter, "53")
+        salted = Exercise(letter, task.variant, "salt")
+        for question in one.questions:
+            seen, hidden = (json.dumps([encode(tuple(values)) for values in question.arguments(each)]) for each in (task, salted))
+            if any(word in seen for word in ("array", "function", ".")):
+                asked += 1
+                assert seen != hidden or "function" in seen, question.name
+    assert asked > 40
+
+
 # -- messages
 
 

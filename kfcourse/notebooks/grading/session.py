@@ -178,7 +178,8 @@ def watch(channel: Channel, folder: Path, protected: Sequence[str]) -> None:
     """
     home = os.path.realpath(folder.parent)
     said: set[str] = set()
-    closed = tuple(os.path.realpath(path) + os.sep for path in protected)
+    needed = [_folder(path) for path in (sys.prefix, sys.base_prefix, home, *sys.path)]  # perhaps inside of a closed one
+    closed = {path: tuple(place for place in needed if place.startswith(path)) for path in map(_folder, protected)}
     tell = channel.send
 
     def note(text: str) -> None:
@@ -192,7 +193,7 @@ def watch(channel: Channel, folder: Path, protected: Sequence[str]) -> None:
             if not isinstance(path, str | bytes | os.PathLike):
                 return
             place = os.path.realpath(os.fsdecode(path))
-            if place.startswith(closed):
+            if any(place.startswith(path) and not place.startswith(inside) for path, inside in closed.items()):
                 note(f"reads {place}")
                 raise PermissionError(f"{place} is closed while notebooks are graded")
             if isinstance(flags, int) and flags & WRITES and not place.startswith((home + os.sep, "/dev/")):
@@ -209,6 +210,10 @@ def watch(channel: Channel, folder: Path, protected: Sequence[str]) -> None:
             note("sends signals to processes")
 
     sys.addaudithook(heard)
+
+
+def _folder(path: str) -> str:
+    return os.path.realpath(path) + os.sep
 
 
 def main() -> None:
