@@ -12,6 +12,7 @@ equations were verified when it was executed: outputs that verify equations say 
 
 from __future__ import annotations
 
+import base64
 import html
 from pathlib import Path
 from typing import ClassVar
@@ -22,12 +23,12 @@ from docutils import nodes
 from docutils.parsers.rst import directives
 from downloads import plain
 from equations import records
+from sphinx import addnodes
 from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
 
 from kfcourse.checks import sets
 
-NOTEBOOKS = "notebooks"
 log = logging.getLogger(__name__)
 
 
@@ -76,9 +77,7 @@ def _items(app, name: str, line: chapter_line):
     executed = Path(app.outdir).parent / "jupyter_execute" / f"{name}.ipynb"
     if executed.exists():
         notebook = nbformat.read(executed, as_version=4)
-        to = app.builder.get_relative_uri(name, "index").removesuffix("index.html") + f"{NOTEBOOKS}/{name}.ipynb"
-        _write(plain(notebook), Path(app.outdir) / NOTEBOOKS / f"{name}.ipynb")
-        yield f'<a download href="{to}">↓ notebook</a>'
+        yield embedded(f"{name}.ipynb", nbformat.writes(plain(notebook)).encode(), "↓ notebook")
         count = sum(one["equations"] for one in records(notebook))
         yield count and f'<span class="kf-count">✓ {count} equation{"s" * (count > 1)} verified</span>'
 
@@ -95,9 +94,18 @@ def _words(text: str) -> list[str]:
     return text.replace(",", " ").split()
 
 
-def _write(notebook: nbformat.NotebookNode, path: Path) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    nbformat.write(notebook, path)
+def embedded(file: str, content: bytes, text: str) -> str:
+    """A link that downloads what it carries: from a book opened as files a browser would show a linked notebook, not save it."""
+    data = base64.b64encode(content).decode()
+    return f'<a download="{html.escape(file)}" href="data:application/x-ipynb+json;base64,{data}">{html.escape(text)}</a>'
+
+
+def embed_downloads(app, doctree, name: str) -> None:
+    """The students' notebooks, too, come with their pages."""
+    for link in list(doctree.findall(addnodes.download_reference)):
+        path = Path(app.srcdir, name).parent / link["reftarget"]
+        if path.suffix == ".ipynb" and path.exists():
+            link.replace_self(nodes.raw("", embedded(path.name, path.read_bytes(), link.astext()), format="html"))
 
 
 def setup(app) -> dict[str, bool]:
@@ -105,4 +113,5 @@ def setup(app) -> dict[str, bool]:
     app.add_directive("chapter", Chapter)
     app.connect("doctree-read", behind_the_lead)
     app.connect("doctree-resolved", print_line)
+    app.connect("doctree-resolved", embed_downloads)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

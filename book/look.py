@@ -105,6 +105,13 @@ def _boxed(node: nodes.Node) -> bool:
     return False
 
 
+def only_where_needed(app, pagename: str, templatename: str, context: dict, doctree) -> None:
+    """Sphinx takes the front page for one with formulas because its contents lead to such pages."""
+    if 'class="math' not in context.get("body", ""):
+        scripts = context.get("script_files", [])
+        context["script_files"] = [one for one in scripts if "mathjax" not in f"{one.filename} {one.attributes}".lower()]
+
+
 def write_not_found(app, exception) -> None:
     """The page that a server shows for an address that does not exist; it needs no other file."""
     if exception or app.builder.format != "html":
@@ -119,6 +126,7 @@ def write_not_found(app, exception) -> None:
 
 def setup(app) -> dict[str, bool]:
     app.connect("config-inited", use_templates, priority=900)
+    app.connect("html-page-context", only_where_needed, priority=950)
     app.connect("build-finished", write_not_found)
     app.connect("html-page-context", complete, priority=300)  # before the theme, which tries the templates
     return {"parallel_read_safe": True, "parallel_write_safe": True}

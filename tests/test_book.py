@@ -118,8 +118,8 @@ FIT = """() => {
     return {
         page: document.documentElement.scrollWidth - width,
         code: out(".cell_input pre, section > [class*=highlight-] pre"),
-        boxes: out("div.math, mjx-container, .pst-scrollable-table-container, pre, .cell_output .output"),
-        pictures: [...document.querySelectorAll(".bd-article :is(img, svg, table, mjx-container)")]
+        boxes: out("div.math, .pst-scrollable-table-container, pre, .cell_output .output"),
+        pictures: [...document.querySelectorAll(".bd-article :is(img, svg, table, mjx-math)")]
             .filter((e) => e.checkVisibility() && e.getBoundingClientRect().right > width + 1)
             .map((e) => e.outerHTML.slice(0, 80)),
     };
@@ -204,7 +204,7 @@ def test_search_finds_chapters(window):
     problems.clear()
     tab.goto((HTML / "search.html").as_uri() + "?q=stratonovich")
     tab.wait_for_selector("#search-results li a")
-    assert "The Stratonovich equation" in tab.locator("#search-results li a").all_inner_texts()
+    assert any(text.endswith("The Stratonovich equation") for text in tab.locator("#search-results li a").all_inner_texts())
     assert problems == []
 
 
@@ -240,4 +240,4 @@ def test_the_live_chapter_prints_what_its_page_shows(browser):
         for name in ("noisy", "filtered", "inside", "nis"):
             row = tab.locator(f"tr:has([data-show={name}-all])")
             label, value = row.locator("th").inner_text(), row.locator(f"[data-show={name}-all]").inner_text()
-            assert f"| {label} | {value} |" in re.sub(r"[ \u00a0]+", " ", printed), (label, value, printed)
+            assert f"| {label} | {value} |".replace("\u00a0", " ") in printed, (label, value, printed)
