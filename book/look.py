@@ -50,6 +50,8 @@ def complete(app, pagename: str, templatename: str, context: dict, doctree) -> N
         (FIGURE, r"\1.</span> "),
         (CAPTION, r'\2<table class="kf-table \3"><caption>\1</caption>'),
         (TICK, SMALL_TICK),
+        (NO_MEANING, "</dt><dd></dd></dl>"),
+        (ROLES, ""),
         (STAR, SMALL_STAR),
     ):
         body = pattern.sub(replacement, body)
