@@ -20,6 +20,7 @@ CAPTION = re.compile(
     r'<p><span class="kf-caption">(.*?)</span></p>\s*(<div class="pst-scrollable-table-container">)?\s*<table class="([^"]*)">'
 )
 NUMBER = re.compile(r"(?:(?<=>)|^)\s*\d+(\.\d+)*\.\s")  # of a section
+PARAMETERS = re.compile(r"<dl>\s*(<dd><em class=\"sig-param.*?)</dl>", re.DOTALL)  # of a long signature: no list of definitions
 NO_MEANING = re.compile(r"</dt>\s*</dl>")  # of a parameter, say
 ROLES = re.compile(r' role="(?:list|doc-biblioentry)"')  # of a bibliography, not those of today's HTML
 FIGURE = re.compile(r'(<span class="caption-number">[^<]*\d) </span>')
@@ -50,6 +51,7 @@ def complete(app, pagename: str, templatename: str, context: dict, doctree) -> N
         (FIGURE, r"\1.</span> "),
         (CAPTION, r'\2<table class="kf-table \3"><caption>\1</caption>'),
         (TICK, SMALL_TICK),
+        (PARAMETERS, _lines),
         (NO_MEANING, "</dt><dd></dd></dl>"),
         (ROLES, ""),
         (STAR, SMALL_STAR),
@@ -79,6 +81,10 @@ def _reachable(match: re.Match) -> str:
     identity, number = match[1] or "", match[2] or ""
     name = f"Formula {match[3]}" if match[3] else "Formula"
     return f'<div class="math notranslate nohighlight"{identity} tabindex="0" role="group" aria-label="{name}">\n{number}'
+
+
+def _lines(match: re.Match) -> str:
+    return match[1].replace("<dd>", '<span class="sig-line">').replace("</dd>", "</span>")
 
 
 def _described(app, pagename: str, context: dict, doctree) -> str:
