@@ -40,7 +40,8 @@ plt.rcParams.update(
 )
 matplotlib.set_loglevel("error")  # the page has the font, this machine need not
 model = find_variant("53").model
-result = compare(lab_filters(model, [*SHOWN, "aof-exact"]), model, runs=400_000, steps=STEPS.stop, seed=1, subset_runs=6_000)
+filters = lab_filters(model, [*SHOWN, "aof-exact"])
+result = compare(filters, model, runs=100_000, steps=STEPS.stop, seed=1, subset_runs=20_000, designs=4, wide=2)
 figure, ax = plt.subplots(figsize=(7.2, 3.1))
 steps = np.arange(STEPS.stop)
 for name, label in SHOWN.items():

@@ -91,7 +91,7 @@ class _Alarm:
 
     @classmethod
     def wind(cls) -> None:
-        left = max(min(cls.ends.values()) - time.monotonic(), AGAIN) if cls.ends else 0.0
+        left = max(min(cls.ends.values()) - time.monotonic(), 1e-6) if cls.ends else 0.0
         signal.setitimer(signal.ITIMER_REAL, left, AGAIN)
 
     @classmethod
@@ -114,7 +114,9 @@ class _Watcher:
         threading.Thread(target=self.watch, args=(end,), name="time limit", daemon=True).start()
 
     def watch(self, end: float) -> None:
-        while not self.alive.acquire(timeout=min(max(end - time.monotonic(), AGAIN), threading.TIMEOUT_MAX)):
+        wait = max(end - time.monotonic(), 0.0)
+        while not self.alive.acquire(timeout=min(wait, threading.TIMEOUT_MAX)):
+            wait = max(end - time.monotonic(), AGAIN)
             with self.switch:
                 over = self.running and end <= time.monotonic()
                 if over and not _inside(sys._current_frames().get(self.watched)):

@@ -165,7 +165,7 @@ def test_without_exact_runs_the_exact_filter_is_left_out(call, tmp_path):
 
 
 def test_an_exact_filter_without_time_is_left_out_and_the_others_reported(call, tmp_path):
-    options = ("--runs", "400", "--steps", "4", "--exact-runs", "400", "--exact-seconds", "0.001")
+    options = ("--runs", "400", "--steps", "40", "--exact-runs", "400", "--exact-seconds", "0.001")
     result = call("lab", "53", *options, "--json", "n.json")
     assert result.exit_code == 0, result.output
     reason = "8 trajectories take more than 0.001 s"

@@ -84,8 +84,8 @@ def mfos_step_with(
         u, T = condition(x, z)
         s, Psi_next = _predicting(predict, u, p if own_variance else T)
         if prediction:
-            F, g, _ = fit(x_next, s)
-            s = s @ F.T + g
+            L, n, _ = fit(x_next, s)
+            s = s @ L.T + n
         return z, s, Psi_next
 
     return step

@@ -234,12 +234,13 @@ def _part(results: Sequence[Any], place: int) -> list[Any]:
 
 def _reference(answer: Answer, arguments: Sequence[tuple]) -> list[Any]:
     """Results of an answer of ours, in a form that others are compared with."""
-    return [_standard(answer(*copy.deepcopy(values))) for values in arguments]
+    return [standard(answer(*copy.deepcopy(values))) for values in arguments]
 
 
-def _standard(value: Any) -> Any:
+def standard(value: Any) -> Any:
+    """A result in the form in which results are compared: formulas, arrays of floats, and tuples of them."""
     if isinstance(value, tuple | list):
-        return tuple(_standard(part) for part in value)
+        return tuple(standard(part) for part in value)
     return value if isinstance(value, sp.Basic | sp.MatrixBase) else np.asarray(value, dtype=float)
 
 

@@ -194,7 +194,12 @@ def confused(case: Case) -> Said | None:
 def rough(case: Case) -> Said | None:
     """Right to some digits."""
     if case.numeric and all(equal(a, b, ROUGH, {}) for a, b in case.pairs):
-        return "precision", "It is right to a few digits only: is something rounded, or computed in single precision (float32)?"
+        if all(np.array_equal(mine, np.asarray(mine, np.float32), equal_nan=True) for mine, _ in case.pairs):
+            return (
+                "precision",
+                "It is right to the 7 digits of single precision (float32): compute in double precision (float64).",
+            )
+        return "precision", "It is right to a few digits only: is something rounded?"
     return None
 
 

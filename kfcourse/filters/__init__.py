@@ -7,7 +7,7 @@ conditionally_optimal   Pugachev's two-step conditionally optimal filter (DUOF)
 optimal_structure       Rudenko's filter of optimal structure (FOS)
 modified_structure      its modification (MFOS)
 exact                   the AOF itself, on a grid (exact_kernels, exact_places, exact_batch; exact_adaptive checks it)
-particles               the same by sampling;  proposals: where to look;  densities: what all need
+particles               the same by sampling;  proposals: where to look;  densities, inverted: what all need
 iterated_ekf            the meter linearised again at the estimate
 alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving (IMM)

@@ -13,6 +13,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import TURN, Components, difference, wrapped
+from kfcourse.filters.inverted import by_change_of_variable
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.choices import decides, jumps
 from kfcourse.symbolic.known import Stepwise
@@ -44,6 +45,8 @@ def likelihood(model: Model) -> LogLikelihood:
 
     The law of a component that is an angle is wound around the circle: the densities of y and of y plus whole turns add up.
     """
+    if _nonlinear(model) and (solved := by_change_of_variable(model)):
+        return lambda y, x, k=None: solved(y, x)
     law = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model)
 
     def log_likelihood(y: Array, x: Array, k: int | None = None) -> Array:
@@ -115,7 +118,10 @@ def scalar_densities(model: Model) -> ScalarDensities:
     Of a model that depends on the step they are those of step 0, and `at(k)` those of step k.
     """
     next_state = _conditional("transition", model.state_equation, model.v, model.state_noise, model, noiseless=True)
-    meter = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model, noiseless=True)
+    solved = by_change_of_variable(model) if _nonlinear(model) else None
+    meter = _conditional(
+        "likelihood", model.meter_equation, model.w, model.meter_noise, model, noiseless=True, solved=bool(solved)
+    )
     x, B = model.x[0], model.state_equation.jacobian(sp.Matrix(model.v))
     mean, b = (
         equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True))).subs(model.values)
@@ -125,7 +131,7 @@ def scalar_densities(model: Model) -> ScalarDensities:
         )
     )
     variance = (B * exact_matrix(model.state_noise.cov) * B.T).subs(model.values)
-    B_w = model.meter_equation.jacobian(sp.Matrix(model.w))
+    B_w = _at_mean(model.meter_equation.jacobian(sp.Matrix(model.w)), model.w, model.meter_noise)
     meter_variance = (B_w * exact_matrix(model.meter_noise.cov) * B_w.T).subs(model.values)
     outputs = {"state": mean.diff(x), "variance": variance.diff(x), "meter": b.diff(x), "meter_variance": meter_variance.diff(x)}
     choices = {*model.state_equation.atoms(sp.Piecewise), *model.meter_equation.atoms(sp.Piecewise)}
@@ -143,6 +149,8 @@ def scalar_densities(model: Model) -> ScalarDensities:
     def at(k: int) -> ScalarDensities:
         functions = (one.at(k) for one in (next_state, meter, slopes))
         found = _elementwise(model, *functions, lacks_x=lacks_x, at_step=at if model.timed else None)
+        if solved is not None:
+            found = found._replace(log_likelihood=lambda y, x: solved(y[..., None], x[..., None]))
         return found._replace(noiseless=meter_variance.is_zero_matrix is True)
 
     return at(0)
@@ -204,6 +212,14 @@ def _elementwise(
     return ScalarDensities(kernel, kernel_slope, log_likelihood, signal, slope, residual, meter_width, jump, at_step=at_step)
 
 
+def _nonlinear(model: Model) -> bool:
+    return model.meter_equation.jacobian(sp.Matrix(model.w)).has(*model.w)
+
+
+def _at_mean(matrix: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian) -> sp.MatrixBase:
+    return matrix.subs(dict(zip(noise, exact_matrix(law.mean), strict=True)))
+
+
 def _log_normal(deviation: Array, variance: Array) -> Array:
     variance = np.maximum(variance, TINY)
     with np.errstate(over="ignore"):  # a deviation infinitely many sigmas away has log-density -inf
@@ -211,10 +227,19 @@ def _log_normal(deviation: Array, variance: Array) -> Array:
 
 
 def _conditional(
-    name: str, equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian, model: Model, *, noiseless: bool = False
+    name: str,
+    equation: sp.MatrixBase,
+    noise: tuple[sp.Symbol, ...],
+    law: Gaussian,
+    model: Model,
+    *,
+    noiseless: bool = False,
+    solved: bool = False,
 ) -> Stepwise:
     B = equation.jacobian(sp.Matrix(noise))
-    if B.has(*noise) or decides(equation, noise):
+    if solved:  # the density is known otherwise; what is linear in the noise tells where it lies
+        B = _at_mean(B, noise, law)
+    elif B.has(*noise) or decides(equation, noise):
         raise ModelError(
             f"{list(equation)}: the noise enters nonlinearly, so there is no simple {name} density; "
             "the Gaussian filters (gaussian, unscented, gauss_hermite) do not need one"

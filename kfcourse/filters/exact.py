@@ -29,7 +29,7 @@ from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
 from kfcourse.filters.exact_adaptive import check_scalar, estimated
 from kfcourse.filters.exact_batch import Posteriors, posteriors, settled
-from kfcourse.filters.exact_kernels import Grid, Kernels, Unresolved, apart, chunks, of_prior
+from kfcourse.filters.exact_kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, of_prior
 from kfcourse.filters.exact_places import hidden, likeliest
 from kfcourse.filters.exact_predictions import predictions
 from kfcourse.filters.exact_roots import at_roots
@@ -41,7 +41,7 @@ ACCURACY = 1e-6  # of the mean and the deviation at a step, in posterior standar
 TOLERABLE = 1e-3  # error of a step that no way resolves better, before the filter gives up
 NODES = (33, 65, 129, 257)  # tried one after the other
 LOOKED = 25  # nodes of the look that finds the place
-FINE = 129  # nodes of a posterior that must be interpolated
+FINE = (129, 257)  # nodes of a posterior that must be interpolated: the second if the first are too few to share its mass
 ELEMENTS = 2**20  # of kernels, that many trajectories at once
 
 
@@ -77,7 +77,8 @@ def pointmass(model: Model, accuracy: float = ACCURACY) -> Filter:
     Parameters
     ----------
     model : Model
-        One state, one measurement, noises entering linearly (with any functions of x as factors).
+        One state, one measurement, noises entering linearly (with any functions of x as factors); the meter's may be solved
+        for (`inverted`), or be nothing.
     accuracy : float
         Largest estimated error of a step, in posterior standard deviations; a step with a larger one is left to the
         adaptive filter.
@@ -85,7 +86,7 @@ def pointmass(model: Model, accuracy: float = ACCURACY) -> Filter:
     Raises
     ------
     ModelError
-        The model is not scalar, or a noise enters nonlinearly.
+        The model is not scalar, or a noise enters nonlinearly and cannot be solved for.
     Unresolved
         When it runs: a step would need more nodes than the budget has.
     """
@@ -97,8 +98,12 @@ def pointmass(model: Model, accuracy: float = ACCURACY) -> Filter:
     def step(state: State, y: Array) -> State:
         first = np.zeros(len(y), dtype=int)
         groups = state.memory.groups if state.memory else [(np.arange(len(y)), prior.rows(first))]
+        law = densities.at(state.step)
         try:
-            posterior, predicted, memory = _step(groups, y, densities.at(state.step), accuracy)
+            try:
+                posterior, predicted, memory = _step(groups, y, law, accuracy, FINE[0])
+            except TooNarrow:
+                posterior, predicted, memory = _step(groups, y, law, accuracy, FINE[1])
         except Unresolved as error:
             raise Unresolved(f"step {state.step} of {model}: {error}; leave the exact filter out (--exact-runs 0)") from None
         if model.angles.x:
@@ -123,7 +128,7 @@ def _on_circle(memory: PointMass) -> tuple[Gaussian, Gaussian]:
 
 
 def _step(
-    groups: list[tuple[Array, Kernels]], y: Array, law: ScalarDensities, accuracy: float
+    groups: list[tuple[Array, Kernels]], y: Array, law: ScalarDensities, accuracy: float, fine_nodes: int
 ) -> tuple[Gaussian, Gaussian, PointMass]:
     """Posterior, prediction of the next state, and memory after the measurements y (runs, 1)."""
     grids: dict[int, Grid] = {}
@@ -137,7 +142,7 @@ def _step(
             continue
         for chunk in chunks(len(rows), NODES[0] * kernels.mu.shape[1], ELEMENTS):
             left = rows[chunk]
-            for done, found, good in _in_batch(left, kernels.rows(chunk), y[left], law, accuracy):
+            for done, found, good in _in_batch(left, kernels.rows(chunk), y[left], law, accuracy, fine_nodes):
                 mean[done], variance[done], error[done] = found.mean, found.variance, found.error + found.inherited
                 for place, x, mass, density in zip(done.tolist(), found.x, found.mass, found.density, strict=True):
                     grids[place] = Grid(x, mass, density, uniform=True)
@@ -161,7 +166,7 @@ def _step(
 
 
 def _in_batch(
-    rows: Array, kernels: Kernels, y: Array, law: ScalarDensities, accuracy: float
+    rows: Array, kernels: Kernels, y: Array, law: ScalarDensities, accuracy: float, fine_nodes: int
 ) -> Iterator[tuple[Array, Posteriors, Array]]:
     """Places of trajectories, their posteriors, and whether these are resolved; on the finest grid also those that are not."""
     place, candidates = likeliest(kernels, y, law)
@@ -172,7 +177,7 @@ def _in_batch(
             i = todo[chunk]
             there = settled(kernels.rows(i), y[i], law, place.rows(i), LOOKED, count)
             found = posteriors(kernels.rows(i), y[i], law, there, count)
-            least[i] = nodes_for_kernels(law, found, count)
+            least[i] = nodes_for_kernels(law, found, count, fine_nodes)
             found = found._replace(error=np.where(hidden(candidates.rows(i), there, count), np.inf, found.error))
             good = (found.error <= accuracy) & (least[i] <= count)
             told = good | (count == NODES[-1])
@@ -183,12 +188,10 @@ def _in_batch(
             return
 
 
-def nodes_for_kernels(law: ScalarDensities, found: Posteriors, count: int) -> Array:
+def nodes_for_kernels(law: ScalarDensities, found: Posteriors, count: int, fine_nodes: int) -> Array:
     """How many nodes a posterior needs, (T,), that the next prediction be a sum of kernels that overlap.
 
-    If they are too many even for the finest grid, `FINE`: it will be interpolated.  The finest where some kernels overlap, and
-    others do not, as `exact_noise` then shares the mass.
+    If they are too many even for the finest grid, `fine_nodes`: it will be interpolated.
     """
-    most, least = apart(*law.kernel(found.x), found.mass)
-    wanted = (count - 1) * most + 1
-    return np.where(wanted <= NODES[-1], wanted, np.where(least > 1, FINE, NODES[-1]))
+    wanted = (count - 1) * apart(*law.kernel(found.x), found.mass) + 1
+    return np.where(wanted <= NODES[-1], wanted, fine_nodes)

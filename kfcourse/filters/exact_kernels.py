@@ -36,6 +36,10 @@ class Unresolved(ModelError):
     """A posterior or a prediction needs more nodes than the budget has; the message says where."""
 
 
+class TooNarrow(Unresolved):
+    """The transition kernel is far narrower than the distance of a posterior's nodes."""
+
+
 class Grid(NamedTuple):
     """A posterior as point masses: nodes x (M,), ascending, their masses (M,), and the density there (M,).
 
@@ -127,16 +131,11 @@ def of_prior(prior: Gaussian) -> Kernels:
     return Kernels(mean * one, sigma * one, one, one, mean * one, sigma * one, np.array([True]))
 
 
-def apart(mu: Array, sigma: Array, mass: Array) -> tuple[Array, Array]:
-    """How far apart the kernels (T, M) of neighbouring nodes lie, the largest and the least, (T,) each.
-
-    Up to 1, their sum is as good as the integral.  Where the centres turn back, the least is 0.
-    """
-    step = np.diff(mu, axis=1)
-    distance, turned = np.abs(step), step[:, 1:] * step[:, :-1] < 0
-    gap = OVERLAP * np.maximum(distance[:, 1:], distance[:, :-1]) / sigma[:, 1:-1]
-    counts = mass[:, 1:-1] > SEEN
-    return (gap * counts).max(axis=1), np.where(counts, np.where(turned, 0.0, gap), np.inf).min(axis=1)
+def apart(mu: Array, sigma: Array, mass: Array) -> Array:
+    """How far apart the kernels (T, M) of neighbouring nodes lie, (T,): up to 1, their sum is as good as the integral."""
+    distance = np.abs(np.diff(mu, axis=1))
+    gap = np.maximum(distance[:, 1:], distance[:, :-1]) / sigma[:, 1:-1]
+    return OVERLAP * (gap * (mass[:, 1:-1] > SEEN)).max(axis=1)
 
 
 def overlapping(x: Array, mass: Array, density: Array, uniform: bool, law: ScalarDensities) -> Kernels:

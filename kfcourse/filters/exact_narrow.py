@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_kernels import Grid, Kernels, Unresolved
+from kfcourse.filters.exact_kernels import Grid, Kernels, TooNarrow
 from kfcourse.laws import Array
 
 STEP = 3.0  # largest distance, in sigmas, that the centres of a panel of new nodes may cover
@@ -41,7 +41,7 @@ def refined(grid: Grid, law: ScalarDensities, rough: Kernels, most: int) -> Kern
 
     Raises
     ------
-    Unresolved
+    TooNarrow
         The kernels are too narrow for the budget.
     """
     with np.errstate(divide="ignore"):
@@ -87,7 +87,7 @@ def panels(x: Array, mass: Array, law: ScalarDensities, most: int) -> tuple[Arra
         done.append((left[~split], right[~split]))
         total += int(np.count_nonzero(~split))
         if total + 2 * np.count_nonzero(split) > most // len(PANEL[0]):
-            raise Unresolved("the transition kernel is far narrower than the posterior")
+            raise TooNarrow("the transition kernel is far narrower than the posterior")
         left, right = np.concatenate([left[split], middle[split]]), np.concatenate([middle[split], right[split]])
     left, right = (np.concatenate(side)[:, None] for side in zip(*done, strict=True))
     half = 0.5 * (right - left)

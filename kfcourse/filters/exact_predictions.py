@@ -33,7 +33,7 @@ def predictions(grids: Sequence[Grid], law: ScalarDensities) -> list[tuple[Array
         rows = np.array(members)
         x, mass, density = _stacked([grids[i][:3] for i in members], size, 1)
         kernels = overlapping(x, mass, density, uniform, law)
-        narrow = uniform & (apart(kernels.mu, kernels.sigma, mass)[0] > 1)
+        narrow = uniform & (apart(kernels.mu, kernels.sigma, mass) > 1)
         if not narrow.all():
             result.append((rows[~narrow], kernels.rows(~narrow)))
         for i in np.flatnonzero(narrow).tolist():

@@ -109,7 +109,8 @@ class Look:
         state: Callable[[Array, Array, int], tuple[Array, Array]],
     ) -> Look:
         mean = model.meter_equation.subs(dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True))).subs(model.values)
-        B = model.meter_equation.jacobian(sp.Matrix(model.w))
+        means = dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True))
+        B = model.meter_equation.jacobian(sp.Matrix(model.w)).subs(means)  # where the noise enters nonlinearly: only a proposal
         cov = (B * exact_matrix(model.meter_noise.cov) * B.T).subs(model.values)
         outputs = {"signal": mean, "slope": _slopes(mean, model.x), "noise": cov}
         meter = Stepwise.compile(model.known, "seen", {"x": sp.Matrix(model.x)}, outputs, ["x", "signal"])

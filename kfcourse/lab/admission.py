@@ -61,7 +61,7 @@ class Admission:
 
     @property
     def verdict(self) -> str:
-        """ "no", "poor" (it can be built, and there are warnings) or "yes"."""
+        """Whether it may be used: "yes", "no", or "poor" if it can be built, but there are warnings."""
         return "no" if self.one is None else "poor" if self.warnings else "yes"
 
     @property

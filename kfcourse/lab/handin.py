@@ -16,7 +16,6 @@ from pathlib import Path
 import jinja2
 import numpy as np
 import sympy as sp
-from latex2mathml.converter import convert
 from matplotlib.figure import Figure
 
 from kfcourse.files import replacing, save
@@ -28,6 +27,7 @@ from kfcourse.lab.variants import Variant
 from kfcourse.laws import Gaussian
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.statistics import Estimate
+from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 from kfcourse.symbolic.structure import FUNCTION_LATEX, Structure
@@ -75,7 +75,7 @@ def write_handin(variant: Variant, result: Comparison, folder: Path, language: s
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("kfcourse.lab"), trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    environment.filters |= {"mathml": lambda line: convert(line.replace("&", ""), display="block"), "inline": _inline_html}
+    environment.filters |= {"mathml": lambda line: mathml(line.replace("&", "")), "inline": _inline_html}
     written = [*_known_errors(result, folder)]
     for name in ("handin.html", "handin.tex"):
         text = environment.get_template(name + ".j2").render(blocks=blocks, words=words, variant=variant, language=language)
@@ -329,4 +329,6 @@ def _ranges(steps: list[int]) -> str:
 def _inline_html(text: str) -> str:
     """Text for HTML: special characters escaped, $formulas$ as MathML."""
     pieces = re.split(r"\$([^$]+)\$", text)
-    return "".join(convert(piece) if i % 2 else str(jinja2.filters.do_forceescape(piece)) for i, piece in enumerate(pieces))
+    return "".join(
+        mathml(piece, "inline") if i % 2 else str(jinja2.filters.do_forceescape(piece)) for i, piece in enumerate(pieces)
+    )

@@ -16,7 +16,6 @@ from typing import Any
 
 import jinja2
 import numpy as np
-from latex2mathml.converter import convert
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -30,6 +29,7 @@ from kfcourse.lab.variants import Variant
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.statistics import Estimate, ratio
+from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.model import Model
 
 _FAMILIES = {
@@ -246,7 +246,7 @@ def _cell(estimate: Estimate) -> str:
 
 def _mathml(line: str) -> str:
     """One line of an aligned block as MathML, which browsers show without any script."""
-    return convert(line.replace("&", ""), display="block")
+    return mathml(line.replace("&", ""))
 
 
 def _escape_tex(text: str) -> str:

@@ -158,7 +158,7 @@ def _step(one: Filter, state: State, y: Array) -> State:
 
 
 def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
-    finite = np.asarray(np.isfinite(sums.square).all(axis=(2, 3)))
+    finite = np.asarray(np.isfinite(sums.square).all(axis=(2, 3)) & ~np.isnan(sums.own).any(axis=(2, 3)))
     if finite.all():
         return
     step = int(np.argmin(finite.all(axis=0)))

@@ -13,13 +13,13 @@ from typing import Any
 
 import jinja2
 import nbformat
-from latex2mathml.converter import convert
 from nbclient import NotebookClient
 from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernelError
 from nbconvert import HTMLExporter
 from nbformat import NotebookNode
 
 from kfcourse.checks.question import MIME
+from kfcourse.symbolic.markup import mathml as formula
 
 SECONDS = 120  # a cell may take
 BROWSERS = ("chromium", "google-chrome", "chromium-browser", "msedge", "chrome")
@@ -110,9 +110,9 @@ def html(executed: NotebookNode, title: str) -> str:
         for output in cell.get("outputs", []):
             if "text/latex" in output.get("data", {}):
                 output.data["text/html"] = mathml(output.data["text/latex"])
-    body, _ = HTMLExporter(template_name="basic").from_notebook_node(copy)
+    body, resources = HTMLExporter(template_name="basic").from_notebook_node(copy)
     environment = jinja2.Environment(loader=jinja2.PackageLoader("kfcourse.notebooks"), autoescape=True)
-    return environment.get_template("notebook.html.j2").render(title=title, body=body)
+    return environment.get_template("notebook.html.j2").render(title=title, body=body, colours=resources["inlining"]["css"][-1])
 
 
 def mathml(text: str) -> str:
@@ -123,7 +123,7 @@ def mathml(text: str) -> str:
 
 def _formulas(text: str) -> str:
     def display(mode: str) -> Callable[[re.Match], str]:
-        return lambda match: convert(match.group(1).replace(r"\displaystyle", "").strip(), display=mode)
+        return lambda match: formula(match.group(1).replace(r"\displaystyle", "").strip(), mode)
 
     text = re.sub(r"\$\$(.+?)\$\$", display("block"), text, flags=re.DOTALL)
     return re.sub(r"(?<![\\$])\$([^$]+?)\$", display("inline"), text)

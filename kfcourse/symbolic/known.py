@@ -187,7 +187,10 @@ def _formulas(what: str, given: Any, size: int, symbols: dict[str, sp.Symbol]) -
             f"`{what}`: a covariance matrix cannot have formulas; write correlated noises that change with time into the "
             "equation, as in (1 + k)*v1 + k*v2"
         )
-    return {i: read(one, symbols, what) for i, one in enumerate(entries) if _is_formula(one)}
+    found = {i: read(one, symbols, what) for i, one in enumerate(entries) if _is_formula(one)}
+    if found and len(entries) != size:
+        raise ModelError(f"`{what}`: {len(entries)} entries for {size} noise(s); give one for each")
+    return found
 
 
 def _is_formula(one: Any) -> bool:

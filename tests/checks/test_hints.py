@@ -61,6 +61,13 @@ def test_hints(question, name, answer):
     assert (result.status, result.diagnosis) == ("wrong", (name,)), result
 
 
+def test_the_precision_is_named():
+    single = outcome(CARRIED, lambda A, P: carried(A, P).astype(np.float32)).message
+    assert "single precision (float32)" in single and "float64" in single
+    rounded = outcome(CARRIED, lambda A, P: np.round(carried(A, P), 5)).message
+    assert "rounded" in rounded and "float32" not in rounded
+
+
 def test_the_same_is_said_once():
     message = outcome(PAIR, lambda a, b: (2 * (a + b), 2 * a * b)).message
     assert message == "not right. sum, product: It is twice what it should be."
@@ -82,6 +89,9 @@ def test_other_forms_are_right():
     assert outcome(number, complex).passed
     assert outcome(asks(lambda a: np.array([0.0, 1.0]), [(1.0,)]), lambda a: np.array([False, True])).passed
     assert like(np.matrix([[1.0]]), z) == 1
+    assert outcome(asks(lambda a: np.array([0.0, a]), [(2.0,)]), lambda a: np.matrix([0.0, a])).passed
+    with pytest.raises(Unusable, match="shape"):
+        like(np.matrix([1.0, 2.0]), np.zeros((2, 1)))
 
 
 def test_complex_numbers_are_told():

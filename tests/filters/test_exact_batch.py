@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from kfcourse import Model, load_variants, simulate
-from kfcourse.filters import adaptive_pointmass, kalman_filter, pointmass
+from kfcourse import Model, load_variants, run, simulate
+from kfcourse.filters import adaptive_pointmass, kalman_filter, particle, pointmass
 from kfcourse.filters.exact import ACCURACY
 
 SHIPPED = {name: variant.model for name, variant in load_variants().items() if variant.model.n == 1}
@@ -97,3 +97,34 @@ def test_a_prediction_has_the_moments_of_the_closed_form(state, mean, variance):
     assert abs(first.predicted.cov[0, 0, 0] / variance - 1) <= 1e-8
     assert abs(second.posterior.mean[0, 0] - mean) <= 1e-6 * sigma
     assert abs(second.posterior.cov[0, 0, 0] / variance - 1) <= 1e-6
+
+
+# --- a static parameter, and stochastic volatility
+
+
+def test_a_parameter_that_stands_still_is_estimated():
+    """y_i = exp(x/2) w: p(x | y) = C exp(-x^2/2 - n x/2 - exp(-x) sum y^2 / 2), not normal; by quadrature at every step."""
+    model = Model.define("x", "exp(x/2)*w")
+    _, y = simulate(model, 3, 6, seed=5)
+    found = run(pointmass(model), y)
+    x = np.linspace(-9, 9, 20_001)
+    for i in range(3):
+        for n in range(1, 7):
+            logs = -0.5 * x**2 - 0.5 * n * x - 0.5 * np.exp(-x) * (y[:n, i, 0] ** 2).sum()
+            weight = np.exp(logs - logs.max())
+            mean = weight @ x / weight.sum()
+            variance = weight @ (x - mean) ** 2 / weight.sum()
+            assert abs(found.mean[n - 1, i, 0] - mean) < 1e-6 * np.sqrt(variance)
+            assert found.cov[n - 1, i, 0, 0] == pytest.approx(variance, rel=1e-6)
+
+
+def test_stochastic_volatility_is_what_many_particles_find():
+    """Twenty clouds of 10,000 particles that do not look at the measurement: within 4 of their standard errors."""
+    model = Model.define("0.95*x + 0.3*v", "exp(x/2)*w")
+    _, y = simulate(model, 2, 6, seed=4)
+    expected = run(pointmass(model), y)
+    found = [run(particle(model, 10_000, seed, guided=False), y) for seed in range(20)]
+    for kind in ("mean", "cov"):
+        values = np.stack([getattr(one, kind).reshape(6, 2) for one in found])
+        error = values.std(axis=0, ddof=1) / np.sqrt(20)
+        assert (abs(values.mean(axis=0) - getattr(expected, kind).reshape(6, 2)) < 4 * error).all(), kind

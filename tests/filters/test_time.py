@@ -439,6 +439,8 @@ def test_what_is_printed_names_the_step():
         ({"state_noise": {"variance": "1/(k - 2)"}}, ModelError, "at step 0"),
         ({"state_noise": {"variance": "x"}}, FormulaError, "unknown symbol 'x'; known here: k, pi, t"),
         ({"state_noise": {"variance": [["k"]]}}, ModelError, "write correlated noises that change with time into the equation"),
+        ({"state_noise": {"variance": ["k", 1]}}, ModelError, r"2 entries for 1 noise\(s\)"),
+        ({"meter_noise": {"mean": ["k", "t"], "variance": 2}}, ModelError, r"2 entries for 1 noise\(s\)"),
         ({"prior": {"variance": "k"}}, ModelError, "`prior`: mean and variance must be numbers"),
     ],
 )

@@ -65,13 +65,13 @@ def outside(tmp_path_factory):
 def kernel(staged, outside):
     """One process for all tricks that leave it alive; the others end it, and it is started anew."""
     with kernel_in(Sandbox("none", tuple(map(str, [*answers(), outside]))), staged) as started:
-        assert Marking(Exercise("b", TASK.variant, SALT), (), print).run(started, [OPEN]) == []
+        assert Marking(TASK, SALT, (), print).run(started, [OPEN]) == []
         yield started
 
 
 def marked(kernel, *steps):
     """The result of b1 after these cells, and where they stopped."""
-    marking = Marking(Exercise("b", TASK.variant, SALT), (), lambda _: None)
+    marking = Marking(TASK, SALT, (), lambda _: None)
     stopped = marking.run(kernel, steps)
     return marking.results.get("b1"), stopped
 
@@ -163,7 +163,7 @@ def test_a_sandbox_holds(staged, outside, tmp_path, port):
     values = {"OTHER": str(outside / "other.ipynb"), "OUTSIDE": str(written), "FLAG": str(flag), "PORT": port}
     steps = [Step(filled(code, **values), name, own=True) for name, code in PROCESSES.items()]
     listed = f"import os\nassert not os.path.exists({str(answers()[0])!r}) or not os.listdir({str(answers()[0])!r})"
-    marking = Marking(Exercise("b", TASK.variant, SALT), (), lambda _: None)
+    marking = Marking(TASK, SALT, (), lambda _: None)
     with kernel_in(sandbox, staged) as kernel:
         assert marking.run(kernel, [OPEN, *steps, Step(listed, "keys", own=True), Step(RIGHT, "answer"), CHECK]) == []
     assert marking.marks["b1"] == "passed"

@@ -9,6 +9,7 @@ staging       the package without the right answers, for that process
 sandbox       where that process runs: in bubblewrap's sandbox, or below a keeper
 keeper        its parent otherwise: ends what it leaves behind
 running       its cells and answers, with limits of time and memory
+asking        arguments of the grader's own
 marking       one notebook -> its marks and notes
 worker        the grading process, which compares
 pool          several of them, started anew when one ends

@@ -21,6 +21,7 @@ from kfcourse.checks.engine import SECONDS as CHECK
 from kfcourse.checks.engine import check
 from kfcourse.checks.question import UNUSABLE, WRONG
 from kfcourse.limits import OutOfTime, time_limit
+from kfcourse.notebooks.grading.asking import salted
 from kfcourse.notebooks.grading.assembly import Step, assembled, generated
 from kfcourse.notebooks.grading.running import WHOLE, Answer, Kernel, Killed, Opening, Place, Stopped
 from kfcourse.notebooks.grading.staging import opened_elsewhere, personal_numbers
@@ -101,8 +102,7 @@ def _grade(
         elsewhere = opened_elsewhere(call for cell in cells for call in openings(cell.source))
         opening = Opening(exercise.letter, opened(exercise), personal_numbers(exercise, elsewhere))
     steps, own = assembled(master, cells)
-    asked = Exercise(exercise.letter, exercise.variant, setting.salt)
-    marking = Marking(asked, skip, progress)
+    marking = Marking(exercise, setting.salt, skip, progress)
     with start(setting.place, opening, work.seconds) as kernel:
         stopped = marking.run(kernel, steps)
     notes = [*stopped, *marking.errors[:2], *marking.reasons(), *notes, *_noted(kernel.notes), *strange_lines(own, master)]
@@ -150,8 +150,8 @@ class Marking:
         Errors of the student's cells; those of stubs are no news.
     """
 
-    def __init__(self, exercise: Exercise, skip: Sequence[str], progress: Progress):
-        self._exercise, self._skip, self._progress = exercise, skip, progress
+    def __init__(self, exercise: Exercise, salt: str, skip: Sequence[str], progress: Progress):
+        self._exercise, self._salt, self._skip, self._progress = exercise, salt, skip, progress
         self.marks = dict.fromkeys(exercise.questions, NOT_RUN)
         self.results: dict[str, Result] = {}
         self.errors: list[str] = []
@@ -181,7 +181,8 @@ class Marking:
         else:
             self._progress(name)
             answer: Any = type(kind, (Other,), {})() if kind else Answer(kernel, name)
-            result = check(question, self._exercise, answer, CHECK)
+            asked = salted(self._exercise.letter, opened(self._exercise), name, self._salt)
+            result = check(question, asked, answer, CHECK)
         self.results[name], self.marks[name] = result, result.status
         if result.status == UNUSABLE:
             self._reason(result.message, name)
