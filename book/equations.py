@@ -34,12 +34,17 @@ def page(chapters: Iterable[tuple[str, list[dict]]]) -> str:
     parts = []
     for document, equations, made in found:
         if equations:
-            parts.append(f"## {{doc}}`{document}`\n\n{_count(equations, made)}\n")
+            parts.append(f"## {_title(document)}\n\n{_count(equations, made)}: {{doc}}`{document}`\n")
             parts += [_entry(one) for one in equations]
     total = sum(one["equations"] for _, equations, _ in found for one in equations)
     claims = sum(len(made) - len(equations) for _, equations, made in found)
     chapters_with = sum(bool(equations) for _, equations, _ in found)
     return HEAD.format(total=total, chapters=chapters_with, claims=claims) + "\n" + "\n".join(parts)
+
+
+def _title(document: str) -> str:
+    text = (PAGE.parent / f"{document}.md").read_text(encoding="utf-8")
+    return next(line[2:] for line in text.splitlines() if line.startswith("# "))
 
 
 def _count(equations: list[dict], made: list[dict]) -> str:
