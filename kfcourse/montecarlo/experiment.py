@@ -115,7 +115,7 @@ def compare(
         Trajectories, and measurements of each.
     seed : int or numpy.random.Generator
         The same seed gives the same numbers, bit by bit, whatever the number of threads.  Another NumPy or processor may do
-        linear algebra by another kernel (BLAS): then vector models differ by rounding, 1e-13 or so, and scalar ones hardly.
+        linear algebra by another kernel (BLAS): then vector models differ by rounding, up to some 1e-12, and scalar ones hardly.
     design_runs : int, optional
         Size of the design ensemble; `runs` by default.
     designs : int
