@@ -174,6 +174,8 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
         if any(r.has(*variables) for r in rate):
             raise _no_closed_form(sp.exp(exponent), function)
         constant = sp.expand(exponent - sum((r * x for r, x in zip(rate, variables, strict=True)), sp.S.Zero))
+        if constant.has(*variables):  # atan2(x, x), whose slope is zero
+            raise _no_closed_form(sp.exp(exponent), function)
         collected[rate] = collected.get(rate, sp.S.Zero) + polynomial * _cis(constant)
     return [
         Term(polynomial.xreplace(originals), tuple(one.xreplace(originals) for one in rate))

@@ -140,6 +140,7 @@ def test_the_variance_keeps_its_digits_for_large_means_and_small_variances(funct
         (sp.exp(-(x**2)), r"exp\(-x\*\*2\)"),
         (sp.sin(x**2), r"x\*\*2"),
         (sp.exp(sp.sin(x)), r"sin\(x\)|exp\("),
+        (sp.cosh(sp.atan2(x, x)), "atan2"),
         (x**100, "degree"),
     ],
 )
