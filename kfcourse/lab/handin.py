@@ -10,18 +10,19 @@ import re
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import resources
 from pathlib import Path
 
 import jinja2
 import numpy as np
 import sympy as sp
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
 
-from kfcourse.files import replacing, save
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
+from kfcourse.lab.report import Section, on_one_power, percent, printed, save_figure, save_texts, table_steps
 from kfcourse.lab.short_names import FILTERS, Structures
 from kfcourse.lab.variants import Variant
 from kfcourse.laws import Gaussian
@@ -30,11 +31,12 @@ from kfcourse.montecarlo.statistics import Estimate
 from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
-from kfcourse.symbolic.structure import FUNCTION_LATEX, Structure
+from kfcourse.symbolic.reading import exact_matrix
+from kfcourse.symbolic.structure import FUNCTION_LATEX
 from kfcourse.symbolic.writing import formula_latex
 
 LANGUAGES = ("en", "ru")
-STEPS = (0, 1, 2, 3, 5, 7, 10, 15, 20, 30, 50)  # of the tables
+HIGHEST = 8  # moment that is printed
 COLUMNS = 4  # filters side by side in a table, so that it fits a page
 FIGURES = ("accuracy", "relative", "ranking", "consistency")
 
@@ -71,36 +73,22 @@ def write_handin(variant: Variant, result: Comparison, folder: Path, language: s
     if language not in LANGUAGES:
         raise ValueError(f"the report is written in {' or '.join(LANGUAGES)}, not {language!r}")
     words = tomllib.loads((resources.files("kfcourse.lab") / "handin.toml").read_text(encoding="utf-8"))[language]
-    blocks = list(_Report(variant, result, words).blocks())
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("kfcourse.lab"), trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    environment.filters |= {"mathml": lambda line: mathml(line.replace("&", "")), "inline": _inline_html}
-    written = [*_known_errors(result, folder)]
-    for name in ("handin.html", "handin.tex"):
-        text = environment.get_template(name + ".j2").render(blocks=blocks, words=words, variant=variant, language=language)
-        written.append(folder / name)
-        save(text, written[-1])
-    return written
+    content = {"blocks": list(_Report(result, words).blocks()), "words": words, "variant": variant, "language": language}
+    figure = save_figure(partial(_known_errors, result), folder, "handin-consistency")
+    return figure + save_texts(("handin.html", "handin.tex"), folder, content, inline=_inline_html)
 
 
-def _known_errors(result: Comparison, folder: Path) -> Iterator[Path]:
-    """The figure of the normalised errors, between a half and two: rare far trajectories reach beyond."""
-    figure = Figure(figsize=(7, 4.2), layout="constrained")
-    ax = plots.consistency(result, figure.add_subplot(), names=result.entrants)
-    ax.set_ylim(0.5, 2)
-    for kind, metadata in {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.items():
-        path = folder / f"handin-consistency.{kind}"
-        with replacing(path) as place:
-            figure.savefig(place, format=kind, metadata=metadata)
-        yield path
+def _known_errors(result: Comparison, ax: Axes) -> Axes:
+    """The normalised errors, between a half and two: rare far trajectories reach beyond."""
+    plots.consistency(result, ax, names=result.entrants).set_ylim(0.5, 2)
+    return ax
 
 
 class _Report:
     """The blocks of the report, section by section."""
 
-    def __init__(self, variant: Variant, result: Comparison, words: dict[str, str]) -> None:
-        self.variant, self.result, self.words = variant, result, words
+    def __init__(self, result: Comparison, words: dict[str, str]) -> None:
+        self.result, self.words = result, words
         self.model: Model = result.model
         self.structures = Structures(self.model)
         self.kinds = [kind for kind in ("linearised", "gaussian") if any(name.endswith(kind) for name in result.available)]
@@ -109,7 +97,8 @@ class _Report:
         yield from self.task()
         yield Block("section", self.words["functions"])
         for kind in self.kinds:
-            yield from getattr(self, kind)(getattr(self.structures, kind))
+            yield from getattr(self, kind)()
+            yield from self.derived(kind)
         yield from self.filters()
         yield from self.experiment()
         yield from self.conclusion()
@@ -127,7 +116,7 @@ class _Report:
         yield Block("text", words["independent"])
         yield Block("text", _filled(words["find"], filters=", ".join(self.title(name) for name in self.result.entrants)))
 
-    def linearised(self, structure: Structure) -> Iterator[Block]:
+    def linearised(self) -> Iterator[Block]:
         model, words = self.model, self.words
         yield Block("subsection", words["linearised"])
         yield Block("text", words["linearised_text"])
@@ -141,19 +130,21 @@ class _Report:
             ]
             yield Block("text", words["derivatives"])
             yield Block("formulas", lines=derivatives)
-        yield from self.derived(structure)
 
-    def gaussian(self, structure: Structure) -> Iterator[Block]:
+    def gaussian(self) -> Iterator[Block]:
         model, words = self.model, self.words
         yield Block("subsection", words["gaussian"])
         yield Block("text", words["gaussian_text"])
         yield Block("formulas", lines=words["gaussian_formulas"].split("\n"))
         if model.n == model.p == 1:
-            yield Block("text", words["conditional"])
-            yield Block("formulas", lines=self.conditional())
-            yield Block("text", words["recursion"])
-            yield Block("formulas", lines=[r"q_0 &= 1,\quad q_1 = m,\quad q_{n+1} = m\,q_n + n\,d\,q_{n-1}", *self.moments()])
-        yield from self.derived(structure)
+            if conditional := self.conditional():
+                yield Block("text", words["conditional"])
+                yield Block("formulas", lines=conditional)
+            if moments := self.moments():
+                yield Block("text", words["recursion"])
+                yield Block("formulas", lines=[r"q_0 &= 1,\quad q_1 = m,\quad q_{n+1} = m\,q_n + n\,d\,q_{n-1}", *moments])
+            else:
+                yield Block("text", words["exponentials"])
 
     def conditional(self) -> list[str]:
         """Means of a, a^2, b, b^2 over their noise, at a fixed state."""
@@ -162,9 +153,7 @@ class _Report:
             (model.state_equation[0], model.v, model.state_noise, r"\alpha", r"\gamma"),
             (model.meter_equation[0], model.w, model.meter_noise, r"\beta", r"\eta"),
         ):
-            over = GaussianMoments(
-                list(noises), [sp.nsimplify(value) for value in law.mean], sp.Matrix(law.cov).applyfunc(sp.nsimplify)
-            )
+            over = GaussianMoments(list(noises), list(exact_matrix(law.mean)), sp.Matrix(exact_matrix(law.cov)))
             for letter, power in ((first, 1), (second, 2)):
                 try:
                     mean = sp.expand(over.mean_of(formula**power))
@@ -175,29 +164,25 @@ class _Report:
 
     def moments(self) -> list[str]:
         """The moments q_2 ... that the meter and the object need, if they are polynomials."""
-        model = self.model
-        sides = (model.state_equation[0] ** 2, model.meter_equation[0] ** 2)
-        if not all(side.is_polynomial(model.x[0]) for side in sides):
+        (x,) = self.model.x
+        sides = (self.model.state_equation[0] ** 2, self.model.meter_equation[0] ** 2)
+        if not all(side.is_polynomial(x) for side in sides):
             return []
         m, d = sp.symbols("m d", real=True)
-        highest = min(max(int(sp.degree(sp.expand(side), model.x[0])) for side in sides), 8)
-        q = [sp.S.One, m]
-        for n in range(1, highest):
-            q.append(sp.expand(m * q[n] + n * d * q[n - 1]))
-        return [f"q_{n} &= {formula_latex(q[n], (m, d))}" for n in range(2, highest + 1)]
+        law = GaussianMoments([x], [m], sp.Matrix([[d]]))
+        highest = min(max(int(sp.degree(sp.expand(side), x)) for side in sides), HIGHEST)
+        return [f"q_{n} &= {formula_latex(sp.expand(law.mean_of(x**n)), (m, d))}" for n in range(2, highest + 1)]
 
-    def derived(self, structure: Structure) -> Iterator[Block]:
+    def derived(self, kind: str) -> Iterator[Block]:
         """The five functions, with their numbers in the catalogue where it has them."""
-        lines = _lines(structure.latex())
+        block = printed(self.structures, kind)
         yield Block("text", self.words["result"])
-        yield Block("formulas", lines=lines)
-        numbers = [
-            f"${FUNCTION_LATEX[name]}$: {CATALOGUE[key]}"
-            for name in FUNCTION_LATEX
-            if self.model.n == self.model.p == 1
-            for key in [(name, str(sp.expand(structure[name])))]
-            if key in CATALOGUE
-        ]
+        yield Block("formulas", lines=_lines(block))
+        numbers = []
+        if self.model.n == self.model.p == 1 and FUNCTION_LATEX["tau"] in block:  # else they took too long
+            structure = getattr(self.structures, kind)
+            forms = {name: (name, str(sp.expand(structure[name]))) for name in FUNCTION_LATEX}
+            numbers = [f"${FUNCTION_LATEX[name]}$: {CATALOGUE[form]}" for name, form in forms.items() if form in CATALOGUE]
         if numbers:
             yield Block("text", _filled(self.words["catalogue"], numbers=", ".join(numbers)))
 
@@ -222,19 +207,17 @@ class _Report:
         yield Block(
             "text", _filled(words["experiment_text"], runs=result.runs, steps=result.steps, seed=result.seed) + designs + exact
         )
-        steps = [k for k in STEPS if k < result.steps]
         for start in range(0, len(result.available), COLUMNS):
             names = result.available[start : start + COLUMNS]
             estimates = [result.error_variance(name) for name in names]
-            rows = [[f"${k}$", *(_power(one[k]) for one in estimates)] for k in steps]
+            rows = [[f"${k}$", *(_power(one[k]) for one in estimates)] for k in table_steps(result)]
             yield Block("table", words["table"], ["$k$", *map(self.title, names)], rows)
         for name in FIGURES:
             yield Block("figure", words[f"figure_{name}"], ["handin-consistency" if name == "consistency" else name])
 
     def conclusion(self) -> Iterator[Block]:
         result, words = self.result, self.words
-        steps = [k for k in STEPS if k < result.steps]
-        verdicts = {k: self.verdict(k) for k in steps}
+        verdicts = {k: self.verdict(k) for k in table_steps(result)}
         yield Block("section", words["conclusion"])
         yield Block("text", words["verdict_text"])
         heading = [words[key] for key in ("step", "best", "not_worse", "worst")]
@@ -289,8 +272,7 @@ def _filled(text: str, **values: object) -> str:
 
 
 def _lines(block: str) -> list[str]:
-    body = re.sub(r"\\(begin|end)\{aligned\}", "", block)
-    return [line.strip() for line in body.split("\\\\\n")]
+    return Section.of("", block).lines
 
 
 def _law(law: Gaussian) -> str:
@@ -304,15 +286,14 @@ def _law(law: Gaussian) -> str:
 
 def _power(estimate: Estimate) -> str:
     """A value and its standard error on one power of ten: (6.51 ± 0.07)·10^-4."""
-    value, error = float(estimate.value), float(estimate.standard_error)
-    if not (np.isfinite(value) and value):
+    value, error, power = on_one_power(estimate)
+    if power is None:
         return f"${value:g}$" if np.isfinite(value) else r"$\infty$"
-    power = int(np.floor(np.log10(abs(value))))
-    return rf"$({value / 10.0**power:.3f} \pm {error / 10.0**power:.3f})\cdot 10^{{{power}}}$"
+    return rf"$({value:.3f} \pm {error:.3f})\cdot 10^{{{power}}}$"
 
 
 def _percent(estimate: Estimate) -> str:
-    return rf"${100 * float(estimate.value):.2f} \pm {100 * float(estimate.standard_error):.2f}$"
+    return "$" + percent(estimate).replace("±", r"\pm") + "$"
 
 
 def _ranges(steps: list[int]) -> str:

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -74,22 +75,31 @@ def write_report(variant: Variant, result: Comparison, folder: Path) -> list[Pat
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for name, (_, draw) in _FIGURES.items():
-        figure = Figure(figsize=(7, 4.2), layout="constrained")
-        draw(result, figure.add_subplot())
-        for kind, metadata in _UNDATED.items():
-            written.append(folder / f"{name}.{kind}")
-            with replacing(written[-1]) as path:
-                figure.savefig(path, format=kind, metadata=metadata)
-    content = _content(variant, result)
+        written += save_figure(partial(draw, result), folder, name)
+    return written + save_texts(("report.html", "report.tex"), folder, _content(variant, result))
+
+
+def save_figure(draw: Callable[[Axes], Axes], folder: Path, name: str) -> list[Path]:
+    """A figure for the page and for LaTeX."""
+    figure, paths = Figure(figsize=(7, 4.2), layout="constrained"), []
+    draw(figure.add_subplot())
+    for kind, metadata in _UNDATED.items():
+        paths.append(folder / f"{name}.{kind}")
+        with replacing(paths[-1]) as path:
+            figure.savefig(path, format=kind, metadata=metadata)
+    return paths
+
+
+def save_texts(names: Sequence[str], folder: Path, content: Mapping[str, Any], **filters: Callable[[str], str]) -> list[Path]:
+    """The files made from the templates NAME.j2; the templates may use further filters."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("kfcourse.lab"), trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    environment.filters |= {"mathml": _mathml, "tex": _escape_tex, "html": jinja2.filters.do_forceescape}
-    for name in ("report.html", "report.tex"):
-        text = environment.get_template(name + ".j2").render(content)
-        written.append(folder / name)
-        save(text, written[-1])
-    return written
+    environment.filters |= {"mathml": _mathml, "tex": _escape_tex, "html": jinja2.filters.do_forceescape, **filters}
+    texts = {folder / name: environment.get_template(name + ".j2").render(content) for name in names}
+    for path, text in texts.items():
+        save(text, path)
+    return list(texts)
 
 
 # No dates in the figures: the same numbers give the same report.
@@ -171,11 +181,11 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
         ],
         "table": _table(result, [[_cell(one) for one in result.error_variance(name)] for name in names]),
         "compared": [title(name) for name in compared],
-        "gaps": _table(result, [[_percent(one) for one in result.gap(name)] for name in compared]) if compared else [],
+        "gaps": _table(result, [[percent(one) for one in result.gap(name)] for name in compared]) if compared else [],
         "ranking": [
             (
                 title(name),
-                _percent(mean),
+                percent(mean),
                 _between_designs(result, name),
             )
             for name, mean in result.ranking()
@@ -190,10 +200,10 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
 def _structure_sections(model: Model, names: tuple[str, ...]) -> list[Section]:
     structures = Structures(model)
     kinds = [kind for kind in ("gaussian", "linearised") if any(name.endswith(kind) for name in names)]
-    return [Section.of(kind.capitalize(), _printed(structures, kind)) for kind in kinds]
+    return [Section.of(kind.capitalize(), printed(structures, kind)) for kind in kinds]
 
 
-def _printed(structures: Structures, kind: str) -> str:
+def printed(structures: Structures, kind: str) -> str:
     """The formulas in LaTeX, if they can be found and read."""
     try:
         with time_limit(FORMULAS):
@@ -208,7 +218,7 @@ def _equation_sections(names: tuple[str, ...]) -> list[Section]:
     return [Section.of(_FAMILIES[family], equations_latex(EQUATIONS[family])) for family in families if family in EQUATIONS]
 
 
-def _percent(part: Estimate) -> str:
+def percent(part: Estimate) -> str:
     """A part and its standard error in per cent, the latter with two digits: "1.19 ± 0.40"."""
     value, error = 100 * float(part.value), 100 * float(part.standard_error)
     places = int(np.clip(1 - np.floor(np.log10(error)), 0, 6)) if np.isfinite(error) and error > 0 else 2
@@ -227,21 +237,30 @@ def _number(estimate: Estimate) -> dict[str, float]:
     return {"value": float(estimate.value), "standard_error": float(estimate.standard_error)}
 
 
-def _table(result: Comparison, columns: list[list[str]]) -> list[tuple[int, list[str]]]:
-    """Rows (step, cells) of columns (steps,), for the first steps and then some."""
+def table_steps(result: Comparison) -> list[int]:
+    """The first steps and then some, to the last."""
     steps = [k for k in (0, 1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 50, 100, 200, 500, 1000) if k < result.steps]
-    if steps[-1] != result.steps - 1:
-        steps.append(result.steps - 1)
-    return [(k, [column[k] for column in columns]) for k in steps]
+    return steps if steps[-1] == result.steps - 1 else [*steps, result.steps - 1]
+
+
+def _table(result: Comparison, columns: list[list[str]]) -> list[tuple[int, list[str]]]:
+    """Rows (step, cells) of columns (steps,)."""
+    return [(k, [column[k] for column in columns]) for k in table_steps(result)]
 
 
 def _cell(estimate: Estimate) -> str:
-    """A value and its standard error on one power of ten: "6.51e-04 ± 0.04e-04"."""
+    """A value and its standard error on one power of ten: "6.510 ± 0.040 · 1e-4"."""
+    value, error, power = on_one_power(estimate)
+    return f"{value:g}" if power is None else f"{value:.3f} ± {error:.3f} · 1e{power:d}"
+
+
+def on_one_power(estimate: Estimate) -> tuple[float, float, int | None]:
+    """Value and standard error over the power of ten of the value, and that power; None for zero and what is not finite."""
     value, error = float(estimate.value), float(estimate.standard_error)
     if not (np.isfinite(value) and value):
-        return f"{value:g}"
+        return value, error, None
     power = int(np.floor(np.log10(abs(value))))
-    return f"{value / 10.0**power:.3f} ± {error / 10.0**power:.3f} · 1e{power:d}"
+    return value / 10.0**power, error / 10.0**power, power
 
 
 def _mathml(line: str) -> str:
