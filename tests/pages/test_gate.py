@@ -20,6 +20,8 @@ CHANGES = {
     "linearisation": ("linear_f, constant_g2 = f + f1 * (before - z)", "linear_f, constant_g2 = f - f1 * (before - z)"),
     "when-linearisation-fails": ("(M_e, -K_k * S2 * Psi / 2)", "(M_e, K_k * S2 * Psi / 2)"),
     "extended-kalman": ('(s["F"], s["H"] * s["Psi"] * s["H"].T + s["D_n"])', '(s["F"], s["H"] * s["Psi"] * s["H"].T - s["D_n"])'),
+    "consistency": ("F = (H * Psi * H.T)[0] + R", "F = (H * Psi * H.T)[0] - R"),
+    "sigma-points": ("off.T * W * off + miss.T", "off.T * W * off - miss.T"),
     "discriminator": ("u = signal.jacobian(phi).T * D_n.inv() * miss", "u = -signal.jacobian(phi).T * D_n.inv() * miss"),
     "continuous": ("inner = N / 2 * sp.integrate", "inner = -N / 2 * sp.integrate"),
     "structural-functions": ("a.diff(x) ** 2 * p + a.diff(v) ** 2", "a.diff(x) ** 2 * p - a.diff(v) ** 2"),
