@@ -13,8 +13,9 @@ from kfcourse.pages import Unverified
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 
+# Where the changed cell needs nothing but imports, and the cells before are long.
+ALONE = {"comparison", "manoeuvres", "lecture-continuous"}
 # One change in each chapter that derives something.
-ALONE = {"comparison", "manoeuvres"}  # where the changed cell needs nothing but imports, and the cells before are long
 CHANGES = {
     "stratonovich": ("verified((given, p(x2, x1)),", "verified((given, -p(x2, x1)),"),
     "linearisation": ("linear_f, constant_g2 = f + f1 * (before - z)", "linear_f, constant_g2 = f - f1 * (before - z)"),
@@ -24,6 +25,7 @@ CHANGES = {
     "sigma-points": ("off.T * W * off + miss.T", "off.T * W * off - miss.T"),
     "discriminator": ("u = signal.jacobian(phi).T * D_n.inv() * miss", "u = -signal.jacobian(phi).T * D_n.inv() * miss"),
     "continuous": ("inner = N / 2 * sp.integrate", "inner = -N / 2 * sp.integrate"),
+    "lecture-continuous": ("pull = 2 * N2.inv()", "pull = -2 * N2.inv()"),
     "structural-functions": ("a.diff(x) ** 2 * p + a.diff(v) ** 2", "a.diff(x) ** 2 * p - a.diff(v) ** 2"),
     "lab-filters": ("Psi - 2 * K * C + K**2 * F", "Psi + 2 * K * C + K**2 * F"),
     "comparison": ("where={epsilon: x - exact, delta: exact - z}", "where={epsilon: x - exact, delta: exact + z}"),
