@@ -1,5 +1,6 @@
 """Tracks and sensors of the applications.
 
+carrier      a carrier of unknown phase
 flight       the five-part flight of an aircraft
 radar        what a radar measures of it, and the models that track it
 errors       errors by part of the flight

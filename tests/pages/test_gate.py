@@ -14,7 +14,7 @@ from kfcourse.pages import Unverified
 BOOK = Path(__file__).resolve().parents[2] / "book"
 
 # Where the changed cell needs nothing but imports, and the cells before are long.
-ALONE = {"comparison", "manoeuvres", "lecture-continuous", "grid"}
+ALONE = {"comparison", "manoeuvres", "lecture-continuous", "grid", "cycle-slips"}
 # One change in each chapter that derives something.
 CHANGES = {
     "stratonovich": ("verified((given, p(x2, x1)),", "verified((given, -p(x2, x1)),"),
@@ -26,6 +26,7 @@ CHANGES = {
     "consistency": ("F = (H * Psi * H.T)[0] + R", "F = (H * Psi * H.T)[0] - R"),
     "sigma-points": ("off.T * W * off + miss.T", "off.T * W * off - miss.T"),
     "discriminator": ("u = signal.jacobian(phi).T * D_n.inv() * miss", "u = -signal.jacobian(phi).T * D_n.inv() * miss"),
+    "cycle-slips": ("inner = sp.Integral(sp.exp(-V(a))", "inner = sp.Integral(sp.exp(V(a))"),
     "continuous": ("inner = N / 2 * sp.integrate", "inner = -N / 2 * sp.integrate"),
     "lecture-continuous": ("pull = 2 * N2.inv()", "pull = -2 * N2.inv()"),
     "structural-functions": ("a.diff(x) ** 2 * p + a.diff(v) ** 2", "a.diff(x) ** 2 * p - a.diff(v) ** 2"),
