@@ -109,10 +109,10 @@ def window(browser):
         yield tab, problems
 
 
-# What sticks out of the page, or out of its own box, and by how much.
 # Pictures that are shown wider or higher than they are, by more than the rounding of small ones.
 SQUEEZED = """() => [...document.querySelectorAll("article img")]
   .filter(e => Math.abs(e.clientWidth / e.clientHeight / (e.naturalWidth / e.naturalHeight) - 1) > 0.05).map(e => e.src)"""
+# What sticks out of the page, or out of its own box, and by how much.
 FIT = """() => {
     const width = document.documentElement.clientWidth;
     const out = (selector) => [...document.querySelectorAll(selector)]
