@@ -2,6 +2,7 @@
 
 flight       the five-part flight of an aircraft
 radar        what a radar measures of it, and the models that track it
+tracking     the Kalman filter of the radar chapters, with a control made of the measurements or without
 errors       errors by part of the flight
 pointer      a pointer moved by hand, and the filter that cleans its track
 benchmarks   models on which the field compares its filters, with published figures

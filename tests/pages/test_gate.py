@@ -14,7 +14,7 @@ from kfcourse.pages import Unverified
 BOOK = Path(__file__).resolve().parents[2] / "book"
 
 # One change in each chapter that derives something.
-ALONE = {"comparison", "manoeuvres"}  # where the changed cell needs nothing but imports, and the cells before are long
+ALONE = {"comparison", "manoeuvres", "radar-extended"}  # where the changed cell needs nothing but imports, and the cells before are long
 CHANGES = {
     "stratonovich": ("verified((given, p(x2, x1)),", "verified((given, -p(x2, x1)),"),
     "linearisation": ("linear_f, constant_g2 = f + f1 * (before - z)", "linear_f, constant_g2 = f - f1 * (before - z)"),
@@ -29,6 +29,7 @@ CHANGES = {
     "track-2d": ("velocity = v0 + sp.integrate", "velocity = v0 - sp.integrate"),
     "numerics": ("return (sp.eye(2) - K * H) * Psi", "return (sp.eye(2) + K * H) * Psi"),
     "radar-tracking": ("2 * b - (a + b / 2) ** 2", "2 * b + (a + b / 2) ** 2"),
+    "radar-extended": ("2 * b / (a + 2 * b)),", "2 * b / (a - 2 * b)),"),
     "manoeuvres": ("past, future = common / (1 - a / zeta)", "past, future = common / (1 + a / zeta)"),
     "time-tags": ("s_hat = s.subs(t, t - tau)", "s_hat = s.subs(t, t + tau)"),
     "integration": ("at_lam, -S(lam).diff(lam)", "at_lam, S(lam).diff(lam)"),
