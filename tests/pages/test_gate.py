@@ -14,7 +14,12 @@ from kfcourse.pages import Unverified
 BOOK = Path(__file__).resolve().parents[2] / "book"
 
 # One change in each chapter that derives something.
-ALONE = {"comparison", "manoeuvres", "radar-extended"}  # where the changed cell needs nothing but imports, and the cells before are long
+ALONE = {
+    "before-measuring",
+    "comparison",
+    "manoeuvres",
+    "radar-extended",
+}  # where the changed cell needs nothing but imports, and the cells before are long
 CHANGES = {
     "stratonovich": ("verified((given, p(x2, x1)),", "verified((given, -p(x2, x1)),"),
     "linearisation": ("linear_f, constant_g2 = f + f1 * (before - z)", "linear_f, constant_g2 = f - f1 * (before - z)"),
@@ -27,6 +32,7 @@ CHANGES = {
     "comparison": ("where={epsilon: x - exact, delta: exact - z}", "where={epsilon: x - exact, delta: exact + z}"),
     "checking-exact": ("node = center + scale * sp.sinh(t)", "node = center - scale * sp.sinh(t)"),
     "track-2d": ("velocity = v0 + sp.integrate", "velocity = v0 - sp.integrate"),
+    "before-measuring": ("(Lambda, 2 * (1 - rho) ** 2 / rho)", "(Lambda, 2 * (1 + rho) ** 2 / rho)"),
     "numerics": ("return (sp.eye(2) - K * H) * Psi", "return (sp.eye(2) + K * H) * Psi"),
     "radar-tracking": ("2 * b - (a + b / 2) ** 2", "2 * b + (a + b / 2) ** 2"),
     "radar-extended": ("2 * b / (a + 2 * b)),", "2 * b / (a - 2 * b)),"),
