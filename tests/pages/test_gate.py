@@ -36,7 +36,8 @@ CHANGES = {
     "numerics": ("return (sp.eye(2) - K * H) * Psi", "return (sp.eye(2) + K * H) * Psi"),
     "radar-tracking": ("2 * b - (a + b / 2) ** 2", "2 * b + (a + b / 2) ** 2"),
     "radar-extended": ("2 * b / (a + 2 * b)),", "2 * b / (a - 2 * b)),"),
-    "manoeuvres": ("past, future = common / (1 - a / zeta)", "past, future = common / (1 + a / zeta)"),
+    "manoeuvres": ("CARTESIAN.subs({one: by_name", "CARTESIAN.subs({one: -by_name"),
+    "wiener": ("past, future = common / (1 - a / zeta)", "past, future = common / (1 + a / zeta)"),
     "time-tags": ("s_hat = s.subs(t, t - tau)", "s_hat = s.subs(t, t + tau)"),
     "integration": ("at_lam, -S(lam).diff(lam)", "at_lam, S(lam).diff(lam)"),
 }
