@@ -19,6 +19,7 @@ ALONE = {
     "comparison",
     "manoeuvres",
     "radar-extended",
+    "wiener",
 }  # where the changed cell needs nothing but imports, and the cells before are long
 CHANGES = {
     "stratonovich": ("verified((given, p(x2, x1)),", "verified((given, -p(x2, x1)),"),
