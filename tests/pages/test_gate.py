@@ -17,6 +17,7 @@ BOOK = Path(__file__).resolve().parents[2] / "book"
 ALONE = {
     "before-measuring",
     "comparison",
+    "integration-limits",
     "manoeuvres",
     "radar-extended",
     "wiener",
@@ -40,6 +41,10 @@ CHANGES = {
     "manoeuvres": ("CARTESIAN.subs({one: by_name", "CARTESIAN.subs({one: -by_name"),
     "wiener": ("past, future = common / (1 - a / zeta)", "past, future = common / (1 + a / zeta)"),
     "time-tags": ("s_hat = s.subs(t, t - tau)", "s_hat = s.subs(t, t + tau)"),
+    "integration-limits": (
+        "error_step = (1 + k_any) * (e_0 + xi) - k_any * n",
+        "error_step = (1 + k_any) * (e_0 + xi) + k_any * n",
+    ),
     "integration": ("at_lam, -S(lam).diff(lam)", "at_lam, S(lam).diff(lam)"),
 }
 
