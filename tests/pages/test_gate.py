@@ -41,6 +41,7 @@ CHANGES = {
     "manoeuvres": ("CARTESIAN.subs({one: by_name", "CARTESIAN.subs({one: -by_name"),
     "wiener": ("past, future = common / (1 - a / zeta)", "past, future = common / (1 + a / zeta)"),
     "time-tags": ("s_hat = s.subs(t, t - tau)", "s_hat = s.subs(t, t + tau)"),
+    "four-sensors": ("(s - d) / r, h / r, 0, 0", "(s - d) / r, -h / r, 0, 0"),
     "integration-limits": (
         "error_step = (1 + k_any) * (e_0 + xi) - k_any * n",
         "error_step = (1 + k_any) * (e_0 + xi) + k_any * n",
