@@ -45,7 +45,7 @@ def flight_and_errors(track: Track, estimates: Mapping[str, Array], shown: str) 
         squares = ((positions - track.position[:, None]) ** 2).sum(axis=-1)
         ax.semilogy(track.time, np.sqrt(squares.mean(axis=1)), linewidth=1.2, label=name, **LOOKS[name])
     ax.set(xlabel="time, s", title="RMS error, m", ylim=(25, 2000))
-    ax.legend(loc="lower right")
+    ax.legend(loc="upper right", bbox_to_anchor=(1, 0.9))
     return fig
 
 
@@ -61,7 +61,7 @@ def in_plan(track: Track, y: Array, estimates: Mapping[str, Array]) -> Figure:
     for ax, (title, (start, end)) in zip(axes, pieces.items(), strict=True):
         inside = (track.time >= start) & (track.time <= end)
         ax.plot(*(y[inside, 0, :2] / 1000).T, ".", color=COLOURS["measurement"], markersize=3)
-        ax.plot(*(track.position[inside, :2] / 1000).T, color=COLOURS["truth"], linewidth=1)
+        ax.plot(*(track.position[inside, :2] / 1000).T, color=COLOURS["estimate"])
         for name, positions in estimates.items():
             ax.plot(*(positions[inside, 0, :2] / 1000).T, linewidth=1.3, label=name, **LOOKS[name])
         ax.set(title=title, xlabel="east, km")
