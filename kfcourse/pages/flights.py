@@ -38,7 +38,7 @@ def flight_and_errors(track: Track, estimates: Mapping[str, Array], shown: str) 
         space.plot(x, y, z, color=colour, linewidth=2)
         space.plot(x, y, 0 * z, color=COLOURS["measurement"], linewidth=0.7)  # the shadow on the ground
         ax.axvline(track.time[inside][0], color=COLOURS["measurement"], linewidth=0.6)
-        ax.text(track.time[inside].mean(), 1500, str(part), color=colour, ha="center", weight="bold")
+        ax.text(track.time[inside].mean(), 1500, str(part), color=colour, ha="center")
     space.plot(*(estimates[shown][5:, 0] / 1000).T, "--", color="black", linewidth=1)
     space.set(xlabel="east, km", ylabel="north, km", zlim=(0, 10), title="flight, altitude in km")
     for name, positions in estimates.items():
