@@ -14,7 +14,17 @@ from kfcourse.pages import Unverified
 BOOK = Path(__file__).resolve().parents[2] / "book"
 
 # Where the changed cell needs nothing but imports, and the cells before are long.
-ALONE = {"comparison", "manoeuvres", "lecture-continuous", "grid", "cycle-slips"}
+ALONE = {
+    "before-measuring",
+    "comparison",
+    "cycle-slips",
+    "grid",
+    "integration-limits",
+    "lecture-continuous",
+    "manoeuvres",
+    "radar-extended",
+    "wiener",
+}
 # One change in each chapter that derives something.
 CHANGES = {
     "stratonovich": ("verified((given, p(x2, x1)),", "verified((given, -p(x2, x1)),"),
@@ -34,10 +44,18 @@ CHANGES = {
     "comparison": ("where={epsilon: x - exact, delta: exact - z}", "where={epsilon: x - exact, delta: exact + z}"),
     "checking-exact": ("node = center + scale * sp.sinh(t)", "node = center - scale * sp.sinh(t)"),
     "track-2d": ("velocity = v0 + sp.integrate", "velocity = v0 - sp.integrate"),
+    "before-measuring": ("(Lambda, 2 * (1 - rho) ** 2 / rho)", "(Lambda, 2 * (1 + rho) ** 2 / rho)"),
     "numerics": ("return (sp.eye(2) - K * H) * Psi", "return (sp.eye(2) + K * H) * Psi"),
     "radar-tracking": ("2 * b - (a + b / 2) ** 2", "2 * b + (a + b / 2) ** 2"),
-    "manoeuvres": ("past, future = common / (1 - a / zeta)", "past, future = common / (1 + a / zeta)"),
+    "radar-extended": ("2 * b / (a + 2 * b)),", "2 * b / (a - 2 * b)),"),
+    "manoeuvres": ("CARTESIAN.subs({one: by_name", "CARTESIAN.subs({one: -by_name"),
+    "wiener": ("past, future = common / (1 - a / zeta)", "past, future = common / (1 + a / zeta)"),
     "time-tags": ("s_hat = s.subs(t, t - tau)", "s_hat = s.subs(t, t + tau)"),
+    "four-sensors": ("(s - d) / r, h / r, 0, 0", "(s - d) / r, -h / r, 0, 0"),
+    "integration-limits": (
+        "error_step = (1 + k_any) * (e_0 + xi) - k_any * n",
+        "error_step = (1 + k_any) * (e_0 + xi) + k_any * n",
+    ),
     "integration": ("at_lam, -S(lam).diff(lam)", "at_lam, S(lam).diff(lam)"),
 }
 
