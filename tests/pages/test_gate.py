@@ -13,22 +13,32 @@ from kfcourse.pages import Unverified
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 
-# One change in each chapter that derives something.
+# Where the changed cell needs nothing but imports, and the cells before are long.
 ALONE = {
     "before-measuring",
     "comparison",
+    "cycle-slips",
+    "grid",
     "integration-limits",
+    "lecture-continuous",
     "manoeuvres",
     "radar-extended",
     "wiener",
-}  # where the changed cell needs nothing but imports, and the cells before are long
+}
+# One change in each chapter that derives something.
 CHANGES = {
     "stratonovich": ("verified((given, p(x2, x1)),", "verified((given, -p(x2, x1)),"),
+    "grid": ("2 * sp.integrate(density * wave", "-2 * sp.integrate(density * wave"),
     "linearisation": ("linear_f, constant_g2 = f + f1 * (before - z)", "linear_f, constant_g2 = f - f1 * (before - z)"),
     "when-linearisation-fails": ("(M_e, -K_k * S2 * Psi / 2)", "(M_e, K_k * S2 * Psi / 2)"),
+    "better-than-a-tangent": ("second = f + f1 * u + f2 * u**2 / 2", "second = f + f1 * u - f2 * u**2 / 2"),
     "extended-kalman": ('(s["F"], s["H"] * s["Psi"] * s["H"].T + s["D_n"])', '(s["F"], s["H"] * s["Psi"] * s["H"].T - s["D_n"])'),
+    "consistency": ("F = (H * Psi * H.T)[0] + R", "F = (H * Psi * H.T)[0] - R"),
+    "sigma-points": ("off.T * W * off + miss.T", "off.T * W * off - miss.T"),
     "discriminator": ("u = signal.jacobian(phi).T * D_n.inv() * miss", "u = -signal.jacobian(phi).T * D_n.inv() * miss"),
+    "cycle-slips": ("inner = sp.Integral(sp.exp(-V(a))", "inner = sp.Integral(sp.exp(V(a))"),
     "continuous": ("inner = N / 2 * sp.integrate", "inner = -N / 2 * sp.integrate"),
+    "lecture-continuous": ("pull = 2 * N2.inv()", "pull = -2 * N2.inv()"),
     "structural-functions": ("a.diff(x) ** 2 * p + a.diff(v) ** 2", "a.diff(x) ** 2 * p - a.diff(v) ** 2"),
     "lab-filters": ("Psi - 2 * K * C + K**2 * F", "Psi + 2 * K * C + K**2 * F"),
     "comparison": ("where={epsilon: x - exact, delta: exact - z}", "where={epsilon: x - exact, delta: exact + z}"),
