@@ -40,7 +40,7 @@ from kfcourse.symbolic.reading import ModelError
 ACCURACY = 1e-6  # of the mean and the deviation at a step, in posterior standard deviations
 TOLERABLE = 1e-3  # error of a step that no way resolves better, before the filter gives up
 NODES = (33, 49, 65, 97, 129, 193, 257)  # that a posterior may have
-MORE = 1.4  # times more nodes than did not do
+MORE = 1.9  # times more nodes than did not do
 SPACINGS = (0.5, 0.35, 0.25, 0.18, 0.12)  # of its nodes, tried one after the other
 FINE = (129, 257)  # nodes of a posterior that must be interpolated: the second if the first are too few to share its mass
 ELEMENTS = 2**20  # of kernels, that many trajectories at once
@@ -165,13 +165,13 @@ def _step(
                 mean[place], variance[place] = grid.mean(), grid.variance()
             continue
         for chunk in chunks(len(rows), NODES[0] * kernels.mu.shape[1], ELEMENTS):
-            left = rows[chunk]
-            for done, found, good in _in_batch(left, kernels.rows(chunk), y[left], law, accuracy, fine_nodes):
+            unresolved = []
+            for done, found, good in _in_batch(rows[chunk], kernels.rows(chunk), y[rows[chunk]], law, accuracy, fine_nodes):
                 mean[done], variance[done], error[done] = found.mean, found.variance, found.error + found.inherited
                 for place, x, mass, density in zip(done.tolist(), found.x, found.mass, found.density, strict=True):
                     grids[place] = Grid(x, mass, density, uniform=True)
-                left = np.setdiff1d(left, done[good], assume_unique=True)
-            for place in left.tolist():
+                unresolved += done[~good].tolist()
+            for place in unresolved:
                 try:
                     grid, error_there = estimated(kernels.rows(rows == place), float(y[place, 0]), law)
                 except Unresolved:
@@ -204,11 +204,12 @@ def _in_batch(
     for spacing in SPACINGS:
         place, wanted = spaced(look.rows(left), candidates.rows(left), law, spacing)
         sizes = np.searchsorted(NODES[:-1], np.maximum(wanted, least[left]))
-        done = []
+        again = np.zeros(len(left), dtype=bool)
         for size in np.unique(sizes).tolist():
             count, todo = NODES[size], np.flatnonzero(sizes == size)
             for chunk in chunks(len(todo), count * kernels.mu.shape[1], ELEMENTS):
-                i, there = left[todo[chunk]], place.rows(todo[chunk])
+                some = todo[chunk]
+                i, there = left[some], place.rows(some)
                 found = posteriors(kernels.rows(i), y[i], law, there, count)
                 least[i] = nodes_for_kernels(law, found, count, fine_nodes)
                 found = found._replace(error=np.where(hidden(candidates.rows(i), there, count), np.inf, found.error))
@@ -216,8 +217,8 @@ def _in_batch(
                 told = good | (spacing == SPACINGS[-1]) | (count == NODES[-1])
                 yield rows[i[told]], Posteriors(*(array[told] for array in found)), good[told]
                 least[i] = np.maximum(least[i], np.where(good, 0, MORE * count))
-                done.append(i[told])
-        left = np.setdiff1d(left, np.concatenate(done), assume_unique=True)
+                again[some] = ~told
+        left = left[again]
         if not len(left):
             return
 

@@ -21,7 +21,7 @@ from kfcourse.filters.exact_kernels import Kernels
 from kfcourse.laws import Array
 
 ROUNDING = 10 * np.finfo(float).eps  # of a node and its density, relative to x
-POWER = 1.5  # the error is that by every second node to this power: 2 for analytic humps, 1.6 where p = exp(-a / x^2) is 0
+POWER = 1.75  # the error is about that by every second node, to this power: 2 for analytic humps, 1.6 beside p = exp(-a / x^2)
 INTERPOLATED = 16.0  # interpolation of order 8 at twice the distance errs 2^8 times as much, but near a zero of the density less
 
 

@@ -37,10 +37,13 @@ def predictions(grids: Sequence[Grid], law: ScalarDensities) -> Iterator[tuple[A
             x, mass, density = _stacked([grids[i] for i in rows.tolist()], size)
             kernels = overlapping(x, mass, density, uniform, law)
             middle[:, rows] = kernels.centre, kernels.width
-            narrow = np.flatnonzero(uniform & (apart(kernels.mu, kernels.sigma, mass) > 1))
-            wide = np.setdiff1d(np.arange(len(rows)), narrow)
-            if len(wide):
-                yield rows[wide], kernels.rows(wide)
+            too_narrow = uniform & (apart(kernels.mu, kernels.sigma, mass) > 1)
+            narrow = np.flatnonzero(too_narrow)
+            if not len(narrow):
+                yield rows, kernels
+                continue
+            if not too_narrow.all():
+                yield rows[~too_narrow], kernels.rows(~too_narrow)
             for chunk in chunks(len(narrow), FEW, ELEMENTS):
                 i = narrow[chunk]
                 found = refined(x[i], mass[i], law, FEW)
