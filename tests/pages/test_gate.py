@@ -31,6 +31,7 @@ CHANGES = {
     "radar-tracking": ("2 * b - (a + b / 2) ** 2", "2 * b + (a + b / 2) ** 2"),
     "manoeuvres": ("past, future = common / (1 - a / zeta)", "past, future = common / (1 + a / zeta)"),
     "time-tags": ("s_hat = s.subs(t, t - tau)", "s_hat = s.subs(t, t + tau)"),
+    "literature": ("sp.Matrix([[sp.cos(angle), 0]])", "sp.Matrix([[-sp.cos(angle), 0]])"),
     "integration": ("at_lam, -S(lam).diff(lam)", "at_lam, S(lam).diff(lam)"),
 }
 
