@@ -135,7 +135,7 @@ FOUND = """async ([theme, rules]) => {
 }"""
 
 
-@pytest.mark.parametrize("page", [*PAGES, "search"])
+@pytest.mark.parametrize("page", [*PAGES, "search", "genindex", "py-modindex", "404"])
 def test_page_in_a_browser_without_network(window, page: str) -> None:
     """Loads without a complaint; fits screens and paper; axe-core finds nothing, light and dark; formulas are formulas."""
     tab, problems = window

@@ -5,6 +5,7 @@ import pytest
 import sympy as sp
 
 from kfcourse import Model, ModelError, gaussian
+from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.sense import is_covariance, nothing_random, unfit
 
 pytestmark = pytest.mark.quick
@@ -86,6 +87,12 @@ def test_derived_numbers_beyond_the_floats_are_refused_not_printed_as_names():
     """Each number is within its limits, their product in the moments is not: generated code would hold the name `inf`."""
     with pytest.raises(ModelError, match=r"derived functions hold the number .*e"):
         gaussian(Model.define("(1e90*x + v)**4", "x + w"))
+
+
+def test_no_number_is_taken_out_of_a_power_beyond_the_floats():
+    """(x + 1e-99)**4 is not 1e-396*(1e99*x + 1)**4: the one is 1 at x = 1, the other no float."""
+    state, _ = compile_model(Model.define("(x + 1e-99)**4 + v", "x + w"))
+    assert state(np.array([1.0]), np.array([0.5])) == 1.5
 
 
 @pytest.mark.parametrize(
