@@ -202,14 +202,16 @@ class _Report:
         """The five functions, with their numbers in the catalogue where it has them."""
         block = printed(self.structures, kind)
         yield Block("text", self.words["result"])
+        if FUNCTION_LATEX["tau"] not in block:
+            yield Block("text", self.words["not_printed"])
+            return
         yield Block("formulas", lines=lines_of(block))
-        numbers = []
-        if self.model.n == self.model.p == 1 and FUNCTION_LATEX["tau"] in block:  # else they took too long
+        if self.model.n == self.model.p == 1:
             structure = getattr(self.structures, kind)
             forms = {name: (name, str(sp.expand(structure[name]))) for name in FUNCTION_LATEX}
             numbers = [f"${FUNCTION_LATEX[name]}$: {CATALOGUE[form]}" for name, form in forms.items() if form in CATALOGUE]
-        if numbers:
-            yield Block("text", filled(self.words["catalogue"], numbers=", ".join(numbers)))
+            if numbers:
+                yield Block("text", filled(self.words["catalogue"], numbers=", ".join(numbers)))
 
     def filters(self) -> Iterator[Block]:
         words = self.words

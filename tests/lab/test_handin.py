@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from kfcourse import Model, compare, lab_filters, load_variants
-from kfcourse.lab import Variant, admission, handin
+from kfcourse.lab import Variant, admission, handin, report
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.handin import CATALOGUE, FIGURES, LANGUAGES, write_handin
 from kfcourse.lab.handin_text import inline_tex, ranges
@@ -163,6 +163,13 @@ def test_one_filter_left(tmp_path):
     assert r"\item ЛАОФ, ЛФОС, ЛМФОС: уравнения не дифференцируемы" in tex and r"\text{при}" in tex and r"\text{for}" not in tex
     assert r"one\_left" in tex and "участвует один фильтр, ДУОФ" in tex
     assert {path.stem for path in paths} == {"handin", "handin-accuracy", "handin-consistency"}
+
+
+def test_formulas_that_are_too_long_are_not_printed(result, monkeypatch, tmp_path):
+    monkeypatch.setattr(report, "LONGEST", 10)
+    write_handin(load_variants()["53"], result, tmp_path, "ru")
+    tex = (tmp_path / "handin.tex").read_text(encoding="utf-8")
+    assert tex.count("Формулы слишком длинны") == 2 and "too long" not in tex and "каталоге" not in tex
 
 
 @pytest.mark.quick
