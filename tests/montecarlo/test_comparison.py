@@ -337,26 +337,26 @@ def test_without_a_gaussian_aof_the_bound_still_has_its_digits():
     filters = [aof(linearised(model)), duof(model), pointmass(model)]
     result = compare(filters, model, 1000, 8, 1, subset_runs=150, designs=2, progress=False)
     exact, claimed = result.error_variance("aof-exact"), result.own_variance("aof-exact")
-    assert result.control == "duof" and (exact.standard_error < exact.value).all()
+    assert result.carrier == "duof" and (exact.standard_error < exact.value).all()
     apart = np.abs(exact.value - claimed.value) / np.hypot(exact.standard_error, claimed.standard_error)
     assert (apart < 4).all()
 
 
 def test_each_filter_is_judged_by_the_trajectories_it_ran_on(variant53):
-    """The fast ones by all, a slow one by its subset; only D goes through the control, which is the most accurate
+    """The fast ones by all, a slow one by its subset; only D goes through the carrier, which is the most accurate
     fast filter where there is no Gaussian AOF."""
     squares = {"first": np.array([1.0, 3, 5]), "second": np.array([2.0, 8, 2]), "slow": np.array([4.0, 2])}
     own = {"first": np.array([1.0, 1, 4]), "second": np.array([2.0, 2, 5]), "slow": np.array([3.0, 1])}
     result = by_hand(variant53, squares, ["slow"], subset=2, own=own)
-    assert result.control == "first"
+    assert result.control == result.carrier == "first"
     assert result.error_variance("slow").value.item() == 3 + (3 - 2)  # M e^2 of the first over all; of both over the subset
     for name, square, claimed in (("first", 3, 2), ("second", 4, 3), ("slow", 3, 2)):
         assert result.component_variance(name).value.item() == square
         assert result.own_variance(name).value.item() == claimed
     assert result.error_variance("first").freedom == 3 - 1  # a subset beside it does not make it less certain
     assert result.error_variance("slow").freedom == 2 - 1
-    other_order = {name: squares[name] for name in ("second", "first", "slow")}
-    assert by_hand(variant53, other_order, ["slow"], subset=2).control == "first"
+    other_order = by_hand(variant53, {name: squares[name] for name in ("second", "first", "slow")}, ["slow"], subset=2)
+    assert other_order.carrier == "first" and other_order.control == "second"
     squares["aof-gaussian"] = squares["second"]
     assert by_hand(variant53, squares, ["slow"], subset=2).control == "aof-gaussian"
 
