@@ -60,7 +60,7 @@ fuzz: install
 CHECKED := --variant 53 --variant 5 --variant 20
 notebooks: install
 	$(BIN)/kfcourse solutions $(CHECKED) --out _build/solutions
-	KFCOURSE_BOOK=required $(BIN)/pytest -q -n 2 --dist loadscope --nbval --nbval-current-env tests/test_book.py _build/jupyter_execute _build/solutions
+	JUPYTER_DEFAULT_PROVISIONER_NAME=kfcourse-forked KFCOURSE_BOOK=required $(BIN)/pytest -q -n 2 --dist loadscope --nbval --nbval-current-env tests/test_book.py _build/jupyter_execute _build/solutions
 
 literature: install
 	$(BIN)/python book/chapters.py literature

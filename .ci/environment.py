@@ -88,6 +88,7 @@ def main(goals: str) -> None:
             run(sys.executable, "-m", "venv", "--clear", str(VENV))
         FINISHED.unlink(missing_ok=True)
         run(*PIP, "--require-hashes", "-r", "requirements.txt")
+        shutil.rmtree(ROOT / "kfcourse.egg-info", ignore_errors=True)  # one left by an older setuptools hides what is installed
         run(*PIP, "--no-deps", "--no-build-isolation", "--editable", ".")
         FINISHED.write_text("\n".join(mark), "utf-8")
     except (OSError, RuntimeError) as problem:

@@ -109,6 +109,9 @@ def window(browser):
         yield tab, problems
 
 
+# Pictures that are shown wider or higher than they are, by more than the rounding of small ones.
+SQUEEZED = """() => [...document.querySelectorAll("article img")]
+  .filter(e => Math.abs(e.clientWidth / e.clientHeight / (e.naturalWidth / e.naturalHeight) - 1) > 0.05).map(e => e.src)"""
 # What sticks out of the page, or out of its own box, and by how much.
 FIT = """() => {
     const width = document.documentElement.clientWidth;
@@ -135,7 +138,7 @@ FOUND = """async ([theme, rules]) => {
 }"""
 
 
-@pytest.mark.parametrize("page", [*PAGES, "search"])
+@pytest.mark.parametrize("page", [*PAGES, "search", "genindex", "py-modindex", "404"])
 def test_page_in_a_browser_without_network(window, page: str) -> None:
     """Loads without a complaint; fits screens and paper; axe-core finds nothing, light and dark; formulas are formulas."""
     tab, problems = window
@@ -158,6 +161,7 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
     for width in (768, 390):
         tab.set_viewport_size({"width": width, "height": 1000})
         assert tab.evaluate(FIT)["page"] <= 0, f"the page scrolls sideways at {width} px"
+        assert tab.evaluate(SQUEEZED) == [], f"pictures out of proportion at {width} px"
     tab.set_viewport_size({"width": PAPER, "height": 1000})
     tab.emulate_media(media="print")
     printed = tab.evaluate(FIT)

@@ -131,7 +131,7 @@ def off_a_jump(number):
 
 
 def value(tree, point):
-    """The exact value to 60 digits; an exception or a complex number where there is none."""
+    """The exact value to 400 digits; an exception or a complex number where there is none."""
     kind, *parts = tree
     if kind == "name":
         return point[parts[0]]
@@ -174,13 +174,13 @@ def test_a_formula_has_the_value_that_its_text_has(tree):
     except FormulaError:
         event("refused")
         return
-    with mpmath.workdps(60):
+    with mpmath.workdps(400):
         point = {name: mpmath.mpf(number) for name, number in POINT.items()} | {"pi": mpmath.pi}
         try:
             expected = value(tree, point)
         except (ArithmeticError, ValueError, TypeError, AttributeError):  # the last of complex arguments
             expected = mpmath.nan
-        # No real number there, or one in whose sines 60 digits are not enough:
+        # No real number there, or one in whose sines 400 digits are not enough:
         assume(isinstance(expected, mpmath.mpf) and mpmath.isfinite(expected) and abs(expected) < 1e150)
         own = found.subs({NAMES[name]: sp.Rational(number) for name, number in POINT.items()}).evalf(30, maxn=300)
         assume(own.is_Float or own.is_Rational)

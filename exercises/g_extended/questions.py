@@ -132,5 +132,9 @@ QUESTIONS = (
 )
 
 SET = ExerciseSet(
-    "g", "The extended Kalman filter and its consistency", Path(__file__).parent, QUESTIONS, chapters=("extended-kalman",)
+    "g",
+    "The extended Kalman filter and its consistency",
+    Path(__file__).parent,
+    QUESTIONS,
+    chapters=("extended-kalman", "consistency"),
 )

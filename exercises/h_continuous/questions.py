@@ -146,7 +146,7 @@ SET = ExerciseSet(
     "The continuous-time filter",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("continuous",),
+    chapters=("continuous", "lecture-continuous"),
     numbers=continuous_numbers,
     about_variant=False,
 )

@@ -93,7 +93,7 @@ SET = ExerciseSet(
     "Inertial system and satellite receiver",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("integration",),
+    chapters=("integration", "integration-limits"),
     numbers=integration_numbers,
     about_variant=False,
 )

@@ -132,7 +132,7 @@ SET = ExerciseSet(
     "Rates and time tags",
     Path(__file__).parent,
     QUESTIONS,
-    chapters=("time-tags",),
+    chapters=("time-tags", "four-sensors"),
     numbers=timing_numbers,
     about_variant=False,
 )

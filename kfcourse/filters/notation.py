@@ -92,8 +92,9 @@ class _Printer(LatexPrinter):
         return text
 
 
-def latex(equations: Sequence[sp.Eq]) -> str:
-    """The equations as one aligned LaTeX block."""
+def latex(equations: Sequence[sp.Eq], columns: int = 1) -> str:
+    """The equations as one aligned LaTeX block, row by row in this number of columns."""
     printer = _Printer()
-    lines = [rf"{printer.doprint(q.lhs)} &= {printer.doprint(q.rhs)}" for q in equations]
-    return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
+    each = [rf"{printer.doprint(q.lhs)} &= {printer.doprint(q.rhs)}" for q in equations]
+    rows = [r" &\qquad ".join(each[i : i + columns]) for i in range(0, len(each), columns)]
+    return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"

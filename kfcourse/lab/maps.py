@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
 from kfcourse.lab.plots import style
+from kfcourse.lab.report import percent
 from kfcourse.lab.short_names import LAB, lab_filters, title
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.experiment import compare
@@ -109,7 +110,7 @@ def draw(found: ParameterMap, step: int, ax: Axes, confidence: float = 0.95) -> 
         ax.text(
             x,
             y,
-            f"{title(best)}{more}\n{_percent(result, best, step)}\n\nlast {title(worst)}\n{_percent(result, worst, step)}",
+            f"{title(best)}{more}\n{percent(gaps[best])} %\n\nlast {title(worst)}\n{percent(gaps[worst])} %",
             ha="center",
             va="center",
             fontsize="small",
@@ -120,8 +121,3 @@ def draw(found: ParameterMap, step: int, ax: Axes, confidence: float = 0.95) -> 
     ax.set_xlabel(f"${found.parameters[1]}$")
     ax.set_ylabel(f"${found.parameters[0]}$")
     return ax
-
-
-def _percent(result: Comparison, name: str, step: int) -> str:
-    gap = result.gap(name)[step]
-    return f"{100 * float(gap.value):.3g} ± {100 * float(gap.standard_error):.1g} %"

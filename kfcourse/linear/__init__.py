@@ -5,7 +5,7 @@ arithmetic    one correction and prediction in five forms: textbook, symmetrised
 factored      the UD form: factors of the covariance instead of it
 runs          the filter along stored measurements; simulation
 accuracy      covariances in advance, for any gains; the steady state of the Riccati equation
-consistency   NEES, NIS, whiteness: is a filter right about its own errors?
+consistency   NEES, NIS, whiteness, confidence ellipses: is a filter right about its own errors?
 """
 
 from kfcourse.linear.accuracy import covariances, steady_state

@@ -3,6 +3,7 @@
     NEES   e^T p^-1 e,       e = x_k - z_k            needs the true state: simulation
     NIS    nu^T F^-1 nu,     nu = y_k - h             needs only measurements: works on the real thing
     whiteness of the innovations                      likewise
+    confidence ellipse  e^T p^-1 e < rho^2, of two components
 
 For a filter that is right, and normal laws, NEES and NIS are chi-squared with n and p degrees of freedom, and
 innovations of different steps are uncorrelated.  Bar-Shalom, Li, Kirubarajan (2001), section 5.4.
@@ -14,9 +15,38 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import chdtri  # not scipy.stats: slow to import
 
 from kfcourse.angles import Components, difference
-from kfcourse.laws import Array, Gaussian, Measurement, normalised_square
+from kfcourse.laws import Array, Gaussian, Measurement, normalised_square, square_root
+
+
+def confidence_ellipse(law: Gaussian, probability: float = 0.95, points: int = 200) -> Array:
+    """Border of the smallest region that holds two components with the given probability, (2, points).
+
+    e^T p^-1 e = rho^2 with e = x - mean and rho = sqrt(-2 ln(1 - probability)): e^T p^-1 e is chi-squared with two degrees.
+
+    Parameters
+    ----------
+    law : Gaussian
+        Of one run: mean (2,), cov (2, 2).
+    probability : float
+        Between 0 and 1.
+    points : int
+        How many; the last is the first.
+
+    Raises
+    ------
+    ValueError
+        The law is not one of two components, or the probability is not between 0 and 1.
+    """
+    if np.shape(law.mean) != (2,) or np.shape(law.cov) != (2, 2):
+        raise ValueError(f"expected the law of two components of one run, got shapes {np.shape(law.mean)}, {np.shape(law.cov)}")
+    if not 0 < probability < 1:
+        raise ValueError(f"expected a probability between 0 and 1, got {probability}")
+    turn = np.linspace(0, 2 * np.pi, points)
+    circle = np.sqrt(-2 * np.log(1 - probability)) * np.array([np.cos(turn), np.sin(turn)])
+    return np.asarray(law.mean)[:, None] + square_root(law.cov) @ circle
 
 
 class Innovations(NamedTuple):
@@ -80,10 +110,8 @@ def chi_squared_bounds(degrees: int, runs: int, confidence: float = 0.95) -> tup
     """
     if degrees < 1 or runs < 1 or not 0 < confidence < 1:
         raise ValueError(f"expected degrees >= 1, runs >= 1 and 0 < confidence < 1, got {degrees}, {runs}, {confidence}")
-    from scipy import stats  # slow to import
-
-    low, high = stats.chi2.interval(confidence, degrees * runs)
-    return float(low) / runs, float(high) / runs
+    low, high = (float(chdtri(degrees * runs, above)) for above in ((1 + confidence) / 2, (1 - confidence) / 2))
+    return low / runs, high / runs
 
 
 def alarms(found: Innovations, confidence: float = 0.95) -> Array:

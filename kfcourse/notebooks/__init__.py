@@ -4,6 +4,7 @@ master         statement.md -> the complete notebook, the student's, the book's 
 nbgrader       the same in nbgrader's format
 written_code   formulas as the code of a solution
 execution      a notebook in a kernel of its own; pictures, checks, HTML, PDF
+kernels        kernels that need not import the libraries: forks of a process that has
 jobs           every set for every variant, in parallel, resumed
 course_list    a variant for each student
 grading        what came back

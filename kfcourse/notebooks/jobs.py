@@ -27,6 +27,7 @@ from kfcourse.checks.question import PASSED
 from kfcourse.files import package_digest, replacing, save
 from kfcourse.lab.variants import find_variant
 from kfcourse.notebooks.execution import NotebookFailed, execute, html, pdf, pictures, results
+from kfcourse.notebooks.kernels import prefer_forked
 from kfcourse.notebooks.master import read, render, solution, student
 from kfcourse.notebooks.nbgrader import source_notebook
 
@@ -173,6 +174,7 @@ def run_all(jobs: Sequence[Any], work: Callable[[Any], Any], workers: int, what:
 @contextmanager
 def _backend(dask: str | None, workers: int) -> Iterator[joblib.Parallel]:
     if dask is None:
+        prefer_forked()
         yield joblib.Parallel(n_jobs=workers, return_as="generator_unordered")
         return
     try:

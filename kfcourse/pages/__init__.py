@@ -5,6 +5,7 @@ exponents    squares completed in the exponents of normal laws
 tables       tables of numbers
 figures      the style of the figures, labels at the ends of curves
 diagram      block diagrams from a description
+flights      pictures and tables of a flight and its estimates
 live         the page on which a reader moves the pointer
 house        the structure of this package, read from its imports
 """

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib import rcParams
 from matplotlib.axes import Axes
+from matplotlib.font_manager import fontManager
 from matplotlib_inline.backend_inline import set_matplotlib_formats
 
 # Fixed colours (Okabe and Ito's, distinguishable by the colour-blind); those of the filters are in kfcourse.lab.plots.
@@ -15,14 +17,23 @@ COLOURS = {"truth": "#000000", "measurement": "#999999", "estimate": "#0072B2", 
 # Inches: the column of a page.  A figure of this width is shown at its own size, its labels as large as the page's notes.
 WIDTH = 7.2
 
+FONTS = sorted((Path(__file__).parent / "data").glob("*.ttf"))  # the pages' own, Source Sans 3 (OFL.txt)
+
 _STYLE: dict[Any, Any] = {
     "figure.figsize": (WIDTH, 3.4),
     "figure.facecolor": "none",  # the page shows through, light or dark
     "axes.facecolor": "none",
     "savefig.facecolor": "none",
     "figure.constrained_layout.use": True,
-    "font.size": 9.5,
-    "axes.titlesize": 10,
+    "font.family": ["Source Sans 3", "DejaVu Sans"],  # the second has the signs that the first lacks
+    "mathtext.fontset": "custom",
+    "mathtext.rm": "Source Sans 3",
+    "mathtext.it": "Source Sans 3:italic",
+    "mathtext.sf": "Source Sans 3",
+    "mathtext.cal": "Source Sans 3:italic",
+    "mathtext.bf": "Source Sans 3",
+    "font.size": 10,
+    "axes.titlesize": 10.5,
     "axes.titlelocation": "left",
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -32,13 +43,16 @@ _STYLE: dict[Any, Any] = {
     "grid.linewidth": 0.6,
     "lines.linewidth": 1.6,
     "legend.frameon": False,
-    "legend.fontsize": 9,
+    "legend.fontsize": 9.5,
 }
 
 
 def book_style() -> None:
-    """Figures of this notebook in the style of the book: twice the pixels, transparent, no frame above and right."""
-    set_matplotlib_formats("retina")
+    """Figures of this notebook in the style of the book: its font, twice the pixels, transparent, no frame above and right."""
+    for font in FONTS:
+        fontManager.addfont(font)
+    # The whole figure, as wide as it says: constrained layout has found room for everything.
+    set_matplotlib_formats("retina", bbox_inches=None)
     rcParams.update(_STYLE)
 
 

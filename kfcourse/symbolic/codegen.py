@@ -83,18 +83,29 @@ def compile_function(
                 f"{name}: no finite real value, as at the mean of a noise something is divided by 0, or the root of a negative "
                 "number taken; use unscented(model) or gauss_hermite(model), or another mean of the noise"
             )
-    program = lower(outputs, vectors, definitions or {})
-    source = numpy_source(name, arguments, program, doc)
+    try:
+        source = numpy_source(name, arguments, lower(outputs, vectors, definitions or {}), doc)
+    except BeyondFloats:  # a factor that was taken out of a power: (x + 1e-99)**4 = 1e-396*(1e99*x + 1)**4
+        source = numpy_source(name, arguments, lower(outputs, vectors, definitions or {}, factor=False), doc)
     namespace: dict[str, Any] = {"np": np}
     exec(compile(source, f"<generated {name}>", "exec"), namespace)  # our own text: printed from SymPy, no user strings
     return Compiled(namespace[name], source)
 
 
-def lower(outputs: Mapping[str, sp.MatrixBase], vectors: Sequence[str], definitions: Mapping[sp.Symbol, sp.Expr]) -> Program:
-    """Common subexpressions and small integer powers as elementary assignments."""
+class BeyondFloats(ModelError):
+    """The functions hold a number that is no float."""
+
+
+def lower(
+    outputs: Mapping[str, sp.MatrixBase],
+    vectors: Sequence[str],
+    definitions: Mapping[sp.Symbol, sp.Expr],
+    factor: bool = True,
+) -> Program:
+    """Common subexpressions, with common factors taken out, and small integer powers as elementary assignments."""
     names = sp.numbered_symbols("s", cls=sp.Dummy)
     everything = [*definitions.values(), *(sp.Matrix(m) for m in outputs.values())]
-    found, reduced = sp.cse(everything, symbols=names, optimizations="basic")
+    found, reduced = sp.cse(everything, symbols=names, optimizations="basic" if factor else None)
     shared = _in_order([*found, *zip(definitions, reduced[: len(definitions)], strict=True)])
     assignments: list[tuple[sp.Symbol, sp.Expr]] = []
     powers: dict[tuple[sp.Expr, int], sp.Expr] = {}
@@ -170,7 +181,7 @@ class _Printer(NumPyPrinter):
     def _print_Rational(self, expr: sp.Rational) -> str:
         value = float(expr) if abs(expr) < 2**1023 else np.inf
         if not np.isfinite(value) or (expr and not value):
-            raise ModelError(
+            raise BeyondFloats(
                 f"the derived functions hold the number {sp.N(expr, 3)!s}, beyond what a float can be; change the units"
             )
         return repr(value)

@@ -246,6 +246,8 @@ class _Reader:
             case ast.Compare() if all(type(one) in COMPARISONS for one in node.ops):
                 sides = [self.read(one) for one in (node.left, *node.comparators)]
                 found = [COMPARISONS[type(one)](*both) for one, both in zip(node.ops, pairwise(sides), strict=True)]
+                if any(undecided(one) for one in found):
+                    raise self.fail(node, f"{UNDECIDED}; write the one that holds")
                 return sp.And(*found)
             case ast.BoolOp():
                 return (sp.And if isinstance(node.op, ast.And) else sp.Or)(*map(self.condition, node.values))
@@ -270,6 +272,14 @@ class _Reader:
         if any(argument.is_number and abs(argument) >= MAX_ARGUMENT for argument in arguments):
             raise self.fail(node, f"the argument of {node.func.id} is too large")
         return FUNCTIONS[node.func.id](*arguments)
+
+
+UNDECIDED = "the choice depends on numbers that do not differ in 15 digits"
+
+
+def undecided(condition: Boolean) -> bool:
+    """Whether a condition has no symbols, and yet SymPy does not find its value; a Piecewise with it would never be ready."""
+    return not condition.free_symbols and condition not in (sp.true, sp.false)
 
 
 def _degree(expression: sp.Expr) -> int:

@@ -16,6 +16,7 @@ from kfcourse.laws import Array
 from kfcourse.symbolic.codegen import Compiled, compile_function
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.reading import ModelError, checked_name, exact_number, read, table
+from kfcourse.symbolic.sense import not_computable
 
 CHECKED = 1000  # steps for which a variance is tried out
 
@@ -205,7 +206,9 @@ def _check_variance(
     symbols: Mapping[str, sp.Symbol],
     parameters: Mapping[sp.Symbol, sp.Rational],
 ) -> None:
-    """ModelError if a variance is negative or not finite at one of the first steps."""
+    """ModelError if a variance cannot be computed, or is negative or not finite at one of the first steps."""
+    if problem := not_computable(sp.Matrix([variance]), parameters, {}):
+        raise ModelError(f"`{what}`: the variance of {noise}, {problem}")
     numeric = sp.Matrix([variance.subs(parameters)])
     used = known.used(numeric, {name: s for name, s in symbols.items() if s not in parameters})
     steps = int(min(CHECKED, used.steps))

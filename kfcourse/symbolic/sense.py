@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy as sp
+from sympy.core.relational import Relational
 
 from kfcourse.laws import Array
-from kfcourse.symbolic.formula import LARGEST, NO_NUMBERS
+from kfcourse.symbolic.formula import LARGEST, NO_NUMBERS, UNDECIDED, undecided
 
 if TYPE_CHECKING:
     from kfcourse.symbolic.model import Model
@@ -47,6 +48,8 @@ def not_computable(equation: sp.MatrixBase, values: Mapping[sp.Symbol, sp.Expr],
     """Why an equation with the parameters' values in it cannot be computed with; empty if it can."""
     for formula in equation:
         try:
+            if _has_undecided(formula, {**values, **noise_means}):
+                return f"{_short(formula)}: {UNDECIDED}; change the parameters or write without the choice"
             problem = _unusable(formula.subs(values))
             formula.subs(values).subs(noise_means)  # as filters need it
         except TypeError:  # SymPy's
@@ -54,6 +57,11 @@ def not_computable(equation: sp.MatrixBase, values: Mapping[sp.Symbol, sp.Expr],
         if problem:
             return f"{_short(formula)} {problem}"
     return ""
+
+
+def _has_undecided(formula: sp.Expr, values: Mapping[sp.Symbol, sp.Expr]) -> bool:
+    """Whether one of its conditions cannot be decided with these values; inner ones first, as an outer one waits for them."""
+    return any(undecided(condition.subs(values)) for condition in sorted(formula.atoms(Relational), key=sp.count_ops))
 
 
 def nothing_random(model: Model) -> str:

@@ -456,6 +456,16 @@ def test_the_printed_equations_are_what_runs(family, size, kind):
         lam = printed[s.lam_next]
 
 
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("columns", [1, 2, 3])
+def test_every_equation_is_printed_once_and_in_order(family, columns):
+    equations, _ = FAMILIES[family]
+    rows = s.latex(equations, columns).splitlines()[1:-1]
+    assert [row.count("&=") for row in rows[:-1]] == [columns] * (len(rows) - 1)
+    one_by_one = [s.latex([equation]).splitlines()[1] for equation in equations]
+    assert " ".join(rows).replace(r" &\qquad", "").replace(r" \\", "") == " ".join(one_by_one)
+
+
 # ---------------------------------------------------------------- missing measurements and degenerate cases
 
 

@@ -53,7 +53,9 @@ def test_the_map_is_drawn(found):
     for text, result in zip(texts, found.cells.values(), strict=True):
         best, *others = result.leaders(2)
         assert text.startswith(title(best) + (f" and {len(others)} more\n" if others else "\n"))
-        assert f"{100 * float(result.gap(best).value[2]):.3g} ±" in text
+        value, error = (float(number) for number in text.splitlines()[1].removesuffix(" %").split(" ± "))
+        gap = result.gap(best)[2]
+        assert abs(value - 100 * gap.value) <= 0.05 * error and error == pytest.approx(100 * gap.standard_error, rel=0.05)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("$f$", "$e$")
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["0.02", "0.05"]
     np.testing.assert_array_equal(ax.get_xlim(), (-0.5, 1.5))

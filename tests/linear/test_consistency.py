@@ -14,6 +14,7 @@ from kfcourse.linear.consistency import (
     alarms,
     autocorrelation,
     chi_squared_bounds,
+    confidence_ellipse,
     innovations,
     nees,
     nis,
@@ -307,3 +308,18 @@ def test_predictions_are_the_hand_loop(variant53):
 def test_predictions_for_measurements_of_another_shape_are_refused(variant53, shape):
     with pytest.raises(ValueError, match="measurement"):
         predictions(aof(linearised(variant53)), np.zeros(shape))
+
+
+def test_a_confidence_ellipse_is_a_level_of_the_chi_squared_law():
+    law = Gaussian(np.array([3.0, -1.0]), np.array([[2.0, 1.9], [1.9, 2.0]]))
+    off = (confidence_ellipse(law, 0.9, points=7) - law.mean[:, None]).T
+    level = np.einsum("ki,ij,kj->k", off, np.linalg.inv(law.cov), off)
+    np.testing.assert_allclose(level, scipy.stats.chi2.ppf(0.9, 2), rtol=1e-12)  # an inverse of condition 40
+
+
+def test_a_confidence_ellipse_is_refused_in_words():
+    law = Gaussian(np.zeros(2), np.eye(2))
+    with pytest.raises(ValueError, match="between 0 and 1, got 1"):
+        confidence_ellipse(law, 1)
+    with pytest.raises(ValueError, match=r"two components of one run, got shapes \(3,\)"):
+        confidence_ellipse(Gaussian(np.zeros(3), np.eye(3)))

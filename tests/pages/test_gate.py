@@ -13,24 +13,50 @@ from kfcourse.pages import Unverified
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 
+# Where the changed cell needs nothing but imports, and the cells before are long.
+ALONE = {
+    "before-measuring",
+    "comparison",
+    "cycle-slips",
+    "grid",
+    "integration-limits",
+    "lecture-continuous",
+    "manoeuvres",
+    "radar-extended",
+    "wiener",
+}
 # One change in each chapter that derives something.
-ALONE = {"comparison", "manoeuvres"}  # where the changed cell needs nothing but imports, and the cells before are long
 CHANGES = {
     "stratonovich": ("verified((given, p(x2, x1)),", "verified((given, -p(x2, x1)),"),
+    "grid": ("2 * sp.integrate(density * wave", "-2 * sp.integrate(density * wave"),
     "linearisation": ("linear_f, constant_g2 = f + f1 * (before - z)", "linear_f, constant_g2 = f - f1 * (before - z)"),
     "when-linearisation-fails": ("(M_e, -K_k * S2 * Psi / 2)", "(M_e, K_k * S2 * Psi / 2)"),
+    "better-than-a-tangent": ("second = f + f1 * u + f2 * u**2 / 2", "second = f + f1 * u - f2 * u**2 / 2"),
     "extended-kalman": ('(s["F"], s["H"] * s["Psi"] * s["H"].T + s["D_n"])', '(s["F"], s["H"] * s["Psi"] * s["H"].T - s["D_n"])'),
+    "consistency": ("F = (H * Psi * H.T)[0] + R", "F = (H * Psi * H.T)[0] - R"),
+    "sigma-points": ("off.T * W * off + miss.T", "off.T * W * off - miss.T"),
     "discriminator": ("u = signal.jacobian(phi).T * D_n.inv() * miss", "u = -signal.jacobian(phi).T * D_n.inv() * miss"),
+    "cycle-slips": ("inner = sp.Integral(sp.exp(-V(a))", "inner = sp.Integral(sp.exp(V(a))"),
     "continuous": ("inner = N / 2 * sp.integrate", "inner = -N / 2 * sp.integrate"),
+    "lecture-continuous": ("pull = 2 * N2.inv()", "pull = -2 * N2.inv()"),
     "structural-functions": ("a.diff(x) ** 2 * p + a.diff(v) ** 2", "a.diff(x) ** 2 * p - a.diff(v) ** 2"),
     "lab-filters": ("Psi - 2 * K * C + K**2 * F", "Psi + 2 * K * C + K**2 * F"),
     "comparison": ("where={epsilon: x - exact, delta: exact - z}", "where={epsilon: x - exact, delta: exact + z}"),
     "checking-exact": ("node = center + scale * sp.sinh(t)", "node = center - scale * sp.sinh(t)"),
     "track-2d": ("velocity = v0 + sp.integrate", "velocity = v0 - sp.integrate"),
+    "before-measuring": ("(Lambda, 2 * (1 - rho) ** 2 / rho)", "(Lambda, 2 * (1 + rho) ** 2 / rho)"),
     "numerics": ("return (sp.eye(2) - K * H) * Psi", "return (sp.eye(2) + K * H) * Psi"),
     "radar-tracking": ("2 * b - (a + b / 2) ** 2", "2 * b + (a + b / 2) ** 2"),
-    "manoeuvres": ("past, future = common / (1 - a / zeta)", "past, future = common / (1 + a / zeta)"),
+    "radar-extended": ("2 * b / (a + 2 * b)),", "2 * b / (a - 2 * b)),"),
+    "manoeuvres": ("CARTESIAN.subs({one: by_name", "CARTESIAN.subs({one: -by_name"),
+    "wiener": ("past, future = common / (1 - a / zeta)", "past, future = common / (1 + a / zeta)"),
     "time-tags": ("s_hat = s.subs(t, t - tau)", "s_hat = s.subs(t, t + tau)"),
+    "literature": ("sp.Matrix([[sp.cos(angle), 0]])", "sp.Matrix([[-sp.cos(angle), 0]])"),
+    "four-sensors": ("(s - d) / r, h / r, 0, 0", "(s - d) / r, -h / r, 0, 0"),
+    "integration-limits": (
+        "error_step = (1 + k_any) * (e_0 + xi) - k_any * n",
+        "error_step = (1 + k_any) * (e_0 + xi) + k_any * n",
+    ),
     "integration": ("at_lam, -S(lam).diff(lam)", "at_lam, S(lam).diff(lam)"),
 }
 

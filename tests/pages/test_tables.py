@@ -1,11 +1,9 @@
-"""Tables, typeset equations and labels of curves."""
+"""Tables and typeset equations."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import sympy as sp
 
-from kfcourse.pages.figures import label_ends
 from kfcourse.pages.tables import table
 from kfcourse.symbolic.typesetting import WIDTH, equation_latex, symbols
 
@@ -54,14 +52,3 @@ def test_width_of_a_fraction_is_that_of_its_wider_part() -> None:
     assert symbols(r"\frac{a}{b c d}") == symbols("b c d") == 3
     assert symbols(r"x^{2}") == 1.6
     assert symbols(r"\begin{matrix}a & b\\c & d\end{matrix}") == symbols("ab") + 2
-
-
-def test_labels_at_the_ends_are_apart_and_in_order() -> None:
-    _, ax = plt.subplots()
-    for end, name in ((1.0, "low"), (1.01, "middle"), (1.02, "high"), (5.0, "far")):
-        ax.plot([0, 1], [0, end], label=name)
-    label_ends(ax, least=0.1)
-    heights = {text.get_text(): text.get_position()[1] for text in ax.texts}
-    assert list(sorted(heights, key=heights.__getitem__)) == ["low", "middle", "high", "far"]
-    assert np.diff(sorted(heights.values())).min() > 0.1 - 1e-9
-    plt.close()

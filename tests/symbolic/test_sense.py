@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from kfcourse import Model, ModelError, gaussian
+from kfcourse import FormulaError, Model, ModelError, gaussian
+from kfcourse.limits import time_limit
+from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.sense import is_covariance, nothing_random, unfit
 
 pytestmark = pytest.mark.quick
@@ -86,6 +88,36 @@ def test_derived_numbers_beyond_the_floats_are_refused_not_printed_as_names():
     """Each number is within its limits, their product in the moments is not: generated code would hold the name `inf`."""
     with pytest.raises(ModelError, match=r"derived functions hold the number .*e"):
         gaussian(Model.define("(1e90*x + v)**4", "x + w"))
+
+
+def test_no_number_is_taken_out_of_a_power_beyond_the_floats():
+    """(x + 1e-99)**4 is not 1e-396*(1e99*x + 1)**4: the one is 1 at x = 1, the other no float."""
+    state, _ = compile_model(Model.define("(x + 1e-99)**4 + v", "x + w"))
+    assert state(np.array([1.0]), np.array([0.5])) == 1.5
+
+
+@pytest.mark.parametrize(
+    ("meter", "parameters"),
+    [
+        ("x + (w if c <= sinh(c) else 2*w)", {"c": 1e-60}),  # sinh(c) = c in 120 digits
+        ("x + (w if 1e-60 <= sinh(1e-60) else 2*w)", {}),
+        ("x + (w if (1 if c <= sinh(c) else 2) <= x else 2*w)", {"c": 1e-60}),  # a choice in a condition
+        ("x + w + (1 if w <= c*sinh(c) - c*c else 2)", {"c": 1e-60}),  # where the noise is at its mean, 0
+    ],
+)
+def test_a_choice_that_nobody_can_make_is_refused(meter, parameters):
+    """SymPy would try for ever."""
+    with time_limit(20), pytest.raises((FormulaError, ModelError), match="choice depends on numbers that do not differ"):
+        Model.define("0.9*x + v", meter, parameters)
+
+
+def test_so_is_one_in_a_variance():
+    with time_limit(20), pytest.raises(ModelError, match=r"variance of v.*choice depends"):
+        Model.define("c*x + v", "x + w", {"c": 1e-60}, state_noise={"variance": "1 if c <= sinh(c) else 1 + k"})
+
+
+def test_a_choice_of_numbers_that_differ_is_made():
+    Model.define("0.9*x + v", "x + (w if c <= sinh(c) else 2*w)", {"c": 1e-6})
 
 
 @pytest.mark.parametrize(

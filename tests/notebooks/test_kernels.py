@@ -1,0 +1,95 @@
+"""Kernels that are forked: they are kernels like others, only sooner."""
+
+import os
+import sys
+from pathlib import Path
+
+import nbformat
+import psutil
+import pytest
+from jupyter_client.manager import start_new_kernel
+from nbclient import NotebookClient
+from nbclient.exceptions import CellTimeoutError, DeadKernelError
+
+from kfcourse.notebooks.kernels import FORKED, IMPORTED
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forked on Linux only")
+
+
+@pytest.fixture(autouse=True)
+def forked(monkeypatch):
+    monkeypatch.setenv("JUPYTER_DEFAULT_PROVISIONER_NAME", FORKED)
+
+
+def run(*cells: str, folder: Path, seconds: float = 60):
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
+    client = NotebookClient(notebook, timeout=seconds, kernel_name="python3", resources={"metadata": {"path": str(folder)}})
+    try:
+        client.execute()
+    finally:
+        assert client.km is None or not client.km.has_kernel
+    return [[output.get("text", output.get("data")) for output in cell.outputs] for cell in notebook.cells]
+
+
+def test_the_libraries_are_there_before_they_are_imported(tmp_path):
+    ((loaded,), (names,)) = run(
+        f"import sys; print(all(name in sys.modules for name in {IMPORTED}))", "print(sorted(dir()))", folder=tmp_path
+    )
+    assert loaded == "True\n"
+    assert "sympy" not in names and "np" not in names, "the names of a notebook are its own"
+
+
+def test_it_has_the_folder_and_the_environment_of_its_notebook(tmp_path, monkeypatch):
+    for value in ("first", "second"):  # the fork server knows the first only
+        monkeypatch.setenv("KFCOURSE_TOLD", value)
+        (tmp_path / value).mkdir()
+        ((told,),) = run("import os; print(os.environ['KFCOURSE_TOLD'], os.getcwd())", folder=tmp_path / value)
+        assert told == f"{value} {tmp_path / value}\n"
+
+
+def test_it_shows_figures(tmp_path):
+    (outputs,) = run("import matplotlib.pyplot as plt\nplt.plot([1, 2])\nplt.show()", folder=tmp_path)
+    assert "image/png" in outputs[-1]
+
+
+def test_one_notebook_does_not_see_another(tmp_path):
+    run("import sympy\nsympy.mine = 1\nsecret = 2", folder=tmp_path)
+    ((seen,),) = run("import sympy\nprint(hasattr(sympy, 'mine'), 'secret' in globals())", folder=tmp_path)
+    assert seen == "False False\n"
+
+
+def test_its_time_ends(tmp_path):
+    with pytest.raises(CellTimeoutError):
+        run("while True: pass", folder=tmp_path, seconds=1)
+
+
+def test_its_death_is_noticed(tmp_path):
+    with pytest.raises(DeadKernelError):
+        run("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", folder=tmp_path)
+
+
+def test_it_is_interrupted():
+    manager, client = start_new_kernel()
+    try:
+        client.execute("print('begun', flush=True)\nwhile True: pass")
+        while client.get_iopub_msg(timeout=30)["msg_type"] != "stream":
+            pass
+        manager.interrupt_kernel()
+        assert client.get_shell_msg(timeout=30)["content"]["ename"] == "KeyboardInterrupt"
+    finally:
+        client.stop_channels()
+        manager.shutdown_kernel(now=True)
+    assert not manager.has_kernel
+
+
+def test_it_ends_with_the_fork_server():
+    """So no kernel outlives the process that wanted it: a fork server ends with that."""
+    manager, client = start_new_kernel()
+    client.execute_interactive("import os")
+    kernel = psutil.Process(manager.provisioner.pid)
+    server = kernel.parent()
+    assert server.pid != os.getpid()
+    client.stop_channels()
+    server.kill()
+    assert psutil.wait_procs([kernel], timeout=20)[0]
+    manager.shutdown_kernel(now=True)

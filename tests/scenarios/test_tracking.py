@@ -1,0 +1,52 @@
+"""The Kalman filter of the radar chapters against one written step by step, and the start against what it promises."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kfcourse.laws import Gaussian
+from kfcourse.linear import covariances
+from kfcourse.linear.system import linear_system
+from kfcourse.scenarios.radar import kinematic
+from kfcourse.scenarios.tracking import kalman_positions, roughly_known
+
+T, SIGMA = 0.8, 100.0
+
+
+@pytest.mark.parametrize("control", [False, True])
+def test_positions_step_by_step(control):
+    rng = np.random.default_rng(1)
+    y, start = rng.normal(size=(6, 2, 3)), Gaussian(rng.normal(size=(2, 6)), np.diag([2.0, 3, 1, 4, 1, 5]))
+    A = np.kron([[1, T], [0, 1]], np.eye(3))
+    B, H = np.kron([[T**2 / 2], [T]], np.eye(3)), np.kron([[1, 0]], np.eye(3))
+    expected = np.empty((6, 2, 3))
+    for i in range(2):
+        lam, Psi = start.mean[i], start.cov
+        for k in range(6):
+            K = Psi @ H.T @ np.linalg.inv(H @ Psi @ H.T + 4.0 * np.eye(3))
+            z, p = lam + K @ (y[k, i] - H @ lam), Psi - K @ H @ Psi
+            expected[k, i] = z[:3]
+            u = (y[k, i] - 2 * y[k - 1, i] + y[k - 2, i]) / T**2 if control and k >= 2 else np.zeros(3)
+            lam, Psi = A @ z + B @ u, A @ p @ A.T + 0.25 * B @ B.T
+    found = kalman_positions(y, T, 0.5, 2.0, start, control)
+    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12)  # rounding
+
+
+def test_a_rough_start_has_the_gain_that_is_asked_for_and_spreads_as_it_says():
+    system = linear_system(kinematic(T, noise_sd=0.8, measurement_sd=SIGMA))[0]
+    state = np.arange(6.0)
+    law = roughly_known(system, 0.55, state, runs=20_000, seed=3)
+    assert covariances(system, law.cov, 1).gains[0, 0, 0] == pytest.approx(0.55, rel=1e-12)
+    sd = np.sqrt(np.diag(law.cov))
+    error = (law.mean - state) / sd
+    assert (np.abs(error.mean(axis=0)) < 4 / np.sqrt(20_000)).all()
+    # a sample correlation scatters by at most 1 / sqrt(runs)
+    np.testing.assert_allclose(np.corrcoef(error.T), law.cov / np.outer(sd, sd), atol=4 / np.sqrt(20_000))
+
+
+@pytest.mark.parametrize("gain", [0.3, 1.0])
+def test_a_first_gain_that_no_start_has_is_refused(gain):
+    system = linear_system(kinematic(T, noise_sd=0.8, measurement_sd=SIGMA))[0]
+    with pytest.raises(ValueError, match=r"between 0\.5 and 1"):
+        roughly_known(system, gain, np.zeros(6), runs=2, seed=3)
