@@ -73,13 +73,14 @@ def extended_kalman_bucy(
     def step_forward(state: State, y: Array) -> State:
         with np.errstate(over="ignore", invalid="ignore"):  # what becomes infinite is reported below
             z, D = state.predicted
-            f, A, Q, S, H = linear(z)
+            t = state.step * step
+            f, A, Q, S, H = linear(t, z)
             measurement = Measurement(S, H, symmetric(product(product(H, D), transpose(H))) + R, R)
             mean, B = correct(state.predicted, measurement, y)
             M, cov = identity, B
             if second is not None:
                 missing: Array = np.asarray(np.isnan(y).any(axis=-1))
-                W, V, dz, dD = second(z, B, np.where(missing[:, None], 0.0, y))
+                W, V, dz, dD = second(t, z, B, np.where(missing[:, None], 0.0, y))
                 W, V, dD = (np.where(missing[:, None, None], 0.0, matrix) for matrix in (W, V, dD))
                 M = _solve(identity + step / 8 * product(B, V), identity + step / 2 * product(B, W))
                 mean, Q = mean + step * np.where(missing[:, None], 0.0, dz), Q + dD

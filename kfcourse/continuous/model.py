@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -36,7 +36,7 @@ class ContinuousModel:
     Attributes
     ----------
     drift, diffusion, signal : sympy.Matrix
-        f(x), n x 1; g(x), n x r; S(x), p x 1, with parameters as symbols.
+        f(x, t), n x 1; g(x, t), n x r; S(x, t), p x 1, with parameters and the time t as symbols.
     x : tuple of sympy.Symbol
     parameters : dict
         Parameter name to value (exact rational numbers).
@@ -73,9 +73,10 @@ class ContinuousModel:
         Parameters
         ----------
         drift, signal : str, sympy expression, or a list of them
-            f(x) and S(x).  A single drift formula is a scalar model in x; lists use x1, x2, ... unless `symbols` names them.
+            f(x, t) and S(x, t).  A single drift formula is a scalar model in x; lists use x1, x2, ... unless `symbols` names
+            them.  t is the time from the start on, unless a parameter or a component is called so.
         diffusion : str, sympy expression, or a list of rows
-            g(x), one row for each state component, one column for each noise.
+            g(x, t), one row for each state component, one column for each noise.
         parameters : dict
             Name to number, for every other symbol in the formulas.
         symbols : sequence of str, optional
@@ -94,6 +95,8 @@ class ContinuousModel:
         --------
         >>> ContinuousModel.define("-a*x", "s", "sin(x)", dict(a=0.5, s=1), noise_density=0.2)
         ContinuousModel(dx/dt = -a*x + s*xi, y = sin(x) + n; a = 1/2, s = 1)
+        >>> ContinuousModel.define("-x + cos(t)", "1 + exp(-t)", "x")
+        ContinuousModel(dx/dt = -x + xi*(1 + exp(-t)) + cos(t), y = x + n)
         """
         values = {checked_name(name): exact_number(name, value) for name, value in table("parameters", parameters).items()}
         f, S = (formula_list(what, _plain(formulas)) for what, formulas in (("drift", drift), ("signal", signal)))
@@ -108,7 +111,7 @@ class ContinuousModel:
         if twice:
             raise ModelError(f"{', '.join(twice)} named twice: state and parameters need different names")
         x = tuple(symbol(checked_name(name)) for name in names)
-        known = {name: symbol(name) for name in values} | by_name(x)
+        known = {"t": symbol("t")} | {name: symbol(name) for name in values} | by_name(x)
         N = law("noise_density", {"variance": noise_density}, len(S)).cov
         if np.linalg.eigvalsh(N).min() <= 1e-12 * np.linalg.eigvalsh(N).max():  # rounding of eigvalsh
             raise ModelError(
@@ -141,6 +144,13 @@ class ContinuousModel:
     def values(self) -> dict[sp.Symbol, sp.Rational]:
         """Parameter symbols and their values, for `subs`."""
         return {symbol(name): value for name, value in self.parameters.items()}
+
+    @cached_property
+    def time(self) -> sp.Symbol | None:
+        """t, if the formulas contain it."""
+        t = symbol("t")
+        named = t.name in self.parameters or t in self.x
+        return t if not named and any(matrix.has(t) for matrix in (self.drift, self.diffusion, self.signal)) else None
 
     def fresh(self, name: str) -> sp.Symbol:
         """A symbol of that name, with underscores if the model uses it already."""
@@ -185,7 +195,7 @@ def to_discrete(model: ContinuousModel, step: float) -> Model:
 
     x_{k+1} = x_k + T f(x_k) + T g(x_k) v_k,  v ~ N(0, S_xi / (2 T));    y_k = S(x_k) + w_k,  w ~ N(0, N / (2 T))
 
-    Both noises are means of white noise over the step.  All discrete filters run on it.
+    f, g and S at the time t_k = T k.  Both noises are means of white noise over the step.  All discrete filters run on it.
     """
     check_step(step)
     T = sp.Rational(str(float(step)))
@@ -199,12 +209,20 @@ def to_discrete(model: ContinuousModel, step: float) -> Model:
         prior={"mean": model.prior.mean, "variance": model.prior.cov},
         state_noise={"variance": model.spectral_density / (2 * step)},
         meter_noise={"variance": model.noise_density / (2 * step)},
+        interval=T,
     )
 
 
-def compiled(model: ContinuousModel, arguments: dict[str, Any], outputs: dict[str, Any], vectors: list[str]) -> Any:
+def compiled(
+    model: ContinuousModel, arguments: dict[str, Any], outputs: dict[str, Any], vectors: list[str]
+) -> Callable[..., Any]:
+    """The generated function of the time and these arguments."""
     numeric = {name: sp.ImmutableMatrix(matrix.subs(model.values)) for name, matrix in outputs.items()}
-    return compile_function("continuous", arguments, numeric, vectors, f"{', '.join(outputs)} of {model}").function
+    if model.time is not None:
+        arguments = {**arguments, "t": sp.Matrix([model.time])}
+    doc = f"{', '.join(outputs)} of {model}"
+    function = compile_function("continuous", arguments, numeric, [*vectors, "t"], doc).function
+    return (lambda t, *arrays: function(*arrays)) if model.time is None else lambda t, *arrays: function(*arrays, np.array([t]))
 
 
 def check_step(step: float) -> None:

@@ -30,7 +30,7 @@ def simulate(
 ) -> Path:
     """Trajectories by the Euler-Maruyama scheme with the step T / substeps.
 
-    x' = x + dt f(x) + g(x) N(0, S_xi dt / 2),     y_k = mean over the step of S(x) + N(0, N / (2 dt))
+    x' = x + dt f(x, t) + g(x, t) N(0, S_xi dt / 2),     y_k = mean over the step of S(x, t) + N(0, N / (2 dt))
 
     The error of a trajectory is of the order dt if g is constant, and sqrt(dt) if g depends on x; that of its moments is of the
     order dt in both cases.
@@ -56,8 +56,8 @@ def simulate(
     x[0] = now
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what becomes infinite is reported below
         for k in range(steps):
-            for _ in range(substeps):
-                f, g, S = equations(now)
+            for part in range(substeps):
+                f, g, S = equations((k + part / substeps) * step, now)
                 y[k] += (S + rng.standard_normal((runs, model.p)) @ n_root.T) / substeps
                 now = now + dt * f + apply(g, rng.standard_normal((runs, len(xi_root))) @ xi_root.T)
             x[k + 1] = now

@@ -24,9 +24,13 @@ class Linear(NamedTuple):
 
 
 def linear_matrices(model: ContinuousModel) -> Linear:
-    """A = df/dx, G = g, H = dS/dx; ModelError if the model is not linear."""
+    """A = df/dx, G = g, H = dS/dx; ModelError if the model is not linear or depends on time."""
     x = sp.Matrix(model.x)
     matrices = [m.subs(model.values) for m in (model.drift.jacobian(x), model.diffusion, model.signal.jacobian(x))]
+    if model.time is not None:
+        raise ModelError(
+            f"{model} depends on the time t: it has no steady state; follow the covariance with extended_kalman_bucy(model, step)"
+        )
     if any(matrix.has(*model.x) for matrix in matrices):
         raise ModelError(
             f"{model} is not linear: it has no steady state that holds everywhere; use extended_kalman_bucy(model, step)"

@@ -1,34 +1,31 @@
 """The student's report (отчёт по лабораторной работе), in English or Russian: from the task to the conclusion.
 
-`write_handin` writes handin.tex and handin.html beside the figures of `write_report`.  The words of both languages are in
-handin.toml; formulas, numbers and verdicts come from the model and the comparison.
+`write_handin` writes handin.tex, handin.html and their figures.  The words of both languages are in handin.toml; formulas,
+numbers and verdicts come from the model and the comparison.
 """
 
 from __future__ import annotations
 
-import re
+import dataclasses
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from importlib import resources
 from pathlib import Path
 
-import jinja2
-import numpy as np
 import sympy as sp
 from matplotlib.axes import Axes
 
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
-from kfcourse.lab.report import Section, on_one_power, percent, printed, save_figure, save_texts, table_steps
+from kfcourse.lab.handin_text import filled, in_percent, inline_html, inline_tex, law, lines_of, power_of_ten, ranges
+from kfcourse.lab.refusals import cause
+from kfcourse.lab.report import printed, save_figure, save_texts, table_steps
 from kfcourse.lab.short_names import FILTERS, Structures
 from kfcourse.lab.variants import Variant
-from kfcourse.laws import Gaussian
 from kfcourse.montecarlo.comparison import EXACT, Comparison
-from kfcourse.montecarlo.statistics import Estimate
-from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 from kfcourse.symbolic.reading import exact_matrix
@@ -38,7 +35,6 @@ from kfcourse.symbolic.writing import formula_latex
 LANGUAGES = ("en", "ru")
 HIGHEST = 8  # moment that is printed
 COLUMNS = 4  # filters side by side in a table, so that it fits a page
-FIGURES = ("accuracy", "relative", "ranking", "consistency")
 
 # Numbers in the school's catalogue of structural functions, for the forms whose numbers the course gives.
 CATALOGUE = {
@@ -49,6 +45,22 @@ CATALOGUE = {
     ("G", "g"): 8,
     ("F", "d*g**2 + f**2*m**4"): 16,
     ("F", "3*d**2*f**2 + 6*d*f**2*m**2 + d*g**2 + f**2*m**4"): 20,
+}
+
+
+def _known_errors(result: Comparison, ax: Axes, words: plots.Words) -> Axes:
+    """The normalised errors, between a half and two: rare far trajectories reach beyond."""
+    plots.consistency(result, ax, names=result.entrants, words=words).set_ylim(0.5, 2)
+    ax.set_yticks([0.5, 1, 2], ["0.5", "1", "2"])
+    ax.set_yticks([], minor=True)
+    return ax
+
+
+FIGURES: dict[str, Callable[..., Axes]] = {
+    "accuracy": plots.accuracy,
+    "relative": plots.relative_accuracy,
+    "ranking": plots.ranking,
+    "consistency": _known_errors,
 }
 
 
@@ -63,7 +75,7 @@ class Block:
 
 
 def write_handin(variant: Variant, result: Comparison, folder: Path, language: str) -> list[Path]:
-    """Write handin.tex, handin.html and the figure that only they show; the other figures are those of `write_report`.
+    """Write handin.tex, handin.html and their figures.
 
     Raises
     ------
@@ -73,15 +85,13 @@ def write_handin(variant: Variant, result: Comparison, folder: Path, language: s
     if language not in LANGUAGES:
         raise ValueError(f"the report is written in {' or '.join(LANGUAGES)}, not {language!r}")
     words = tomllib.loads((resources.files("kfcourse.lab") / "handin.toml").read_text(encoding="utf-8"))[language]
-    content = {"blocks": list(_Report(result, words).blocks()), "words": words, "variant": variant, "language": language}
-    figure = save_figure(partial(_known_errors, result), folder, "handin-consistency")
-    return figure + save_texts(("handin.html", "handin.tex"), folder, content, inline=_inline_html)
-
-
-def _known_errors(result: Comparison, ax: Axes) -> Axes:
-    """The normalised errors, between a half and two: rare far trajectories reach beyond."""
-    plots.consistency(result, ax, names=result.entrants).set_ylim(0.5, 2)
-    return ax
+    report = _Report(result, words)
+    content = {"blocks": list(report.blocks()), "words": words, "variant": variant, "language": language}
+    labels = plots.Words(report.title, **{part: words[f"axis_{part}"] for part in plots.Words._fields[1:]})
+    written = []
+    for name in report.figures:
+        written += save_figure(partial(FIGURES[name], result, words=labels), folder, f"handin-{name}")
+    return written + save_texts(("handin.html", "handin.tex"), folder, content, inline=inline_html, inline_tex=inline_tex)
 
 
 class _Report:
@@ -93,9 +103,24 @@ class _Report:
         self.structures = Structures(self.model)
         self.kinds = [kind for kind in ("linearised", "gaussian") if any(name.endswith(kind) for name in result.available)]
 
+        compared = result.has_bound or len(result.entrants) > 1
+        self.figures = [name for name in FIGURES if compared or name not in ("relative", "ranking")]
+
     def blocks(self) -> Iterator[Block]:
+        """The whole report; the words that SymPy puts into formulas in its language, too."""
+        for block in self.sections():
+            lines = [self.translated(line) for line in block.lines]
+            yield dataclasses.replace(block, text=self.translated(block.text), lines=lines)
+
+    def translated(self, text: str) -> str:
+        for english, key in ((r"\text{for}", "if"), (r"\text{otherwise}", "else")):
+            text = text.replace(english, rf"\text{{{self.words[key]}}}")
+        return text
+
+    def sections(self) -> Iterator[Block]:
         yield from self.task()
-        yield Block("section", self.words["functions"])
+        if self.kinds:
+            yield Block("section", self.words["functions"])
         for kind in self.kinds:
             yield from getattr(self, kind)()
             yield from self.derived(kind)
@@ -107,14 +132,14 @@ class _Report:
         model, words = self.model, self.words
         yield Block("section", words["task"])
         yield Block("text", words["task_text"])
-        yield Block("formulas", lines=_lines(model.latex(values=False)))
+        yield Block("formulas", lines=lines_of(model.latex(values=False)))
         values = ", ".join(f"${sp.latex(name)} = {float(value):g}$" for name, value in model.values.items())
         if values:
-            yield Block("text", _filled(words["parameters"], values=values))
+            yield Block("text", filled(words["parameters"], values=values))
         laws = (("x_0", model.prior), ("v_k", model.state_noise), ("w_k", model.meter_noise))
-        yield Block("formulas", lines=[rf"{name} &\sim {_law(law)}" for name, law in laws])
+        yield Block("formulas", lines=[rf"{name} &\sim {law(one)}" for name, one in laws])
         yield Block("text", words["independent"])
-        yield Block("text", _filled(words["find"], filters=", ".join(self.title(name) for name in self.result.entrants)))
+        yield Block("text", filled(words["find"], filters=", ".join(self.title(name) for name in self.result.entrants)))
 
     def linearised(self) -> Iterator[Block]:
         model, words = self.model, self.words
@@ -149,11 +174,11 @@ class _Report:
     def conditional(self) -> list[str]:
         """Means of a, a^2, b, b^2 over their noise, at a fixed state."""
         model, lines = self.model, []
-        for formula, noises, law, first, second in (
+        for formula, noises, noise, first, second in (
             (model.state_equation[0], model.v, model.state_noise, r"\alpha", r"\gamma"),
             (model.meter_equation[0], model.w, model.meter_noise, r"\beta", r"\eta"),
         ):
-            over = GaussianMoments(list(noises), list(exact_matrix(law.mean)), sp.Matrix(exact_matrix(law.cov)))
+            over = GaussianMoments(list(noises), list(exact_matrix(noise.mean)), sp.Matrix(exact_matrix(noise.cov)))
             for letter, power in ((first, 1), (second, 2)):
                 try:
                     mean = sp.expand(over.mean_of(formula**power))
@@ -177,14 +202,16 @@ class _Report:
         """The five functions, with their numbers in the catalogue where it has them."""
         block = printed(self.structures, kind)
         yield Block("text", self.words["result"])
-        yield Block("formulas", lines=_lines(block))
-        numbers = []
-        if self.model.n == self.model.p == 1 and FUNCTION_LATEX["tau"] in block:  # else they took too long
+        if FUNCTION_LATEX["tau"] not in block:
+            yield Block("text", self.words["not_printed"])
+            return
+        yield Block("formulas", lines=lines_of(block))
+        if self.model.n == self.model.p == 1:
             structure = getattr(self.structures, kind)
             forms = {name: (name, str(sp.expand(structure[name]))) for name in FUNCTION_LATEX}
             numbers = [f"${FUNCTION_LATEX[name]}$: {CATALOGUE[form]}" for name, form in forms.items() if form in CATALOGUE]
-        if numbers:
-            yield Block("text", _filled(self.words["catalogue"], numbers=", ".join(numbers)))
+            if numbers:
+                yield Block("text", filled(self.words["catalogue"], numbers=", ".join(numbers)))
 
     def filters(self) -> Iterator[Block]:
         words = self.words
@@ -197,26 +224,40 @@ class _Report:
             if family == "duof":
                 yield Block("text", words["criteria"])
                 yield Block("formulas", lines=words["criteria_formulas"].split("\n"))
-            yield Block("formulas", lines=_lines(equations_latex(EQUATIONS[family])))
+            yield Block("formulas", lines=lines_of(equations_latex(EQUATIONS[family])))
 
     def experiment(self) -> Iterator[Block]:
         result, words = self.result, self.words
         yield Block("section", words["experiment"])
-        designs = _filled(words["designs"], designs=result.designs) if result.designs else ""
-        exact = _filled(words["exact"], runs=result.subset_runs) if result.has_bound else ""
+        designs = filled(words["designs"], designs=result.designs) if result.designs else ""
+        exact = filled(words["exact"], runs=result.subset_runs) if result.has_bound else ""
         yield Block(
-            "text", _filled(words["experiment_text"], runs=result.runs, steps=result.steps, seed=result.seed) + designs + exact
+            "text", filled(words["experiment_text"], runs=result.runs, steps=result.steps, seed=result.seed) + designs + exact
         )
+        if result.left_out:
+            yield Block("text", words["left_out"])
+            yield Block("items", lines=list(self.left_out()))
         for start in range(0, len(result.available), COLUMNS):
             names = result.available[start : start + COLUMNS]
             estimates = [result.error_variance(name) for name in names]
-            rows = [[f"${k}$", *(_power(one[k]) for one in estimates)] for k in table_steps(result)]
+            rows = [[f"${k}$", *(power_of_ten(one[k]) for one in estimates)] for k in table_steps(result)]
             yield Block("table", words["table"], ["$k$", *map(self.title, names)], rows)
-        for name in FIGURES:
-            yield Block("figure", words[f"figure_{name}"], ["handin-consistency" if name == "consistency" else name])
+        for name in self.figures:
+            yield Block("figure", words[f"figure_{name}"], [f"handin-{name}"])
+
+    def left_out(self) -> Iterator[str]:
+        """The filters that do not take part, and why, those with the same reason together."""
+        names: dict[str, list[str]] = {}
+        for name, reason in self.result.left_out.items():
+            names.setdefault(cause(reason, self.model, self.words), []).append(self.title(name))
+        yield from (f"{', '.join(titles)}: {reason}" for reason, titles in names.items())
 
     def conclusion(self) -> Iterator[Block]:
         result, words = self.result, self.words
+        if len(result.entrants) == 1:
+            yield Block("section", words["conclusion"])
+            yield Block("text", self.mean_sentence("alone"))
+            return
         verdicts = {k: self.verdict(k) for k in table_steps(result)}
         yield Block("section", words["conclusion"])
         yield Block("text", words["verdict_text"])
@@ -239,24 +280,29 @@ class _Report:
         verdicts = [self.verdict(k) for k in range(result.steps)]
         alone = [best for best, others, _ in verdicts if not others]
         for name in sorted(set(alone), key=lambda one: -alone.count(one)):
-            where = _ranges([k for k, (best, others, _) in enumerate(verdicts) if best == name and not others])
-            yield _filled(words["leads"], name=self.title(name), where=where)
+            where = ranges([k for k, (best, others, _) in enumerate(verdicts) if best == name and not others])
+            yield filled(words["leads"], name=self.title(name), where=where)
         if not alone:
             yield words["nobody_leads"]
         unsure = [k for k, (_, others, _) in enumerate(verdicts) if others]
         if unsure:
-            yield _filled(words["together"], where=_ranges(unsure))
+            yield filled(words["together"], where=ranges(unsure))
         last = [worst for _, _, worst in verdicts]
         name = max(set(last), key=lambda one: (last.count(one), one))
-        yield _filled(words["last"], name=self.title(name), steps=last.count(name), all=result.steps)
-        (first, gap), *_, (final, largest) = result.ranking()
-        key = "mean_bound" if result.has_bound else "mean_control"
-        yield _filled(
-            words[key],
+        yield filled(words["last"], name=self.title(name), steps=last.count(name), all=result.steps)
+        yield self.mean_sentence("mean")
+
+    def mean_sentence(self, kind: str) -> str:
+        """How far the first filter and the last are from the bound, or from the control."""
+        result = self.result
+        ranked = result.ranking()
+        (first, gap), (final, largest) = ranked[0], ranked[-1]
+        return filled(
+            self.words[f"{kind}_{'bound' if result.has_bound else 'control'}"],
             first=self.title(first),
-            gap=_percent(gap),
+            gap=in_percent(gap),
             last=self.title(final),
-            largest=_percent(largest),
+            largest=in_percent(largest),
             control=self.title(result.control),
         )
 
@@ -264,52 +310,3 @@ class _Report:
         entry = FILTERS[name]
         exact = self.words["exact_title"] if name == EXACT else ""
         return exact or (entry.russian if self.words["language"] == "ru" else entry.title)
-
-
-def _filled(text: str, **values: object) -> str:
-    """The text with {name} replaced by what the name stands for; braces of LaTeX stay."""
-    return re.sub("|".join(rf"\{{{name}\}}" for name in values), lambda found: str(values[found[0][1:-1]]), text)
-
-
-def _lines(block: str) -> list[str]:
-    return Section.of("", block).lines
-
-
-def _law(law: Gaussian) -> str:
-    """N(0, 1); N(mean, covariance) with matrices for vectors."""
-    if law.mean.size == 1:
-        return rf"\mathcal{{N}}({law.mean.item():g},\; {law.cov.item():g})"
-    column = r" \\ ".join(f"{value:g}" for value in law.mean)
-    rows = r" \\ ".join(" & ".join(f"{value:g}" for value in row) for row in law.cov)
-    return rf"\mathcal{{N}}\left(\begin{{pmatrix}}{column}\end{{pmatrix}},\; \begin{{pmatrix}}{rows}\end{{pmatrix}}\right)"
-
-
-def _power(estimate: Estimate) -> str:
-    """A value and its standard error on one power of ten: (6.51 ± 0.07)·10^-4."""
-    value, error, power = on_one_power(estimate)
-    if power is None:
-        return f"${value:g}$" if np.isfinite(value) else r"$\infty$"
-    return rf"$({value:.3f} \pm {error:.3f})\cdot 10^{{{power}}}$"
-
-
-def _percent(estimate: Estimate) -> str:
-    return "$" + percent(estimate).replace("±", r"\pm") + "$"
-
-
-def _ranges(steps: list[int]) -> str:
-    """1, 3-5, 8: runs of steps joined."""
-    parts: list[list[int]] = []
-    for k in steps:
-        if parts and k == parts[-1][1] + 1:
-            parts[-1][1] = k
-        else:
-            parts.append([k, k])
-    return ", ".join(f"${a}$" if a == b else f"${a}$–${b}$" for a, b in parts)
-
-
-def _inline_html(text: str) -> str:
-    """Text for HTML: special characters escaped, $formulas$ as MathML."""
-    pieces = re.split(r"\$([^$]+)\$", text)
-    return "".join(
-        mathml(piece, "inline") if i % 2 else str(jinja2.filters.do_forceescape(piece)) for i, piece in enumerate(pieces)
-    )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -29,6 +29,20 @@ _FAMILIES = {
 _MARKERS = {"aof": "o", "duof": "s", "fos": "^", "mfos": "D", "fos3": "v", "mfos3": "P", "particle": "*", "kalman": "x"}
 
 
+class Words(NamedTuple):
+    """What the figures say: the names of filters and the axes, {name} for the filter that is the zero line."""
+
+    title: Callable[[str], str] = title
+    step: str = "step $k$"
+    variance: str = "error variance $D_k$ (units of $x^2$)"
+    above: str = "$D_k$ above {name}, %"
+    mean_above: str = "mean of $D_k$ above {name}, %"
+    normalised: str = r"normalised squared error $\mathsf{M}[e^2/p]$"
+
+
+ENGLISH = Words()
+
+
 def style(name: str) -> dict[str, Any]:
     """Line style of a filter: colour by family, dashes for the linearised approximation, black for the exact."""
     family, _, approximation = (name, "", "") if name in _FAMILIES else name.partition("-")
@@ -43,20 +57,26 @@ def style(name: str) -> dict[str, Any]:
     }
 
 
-def accuracy(result: Comparison, ax: Axes, names: Sequence[str] | None = None) -> Axes:
+def accuracy(result: Comparison, ax: Axes, names: Sequence[str] | None = None, words: Words = ENGLISH) -> Axes:
     """Error variance D_k of every filter against the step, on a logarithmic scale."""
     steps = np.arange(result.steps)
     for name in names or result.available:
-        ax.semilogy(steps, result.error_variance(name).value, markevery=max(1, result.steps // 10), markersize=4, **style(name))
-    ax.set_xlabel("step $k$")
-    ax.set_ylabel("error variance $D_k$ (units of $x^2$)")
+        line = style(name) | {"label": words.title(name), "markersize": 4, "markevery": max(1, result.steps // 10)}
+        ax.semilogy(steps, result.error_variance(name).value, **line)
+    ax.set_xlabel(words.step)
+    ax.set_ylabel(words.variance)
     ax.grid(True, which="major", alpha=0.3)
     ax.legend(fontsize="small", ncols=2)
     return ax
 
 
 def relative_accuracy(
-    result: Comparison, ax: Axes, names: Sequence[str] | None = None, steps: slice = slice(None), confidence: float = 0.95
+    result: Comparison,
+    ax: Axes,
+    names: Sequence[str] | None = None,
+    steps: slice = slice(None),
+    confidence: float = 0.95,
+    words: Words = ENGLISH,
 ) -> Axes:
     """How far D_k of every filter is above the exact AOF's, the zero line, in per cent, with bands of confidence.
 
@@ -69,44 +89,46 @@ def relative_accuracy(
             continue
         gap = result.gap(name)[steps]
         middle, half = 100 * gap.value, 100 * gap.half_width(confidence)
-        line = style(name)
+        line = style(name) | {"label": words.title(name)}
         ax.plot(k, middle, markersize=4, markevery=max(1, len(k) // 12), **line)
         ax.fill_between(k, middle - half, middle + half, color=line["color"], alpha=0.15, linewidth=0)
-    ax.axhline(0, color="black", linewidth=0.8, label=title(zero))
-    ax.set_xlabel("step $k$")
-    ax.set_ylabel(f"$D_k$ above {title(zero)}, %")
+    ax.axhline(0, color="black", linewidth=0.8, label=words.title(zero))
+    ax.set_xlabel(words.step)
+    ax.set_ylabel(words.above.replace("{name}", words.title(zero)))
     ax.grid(True, alpha=0.3)
     ax.legend(fontsize="small", ncols=2)
     return ax
 
 
-def ranking(result: Comparison, ax: Axes, steps: slice = slice(None), confidence: float = 0.95) -> Axes:
+def ranking(result: Comparison, ax: Axes, steps: slice = slice(None), confidence: float = 0.95, words: Words = ENGLISH) -> Axes:
     """Mean over steps of how far D_k is above the exact AOF's (without it, the control's), the best on top, with intervals."""
     ranked = result.ranking(steps)[::-1]
     for row, (name, gap) in enumerate(ranked):
         line = style(name)
         half = 100 * float(gap.half_width(confidence))
         ax.errorbar(100 * float(gap.value), row, xerr=half, fmt=line["marker"], color=line["color"], capsize=3)
-    ax.set_yticks(range(len(ranked)), [title(name) for name, _ in ranked])
+    ax.set_yticks(range(len(ranked)), [words.title(name) for name, _ in ranked])
     ax.axvline(0, color="black", linewidth=0.8)
-    ax.set_xlabel(f"mean of $D_k$ above {title(EXACT if result.has_bound else result.control)}, %")
+    ax.set_xlabel(words.mean_above.replace("{name}", words.title(EXACT if result.has_bound else result.control)))
     ax.grid(True, axis="x", alpha=0.3)
     return ax
 
 
-def consistency(result: Comparison, ax: Axes, names: Sequence[str] | None = None, confidence: float = 0.95) -> Axes:
+def consistency(
+    result: Comparison, ax: Axes, names: Sequence[str] | None = None, confidence: float = 0.95, words: Words = ENGLISH
+) -> Axes:
     """Normalised squared error M[e^T p^-1 e]/n per step: 1 if the filter's own covariance is right."""
     steps = np.arange(result.steps)
     for name in names or result.available:
         value = result.normalised_error(name)
-        line = style(name)
+        line = style(name) | {"label": words.title(name)}
         ax.plot(steps, value.value, markersize=4, markevery=max(1, result.steps // 10), **line)
         half = value.half_width(confidence)
         ax.fill_between(steps, value.value - half, value.value + half, color=line["color"], alpha=0.15, linewidth=0)
     ax.axhline(1, color="black", linewidth=0.8)
     ax.set_yscale("log")
-    ax.set_xlabel("step $k$")
-    ax.set_ylabel(r"normalised squared error $\mathsf{M}[e^2/p]$")
+    ax.set_xlabel(words.step)
+    ax.set_ylabel(words.normalised)
     ax.grid(True, alpha=0.3)
     ax.legend(fontsize="small", ncols=2)
     return ax

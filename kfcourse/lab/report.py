@@ -95,7 +95,7 @@ def save_texts(names: Sequence[str], folder: Path, content: Mapping[str, Any], *
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("kfcourse.lab"), trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    environment.filters |= {"mathml": _mathml, "tex": _escape_tex, "html": jinja2.filters.do_forceescape, **filters}
+    environment.filters |= {"mathml": _mathml, "tex": escape_tex, "html": jinja2.filters.do_forceescape, **filters}
     texts = {folder / name: environment.get_template(name + ".j2").render(content) for name in names}
     for path, text in texts.items():
         save(text, path)
@@ -268,7 +268,8 @@ def _mathml(line: str) -> str:
     return mathml(line.replace("&", ""))
 
 
-def _escape_tex(text: str) -> str:
+def escape_tex(text: str) -> str:
+    """Plain text for LaTeX."""
     special = {"\\": r"\textbackslash{}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}", "±": r"$\pm$", "·": r"$\cdot$"}
     return re.sub(r"[#$%&_{}\\^~±·]", lambda found: special.get(found[0], "\\" + found[0]), text)
 

@@ -51,7 +51,7 @@ FILTERS: dict[str, Entry] = {
     "fos3-linearised": Entry("LFOS3", "ЛФОС, 3 арг.", lambda s: fos(s.linearised, arguments=3)),
     "mfos3-gaussian": Entry("GMFOS3", "ГМФОС, 3 арг.", lambda s: mfos(s.gaussian, arguments=3)),
     "mfos3-linearised": Entry("LMFOS3", "ЛМФОС, 3 арг.", lambda s: mfos(s.linearised, arguments=3)),
-    "aof-unscented": Entry("UKF", "АОФ, unscented", lambda s: aof(unscented(s.model))),
+    "aof-unscented": Entry("UKF", "АОФ, сигма-точки", lambda s: aof(unscented(s.model))),
     "aof-gauss-hermite": Entry("GHKF", "АОФ, Гаусс–Эрмит", lambda s: aof(gauss_hermite(s.model))),
     "aof-exact": Entry("exact AOF", "АОФ", lambda s: exact(s.model)),
     "particle": Entry("particle", "АОФ, частицы", lambda s: particle(s.model)),

@@ -6,6 +6,7 @@ provisioner, chosen by its name in the environment variable JUPYTER_DEFAULT_PROV
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import signal
@@ -85,7 +86,8 @@ def serve(arguments: list[str], environment: dict[str, str], folder: str | None)
     if folder is not None:
         os.chdir(folder)
     sys.argv = [LAUNCHER, *arguments]
-    kernel = IPKernelApp.instance(parent_handle=os.getppid())  # without its parent, the fork server, it ends itself
+    # Without its parent, the fork server, it ends itself.
+    kernel = IPKernelApp.instance(parent_handle=os.getppid(), log_level=logging.ERROR)
     kernel.initialize(arguments)
     if kernel.shell is not None:
         kernel.shell.enable_matplotlib("inline")  # as pyplot does when it is imported in a kernel; here it has been

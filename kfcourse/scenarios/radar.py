@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import sympy as sp
 
+from kfcourse.angles import on_circle
 from kfcourse.laws import Array
 from kfcourse.scenarios.flight import Track
 from kfcourse.symbolic.codegen import compile_function
@@ -84,19 +85,10 @@ def measure_spherical(track: Track, sigmas: Sequence[float], runs: int, seed: in
     runs, seed
         As in `measure_cartesian`.
 
-    Raises
-    ------
-    ValueError
-        The flight comes so near to the azimuth pi that measurements jump by 2 pi there: a filter would take the jump for an
-        innovation.
+    The azimuth lies between -pi and pi, so it jumps where the flight crosses the negative x axis: a model of these
+    measurements needs `angles=["y2"]`.
     """
-    true = spherical(track.position)
-    measured = _noisy(true, sigmas, runs, seed)
-    if (np.abs(np.diff(np.unwrap(true[:, 1]) - true[:, 1])) > 1).any() or (np.abs(measured[..., 1]) > np.pi).any():
-        raise ValueError(
-            "the flight crosses the azimuth pi, where the angle jumps by 2 pi; move it with `start`, or turn it with `heading`"
-        )
-    return measured
+    return on_circle(_noisy(spherical(track.position), sigmas, runs, seed), (1,))
 
 
 def _noisy(true: Array, sigmas: float | Sequence[float], runs: int, seed: int | np.random.Generator) -> Array:

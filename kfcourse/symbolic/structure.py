@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property, partial, reduce
 from itertools import product as cartesian
 from typing import NoReturn
 
@@ -247,7 +247,8 @@ def linearised(model: Model) -> Structure:
         "G": H,
         "F": H * d * H.T + C * exact_matrix(model.meter_noise.cov) * C.T,
     }
-    return StructuralFormulas(model, "linearised", z, p, m, d, _expanded(functions)).structure()
+    # e^(a+b) stays one: a height of 6500 km over a scale of 13 km has an e^a beyond all numbers.
+    return StructuralFormulas(model, "linearised", z, p, m, d, _expanded(functions, power_exp=False)).structure()
 
 
 def _taylor(equation, x, mean, noise, noise_mean):
@@ -298,5 +299,5 @@ def _moments(equation, x, mean, cov, noise, law: Gaussian, known: tuple[sp.Symbo
     return (matrix.xreplace(masks) for matrix in (means, covs))
 
 
-def _expanded(functions) -> dict[str, sp.ImmutableMatrix]:
-    return {name: sp.ImmutableMatrix(matrix).applyfunc(sp.expand) for name, matrix in functions.items()}
+def _expanded(functions, **hints: bool) -> dict[str, sp.ImmutableMatrix]:
+    return {name: sp.ImmutableMatrix(matrix).applyfunc(partial(sp.expand, **hints)) for name, matrix in functions.items()}

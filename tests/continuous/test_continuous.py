@@ -6,6 +6,7 @@ from itertools import pairwise
 import control
 import numpy as np
 import pytest
+import scipy.integrate
 import scipy.linalg
 import sympy as sp
 
@@ -25,6 +26,7 @@ from kfcourse.filters import aof
 from kfcourse.laws import Gaussian
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare, predictions, run
+from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.formula import FormulaError
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import linearised
@@ -413,6 +415,95 @@ def test_the_scalar_riccati_equation_has_its_closed_form():
         errors.append(np.abs(D - exact).max())
     assert 1.6 < errors[0] / errors[1] < 2.4  # the first steps from D0 = 3 are far from linear in T
     assert errors[1] < 0.1
+
+
+# --- functions of time ------------------------------------------------------------------------------------------------------
+
+
+def varying(**changes):
+    """Linear, and everything depends on time: a decay that swings, a noise that dies down, a meter that fades in and out."""
+    settings = {"prior": {"mean": 1.5, "variance": 2.0}, "spectral_density": 0.9, "noise_density": 0.4} | changes
+    return ContinuousModel.define("-(a + sin(2*t))*x + cos(t)", "0.5 + exp(-t)", "(1 + 0.8*cos(3*t))*x", {"a": 0.7}, **settings)
+
+
+def varying_moments(times):
+    """Mean and variance of `varying` without measurements, and the error variance of its optimal filter: ODEs of the page."""
+
+    def rates(t, moments):
+        mean, variance, D = moments
+        A, q, H = -(0.7 + math.sin(2 * t)), (0.5 + math.exp(-t)) ** 2 * 0.9 / 2, 1 + 0.8 * math.cos(3 * t)
+        return [A * mean + math.cos(t), 2 * A * variance + q, 2 * A * D + q - (H * D) ** 2 * 2 / 0.4]
+
+    return scipy.integrate.solve_ivp(rates, (0, times[-1]), [1.5, 2.0, 2.0], t_eval=times, rtol=1e-10, atol=1e-12).y
+
+
+def test_the_covariance_of_a_time_varying_model_solves_its_riccati_equation():
+    """The scheme's error halves with the step; D itself swings between 0.1 and 0.3 after its start from 2."""
+    errors = []
+    for T in (0.02, 0.01, 0.005):
+        steps = round(4 / T)
+        D = predictions(extended_kalman_bucy(varying(), T), np.zeros((steps, 1, 1))).cov[:, 0, 0, 0]
+        exact = varying_moments(T * np.arange(steps))[2]
+        errors.append(np.abs(D - exact)[round(0.5 / T) :].max())
+    for coarse, half in pairwise(errors):
+        assert 1.6 < coarse / half < 2.4
+    assert errors[-1] < 0.01
+
+
+def test_simulated_moments_of_a_time_varying_model():
+    """Within four standard errors and the bias of Euler's scheme, at most 0.01 of the moments at dt = 0.0025."""
+    runs, path = 4000, simulate(varying(), 0.5, 6, 4000, 11, substeps=200)
+    mean, variance, _ = varying_moments(path.step * np.arange(7))
+    found = path.x[..., 0]
+    assert (np.abs(found.mean(axis=1) - mean) < 4 * np.sqrt(variance / runs) + 0.01).all()
+    assert (np.abs(found.var(axis=1) / variance - 1) < 4 * np.sqrt(2 / runs) + 0.01).all()
+
+
+def test_the_time_is_a_component_that_is_known():
+    """t in the formulas, or a component s with ds/dt = 1, s(0) = 0: the same signal, noises and estimates."""
+    settings = {"spectral_density": 0.3, "noise_density": 0.2}
+    direct = ContinuousModel.define("-x + t/5", "1 + t/9", "cos(2*t + x)", prior={"mean": 0.3, "variance": 0.5}, **settings)
+    prior = {"mean": [0.3, 0], "variance": [0.5, 0]}
+    carried = ContinuousModel.define(
+        ["-x + s/5", "1"], [["1 + s/9"], ["0"]], "cos(2*s + x)", symbols=["x", "s"], prior=prior, **settings
+    )
+    y = simulate(direct, 0.05, 60, 5, 2).y
+    for options in ({}, {"second_derivatives": True}, {"second_derivatives": True, "symmetrised": True}):
+        one, two = (run(extended_kalman_bucy(model, 0.05, **options), y) for model in (direct, carried))
+        np.testing.assert_allclose(one.mean[..., 0], two.mean[..., 0], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(one.cov[..., 0, 0], two.cov[..., 0, 0], rtol=0, atol=1e-12)
+
+
+def test_the_discrete_model_has_its_functions_at_the_times_of_its_steps():
+    """f, g, S at t_k = k T; its Kalman filter has the same covariances, and estimates that differ in proportion to T:
+    f is taken at the corrected estimate instead of the predicted one."""
+    T, x, v, w = 0.25, np.array([[0.7]]), np.array([[-0.4]]), np.array([[1.1]])
+    state, meter = compile_model(to_discrete(varying(), T))
+    for k in (0, 3):
+        t = k * T
+        following = x + T * (-(0.7 + math.sin(2 * t)) * x + math.cos(t) + (0.5 + math.exp(-t)) * v)
+        np.testing.assert_allclose(state(x, v, k), following, rtol=1e-14)
+        np.testing.assert_allclose(meter(x, w, k), (1 + 0.8 * math.cos(3 * t)) * x + w, rtol=1e-14)
+    fine, apart = simulate(varying(), 0.005, 400, 200, 4), []
+    for factor in (4, 2):
+        path = coarsen(fine, factor)
+        one = run(extended_kalman_bucy(varying(), path.step), path.y)
+        two = run(aof(linearised(to_discrete(varying(), path.step))), path.y)
+        np.testing.assert_allclose(one.cov, two.cov, rtol=0, atol=1e-12)
+        apart.append(np.sqrt(np.mean((one.mean - two.mean) ** 2)))
+    assert 1.6 < apart[0] / apart[1] < 2.4
+
+
+def test_names_of_the_time():
+    """t is the time unless it names something else; the number of a step means nothing here."""
+    assert varying().time == sp.Symbol("t", real=True)
+    assert parabola().time is None
+    assert ContinuousModel.define("-t*x", "1", "x", {"t": 2}).time is None
+    assert ContinuousModel.define("-t", "1", "t", symbols=["t"]).time is None
+    with pytest.raises(FormulaError, match="unknown symbol 'k'"):
+        ContinuousModel.define("-k*x", "1", "x")
+    with pytest.raises(ModelError, match="depends on the time t"):
+        steady_state(varying())
 
 
 def test_without_second_derivatives_a_linear_model_has_one_covariance_for_all():

@@ -1,16 +1,22 @@
 """The student's report: what it says is what was computed, in both languages, and its files are whole."""
 
+import dataclasses
 import re
 import tomllib
 from importlib import resources
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
-from kfcourse import compare, lab_filters, load_variants
-from kfcourse.lab import handin
-from kfcourse.lab.handin import CATALOGUE, LANGUAGES, _ranges, write_handin
+from kfcourse import Model, compare, lab_filters, load_variants
+from kfcourse.lab import Variant, admission, handin, report
+from kfcourse.lab.admission import admissions
+from kfcourse.lab.handin import CATALOGUE, FIGURES, LANGUAGES, write_handin
+from kfcourse.lab.handin_text import inline_tex, ranges
+from kfcourse.lab.refusals import cause
 from kfcourse.lab.short_names import LAB, title
+from kfcourse.montecarlo.designing import NotFinite
 
 WORDS = tomllib.loads((resources.files("kfcourse.lab") / "handin.toml").read_text(encoding="utf-8"))
 
@@ -88,6 +94,89 @@ def test_a_vector_variant_has_no_scalar_derivation(tmp_path):
     assert "pmatrix" in tex and "q_2" not in tex and r"&\quad" in tex
 
 
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_figures_speak_the_language_of_the_report(result, language, monkeypatch, tmp_path):
+    """Every label, title and legend that is drawn; Cyrillic letters in the Russian report only, and no English words there."""
+    said, draw = [], Figure.savefig
+
+    def listen(figure, *arguments, **options):
+        for ax in figure.axes:
+            legend = ax.get_legend()
+            rows = [text.get_text() for text in ax.get_yticklabels()] if "ranking" in str(arguments[0]) else []
+            said.extend(
+                [ax.get_xlabel(), ax.get_ylabel(), *rows, *(t.get_text() for t in (legend.get_texts() if legend else []))]
+            )
+        draw(figure, *arguments, **options)
+
+    monkeypatch.setattr(Figure, "savefig", listen)
+    paths = write_handin(load_variants()["53"], result, tmp_path, language)
+    plain = " ".join(re.sub(r"\$[^$]*\$", "", text) for text in said)
+    assert {path.stem for path in paths} == {"handin", *(f"handin-{name}" for name in FIGURES)}
+    assert ("точный АОФ" in said and "ЛМФОС" in said) == (language == "ru")
+    assert ("exact AOF" in said and "LMFOS" in said) == (language == "en")
+    assert bool(re.search("[а-яА-Я]", plain)) == (language == "ru")
+    assert bool(re.search("[a-zA-Z]", plain)) == (language == "en")
+
+
+LEFT_OUT = {
+    "growth": ("x/2 + 25*x/(1 + x**2) + 8*cos(1.2*k) + v", "x**2/20 + w", "aof-gaussian", r"$\frac{1}{x^{2} + 1}$", "слагаемого"),
+    "kink": ("0.9*x + v", "sign(x) + w", "aof-linearised", "differentiable", "линеаризовать их нельзя"),
+    "nonlinear": ("0.9*x + v", "sin(x + w) + w**2", "aof-exact", "no simple density", "нет простой плотности"),
+    "no noise": ("0.9*x + v", "x + x**3", "particle", "no simple density", "нет простой плотности"),
+    "choice": ("(1 if x < 0 else 2) + v", "x + w", "aof-gaussian", r"\text{for}", r"\text{при}"),
+}
+
+
+@pytest.mark.parametrize("case", LEFT_OUT)
+def test_the_cause_of_a_refusal_is_said_in_the_report_s_words(case):
+    """The package's real messages: if their wording changes, the report would quote them instead."""
+    state, meter, name, english, russian = LEFT_OUT[case]
+    model = Model.define(state, meter)
+    (refused,) = admissions(model, [name])
+    assert refused.one is None
+    if case != "choice":  # its words are those of SymPy, translated in the whole report
+        assert english in cause(refused.reason, model, WORDS["en"]) and russian in cause(refused.reason, model, WORDS["ru"])
+    assert cause(refused.reason, model, WORDS["ru"]) != WORDS["ru"]["left_other"].format(reason=refused.reason)
+
+
+def test_a_filter_that_diverges_and_other_reasons():
+    model = load_variants()["53"].model
+    with pytest.raises(NotFinite) as caught:
+        cubic = Model.define("2*x + x**3 + v", "x + w")
+        compare(lab_filters(cubic, ["aof-linearised"]), cubic, 50, 40, 1, progress=False)
+    assert "trajectories" in cause(str(caught.value), model, WORDS["ru"])  # not the filter's fault: quoted
+    infinite = "step 7: duof became infinite or NaN although the trajectories are finite; leave it out or check the model"
+    assert "на шаге 7" in cause(infinite, model, WORDS["ru"]) and "at step 7" in cause(infinite, model, WORDS["en"])
+    assert "60 с" in cause(admission._TOO_LONG.format(60), model, WORDS["ru"])
+    assert cause("50 % of $ & _", model, WORDS["en"]) == "50 % of $ & _"
+
+
+def test_one_filter_left(tmp_path):
+    """The others are refused: named with their causes, together where they share it; nothing is compared, nothing fails."""
+    model = Model.define("0.9*x + v", "x + (1 if x > 0 else 0) + sin(w)")
+    found = admissions(model, LAB)
+    reasons = {one.name: one.reason for one in found if one.one is None}
+    result = compare([one.one for one in found if one.one], model, 200, 3, 1, progress=False)
+    result = dataclasses.replace(result, left_out=reasons)
+    paths = write_handin(Variant("one_left", "", model), result, tmp_path, "ru")
+    tex = (tmp_path / "handin.tex").read_text(encoding="utf-8")
+    assert r"\item ЛАОФ, ЛФОС, ЛМФОС: уравнения не дифференцируемы" in tex and r"\text{при}" in tex and r"\text{for}" not in tex
+    assert r"one\_left" in tex and "участвует один фильтр, ДУОФ" in tex
+    assert {path.stem for path in paths} == {"handin", "handin-accuracy", "handin-consistency"}
+
+
+def test_formulas_that_are_too_long_are_not_printed(result, monkeypatch, tmp_path):
+    monkeypatch.setattr(report, "LONGEST", 10)
+    write_handin(load_variants()["53"], result, tmp_path, "ru")
+    tex = (tmp_path / "handin.tex").read_text(encoding="utf-8")
+    assert tex.count("Формулы слишком длинны") == 2 and "too long" not in tex and "каталоге" not in tex
+
+
+@pytest.mark.quick
+def test_special_characters_are_escaped_outside_of_formulas():
+    assert inline_tex("a_b & 5 % – $x_k^2$ #") == r"a\_b \& 5 \% -- $x_k^2$ \#"
+
+
 @pytest.mark.quick
 def test_catalogue_numbers_are_the_courses():
     assert sorted(CATALOGUE.values()) == [2, 5, 8, 15, 16, 20, 22]
@@ -95,7 +184,7 @@ def test_catalogue_numbers_are_the_courses():
 
 @pytest.mark.quick
 def test_runs_of_steps_are_joined():
-    assert _ranges([1, 3, 4, 5, 8]) == "$1$, $3$–$5$, $8$"
+    assert ranges([1, 3, 4, 5, 8]) == "$1$, $3$–$5$, $8$"
 
 
 @pytest.mark.quick

@@ -2,7 +2,6 @@
 
 import os
 import sys
-import time
 from pathlib import Path
 
 import nbformat
@@ -72,8 +71,9 @@ def test_its_death_is_noticed(tmp_path):
 def test_it_is_interrupted():
     manager, client = start_new_kernel()
     try:
-        client.execute("import time; time.sleep(60)")
-        time.sleep(0.5)
+        client.execute("print('begun', flush=True)\nwhile True: pass")
+        while client.get_iopub_msg(timeout=30)["msg_type"] != "stream":
+            pass
         manager.interrupt_kernel()
         assert client.get_shell_msg(timeout=30)["content"]["ename"] == "KeyboardInterrupt"
     finally:

@@ -51,6 +51,7 @@ CHANGES = {
     "manoeuvres": ("CARTESIAN.subs({one: by_name", "CARTESIAN.subs({one: -by_name"),
     "wiener": ("past, future = common / (1 - a / zeta)", "past, future = common / (1 + a / zeta)"),
     "time-tags": ("s_hat = s.subs(t, t - tau)", "s_hat = s.subs(t, t + tau)"),
+    "literature": ("sp.Matrix([[sp.cos(angle), 0]])", "sp.Matrix([[-sp.cos(angle), 0]])"),
     "four-sensors": ("(s - d) / r, h / r, 0, 0", "(s - d) / r, -h / r, 0, 0"),
     "integration-limits": (
         "error_step = (1 + k_any) * (e_0 + xi) - k_any * n",

@@ -5,11 +5,13 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from kfcourse import ModelError
+from kfcourse import Model, ModelError, linearised, run
+from kfcourse.filters import aof
 from kfcourse.linear.system import linear_system
 from kfcourse.scenarios.errors import rms_by_part, rms_difference
 from kfcourse.scenarios.flight import aircraft
 from kfcourse.scenarios.radar import CARTESIAN, SPHERICAL, cartesian, kinematic, measure_cartesian, measure_spherical, spherical
+from kfcourse.symbolic.formula import symbol
 
 pytestmark = pytest.mark.quick
 
@@ -179,14 +181,40 @@ def test_the_same_seed_gives_the_same_measurements():
     assert not np.array_equal(measure_cartesian(track, 10.0, 3, 7), measure_cartesian(track, 10.0, 3, 8))
 
 
-def test_a_flight_through_the_azimuth_pi_is_refused():
-    behind = aircraft(1.0, start=(-40_000.0, -3_000.0, 8_500.0), heading=np.pi / 2)
-    with pytest.raises(ValueError, match="crosses the azimuth pi"):
-        measure_spherical(behind, (1.0, 0.0, 0.0), 2, seed=1)
-    beside = aircraft(1.0, start=(-40_000.0, 1.0, 8_500.0))  # not across, but within the noise of it
-    with pytest.raises(ValueError, match="crosses the azimuth pi"):
-        measure_spherical(beside, (1.0, 1e-3, 1e-3), 2, seed=1)
-    assert np.isfinite(measure_cartesian(behind, 1.0, 2, seed=1)).all()
+def test_a_flight_across_the_azimuth_pi_is_followed_as_any_other():
+    """The same flight turned by 90 degrees: the same errors of measurements, and the extended filter's estimates turn with it."""
+    sigmas, runs, T = (50.0, 2e-3, 3e-3), 20, 2.0
+    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    start = np.array([-40_000.0, -3_000.0, 8_500.0])
+    tracks = [aircraft(T, start=tuple(place), heading=h) for place, h in ((turned.T @ start, 0.0), (start, np.pi / 2))]
+    np.testing.assert_allclose(tracks[1].position, tracks[0].position @ turned.T, atol=1e-6)
+    assert (np.diff(spherical(tracks[1].position)[:, 1]) > 6).any()
+    found, measured = [], [measure_spherical(track, sigmas, runs, seed=5) for track in tracks]
+    assert (np.abs(np.diff(measured[1][..., 1], axis=0)) > 6).any(axis=0).all()  # every record jumps
+    assert np.abs(measured[1][..., 1]).max() <= np.pi
+    apart = measured[1] - measured[0] - [0.0, np.pi / 2, 0.0]
+    apart[..., 1] = np.remainder(apart[..., 1] + np.pi, 2 * np.pi) - np.pi
+    assert np.abs(apart).max() < 1e-6
+    for track, y in zip(tracks, measured, strict=True):
+        prior = {"mean": track.state[0], "variance": np.square([100.0] * 3 + [30.0] * 3)}
+        motion = kinematic(T, noise_sd=5.0, prior=prior)
+        w = [symbol(f"w{i + 1}") for i in range(3)]
+        names = dict(zip((symbol(name) for name in "xyz"), motion.x, strict=False))
+        meter = [formula.subs(names) + noise for formula, noise in zip(SPHERICAL, w, strict=True)]
+        model = Model.define(
+            list(motion.state_equation),
+            meter,
+            dict(motion.parameters),
+            symbols={"x": [s.name for s in motion.x]},
+            angles=["y2"],
+            prior=prior,
+            state_noise={"variance": motion.state_noise.cov},
+            meter_noise={"variance": np.square(sigmas)},
+        )
+        found.append(run(aof(linearised(model)), y).mean[..., :3])
+    np.testing.assert_allclose(found[1], found[0] @ turned.T, atol=1e-3)
+    error = np.linalg.norm(found[1] - tracks[1].position[:, None], axis=-1)
+    assert np.sqrt((error**2).mean()) < 200  # a single measurement: 60 km * 3 mrad = 180 m in elevation, 120 m in azimuth
 
 
 @pytest.mark.parametrize(

@@ -224,6 +224,15 @@ def test_no_closed_form_leads_to_a_numerical_structure(term):
     assert np.isfinite(unscented(model).predict(np.array([[1.0]]), np.array([[[0.01]]])).mean).all()
 
 
+def test_an_exponential_of_a_large_constant_is_not_torn_apart():
+    """A density e^((R - r)/H) near r = R: e^(2R/H) is e^950, beyond all numbers, and must not be computed by itself."""
+    model = Model.define("x - T*b*exp((R - x)/H) + v", "x + w", {"T": 0.1, "b": 0.6, "R": 6374, "H": 13.406})
+    z, p, slope = 6400.0, 2.0, 1 + 0.1 * 0.6 / 13.406 * np.exp(-26 / 13.406)
+    tau, Theta = linearised(model).predict(np.array([[z]]), np.array([[[p]]]))
+    np.testing.assert_allclose(tau, [[z - 0.1 * 0.6 * np.exp(-26 / 13.406)]], rtol=1e-13)
+    np.testing.assert_allclose(Theta, [[[slope**2 * p + 1]]], rtol=1e-12)
+
+
 def test_a_jump_cannot_be_linearised():
     x, v, w = sp.symbols("x v w")
     with pytest.raises(NoClosedForm, match="not differentiable"):

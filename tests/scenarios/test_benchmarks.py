@@ -1,0 +1,56 @@
+"""The benchmarks of the field: their models and data against what the sources print and say."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from kfcourse import linearised, run, simulate
+from kfcourse.filters import aof
+from kfcourse.scenarios.benchmarks import BEARINGS_ERRORS, REENTRY_ERRORS, bearings, bearings_data, reentry
+
+
+@pytest.mark.quick
+def test_the_course_of_the_target_is_the_sources_matrix_exponential():
+    """x' = expm(F dt) x step by step, from (0, 0, 1, 0), with the turn rates of the same seed."""
+    rng = np.random.default_rng(4)
+    rate = np.zeros((500, 3))
+    for start in (49, 199, 349):  # a(1,50:100) counts from one
+        rate[start : start + 51] = np.pi / 2 / 51 / 0.01 + 0.01 * rng.standard_normal((51, 3))
+    for one in range(3):
+        state, course = np.array([0.0, 0.0, 1.0, 0.0]), []
+        for a in rate[:, one]:
+            state = expm(0.01 * np.array([[0, 0, 1, 0], [0, 0, 0, 1], [0, 0, 0, a], [0, 0, -a, 0]])) @ state
+            course.append(state[:2])
+        np.testing.assert_allclose(bearings_data(3, 4)[0][:, one], course, rtol=0, atol=1e-12)
+
+
+@pytest.mark.quick
+def test_measurements_of_the_bearings_have_the_errors_of_the_model():
+    x, y = bearings_data(200, 1)
+    assert np.isnan(y[0]).all() and y.shape == (501, 200, 2)
+    for i, (px, py) in enumerate(((-1, -2), (1, 1))):
+        noise = y[1:, :, i] - np.arctan2(x[..., 1] - py, x[..., 0] - px)
+        assert abs(noise.std() / 0.05 - 1) < 4 / np.sqrt(2 * noise.size)  # 4 standard errors
+        assert abs(noise.mean()) < 4 * 0.05 / np.sqrt(noise.size)
+
+
+def test_the_extended_filter_has_the_published_errors():
+    """Means of roots of mean square errors over runs, within four standard errors of both simulations and the printed digits."""
+    x, y = bearings_data(200, 1)
+    error = run(aof(linearised(bearings())), y).mean[1:, :, :2] - x
+    each = np.sqrt((error**2).sum(axis=-1).mean(axis=0))
+    assert abs(each.mean() - BEARINGS_ERRORS["EKF"]) < 4 * each.std() * np.sqrt(1 / 200 + 1 / 1000) + 5e-4
+
+
+def test_the_reentry_of_the_source():
+    """Newton's law and the drag, in plain numbers; and the extended filter's published error, km."""
+    x, y = simulate(reentry(known=True), 40, 2001, seed=1)
+    r, speed = np.hypot(x[0, 0, 0], x[0, 0, 1]), np.hypot(x[0, 0, 2], x[0, 0, 3])
+    drag = -0.59783 * np.exp(0.6932) * np.exp((6374 - r) / 13.406) * speed
+    following = x[0, 0, 2:4] + 0.1 * (drag * x[0, 0, 2:4] - 3.986e5 / r**3 * x[0, 0, :2])
+    assert (np.abs(x[1, 0, 2:4] - following) < 5 * np.sqrt(2.4064e-5)).all()
+    assert (x[:, :, 4] == 0.6932).all() and np.ptp(x[-1, :, 0]) > 0
+    y[0] = np.nan  # the source predicts before its first correction
+    error = (run(aof(linearised(reentry(known=False))), y).mean - x)[1:, :, :2]
+    each = np.sqrt((error**2).sum(axis=-1).mean(axis=0))
+    assert abs(each.mean() - REENTRY_ERRORS["EKF"]) < 4 * each.std() * np.sqrt(1 / 40 + 1 / 100) + 5e-5
