@@ -191,6 +191,13 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
     help="Time for the slow filters: what fits is computed, and the report says on how many trajectories.",
 )
 @click.option(
+    "--exact-memory",
+    type=click.FloatRange(min=0, min_open=True),
+    default=1000.0,
+    show_default=True,
+    help="Megabytes for the slow filters (Linux): they take as many trajectories at once as have room.",
+)
+@click.option(
     "--designs",
     type=click.IntRange(min=1),
     help="Ensembles to design DUOF, FOS and MFOS on: how much they differ goes into the standard errors.  [default: 4]",
@@ -220,6 +227,7 @@ def lab(
     names: str | None,
     exact_runs: int,
     exact_seconds: float,
+    exact_memory: float,
     designs: int | None,
     wide: float,
     same_ensemble: bool,
@@ -266,6 +274,7 @@ def lab(
             seed,
             subset_runs=exact_runs,
             subset_seconds=exact_seconds,
+            subset_memory=1e6 * exact_memory,
             designs=1 if same_ensemble else designs or DESIGNS,
             same_ensemble=same_ensemble,
             wide=wide,

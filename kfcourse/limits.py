@@ -1,4 +1,4 @@
-"""A time limit for a block of code, in any thread and on any system.
+"""A time limit for a block of code, in any thread and on any system; a limit of memory, on Linux.
 
 Two ways to stop code that does not ask whether it should:
 
@@ -19,6 +19,9 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any, ClassVar
 
@@ -63,6 +66,27 @@ class time_limit:
                 return self._stopper.stop()
             except OutOfTime:  # too late, or of a block around this one: then it comes again
                 continue
+
+
+@contextmanager
+def memory_limit(more: float | None) -> Iterator[None]:
+    """MemoryError in this block where the process would take so many bytes more than it has; None is no limit.
+
+    Linux only: elsewhere the system has no such limit, and nothing is limited.
+    """
+    if more is None or sys.platform != "linux":
+        yield
+        return
+    import resource
+
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    before, most = resource.getrlimit(resource.RLIMIT_AS)
+    limit = pages * resource.getpagesize() + int(more)
+    resource.setrlimit(resource.RLIMIT_AS, (limit if before == resource.RLIM_INFINITY else min(limit, before), most))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (before, most))
 
 
 def _inside(frame: FrameType | None) -> bool:

@@ -169,7 +169,7 @@ def _elementwise(
 
     def moments(law: Callable[[Array], tuple[Array, Array]], x: Array) -> tuple[Array, Array]:
         mean, variance = law(x[..., None])
-        return np.broadcast_to(mean[..., 0], x.shape), np.broadcast_to(variance[..., 0, 0], x.shape)
+        return _spread(mean[..., 0], x.shape), _spread(variance[..., 0, 0], x.shape)
 
     def kernel(x: Array) -> tuple[Array, Array]:
         mean, variance = moments(next_state, x)
@@ -210,6 +210,11 @@ def _elementwise(
 
     jump = np.pi if model.angles.y else np.inf
     return ScalarDensities(kernel, kernel_slope, log_likelihood, signal, slope, residual, meter_width, jump, at_step=at_step)
+
+
+def _spread(values: Array, shape: tuple[int, ...]) -> Array:
+    """`np.broadcast_to` that costs nothing where there is nothing to do."""
+    return values if values.shape == shape else np.broadcast_to(values, shape)
 
 
 def _nonlinear(model: Model) -> bool:

@@ -19,7 +19,7 @@ exact_adaptive     for what they do not resolve, one trajectory at a time: panel
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -28,9 +28,9 @@ from kfcourse.angles import moments_on_circle
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
 from kfcourse.filters.exact_adaptive import check_scalar, estimated
-from kfcourse.filters.exact_batch import Posteriors, posteriors, settled
+from kfcourse.filters.exact_batch import Posteriors, posteriors
 from kfcourse.filters.exact_kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, of_prior
-from kfcourse.filters.exact_places import hidden, likeliest
+from kfcourse.filters.exact_places import hidden, likeliest, looked, spaced
 from kfcourse.filters.exact_predictions import predictions
 from kfcourse.filters.exact_roots import at_roots
 from kfcourse.laws import Array, Gaussian
@@ -39,10 +39,13 @@ from kfcourse.symbolic.reading import ModelError
 
 ACCURACY = 1e-6  # of the mean and the deviation at a step, in posterior standard deviations
 TOLERABLE = 1e-3  # error of a step that no way resolves better, before the filter gives up
-NODES = (33, 65, 129, 257)  # tried one after the other
-LOOKED = 25  # nodes of the look that finds the place
+NODES = (33, 49, 65, 97, 129, 193, 257)  # that a posterior may have
+MORE = 1.9  # times more nodes than did not do
+SPACINGS = (0.5, 0.35, 0.25, 0.18, 0.12)  # of its nodes, tried one after the other
 FINE = (129, 257)  # nodes of a posterior that must be interpolated: the second if the first are too few to share its mass
 ELEMENTS = 2**20  # of kernels, that many trajectories at once
+MEMORY = 2**28  # bytes of predictions
+REMADE = 128  # trajectories whose predictions are made again at once
 
 
 class PointMass(NamedTuple):
@@ -59,19 +62,30 @@ class PointMass(NamedTuple):
         Whether this step was left to the adaptive filter.
     groups : list of (ndarray, Kernels)
         The predictions: numbers of trajectories, and their kernels.
+    later : ndarray of int
+        Trajectories whose predictions are made again in the next step, as there is no room for them.
     """
 
     fine: list[Grid]
     error: Array
     adaptive: Array
     groups: list[tuple[Array, Kernels]]
+    later: Array
+
+    def predictions(self, law: ScalarDensities) -> Iterator[tuple[Array, Kernels]]:
+        """Those of all trajectories, as `groups`; with the law of the step that was made."""
+        yield from self.groups
+        for chunk in chunks(len(self.later), 1, REMADE):
+            rows = self.later[chunk]
+            for some, kernels in predictions([self.fine[i] for i in rows.tolist()], law):
+                yield rows[some], kernels
 
     def discretisation_error(self) -> Array:
         """Estimated error of the posterior means, (runs,), in the units of x."""
         return self.error * np.sqrt([grid.variance() for grid in self.fine])
 
 
-def pointmass(model: Model, accuracy: float = ACCURACY) -> Filter:
+def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) -> Filter:
     """The exact AOF of a scalar model by point masses.
 
     Parameters
@@ -82,6 +96,9 @@ def pointmass(model: Model, accuracy: float = ACCURACY) -> Filter:
     accuracy : float
         Largest estimated error of a step, in posterior standard deviations; a step with a larger one is left to the
         adaptive filter.
+    memory : float
+        Bytes that predictions may take from one step to the next; those of further trajectories are made twice, a chunk of some
+        50 MB at a time.  A posterior is some kB, 10 MB at most, and not counted.
 
     Raises
     ------
@@ -97,30 +114,37 @@ def pointmass(model: Model, accuracy: float = ACCURACY) -> Filter:
 
     def step(state: State, y: Array) -> State:
         first = np.zeros(len(y), dtype=int)
-        groups = state.memory.groups if state.memory else [(np.arange(len(y)), prior.rows(first))]
         law = densities.at(state.step)
+
+        def before() -> Iterable[tuple[Array, Kernels]]:
+            return (
+                state.memory.predictions(densities.at(state.step - 1))
+                if state.memory
+                else [(np.arange(len(y)), prior.rows(first))]
+            )
+
         try:
             try:
-                posterior, predicted, memory = _step(groups, y, law, accuracy, FINE[0])
+                posterior, predicted, found = _step(before(), y, law, accuracy, FINE[0], memory)
             except TooNarrow:
-                posterior, predicted, memory = _step(groups, y, law, accuracy, FINE[1])
+                posterior, predicted, found = _step(before(), y, law, accuracy, FINE[1], memory)
         except Unresolved as error:
             raise Unresolved(f"step {state.step} of {model}: {error}; leave the exact filter out (--exact-runs 0)") from None
         if model.angles.x:
-            posterior, predicted = _on_circle(memory)
+            posterior, predicted = _on_circle(found, law)
         if state.memory:
-            memory = memory._replace(error=memory.error + state.memory.error)
-        return State(state.step + 1, posterior, predicted, memory)
+            found = found._replace(error=found.error + state.memory.error)
+        return State(state.step + 1, posterior, predicted, found)
 
     return Filter("aof-exact", model, init, step, slow=True)
 
 
-def _on_circle(memory: PointMass) -> tuple[Gaussian, Gaussian]:
+def _on_circle(memory: PointMass, law: ScalarDensities) -> tuple[Gaussian, Gaussian]:
     """Posterior and prediction of a state that is an angle: the filter works on the line, whole turns are dropped at the end."""
     after, before = np.empty((2, len(memory.fine))), np.empty((2, len(memory.fine)))
     for place, grid in enumerate(memory.fine):
         after[:, place] = moments_on_circle(grid.x, grid.mass)
-    for rows, kernels in memory.groups:
+    for rows, kernels in memory.predictions(law):
         mean, variance = moments_on_circle(kernels.mu, kernels.mass)
         before[:, rows] = mean, variance + (kernels.mass * kernels.sigma**2).sum(axis=1)
     posterior, predicted = (Gaussian(mean[:, None], variance[:, None, None]) for mean, variance in (after, before))
@@ -128,7 +152,7 @@ def _on_circle(memory: PointMass) -> tuple[Gaussian, Gaussian]:
 
 
 def _step(
-    groups: list[tuple[Array, Kernels]], y: Array, law: ScalarDensities, accuracy: float, fine_nodes: int
+    groups: Iterable[tuple[Array, Kernels]], y: Array, law: ScalarDensities, accuracy: float, fine_nodes: int, room: float
 ) -> tuple[Gaussian, Gaussian, PointMass]:
     """Posterior, prediction of the next state, and memory after the measurements y (runs, 1)."""
     grids: dict[int, Grid] = {}
@@ -141,13 +165,13 @@ def _step(
                 mean[place], variance[place] = grid.mean(), grid.variance()
             continue
         for chunk in chunks(len(rows), NODES[0] * kernels.mu.shape[1], ELEMENTS):
-            left = rows[chunk]
-            for done, found, good in _in_batch(left, kernels.rows(chunk), y[left], law, accuracy, fine_nodes):
+            unresolved = []
+            for done, found, good in _in_batch(rows[chunk], kernels.rows(chunk), y[rows[chunk]], law, accuracy, fine_nodes):
                 mean[done], variance[done], error[done] = found.mean, found.variance, found.error + found.inherited
                 for place, x, mass, density in zip(done.tolist(), found.x, found.mass, found.density, strict=True):
                     grids[place] = Grid(x, mass, density, uniform=True)
-                left = np.setdiff1d(left, done[good], assume_unique=True)
-            for place in left.tolist():
+                unresolved += done[~good].tolist()
+            for place in unresolved:
                 try:
                     grid, error_there = estimated(kernels.rows(rows == place), float(y[place, 0]), law)
                 except Unresolved:
@@ -157,12 +181,17 @@ def _step(
                     grids[place], error[place], adaptive[place] = grid, error_there, True
                     mean[place], variance[place] = grid.mean(), grid.variance()
     fine = [grids[place] for place in range(len(y))]
-    following = predictions(fine, law)
     predicted = np.empty((2, len(y)))
-    for rows, kernels in following:
+    following, later = [], [np.empty(0, dtype=int)]
+    for rows, kernels in predictions(fine, law):
         predicted[:, rows] = kernels.moments()
+        room -= kernels.bytes()
+        if room >= 0:
+            following.append((rows, kernels))
+        else:
+            later.append(rows)
     posterior, prediction = (Gaussian(m[:, None], v[:, None, None]) for m, v in ((mean, variance), predicted))
-    return posterior, prediction, PointMass(fine, error, adaptive, following)
+    return posterior, prediction, PointMass(fine, error, adaptive, following, np.sort(np.concatenate(later)))
 
 
 def _in_batch(
@@ -170,20 +199,26 @@ def _in_batch(
 ) -> Iterator[tuple[Array, Posteriors, Array]]:
     """Places of trajectories, their posteriors, and whether these are resolved; on the finest grid also those that are not."""
     place, candidates = likeliest(kernels, y, law)
-    left, least = np.arange(len(rows)), np.zeros(len(rows))  # trajectories to do, and the nodes they need
-    for count in NODES:
-        todo, done = left[least[left] <= count], []
-        for chunk in chunks(len(todo), count * kernels.mu.shape[1], ELEMENTS):
-            i = todo[chunk]
-            there = settled(kernels.rows(i), y[i], law, place.rows(i), LOOKED, count)
-            found = posteriors(kernels.rows(i), y[i], law, there, count)
-            least[i] = nodes_for_kernels(law, found, count, fine_nodes)
-            found = found._replace(error=np.where(hidden(candidates.rows(i), there, count), np.inf, found.error))
-            good = (found.error <= accuracy) & (least[i] <= count)
-            told = good | (count == NODES[-1])
-            yield rows[i[told]], Posteriors(*(array[told] for array in found)), good[told]
-            done.append(i[good])
-        left = np.setdiff1d(left, np.concatenate([*done, np.empty(0, dtype=int)]), assume_unique=True)
+    look = looked(kernels, y, law, place)
+    left, least = np.arange(len(rows)), np.zeros(len(rows))  # trajectories to do, and the nodes that kernels need
+    for spacing in SPACINGS:
+        place, wanted = spaced(look.rows(left), candidates.rows(left), law, spacing)
+        sizes = np.searchsorted(NODES[:-1], np.maximum(wanted, least[left]))
+        again = np.zeros(len(left), dtype=bool)
+        for size in np.unique(sizes).tolist():
+            count, todo = NODES[size], np.flatnonzero(sizes == size)
+            for chunk in chunks(len(todo), count * kernels.mu.shape[1], ELEMENTS):
+                some = todo[chunk]
+                i, there = left[some], place.rows(some)
+                found = posteriors(kernels.rows(i), y[i], law, there, count)
+                least[i] = nodes_for_kernels(law, found, count, fine_nodes)
+                found = found._replace(error=np.where(hidden(candidates.rows(i), there, count), np.inf, found.error))
+                good = (found.error <= accuracy) & (least[i] <= count)
+                told = good | (spacing == SPACINGS[-1]) | (count == NODES[-1])
+                yield rows[i[told]], Posteriors(*(array[told] for array in found)), good[told]
+                least[i] = np.maximum(least[i], np.where(good, 0, MORE * count))
+                again[some] = ~told
+        left = left[again]
         if not len(left):
             return
 

@@ -17,13 +17,12 @@ from typing import NamedTuple
 import numpy as np
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_kernels import ROOT, Kernels
+from kfcourse.filters.exact_kernels import Kernels
 from kfcourse.laws import Array
 
-TAIL = 1e-20  # mass at a node that is beyond the end of a posterior
-SPACING = 0.4  # of nodes at the highest hump, in its width
 ROUNDING = 10 * np.finfo(float).eps  # of a node and its density, relative to x
-INTERPOLATED = 64.0  # interpolation of order 8 at twice the distance errs 2^8 times as much; a factor 4 is safety
+POWER = 1.75  # the error is about that by every second node, to this power: 2 for analytic humps, 1.6 beside p = exp(-a / x^2)
+INTERPOLATED = 16.0  # interpolation of order 8 at twice the distance errs 2^8 times as much, but near a zero of the density less
 
 
 class Place(NamedTuple):
@@ -74,38 +73,6 @@ class Posteriors(NamedTuple):
     inherited: Array
 
 
-def settled(kernels: Kernels, y: Array, law: ScalarDensities, place: Place, looked: int, count: int) -> Place:
-    """A better place for `count` nodes, from a look at the posterior with `looked` nodes.
-
-    The centre is the highest point.  The scale is the largest with which the hump there is resolved: its width is that of a
-    normal hump as high, or less if the posterior falls off faster.  The support ends where the posterior is negligible.
-    """
-    coarse = kernels.thinned()
-    x, length = place.nodes(looked)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        logs = np.log(coarse.density(x, coarse.mass)[:, :, 0]) + law.log_likelihood(y, x)
-    logs = np.where(np.isnan(logs), -np.inf, logs)
-    top = logs.argmax(axis=1, keepdims=True)
-    with np.errstate(invalid="ignore"):
-        mass = np.exp(logs - np.take_along_axis(logs, top, axis=1)) * length
-    area = mass.sum(axis=1, keepdims=True)
-    seen = np.isfinite(area)
-    counts = mass > TAIL * area
-    first = np.maximum(counts.argmax(axis=1) - 1, 0)[:, None]
-    last = np.minimum(looked - counts[:, ::-1].argmax(axis=1), looked - 1)[:, None]
-    low = np.where(seen, np.take_along_axis(x, first, axis=1), place.low)
-    high = np.where(seen, np.take_along_axis(x, last, axis=1), place.high)
-    centre = np.where(seen, np.take_along_axis(x, top, axis=1), place.centre)
-    fallen = np.where(logs < np.take_along_axis(logs, top, axis=1) - 0.5, np.abs(x - centre), np.inf).min(axis=1, keepdims=True)
-    width = np.where(seen, np.minimum(area / ROOT, 2 * fallen), place.scale)
-    scale, wanted = width, SPACING * np.sqrt(32 * (count - 1)) * width
-    for _ in range(6):  # of the equation: distance of the nodes at the centre = wanted
-        with np.errstate(invalid="ignore"):  # a support that is a single point: its error will be infinite
-            span = np.arcsinh((high - centre) / scale) + np.arcsinh((centre - low) / scale)
-        scale = np.minimum(wanted / span, high - low)
-    return Place(centre, scale, low, high)
-
-
 def posteriors(kernels: Kernels, y: Array, law: ScalarDensities, place: Place, count: int) -> Posteriors:
     """Predict and correct with y (T, 1) on `count` nodes, an odd number: every second one has both ends."""
     x, length = place.nodes(count)
@@ -124,7 +91,7 @@ def posteriors(kernels: Kernels, y: Array, law: ScalarDensities, place: Place, c
         beyond = (mass[:, 0] + mass[:, -1]) * np.maximum(mean - x[:, 0], x[:, -1] - mean) / np.sqrt(variance)
         rounding = ROUNDING * np.abs(mean) / np.sqrt(variance)
         nested, inherited = (np.maximum(change - rounding, 0.0) for change in (nested, inherited))
-        error = nested * nested + beyond
+        error = nested**POWER + beyond
         inherited = rounding + np.where(kernels.spectral, inherited * inherited, inherited / INTERPOLATED)
         density = mass / length
     return Posteriors(x, mass, density, mean, variance, *(np.where(np.isfinite(e), e, np.inf) for e in (error, inherited)))

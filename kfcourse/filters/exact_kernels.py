@@ -22,7 +22,8 @@ NEGLIGIBLE = 1e-14  # mass that may be left out
 ROOT = np.sqrt(2 * np.pi)
 # Sigmas of a kernel, in distances of the centres: a sum over every second node errs by exp(-pi^2 / 2 OVERLAP^2) = 6e-5.
 OVERLAP = 1.4
-SEEN = 1e-9  # mass of a node whose kernel must overlap with its neighbours'
+SEEN = 1e-10  # mass of a node whose kernel need not overlap with its neighbours'
+LOWEST = 700.0  # exponentials of -LOWEST and less are nothing; NumPy takes ten times as long for those that underflow
 CACHED = 2**15  # elements of the largest array, 256 kB: it stays in the processor's cache
 
 
@@ -72,6 +73,8 @@ class Kernels(NamedTuple):
         True where the error falls exponentially with the nodes, false where the posterior was interpolated.
     pushed : callable, optional
         For T = 1: x (1, N) -> the density and that of `even`, (1, N, 2), if the sum of kernels is too rough for it.
+    pushed_bytes : int
+        That `pushed` holds.
     """
 
     mu: Array
@@ -82,6 +85,11 @@ class Kernels(NamedTuple):
     width: Array
     spectral: Array
     pushed: Callable[[Array], Array] | None = None
+    pushed_bytes: int = 0
+
+    def bytes(self) -> int:
+        """That it holds."""
+        return sum(array.nbytes for array in self[:7]) + self.pushed_bytes
 
     def support(self, sigmas: float = WIDTH) -> tuple[Array, Array]:
         """Lower and upper limit, (T, 1) each: so many sigmas around every kernel that counts."""
@@ -108,9 +116,11 @@ class Kernels(NamedTuple):
             kernel = x[i, :, None] * rate[i, None, :]
             kernel -= centre[i, None, :]
             kernel *= kernel
+            np.minimum(kernel, LOWEST, out=kernel)
             np.negative(kernel, out=kernel)
             np.exp(kernel, out=kernel)
             np.matmul(kernel, weights[i], out=result[i])
+        result[result <= 2 * np.exp(-LOWEST) * weights.sum(axis=1, keepdims=True)] = 0.0
         return result / np.sqrt(np.pi)
 
     def moments(self) -> tuple[Array, Array]:
@@ -121,7 +131,7 @@ class Kernels(NamedTuple):
 
     def rows(self, chosen: Array | slice) -> Kernels:
         mu, sigma, mass, even, centre, width, spectral = (array[chosen] for array in self[:7])
-        return Kernels(mu, sigma, mass, even, centre, width, spectral, self.pushed)
+        return Kernels(mu, sigma, mass, even, centre, width, spectral, self.pushed, self.pushed_bytes)
 
 
 def of_prior(prior: Gaussian) -> Kernels:
@@ -131,11 +141,16 @@ def of_prior(prior: Gaussian) -> Kernels:
     return Kernels(mean * one, sigma * one, one, one, mean * one, sigma * one, np.array([True]))
 
 
+def overlap(mass: Array) -> Array:
+    """Sigmas of a node's kernel, in distances of the centres, that do: the sum errs by mass exp(-2 pi^2 overlap^2) there."""
+    return OVERLAP * np.sqrt(np.clip(1 - np.log(np.maximum(mass, SEEN)) / np.log(SEEN), 0, 1))
+
+
 def apart(mu: Array, sigma: Array, mass: Array) -> Array:
     """How far apart the kernels (T, M) of neighbouring nodes lie, (T,): up to 1, their sum is as good as the integral."""
     distance = np.abs(np.diff(mu, axis=1))
     gap = np.maximum(distance[:, 1:], distance[:, :-1]) / sigma[:, 1:-1]
-    return OVERLAP * (gap * (mass[:, 1:-1] > SEEN)).max(axis=1)
+    return (gap * overlap(mass[:, 1:-1])).max(axis=1)
 
 
 def overlapping(x: Array, mass: Array, density: Array, uniform: bool, law: ScalarDensities) -> Kernels:

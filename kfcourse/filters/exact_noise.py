@@ -21,7 +21,7 @@ from scipy.ndimage import binary_dilation, binary_erosion
 from scipy.special import erf
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_kernels import CACHED, OVERLAP, ROOT, Grid, Kernels, Unresolved, chunks
+from kfcourse.filters.exact_kernels import CACHED, OVERLAP, ROOT, Grid, Kernels, TooNarrow, Unresolved, chunks
 from kfcourse.filters.exact_narrow import DEAD, interpolated, panels
 from kfcourse.laws import Array
 
@@ -99,7 +99,7 @@ class Pushed:
             logs = np.maximum(np.log(mass / mass.sum()), -DEAD)
         values = np.stack([x, logs, length])
         table = np.linspace(0, len(x) - 1, FINER * (len(x) - 1) + 1)
-        states, heights, _ = interpolated(values, table)
+        states, heights, _ = interpolated(values[:, None], table)
         mu, sigma = law.kernel(states)
         numbers = np.arange(len(x))
         turning, density = _turning(mu, sigma, heights)
@@ -128,6 +128,11 @@ class Pushed:
                     images.append((u, branch.start, image[branch]))
         return cls(values, law, chi, table, step, images, *_summed(values, chi, numbers, law))
 
+    def bytes(self) -> int:
+        """That it holds."""
+        images = sum(image.nbytes for _, _, image in self.images)
+        return images + sum(array.nbytes for array in (self.values, self.table, self.mu, self.sigma, self.mass))
+
     def density(self, wanted: Array) -> Array:
         """p(x') at (N',)."""
         result = np.zeros(len(wanted))
@@ -146,14 +151,14 @@ class Pushed:
         i, u, at = np.concatenate(places), np.concatenate(noises), np.concatenate(starts)
         last = self.values.shape[1] - 1
         for _ in range(NEWTON):
-            x, _, length = interpolated(self.values, at)
+            x, _, length = interpolated(self.values[:, None], at)
             (mu, sigma), (mu_slope, sigma_slope) = self.law.kernel(x), self.law.kernel_slope(x)
             slope = (mu_slope + sigma_slope * u) * length
             with np.errstate(divide="ignore", invalid="ignore"):
                 moved = at - (mu + sigma * u - wanted[i]) / slope
             at = np.where(np.abs(moved - at) < 1, np.clip(moved, 0, last), at)
         with np.errstate(divide="ignore", invalid="ignore"):
-            terms = np.exp(interpolated(self.values, at)[1] - 0.5 * u * u) * (1 - self.chi(at)) / np.abs(slope)
+            terms = np.exp(interpolated(self.values[:, None], at)[1] - 0.5 * u * u) * (1 - self.chi(at)) / np.abs(slope)
         return result + self.step / ROOT * np.bincount(i, np.where(np.isfinite(terms), terms, 0.0), len(wanted))
 
 
@@ -170,8 +175,10 @@ def _summed(values: Array, chi: Chi, numbers: Array, law: ScalarDensities) -> tu
     """The kernels of chi p."""
     if not len(chi.begin):
         return np.empty(0), np.empty(0), np.empty(0)
-    at, weight = panels(values[0], np.exp(values[1]) * chi(numbers), law, MOST)
-    x, logs, _ = interpolated(values, at)
+    _, at, weight, _ = panels(values[:1], (np.exp(values[1]) * chi(numbers))[None], law, MOST)
+    if not len(at):
+        raise TooNarrow("the transition kernel is far narrower than the posterior")
+    x, logs, _ = interpolated(values[:, None], at)
     mass = weight * np.exp(logs) * chi(at)
     kept = mass > POLES**2
     return (*(array[kept] for array in law.kernel(x)), mass[kept])
@@ -193,4 +200,4 @@ def by_noise(grid: Grid, law: ScalarDensities, rough: Kernels) -> Kernels:
     def both(x: Array) -> Array:
         return np.stack([full.density(x[0]), even.density(x[0])], axis=-1)[None]
 
-    return rough._replace(pushed=both, spectral=np.array([False]))
+    return rough._replace(pushed=both, spectral=np.array([False]), pushed_bytes=full.bytes() + even.bytes())

@@ -12,10 +12,15 @@ import numpy as np
 
 from kfcourse.filters.densities import ScalarDensities
 from kfcourse.filters.exact_batch import Place
-from kfcourse.filters.exact_kernels import ROOT, Kernels
+from kfcourse.filters.exact_kernels import ROOT, Kernels, overlap
 from kfcourse.laws import Array
 
-HIDDEN = np.log(1e-9)  # mass of a hump that does not count
+HIDDEN = np.log(1e-12)  # mass of a hump that does not count
+LOOKED = 25  # nodes of a look
+TAIL = 1e-18  # mass at a node that is beyond the end of a posterior
+HUMP = 2.0  # widths of the highest hump, to both sides of its top, on which it is resolved
+FRACTIONS = np.linspace(0.1, 1, 5)  # scales that are tried: powers of the support's width in the hump's
+MOST = 257  # nodes of a posterior
 SEARCHED = 33  # points of the support that are looked at for a change of sign
 SECTIONS = np.linspace(0, 1, 17)  # of a bracket
 EXPLANATIONS = 3  # roots that are followed: those nearest to the middle of the prediction
@@ -27,6 +32,10 @@ class Candidates(NamedTuple):
     centre: Array
     width: Array
     log_mass: Array
+
+    def matter(self) -> Array:
+        """Which of them have so much mass that they may count."""
+        return self.log_mass > self.log_mass.max(axis=1, keepdims=True) + HIDDEN
 
     def rows(self, chosen: Array | slice) -> Candidates:
         return Candidates(*(array[chosen] for array in self))
@@ -50,10 +59,80 @@ def likeliest(kernels: Kernels, y: Array, law: ScalarDensities) -> tuple[Place, 
     return chosen, Candidates(known, scales, logs)
 
 
+class Look(NamedTuple):
+    """A rough view of posteriors: masses on a few nodes (T, LOOKED), the highest point, the width of the hump there, the ends."""
+
+    x: Array
+    mass: Array
+    centre: Array
+    width: Array
+    low: Array
+    high: Array
+
+    def rows(self, chosen: Array | slice) -> Look:
+        return Look(*(array[chosen] for array in self))
+
+
+def looked(kernels: Kernels, y: Array, law: ScalarDensities, place: Place) -> Look:
+    """A look at the posterior with few nodes.
+
+    The width is that of a normal hump as high, or less if the posterior falls off faster.  It ends where it is negligible.
+    """
+    coarse = kernels.thinned()
+    x, length = place.nodes(LOOKED)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logs = np.log(coarse.density(x, coarse.mass)[:, :, 0]) + law.log_likelihood(y, x)
+    logs = np.where(np.isnan(logs), -np.inf, logs)
+    top = logs.argmax(axis=1, keepdims=True)
+    with np.errstate(invalid="ignore"):
+        mass = np.exp(logs - np.take_along_axis(logs, top, axis=1)) * length
+    seen = np.isfinite(mass.sum(axis=1, keepdims=True))
+    mass = np.where(seen, mass, length)
+    area = mass.sum(axis=1, keepdims=True)
+    counts = mass > TAIL * area
+    first = np.maximum(counts.argmax(axis=1) - 1, 0)[:, None]
+    last = np.minimum(LOOKED - counts[:, ::-1].argmax(axis=1), LOOKED - 1)[:, None]
+    low = np.where(seen, np.take_along_axis(x, first, axis=1), place.low)
+    high = np.where(seen, np.take_along_axis(x, last, axis=1), place.high)
+    centre = np.where(seen, np.take_along_axis(x, top, axis=1), place.centre)
+    fallen = np.where(logs < np.take_along_axis(logs, top, axis=1) - 0.5, np.abs(x - centre), np.inf).min(axis=1, keepdims=True)
+    width = np.where(seen, np.minimum(area / ROOT, 2 * fallen), place.scale)
+    with np.errstate(invalid="ignore"):  # a support that is a single point
+        mass = mass / area
+    return Look(x, mass, centre, width, low, high)
+
+
+def spaced(look: Look, candidates: Candidates, law: ScalarDensities, spacing: float) -> tuple[Place, Array]:
+    """The place with which the fewest nodes do, and how many (T,).
+
+    They do if the nodes of the highest hump, to both sides of its top, are no farther apart than `spacing` of its width, those at
+    other humps than theirs, and if the kernels of all nodes overlap.  Where that takes more than MOST, kernels do not count.
+    """
+    x, mass, centre, width, low, high = look
+    with np.errstate(divide="ignore", invalid="ignore"):  # a support that is a single point: its error will be infinite
+        scale = width * ((high - low) / width) ** FRACTIONS
+        span = np.arcsinh((high - centre) / scale) + np.arcsinh((centre - low) / scale)
+        dense = overlap(mass) * np.abs(law.kernel_slope(x)[0]) / law.kernel(x)[1]
+        by_kernels = _densest(dense, x - centre, scale)
+        by_humps = _densest(np.where(candidates.matter(), 1 / candidates.width, 0.0), candidates.centre - centre, scale)
+        by_humps = np.maximum(by_humps, np.hypot(scale, HUMP * width) / (spacing * width))
+        wanted = span * np.maximum(by_humps, by_kernels)
+        wanted = np.where(wanted.min(axis=1, keepdims=True) < MOST, wanted, span * by_humps)
+    best = np.where(np.isnan(wanted), np.inf, wanted).argmin(axis=1)[:, None]
+    number = np.take_along_axis(wanted, best, axis=1)[:, 0] + 1
+    return Place(centre, np.take_along_axis(scale, best, axis=1), low, high), np.where(np.isnan(number), MOST, number)
+
+
+def _densest(dense: Array, distance: Array, scale: Array) -> Array:
+    """Largest of dense sqrt(scale^2 + distance^2), (T, S), for densities of nodes at distances from the centre (T, N)."""
+    square = dense * dense
+    return np.sqrt((square[:, None] * (scale * scale)[:, :, None] + (square * distance * distance)[:, None]).max(axis=2))
+
+
 def hidden(candidates: Candidates, place: Place, count: int) -> Array:
     """Rows (T,) in which a hump that may count could fall between two nodes."""
-    counts = candidates.log_mass > candidates.log_mass.max(axis=1, keepdims=True) + HIDDEN
-    return (counts & (place.distance(candidates.centre, count) > 2 * candidates.width)).any(axis=1)
+    far = place.distance(candidates.centre, count) > 2 * candidates.width
+    return np.any(candidates.matter() & far, axis=1)
 
 
 def explanations(kernels: Kernels, y: Array, law: ScalarDensities, low: Array, high: Array) -> Array:

@@ -7,66 +7,99 @@ exact_noise    the integral over the noise, where too many more would be needed
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_kernels import Grid, Kernels, Unresolved, apart, overlapping
-from kfcourse.filters.exact_narrow import refined
+from kfcourse.filters.exact_kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, overlapping
+from kfcourse.filters.exact_narrow import Finer, refined
 from kfcourse.filters.exact_noise import by_noise
 from kfcourse.laws import Array
 
-FEW = 2048  # nodes with which a sum of kernels is cheaper than the integral over the noise
+FEW = 6144  # nodes with which a sum of kernels is cheaper than the integral over the noise
+ELEMENTS = 2**19  # nodes that are refined at once, or put together: some 50 MB while it lasts
 MOST = 24_576  # nodes with which the largest array has 50 MB, and a step takes 50 ms
+PACKED = (256, 512, 768, 1024, 1536, 2048, 4096, 8192, 16_384, MOST)  # kernels up to which predictions are taken together
 
 
-def predictions(grids: Sequence[Grid], law: ScalarDensities) -> list[tuple[Array, Kernels]]:
-    """The predictions of all posteriors, those of equally many kernels together: (places of the posteriors, kernels)."""
+def predictions(grids: Sequence[Grid], law: ScalarDensities) -> Iterator[tuple[Array, Kernels]]:
+    """The predictions of all posteriors, those of about as many kernels together: (places of the posteriors, kernels)."""
     groups: dict[tuple[int, bool], list[int]] = {}
-    for i, grid in enumerate(grids):
+    for place, grid in enumerate(grids):
         size = len(grid.x) if grid.uniform else 64 * -(-len(grid.x) // 64)
-        groups.setdefault((size, grid.uniform), []).append(i)
-    result = []
-    finer: dict[int, list[tuple[int, Kernels]]] = {}
+        groups.setdefault((size, grid.uniform), []).append(place)
+    finer: list[Finer] = []
+    middle = np.empty((2, len(grids), 1))  # centre and width of each prediction
     for (size, uniform), members in groups.items():
-        rows = np.array(members)
-        x, mass, density = _stacked([grids[i][:3] for i in members], size, 1)
-        kernels = overlapping(x, mass, density, uniform, law)
-        narrow = uniform & (apart(kernels.mu, kernels.sigma, mass) > 1)
-        if not narrow.all():
-            result.append((rows[~narrow], kernels.rows(~narrow)))
-        for i in np.flatnonzero(narrow).tolist():
-            one = _narrow(grids[members[i]], law, kernels.rows(slice(i, i + 1)))
-            if one.pushed is not None:
-                result.append((rows[i : i + 1], one))
+        for some in chunks(len(members), size, ELEMENTS):
+            rows = np.array(members[some])
+            x, mass, density = _stacked([grids[i] for i in rows.tolist()], size)
+            kernels = overlapping(x, mass, density, uniform, law)
+            middle[:, rows] = kernels.centre, kernels.width
+            too_narrow = uniform & (apart(kernels.mu, kernels.sigma, mass) > 1)
+            narrow = np.flatnonzero(too_narrow)
+            if not len(narrow):
+                yield rows, kernels
                 continue
-            finer.setdefault(128 * -(-one.mu.shape[1] // 128), []).append((members[i], one))
-    for size, several in finer.items():
-        mu, sigma, mass, even = _stacked([[one.mu[0], one.sigma[0], one.mass[0], one.even[0]] for _, one in several], size, 2)
-        centre, width, spectral = (
-            np.concatenate([getattr(one, name) for _, one in several]) for name in ("centre", "width", "spectral")
-        )
-        result.append((np.array([i for i, _ in several]), Kernels(mu, sigma, mass, even, centre, width, spectral)))
-    return result
+            if not too_narrow.all():
+                yield rows[~too_narrow], kernels.rows(~too_narrow)
+            for chunk in chunks(len(narrow), FEW, ELEMENTS):
+                i = narrow[chunk]
+                found = refined(x[i], mass[i], law, FEW)
+                finer.append(found._replace(row=rows[i[found.row]]))
+                for j in np.setdiff1d(i, i[found.row]).tolist():
+                    way = _far_narrower(Grid(x[j], mass[j], density[j], uniform=True), law, kernels.rows(slice(j, j + 1)))
+                    if isinstance(way, Finer):
+                        finer.append(way._replace(row=np.full(len(way.row), rows[j])))
+                    else:
+                        yield rows[j : j + 1], way
+                if sum(len(one.row) for one in finer) > ELEMENTS:
+                    yield from _packed(finer, *middle)
+                    finer = []
+    if finer:
+        yield from _packed(finer, *middle)
 
 
-def _narrow(grid: Grid, law: ScalarDensities, rough: Kernels) -> Kernels:
-    """The prediction of one trajectory whose kernels do not overlap, by the cheapest way that there is."""
-    for way in (lambda: refined(grid, law, rough, FEW), lambda: by_noise(grid, law, rough)):
-        try:
-            return way()
-        except Unresolved:
-            continue
-    return refined(grid, law, rough, MOST)
+def _far_narrower(grid: Grid, law: ScalarDensities, rough: Kernels) -> Kernels | Finer:
+    """The prediction of one trajectory whose kernels are too narrow for a sum of FEW."""
+    try:
+        return by_noise(grid, law, rough)
+    except Unresolved:
+        found = refined(grid.x[None], grid.mass[None], law, MOST)
+        if not len(found.row):
+            raise TooNarrow("the transition kernel is far narrower than the posterior") from None
+        return found
 
 
-def _stacked(rows: Sequence[Sequence[Array]], size: int, places: int) -> Array:
-    """Arrays (size,) of each row, (number of arrays, rows, size): the first are places, filled up with the last; then 0."""
-    found = np.zeros((len(rows[0]), len(rows), size))
-    for i, row in enumerate(rows):
-        for j, array in enumerate(row):
-            found[j, i, : len(array)] = array
-            if j < places:
-                found[j, i, len(array) :] = array[-1]
-    return found
+def _packed(finer: Sequence[Finer], centre: Array, width: Array) -> Iterator[tuple[Array, Kernels]]:
+    """Those of about as many nodes together, filled up with kernels of no mass."""
+    row, *values = (np.concatenate(arrays) for arrays in zip(*finer, strict=True))
+    order = np.argsort(row, kind="stable")
+    row, values = row[order], [array[order] for array in values]
+    count = np.bincount(row, minlength=len(centre))
+    end = np.cumsum(count)
+    number = np.arange(len(row)) - (end - count)[row]
+    sizes = np.array(PACKED)[np.searchsorted(PACKED, count)]
+    for size in np.unique(sizes[count > 0]).tolist():
+        some = np.flatnonzero((sizes == size) & (count > 0))
+        chosen = np.flatnonzero(sizes[row] == size)
+        mu, sigma, mass, even = np.zeros((4, len(some), count[some].max()))
+        mu += values[0][end[some] - 1, None]
+        sigma += values[1][end[some] - 1, None]
+        for array, wanted in zip((mu, sigma, mass, even), values, strict=True):
+            array[np.searchsorted(some, row[chosen]), number[chosen]] = wanted[chosen]
+        yield some, Kernels(mu, sigma, mass, even, centre[some], width[some], np.zeros(len(some), dtype=bool))
+
+
+def _stacked(grids: Sequence[Grid], size: int) -> tuple[Array, Array, Array]:
+    """Nodes, masses and densities (T, size), filled up with the last node, that has no mass a second time."""
+    if all(len(grid.x) == size for grid in grids):
+        x, mass, density = (np.array(arrays) for arrays in list(zip(*grids, strict=True))[:3])
+        return x, mass, density
+    x, mass, density = np.zeros((3, len(grids), size))
+    for i, grid in enumerate(grids):
+        count = len(grid.x)
+        x[i, :count], mass[i, :count], density[i, :count] = grid[:3]
+        x[i, count:] = grid.x[-1]
+    return x, mass, density

@@ -101,6 +101,7 @@ def compare(
     wide: float = 1.0,
     subset_runs: int = 500,
     subset_seconds: float | None = None,
+    subset_memory: float | None = None,
     threads: int = 2,
     progress: bool | None = None,
 ) -> Comparison:
@@ -135,6 +136,9 @@ def compare(
         The slow filters stop after so long, on fewer trajectories; `Comparison.subset_runs` tells on how many.  With
         the same seed, as many trajectories give the same numbers.  A slow filter that fails, or that does not come through
         the first few in this time, is left out, and `Comparison.left_out` tells why.
+    subset_memory : float, optional
+        Bytes that the slow filters may take beyond what the process has (Linux).  They then take fewer trajectories at once,
+        which changes nothing but the time; one that has not room for the first few is left out.
     threads : int
         Threads that share the blocks of trajectories.
     progress : bool, optional
@@ -147,7 +151,7 @@ def compare(
     NotFinite
         A trajectory or a filter left the finite numbers.
     """
-    _check_arguments(filters, model, subset_runs, subset_seconds)
+    _check_arguments(filters, model, subset_runs, subset_seconds, subset_memory)
     _check_designs(designs, same_ensemble, wide)
     seed = seed_number(seed)
     names = [one.name for one in filters]
@@ -166,11 +170,19 @@ def compare(
         subset, left_out = None, dict[str, str]()
         if slow:
             slow_ready = _designed(slow, design_ensemble, pool, progress)
-            subset, left_out = run_subset(ready, slow_ready, common, min(subset_runs, runs), subset_seconds, progress)
+            subset, left_out = run_subset(
+                ready, slow_ready, common, min(subset_runs, runs), subset_seconds, subset_memory, progress
+            )
     return Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset, left_out, replicas)
 
 
-def _check_arguments(filters: Sequence[Filter | Design], model: Model, subset_runs: int, subset_seconds: float | None) -> None:
+def _check_arguments(
+    filters: Sequence[Filter | Design],
+    model: Model,
+    subset_runs: int,
+    subset_seconds: float | None,
+    subset_memory: float | None,
+) -> None:
     """ValueError for what `compare` cannot do with these arguments."""
     names = [one.name for one in filters]
     if len(set(names)) < len(names) or not names:
@@ -181,6 +193,8 @@ def _check_arguments(filters: Sequence[Filter | Design], model: Model, subset_ru
         raise ValueError(f"subset_runs must not be negative, got {subset_runs}")
     if subset_seconds is not None and not subset_seconds > 0:
         raise ValueError(f"subset_seconds must be positive, got {subset_seconds}; subset_runs=0 leaves the slow filters out")
+    if subset_memory is not None and not subset_memory > 0:
+        raise ValueError(f"subset_memory must be positive, got {subset_memory}; subset_runs=0 leaves the slow filters out")
     for one in filters:
         if (one.model.n, one.model.p) != (model.n, model.p):
             raise ValueError(
@@ -214,7 +228,7 @@ def _designed(filters: Sequence[Filter | Design], ensemble: Ensemble, pool: Exec
     designs = [one for one in filters if isinstance(one, Design)]
     fitted: dict[str, Filter] = {}
     if designs:
-        steps = progress_bar(ensemble.by_step(pool), "designing", ensemble.steps, "step", progress)
+        steps = progress_bar("designing", ensemble.steps, "step", progress, ensemble.by_step(pool))
         fitted = {one.name: one for one in design(designs, steps, pool)}
     return [fitted[one.name] if isinstance(one, Design) else one for one in filters]
 
@@ -229,4 +243,4 @@ def _run_blocks(filters: Sequence[Filter], ensemble: Ensemble, pool: Executor, p
         return sums
 
     indices = range(len(ensemble.sizes))
-    return Sums.concatenate(list(progress_bar(pool.map(block, indices), "comparing", len(indices), "block", progress)))
+    return Sums.concatenate(list(progress_bar("comparing", len(indices), "block", progress, pool.map(block, indices))))

@@ -1,13 +1,13 @@
 """The slow filters of a comparison: on the first of the common trajectories, as many as a budget of time allows.
 
-Chunks of trajectories grow from a few to hundreds, always the same ones.  So the time decides after which chunk the work
-stops, and nothing else.
+Chunks of trajectories grow from a few to hundreds, as far as the memory allows; results are kept by batches of a few
+trajectories, always the same ones.  So the time decides after which chunk the work stops, and nothing else.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import TypeVar
 
@@ -18,7 +18,7 @@ from kfcourse.angles import near
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.particles import Particles
 from kfcourse.laws import Array
-from kfcourse.limits import OutOfTime, time_limit
+from kfcourse.limits import OutOfTime, memory_limit, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Subset
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import Ensemble, Instant
@@ -39,22 +39,49 @@ class _Failed(Exception):
         self.name, self.reason = name, reason
 
 
+class _TooMuch(MemoryError):
+    """A slow filter would need more memory than it may take: its name, and the step."""
+
+    def __init__(self, name: str, step: int):
+        super().__init__(name, step)
+        self.name, self.step = name, step
+
+
 def run_subset(
-    fast: Sequence[Filter], slow: Sequence[Filter], ensemble: Ensemble, size: int, seconds: float | None, progress: bool | None
+    fast: Sequence[Filter],
+    slow: Sequence[Filter],
+    ensemble: Ensemble,
+    size: int,
+    seconds: float | None,
+    memory: float | None,
+    progress: bool | None,
 ) -> tuple[Subset | None, dict[str, str]]:
     """All filters on at most `size` of the trajectories, one thread, as short operations gain nothing from more.
 
     Also, by name, why slow filters were left out; the others then start again without them, or with what runs instead.
     """
-    end = None if seconds is None else time.monotonic() + seconds
     data = _first(ensemble, size)
+    with memory_limit(memory):
+        return _run(fast, slow, ensemble, data, seconds, memory, progress)
+
+
+def _run(
+    fast: Sequence[Filter],
+    slow: Sequence[Filter],
+    ensemble: Ensemble,
+    data: tuple[Array, Array, Array],
+    seconds: float | None,
+    memory: float | None,
+    progress: bool | None,
+) -> tuple[Subset | None, dict[str, str]]:
+    end = None if seconds is None else time.monotonic() + seconds
     left_out: dict[str, str] = {}
     replaced: dict[str, str] = {}
     chosen = {one.name: one for one in slow}
     while running := [one for name, one in chosen.items() if name not in left_out]:
         names = [one.name for one in running]
         try:
-            sums = _chunks_in_time([*fast, *running], ensemble, data, end, progress)
+            sums = _chunks_in_time([*fast, *running], ensemble, data, end, memory, progress)
         except _Failed as failed:
             other = chosen[failed.name].instead
             (left_out if other is None else replaced)[failed.name] = failed.reason
@@ -62,48 +89,56 @@ def run_subset(
             continue
         if sums:
             return Subset(names, Sums.concatenate(sums), replaced), left_out
-        reason = f"{min(size, CHUNKS[0])} trajectories take more than {seconds:g} s"
+        reason = f"{min(data[0].shape[1], CHUNKS[0])} trajectories take more than {seconds:g} s"
         left_out |= dict.fromkeys(names, reason)
     return None, left_out
 
 
 def _chunks_in_time(
-    filters: Sequence[Filter], ensemble: Ensemble, data: tuple[Array, Array, Array], end: float | None, progress: bool | None
+    filters: Sequence[Filter],
+    ensemble: Ensemble,
+    data: tuple[Array, Array, Array],
+    end: float | None,
+    memory: float | None,
+    progress: bool | None,
 ) -> list[Sums]:
-    """Sums over the chunks that are done in time."""
+    """Sums over the chunks that are done in time; a chunk that would take too much memory is done in two."""
     names = [one.name for one in filters]
     reference = names.index(EXACT) if EXACT in names else None
     steps, size, n = data[0].shape
-    rows = list(_rows(size))
+    most = CHUNKS[-1]
     found: list[Sums] = []
-    start = time.monotonic()
-    for chunk in progress_bar(rows, "slow filters", len(rows), "chunk", progress):
-        count = chunk.stop - chunk.start
-        now = time.monotonic()
-        if end is not None and found and MARGIN * (now - start) / chunk.start * count > end - now:
-            break
-        instants = [Instant(*(array[k, chunk] for array in data)) for k in range(steps)]
-        sums = Sums.empty(len(filters), steps, n, count, max(1, count // BATCH))
-        try:
-            with _until(end):
-                run_block(filters, instants, sums, reference, ensemble.weight)
-        except OutOfTime:
-            break
-        found.append(sums)
+    begun, start = time.monotonic(), 0
+    with progress_bar("slow filters", size, "trajectory", progress) as bar:
+        while start < size:
+            count = min(CHUNKS[min(len(found), len(CHUNKS) - 1)], most, size - start)
+            now = time.monotonic()
+            if end is not None and found and MARGIN * (now - begun) / start * count > end - now:
+                break
+            instants = [Instant(*(array[k, start : start + count] for array in data)) for k in range(steps)]
+            sums = Sums.empty(len(filters), steps, n, count, max(1, count // BATCH))
+            try:
+                with _until(end):
+                    run_block(filters, instants, sums, reference, ensemble.weight)
+            except OutOfTime:
+                break
+            except MemoryError as problem:
+                if count > CHUNKS[0]:
+                    most = count // 2
+                    continue
+                if not isinstance(problem, _TooMuch):
+                    raise
+                most_of_it = "there is" if memory is None else f"the {memory / 1e6:g} MB that the slow filters may take"
+                reason = f"step {problem.step}: {count} trajectories need more memory than {most_of_it}"
+                raise _Failed(problem.name, reason) from None
+            found.append(sums)
+            start += count
+            bar.update(count)
     return found
 
 
 def _until(end: float | None) -> AbstractContextManager[None]:
     return nullcontext() if end is None else time_limit(max(end - time.monotonic(), 1e-3))
-
-
-def _rows(size: int) -> Iterator[slice]:
-    """Rows of each chunk."""
-    start = index = 0
-    while start < size:
-        stop = min(start + CHUNKS[min(index, len(CHUNKS) - 1)], size)
-        yield slice(start, stop)
-        start, index = stop, index + 1
 
 
 def run_block(
@@ -152,7 +187,7 @@ def _step(one: Filter, state: State, y: Array) -> State:
     try:
         return one.step(state, y)
     except MemoryError:
-        raise _Failed(one.name, f"step {state.step} needs more memory than there is") from None
+        raise _TooMuch(one.name, state.step) from None
     except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         raise _Failed(one.name, str(error)) from None
 
@@ -185,7 +220,7 @@ def _first(ensemble: Ensemble, size: int) -> tuple[Array, Array, Array]:
     return x, y, x_next
 
 
-def progress_bar(items: Iterable[T], what: str, total: int, unit: str, progress: bool | None) -> Iterable[T]:
-    """A progress bar around the items."""
+def progress_bar(what: str, total: int, unit: str, progress: bool | None, items: Iterable[T] | None = None) -> tqdm[T]:
+    """A progress bar, around the items if there are any."""
     # tqdm: disable=None means "unless standard error is a terminal"
     return tqdm(items, desc=what, total=total, unit=unit, disable=None if progress is None else not progress, delay=0.5)

@@ -41,7 +41,7 @@ from kfcourse.symbolic.reading import (
     table,
 )
 from kfcourse.symbolic.sense import not_computable
-from kfcourse.symbolic.writing import formula_latex
+from kfcourse.symbolic.writing import formula_latex, number_latex
 
 
 @dataclass(frozen=True)
@@ -218,7 +218,9 @@ class Model:
         ]
         lines += [rf"{name}_k &\in [-\pi, \pi]" for name in [state[i] for i in self.angles.x] + [meter[i] for i in self.angles.y]]
         if values:
-            lines += [rf"{sp.latex(name)} &= {float(value):g}" for name, value in self.values.items()] + self.known.latex()
+            lines += [
+                rf"{sp.latex(name)} &= {number_latex(float(value))}" for name, value in self.values.items()
+            ] + self.known.latex()
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
     def __repr__(self) -> str:

@@ -38,6 +38,12 @@ def formula_lines(expression: sp.Expr, variables: Sequence[sp.Symbol], noises: S
     return joined([formula_latex(term, variables, noises) for term in writer.terms(expression)])
 
 
+def number_latex(value: float) -> str:
+    r"""LaTeX of a parameter's value: 0.5, or 5 \cdot 10^{-5}."""
+    digits, _, power = f"{value:g}".partition("e")
+    return digits + (rf" \cdot 10^{{{int(power)}}}" if power else "")
+
+
 class _Writer:
     """Rebuilds an expression with its sums and products in a given order, which the printer keeps."""
 

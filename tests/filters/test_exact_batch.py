@@ -1,11 +1,15 @@
 """The exact AOF on equidistant nodes: against panels, against closed forms, and whether its error estimates hold."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
+from scipy import stats
 
 from kfcourse import Model, load_variants, run, simulate
 from kfcourse.filters import adaptive_pointmass, kalman_filter, particle, pointmass
 from kfcourse.filters.exact import ACCURACY
+from kfcourse.filters.exact_batch import POWER
 
 SHIPPED = {name: variant.model for name, variant in load_variants().items() if variant.model.n == 1}
 MODELS = SHIPPED | {"53, f=0.2": SHIPPED["53"].replace(f=0.2)}
@@ -13,6 +17,7 @@ MODELS = SHIPPED | {"53, f=0.2": SHIPPED["53"].replace(f=0.2)}
 ROUNDING = 1000 * np.finfo(float).eps
 # Kernels of nodes lighter than 1e-9, and of panels lighter than 1e-10, need not overlap; a few of them lie side by side.
 LEFT_OUT = 1e-8
+WORKING = 1.2e8  # bytes that a step takes for a while: 2^19 nodes that are refined, in some 25 arrays
 
 
 def followed(one, y):
@@ -116,6 +121,58 @@ def test_a_parameter_that_stands_still_is_estimated():
             variance = weight @ (x - mean) ** 2 / weight.sum()
             assert abs(found.mean[n - 1, i, 0] - mean) < 1e-6 * np.sqrt(variance)
             assert found.cov[n - 1, i, 0, 0] == pytest.approx(variance, rel=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore:divide by zero")  # the noise is infinite at x = 0
+def test_a_precision_with_a_chi_square_prior_has_a_gamma_posterior():
+    """y_i = w / x: p(x | y) = C |x|^n exp(-x^2 (1 + S) / 2), S = sum y^2, x^2 ~ Gamma((n + 1) / 2, scale 2 / (1 + S))."""
+    y = np.array([0.7, -1.2, 0.1, 2.0, 0.3])
+    for n, state in enumerate(followed(pointmass(Model.define("x", "w/x")), y[:, None, None]), start=1):
+        gamma = stats.gamma((n + 1) / 2, scale=2 / (1 + (y[:n] ** 2).sum()))
+        grid, error = state.memory.fine[0], state.memory.error[0]
+        # The estimate is E(2h)^POWER.  |x|^n has a kink at 0 for odd n, where a rule of twice the step errs 4 times as much, not
+        # E(h)^-0.5 times: E(2h) - E(h) = 3 E(h), so E(h) = estimate^(1/POWER) / 3, and interpolation across the kink is no worse.
+        allowed = error ** (1 / POWER) / 3
+        assert error < 1e-3
+        assert abs(grid.mean()) <= allowed * np.sqrt(gamma.mean())
+        assert abs(state.posterior.cov[0, 0, 0] / gamma.mean() - 1) <= allowed
+        assert abs(grid.mass @ grid.x**4 / gamma.moment(2) - 1) <= 4 * allowed  # d x^4 / x^4 = 2 d x^2 / x^2, and the tails
+
+
+def test_a_share_has_a_beta_type_posterior():
+    """y_i = w / (u^2 (1 - u)), u = (1 + tanh x) / 2, always 0: p(x | y) = C exp(-x^2/2) u^(2n) (1 - u)^n, by rectangles."""
+    model = Model.define("x", "8*w/((1 + tanh(x))**2*(1 - tanh(x)))")
+    x = np.linspace(-9, 9, 2001)  # some 50 nodes a deviation: rectangles do not err on smooth humps
+    u = (1 + np.tanh(x)) / 2
+    for n, state in enumerate(followed(pointmass(model), np.zeros((6, 1, 1))), start=1):
+        weight = np.exp(-0.5 * x * x) * u ** (2 * n) * (1 - u) ** n
+        mean = weight @ x / weight.sum()
+        variance = weight @ (x - mean) ** 2 / weight.sum()
+        allowed = state.memory.error[0] + LEFT_OUT
+        assert state.memory.error[0] < 100 * ACCURACY
+        assert abs(state.posterior.mean[0, 0] - mean) <= allowed * np.sqrt(variance)
+        assert abs(state.posterior.cov[0, 0, 0] / variance - 1) <= allowed
+
+
+def test_predictions_keep_within_their_room_and_change_nothing():
+    """Noise that vanishes at 0 wants thousands of kernels a trajectory.  What finds no room is made again in the next step."""
+    model, room = Model.define("0.9*x + 0.05*x*v", "x + w"), 5e5
+    _, y = simulate(model, 24, 2, seed=5)
+    free = list(followed(pointmass(model), y))
+    held = sum(kernels.bytes() for _, kernels in free[0].memory.groups)
+    assert held > 3 * room
+    assert not len(free[0].memory.later)
+    tracemalloc.start()
+    tight = list(followed(pointmass(model, memory=room), y))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < room + WORKING
+    assert len(tight[0].memory.later)
+    for a, b in zip(free, tight, strict=True):
+        assert sum(kernels.bytes() for _, kernels in b.memory.groups) <= room
+        # sums over the same kernels, with more or fewer zeros behind them
+        np.testing.assert_allclose(b.posterior.mean, a.posterior.mean, rtol=1e-10)
+        np.testing.assert_allclose(b.predicted.cov, a.predicted.cov, rtol=1e-10)
 
 
 def test_stochastic_volatility_is_what_many_particles_find():

@@ -1,6 +1,7 @@
-"""The slow filters of a comparison: their budget of time, and what happens when one fails."""
+"""The slow filters of a comparison: their budgets of time and memory, and what happens when one fails."""
 
 import re
+import sys
 import time
 from dataclasses import replace
 
@@ -76,7 +77,7 @@ def test_a_slow_filter_that_fails_leaves_the_others_as_they_are(model, control, 
     other, failing = slow(aof(linearised(model)), "other"), slow(control, "failing", error=error, at=1)
     result = compare([control, failing, other], model, 60, STEPS, 1, subset_runs=60, progress=False)
     assert list(result.left_out) == ["failing"]
-    assert (str(error) or "step 1 needs more memory") in result.left_out["failing"]
+    assert (str(error) or "step 1: 8 trajectories need more memory than there is") in result.left_out["failing"]
     assert same(result, compare([control, other], model, 60, STEPS, 1, subset_runs=60, progress=False))
 
 
@@ -94,6 +95,45 @@ def test_a_fast_filter_that_fails_is_still_an_error(model, control):
     failing = replace(slow(control, "failing", error=ModelError("no")), slow=False)
     with pytest.raises(ModelError, match="no"):
         compare([control, failing], model, 20, STEPS, 1, progress=False)
+
+
+def greedy(one, megabytes, taken):
+    """A slow filter that is like another, with so much memory for a trajectory; notes how many it took to the end at once."""
+
+    def step(state, y):
+        held = np.ones(int(megabytes * 1e6 / 8) * len(y))
+        if state.step == STEPS - 1:
+            taken.append(len(y))
+        return one.step(state, y)._replace(memory=held)
+
+    return replace(one, name="greedy", slow=True, step=step)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux can limit it")
+def test_what_has_no_room_at_once_is_taken_in_parts(model, control):
+    import resource
+
+    before, free, tight = resource.getrlimit(resource.RLIMIT_AS), [], []
+    filters = ([control, greedy(control, 4, taken)] for taken in (free, tight))
+    options = {"subset_runs": 160, "progress": False, "threads": 1}
+    found = compare(next(filters), model, 160, STEPS, 1, **options)
+    # Two of the filter's arrays at a time: 16 trajectories want 128 MB, 32 of them 256.
+    limited = compare(next(filters), model, 160, STEPS, 1, subset_memory=200e6, **options)
+    assert max(free) == 64 and max(tight) == 16
+    assert same(found, limited)
+    assert resource.getrlimit(resource.RLIMIT_AS) == before
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux can limit it")
+def test_what_has_no_room_at_all_is_left_out(model, control):
+    result = compare([control, greedy(control, 20, [])], model, 40, STEPS, 1, subset_runs=40, subset_memory=100e6, progress=False)
+    assert result.left_out == {"greedy": "step 0: 8 trajectories need more memory than the 100 MB that the slow filters may take"}
+    assert result.available == ("aof-gaussian",)
+
+
+def test_no_memory_at_all_is_refused(model, control):
+    with pytest.raises(ValueError, match="subset_memory must be positive"):
+        compare([control], model, 20, STEPS, 1, subset_memory=0)
 
 
 def test_the_exact_filter_on_a_model_beyond_its_budget_is_left_out_within_seconds():

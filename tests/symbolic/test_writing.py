@@ -3,7 +3,7 @@
 import pytest
 import sympy as sp
 
-from kfcourse.symbolic.writing import _Writer, formula_latex
+from kfcourse.symbolic.writing import _Writer, formula_latex, number_latex
 
 pytestmark = pytest.mark.quick
 
@@ -43,3 +43,10 @@ def test_what_is_written_is_what_was_given(name) -> None:
     formula = gaussian(model)[name]
     arranged = _Writer(sorted(formula.free_symbols, key=str), []).arranged(formula)
     assert sp.simplify(arranged.doit() - formula) == 0
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"), [(1, "1"), (0.5, "0.5"), (5e-5, r"5 \cdot 10^{-5}"), (-3.986e14, r"-3.986 \cdot 10^{14}")]
+)
+def test_powers_of_ten_of_a_value_are_written_as_people_do(value, expected):
+    assert number_latex(value) == expected
