@@ -339,4 +339,5 @@ SET = ExerciseSet(
         "structural-functions",
         "linearisation",
     ),
+    angles=("x", "y"),
 )

@@ -74,4 +74,4 @@ QUESTIONS = (
     ),
 )
 
-SET = ExerciseSet("e", "Comparison by Monte Carlo", Path(__file__).parent, QUESTIONS, chapters=("comparison",))
+SET = ExerciseSet("e", "Comparison by Monte Carlo", Path(__file__).parent, QUESTIONS, chapters=("comparison",), angles=("y",))

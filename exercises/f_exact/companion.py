@@ -25,9 +25,9 @@ COMPANION = {"c": (0.75, 0.95), "e": (0.3, 0.5), "g": (0.4, 0.8), "h": (0.4, 0.7
 def companion_numbers(exercise: Exercise) -> dict[str, float]:
     """Numbers of a scalar companion of the variant; none if the variant's own model is used.
 
-    A grid that spans the prior, and one transition density for all steps, are not for a model with time and inputs.
+    A grid that spans the prior, and one transition density for all steps, are not for a model with time, inputs or angles.
     """
-    if has_exact(exercise.model) and not exercise.model.timed:
+    if has_exact(exercise.model) and not exercise.model.timed and not any(exercise.model.angles):
         return {}
     rng = exercise.rng("companion")
     return {name: round(float(rng.uniform(*limits)), 2) for name, limits in COMPANION.items()}

@@ -61,11 +61,12 @@ class Exercise:
     def __post_init__(self) -> None:
         if self.letter not in sets() or not sets()[self.letter].about_variant:
             return
-        if any(self.model.angles):
-            raise ExerciseError(
-                f"set {self.letter} asks about a model without angles (innovations and means would have to go the short way "
-                f"round), and variant {self.variant.name} has them: {self.model}; take another variant"
-            )
+        for which, where in (("y", "measurement"), ("x", "state")):
+            if getattr(self.model.angles, which) and which not in sets()[self.letter].angles:
+                raise ExerciseError(
+                    f"set {self.letter} asks about a model without angles in the {where} (differences would have to go the short "
+                    f"way round), and variant {self.variant.name} has them: {self.model}; take another variant"
+                )
         if (known := self.model.known).steps < STEPS:
             raise ExerciseError(
                 f"set {self.letter} simulates {STEPS} steps, and an input of variant {self.variant.name} ends after "

@@ -213,10 +213,22 @@ def test_quadrature_stands_in_where_there_is_no_closed_form():
 def test_what_cannot_be_asked_is_refused_with_the_reason():
     with pytest.raises(ExerciseError, match=r"set a asks for formulas.*no closed form.*another variant for this set"):
         rendered("growth", "a")
-    for letter in "abcdefg":
-        with pytest.raises(ExerciseError, match=f"set {letter} asks about a model without angles.*take another variant"):
-            exercise(letter, {"state": "0.9*x + 0.1*v", "meter": "x + 0.1*w", "angles": ["y"]})
-    assert exercise("h", {"state": "0.9*x + 0.1*v", "meter": "x + 0.1*w", "angles": ["y"]}).numbers
+    for letter in "bcdg":
+        with pytest.raises(ExerciseError, match=f"set {letter} asks about a model without angles in the measurement"):
+            exercise(letter, ANGLE)
+    with pytest.raises(ExerciseError, match="set e asks about a model without angles in the state"):
+        exercise("e", ANGLE | {"angles": {"x": ["x"], "y": ["y"]}})
+
+
+ANGLE = {"state": "0.9*x + 0.4*v", "meter": "x + 0.5*w", "angles": ["y"], "prior": {"mean": 3.0}}
+
+
+@pytest.mark.parametrize("letter", "aef")
+def test_sets_without_differences_of_angles_take_them(letter):
+    lab = exercise(letter, ANGLE)
+    functions = run(solution(render(read(letter), lab)))
+    for question in sets()[letter].questions:
+        assert lab.check(question.name, functions[question.function]).passed
 
 
 @pytest.mark.parametrize("letter", "abcdefg")
