@@ -14,7 +14,7 @@ import contents
 from docutils import nodes
 
 HERE = Path(__file__).resolve().parent
-STAR = re.compile(r"(<h\d[^>]*>(?:<span[^>]*>[^<]*</span>)?|<a[^>]*>)\s*★\s*")
+STAR = re.compile(r"(<h\d[^>]*>(?:<span[^>]*>[^<]*</span>)?|<a[^>]*>(?:<span[^>]*>)?)\s*★\s*")
 FORMULA = re.compile(r'<div class="math notranslate nohighlight"( id="[^"]*")?>\s*(<span class="eqno">\(([^)]*)\))?')
 CAPTION = re.compile(
     r'<p><span class="kf-caption">(.*?)</span></p>\s*(<div class="pst-scrollable-table-container">)?\s*<table class="([^"]*)">'
@@ -26,7 +26,7 @@ ROLES = re.compile(r' role="(?:list|doc-biblioentry)"')  # of a bibliography, no
 FIGURE = re.compile(r'(<span class="caption-number">[^<]*\d) </span>')
 TICK = re.compile(r'(<p class="kf-claim">)\s*✓')
 SMALL_TICK = r'\1<span class="kf-tick">✓</span>'
-SMALL_STAR = r'\1<span class="kf-star">★</span> '
+SMALL_STAR = '\\1<span class="kf-star">★</span>\u00a0'  # never alone at the end of a line
 
 
 def use_templates(app, config) -> None:

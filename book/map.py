@@ -71,7 +71,8 @@ def _box(app, name: str, page: contents.Page, routes: dict[str, list[str]]) -> s
     names = ", ".join(route for _, route in on)
     number = f"{page.number}. " if page.number else ""
     link = app.builder.get_relative_uri(name, page.name)
-    text = f"<b>{number}{html.escape(page.title)}</b><small>{f'{minutes} min' if minutes else '&nbsp;'}</small>"
+    title = html.escape(page.title).replace(" ★", "\u00a0★")  # a star never alone on a line
+    text = f"<b>{number}{title}</b><small>{f'{minutes} min' if minutes else '&nbsp;'}</small>"
     classes = " ".join(f"on-{i}" for i, _ in on)
     return f'<a class="{classes}" href="{link}">{text}<span title="{html.escape(names)}">{bars}</span></a>'
 

@@ -12,3 +12,19 @@ addEventListener("load", async () => {
   }
   document.documentElement.dataset.formulas = "ready";
 });
+
+// A formula and the punctuation beside it stay on one line; browsers break lines around MathJax's boxes.
+addEventListener("DOMContentLoaded", () => {
+  for (const formula of document.querySelectorAll("span.math")) {
+    const after = formula.nextSibling, before = formula.previousSibling;
+    const mark = after?.nodeType === Node.TEXT_NODE && after.data.match(/^[,.;:!?)\]”’]+/)?.[0];
+    const bracket = before?.nodeType === Node.TEXT_NODE && before.data.match(/[(\[“‘]+$/)?.[0];
+    if (!mark && !bracket) continue;
+    const together = document.createElement("span");
+    together.className = "kf-together";
+    formula.replaceWith(together);
+    together.append(bracket || "", formula, mark || "");
+    if (mark) after.data = after.data.slice(mark.length);
+    if (bracket) before.data = before.data.slice(0, -bracket.length);
+  }
+});

@@ -116,7 +116,7 @@ def claim(sentence: str, *conditions: Any) -> Shown:
         if not np.all(condition):
             which = f" (condition {number} of {len(conditions)})" if len(conditions) > 1 else ""
             raise Unverified(f"this does not hold{which}: {sentence}")
-    return Shown(f'{sentence} <span class="kf-claim">✓</span>', {"sentence": sentence, "equations": 0})
+    return Shown(f'{sentence}\u00a0<span class="kf-claim">✓</span>', {"sentence": sentence, "equations": 0})
 
 
 def agree(sentence: str, computed: Any, expected: Any, within: float, relative: bool = True) -> Shown:
@@ -136,7 +136,7 @@ def agree(sentence: str, computed: Any, expected: Any, within: float, relative: 
     bound = within * (np.max(np.abs(expected)) if relative else 1)
     if not difference <= bound:  # a NaN is no agreement
         raise Unverified(f"differs by {difference:.3g}, more than {bound:.3g}: {sentence}")
-    return Shown(f'{sentence} <span class="kf-claim">✓</span>', {"sentence": sentence, "equations": 0})
+    return Shown(f'{sentence}\u00a0<span class="kf-claim">✓</span>', {"sentence": sentence, "equations": 0})
 
 
 def _sides(equation: Any) -> tuple[Side, ...]:

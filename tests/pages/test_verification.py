@@ -97,7 +97,7 @@ def test_definitions_have_no_mark() -> None:
 
 def test_claims_hold_or_raise() -> None:
     assert claim("The gain is below **0.7**.", 0.6 < 0.7, np.array([True, True])).markdown.startswith(
-        "The gain is below **0.7**. <span"
+        "The gain is below **0.7**.\u00a0<span"
     )
     with pytest.raises(Unverified, match=r"condition 2 of 2.*The gain"):
         claim("The gain is below 0.7.", True, np.array([True, False]))
