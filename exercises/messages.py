@@ -58,6 +58,14 @@ PREDICTED_FIRST = (
 PREDICTIONS_RETURNED = "These are the predictions, before each measurement; return the estimates, after it."
 MISSING_AS_ZERO = "A missing measurement is treated as the number 0; it says nothing, so the prediction stays."
 
+# -- a model with time and inputs
+
+INPUT_FORGOTTEN = "A term that is known at every step is missing in the mean: time and inputs move the state too."
+STEP_NOT_PASSED = "The functions are those of one step throughout; time and inputs change: give them the number of each step."
+INPUT_OF_NEXT_STEP = "The prediction from step k to k + 1 takes time and input of step k, not of step k + 1."
+INPUT_OF_STEP_BEFORE = "Time and input of the step before are taken: y_k and the prediction from x_k take those of step k."
+STEPS_FROM_ONE = "The steps are counted from 1; the first measurement is y_0, that of step 0."
+
 # -- continuous time: densities are one-sided
 
 BOTH_ONE_SIDED = "The densities are one-sided: the intensity of the noise is not the whole of them."

@@ -8,6 +8,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.exercises import Exercise
+from kfcourse.checks.steps import Function, at_wrong_step
 from kfcourse.filters.designed import Scatter
 from kfcourse.laws import Array
 
@@ -33,6 +34,24 @@ def covariance(rng: np.random.Generator, size: int, scale: float = 1.0) -> Array
 def substituted(formulas: sp.MatrixBase, names: tuple[sp.Symbol, ...]) -> Callable[..., sp.ImmutableMatrix]:
     """The formulas as a function of other symbols in the place of these."""
     return lambda *values: sp.ImmutableMatrix(formulas.xreplace(dict(zip(names, map(sp.sympify, values), strict=True))))
+
+
+# -- a wrong step, for known mistakes: the function of another step, at step k
+
+
+def first_step(function: Function, k: int) -> Function:
+    """That of step 0, whatever k is."""
+    return at_wrong_step(function, 0)
+
+
+def next_step(function: Function, k: int) -> Function:
+    """That of step k + 1."""
+    return at_wrong_step(function, k + 1)
+
+
+def step_before(function: Function, k: int) -> Function:
+    """That of step k - 1."""
+    return at_wrong_step(function, k - 1)
 
 
 # -- regressions over an ensemble

@@ -60,7 +60,7 @@ def key(name: str, make: Make, side: str) -> ForVariant:
 def right(kind: str, side: str) -> Make:
     """(tau, Theta) of the object, or (h, G, F) of the meter."""
     names = ("tau", "Theta") if side == "object" else ("h", "G", "F")
-    return lambda exercise: tuple(getattr(exercise.structures, kind)[name] for name in names)
+    return lambda exercise: tuple(exercise.closed(kind)[name] for name in names)
 
 
 def wrong_covariance(name: str, says: str, kind: str, side: str, covariance: Callable[[Side], sp.MatrixBase]) -> Mistake:
@@ -105,6 +105,41 @@ def mistakes_of_variance(kind: str, side: str) -> tuple[Mistake, ...]:
     )
 
 
+def without_known(formula: sp.Expr, known: tuple[sp.Symbol, ...]) -> sp.Expr:
+    """A sum without the terms that depend on the step."""
+    return sp.Add(*(term for term in sp.Add.make_args(sp.expand(formula)) if not term.has(*known)))
+
+
+def mistakes_of_time(kind: str, side: str) -> tuple[Mistake, ...]:
+    """Time and inputs forgotten in the mean, or taken at another step; none for a model that has none of them."""
+
+    def changed(change: Callable[[Exercise, sp.Expr], sp.Expr]) -> ForVariant:
+        def make(exercise: Exercise) -> tuple:
+            mean, *others = right(kind, side)(exercise)
+            entries = sp.Matrix([mean])
+            wrong = entries.applyfunc(lambda entry: change(exercise, entry))
+            if wrong == entries:
+                raise ValueError("only where the mean depends on the step")
+            return (plain(wrong), *others)
+
+        return constant(make)
+
+    def forgotten(exercise: Exercise, entry: sp.Expr) -> sp.Expr:
+        known = exercise.model.known.symbols
+        return without_known(entry, known) if known else entry
+
+    def later(exercise: Exercise, entry: sp.Expr) -> sp.Expr:
+        known = exercise.model.known
+        lengths = {"k": sp.S.One, "t": known.interval}
+        shift = {s: s + lengths[s.name] for s in known.symbols if s.name not in known.inputs}
+        return entry.subs(shift, simultaneous=True)
+
+    return (
+        Mistake("input-forgotten", messages.INPUT_FORGOTTEN, changed(forgotten)),
+        Mistake("input-of-next-step", messages.INPUT_OF_NEXT_STEP, changed(later)),
+    )
+
+
 def mistakes_of_linearised(side: str) -> tuple[Mistake, ...]:
     """Mistakes in (tau, Theta) or (h, G, F) by linearisation."""
     p = "p" if side == "object" else "d"
@@ -144,7 +179,7 @@ def mistakes_of_linearised(side: str) -> tuple[Mistake, ...]:
         constant(right("gaussian", side)),
     )
     slopes = (wrong_slope("linearised"),) if side == "meter" else ()
-    return (*named, *mistakes_of_variance("linearised", side), exact, *slopes)
+    return (*named, *mistakes_of_variance("linearised", side), *mistakes_of_time("linearised", side), exact, *slopes)
 
 
 def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
@@ -190,6 +225,7 @@ def mistakes_of_gaussian(side: str) -> tuple[Mistake, ...]:
         ),
         Mistake("second-moment", SECOND_MOMENT, constant(second_moment)),
         *mistakes_of_variance("gaussian", side),
+        *mistakes_of_time("gaussian", side),
     )
 
 
@@ -221,7 +257,7 @@ def unexplained_with(part: Callable[[Side], sp.MatrixBase]) -> ForVariant:
 
 def unexplained(exercise: Exercise) -> Formula:
     """R = F - G d G^T of the Gaussian functions."""
-    return exercise.structures.gaussian["R"]
+    return exercise.closed("gaussian")["R"]
 
 
 def _question(number: int, title: str, kind: str, side: str, mistakes: tuple[Mistake, ...]) -> Question:
@@ -303,4 +339,5 @@ SET = ExerciseSet(
         "structural-functions",
         "linearisation",
     ),
+    angles=("x", "y"),
 )

@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 
 from kfcourse import laws
-from kfcourse.checks.exercises import full
 from kfcourse.checks.question import Answer
+from kfcourse.checks.steps import Function, at_step, full
 from kfcourse.laws import Array, Gaussian, Measurement, transpose
 
 # -- b1: the gain
@@ -51,16 +51,32 @@ def run_filter(y: Array, mean: Array, cov: Array, measure: Callable, predict: Ca
     return run_with(step, y, mean, cov, measure, predict)
 
 
-def run_with(step: Answer, y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
-    """Estimates of a filter over y (steps, N, p); a trajectory whose measurement is missing keeps its prediction."""
+AtStep = Callable[[Function, int], Function]
+
+
+def run_with(
+    step: Answer,
+    y: Array,
+    mean: Array,
+    cov: Array,
+    measure: Callable,
+    predict: Callable,
+    measure_at: AtStep = at_step,
+    predict_at: AtStep = at_step,
+) -> Array:
+    """Estimates of a filter over y (steps, N, p); a trajectory whose measurement is missing keeps its prediction.
+
+    measure_at, predict_at: (function, k) -> the function of which step is taken at step k.
+    """
     lam, Psi = np.tile(mean, (y.shape[1], 1)), full(cov, y.shape[1])
     estimates = []
-    for measurement_k in y:
+    for k, measurement_k in enumerate(y):
+        meter, object_ = measure_at(measure, k), predict_at(predict, k)
         missing = np.isnan(measurement_k).any(axis=-1)
-        z, p, *_ = step(lam, Psi, np.where(missing[:, None], 0.0, measurement_k), measure, predict)
+        z, p, *_ = step(lam, Psi, np.where(missing[:, None], 0.0, measurement_k), meter, object_)
         z, p = np.where(missing[:, None], lam, z), np.where(missing[:, None, None], Psi, p)
         estimates.append(z)
-        lam, Psi = predict(z, p)
+        lam, Psi = object_(z, p)
     return np.array(estimates)
 
 

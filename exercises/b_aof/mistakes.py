@@ -7,10 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from kfcourse import laws
-from kfcourse.checks.exercises import full
 from kfcourse.checks.question import Answer
+from kfcourse.checks.steps import at_step, full
 from kfcourse.exercises import messages
 from kfcourse.exercises.b_aof.keys import Gain, correct, gain, run_filter, run_with, step
+from kfcourse.exercises.shared import first_step, next_step, step_before
 from kfcourse.laws import Array, apply, transpose
 
 # -- b1: the gain
@@ -189,24 +190,24 @@ WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
 
 
 def _predicted_first(y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
-    lam, Psi = predict(mean[None], cov[None])
+    lam, Psi = at_step(predict, 0)(mean[None], cov[None])
     return run_with(step, y, lam[0], Psi[0], measure, predict)
 
 
 def _predictions(y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
     lam, Psi = np.tile(mean, (y.shape[1], 1)), full(cov, y.shape[1])
     predictions = []
-    for one in y:
+    for k, one in enumerate(y):
         predictions.append(lam)
-        *_, lam, Psi = step(lam, Psi, one, measure, predict)
+        *_, lam, Psi = step(lam, Psi, one, at_step(measure, k), at_step(predict, k))
     return np.array(predictions)
 
 
 def _frozen(y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
     lam, Psi = np.tile(mean, (y.shape[1], 1)), full(cov, y.shape[1])
     estimates = []
-    for one in y:
-        z, _, lam, _ = step(lam, Psi, one, measure, predict)
+    for k, one in enumerate(y):
+        z, _, lam, _ = step(lam, Psi, one, at_step(measure, k), at_step(predict, k))
         estimates.append(z)
     return np.array(estimates)
 
@@ -230,6 +231,11 @@ WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
         "The first measurement is not used; y_0 is a measurement of x_0 and corrects the prior.",
         lambda y, *rest: run_filter(np.concatenate([np.full_like(y[:1], np.nan), y[1:]]), *rest),
     ),
+    ("step-not-passed", messages.STEP_NOT_PASSED, lambda *a: run_with(step, *a, first_step, first_step)),
+    ("input-of-next-step", messages.INPUT_OF_NEXT_STEP, lambda *a: run_with(step, *a, predict_at=next_step)),
+    ("input-of-step-before", messages.INPUT_OF_STEP_BEFORE, lambda *a: run_with(step, *a, measure_at=step_before)),
+    ("input-of-step-before", messages.INPUT_OF_STEP_BEFORE, lambda *a: run_with(step, *a, predict_at=step_before)),
+    ("steps-from-one", messages.STEPS_FROM_ONE, lambda *a: run_with(step, *a, next_step, next_step)),
 )
 
 

@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from kfcourse.checks.question import Answer
+from kfcourse.checks.steps import Function, at_step
 from kfcourse.exercises.shared import Fit, regression
 from kfcourse.laws import Array
 
@@ -57,15 +58,25 @@ def design_and_run(x: Array, y_design: Array, y: Array, mean: Array, a: Callable
 
 
 def duof_run_with(
-    without_offset: bool = False, one_gain: bool = False, predictions: bool = False, object_alone: bool = False, sign: float = 1.0
+    without_offset: bool = False,
+    one_gain: bool = False,
+    predictions: bool = False,
+    object_alone: bool = False,
+    sign: float = 1.0,
+    a_at: Callable[[Function, int], Function] = at_step,
+    b_at: Callable[[Function, int], Function] = at_step,
 ) -> Answer:
-    """Design over x, y (steps, N, ...), then filter other measurements; with one thing changed."""
+    """Design over x, y (steps, N, ...), then filter other measurements; with one thing changed.
+
+    a_at, b_at: (function, k) -> the function of which step is taken at step k.
+    """
 
     def run(x: Array, y_design: Array, y: Array, mean: Array, a: Callable, b: Callable) -> Array:
         lam, other = np.tile(mean, (x.shape[1], 1)), np.tile(mean, (y.shape[1], 1))
         estimates, first = [], None
         for k in range(len(x)):
-            omega = y_design[k] - b(lam)
+            a_k, b_k = a_at(a, k), b_at(b, k)
+            omega = y_design[k] - b_k(lam)
             H, e, _ = regression(x[k] - lam, omega)
             first = (H, e) if first is None else first
             if one_gain:
@@ -73,11 +84,11 @@ def duof_run_with(
             z = lam + omega @ H.T + e
             if without_offset:
                 e = 0 * e
-            z_other = other + sign * (y[k] - b(other)) @ H.T + e
+            z_other = other + sign * (y[k] - b_k(other)) @ H.T + e
             estimates.append(other if predictions else z_other)
             if k + 1 < len(x):
-                F, g, _ = regression(x[k + 1], a(z))
-                lam, other = a(z) @ F.T + g, a(z_other) if object_alone else a(z_other) @ F.T + g
+                F, g, _ = regression(x[k + 1], a_k(z))
+                lam, other = a_k(z) @ F.T + g, a_k(z_other) if object_alone else a_k(z_other) @ F.T + g
         return np.array(estimates)
 
     return run

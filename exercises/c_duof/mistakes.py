@@ -14,9 +14,12 @@ from kfcourse.exercises.shared import (
     WITHOUT_OFFSET,
     Fit,
     covariance_of,
+    first_step,
+    next_step,
     raw_moment,
     regression,
     regression_with,
+    step_before,
 )
 from kfcourse.laws import Array
 
@@ -186,6 +189,7 @@ WRONG_DUOF_STEPS: tuple[tuple[str, str, Answer], ...] = (
 
 Ensemble = tuple[Array, Array]
 
+
 WRONG_DUOF_RUNS: tuple[tuple[str, str, Answer], ...] = (
     (
         "part-of-ensemble",
@@ -205,4 +209,9 @@ WRONG_DUOF_RUNS: tuple[tuple[str, str, Answer], ...] = (
         messages.INNOVATION_SIGN,
         duof_run_with(sign=-1.0),
     ),
+    ("step-not-passed", messages.STEP_NOT_PASSED, duof_run_with(a_at=first_step, b_at=first_step)),
+    ("input-of-next-step", messages.INPUT_OF_NEXT_STEP, duof_run_with(a_at=next_step)),
+    ("input-of-step-before", messages.INPUT_OF_STEP_BEFORE, duof_run_with(a_at=step_before)),
+    ("input-of-step-before", messages.INPUT_OF_STEP_BEFORE, duof_run_with(b_at=step_before)),
+    ("steps-from-one", messages.STEPS_FROM_ONE, duof_run_with(a_at=next_step, b_at=next_step)),
 )

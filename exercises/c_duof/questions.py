@@ -14,14 +14,16 @@ import numpy as np
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.checks.steps import STEP, Function, at_step, of_steps
 from kfcourse.exercises.c_duof.keys import design_and_run, design_step, structure
 from kfcourse.exercises.c_duof.mistakes import WRONG_DUOF_RUNS, WRONG_DUOF_STEPS, WRONG_REGRESSIONS, WRONG_STRUCTURES
 from kfcourse.exercises.shared import RUNS, ensemble, predicted, regression
 
 
 def noiseless(exercise: Exercise) -> tuple[Callable, Callable]:
-    """a(x, m_v) and b(x, m_w) of the hidden model, (N, n) -> (N, n) and (N, p)."""
-    return exercise.hidden_noiseless
+    """a(x, m_v) and b(x, m_w) of the hidden model at one step, (N, n) -> (N, n) and (N, p)."""
+    a, b = exercise.hidden_noiseless
+    return at_step(a, STEP), at_step(b, STEP)
 
 
 # -- c1: the structure
@@ -58,10 +60,16 @@ def duof_arguments(exercise: Exercise) -> list[tuple]:
 # -- c4: coefficients found on one ensemble, used on another
 
 
+def bent(function: Function) -> Function:
+    """The function of x and k, bent otherwise at every step: the offsets would make good an added input of a wrong step."""
+    return of_steps(lambda x, k: function(x, k) + np.sin(1.7 * k + 0.6) * np.sin(x).sum(axis=-1, keepdims=True))
+
+
 def duof_run_arguments(exercise: Exercise) -> list[tuple]:
     """An ensemble to design on, and measurements of other trajectories."""
     x, y = exercise.simulate(RUNS, 4, "c4-design")
-    return [(x, y, exercise.simulate(5, 4, "c4").y, exercise.model.prior.mean, *noiseless(exercise))]
+    functions = map(bent, exercise.hidden_noiseless) if exercise.model.timed else exercise.hidden_noiseless
+    return [(x, y, exercise.simulate(5, 4, "c4").y, exercise.model.prior.mean, *functions)]
 
 
 QUESTIONS = (

@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kfcourse.checks.exercises import full
 from kfcourse.checks.question import Answer
+from kfcourse.checks.steps import full
 from kfcourse.exercises.b_aof.keys import correct
 from kfcourse.exercises.shared import Fit, regression
 from kfcourse.laws import Array

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kfcourse.checks.exercises import Exercise, array_functions, full
+from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.checks.steps import STEP, array_functions, full
 from kfcourse.exercises import messages
 from kfcourse.exercises.d_fos.keys import condition, condition_on_both, fos_step, mfos_step
 from kfcourse.exercises.d_fos.mistakes import WRONG_CONDITIONS, WRONG_FOS_STEPS, WRONG_MFOS_STEPS
@@ -33,7 +34,7 @@ def fos_arguments(exercise: Exercise, name: str = "d2") -> list[tuple]:
     x, y, _ = ensemble(exercise, name)
     lam = predicted(exercise, f"{name}-lam", x)
     Psi = full(covariance_of(x - lam, x - lam), RUNS) * (1 + 0.3 * exercise.rng(f"{name}-Psi").random((RUNS, 1, 1)))
-    return [(lam, Psi, x, y, *array_functions(exercise.hidden.gaussian))]
+    return [(lam, Psi, x, y, *array_functions(exercise.hidden.gaussian.at(STEP)))]
 
 
 # -- d3: one step of the MFOS

@@ -29,7 +29,7 @@ RUNS, STEPS = 40, 5
 def hidden_estimates(exercise: Exercise, name: str) -> tuple[Array, Array, Array, Array]:
     """States, the estimates of two filters and the first one's covariances, on common trajectories."""
     x, y = exercise.simulate(RUNS, STEPS, name)
-    first = run(aof(exercise.structures.gaussian), y)
+    first = run(aof(exercise.given.gaussian), y)
     noise = exercise.rng(f"{name}-other").normal(size=x.shape) * x.std(axis=1, keepdims=True)
     return x, first.mean + 0.03 * noise, first.mean + 0.08 * noise[::-1], first.cov
 
@@ -74,4 +74,4 @@ QUESTIONS = (
     ),
 )
 
-SET = ExerciseSet("e", "Comparison by Monte Carlo", Path(__file__).parent, QUESTIONS, chapters=("comparison",))
+SET = ExerciseSet("e", "Comparison by Monte Carlo", Path(__file__).parent, QUESTIONS, chapters=("comparison",), angles=("y",))

@@ -1,6 +1,7 @@
 """What the notebook of set f is given: a scalar model with noises that enter linearly, and its two conditional laws.
 
-A variant's own model is used if the exact filter exists for it; else a companion of it, with numbers of the variant's own.
+A variant's own model is used if the exact filter exists for it and it is the same at every step; else a companion of it, with
+numbers of the variant's own.
 """
 
 from __future__ import annotations
@@ -22,15 +23,18 @@ COMPANION = {"c": (0.75, 0.95), "e": (0.3, 0.5), "g": (0.4, 0.8), "h": (0.4, 0.7
 
 
 def companion_numbers(exercise: Exercise) -> dict[str, float]:
-    """Numbers of a scalar companion of the variant; none if the exact filter exists for the variant's own model."""
-    if has_exact(exercise.model):
+    """Numbers of a scalar companion of the variant; none if the variant's own model is used.
+
+    A grid that spans the prior, and one transition density for all steps, are not for a model with time, inputs or angles.
+    """
+    if has_exact(exercise.model) and not exercise.model.timed and not any(exercise.model.angles):
         return {}
     rng = exercise.rng("companion")
     return {name: round(float(rng.uniform(*limits)), 2) for name, limits in COMPANION.items()}
 
 
 def scalar_model(exercise: Exercise) -> Model:
-    """The variant's model if the exact filter exists for it, else a scalar companion with numbers of the variant's own.
+    """The variant's model if the set can use it, else a scalar companion with numbers of the variant's own.
 
     x_{k+1} = c x_k + e v_k,    y_k = g x_k + h x_k^2 + f w_k,    x_0 ~ N(m, 1)
     """

@@ -118,4 +118,5 @@ SET = ExerciseSet(
         "checking-exact",
     ),
     numbers=companion_numbers,
+    angles=("x", "y"),  # its companion has none
 )

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import sympy as sp
 
+from kfcourse.checks.steps import of_steps
 from kfcourse.laws import Array
-from kfcourse.symbolic.codegen import compile_function
+from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import exact_matrix
 
@@ -32,8 +33,16 @@ class Functions(NamedTuple):
     D_n: Map
 
 
+def of_all_steps(function: Callable[[Array, int], Array], first: int = 0) -> Map:
+    """A function of x and k as one of arrays with all steps before the other axes, (steps, N, n), from step `first` on."""
+    return lambda x: np.array([function(x_k, first + k) for k, x_k in enumerate(x)])
+
+
 def linearisation(model: Model) -> Functions:
-    """f, Phi, g, D_xi, S, H, D_n of a model: its equations with the noises at their means, differentiated by state and noises."""
+    """f, Phi, g, D_xi, S, H, D_n of a model: its equations with the noises at their means, differentiated by state and noises.
+
+    Where the model depends on the step, the functions take it: f(x, k).
+    """
     x, a, b = sp.Matrix(model.x), model.state_equation, model.meter_equation
     quiet = {
         noise: mean
@@ -52,9 +61,13 @@ def linearisation(model: Model) -> Functions:
 
     def compiled(name: str) -> Map:
         formula = sp.ImmutableMatrix(matrices[name].subs(model.values))
-        function = compile_function(name, {"x": x}, {name: formula}, ["x", "f", "S"], f"{name} of {model}").function
+        function = Stepwise.compile(model.known, name, {"x": x}, {name: formula}, ["x", "f", "S"], f"{name} of {model}")
         shape = formula.shape[:1] if name in ("f", "S") else formula.shape
-        return lambda at: np.array(np.broadcast_to(function(at)[0], (*np.shape(at)[:-1], *shape)))
+
+        def of_arrays(at: Array, k: int | None = None) -> Array:
+            return np.array(np.broadcast_to(function.at(k)(at)[0], (*np.shape(at)[:-1], *shape)))
+
+        return of_steps(lambda at, k: of_arrays(at, k)) if model.timed else lambda at: of_arrays(at)
 
     f, Phi, g, S, H, D_n = map(compiled, matrices)
     return Functions(f, Phi, g, model.state_noise.cov, S, H, D_n)

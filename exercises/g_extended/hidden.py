@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from kfcourse.checks.exercises import Exercise
+from kfcourse.checks.steps import of_steps
 from kfcourse.exercises.g_extended.companion import Functions
 from kfcourse.exercises.shared import Map, covariance
 from kfcourse.laws import Array, Gaussian, symmetric
@@ -42,6 +43,16 @@ def hidden_functions(exercise: Exercise, name: str, n: int, r: int, p: int) -> F
     S, H = curved(rng, p, n, 1.2)
     g = varying(rng, 0.3 + 0.6 * rng.uniform(size=(n, r)) + np.eye(n, r), n)
     return Functions(f, Phi, g, covariance(rng, r, 0.2), S, H, varying(rng, covariance(rng, p, 0.3), n))
+
+
+def changing(one: Functions) -> Functions:
+    """The same functions times factors that change from step to step, as functions of x and k."""
+
+    def times(function: Map, phase: float) -> Map:
+        return of_steps(lambda x, k: (1 + 0.3 * np.sin(1.7 * k + phase)) * function(x))
+
+    phases = {"f": 0.4, "Phi": 0.4, "g": 1.1, "S": 2.0, "H": 2.0, "D_n": 2.9}
+    return one._replace(**{name: times(getattr(one, name), phase) for name, phase in phases.items()})
 
 
 def sizes(exercise: Exercise) -> tuple[tuple[int, int, int], ...]:

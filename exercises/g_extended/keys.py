@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 
 from kfcourse import laws
-from kfcourse.checks.exercises import full
 from kfcourse.checks.question import Answer
+from kfcourse.checks.steps import Function, at_step, full
 from kfcourse.exercises.shared import Map
 from kfcourse.laws import Array, Gaussian, Measurement, gain, transpose
 from kfcourse.linear.consistency import chi_squared_bounds, normalised_square
@@ -98,8 +98,12 @@ def run_with(
     object_at: Callable[[Array, Array], Array] = lambda z, lam: z,
     frozen: bool = False,
     first: bool = False,
+    f_at: Callable[[Function, int], Function] = at_step,
+    S_at: Callable[[Function, int], Function] = at_step,
 ) -> Answer:
     """A run with one thing changed.
+
+    f_at, S_at: (function, k) -> the functions of which step are taken for the object, and for the meter, at step k.
 
     meter_at: (lam_k, z_{k-1}) -> where H is taken;  object_at: (z_k, lam_k) -> where Phi is taken;
     frozen: Psi is never handed on;  first: predicts before the first measurement.
@@ -108,13 +112,14 @@ def run_with(
     def answer(y: Array, mean: Array, cov: Array, f: Map, Phi: Map, g: Map, D_xi: Array, S: Map, H: Map, D_n: Map) -> Run:
         lam, Psi = np.tile(mean, (y.shape[1], 1)), full(cov, y.shape[1])
         if first:
-            lam, Psi = prediction(lam, Psi, f, Phi, g, D_xi)
+            lam, Psi = prediction(lam, Psi, *(at_step(one, 0) for one in (f, Phi, g)), D_xi)
         before, start, history = lam, Psi, []
-        for value in y:
-            z, p = correction(lam, Psi, value, S, fixed(H, meter_at(lam, before)), D_n)
+        for k, value in enumerate(y):
+            (f_k, Phi_k, g_k), (S_k, H_k, D_k) = (f_at(one, k) for one in (f, Phi, g)), (S_at(one, k) for one in (S, H, D_n))
+            z, p = correction(lam, Psi, value, S_k, fixed(H_k, meter_at(lam, before)), D_k)
             history.append((z, p, lam, Psi))
             before = z
-            lam, Psi = prediction(z, p, f, fixed(Phi, object_at(z, lam)), g, D_xi)
+            lam, Psi = prediction(z, p, f_k, fixed(Phi_k, object_at(z, lam)), g_k, D_xi)
             Psi = start if frozen else Psi
         return tuple(np.array(column) for column in zip(*history, strict=True))
 

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from kfcourse.checks.question import Answer
+from kfcourse.checks.steps import at_step
 from kfcourse.exercises import messages
 from kfcourse.exercises.g_extended.keys import Run, predict, run_filter, run_with
 from kfcourse.exercises.g_extended.mistakes_of_filter import WRONG_CORRECTIONS, WRONG_PREDICTIONS
-from kfcourse.exercises.shared import Map
+from kfcourse.exercises.shared import Map, first_step, next_step, step_before
 from kfcourse.laws import Array
 
 # -- g5: a whole run
@@ -18,7 +19,7 @@ from kfcourse.laws import Array
 
 def _linearised_once(y: Array, mean: Array, cov: Array, f: Map, Phi: Map, g: Map, D_xi: Array, S: Map, H: Map, D_n: Map) -> Run:
     def at_start(function: Map) -> Map:
-        return lambda x: function(np.tile(mean, (len(x), 1)))
+        return lambda x: at_step(function, 0)(np.tile(mean, (len(x), 1)))
 
     return run_filter(y, mean, cov, f, at_start(Phi), g, D_xi, S, at_start(H), D_n)
 
@@ -30,7 +31,8 @@ def _predictions_as_estimates(*arguments: Any) -> Run:
 
 def _predictions_of_next(y: Array, mean: Array, cov: Array, *functions: Any) -> Run:
     z, p, lam, Psi = run_filter(y, mean, cov, *functions)
-    following = predict(z[-1], p[-1], *functions[:4])
+    f, Phi, g = (at_step(one, len(y) - 1) for one in functions[:3])
+    following = predict(z[-1], p[-1], f, Phi, g, functions[3])
     return z, p, np.array([*lam[1:], following[0]]), np.array([*Psi[1:], following[1]])
 
 
@@ -77,4 +79,9 @@ WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
         for name, says, wrong in WRONG_PREDICTIONS
         if name in ("noise-forgotten", "jacobian-transposed", "noise-at-prediction")
     ),
+    ("step-not-passed", messages.STEP_NOT_PASSED, run_with(f_at=first_step, S_at=first_step)),
+    ("input-of-next-step", messages.INPUT_OF_NEXT_STEP, run_with(f_at=next_step)),
+    ("input-of-step-before", messages.INPUT_OF_STEP_BEFORE, run_with(f_at=step_before)),
+    ("input-of-step-before", messages.INPUT_OF_STEP_BEFORE, run_with(S_at=step_before)),
+    ("steps-from-one", messages.STEPS_FROM_ONE, run_with(f_at=next_step, S_at=next_step)),
 )

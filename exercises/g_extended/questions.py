@@ -13,7 +13,8 @@ import numpy as np
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises.g_extended.hidden import RUNS, STEPS, cases, curved, hidden_law, root
+from kfcourse.checks.steps import at_step
+from kfcourse.exercises.g_extended.hidden import RUNS, STEPS, cases, changing, curved, hidden_law, root
 from kfcourse.exercises.g_extended.keys import bounds, consistency, correct, information, jacobian, predict, run_filter
 from kfcourse.exercises.g_extended.mistakes_of_consistency import WRONG_BOUNDS, WRONG_NORMALISED
 from kfcourse.exercises.g_extended.mistakes_of_filter import (
@@ -71,15 +72,17 @@ def correction_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def run_arguments(exercise: Exercise) -> list[tuple]:
-    """Measurements of hidden trajectories, the prior and all functions."""
+    """Measurements of hidden trajectories, the prior and all functions; of the step too where the variant's depend on it."""
     found = []
     for one, rng, n, p in cases(exercise, "g5"):
+        one = changing(one) if exercise.model.timed else one
         mean, cov = rng.normal(size=n), covariance(rng, n, 0.6)
         x = mean + rng.normal(size=(RUNS, n)) @ np.linalg.cholesky(cov).T
         y = []
-        for _ in range(STEPS):
-            y.append(one.S(x) + apply(root(one.D_n(x)), rng.normal(size=(RUNS, p))))
-            x = one.f(x) + apply(one.g(x) @ root(one.D_xi), rng.normal(size=(RUNS, len(one.D_xi))))
+        for k in range(STEPS):
+            f, g, S, D_n = (at_step(function, k) for function in (one.f, one.g, one.S, one.D_n))
+            y.append(S(x) + apply(root(D_n(x)), rng.normal(size=(RUNS, p))))
+            x = f(x) + apply(g(x) @ root(one.D_xi), rng.normal(size=(RUNS, len(one.D_xi))))
         found.append((np.array(y), mean, cov, *one))
     return found
 

@@ -3,6 +3,7 @@
 question    what a question is: key, hidden arguments, known mistakes
 registry    the sets that there are; they register, nothing here knows one
 exercises   a set for a variant: what a notebook opens
+steps       questions about a model with time and inputs: functions that take the step
 engine      is an answer right, and if not, what kind of mistake is it?  How long may it take?
 equality    are two formulas, two arrays equal?
 posing      can every question be posed for a variant?

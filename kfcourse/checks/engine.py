@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.checks.equality import Unusable, equal, like
+from kfcourse.checks.equality import Places, Unusable, equal, like
 from kfcourse.checks.hints import Agree, Case, Sensitivity, general, names_of
 from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG, Answer, Mistake, Question, Result
 from kfcourse.checks.registry import folders
@@ -128,7 +128,7 @@ def check(question: Question, exercise: Exercise, answer: Any, seconds: float = 
         return result(MISSING, "not implemented yet")
     except Unusable as reason:
         return result(UNUSABLE, str(reason))
-    agree = partial(_agree, values=exercise.model.values, tolerance=question.tolerance)
+    agree = partial(_agree, values=exercise.model.values, tolerance=question.tolerance, places=exercise.places)
     try:
         with time_limit(seconds):
             if agree(found, expected):
@@ -244,8 +244,10 @@ def standard(value: Any) -> Any:
     return value if isinstance(value, sp.Basic | sp.MatrixBase) else np.asarray(value, dtype=float)
 
 
-def _agree(found: Sequence[Any], expected: Sequence[Any], values: Mapping[sp.Symbol, Any], tolerance: float) -> bool:
-    return all(equal(a, b, tolerance, values) for a, b in zip(found, expected, strict=True))
+def _agree(
+    found: Sequence[Any], expected: Sequence[Any], values: Mapping[sp.Symbol, Any], tolerance: float, places: Places = ()
+) -> bool:
+    return all(equal(a, b, tolerance, values, places) for a, b in zip(found, expected, strict=True))
 
 
 def _wrong(mistake: Mistake, exercise: Exercise, arguments: Sequence[tuple], expected: Sequence[Any]) -> list[Any] | None:

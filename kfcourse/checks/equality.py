@@ -22,6 +22,9 @@ POINTS = 6
 ROUNDED = 1e-9  # relative size of an imaginary part that rounding explains
 
 
+Places = Sequence[Mapping[sp.Symbol, sp.Expr]]
+
+
 class Unusable(Exception):
     """An answer that cannot be compared; the message tells the student what was expected."""
 
@@ -122,24 +125,27 @@ def describe(value: Any) -> str:
     return f"{type(value).__name__}"
 
 
-def equal(first: Any, second: Any, tolerance: float, values: Mapping[sp.Symbol, Any]) -> bool:
+def equal(first: Any, second: Any, tolerance: float, values: Mapping[sp.Symbol, Any], places: Places = ()) -> bool:
     """Whether two answers of the same form are equal.
 
-    `tolerance` is relative, for numbers; `values` are the parameters' values, for formulas in which they were put in.
+    `tolerance` is relative, for numbers; `values` are the parameters' values, for formulas in which they were put in, and
+    `places` values of other symbols that have to be tried, in turn, in the place of random ones.
     """
     if isinstance(second, tuple):
-        return all(equal(a, b, tolerance, values) for a, b in zip(first, second, strict=True))
+        return all(equal(a, b, tolerance, values, places) for a, b in zip(first, second, strict=True))
     if isinstance(second, sp.MatrixBase):
-        return first.shape == second.shape and equal_formulas(list(first), list(second), values)
+        return first.shape == second.shape and equal_formulas(list(first), list(second), values, places)
     if isinstance(second, sp.Basic):
-        return equal_formulas([first], [second], values)
+        return equal_formulas([first], [second], values, places)
     scale = np.max(np.abs(second[np.isfinite(second)]), initial=0.0)
     return first.shape == second.shape and bool(
         np.allclose(first, second, rtol=tolerance, atol=tolerance * scale, equal_nan=True)
     )
 
 
-def equal_formulas(first: Sequence[sp.Expr], second: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any]) -> bool:
+def equal_formulas(
+    first: Sequence[sp.Expr], second: Sequence[sp.Expr], values: Mapping[sp.Symbol, Any], places: Places = ()
+) -> bool:
     """Whether the formulas agree, pairwise, at random points.
 
     Symbols are told apart by name only.  Where one side has no parameter left as a symbol, the other's get their values.
@@ -153,9 +159,10 @@ def equal_formulas(first: Sequence[sp.Expr], second: Sequence[sp.Expr], values: 
             sides = [[_with_numbers(f, numbers) for f in side] for side in sides]
         signs = {s: -1 if value < 0 else 1 for s, value in parameters.items()}
         known, both = frozenset(signs.items()), all(map(_entire, sides[1]))
-        for number in range(POINTS):
+        for number in range(max(POINTS, len(places))):
+            place = frozenset(places[number % len(places)].items() if places else ())
             for a, b in zip(*sides, strict=True):
-                left, right = (_value(f, number, known, both) for f in (a, b))
+                left, right = (_value(f, number, known, both, place) for f in (a, b))
                 if not (left.is_number and right.is_number) or not abs(left - right) <= AGREE * (1 + abs(right)):
                     return False
     except Exception:  # SymPy has many ways to stop at a formula that makes no sense
@@ -164,13 +171,19 @@ def equal_formulas(first: Sequence[sp.Expr], second: Sequence[sp.Expr], values: 
 
 
 @lru_cache(maxsize=20_000)  # an answer is compared with many mistakes, and a mistake with many answers
-def _value(formula: sp.Expr, number: int, signs: frozenset[tuple[sp.Symbol, int]], both: bool) -> sp.Expr:
+def _value(
+    formula: sp.Expr,
+    number: int,
+    signs: frozenset[tuple[sp.Symbol, int]],
+    both: bool,
+    place: frozenset[tuple[sp.Symbol, sp.Expr]] = frozenset(),
+) -> sp.Expr:
     """The value at a random point: parameters with their own sign, other symbols of both signs, or positive only.
 
-    Floats: powers of fractions would grow without bound.
+    Floats: powers of fractions would grow without bound.  The symbols of `place` have their values from there.
     """
-    point = {}
-    for s in formula.free_symbols:
+    point = dict(place)  # exact, as Eq(k, 30) tells 30 from 30.0
+    for s in formula.free_symbols - set(point):
         source = random.Random(f"{s.name}/{number}")
         sign = dict(signs).get(s, (1, -1, source.choice((1, -1)))[min(number, 2)] if both else 1)
         point[s] = sp.Float(sp.Rational(sign * source.randint(101, 397), source.randint(101, 397)), DIGITS)

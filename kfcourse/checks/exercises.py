@@ -14,36 +14,32 @@ import sympy as sp
 from kfcourse.checks.engine import check
 from kfcourse.checks.question import Question, Result
 from kfcourse.checks.registry import sets
+from kfcourse.checks.steps import array_functions, noiseless_functions, places, telling_steps
 from kfcourse.lab.short_names import Structures
 from kfcourse.lab.variants import Variant, find_variant, read_variant
-from kfcourse.laws import Array
 from kfcourse.montecarlo.ensemble import Trajectories, simulate
-from kfcourse.symbolic.equations import compile_noiseless
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import Structure
+from kfcourse.symbolic.moments import NoClosedForm
+from kfcourse.symbolic.quadrature import gauss_hermite
+from kfcourse.symbolic.structure import Structure, gaussian
+
+STEPS = 21  # that the sets simulate at most
+NODES = {1: 100, 2: 16}  # on an axis, for so many states
 
 
 class ExerciseError(ValueError):
     """No such set or question; the message lists those there are."""
 
 
-def full(matrix: Array, runs: int) -> Array:
-    """One matrix for every trajectory, (runs, r, c)."""
-    return np.array(np.broadcast_to(matrix, (runs, *matrix.shape[-2:])))
+class Given(Structures):
+    """The same for a normal law without a closed form too: by quadrature."""
 
-
-def array_functions(structure: Structure) -> tuple[Callable, Callable]:
-    """(measure, predict) of full arrays, as students get them: (m, d) -> h, G, F and (z, p) -> tau, Theta."""
-
-    def measure(m: Array, d: Array) -> tuple[Array, Array, Array]:
-        h, G, F, _ = structure.measure(m, d)
-        return np.array(np.broadcast_to(h, (len(m), structure.model.p))), full(G, len(m)), full(F, len(m))
-
-    def predict(z: Array, p: Array) -> tuple[Array, Array]:
-        tau, Theta = structure.predict(z, p)
-        return tau, full(Theta, len(z))
-
-    return measure, predict
+    @cached_property
+    def gaussian(self) -> Structure:
+        try:
+            return gaussian(self.model)
+        except NoClosedForm:
+            return gauss_hermite(self.model, NODES.get(self.model.n, 5))
 
 
 @dataclass(frozen=True)
@@ -63,11 +59,18 @@ class Exercise:
     salt: str = ""
 
     def __post_init__(self) -> None:
-        asked = self.letter in sets() and sets()[self.letter].about_variant
-        if asked and (self.model.timed or any(self.model.angles)):
+        if self.letter not in sets() or not sets()[self.letter].about_variant:
+            return
+        for which, where in (("y", "measurement"), ("x", "state")):
+            if getattr(self.model.angles, which) and which not in sets()[self.letter].angles:
+                raise ExerciseError(
+                    f"set {self.letter} asks about a model without angles in the {where} (differences would have to go the short "
+                    f"way round), and variant {self.variant.name} has them: {self.model}; take another variant"
+                )
+        if (known := self.model.known).steps < STEPS:
             raise ExerciseError(
-                f"set {self.letter} asks about a model without time, inputs and angles, and variant {self.variant.name} has "
-                f"them: {self.model}; take another variant"
+                f"set {self.letter} simulates {STEPS} steps, and an input of variant {self.variant.name} ends after "
+                f"{known.steps}: {self.model}; give it a value for every step"
             )
 
     @property
@@ -90,14 +93,36 @@ class Exercise:
         """`.linearised` and `.gaussian` structural functions of the model."""
         return Structures(self.model)
 
-    def functions(self, kind: str) -> tuple[Callable, Callable]:
+    def closed(self, kind: str) -> Structure:
+        """Structural functions with formulas, "linearised" or "gaussian"; ExerciseError if they have no closed form."""
+        try:
+            return getattr(self.structures, kind)
+        except NoClosedForm as error:
+            raise ExerciseError(
+                f"set {self.letter} asks for formulas of the structural functions, and those of variant {self.variant.name} have "
+                f"no closed form ({error}); take another variant for this set"
+            ) from None
+
+    @cached_property
+    def given(self) -> Structures:
+        """Structural functions of the model that are given, not asked for: by quadrature where there is no closed form."""
+        return Given(self.model)
+
+    @property
+    def by_quadrature(self) -> bool:
+        """Whether those of a normal law have no closed form."""
+        return self.given.gaussian.formulas is None
+
+    def functions(self, kind: str, k: int | None = None) -> tuple[Callable, Callable]:
         """Structural functions of arrays: measure(m, d) -> h, G, F and predict(z, p) -> tau, Theta.
 
-        `kind` is "gaussian" or "linearised"; shapes (N, n), (N, n, n), (N, p), (N, p, n), (N, p, p).
+        `kind` is "gaussian" or "linearised"; shapes (N, n), (N, n, n), (N, p), (N, p, n), (N, p, p).  Where the model depends on
+        the step, they are those of step k; without k they take it, `measure(m, d, k)`.
         """
         if kind not in ("gaussian", "linearised"):
             raise ExerciseError(f"no structural functions {kind!r}; there are gaussian and linearised")
-        return array_functions(getattr(self.structures, kind))
+        structure: Structure = getattr(self.given, kind)
+        return array_functions(structure if k is None else structure.at(k))
 
     @cached_property
     def hidden(self) -> Structures:
@@ -105,7 +130,25 @@ class Exercise:
 
         An answer that works for any functions is called with these: where the variant has a 1, a forgotten factor would pass.
         """
-        return Structures(self.hidden_model)
+        return Given(self.hidden_model)
+
+    @cached_property
+    def hidden_steps(self) -> list[int]:
+        """Steps that take the place of 0, 1, 2... in hidden functions: where an input rests, a wrong one would pass."""
+        return telling_steps(self.hidden_model)
+
+    def hidden_functions(self) -> tuple[Callable, Callable]:
+        """Hidden measure and predict of arrays, which take the step where the model depends on it."""
+        return array_functions(self.hidden.gaussian, self.hidden_steps if self.model.timed else ())
+
+    @cached_property
+    def places(self) -> list[Mapping[sp.Symbol, sp.Expr]]:
+        """Steps at which formulas are compared, if the model has a switch."""
+        return places(self.model) if self.model.timed else []
+
+    def known(self, k: int) -> dict[sp.Symbol, float]:
+        """Values of k, t and the inputs at step k, for `subs`; empty where the model depends on none of them."""
+        return dict(zip(self.model.known.symbols, self.model.known.at(k).tolist(), strict=True))
 
     @cached_property
     def hidden_model(self) -> Model:
@@ -115,13 +158,16 @@ class Exercise:
 
     @cached_property
     def noiseless(self) -> tuple[Callable, Callable]:
-        """The equations with the noises at their means, a(x) and b(x): (N, n) -> (N, n) and (N, p)."""
-        return compile_noiseless(self.model)
+        """The equations with the noises at their means, a(x) and b(x): (N, n) -> (N, n) and (N, p).
+
+        Where the model depends on the step they take it, `a(x, k)`.
+        """
+        return noiseless_functions(self.model)
 
     @cached_property
     def hidden_noiseless(self) -> tuple[Callable, Callable]:
         """The same of the hidden model."""
-        return compile_noiseless(self.hidden_model)
+        return noiseless_functions(self.hidden_model, self.hidden_steps if self.model.timed else ())
 
     @property
     def prior_mean(self) -> np.ndarray:

@@ -100,6 +100,7 @@ def nudged(value: Any) -> Any:
             result = value(*arguments)
             return tuple(1.05 * part for part in result) if isinstance(result, tuple) else 1.05 * result
 
+        changed.__dict__.update(getattr(value, "__dict__", {}))  # whether it takes the step
         return changed
     return None
 

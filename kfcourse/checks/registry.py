@@ -30,6 +30,8 @@ class ExerciseSet:
         Exercise -> personal numbers by name, for a set that needs others than the variant's.
     about_variant : bool
         Whether the questions are about the variant's model; otherwise the set has a model of its own.
+    angles : tuple of {"x", "y"}
+        Which of state and measurement may have components that are angles, if the questions are about the variant's model.
     """
 
     letter: str
@@ -39,6 +41,7 @@ class ExerciseSet:
     chapters: tuple[str, ...] = ()
     numbers: Callable[[Any], dict[str, float]] | None = None
     about_variant: bool = True
+    angles: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:

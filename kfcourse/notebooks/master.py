@@ -30,6 +30,7 @@ from nbformat import NotebookNode
 from kfcourse.checks import Exercise, Question, sets
 from kfcourse.lab.variants import load_variants
 from kfcourse.notebooks.written_code import Solutions
+from kfcourse.symbolic.model import Model
 
 BEGIN, END = "BEGIN SOLUTION", "END SOLUTION"
 STUB = "# YOUR CODE HERE"
@@ -200,13 +201,30 @@ def context(exercise: Exercise) -> dict[str, Any]:
         "model": model,
         "scalar": model.n == 1 and model.p == 1,
         "latex": sp.latex,
-        "equations": f"$$\n{model.latex(values=False)}\n$$",
+        "equations": "\n\n".join(f"$$\n{block}\n$$" for block in (model.latex(values=False), *known_values(model))),
+        "timed": model.timed,
+        "known": known(model),
+        "k": ", k" if model.timed else "",  # the last argument of functions that take the step
         "symbols": parameter_symbols(exercise),
         "values": {name: float(value) for name, value in model.parameters.items()},
         "solution": Solutions(exercise),
         "heading": lambda name, russian="": heading(exercise.questions[name], russian),
         "check": lambda name: check_cell(exercise.questions[name]),
     }
+
+
+def known_values(model: Model) -> list[str]:
+    """An `aligned` block with the time and the first values of the inputs; none if the equations have neither."""
+    lines = model.known.latex() if model.timed else []
+    return ["\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"] if lines else []
+
+
+def known(model: Model) -> str:
+    """A sentence on what the equations contain of the step; nothing if it is nothing."""
+    meanings = dict.fromkeys(model.known.inputs, "an input, whose value is known at every step")
+    meanings = {"k": "the number of the step", "t": "the time"} | meanings
+    parts = [f"${sp.latex(s)}$ is {meanings[s.name]}" for s in model.known.symbols]
+    return f"Your equations depend on the step: {'; '.join(parts)}." if parts else ""
 
 
 def heading(question: Question, russian: str = "") -> str:
@@ -229,8 +247,8 @@ def opened(exercise: Exercise) -> str:
 
 
 def parameter_symbols(exercise: Exercise) -> str:
-    """The line of code that makes the parameters' symbols."""
-    names = list(exercise.model.parameters)
+    """The line of code that makes the symbols of the parameters, and of what is known of every step."""
+    names = [*exercise.model.parameters, *(s.name for s in exercise.model.known.symbols)]
     if not names:
         return "# this variant has no parameters"
     left = ", ".join(names)

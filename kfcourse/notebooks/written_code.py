@@ -11,7 +11,6 @@ from sympy.printing.str import StrPrinter
 
 from kfcourse.checks import Exercise
 from kfcourse.symbolic.sides import Side, plain
-from kfcourse.symbolic.structure import Structure
 
 COLUMNS = 70  # of the page's 78, less the indents of a function and of its brackets
 
@@ -24,7 +23,7 @@ class Solutions:
 
     def functions(self, kind: str, side: str) -> str:
         """Body of a function of (z, p) or (m, d) that returns (tau, Theta) or (h, G, F)."""
-        structure: Structure = getattr(self.exercise.structures, kind)
+        structure = self.exercise.closed(kind)
         names = ("tau", "Theta") if side == "object" else ("h", "G", "F")
         return self._body(side, {name: structure[name] for name in names})
 
@@ -36,7 +35,7 @@ class Solutions:
 
     def unexplained(self) -> str:
         """Body of a function of (m, d) that returns R = F - G d G^T of the Gaussian functions."""
-        return self._body("meter", {"R": self.exercise.structures.gaussian["R"]})
+        return self._body("meter", {"R": self.exercise.closed("gaussian")["R"]})
 
     def _body(self, side: str, formulas: Mapping[str, Any], cov: bool = True) -> str:
         part = Side.of(self.exercise.model, side)

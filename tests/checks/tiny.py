@@ -10,7 +10,7 @@ from kfcourse.checks.question import Question
 
 x, y, z, p, m, d = sp.symbols("x y z p m d", real=True)
 c, e, g, f = sp.symbols("c e g f", real=True)
-NOTHING = SimpleNamespace(model=SimpleNamespace(values={}))
+NOTHING = SimpleNamespace(model=SimpleNamespace(values={}), places=())
 
 
 def asks(right, arguments, mistakes=(), parts=(), **options):

@@ -256,7 +256,7 @@ def test_a_missing_file_and_a_folder_are_refused_by_name(tmp_path):
         load_variants(tmp_path)
 
 
-def test_time_inputs_and_angles_are_read_and_the_exercises_say_why_they_do_not_ask_about_them(tmp_path):
+def test_time_inputs_and_angles_are_read_and_the_exercises_say_what_they_cannot_ask_about(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(
         '[variants.drive]\nstate = "0.9*x + u + 0.3*v + (1 if t < 1 else 0)"\nmeter = "x + w"\n'
@@ -268,9 +268,15 @@ def test_time_inputs_and_angles_are_read_and_the_exercises_say_why_they_do_not_a
     assert model.angles.y == (0,)
     finding = unposed(find_variant("drive", path))
     assert finding is not None and finding.ok is False
-    assert "asks about a model without time, inputs and angles, and variant drive has them" in finding.says
-    with pytest.raises(ExerciseError, match="take another variant"):
-        exercise("a", tomllib.loads(path.read_text(encoding="utf-8"))["variants"]["drive"])
+    assert "an input of variant drive ends after 3" in finding.says
+    table = tomllib.loads(path.read_text(encoding="utf-8"))["variants"]["drive"]
+    with pytest.raises(ExerciseError, match=r"a model without angles in the measurement.*take another variant"):
+        exercise("b", table)
+    del table["angles"]
+    with pytest.raises(ExerciseError, match=r"an input of variant own ends after 3.*a value for every step"):
+        exercise("b", table)
+    table["inputs"] = {"u": [0.0, 1.0, -1.0] * 7}
+    assert exercise("b", table).model.known.steps == 21
     path.write_text('[variants.v]\nstate = "x + u + v"\nmeter = "x + w"\ninputs = 3\n', encoding="utf-8")
     with pytest.raises(VariantError, match="`inputs` must be a table"):
         find_variant("v", path)

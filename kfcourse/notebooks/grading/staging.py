@@ -32,9 +32,9 @@ def _numbers(task):
         raise ValueError(f"personal numbers of set {task.letter}, variant {task.variant.name} are not yours") from None
 
 
-for _letter, _title, _name, _about in {rows!r}:
+for _letter, _title, _name, _about, _angles in {rows!r}:
     _folder = Path(__file__).parent / _name
-    register(ExerciseSet(_letter, _title, _folder, (), numbers=_numbers, about_variant=_about))
+    register(ExerciseSet(_letter, _title, _folder, (), numbers=_numbers, about_variant=_about, angles=_angles))
 '''
 
 
@@ -61,7 +61,7 @@ def stage(folder: Path) -> Path:
         if (one.folder / COMPANIONS).exists():
             (target / "exercises" / one.folder.name).mkdir()
             shutil.copy2(one.folder / COMPANIONS, target / "exercises" / one.folder.name)
-    rows = [(one.letter, one.title, one.folder.name, one.about_variant) for one in registered]
+    rows = [(one.letter, one.title, one.folder.name, one.about_variant, one.angles) for one in registered]
     (target / "exercises" / "__init__.py").write_text(REGISTRY.replace("{rows!r}", repr(rows)), encoding="utf-8")
     compileall.compile_dir(target, quiet=2)
     return folder
