@@ -8,6 +8,7 @@ import nbformat
 import psutil
 import pytest
 from jupyter_client.manager import start_new_kernel
+from jupyter_client.provisioning import KernelProvisionerFactory
 from nbclient import NotebookClient
 from nbclient.exceptions import CellTimeoutError, DeadKernelError
 
@@ -19,6 +20,9 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forked on Linux
 @pytest.fixture(autouse=True)
 def forked(monkeypatch):
     monkeypatch.setenv("JUPYTER_DEFAULT_PROVISIONER_NAME", FORKED)
+    KernelProvisionerFactory.clear_instance()  # it reads the variable once
+    yield
+    KernelProvisionerFactory.clear_instance()
 
 
 def run(*cells: str, folder: Path, seconds: float = 60):
