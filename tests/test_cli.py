@@ -350,7 +350,9 @@ def end_by(request, monkeypatch):
         monkeypatch.setattr(cli, "compare", lambda *_, **__: signal.raise_signal(number))
         return 128 + number
 
-    return arranged
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job has it ignored
+    yield arranged
+    signal.signal(signal.SIGINT, before)
 
 
 def test_an_end_leaves_the_report_that_was_there(call, tmp_path, end_by):
