@@ -69,7 +69,7 @@ def main() -> None:
     options = parser.parse_args()
     models = {name: variant.model for name, variant in load_variants().items()}
     models["53/f=.2"] = models["53"].replace(f=0.2)
-    print(f"{'variant':>8} {'us':>8} {'times':>8} {'nodes':>8} {'adaptive':>11}{'error 50 %':>10}{'99 %':>10}{'worst':>10}")
+    print(f"{'variant':>8} {'us':>8} {'times':>8} {'nodes':>8} {'adaptive':>9}{'error 50 %':>12}{'99 %':>10}{'worst':>10}")
     for name in options.variants or models:
         if models[name].n == models[name].p == 1:
             print(line(name, models[name], options.runs, options.steps, options.checked), flush=True)
