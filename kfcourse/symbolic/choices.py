@@ -50,7 +50,10 @@ def jumps(choice: sp.Piecewise, x: Sequence[sp.Symbol]) -> bool:
         if not isinstance(condition, Relational):
             return True  # several thresholds: not looked into
         border = next(s for s in x if condition.has(s))
-        places = sp.solve(condition.lhs - condition.rhs, border)
+        try:
+            places = sp.solve(condition.lhs - condition.rhs, border)
+        except NotImplementedError:  # SymPy cannot tell where
+            return True
         if not places or any(sp.simplify((formula - following).subs(border, place)) != 0 for place in places):
             return True
     return False

@@ -52,7 +52,7 @@ def not_computable(equation: sp.MatrixBase, values: Mapping[sp.Symbol, sp.Expr],
                 return f"{_short(formula)}: {UNDECIDED}; change the parameters or write without the choice"
             problem = _unusable(formula.subs(values))
             formula.subs(values).subs(noise_means)  # as filters need it
-        except TypeError:  # SymPy's
+        except (TypeError, ValueError):  # SymPy's; the second of a step at a complex number
             problem = "compares what has no real value, with these parameters or where the noises are at their means"
         if problem:
             return f"{_short(formula)} {problem}"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from kfcourse import FormulaError, Model, ModelError, gaussian
+from kfcourse import FormulaError, Model, ModelError, NoClosedForm, gaussian, linearised
 from kfcourse.limits import time_limit
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.sense import is_covariance, nothing_random, unfit
@@ -109,6 +109,17 @@ def test_a_choice_that_nobody_can_make_is_refused(meter, parameters):
     """SymPy would try for ever."""
     with time_limit(20), pytest.raises((FormulaError, ModelError), match="choice depends on numbers that do not differ"):
         Model.define("0.9*x + v", meter, parameters)
+
+
+def test_a_step_at_what_is_not_real_is_refused():
+    with pytest.raises(ModelError, match="compares what has no real value"):
+        Model.define("x + Heaviside(a**0.5) + v", "x + w", {"a": -1})
+
+
+@pytest.mark.parametrize("condition", ["v < Heaviside(x)", "v < Abs(v)"])
+def test_where_nobody_finds_the_place_of_a_jump_there_may_be_one(condition):
+    with pytest.raises(NoClosedForm, match="not differentiable"):
+        linearised(Model.define(f"(x if {condition} else -x)", "x + w"))
 
 
 def test_so_is_one_in_a_variance():
