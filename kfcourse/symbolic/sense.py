@@ -92,7 +92,7 @@ def _unusable(formula: sp.Expr) -> str:
         if isinstance(part, sp.sin | sp.cos | sp.tan) and abs(part.args[0]) > ANGLE:
             return f"holds {_short(part)} with these parameters, an angle of so many turns that no digit of it is left"
         if size and not 1 / LARGEST <= size <= LARGEST:
-            return f"holds the number {sp.N(part, 3)!s} with these parameters, beyond 1e-100 to 1e100; change the units"
+            return f"holds the number {_short(sp.N(part, 3))} with these parameters, beyond 1e-100 to 1e100; change the units"
     return ""
 
 

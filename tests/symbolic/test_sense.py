@@ -78,10 +78,11 @@ def test_a_parameter_s_exact_value_has_a_size_too():
         Model.define("a*x + v", "x + w", {"a": sp.Integer(10) ** 400})
 
 
-def test_a_long_formula_is_shown_shortened():
+@pytest.mark.parametrize(("state", "parameters"), [("1e99*1e99*x + v", {}), ("cosh(a**16) + v", {"a": 1e99})])
+def test_a_long_formula_or_number_is_shown_shortened(state, parameters):
     with pytest.raises(ModelError) as caught:
-        Model.define("1e99*1e99*x + v", "x + w")
-    assert len(str(caught.value)) < 250
+        Model.define(state, "x + w", parameters)
+    assert len(str(caught.value)) < 300
 
 
 def test_derived_numbers_beyond_the_floats_are_refused_not_printed_as_names():
