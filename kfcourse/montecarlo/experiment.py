@@ -131,7 +131,7 @@ def compare(
         standard errors of many times the trajectories.
     subset_runs : int
         Slow filters (exact, particle) run on this many of the common trajectories; their error variance
-        is found through the paired difference from the Gaussian AOF (or else the first fast filter).  0 leaves them out.
+        is found through the paired difference from the Gaussian AOF (or else the most accurate fast filter).  0 leaves them out.
     subset_seconds : float, optional
         The slow filters stop after so long, on fewer trajectories; `Comparison.subset_runs` tells on how many.  With
         the same seed, as many trajectories give the same numbers.  A slow filter that fails, or that does not come through

@@ -1,4 +1,4 @@
-"""The slow filters of a comparison: on the first of the common trajectories, as many as a budget of time allows.
+"""The slow filters of a comparison: on the first of the common trajectories, as many as budgets of time and memory allow.
 
 Chunks of trajectories grow from a few to hundreds, as far as the memory allows; results are kept by batches of a few
 trajectories, always the same ones.  So the time decides after which chunk the work stops, and nothing else.
@@ -61,36 +61,24 @@ def run_subset(
     Also, by name, why slow filters were left out; the others then start again without them, or with what runs instead.
     """
     data = _first(ensemble, size)
-    with memory_limit(memory):
-        return _run(fast, slow, ensemble, data, seconds, memory, progress)
-
-
-def _run(
-    fast: Sequence[Filter],
-    slow: Sequence[Filter],
-    ensemble: Ensemble,
-    data: tuple[Array, Array, Array],
-    seconds: float | None,
-    memory: float | None,
-    progress: bool | None,
-) -> tuple[Subset | None, dict[str, str]]:
     end = None if seconds is None else time.monotonic() + seconds
     left_out: dict[str, str] = {}
     replaced: dict[str, str] = {}
     chosen = {one.name: one for one in slow}
-    while running := [one for name, one in chosen.items() if name not in left_out]:
-        names = [one.name for one in running]
-        try:
-            sums = _chunks_in_time([*fast, *running], ensemble, data, end, memory, progress)
-        except _Failed as failed:
-            other = chosen[failed.name].instead
-            (left_out if other is None else replaced)[failed.name] = failed.reason
-            chosen[failed.name] = other or chosen[failed.name]
-            continue
-        if sums:
-            return Subset(names, Sums.concatenate(sums), replaced), left_out
-        reason = f"{min(data[0].shape[1], CHUNKS[0])} trajectories take more than {seconds:g} s"
-        left_out |= dict.fromkeys(names, reason)
+    with memory_limit(memory):
+        while running := [one for name, one in chosen.items() if name not in left_out]:
+            names = [one.name for one in running]
+            try:
+                sums = _chunks_in_time([*fast, *running], ensemble, data, end, memory, progress)
+            except _Failed as failed:
+                other = chosen[failed.name].instead
+                (left_out if other is None else replaced)[failed.name] = failed.reason
+                chosen[failed.name] = other or chosen[failed.name]
+                continue
+            if sums:
+                return Subset(names, Sums.concatenate(sums), replaced), left_out
+            reason = f"{min(size, CHUNKS[0])} trajectories take more than {seconds:g} s"
+            left_out |= dict.fromkeys(names, reason)
     return None, left_out
 
 
@@ -102,7 +90,7 @@ def _chunks_in_time(
     memory: float | None,
     progress: bool | None,
 ) -> list[Sums]:
-    """Sums over the chunks that are done in time; a chunk that would take too much memory is done in two."""
+    """Sums over the chunks that are done in time; a chunk that would take too much memory is done in smaller ones."""
     names = [one.name for one in filters]
     reference = names.index(EXACT) if EXACT in names else None
     steps, size, n = data[0].shape
@@ -124,7 +112,7 @@ def _chunks_in_time(
                 break
             except MemoryError as problem:
                 if count > CHUNKS[0]:
-                    most = count // 2
+                    most = max(count // 2 // BATCH * BATCH, CHUNKS[0])  # whole batches, so that they stay the same
                     continue
                 if not isinstance(problem, _TooMuch):
                     raise
