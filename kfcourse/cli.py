@@ -29,6 +29,7 @@ from kfcourse.lab.variants import VariantError, find_variant
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare
+from kfcourse.montecarlo.subset import LEAST
 from kfcourse.notebooks import commands
 from kfcourse.notebooks.course_list import chosen_variants
 from kfcourse.symbolic.formula import FormulaError
@@ -192,7 +193,7 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
 )
 @click.option(
     "--exact-memory",
-    type=click.FloatRange(min=0, min_open=True),
+    type=click.FloatRange(min=LEAST / 1e6),
     default=1000.0,
     show_default=True,
     help="Megabytes for the slow filters (Linux): they take as many trajectories at once as have room.",

@@ -22,7 +22,7 @@ from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble, workers
 from kfcourse.montecarlo.statistics import BATCHES, Sums
-from kfcourse.montecarlo.subset import progress_bar, run_block, run_subset
+from kfcourse.montecarlo.subset import LEAST, progress_bar, run_block, run_subset
 from kfcourse.montecarlo.two_phase import Replicas
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.model import Model
@@ -193,8 +193,10 @@ def _check_arguments(
         raise ValueError(f"subset_runs must not be negative, got {subset_runs}")
     if subset_seconds is not None and not subset_seconds > 0:
         raise ValueError(f"subset_seconds must be positive, got {subset_seconds}; subset_runs=0 leaves the slow filters out")
-    if subset_memory is not None and not subset_memory > 0:
-        raise ValueError(f"subset_memory must be positive, got {subset_memory}; subset_runs=0 leaves the slow filters out")
+    if subset_memory is not None and not subset_memory >= LEAST:
+        raise ValueError(
+            f"subset_memory must be at least {LEAST:g}, got {subset_memory}; subset_runs=0 leaves the slow filters out"
+        )
     for one in filters:
         if (one.model.n, one.model.p) != (model.n, model.p):
             raise ValueError(

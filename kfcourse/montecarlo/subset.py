@@ -26,6 +26,7 @@ from kfcourse.montecarlo.statistics import Sums
 
 CHUNKS = (8, 8, 16, 32, 64, 128, 256)  # trajectories taken at once; after these always as many as the last
 BATCH = 4  # trajectories of a batch
+LEAST = 10e6  # bytes that can be a limit: interpreter and libraries take some at any time
 MARGIN = 1.3  # how much longer than the chunks before the next one may take, for each trajectory
 
 T = TypeVar("T")
@@ -65,6 +66,7 @@ def run_subset(
     left_out: dict[str, str] = {}
     replaced: dict[str, str] = {}
     chosen = {one.name: one for one in slow}
+    _prepare_blas()
     with memory_limit(memory):
         while running := [one for name, one in chosen.items() if name not in left_out]:
             names = [one.name for one in running]
@@ -104,9 +106,9 @@ def _chunks_in_time(
             if end is not None and found and MARGIN * (now - begun) / start * count > end - now:
                 break
             instants = [Instant(*(array[k, start : start + count] for array in data)) for k in range(steps)]
-            sums = Sums.empty(len(filters), steps, n, count, max(1, count // BATCH))
             try:
                 with _until(end):
+                    sums = Sums.empty(len(filters), steps, n, count, max(1, count // BATCH))
                     run_block(filters, instants, sums, reference, ensemble.weight)
             except OutOfTime:
                 break
@@ -114,15 +116,20 @@ def _chunks_in_time(
                 if count > CHUNKS[0]:
                     most = max(count // 2 // BATCH * BATCH, CHUNKS[0])  # whole batches, so that they stay the same
                     continue
-                if not isinstance(problem, _TooMuch):
-                    raise
                 most_of_it = "there is" if memory is None else f"the {memory / 1e6:g} MB that the slow filters may take"
-                reason = f"step {problem.step}: {count} trajectories need more memory than {most_of_it}"
-                raise _Failed(problem.name, reason) from None
+                # What another filter lacks a slow one has taken.
+                name, step = (problem.name, f"step {problem.step}: ") if isinstance(problem, _TooMuch) else (names[-1], "")
+                raise _Failed(name, f"{step}{count} trajectories need more memory than {most_of_it}") from None
             found.append(sums)
             start += count
             bar.update(count)
     return found
+
+
+def _prepare_blas() -> None:
+    """Have the linear algebra take its buffers, for all its threads: OpenBLAS ends the process if it finds no room for them."""
+    square = np.eye(512)
+    np.linalg.cholesky(np.linalg.solve(square, square) @ square)
 
 
 def _until(end: float | None) -> AbstractContextManager[None]:

@@ -1,6 +1,7 @@
 """The slow filters of a comparison: their budgets of time and memory, and what happens when one fails."""
 
 import re
+import subprocess
 import sys
 import time
 from dataclasses import replace
@@ -132,9 +133,41 @@ def test_what_has_no_room_at_all_is_left_out(model, control):
     assert result.available == ("aof-gaussian",)
 
 
-def test_no_memory_at_all_is_refused(model, control):
-    with pytest.raises(ValueError, match="subset_memory must be positive"):
-        compare([control], model, 20, STEPS, 1, subset_memory=0)
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux can limit it")
+def test_what_leaves_no_room_for_a_fast_filter_is_left_out_too(model, control):
+    """It runs on the same trajectories within the same limit; outside, without the slow one, it has all the room it wants."""
+
+    def step(state, y):
+        if state.step == 1:
+            np.empty(int(20e6))  # 160 MB
+        return control.step(state, y)
+
+    filters = [replace(control, name="fast", step=step), greedy(control, 1, [])]
+    result = compare(filters, model, 24, STEPS, 1, subset_runs=24, subset_memory=150e6, progress=False, threads=1)
+    assert result.left_out == {"greedy": "8 trajectories need more memory than the 150 MB that the slow filters may take"}
+    assert result.available == ("fast",)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux can limit it")
+def test_the_exact_filter_with_the_least_memory_ends_in_numbers_or_is_left_out():
+    """In a process of its own: linear algebra that finds no room for its buffers would end the process, not raise."""
+    lines = (
+        "from kfcourse import Model, compare, linearised",
+        "from kfcourse.filters import aof, pointmass",
+        "from kfcourse.montecarlo.subset import LEAST",
+        "model = Model.define('0.9*x + 0.05*x*v', 'x + 0.02*x**2*w')",
+        "filters = [aof(linearised(model)), pointmass(model)]",
+        "found = compare(filters, model, 64, 3, 1, subset_runs=64, subset_memory=LEAST, progress=False)",
+        "print(found.subset_runs, found.left_out)",
+    )
+    done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True)
+    assert done.returncode == 0 and re.match(r"64 \{\}|0 \{'aof-exact': .*need more memory", done.stdout), done
+
+
+@pytest.mark.parametrize("memory", [0, -1e9, 1e6, float("nan")])
+def test_hardly_any_memory_is_refused(model, control, memory):
+    with pytest.raises(ValueError, match=r"subset_memory must be at least 1e\+07"):
+        compare([control], model, 20, STEPS, 1, subset_memory=memory)
 
 
 def test_the_exact_filter_on_a_model_beyond_its_budget_is_left_out_within_seconds():
