@@ -6,6 +6,7 @@ from collections.abc import Callable
 from statistics import NormalDist
 
 import numpy as np
+from scipy.special import chdtri  # not scipy.stats: slow to import
 
 from kfcourse.exercises import messages
 from kfcourse.exercises.g_extended.keys import Normalised, innovation_covariance, normalised_with
@@ -20,9 +21,7 @@ Bounds = Callable[[int, int, float], tuple[float, float]]
 
 def _quantiles(probabilities: list[float], degrees: int) -> Array:
     """Of a chi-squared law."""
-    from scipy import stats  # slow to import
-
-    return stats.chi2.ppf(probabilities, degrees)
+    return chdtri(degrees, 1 - np.array(probabilities))
 
 
 def _interval(confidence: float, degrees: int) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from itertools import combinations
 
 import numpy as np
 import sympy as sp
+from scipy.special import stdtrit  # not scipy.stats: slow to import
 
 from kfcourse.filters import Filter
 from kfcourse.filters.base import State, initial_state
@@ -193,8 +194,6 @@ def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
     error variance.  There are n + p + 1 for a component, and the prediction has its own.  Value: the largest significant
     difference, relative to the error variance of the control.
     """
-    from scipy import stats  # slow to import
-
     pairs = list(combinations(measured(comparison), 2))
     tests = max(len(pairs), 1) * (comparison.steps + 1)
     fitted = 2 * (comparison.model.n + comparison.model.p + 1) / comparison.runs
@@ -204,7 +203,7 @@ def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
         difference, score = comparison.difference(first, second), comparison.score_difference(first, second)
         relative = np.abs(np.append(ratio(difference.value, control, 0.0), score.value))
         error = np.append(ratio(difference.standard_error, control, 0.0), score.standard_error)
-        quantile = stats.t.ppf(1 - SIGNIFICANCE / tests / 2, difference.freedom)
+        quantile = stdtrit(difference.freedom, 1 - SIGNIFICANCE / tests / 2)
         allowed = quantile * error + ROUNDING + (fitted if first in designed or second in designed else 0.0)
         significant = np.where(relative > allowed, relative, 0.0)
         if significant.max() > largest:

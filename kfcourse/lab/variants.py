@@ -46,6 +46,12 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     VariantError
         The file is missing or not TOML, or a variant in it is not a model; nothing else is read then.
     """
+    where, tables = _tables(path)
+    return {name: read_variant(name, table, where) for name, table in tables.items()}
+
+
+def _tables(path: str | Path | None) -> tuple[str, dict[str, Any]]:
+    """What a file is called in messages, and its tables."""
     where = "the shipped variants" if path is None else str(path)
     try:
         with (resources.files("kfcourse.lab") / "variants.toml" if path is None else Path(path)).open("rb") as file:
@@ -63,7 +69,7 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
         raise VariantError(f"{where} is not valid TOML: {error}") from None
     if not isinstance(tables, dict) or not tables:
         raise VariantError(f'{where} has no variants; it needs tables such as [variants.53] with state = "..." and meter = "..."')
-    return {name: read_variant(name, table, where) for name, table in tables.items()}
+    return where, tables
 
 
 def read_variant(name: str, table: Any, where: str) -> Variant:
@@ -90,7 +96,9 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
 
 def find_variant(name: str, path: str | Path | None = None) -> Variant:
     """One variant by name; VariantError lists the names if there is no such."""
-    variants = load_variants(path)
-    if name not in variants:
-        raise VariantError(f"no variant {name!r}; there are {', '.join(variants)}")
-    return variants[name]
+    where, tables = _tables(path)
+    if name not in tables:
+        raise VariantError(f"no variant {name!r}; there are {', '.join(tables)}")
+    if path is None:  # the others are models, too: there is no need to read them
+        return read_variant(name, tables[name], where)
+    return load_variants(path)[name]

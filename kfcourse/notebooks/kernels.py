@@ -6,6 +6,7 @@ provisioner, chosen by its name in the environment variable JUPYTER_DEFAULT_PROV
 
 from __future__ import annotations
 
+import gc
 import logging
 import multiprocessing
 import os
@@ -20,8 +21,14 @@ from jupyter_client.provisioning import LocalProvisioner
 
 FORKED = "kfcourse-forked"  # the name in pyproject.toml
 LAUNCHER = "ipykernel_launcher"
-# The last: a fork is told how its parent starts processes, and a worker of joblib does it in joblib's way.
-IMPORTED = ["ipykernel.kernelapp", "matplotlib.backends.backend_svg", "kfcourse.pages", "kfcourse.checks", "joblib"]
+# What a kernel imports by itself, what notebooks do, what SymPy's `simplify` does.  The last: a fork is told how its parent
+# starts processes, and a worker of joblib does it in joblib's way.
+IMPORTED = [
+    *("ipykernel.kernelapp", "ipykernel.debugger"),
+    *("matplotlib.backends.backend_svg", "scipy.stats", "control", "kfcourse.pages", "kfcourse.checks"),
+    "sympy.physics.units",
+    "joblib",
+]
 
 
 def prefer_forked() -> None:
@@ -81,6 +88,7 @@ def serve(arguments: list[str], environment: dict[str, str], folder: str | None)
     """In the fork: be a kernel, with the environment and in the folder that it shall have."""
     from ipykernel.kernelapp import IPKernelApp
 
+    gc.freeze()  # what has been imported stays: not to be looked through, nor copied for that, at every collection
     os.environ.clear()
     os.environ.update(environment)
     if folder is not None:

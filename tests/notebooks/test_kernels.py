@@ -2,6 +2,7 @@
 
 import os
 import sys
+import time
 from pathlib import Path
 
 import nbformat
@@ -95,5 +96,16 @@ def test_it_ends_with_the_fork_server():
     assert server.pid != os.getpid()
     client.stop_channels()
     server.kill()
-    assert psutil.wait_procs([kernel], timeout=20)[0]
+    end = time.monotonic() + 20
+    while not ended(kernel) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert ended(kernel)
     manager.shutdown_kernel(now=True)
+
+
+def ended(process: psutil.Process) -> bool:
+    """It may stay a zombie: whoever adopts orphans need not bury them at once."""
+    try:
+        return process.status() == psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return True
