@@ -135,10 +135,15 @@ FOUND = """async (context, rules) => {
     const serious = violations.filter(({ impact }) => impact !== "minor");
     return serious.flatMap(({ id, impact, nodes }) => nodes.map((one) => `${impact} ${id}: ${one.html.slice(0, 200)}`));
 }"""
-# Marks a few texts of each kind, on all pages of the tab together: what is styled alike has the same contrast.
-# Then thins out the page, as axe takes as long as there are elements: spans that only colour code and
-# signatures, beyond those marked, and the insides of formulas, which keep their size; nobody but the eye meets them.
+# Marks a few texts of each kind, on all pages of the tab together: what is styled alike has the same contrast.  And thins out
+# the page, as axe takes as long as there are elements: the insides of formulas, which keep their size and have no text of their
+# own, and spans that only colour code and signatures, beyond those marked.
 THIN = """() => {
+    const formulas = [...document.querySelectorAll("mjx-container")].map((e) => [e, e.getBoundingClientRect()]);
+    for (const [e, { width, height }] of formulas) {
+        Object.assign(e.style, { display: "inline-block", width: `${width}px`, height: `${height}px` });
+        e.replaceChildren();
+    }
     const kinds = JSON.parse(sessionStorage.kinds ?? "{}");
     const own = (e) => `${e.tagName}.${e.className.baseVal ?? e.className}${e.getAttribute("style") ?? ""}`;
     const names = new Map([[document.body, ""]]);
@@ -147,11 +152,6 @@ THIN = """() => {
         if (![...e.childNodes].some((one) => one.nodeType === Node.TEXT_NODE && one.data.trim())) continue;
         kinds[name] = (kinds[name] ?? 0) + 1;
         if (kinds[name] <= 4) e.dataset.marked = true;  // rows of tables alternate
-    }
-    const formulas = [...document.querySelectorAll("mjx-container")].map((e) => [e, e.getBoundingClientRect()]);
-    for (const [e, { width, height }] of formulas) {
-        Object.assign(e.style, { display: "inline-block", width: `${width}px`, height: `${height}px` });
-        e.replaceChildren();
     }
     for (const e of document.querySelectorAll("pre span, .sig span")) {
         if (e.querySelector("[data-marked], a") || e.getAttributeNames().join() !== "class") continue;

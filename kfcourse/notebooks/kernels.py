@@ -25,7 +25,7 @@ LAUNCHER = "ipykernel_launcher"
 # starts processes, and a worker of joblib does it in joblib's way.
 IMPORTED = [
     *("ipykernel.kernelapp", "ipykernel.debugger"),
-    *("matplotlib.backends.backend_svg", "scipy.stats", "control", "kfcourse.pages", "kfcourse.checks"),
+    *("matplotlib.backends.backend_svg", "scipy.stats", "control", "kfcourse.pages", "kfcourse.exercises"),
     "sympy.physics.units",
     "joblib",
 ]
