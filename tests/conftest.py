@@ -2,6 +2,7 @@
 
 import pytest
 
+from kfcourse.lab import report
 from kfcourse.symbolic.model import Model
 
 
@@ -9,3 +10,10 @@ from kfcourse.symbolic.model import Model
 def variant53() -> Model:
     """Variant 53 of the lab, both noises multiplicative."""
     return Model.define("c*x + e*x*v", "g*x + f*x**2*w", {"c": 0.9, "e": 0.05, "g": 1, "f": 0.02})
+
+
+@pytest.fixture
+def no_figures(monkeypatch):
+    """Drawing takes most of the time of a report; for tests of its text, and of what becomes of files."""
+    monkeypatch.setattr(report, "_FIGURES", {name: (caption, lambda *_: None) for name, (caption, _) in report._FIGURES.items()})
+    monkeypatch.setattr(report.Figure, "savefig", lambda _, path, **__: path.touch())

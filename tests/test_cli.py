@@ -164,7 +164,7 @@ def test_without_exact_runs_the_exact_filter_is_left_out(call, tmp_path):
     assert set(json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]) == {"duof"}
 
 
-def test_an_exact_filter_without_time_is_left_out_and_the_others_reported(call, tmp_path):
+def test_an_exact_filter_without_time_is_left_out_and_the_others_reported(call, no_figures, tmp_path):
     options = ("--runs", "400", "--steps", "40", "--exact-runs", "400", "--exact-seconds", "0.001")
     result = call("lab", "53", *options, "--json", "n.json")
     assert result.exit_code == 0, result.output
@@ -207,7 +207,7 @@ def test_a_vector_variant_works(call, tmp_path):
     assert (tmp_path / "lab-20" / "report.html").is_file()
 
 
-def test_a_variant_s_name_cannot_lead_out_of_the_folder(call, tmp_path):
+def test_a_variant_s_name_cannot_lead_out_of_the_folder(call, no_figures, tmp_path):
     assert call("lab", "../elsewhere", *QUICK, "--variants", "mine.toml").exit_code == 0
     (folder,) = [path for path in tmp_path.iterdir() if path.is_dir()]
     assert (folder / "report.html").is_file()
@@ -262,7 +262,7 @@ def test_a_model_without_closed_form_names_the_term_and_the_way_out(call, no_com
     assert "unscented" in line or "gauss_hermite" in line
 
 
-def test_filters_that_the_model_does_not_admit_are_left_out_with_the_reason(call, tmp_path):
+def test_filters_that_the_model_does_not_admit_are_left_out_with_the_reason(call, no_figures, tmp_path):
     result = call("lab", "tan", *QUICK, "--variants", "mine.toml", "--out", "r", "--json", "r.json")
     assert result.exit_code == 0
     for name in ("GAOF", "GFOS", "GMFOS"):
@@ -332,7 +332,7 @@ def test_impossible_numbers_are_refused(call, no_computation, option):
     assert "Traceback" not in result.output
 
 
-def test_a_failing_run_leaves_the_report_that_was_there(call, tmp_path):
+def test_a_failing_run_leaves_the_report_that_was_there(call, no_figures, tmp_path):
     assert call("lab", "53", *QUICK, "--out", "report", "--json", "n.json").exit_code == 0
     before = snapshot(tmp_path)
     failing = ("lab", "diverging", "--variants", "mine.toml", "--runs", 200, "--steps", 30, "--exact-runs", 0)
@@ -355,7 +355,7 @@ def end_by(request, monkeypatch):
     signal.signal(signal.SIGINT, before)
 
 
-def test_an_end_leaves_the_report_that_was_there(call, tmp_path, end_by):
+def test_an_end_leaves_the_report_that_was_there(call, no_figures, tmp_path, end_by):
     assert call("lab", "53", *QUICK, "--out", "report", "--json", "n.json").exit_code == 0
     before = snapshot(tmp_path)
     code = end_by()
@@ -396,7 +396,7 @@ def spaced(page):
     return page.read_text(encoding="utf-8").replace("&#x000A0;", " ")
 
 
-def test_formulas_too_long_to_print_are_left_out_of_the_report(call, tmp_path, monkeypatch):
+def test_formulas_too_long_to_print_are_left_out_of_the_report(call, no_figures, tmp_path, monkeypatch):
     monkeypatch.setattr(report, "LONGEST", 100)
     assert call("lab", "53", *QUICK, "--filters", "aof-gaussian,duof", "--out", "a").exit_code == 0
     html = spaced(tmp_path / "a" / "report.html")

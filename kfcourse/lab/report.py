@@ -87,6 +87,7 @@ def save_figure(draw: Callable[[Axes], Axes], folder: Path, name: str) -> list[P
         paths.append(folder / f"{name}.{kind}")
         with replacing(paths[-1]) as path:
             figure.savefig(path, format=kind, metadata=metadata)
+        figure.set_layout_engine("none")  # has been laid out
     return paths
 
 

@@ -12,7 +12,6 @@ import pytest
 
 from kfcourse import compare, gaussian, lab_filters, linearised, load_variants
 from kfcourse.filters import aof
-from kfcourse.lab import report
 from kfcourse.lab.report import conclusions, write_json, write_report
 from kfcourse.lab.short_names import LAB, title
 from kfcourse.lab.variants import Variant
@@ -44,13 +43,6 @@ def written(variants, result53, result20, tmp_path_factory):
     for name, result in (("53", result53), ("20", result20)):
         write_report(variants[name], result, folders[name])
     return folders
-
-
-@pytest.fixture
-def no_figures(monkeypatch):
-    """Drawing takes most of the time of a report; for tests of its text only."""
-    monkeypatch.setattr(report, "_FIGURES", {name: (caption, lambda *_: None) for name, (caption, _) in report._FIGURES.items()})
-    monkeypatch.setattr(report.Figure, "savefig", lambda _, path, **__: path.touch())
 
 
 class Page(HTMLParser):
