@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial, reduce
+from functools import cached_property, lru_cache, partial, reduce
 from itertools import product as cartesian
 from typing import NoReturn
 
@@ -275,17 +275,20 @@ def gaussian(model: Model) -> Structure:
     """
     (z, p), (m, d) = gaussian_symbols(model, "z", "p"), gaussian_symbols(model, "m", "d")
     known = model.known.symbols
-    tau, Theta = _moments(model.state_equation, model.x, z, p, model.v, model.state_noise, known)
-    h, F = _moments(model.meter_equation, model.x, m, d, model.w, model.meter_noise, known)
+    tau, Theta = _moments(model.state_equation, model.x, z, p, model.v, *_exact(model.state_noise), known)
+    h, F = _moments(model.meter_equation, model.x, m, d, model.w, *_exact(model.meter_noise), known)
     functions = {"tau": tau, "Theta": Theta, "h": h, "G": h.jacobian(m), "F": F}
     return StructuralFormulas(model, "gaussian", z, p, m, d, _expanded(functions)).structure()
 
 
-def _moments(equation, x, mean, cov, noise, law: Gaussian, known: tuple[sp.Symbol, ...]):
+def _exact(law: Gaussian) -> tuple[sp.ImmutableMatrix, sp.ImmutableMatrix]:
+    return exact_matrix(law.mean), exact_matrix(law.cov)
+
+
+@lru_cache(maxsize=64)  # the same for all values of the parameters
+def _moments(equation, x, mean, cov, noise, noise_mean, noise_cov, known: tuple[sp.Symbol, ...]):
     """Mean and covariance of equation(x, noise), x ~ N(mean, cov) and the noise independent."""
-    joint = GaussianMoments(
-        [*x, *noise], [*mean, *exact_matrix(law.mean)], sp.diag(sp.Matrix(cov), sp.Matrix(exact_matrix(law.cov)))
-    )
+    joint = GaussianMoments([*x, *noise], [*mean, *noise_mean], sp.diag(sp.Matrix(cov), sp.Matrix(noise_cov)))
     size = len(equation)
     equation, masks = masked(equation, known, [*x, *noise])
     try:
@@ -296,7 +299,7 @@ def _moments(equation, x, mean, cov, noise, law: Gaussian, known: tuple[sp.Symbo
     for i in range(size):
         for j in range(i, size):
             covs[i, j] = covs[j, i] = joint.covariance(equation[i], equation[j])
-    return (matrix.xreplace(masks) for matrix in (means, covs))
+    return tuple(sp.ImmutableMatrix(matrix.xreplace(masks)) for matrix in (means, covs))
 
 
 def _expanded(functions, **hints: bool) -> dict[str, sp.ImmutableMatrix]:
