@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -77,16 +78,30 @@ def compile_function(
         `function(*arrays)`: leading axes broadcast.  An output that no argument enters comes back
         without leading axes, the same for every trajectory.
     """
-    for expression in (*outputs.values(), *(definitions or {}).values()):
+    matrices = (tuple((key, sp.ImmutableMatrix(one)) for key, one in given.items()) for given in (arguments, outputs))
+    return _compiled(name, *matrices, tuple(vectors), doc, tuple((definitions or {}).items()))
+
+
+@lru_cache(maxsize=256)  # every filter of a model, and every check, wants the same functions
+def _compiled(
+    name: str,
+    argument_items: tuple[tuple[str, sp.ImmutableMatrix], ...],
+    output_items: tuple[tuple[str, sp.ImmutableMatrix], ...],
+    vectors: tuple[str, ...],
+    doc: str,
+    definition_items: tuple[tuple[sp.Symbol, sp.Expr], ...],
+) -> Compiled:
+    arguments, outputs, definitions = dict(argument_items), dict(output_items), dict(definition_items)
+    for expression in (*outputs.values(), *definitions.values()):
         if expression.has(*NO_NUMBERS):
             raise ModelError(
                 f"{name}: no finite real value, as at the mean of a noise something is divided by 0, or the root of a negative "
                 "number taken; use unscented(model) or gauss_hermite(model), or another mean of the noise"
             )
     try:
-        source = numpy_source(name, arguments, lower(outputs, vectors, definitions or {}), doc)
+        source = numpy_source(name, arguments, lower(outputs, vectors, definitions), doc)
     except BeyondFloats:  # a factor that was taken out of a power: (x + 1e-99)**4 = 1e-396*(1e99*x + 1)**4
-        source = numpy_source(name, arguments, lower(outputs, vectors, definitions or {}, factor=False), doc)
+        source = numpy_source(name, arguments, lower(outputs, vectors, definitions, factor=False), doc)
     namespace: dict[str, Any] = {"np": np}
     exec(compile(source, f"<generated {name}>", "exec"), namespace)  # our own text: printed from SymPy, no user strings
     return Compiled(namespace[name], source)

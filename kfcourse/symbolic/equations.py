@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Protocol
 
 import sympy as sp
@@ -25,7 +24,6 @@ class Noiseless(Protocol):
     def __call__(self, x: Array, k: int | None = None) -> Array: ...
 
 
-@lru_cache(maxsize=32)  # every simulation of a model begins with it
 def compile_model(model: Model) -> tuple[Equation, Equation]:
     """The state and meter equations as functions of arrays: (x (..., n), v (..., r)) -> (..., n).
 

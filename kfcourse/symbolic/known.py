@@ -37,7 +37,7 @@ class Known:
 
     symbols: tuple[sp.Symbol, ...] = ()
     interval: sp.Rational = sp.S.One
-    inputs: Mapping[str, tuple[float, ...]] = field(default_factory=dict, hash=False)
+    inputs: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @classmethod
     def read(cls, interval: Any, inputs: Mapping[str, Sequence[float]] | None) -> Known:

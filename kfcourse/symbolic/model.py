@@ -69,7 +69,7 @@ class Model:
     x: tuple[sp.Symbol, ...]
     v: tuple[sp.Symbol, ...]
     w: tuple[sp.Symbol, ...]
-    parameters: Mapping[str, sp.Rational] = field(hash=False)
+    parameters: Mapping[str, sp.Rational]
     prior: Gaussian = field(compare=False)
     state_noise: Gaussian = field(compare=False)
     meter_noise: Gaussian = field(compare=False)

@@ -152,7 +152,7 @@ class StructuralFormulas:
         h, G, R = (part.subs(self.model.values) for part in (self.functions["h"], self.functions["G"], self.R))
         explained = G * self.d * G.T
         # F is computed as G d G^T + R: R enters both outputs, and is found once.
-        auxiliary = {(i, j): sp.Dummy(f"R{i}{j}") for i in range(R.rows) for j in range(i, R.rows) if R[i, j].free_symbols}
+        auxiliary = {(i, j): sp.Dummy(f"R{i}{j}", dummy_index=1) for i in range(R.rows) for j in range(i, R.rows) if R[i, j].free_symbols}
         named = sp.ImmutableMatrix(*R.shape, lambda i, j: auxiliary.get((min(i, j), max(i, j)), R[i, j]))
         outputs = {"h": h, "G": G, "F": explained + named, "R": named}
         return self._compile("measure", {"m": self.m, "d": self.d}, outputs, {name: R[ij] for ij, name in auxiliary.items()})
@@ -251,6 +251,7 @@ def linearised(model: Model) -> Structure:
     return StructuralFormulas(model, "linearised", z, p, m, d, _expanded(functions, power_exp=False)).structure()
 
 
+@lru_cache(maxsize=64)
 def _taylor(equation, x, mean, noise, noise_mean):
     """Value and Jacobians by state and by noise, at (mean, noise_mean)."""
     point = dict(zip(x, mean, strict=True)) | dict(zip(noise, noise_mean, strict=True))
@@ -260,7 +261,7 @@ def _taylor(equation, x, mean, noise, noise_mean):
             raise NoClosedForm(
                 f"{list(equation)} is not differentiable and cannot be linearised; use unscented(model) or gauss_hermite(model)"
             )
-    return [part.subs(point, simultaneous=True) for part in parts]
+    return tuple(part.subs(point, simultaneous=True) for part in parts)
 
 
 def gaussian(model: Model) -> Structure:
