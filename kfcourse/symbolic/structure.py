@@ -152,7 +152,8 @@ class StructuralFormulas:
         h, G, R = (part.subs(self.model.values) for part in (self.functions["h"], self.functions["G"], self.R))
         explained = G * self.d * G.T
         # F is computed as G d G^T + R: R enters both outputs, and is found once.
-        auxiliary = {(i, j): sp.Dummy(f"R{i}{j}", dummy_index=1) for i in range(R.rows) for j in range(i, R.rows) if R[i, j].free_symbols}
+        upper = [(i, j) for i in range(R.rows) for j in range(i, R.rows) if R[i, j].free_symbols]
+        auxiliary = {(i, j): sp.Dummy(f"R{i}{j}", dummy_index=1) for i, j in upper}  # the same each time
         named = sp.ImmutableMatrix(*R.shape, lambda i, j: auxiliary.get((min(i, j), max(i, j)), R[i, j]))
         outputs = {"h": h, "G": G, "F": explained + named, "R": named}
         return self._compile("measure", {"m": self.m, "d": self.d}, outputs, {name: R[ij] for ij, name in auxiliary.items()})
