@@ -95,10 +95,9 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
 
 
 def find_variant(name: str, path: str | Path | None = None) -> Variant:
-    """One variant by name; VariantError lists the names if there is no such."""
+    """One variant by name; VariantError lists the names if there is no such, and tells what is wrong in a file of yours."""
     where, tables = _tables(path)
     if name not in tables:
         raise VariantError(f"no variant {name!r}; there are {', '.join(tables)}")
-    if path is None:  # the others are models, too: there is no need to read them
-        return read_variant(name, tables[name], where)
-    return load_variants(path)[name]
+    wanted = [name] if path is None else tables  # of the shipped ones, the others are models, too
+    return {one: read_variant(one, tables[one], where) for one in wanted}[name]

@@ -21,10 +21,10 @@ from jupyter_client.provisioning import LocalProvisioner
 
 FORKED = "kfcourse-forked"  # the name in pyproject.toml
 LAUNCHER = "ipykernel_launcher"
-# What a kernel imports by itself, what notebooks do, what SymPy's `simplify` does.  The last: a fork is told how its parent
-# starts processes, and a worker of joblib does it in joblib's way.
+# A kernel; what notebooks import; what SymPy's `simplify` does.  The last: a fork is told how its parent starts processes, and a
+# worker of joblib does it in joblib's way.
 IMPORTED = [
-    *("ipykernel.kernelapp", "ipykernel.debugger"),
+    "ipykernel.kernelapp",
     *("matplotlib.backends.backend_svg", "scipy.stats", "control", "kfcourse.pages", "kfcourse.exercises"),
     "sympy.physics.units",
     "joblib",
