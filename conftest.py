@@ -1,6 +1,10 @@
 """Python examples of the README are executed, in order, as one test session."""
 
+import gc
+
 from sybil import Sybil
 from sybil.parsers.markdown import PythonCodeBlockParser
+
+gc.set_threshold(50_000, 20, 50)  # SymPy makes much and leaves little: looking for garbage so often takes a twentieth of the time
 
 pytest_collect_file = Sybil(parsers=[PythonCodeBlockParser()], patterns=["README.md"]).pytest()

@@ -21,14 +21,8 @@ from jupyter_client.provisioning import LocalProvisioner
 
 FORKED = "kfcourse-forked"  # the name in pyproject.toml
 LAUNCHER = "ipykernel_launcher"
-# A kernel; what notebooks import; what SymPy's `simplify` does.  The last: a fork is told how its parent starts processes, and a
-# worker of joblib does it in joblib's way.
-IMPORTED = [
-    "ipykernel.kernelapp",
-    *("matplotlib.backends.backend_svg", "scipy.stats", "control", "kfcourse.pages", "kfcourse.exercises"),
-    "sympy.physics.units",
-    "joblib",
-]
+# The last: a fork is told how its parent starts processes, and a worker of joblib does it in joblib's way.
+IMPORTED = ["ipykernel.kernelapp", "matplotlib.backends.backend_svg", "kfcourse.pages", "kfcourse.exercises", "joblib"]
 
 
 def prefer_forked() -> None:
