@@ -6,7 +6,7 @@ from collections.abc import Callable
 from statistics import NormalDist
 
 import numpy as np
-from scipy.special import chdtri  # not scipy.stats: slow to import
+import scipy
 
 from kfcourse.exercises import messages
 from kfcourse.exercises.g_extended.keys import Normalised, innovation_covariance, normalised_with
@@ -21,7 +21,7 @@ Bounds = Callable[[int, int, float], tuple[float, float]]
 
 def _quantiles(probabilities: list[float], degrees: int) -> Array:
     """Of a chi-squared law."""
-    return chdtri(degrees, 1 - np.array(probabilities))
+    return scipy.special.chdtri(degrees, 1 - np.array(probabilities))
 
 
 def _interval(confidence: float, degrees: int) -> tuple[float, float]:

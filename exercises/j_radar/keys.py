@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
+import scipy
 import sympy as sp
 
 from kfcourse.checks.question import Answer
@@ -92,8 +93,6 @@ def lag(a: sp.Expr, T: sp.Expr, alpha: sp.Expr, beta: sp.Expr) -> tuple[sp.Expr,
 
 def _stationary(alpha: float, beta: float) -> tuple[Array, Array]:
     """Covariances of estimate and prediction, noise of the measurements alone, in units of sigma and T."""
-    import scipy.linalg  # slow to import
-
     rest, A = (np.array(matrix, dtype=float) for matrix in closed_loop(1, alpha, beta))
     K = np.array([[alpha], [beta]])
     after = scipy.linalg.solve_discrete_lyapunov(rest @ A, K @ K.T)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
+import scipy
 import sympy as sp
 
 from kfcourse.continuous.model import ContinuousModel

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy
 
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
@@ -256,5 +256,5 @@ def _log_mixture(x: Array, mu: Array, sigma: Array, mass: Array) -> Array:
         logs = np.log(total)
         far = np.flatnonzero(total == 0)  # so far out that the exponentials underflow
         if len(far):
-            logs[far] = logsumexp(-0.5 * ((x[far, None] - mu) / sigma) ** 2 + np.log(mass / (sigma * ROOT)), axis=1)
+            logs[far] = scipy.special.logsumexp(-0.5 * ((x[far, None] - mu) / sigma) ** 2 + np.log(mass / (sigma * ROOT)), axis=1)
     return logs

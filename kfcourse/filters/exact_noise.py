@@ -17,8 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import binary_dilation, binary_erosion
-from scipy.special import erf
+import scipy
 
 from kfcourse.filters.densities import ScalarDensities
 from kfcourse.filters.exact_kernels import CACHED, OVERLAP, ROOT, Grid, Kernels, TooNarrow, Unresolved, chunks
@@ -57,7 +56,7 @@ class Chi:
         return cls(begin[kept], end[kept])
 
     def __call__(self, number: Array) -> Array:
-        rise, fall = (erf((number[..., None] - place) / SOFT) for place in (self.begin, self.end))
+        rise, fall = (scipy.special.erf((number[..., None] - place) / SOFT) for place in (self.begin, self.end))
         return 0.5 * (rise - fall).sum(axis=-1)
 
 
@@ -107,8 +106,8 @@ class Pushed:
         wide = OVERLAP * np.fmax(distance[1:], distance[:-1]) <= sigma[::FINER]
         at_turns = np.zeros(len(x), dtype=bool)
         at_turns[np.unique(np.round(table[turning]).astype(int))] = True
-        grown = binary_dilation(at_turns, iterations=2 * EDGE) if at_turns.any() else at_turns
-        chi = Chi.of(binary_erosion(wide, iterations=1, border_value=1) | grown)
+        grown = scipy.ndimage.binary_dilation(at_turns, iterations=2 * EDGE) if at_turns.any() else at_turns
+        chi = Chi.of(scipy.ndimage.binary_erosion(wide, iterations=1, border_value=1) | grown)
         rest = 1 - chi(table)
         if (rest[turning] * density).sum() / np.exp(heights).sum() > poles:
             raise Unresolved("the transition kernel is far narrower than the posterior, and folds the state")

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 import sympy as sp
-from scipy.special import gammaln
 
 from kfcourse.angles import Components, near
 from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, product, square_root, transpose
@@ -210,5 +210,5 @@ def _log_laws(s: Array, mean: Array, root: Array, freedom: float | None) -> Arra
     size = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)[..., None, :]
     if freedom is None:
         return -0.5 * square - size - 0.5 * r * np.log(2 * np.pi)
-    constant = gammaln((freedom + r) / 2) - gammaln(freedom / 2) - 0.5 * r * np.log(freedom * np.pi)
+    constant = scipy.special.gammaln((freedom + r) / 2) - scipy.special.gammaln(freedom / 2) - 0.5 * r * np.log(freedom * np.pi)
     return constant - size - 0.5 * (freedom + r) * np.log1p(square / freedom)

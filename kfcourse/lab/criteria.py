@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+import scipy
 import sympy as sp
-from scipy.special import stdtrit  # not scipy.stats: slow to import
 
 from kfcourse.filters import Filter
 from kfcourse.filters.base import State, initial_state
@@ -203,7 +203,7 @@ def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
         difference, score = comparison.difference(first, second), comparison.score_difference(first, second)
         relative = np.abs(np.append(ratio(difference.value, control, 0.0), score.value))
         error = np.append(ratio(difference.standard_error, control, 0.0), score.standard_error)
-        quantile = stdtrit(difference.freedom, 1 - SIGNIFICANCE / tests / 2)
+        quantile = scipy.special.stdtrit(difference.freedom, 1 - SIGNIFICANCE / tests / 2)
         allowed = quantile * error + ROUNDING + (fitted if first in designed or second in designed else 0.0)
         significant = np.where(relative > allowed, relative, 0.0)
         if significant.max() > largest:

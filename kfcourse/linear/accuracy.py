@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from kfcourse.laws import Array, Gaussian, correct, gain, symmetric
 from kfcourse.linear.system import LinearSystem
@@ -63,8 +64,6 @@ def steady_state(system: LinearSystem) -> Steady:
         There is no limit that the filter reaches from every start: a part of the state is neither seen nor decays, or has
         no noise.
     """
-    import scipy.linalg  # slow to import
-
     try:
         predicted = scipy.linalg.solve_discrete_are(system.A.T, system.H.T, system.Q, system.R)
     except (np.linalg.LinAlgError, ValueError):

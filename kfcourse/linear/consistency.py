@@ -15,7 +15,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtri  # not scipy.stats: slow to import
+import scipy
 
 from kfcourse.angles import Components, difference
 from kfcourse.laws import Array, Gaussian, Measurement, normalised_square, square_root
@@ -110,7 +110,7 @@ def chi_squared_bounds(degrees: int, runs: int, confidence: float = 0.95) -> tup
     """
     if degrees < 1 or runs < 1 or not 0 < confidence < 1:
         raise ValueError(f"expected degrees >= 1, runs >= 1 and 0 < confidence < 1, got {degrees}, {runs}, {confidence}")
-    low, high = (float(chdtri(degrees * runs, above)) for above in ((1 + confidence) / 2, (1 - confidence) / 2))
+    low, high = (float(scipy.special.chdtri(degrees * runs, above)) for above in ((1 + confidence) / 2, (1 - confidence) / 2))
     return low / runs, high / runs
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import stdtrit  # not scipy.stats: slow to import
+import scipy
 
 from kfcourse.laws import Array, Gaussian, normalised_square
 
@@ -42,7 +42,7 @@ class Estimate:
     def half_width(self, confidence: float = 0.95) -> Array:
         if not 0 < confidence < 1:
             raise ValueError(f"a confidence lies between 0 and 1, got {confidence}")
-        return stdtrit(self.freedom, 0.5 + confidence / 2) * self.standard_error
+        return scipy.special.stdtrit(self.freedom, 0.5 + confidence / 2) * self.standard_error
 
     def __iter__(self) -> Iterator[Estimate]:
         """Along the first axis: the steps, one after the other."""

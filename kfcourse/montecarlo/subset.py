@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from importlib import import_module
 from typing import TypeVar
 
 import numpy as np
@@ -66,7 +67,7 @@ def run_subset(
     left_out: dict[str, str] = {}
     replaced: dict[str, str] = {}
     chosen = {one.name: one for one in slow}
-    _prepare_blas()
+    _load_libraries()
     with memory_limit(memory):
         while running := [one for name, one in chosen.items() if name not in left_out]:
             names = [one.name for one in running]
@@ -126,8 +127,10 @@ def _chunks_in_time(
     return found
 
 
-def _prepare_blas() -> None:
-    """Have the linear algebra take its buffers, for all its threads: OpenBLAS ends the process if it finds no room for them."""
+def _load_libraries() -> None:
+    """What the limits must not stop half-way: parts of SciPy, and OpenBLAS' buffers, without which it ends the process."""
+    for part in ("linalg", "ndimage", "special"):
+        import_module(f"scipy.{part}")
     square = np.eye(512)
     np.linalg.cholesky(np.linalg.solve(square, square) @ square)
 

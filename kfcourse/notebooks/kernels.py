@@ -22,7 +22,10 @@ from jupyter_client.provisioning import LocalProvisioner
 FORKED = "kfcourse-forked"  # the name in pyproject.toml
 LAUNCHER = "ipykernel_launcher"
 # The last: a fork is told how its parent starts processes, and a worker of joblib does it in joblib's way.
-IMPORTED = ["ipykernel.kernelapp", "matplotlib.backends.backend_svg", "kfcourse.pages", "kfcourse.exercises", "joblib"]
+IMPORTED = [
+    *("ipykernel.kernelapp", "matplotlib.backends.backend_svg", "scipy.special", "scipy.linalg"),
+    *("kfcourse.pages", "kfcourse.exercises", "joblib"),
+]
 
 
 def prefer_forked() -> None:
