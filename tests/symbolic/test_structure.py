@@ -299,3 +299,20 @@ def test_the_noiseless_model_has_its_noises_at_their_means():
     x = np.random.default_rng(3).normal(size=(6, 2))
     np.testing.assert_allclose(a(x), state(x, np.tile(model.state_noise.mean, (6, 1))), rtol=1e-13)
     np.testing.assert_allclose(b(x), meter(x, np.tile(model.meter_noise.mean, (6, 1))), rtol=1e-13)
+
+
+@pytest.mark.parametrize("derive", [linearised, gaussian])
+def test_models_that_differ_in_a_number_only_are_not_taken_for_each_other(derive, variant53):
+    """What is derived for one is used for the other: formulas for other parameters, and nothing for other noises."""
+    z, p = np.array([[1.2]]), np.array([[[0.3]]])
+    noisier = Model.define(
+        "c*x + e*x*v", "g*x + f*x**2*w", dict(variant53.parameters), state_noise={"variance": 4}, meter_noise={"variance": 4}
+    )
+    found = []
+    for model in (variant53, variant53.replace(e=0.1, f=0.04), noisier, variant53):
+        structure = derive(model)
+        assert structure.model is model
+        found.append((structure.predict(z, p).cov, structure.measure(z, p).R))
+    first, doubled, other, again = found
+    np.testing.assert_allclose(np.array(doubled), np.array(other), rtol=1e-14)  # e v with twice the e, or four times the variance
+    assert np.array_equal(first, again) and not np.allclose(first, doubled)
