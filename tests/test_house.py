@@ -1,6 +1,8 @@
 """The house keeps its order: imports run down its floors, no module hides behind a function, each room says what it is."""
 
 import inspect
+import subprocess
+import sys
 from graphlib import TopologicalSorter
 from importlib import import_module
 from pathlib import Path
@@ -54,3 +56,10 @@ def test_what_notebooks_import_is_there():
     from kfcourse.checks import exercise
 
     assert exercise("a").check("a2", None).status == "unusable"
+
+
+def test_what_is_slow_to_import_waits_until_it_is_used():
+    """Every command and every graded notebook imports the package; after `import scipy`, `scipy.special.erf` imports the rest."""
+    slow = ("matplotlib", "scipy.linalg", "scipy.ndimage", "scipy.special", "scipy.stats")
+    code = f"import sys, kfcourse; print([name for name in {slow} if name in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
