@@ -136,9 +136,9 @@ FOUND = """async (context, rules) => {
     const serious = violations.filter(({ impact }) => impact !== "minor");
     return serious.flatMap(({ id, impact, nodes }) => nodes.map((one) => `${impact} ${id}: ${one.html.slice(0, 200)}`));
 }"""
-# Thins out the page, as axe takes as long as there are elements: the insides of formulas, which keep their size and have no text of
-# their own, and spans that only colour code and signatures, beyond those marked.  A few texts of each kind are marked, on all pages
-# of the tab together: what has the same colours, in both themes, and the same size has the same contrast.
+# Thins out the page, as axe takes as long as there are elements: the insides of formulas, which keep their size and have no text
+# of their own, and spans that only colour code and signatures, beyond those marked.  A few texts of each kind are marked, on all
+# pages of the tab together: what has the same colours, in both themes, and the same size has the same contrast.
 THIN = """(themes) => {
     const formulas = [...document.querySelectorAll("mjx-container")].map((e) => [e, e.getBoundingClientRect()]);
     for (const [e, { width, height }] of formulas) {

@@ -189,7 +189,7 @@ def set_slider(tab, name: str, value: int) -> None:
 
 
 def page_s_run(tab, settings: dict) -> dict:
-    """What the page's filter makes of the recording; as one text, which passes through Playwright much faster than its numbers."""
+    """What the page's filter makes of the recording; as one text, which passes through Playwright faster than its numbers."""
     recording = {"position": RECORDING.position.tolist(), "noise": RECORDING.noise.tolist()}
     run = "text => JSON.stringify(kfcourseLive.run(...JSON.parse(text)))"
     return json.loads(tab.evaluate(run, json.dumps([recording, settings])))
