@@ -11,6 +11,8 @@ endif
 
 # Small matrices: several threads in one process cost more than they gain, and processes share the machine.
 export OMP_NUM_THREADS := 1
+# Many processes import the package: compiled once, not by each.
+unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:

@@ -24,7 +24,7 @@ LAUNCHER = "ipykernel_launcher"
 # The last: a fork is told how its parent starts processes, and a worker of joblib does it in joblib's way.
 IMPORTED = [
     *("ipykernel.kernelapp", "matplotlib.backends.backend_svg", "scipy.special", "scipy.linalg"),
-    *("kfcourse.pages", "kfcourse.exercises", "joblib"),
+    *("sympy.physics.units", "kfcourse.pages", "kfcourse.exercises", "joblib"),
 ]
 
 

@@ -224,6 +224,10 @@ class Model:
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
     def __repr__(self) -> str:
+        return self._text
+
+    @cached_property
+    def _text(self) -> str:
         a = ", ".join(f"{name}' = {formula}" for name, formula in zip(self.x, self.state_equation, strict=True))
         b = ", ".join(f"{name} = {formula}" for name, formula in zip(self.measured, self.meter_equation, strict=True))
         values = ", ".join(f"{name} = {value}" for name, value in self.parameters.items())
