@@ -187,6 +187,15 @@ CONTRAST = f"""([theme, colours]) => {{
 }}"""
 
 
+def show_on(tab, media: str, width: int) -> None:
+    """Lay the page out for another medium and width: once, as it is hidden while they change."""
+    tab.evaluate("document.body.style.contentVisibility = 'hidden'")
+    tab.emulate_media(media=media)
+    tab.set_viewport_size({"width": width, "height": 1000})
+    tab.add_style_tag(content="* { transition: none !important; }")  # colours of a theme, not those on the way to it
+    tab.evaluate("document.body.style.contentVisibility = ''")
+
+
 @pytest.mark.parametrize("page", [*PAGES, "search", "genindex", "py-modindex", "404"])
 def test_page_in_a_browser_without_network(window, page: str) -> None:
     """Loads without a complaint; fits screens and paper; axe-core finds nothing, light and dark; formulas are formulas."""
@@ -209,16 +218,12 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
         tab.set_viewport_size({"width": width, "height": 1000})
         assert tab.evaluate(FIT)["page"] <= 0, f"the page scrolls sideways at {width} px"
         assert tab.evaluate(SQUEEZED) == [], f"pictures out of proportion at {width} px"
-    tab.set_viewport_size({"width": PAPER, "height": 1000})
-    tab.emulate_media(media="print")
+    show_on(tab, "print", PAPER)
     printed = tab.evaluate(FIT)
-    tab.emulate_media(media="screen")
     assert printed["boxes"] == [] and printed["pictures"] == [], "cut on paper"
-
-    tab.set_viewport_size({"width": 1280, "height": 1000})
+    show_on(tab, "screen", 1280)
     wide = tab.evaluate(FIT)
     assert wide["page"] <= 0 and wide["code"] == [], "at 1280 px a page scrolls, or a code cell"
-    tab.add_style_tag(content="* { transition: none !important; }")  # colours of a theme, not those on the way to it
     tab.evaluate(AXE)
     whole = tab.evaluate(AUDIT, COLOURS) if page == WHOLE else []
     tab.evaluate(THIN, THEMES)
