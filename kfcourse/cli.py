@@ -25,17 +25,16 @@ from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
 from kfcourse.lab.report import conclusions, write_json, write_report
 from kfcourse.lab.short_names import FILTERS, LAB, has_bound, title
-from kfcourse.lab.variants import VariantError, find_variant
+from kfcourse.lab.variants import VariantError, chosen_variants, find_variant
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.subset import LEAST
-from kfcourse.notebooks import commands
-from kfcourse.notebooks.course_list import chosen_variants
 from kfcourse.symbolic.formula import FormulaError
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.reading import ModelError
 
+OF_NOTEBOOKS = ("exercises", "solutions", "grade")
 DERIVATION = 60.0  # seconds for the formulas of the filters
 
 _VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")
@@ -92,7 +91,17 @@ def _ended_by(numbers: Iterable[int]) -> Iterator[None]:
 
 
 class _Group(click.Group):
-    """Every command says what a user did wrong in a sentence."""
+    """Every command says what a user did wrong in a sentence; those of notebooks import Jupyter, when they are asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted([*super().list_commands(ctx), *OF_NOTEBOOKS])
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        if name not in OF_NOTEBOOKS:
+            return super().get_command(ctx, name)
+        from kfcourse.notebooks import commands
+
+        return getattr(commands, name)
 
     def invoke(self, ctx: click.Context) -> object:
         with _clear_errors():
@@ -359,8 +368,3 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
         raise click.ClickException(f"the numbers cannot go to {json_file}: name a file in an existing folder with --json")
     if read_only(json_file):
         raise click.ClickException(f"{json_file} is read-only, and is not replaced: name another file with --json")
-
-
-main.add_command(commands.exercises)
-main.add_command(commands.solutions)
-main.add_command(commands.grade)

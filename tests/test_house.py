@@ -58,8 +58,14 @@ def test_what_notebooks_import_is_there():
     assert exercise("a").check("a2", None).status == "unusable"
 
 
-def test_what_is_slow_to_import_waits_until_it_is_used():
+@pytest.mark.parametrize(
+    ("module", "slow"),
+    [
+        ("kfcourse", ["matplotlib", "scipy.linalg", "scipy.ndimage", "scipy.special", "scipy.stats"]),
+        ("kfcourse.cli", ["jupyter_client", "jupytext", "nbclient", "nbconvert", "nbformat"]),
+    ],
+)
+def test_what_is_slow_to_import_waits_until_it_is_used(module, slow):
     """Every command and every graded notebook imports the package; after `import scipy`, `scipy.special.erf` imports the rest."""
-    slow = ("matplotlib", "scipy.linalg", "scipy.ndimage", "scipy.special", "scipy.stats")
-    code = f"import sys, kfcourse; print([name for name in {slow} if name in sys.modules])"
+    code = f"import sys, {module}; print([name for name in {slow} if name in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -101,3 +101,14 @@ def find_variant(name: str, path: str | Path | None = None) -> Variant:
         raise VariantError(f"no variant {name!r}; there are {', '.join(tables)}")
     wanted = [name] if path is None else tables  # of the shipped ones, the others are models, too
     return {one: read_variant(one, tables[one], where) for one in wanted}[name]
+
+
+def chosen_variants(names: Sequence[str], everything: bool, variants_file: Path | None) -> list[Variant]:
+    """The variants asked for; ValueError if there is no such, or none is named."""
+    known = load_variants(variants_file)
+    if everything:
+        return list(known.values())
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise ValueError(f"no variant {', '.join(unknown)}; there are {', '.join(known)}")
+    return [known[name] for name in dict.fromkeys(names)]

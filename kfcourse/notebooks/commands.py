@@ -16,7 +16,8 @@ from typing import Any
 import click
 
 from kfcourse.checks import sets
-from kfcourse.notebooks.course_list import assign, chosen_variants, read_assignment, save_assignment
+from kfcourse.lab.variants import chosen_variants
+from kfcourse.notebooks.course_list import assign, read_assignment, save_assignment
 from kfcourse.notebooks.grading.marking import Setting
 from kfcourse.notebooks.grading.owners import Person
 from kfcourse.notebooks.grading.pool import grading

@@ -1,4 +1,4 @@
-"""A variant for each student of a course list, always the same; and the variants that a command names."""
+"""A variant for each student of a course list, always the same."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from kfcourse.files import save
-from kfcourse.lab.variants import Variant, load_variants
 from kfcourse.notebooks.jobs import safe
 
 LONGEST = 100  # characters of a name: it becomes the name of a folder
@@ -164,14 +163,3 @@ def _row(path: Path, line: int, values: Mapping[str | None, Any]) -> Iterator[Ro
         if len(found[key]) > LONGEST:
             raise ValueError(f"{where}: a {key} of more than {LONGEST} characters; is a quote or a line break missing?")
     yield Row(line, **found)
-
-
-def chosen_variants(names: Sequence[str], everything: bool, variants_file: Path | None) -> list[Variant]:
-    """The variants asked for; ValueError if there is no such, or none is named."""
-    known = load_variants(variants_file)
-    if everything:
-        return list(known.values())
-    unknown = [name for name in names if name not in known]
-    if unknown:
-        raise ValueError(f"no variant {', '.join(unknown)}; there are {', '.join(known)}")
-    return [known[name] for name in dict.fromkeys(names)]
