@@ -25,7 +25,7 @@ from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import Ensemble, Instant
 from kfcourse.montecarlo.statistics import Sums
 
-CHUNKS = (8, 8, 16, 32, 64, 128, 256)  # trajectories taken at once; after these always as many as the last
+CHUNKS = (8, 8, 16, 32, 64, 128, 256, 512)  # trajectories taken at once; after these always as many as the last
 BATCH = 4  # trajectories of a batch
 LEAST = 10e6  # bytes that can be a limit: interpreter and libraries take some at any time
 MARGIN = 1.3  # how much longer than the chunks before the next one may take, for each trajectory
@@ -93,7 +93,7 @@ def _chunks_in_time(
     memory: float | None,
     progress: bool | None,
 ) -> list[Sums]:
-    """Sums over the chunks that are done in time; a chunk that would take too much memory is done in smaller ones."""
+    """Sums over the chunks that are done in time; one that would take too much time or memory is done in smaller ones."""
     names = [one.name for one in filters]
     reference = names.index(EXACT) if EXACT in names else None
     steps, size, n = data[0].shape
@@ -104,8 +104,12 @@ def _chunks_in_time(
         while start < size:
             count = min(CHUNKS[min(len(found), len(CHUNKS) - 1)], most, size - start)
             now = time.monotonic()
-            if end is not None and found and MARGIN * (now - begun) / start * count > end - now:
-                break
+            if end is not None and found:
+                each = MARGIN * (now - begun) / start
+                while each * count > end - now and count >= 2 * CHUNKS[0]:
+                    count = count // 2 // BATCH * BATCH
+                if each * count > end - now:
+                    break
             instants = [Instant(*(array[k, start : start + count] for array in data)) for k in range(steps)]
             try:
                 with _until(end):

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from kfcourse import Model, compare, gaussian, linearised
 from kfcourse.filters import aof, pointmass
 from kfcourse.lab.short_names import exact
+from kfcourse.montecarlo import subset
 from kfcourse.symbolic.reading import ModelError
 
 STEPS = 3
@@ -61,6 +63,21 @@ def test_the_time_decides_on_the_number_of_trajectories_and_on_nothing_else(mode
     again = compare([control, sluggish], model, 600, STEPS, 1, subset_runs=result.subset_runs, progress=False)
     assert same(result, again)
     assert not result.left_out
+
+
+def test_the_time_is_used(model, control, monkeypatch):
+    """A step of a trajectory takes a second, by a clock that only the filter moves; what would be late is done in part."""
+    clock = SimpleNamespace(now=0.0)
+    monkeypatch.setattr(subset, "time", SimpleNamespace(monotonic=lambda: clock.now))
+
+    def step(state, y):
+        clock.now += len(y)
+        return control.step(state, y)
+
+    steady = replace(control, name="steady", slow=True, step=step)
+    result = compare([control, steady], model, 2000, STEPS, 1, subset_runs=2000, subset_seconds=1000 * STEPS, progress=False)
+    # MARGIN leaves less than ten trajectories unused
+    assert 990 <= result.subset_runs == clock.now / STEPS <= 1000
 
 
 def test_a_chunk_that_does_not_end_in_time_is_given_up(model, control):
