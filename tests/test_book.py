@@ -147,7 +147,7 @@ THIN = """(themes) => {
     }
     const texts = [...document.body.querySelectorAll("*")]
         .filter((e) => [...e.childNodes].some((one) => one.nodeType === Node.TEXT_NODE && one.data.trim()));
-    const looks = new Map(texts.map((e) => [e, e.closest("a") ? "link" : ""]));
+    const looks = new Map(texts.map((e) => [e, ""]));
     for (const theme of themes) {
         document.documentElement.dataset.theme = document.documentElement.dataset.mode = theme;
         const under = new Map([[null, ""]]);  // all that is painted under an element's text
@@ -160,8 +160,9 @@ THIN = """(themes) => {
             return under.get(e);
         };
         for (const e of texts) {
-            const { color, fontSize, fontWeight, textShadow } = getComputedStyle(e);
-            looks.set(e, [looks.get(e), color, fontSize, fontWeight, textShadow, ground(e)].join("; "));
+            const { color, fontSize, fontWeight, textShadow } = getComputedStyle(e), link = e.closest("a");
+            const around = link ? getComputedStyle(link.parentElement).color : "";  // what a link differs from
+            looks.set(e, [looks.get(e), color, around, fontSize, fontWeight, textShadow, ground(e)].join("; "));
         }
     }
     const seen = JSON.parse(sessionStorage.seen ?? "{}");
