@@ -104,7 +104,7 @@ def find_variant(name: str, path: str | Path | None = None) -> Variant:
 
 
 def chosen_variants(names: Sequence[str], everything: bool, variants_file: Path | None) -> list[Variant]:
-    """The variants asked for; ValueError if there is no such, or none is named."""
+    """The variants of these names, each once, or all of them; ValueError if there is no such."""
     known = load_variants(variants_file)
     if everything:
         return list(known.values())

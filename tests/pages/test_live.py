@@ -275,7 +275,6 @@ def test_settings_that_are_none_are_refused(script, change):
 
 
 def test_noise_of_the_reader_s_track(script):
-
     def mulberry32(seed):  # T. Ettinger's generator, in Python's unlimited integers
         mask = 2**32 - 1
         while True:
