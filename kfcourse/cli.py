@@ -189,7 +189,7 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
 @click.option(
     "--exact-runs",
     type=click.IntRange(min=0),
-    default=10_000,
+    default=4000,
     show_default=True,
     help="Trajectories for the slow filters, if the time allows; 0 leaves them out.",
 )
@@ -215,9 +215,7 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
 @click.option(
     "--wide",
     type=click.FloatRange(min=1),
-    default=1.0,
-    show_default=True,
-    help="Draw initial states from a law so many times as wide, and weight the trajectories: 2 where rare far starts dominate.",
+    help="Draw half of the initial states from a law so many times as wide, and weight the trajectories.  [default: by a pilot]",
 )
 @click.option("--same-ensemble", is_flag=True, help="Design DUOF, FOS and MFOS on the trajectories they are compared on, once.")
 @click.option("--threads", type=click.IntRange(min=1), default=2, show_default=True, help="Does not change the numbers.")
@@ -239,7 +237,7 @@ def lab(
     exact_seconds: float,
     exact_memory: float,
     designs: int | None,
-    wide: float,
+    wide: float | None,
     same_ensemble: bool,
     threads: int,
     out: Path | None,

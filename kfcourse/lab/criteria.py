@@ -127,12 +127,12 @@ def shares(comparison: Comparison, name: str) -> Estimate:
     Steps where the component does not vary are left out; a component that never varies has the share 1.
     """
     square, base = (comparison.sums.square[comparison.fast.index(one)] for one in (name, UNMEASURED))
-    counts, total = comparison.sums.counts, base.sum(axis=-1)
+    weights, total = comparison.sums.weights, base.sum(axis=-1)
     used = total > 1e-24 * total.max(axis=0)
     steps = np.maximum(used.sum(axis=0), 1)
     share = np.where(used, ratio(square.sum(axis=-1), total, 0.0), 0.0)
-    weight = np.where(used, ratio(counts.sum() / steps, total, 0.0), 0.0)  # 1 / variance, averaged over the steps
-    deviation = batch_mean(((square - share[..., None] * base) * weight[..., None]).sum(axis=0), counts)  # delta method
+    weight = np.where(used, ratio(weights.sum() / steps, total, 0.0), 0.0)  # 1 / variance, averaged over the steps
+    deviation = batch_mean(((square - share[..., None] * base) * weight[..., None]).sum(axis=0), weights)  # delta method
     value = np.where(used.any(axis=0), share.sum(axis=0) / steps, 1.0)
     return Estimate(value, deviation.standard_error, deviation.freedom)
 

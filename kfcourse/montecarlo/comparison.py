@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
+from kfcourse.laws import Array
 from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean, ratio
 from kfcourse.montecarlo.two_phase import Replicas, Terms, batch_sums, estimate, with_design
 from kfcourse.symbolic.model import Model
 
 EXACT = "aof-exact"
-FAR = 0.5  # excess over the bound, relative to it, from which on its tails are as heavy as those of the error itself
+ROUNDING = (64 * np.finfo(float).eps) ** 2  # an error variance less than this part of M|x|^2 is one of rounding
+UNHEALTHY = 0.1  # squared error of the exact filter's substitute, in its variance, from which on it bounds nothing
+BEATEN = 5.0  # standard errors by which a filter must be better than the "exact" one to refute it, at any step
+HEAVY = 0.1  # part of a sum over trajectories that a single one makes where its interval cannot be trusted
 
 
 @dataclass(frozen=True)
@@ -27,6 +31,13 @@ class Subset:
     sums: Sums
     replaced: Mapping[str, str] = field(default_factory=dict)
 
+    def without_exact(self) -> Subset | None:
+        """Without the exact AOF, if any other slow filter is left."""
+        kept = [i for i, name in enumerate(self.slow, len(self.sums.square) - len(self.slow)) if name != EXACT]
+        fast = list(range(len(self.sums.square) - len(self.slow)))
+        slow = [name for name in self.slow if name != EXACT]
+        return replace(self, slow=slow, sums=self.sums.of_filters([*fast, *kept])) if slow else None
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -36,7 +47,11 @@ class Comparison:
     vector state, the trace of M[(x - z)(x - z)^T]); `error_mean` tells how much of it is bias.
 
     The exact AOF is no filter among others, but their bound: `gap` tells how far above it each of them is.  By orthogonality
-    (`excess`) that is known far better than any difference of two error variances, and so is the bound itself.
+    (`excess`) that is often known far better than any difference of two error variances, and so is the bound itself.
+
+    There is one estimate of each D_k, from which all else follows, so that table, ranking and verdict cannot disagree: the bound
+    and what the filter is above it, found from its distance from the exact filter and from its errors, each with the weight that
+    makes the standard error least.
 
     Attributes
     ----------
@@ -78,6 +93,46 @@ class Comparison:
         """Whether the exact AOF ran."""
         return self._is_slow(EXACT)
 
+    @cached_property
+    def without_error(self) -> Array:
+        """Steps, (steps,), at which the most accurate filter errs by rounding only: of such a bound no part can be told."""
+        least = self.bound() if self.has_bound else self.error_variance(self.control)
+        size = self.sums.size.sum(axis=-1) / self.sums.weights.sum()
+        return np.asarray(least.value <= ROUNDING * size)
+
+    @cached_property
+    def doubtful(self) -> Array:
+        """Steps, (steps,), at which what should be exact is not: it errs by too much itself, or a filter is more accurate."""
+        found = np.zeros(self.steps, dtype=bool)
+        if self.subset is not None and self.has_bound:
+            own = batch_mean(self.subset.sums.doubt, self.subset.sums.weights).value
+            found |= ~(own <= UNHEALTHY * self.bound().value)
+            for name in self.fast:
+                above = self._estimate(self._above(name))
+                found |= above.value < -BEATEN * above.standard_error
+        return found & ~self.without_error
+
+    @property
+    def usable(self) -> Array:
+        """Steps, (steps,), at which distances from the bound, or from the control, have a meaning."""
+        return ~(self.without_error | self.doubtful)
+
+    def without_unhealthy(self) -> Comparison:
+        """Without the exact AOF, and with the reason, if what ran in its place can be relied on at no step."""
+        if self.subset is None or not self.doubtful.any() or (self.usable | self.without_error).any():
+            return self
+        first = self.replaced.get(EXACT, "it does not resolve this model")
+        why = f"{first}; and particles, which ran in its place, err by too much"
+        return replace(self, subset=self.subset.without_exact(), left_out={**self.left_out, EXACT: why})
+
+    def heavy(self, name: str) -> Array:
+        """Part that the largest single trajectory makes of what is known of the filter's distance from the exact one, (steps,).
+
+        Where it is more than `HEAVY`, there are too few trajectories for the interval to be trusted.
+        """
+        sums, i = self._in_subset(name)
+        return ratio(sums.largest[i].max(axis=-1), sums.distance[i].sum(axis=-1), 0.0) * self._shares[name]
+
     @property
     def designs(self) -> int:
         """Ensembles that each of the designed filters was designed on; 0 if there is no such filter or one design only."""
@@ -103,14 +158,10 @@ class Comparison:
         """The fast filter through which the slow ones' errors are found: the Gaussian AOF if there, else the most accurate."""
         if "aof-gaussian" in self.fast:
             return "aof-gaussian"
-        return min(self.fast, key=lambda name: float(self.error_variance(name).value.mean()))
+        return min(self.fast, key=lambda name: float(self._estimate(self._mean_square(name)).value.mean()))
 
     def error_variance(self, name: str) -> Estimate:
-        """D_k per step, (steps,), with standard errors.
-
-        For a slow filter, D = D(carrier, all trajectories) + (D(slow) - D(carrier)) on the subset: the
-        difference varies far less than the error itself.  For the exact AOF that difference is -`excess(carrier)`.
-        """
+        """D_k per step, (steps,), with standard errors; for the exact AOF the mean of its own variance (`bound`)."""
         return self._estimate(self._error(name))
 
     def difference(self, first: str, second: str) -> Estimate:
@@ -122,11 +173,7 @@ class Comparison:
 
         By the delta method: the ratio r of means varies as the mean of (e^2 - r e_ref^2) / D_ref.
         """
-        own, base = self._error(name), self._error(reference or self.control)
-        quotient = self._quotient(own, base)
-        values = self._estimate(own).value, self._estimate(base).value
-        # both know everything: equal
-        return Estimate(ratio(*values, np.where(values[0] == 0, 1.0, np.inf)), quotient.standard_error, quotient.freedom)
+        return self._quotient(self._error(name), self._error(reference or self.control))
 
     def score(self, name: str, steps: slice = slice(None)) -> Estimate:
         """The mean over steps of D_k(name) / D_k(control): one number for a filter, with its standard error."""
@@ -144,7 +191,7 @@ class Comparison:
         The error of the posterior mean is uncorrelated with every function of the measurements, so
         M|x - z|^2 - M|x - z_exact|^2 = M|z - z_exact|^2.  The right side never sees the error itself, so it is far less
         noisy than the paired difference as long as the two filters are close.  Where they are not, its own tails are
-        heavy, and few trajectories underestimate it: then use `above_bound`.
+        heavy, and few trajectories underestimate it: then `above_bound` is better.  `gap` weighs both.
         """
         return self._estimate(self._distance(name))
 
@@ -165,8 +212,7 @@ class Comparison:
     def gap(self, name: str) -> Estimate:
         """How far above the bound a filter is, D_k(name) / D_k(exact AOF) - 1 per step, (steps,).
 
-        From `excess`; where the filter is far from the bound (by more than half of it) as `above_bound` is.  Without the exact
-        AOF, how far above the control.
+        Without the exact AOF, how far above the control.  NaN at steps that are not `usable`.
         """
         return self._quotient(self._over(name), self._reference())
 
@@ -189,9 +235,9 @@ class Comparison:
 
     def leaders(self, step: int, confidence: float = 0.95) -> list[str]:
         """The most accurate entrant at a step, then those that are not significantly worse, each by its own paired interval."""
-        gaps = {name: float(self.gap(name).value[step]) for name in self.entrants}
-        best, *others = sorted(gaps, key=lambda name: gaps[name])
-        return [best, *(name for name in others if self.gap_difference(name, best)[step].interval(confidence)[0] <= 0)]
+        found = {name: float(self.error_variance(name).value[step]) for name in self.entrants}
+        best, *others = sorted(found, key=lambda name: found[name])
+        return [best, *(name for name in others if self.difference(name, best)[step].interval(confidence)[0] <= 0)]
 
     def design_error(self, name: str) -> Estimate:
         """Standard deviation of D_k from one design of the filter to another, (steps,); 0 for filters that need none.
@@ -209,22 +255,22 @@ class Comparison:
     def error_mean(self, name: str) -> Estimate:
         """M[x_k - z_k] per step and component, (steps, n)."""
         sums, i = self._where(name)
-        return batch_mean(sums.error[i], sums.counts)
+        return batch_mean(sums.error[i], sums.weights)
 
     def component_variance(self, name: str) -> Estimate:
         """M[(x_i - z_i)^2] per step and component, (steps, n), over the trajectories the filter ran on."""
         sums, i = self._where(name)
-        return batch_mean(sums.square[i], sums.counts)
+        return batch_mean(sums.square[i], sums.weights)
 
     def own_variance(self, name: str) -> Estimate:
         """What the filter claims: the mean of its own variances, summed over components, (steps,)."""
         sums, i = self._where(name)
-        return batch_mean(sums.own[i].sum(axis=1), sums.counts)
+        return batch_mean(sums.own[i].sum(axis=1), sums.weights)
 
     def normalised_error(self, name: str) -> Estimate:
         """M[e^T p^-1 e] / n per step, (steps,): 1 for a filter whose covariance is right."""
         sums, i = self._where(name)
-        return batch_mean(sums.normalised[i], sums.counts)
+        return batch_mean(sums.normalised[i], sums.weights)
 
     def _is_slow(self, name: str) -> bool:
         return self.subset is not None and name in self.subset.slow
@@ -234,7 +280,14 @@ class Comparison:
         self._check(name)
         if name in self.fast or self.subset is None:
             return self.sums, self.fast.index(name)
-        return self.subset.sums, len(self.fast) + self.subset.slow.index(name)
+        return self._in_subset(name)
+
+    def _in_subset(self, name: str) -> tuple[Sums, int]:
+        """Sums over the subset, and the filter's place in them."""
+        self._check(name)
+        if self.subset is None:
+            raise KeyError(f"no filter ran on a subset of the trajectories, so nothing is known of {name} there")
+        return self.subset.sums, (*self.fast, *self.subset.slow).index(name)
 
     def _check(self, *names: str) -> None:
         for name in names:
@@ -244,12 +297,17 @@ class Comparison:
     # --- estimates as terms: what of which filter, over all trajectories and over the subset
 
     def _error(self, name: str) -> Terms:
-        """D_k."""
+        """D_k: the bound, and what is above it."""
         self._check(name)
+        if self.has_bound:
+            return self._bound() if name == EXACT else self._bound().plus(self._above_all(name))
+        return self._mean_square(name)
+
+    def _mean_square(self, name: str) -> Terms:
+        """M|x - z|^2; for a slow filter by its difference from the carrier, which varies less than the error itself."""
         if not self._is_slow(name):
             return Terms({("square", name): 1.0}, {})
-        own = {("distance", self.carrier): -1.0} if name == EXACT else {("square", name): 1.0, ("square", self.carrier): -1.0}
-        return Terms({("square", self.carrier): 1.0}, own)
+        return Terms({("square", self.carrier): 1.0}, {("square", name): 1.0, ("square", self.carrier): -1.0})
 
     def _distance(self, name: str) -> Terms:
         """M|z - z_exact|^2."""
@@ -269,52 +327,74 @@ class Comparison:
         bound = self._bound()
         if name not in self.fast:
             raise KeyError(f"{name!r} did not run on every trajectory: its distance from the bound is `gap`")
-        return Terms({("square", name): 1.0}, {}).plus(bound.times(-1.0))
+        return self._mean_square(name).plus(bound.times(-1.0))
+
+    def _above_all(self, name: str) -> Terms:
+        """What a filter is above the bound, by its distance and by its errors; by what both differ from the carrier's."""
+        if self._is_slow(name):
+            return self._distance(name)
+        near, far = self._ways(name)
+        weighed = near.times(self._shares[name]).plus(far.times(1 - self._shares[name]))
+        return weighed if name == self.carrier else self._above_all(self.carrier).plus(weighed)
+
+    def _ways(self, name: str) -> tuple[Terms, Terms]:
+        """The two ways to what a filter is above the carrier, and the carrier above the bound: by distances, and by errors."""
+        near, far = self._distance(name), self._above(name)
+        if name == self.carrier:
+            return near, far
+        return near.plus(self._distance(self.carrier).times(-1.0)), far.plus(self._above(self.carrier).times(-1.0))
+
+    @cached_property
+    def _shares(self) -> dict[str, Array]:
+        """Weights (steps,) of the first of both ways: those with the least variance, as their errors hardly correlate.
+
+        A sample that lacks rare large distances has too small a mean of them, and too small a standard error.  So that this does
+        not give it weight, the error of the distances counts as twice what it seems, and their largest single term is added.
+        """
+        shares = {}
+        for name in self.fast:
+            sums, i = self._in_subset(name)
+            single = sums.largest[i].max(axis=-1) / sums.weights.sum()
+            near, far = (self._estimate(way).standard_error ** 2 for way in self._ways(name))
+            shares[name] = np.where(self.doubtful, 0.0, ratio(far, 4 * near + single**2 + far, 1.0))
+        return shares
 
     def _reference(self) -> Terms:
         return self._bound() if self.has_bound else self._error(self.control)
 
     def _over(self, name: str, other: str | None = None) -> Terms:
-        """D_k(name) less the reference, or less D_k(other): from errors where one is far from the bound, else from distances."""
-        against = self._error(other or self.control)
-        if not self.has_bound:
-            return self._error(name).plus(against.times(-1.0))
-        names = [name] if other is None else [name, other]
-        near = self._distance(name) if other is None else self._distance(name).plus(self._distance(other).times(-1.0))
-        if not all(one in self.fast for one in names):
-            return near
-        bound = self.bound().value
-        far = np.zeros(self.steps, dtype=bool)
-        for one in names:
-            for terms in (self._distance(one), self._above(one)):
-                far |= self._estimate(terms).value > FAR * bound
-        direct = self._above(name) if other is None else self._error(name).plus(against.times(-1.0))
-        return near.times(~far).plus(direct.times(far)) if far.any() else near
+        """D_k(name) less the reference, or less D_k(other)."""
+        against = self._reference() if other is None else self._error(other)
+        return self._error(name).plus(against.times(-1.0))
 
     def _quotient(self, numerator: Terms, denominator: Terms, steps: slice | None = None) -> Estimate:
-        """numerator / denominator per step, or its mean over some steps, by the delta method as in `relative`."""
-        below = self._estimate(denominator).value
-        share = np.ones(self.steps)
+        """numerator / denominator per step, or its mean over the usable ones of some steps, by the delta method as in `relative`.
+
+        NaN where there is nothing to be a part of.
+        """
+        below, share = self._estimate(denominator).value, np.ones(self.steps)
+        usable = self.usable & (below > 0)
         if steps is not None:
             counted = np.zeros(self.steps, dtype=bool)
-            counted[steps] = below[steps] > 0
+            counted[steps] = usable[steps]
             share = counted / max(np.count_nonzero(counted), 1)
-        above = self._estimate(numerator).value
-        values = share * ratio(above, below, 0.0)
-        inverse = ratio(np.ones_like(below), below, 0.0)
+        below = np.where(usable, below, 0.0)
+        values, inverse = share * ratio(self._estimate(numerator).value, below, 0.0), ratio(np.ones(self.steps), below, 0.0)
         linear = numerator.times(share * inverse).plus(denominator.times(-values * inverse))
-        deviation = self._estimate(linear, total=steps is not None)
-        if steps is None:  # of nothing any part is infinitely much
-            values = np.where((below <= 0) & (above > 0), np.inf, values)
-        return Estimate(values if steps is None else values.sum(), deviation.standard_error, deviation.freedom)
+        found = self._estimate(linear, total=steps is not None)
+        if steps is not None:
+            return replace(found, value=values.sum())
+        return replace(
+            found, value=np.where(usable, values, np.nan), standard_error=np.where(usable, found.standard_error, np.nan)
+        )
 
     def _estimate(self, terms: Terms, total: bool = False) -> Estimate:
         """The mean of the terms, (steps,), or summed over the steps, with its standard error."""
         full = batch_sums(self.sums, self.fast, terms.everywhere, total)
         if self.subset is None or not terms.on_subset:
-            found = estimate(full, self.sums.counts)
+            found = estimate(full, self.sums.weights)
         else:
             names = (*self.fast, *self.subset.slow)
             x, y = (batch_sums(self.subset.sums, names, weights, total) for weights in terms)
-            found = estimate(full, self.sums.counts, x, y, self.subset.sums.counts)
+            found = estimate(full, self.sums.weights, x, y, self.subset.sums.weights)
         return found if self.replicas is None else with_design(found, *self.replicas.variance(terms, total))

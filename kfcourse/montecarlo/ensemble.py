@@ -16,6 +16,7 @@ from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 
 from kfcourse.angles import on_circle
 from kfcourse.laws import Array, Gaussian, Trajectories, normalised_square, square_root
@@ -27,6 +28,7 @@ from kfcourse.symbolic.model import Model
 # arrays short enough for the processor's caches.
 BLOCK, SMALL_BLOCK = 100_000, 16_384
 STEPS_AT_ONCE = 4  # steps drawn by one call: few calls, and little memory over the whole ensemble
+STRATA = 16  # initial states of a set that share the law out among them: a batch of the slow filters
 
 
 class Instant(NamedTuple):
@@ -48,22 +50,24 @@ class Ensemble:
         Trajectories, and measurements y_0 ... y_{steps-1} of each.
     seed : numpy.random.SeedSequence
         A number or a `numpy.random.Generator` becomes one.
-    wide : float
-        The initial states are drawn from a law so many times as wide as the prior; `weight` makes up for it.
+    wide : float, optional
+        Initial states drawn for small standard errors, in sets of `STRATA`: half of them from the prior, half from a law so many
+        times as wide, each half by strata of equal probability.  `weight` makes up for it.  1: by strata of the prior alone;
+        None: independently, without weights.
     """
 
     model: Model
     runs: int
     steps: int
     seed: np.random.SeedSequence
-    wide: float = 1.0
+    wide: float | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.seed, np.random.SeedSequence):
             object.__setattr__(self, "seed", np.random.SeedSequence(seed_number(self.seed)))
-        if not self.wide >= 1:
+        if self.wide is not None and not 1 <= self.wide < np.inf:
             raise ValueError(f"a prior can be drawn wider, not narrower: wide must be at least 1, got {self.wide!r}")
-        if self.wide > 1 and self.model.angles.x:
+        if self._mixed and self.model.angles.x:
             raise ValueError("initial states that are angles cannot be drawn from a wider law; leave wide=1")
         for name in ("runs", "steps"):
             value = getattr(self, name)
@@ -114,20 +118,30 @@ class Ensemble:
         return np.random.Generator(np.random.SFC64(spawned))
 
     def _initial(self, block: int) -> Array:
-        mean, cov = self.model.prior
-        x = _draw(self._stream(block, 0), Gaussian(mean, self.wide**2 * cov), 1, self.sizes[block])[0]
-        return on_circle(x, self.model.angles.x)
+        rng, size, prior = self._stream(block, 0), self.sizes[block], self.model.prior
+        if self.wide is None:
+            return on_circle(_draw(rng, prior, 1, size)[0], self.model.angles.x)
+        standard = _by_strata(rng, -(-size // STRATA), len(prior.mean), self.wide)[:size]
+        return on_circle(prior.mean + standard @ square_root(prior.cov).T, self.model.angles.x)
+
+    @property
+    def _mixed(self) -> bool:
+        return self.wide is not None and self.wide > 1
 
     def weight(self, x: Array) -> Array | None:
-        """Prior over the law drawn from, at initial states x (N, n): (N,); None if they are the same.
+        """Prior over the law drawn from, at initial states x (N, n): (N,), between 0 and 2; None if they are the same.
 
-        N(x; m, d) / N(x; m, w^2 d) = w^r exp(-(1 - w^-2) (x - m)^T d^+ (x - m) / 2), r the rank of d.
+        With t = (x - m)^T d^+ (x - m) and r the rank of d,
+        2 N(x; m, d) / (N(x; m, d) + N(x; m, w^2 d)) = 2 / (1 + w^-r exp((1 - w^-2) t / 2)).
+        A wider law alone has weights without bound: one start near the mean would count as many.
         """
-        if self.wide == 1:
+        if not self._mixed:
             return None
+        assert self.wide is not None
         mean, cov = self.model.prior
         rank = np.linalg.matrix_rank(cov, hermitian=True)
-        return self.wide**rank * np.exp(-0.5 * (1 - self.wide**-2) * normalised_square(x - mean, cov))
+        exponent = 0.5 * (1 - self.wide**-2) * normalised_square(x - mean, cov) - rank * np.log(self.wide)
+        return 2 * scipy.special.expit(-exponent)
 
     def _draw(self, block: int, chunk: int) -> tuple[Array, Array]:
         """Noises of a few steps of a block: v and w, (steps, size, r)."""
@@ -144,7 +158,8 @@ class _Simulator:
         self.n, self.p, self.angles = model.n, model.p, model.angles
 
     def __call__(self, k: int, x: Array, v: Array, w: Array) -> Instant:
-        y, x_next = self.meter(x, w, k), self.state(x, v, k)
+        with np.errstate(over="ignore", invalid="ignore"):  # what diverges is reported by who looks at it
+            y, x_next = self.meter(x, w, k), self.state(x, v, k)
         # A formula without noise and state is one constant for all trajectories.
         y, x_next = np.broadcast_to(y, (len(x), self.p)), np.broadcast_to(x_next, (len(x), self.n))
         return Instant(x, on_circle(y, self.angles.y), on_circle(x_next, self.angles.x))
@@ -157,6 +172,22 @@ def _draw(rng: np.random.Generator, law: Gaussian, steps: int, size: int) -> Arr
     if not law.mean.any() and np.array_equal(law.cov, np.eye(r)):
         return standard
     return law.mean + standard @ square_root(law.cov).T
+
+
+def _by_strata(rng: np.random.Generator, sets: int, r: int, wide: float) -> Array:
+    """Standard normal states (sets * STRATA, r), half of each set `wide` times as wide, each half a Latin hypercube.
+
+    Every component of a half has one value in each of as many strata of equal probability; within a set the order is random, so
+    that a part of one is a fair sample too.
+    """
+    parts = 1 if wide == 1 else 2
+    strata = STRATA // parts
+    places = rng.permuted(np.broadcast_to(np.arange(strata), (sets, parts, r, strata)), axis=-1)
+    standard = scipy.special.ndtri((places + rng.random(places.shape)) / strata)
+    standard[:, 1:] *= wide
+    order = rng.permuted(np.broadcast_to(np.arange(STRATA), (sets, STRATA)), axis=-1)
+    standard = standard.swapaxes(2, 3).reshape(sets, STRATA, r)
+    return np.take_along_axis(standard, order[:, :, None], axis=1).reshape(-1, r)
 
 
 class Serial(Executor):

@@ -19,11 +19,12 @@ from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
 from kfcourse.laws import Array, Gaussian, stacked
 from kfcourse.montecarlo.comparison import Comparison
-from kfcourse.montecarlo.designing import design
+from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, workers
-from kfcourse.montecarlo.statistics import BATCHES, Sums
+from kfcourse.montecarlo.statistics import BATCHES, Sums, batch_sizes
 from kfcourse.montecarlo.subset import LEAST, progress_bar, run_block, run_subset
 from kfcourse.montecarlo.two_phase import Replicas
+from kfcourse.montecarlo.widths import best_width
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.model import Model
 
@@ -98,8 +99,8 @@ def compare(
     design_runs: int | None = None,
     designs: int = 1,
     same_ensemble: bool = False,
-    wide: float = 1.0,
-    subset_runs: int = 500,
+    wide: float | None = None,
+    subset_runs: int = 2000,
     subset_seconds: float | None = None,
     subset_memory: float | None = None,
     threads: int = 2,
@@ -125,13 +126,13 @@ def compare(
     same_ensemble : bool
         Design on the very trajectories of the comparison, as the lab does: optimistic for the designed
         filters, by about the number of coefficients over `runs`.
-    wide : float
-        Draw the initial states of the comparison from a law so many times as wide as the prior, and weight every trajectory with
-        the ratio of the two densities (importance sampling).  Where rare far starts dominate the error, 1.5 or 2 gives the
-        standard errors of many times the trajectories.
+    wide : float, optional
+        Draw half of the initial states of the comparison from a law so many times as wide as the prior, all by strata, and weight
+        every trajectory (importance sampling): where rare far starts dominate the error, that gives the standard errors of many
+        times the trajectories.  By default a pilot on the fast filters chooses among 1, 1.5, 2 and 3.
     subset_runs : int
-        Slow filters (exact, particle) run on this many of the common trajectories; their error variance
-        is found through the paired difference from the Gaussian AOF (or else the most accurate fast filter).  0 leaves them out.
+        Slow filters (exact, particle) run on this many of the common trajectories, at least 100; what they differ by from the
+        Gaussian AOF (or else the most accurate fast filter) is found there.  0 leaves them out.
     subset_seconds : float, optional
         The slow filters stop after so long, on fewer trajectories; `Comparison.subset_runs` tells on how many.  With
         the same seed, as many trajectories give the same numbers.  A slow filter that fails, or that does not come through
@@ -157,15 +158,28 @@ def compare(
     names = [one.name for one in filters]
     slow = [one for one in filters if one.slow and subset_runs]
     fast = [one for one in filters if not one.slow]
-    run_seed, *design_seeds = np.random.SeedSequence(seed).spawn(1 + designs)
-    common = Ensemble(model, runs, steps, run_seed, wide)
+    run_seed, pilot_seed, *design_seeds = np.random.SeedSequence(seed).spawn(2 + designs)
     size = runs if design_runs is None else design_runs
-    design_ensemble, *others = [common] if same_ensemble else [Ensemble(model, size, steps, one) for one in design_seeds]
+    design_ensemble, *others = (
+        [Ensemble(model, runs, steps, run_seed)] if same_ensemble else [Ensemble(model, size, steps, one) for one in design_seeds]
+    )
     to_design = [one for one in fast if isinstance(one, Design)]
     with workers(threads) as pool:
         ready = _designed(fast, design_ensemble, pool, progress)
         again = [_designed(to_design, one, pool, progress) for one in others]
-        everything = _run_blocks([*ready, *chain(*again)], common, pool, progress)
+        if same_ensemble:
+            common = design_ensemble
+        else:
+            width = best_width(ready, model, runs, steps, pilot_seed) if wide is None else wide
+            common = Ensemble(model, runs, steps, run_seed, width)
+        everyone = [*ready, *chain(*again)]
+        try:
+            everything = _run_blocks(everyone, common, pool, progress)
+        except NotFinite:
+            if wide is not None or not common.wide or common.wide == 1:
+                raise
+            common = Ensemble(model, runs, steps, run_seed, 1.0)  # some far start is too far: none but the prior's own
+            everything = _run_blocks(everyone, common, pool, progress)
         sums, replicas = _split(everything, fast, len(others))
         subset, left_out = None, dict[str, str]()
         if slow:
@@ -173,7 +187,8 @@ def compare(
             subset, left_out = run_subset(
                 ready, slow_ready, common, min(subset_runs, runs), subset_seconds, subset_memory, progress
             )
-    return Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset, left_out, replicas)
+    found = Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset, left_out, replicas)
+    return found.without_unhealthy()
 
 
 def _check_arguments(
@@ -205,13 +220,13 @@ def _check_arguments(
             )
 
 
-def _check_designs(designs: int, same_ensemble: bool, wide: float) -> None:
+def _check_designs(designs: int, same_ensemble: bool, wide: float | None) -> None:
     if isinstance(designs, bool) or not isinstance(designs, int | np.integer) or designs < 1:
         raise ValueError(f"designs must be a positive whole number, got {designs!r}")
     if designs > 1 and same_ensemble:
         raise ValueError("there is one ensemble of the comparison: same_ensemble=True goes with designs=1 only")
-    if same_ensemble and wide != 1:
-        raise ValueError("a design weighs all its trajectories alike: same_ensemble=True goes with wide=1 only")
+    if same_ensemble and wide is not None:
+        raise ValueError("a design weighs all its trajectories alike: same_ensemble=True goes without wide")
 
 
 def _split(sums: Sums, fast: Sequence[Filter | Design], again: int) -> tuple[Sums, Replicas | None]:
@@ -240,7 +255,8 @@ def _run_blocks(filters: Sequence[Filter], ensemble: Ensemble, pool: Executor, p
 
     def block(index: int) -> Sums:
         size = ensemble.sizes[index]
-        sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, size, max(1, round(BATCHES * size / ensemble.runs)))
+        counts = batch_sizes(size, max(1, round(BATCHES * size / ensemble.runs)))
+        sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, counts)
         run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight)
         return sums
 

@@ -15,56 +15,84 @@ import numpy as np
 import scipy
 
 from kfcourse.laws import Array, Gaussian, normalised_square
+from kfcourse.montecarlo.ensemble import STRATA
 
 BATCHES = 128  # standard errors from 128 batches are themselves good to 6 %
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A mean over the ensemble, its standard error, and the freedom of that error's estimate.
+    """A mean over the ensemble, its standard error, and what is known of the law of its error.
 
     Attributes
     ----------
     value, standard_error : ndarray, any shape
     freedom : int or ndarray
         Degrees of freedom of the standard error (batches - 1; fewer where it was found from few designs).
+    skewness : float or ndarray
+        Of the error, in units of its third power.  Means of squares are skewed: most samples lack the rare large values.
     """
 
     value: Array
     standard_error: Array
     freedom: int | Array
+    skewness: float | Array = 0.0
 
     def interval(self, confidence: float = 0.95) -> tuple[Array, Array]:
-        """Lower and upper limit of the confidence interval (Student's t)."""
-        half = self.half_width(confidence)
-        return self.value - half, self.value + half
+        """Lower and upper limit of the confidence interval.
 
-    def half_width(self, confidence: float = 0.95) -> Array:
+        With the skewness a, t = (mean found - mean) / standard error follows no Student's law, but nearly
+
+            g(t) = t + a t^2 / 3 + a^2 t^3 / 27 + a / 6
+
+        does, so the limits are those where g is the quantile of that law (P. Hall, On the removal of skewness by transformation,
+        J. R. Stat. Soc. B 54, 1992).  A mean of few large values then has more room above than below.
+        """
         if not 0 < confidence < 1:
             raise ValueError(f"a confidence lies between 0 and 1, got {confidence}")
-        return scipy.special.stdtrit(self.freedom, 0.5 + confidence / 2) * self.standard_error
+        quantile = scipy.special.stdtrit(self.freedom, 0.5 + confidence / 2)
+        a = np.asarray(self.skewness)
+        lower, upper = (self.value - _before_transformation(g, a) * self.standard_error for g in (quantile, -quantile))
+        return lower, upper
+
+    def half_width(self, confidence: float = 0.95) -> Array:
+        """Half the length of the interval."""
+        lower, upper = self.interval(confidence)
+        return 0.5 * (upper - lower)
 
     def __iter__(self) -> Iterator[Estimate]:
         """Along the first axis: the steps, one after the other."""
         return (self[k] for k in range(len(self.value)))
 
     def __getitem__(self, index) -> Estimate:
-        freedom = self.freedom[index] if isinstance(self.freedom, np.ndarray) and self.freedom.ndim else self.freedom
-        return Estimate(self.value[index], self.standard_error[index], freedom)
+        def part(values):
+            return values[index] if isinstance(values, np.ndarray) and values.ndim else values
+
+        return Estimate(self.value[index], self.standard_error[index], part(self.freedom), part(self.skewness))
+
+
+def _before_transformation(g: Array, a: Array) -> Array:
+    """t with t + a t^2 / 3 + a^2 t^3 / 27 + a / 6 = g: 3 / a (cbrt(1 + a (g - a / 6)) - 1)."""
+    known = np.abs(a) > 1e-6  # below, rounding would be larger than the correction
+    safe = np.where(known, a, 1.0)
+    return np.where(known, 3 / safe * (np.cbrt(1 + safe * (g - safe / 6)) - 1), g)
 
 
 def batch_mean(sums: Array, counts: Array) -> Estimate:
-    """Mean and standard error from sums over batches (last axis) of `counts` trajectories each.
+    """Mean, standard error and skewness from sums over batches (last axis) of `counts` trajectories each, or of that weight.
 
-    With N trajectories in B batches of n_b, means m_b and total mean m,
-    SE^2 = B / (B - 1) sum_b n_b^2 (m_b - m)^2 / N^2.
+    With N trajectories in B batches of n_b, means m_b and total mean m, and d_b = n_b (m_b - m),
+    SE^2 = B / (B - 1) sum_b d_b^2 / N^2, and the skewness of m is sum_b d_b^3 / (sum_b d_b^2)^(3/2).
     """
     total, batches = counts.sum(), len(counts)
     value = sums.sum(axis=-1) / total
     with np.errstate(invalid="ignore"):  # an infinite mean (a filter that claims variance 0) has no standard error
         deviations = sums - counts * value[..., None]
-    variance = (deviations**2).sum(axis=-1) / total**2 * batches / (batches - 1) if batches > 1 else np.full(value.shape, np.nan)
-    return Estimate(value, np.sqrt(variance), max(batches - 1, 1))
+    square = (deviations**2).sum(axis=-1)
+    variance = square / total**2 * batches / (batches - 1) if batches > 1 else np.full(value.shape, np.nan)
+    cube = np.sqrt(square) ** 3  # may be 0 where its root is not: 1e-300 is a square, no cube
+    skewness = np.divide((deviations**3).sum(axis=-1), cube, out=np.zeros(value.shape), where=cube > 0)
+    return Estimate(value, np.sqrt(variance), max(batches - 1, 1), skewness)
 
 
 def ratio(numerator: Array, denominator: Array, of_zero: Array | float) -> Array:
@@ -73,13 +101,23 @@ def ratio(numerator: Array, denominator: Array, of_zero: Array | float) -> Array
     return np.divide(numerator, denominator, out=np.broadcast_to(of_zero, shape).astype(float), where=denominator > 0)
 
 
+def batch_sizes(runs: int, batches: int) -> Array:
+    """Sizes of about so many batches, nearly equal; of whole sets of `STRATA` trajectories if there are many."""
+    whole = STRATA if runs >= 8 * STRATA else 1
+    inner = np.linspace(0, runs, min(batches, max(runs // whole, 1)) + 1)[1:-1].astype(int) // whole * whole
+    return np.diff(np.concatenate([[0], np.unique(inner[inner > 0]), [runs]]))
+
+
 @dataclass(frozen=True)
 class Sums:
     """Sums over batches for a tuple of filters.
 
     Attributes
     ----------
-    counts : ndarray (batches,)
+    counts, weights : ndarray (batches,)
+        Trajectories, and the sum of their weights: the same if they have none.  Means are sums over sums of weights.
+    size, doubt : ndarray (steps, batches)
+        Sums of |x|^2, what rounding errors are to be compared with, and of the reference filter's own squared error.
     error : ndarray (filters, steps, n, batches)
         Sums of e = x - z.
     square : ndarray (filters, steps, n, batches)
@@ -90,22 +128,27 @@ class Sums:
         Sums of e^T p^-1 e / n.
     distance : ndarray (filters, steps, batches)
         Sums of |z - z_reference|^2, if there is a reference filter, else 0.
+    largest : ndarray (filters, steps, batches)
+        The largest single term of `distance`.
     """
 
     counts: Array
+    weights: Array
+    size: Array
+    doubt: Array
     error: Array
     square: Array
     own: Array
     normalised: Array
     distance: Array
+    largest: Array
 
     @classmethod
-    def empty(cls, filters: int, steps: int, n: int, runs: int, batches: int) -> Sums:
-        """Room for `runs` trajectories in about `batches` batches of nearly equal size."""
-        edges = np.linspace(0, runs, min(batches, runs) + 1).astype(int)
-        size = len(edges) - 1
-        full, plain = (filters, steps, n, size), (filters, steps, size)
-        return cls(np.diff(edges).astype(float), np.zeros(full), np.zeros(full), np.zeros(full), np.zeros(plain), np.zeros(plain))
+    def empty(cls, filters: int, steps: int, n: int, counts: Array) -> Sums:
+        """Room for the sums over batches of so many trajectories each."""
+        full, plain = (filters, steps, n, len(counts)), (filters, steps, len(counts))
+        shapes = (plain[1:],) * 2 + (full,) * 3 + (plain,) * 3
+        return cls(counts.astype(float), counts.astype(float), *(np.zeros(shape) for shape in shapes))
 
     @classmethod
     def concatenate(cls, parts: Sequence[Sums]) -> Sums:
@@ -114,7 +157,14 @@ class Sums:
 
     def of_filters(self, chosen: slice | list[int]) -> Sums:
         """Those of some of the filters."""
-        return Sums(self.counts, *(getattr(self, name)[chosen] for name in list(self.__dataclass_fields__)[1:]))
+        common = (self.counts, self.weights, self.size, self.doubt)
+        return Sums(*common, *(getattr(self, name)[chosen] for name in list(self.__dataclass_fields__)[len(common) :]))
+
+    def record_states(self, step: int, x: Array, weight: Array | None) -> None:
+        """Add the true states x (N, n) of a step, and at the first the weights (N,) of the trajectories."""
+        if step == 0 and weight is not None:
+            self.weights[:] = self._sums(weight, None)
+        self.size[step] = self._sums((x * x).sum(axis=1), weight)
 
     def record(self, filter_index: int, step: int, x: Array, estimate: Gaussian, weight: Array | None = None) -> None:
         """Add one step of one filter: true states x (N, n) and its estimate; with a weight (N,) of each trajectory."""
@@ -125,8 +175,7 @@ class Sums:
             self.error[filter_index, step, i] = self._sums(error[:, i], weight)
             square = error[:, i] * error[:, i]
             self.square[filter_index, step, i] = self._sums(square, weight)
-            alike = own.ndim == 1 and weight is None
-            self.own[filter_index, step, i] = own[i] * self.counts if alike else self._sums(_spread(own, len(x))[:, i], weight)
+            self.own[filter_index, step, i] = own[i] * self.weights if own.ndim == 1 else self._sums(own[:, i], weight)
         if error.shape[1] > 1:
             self.normalised[filter_index, step] = self._sums(normalised_square(error, cov), weight) / error.shape[1]
         elif own.ndim == 2:
@@ -146,7 +195,14 @@ class Sums:
         A squared distance if these are the same; else its mean does not hold their errors, if those are independent.
         """
         first, second = reference
-        self.distance[filter_index, step] = self._sums(((mean - first) * (mean - second)).sum(axis=1), weight)
+        terms = ((mean - first) * (mean - second)).sum(axis=1)
+        terms = terms if weight is None else terms * weight
+        self.distance[filter_index, step] = self._sums(terms, None)
+        self.largest[filter_index, step] = np.maximum.reduceat(terms, self._starts)
+
+    def record_doubt(self, step: int, error: Array, weight: Array | None) -> None:
+        """Add the estimated errors (N,) of the reference filter's estimates."""
+        self.doubt[step] = self._sums(error * error, weight)
 
     def _sums(self, values: Array, weight: Array | None) -> Array:
         return np.add.reduceat(values if weight is None else values * weight, self._starts)
@@ -154,10 +210,6 @@ class Sums:
     @cached_property
     def _starts(self) -> Array:
         return np.concatenate([[0], np.cumsum(self.counts[:-1])]).astype(int)
-
-
-def _spread(own: Array, runs: int) -> Array:
-    return np.broadcast_to(own, (runs, own.shape[-1]))
 
 
 def _quotient(square: Array, variance: Array) -> Array:

@@ -22,11 +22,12 @@ from kfcourse.laws import Array
 from kfcourse.limits import OutOfTime, memory_limit, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Subset
 from kfcourse.montecarlo.designing import NotFinite
-from kfcourse.montecarlo.ensemble import Ensemble, Instant
+from kfcourse.montecarlo.ensemble import STRATA, Ensemble, Instant
 from kfcourse.montecarlo.statistics import Sums
 
-CHUNKS = (8, 8, 16, 32, 64, 128, 256, 512)  # trajectories taken at once; after these always as many as the last
-BATCH = 4  # trajectories of a batch
+BATCH = STRATA  # trajectories of a batch: their initial states share the prior out among them
+CHUNKS = (16, 16, 32, 64, 128, 256, 512)  # trajectories taken at once; after these always as many as the last
+FEWEST = 100  # trajectories that are a result: with fewer, the rare ones that make up a distance are missing
 LEAST = 10e6  # bytes that can be a limit: interpreter and libraries take some at any time
 MARGIN = 1.3  # how much longer than the chunks before the next one may take, for each trajectory
 
@@ -67,6 +68,8 @@ def run_subset(
     left_out: dict[str, str] = {}
     replaced: dict[str, str] = {}
     chosen = {one.name: one for one in slow}
+    if size < FEWEST and EXACT in chosen:
+        left_out[EXACT] = f"on {size} trajectories the rare ones that matter are missing: take at least {FEWEST}, or 0"
     _load_libraries()
     with memory_limit(memory):
         while running := [one for name, one in chosen.items() if name not in left_out]:
@@ -78,10 +81,15 @@ def run_subset(
                 (left_out if other is None else replaced)[failed.name] = failed.reason
                 chosen[failed.name] = other or chosen[failed.name]
                 continue
-            if sums:
-                return Subset(names, Sums.concatenate(sums), replaced), left_out
-            reason = f"{min(size, CHUNKS[0])} trajectories take more than {seconds:g} s"
-            left_out |= dict.fromkeys(names, reason)
+            done = sum(int(one.counts.sum()) for one in sums)
+            found = Subset(names, Sums.concatenate(sums), replaced) if sums else None
+            if found and (done >= FEWEST or EXACT not in names):
+                return found, left_out
+            reason = f"{done or min(size, CHUNKS[0])} trajectories take {'' if done else 'more than '}{seconds:g} s"
+            if not found:
+                return None, left_out | dict.fromkeys(names, reason)
+            left_out[EXACT] = f"{reason}, and of fewer than {FEWEST} the rare ones that matter are missing: give it more time"
+            return found.without_exact(), left_out
     return None, left_out
 
 
@@ -113,7 +121,7 @@ def _chunks_in_time(
             instants = [Instant(*(array[k, start : start + count] for array in data)) for k in range(steps)]
             try:
                 with _until(end):
-                    sums = Sums.empty(len(filters), steps, n, count, max(1, count // BATCH))
+                    sums = Sums.empty(len(filters), steps, n, np.diff([*range(0, count, BATCH), count]))
                     run_block(filters, instants, sums, reference, ensemble.weight)
             except OutOfTime:
                 break
@@ -160,12 +168,14 @@ def run_block(
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
         for k, instant in enumerate(instants):
             weight = weight_of(instant.x) if k == 0 else weight
+            sums.record_states(k, instant.x, weight)
             for i, one in enumerate(filters):
                 states[i] = _step(one, states[i], instant.y)
                 estimate = states[i].posterior
                 sums.record(i, k, near(instant.x, estimate.mean, one.model.angles.x), estimate, weight)
             if reference is not None:
                 twice = _twice(states[reference])
+                sums.record_doubt(k, _doubt(states[reference], twice), weight)
                 for i, state in enumerate(states):
                     if i != reference:
                         mean, angles = state.posterior.mean, filters[i].model.angles.x
@@ -180,6 +190,14 @@ def _twice(state: State) -> tuple[Array, Array]:
         first, second = state.memory.halves
         return first, second
     return state.posterior.mean, state.posterior.mean
+
+
+def _doubt(state: State, twice: tuple[Array, Array]) -> Array:
+    """The reference's own error, (runs,): half the distance of two clouds; what discretisation leaves of the nodes' mean."""
+    if isinstance(state.memory, Particles):
+        return np.asarray(0.5 * np.linalg.norm(twice[0] - twice[1], axis=1))
+    found = getattr(state.memory, "discretisation_error", None)
+    return np.zeros(len(twice[0])) if found is None else found()
 
 
 def _step(one: Filter, state: State, y: Array) -> State:

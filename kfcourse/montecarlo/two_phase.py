@@ -70,9 +70,9 @@ class Replicas:
         values = np.stack(
             [batch_sums(sums, self.names, {("square", n): w for n, w in weights.items()}, total) for sums in self.sums]
         )
-        designs, counts = len(values), self.sums[0].counts
-        means = values.sum(axis=-1) / counts.sum()
-        by_chance = batch_mean(values - values.mean(axis=0), counts).standard_error ** 2
+        designs, weights_of = len(values), self.sums[0].weights
+        means = values.sum(axis=-1) / weights_of.sum()
+        by_chance = batch_mean(values - values.mean(axis=0), weights_of).standard_error ** 2
         return np.maximum(means.var(axis=0, ddof=1) - by_chance.sum(axis=0) / (designs - 1), 0.0), designs - 1
 
 
@@ -87,24 +87,35 @@ def batch_sums(sums: Sums, names: tuple[str, ...], weights: Weights, total: bool
 
 
 def estimate(
-    full: Array, counts: Array, x: Array | None = None, y: Array | None = None, of_subset: Array | None = None
+    full: Array, weights: Array, x: Array | None = None, y: Array | None = None, of_subset: Array | None = None
 ) -> Estimate:
-    """M_N X + M_n Y from batch sums of X over all trajectories, and of X and Y over the subset, if there is a Y."""
-    everywhere = batch_mean(full, counts)
+    """M_N X + M_n Y from batch sums of X over all trajectories, and of X and Y over the subset, if there is a Y.
+
+    `weights` and `of_subset` are the weights of the batches.
+    """
+    everywhere = batch_mean(full, weights)
     if x is None or y is None or of_subset is None:
         return everywhere
     correction = batch_mean(y, of_subset)
     # Var(x + y) - Var(x - y) = 4 Cov(x, y), each a variance of means over the n of the subset
     plus, minus = (batch_mean(x + sign * y, of_subset).standard_error ** 2 for sign in (1, -1))
-    covariance = (plus - minus) / 4 * of_subset.sum() / counts.sum()
-    variance = everywhere.standard_error**2 + correction.standard_error**2 + 2 * covariance
-    return Estimate(everywhere.value + correction.value, np.sqrt(np.maximum(variance, 0.0)), correction.freedom)
+    covariance = (plus - minus) / 4 * of_subset.sum() / weights.sum()
+    error = np.sqrt(np.maximum(everywhere.standard_error**2 + correction.standard_error**2 + 2 * covariance, 0.0))
+    # third cumulants of sums of nearly independent parts add up
+    third = sum(one.skewness * one.standard_error**3 for one in (everywhere, correction))
+    return Estimate(everywhere.value + correction.value, error, correction.freedom, _over_cube(third, error))
 
 
 def with_design(one: Estimate, variance: Array, freedom: int) -> Estimate:
     """An estimate whose error varies with the design, too; freedom by Welch and Satterthwaite."""
     trajectories = one.standard_error**2
-    total = trajectories + variance
+    error = np.sqrt(trajectories + variance)
     with np.errstate(divide="ignore", invalid="ignore"):
-        together = total**2 / (trajectories**2 / one.freedom + variance**2 / freedom)
-    return Estimate(one.value, np.sqrt(total), np.where(variance > 0, together, one.freedom))
+        together = error**4 / (trajectories**2 / one.freedom + variance**2 / freedom)
+    skewness = _over_cube(one.skewness * one.standard_error**3, error)
+    return Estimate(one.value, error, np.where(variance > 0, together, one.freedom), skewness)
+
+
+def _over_cube(third: Array, error: Array) -> Array:
+    cube = error**3
+    return np.divide(third, cube, out=np.zeros(np.shape(error)), where=cube > 0)

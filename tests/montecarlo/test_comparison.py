@@ -56,15 +56,15 @@ def direct(linear):
         symbols={"v": ["v1", "v2"], "w": ["w1", "w2"]},
     )
     filters[2] = replace(kalman_filter(wrong), name="wrong")
-    result = compare(filters, linear, RUNS, STEPS, SEED, progress=False)
+    result = compare(filters, linear, RUNS, STEPS, SEED, same_ensemble=True, progress=False)
     x, y = stored(linear, RUNS, STEPS, SEED)
     found = {one.name: run(one, y) for one in (filters[0], filters[2])}
     return result, {name: (x - estimate.mean, estimate.cov) for name, estimate in found.items()}
 
 
 def batches(values):
-    """Sums over the batches of one block: values (..., runs)."""
-    edges = np.linspace(0, RUNS, BATCHES + 1).astype(int)
+    """Sums over the batches of one block, of whole sets of 16: values (..., runs)."""
+    edges = np.append(np.linspace(0, RUNS, BATCHES + 1).astype(int)[:-1] // 16 * 16, RUNS)
     return np.add.reduceat(values, edges[:-1], axis=-1), np.diff(edges).astype(float)
 
 
@@ -98,9 +98,8 @@ def test_the_normalised_error_of_a_scalar_filter_is_the_mean_of_e2_over_p():
     still = np.zeros_like(x)  # the estimate is 0: x is the error
 
     def recorded(errors, cov):
-        sums = Sums.empty(1, 1, errors.shape[1], len(errors), 2)
+        sums = Sums.empty(1, 1, errors.shape[1], np.array([2, 3]))
         sums.record(0, 0, errors, Gaussian(np.zeros_like(errors), cov))
-        assert sums.counts.tolist() == [2, 3]
         return sums.normalised[0, 0]
 
     def expected(quotients):
@@ -192,13 +191,45 @@ def test_the_ranking_is_by_mean_relative_variance(direct):
 
 def test_intervals_are_student_s(direct):
     estimate = direct[0].error_variance("duof")
-    low, high = estimate.interval(0.9)
+    symmetric = replace(estimate, skewness=0.0)
+    low, high = symmetric.interval(0.9)
     half = stats.t.ppf(0.95, BATCHES - 1) * estimate.standard_error
     np.testing.assert_allclose(high - estimate.value, half, rtol=1e-9)
     np.testing.assert_allclose(estimate.value - low, half, rtol=1e-9)
+    np.testing.assert_allclose(symmetric.half_width(0.9), half, rtol=1e-9)
     for confidence in (0, 1, 95):
         with pytest.raises(ValueError, match="confidence"):
             estimate.interval(confidence)
+
+
+def test_a_skewed_mean_has_intervals_by_hall_s_transformation():
+    """g(t) = t + a t^2 / 3 + a^2 t^3 / 27 + a / 6 is Student's quantile at both limits, t = (mean - limit) / SE; a by hand."""
+    sums, counts = np.array([0.0, 1, 2, 9]), np.ones(4)
+    found = batch_mean(sums, counts)
+    deviations = sums - 3
+    a = (deviations**3).sum() / (deviations**2).sum() ** 1.5
+    assert found.skewness == pytest.approx(a, rel=1e-14) and a > 0
+    quantile = stats.t.ppf(0.975, 3)
+    for limit, wanted in zip(found.interval(0.95), (quantile, -quantile), strict=True):
+        t = (found.value - limit) / found.standard_error
+        assert t + a * t**2 / 3 + a**2 * t**3 / 27 + a / 6 == pytest.approx(wanted, rel=1e-10)
+    low, high = found.interval(0.95)
+    assert high - found.value > found.value - low  # more room above
+
+
+def test_intervals_of_skewed_means_cover_where_student_s_do_not():
+    """Means of 60 values exp(2 u), u normal: skewed as a squared error with rare far starts is.
+
+    95 % of 2000 samples would be covered.  Student's interval covers about 80 %, Hall's more by at least 6 %: four of the
+    binomial's standard errors of a difference, 0.9 %, are less.
+    """
+    samples = np.exp(2 * np.random.default_rng(1).standard_normal((2000, 60)))
+    found, truth = batch_mean(samples, np.ones(60)), np.exp(2.0)
+    shares = []
+    for one in (found, replace(found, skewness=0.0)):
+        low, high = one.interval(0.95)
+        shares.append(((low < truth) & (truth < high)).mean())
+    assert shares[0] > shares[1] + 0.06
 
 
 def test_intervals_cover_the_truth_as_often_as_they_say(linear):
@@ -253,7 +284,7 @@ def test_one_trajectory_has_no_standard_error(linear):
 @pytest.mark.parametrize("runs", [700, BLOCK + 1])
 def test_a_slow_filter_is_found_through_its_difference_from_the_control(variant53, runs):
     control, slow = aof(gaussian(variant53)), replace(aof(linearised(variant53)), name="slow", slow=True)
-    result = compare([control, slow], variant53, runs, 4, seed=3, subset_runs=500, progress=False)
+    result = compare([control, slow], variant53, runs, 4, seed=3, subset_runs=500, same_ensemble=True, progress=False)
     assert result.subset_runs == 500
     x, y = stored(variant53, runs, 4, 3)
     ours, theirs = ((x - run(one, y).mean)[..., 0] ** 2 for one in (control, slow))
@@ -267,8 +298,8 @@ def test_a_slow_filter_is_found_through_its_difference_from_the_control(variant5
     difference = result.difference("slow", "aof-gaussian")
     found = difference.standard_error
     assert (found > 0).all()
-    assert difference.freedom + 1 == 500 // BATCH
-    # from 125 batches of 4 heavy-tailed values: not better than a factor 2
+    assert difference.freedom + 1 == -(-500 // BATCH)
+    # from 32 batches of 16 heavy-tailed values: not better than a factor 2
     assert ((found > exact / 2) & (found < 2 * exact)).all()
 
 
@@ -292,21 +323,20 @@ def test_the_excess_over_the_optimal_filter_is_the_distance_from_it(linear):
     assert (excess.standard_error < gap.standard_error).all()
     # Here the control is the exact filter too: no excess, and the bound is the variance that both claim.
     np.testing.assert_allclose(result.excess("aof-gaussian").value, 0, atol=1e-20)
-    bound, actual = result.bound().value, result.error_variance("duof")
+    bound, actual = result.bound().value, result.component_variance("duof").value.sum(axis=-1)
     np.testing.assert_allclose(bound, result.own_variance("aof-gaussian").value, rtol=1e-12)
     above = result.above_bound("duof")
-    np.testing.assert_allclose(above.value, actual.value / bound - 1, rtol=1e-9)
-    np.testing.assert_allclose(above.standard_error, actual.standard_error / bound, rtol=1e-9)
+    np.testing.assert_allclose(above.value, actual / bound - 1, rtol=1e-9)
     optimal = result.above_bound("aof-gaussian")
     assert (abs(optimal.value) < SIGMA * optimal.standard_error).all()
 
 
 def test_a_subset_larger_than_the_ensemble_is_all_of_it(variant53):
-    """40 trajectories are all there are for a subset of 500: the slow filter has the fast one's numbers."""
+    """140 trajectories are all there are for a subset of 500: the slow filter has the fast one's numbers."""
     control, fast = aof(gaussian(variant53)), aof(linearised(variant53))
     slow = replace(fast, name="slow", slow=True)
-    result = compare([control, fast, slow], variant53, 40, 2, seed=3, subset_runs=500, progress=False)
-    assert result.subset_runs == 40
+    result = compare([control, fast, slow], variant53, 140, 2, seed=3, subset_runs=500, progress=False)
+    assert result.subset_runs == 140
     np.testing.assert_allclose(result.error_variance("slow").value, result.error_variance("aof-linearised").value, rtol=1e-11)
 
 
@@ -319,7 +349,7 @@ def by_hand(model, squares, slow, subset, own=None):
     fast = tuple(name for name in squares if name not in slow)
 
     def sums(names, runs):
-        empty = Sums.empty(len(names), 1, 1, runs, runs)
+        empty = Sums.empty(len(names), 1, 1, np.ones(runs))
         for i, name in enumerate(names):
             empty.square[i, 0, 0] = squares[name][:runs]
             empty.own[i, 0, 0] = own[name][:runs] if own else 0
@@ -447,7 +477,8 @@ def test_where_all_errors_are_zero_filters_are_equal(variant53):
     known = Model.define("0.9*x + 0.05*x*v", "x + 0.02*x**2*w", prior={"variance": 0})
     result = compare([aof(gaussian(known)), aof(linearised(known))], known, 200, 3, seed=1, progress=False)
     assert not result.error_variance("aof-linearised").value.any()
-    assert (result.relative("aof-linearised").value == 1).all()
+    assert result.without_error.all() and not result.usable.any()
+    assert np.isnan(result.relative("aof-linearised").value).all()  # of nothing, nothing is a part
     assert result.score("aof-linearised").standard_error == 0
 
 

@@ -149,9 +149,9 @@ def test_the_seed_changes_everything(variant53):
 
 def test_a_filter_s_numbers_do_not_depend_on_its_company(variant53):
     filters = lab_of(variant53)
-    together = compare(filters, variant53, 500, 4, seed=7, progress=False)
+    together = compare(filters, variant53, 500, 4, seed=7, wide=2, progress=False)
     for filter_ in (filters[0], filters[2], filters[5]):
-        alone = compare([filter_], variant53, 500, 4, seed=7, progress=False)
+        alone = compare([filter_], variant53, 500, 4, seed=7, wide=2, progress=False)
         np.testing.assert_array_equal(alone.error_variance(filter_.name).value, together.error_variance(filter_.name).value)
 
 
@@ -170,10 +170,9 @@ def test_the_design_ensemble_is_another_one(variant53):
     filters = [aof(gaussian(variant53)), mfos(gaussian(variant53))]
     same = compare(filters, variant53, 60, 1, seed=11, same_ensemble=True, progress=False)
     fresh = compare(filters, variant53, 60, 1, seed=11, progress=False)
-    np.testing.assert_array_equal(same.error_variance("aof-gaussian").value, fresh.error_variance("aof-gaussian").value)
     # At k = 0 the MFOS's correction is the best affine one over its own ensemble: no other coefficients can be below.
-    assert same.error_variance("mfos-gaussian").value[0] < fresh.error_variance("mfos-gaussian").value[0]
-    assert same.error_variance("mfos-gaussian").value[0] <= same.error_variance("aof-gaussian").value[0]
+    own, others = (result.gap("mfos-gaussian").value[0] for result in (same, fresh))
+    assert own <= 0 < others
 
 
 def test_memory_does_not_grow_with_the_number_of_steps(variant53):

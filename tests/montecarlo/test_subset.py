@@ -85,7 +85,7 @@ def test_a_chunk_that_does_not_end_in_time_is_given_up(model, control):
     start = time.monotonic()
     result = compare([control, stuck], model, 50, STEPS, 1, subset_runs=50, subset_seconds=0.2, progress=False)
     assert time.monotonic() - start < 3
-    assert result.left_out == {"stuck": "8 trajectories take more than 0.2 s"}
+    assert result.left_out == {"stuck": "16 trajectories take more than 0.2 s"}
     assert result.available == ("aof-gaussian",)
     assert result.subset_runs == 0
 
@@ -95,7 +95,7 @@ def test_a_slow_filter_that_fails_leaves_the_others_as_they_are(model, control, 
     other, failing = slow(aof(linearised(model)), "other"), slow(control, "failing", error=error, at=1)
     result = compare([control, failing, other], model, 60, STEPS, 1, subset_runs=60, progress=False)
     assert list(result.left_out) == ["failing"]
-    assert (str(error) or "step 1: 8 trajectories need more memory than there is") in result.left_out["failing"]
+    assert (str(error) or "step 1: 16 trajectories need more memory than there is") in result.left_out["failing"]
     assert same(result, compare([control, other], model, 60, STEPS, 1, subset_runs=60, progress=False))
 
 
@@ -146,8 +146,10 @@ def test_what_has_no_room_at_once_is_taken_in_parts(model, control, runs, most):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux can limit it")
 def test_what_has_no_room_at_all_is_left_out(model, control):
-    result = compare([control, greedy(control, 60, [])], model, 40, STEPS, 1, subset_runs=40, subset_memory=100e6, progress=False)
-    assert result.left_out == {"greedy": "step 0: 8 trajectories need more memory than the 100 MB that the slow filters may take"}
+    result = compare([control, greedy(control, 40, [])], model, 40, STEPS, 1, subset_runs=40, subset_memory=100e6, progress=False)
+    assert result.left_out == {
+        "greedy": "step 0: 16 trajectories need more memory than the 100 MB that the slow filters may take"
+    }
     assert result.available == ("aof-gaussian",)
 
 
@@ -162,7 +164,7 @@ def test_what_leaves_no_room_for_a_fast_filter_is_left_out_too(model, control):
 
     filters = [replace(control, name="fast", step=step), greedy(control, 1, [])]
     result = compare(filters, model, 24, STEPS, 1, subset_runs=24, subset_memory=150e6, progress=False, threads=1)
-    assert result.left_out == {"greedy": "8 trajectories need more memory than the 150 MB that the slow filters may take"}
+    assert result.left_out == {"greedy": "16 trajectories need more memory than the 150 MB that the slow filters may take"}
     assert result.available == ("fast",)
 
 
@@ -175,11 +177,11 @@ def test_the_exact_filter_with_the_least_memory_ends_in_numbers_or_is_left_out()
         "from kfcourse.montecarlo.subset import LEAST",
         "model = Model.define('0.9*x + 0.05*x*v', 'x + 0.02*x**2*w')",
         "filters = [aof(linearised(model)), pointmass(model)]",
-        "found = compare(filters, model, 64, 3, 1, subset_runs=64, subset_memory=LEAST, progress=False)",
+        "found = compare(filters, model, 112, 3, 1, subset_runs=112, subset_memory=LEAST, progress=False)",
         "print(found.subset_runs, found.left_out)",
     )
     done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True)
-    assert done.returncode == 0 and re.match(r"64 \{\}|0 \{'aof-exact': .*need more memory", done.stdout), done
+    assert done.returncode == 0 and re.match(r"112 \{\}|0 \{'aof-exact': .*need more memory", done.stdout), done
 
 
 @pytest.mark.parametrize("memory", [0, -1e9, 1e6, float("nan")])
@@ -192,7 +194,7 @@ def test_the_exact_filter_on_a_model_beyond_its_budget_is_left_out_within_second
     model = Model.define("x**3 + 1e-6*v", "x + w")
     start = time.monotonic()
     filters = [aof(linearised(model)), pointmass(model)]
-    result = compare(filters, model, 16, 2, 1, subset_runs=16, subset_seconds=5, progress=False)
+    result = compare(filters, model, 112, 2, 1, subset_runs=112, subset_seconds=5, progress=False)
     assert time.monotonic() - start < 30  # 5 s of budget, and a slow machine
     assert re.search(r"^step \d of Model\(x' = .* nodes, .*--exact-runs 0", result.left_out["aof-exact"])
 
@@ -217,7 +219,7 @@ def test_another_filter_runs_instead_of_one_that_fails(model, control):
 def test_where_point_masses_fail_the_bound_is_found_by_particles():
     """A meter with thousands of humps is beyond the nodes; as a measurement it tells next to nothing."""
     model = Model.define("0.9*x + 0.1*v", "sin(1000*x) + w")
-    result = compare([aof(linearised(model)), exact(model)], model, 400, 4, 1, subset_runs=60, progress=False)
+    result = compare([aof(linearised(model)), exact(model)], model, 400, 4, 1, subset_runs=112, progress=False)
     assert "nodes" in result.replaced["aof-exact"]
     assert result.has_bound
     bound = result.bound()
