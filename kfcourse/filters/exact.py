@@ -27,18 +27,20 @@ import numpy as np
 from kfcourse.angles import moments_on_circle
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
-from kfcourse.filters.exact_adaptive import check_scalar, estimated
-from kfcourse.filters.exact_batch import Posteriors, posteriors
+from kfcourse.filters.exact_adaptive import check_scalar, on_panels
+from kfcourse.filters.exact_batch import Place, Posteriors, posteriors
 from kfcourse.filters.exact_kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, of_prior
-from kfcourse.filters.exact_places import hidden, likeliest, looked, spaced
+from kfcourse.filters.exact_places import Candidates, hidden, likeliest, looked, spaced
 from kfcourse.filters.exact_predictions import predictions
 from kfcourse.filters.exact_roots import at_roots
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
-ACCURACY = 1e-6  # of the mean and the deviation at a step, in posterior standard deviations
-TOLERABLE = 1e-3  # error of a step that no way resolves better, before the filter gives up
+# Of the mean and the deviation at a step, in posterior standard deviations: their square, 1e-6 of the bound, is far below what
+# any number of trajectories tells.
+ACCURACY = 1e-3
+TOLERABLE = 1e-2  # error of a step that no way resolves better, before the filter gives up
 NODES = (33, 49, 65, 97, 129, 193, 257)  # that a posterior may have
 MORE = 1.9  # times more nodes than did not do
 SPACINGS = (0.5, 0.35, 0.25, 0.18, 0.12)  # of its nodes, tried one after the other
@@ -166,20 +168,22 @@ def _step(
             continue
         for chunk in chunks(len(rows), NODES[0] * kernels.mu.shape[1], ELEMENTS):
             unresolved = []
-            for done, found, good in _in_batch(rows[chunk], kernels.rows(chunk), y[rows[chunk]], law, accuracy, fine_nodes):
+            here, values = kernels.rows(chunk), y[rows[chunk]]
+            place, candidates = likeliest(here, values, law)
+            for some, found, good in _in_batch(here, values, law, place, candidates, accuracy, fine_nodes):
+                done = rows[chunk][some]
                 mean[done], variance[done], error[done] = found.mean, found.variance, found.error + found.inherited
-                for place, x, mass, density in zip(done.tolist(), found.x, found.mass, found.density, strict=True):
-                    grids[place] = Grid(x, mass, density, uniform=True)
-                unresolved += done[~good].tolist()
-            for place in unresolved:
-                try:
-                    grid, error_there = estimated(kernels.rows(rows == place), float(y[place, 0]), law)
-                except Unresolved:
-                    if not error[place] <= TOLERABLE:
-                        raise
-                else:
-                    grids[place], error[place], adaptive[place] = grid, error_there, True
-                    mean[place], variance[place] = grid.mean(), grid.variance()
+                for i, x, mass, density in zip(done.tolist(), found.x, found.mass, found.density, strict=True):
+                    grids[i] = Grid(x, mass, density, uniform=True)
+                unresolved.append(some[~good])
+            left = np.concatenate(unresolved)
+            if not len(left):
+                continue
+            better = _on_panels(here.rows(left), values[left], law, candidates.rows(left), accuracy, error[rows[chunk][left]])
+            for row, grid, error_there in better:
+                i = int(rows[chunk][left[row]])
+                grids[i], error[i], adaptive[i] = grid, error_there, True
+                mean[i], variance[i] = grid.mean(), grid.variance()
     fine = [grids[place] for place in range(len(y))]
     predicted = np.empty((2, len(y)))
     following, later = [], [np.empty(0, dtype=int)]
@@ -195,12 +199,11 @@ def _step(
 
 
 def _in_batch(
-    rows: Array, kernels: Kernels, y: Array, law: ScalarDensities, accuracy: float, fine_nodes: int
+    kernels: Kernels, y: Array, law: ScalarDensities, place: Place, candidates: Candidates, accuracy: float, fine_nodes: int
 ) -> Iterator[tuple[Array, Posteriors, Array]]:
-    """Places of trajectories, their posteriors, and whether these are resolved; on the finest grid also those that are not."""
-    place, candidates = likeliest(kernels, y, law)
+    """Rows of kernels, their posteriors, and whether these are resolved; on the finest grid also those that are not."""
     look = looked(kernels, y, law, place)
-    left, least = np.arange(len(rows)), np.zeros(len(rows))  # trajectories to do, and the nodes that kernels need
+    left, least = np.arange(len(y)), np.zeros(len(y))  # trajectories to do, and the nodes that kernels need
     for spacing in SPACINGS:
         place, wanted = spaced(look.rows(left), candidates.rows(left), law, spacing)
         sizes = np.searchsorted(NODES[:-1], np.maximum(wanted, least[left]))
@@ -215,12 +218,38 @@ def _in_batch(
                 found = found._replace(error=np.where(hidden(candidates.rows(i), there, count), np.inf, found.error))
                 good = (found.error <= accuracy) & (least[i] <= count)
                 told = good | (spacing == SPACINGS[-1]) | (count == NODES[-1])
-                yield rows[i[told]], Posteriors(*(array[told] for array in found)), good[told]
+                yield i[told], Posteriors(*(array[told] for array in found)), good[told]
                 least[i] = np.maximum(least[i], np.where(good, 0, MORE * count))
                 again[some] = ~told
         left = left[again]
         if not len(left):
             return
+
+
+def _on_panels(
+    kernels: Kernels, y: Array, law: ScalarDensities, candidates: Candidates, accuracy: float, error: Array
+) -> Iterator[tuple[int, Grid, float]]:
+    """Rows, their posteriors and errors on panels, where these are better than with nodes; together, or else one by one."""
+
+    def found(rows: slice) -> list[tuple[Grid, float]]:
+        return on_panels(kernels.rows(rows), y[rows], law, candidates.rows(rows), accuracy)
+
+    try:
+        results = found(slice(None))
+    except Unresolved:
+        results = []
+        for i in range(len(y)):
+            try:
+                results += found(slice(i, i + 1))
+            except Unresolved:
+                if not error[i] <= TOLERABLE:
+                    raise
+                results.append((Grid(*np.empty((3, 0))), np.inf))
+    for row, (grid, error_there) in enumerate(results):
+        if TOLERABLE < error_there < np.inf and not error[row] <= TOLERABLE:
+            raise Unresolved("a posterior has more humps, spikes or kinks than its nodes resolve")
+        if error_there < error[row]:
+            yield row, grid, error_there
 
 
 def nodes_for_kernels(law: ScalarDensities, found: Posteriors, count: int, fine_nodes: int) -> Array:

@@ -3,8 +3,8 @@
 One trajectory at a time.  Panels cover the support of the prediction, geometrically finer towards the states that would explain
 the measurement without noise; they are split until a Gauss-Legendre rule resolves the posterior on each of them.
 
-`estimated` does one step, where equidistant nodes do not resolve it.  `adaptive_pointmass` is a filter of nothing but such steps:
-it shares neither nodes nor rules with `kfcourse.filters.exact`, and so checks it.
+`on_panels` does one step of some trajectories, where equidistant nodes do not resolve it.  `adaptive_pointmass` is a filter of
+nothing but such steps: it shares neither nodes nor rules with `kfcourse.filters.exact`, and so checks it.
 """
 
 from __future__ import annotations
@@ -17,8 +17,10 @@ import scipy
 
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
+from kfcourse.filters.exact_batch import Place
 from kfcourse.filters.exact_kernels import NEGLIGIBLE, ROOT, WIDTH, Grid, Kernels, Unresolved
 from kfcourse.filters.exact_panels import MOST, SPLITS, Rule, resolve
+from kfcourse.filters.exact_places import Candidates, explanations
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
@@ -29,8 +31,12 @@ SECTIONS = np.linspace(0, 1, 257)  # of a bracket, in the search for a zero
 SCALES = (0.5, 2.0, WIDTH)  # distances, in kernel sigmas, of panel borders from the prediction's own centres
 QUANTILES = np.array([0.02, 0.25, 0.5, 0.75, 0.98])  # of the posterior, where those centres are
 BORDER = 1e-10  # of the density at the ends of the support, relative: beyond them there must be nothing
-PUSHED = 20_000  # kernels of as much work as an integral over the noise
-WORK = 4e7  # nodes times kernels of a step: half a second
+ROUGH, FINE = Rule.of_order(8, 1e-4), Rule.of_order(12, 1e-7)  # of `on_panels`
+TENTH = 1e-4  # accuracy from which on the rough one does
+AROUND = 11  # borders of first panels towards a hump
+HUMPS = 12  # states that explain the measurement, to which first panels lead
+SOME = 24  # kernels at which there are borders
+WORK = 1e8  # nodes times kernels of a trajectory at a time: a second
 ELEMENTS = 2**20  # of the largest array, 8 MB
 
 
@@ -48,9 +54,6 @@ class Panels(NamedTuple):
         return np.array([abs(fine.mean() - coarse.mean()) for fine, coarse in zip(self.fine, self.coarse, strict=True)])
 
 
-STEPWISE = Rule.of_order(12, 1e-7), Rule.of_order(9, 1e-5)  # of `estimated`: the result, and what tells its error
-
-
 def check_scalar(model: Model) -> None:
     """ModelError unless the model has one state and one measurement."""
     if model.n != 1 or model.p != 1:
@@ -60,25 +63,54 @@ def check_scalar(model: Model) -> None:
         )
 
 
-def estimated(kernels: Kernels, y: float, law: ScalarDensities) -> tuple[Grid, float]:
-    """The posterior of one trajectory, from the kernels of its prediction, (1, M), and y.
+def on_panels(
+    kernels: Kernels, y: Array, law: ScalarDensities, candidates: Candidates, accuracy: float
+) -> list[tuple[Grid, float]]:
+    """The posteriors of some trajectories, from the kernels of their predictions (T, M) and y (T, 1).
 
-    Also the estimated error of its mean in posterior standard deviations: the change from a coarser rule; infinite if y
-    contradicts the prediction so much that the posterior lies beyond its support.
+    Each with an estimate of its error in posterior standard deviations, see `resolve`; infinite if y contradicts the prediction
+    so much that the posterior lies beyond its support.
     """
-    mu, sigma, mass = (array[0] for array in kernels[:3])
-    bayes = _Bayes(law, _wider_than_kernels(law))
-    pushed = kernels.pushed
+    rule = ROUGH if accuracy >= TENTH else FINE
+    found: list[tuple[Grid, float]] = [(Grid(*np.empty((3, 0))), np.inf)] * len(y)
+    left = np.arange(len(y))
+    for sigmas in (WIDTH, FAR):
+        some, borders = kernels.rows(left), _first_borders(kernels.rows(left), y[left], law, candidates.rows(left), sigmas)
 
-    def interpolated(x: Array) -> Array:
-        assert pushed is not None
-        with np.errstate(divide="ignore"):
-            return np.log(pushed(x[None])[0, :, 0])
+        def log_density(x: Array, rows: Array, some: Kernels = some, left: Array = left) -> Array:
+            if x.shape[1] * some.mu.shape[1] > WORK:
+                raise Unresolved(
+                    f"the posterior needs more than {x.shape[1]:,} nodes at a time, the prediction is a sum of "
+                    f"{some.mu.shape[1]:,} kernels"
+                )
+            chosen = some.rows(rows)
+            with np.errstate(divide="ignore"):
+                return np.log(chosen.density(x, chosen.mass)[:, :, 0]) + law.log_likelihood(y[left[rows]], x)
 
-    log_prediction = None if pushed is None else interpolated
-    (fine, complete), (coarse, _) = (bayes.corrected(mu, sigma, mass, y, rule, log_prediction) for rule in STEPWISE)
-    difference, deviation = abs(fine.mean() - coarse.mean()), np.sqrt(fine.variance())
-    return fine, (float(difference / deviation) if difference else 0.0) if complete else np.inf
+        narrow = borders[:, 0] == borders[:, -1]  # a prior without variance, a support narrower than rounding: the state is known
+        borders[narrow, -1] = np.nextafter(borders[narrow, -1], np.inf)
+        with np.errstate(all="ignore"):  # far states, where formulas leave the finite numbers, have no density
+            grids = resolve(borders, log_density, _wider_than_kernels(law), rule)
+        cut = np.array([_cut_off(grid, np.unique(line)) for (grid, _), line in zip(grids, borders, strict=True)])
+        for place, (grid, error), bad, known in zip(left.tolist(), grids, cut, narrow, strict=True):
+            found[place] = (Grid(grid.x[:1], np.ones(1), np.full(1, 1e300)), 0.0) if known else (grid, np.inf if bad else error)
+        left = left[cut & ~narrow]
+        if not len(left):
+            break
+    return found
+
+
+def _first_borders(kernels: Kernels, y: Array, law: ScalarDensities, candidates: Candidates, sigmas: float) -> Array:
+    """Borders (T, B) of panels: ever closer towards where humps may be, and at some of the prediction's kernels."""
+    low, high = kernels.support(sigmas)
+    roots = explanations(kernels, y, law, low, high, HUMPS)
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        centres = np.concatenate([candidates.centre, roots], axis=1)
+        widths = np.concatenate([candidates.width, np.fmin(law.meter_width(roots), kernels.width)], axis=1)
+        near = [Place(c[:, None], w[:, None], low, high).nodes(AROUND)[0] for c, w in zip(centres.T, widths.T, strict=True)]
+    among = kernels.mu[:, :: max(1, kernels.mu.shape[1] // SOME)]  # they crowd where the posterior before had its humps
+    borders = np.concatenate([low, *near, among, high], axis=1)
+    return np.sort(np.clip(np.where(np.isfinite(borders), borders, low), low, high), axis=1)
 
 
 def adaptive_pointmass(model: Model, order: int = 8, tolerance: float = 1e-5) -> Filter:
@@ -171,29 +203,25 @@ class _Bayes:
         mass: Array,
         y: float,
         rule: Rule,
-        log_prediction: Callable[[Array], Array] | None = None,
     ) -> tuple[Grid, bool]:
         """The posterior: a prediction that is a sum of normal kernels (M,), corrected with y; and whether it is complete.
-
-        If there is a `log_prediction`, the kernels tell only roughly where it lies.
 
         It is not where the measurement contradicts the prediction by more than `FAR` sigmas.
         """
 
         def log_density(x: Array) -> Array:
-            if x.size > MOST or x.size * (mu.size if log_prediction is None else PUSHED) > WORK:
+            if x.size > MOST or x.size * mu.size > WORK:
                 raise Unresolved(
                     f"the posterior needs more than {x.size:,} nodes, the prediction is a sum of {mu.size:,} kernels"
                 )
-            prediction = _log_mixture(x, mu, sigma, mass) if log_prediction is None else log_prediction(x)
-            return prediction + self.log_likelihood(y, x)
+            return _log_mixture(x, mu, sigma, mass) + self.log_likelihood(y, x)
 
         def between(borders: Array) -> tuple[Grid, bool]:
             if not np.isnan(y):
                 borders = np.union1d(borders, self._explanations(borders, y))
             if len(borders) < 2:  # a prior without variance, or a support narrower than rounding: the state is known
                 return Grid(borders, np.ones(1), np.full(1, 1e300)), True
-            grid = resolve(borders, log_density, self.too_wide, rule)
+            grid, _ = resolve(borders[None], lambda x, _: log_density(x[0])[None], self.too_wide, rule)[0]
             return grid, not _cut_off(grid, borders)
 
         near, complete = between(_prediction_borders(mu, sigma, mass, WIDTH))

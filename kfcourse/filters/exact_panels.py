@@ -1,4 +1,4 @@
-"""Panels that are halved until a Gauss-Legendre rule resolves a density on each of them."""
+"""Panels that are halved until a Gauss-Legendre rule resolves densities on each of them, for many trajectories at once."""
 
 from __future__ import annotations
 
@@ -41,45 +41,105 @@ class Rule:
         return cls(nodes, weights, (vander * weights[:, None] * scale).T[-2:], tolerance)
 
 
-def resolve(borders: Array, log_density: Callable[[Array], Array], too_wide: Callable[[Array, Array], Array], rule: Rule) -> Grid:
-    """Nodes and masses of exp(log_density), its panels split until the rule resolves it on each."""
-    left, right = borders[:-1], borders[1:]
-    x, logs = _evaluate(left, right, log_density, rule)
+def resolve(
+    borders: Array, log_density: Callable[[Array, Array], Array], too_wide: Callable[[Array, Array], Array], rule: Rule
+) -> list[tuple[Grid, float]]:
+    """Nodes and masses of exp(log_density), panels split until the rule resolves the density on each.
+
+    Parameters
+    ----------
+    borders : ndarray (T, B)
+        Of the first panels of each trajectory, ascending; equal ones have no panel between them.
+    log_density : x (R, N), trajectories (R,) -> (R, N)
+    too_wide : left, right (P,) -> (P,)
+        Panels to be split whatever the density.
+
+    Returns
+    -------
+    list of (Grid, float)
+        Each with the part of the mass that is in the last two Legendre coefficients: as large as the error where the density
+        has kinks, and far larger where it is smooth, as a rule of q nodes integrates 2 q coefficients exactly.
+    """
+    panels = _Panels(len(borders), log_density, rule)
+    first, place = np.nonzero(borders[:, 1:] > borders[:, :-1])
+    panels.add(first, borders[first, place], borders[first, place + 1])
     for _ in range(SPLITS):
-        values = _relative(logs)
-        half = 0.5 * (right - left)
-        mass = half * (values @ rule.weights)
-        total = mass.sum()
+        mass, unresolved = panels.masses()
+        total = np.bincount(panels.row, mass, len(borders))[panels.row]
         kept = mass > NEGLIGIBLE * total
-        if rule.nodes.size * np.count_nonzero(kept) > MOST:
+        if rule.nodes.size * np.bincount(panels.row[kept], minlength=1).max() > MOST:
             raise Unresolved(f"the posterior needs more than {MOST:,} nodes")
-        unresolved = half * np.abs(values @ rule.tail.T).sum(axis=1) > rule.tolerance * total
-        split = kept & (unresolved | (too_wide(left, right) & (mass > rule.tolerance * total)))
-        middle = 0.5 * (left + right)
-        split &= (middle > left) & (middle < right)
-        if not split.any():
+        middle = 0.5 * (panels.left + panels.right)
+        split = kept & (unresolved > rule.tolerance * total)
+        split |= kept & (mass > rule.tolerance * total) & too_wide(panels.left, panels.right)
+        split &= (middle > panels.left) & (middle < panels.right) & panels.seen()
+        row, left, middle, right = (array[split] for array in (panels.row, panels.left, middle, panels.right))
+        panels.keep(kept & ~split)
+        if not len(row):
             break
-        stay = kept & ~split
-        a = np.concatenate([left[split], middle[split]])
-        b = np.concatenate([middle[split], right[split]])
-        new_x, new_logs = _evaluate(a, b, log_density, rule)
-        left, right = np.concatenate([left[stay], a]), np.concatenate([right[stay], b])
-        x, logs = np.concatenate([x[stay], new_x]), np.concatenate([logs[stay], new_logs])
-    values = _relative(logs)
-    masses = 0.5 * (right - left)[:, None] * rule.weights * values
-    kept = masses.sum(axis=1) > NEGLIGIBLE * masses.sum()
-    order = np.argsort(x[kept].ravel())
-    total = masses[kept].sum()
-    return Grid(*(array[kept].ravel()[order] for array in (x, masses / total, values / total)))
+        panels.add(np.concatenate([row, row]), np.concatenate([left, middle]), np.concatenate([middle, right]))
+    return panels.grids()
 
 
-def _relative(logs: Array) -> Array:
-    """The density relative to its peak; flat if no value is finite."""
-    peak = logs.max()
-    return np.exp(logs - peak) if np.isfinite(peak) else np.ones_like(logs)
+class _Panels:
+    """Panels of all trajectories: row, left and right end (P,), nodes and log-densities (P, q)."""
 
+    def __init__(self, rows: int, log_density: Callable[[Array, Array], Array], rule: Rule):
+        self.rows, self.log_density, self.rule = rows, log_density, rule
+        self.row: Array = np.empty(0, dtype=int)
+        self.left: Array = np.empty(0)
+        self.right: Array = np.empty(0)
+        self.x, self.logs = np.empty((2, 0, len(rule.nodes)))
 
-def _evaluate(left: Array, right: Array, log_density: Callable[[Array], Array], rule: Rule) -> tuple[Array, Array]:
-    """Nodes of each panel (panels, q) and the log-density there."""
-    x = 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * rule.nodes
-    return x, log_density(x.ravel()).reshape(x.shape)
+    def add(self, row: Array, left: Array, right: Array) -> None:
+        """Further ones, in any order; log-densities of all trajectories are asked for at once."""
+        if not len(row):
+            return
+        x = 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * self.rule.nodes
+        some, place, count = np.unique(row, return_inverse=True, return_counts=True)
+        order = np.argsort(place, kind="stable")
+        slot = np.empty(len(row), dtype=int)
+        slot[order] = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+        asked = np.repeat(x[order[np.cumsum(count) - 1]][:, None], count.max(), axis=1)  # filled up with the last panel
+        asked[place, slot] = x
+        logs = self.log_density(asked.reshape(len(some), -1), some).reshape(asked.shape)[place, slot]
+        for name, new in (("row", row), ("left", left), ("right", right), ("x", x), ("logs", logs)):
+            setattr(self, name, np.concatenate([getattr(self, name), new]))
+
+    def keep(self, chosen: Array) -> None:
+        for name in ("row", "left", "right", "x", "logs"):
+            setattr(self, name, getattr(self, name)[chosen])
+
+    def peak(self) -> Array:
+        """The highest log-density of each panel's trajectory (P,)."""
+        peak = np.full(self.rows, -np.inf)
+        np.maximum.at(peak, self.row, self.logs.max(axis=1))
+        return peak[self.row]
+
+    def seen(self) -> Array:
+        """Panels of trajectories whose density is a number anywhere."""
+        return np.isfinite(self.peak())
+
+    def values(self) -> Array:
+        """Densities (P, q) relative to the highest of each trajectory; flat where nothing is seen."""
+        with np.errstate(invalid="ignore"):
+            return np.where(self.seen()[:, None], np.exp(self.logs - self.peak()[:, None]), 1.0)
+
+    def masses(self) -> tuple[Array, Array]:
+        """The mass of each panel (P,), and that in its last two Legendre coefficients."""
+        values, half = self.values(), 0.5 * (self.right - self.left)
+        return half * (values @ self.rule.weights), half * np.abs(values @ self.rule.tail.T).sum(axis=1)
+
+    def grids(self) -> list[tuple[Grid, float]]:
+        values, (mass, unresolved) = self.values(), self.masses()
+        masses = 0.5 * (self.right - self.left)[:, None] * self.rule.weights * values
+        total, left_over = (np.bincount(self.row, one, self.rows) for one in (mass, unresolved))
+        order = np.lexsort((self.left, self.row))
+        order = order[mass[order] > NEGLIGIBLE * total[self.row[order]]]
+        ends = np.cumsum(np.bincount(self.row[order], minlength=self.rows))
+        found = []
+        for i, chosen in enumerate(np.split(order, ends[:-1])):
+            x, m, density = (array[chosen].ravel() for array in (self.x, masses, values))
+            whole = m.sum()
+            found.append((Grid(x, m / whole, density / whole), float(left_over[i] / whole)))
+        return found

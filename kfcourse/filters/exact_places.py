@@ -135,8 +135,8 @@ def hidden(candidates: Candidates, place: Place, count: int) -> Array:
     return np.any(candidates.matter() & far, axis=1)
 
 
-def explanations(kernels: Kernels, y: Array, law: ScalarDensities, low: Array, high: Array) -> Array:
-    """Roots (T, 3) of b(x, m_w) = y in the support, those nearest to the middle; NaN where there are fewer."""
+def explanations(kernels: Kernels, y: Array, law: ScalarDensities, low: Array, high: Array, most: int = EXPLANATIONS) -> Array:
+    """Roots (T, most) of b(x, m_w) = y in the support, those nearest to the middle; NaN where there are fewer."""
     x, _ = Place(kernels.centre, kernels.width, low, high).nodes(SEARCHED)
     residual = law.residual(y, x)
     negative = residual > 0
@@ -144,7 +144,7 @@ def explanations(kernels: Kernels, y: Array, law: ScalarDensities, low: Array, h
     if np.isnan(y).any():
         change &= ~np.isnan(y)
     middle = np.abs(0.5 * (x[:, 1:] + x[:, :-1]) - kernels.centre)
-    places = np.argsort(np.where(change, middle, np.inf), axis=1, kind="stable")[:, :EXPLANATIONS]
+    places = np.argsort(np.where(change, middle, np.inf), axis=1, kind="stable")[:, :most]
     found = np.take_along_axis(change, places, axis=1)
     left, right = np.take_along_axis(x, places, axis=1), np.take_along_axis(x, places + 1, axis=1)
     left_negative = np.take_along_axis(negative, places, axis=1)

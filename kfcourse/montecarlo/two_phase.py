@@ -102,7 +102,7 @@ def estimate(
     covariance = (plus - minus) / 4 * of_subset.sum() / weights.sum()
     error = np.sqrt(np.maximum(everywhere.standard_error**2 + correction.standard_error**2 + 2 * covariance, 0.0))
     # third cumulants of sums of nearly independent parts add up
-    third = sum(one.skewness * one.standard_error**3 for one in (everywhere, correction))
+    third = everywhere.skewness * everywhere.standard_error**3 + correction.skewness * correction.standard_error**3
     return Estimate(everywhere.value + correction.value, error, correction.freedom, _over_cube(third, error))
 
 

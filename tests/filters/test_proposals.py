@@ -155,7 +155,7 @@ def test_vector_variants_have_a_bound(variants):
     for name in ("20", "21"):
         assert has_bound(variants[name])
         filters = [*lab_filters(variants[name], ["aof-gaussian", "duof"]), exact(variants[name])]
-        result = compare(filters, variants[name], 500, 5, 1, subset_runs=60, progress=False)
+        result = compare(filters, variants[name], 500, 5, 1, subset_runs=112, progress=False)
         assert result.has_bound
         for one in result.entrants:
             gap = result.gap(one)
