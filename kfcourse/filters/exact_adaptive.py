@@ -34,7 +34,10 @@ BORDER = 1e-10  # of the density at the ends of the support, relative: beyond th
 ROUGH, FINE = Rule.of_order(8, 1e-4), Rule.of_order(12, 1e-7)  # of `on_panels`
 TENTH = 1e-4  # accuracy from which on the rough one does
 AROUND = 11  # borders of first panels towards a hump
-HUMPS = 12  # states that explain the measurement, to which first panels lead
+HUMPS, SEARCHED = (
+    40,
+    129,
+)  # states that explain the measurement, to which first panels lead, and points among which they are sought
 SOME = 24  # kernels at which there are borders
 WORK = 1e8  # nodes times kernels of a trajectory at a time: a second
 ELEMENTS = 2**20  # of the largest array, 8 MB
@@ -103,7 +106,9 @@ def on_panels(
 def _first_borders(kernels: Kernels, y: Array, law: ScalarDensities, candidates: Candidates, sigmas: float) -> Array:
     """Borders (T, B) of panels: ever closer towards where humps may be, and at some of the prediction's kernels."""
     low, high = kernels.support(sigmas)
-    roots = explanations(kernels, y, law, low, high, HUMPS)
+    roots = explanations(kernels, y, law, low, high, HUMPS, SEARCHED)
+    if np.isfinite(roots).all(axis=1).any():
+        raise Unresolved(f"more than {HUMPS - 1} states explain a measurement: too many humps for any number of nodes")
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         centres = np.concatenate([candidates.centre, roots], axis=1)
         widths = np.concatenate([candidates.width, np.fmin(law.meter_width(roots), kernels.width)], axis=1)

@@ -135,9 +135,11 @@ def hidden(candidates: Candidates, place: Place, count: int) -> Array:
     return np.any(candidates.matter() & far, axis=1)
 
 
-def explanations(kernels: Kernels, y: Array, law: ScalarDensities, low: Array, high: Array, most: int = EXPLANATIONS) -> Array:
+def explanations(
+    kernels: Kernels, y: Array, law: ScalarDensities, low: Array, high: Array, most: int = EXPLANATIONS, points: int = SEARCHED
+) -> Array:
     """Roots (T, most) of b(x, m_w) = y in the support, those nearest to the middle; NaN where there are fewer."""
-    x, _ = Place(kernels.centre, kernels.width, low, high).nodes(SEARCHED)
+    x, _ = Place(kernels.centre, kernels.width, low, high).nodes(points)
     residual = law.residual(y, x)
     negative = residual > 0
     change = (negative[:, 1:] != negative[:, :-1]) & (np.abs(residual[:, 1:] - residual[:, :-1]) < law.jump)
