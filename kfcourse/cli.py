@@ -25,7 +25,7 @@ from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
 from kfcourse.lab.report import conclusions, write_json, write_report
 from kfcourse.lab.short_names import FILTERS, LAB, has_bound, title
-from kfcourse.lab.variants import VariantError, chosen_variants, find_variant
+from kfcourse.lab.variants import VariantError, find_variant, read_variants
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare
@@ -147,15 +147,19 @@ def variants(
     if wanted is not None:
         _generate(wanted, seed, runs, jobs, out)
         return
-    chosen = chosen_variants(names, not names, variants_file)
-    if check:
-        found = list(examine_all(chosen, runs, seed, jobs, unposed))
+    chosen, faults = read_variants(variants_file, names)
+    good = not faults
+    if check and chosen:
+        found = list(examine_all(list(chosen.values()), runs, seed, jobs, unposed))
         click.echo(table(found))
-        sys.exit(0 if all(one.well_posed for one in found) else 1)
-    for variant in chosen:
-        model = variant.model
-        click.echo(f"{variant.name:>6}  {variant.title or 'no title'}")
-        click.echo(f"        x' = {', '.join(map(str, model.state_equation))};  y = {', '.join(map(str, model.meter_equation))}")
+        good &= all(one.well_posed for one in found)
+    else:
+        for variant in chosen.values():
+            state, meter = (", ".join(map(str, one)) for one in (variant.model.state_equation, variant.model.meter_equation))
+            click.echo(f"{variant.name:>6}  {variant.title or 'no title'}\n        x' = {state};  y = {meter}")
+    for fault in faults.values():
+        click.echo(f"Error: {fault}", err=True)
+    sys.exit(0 if good else 1)
 
 
 def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) -> None:

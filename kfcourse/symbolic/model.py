@@ -38,6 +38,7 @@ from kfcourse.symbolic.reading import (
     law,
     names_in,
     read,
+    shown,
     table,
 )
 from kfcourse.symbolic.sense import not_computable
@@ -141,8 +142,8 @@ class Model:
         of_step = known.names([*values, *by_name(x, v, w)])
         constants = {name: symbol(name) for name in values} | of_step
         numbers = {symbol(name): value for name, value in values.items()}
-        change_v, state_noise = varying_law("state_noise", state_noise, v, constants, known, numbers)
-        change_w, meter_noise = varying_law("meter_noise", meter_noise, w, constants, known, numbers)
+        change_v, state_noise, known = varying_law("state_noise", state_noise, v, constants, known, numbers)
+        change_w, meter_noise, known = varying_law("meter_noise", meter_noise, w, constants, known, numbers)
         state_equation = sp.ImmutableMatrix([read(f, constants | by_name(x, v), "state") for f in a]).subs(change_v)
         meter_equation = sp.ImmutableMatrix([read(f, constants | by_name(x, w), "meter") for f in b]).subs(change_w)
         model = cls(
@@ -252,7 +253,7 @@ def _symbols(symbols: Mapping[str, Names] | None, values: Sequence[str], used: s
             listed = [given[key]] if isinstance(given[key], str) else given[key]
             if not isinstance(listed, Sequence):
                 raise ModelError(
-                    f'`symbols`: {key} must be a name or a list of names, such as ["{key}1", "{key}2"], got {listed!r}'
+                    f'`symbols`: {key} must be a name or a list of names, such as ["{key}1", "{key}2"], got {shown(listed)}'
                 )
             names: list[str] = [*listed]
         elif key == "x":

@@ -406,6 +406,18 @@ def test_k_and_t_mean_what_else_they_name():
     assert Model.define("x + v + k", "x + w", inputs={"k": [1, 2]}).known.at(1).tolist() == [2.0]
 
 
+def test_a_variance_must_be_one_at_the_steps_that_are_run():
+    """e^k is no number from step 710 on, 1 - k/500 negative from 501 on: shorter runs do not see it, longer ones say so."""
+    for variance, steps, wrong in (("exp(k)", 710, "inf at step 710; it must be finite"), ("1 - k/500", 501, "-0.002 at step")):
+        model = Model.define("0.9*x + u + v", "x + w", meter_noise={"variance": variance}, inputs={"u": [0.0] * 2000})
+        assert model.known.steps == steps
+        assert np.isfinite(simulate(model, 3, 51, seed=1).y).all()
+        with pytest.raises(ModelError, match=f"{wrong}.*run at most {steps} steps"):
+            simulate(model, 3, steps + 1, seed=1)
+    short = Model.define("0.9*x + u + v", "x + w", meter_noise={"variance": "exp(k)"}, inputs={"u": [0.0] * 60})
+    assert short.known.steps == 60
+
+
 def test_models_without_time_pay_nothing(variant53):
     structure = linearised(variant53)
     assert structure.at(5) is structure and "known" not in structure.source()
