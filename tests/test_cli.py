@@ -102,6 +102,18 @@ def test_another_file_is_listed(call):
     assert re.findall(r"^ *(\S+)  no title", result.output, re.MULTILINE) == ["53", "tan", "diverging", "../elsewhere"]
 
 
+def test_one_bad_variant_is_named_and_stops_no_other(call, no_report, tmp_path):
+    (tmp_path / "mine.toml").write_text(EXAMPLE + '[variants.bad]\nstate = "0.9*x + q"\nmeter = "x + w"\n', encoding="utf-8")
+    listed = call("variants", "--variants", "mine.toml")
+    assert listed.exit_code == 1 and "Error: variant bad in mine.toml: unknown symbol 'q'" in listed.output
+    assert len(re.findall(r"no title", listed.output)) == 4
+    checked = call("variants", "--variants", "mine.toml", "--variant", "53", "--variant", "bad", "--check", "--runs", 1000)
+    assert checked.exit_code == 1 and "Error: variant bad" in checked.output and re.search(r"(?m)^53 ", checked.output)
+    assert call("variants", "--variants", "mine.toml", "--variant", "53").exit_code == 0
+    assert call("lab", "53", "--variants", "mine.toml", *QUICK).exit_code == 0
+    refused(call("lab", "bad", "--variants", "mine.toml", *QUICK), "variant bad in mine.toml", "'q'")
+
+
 @pytest.mark.parametrize("option", ["-h", "--help", "--version"])
 def test_help_and_version(call, option):
     assert call(option).exit_code == 0
@@ -510,6 +522,13 @@ def test_a_noiseless_meter_warns_of_nothing(call, tmp_path):
     assert all(result.error_variance(name).value.max() < 1e-25 for name in LAB)  # rounding of a state of size 1
     done = call("lab", "exact", *QUICK, "--variants", "exact.toml")
     assert done.exit_code == 0 and "arning" not in done.output
+
+
+def test_endless_budgets_are_budgets(call, no_report):
+    """No clock can be set to infinity; nothing is limited then."""
+    endless = ("--exact-seconds", "inf", "--exact-memory", "inf", "--exact-runs", 4)
+    result = call("lab", "53", *QUICK[:4], *endless, "--filters", "aof-gaussian,aof-exact")
+    assert result.exit_code == 0 and "on 4 of 400 trajectories" in result.output, result.output
 
 
 def test_one_exact_run_has_no_standard_error_and_is_refused(call):
