@@ -147,6 +147,8 @@ def test_a_filter_that_diverges_and_other_reasons():
     assert "trajectories" in cause(str(caught.value), model, WORDS["ru"])  # not the filter's fault: quoted
     infinite = "step 7: duof became infinite or NaN although the trajectories are finite; leave it out or check the model"
     assert "на шаге 7" in cause(infinite, model, WORDS["ru"]) and "at step 7" in cause(infinite, model, WORDS["en"])
+    negative = "step 28: mfos-gaussian failed: a covariance has the variance -165479, which must not be negative: check the"
+    assert "на шаге 28" in cause(negative, model, WORDS["ru"]) and "at step 28" in cause(negative, model, WORDS["en"])
     assert "60 с" in cause(admission._TOO_LONG.format(60), model, WORDS["ru"])
     assert cause("50 % of $ & _", model, WORDS["en"]) == "50 % of $ & _"
 
