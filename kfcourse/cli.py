@@ -17,7 +17,7 @@ from types import FrameType
 import click
 
 from kfcourse.checks.posing import unposed
-from kfcourse.files import is_standard_output, read_only, save
+from kfcourse.files import is_standard_output, read_only, replacing_together, save
 from kfcourse.lab.admission import admissions, on_trial, without_failing
 from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.grammar import generate
@@ -304,10 +304,10 @@ def lab(
     _tell(result, to_error)
     if json_file:
         write_json(chosen, result, json_file)
-    with _kept(folder):
-        write_report(chosen, result, folder)
+    with _kept(folder), replacing_together(folder) as place:
+        write_report(chosen, result, place)
         if language:
-            write_handin(chosen, result, folder, language)
+            write_handin(chosen, result, place, language)
     click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""), err=to_error)
 
 
@@ -324,7 +324,7 @@ def _tell(result: Comparison, to_error: bool) -> None:
 
 @contextmanager
 def _kept(folder: Path) -> Iterator[None]:
-    """What a report that fails leaves: its finished files, and no empty folder."""
+    """A report that fails changes nothing in its folder."""
     try:
         yield
     except (OSError, MemoryError):
@@ -332,11 +332,8 @@ def _kept(folder: Path) -> Iterator[None]:
     except Exception as error:
         reason = " ".join(str(error).split())[:200] or "no reason given"
         raise click.ClickException(
-            f"the report in {folder} is not complete ({type(error).__name__}: {reason}); the ranking and the files written hold"
+            f"no report was written to {folder} ({type(error).__name__}: {reason}); what was there is there, the ranking holds"
         ) from None
-    finally:
-        if folder.is_dir() and not any(folder.iterdir()):
-            folder.rmdir()
 
 
 @main.command()

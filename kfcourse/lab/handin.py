@@ -17,6 +17,7 @@ from pathlib import Path
 import sympy as sp
 from matplotlib.axes import Axes
 
+from kfcourse.files import replacing_together
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
@@ -75,7 +76,7 @@ class Block:
 
 
 def write_handin(variant: Variant, result: Comparison, folder: Path, language: str) -> list[Path]:
-    """Write handin.tex, handin.html and their figures.
+    """Write handin.tex, handin.html and their figures, all of them or none; returns the paths.
 
     Raises
     ------
@@ -88,10 +89,11 @@ def write_handin(variant: Variant, result: Comparison, folder: Path, language: s
     report = _Report(result, words)
     content = {"blocks": list(report.blocks()), "words": words, "variant": variant, "language": language}
     labels = plots.Words(report.title, **{part: words[f"axis_{part}"] for part in plots.Words._fields[1:]})
-    written = []
-    for name in report.figures:
-        written += save_figure(partial(FIGURES[name], result, words=labels), folder, f"handin-{name}")
-    return written + save_texts(("handin.html", "handin.tex"), folder, content, inline=inline_html, inline_tex=inline_tex)
+    with replacing_together(folder) as place:
+        for name in report.figures:
+            save_figure(partial(FIGURES[name], result, words=labels), place, f"handin-{name}")
+        save_texts(("handin.html", "handin.tex"), place, content, inline=inline_html, inline_tex=inline_tex)
+        return [folder / path.name for path in place.iterdir()]
 
 
 class _Report:
