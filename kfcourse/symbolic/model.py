@@ -206,16 +206,22 @@ class Model:
         values = dict(self.parameters) | {name: exact_number(name, value) for name, value in parameters.items()}
         return dataclasses.replace(self, parameters=values)
 
-    def latex(self, values: bool = True) -> str:
-        """The two equations, and the parameters' values unless they are not wanted, as a LaTeX `aligned` block."""
+    def latex(self, values: bool = True, indexed: bool = False) -> str:
+        """The two equations, and the parameters' values unless they are not wanted, as a LaTeX `aligned` block.
+
+        Indexed: x_{k+1} = c x_k + e x_k v_k, as on paper, for x_{k+1} = c x + e x v.
+        """
+        x, v, w = ([sp.Symbol(f"{{{sp.latex(s)}}}_{{k}}") if indexed else s for s in some] for some in (self.x, self.v, self.w))
+        at_k = dict(zip((*self.x, *self.v, *self.w), (*x, *v, *w), strict=True))
         state = ["{" + sp.latex(x) + "}" for x in self.x]  # braces: a name may have an index of its own
         meter = ["y"] if self.p == 1 else [f"{{y_{{{i + 1}}}}}" for i in range(self.p)]
         lines = [
-            rf"{x}_{{k+1}} &= {formula_latex(formula, self.x, self.v)}"
-            for x, formula in zip(state, self.state_equation, strict=True)
+            rf"{name}_{{k+1}} &= {formula_latex(formula.xreplace(at_k), x, v)}"
+            for name, formula in zip(state, self.state_equation, strict=True)
         ]
         lines += [
-            rf"{y}_k &= {formula_latex(formula, self.x, self.w)}" for y, formula in zip(meter, self.meter_equation, strict=True)
+            rf"{name}_k &= {formula_latex(formula.xreplace(at_k), x, w)}"
+            for name, formula in zip(meter, self.meter_equation, strict=True)
         ]
         lines += [rf"{name}_k &\in [-\pi, \pi]" for name in [state[i] for i in self.angles.x] + [meter[i] for i in self.angles.y]]
         if values:
