@@ -138,9 +138,10 @@ class _Report:
         yield Block("text", words["task_text"])
         state, *others = lines_of(model.latex(values=False, indexed=True))
         if model.n == model.p == 1:  # what a and b are called below
-            (meter, *others) = others
-            state, meter = state.replace("&=", "&= a(x_k, v_k) =", 1), meter.replace("&=", "&= b(x_k, w_k) =", 1)
-            others = [meter, *others]
+            meter, *others = others
+            k = ", k" if model.timed else ""
+            state = state.replace("&=", f"&= a(x_k, v_k{k}) =", 1)
+            others = [meter.replace("&=", f"&= b(x_k, w_k{k}) =", 1), *others]
         yield Block("formulas", lines=[state, *others])
         values = ", ".join(f"${sp.latex(name)} = {number_latex(float(value))}$" for name, value in model.values.items())
         if values:
@@ -277,7 +278,7 @@ class _Report:
         result, words = self.result, self.words
         if len(result.entrants) == 1:
             yield Block("section", words["conclusion"])
-            yield Block("text", self.mean_sentence("alone"))
+            yield Block("text", self.mean_sentence("alone_bound" if result.has_bound else "alone_control"))
             return
         verdicts = {k: self.verdict(k) for k in table_steps(result)}
         yield Block("section", words["conclusion"])
@@ -315,19 +316,20 @@ class _Report:
             yield filled(words["last"], name=self.title(name), steps=last.count(name), all=result.steps)
         else:
             yield words["nobody_last"]
-        yield self.mean_sentence("mean")
+        leads = not result.has_bound and result.ranking()[0][0] == result.control
+        yield self.mean_sentence("mean_first" if leads else "mean_bound" if result.has_bound else "mean_control")
 
     def at(self, steps: list[int]) -> str:
         """At step 2; at steps 0–1, 3–50."""
         return filled(self.words["at_step" if len(steps) == 1 else "at_steps"], where=ranges(steps))
 
-    def mean_sentence(self, kind: str) -> str:
+    def mean_sentence(self, key: str) -> str:
         """How far the first filter and the last are from the bound, or from the control."""
         result = self.result
         ranked = result.ranking()
         (first, gap), (final, largest) = ranked[0], ranked[-1]
         return filled(
-            self.words[f"{kind}_{'bound' if result.has_bound else 'control'}"],
+            self.words[key],
             first=self.title(first),
             gap=in_percent(gap),
             last=self.title(final),
