@@ -9,8 +9,8 @@ from kfcourse import Model, compare, lab_filters
 from kfcourse.filters import duof, kalman_filter
 from kfcourse.lab import LAB
 from kfcourse.montecarlo.comparison import Comparison, Subset
-from kfcourse.montecarlo.statistics import Sums, batch_mean
-from kfcourse.montecarlo.two_phase import Replicas, Terms
+from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean
+from kfcourse.montecarlo.two_phase import Replicas, Terms, with_design
 
 SIGMA = 4
 
@@ -63,6 +63,23 @@ def test_far_from_the_bound_the_errors_themselves_count(counted):
     assert far.gap("other").standard_error == far.above_bound("other").standard_error
     assert far.gap_difference("other", "aof-gaussian").value.item() == pytest.approx((10 - 5) / 4.5, rel=1e-14)
     assert far.gap("aof-gaussian").value.item() == pytest.approx(0.5 / 4.5, rel=1e-14)
+
+
+def test_what_a_few_distances_say_is_far_is_found_from_the_errors(counted):
+    """Of two trajectories one is far off: by the distances 10.5 / 4.5 above the bound, by all four errors 1.5 / 4.5 only."""
+    part = counted.subset.sums
+    distant = sums_of(2, square=part.square[:, 0, 0], own=part.own[:, 0, 0], distance=[[0.25, 0.75], [1, 20], [0, 0]])
+    far = replace(counted, subset=Subset(["aof-exact"], distant))
+    assert far.excess("other").value.item() == 10.5
+    assert far.gap("other").value.item() == pytest.approx(1.5 / 4.5, rel=1e-14)
+    assert far.gap_difference("other", "aof-gaussian").value.item() == pytest.approx((6 - 5) / 4.5, rel=1e-14)
+
+
+def test_freedom_of_an_error_of_trajectories_and_designs():
+    """Welch and Satterthwaite's formula, by hand: (a + b)^2 / (a^2 / f + b^2 / g) of two variances a and b."""
+    one = with_design(Estimate(np.array([1.0, 2.0]), np.array([0.3, 0.3]), 20), np.array([0.04, 0.0]), 3)
+    np.testing.assert_allclose(one.standard_error, [np.sqrt(0.13), 0.3], rtol=1e-14)
+    np.testing.assert_allclose(one.freedom, [0.13**2 / (0.09**2 / 20 + 0.04**2 / 3), 20], rtol=1e-14)
 
 
 def test_the_exact_filter_is_no_entrant(counted):
