@@ -17,7 +17,7 @@ from types import FrameType
 import click
 
 from kfcourse.checks.posing import unposed
-from kfcourse.files import is_standard_output, read_only, save
+from kfcourse.files import is_standard_output, read_only, replacing_together, save
 from kfcourse.lab.admission import admissions, on_trial, without_failing
 from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.grammar import generate
@@ -25,7 +25,7 @@ from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
 from kfcourse.lab.report import conclusions, write_json, write_report
 from kfcourse.lab.short_names import FILTERS, LAB, has_bound, title
-from kfcourse.lab.variants import VariantError, chosen_variants, find_variant
+from kfcourse.lab.variants import VariantError, find_variant, read_variants
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare
@@ -147,15 +147,19 @@ def variants(
     if wanted is not None:
         _generate(wanted, seed, runs, jobs, out)
         return
-    chosen = chosen_variants(names, not names, variants_file)
-    if check:
-        found = list(examine_all(chosen, runs, seed, jobs, unposed))
+    chosen, faults = read_variants(variants_file, names)
+    good = not faults
+    if check and chosen:
+        found = list(examine_all(list(chosen.values()), runs, seed, jobs, unposed))
         click.echo(table(found))
-        sys.exit(0 if all(one.well_posed for one in found) else 1)
-    for variant in chosen:
-        model = variant.model
-        click.echo(f"{variant.name:>6}  {variant.title or 'no title'}")
-        click.echo(f"        x' = {', '.join(map(str, model.state_equation))};  y = {', '.join(map(str, model.meter_equation))}")
+        good &= all(one.well_posed for one in found)
+    else:
+        for variant in chosen.values():
+            state, meter = (", ".join(map(str, one)) for one in (variant.model.state_equation, variant.model.meter_equation))
+            click.echo(f"{variant.name:>6}  {variant.title or 'no title'}\n        x' = {state};  y = {meter}")
+    for fault in faults.values():
+        click.echo(f"Error: {fault}", err=True)
+    sys.exit(0 if good else 1)
 
 
 def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) -> None:
@@ -298,10 +302,10 @@ def lab(
     _tell(result, to_error)
     if json_file:
         write_json(chosen, result, json_file)
-    with _kept(folder):
-        write_report(chosen, result, folder)
+    with _kept(folder), replacing_together(folder) as place:
+        write_report(chosen, result, place)
         if language:
-            write_handin(chosen, result, folder, language)
+            write_handin(chosen, result, place, language)
     click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""), err=to_error)
 
 
@@ -318,7 +322,7 @@ def _tell(result: Comparison, to_error: bool) -> None:
 
 @contextmanager
 def _kept(folder: Path) -> Iterator[None]:
-    """What a report that fails leaves: its finished files, and no empty folder."""
+    """A report that fails changes nothing in its folder."""
     try:
         yield
     except (OSError, MemoryError):
@@ -326,11 +330,8 @@ def _kept(folder: Path) -> Iterator[None]:
     except Exception as error:
         reason = " ".join(str(error).split())[:200] or "no reason given"
         raise click.ClickException(
-            f"the report in {folder} is not complete ({type(error).__name__}: {reason}); the ranking and the files written hold"
+            f"no report was written to {folder} ({type(error).__name__}: {reason}); what was there is there, the ranking holds"
         ) from None
-    finally:
-        if folder.is_dir() and not any(folder.iterdir()):
-            folder.rmdir()
 
 
 @main.command()

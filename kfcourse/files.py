@@ -8,10 +8,11 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 
 @contextmanager
@@ -44,6 +45,53 @@ def replacing(target: Path) -> Iterator[Path]:
     finally:
         if path is not None:
             path.unlink(missing_ok=True)
+
+
+@contextmanager
+def replacing_together(folder: Path) -> Iterator[Path]:
+    """An empty folder whose files go to `folder` if the block ends well, all of them or none; its other files stay.
+
+    A file that was there is kept until the new ones are all in place, and put back if that fails.
+
+    Raises
+    ------
+    OSError
+        A file there is read-only, the disk is full, ...; its `filename` is the folder.
+    """
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(dir=folder, prefix=".new-") as new, TemporaryDirectory(dir=folder, prefix=".old-") as old:
+            yield Path(new)
+            _exchange(Path(new), folder, Path(old))
+    except OSError as error:
+        error.filename = str(folder)  # a full disk has no name, and that of a file in making helps nobody
+        raise
+    finally:
+        for place in made:
+            with suppress(OSError):  # of what was written
+                place.rmdir()
+
+
+def _exchange(new: Path, folder: Path, old: Path) -> None:
+    """Move all files of `new` into the folder, and those of the same names there to `old`; undo it if anything fails."""
+    moves: list[tuple[Path, Path]] = []
+    for path in sorted(new.iterdir()):
+        target = (folder / path.name).resolve()  # a link is written through
+        if read_only(target):
+            raise PermissionError(errno.EACCES, f"{path.name} is read-only, and is not replaced")
+        if target.exists():
+            path.chmod(target.stat().st_mode & 0o777)
+            moves.append((target, old / path.name))
+        moves.append((path, target))
+    try:
+        for source, target in moves:
+            source.replace(target)
+    except BaseException:
+        for source, target in reversed(moves):
+            if not os.path.lexists(source):
+                target.replace(source)
+        raise
 
 
 def read_only(target: Path) -> bool:

@@ -19,6 +19,10 @@ from kfcourse.angles import Components, difference
 Array: TypeAlias = NDArray[Any]
 
 
+class NegativeVariance(ValueError):
+    """What should be a covariance has a negative variance."""
+
+
 class Gaussian(NamedTuple):
     """A normal law N(mean, cov): mean (..., n), cov (..., n, n)."""
 
@@ -109,7 +113,7 @@ def gain(cross: Array, cov: Array, broken: bool = False) -> Array:
 
     Raises
     ------
-    ValueError
+    NegativeVariance
         A variance is negative (beside others, by more than rounding), and not `broken`.
     """
     if cov.shape[-1] == 1:
@@ -145,9 +149,9 @@ SINGULAR = 7.0
 
 
 def _refuse_negative(variance: Array, rounding: float) -> None:
-    """ValueError if a variance is negative by more than this part of the largest."""
+    """NegativeVariance if a variance is negative by more than this part of the largest."""
     if (variance < -rounding * np.nanmax(variance, initial=0.0)).any():
-        raise ValueError(
+        raise NegativeVariance(
             f"a covariance has the variance {np.nanmin(variance):.6g}, which must not be negative: "
             "check the formula that it comes from, or give its square root to be multiplied out"
         )

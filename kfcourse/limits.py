@@ -50,7 +50,7 @@ class time_limit:
     """
 
     def __init__(self, seconds: float):
-        self.seconds = seconds
+        self.seconds = min(seconds, threading.TIMEOUT_MAX)  # centuries; infinity is no time for a clock
 
     def __enter__(self) -> None:
         main = threading.current_thread() is threading.main_thread()
@@ -75,7 +75,7 @@ def memory_limit(more: float | None) -> Iterator[None]:
 
     Linux only: elsewhere the system has no such limit, and nothing is limited.
     """
-    if more is None or sys.platform != "linux":
+    if more is None or more == float("inf") or sys.platform != "linux":
         yield
         return
     import resource

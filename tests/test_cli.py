@@ -16,7 +16,7 @@ import pytest
 from click.testing import CliRunner
 
 from kfcourse import cli, compare
-from kfcourse.files import save
+from kfcourse.files import replacing_together, save
 from kfcourse.lab import report
 from kfcourse.lab.short_names import FILTERS, LAB, lab_filters
 from kfcourse.lab.variants import find_variant
@@ -100,6 +100,18 @@ def test_another_file_is_listed(call):
     result = call("variants", "--variants", "mine.toml")
     assert result.exit_code == 0
     assert re.findall(r"^ *(\S+)  no title", result.output, re.MULTILINE) == ["53", "tan", "diverging", "../elsewhere"]
+
+
+def test_one_bad_variant_is_named_and_stops_no_other(call, no_report, tmp_path):
+    (tmp_path / "mine.toml").write_text(EXAMPLE + '[variants.bad]\nstate = "0.9*x + q"\nmeter = "x + w"\n', encoding="utf-8")
+    listed = call("variants", "--variants", "mine.toml")
+    assert listed.exit_code == 1 and "Error: variant bad in mine.toml: unknown symbol 'q'" in listed.output
+    assert len(re.findall(r"no title", listed.output)) == 4
+    checked = call("variants", "--variants", "mine.toml", "--variant", "53", "--variant", "bad", "--check", "--runs", 1000)
+    assert checked.exit_code == 1 and "Error: variant bad" in checked.output and re.search(r"(?m)^53 ", checked.output)
+    assert call("variants", "--variants", "mine.toml", "--variant", "53").exit_code == 0
+    assert call("lab", "53", "--variants", "mine.toml", *QUICK).exit_code == 0
+    refused(call("lab", "bad", "--variants", "mine.toml", *QUICK), "variant bad in mine.toml", "'q'")
 
 
 @pytest.mark.parametrize("option", ["-h", "--help", "--version"])
@@ -427,7 +439,6 @@ def test_what_the_machine_has_not_is_said_in_a_line(call, monkeypatch, error, wo
 @pytest.mark.parametrize("error", [RuntimeError("double\nsubscript"), OSError(errno.ENOSPC, "No space left on device", "f")])
 def test_a_report_that_fails_keeps_ranking_and_numbers(call, tmp_path, monkeypatch, error):
     def failing(variant, result, folder):
-        folder.mkdir()
         (folder / "accuracy.svg").write_text("finished", encoding="utf-8")
         raise error
 
@@ -437,17 +448,60 @@ def test_a_report_that_fails_keeps_ranking_and_numbers(call, tmp_path, monkeypat
     assert ("RuntimeError: double subscript" in line) or ("No space left" in line)
     assert "GAOF is" in result.output
     assert set(json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]) == {"aof-gaussian", "duof"}
-    assert (tmp_path / "lab-53" / "accuracy.svg").read_text(encoding="utf-8") == "finished"
-
-
-def test_a_report_that_fails_at_once_leaves_no_empty_folder(call, tmp_path, monkeypatch):
-    def failing(variant, result, folder):
-        folder.mkdir()
-        raise RuntimeError
-
-    monkeypatch.setattr(cli, "write_report", failing)
-    refused(call("lab", "53", *QUICK), "is not complete")
     assert not (tmp_path / "lab-53").exists()
+
+
+@pytest.mark.parametrize("after", range(0, 30, 3))
+def test_an_end_while_files_are_moved_mixes_no_old_and_new(tmp_path, monkeypatch, after):
+    """A report is exchanged for another one of other names, in part; Ctrl-C comes after so many moves."""
+    folder, moves, whole = tmp_path / "report", [], Path.replace
+    for number, names in (("old", "abcdefgh"), ("new", "efghijkl")):
+
+        def interrupted(source, target, number=number):
+            if number == "new" and len(moves) == after:
+                moves.append("end")
+                raise KeyboardInterrupt
+            moves.append(target) if number == "new" else None
+            return whole(source, target)
+
+        before = snapshot(folder) if number == "new" else {}
+        monkeypatch.setattr(Path, "replace", interrupted)
+        try:
+            with replacing_together(folder) as place:
+                for name in names:
+                    (place / name).write_text(number, encoding="utf-8")
+        except KeyboardInterrupt:
+            assert snapshot(folder) == before
+        else:
+            assert after >= 12 or number == "old"
+    assert not [path for path in folder.iterdir() if path.name.startswith(".")]
+    assert {path.read_text(encoding="utf-8") for path in folder.iterdir() if path.name in "efghijkl"} == (
+        {"old"} if after < 12 else {"new"}
+    )
+
+
+def test_an_end_while_the_report_is_written_leaves_the_one_that_was_there(call, tmp_path, monkeypatch):
+    """Of both reports: what is new appears when all of it is written."""
+    assert call("lab", "53", *QUICK, "--filters", "duof", "--out", "r", "--report", "ru").exit_code == 0
+    before = snapshot(tmp_path)
+    for name, writes in (("write_handin", cli.write_handin), ("write_report", cli.write_report)):
+
+        def ended(*arguments, writes=writes):
+            writes(*arguments)
+            raise KeyboardInterrupt
+
+        with monkeypatch.context() as patch:
+            patch.setattr(cli, name, ended)
+            assert call("lab", "53", *QUICK, "--seed", 2, "--filters", "duof", "--out", "r", "--report", "ru").exit_code == 130
+        assert snapshot(tmp_path) == before and [path.name for path in tmp_path.glob("r/.*")] == []
+
+
+def test_a_read_only_file_of_the_report_is_not_replaced_nor_are_the_others(call, no_figures, tmp_path):
+    assert call("lab", "53", *QUICK, "--filters", "duof", "--out", "r").exit_code == 0
+    before = snapshot(tmp_path)
+    (tmp_path / "r" / "report.tex").chmod(0o444)
+    refused(call("lab", "53", *QUICK, "--seed", 2, "--filters", "duof", "--out", "r"), "report.tex is read-only")
+    assert snapshot(tmp_path) == before
 
 
 @pytest.mark.parametrize("target", ["-", "/dev/stdout", "same.json"])
@@ -510,6 +564,13 @@ def test_a_noiseless_meter_warns_of_nothing(call, tmp_path):
     assert all(result.error_variance(name).value.max() < 1e-25 for name in LAB)  # rounding of a state of size 1
     done = call("lab", "exact", *QUICK, "--variants", "exact.toml")
     assert done.exit_code == 0 and "arning" not in done.output
+
+
+def test_endless_budgets_are_budgets(call, no_report):
+    """No clock can be set to infinity; nothing is limited then."""
+    endless = ("--exact-seconds", "inf", "--exact-memory", "inf", "--exact-runs", 4)
+    result = call("lab", "53", *QUICK[:4], *endless, "--filters", "aof-gaussian,aof-exact")
+    assert result.exit_code == 0 and "on 4 of 400 trajectories" in result.output, result.output
 
 
 def test_one_exact_run_has_no_standard_error_and_is_refused(call):

@@ -256,6 +256,11 @@ def _conditional(
         )
     mean = equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True)))
     cov = B * exact_matrix(law.cov) * B.T
+    if name == "likelihood" and len(equation) > 1 and cov.subs(model.values).det().equals(0):
+        raise ModelError(
+            f"{list(equation)}: the noises of these components depend on one another, so a combination of them has no noise and "
+            f"there is no {name} density; leave a component out, or use the Gaussian filters (gaussian, unscented, gauss_hermite)"
+        )
     outputs = {"mean": mean.subs(model.values), "cov": cov.subs(model.values)}
     x = sp.Matrix(model.x)
     return Stepwise.compile(model.known, name, {"x": x}, outputs, ["x", "mean"], f"{name} law of {model}")

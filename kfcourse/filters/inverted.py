@@ -17,6 +17,7 @@ import sympy as sp
 from kfcourse.laws import Array
 from kfcourse.symbolic.codegen import compile_function
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import ModelError
 
 TRIALS = 200  # states and noises with which a solution must give the noise back
 DIGITS = 1e-6  # to which it must
@@ -43,7 +44,10 @@ def by_change_of_variable(model: Model) -> Callable[[Array, Array], Array] | Non
     for solution in solutions:
         if solution.has(sp.I) or not deviation > 0:
             continue
-        found = _compiled("noise", model, y, solution, sp.log(sp.Abs(solution.diff(y))))
+        try:
+            found = _compiled("noise", model, y, solution, sp.log(sp.Abs(solution.diff(y))))
+        except ModelError:  # a solution that cannot be computed, such as Lambert's function
+            continue
         with np.errstate(all="ignore"):
             back = found(states, forward(states, noises)[..., :1])[..., 0]
             good = np.abs(back - noises[:, 0]) <= DIGITS * deviation

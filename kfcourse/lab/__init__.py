@@ -6,7 +6,8 @@ short_names  the lab's filters: "duof" -> how to build it, "DUOF" in tables
 quality      is a variant well posed?  criteria: each criterion;  difficulty: how hard;  grammar: new ones
 maps         who leads, and how far from the bound, over two parameters
 plots        figures of a comparison, one colour and name for each filter
-report       what `kfcourse lab` writes;  handin: the student's report, with its refusals in words
+report       what `kfcourse lab` writes;  handin: the student's report (handin_text, refusals in words,
+             written_out: the AOF's equations with the model's functions in them)
 """
 
 from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_bound, has_exact, lab_filters, title

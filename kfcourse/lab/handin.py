@@ -17,20 +17,22 @@ from pathlib import Path
 import sympy as sp
 from matplotlib.axes import Axes
 
+from kfcourse.files import replacing_together
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
-from kfcourse.lab.handin_text import filled, in_percent, inline_html, inline_tex, law, lines_of, power_of_ten, ranges
+from kfcourse.lab.handin_text import filled, in_percent, inline_html, inline_tex, law, lines_of, matrix, power_of_ten, ranges
 from kfcourse.lab.refusals import cause
 from kfcourse.lab.report import printed, save_figure, save_texts, table_steps
 from kfcourse.lab.short_names import FILTERS, Structures
 from kfcourse.lab.variants import Variant
+from kfcourse.lab.written_out import written_lines
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 from kfcourse.symbolic.reading import exact_matrix
 from kfcourse.symbolic.structure import FUNCTION_LATEX
-from kfcourse.symbolic.writing import formula_latex
+from kfcourse.symbolic.writing import formula_latex, number_latex
 
 LANGUAGES = ("en", "ru")
 HIGHEST = 8  # moment that is printed
@@ -75,7 +77,7 @@ class Block:
 
 
 def write_handin(variant: Variant, result: Comparison, folder: Path, language: str) -> list[Path]:
-    """Write handin.tex, handin.html and their figures.
+    """Write handin.tex, handin.html and their figures, all of them or none; returns the paths.
 
     Raises
     ------
@@ -88,10 +90,11 @@ def write_handin(variant: Variant, result: Comparison, folder: Path, language: s
     report = _Report(result, words)
     content = {"blocks": list(report.blocks()), "words": words, "variant": variant, "language": language}
     labels = plots.Words(report.title, **{part: words[f"axis_{part}"] for part in plots.Words._fields[1:]})
-    written = []
-    for name in report.figures:
-        written += save_figure(partial(FIGURES[name], result, words=labels), folder, f"handin-{name}")
-    return written + save_texts(("handin.html", "handin.tex"), folder, content, inline=inline_html, inline_tex=inline_tex)
+    with replacing_together(folder) as place:
+        for name in report.figures:
+            save_figure(partial(FIGURES[name], result, words=labels), place, f"handin-{name}")
+        save_texts(("handin.html", "handin.tex"), place, content, inline=inline_html, inline_tex=inline_tex)
+        return [folder / path.name for path in place.iterdir()]
 
 
 class _Report:
@@ -103,6 +106,7 @@ class _Report:
         self.structures = Structures(self.model)
         self.kinds = [kind for kind in ("linearised", "gaussian") if any(name.endswith(kind) for name in result.available)]
 
+        self.derivable: list[str] = []  # kinds whose formulas are found in time, and are not too long
         compared = result.has_bound or len(result.entrants) > 1
         self.figures = [name for name in FIGURES if compared or name not in ("relative", "ranking")]
 
@@ -132,8 +136,14 @@ class _Report:
         model, words = self.model, self.words
         yield Block("section", words["task"])
         yield Block("text", words["task_text"])
-        yield Block("formulas", lines=lines_of(model.latex(values=False)))
-        values = ", ".join(f"${sp.latex(name)} = {float(value):g}$" for name, value in model.values.items())
+        state, *others = lines_of(model.latex(values=False, indexed=True))
+        if model.n == model.p == 1:  # what a and b are called below
+            meter, *others = others
+            k = ", k" if model.timed else ""
+            state = state.replace("&=", f"&= a(x_k, v_k{k}) =", 1)
+            others = [meter.replace("&=", f"&= b(x_k, w_k{k}) =", 1), *others]
+        yield Block("formulas", lines=[state, *others])
+        values = ", ".join(f"${sp.latex(name)} = {number_latex(float(value))}$" for name, value in model.values.items())
         if values:
             yield Block("text", filled(words["parameters"], values=values))
         laws = (("x_0", model.prior), ("v_k", model.state_noise), ("w_k", model.meter_noise))
@@ -205,11 +215,12 @@ class _Report:
         if FUNCTION_LATEX["tau"] not in block:
             yield Block("text", self.words["not_printed"])
             return
+        self.derivable.append(kind)
         yield Block("formulas", lines=lines_of(block))
         if self.model.n == self.model.p == 1:
             structure = getattr(self.structures, kind)
             forms = {name: (name, str(sp.expand(structure[name]))) for name in FUNCTION_LATEX}
-            numbers = [f"${FUNCTION_LATEX[name]}$: {CATALOGUE[form]}" for name, form in forms.items() if form in CATALOGUE]
+            numbers = [f"${FUNCTION_LATEX[name]}$ — {CATALOGUE[form]}" for name, form in forms.items() if form in CATALOGUE]
             if numbers:
                 yield Block("text", filled(self.words["catalogue"], numbers=", ".join(numbers)))
 
@@ -217,23 +228,33 @@ class _Report:
         words = self.words
         yield Block("section", words["filters"])
         yield Block("text", words["start"])
-        yield Block("formulas", lines=[r"\lambda_0 &= m_0,\qquad \Psi_0 = D_0"])
+        mean, cov = self.model.prior
+        yield Block("formulas", lines=[rf"\lambda_0 &= m_0 = {matrix(mean[:, None])},\qquad \Psi_0 = D_0 = {matrix(cov)}"])
         families = dict.fromkeys(name.split("-")[0].removesuffix("3") for name in self.result.entrants)
+        designed = next((family for family in families if family != "aof"), "")
         for family in (family for family in families if family in EQUATIONS):
             yield Block("subsection", words[family])
             if family == "duof":
                 yield Block("text", words["criteria"])
                 yield Block("formulas", lines=words["criteria_formulas"].split("\n"))
             yield Block("formulas", lines=lines_of(equations_latex(EQUATIONS[family])))
+            if family == "aof" and self.model.n == self.model.p == 1:
+                for name in (f"aof-{kind}" for kind in self.derivable if f"aof-{kind}" in self.result.entrants):
+                    yield Block("text", filled(words["written_out"], name=self.title(name)))
+                    yield Block("formulas", lines=written_lines(getattr(self.structures, name.removeprefix("aof-"))))
+            if family == designed:
+                yield Block("text", words["over_ensemble"])
 
     def experiment(self) -> Iterator[Block]:
         result, words = self.result, self.words
         yield Block("section", words["experiment"])
-        designs = filled(words["designs"], designs=result.designs) if result.designs else ""
-        exact = filled(words["exact"], runs=result.subset_runs) if result.has_bound else ""
-        yield Block(
-            "text", filled(words["experiment_text"], runs=result.runs, steps=result.steps, seed=result.seed) + designs + exact
-        )
+        sentences = [filled(words["experiment_text"], runs=result.runs, steps=result.steps, seed=result.seed)]
+        if result.replicas:
+            designed = ", ".join(map(self.title, result.replicas.names))
+            sentences.append(filled(words["designs"], filters=designed, designs=result.designs))
+        if result.has_bound:
+            sentences.append(filled(words["exact"], runs=result.subset_runs))
+        yield Block("text", " ".join(sentences))
         if result.left_out:
             yield Block("text", words["left_out"])
             yield Block("items", lines=list(self.left_out()))
@@ -241,9 +262,10 @@ class _Report:
             names = result.available[start : start + COLUMNS]
             estimates = [result.error_variance(name) for name in names]
             rows = [[f"${k}$", *(power_of_ten(one[k]) for one in estimates)] for k in table_steps(result)]
-            yield Block("table", words["table"], ["$k$", *map(self.title, names)], rows)
+            yield Block("table", words["table_goes_on" if start else "table"], ["$k$", *map(self.title, names)], rows)
+        reference = words["of_exact"] if result.has_bound else self.title(result.control)
         for name in self.figures:
-            yield Block("figure", words[f"figure_{name}"], [f"handin-{name}"])
+            yield Block("figure", filled(words[f"figure_{name}"], reference=reference), [f"handin-{name}"])
 
     def left_out(self) -> Iterator[str]:
         """The filters that do not take part, and why, those with the same reason together."""
@@ -256,23 +278,24 @@ class _Report:
         result, words = self.result, self.words
         if len(result.entrants) == 1:
             yield Block("section", words["conclusion"])
-            yield Block("text", self.mean_sentence("alone"))
+            yield Block("text", self.mean_sentence("alone_bound" if result.has_bound else "alone_control"))
             return
         verdicts = {k: self.verdict(k) for k in table_steps(result)}
         yield Block("section", words["conclusion"])
         yield Block("text", words["verdict_text"])
         heading = [words[key] for key in ("step", "best", "not_worse", "worst")]
         rows = [
-            [f"${k}$", self.title(best), ", ".join(map(self.title, others)) or "–", self.title(worst)]
+            [f"${k}$", self.title(best), ", ".join(map(self.title, others)) or "–", self.title(worst) if worst else "–"]
             for k, (best, others, worst) in verdicts.items()
         ]
         yield Block("table", words["verdict_table"], heading, rows)
         yield Block("items", lines=list(self.sentences()))
 
     def verdict(self, k: int) -> tuple[str, list[str], str]:
-        """The most accurate at step k, those not significantly worse, and the least accurate."""
+        """The most accurate at step k, those not significantly worse, and the least accurate, or "" if it is one of those."""
         best, *others = self.result.leaders(k)
-        return best, others, max(self.result.entrants, key=lambda name: float(self.result.gap(name)[k].value))
+        last = max(self.result.entrants, key=lambda name: float(self.result.gap(name)[k].value))
+        return best, others, "" if last in (best, *others) else last
 
     def sentences(self) -> Iterator[str]:
         """The conclusion: who leads and who is last, on how many steps, and how far from the bound."""
@@ -280,25 +303,33 @@ class _Report:
         verdicts = [self.verdict(k) for k in range(result.steps)]
         alone = [best for best, others, _ in verdicts if not others]
         for name in sorted(set(alone), key=lambda one: -alone.count(one)):
-            where = ranges([k for k, (best, others, _) in enumerate(verdicts) if best == name and not others])
-            yield filled(words["leads"], name=self.title(name), where=where)
+            steps = [k for k, (best, others, _) in enumerate(verdicts) if best == name and not others]
+            yield filled(words["leads"], name=self.title(name), at=self.at(steps))
         if not alone:
             yield words["nobody_leads"]
         unsure = [k for k, (_, others, _) in enumerate(verdicts) if others]
         if unsure:
-            yield filled(words["together"], where=ranges(unsure))
-        last = [worst for _, _, worst in verdicts]
-        name = max(set(last), key=lambda one: (last.count(one), one))
-        yield filled(words["last"], name=self.title(name), steps=last.count(name), all=result.steps)
-        yield self.mean_sentence("mean")
+            yield filled(words["together"], at=self.at(unsure))
+        last = [worst for _, _, worst in verdicts if worst]
+        if last:
+            name = max(set(last), key=lambda one: (last.count(one), one))
+            yield filled(words["last"], name=self.title(name), steps=last.count(name), all=result.steps)
+        else:
+            yield words["nobody_last"]
+        leads = not result.has_bound and result.ranking()[0][0] == result.control
+        yield self.mean_sentence("mean_first" if leads else "mean_bound" if result.has_bound else "mean_control")
 
-    def mean_sentence(self, kind: str) -> str:
+    def at(self, steps: list[int]) -> str:
+        """At step 2; at steps 0–1, 3–50."""
+        return filled(self.words["at_step" if len(steps) == 1 else "at_steps"], where=ranges(steps))
+
+    def mean_sentence(self, key: str) -> str:
         """How far the first filter and the last are from the bound, or from the control."""
         result = self.result
         ranked = result.ranking()
         (first, gap), (final, largest) = ranked[0], ranked[-1]
         return filled(
-            self.words[f"{kind}_{'bound' if result.has_bound else 'control'}"],
+            self.words[key],
             first=self.title(first),
             gap=in_percent(gap),
             last=self.title(final),

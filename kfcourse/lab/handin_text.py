@@ -8,14 +8,38 @@ import jinja2
 import numpy as np
 
 from kfcourse.lab.report import Section, escape_tex, on_one_power, percent
-from kfcourse.laws import Gaussian
+from kfcourse.laws import Array, Gaussian
 from kfcourse.montecarlo.statistics import Estimate
 from kfcourse.symbolic.markup import mathml
+from kfcourse.symbolic.writing import number_latex
 
 
 def filled(text: str, **values: object) -> str:
-    """The text with {name} replaced by what the name stands for; braces of LaTeX stay."""
-    return re.sub("|".join(rf"\{{{name}\}}" for name in values), lambda found: str(values[found[0][1:-1]]), text)
+    """The text with {name} replaced by what the name stands for; braces of LaTeX stay.
+
+    {name:step/steps} puts a number and the word that goes with it, in Russian one of three: {name:шаг/шага/шагов}.
+    """
+
+    def value(found: re.Match[str]) -> str:
+        one = values[found["name"]]
+        if not isinstance(one, int):
+            return str(one)
+        return spaced(one) + (f" {with_number(one, found['words'].split('/'))}" if found["words"] else "")
+
+    return re.sub(rf"\{{(?P<name>{'|'.join(values)})(:(?P<words>[^{{}}]*))?\}}", value, text)
+
+
+def spaced(number: int) -> str:
+    """A whole number with its thousands apart, from five digits on: 100 000."""
+    return f"{number:,}".replace(",", "\u202f") if number >= 10_000 else str(number)
+
+
+def with_number(number: int, words: list[str]) -> str:
+    """The word that goes with a number: of one and many, or in Russian of 1, 2 and 5, as 21, 22 and 25 have them too."""
+    if len(words) == 2:
+        return words[number != 1]
+    ends, teens = number % 10, number % 100 in range(11, 15)
+    return words[2 if teens or ends == 0 or ends > 4 else 0 if ends == 1 else 1]
 
 
 def lines_of(block: str) -> list[str]:
@@ -25,11 +49,16 @@ def lines_of(block: str) -> list[str]:
 
 def law(given: Gaussian) -> str:
     """N(0, 1); N(mean, covariance) with matrices for vectors."""
-    if given.mean.size == 1:
-        return rf"\mathcal{{N}}({given.mean.item():g},\; {given.cov.item():g})"
-    column = r" \\ ".join(f"{value:g}" for value in given.mean)
-    rows = r" \\ ".join(" & ".join(f"{value:g}" for value in row) for row in given.cov)
-    return rf"\mathcal{{N}}\left(\begin{{pmatrix}}{column}\end{{pmatrix}},\; \begin{{pmatrix}}{rows}\end{{pmatrix}}\right)"
+    left, right = ("(", ")") if given.mean.size == 1 else (r"\left(", r"\right)")
+    return rf"\mathcal{{N}}{left}{matrix(given.mean[:, None])},\; {matrix(given.cov)}{right}"
+
+
+def matrix(values: Array) -> str:
+    """Numbers (r, c) in brackets; one alone without."""
+    if values.size == 1:
+        return number_latex(values.item())
+    rows = r" \\ ".join(" & ".join(map(number_latex, row)) for row in values)
+    return rf"\begin{{pmatrix}}{rows}\end{{pmatrix}}"
 
 
 def power_of_ten(estimate: Estimate) -> str:
@@ -46,7 +75,7 @@ def in_percent(estimate: Estimate) -> str:
 
 
 def ranges(steps: list[int]) -> str:
-    """1, 3-5, 8: runs of steps joined."""
+    """1, 3–5, 8: runs of steps joined."""
     parts: list[list[int]] = []
     for k in steps:
         if parts and k == parts[-1][1] + 1:
@@ -67,4 +96,8 @@ def inline_html(text: str) -> str:
 def inline_tex(text: str) -> str:
     """Text for LaTeX: special characters escaped outside of $formulas$."""
     pieces = re.split(r"(\$[^$]+\$)", text)
-    return "".join(piece if i % 2 else escape_tex(piece).replace("–", "--").replace("—", "---") for i, piece in enumerate(pieces))
+    return "".join(piece if i % 2 else _typeset(escape_tex(piece)) for i, piece in enumerate(pieces))
+
+
+def _typeset(text: str) -> str:
+    return text.replace("–", "--").replace("—", "---").replace("\u202f", r"\,").replace("\u00a0", "~")

@@ -19,7 +19,11 @@ _CAUSES = (
     ("left_degree", re.compile(r"the degree of .+ is above \d+")),
     ("left_no_slope", re.compile(r"is not differentiable and cannot be linearised")),
     ("left_too_long", re.compile(r"formulas are not derived within (?P<seconds>\S+) s")),
-    ("left_no_density", re.compile(r"the noise enters nonlinearly|without noise there is no likelihood density")),
+    (
+        "left_no_density",
+        re.compile(r"the noise enters nonlinearly|without noise there is no likelihood density|depend on one another"),
+    ),
+    ("left_negative", re.compile(r"step (?P<step>\d+): \S+ failed: a covariance has the variance")),
     ("left_infinite", re.compile(r"step (?P<step>\d+): (the design met|\S+ became) infinite")),
 )
 

@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from kfcourse.files import replacing, save
+from kfcourse.files import replacing_together, save
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
@@ -68,42 +69,34 @@ class Section:
 
 
 def write_report(variant: Variant, result: Comparison, folder: Path) -> list[Path]:
-    """Write report.html, report.tex and the figures; returns the paths.
-
-    Every file is completed beside its place and then moved there, so an interrupted run leaves no half.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    for name, (_, draw) in _FIGURES.items():
-        written += save_figure(partial(draw, result), folder, name)
-    return written + save_texts(("report.html", "report.tex"), folder, _content(variant, result))
+    """Write report.html, report.tex and the figures, all of them or none; returns the paths."""
+    with replacing_together(folder) as place:
+        for name, (_, draw) in _FIGURES.items():
+            save_figure(partial(draw, result), place, name)
+        save_texts(("report.html", "report.tex"), place, _content(variant, result))
+        return [folder / path.name for path in place.iterdir()]
 
 
-def save_figure(draw: Callable[[Axes], Axes], folder: Path, name: str) -> list[Path]:
-    """A figure for the page and for LaTeX."""
-    figure, paths = Figure(figsize=(7, 4.2), layout="constrained"), []
+def save_figure(draw: Callable[[Axes], Axes], folder: Path, name: str) -> None:
+    """A figure for the page and for LaTeX; the same numbers give the same files."""
+    figure = Figure(figsize=(7, 4.2), layout="constrained")
     draw(figure.add_subplot())
-    for kind, metadata in _UNDATED.items():
-        paths.append(folder / f"{name}.{kind}")
-        with replacing(paths[-1]) as path:
-            figure.savefig(path, format=kind, metadata=metadata)
-        figure.set_layout_engine("none")  # has been laid out
-    return paths
+    with matplotlib.rc_context({"svg.hashsalt": name}):  # else its marks have random names
+        for kind, metadata in _UNDATED.items():
+            figure.savefig(folder / f"{name}.{kind}", format=kind, metadata=metadata)
+            figure.set_layout_engine("none")  # has been laid out
 
 
-def save_texts(names: Sequence[str], folder: Path, content: Mapping[str, Any], **filters: Callable[[str], str]) -> list[Path]:
+def save_texts(names: Sequence[str], folder: Path, content: Mapping[str, Any], **filters: Callable[[str], str]) -> None:
     """The files made from the templates NAME.j2; the templates may use further filters."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("kfcourse.lab"), trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
     environment.filters |= {"mathml": _mathml, "tex": escape_tex, "html": jinja2.filters.do_forceescape, **filters}
-    texts = {folder / name: environment.get_template(name + ".j2").render(content) for name in names}
-    for path, text in texts.items():
-        save(text, path)
-    return list(texts)
+    for name in names:
+        (folder / name).write_text(environment.get_template(name + ".j2").render(content), encoding="utf-8")
 
 
-# No dates in the figures: the same numbers give the same report.
 _UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
@@ -10,16 +11,22 @@ from pathlib import Path
 from typing import Any
 
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import shown
 from kfcourse.symbolic.sense import nothing_random
 
 MODEL_KEYS = {"parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs", "interval", "angles"}
 VARIANT_KEYS = {"title", "state", "meter"} | MODEL_KEYS
 
+MANY = 40  # names that a message lists
 LARGEST_FILE = 1_000_000  # bytes; thousands of variants.  /dev/zero never ends
 
 
 class VariantError(ValueError):
     """A file of variants, or a variant in it, cannot be used; the message names the file and variant."""
+
+
+class VariantWarning(UserWarning):
+    """A variant in a file is not a model, and is passed over."""
 
 
 @dataclass(frozen=True)
@@ -44,10 +51,48 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     Raises
     ------
     VariantError
-        The file is missing or not TOML, or a variant in it is not a model; nothing else is read then.
+        The file is missing or not TOML, or no variant in it is a model.
+
+    Warns
+    -----
+    VariantWarning
+        A variant is not a model; the others can be used.
+    """
+    found, faults = read_variants(path)
+    if not found:
+        raise next(iter(faults.values()))
+    for fault in faults.values():
+        warnings.warn(str(fault), VariantWarning, stacklevel=2)
+    return found
+
+
+def read_variants(
+    path: str | Path | None = None, names: Sequence[str] = ()
+) -> tuple[dict[str, Variant], dict[str, VariantError]]:
+    """The variants of these names, or all of a file; and, by name, what is wrong with those that are none.
+
+    Only what is asked for is built: a file may hold thousands.
+
+    Raises
+    ------
+    VariantError
+        The file is missing or not TOML, or has no variant of such a name.
     """
     where, tables = _tables(path)
-    return {name: read_variant(name, table, where) for name, table in tables.items()}
+    if unknown := [name for name in names if name not in tables]:
+        raise VariantError(f"no variant {', '.join(map(repr, unknown))}; there are {_listed(list(tables))}")
+    found: dict[str, Variant] = {}
+    faults: dict[str, VariantError] = {}
+    for name in dict.fromkeys(names) or tables:
+        try:
+            found[name] = read_variant(name, tables[name], where)
+        except VariantError as error:
+            faults[name] = error
+    return found, faults
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(names if len(names) <= MANY else [*names[:MANY], f"... ({len(names)} in all)"])
 
 
 def _tables(path: str | Path | None) -> tuple[str, dict[str, Any]]:
@@ -58,15 +103,18 @@ def _tables(path: str | Path | None) -> tuple[str, dict[str, Any]]:
             content = file.read(LARGEST_FILE + 1)
         if len(content) > LARGEST_FILE:
             raise VariantError(f"{where} has more than {LARGEST_FILE:,} bytes: it is no file of variants; check the path")
-        text = content.decode("utf-8").replace("\r\n", "\n")
+        text = content.decode("utf-8-sig").replace("\r\n", "\n")
     except FileNotFoundError:
         raise VariantError(f"no file of variants at {where}; check the path") from None
     except (OSError, UnicodeDecodeError) as error:
         raise VariantError(f"{where} cannot be read: {error}") from None
     try:
         tables = tomllib.loads(text).get("variants")
-    except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError; so is a number of too many digits
+    except tomllib.TOMLDecodeError as error:
         raise VariantError(f"{where} is not valid TOML: {error}") from None
+    except (ValueError, RecursionError) as error:
+        what = "lists in too many lists" if isinstance(error, RecursionError) else "a number of thousands of digits"
+        raise VariantError(f"{where} holds {what}, and is not read; no variant needs that") from None
     if not isinstance(tables, dict) or not tables:
         raise VariantError(f'{where} has no variants; it needs tables such as [variants.53] with state = "..." and meter = "..."')
     return where, tables
@@ -76,14 +124,14 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
     """A variant from its table; VariantError, naming the place, if it is not a model."""
     prefix = f"variant {name} in {where}: "
     if not isinstance(table, Mapping):
-        raise VariantError(f"{prefix}expected a table [variants.{name}], got {table!r}")
+        raise VariantError(f"{prefix}expected a table [variants.{name}], got {shown(table)}")
     unknown, missing = sorted(set(table) - VARIANT_KEYS), sorted({"state", "meter"} - set(table))
     if unknown or missing:
         problem = f"unknown key {', '.join(unknown)}" if unknown else f"no {' and no '.join(missing)}"
         raise VariantError(f"{prefix}{problem}; the keys are {', '.join(sorted(VARIANT_KEYS))}")
     for key in ("parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs"):
         if key in table and not isinstance(table[key], Mapping):
-            raise VariantError(f"{prefix}`{key}` must be a table such as {{ c = 0.9 }}, got {table[key]!r}")
+            raise VariantError(f"{prefix}`{key}` must be a table such as {{ c = 0.9 }}, got {shown(table[key])}")
     options = {key: value for key, value in table.items() if key not in ("title", "state", "meter", "parameters")}
     try:
         model = Model.define(table["state"], table["meter"], table.get("parameters"), **options)
@@ -95,20 +143,18 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
 
 
 def find_variant(name: str, path: str | Path | None = None) -> Variant:
-    """One variant by name; VariantError lists the names if there is no such, and tells what is wrong in a file of yours."""
-    where, tables = _tables(path)
-    if name not in tables:
-        raise VariantError(f"no variant {name!r}; there are {', '.join(tables)}")
-    wanted = [name] if path is None else tables  # of the shipped ones, the others are models, too
-    return {one: read_variant(one, tables[one], where) for one in wanted}[name]
+    """One variant by name; VariantError lists the names if there is no such, and tells what is wrong with it."""
+    return chosen_variants([name], False, path)[0]
 
 
-def chosen_variants(names: Sequence[str], everything: bool, variants_file: Path | None) -> list[Variant]:
-    """The variants of these names, each once, or all of them; ValueError if there is no such."""
-    known = load_variants(variants_file)
+def chosen_variants(names: Sequence[str], everything: bool, path: str | Path | None = None) -> list[Variant]:
+    """The variants of these names, each once, or all that can be used (`load_variants`).
+
+    VariantError if there is no such, or if one of them is not a model.
+    """
     if everything:
-        return list(known.values())
-    unknown = [name for name in names if name not in known]
-    if unknown:
-        raise ValueError(f"no variant {', '.join(unknown)}; there are {', '.join(known)}")
-    return [known[name] for name in dict.fromkeys(names)]
+        return list(load_variants(path).values())
+    found, faults = read_variants(path, names)
+    for fault in faults.values():
+        raise fault
+    return list(found.values())

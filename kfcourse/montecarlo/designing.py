@@ -15,7 +15,7 @@ import numpy as np
 from kfcourse.angles import on_circle
 from kfcourse.filters.base import Filter, initial_state
 from kfcourse.filters.designed import Affine, Design, Scatter, Step
-from kfcourse.laws import Gaussian
+from kfcourse.laws import Gaussian, NegativeVariance
 from kfcourse.montecarlo.ensemble import Instant, Serial
 
 
@@ -52,7 +52,7 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: E
     Raises
     ------
     NotFinite
-        If a regression meets infinite or NaN values: the model or the filter diverges.
+        If a regression meets infinite or NaN values, or a filter a negative variance: the model or the filter diverges.
     """
     coefficients: list[list[list[Affine]]] = [[] for _ in designs]
     predicted: list[list[Gaussian]] = []  # [block][design]
@@ -71,7 +71,7 @@ class _BlockStep:
     """The equations of all designs over one step of one block of trajectories."""
 
     def __init__(self, designs: Sequence[Design], predicted: Sequence[Gaussian], block: Instant, k: int):
-        self.block = block
+        self.block, self.names, self.k = block, [one.name for one in designs], k
         self.angles = [one.model.angles.x for one in designs]
         self.running = [one.equations(before, block.y, k) for one, before in zip(designs, predicted, strict=True)]
         self.results: list[Step | None] = [None] * len(designs)
@@ -87,6 +87,8 @@ class _BlockStep:
         except StopIteration as stop:
             self.results[i] = stop.value
             return None
+        except (NegativeVariance, np.linalg.LinAlgError) as error:
+            raise NotFinite(f"step {self.k}: {self.names[i]} failed: {error}", self.names[i]) from None
         return Scatter.of(request.target(self.block.x, self.block.x_next), request.regressor)
 
     def predictions(self) -> list[Gaussian]:

@@ -7,8 +7,8 @@ trajectories, always the same ones.  So the time decides after which chunk the w
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from importlib import import_module
 from typing import TypeVar
 
@@ -18,7 +18,7 @@ from tqdm import tqdm
 from kfcourse.angles import near
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.particles import Particles
-from kfcourse.laws import Array
+from kfcourse.laws import Array, NegativeVariance
 from kfcourse.limits import OutOfTime, memory_limit, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Subset
 from kfcourse.montecarlo.designing import NotFinite
@@ -170,9 +170,10 @@ def run_block(
             weight = weight_of(instant.x) if k == 0 else weight
             sums.record_states(k, instant.x, weight)
             for i, one in enumerate(filters):
-                states[i] = _step(one, states[i], instant.y)
-                estimate = states[i].posterior
-                sums.record(i, k, near(instant.x, estimate.mean, one.model.angles.x), estimate, weight)
+                with _affair_of(one, k):
+                    states[i] = one.step(states[i], instant.y)
+                    estimate = states[i].posterior
+                    sums.record(i, k, near(instant.x, estimate.mean, one.model.angles.x), estimate, weight)
             if reference is not None:
                 twice = _twice(states[reference])
                 sums.record_doubt(k, _doubt(states[reference], twice), weight)
@@ -200,16 +201,17 @@ def _doubt(state: State, twice: tuple[Array, Array]) -> Array:
     return np.zeros(len(twice[0])) if found is None else found()
 
 
-def _step(one: Filter, state: State, y: Array) -> State:
-    """The filter's step; what goes wrong in a slow filter is only its own affair."""
-    if not one.slow:
-        return one.step(state, y)
+@contextmanager
+def _affair_of(one: Filter, step: int) -> Iterator[None]:
+    """What goes wrong in a filter is its own affair: it can be left out."""
     try:
-        return one.step(state, y)
-    except MemoryError:
-        raise _TooMuch(one.name, state.step) from None
-    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
-        raise _Failed(one.name, str(error)) from None
+        yield
+    except (ValueError, ArithmeticError, MemoryError) as error:
+        if one.slow:
+            raise _TooMuch(one.name, step) if isinstance(error, MemoryError) else _Failed(one.name, str(error)) from None
+        if isinstance(error, NegativeVariance | np.linalg.LinAlgError):
+            raise NotFinite(f"step {step}: {one.name} failed: {error}", one.name) from None
+        raise
 
 
 def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:

@@ -36,7 +36,10 @@ def best_width(filters: Sequence[Filter], model: Model, runs: int, steps: int, s
                 for weight, law in zip(weights, (*laws, widest), strict=True):
                     found = law.weight(x)
                     weight[:] = 1.0 if found is None else found
-            states = [one.step(state, y) for one, state in zip(filters, states, strict=True)]
+            try:
+                states = [one.step(state, y) for one, state in zip(filters, states, strict=True)]
+            except (ValueError, ArithmeticError, np.linalg.LinAlgError):
+                return 1.0  # which filter it is is said where all of them run
             first = states[0].posterior.mean
             for other in (x, *(state.posterior.mean for state in states[1:])):
                 square = ((first - other) ** 2).sum(axis=1)

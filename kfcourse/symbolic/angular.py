@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import sympy as sp
 
 from kfcourse.angles import Angles
-from kfcourse.symbolic.reading import ModelError, Names
+from kfcourse.symbolic.reading import ModelError, Names, shown
 
 
 class AngleWarning(UserWarning):
@@ -21,9 +22,9 @@ def read_angles(given: Names | Mapping[str, Names] | None, x: list[str], y: list
     if isinstance(given, Mapping):
         if set(given) - set(known):
             raise ModelError(f"`angles` has the keys x and y, not {', '.join(map(str, set(given) - set(known)))}")
-        chosen = {key: [names] if isinstance(names, str) else [*names] for key, names in given.items()}
+        chosen = {key: _names(names) for key, names in given.items()}
     else:
-        names = [given] if isinstance(given, str) else [*(given or [])]
+        names = [] if given is None else _names(given)
         if both := [name for name in names if name in x and name in y]:
             raise ModelError(
                 f"{both[0]} is the name of a state and of a measurement: say which is an angle, "
@@ -35,6 +36,16 @@ def read_angles(given: Names | Mapping[str, Names] | None, x: list[str], y: list
         if unknown := [name for name in names if name not in known[key]]:
             raise ModelError(f"`angles` names {', '.join(map(str, unknown))}; components are {', '.join(x)} and {', '.join(y)}")
     return Angles(*(tuple(i for i, name in enumerate(known[key]) if name in chosen.get(key, ())) for key in known))
+
+
+def _names(given: Any) -> list[str]:
+    """A name or a list of names, as a list."""
+    names = [given] if isinstance(given, str) else given
+    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
+        raise ModelError(
+            f'`angles` must name components, as in ["y2"] or {{x = ["psi"]}}, got {shown(given)}; leave it out if there is none'
+        )
+    return [*names]
 
 
 def warn_of_angles(equations: Mapping[str, sp.Expr]) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.precedence import PRECEDENCE
 
@@ -102,6 +103,8 @@ def _compiled(
         source = numpy_source(name, arguments, lower(outputs, vectors, definitions), doc)
     except BeyondFloats:  # a factor that was taken out of a power: (x + 1e-99)**4 = 1e-396*(1e99*x + 1)**4
         source = numpy_source(name, arguments, lower(outputs, vectors, definitions, factor=False), doc)
+    except PrintMethodNotImplementedError as error:  # of a solution that SymPy found, with LambertW
+        raise ModelError(f"{name}: {str(error).splitlines()[0].rpartition(' ')[2]} is no function of NumPy") from None
     namespace: dict[str, Any] = {"np": np}
     exec(compile(source, f"<generated {name}>", "exec"), namespace)  # our own text: printed from SymPy, no user strings
     return Compiled(namespace[name], source)

@@ -6,7 +6,7 @@ A model without them pays nothing: a `Stepwise` function is then the generated f
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,10 +15,11 @@ import sympy as sp
 from kfcourse.laws import Array
 from kfcourse.symbolic.codegen import Compiled, compile_function
 from kfcourse.symbolic.formula import symbol
-from kfcourse.symbolic.reading import ModelError, checked_name, exact_number, read, table
+from kfcourse.symbolic.reading import ModelError, checked_name, exact_number, of_numbers, read, shown, table
 from kfcourse.symbolic.sense import not_computable
 
 CHECKED = 1000  # steps for which a variance is tried out
+SURE = 51  # steps of a run of the lab: a model whose variance fails before is refused as it is defined
 
 
 @dataclass(frozen=True)
@@ -33,18 +34,21 @@ class Known:
         Time between two steps, t = interval * k.
     inputs : dict
         Name to its values at the steps 0, 1, 2...
+    end : (float, str)
+        The first step at which a noise has no variance, and why; the model holds for the steps before.
     """
 
     symbols: tuple[sp.Symbol, ...] = ()
     interval: sp.Rational = sp.S.One
     inputs: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    end: tuple[float, str] = (np.inf, "")
 
     @classmethod
     def read(cls, interval: Any, inputs: Mapping[str, Sequence[float]] | None) -> Known:
         """The interval and the inputs as people give them; ModelError if they are none."""
         length = exact_number("interval", interval)
         if not length > 0:
-            raise ModelError(f"the interval between two steps must be positive, got {interval!r}")
+            raise ModelError(f"the interval between two steps must be positive, got {shown(interval)}")
         values = {checked_name(name): _sequence(name, given) for name, given in table("inputs", inputs).items()}
         return cls((), length, values)
 
@@ -54,15 +58,17 @@ class Known:
 
     def used(self, equations: sp.MatrixBase, known: Mapping[str, sp.Symbol]) -> Known:
         """The same with the symbols of these equations."""
-        return Known(tuple(s for s in known.values() if equations.has(s)), self.interval, self.inputs)
+        return replace(self, symbols=tuple(s for s in known.values() if equations.has(s)))
 
     @property
     def steps(self) -> float:
-        """For how many steps the inputs have values; infinite if the equations contain none."""
-        return min((len(values) for name, values in self.inputs.items() if symbol(name) in self.symbols), default=np.inf)
+        """For how many steps the inputs have values and the noises variances; infinite if nothing ends."""
+        return min(self.end[0], *(len(values) for name, values in self.inputs.items() if symbol(name) in self.symbols), np.inf)
 
     def at(self, k: int) -> Array:
-        """Values of `symbols` at step k, (m,); ModelError if an input ends before."""
+        """Values of `symbols` at step k, (m,); ModelError if an input or a variance ends before."""
+        if k >= self.end[0]:
+            raise ModelError(f"{self.end[1]}; run at most {self.end[0]} steps, or change the formula")
         return np.array([self._value(s.name, k) for s in self.symbols])
 
     def _value(self, name: str, k: int) -> float:
@@ -87,11 +93,11 @@ class Known:
 
 def _sequence(name: str, given: Any) -> tuple[float, ...]:
     try:
-        values = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
+        values = np.asarray(given, dtype=float) if of_numbers(given) else np.array(np.nan)
+    except (TypeError, ValueError, OverflowError):
         values = np.array(np.nan)
     if values.ndim != 1 or not len(values) or not np.isfinite(values).all():
-        raise ModelError(f"the input {name} must be a list of finite numbers, one for every step; got {given!r:.80}")
+        raise ModelError(f"the input {name} must be a list of finite numbers, one for every step; got {shown(given)}")
     return tuple(values.tolist())
 
 
@@ -140,15 +146,15 @@ def varying_law(
     symbols: dict[str, sp.Symbol],
     known: Known,
     parameters: Mapping[sp.Symbol, sp.Rational],
-) -> tuple[dict[sp.Symbol, sp.Expr], dict[str, Any]]:
+) -> tuple[dict[sp.Symbol, sp.Expr], dict[str, Any], Known]:
     """A law of noises in which means and variances may be formulas of the step.
 
     A noise with the mean m_k and the variance D_k is m_k + sqrt(D_k) v with a standard one: these go into the equations.
 
     Returns
     -------
-    dict, dict
-        What takes the place of each noise in the equations, and the law that is left for it.
+    dict, dict, Known
+        What takes the place of each noise in the equations, the law that is left for it, and for which steps that holds.
     """
     law = table(what, given)
     scale, shift = (_formulas(what, law.get(key), len(noises), symbols) for key in ("variance", "mean"))
@@ -159,11 +165,11 @@ def varying_law(
         law["mean"] = [0.0 if i in scale else one for i, one in enumerate(means)] if means else law.get("mean", 0.0)
         law["variance"] = _without(scale, law["variance"], 1.0)
         for i, variance in scale.items():
-            _check_variance(what, noises[i], variance, known, symbols, parameters)
+            known = replace(known, end=min(known.end, _end_of(what, noises[i], variance, known, symbols, parameters)))
     if shift:
         law["mean"] = _without(shift, law["mean"], 0.0)
     changed = {noises[i]: shift.get(i, 0) + sp.sqrt(scale.get(i, 1)) * noises[i] for i in {**scale, **shift}}
-    return changed, law
+    return changed, law, known
 
 
 def _numbers(given: Any, size: int) -> list[Any]:
@@ -198,23 +204,28 @@ def _is_formula(one: Any) -> bool:
     return isinstance(one, str) or (isinstance(one, sp.Expr) and bool(one.free_symbols))
 
 
-def _check_variance(
+def _end_of(
     what: str,
     noise: sp.Symbol,
     variance: sp.Expr,
     known: Known,
     symbols: Mapping[str, sp.Symbol],
     parameters: Mapping[sp.Symbol, sp.Rational],
-) -> None:
-    """ModelError if a variance cannot be computed, or is negative or not finite at one of the first steps."""
+) -> tuple[float, str]:
+    """The first of many steps at which a variance is negative or not finite, and what to say then; ModelError if it is early."""
     if problem := not_computable(sp.Matrix([variance]), parameters, {}):
         raise ModelError(f"`{what}`: the variance of {noise}, {problem}")
     numeric = sp.Matrix([variance.subs(parameters)])
-    used = known.used(numeric, {name: s for name, s in symbols.items() if s not in parameters})
+    used = replace(known, end=Known.end).used(numeric, {name: s for name, s in symbols.items() if s not in parameters})
     steps = int(min(CHECKED, used.steps))
     variance_at = Stepwise.compile(used, "variance", {}, {"variance": numeric}, [])
     with np.errstate(all="ignore"):
         for k in range(steps):
             value = float(np.squeeze(variance_at.at(k)()[0]))
             if not 0 <= value < np.inf:
-                raise ModelError(f"`{what}`: the variance of {noise} is {value:g} at step {k}; it must not be negative")
+                wrong = "must be finite" if value > 0 else "must not be negative"
+                problem = f"`{what}`: the variance of {noise} is {value:g} at step {k}; it {wrong}"
+                if k < SURE:
+                    raise ModelError(problem)
+                return k, problem
+    return Known.end

@@ -38,6 +38,7 @@ from kfcourse.symbolic.reading import (
     law,
     names_in,
     read,
+    shown,
     table,
 )
 from kfcourse.symbolic.sense import not_computable
@@ -141,8 +142,8 @@ class Model:
         of_step = known.names([*values, *by_name(x, v, w)])
         constants = {name: symbol(name) for name in values} | of_step
         numbers = {symbol(name): value for name, value in values.items()}
-        change_v, state_noise = varying_law("state_noise", state_noise, v, constants, known, numbers)
-        change_w, meter_noise = varying_law("meter_noise", meter_noise, w, constants, known, numbers)
+        change_v, state_noise, known = varying_law("state_noise", state_noise, v, constants, known, numbers)
+        change_w, meter_noise, known = varying_law("meter_noise", meter_noise, w, constants, known, numbers)
         state_equation = sp.ImmutableMatrix([read(f, constants | by_name(x, v), "state") for f in a]).subs(change_v)
         meter_equation = sp.ImmutableMatrix([read(f, constants | by_name(x, w), "meter") for f in b]).subs(change_w)
         model = cls(
@@ -205,16 +206,22 @@ class Model:
         values = dict(self.parameters) | {name: exact_number(name, value) for name, value in parameters.items()}
         return dataclasses.replace(self, parameters=values)
 
-    def latex(self, values: bool = True) -> str:
-        """The two equations, and the parameters' values unless they are not wanted, as a LaTeX `aligned` block."""
+    def latex(self, values: bool = True, indexed: bool = False) -> str:
+        """The two equations, and the parameters' values unless they are not wanted, as a LaTeX `aligned` block.
+
+        Indexed: x_{k+1} = c x_k + e x_k v_k, as on paper, for x_{k+1} = c x + e x v.
+        """
+        x, v, w = ([sp.Symbol(f"{{{sp.latex(s)}}}_{{k}}") if indexed else s for s in some] for some in (self.x, self.v, self.w))
+        at_k = dict(zip((*self.x, *self.v, *self.w), (*x, *v, *w), strict=True))
         state = ["{" + sp.latex(x) + "}" for x in self.x]  # braces: a name may have an index of its own
         meter = ["y"] if self.p == 1 else [f"{{y_{{{i + 1}}}}}" for i in range(self.p)]
         lines = [
-            rf"{x}_{{k+1}} &= {formula_latex(formula, self.x, self.v)}"
-            for x, formula in zip(state, self.state_equation, strict=True)
+            rf"{name}_{{k+1}} &= {formula_latex(formula.xreplace(at_k), x, v)}"
+            for name, formula in zip(state, self.state_equation, strict=True)
         ]
         lines += [
-            rf"{y}_k &= {formula_latex(formula, self.x, self.w)}" for y, formula in zip(meter, self.meter_equation, strict=True)
+            rf"{name}_k &= {formula_latex(formula.xreplace(at_k), x, w)}"
+            for name, formula in zip(meter, self.meter_equation, strict=True)
         ]
         lines += [rf"{name}_k &\in [-\pi, \pi]" for name in [state[i] for i in self.angles.x] + [meter[i] for i in self.angles.y]]
         if values:
@@ -252,7 +259,7 @@ def _symbols(symbols: Mapping[str, Names] | None, values: Sequence[str], used: s
             listed = [given[key]] if isinstance(given[key], str) else given[key]
             if not isinstance(listed, Sequence):
                 raise ModelError(
-                    f'`symbols`: {key} must be a name or a list of names, such as ["{key}1", "{key}2"], got {listed!r}'
+                    f'`symbols`: {key} must be a name or a list of names, such as ["{key}1", "{key}2"], got {shown(listed)}'
                 )
             names: list[str] = [*listed]
         elif key == "x":

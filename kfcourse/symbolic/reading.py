@@ -30,12 +30,21 @@ def by_name(*groups: tuple[sp.Symbol, ...]) -> dict[str, sp.Symbol]:
     return {s.name: s for group in groups for s in group}
 
 
+def shown(value: Any) -> str:
+    """What people wrote, for a message: not too long, and any number (Python prints none of more than 4300 digits)."""
+    try:
+        text = repr(value)
+    except ValueError:
+        text = "numbers of thousands of digits"
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
 def table(what: str, given: Mapping[str, Any] | None) -> dict[str, Any]:
     """A table that may have been left out."""
     if given is None:
         return {}
     if not isinstance(given, Mapping):
-        raise ModelError(f"`{what}` must be a table such as {{'name': value}}, got {given!r}")
+        raise ModelError(f"`{what}` must be a table such as {{'name': value}}, got {shown(given)}")
     return dict(given)
 
 
@@ -54,9 +63,9 @@ def exact_number(name: str, value: Any) -> sp.Rational:
     except OverflowError:
         number = float("inf")
     if isinstance(value, bool) or not np.isfinite(number):
-        raise ModelError(f"parameter {name} = {value!r}: expected a finite number")
+        raise ModelError(f"parameter {name} = {shown(value)}: expected a finite number")
     if number and not 1e-100 < abs(number) < 1e100:
-        raise ModelError(f"parameter {name} = {value!r} is too large or too small; change the units")
+        raise ModelError(f"parameter {name} = {shown(value)} is too large or too small; change the units")
     return value if isinstance(value, sp.Rational) else sp.Rational(str(value))
 
 
@@ -75,7 +84,7 @@ def formula_list(what: str, formulas: Formulas) -> list[Formula]:
         raise ModelError(f"`{what}` holds no formula")
     for formula in result:
         if not isinstance(formula, str | sp.Expr):
-            raise ModelError(f"`{what}` must be a formula or a list of formulas, got {formula!r}")
+            raise ModelError(f"`{what}` must be a formula or a list of formulas, got {shown(formula)}")
     return result
 
 
@@ -103,12 +112,15 @@ def law(what: str, given: Mapping[str, Any] | None, size: int) -> Gaussian:
     if set(parts) - {"mean", "variance"}:
         raise ModelError(f"`{what}` has the keys mean and variance, not {', '.join(sorted(set(parts) - {'mean', 'variance'}))}")
     try:
+        if not of_numbers([*parts.values()]):
+            raise TypeError
         mean = np.broadcast_to(np.asarray(parts.get("mean", 0.0), dtype=float), (size,)).copy()
         cov = np.asarray(parts.get("variance", 1.0), dtype=float)
         cov = cov.copy() if cov.ndim == 2 else np.diag(np.broadcast_to(cov, (size,)))
     except (TypeError, ValueError, OverflowError):
         raise ModelError(
-            f"`{what}`: mean and variance must be numbers, or lists of {size} numbers (variance: or a matrix)"
+            f"`{what}`: mean and variance must be numbers, or lists of {size} numbers (variance: or a matrix), "
+            f"got {', '.join(f'{key} = {shown(value)}' for key, value in parts.items())}"
         ) from None
     if cov.shape != (size, size):
         raise ModelError(f"`{what}`: the covariance has shape {cov.shape}, expected ({size}, {size})")
@@ -121,3 +133,10 @@ def law(what: str, given: Mapping[str, Any] | None, size: int) -> Gaussian:
     if problem := unfit(mean, cov.diagonal()):
         raise ModelError(f"`{what}`: {problem}")
     return Gaussian(mean, cov)
+
+
+def of_numbers(given: Any) -> bool:
+    """Whether there are no texts and no truth values among the entries: NumPy would take "1e5" for 100000, and true for 1."""
+    if isinstance(given, Sequence) and not isinstance(given, str):
+        return all(map(of_numbers, given))
+    return not isinstance(given, str | bool | np.bool_)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from itertools import groupby
 
 import sympy as sp
+from sympy.codegen.cfunctions import expm1
 from sympy.printing.latex import LatexPrinter
 
 from kfcourse.symbolic.typesetting import WIDTH, joined, symbols
@@ -26,16 +27,22 @@ def formula_latex(expression: sp.Expr, variables: Sequence[sp.Symbol], noises: S
         Variables that are written last in a product, and whose terms are written last in a sum.
     """
     printer = LatexPrinter({"order": "none", "fold_func_brackets": True})
-    return str(printer.doprint(_Writer([*variables, *noises], noises).arranged(sp.sympify(expression))))
+    return str(printer.doprint(_Writer([*variables, *noises], noises).arranged(_readable(sp.sympify(expression)))))
 
 
 def formula_lines(expression: sp.Expr, variables: Sequence[sp.Symbol], noises: Sequence[sp.Symbol] = ()) -> list[str]:
     """The same in as many lines as a page is wide; only sums are broken."""
+    expression = _readable(expression)
     whole = formula_latex(expression, variables, noises)
     writer = _Writer([*variables, *noises], noises)
     if symbols(whole) <= WIDTH or not isinstance(expression, sp.Add):
         return [whole]
     return joined([formula_latex(term, variables, noises) for term in writer.terms(expression)])
+
+
+def _readable(expression: sp.Expr) -> sp.Expr:
+    """Without expm1, which keeps the digits of e^u - 1 in the code: people write the latter."""
+    return sp.expand(expression.replace(expm1, lambda u: sp.exp(u) - 1)) if expression.has(expm1) else expression
 
 
 def number_latex(value: float) -> str:

@@ -27,6 +27,7 @@ def filtered(y, gain):
 
 CARRIED = asks(carried, [(A, P), (np.array([[1.3]]), np.array([[0.7]]))])
 FILTERED = asks(filtered, [(RUN, 0.4)])
+DIFFERENCE = asks(lambda P: -P, [(P,), (2 * P,)])  # no covariance: what is subtracted from one
 PAIR = asks(lambda a, b: (a + b, a * b), [(2.5, 1.5), (0.5, 3.0)], parts=("sum", "product"))
 FORMULAS = asks(lambda z, p: (c * z, c**2 * p + e**2), [(z, p)], parts=("tau", "Theta"))
 
@@ -106,3 +107,9 @@ def test_an_answer_that_ends_the_program_for_other_arguments_does_not_end_the_ch
         return gain * y + y[::-1]
 
     assert outcome(FILTERED, touchy).status == "wrong"
+
+
+def test_negative_variances_are_no_news_where_the_right_answer_has_them():
+    for answer in (lambda P: -3 * P, lambda P: -P - np.eye(3)):
+        assert "negative-variance" not in outcome(DIFFERENCE, answer).diagnosis
+    assert "negative-variance" in outcome(CARRIED, lambda A, P: A @ P @ A.T - 50 * P).diagnosis

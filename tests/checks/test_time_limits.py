@@ -128,6 +128,15 @@ def test_the_alarm_ends_what_only_looks_for_signals():
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no alarms here")
+@pytest.mark.parametrize("seconds", [float("inf"), 1e300])
+def test_a_block_without_end_is_not_stopped(somewhere, seconds):
+    def unlimited():
+        with time_limit(seconds):
+            return "done"
+
+    assert somewhere(unlimited) == "done"
+
+
 def test_time_limit_restores_the_alarm():
     before = signal.getsignal(signal.SIGALRM)
     with pytest.raises(OutOfTime), time_limit(0.05):

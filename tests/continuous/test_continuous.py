@@ -720,6 +720,17 @@ def test_no_steady_state():
             steady_state(ContinuousModel.define(drift, diffusion, signal))
 
 
+@pytest.mark.parametrize("rate", [0.1, 0.3, 0.5, 0.7, 1.0, 1.3, 2.0, 3.0, 5.0, 7.0])
+def test_a_constant_that_is_seen_better_and_better_has_no_steady_state(rate):
+    """The closed loop has a root at 0, which is found to rounding, on either side: -3e-18 is no decay."""
+    for drift, noises, signal in (
+        ([f"-{rate}*x1 + x2", "0"], [["1"], ["0"]], ["x1"]),
+        (["-x1 + x3", f"-{rate}*x2", "0"], [["1"], ["1"], ["0"]], ["x1", "x2"]),
+    ):
+        with pytest.raises(ValueError, match="no stabilising solution"):
+            steady_state(ContinuousModel.define(drift, noises, signal))
+
+
 def test_measurements_of_the_wrong_shape():
     one = extended_kalman_bucy(oscillator(), 0.1)
     with pytest.raises(ValueError, match="expects 2 measurement"):

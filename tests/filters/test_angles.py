@@ -389,6 +389,21 @@ def test_the_estimate_of_a_state_that_is_an_angle_does_not_count_turns(build):
         assert found.cov[k].item() == pytest.approx(variance, rel=max(1e-4, 2 * allowed) if allowed > 1e-3 else 1e-4)
 
 
+@pytest.mark.parametrize("sd", [0.1, 0.3])
+def test_the_prediction_of_an_angle_is_as_wide_as_that_on_the_line(sd):
+    """Far from half a turn the circle is a line: the prediction's variance is the posterior's and that of the noise."""
+    model = Model.define(f"x + {sd}*v", "x + 0.3*w", prior={"mean": 3.0, "variance": 0.04}, angles=["x", "y"])
+    y = np.array([3.1, -3.0, 2.9, -2.9])
+    after, before = run(pointmass(model), y), predictions(pointmass(model), y)
+    p, z = 0.04, 3.0
+    for k, value in enumerate(np.where(y < 0, y + 2 * PI, y)):  # the Kalman filter on the line
+        assert before.cov[k].item() == pytest.approx(p, rel=1e-4)
+        assert wrapped(before.mean[k].item() - z) == pytest.approx(0, abs=1e-4)
+        z, p = z + p / (p + 0.09) * (value - z), p * 0.09 / (p + 0.09)
+        assert after.cov[k].item() == pytest.approx(p, rel=1e-4)
+        p += sd**2
+
+
 def test_the_ensemble_is_drawn_on_the_circle():
     model = phase(["psi", "y"])
     ensemble = Ensemble(model, 200, 30, seed=1)

@@ -187,3 +187,11 @@ def test_stochastic_volatility_is_what_many_particles_find():
         values = np.stack([getattr(one, kind).reshape(6, 2) for one in found])
         error = values.std(axis=0, ddof=1) / np.sqrt(20)
         assert (abs(values.mean(axis=0) - getattr(expected, kind).reshape(6, 2)) < 4 * error).all(), kind
+
+
+def test_the_error_that_is_told_is_that_of_all_steps_so_far():
+    """As if the filter never forgot one: it never falls, on any trajectory."""
+    model = Model.define("0.9*x + 0.3*sin(x) + 0.2*v", "x + 0.1*x**2 + 0.3*w")
+    _, y = simulate(model, 12, 12, seed=4)
+    errors = np.array([state.memory.error for state in followed(pointmass(model), y)])
+    assert (np.diff(errors, axis=0, prepend=0.0) >= 0).all() and (errors[-1] > 0).all()

@@ -48,7 +48,7 @@ def test_the_density_is_that_of_the_transformed_noise():
     assert likelihood(model)(y, x)[3] == 0
 
 
-@pytest.mark.parametrize("meter", ["x + w**3", "x + w**2", "x + sin(w)"])
+@pytest.mark.parametrize("meter", ["x + w**3", "x + w**2", "x + sin(w)", "exp(w*x) + w"])
 def test_what_cannot_be_solved_for_is_refused(meter):
     model = Model.define("x + v", meter)
     with pytest.raises(ModelError, match="noise enters nonlinearly"):

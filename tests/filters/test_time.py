@@ -4,6 +4,7 @@ import math
 from typing import ClassVar
 
 import numpy as np
+import oracles
 import pytest
 import sympy as sp
 
@@ -24,7 +25,7 @@ from kfcourse.filters.densities import likelihood, transition
 from kfcourse.linear.system import is_linear, linear_system, linear_systems
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble, Instant, simulate
-from kfcourse.montecarlo.experiment import compare, run
+from kfcourse.montecarlo.experiment import compare, predictions, run
 from kfcourse.scenarios.navigation import Sensor
 from kfcourse.symbolic.equations import compile_model, compile_noiseless
 from kfcourse.symbolic.formula import FormulaError
@@ -180,6 +181,24 @@ def test_blocks_and_steps_drawn_ahead_agree():
             np.testing.assert_array_equal(instant.x_next, by_block[i][k].x_next)
 
 
+def test_the_duof_of_the_growth_model_by_a_loop_of_hand():
+    """Its prediction regresses x_{k+1} on a(z_k, m_v) of step k: a curved function, on which a wrong step is no other scale."""
+    model = Model.define("0.5*x + 3*sin(x + 0.9*k) + v", "x + 0.1*k*x**2 + 0.5*w")
+    x, y = (array[..., 0] for array in simulate(model, 50, 8, seed=6))
+    blocks = [[Instant(*(one[:, None] for one in step))] for step in zip(x[:-1], y[:-1], x[1:], strict=True)]
+    (filter_,) = design([duof(model)], blocks)
+    found = run(filter_, y[:-1, :, None]).mean[..., 0]
+    lam = np.zeros(50)
+    for k in range(7):
+        omega = y[k] - (lam + 0.1 * k * lam**2)
+        (slope,), offset, _ = oracles.regression(x[k] - lam, omega)
+        z = lam + slope * omega + offset
+        np.testing.assert_allclose(found[k], z, rtol=1e-9, atol=1e-11)  # 50 trajectories, regressions conditioned up to 1e3
+        alpha = 0.5 * z + 3 * np.sin(z + 0.9 * k)
+        (slope,), offset, _ = oracles.regression(x[k + 1], alpha)
+        lam = slope * alpha + offset
+
+
 # ---------------------------------------------------------------- the exact filter
 
 
@@ -194,6 +213,9 @@ def test_the_exact_filter_takes_the_input_of_the_step_before(build):
     # the filters promise 1e-6 and 1e-5 posterior deviations a step, for some steps
     np.testing.assert_allclose(found.mean, expected.mean, atol=1e-4)
     np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-4)
+    predicted, prediction = predictions(kalman_filter(model), y), predictions(build(model), y)
+    np.testing.assert_allclose(prediction.mean, predicted.mean, atol=1e-4)
+    np.testing.assert_allclose(prediction.cov, predicted.cov, rtol=1e-4)
     late = Model.define(
         "(0.8 + 0.02*k)*x + 4*u + (0.5 + 0.1*k)*v", "x + u + (1 + 0.2*k)*w", inputs={"u": [0, *U]}, prior={"mean": 0.3}
     )
@@ -406,6 +428,18 @@ def test_k_and_t_mean_what_else_they_name():
     assert Model.define("x + v + k", "x + w", inputs={"k": [1, 2]}).known.at(1).tolist() == [2.0]
 
 
+def test_a_variance_must_be_one_at_the_steps_that_are_run():
+    """e^k is no number from step 710 on, 1 - k/500 negative from 501 on: shorter runs do not see it, longer ones say so."""
+    for variance, steps, wrong in (("exp(k)", 710, "inf at step 710; it must be finite"), ("1 - k/500", 501, "-0.002 at step")):
+        model = Model.define("0.9*x + u + v", "x + w", meter_noise={"variance": variance}, inputs={"u": [0.0] * 2000})
+        assert model.known.steps == steps
+        assert np.isfinite(simulate(model, 3, 51, seed=1).y).all()
+        with pytest.raises(ModelError, match=f"{wrong}.*run at most {steps} steps"):
+            simulate(model, 3, steps + 1, seed=1)
+    short = Model.define("0.9*x + u + v", "x + w", meter_noise={"variance": "exp(k)"}, inputs={"u": [0.0] * 60})
+    assert short.known.steps == 60
+
+
 def test_models_without_time_pay_nothing(variant53):
     structure = linearised(variant53)
     assert structure.at(5) is structure and "known" not in structure.source()
@@ -520,6 +554,24 @@ def test_a_jump_is_refused_with_the_reason_where_it_cannot_be_used(formula):
         linearised(model)
     with pytest.raises(ModelError, match="jumps at a state"):
         pointmass(model)
+
+
+@pytest.mark.parametrize(
+    ("choice", "jumping"),
+    [
+        ("x + 1 if x**2 < 1 else 2", True),  # 2 on both sides of 1, but 0 and 2 at -1
+        ("2 - x if x**2 < 1 else 1", True),  # the other way round
+        ("x**2 if x**2 < 1 else 1", False),  # 1 at both
+        ("2*abs(x) if x**2 < 4 else 4", False),
+    ],
+)
+def test_a_choice_with_several_borders_jumps_if_it_does_at_one(choice, jumping):
+    model = with_meter(f"({choice})")
+    if jumping:
+        with pytest.raises(ModelError, match="jumps at a state"):
+            pointmass(model)
+    else:
+        assert pointmass(model).name == "aof-exact"
 
 
 def test_the_reason_is_told_in_the_formulas_of_the_model():

@@ -1,5 +1,7 @@
 """Which filter may I use?  Refusals and warnings against what is known of the models, and the lab without the refused."""
 
+import re
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -7,10 +9,12 @@ import pytest
 
 from kfcourse.filters import aof, duof
 from kfcourse.lab.admission import admissions, on_trial, table, without_failing
-from kfcourse.lab.short_names import FILTERS, LAB
+from kfcourse.lab.short_names import FILTERS, LAB, has_bound, lab_filters
+from kfcourse.laws import gain
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import gaussian
 
 pytestmark = pytest.mark.quick
@@ -134,3 +138,49 @@ def test_a_comparison_goes_on_without_the_filters_that_fail():
     with pytest.raises(NotFinite, match="trajectories become infinite"):
         without_failing([duof(endless)], lambda f: compare(f, endless, 300, 20, 1, threads=1, progress=False), {})
     assert set(LAB) <= set(FILTERS)
+
+
+def test_a_negative_variance_is_the_affair_of_its_filter():
+    """The Gaussian formulas of this meter cancel in doubles; the other filters are compared as if it were not there."""
+    model = Model.define("0.9*x + 0.1*v", "(1 + x)**16*(1 + x)**8 + w")
+
+    def compared(filters):
+        return compare(filters, model, 500, 40, 1, threads=1, progress=False)
+
+    names = ("mfos-gaussian", "aof-gaussian", "aof-unscented")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        filters = lab_filters(model, names)
+    found = without_failing(filters, compared, {})
+    assert found.names == names[1:]
+    assert re.match(r"step \d+: mfos-gaussian failed: a covariance has the variance -", found.left_out["mfos-gaussian"])
+    expected = compared(filters[1:]).error_variance("aof-gaussian").value
+    np.testing.assert_array_equal(found.error_variance("aof-gaussian").value, expected)
+
+
+def test_a_variance_that_turns_negative_as_the_filter_runs_is_the_affair_of_that_filter():
+    model = Model.define("0.9*x + 0.3*v", "x + w")
+    good = aof(gaussian(model))
+
+    def step(state, y):
+        gain(np.ones((1, 1)), np.array([[-1.0 if state.step == 2 else 1.0]]))
+        return good.step(state, y)
+
+    broken = type(good)("broken", model, good.init, step)
+    with pytest.raises(NotFinite, match=r"^step 2: broken failed: a covariance has the variance -1") as caught:
+        compare([good, broken], model, 100, 4, 1, threads=1, progress=False)
+    assert caught.value.filter_name == "broken"
+    with pytest.raises(ModelError, match="the input u has 2 value"):  # a mistake in the model is no filter's affair
+        timed = Model.define("0.9*x + u + v", "x + w", inputs={"u": [1, 2]})
+        compare([aof(gaussian(timed))], timed, 10, 4, 1, threads=1, progress=False)
+
+
+@pytest.mark.parametrize("meter", [["x + w", "x + w"], ["x + w", "2*x + w"], ["x + w1", "x + w1 + w2", "w2 + x**2"]])
+def test_measurements_whose_noises_depend_on_one_another_have_no_density(meter):
+    """Two equal rows, and sums of rows: particles would meet a singular matrix; the Gaussian filters take the pseudo-inverse."""
+    model = Model.define("0.9*x + v", meter)
+    particles, normal = admissions(model, ["particle", "aof-gaussian"])
+    assert particles.one is None and "depend on one another" in particles.reason and not has_bound(model)
+    assert normal.verdict == "yes"
+    result = compare([normal.one], model, 100, 4, 1, threads=1, progress=False)
+    assert np.isfinite(result.error_variance("aof-gaussian").value).all()

@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from kfcourse import Model, compare, lab_filters, load_variants
+from kfcourse import Model, compare, gaussian, lab_filters, linearised, load_variants, run, simulate
+from kfcourse.filters import aof
 from kfcourse.lab import Variant, admission, handin, report
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.handin import CATALOGUE, FIGURES, LANGUAGES, write_handin
-from kfcourse.lab.handin_text import inline_tex, ranges
+from kfcourse.lab.handin_text import filled, inline_tex, ranges
 from kfcourse.lab.refusals import cause
 from kfcourse.lab.short_names import LAB, title
+from kfcourse.lab.written_out import scalar_equations
 from kfcourse.montecarlo.designing import NotFinite
+from kfcourse.montecarlo.statistics import Estimate
 
 WORDS = tomllib.loads((resources.files("kfcourse.lab") / "handin.toml").read_text(encoding="utf-8"))
 
@@ -43,25 +46,38 @@ def written(result, tmp_path_factory):
 def test_both_languages_have_the_same_words_with_the_same_places():
     russian, english = WORDS["ru"], WORDS["en"]
     assert set(russian) == set(english)
+    places = re.compile(r"(?<!\\mathsf)\{(\w+)(?::([^{}]*))?\}")  # {name}, or {name:word/words}
     for key, text in english.items():
-        assert sorted(re.findall(r"(?<!\\mathsf)\{\w+\}", text)) == sorted(re.findall(r"(?<!\\mathsf)\{\w+\}", russian[key])), key
+        here, there = (sorted(places.findall(one)) for one in (text, russian[key]))
+        assert [name for name, _ in here] == [name for name, _ in there], key
+        assert all(words.count("/") == (1 if words else 0) for _, words in here), key
+        assert all(words.count("/") == (2 if words else 0) for _, words in there), key
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_the_report_of_variant_53(written, language):
     tex = written[language]["handin.tex"]
     for formula in (
-        r"{x}_{k+1} &= c x + e x v",
-        r"y_k &= g x + f x^{2} w",
+        r"{x}_{k+1} &= a(x_k, v_k) = c {x}_{k} + e {x}_{k} {v}_{k}",
+        r"y_k &= b(x_k, w_k) = g {x}_{k} + f {x}_{k}^{2} {w}_{k}",
         r"x_0 &\sim \mathcal{N}(0,\; 1)",
         r"\frac{\partial a}{\partial x} &= c + e v",
         r"\eta(x) &= g^{2} x^{2} + f^{2} x^{4}",
         r"q_4 &= m^{4} + 6 m^{2} d + 3 d^{2}",
         r"F(m, d) &= g^{2} d + f^{2} m^{4} + 6 f^{2} m^{2} d + 3 f^{2} d^{2}",
-        r"\lambda_0 &= m_0",
+        r"\lambda_0 &= m_0 = 0,\qquad \Psi_0 = D_0 = 1",
+        r"F_{k} &= g^{2} \Psi_{k} + f^{2} \lambda_{k}^{4} + 6 f^{2} \lambda_{k}^{2} \Psi_{k} + 3 f^{2} \Psi_{k}^{2}",
+        r"F_{k} &= g^{2} \Psi_{k} + f^{2} \lambda_{k}^{4} \\",
+        r"K_{k} &= \frac{g \Psi_{k}}{F_{k}}",
+        r"z_{k} &= \lambda_{k} + K_{k} \left(y_{k} - g \lambda_{k}\right)",
+        r"\Psi_{k+1} &= c^{2} p_{k} + e^{2} z_{k}^{2} + e^{2} p_{k}",
+        {"ru": "Отчёт по лабораторной работе", "en": "Report on the laboratory work"}[language],
+        {"ru": "2000 траекторий по 4 измерения, начальное", "en": "2000 trajectories of 4 measurements, seed"}[language],
+        {"ru": "по 2 другим выборкам", "en": "over 2 other ensembles"}[language],
+        {"ru": "вычислен на 200 траекториях", "en": "ran on 200 trajectories"}[language],
         "I_k &=",
         "J_k &=",
-        r"\Theta$: 22",
+        r"\Theta$ --- 22",
     ):
         assert formula in tex, formula
     assert (r"\usepackage[english,russian]{babel}" in tex) == (language == "ru")
@@ -82,8 +98,97 @@ def test_numbers_and_verdicts_are_those_of_the_comparison(written, result):
     assert rf"$({value.value / 10.0**power:.3f} \pm {value.standard_error / 10.0**power:.3f})\cdot 10^{{{power}}}$" in tex
     for k in range(result.steps):
         best, *others = result.leaders(k)
-        row = rf"${k}$ & {title(best)} & {', '.join(map(title, others)) or '--'} & "
-        assert row in tex
+        last = max(result.entrants, key=lambda name: float(result.gap(name)[k].value))
+        last = "--" if last in (best, *others) else title(last)
+        assert rf"${k}$ & {title(best)} & {', '.join(map(title, others)) or '--'} & {last} \\" in tex
+
+
+class Told:
+    """A comparison of which only the order of the filters is told: at each step those that lead, and the last."""
+
+    has_bound, control, steps, seed = True, "aof-gaussian", 51, 1
+    entrants = ("aof-gaussian", "duof", "fos-gaussian")
+
+    def __init__(self, leaders, last):
+        self.model, self.available = load_variants()["53"].model, self.entrants
+        self.leaders, self.last = leaders, last
+
+    def gap(self, name):
+        return Estimate(np.array([float(self.last(k) == name) for k in range(51)]), np.zeros(51), 9)
+
+    def ranking(self):
+        return [(name, self.gap(name)[0]) for name in self.entrants]
+
+
+def sentences(leaders, last, language):
+    return list(handin._Report(Told(leaders, last), WORDS[language]).sentences())
+
+
+@pytest.mark.quick
+def test_the_conclusion_counts_in_good_language():
+    """One step or several, of 51; and who is not significantly worse than the best is not called the last at that step."""
+
+    def leaders(k):
+        return ["aof-gaussian"] if k == 2 else ["aof-gaussian", "duof"] if k in (0, 30, 31) else ["aof-gaussian", "fos-gaussian"]
+
+    russian, english = (sentences(leaders, lambda k: "duof", language) for language in ("ru", "en"))
+    assert russian[:3] == [
+        "ГАОФ значимо точнее каждого из остальных фильтров на шаге $2$.",
+        "Хотя бы один из остальных фильтров незначимо хуже самого точного на шагах $0$–$1$, $3$–$50$.",
+        "ДУОФ — наименее точный фильтр на 48 шагах из 51.",
+    ]
+    assert english[0] == "GAOF is significantly more accurate than every other filter at step $2$."
+    assert english[2] == "DUOF is the least accurate filter at 48 steps of 51."
+    once = sentences(lambda k: ["duof", "fos-gaussian"], lambda k: "aof-gaussian", "ru")[2]
+    never = sentences(lambda k: ["duof", "aof-gaussian"], lambda k: "aof-gaussian", "ru")[2]
+    assert once == "ГАОФ — наименее точный фильтр на 51 шаге из 51."
+    assert never == "Ни на одном шаге наименее точный фильтр не хуже самого точного значимо."
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(
+    ("number", "russian", "english"),
+    [
+        (1, "1 шаг", "1 step"),
+        (2, "2 шага", "2 steps"),
+        (5, "5 шагов", "5 steps"),
+        (11, "11 шагов", "11 steps"),
+        (21, "21 шаг", "21 steps"),
+        (112, "112 шагов", "112 steps"),
+        (9999, "9999 шагов", "9999 steps"),
+        (100_003, "100\u202f003 шага", "100\u202f003 steps"),
+    ],
+)
+def test_a_number_and_its_word(number, russian, english):
+    assert filled("{n:шаг/шага/шагов}", n=number) == russian
+    assert filled("{n:step/steps}", n=number) == english
+    assert inline_tex(filled("{n:step/steps}", n=number)) == english.replace("\u202f", r"\,")
+    assert filled(r"\mathsf{M} {n} {name}", n=number, name="a") == rf"\mathsf{{M}} {russian.split(' ')[0]} a"
+
+
+@pytest.mark.parametrize("kind", [gaussian, linearised])
+@pytest.mark.parametrize("name", ["53", "2", "5", "9", "10"])
+def test_what_is_written_out_is_the_filter_that_runs(name, kind):
+    """The printed formulas, evaluated one after the other, against the compiled filter: polynomials, a sine, exponentials."""
+    model = load_variants()[name].model
+    structure = kind(model)
+    _, y = simulate(model, 1, 6, seed=3)
+    expected = run(aof(structure), y)
+    values = {"\\lambda_{k+1}": model.prior.mean.item(), "\\Psi_{k+1}": model.prior.cov.item()}
+    for k, measured in enumerate(y[:, 0, 0]):
+        now = {r"\lambda_{k}": values["\\lambda_{k+1}"], r"\Psi_{k}": values["\\Psi_{k+1}"], "y_{k}": float(measured)}
+        for one, formula in scalar_equations(structure):
+            numbers = {s: now[s.name] if s.name in now else model.values[s] for s in formula.free_symbols}
+            now[one.name] = values[one.name] = float(formula.subs(numbers))
+        # rounding of some dozens of operations, in another order
+        assert now["z_{k}"] == pytest.approx(expected.mean[k].item(), rel=1e-9, abs=1e-12)
+        assert now["p_{k}"] == pytest.approx(expected.cov[k].item(), rel=1e-9)
+
+
+@pytest.mark.quick
+def test_only_scalar_models_are_written_out():
+    with pytest.raises(ValueError, match="only scalar models"):
+        scalar_equations(gaussian(load_variants()["20"].model))
 
 
 def test_a_vector_variant_has_no_scalar_derivation(tmp_path):
@@ -91,6 +196,8 @@ def test_a_vector_variant_has_no_scalar_derivation(tmp_path):
     found = compare(lab_filters(model, ["aof-gaussian", "duof"]), model, 500, 3, 1, progress=False)
     write_handin(load_variants()["20"], found, tmp_path, "ru")
     tex = (tmp_path / "handin.tex").read_text(encoding="utf-8")
+    assert "В среднем по шагам точнее всех ГАОФ; дисперсия ошибки наименее точного, ДУОФ, больше на $" in tex
+    assert r"\Psi_0 = D_0 = \begin{pmatrix}0.1 & 0 \\ 0 & 0.1\end{pmatrix}" in tex
     assert "pmatrix" in tex and "q_2" not in tex and r"&\quad" in tex
 
 
@@ -147,6 +254,8 @@ def test_a_filter_that_diverges_and_other_reasons():
     assert "trajectories" in cause(str(caught.value), model, WORDS["ru"])  # not the filter's fault: quoted
     infinite = "step 7: duof became infinite or NaN although the trajectories are finite; leave it out or check the model"
     assert "на шаге 7" in cause(infinite, model, WORDS["ru"]) and "at step 7" in cause(infinite, model, WORDS["en"])
+    negative = "step 28: mfos-gaussian failed: a covariance has the variance -165479, which must not be negative: check the"
+    assert "на шаге 28" in cause(negative, model, WORDS["ru"]) and "at step 28" in cause(negative, model, WORDS["en"])
     assert "60 с" in cause(admission._TOO_LONG.format(60), model, WORDS["ru"])
     assert cause("50 % of $ & _", model, WORDS["en"]) == "50 % of $ & _"
 
@@ -169,7 +278,12 @@ def test_formulas_that_are_too_long_are_not_printed(result, monkeypatch, tmp_pat
     monkeypatch.setattr(report, "LONGEST", 10)
     write_handin(load_variants()["53"], result, tmp_path, "ru")
     tex = (tmp_path / "handin.tex").read_text(encoding="utf-8")
-    assert tex.count("Формулы слишком длинны") == 2 and "too long" not in tex and "каталоге" not in tex
+    assert (
+        tex.count("Формулы слишком громоздки") == 2
+        and "уравнения для данной модели" not in tex
+        and "too long" not in tex
+        and "каталоге" not in tex
+    )
 
 
 @pytest.mark.quick

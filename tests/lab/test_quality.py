@@ -673,7 +673,7 @@ def test_impossible_options_are_usage_errors(call, monkeypatch, arguments):
 def test_an_unknown_variant_or_file_is_named(call):
     result = call("--check", "--variant", "999")
     assert result.exit_code == 1
-    assert "no variant 999; there are 53, 1, 2" in result.stderr
+    assert "no variant '999'; there are 53, 1, 2" in result.stderr
     result = call("--check", "--variants", "nothing.toml")
     assert result.exit_code == 1
     assert "nothing.toml" in result.stderr

@@ -9,8 +9,9 @@ from kfcourse.checks import exercise
 from kfcourse.checks.exercises import ExerciseError
 from kfcourse.checks.posing import unposed
 from kfcourse.filters import Design, Filter
+from kfcourse.lab import variants as of_variants
 from kfcourse.lab.short_names import FILTERS, LAB, has_exact, title
-from kfcourse.lab.variants import VariantError, find_variant
+from kfcourse.lab.variants import VariantError, VariantWarning, chosen_variants, find_variant
 
 pytestmark = pytest.mark.quick
 
@@ -185,6 +186,20 @@ BAD_VARIANTS = {
     "mean in words": (GOOD + 'prior = { mean = "zero" }', "`prior`"),
     "law of other keys": (GOOD + "prior = { sigma = 1 }", "sigma"),
     "law without a table": (GOOD + "prior = 3", "`prior`"),
+    "prior true": (GOOD + "prior = { variance = true }", "`prior`: mean and variance must be numbers"),
+    "a number in quotes": (GOOD + 'prior = { mean = "1e5" }', "got mean = '1e5'"),
+    "true in a list": (GOOD + "meter_noise = { variance = [true] }", "`meter_noise`: mean and variance must be numbers"),
+    "inputs in quotes": (GOOD.replace("x + w", "x + u + w") + 'inputs = { u = ["1", "2"] }', "the input u must be a list"),
+    "angles 3": (GOOD + "angles = 3", "`angles` must name components"),
+    "angles 0": (GOOD + "angles = 0", "`angles` must name components"),
+    "angles true": (GOOD + "angles = true", "got True; leave it out"),
+    "angles of a component 3": (GOOD + "angles = { x = 3 }", "`angles` must name components"),
+    "angles on a date": (GOOD + "angles = 2024-01-01", "`angles` must name components"),
+    "angles in a list of numbers": (GOOD + "angles = [1]", "`angles` must name components"),
+    "ten thousand hexadecimal digits": (GOOD + f"parameters = {{ c = 0x{'f' * 10_000} }}", "numbers of thousands of digits"),
+    "as many in a list": (GOOD + f"angles = [0x{'f' * 10_000}]", "numbers of thousands of digits"),
+    "a variance that ends at once": (GOOD + 'meter_noise = { variance = "1 - k" }', "-1 at step 2; it must not be negative"),
+    "a variance that is infinite": (GOOD + 'meter_noise = { variance = "1/k" }', "inf at step 0; it must be finite"),
     "symbols of other keys": (GOOD + 'symbols = { z = ["x"] }', "z"),
     "symbols not named": (GOOD + "symbols = { x = 5 }", "x must be a name or a list of names"),
     "one symbol for two": ('state = ["x1 + v1", "x2"]\nmeter = ["x1 + w1"]\nsymbols = { x = ["x1"] }', ""),
@@ -197,10 +212,14 @@ def test_a_bad_variant_is_refused_by_file_and_name(tmp_path, case):
     path = tmp_path / "mine.toml"
     path.write_text(f"[variants.good]\n{GOOD}\n[variants.bad]\n{body}\n", encoding="utf-8")
     with pytest.raises(VariantError) as caught:
-        load_variants(path)
+        find_variant("bad", path)
     message = str(caught.value)
     assert message.startswith(f"variant bad in {path}: ")
     assert problem in message
+    assert find_variant("good", path).model == Model.define("0.9*x + v", "x + w")  # no matter what else is in the file
+    with pytest.warns(VariantWarning, match=r"^variant bad in") as warned:
+        assert list(load_variants(path)) == ["good"]
+    assert [str(one.message) for one in warned] == [message]
 
 
 @pytest.mark.parametrize(
@@ -233,8 +252,8 @@ def test_a_formula_cannot_execute_code(tmp_path, formula):
         ("[variant.53]\n" + GOOD, "no variants"),
         ("[variants.53\n" + GOOD, "not valid TOML"),
         ("[variants.a]\n" + GOOD + "[variants.a]\n" + GOOD, "not valid TOML"),
-        ("[variants.a]\n" + GOOD + f"prior = {{ mean = {'9' * 5000} }}", "not valid TOML"),
-        ("[variants.a]\n" + GOOD + f"prior = {{ mean = {'[' * 5000}{']' * 5000} }}", "not valid TOML"),
+        ("[variants.a]\n" + GOOD + f"prior = {{ mean = {'9' * 10_000} }}", "a number of thousands of digits"),
+        ("[variants.a]\n" + GOOD + f"prior = {{ mean = {'[' * 5000}{']' * 5000} }}", "lists in too many lists"),
         ("[variants]\nbad = 5", "variant bad in"),
         ("[[variants]]\n" + GOOD, "no variants"),
         (b"\xff\xfe", "cannot be read"),
@@ -247,6 +266,23 @@ def test_a_bad_file_is_refused_by_name(tmp_path, content, problem):
         load_variants(path)
     assert str(path) in str(caught.value)
     assert problem in str(caught.value)
+
+
+def test_only_the_variants_asked_for_are_built(tmp_path, monkeypatch):
+    path, built = tmp_path / "many.toml", []
+    path.write_text("".join(f"[variants.{i}]\n{GOOD}" for i in range(5000)), encoding="utf-8")
+    whole = of_variants.read_variant
+    monkeypatch.setattr(of_variants, "read_variant", lambda name, *rest: built.append(name) or whole(name, *rest))
+    assert find_variant("4711", path).name == "4711" and built == ["4711"]
+    assert [one.name for one in chosen_variants(["7", "3", "7"], False, path)] == ["7", "3"] and built[1:] == ["7", "3"]
+    with pytest.raises(VariantError, match=r"no variant 'x'; there are 0, 1, .*39, \.\.\. \(5000 in all\)$"):
+        find_variant("x", path)
+
+
+def test_an_editor_s_byte_order_mark_is_no_part_of_the_file(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("[variants.a]\n" + GOOD, encoding="utf-8-sig")
+    assert find_variant("a", path).model == Model.define("0.9*x + v", "x + w")
 
 
 def test_a_missing_file_and_a_folder_are_refused_by_name(tmp_path):

@@ -9,8 +9,8 @@ from kfcourse import Model, compare, lab_filters
 from kfcourse.filters import duof, kalman_filter
 from kfcourse.lab import LAB
 from kfcourse.montecarlo.comparison import Comparison, Subset
-from kfcourse.montecarlo.statistics import Sums, batch_mean
-from kfcourse.montecarlo.two_phase import Replicas, Terms
+from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean
+from kfcourse.montecarlo.two_phase import Replicas, Terms, with_design
 
 SIGMA = 4
 
@@ -98,6 +98,13 @@ def test_what_is_better_than_the_exact_filter_refutes_it(counted):
     counted.subset.sums.doubt[:] = 0.0
     beaten = replace(counted, sums=sums_of(4, square=[[2, 4, 6, 8], [0.1, 0.2, 0.1, 0.2]], own=[[4, 5, 5, 6], [1, 1, 1, 1]]))
     assert beaten.doubtful.all()
+
+
+def test_freedom_of_an_error_of_trajectories_and_designs():
+    """Welch and Satterthwaite's formula, by hand: (a + b)^2 / (a^2 / f + b^2 / g) of two variances a and b."""
+    one = with_design(Estimate(np.array([1.0, 2.0]), np.array([0.3, 0.3]), 20), np.array([0.04, 0.0]), 3)
+    np.testing.assert_allclose(one.standard_error, [np.sqrt(0.13), 0.3], rtol=1e-14)
+    np.testing.assert_allclose(one.freedom, [0.13**2 / (0.09**2 / 20 + 0.04**2 / 3), 20], rtol=1e-14)
 
 
 def test_the_exact_filter_is_no_entrant(counted):

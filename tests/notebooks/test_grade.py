@@ -21,6 +21,7 @@ from kfcourse.checks.question import MIME
 from kfcourse.notebooks import commands
 from kfcourse.notebooks.grading import marking, running, submissions
 from kfcourse.notebooks.grading.assembly import assembled
+from kfcourse.notebooks.grading.marking import code_of
 from kfcourse.notebooks.grading.running import Place
 from kfcourse.notebooks.grading.sandbox import Sandbox
 from kfcourse.notebooks.grading.submissions import Cell, Unreadable, cells_of, claimed, clean
@@ -562,6 +563,18 @@ def test_signs_of_a_screen_without_ticks(monkeypatch):
 
     monkeypatch.setattr(commands.sys, "stdout", io.TextIOWrapper(io.BytesIO(), encoding="cp1251"))
     assert set(commands._signs().values()) == {"+", "x", "-"}
+
+
+def test_the_same_answers_in_another_order_are_the_same_work():
+    """A copied notebook is known though its cells were moved, and its comments changed; another answer makes another one."""
+    first, second = (
+        Cell(i, f"c{i}", "", text) for i, text in enumerate(("def one(a):\n    return a", "def two(b):\n    return b"))
+    )
+    other = Cell(1, "c1", "", "def two(b):  # mine\n    return b")
+    names = {"one", "two"}
+    assert code_of([first, second], names) == code_of([other, first], names) != ""
+    assert code_of([first], names) != code_of([first, second], names)
+    assert code_of([first], {"three"}) == ""
 
 
 def test_text_of_students_is_cleaned():

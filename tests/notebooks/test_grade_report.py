@@ -12,7 +12,7 @@ from kfcourse.checks.question import PASSED, UNUSABLE, WRONG
 from kfcourse.notebooks.course_list import Student, read_assignment, save_assignment
 from kfcourse.notebooks.grading.owners import of_folder, owner, people
 from kfcourse.notebooks.grading.report import anonymous, drawing, feedback, question_rows, student_rows, unnamed, write_report
-from kfcourse.notebooks.grading.table import NOT_RUN, Grade, Told
+from kfcourse.notebooks.grading.table import NOT_RUN, Grade, Told, cautious
 from kfcourse.notebooks.grading.weights import WEIGHTS, points, possible
 
 IVANOV = Student("Иванов Иван", "РТ-1", "53", "b c")
@@ -26,6 +26,31 @@ def graded(name, letter="b", variant="53", passed=(), student="", work="", note=
     told |= {one: Told("right") for one in passed}
     marks |= {one: WRONG for one, said in told.items() if said.says != "right"}
     return Grade(name, "graded", letter, variant, marks, note, name, told, student, work)
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("begin", "=+-@")
+def test_no_text_is_a_formula_of_a_spreadsheet(begin):
+    assert cautious(f"{begin}SUM(A1)") == f" {begin}SUM(A1)"
+    assert cautious(f"SUM{begin}") == f"SUM{begin}" and cautious("") == ""
+
+
+@pytest.mark.quick
+def test_the_group_in_a_path_tells_more_than_a_longer_name():
+    short, long = Student("Иванов Иван", "РТ-1", "53", "b"), Student("Иванов Иван Петрович", "РТ-2", "7", "b")
+    for students in ([short, long], [long, short]):
+        assert owner(graded("РТ-1/Иванов Иван Петрович/b.ipynb"), students) == short
+        assert owner(graded("РТ-2/Иванов Иван Петрович/b.ipynb"), students) == long
+        assert owner(graded("Иванов Иван Петрович/b.ipynb"), students) == long
+
+
+@pytest.mark.quick
+def test_of_two_equally_good_notebooks_the_first_counts():
+    first, second = (graded(f"РТ-1/Иванов Иван/b{i}.ipynb", passed=["b1"], work=str(i)) for i in (1, 2))
+    for grades in ([first, second], [second, first]):
+        (one, *_), _ = people(grades, COURSE)
+        assert one.grades["b"] == first
+        assert "set b: came back more than once, the best counts" in one.flags
 
 
 @pytest.mark.quick

@@ -524,7 +524,7 @@ def test_dask_has_to_be_installed(call, masters, monkeypatch):
 
 def test_unknown_names_are_refused(call, tmp_path):
     refused(call("exercises", "--out", "o"), "name the variants: --variant 53, or --all")
-    refused(call("exercises", "--out", "o", "--variant", "99"), "no variant 99; there are 53, 1,")
+    refused(call("exercises", "--out", "o", "--variant", "99"), "no variant '99'; there are 53, 1,")
     refused(call("solutions", "--out", "o", "--variant", "53", "--sets", "b,zz"), "no exercise set zz; there are a, b")
     refused(call("solutions", "--out", "o", "--variant", "53", "--sets", ","), "no exercise set")
     refused(call("exercises", "--out", "o", "--variant", "53", "--variants", "no.toml"), "no file of variants at no.toml")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from kfcourse.checks import Exercise, exercise, sets
+from kfcourse.checks import Exercise, Question, exercise, sets
 from kfcourse.notebooks.grading.asking import salted, steady
 from kfcourse.notebooks.grading.channel import Channel, Closed, Late, Patient
 from kfcourse.notebooks.grading.values import HEADS, Other, Strange, Unsent, decode, encode
@@ -196,6 +196,24 @@ def test_the_grader_asks_nothing_that_rounding_decides():
     asked = salted("g", '"20"', "g7", "salt")
     assert asked.salt.startswith("salt/") and steady(question, asked)
     assert salted("g", '"20"', "g7", "salt") is asked  # the same for all notebooks of a run
+
+
+@pytest.mark.parametrize(("part", "good"), [(0.05, True), (0.25, True), (0.35, False), (0.8, False), (2.0, False)])
+def test_rounding_may_take_a_third_of_the_tolerance(part, good):
+    """a - 1 of a = 1 + d changes by 4 last digits of 1 over d: by this part of what is allowed.  The rest is the student's.
+
+    Allowed is the tolerance of the number and once more of the largest one, here the same: twice the tolerance.
+    """
+    tolerance = 1e-9
+    d = 4 * np.finfo(float).eps / (part * 2 * tolerance)
+    question = Question("t1", "a test", "core", lambda a: a - 1, lambda _: [(1 + d,)], tolerance=tolerance)
+    assert steady(question, exercise("b", "53")) == good
+
+
+def test_a_number_and_the_same_number_with_digits_stay_what_they_are():
+    formula = x**2 + sp.Float(2.0) * y + sp.Float(1.0) * sp.sin(x) ** sp.Float(2.0)
+    assert sp.srepr(sent(formula)) == sp.srepr(formula)
+    assert [type(one) for one in sent(sp.Matrix([2, sp.Float(2.0)]))] == [sp.Integer, sp.Float]
 
 
 def test_all_questions_can_be_asked_with_the_first_arguments_that_are_good():

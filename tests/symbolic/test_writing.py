@@ -2,8 +2,11 @@
 
 import pytest
 import sympy as sp
+from sympy.codegen.cfunctions import expm1
 
-from kfcourse.symbolic.writing import _Writer, formula_latex, number_latex
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.structure import gaussian
+from kfcourse.symbolic.writing import _Writer, formula_latex, formula_lines, number_latex
 
 pytestmark = pytest.mark.quick
 
@@ -50,3 +53,13 @@ def test_what_is_written_is_what_was_given(name) -> None:
 )
 def test_powers_of_ten_of_a_value_are_written_as_people_do(value, expected):
     assert number_latex(value) == expected
+
+
+def test_the_code_s_expm1_is_written_as_people_do():
+    """Var sin x of x ~ N(m, d); SymPy would print expm_1 - d, which is no formula."""
+    F = gaussian(Model.define("x + v", "sin(x) + w"))["F"]
+    assert F.has(expm1)
+    printed = formula_latex(F, (m, d))
+    assert "expm" not in printed
+    assert printed == formula_latex(sp.expand(F.replace(expm1, lambda u: sp.exp(u) - 1)), (m, d))
+    assert "expm" not in " ".join(formula_lines(F, (m, d)))
