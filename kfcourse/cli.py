@@ -23,12 +23,13 @@ from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.grammar import generate
 from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
-from kfcourse.lab.report import conclusions, write_json, write_report
+from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
 from kfcourse.lab.short_names import FILTERS, LAB, has_bound, title
 from kfcourse.lab.variants import VariantError, find_variant, read_variants
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare
+from kfcourse.montecarlo.subset import FEWEST as FEWEST_EXACT
 from kfcourse.montecarlo.subset import LEAST
 from kfcourse.symbolic.formula import FormulaError
 from kfcourse.symbolic.moments import NoClosedForm
@@ -253,8 +254,10 @@ def lab(
     The same seed gives the same numbers, bit by bit on one machine; another one's linear algebra (BLAS) may round
     otherwise, by 1e-13 or so.
     """
-    if exact_runs == 1:
-        raise click.ClickException("one trajectory has no standard error: give --exact-runs 0, or at least 2")
+    if 0 < exact_runs < FEWEST_EXACT:
+        raise click.ClickException(
+            f"on {exact_runs} trajectories the rare ones that matter are missing: give --exact-runs 0, or at least {FEWEST_EXACT}"
+        )
     if same_ensemble and designs not in (None, 1):
         raise click.UsageError("--same-ensemble designs once, on the ensemble of the comparison: leave --designs out")
     chosen = find_variant(variant, variants_file)
@@ -317,7 +320,7 @@ def _tell(result: Comparison, to_error: bool) -> None:
         lines.append(f"{title(name):<10} {100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}")
     if result.subset_runs:
         lines.append(f"Slow filters: on {result.subset_runs} of {result.runs} trajectories")
-    click.echo("\n".join([*lines, *conclusions(result)]), err=to_error)
+    click.echo("\n".join([*lines, *remarks_in_words(result), *conclusions(result)]), err=to_error)
 
 
 @contextmanager

@@ -124,7 +124,7 @@ def test_help_and_version(call, option):
 
 
 def test_the_lab_of_variant_53(call, tmp_path):
-    result = call("lab", "53", "--runs", 4000, "--steps", 12, "--exact-runs", 20, "--out", "report", "--json", "n.json")
+    result = call("lab", "53", "--runs", 4000, "--steps", 12, "--exact-runs", 112, "--out", "report", "--json", "n.json")
     assert result.exit_code == 0, result.output
     assert "is more accurate than" in result.output
     data = json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))
@@ -199,7 +199,9 @@ def test_filters_can_be_chosen(call, no_report, tmp_path):
 
 
 def test_every_filter_can_be_chosen(call, no_report, tmp_path):
-    result = call("lab", "53", "--runs", 200, "--steps", 3, "--exact-runs", 4, "--filters", ",".join(FILTERS), "--json", "n.json")
+    result = call(
+        "lab", "53", "--runs", 200, "--steps", 3, "--exact-runs", 112, "--filters", ",".join(FILTERS), "--json", "n.json"
+    )
     assert result.exit_code == 0, result.output
     assert set(json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]) == set(FILTERS)
 
@@ -231,7 +233,7 @@ def test_a_variant_s_name_cannot_lead_out_of_the_folder(call, no_figures, tmp_pa
 
 
 def test_the_same_seed_gives_the_same_bytes_whatever_the_threads(call, no_report, tmp_path):
-    common = ("lab", "53", "--runs", 2000, "--steps", 6, "--exact-runs", 40, "--out", "report")
+    common = ("lab", "53", "--runs", 2000, "--steps", 6, "--exact-runs", 112, "--out", "report")
     for name, options in {"a": (), "b": (), "c": ("--threads", 1), "d": ("--seed", 2)}.items():
         assert call(*common, *options, "--json", f"{name}.json").exit_code == 0
     a, b, c, d = ((tmp_path / f"{name}.json").read_bytes() for name in "abcd")
@@ -266,7 +268,7 @@ def test_no_filter_is_an_error(call, names):
 
 
 def test_the_exact_filter_alone_asks_for_a_fast_one(call):
-    refused(call("lab", "53", "--runs", 100, "--steps", 2, "--exact-runs", 4, "--filters", "aof-exact"), "aof-gaussian")
+    refused(call("lab", "53", "--runs", 100, "--steps", 2, "--exact-runs", 100, "--filters", "aof-exact"), "aof-gaussian")
 
 
 def test_a_model_without_closed_form_names_the_term_and_the_way_out(call, no_computation):
@@ -568,13 +570,13 @@ def test_a_noiseless_meter_warns_of_nothing(call, tmp_path):
 
 def test_endless_budgets_are_budgets(call, no_report):
     """No clock can be set to infinity; nothing is limited then."""
-    endless = ("--exact-seconds", "inf", "--exact-memory", "inf", "--exact-runs", 4)
+    endless = ("--exact-seconds", "inf", "--exact-memory", "inf", "--exact-runs", 100)
     result = call("lab", "53", *QUICK[:4], *endless, "--filters", "aof-gaussian,aof-exact")
     assert result.exit_code == 0 and "on 4 of 400 trajectories" in result.output, result.output
 
 
 def test_one_exact_run_has_no_standard_error_and_is_refused(call):
-    refused(call("lab", "53", "--runs", 100, "--steps", 2, "--exact-runs", 1), "at least 2")
+    refused(call("lab", "53", "--runs", 100, "--steps", 2, "--exact-runs", 7), "at least 100")
 
 
 def test_designs_and_a_wider_start_can_be_chosen(call, no_report, tmp_path):

@@ -14,6 +14,7 @@ from functools import partial
 from importlib import resources
 from pathlib import Path
 
+import numpy as np
 import sympy as sp
 from matplotlib.axes import Axes
 
@@ -21,13 +22,13 @@ from kfcourse.files import replacing_together
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
-from kfcourse.lab.handin_text import filled, in_percent, inline_html, inline_tex, law, lines_of, matrix, power_of_ten, ranges
+from kfcourse.lab.handin_text import filled, in_percent, inline_html, inline_tex, law, lines_of, matrix, power_of_ten
 from kfcourse.lab.refusals import cause
-from kfcourse.lab.report import printed, save_figure, save_texts, table_steps
+from kfcourse.lab.report import printed, ranges, remarks, save_figure, save_texts, table_steps
 from kfcourse.lab.short_names import FILTERS, Structures
 from kfcourse.lab.variants import Variant
 from kfcourse.lab.written_out import written_lines
-from kfcourse.montecarlo.comparison import EXACT, Comparison
+from kfcourse.montecarlo.comparison import EXACT, Comparison, Verdict
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 from kfcourse.symbolic.reading import exact_matrix
@@ -263,6 +264,11 @@ class _Report:
             estimates = [result.error_variance(name) for name in names]
             rows = [[f"${k}$", *(power_of_ten(one[k]) for one in estimates)] for k in table_steps(result)]
             yield Block("table", words["table_goes_on" if start else "table"], ["$k$", *map(self.title, names)], rows)
+        for kind, values in remarks(result):
+            steps = self.at(np.flatnonzero(values["steps"]).tolist())
+            yield Block(
+                "text", filled(words[f"remark_{kind}"], **values | {"name": self.title(values.get("name", "")), "at": steps})
+            )
         reference = words["of_exact"] if result.has_bound else self.title(result.control)
         for name in self.figures:
             yield Block("figure", filled(words[f"figure_{name}"], reference=reference), [f"handin-{name}"])
@@ -280,27 +286,20 @@ class _Report:
             yield Block("section", words["conclusion"])
             yield Block("text", self.mean_sentence("alone_bound" if result.has_bound else "alone_control"))
             return
-        verdicts = {k: self.verdict(k) for k in table_steps(result)}
+        verdicts = result.verdicts()
         yield Block("section", words["conclusion"])
         yield Block("text", words["verdict_text"])
         heading = [words[key] for key in ("step", "best", "not_worse", "worst")]
         rows = [
             [f"${k}$", self.title(best), ", ".join(map(self.title, others)) or "–", self.title(worst) if worst else "–"]
-            for k, (best, others, worst) in verdicts.items()
+            for k, (best, others, worst) in ((k, verdicts[k]) for k in table_steps(result))
         ]
         yield Block("table", words["verdict_table"], heading, rows)
-        yield Block("items", lines=list(self.sentences()))
+        yield Block("items", lines=list(self.sentences(verdicts)))
 
-    def verdict(self, k: int) -> tuple[str, list[str], str]:
-        """The most accurate at step k, those not significantly worse, and the least accurate, or "" if it is one of those."""
-        best, *others = self.result.leaders(k)
-        last = max(self.result.entrants, key=lambda name: float(self.result.gap(name)[k].value))
-        return best, others, "" if last in (best, *others) else last
-
-    def sentences(self) -> Iterator[str]:
+    def sentences(self, verdicts: list[Verdict]) -> Iterator[str]:
         """The conclusion: who leads and who is last, on how many steps, and how far from the bound."""
         result, words = self.result, self.words
-        verdicts = [self.verdict(k) for k in range(result.steps)]
         alone = [best for best, others, _ in verdicts if not others]
         for name in sorted(set(alone), key=lambda one: -alone.count(one)):
             steps = [k for k, (best, others, _) in enumerate(verdicts) if best == name and not others]
@@ -321,7 +320,7 @@ class _Report:
 
     def at(self, steps: list[int]) -> str:
         """At step 2; at steps 0–1, 3–50."""
-        return filled(self.words["at_step" if len(steps) == 1 else "at_steps"], where=ranges(steps))
+        return filled(self.words["at_step" if len(steps) == 1 else "at_steps"], where=ranges(steps, "${}$"))
 
     def mean_sentence(self, key: str) -> str:
         """How far the first filter and the last are from the bound, or from the control."""

@@ -71,18 +71,8 @@ def power_of_ten(estimate: Estimate) -> str:
 
 def in_percent(estimate: Estimate) -> str:
     """A part and its standard error in per cent, as a formula."""
-    return "$" + percent(estimate).replace("±", r"\pm") + "$"
-
-
-def ranges(steps: list[int]) -> str:
-    """1, 3–5, 8: runs of steps joined."""
-    parts: list[list[int]] = []
-    for k in steps:
-        if parts and k == parts[-1][1] + 1:
-            parts[-1][1] = k
-        else:
-            parts.append([k, k])
-    return ", ".join(f"${a}$" if a == b else f"${a}$–${b}$" for a, b in parts)
+    found = percent(estimate)
+    return found if found == "–" else "$" + found.replace("±", r"\pm") + "$"
 
 
 def inline_html(text: str) -> str:

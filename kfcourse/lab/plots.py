@@ -88,10 +88,10 @@ def relative_accuracy(
         if name == zero:
             continue
         gap = result.gap(name)[steps]
-        middle, half = 100 * gap.value, 100 * gap.half_width(confidence)
+        low, high = gap.interval(confidence)
         line = style(name) | {"label": words.title(name)}
-        ax.plot(k, middle, markersize=4, markevery=max(1, len(k) // 12), **line)
-        ax.fill_between(k, middle - half, middle + half, color=line["color"], alpha=0.15, linewidth=0)
+        ax.plot(k, 100 * gap.value, markersize=4, markevery=max(1, len(k) // 12), **line)
+        ax.fill_between(k, 100 * low, 100 * high, color=line["color"], alpha=0.15, linewidth=0)
     ax.axhline(0, color="black", linewidth=0.8, label=words.title(zero))
     ax.set_xlabel(words.step)
     ax.set_ylabel(words.above.replace("{name}", words.title(zero)))
@@ -105,8 +105,10 @@ def ranking(result: Comparison, ax: Axes, steps: slice = slice(None), confidence
     ranked = result.ranking(steps)[::-1]
     for row, (name, gap) in enumerate(ranked):
         line = style(name)
-        half = 100 * float(gap.half_width(confidence))
-        ax.errorbar(100 * float(gap.value), row, xerr=half, fmt=line["marker"], color=line["color"], capsize=3)
+        low, high = gap.interval(confidence)
+        middle = float(gap.value)
+        ends = 100 * np.array([[middle - low], [high - middle]])
+        ax.errorbar(100 * middle, row, xerr=ends, fmt=line["marker"], color=line["color"], capsize=3)
     ax.set_yticks(range(len(ranked)), [words.title(name) for name, _ in ranked])
     ax.axvline(0, color="black", linewidth=0.8)
     ax.set_xlabel(words.mean_above.replace("{name}", words.title(EXACT if result.has_bound else result.control)))
@@ -123,8 +125,7 @@ def consistency(
         value = result.normalised_error(name)
         line = style(name) | {"label": words.title(name)}
         ax.plot(steps, value.value, markersize=4, markevery=max(1, result.steps // 10), **line)
-        half = value.half_width(confidence)
-        ax.fill_between(steps, value.value - half, value.value + half, color=line["color"], alpha=0.15, linewidth=0)
+        ax.fill_between(steps, *value.interval(confidence), color=line["color"], alpha=0.15, linewidth=0)
     ax.axhline(1, color="black", linewidth=0.8)
     ax.set_yscale("log")
     ax.set_xlabel(words.step)

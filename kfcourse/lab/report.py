@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -28,8 +28,9 @@ from kfcourse.lab import plots
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import FILTERS, Structures, title
 from kfcourse.lab.variants import Variant
+from kfcourse.laws import Array
 from kfcourse.limits import OutOfTime, time_limit
-from kfcourse.montecarlo.comparison import EXACT, Comparison
+from kfcourse.montecarlo.comparison import EXACT, HEAVY, Comparison
 from kfcourse.montecarlo.statistics import Estimate, ratio
 from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.model import Model
@@ -173,7 +174,8 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
             (name, title(name) + (", the bound" if name == EXACT else ""), FILTERS[name].russian if name in FILTERS else "")
             for name in names
         ],
-        "table": _table(result, [[_cell(one) for one in result.error_variance(name)] for name in names]),
+        "table": _table(result, [_cells(result, name) for name in names]),
+        "remarks": remarks_in_words(result),
         "compared": [title(name) for name in compared],
         "gaps": _table(result, [[percent(one) for one in result.gap(name)] for name in compared]) if compared else [],
         "ranking": [
@@ -212,8 +214,60 @@ def _equation_sections(names: tuple[str, ...]) -> list[Section]:
     return [Section.of(_FAMILIES[family], equations_latex(EQUATIONS[family])) for family in families if family in EQUATIONS]
 
 
+# What a reader must know before he relies on distances from the bound, by kind.
+REMARKS = {
+    "rounding": "At {steps} the errors are zero but for the rounding of numbers as large as the states: nothing is told of them, "
+    "and means leave these steps out.",
+    "doubtful": "At {steps} there is no bound: what ran in the place of the exact AOF errs by more than a tenth of its variance "
+    "itself, or another filter is more accurate. Means leave these steps out.",
+    "heavy": "{name}: at {steps} one trajectory of {runs} makes up to {part} % of its distance from the exact AOF. The interval "
+    "there cannot be trusted; about {enough} trajectories would do (--exact-runs, --exact-seconds).",
+}
+
+
+def remarks(result: Comparison) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Kinds of `REMARKS` that this comparison needs, with what is put into the words: steps as a mask, names of filters."""
+    if result.without_error.any():
+        yield "rounding", {"steps": result.without_error}
+    if result.doubtful.any():
+        yield "doubtful", {"steps": result.doubtful}
+    for name in result.entrants if result.has_bound else ():
+        heavy = np.where(result.usable, result.heavy(name), 0.0)
+        if heavy.max() > HEAVY:
+            enough = f"{result.subset_runs * heavy.max() / HEAVY:.1g}"
+            part = {"part": f"{100 * heavy.max():.0f}", "runs": result.subset_runs, "enough": f"{float(enough):.0f}"}
+            yield "heavy", {"name": name, "steps": heavy > HEAVY, **part}
+
+
+def remarks_in_words(result: Comparison) -> list[str]:
+    """The remarks as sentences."""
+    return [
+        REMARKS[kind].format(**values | {"name": title(values.get("name", "")), "steps": _at(values["steps"])})
+        for kind, values in remarks(result)
+    ]
+
+
+def _at(chosen: Array) -> str:
+    """step 2; steps 0–1, 3–50."""
+    numbers = np.flatnonzero(chosen).tolist()
+    return f"step{'s' if len(numbers) > 1 else ''} {ranges(numbers)}"
+
+
+def ranges(steps: Sequence[int], one: str = "{}") -> str:
+    """1, 3–5, 8: runs of steps joined, each number written as `one`."""
+    parts: list[list[int]] = []
+    for k in steps:
+        if parts and k == parts[-1][1] + 1:
+            parts[-1][1] = k
+        else:
+            parts.append([k, k])
+    return ", ".join(one.format(a) if a == b else f"{one.format(a)}–{one.format(b)}" for a, b in parts)
+
+
 def percent(part: Estimate) -> str:
-    """A part and its standard error in per cent, the latter with two digits: "1.19 ± 0.40"."""
+    """A part and its standard error in per cent, the latter with two digits: "1.19 ± 0.40"; "–" where there is none."""
+    if np.isnan(part.value):
+        return "–"
     value, error = 100 * float(part.value), 100 * float(part.standard_error)
     places = int(np.clip(1 - np.floor(np.log10(error)), 0, 6)) if np.isfinite(error) and error > 0 else 2
     return f"{value:.{places}f} ± {error:.{places}f}"
@@ -240,6 +294,12 @@ def table_steps(result: Comparison) -> list[int]:
 def _table(result: Comparison, columns: list[list[str]]) -> list[tuple[int, list[str]]]:
     """Rows (step, cells) of columns (steps,)."""
     return [(k, [column[k] for column in columns]) for k in table_steps(result)]
+
+
+def _cells(result: Comparison, name: str) -> list[str]:
+    """D_k of a filter by step, 0 where it is rounding."""
+    estimates = result.error_variance(name)
+    return ["0" if abs(one.value) <= least else _cell(one) for one, least in zip(estimates, result.rounding, strict=True)]
 
 
 def _cell(estimate: Estimate) -> str:

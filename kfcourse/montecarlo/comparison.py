@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from kfcourse.laws import Array
-from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean, ratio
+from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean, ratio, rejected
 from kfcourse.montecarlo.two_phase import Replicas, Terms, batch_sums, estimate, with_design
 from kfcourse.symbolic.model import Model
 
@@ -37,6 +38,14 @@ class Subset:
         fast = list(range(len(self.sums.square) - len(self.slow)))
         slow = [name for name in self.slow if name != EXACT]
         return replace(self, slow=slow, sums=self.sums.of_filters([*fast, *kept])) if slow else None
+
+
+class Verdict(NamedTuple):
+    """At one step: the most accurate filter, those that are not significantly worse, and the least accurate if it is worse."""
+
+    best: str
+    not_worse: list[str]
+    worst: str
 
 
 @dataclass(frozen=True)
@@ -93,12 +102,16 @@ class Comparison:
         """Whether the exact AOF ran."""
         return self._is_slow(EXACT)
 
+    @property
+    def rounding(self) -> Array:
+        """Error variances, (steps,), that may be of rounding alone: of states so large, in doubles."""
+        return ROUNDING * self.sums.size.sum(axis=-1) / self.sums.weights.sum()
+
     @cached_property
     def without_error(self) -> Array:
         """Steps, (steps,), at which the most accurate filter errs by rounding only: of such a bound no part can be told."""
         least = self.bound() if self.has_bound else self.error_variance(self.control)
-        size = self.sums.size.sum(axis=-1) / self.sums.weights.sum()
-        return np.asarray(least.value <= ROUNDING * size)
+        return np.asarray(least.value <= self.rounding)
 
     @cached_property
     def doubtful(self) -> Array:
@@ -238,6 +251,26 @@ class Comparison:
         found = {name: float(self.error_variance(name).value[step]) for name in self.entrants}
         best, *others = sorted(found, key=lambda name: found[name])
         return [best, *(name for name in others if self.difference(name, best)[step].interval(confidence)[0] <= 0)]
+
+    def verdicts(self, confidence: float = 0.95) -> list[Verdict]:
+        """For each step the most accurate entrant, who is not significantly worse, and who is the least accurate.
+
+        With the confidence all of them are right: Holm's test of everybody's difference from the most accurate, over all steps
+        and filters.  Where all errors are rounding, nobody is better.
+        """
+        found = {name: self.error_variance(name).value for name in self.entrants}
+        ranked = [sorted(self.entrants, key=lambda name: found[name][k]) for k in range(self.steps)]
+        pairs = {(name, best) for best, *others in ranked for name in others}
+        by_pair = {pair: self.difference(*pair).p_value() for pair in pairs}
+        p = np.array([[by_pair[name, best][k] for name in others] for k, (best, *others) in enumerate(ranked)])
+        p = np.where(self.without_error[:, None], 1.0, p)
+        worse = rejected(p, 1 - confidence)
+        return [
+            Verdict(
+                best, [name for name, bad in zip(others, row, strict=True) if not bad], others[-1] if others and row[-1] else ""
+            )
+            for (best, *others), row in zip(ranked, worse, strict=True)
+        ]
 
     def design_error(self, name: str) -> Estimate:
         """Standard deviation of D_k from one design of the filter to another, (steps,); 0 for filters that need none.

@@ -55,6 +55,15 @@ class Estimate:
         lower, upper = (self.value - _before_transformation(g, a) * self.standard_error for g in (quantile, -quantile))
         return lower, upper
 
+    def p_value(self) -> Array:
+        """Probability of a mean at least so far from 0, to either side, if the true one were 0: by the law of `interval`."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t, a = self.value / self.standard_error, np.asarray(self.skewness)
+        g = t + a * t**2 / 3 + a**2 * t**3 / 27 + a / 6
+        return np.where(
+            self.standard_error > 0, 2 * scipy.special.stdtr(self.freedom, -np.abs(g)), np.where(self.value == 0, 1.0, 0.0)
+        )
+
     def half_width(self, confidence: float = 0.95) -> Array:
         """Half the length of the interval."""
         lower, upper = self.interval(confidence)
@@ -93,6 +102,19 @@ def batch_mean(sums: Array, counts: Array) -> Estimate:
     cube = np.sqrt(square) ** 3  # may be 0 where its root is not: 1e-300 is a square, no cube
     skewness = np.divide((deviations**3).sum(axis=-1), cube, out=np.zeros(value.shape), where=cube > 0)
     return Estimate(value, np.sqrt(variance), max(batches - 1, 1), skewness)
+
+
+def rejected(p: Array, level: float) -> Array:
+    """Holm's test of many hypotheses: which (any shape) are rejected so that all rejections are right with probability 1 - level.
+
+    The smallest p is compared with level / n, the next with level / (n - 1), ... until one is larger (S. Holm, A simple
+    sequentially rejective multiple test procedure, Scand. J. Stat. 6, 1979).
+    """
+    order = np.argsort(p, axis=None)
+    small = p.ravel()[order] <= level / np.arange(p.size, 0, -1)
+    found = np.zeros(p.size, dtype=bool)
+    found[order[: p.size if small.all() else int(np.argmin(small))]] = True
+    return found.reshape(p.shape)
 
 
 def ratio(numerator: Array, denominator: Array, of_zero: Array | float) -> Array:

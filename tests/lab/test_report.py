@@ -27,7 +27,7 @@ def variants():
 @pytest.fixture(scope="module")
 def result53(variants):
     model = variants["53"].model
-    return compare(lab_filters(model, [*LAB, "aof-exact"]), model, 4000, 6, 1, subset_runs=40, progress=False)
+    return compare(lab_filters(model, [*LAB, "aof-exact"]), model, 4000, 6, 1, subset_runs=112, progress=False)
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +110,7 @@ def test_on_all_trajectories_the_control_variate_is_the_direct_mean(variants):
     model = variants["5"].model
     filters = lab_filters(model, ["aof-gaussian", "duof", "aof-unscented"])
     filters[2] = as_slow(filters[2], "slow")
-    result = compare(filters, model, 60, 5, 3, subset_runs=60, progress=False)
+    result = compare(filters, model, 112, 5, 3, subset_runs=112, progress=False)
     direct = result.component_variance("slow")
     # sums of the same numbers in another order: D + (D_slow - D) against D_slow
     np.testing.assert_allclose(result.error_variance("slow").value, direct.value[:, 0], rtol=1e-12)
