@@ -48,9 +48,13 @@ def test_whose_notebook(name, student, expected):
 
 def test_flags():
     grades = [
-        graded("РТ-1/Иванов Иван/b.ipynb", variant="7", work="x"),
+        graded("РТ-1/Иванов Иван/b.ipynb", work="x"),
         graded(
-            "РТ-1/Петрова Анна/b.ipynb", variant="20", work="x", student="Иванов Иван, РТ-1", note="look at cell 3: import os"
+            "РТ-1/Петрова Анна/b.ipynb",
+            variant="20",
+            work="x",
+            student="Иванов Иван, РТ-1",
+            note="look at cell 3: import os; b3: sign; look: b2 not graded: the check fails",
         ),
         graded("РТ-1/Петрова Анна/c.ipynb", "c", variant="20", passed=["c1"]),
         graded("РТ-1/Петрова Анна/c (1).ipynb", "c", variant="20", passed=["c1", "c2"]),
@@ -59,10 +63,11 @@ def test_flags():
         Grade("notes.ipynb", "not an exercise notebook"),
     ]
     (one, two, three), strangers = people(grades, COURSE)
-    assert one.flags == ["set b: variant 7, was given 53", "missing: c", "set b: the same code as Петрова Анна"]
+    assert one.flags == ["missing: c", "set b: the same code as Петрова Анна"]
     assert two.flags == [
         "set b: the notebook was handed out to Иванов Иван, РТ-1",
-        "set b: see the notes in the table of notebooks",
+        "set b: look at cell 3: import os",
+        "set b: b2 not graded: the check fails",
         "set c: came back more than once, the best counts",
         "set b: the same code as Иванов Иван",
     ]

@@ -19,10 +19,10 @@ from kfcourse.checks import exercise, sets
 from kfcourse.checks.equality import equal_formulas
 from kfcourse.files import save
 from kfcourse.lab.variants import load_variants
-from kfcourse.notebooks import execution, jobs
+from kfcourse.notebooks import execution, handing_out, jobs
 from kfcourse.notebooks.course_list import assign
 from kfcourse.notebooks.execution import NotebookFailed, html, mathml, pictures, results
-from kfcourse.notebooks.jobs import Job, Outcome, make, run_all, safe
+from kfcourse.notebooks.jobs import Job, Outcome, make, run_all
 from kfcourse.notebooks.master import (
     STUB,
     MasterError,
@@ -35,6 +35,7 @@ from kfcourse.notebooks.master import (
     without_markers,
     without_solution,
 )
+from kfcourse.notebooks.texts import safe
 from kfcourse.notebooks.written_code import python
 
 FIXTURES = Path(__file__).parent / "fixtures"
@@ -544,9 +545,7 @@ def test_two_notebooks_never_share_a_file(call, tmp_path):
 
 
 def test_a_course_list_makes_a_folder_for_each_student(call, tmp_path, masters, monkeypatch):
-    from kfcourse.notebooks import commands
-
-    monkeypatch.setattr(commands, "run_all", lambda work, *_: [Outcome(job, "written") for job in work])
+    monkeypatch.setattr(handing_out, "run_all", lambda work, *_: [Outcome(job, "written") for job in work])
     (tmp_path / "list.csv").write_text("name;group\nИванов Иван;М-1\n../../evil;M\n", encoding="utf-8-sig")
     result = call("exercises", "--students", "list.csv", "--out", "o", "--sets", "b,c", "--masters", masters)
     assert result.exit_code == 0

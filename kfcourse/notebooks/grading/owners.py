@@ -10,7 +10,7 @@ from pathlib import PurePosixPath
 
 from kfcourse.checks import sets
 from kfcourse.notebooks.course_list import Student
-from kfcourse.notebooks.grading.table import GRADED, OTHER, Grade
+from kfcourse.notebooks.grading.table import OTHER, Grade
 from kfcourse.notebooks.grading.weights import points
 
 
@@ -94,16 +94,14 @@ def people(grades: Sequence[Grade], students: Sequence[Student] | None = None) -
 
 def _hand_in(person: Person, grade: Grade) -> None:
     student = person.student
-    if grade.status != GRADED:
+    if not grade.marks:
         person.failed.append(grade)
         person.flags.append(f"{grade.name}: not graded: {grade.note}")
         return
-    if student.variant and grade.variant != student.variant:
-        person.flags.append(f"set {grade.letter}: variant {grade.variant}, was given {student.variant}")
     if grade.student and grade.student != f"{student.name}, {student.group}" and student.variant:
         person.flags.append(f"set {grade.letter}: the notebook was handed out to {grade.student}")
-    if any(part.startswith(("look", "its variant")) for part in grade.note.split("; ")):
-        person.flags.append(f"set {grade.letter}: see the notes in the table of notebooks")
+    looks = [part.removeprefix("look: ") for part in grade.note.split("; ") if part.startswith("look")]
+    person.flags += [f"set {grade.letter}: {part}" for part in looks]
     other = person.grades.get(grade.letter)
     if other is not None:
         person.flags.append(f"set {grade.letter}: came back more than once, the best counts")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import base64
-import csv
 import hashlib
 import io
 import re
@@ -22,14 +21,16 @@ from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG
 from kfcourse.files import save
 from kfcourse.notebooks.course_list import Student
 from kfcourse.notebooks.grading.owners import Person, known_sets, people, words
-from kfcourse.notebooks.grading.table import NOT_RUN, SIGNS, Grade, Told, cautious
+from kfcourse.notebooks.grading.table import NOT_GRADED, NOT_RUN, SIGNS, Grade, Told
 from kfcourse.notebooks.grading.weights import WEIGHTS, points, possible, questions
+from kfcourse.notebooks.texts import write_csv
 
 KINDS = {  # of marks, as the picture has them: name and colour
     PASSED: ("right", "#0072b2"),
     WRONG: ("wrong", "#d55e00"),
     UNUSABLE: ("not usable", "#e69f00"),
     MISSING: ("not done", "#cccccc"),
+    NOT_GRADED: ("not graded", "#cc79a7"),
 }
 # How students write Russian names in code.
 _LETTERS = "a b v g d e zh z i y k l m n o p r s t u f kh ts ch sh shch _ y _ e yu ya".replace("_", "").split(" ")
@@ -56,9 +57,8 @@ def write_report(grades: Sequence[Grade], students: Sequence[Student] | None, fo
     persons, strangers = people(grades, students)
     letters = known_sets(persons)
     folder.mkdir(parents=True, exist_ok=True)
-    _table(student_rows(persons, letters), folder / "students.csv")
-    rows = question_rows(persons, letters)
-    _table(rows, folder / "questions.csv")
+    for rows, name in ((student_rows(persons, letters), "students.csv"), (question_rows(persons, letters), "questions.csv")):
+        write_csv(list(rows[0]) if rows else [], rows, folder / name)
     save(unnamed(persons, letters), folder / "unnamed.md")
     for person in persons:
         page = folder / "feedback" / person.student.folder.parent / f"{person.student.folder.name}.html"
@@ -66,17 +66,6 @@ def write_report(grades: Sequence[Grade], students: Sequence[Student] | None, fo
         save(feedback(person, letters), page)
     save(overview(persons, strangers, letters, held), folder / "overview.html")
     return persons
-
-
-def _table(rows: Sequence[dict[str, Any]], path: Path) -> None:
-    text = io.StringIO()
-    if rows:
-        writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(
-            {key: cautious(value) if isinstance(value, str) else value for key, value in row.items()} for row in rows
-        )
-    save("\ufeff" + text.getvalue(), path)
 
 
 def student_rows(persons: Iterable[Person], letters: Sequence[str]) -> list[dict[str, Any]]:
