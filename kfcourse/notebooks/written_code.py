@@ -4,15 +4,51 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 import sympy as sp
 from sympy.printing.str import StrPrinter
 
 from kfcourse.checks import Exercise
+from kfcourse.laws import Array
 from kfcourse.symbolic.sides import Side, plain
 
 COLUMNS = 70  # of the page's 78, less the indents of a function and of its brackets
+
+
+DEVIATIONS = np.linspace(0.05, 1, 20)  # of the state, as the picture of set a has them
+
+
+class Apart(NamedTuple):
+    """An entry of a covariance, and what the linearised one misses of it over `DEVIATIONS`, as a share of the exact variances.
+
+    label : LaTeX;  equation : in words;  functions : names of the exact and the linearised one
+    """
+
+    label: str
+    equation: str
+    functions: str
+    colour: str
+    row: int
+    column: int
+    missing: Array
+
+    @property
+    def differs(self) -> bool:
+        return bool(np.abs(self.missing).max() > 1e-9)
+
+    @property
+    def says(self) -> str:
+        """The curve in a sentence."""
+        half, one = (_percent(self.missing[place]) for place in (9, 19))
+        large = DEVIATIONS[np.abs(self.missing) > 0.1]
+        tenth = f"it is more than a tenth from {large[0]:.2g} on" if large.size else "nowhere in the picture is it a tenth"
+        return f"Of {self.label} the tangent misses {half} at a standard deviation of 0.5 and {one} at 1; {tenth}."
+
+
+def _percent(share: float) -> str:
+    return f"${100 * share:.2g}$ %" if share >= 0 else f"${100 * share:.2g}$ % (it is above the exact one)"
 
 
 class Solutions:
@@ -36,6 +72,35 @@ class Solutions:
     def unexplained(self) -> str:
         """Body of a function of (m, d) that returns R = F - G d G^T of the Gaussian functions."""
         return self._body("meter", {"R": self.exercise.closed("gaussian")["R"]})
+
+    def apart(self) -> list[Apart]:
+        """Where the linearised covariances differ most from the exact ones, at the prior mean: of Theta and of F."""
+        model, known = self.exercise.model, (5,) if self.exercise.model.timed else ()
+        cov = DEVIATIONS[:, None, None] ** 2 * np.eye(model.n)
+        mean = np.tile(model.prior.mean, (len(cov), 1))
+        found = []
+        for place, (name, equation, functions, colour) in enumerate(
+            (
+                (r"\Theta", "the state equation", "object_gaussian, object_linearised", "#0072B2"),
+                ("F", "the meter equation", "meter_gaussian, meter_linearised", "#D55E00"),
+            )
+        ):
+            exact, tangent = (
+                self.exercise.functions(kind, *known)[1 - place](mean, cov)[-1] for kind in ("gaussian", "linearised")
+            )
+            scale = np.sqrt(np.diagonal(exact, axis1=1, axis2=2))
+            missing = (exact - tangent) / (scale[:, :, None] * scale[:, None, :])
+            row, column = np.unravel_index(np.abs(missing).max(axis=0).argmax(), exact.shape[1:])
+            index = "" if exact.shape[1:] == (1, 1) else f"_{{{row + 1}{column + 1}}}"
+            found.append(Apart(f"${name}{index}$", equation, functions, colour, int(row), int(column), missing[:, row, column]))
+        return found
+
+    def meter_is_silent(self) -> bool:
+        """Whether the meter's noise, at the start and at the prior mean, leaves a combination of measurements exactly known."""
+        model, known = self.exercise.model, (0,) if self.exercise.model.timed else ()
+        measure, _ = self.exercise.functions("linearised", *known)
+        F = measure(model.prior.mean[None], np.zeros((1, model.n, model.n)))[2][0]
+        return bool(np.linalg.matrix_rank(F) < model.p)
 
     def _body(self, side: str, formulas: Mapping[str, Any], cov: bool = True) -> str:
         part = Side.of(self.exercise.model, side)
