@@ -134,9 +134,9 @@ def equal(first: Any, second: Any, tolerance: float, values: Mapping[sp.Symbol, 
     if isinstance(second, tuple):
         return all(equal(a, b, tolerance, values, places) for a, b in zip(first, second, strict=True))
     if isinstance(second, sp.MatrixBase):
-        return first.shape == second.shape and equal_formulas(list(first), list(second), values, places)
+        return getattr(first, "shape", None) == second.shape and equal_formulas(list(first), list(second), values, places)
     if isinstance(second, sp.Basic):
-        return equal_formulas([first], [second], values, places)
+        return isinstance(first, sp.Basic) and equal_formulas([first], [second], values, places)
     scale = np.max(np.abs(second[np.isfinite(second)]), initial=0.0)
     return first.shape == second.shape and bool(
         np.allclose(first, second, rtol=tolerance, atol=tolerance * scale, equal_nan=True)

@@ -25,41 +25,53 @@ Said: TypeAlias = tuple[str, str]
 ROUGH = 1e-4  # relative difference that hints at a lower precision
 
 
+CALLS = 3  # with which dependence on an argument is looked for
+
+
 @dataclass(frozen=True)
 class Sensitivity:
     """Which results depend on which argument: of the right answer, and of the student's.
 
+    By value: an argument counts as used if the result changes with it in one of the calls, for one of its changes.
+
     answers : (right, student's)
-    arguments : hidden arguments, one tuple
-    results : what both give for them, each as a list of parts
+    arguments : hidden arguments, a tuple a call
+    results : what both give for each call, each as a list of parts
     several : whether answers have several results
     """
 
     names: Sequence[str]
     answers: tuple[Callable, Callable]
-    arguments: tuple
-    results: tuple[list[Any], ...]
+    arguments: Sequence[tuple]
+    results: Sequence[tuple[list[Any], ...]]
     several: bool
 
     @cached_property
     def _table(self) -> list[tuple[str, list[bool], list[bool]]]:
         rows = []
-        for place, (name, value) in enumerate(zip(self.names, self.arguments, strict=False)):
-            other = nudged(value)
-            if other is None:
-                continue
-            values = [*self.arguments[:place], other, *self.arguments[place + 1 :]]
+        for place, name in enumerate(self.names):
+            seen = [row for which in range(min(CALLS, len(self.arguments))) for row in self._changes(place, which)]
+            if seen:
+                right, mine = ([any(column) for column in zip(*side, strict=True)] for side in zip(*seen, strict=True))
+                rows.append((name, right, mine))
+        return rows
+
+    def _changes(self, place: int, which: int) -> list[tuple[list[bool], list[bool]]]:
+        """Which parts change, of the right answer and of the student's, for each change of an argument that both take."""
+        arguments, found = self.arguments[which], []
+        for other in nudged(arguments[place]):
+            values = [*arguments[:place], other, *arguments[place + 1 :]]
             try:
                 right, mine = (
                     [not _same(a, b) for a, b in zip(self._parts(answer, values), before, strict=True)]
-                    for answer, before in zip(self.answers, self.results, strict=True)
+                    for answer, before in zip(self.answers, self.results[which], strict=True)
                 )
             except (OutOfTime, KeyboardInterrupt):
                 raise
             except BaseException:  # the answer does not work for such an argument, or ends the program
                 continue
-            rows.append((name, right, mine))
-        return rows
+            found.append((right, mine))
+        return found
 
     def _parts(self, answer: Callable, values: Sequence[Any]) -> list[Any]:
         result = answer(*copy.deepcopy(values))
@@ -70,8 +82,11 @@ class Sensitivity:
         return [name for name, right, mine in self._table if right[part] and not mine[part]]
 
     def superfluous(self, part: int) -> list[str]:
-        """Arguments that it depends on and should not."""
-        return [name for name, right, mine in self._table if mine[part] and not right[part]]
+        """Arguments that it depends on and should not, as another part does.
+
+        An argument that changes no result of the right answer may stand in its formula all the same, and cancel there.
+        """
+        return [name for name, right, mine in self._table if mine[part] and any(right) and not right[part]]
 
 
 def names_of(answer: Callable, count: int) -> list[str]:
@@ -83,26 +98,27 @@ def names_of(answer: Callable, count: int) -> list[str]:
     return names if len(names) == count else [f"number {place}" for place in range(1, count + 1)]
 
 
-def nudged(value: Any) -> Any:
-    """A hidden argument changed a little, covariances to covariances; None if it cannot be changed so."""
+def nudged(value: Any) -> list[Any]:
+    """A hidden argument changed a little, covariances to covariances; nothing if it cannot be changed so."""
     if isinstance(value, int | np.integer):
-        return None if isinstance(value, bool) else value + 1
+        return [] if isinstance(value, bool) else [value + 1, value + 2, value + 3]
     if isinstance(value, float | np.floating):
-        return value * 1.05
+        return [value * 1.05, value * 0.9]
     if isinstance(value, np.ndarray) and value.dtype.kind == "f":
         if value.ndim >= 2 and value.shape[-1] == value.shape[-2]:
             scale = 1.03 + 0.01 * np.arange(value.shape[-1])
-            return scale[:, None] * value * scale
-        return value * np.linspace(1.03, 1.07, value.size).reshape(value.shape)
+            return [scale[:, None] * value * scale]
+        return [value * np.linspace(1.03, 1.07, value.size).reshape(value.shape)]
     if inspect.isroutine(value):
 
         def changed(*arguments: Any) -> Any:
             result = value(*arguments)
-            return tuple(1.05 * part for part in result) if isinstance(result, tuple) else 1.05 * result
+            # a factor alone may cancel: a regression on it is the same
+            return tuple(1.05 * part for part in result) if isinstance(result, tuple) else 1.05 * result + 0.01 * result**2
 
         changed.__dict__.update(getattr(value, "__dict__", {}))  # whether it takes the step
-        return changed
-    return None
+        return [changed]
+    return []
 
 
 def _same(first: Any, second: Any) -> bool:
@@ -119,6 +135,7 @@ class Case:
     part : its place among the results
     others : the other results expected, by name
     telling : for every tuple of hidden arguments, whether usual mistakes show there
+    axes : what the leading axes of the results are
     """
 
     found: Sequence[Any]
@@ -130,6 +147,7 @@ class Case:
     others: Sequence[tuple[str, Sequence[Any]]]
     telling: Sequence[bool]
     sensitivity: Sensitivity
+    axes: Sequence[str] = ()
 
     @property
     def numeric(self) -> bool:
@@ -210,9 +228,7 @@ def dependence(case: Case) -> Said | None:
         missing, extra = case.sensitivity.unused(case.part), case.sensitivity.superfluous(case.part)
         form = "`{}`"
     else:
-        mine, theirs = (
-            set().union(*({s.name for f in side[which] for s in f.free_symbols} for side in case.formulas)) for which in (0, 1)
-        )
+        mine, theirs = (_symbols(case, which) for which in (0, 1))
         given = {s.name for values in case.arguments for v in values if hasattr(v, "free_symbols") for s in v.free_symbols}
         numbers = any(not n.is_integer for side in case.formulas for f in side[0] for n in f.atoms(sp.Number))
         missing, extra = sorted((theirs & given if numbers else theirs) - mine), sorted(mine - theirs)
@@ -225,11 +241,18 @@ def dependence(case: Case) -> Said | None:
     return None
 
 
+def _symbols(case: Case, which: int) -> set[str]:
+    """Names of the symbols on whose values a side depends."""
+    formulas = [f for side in case.formulas for f in side[which]]
+    found = set().union(*(f.free_symbols for f in formulas))
+    return {s.name for s in found if not all(equal(f.xreplace({s: s + 1}), f, 0, {}) for f in formulas if s in f.free_symbols)}
+
+
 def improper(case: Case) -> Said | None:
     """A covariance that is none."""
     for found, expected in case.pairs:
         if isinstance(expected, sp.MatrixBase):
-            if expected.rows == expected.cols > 1 and expected == expected.T and found != found.T:
+            if expected.rows == expected.cols > 1 and case.agree([expected], [expected.T]) and not case.agree([found], [found.T]):
                 return "not-symmetric", "The result should be symmetric and is not: is a factor missing on one side?"
         elif case.numeric and expected.ndim > 1 and expected.shape[-1] == expected.shape[-2]:
             if not _same(expected, expected.swapaxes(-1, -2)):
@@ -258,7 +281,7 @@ def sometimes(case: Case) -> Said | None:
 
 def first_step(case: Case) -> Said | None:
     """A run that starts well."""
-    if not case.numeric or not all(b.ndim and len(b) > 3 and not (b.ndim == 2 and len(b) == b.shape[1]) for _, b in case.pairs):
+    if not case.numeric or case.axes[:1] != ("step",) or not all(b.ndim and len(b) > 3 for _, b in case.pairs):
         return None
     if all(case.agree([a[:1]], [b[:1]]) for a, b in case.pairs):
         return "from-second-step", "The first step is right, later ones are not: what is handed on from one step to the next?"

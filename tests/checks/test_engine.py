@@ -120,7 +120,8 @@ def test_result_shows_itself_and_carries_its_data():
     assert repr(result) == "✓ t1 a test: right"
     data = result._repr_mimebundle_()
     assert data["text/plain"] == repr(result)
-    assert data[MIME] == {"question": "t1", "status": "passed", "diagnosis": [], "message": "right"}
+    told = {"question": "t1", "status": "passed", "diagnosis": [], "message": "right", "share": 1.0, "follows": []}
+    assert data[MIME] == told
     assert repr(outcome(SUM, lambda a, b: a)).startswith("✗ t1")
 
 
