@@ -82,6 +82,20 @@ def _make(kind: str, **options: Any) -> None:
     type=click.Path(path_type=Path, file_okay=False),
     help="Folder of points, feedback for each student and an overview.  [default with --students: FOLDER/report]",
 )
+@click.option(
+    "--parts",
+    type=click.FloatRange(0, 1),
+    default=1.0,
+    show_default=True,
+    help="Share of the points for the right results of a wrong answer: with 1, one right result of three is worth a third.",
+)
+@click.option(
+    "--follow-on",
+    type=click.FloatRange(0, 1),
+    default=0.0,
+    show_default=True,
+    help="Share of the points for a step that is right on top of the student's own wrong answer to an earlier question.",
+)
 @click.option("--seed", help="Text that the hidden arguments come from.  [default: another each time]")
 def grade(**options: Any) -> None:
     """Run the returned notebooks in FOLDER and write a table of what passed.

@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 import time
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from inside import InsideKernel
 
 from kfcourse import cli
-from kfcourse.checks import Exercise, exercise
+from kfcourse.checks import Exercise, exercise, sets
 from kfcourse.checks.question import MIME
 from kfcourse.notebooks.course_list import Student
 from kfcourse.notebooks.grading import course, marking, running, submissions
@@ -298,6 +298,51 @@ def test_wrong_answers_are_diagnosed(graded_here):
     _, marks, note = graded_here(wrong())
     assert marks == ("wrong", "wrong")
     assert note == "b1: gain-not-divided; b2: innovation-sign, covariance-added"
+
+
+@contextmanager
+def changed(name, **fields):
+    """A question of set b with other fields."""
+    question = next(one for one in sets()["b"].questions if one.name == name)
+    before = {field: getattr(question, field) for field in fields}
+    try:
+        for field, value in fields.items():
+            object.__setattr__(question, field, value)
+        yield
+    finally:
+        for field, value in before.items():
+            object.__setattr__(question, field, value)
+
+
+def test_a_check_that_fails_in_itself_costs_its_question_only(graded_here):
+    """The teacher reads how; the student, that it is not his fault."""
+
+    def broken(exercise):
+        raise AttributeError("'Mul' object has no attribute 'shape'")
+
+    with changed("b1", arguments=broken):
+        found, marks, note = graded_here(solved(), whole=False)
+    assert marks == ("not graded", "passed")
+    assert (found.status, found.digest, found.told["b1"].says) == ("graded in part", "", marking.LOOKED_AT)
+    assert note.startswith("look: b1 not graded: the check itself fails, please tell us: AttributeError: 'Mul' object")
+
+
+def test_a_step_on_a_wrong_one_and_right_parts_are_said(graded_here):
+    """The second stands on the student's own wrong gain; in the other notebook one of its two results is right."""
+
+    def on(gain):
+        return lambda lam, Psi, h, G, F, y: (
+            lam + (gain(Psi, G, F) @ (y - h)[..., None])[..., 0],
+            Psi - gain(Psi, G, F) @ G @ Psi,
+        )
+
+    with changed("b2", on=on):
+        found, marks, note = graded_here(change(solved(), "def gain", "np.linalg.solve(F, cross)", "cross"))
+    assert marks == ("wrong", "wrong")
+    assert (found.told["b2"].follows, found.told["b2"].share) == (("b1",), 0.0)
+    assert "b2: follows" in note and "right on top of your b1" in found.told["b2"].says
+    found, marks, _ = graded_here(change(solved(), "def correct", "Psi - K @ G @ Psi", "Psi + K @ G @ Psi"))
+    assert (marks, found.told["b2"].share) == (("passed", "wrong"), 0.5)
 
 
 def test_faked_results_do_not_count(graded, graded_here):

@@ -23,6 +23,7 @@ from kfcourse.notebooks.grading.sandbox import HELD, chosen
 from kfcourse.notebooks.grading.staging import answers, stage
 from kfcourse.notebooks.grading.submissions import Unreadable, read_document, returned
 from kfcourse.notebooks.grading.table import FAILED, PARTLY, SIGNS, Grade, grade_all
+from kfcourse.notebooks.grading.weights import Credit
 from kfcourse.notebooks.texts import clean
 
 
@@ -38,6 +39,8 @@ def grade_folder(
     students: Path | None,
     report: Path | None,
     seed: str | None,
+    parts: float,
+    follow_on: float,
 ) -> bool:
     """Grade the notebooks of a folder as `kfcourse grade` is asked to; whether all could be graded."""
     course = None if students is None else _course(students, variants_file)
@@ -61,7 +64,7 @@ def grade_folder(
     click.echo(f"\n{len(grades) - old} run, {old} unchanged since the last table. Table: {table}")
     click.echo(f"Sandbox: {HELD[held.kind]}\nHidden arguments: --seed {salt} repeats them")
     if students or report:
-        _show_report(write_report(grades, course, pages, HELD[held.kind]), pages)
+        _show_report(write_report(grades, course, pages, HELD[held.kind], Credit(parts, follow_on)), pages)
     return all(one.status not in (FAILED, PARTLY) for one in grades)
 
 

@@ -17,10 +17,10 @@ from typing import Any
 
 from nbformat import NotebookNode
 
-from kfcourse.checks import Exercise, Result
+from kfcourse.checks import Exercise, Past, Result
 from kfcourse.checks.engine import SECONDS as CHECK
 from kfcourse.checks.engine import check
-from kfcourse.checks.question import UNUSABLE, WRONG
+from kfcourse.checks.question import NOT_CHECKED, UNUSABLE, WRONG
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.notebooks.grading.asking import salted
 from kfcourse.notebooks.grading.assembly import Step, assembled, generated
@@ -34,6 +34,7 @@ from kfcourse.notebooks.texts import clean
 
 ENDED = "the process that compares it was ended, or hung: too large an answer, or somebody ended it"
 LOOKED_AT = "not graded: your teacher is told"  # what a student reads of it
+TELL_US = "the check itself fails, please tell us"
 CODE = 4000  # characters of an answer that are kept
 
 
@@ -116,7 +117,13 @@ def _grade(
     notes = [*stopped, *marking.failed(), *marking.errors[:2], *marking.reasons(), *noted]
     code = {question.name: question.function for question in exercise.questions.values()}
     told = {
-        name: Told(one.message, one.diagnosis, _code(own, code[name]) if one.status == WRONG and not one.diagnosis else "")
+        name: Told(
+            one.message,
+            one.diagnosis,
+            _code(own, code[name]) if one.status == WRONG and not one.diagnosis else "",
+            one.share,
+            one.follows,
+        )
         for name, one in marking.results.items()
     }
     variant, note = exercise.variant.name, "; ".join(dict.fromkeys(notes))
@@ -166,6 +173,7 @@ class Marking:
         self.errors: list[str] = []
         self._reasons: dict[str, list[str]] = {}
         self._failed: dict[str, list[str]] = {}
+        self._past = Past()
 
     def run(self, kernel: Kernel, steps: Iterable[Step]) -> list[str]:
         """Run all cells and ask for all answers; says where and why it did not come to its end, if it did not."""
@@ -193,15 +201,16 @@ class Marking:
             return
         self._progress(name)
         answer: Any = type(kind, (Other,), {})() if kind else Answer(kernel, name)
-        try:
-            asked = salted(self._exercise.letter, opened(self._exercise), name, self._salt)
-            result = check(question, asked, answer, CHECK)
-        except Exception as error:  # of ours: it costs this question only
-            self._not_graded(name, f"the check itself fails, please tell us: {type(error).__name__}: {error}")
-            return
+        asked = salted(self._exercise.letter, opened(self._exercise), name, self._salt)
+        result = check(question, asked, answer, CHECK, self._past)
         if getattr(answer, "lost", ""):
             self._not_graded(name, answer.lost)
             return
+        if result.status == NOT_CHECKED:
+            self._not_graded(name, f"{TELL_US}: {result.trouble}")
+            return
+        if result.trouble:
+            self._failed.setdefault(f"the hint is lost, and the mark holds; {TELL_US}: {result.trouble}", []).append(name)
         self.results[name], self.marks[name] = result, result.status
         if result.status == UNUSABLE:
             self._reason(result.message, name)
@@ -211,11 +220,11 @@ class Marking:
     def _not_graded(self, name: str, reason: str) -> None:
         title = self._exercise.questions[name].title
         self.results[name], self.marks[name] = Result(name, title, NOT_GRADED, LOOKED_AT), NOT_GRADED
-        self._failed.setdefault(reason, []).append(name)
+        self._failed.setdefault(f"not graded: {reason}", []).append(name)
 
     def failed(self) -> list[str]:
         """Which answers are not graded, and why."""
-        return [clean(f"look: {', '.join(names)} not graded: {reason}") for reason, names in self._failed.items()]
+        return [clean(f"look: {', '.join(names)} {reason}", 500) for reason, names in self._failed.items()]
 
     def _reason(self, reason: str, question: str) -> None:
         self._reasons.setdefault(reason, []).append(question)

@@ -25,11 +25,26 @@ SIGNS = {PASSED: "✓", WRONG: "✗", UNUSABLE: "✗", MISSING: "–", NOT_RUN: 
 
 @dataclass(frozen=True)
 class Told:
-    """What was said of an answer: the sentences, the names of the mistakes, and the code if the mistake has no name."""
+    """What was said of an answer.
+
+    Attributes
+    ----------
+    says : str
+    mistakes : tuple of str
+        Their names.
+    code : str
+        If the mistake has no name.
+    share : float
+        Of its results that are right.
+    follows : tuple of str
+        The earlier questions on whose wrong answers it is right.
+    """
 
     says: str
     mistakes: tuple[str, ...] = ()
     code: str = ""
+    share: float = 0.0
+    follows: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -97,12 +112,13 @@ def write_table(grades: Iterable[Grade], path: Path) -> None:
 
 def details(told: Mapping[str, Told]) -> str:
     """What was said of all answers, as one cell of the table."""
-    rows = {name: [one.says, one.mistakes, one.code] for name, one in told.items()}
+    rows = {name: [one.says, one.mistakes, one.code, round(one.share, 4), one.follows] for name, one in told.items()}
     return json.dumps(rows, ensure_ascii=False) if rows else ""
 
 
 def _told(text: str) -> dict[str, Told]:
-    return {name: Told(says, tuple(mistakes), code) for name, (says, mistakes, code) in json.loads(text or "{}").items()}
+    rows = json.loads(text or "{}").items()
+    return {name: Told(says, tuple(mistakes), code, share, tuple(on)) for name, (says, mistakes, code, share, on) in rows}
 
 
 def read_table(path: Path) -> dict[str, Grade]:
