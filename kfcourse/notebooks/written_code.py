@@ -44,11 +44,12 @@ class Apart(NamedTuple):
         half, one = (_percent(self.missing[place]) for place in (9, 19))
         large = DEVIATIONS[np.abs(self.missing) > 0.1]
         tenth = f"it is more than a tenth from {large[0]:.2g} on" if large.size else "nowhere in the picture is it a tenth"
-        return f"Of {self.label} the tangent misses {half} at a standard deviation of 0.5 and {one} at 1; {tenth}."
+        return f"The tangent's {self.label} is {half} at a standard deviation of 0.5, and {one} at 1; {tenth}."
 
 
 def _percent(share: float) -> str:
-    return f"${100 * share:.2g}$ %" if share >= 0 else f"${100 * share:.2g}$ % (it is above the exact one)"
+    size = f"{100 * abs(share):.0f}" if abs(share) > 0.1 else f"{100 * abs(share):.1g}"
+    return f"{size} % too {'small' if share > 0 else 'large'}"
 
 
 class Solutions:
