@@ -18,6 +18,7 @@ COLUMNS = 70  # of the page's 78, less the indents of a function and of its brac
 
 
 DEVIATIONS = np.linspace(0.05, 1, 20)  # of the state, as the picture of set a has them
+SAME = 1e-9  # share of a variance that rounding explains
 
 
 class Apart(NamedTuple):
@@ -36,7 +37,7 @@ class Apart(NamedTuple):
 
     @property
     def differs(self) -> bool:
-        return bool(np.abs(self.missing).max() > 1e-9)
+        return bool(np.abs(self.missing).max() > SAME)
 
     @property
     def says(self) -> str:
@@ -91,7 +92,9 @@ class Solutions:
             )
             scale = np.sqrt(np.diagonal(exact, axis1=1, axis2=2))
             missing = (exact - tangent) / (scale[:, :, None] * scale[:, None, :])
-            row, column = np.unravel_index(np.abs(missing).max(axis=0).argmax(), exact.shape[1:])
+            most = np.abs(missing).max(axis=0)
+            variances = np.diag(np.diagonal(most))  # a covariance is taken only if no variance differs
+            row, column = np.unravel_index((variances if variances.max() > SAME else most).argmax(), most.shape)
             index = "" if exact.shape[1:] == (1, 1) else f"_{{{row + 1}{column + 1}}}"
             found.append(Apart(f"${name}{index}$", equation, functions, colour, int(row), int(column), missing[:, row, column]))
         return found
