@@ -85,7 +85,7 @@ def _make(kind: str, **options: Any) -> None:
 @click.option(
     "--parts",
     type=click.FloatRange(0, 1),
-    default=1.0,
+    default=0.5,
     show_default=True,
     help="Share of the points for the right results of a wrong answer: with 1, one right result of three is worth a third.",
 )

@@ -24,7 +24,7 @@ class Credit:
         If it is right on top of the student's own wrong answer to an earlier question.
     """
 
-    parts: float = 1.0
+    parts: float = 0.5
     follow_on: float = 0.0
 
     def share(self, grade: Grade, question: str) -> float:
