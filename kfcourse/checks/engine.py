@@ -20,9 +20,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
+from kfcourse.checks.dependence import Sensitivity, names_of
 from kfcourse.checks.equality import Places, Unusable, equal, like
 from kfcourse.checks.failing import shown
-from kfcourse.checks.hints import Agree, Case, Sensitivity, general, names_of
+from kfcourse.checks.hints import Agree, Case, general
 from kfcourse.checks.question import (
     MISSING,
     NOT_CHECKED,

@@ -59,8 +59,8 @@ def like(answer: Any, expected: Any) -> Any:
 
 
 def _formula(answer: Any) -> sp.Expr:
-    if isinstance(answer, sp.MatrixBase | np.ndarray) and getattr(answer, "size", len(answer)) == 1:
-        answer = np.asarray(answer).item() if isinstance(answer, np.ndarray) else answer[0]
+    if isinstance(answer, sp.MatrixBase | np.ndarray | list | tuple) and np.size(answer) == 1:  # in brackets of any kind
+        answer = np.ravel(np.array(answer, dtype=object))[0]
     if isinstance(answer, bool | str) or not isinstance(answer, sp.Expr | int | float | np.number):
         raise Unusable(f"expected a formula in the symbols of the exercise, got {describe(answer)}")
     formula = sp.nsimplify(answer, rational=True) if isinstance(answer, float | np.floating) else sp.sympify(answer)
