@@ -6,57 +6,18 @@ sentence that is true of the answer, or None.  The engine asks them in turn when
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import sympy as sp
 
-from kfcourse.checks.dependence import Sensitivity, same, scaled
-from kfcourse.checks.equality import equal
-
-Agree: TypeAlias = Callable[[Sequence[Any], Sequence[Any]], bool]
-Said: TypeAlias = tuple[str, str]
+from kfcourse.checks.case import Case, Said
+from kfcourse.checks.dependence import same
+from kfcourse.checks.equality import depends, equal
+from kfcourse.checks.relations import RELATIONS
 
 ROUGH = 1e-4  # relative difference that hints at a lower precision
-
-
-@dataclass(frozen=True)
-class Case:
-    """One result of a wrong answer.
-
-    found, expected : for every tuple of hidden arguments
-    arguments, names : these, and what they are called
-    part : its place among the results
-    others : the other results expected, by name
-    telling : for every tuple of hidden arguments, whether usual mistakes show there
-    axes : what the leading axes of the results are
-    """
-
-    found: Sequence[Any]
-    expected: Sequence[Any]
-    agree: Agree
-    arguments: Sequence[tuple]
-    names: Sequence[str]
-    part: int
-    others: Sequence[tuple[str, Sequence[Any]]]
-    telling: Sequence[bool]
-    sensitivity: Sensitivity
-    axes: Sequence[str] = ()
-
-    @property
-    def numeric(self) -> bool:
-        return isinstance(self.expected[0], np.ndarray)
-
-    @property
-    def pairs(self) -> list[tuple[Any, Any]]:
-        return list(zip(self.found, self.expected, strict=True))
-
-    @property
-    def formulas(self) -> list[tuple[list[sp.Expr], list[sp.Expr]]]:
-        """Entries of both sides."""
-        return [(list(a), list(b)) if isinstance(b, sp.MatrixBase) else ([a], [b]) for a, b in self.pairs]
 
 
 def _each(value: Any, change: Callable[[Any], Any]) -> Any:
@@ -72,6 +33,7 @@ TRANSFORMATIONS: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
     ("factor-2", "It is half of what it should be.", lambda v: v * 2),
     ("factor-half", "It is twice what it should be.", lambda v: v / 2),
     ("inverse", "It looks like the inverse of what it should be.", lambda v: _each(v, lambda entry: 1 / entry)),
+    ("complement", "It is one minus what it should be.", lambda v: _each(v, lambda entry: 1 - entry)),
 )
 
 
@@ -140,8 +102,7 @@ def dependence(case: Case) -> Said | None:
 def _symbols(case: Case, which: int) -> set[str]:
     """Names of the symbols on whose values a side depends."""
     formulas = [f for side in case.formulas for f in side[which]]
-    found = set().union(*(f.free_symbols for f in formulas))
-    return {s.name for s in found if not all(equal(f.xreplace({s: s + 1}), f, 0, {}) for f in formulas if s in f.free_symbols)}
+    return {name for f in formulas for name in depends(f, {s.name for s in f.free_symbols})}
 
 
 def improper(case: Case) -> Said | None:
@@ -248,86 +209,6 @@ def _numbers(wrong: Any) -> str:
     return f" {places[0]} is" if len(places) == 1 else f"s {', '.join(places)} are"
 
 
-def limit(case: Case) -> Said | None:
-    """Right where something is zero: what comes in with it is wrong."""
-    where = [name for name, found, expected in _at_zero(case) if not _empty(expected) and case.agree(found, expected)]
-    if not where:
-        return None
-    form = "`{}`" if case.numeric else "{}"
-    which = " or ".join(form.format(name) for name in where[:3])
-    return (
-        "limit",
-        f"It is right where {which} is zero: look at the part that {'this' if len(where) == 1 else 'each of these'} brings in.",
-    )
-
-
-def _at_zero(case: Case) -> Iterator[tuple[str, list[Any], list[Any]]]:
-    """For each argument, or symbol: both results where it is zero."""
-    if case.numeric:
-        for place, name in enumerate(case.names):
-            called = case.sensitivity.called(place, lambda value: scaled(value, 0.0))
-            right, mine = ([pair[side][case.part] for pair in called] for side in (0, 1))
-            if called and all(np.isfinite(one).all() and one.shape == two.shape for one, two in zip(mine, right, strict=True)):
-                yield name, mine, right
-        return
-    sides = [[f for side in case.formulas for f in side[which]] for which in (0, 1)]
-    symbols = set.intersection(*({s.name for f in side for s in f.free_symbols} for side in sides))
-    for name in sorted(symbols):
-        mine, right = ([f.xreplace({s: sp.S.Zero for s in f.free_symbols if s.name == name}) for f in side] for side in sides)
-        if not any(f.has(sp.nan, sp.zoo, sp.oo) for f in (*mine, *right)):
-            yield name, mine, right
-
-
-def _empty(results: Sequence[Any]) -> bool:
-    return all(result == 0 if isinstance(result, sp.Basic) else not np.any(result) for result in results)
-
-
-def power(case: Case) -> Said | None:
-    """Another power of an argument than in the right answer."""
-    if not case.numeric:
-        return None
-    for place, name in enumerate(case.names):
-        growth = [_growth(case, place, factor) for factor in (2.0, 4.0)]
-        if all(right is not None and mine is not None for right, mine in growth):
-            (right, mine), (again, more) = growth
-            if abs(right - mine) > 1e-6 and np.allclose([again, more], [right**2, mine**2], rtol=1e-6):  # powers, both of them
-                return "power", f"It grows with another power of `{name}` than it should: check the units."
-    return None
-
-
-def _growth(case: Case, place: int, factor: float) -> tuple[Any, ...]:
-    """By how much the right answer and the student's grow with an argument; None where not all of it grows alike."""
-    called = case.sensitivity.called(place, lambda value: scaled(value, factor))
-    return tuple(
-        _ratio([pair[side][case.part] for pair in called], before) for side, before in enumerate((case.expected, case.found))
-    )
-
-
-def _ratio(changed: Sequence[Any], before: Sequence[Any]) -> float | None:
-    """By how much everything has grown, if it has grown alike."""
-    pairs = list(zip(changed, before, strict=False))
-    if any(np.shape(a) != np.shape(b) for a, b in pairs):
-        return None
-    a, b = (np.concatenate([np.ravel(pair[which]) for pair in pairs]) for which in (0, 1))
-    told = np.abs(b) > 1e-9 * np.max(np.abs(b), initial=0.0)
-    ratios = a[told] / b[told]
-    return float(ratios[0]) if len(ratios) and np.ptp(ratios) <= 1e-7 * np.abs(ratios).max() else None
-
-
-def terms(case: Case) -> Said | None:
-    """Some terms of a formula, multiplied out."""
-    if case.numeric or len(case.formulas) != 1 or len(case.formulas[0][0]) != 1:
-        return None
-    mine, theirs = (set(sp.Add.make_args(sp.expand(side[0]))) for side in case.formulas[0])
-    if not mine & theirs or len(mine) > 12:
-        return None
-    if theirs < mine:
-        return "terms", "All terms that belong there are there, and something else besides."
-    right = ", ".join(sorted(map(str, mine & theirs)))
-    more = "another is missing" if mine < theirs else "the rest is not"
-    return "terms", f"Of your terms, multiplied out, {right} {'is' if len(mine & theirs) == 1 else 'are'} right; {more}."
-
-
 HINTS: tuple[Callable[[Case], Said | None], ...] = (
     transformed,
     signs_lost,
@@ -339,9 +220,7 @@ HINTS: tuple[Callable[[Case], Said | None], ...] = (
     first_step,
     factor_or_term,
     entries,
-    limit,
-    power,
-    terms,
+    *RELATIONS,
 )
 
 
