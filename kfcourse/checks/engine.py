@@ -219,7 +219,12 @@ class _Check:
         )
 
     def _numbers(self, found: list[Any]) -> bool:
-        """Whether the formulas are right where parameters have their values."""
+        """Whether the formulas are right where parameters have their values, and those that are wrong as they are lack some."""
+        wrong = [
+            pair for pair in zip(_flat(found), _flat(self.expected), strict=True) if not self.agree(*([one] for one in pair))
+        ]
+        if not all(self._in_numbers(mine, right) for mine, right in wrong):
+            return False
         sides = ([with_values(one, self.values) for one in _flat(side)] for side in (found, self.expected))
         return bool(_flat(self.expected)) and self.agree(*sides)
 
