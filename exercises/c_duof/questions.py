@@ -17,12 +17,12 @@ from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import STEP, Function, at_step, of_steps
 from kfcourse.exercises.c_duof.keys import design_and_run, design_step, structure
 from kfcourse.exercises.c_duof.mistakes import WRONG_DUOF_RUNS, WRONG_DUOF_STEPS, WRONG_REGRESSIONS, WRONG_STRUCTURES
-from kfcourse.exercises.shared import RUNS, ensemble, predicted, regression
+from kfcourse.exercises.shared import RUNS, ensemble, other_equations, predicted, regression
 
 
 def noiseless(exercise: Exercise) -> tuple[Callable, Callable]:
-    """a(x, m_v) and b(x, m_w) of the hidden model at one step, (N, n) -> (N, n) and (N, p)."""
-    a, b = exercise.hidden_noiseless
+    """Hidden a(x) and b(x) at one step, (N, n) -> (N, n) and (N, p)."""
+    a, b = other_equations(exercise, *exercise.hidden_noiseless)
     return at_step(a, STEP), at_step(b, STEP)
 
 
@@ -68,8 +68,10 @@ def bent(function: Function) -> Function:
 def duof_run_arguments(exercise: Exercise) -> list[tuple]:
     """An ensemble to design on, and measurements of other trajectories."""
     x, y = exercise.simulate(RUNS, 4, "c4-design")
-    functions = map(bent, exercise.hidden_noiseless) if exercise.model.timed else exercise.hidden_noiseless
-    return [(x, y, exercise.simulate(5, 4, "c4").y, exercise.model.prior.mean, *functions)]
+    functions = other_equations(exercise, *exercise.hidden_noiseless)
+    prior = exercise.model.prior  # not quite: where its mean is zero, a start at zero would pass
+    mean = prior.mean + 0.4 * np.sqrt(np.diagonal(prior.cov))
+    return [(x, y, exercise.simulate(5, 4, "c4").y, mean, *(map(bent, functions) if exercise.model.timed else functions))]
 
 
 QUESTIONS = (

@@ -15,7 +15,7 @@ from kfcourse.checks.steps import STEP, array_functions, full
 from kfcourse.exercises import messages
 from kfcourse.exercises.d_fos.keys import condition, condition_on_both, fos_step, mfos_step
 from kfcourse.exercises.d_fos.mistakes import WRONG_CONDITIONS, WRONG_FOS_STEPS, WRONG_MFOS_STEPS
-from kfcourse.exercises.shared import RUNS, covariance_of, ensemble, predicted
+from kfcourse.exercises.shared import RUNS, covariance_of, ensemble, other_functions, predicted
 
 # -- d1: what the estimate says of the state
 
@@ -34,7 +34,7 @@ def fos_arguments(exercise: Exercise, name: str = "d2") -> list[tuple]:
     x, y, _ = ensemble(exercise, name)
     lam = predicted(exercise, f"{name}-lam", x)
     Psi = full(covariance_of(x - lam, x - lam), RUNS) * (1 + 0.3 * exercise.rng(f"{name}-Psi").random((RUNS, 1, 1)))
-    return [(lam, Psi, x, y, *array_functions(exercise.hidden.gaussian.at(STEP)))]
+    return [(lam, Psi, x, y, *other_functions(exercise, *array_functions(exercise.hidden.gaussian.at(STEP))))]
 
 
 # -- d3: one step of the MFOS

@@ -5,6 +5,10 @@ registry    the sets that there are; they register, nothing here knows one
 exercises   a set for a variant: what a notebook opens
 steps       questions about a model with time and inputs: functions that take the step
 engine      is an answer right, and if not, what kind of mistake is it?  How long may it take?
+case        one result of a wrong answer: what a hint looks at
+dependence  how a result depends on the arguments
+hints       what can be said of any wrong answer
+relations   how a wrong answer stands to the right one
 failing     one input of a wrong answer, and what it gives there
 equality    are two formulas, two arrays equal?
 posing      can every question be posed for a variant?

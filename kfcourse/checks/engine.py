@@ -20,9 +20,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.checks.equality import Places, Unusable, equal, like
+from kfcourse.checks.case import Agree, Case
+from kfcourse.checks.dependence import Sensitivity, names_of
+from kfcourse.checks.equality import Places, Unusable, depends, equal, like, with_values
 from kfcourse.checks.failing import shown
-from kfcourse.checks.hints import Agree, Case, Sensitivity, general, names_of
+from kfcourse.checks.hints import general
 from kfcourse.checks.question import (
     MISSING,
     NOT_CHECKED,
@@ -178,7 +180,7 @@ class _Check:
 
     @cached_property
     def agree(self) -> Agree:
-        return partial(_agree, values=self.exercise.model.values, tolerance=self.question.tolerance, places=self.exercise.places)
+        return partial(_agree, values=self.values, tolerance=self.question.tolerance, places=self.exercise.places)
 
     def result(self) -> Result:
         try:
@@ -189,7 +191,7 @@ class _Check:
             return self._says(UNUSABLE, str(reason))
         try:
             with time_limit(self.seconds):
-                if self.agree(found, self.expected):
+                if self.agree(found, self.expected) and not self._in_numbers(found, self.expected):
                     self.past.given.pop(self.question.name, None)
                     return self._says(PASSED, "right", share=1.0)
         except OutOfTime:
@@ -202,8 +204,33 @@ class _Check:
         except Exception as error:  # of ours: the answer is wrong all the same, only the hint is lost
             return self._says(WRONG, f"not right. {GENERAL}", trouble=_trouble(error))
 
+    @cached_property
+    def values(self) -> dict[sp.Symbol, Any]:
+        """Of the parameters: of the model's symbols that are no arguments of the answer."""
+        given = {s.name for values in self.arguments for v in values if hasattr(v, "free_symbols") for s in v.free_symbols}
+        return {s: value for s, value in self.exercise.model.values.items() if s.name not in given}
+
+    def _in_numbers(self, found: Any, expected: Any) -> bool:
+        """Whether numbers stand in the place of parameters on which the right formulas depend."""
+        return any(
+            name not in {s.name for s in mine.free_symbols}
+            for mine, right in zip(_flat(found), _flat(expected), strict=True)
+            for name in depends(right, {s.name for s in self.values})
+        )
+
+    def _numbers(self, found: list[Any]) -> bool:
+        """Whether the formulas are right where parameters have their values, and those that are wrong as they are lack some."""
+        wrong = [
+            pair for pair in zip(_flat(found), _flat(self.expected), strict=True) if not self.agree(*([one] for one in pair))
+        ]
+        if not all(self._in_numbers(mine, right) for mine, right in wrong):
+            return False
+        sides = ([with_values(one, self.values) for one in _flat(side)] for side in (found, self.expected))
+        return bool(_flat(self.expected)) and self.agree(*sides)
+
     def _wrong(self, found: list[Any]) -> Result:
-        right = [place for place in range(len(self.question.parts)) if self.agree(*_both(found, self.expected, place))]
+        pairs = [_both(found, self.expected, place) for place in range(len(self.question.parts))]
+        right = [1 for mine, theirs in pairs if self.agree(mine, theirs) and not self._in_numbers(mine, theirs)]
         share = len(right) / len(self.question.parts) if right else 0.0
         times = self._times(found)
         follows = self._follows(found)
@@ -211,14 +238,16 @@ class _Check:
             which = ", ".join(follows)
             says = f"this step is right on top of your {which}, and your {which} is not right yet: look there first."
             return self._says(WRONG, says, diagnosis=("follows",), share=share, follows=follows)
+        if self._numbers(found):
+            return self._says(WRONG, NUMBERS, diagnosis=("numbers",), share=share)
         known = [(mistake, _wrong(mistake, self.exercise, self.arguments, self.expected)) for mistake in self.question.mistakes]
         wrong = _Wrong(self.question, (self.key, self.answer), self.arguments, found, self.expected, known, self.agree)
         message, names = wrong.told()
-        more = [] if names else [wrong.case(self.exercise.model.values)]
+        more = [] if names else [wrong.case(self.values)]
         if times and self.question.advice:
             more.insert(0, self.question.advice)
         if times > (1 if self.question.advice else 0) and names:
-            more.append(wrong.case(self.exercise.model.values))
+            more.append(wrong.case(self.values))
         return self._says(WRONG, " ".join([message, *filter(None, more)]), diagnosis=tuple(names), share=share)
 
     def _times(self, found: list[Any]) -> int:
@@ -254,6 +283,13 @@ class _Check:
         """A wrong answer to an earlier question with results in the form of the key's, as our own functions take them."""
         key, wrong = question.answer(self.exercise), self.past.wrong[question.name]
         return lambda *values: like(wrong(*copy.deepcopy(values)), standard(key(*copy.deepcopy(values))))
+
+
+def _flat(result: Any) -> list[sp.Expr]:
+    """All formulas of a result, or of several; none of numbers."""
+    if isinstance(result, list | tuple | sp.MatrixBase):
+        return [formula for part in result for formula in _flat(part)]
+    return [result] if isinstance(result, sp.Basic) else []
 
 
 def _both(found: Sequence[Any], expected: Sequence[Any], place: int) -> tuple[list[Any], list[Any]]:
@@ -319,9 +355,11 @@ class _Wrong:
 
         mine, theirs = of(self.found), of(self.expected)
         possible = [(mistake, of(wrong)) for mistake, wrong in self.known if wrong is not None]
-        seen = [mistake for mistake, wrong in possible if self.agree(mine, wrong)]
-        if seen:
-            return _named(seen), _said(seen)
+        first = next(i for i, (a, b) in enumerate(zip(mine, theirs, strict=True)) if not self.agree([a], [b]))
+        for calls in (slice(None), slice(first, first + 1)):  # in all calls; in the first that is wrong: more may be, later
+            seen = [mistake for mistake, wrong in possible if self.agree(mine[calls], wrong[calls])]
+            if seen:
+                return _named(seen), _said(seen)
         apart = [[not self.agree([a], [b]) for a, b in zip(wrong, theirs, strict=True)] for _, wrong in possible]
         apart = [row for row in apart if any(row)]
         telling = [2 * sum(column) >= len(apart) for column in zip(*apart, strict=True)] or [True] * len(theirs)
@@ -399,6 +437,7 @@ def _wrong(mistake: Mistake, exercise: Exercise, arguments: Sequence[tuple], exp
         return None
 
 
+NUMBERS = "Right in numbers, but the parameters are asked for as symbols: type their letters where their values stand."
 GENERAL = (
     "It does not look like one of the usual mistakes. Check each step of the derivation, and try a case whose answer you know."
 )
