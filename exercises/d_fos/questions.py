@@ -65,9 +65,24 @@ QUESTIONS = (
         condition_arguments,
         catalogue(WRONG_CONDITIONS),
         ("u", "T"),
+        advice=(
+            "The estimate is taken as any other measurement here: a regression of the state on it tells "
+            "both the mean and what is left."
+        ),
     ),
     Question(
-        "d2", "one step of the FOS", "core", fos_step, fos_arguments, catalogue(WRONG_FOS_STEPS), ("z", "lam_next", "Psi_next")
+        "d2",
+        "one step of the FOS",
+        "core",
+        fos_step,
+        fos_arguments,
+        catalogue(WRONG_FOS_STEPS),
+        ("z", "lam_next", "Psi_next"),
+        advice=(
+            "Compare with one step of the AOF line by line: the correction is the same. Which law does the "
+            "prediction begin from here?"
+        ),
+        axes=("trajectory",),
     ),
     Question(
         "d3",
@@ -77,6 +92,11 @@ QUESTIONS = (
         mfos_arguments,
         catalogue(WRONG_MFOS_STEPS),
         ("z", "lam_next", "Psi_next"),
+        advice=(
+            "Count the regressions, and write target and regressor of each beside it; then check that each "
+            "uses the newest estimate there is."
+        ),
+        axes=("trajectory",),
     ),
     Question(
         "d4",
@@ -117,6 +137,9 @@ QUESTIONS = (
             )
         ),
         ("u", "T"),
+        advice=(
+            "One regression with a longer regressor. Try it with a measurement that tells nothing: question 1 must come out."
+        ),
     ),
 )
 

@@ -95,7 +95,16 @@ def fit_arguments(exercise: Exercise) -> list[tuple]:
 
 
 QUESTIONS = (
-    Question("l1", "two rates", "warm-up", dimension, dimension_arguments, catalogue(WRONG_DIMENSIONS)),
+    Question(
+        "l1",
+        "two rates",
+        "warm-up",
+        dimension,
+        dimension_arguments,
+        catalogue(WRONG_DIMENSIONS),
+        advice="Write out k = 0, 1, 2, ... for a ratio of three and a first step of four, and count by hand.",
+        axes=("step",),
+    ),
     Question(
         "l2",
         "two time scales",
@@ -103,6 +112,7 @@ QUESTIONS = (
         own_time,
         lambda e: [sp.symbols("reading rate shift", positive=True)],
         catalogue(WRONG_TIMES),
+        advice="Try a clock that is right but for a shift, then one that only runs twice as fast.",
     ),
     Question(
         "l3",
@@ -112,9 +122,34 @@ QUESTIONS = (
         correction_arguments,
         catalogue(WRONG_CORRECTIONS),
         ("m", "P"),
+        advice=(
+            "Choose the components that are there first, of everything that has a component for each; then "
+            "it is the usual correction."
+        ),
     ),
-    Question("l4", "over an interval of any length", "core", move, move_arguments, catalogue(WRONG_MOVES), ("m", "P")),
-    Question("l5", "late and out of order", "core", fuse, fusion_arguments, catalogue(WRONG_FUSIONS), ("m", "P")),
+    Question(
+        "l4",
+        "over an interval of any length",
+        "core",
+        move,
+        move_arguments,
+        catalogue(WRONG_MOVES),
+        ("m", "P"),
+        advice="Two intervals one after the other must give the same as the whole one: try it with your Q.",
+    ),
+    Question(
+        "l5",
+        "late and out of order",
+        "core",
+        fuse,
+        fusion_arguments,
+        catalogue(WRONG_FUSIONS),
+        ("m", "P"),
+        advice=(
+            "Draw the times on a line: captured, arrived, now. Which measurements may be used, in which "
+            "order, and over which intervals do you move?"
+        ),
+    ),
     Question(
         "l6",
         "what ignoring the tag costs",
@@ -123,8 +158,18 @@ QUESTIONS = (
         lambda e: [sp.symbols("V a tau", positive=True)],
         catalogue(WRONG_COSTS),
         ("position", "velocity"),
+        advice="Expand s(-tau) and its derivative for a motion that you can follow by hand, such as V = 0.",
     ),
-    Question("l7", "the clock from edges", "stretch", fit_clock, fit_arguments, catalogue(WRONG_FITS), ("rate", "shift")),
+    Question(
+        "l7",
+        "the clock from edges",
+        "stretch",
+        fit_clock,
+        fit_arguments,
+        catalogue(WRONG_FITS),
+        ("rate", "shift"),
+        advice=("Which of the two has an error? That one is the target of the fit; then solve the line for the other."),
+    ),
 )
 
 SET = ExerciseSet(
