@@ -15,6 +15,7 @@ from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import STEP, array_functions
+from kfcourse.exercises import follow_on
 from kfcourse.exercises.b_aof.keys import correct, covariance, gain, run_filter, step
 from kfcourse.exercises.b_aof.mistakes import WRONG_CORRECTIONS, WRONG_COVARIANCES, WRONG_GAINS, WRONG_RUNS, WRONG_STEPS
 from kfcourse.exercises.shared import other_functions
@@ -130,6 +131,7 @@ QUESTIONS = (
             "nothing, G = 0. What must z and p be?"
         ),
         axes=("trajectory",),
+        on=follow_on.correct,
     ),
     Question(
         "b3",
@@ -141,6 +143,7 @@ QUESTIONS = (
         ("z", "p", "lam_next", "Psi_next"),
         advice=("Write down which law each function is called with: what is known before the measurement, and what after it?"),
         axes=("trajectory",),
+        on=follow_on.step,
     ),
     Question(
         "b4",
@@ -157,6 +160,7 @@ QUESTIONS = (
             "step",
             "trajectory",
         ),
+        on=follow_on.run_filter,
     ),
     Question(
         "b5",
@@ -168,6 +172,7 @@ QUESTIONS = (
         tolerance=1e-6,
         advice=("Write the error of the estimate as a sum of two independent parts; each has a covariance of the form M C M^T."),
         axes=("trajectory",),
+        on=follow_on.covariance,
     ),
 )
 

@@ -15,6 +15,7 @@ from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import STEP, Function, at_step, of_steps
+from kfcourse.exercises import follow_on
 from kfcourse.exercises.c_duof.keys import design_and_run, design_step, structure
 from kfcourse.exercises.c_duof.mistakes import WRONG_DUOF_RUNS, WRONG_DUOF_STEPS, WRONG_REGRESSIONS, WRONG_STRUCTURES
 from kfcourse.exercises.shared import RUNS, ensemble, other_equations, predicted, regression
@@ -112,6 +113,7 @@ QUESTIONS = (
             "result where the formula of the filter has it."
         ),
         axes=("trajectory",),
+        on=follow_on.design_step,
     ),
     Question(
         "c4",
@@ -127,6 +129,7 @@ QUESTIONS = (
             "step",
             "trajectory",
         ),
+        on=follow_on.design_and_run,
     ),
 )
 

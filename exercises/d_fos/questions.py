@@ -12,7 +12,7 @@ from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import STEP, array_functions, full
-from kfcourse.exercises import messages
+from kfcourse.exercises import follow_on, messages
 from kfcourse.exercises.d_fos.keys import condition, condition_on_both, fos_step, mfos_step
 from kfcourse.exercises.d_fos.mistakes import WRONG_CONDITIONS, WRONG_FOS_STEPS, WRONG_MFOS_STEPS
 from kfcourse.exercises.shared import RUNS, covariance_of, ensemble, other_functions, predicted
@@ -83,6 +83,7 @@ QUESTIONS = (
             "prediction begin from here?"
         ),
         axes=("trajectory",),
+        on=follow_on.fos_step,
     ),
     Question(
         "d3",
@@ -97,6 +98,7 @@ QUESTIONS = (
             "uses the newest estimate there is."
         ),
         axes=("trajectory",),
+        on=follow_on.mfos_step,
     ),
     Question(
         "d4",

@@ -16,6 +16,7 @@ import numpy as np
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.exercises import follow_on
 from kfcourse.exercises.f_exact.companion import Law, companion_numbers
 from kfcourse.exercises.f_exact.keys import correct, moments, nodes_needed, normalised, predict, run_filter
 from kfcourse.exercises.f_exact.mistakes_of_run import WRONG_NODES, WRONG_RUNS
@@ -136,6 +137,7 @@ QUESTIONS = (
         advice=(
             "Write the law before and after each measurement for the first two steps, and for a step without any measurement."
         ),
+        on=follow_on.grid_run,
     ),
     Question(
         "f5",

@@ -16,6 +16,7 @@ import sympy as sp
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.exercises import follow_on
 from kfcourse.exercises.i_track.keys import correct_root, matrices, process_noise, start_up, step
 from kfcourse.exercises.i_track.mistakes_of_filter import WRONG_ROOTS, WRONG_STEPS
 from kfcourse.exercises.i_track.mistakes_of_model import WRONG_MATRICES, WRONG_NOISES, WRONG_STARTS
@@ -82,6 +83,7 @@ QUESTIONS = (
         lambda e: [sp.symbols("dt sigma_a", positive=True)],
         catalogue(WRONG_NOISES),
         advice=("Take one axis: two components, one push. Their covariance has three different entries; what are their units?"),
+        on=follow_on.process_noise,
     ),
     Question(
         "i3",

@@ -14,6 +14,7 @@ import sympy as sp
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.exercises import follow_on
 from kfcourse.exercises.k_integration.keys import S_N, S_XI, bias_error, error_meter, gained, integrate, lost, steady_state
 from kfcourse.exercises.k_integration.mistakes_of_accuracy import WRONG_BIASES, WRONG_GROWTHS, WRONG_IMPROVEMENTS, WRONG_STEADY
 from kfcourse.exercises.k_integration.mistakes_of_filter import WRONG_FILTERS, WRONG_METERS
@@ -100,6 +101,7 @@ QUESTIONS = (
         catalogue(WRONG_IMPROVEMENTS),
         ("factor", "time_constant"),
         advice="Check the units: the first is a pure number, the second a time. Is the first larger than one?",
+        on=follow_on.gained,
     ),
     Question(
         "k5",
