@@ -15,6 +15,7 @@ from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import STEP, Function, at_step, of_steps
+from kfcourse.exercises import follow_on
 from kfcourse.exercises.c_duof.keys import design_and_run, design_step, structure
 from kfcourse.exercises.c_duof.mistakes import WRONG_DUOF_RUNS, WRONG_DUOF_STEPS, WRONG_REGRESSIONS, WRONG_STRUCTURES
 from kfcourse.exercises.shared import RUNS, ensemble, other_equations, predicted, regression
@@ -76,7 +77,18 @@ def duof_run_arguments(exercise: Exercise) -> list[tuple]:
 
 QUESTIONS = (
     Question(
-        "c1", "innovation and alpha", "warm-up", structure, structure_arguments, catalogue(WRONG_STRUCTURES), ("omega", "alpha")
+        "c1",
+        "innovation and alpha",
+        "warm-up",
+        structure,
+        structure_arguments,
+        catalogue(WRONG_STRUCTURES),
+        ("omega", "alpha"),
+        advice=(
+            "One of the two results is about the measurement of this step, the other about the next state: "
+            "from what is each known?"
+        ),
+        axes=("trajectory",),
     ),
     Question(
         "c2",
@@ -86,10 +98,38 @@ QUESTIONS = (
         regression_arguments,
         catalogue(WRONG_REGRESSIONS),
         ("matrix", "offset", "residual"),
+        advice=("Try a target that is exactly an affine function of the regressor: what must the three results be?"),
     ),
-    Question("c3", "one step of the design", "core", design_step, duof_arguments, catalogue(WRONG_DUOF_STEPS), ("z", "lam_next")),
     Question(
-        "c4", "designed on one ensemble, run on another", "core", design_and_run, duof_run_arguments, catalogue(WRONG_DUOF_RUNS)
+        "c3",
+        "one step of the design",
+        "core",
+        design_step,
+        duof_arguments,
+        catalogue(WRONG_DUOF_STEPS),
+        ("z", "lam_next"),
+        advice=(
+            "Say for each regression what is to be estimated, and from what; then put the regression's "
+            "result where the formula of the filter has it."
+        ),
+        axes=("trajectory",),
+        on=follow_on.design_step,
+    ),
+    Question(
+        "c4",
+        "designed on one ensemble, run on another",
+        "core",
+        design_and_run,
+        duof_run_arguments,
+        catalogue(WRONG_DUOF_RUNS),
+        advice=(
+            "Two ensembles go through the same steps: only one of them has known states, and both use the same coefficients."
+        ),
+        axes=(
+            "step",
+            "trajectory",
+        ),
+        on=follow_on.design_and_run,
     ),
 )
 

@@ -66,6 +66,8 @@ QUESTIONS = (
         error_variance,
         asked("e1", 0, 1),
         catalogue(WRONG_VARIANCES),
+        advice="Look at the axes: over which of them is a sum taken, over which a mean, and which one is left?",
+        axes=("step",),
     ),
     Question(
         "e2",
@@ -75,6 +77,11 @@ QUESTIONS = (
         asked("e2", 0, 1),
         catalogue(WRONG_ERRORS),
         TWO,
+        advice=(
+            "The standard error belongs to a mean of N numbers. Which numbers, how much do they scatter, "
+            "and how does a mean of N scatter?"
+        ),
+        axes=("step",),
     ),
     Question(
         "e3",
@@ -84,8 +91,23 @@ QUESTIONS = (
         asked("e3", 0, 1, 2),
         catalogue(WRONG_DIFFERENCES),
         TWO,
+        advice=("Make one number of each trajectory that holds all you want to average; then question 2 applies to it."),
+        axes=("step",),
     ),
-    Question("e4", "a ratio", "stretch", ratio, asked("e4", 0, 1, 2), catalogue(WRONG_RATIOS), TWO),
+    Question(
+        "e4",
+        "a ratio",
+        "stretch",
+        ratio,
+        asked("e4", 0, 1, 2),
+        catalogue(WRONG_RATIOS),
+        TWO,
+        advice=(
+            "Change the mean above a little, then the mean below: how does the ratio change? Keep each "
+            "trajectory's two changes together."
+        ),
+        axes=("step",),
+    ),
     Question(
         "e5",
         "does the filter know its own error?",
@@ -93,6 +115,11 @@ QUESTIONS = (
         normalised_error,
         asked("e5", 0, 1, 3),
         catalogue(WRONG_NORMALISED),
+        advice=(
+            "Take one trajectory at one step: a vector, a matrix and a number. Then average the numbers "
+            "over the trajectories, and look at the 1/n."
+        ),
+        axes=("step",),
     ),
 )
 

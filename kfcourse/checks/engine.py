@@ -235,8 +235,7 @@ class _Check:
         times = self._times(found)
         follows = self._follows(found)
         if follows:
-            which = ", ".join(follows)
-            says = f"this step is right on top of your {which}, and your {which} is not right yet: look there first."
+            says = f"this step is right on top of your {' and '.join(follows)}; what is not right yet is there: look there first."
             return self._says(WRONG, says, diagnosis=("follows",), share=share, follows=follows)
         if self._numbers(found):
             return self._says(WRONG, NUMBERS, diagnosis=("numbers",), share=share)
