@@ -10,7 +10,7 @@ import sympy as sp
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.steps import Function, at_wrong_step
 from kfcourse.filters.designed import Scatter
-from kfcourse.laws import Array
+from kfcourse.laws import Array, transpose
 
 Map = Callable[[Array], Array]
 COURSE = "53"  # the variant that the course itself works through
@@ -34,6 +34,46 @@ def covariance(rng: np.random.Generator, size: int, scale: float = 1.0) -> Array
 def substituted(formulas: sp.MatrixBase, names: tuple[sp.Symbol, ...]) -> Callable[..., sp.ImmutableMatrix]:
     """The formulas as a function of other symbols in the place of these."""
     return lambda *values: sp.ImmutableMatrix(formulas.xreplace(dict(zip(names, map(sp.sympify, values), strict=True))))
+
+
+# -- other functions than the variant's: where it is linear, or has a zero or a one, a mistake would not show
+
+
+def _like(function: Function, changed: Function) -> Function:
+    """The changed function, which takes the step if the first does."""
+    changed.__dict__.update(vars(function))
+    return changed
+
+
+def other_functions(exercise: Exercise, measure: Function, predict: Function) -> tuple[Function, Function]:
+    """Structural functions with another h, a full G with its F, a curved tau, and a Theta that depends on p."""
+    n, p = exercise.model.n, exercise.model.p
+    rng = exercise.rng("other-functions")
+    more, shift = rng.uniform(0.3, 0.6, (p, n)), rng.uniform(0.3, 0.6, p)
+
+    def other_measure(m: Array, d: Array, *k: int) -> tuple[Array, Array, Array]:
+        h, G, F = measure(m, d, *k)
+        full_G = G + more
+        return h + m @ more.T + shift, full_G, 1.1 * (F - G @ d @ transpose(G)) + full_G @ d @ transpose(full_G)
+
+    def other_predict(z: Array, p: Array, *k: int) -> tuple[Array, Array]:
+        tau, Theta = predict(z, p, *k)
+        return tau + 0.3 * np.sin(2 * tau + 0.5), 1.2 * Theta + 0.2 * p
+
+    return _like(measure, other_measure), _like(predict, other_predict)
+
+
+def other_equations(exercise: Exercise, a: Function, b: Function) -> tuple[Function, Function]:
+    """Functions a and b of the state, curved."""
+    more = exercise.rng("other-equations").uniform(0.3, 0.6, (exercise.model.p, exercise.model.n))
+
+    def other_a(x: Array, *k: int) -> Array:
+        return a(x, *k) + 0.3 * np.sin(2 * a(x, *k) + 0.5)
+
+    def other_b(x: Array, *k: int) -> Array:
+        return b(x, *k) + np.sin(x + 0.4) @ more.T + 0.3
+
+    return _like(a, other_a), _like(b, other_b)
 
 
 # -- a wrong step, for known mistakes: the function of another step, at step k

@@ -14,7 +14,7 @@ import sympy as sp
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, ForVariant, Mistake, Question
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises import messages
+from kfcourse.exercises import follow_on, messages
 from kfcourse.exercises.a_structural_functions.mistakes import (
     CORRELATION_FORGOTTEN,
     FUNCTION_FOR_DERIVATIVE,
@@ -260,11 +260,11 @@ def unexplained(exercise: Exercise) -> Formula:
     return exercise.closed("gaussian")["R"]
 
 
-def _question(number: int, title: str, kind: str, side: str, mistakes: tuple[Mistake, ...]) -> Question:
+def _question(number: int, title: str, kind: str, side: str, mistakes: tuple[Mistake, ...], advice: str) -> Question:
     """A question for the functions of one kind and one side."""
     parts = ("tau", "Theta") if side == "object" else ("h", "G", "F")
     right_one = key(f"{side}_{kind}", right(kind, side), side)
-    return Question(f"a{number}", title, "core", right_one, lambda e: [symbols(e, side)], mistakes, parts)
+    return Question(f"a{number}", title, "core", right_one, lambda e: [symbols(e, side)], mistakes, parts, advice=advice)
 
 
 QUESTIONS = (
@@ -298,11 +298,52 @@ QUESTIONS = (
             Mistake("secant", "The value was divided by the state; the derivative is asked for.", constant(_unevaluated)),
         ),
         ("a_x", "a_v"),
+        advice=(
+            "Write the equation down once more, keep all letters but one constant, and differentiate by "
+            "that one; put the mean in last."
+        ),
     ),
-    _question(2, "linearised functions of the object", "linearised", "object", mistakes_of_linearised("object")),
-    _question(3, "linearised functions of the meter", "linearised", "meter", mistakes_of_linearised("meter")),
-    _question(4, "Gaussian functions of the object", "gaussian", "object", mistakes_of_gaussian("object")),
-    _question(5, "Gaussian functions of the meter", "gaussian", "meter", mistakes_of_gaussian("meter")),
+    _question(
+        2,
+        "linearised functions of the object",
+        "linearised",
+        "object",
+        mistakes_of_linearised("object"),
+        advice=(
+            "Write x as mean plus deviation: what multiplies the deviation, what multiplies the noise, and "
+            "what is the variance of each?"
+        ),
+    ),
+    _question(
+        3,
+        "linearised functions of the meter",
+        "linearised",
+        "meter",
+        mistakes_of_linearised("meter"),
+        advice=(
+            "Do for the meter what you did for the object: first the value at the mean, then its slope, "
+            "then what slope and noise do to a variance."
+        ),
+    ),
+    _question(
+        4,
+        "Gaussian functions of the object",
+        "gaussian",
+        "object",
+        mistakes_of_gaussian("object"),
+        advice=(
+            "Average over the noise first, with the state fixed; then over the state. Check with a variance "
+            "of zero: what must come out?"
+        ),
+    ),
+    _question(
+        5,
+        "Gaussian functions of the meter",
+        "gaussian",
+        "meter",
+        mistakes_of_gaussian("meter"),
+        advice=("Check three cases by hand: no uncertainty of the state, no noise, and a meter that is a straight line."),
+    ),
     Question(
         "a6",
         "what the state does not explain of the measurement",
@@ -327,6 +368,11 @@ QUESTIONS = (
             ),
             *(Mistake(name, says, unexplained_with(part)) for name, says, part in WRONG_NOISE_PARTS),
         ),
+        advice=(
+            "Write all three functions of question 5 below each other before you subtract; what is left if "
+            "the meter is a straight line?"
+        ),
+        on=follow_on.unexplained,
     ),
 )
 

@@ -14,9 +14,11 @@ import numpy as np
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.checks.steps import STEP, array_functions, full
+from kfcourse.checks.steps import STEP, array_functions
+from kfcourse.exercises import follow_on
 from kfcourse.exercises.b_aof.keys import correct, covariance, gain, run_filter, step
 from kfcourse.exercises.b_aof.mistakes import WRONG_CORRECTIONS, WRONG_COVARIANCES, WRONG_GAINS, WRONG_RUNS, WRONG_STEPS
+from kfcourse.exercises.shared import other_functions
 from kfcourse.laws import Array, Gaussian, Measurement, transpose
 
 RUNS = 6  # hidden trajectories
@@ -34,8 +36,8 @@ def hidden_law(exercise: Exercise, name: str) -> Gaussian:
 
 def hidden_meter(exercise: Exercise, at: Gaussian) -> Measurement:
     """Structural functions of a hidden meter at a law, one of each for every trajectory."""
-    h, G, F, R = exercise.hidden.gaussian.at(STEP).measure(*at)
-    return Measurement(np.array(np.broadcast_to(h, (RUNS, exercise.model.p))), full(G, RUNS), full(F, RUNS), full(R, RUNS))
+    h, G, F = structure_functions(exercise)[0](*at)
+    return Measurement(h, G, F, F - G @ at.cov @ transpose(G))
 
 
 def hidden_measurements(exercise: Exercise, name: str, expected: Measurement) -> Array:
@@ -46,7 +48,7 @@ def hidden_measurements(exercise: Exercise, name: str, expected: Measurement) ->
 
 def structure_functions(exercise: Exercise) -> tuple[Callable, Callable]:
     """(measure, predict) of one step as students get them: h, G, F and tau, Theta, full arrays."""
-    return array_functions(exercise.hidden.gaussian.at(STEP))
+    return other_functions(exercise, *array_functions(exercise.hidden.gaussian.at(STEP)))
 
 
 # -- b1: the gain
@@ -89,7 +91,7 @@ def run_arguments(exercise: Exercise) -> list[tuple]:
     gaps[2, 1] = gaps[4, :3] = np.nan
     prior = exercise.model.prior  # not quite: where its mean is zero, or its variance one, a mistake would not show
     mean, cov = prior.mean + 0.3 * np.sqrt(np.diagonal(prior.cov)), 1.3 * prior.cov
-    return [(values, mean, cov, *exercise.hidden_functions()) for values in (y, gaps)]
+    return [(values, mean, cov, *other_functions(exercise, *exercise.hidden_functions())) for values in (y, gaps)]
 
 
 # -- b5: a covariance that rounding cannot make negative
@@ -104,10 +106,62 @@ def covariance_arguments(exercise: Exercise) -> list[tuple]:
 
 
 QUESTIONS = (
-    Question("b1", "the gain", "warm-up", gain, gain_arguments, catalogue(WRONG_GAINS)),
-    Question("b2", "the correction", "core", correct, correction_arguments, catalogue(WRONG_CORRECTIONS), ("z", "p")),
-    Question("b3", "one step", "core", step, step_arguments, catalogue(WRONG_STEPS), ("z", "p", "lam_next", "Psi_next")),
-    Question("b4", "a run", "core", run_filter, run_arguments, catalogue(WRONG_RUNS)),
+    Question(
+        "b1",
+        "the gain",
+        "warm-up",
+        gain,
+        gain_arguments,
+        catalogue(WRONG_GAINS),
+        advice=(
+            "Take one trajectory with one component by hand; then look at the shapes: which product of them gives (N, n, p)?"
+        ),
+        axes=("trajectory",),
+    ),
+    Question(
+        "b2",
+        "the correction",
+        "core",
+        correct,
+        correction_arguments,
+        catalogue(WRONG_CORRECTIONS),
+        ("z", "p"),
+        advice=(
+            "Try two cases: a measurement that is exactly what was expected, and a meter that tells "
+            "nothing, G = 0. What must z and p be?"
+        ),
+        axes=("trajectory",),
+        on=follow_on.correct,
+    ),
+    Question(
+        "b3",
+        "one step",
+        "core",
+        step,
+        step_arguments,
+        catalogue(WRONG_STEPS),
+        ("z", "p", "lam_next", "Psi_next"),
+        advice=("Write down which law each function is called with: what is known before the measurement, and what after it?"),
+        axes=("trajectory",),
+        on=follow_on.step,
+    ),
+    Question(
+        "b4",
+        "a run",
+        "core",
+        run_filter,
+        run_arguments,
+        catalogue(WRONG_RUNS),
+        advice=(
+            "Follow one trajectory for two steps by hand; then one whose first measurement is missing: what "
+            "is its estimate, and what its covariance?"
+        ),
+        axes=(
+            "step",
+            "trajectory",
+        ),
+        on=follow_on.run_filter,
+    ),
     Question(
         "b5",
         "a covariance that survives rounding",
@@ -116,6 +170,9 @@ QUESTIONS = (
         covariance_arguments,
         catalogue(WRONG_COVARIANCES),
         tolerance=1e-6,
+        advice=("Write the error of the estimate as a sum of two independent parts; each has a covariance of the form M C M^T."),
+        axes=("trajectory",),
+        on=follow_on.covariance,
     ),
 )
 

@@ -65,6 +65,10 @@ def duof_run_with(
     sign: float = 1.0,
     a_at: Callable[[Function, int], Function] = at_step,
     b_at: Callable[[Function, int], Function] = at_step,
+    fit: Fit = regression,
+    target: Callable[[Array, Array], Array] = lambda x, lam: x - lam,
+    base: Callable[[Array], Array] = lambda lam: lam,
+    prediction_offset: bool = True,
 ) -> Answer:
     """Design over x, y (steps, N, ...), then filter other measurements; with one thing changed.
 
@@ -77,18 +81,19 @@ def duof_run_with(
         for k in range(len(x)):
             a_k, b_k = a_at(a, k), b_at(b, k)
             omega = y_design[k] - b_k(lam)
-            H, e, _ = regression(x[k] - lam, omega)
+            H, e, _ = fit(target(x[k], lam), omega)
             first = (H, e) if first is None else first
             if one_gain:
                 H, e = first
             z = lam + omega @ H.T + e
             if without_offset:
                 e = 0 * e
-            z_other = other + sign * (y[k] - b_k(other)) @ H.T + e
+            z_other = base(other) + sign * (y[k] - b_k(other)) @ H.T + e
             estimates.append(other if predictions else z_other)
             if k + 1 < len(x):
-                F, g, _ = regression(x[k + 1], a_k(z))
-                lam, other = a_k(z) @ F.T + g, a_k(z_other) if object_alone else a_k(z_other) @ F.T + g
+                F, g, _ = fit(x[k + 1], a_k(z))
+                lam, of_other = a_k(z) @ F.T + g, g if prediction_offset else 0 * g
+                other = a_k(z_other) if object_alone else a_k(z_other) @ F.T + of_other
         return np.array(estimates)
 
     return run

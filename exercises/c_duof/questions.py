@@ -15,14 +15,15 @@ from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import STEP, Function, at_step, of_steps
+from kfcourse.exercises import follow_on
 from kfcourse.exercises.c_duof.keys import design_and_run, design_step, structure
 from kfcourse.exercises.c_duof.mistakes import WRONG_DUOF_RUNS, WRONG_DUOF_STEPS, WRONG_REGRESSIONS, WRONG_STRUCTURES
-from kfcourse.exercises.shared import RUNS, ensemble, predicted, regression
+from kfcourse.exercises.shared import RUNS, ensemble, other_equations, predicted, regression
 
 
 def noiseless(exercise: Exercise) -> tuple[Callable, Callable]:
-    """a(x, m_v) and b(x, m_w) of the hidden model at one step, (N, n) -> (N, n) and (N, p)."""
-    a, b = exercise.hidden_noiseless
+    """Hidden a(x) and b(x) at one step, (N, n) -> (N, n) and (N, p)."""
+    a, b = other_equations(exercise, *exercise.hidden_noiseless)
     return at_step(a, STEP), at_step(b, STEP)
 
 
@@ -68,13 +69,26 @@ def bent(function: Function) -> Function:
 def duof_run_arguments(exercise: Exercise) -> list[tuple]:
     """An ensemble to design on, and measurements of other trajectories."""
     x, y = exercise.simulate(RUNS, 4, "c4-design")
-    functions = map(bent, exercise.hidden_noiseless) if exercise.model.timed else exercise.hidden_noiseless
-    return [(x, y, exercise.simulate(5, 4, "c4").y, exercise.model.prior.mean, *functions)]
+    functions = other_equations(exercise, *exercise.hidden_noiseless)
+    prior = exercise.model.prior  # not quite: where its mean is zero, a start at zero would pass
+    mean = prior.mean + 0.4 * np.sqrt(np.diagonal(prior.cov))
+    return [(x, y, exercise.simulate(5, 4, "c4").y, mean, *(map(bent, functions) if exercise.model.timed else functions))]
 
 
 QUESTIONS = (
     Question(
-        "c1", "innovation and alpha", "warm-up", structure, structure_arguments, catalogue(WRONG_STRUCTURES), ("omega", "alpha")
+        "c1",
+        "innovation and alpha",
+        "warm-up",
+        structure,
+        structure_arguments,
+        catalogue(WRONG_STRUCTURES),
+        ("omega", "alpha"),
+        advice=(
+            "One of the two results is about the measurement of this step, the other about the next state: "
+            "from what is each known?"
+        ),
+        axes=("trajectory",),
     ),
     Question(
         "c2",
@@ -84,10 +98,38 @@ QUESTIONS = (
         regression_arguments,
         catalogue(WRONG_REGRESSIONS),
         ("matrix", "offset", "residual"),
+        advice=("Try a target that is exactly an affine function of the regressor: what must the three results be?"),
     ),
-    Question("c3", "one step of the design", "core", design_step, duof_arguments, catalogue(WRONG_DUOF_STEPS), ("z", "lam_next")),
     Question(
-        "c4", "designed on one ensemble, run on another", "core", design_and_run, duof_run_arguments, catalogue(WRONG_DUOF_RUNS)
+        "c3",
+        "one step of the design",
+        "core",
+        design_step,
+        duof_arguments,
+        catalogue(WRONG_DUOF_STEPS),
+        ("z", "lam_next"),
+        advice=(
+            "Say for each regression what is to be estimated, and from what; then put the regression's "
+            "result where the formula of the filter has it."
+        ),
+        axes=("trajectory",),
+        on=follow_on.design_step,
+    ),
+    Question(
+        "c4",
+        "designed on one ensemble, run on another",
+        "core",
+        design_and_run,
+        duof_run_arguments,
+        catalogue(WRONG_DUOF_RUNS),
+        advice=(
+            "Two ensembles go through the same steps: only one of them has known states, and both use the same coefficients."
+        ),
+        axes=(
+            "step",
+            "trajectory",
+        ),
+        on=follow_on.design_and_run,
     ),
 )
 

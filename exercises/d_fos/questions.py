@@ -12,10 +12,10 @@ from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import STEP, array_functions, full
-from kfcourse.exercises import messages
+from kfcourse.exercises import follow_on, messages
 from kfcourse.exercises.d_fos.keys import condition, condition_on_both, fos_step, mfos_step
 from kfcourse.exercises.d_fos.mistakes import WRONG_CONDITIONS, WRONG_FOS_STEPS, WRONG_MFOS_STEPS
-from kfcourse.exercises.shared import RUNS, covariance_of, ensemble, predicted
+from kfcourse.exercises.shared import RUNS, covariance_of, ensemble, other_functions, predicted
 
 # -- d1: what the estimate says of the state
 
@@ -34,7 +34,7 @@ def fos_arguments(exercise: Exercise, name: str = "d2") -> list[tuple]:
     x, y, _ = ensemble(exercise, name)
     lam = predicted(exercise, f"{name}-lam", x)
     Psi = full(covariance_of(x - lam, x - lam), RUNS) * (1 + 0.3 * exercise.rng(f"{name}-Psi").random((RUNS, 1, 1)))
-    return [(lam, Psi, x, y, *array_functions(exercise.hidden.gaussian.at(STEP)))]
+    return [(lam, Psi, x, y, *other_functions(exercise, *array_functions(exercise.hidden.gaussian.at(STEP))))]
 
 
 # -- d3: one step of the MFOS
@@ -65,9 +65,25 @@ QUESTIONS = (
         condition_arguments,
         catalogue(WRONG_CONDITIONS),
         ("u", "T"),
+        advice=(
+            "The estimate is taken as any other measurement here: a regression of the state on it tells "
+            "both the mean and what is left."
+        ),
     ),
     Question(
-        "d2", "one step of the FOS", "core", fos_step, fos_arguments, catalogue(WRONG_FOS_STEPS), ("z", "lam_next", "Psi_next")
+        "d2",
+        "one step of the FOS",
+        "core",
+        fos_step,
+        fos_arguments,
+        catalogue(WRONG_FOS_STEPS),
+        ("z", "lam_next", "Psi_next"),
+        advice=(
+            "Compare with one step of the AOF line by line: the correction is the same. Which law does the "
+            "prediction begin from here?"
+        ),
+        axes=("trajectory",),
+        on=follow_on.fos_step,
     ),
     Question(
         "d3",
@@ -77,6 +93,12 @@ QUESTIONS = (
         mfos_arguments,
         catalogue(WRONG_MFOS_STEPS),
         ("z", "lam_next", "Psi_next"),
+        advice=(
+            "Count the regressions, and write target and regressor of each beside it; then check that each "
+            "uses the newest estimate there is."
+        ),
+        axes=("trajectory",),
+        on=follow_on.mfos_step,
     ),
     Question(
         "d4",
@@ -117,6 +139,9 @@ QUESTIONS = (
             )
         ),
         ("u", "T"),
+        advice=(
+            "One regression with a longer regressor. Try it with a measurement that tells nothing: question 1 must come out."
+        ),
     ),
 )
 

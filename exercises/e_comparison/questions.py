@@ -6,7 +6,10 @@ hidden arguments are made here; the keys are in keys.py, the known mistakes in m
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+
+import numpy as np
 
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
@@ -34,6 +37,25 @@ def hidden_estimates(exercise: Exercise, name: str) -> tuple[Array, Array, Array
     return x, first.mean + 0.03 * noise, first.mean + 0.08 * noise[::-1], first.cov
 
 
+MIXED = np.array([[1.0, 0.5], [-0.3, 1.0]])
+
+
+def asked(name: str, *places: int) -> Callable[[Exercise], list[tuple]]:
+    """Arguments at these places of the hidden estimates; of a scalar variant also with two components, which are correlated."""
+
+    def arguments(exercise: Exercise) -> list[tuple]:
+        one = hidden_estimates(exercise, name)
+        found = [one]
+        if exercise.model.n == 1:
+            other = hidden_estimates(exercise, f"{name}-second")
+            *vectors, (p, q) = zip(one, other, strict=True)
+            blocks = np.concatenate([np.concatenate([p, 0 * p], axis=-1), np.concatenate([0 * q, q], axis=-1)], axis=-2)
+            found.append((*(np.concatenate(pair, axis=-1) @ MIXED.T for pair in vectors), MIXED @ blocks @ MIXED.T))
+        return [tuple(case[place] for place in places) for case in found]
+
+    return arguments
+
+
 TWO = ("value", "standard_error")
 
 QUESTIONS = (
@@ -42,35 +64,62 @@ QUESTIONS = (
         "the error variance",
         "warm-up",
         error_variance,
-        lambda e: [hidden_estimates(e, "e1")[:2]],
+        asked("e1", 0, 1),
         catalogue(WRONG_VARIANCES),
+        advice="Look at the axes: over which of them is a sum taken, over which a mean, and which one is left?",
+        axes=("step",),
     ),
     Question(
         "e2",
         "its standard error",
         "core",
         with_standard_error,
-        lambda e: [hidden_estimates(e, "e2")[:2]],
+        asked("e2", 0, 1),
         catalogue(WRONG_ERRORS),
         TWO,
+        advice=(
+            "The standard error belongs to a mean of N numbers. Which numbers, how much do they scatter, "
+            "and how does a mean of N scatter?"
+        ),
+        axes=("step",),
     ),
     Question(
         "e3",
         "a paired difference",
         "core",
         difference,
-        lambda e: [hidden_estimates(e, "e3")[:3]],
+        asked("e3", 0, 1, 2),
         catalogue(WRONG_DIFFERENCES),
         TWO,
+        advice=("Make one number of each trajectory that holds all you want to average; then question 2 applies to it."),
+        axes=("step",),
     ),
-    Question("e4", "a ratio", "stretch", ratio, lambda e: [hidden_estimates(e, "e4")[:3]], catalogue(WRONG_RATIOS), TWO),
+    Question(
+        "e4",
+        "a ratio",
+        "stretch",
+        ratio,
+        asked("e4", 0, 1, 2),
+        catalogue(WRONG_RATIOS),
+        TWO,
+        advice=(
+            "Change the mean above a little, then the mean below: how does the ratio change? Keep each "
+            "trajectory's two changes together."
+        ),
+        axes=("step",),
+    ),
     Question(
         "e5",
         "does the filter know its own error?",
         "core",
         normalised_error,
-        lambda e: [(hidden_estimates(e, "e5")[0], hidden_estimates(e, "e5")[1], hidden_estimates(e, "e5")[3])],
+        asked("e5", 0, 1, 3),
         catalogue(WRONG_NORMALISED),
+        advice=(
+            "Take one trajectory at one step: a vector, a matrix and a number. Then average the numbers "
+            "over the trajectories, and look at the 1/n."
+        ),
+        axes=("step",),
     ),
 )
 

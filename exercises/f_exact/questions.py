@@ -16,6 +16,7 @@ import numpy as np
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.exercises import follow_on
 from kfcourse.exercises.f_exact.companion import Law, companion_numbers
 from kfcourse.exercises.f_exact.keys import correct, moments, nodes_needed, normalised, predict, run_filter
 from kfcourse.exercises.f_exact.mistakes_of_run import WRONG_NODES, WRONG_RUNS
@@ -99,13 +100,57 @@ QUESTIONS = (
         lambda e: [(hidden_density(e, "f1"), nodes())],
         catalogue(WRONG_MOMENTS),
         ("density", "mean", "variance"),
+        advice="Try a density that is constant over a few nodes: its integral, mean and variance are known.",
     ),
     Question(
-        "f2", "the correction", "core", correct, correction_arguments, catalogue(WRONG_CORRECTIONS), ("posterior", "density of y")
+        "f2",
+        "the correction",
+        "core",
+        correct,
+        correction_arguments,
+        catalogue(WRONG_CORRECTIONS),
+        ("posterior", "density of y"),
+        advice=(
+            "Check that the posterior integrates to one, and that a measurement which tells nothing leaves "
+            "the prediction as it was."
+        ),
     ),
-    Question("f3", "the prediction", "core", predict, prediction_arguments, catalogue(WRONG_PREDICTIONS)),
-    Question("f4", "a run", "core", run_filter, run_arguments, catalogue(WRONG_RUNS), ("z", "p", "ln p(y)")),
-    Question("f5", "how many nodes", "stretch", nodes_needed, nodes_arguments, catalogue(WRONG_NODES)),
+    Question(
+        "f3",
+        "the prediction",
+        "core",
+        predict,
+        prediction_arguments,
+        catalogue(WRONG_PREDICTIONS),
+        advice=(
+            "Look at one entry of your matrix: from which node to which does it lead, and whose mean and variance stand in it?"
+        ),
+    ),
+    Question(
+        "f4",
+        "a run",
+        "core",
+        run_filter,
+        run_arguments,
+        catalogue(WRONG_RUNS),
+        ("z", "p", "ln p(y)"),
+        advice=(
+            "Write the law before and after each measurement for the first two steps, and for a step without any measurement."
+        ),
+        on=follow_on.grid_run,
+    ),
+    Question(
+        "f5",
+        "how many nodes",
+        "stretch",
+        nodes_needed,
+        nodes_arguments,
+        catalogue(WRONG_NODES),
+        advice=(
+            "Draw three intervals and count their nodes. Then solve the bound for the distance once more, "
+            "taking logarithms of both sides."
+        ),
+    ),
 )
 
 SET = ExerciseSet(

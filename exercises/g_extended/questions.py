@@ -14,6 +14,7 @@ from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import at_step
+from kfcourse.exercises import follow_on
 from kfcourse.exercises.g_extended.hidden import RUNS, STEPS, cases, changing, curved, hidden_law, root
 from kfcourse.exercises.g_extended.keys import bounds, consistency, correct, information, jacobian, predict, run_filter
 from kfcourse.exercises.g_extended.mistakes_of_consistency import WRONG_BOUNDS, WRONG_NORMALISED
@@ -122,15 +123,94 @@ TWO = ("z", "p")
 
 QUESTIONS = (
     Question(
-        "g1", "a Jacobian by differences", "warm-up", jacobian, jacobian_arguments, catalogue(WRONG_JACOBIANS), tolerance=1e-8
+        "g1",
+        "a Jacobian by differences",
+        "warm-up",
+        jacobian,
+        jacobian_arguments,
+        catalogue(WRONG_JACOBIANS),
+        tolerance=1e-8,
+        advice=(
+            "Try it on a linear function, whose derivative you know, and on a quadratic one: for both, "
+            "central differences are exact."
+        ),
+        axes=("trajectory",),
     ),
-    Question("g2", "bounds", "warm-up", bounds, bounds_arguments, catalogue(WRONG_BOUNDS), ("low", "high")),
-    Question("g3", "the prediction", "core", predict, prediction_arguments, catalogue(WRONG_PREDICTIONS), ("lam", "Psi")),
-    Question("g4", "the correction, in the gain form", "core", correct, correction_arguments, catalogue(WRONG_CORRECTIONS), TWO),
-    Question("g5", "a run", "core", run_filter, run_arguments, catalogue(WRONG_RUNS), ("z", "p", "lam", "Psi")),
-    Question("g6", "NEES and NIS", "core", consistency, normalised_arguments, catalogue(WRONG_NORMALISED), ("NEES", "NIS")),
     Question(
-        "g7", "the information form", "stretch", information, information_arguments, catalogue(WRONG_INFORMATION), ("p", "K")
+        "g2",
+        "bounds",
+        "warm-up",
+        bounds,
+        bounds_arguments,
+        catalogue(WRONG_BOUNDS),
+        ("low", "high"),
+        advice=(
+            "What is the law of the sum? Then of the mean? For many runs the bounds must close in on the degrees of freedom."
+        ),
+    ),
+    Question(
+        "g3",
+        "the prediction",
+        "core",
+        predict,
+        prediction_arguments,
+        catalogue(WRONG_PREDICTIONS),
+        ("lam", "Psi"),
+        advice="Say of each function at which point it is taken, and check with a linear model and no noise.",
+        axes=("trajectory",),
+    ),
+    Question(
+        "g4",
+        "the correction, in the gain form",
+        "core",
+        correct,
+        correction_arguments,
+        catalogue(WRONG_CORRECTIONS),
+        TWO,
+        advice=(
+            "Try two cases: y equal to what was expected, and a meter that tells nothing. Then look at "
+            "where S and where H belongs."
+        ),
+        axes=("trajectory",),
+    ),
+    Question(
+        "g5",
+        "a run",
+        "core",
+        run_filter,
+        run_arguments,
+        catalogue(WRONG_RUNS),
+        ("z", "p", "lam", "Psi"),
+        advice="Follow the first two steps by hand: which law is compared with y_0, and which with y_1?",
+        axes=(
+            "step",
+            "trajectory",
+        ),
+        on=follow_on.extended_run,
+    ),
+    Question(
+        "g6",
+        "NEES and NIS",
+        "core",
+        consistency,
+        normalised_arguments,
+        catalogue(WRONG_NORMALISED),
+        ("NEES", "NIS"),
+        advice=(
+            "For each of the two: which error, and the covariance of that very error? For a right filter the means are n and p."
+        ),
+        axes=("step",),
+    ),
+    Question(
+        "g7",
+        "the information form",
+        "stretch",
+        information,
+        information_arguments,
+        catalogue(WRONG_INFORMATION),
+        ("p", "K"),
+        advice="Compare with the gain form for one component by hand: which inverses are there, and of what?",
+        axes=("trajectory",),
     ),
 )
 

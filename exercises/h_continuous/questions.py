@@ -123,13 +123,57 @@ QUESTIONS = (
         variances_arguments,
         catalogue(WRONG_VARIANCES),
         ("D_xi", "D_n"),
+        advice="Check the units, and what becomes of the mean when the step is longer.",
     ),
     Question(
-        "h2", "a step of a simulation", "core", simulate_step, simulation_arguments, catalogue(WRONG_SIMULATIONS), ("x_next", "y")
+        "h2",
+        "a step of a simulation",
+        "core",
+        simulate_step,
+        simulation_arguments,
+        catalogue(WRONG_SIMULATIONS),
+        ("x_next", "y"),
+        advice=(
+            "Check the variances: after a step without drift that of the state grows in proportion to T, that of y falls with T."
+        ),
+        axes=("trajectory",),
     ),
-    Question("h3", "the Riccati equation", "core", riccati, rate_arguments, catalogue(WRONG_RATES)),
-    Question("h4", "the steady state", "core", steady_state, steady_arguments, catalogue(WRONG_STEADY), ("D", "K")),
-    Question("h5", "a step of the extended filter", "core", filter_step, step_arguments, catalogue(WRONG_STEPS), ("z", "D")),
+    Question(
+        "h3",
+        "the Riccati equation",
+        "core",
+        riccati,
+        rate_arguments,
+        catalogue(WRONG_RATES),
+        advice=(
+            "Try one component: the equation of the chapter has three terms. Then ask for each product of "
+            "matrices whether it is symmetric."
+        ),
+    ),
+    Question(
+        "h4",
+        "the steady state",
+        "core",
+        steady_state,
+        steady_arguments,
+        catalogue(WRONG_STEADY),
+        ("D", "K"),
+        advice=(
+            "Put your D into the Riccati equation: is the derivative zero? Then let the meter become "
+            "useless: which D must come out?"
+        ),
+    ),
+    Question(
+        "h5",
+        "a step of the extended filter",
+        "core",
+        filter_step,
+        step_arguments,
+        catalogue(WRONG_STEPS),
+        ("z", "D"),
+        advice=("Leave out the noises, then the meter: what remains must be the plain equation x' = f(x) and its variance."),
+        axes=("trajectory",),
+    ),
     Question(
         "h6",
         "derivatives of the log-likelihood",
@@ -138,6 +182,7 @@ QUESTIONS = (
         derivatives_arguments,
         catalogue(WRONG_DERIVATIVES),
         ("u", "U"),
+        advice="Differentiate F as a product; S and its derivatives are functions of x, y is not.",
     ),
 )
 

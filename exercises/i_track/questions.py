@@ -16,6 +16,7 @@ import sympy as sp
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.exercises import follow_on
 from kfcourse.exercises.i_track.keys import correct_root, matrices, process_noise, start_up, step
 from kfcourse.exercises.i_track.mistakes_of_filter import WRONG_ROOTS, WRONG_STEPS
 from kfcourse.exercises.i_track.mistakes_of_model import WRONG_MATRICES, WRONG_NOISES, WRONG_STARTS
@@ -72,6 +73,7 @@ QUESTIONS = (
         lambda e: [(sp.Symbol("dt", positive=True),)],
         catalogue(WRONG_MATRICES),
         ("A", "B", "H"),
+        advice=("Put a state of one component, all others zero, and one interval: where is the point afterwards, and how fast?"),
     ),
     Question(
         "i2",
@@ -80,6 +82,8 @@ QUESTIONS = (
         process_noise,
         lambda e: [sp.symbols("dt sigma_a", positive=True)],
         catalogue(WRONG_NOISES),
+        advice=("Take one axis: two components, one push. Their covariance has three different entries; what are their units?"),
+        on=follow_on.process_noise,
     ),
     Question(
         "i3",
@@ -89,8 +93,18 @@ QUESTIONS = (
         lambda e: [(*sp.symbols("y0 y1 y2", real=True), sp.Symbol("dt", positive=True))],
         catalogue(WRONG_STARTS),
         ("r", "v", "a"),
+        advice=("Try the motion r = t^2: three samples, and position, velocity and acceleration at the third are known."),
     ),
-    Question("i4", "one step with a known input", "core", step, step_arguments, catalogue(WRONG_STEPS), ("lam", "Psi", "z", "p")),
+    Question(
+        "i4",
+        "one step with a known input",
+        "core",
+        step,
+        step_arguments,
+        catalogue(WRONG_STEPS),
+        ("lam", "Psi", "z", "p"),
+        advice=("Take all matrices as numbers and do one step by hand; then look at which of the two laws each line needs."),
+    ),
     Question(
         "i5",
         "a square root instead of the covariance",
@@ -100,6 +114,7 @@ QUESTIONS = (
         catalogue(WRONG_ROOTS),
         ("z", "S"),
         tolerance=1e-5,
+        advice="Multiply your array by its own transpose: which blocks come out? Then compare with X, Y, Z.",
     ),
 )
 

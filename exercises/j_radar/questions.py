@@ -75,6 +75,7 @@ QUESTIONS = (
         lambda e: [sp.symbols("r phi eps", positive=True)],
         catalogue(WRONG_CARTESIANS),
         ("x", "y", "z"),
+        advice="Try the horizon, the zenith, and an azimuth of zero and of a right angle.",
     ),
     Question(
         "j2",
@@ -83,11 +84,34 @@ QUESTIONS = (
         meter_jacobian,
         lambda e: [sp.symbols("x y z", positive=True)],
         catalogue(WRONG_JACOBIANS),
+        advice=(
+            "Differentiate one measurement at a time, by x, y, z in turn; each row has the unit of its measurement over a length."
+        ),
     ),
     Question(
-        "j3", "the constant gain", "core", steady_gain, several("j3", ((0.15, 0.7),)), catalogue(WRONG_GAINS), ("beta", "index")
+        "j3",
+        "the constant gain",
+        "core",
+        steady_gain,
+        several("j3", ((0.15, 0.7),)),
+        catalogue(WRONG_GAINS),
+        ("beta", "index"),
+        advice=("Put your beta into the three equations of the hint: do they hold? For small alpha, beta is about alpha^2/2."),
     ),
-    Question("j4", "the filter", "core", alpha_beta, filter_arguments, catalogue(WRONG_FILTERS), ("r", "v")),
+    Question(
+        "j4",
+        "the filter",
+        "core",
+        alpha_beta,
+        filter_arguments,
+        catalogue(WRONG_FILTERS),
+        ("r", "v"),
+        advice=("Follow the first two steps by hand: what is given is the prediction for the first measurement already."),
+        axes=(
+            "step",
+            "trajectory",
+        ),
+    ),
     Question(
         "j5",
         "the lag in a turn",
@@ -96,8 +120,20 @@ QUESTIONS = (
         lambda e: [sp.symbols("a T alpha beta", positive=True)],
         catalogue(WRONG_LAGS),
         ("position", "velocity"),
+        advice="Put your two lags into the two equations of the hint: do they repeat themselves?",
     ),
-    Question("j6", "the noise that is left", "stretch", noise_left, share_arguments, catalogue(WRONG_SHARES)),
+    Question(
+        "j6",
+        "the noise that is left",
+        "stretch",
+        noise_left,
+        share_arguments,
+        catalogue(WRONG_SHARES),
+        advice=(
+            "Try alpha = 1 with a small beta: the estimate is the measurement itself; and check that the "
+            "answer is below one for a small alpha."
+        ),
+    ),
 )
 
 SET = ExerciseSet(

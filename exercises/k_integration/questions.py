@@ -14,6 +14,7 @@ import sympy as sp
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.exercises import follow_on
 from kfcourse.exercises.k_integration.keys import S_N, S_XI, bias_error, error_meter, gained, integrate, lost, steady_state
 from kfcourse.exercises.k_integration.mistakes_of_accuracy import WRONG_BIASES, WRONG_GROWTHS, WRONG_IMPROVEMENTS, WRONG_STEADY
 from kfcourse.exercises.k_integration.mistakes_of_filter import WRONG_FILTERS, WRONG_METERS
@@ -57,9 +58,40 @@ def filter_arguments(exercise: Exercise) -> list[tuple]:
 
 
 QUESTIONS = (
-    Question("k1", "the error as the state", "warm-up", error_meter, signals, catalogue(WRONG_METERS), ("signal", "slope")),
-    Question("k2", "the steady state", "core", steady_state, lambda e: [(S_XI, S_N)], catalogue(WRONG_STEADY), ("Psi", "p", "K")),
-    Question("k3", "the filter", "core", integrate, filter_arguments, catalogue(WRONG_FILTERS), ("V", "p")),
+    Question(
+        "k1",
+        "the error as the state",
+        "warm-up",
+        error_meter,
+        signals,
+        catalogue(WRONG_METERS),
+        ("signal", "slope"),
+        advice="Try S(V) = V^2 by hand: put V = y - eps in, and differentiate by eps.",
+    ),
+    Question(
+        "k2",
+        "the steady state",
+        "core",
+        steady_state,
+        lambda e: [(S_XI, S_N)],
+        catalogue(WRONG_STEADY),
+        ("Psi", "p", "K"),
+        advice="Put your three results into the three equations of the hint: do they hold?",
+    ),
+    Question(
+        "k3",
+        "the filter",
+        "core",
+        integrate,
+        filter_arguments,
+        catalogue(WRONG_FILTERS),
+        ("V", "p"),
+        advice=(
+            "Follow one axis for two steps by hand: the prior is for the first measurement; without a "
+            "measurement only the variance changes."
+        ),
+        axes=("step",),
+    ),
     Question(
         "k4",
         "what is gained, and how soon",
@@ -68,6 +100,8 @@ QUESTIONS = (
         lambda e: [(S_XI, S_N, sp.Symbol("T", positive=True))],
         catalogue(WRONG_IMPROVEMENTS),
         ("factor", "time_constant"),
+        advice="Check the units: the first is a pure number, the second a time. Is the first larger than one?",
+        on=follow_on.gained,
     ),
     Question(
         "k5",
@@ -77,6 +111,10 @@ QUESTIONS = (
         lambda e: [(sp.Symbol("p", positive=True), S_XI, S_N, *sp.symbols("n T", positive=True))],
         catalogue(WRONG_GROWTHS),
         ("deviation", "until"),
+        advice=(
+            "Variances grow in proportion to the number of periods; convert to a standard deviation, and "
+            "periods to seconds, last."
+        ),
     ),
     Question(
         "k6",
@@ -85,6 +123,7 @@ QUESTIONS = (
         bias_error,
         lambda e: [(*sp.symbols("beta K", real=True), sp.Symbol("j", integer=True, positive=True))],
         catalogue(WRONG_BIASES),
+        advice="Try the first and the second biased measurement by hand, then an infinite number of them.",
     ),
 )
 

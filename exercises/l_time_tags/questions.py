@@ -14,6 +14,7 @@ import sympy as sp
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
+from kfcourse.exercises import follow_on
 from kfcourse.exercises.l_time_tags.keys import correct, cost, dimension, fit_clock, fuse, move, own_time
 from kfcourse.exercises.l_time_tags.mistakes_of_clocks import WRONG_COSTS, WRONG_FITS, WRONG_TIMES
 from kfcourse.exercises.l_time_tags.mistakes_of_fusion import WRONG_CORRECTIONS, WRONG_DIMENSIONS, WRONG_FUSIONS, WRONG_MOVES
@@ -45,7 +46,7 @@ def timing_numbers(exercise: Exercise) -> dict[str, float]:
 def dimension_arguments(exercise: Exercise) -> list[tuple]:
     """Two series; in the second a whole period passes before the first measurement of the receiver."""
     rng = exercise.rng("l1")
-    ratio, first = int(rng.integers(4, 7)), int(rng.integers(2, 4))
+    ratio, first = int(rng.choice((5, 7))), int(rng.integers(2, 4))  # odd: first and -first are other steps of a period
     return [(4 * ratio + 1, ratio, first), (3 * ratio, ratio, first + ratio)]
 
 
@@ -95,7 +96,16 @@ def fit_arguments(exercise: Exercise) -> list[tuple]:
 
 
 QUESTIONS = (
-    Question("l1", "two rates", "warm-up", dimension, dimension_arguments, catalogue(WRONG_DIMENSIONS)),
+    Question(
+        "l1",
+        "two rates",
+        "warm-up",
+        dimension,
+        dimension_arguments,
+        catalogue(WRONG_DIMENSIONS),
+        advice="Write out k = 0, 1, 2, ... for a ratio of three and a first step of four, and count by hand.",
+        axes=("step",),
+    ),
     Question(
         "l2",
         "two time scales",
@@ -103,6 +113,7 @@ QUESTIONS = (
         own_time,
         lambda e: [sp.symbols("reading rate shift", positive=True)],
         catalogue(WRONG_TIMES),
+        advice="Try a clock that is right but for a shift, then one that only runs twice as fast.",
     ),
     Question(
         "l3",
@@ -112,9 +123,35 @@ QUESTIONS = (
         correction_arguments,
         catalogue(WRONG_CORRECTIONS),
         ("m", "P"),
+        advice=(
+            "Choose the components that are there first, of everything that has a component for each; then "
+            "it is the usual correction."
+        ),
     ),
-    Question("l4", "over an interval of any length", "core", move, move_arguments, catalogue(WRONG_MOVES), ("m", "P")),
-    Question("l5", "late and out of order", "core", fuse, fusion_arguments, catalogue(WRONG_FUSIONS), ("m", "P")),
+    Question(
+        "l4",
+        "over an interval of any length",
+        "core",
+        move,
+        move_arguments,
+        catalogue(WRONG_MOVES),
+        ("m", "P"),
+        advice="Two intervals one after the other must give the same as the whole one: try it with your Q.",
+    ),
+    Question(
+        "l5",
+        "late and out of order",
+        "core",
+        fuse,
+        fusion_arguments,
+        catalogue(WRONG_FUSIONS),
+        ("m", "P"),
+        advice=(
+            "Draw the times on a line: captured, arrived, now. Which measurements may be used, in which "
+            "order, and over which intervals do you move?"
+        ),
+        on=follow_on.fuse,
+    ),
     Question(
         "l6",
         "what ignoring the tag costs",
@@ -123,8 +160,18 @@ QUESTIONS = (
         lambda e: [sp.symbols("V a tau", positive=True)],
         catalogue(WRONG_COSTS),
         ("position", "velocity"),
+        advice="Expand s(-tau) and its derivative for a motion that you can follow by hand, such as V = 0.",
     ),
-    Question("l7", "the clock from edges", "stretch", fit_clock, fit_arguments, catalogue(WRONG_FITS), ("rate", "shift")),
+    Question(
+        "l7",
+        "the clock from edges",
+        "stretch",
+        fit_clock,
+        fit_arguments,
+        catalogue(WRONG_FITS),
+        ("rate", "shift"),
+        advice=("Which of the two has an error? That one is the target of the fit; then solve the line for the other."),
+    ),
 )
 
 SET = ExerciseSet(

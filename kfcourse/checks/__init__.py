@@ -1,16 +1,21 @@
 """Self-checks of the exercises: `exercise("a", variant="53").check("a1", answer)`.
 
-question    what a question is: key, hidden arguments, known mistakes
+question    what a question is: key, hidden arguments, known mistakes; what a check says
 registry    the sets that there are; they register, nothing here knows one
 exercises   a set for a variant: what a notebook opens
 steps       questions about a model with time and inputs: functions that take the step
 engine      is an answer right, and if not, what kind of mistake is it?  How long may it take?
+case        one result of a wrong answer: what a hint looks at
+dependence  how a result depends on the arguments
+hints       what can be said of any wrong answer
+relations   how a wrong answer stands to the right one
+failing     one input of a wrong answer, and what it gives there
 equality    are two formulas, two arrays equal?
 posing      can every question be posed for a variant?
 """
 
 from kfcourse.checks.exercises import Exercise, ExerciseError, exercise
-from kfcourse.checks.question import Mistake, Question, Result
+from kfcourse.checks.question import Mistake, Past, Question, Result
 from kfcourse.checks.registry import ExerciseSet, sets
 
-__all__ = ["Exercise", "ExerciseError", "ExerciseSet", "Mistake", "Question", "Result", "exercise", "sets"]
+__all__ = ["Exercise", "ExerciseError", "ExerciseSet", "Mistake", "Past", "Question", "Result", "exercise", "sets"]

@@ -8,6 +8,7 @@ Nothing that a student hands in may crash a check, and no message contains the a
 from __future__ import annotations
 
 import copy
+import inspect
 import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,9 +20,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.checks.equality import Places, Unusable, equal, like
-from kfcourse.checks.hints import Agree, Case, Sensitivity, general, names_of
-from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG, Answer, Mistake, Question, Result
+from kfcourse.checks.case import Agree, Case
+from kfcourse.checks.dependence import Sensitivity, names_of
+from kfcourse.checks.equality import Places, Unusable, depends, equal, like, with_values
+from kfcourse.checks.failing import shown
+from kfcourse.checks.hints import general
+from kfcourse.checks.question import (
+    MISSING,
+    NOT_CHECKED,
+    PASSED,
+    UNUSABLE,
+    WRONG,
+    Answer,
+    Mistake,
+    Past,
+    Question,
+    Result,
+    answer_for,
+)
 from kfcourse.checks.registry import folders
 from kfcourse.limits import OutOfTime, time_limit
 
@@ -114,47 +130,186 @@ def told(error: BaseException) -> str:
     return f"{type(error).__name__}{': ' * bool(text)}{text}{where}"
 
 
-def check(question: Question, exercise: Exercise, answer: Any, seconds: float = SECONDS) -> Result:
-    """Check an answer to a question; never raises because of the answer."""
+def check(question: Question, exercise: Exercise, answer: Any, seconds: float = SECONDS, past: Past | None = None) -> Result:
+    """Check an answer to a question; never raises, whatever the answer is, and whatever fails in the check itself.
 
-    def result(status: str, message: str, diagnosis: Sequence[str] = ()) -> Result:
-        return Result(question.name, question.title, status, message, tuple(diagnosis))
+    `past` is what was handed in before, of the same notebook; the answer is added to it.
+    """
+    past = Past() if past is None else past
+    past.wrong.pop(question.name, None)
+    try:
+        result = _Check(question, exercise, answer, seconds, past).result()
+    except Exception as error:
+        says = "The check itself failed, and that is not your fault. It counts for nothing; please tell your teacher."
+        return Result(question.name, question.title, NOT_CHECKED, says, trouble=_trouble(error))
+    if result.status == WRONG:
+        past.wrong[question.name] = answer
+    return result
 
-    arguments = list(question.arguments(exercise))
-    expected = _reference(question.answer(exercise), arguments)
-    try:
-        found = call(answer, arguments, expected, seconds)
-    except Missing:
-        return result(MISSING, "not implemented yet")
-    except Unusable as reason:
-        return result(UNUSABLE, str(reason))
-    agree = partial(_agree, values=exercise.model.values, tolerance=question.tolerance, places=exercise.places)
-    try:
-        with time_limit(seconds):
-            if agree(found, expected):
-                return result(PASSED, "right")
-    except OutOfTime:
-        return result(UNUSABLE, f"cannot be compared within {seconds:g} s: simplify it")
-    try:
-        with time_limit(DIAGNOSIS), np.errstate(all="ignore"):
-            known = [(mistake, _wrong(mistake, exercise, arguments, expected)) for mistake in question.mistakes]
-            key = question.answer(exercise)
-            return result(WRONG, *_Wrong(question.parts, (key, answer), arguments, found, expected, known, agree).told())
-    except OutOfTime:
-        return result(WRONG, f"not right. {GENERAL}")
+
+def _trouble(error: Exception) -> str:
+    """Kind and place of an error of ours, for the teacher."""
+    frames = [f"{Path(frame.filename).name}:{frame.lineno} {frame.name}" for frame in _frames(error)]
+    return f"{told(error)} ({' < '.join(reversed(frames[-4:]))})"
+
+
+@dataclass(frozen=True)
+class _Check:
+    """A question with what is asked, and an answer to it."""
+
+    question: Question
+    exercise: Exercise
+    answer: Any
+    seconds: float
+    past: Past
+
+    def _says(self, status: str, message: str, **more: Any) -> Result:
+        return Result(self.question.name, self.question.title, status, message, **more)
+
+    @cached_property
+    def arguments(self) -> list[tuple]:
+        return list(self.question.arguments(self.exercise))
+
+    @cached_property
+    def key(self) -> Answer:
+        return self.question.answer(self.exercise)
+
+    @cached_property
+    def expected(self) -> list[Any]:
+        return _reference(self.key, self.arguments)
+
+    @cached_property
+    def agree(self) -> Agree:
+        return partial(_agree, values=self.values, tolerance=self.question.tolerance, places=self.exercise.places)
+
+    def result(self) -> Result:
+        try:
+            found = call(self.answer, self.arguments, self.expected, self.seconds)
+        except Missing:
+            return self._says(MISSING, "not implemented yet")
+        except Unusable as reason:
+            return self._says(UNUSABLE, str(reason))
+        try:
+            with time_limit(self.seconds):
+                if self.agree(found, self.expected) and not self._in_numbers(found, self.expected):
+                    self.past.given.pop(self.question.name, None)
+                    return self._says(PASSED, "right", share=1.0)
+        except OutOfTime:
+            return self._says(UNUSABLE, f"cannot be compared within {self.seconds:g} s: simplify it")
+        try:
+            with time_limit(DIAGNOSIS), np.errstate(all="ignore"):
+                return self._wrong(found)
+        except OutOfTime:
+            return self._says(WRONG, f"not right. {GENERAL}")
+        except Exception as error:  # of ours: the answer is wrong all the same, only the hint is lost
+            return self._says(WRONG, f"not right. {GENERAL}", trouble=_trouble(error))
+
+    @cached_property
+    def values(self) -> dict[sp.Symbol, Any]:
+        """Of the parameters: of the model's symbols that are no arguments of the answer."""
+        given = {s.name for values in self.arguments for v in values if hasattr(v, "free_symbols") for s in v.free_symbols}
+        return {s: value for s, value in self.exercise.model.values.items() if s.name not in given}
+
+    def _in_numbers(self, found: Any, expected: Any) -> bool:
+        """Whether numbers stand in the place of parameters on which the right formulas depend."""
+        return any(
+            name not in {s.name for s in mine.free_symbols}
+            for mine, right in zip(_flat(found), _flat(expected), strict=True)
+            for name in depends(right, {s.name for s in self.values})
+        )
+
+    def _numbers(self, found: list[Any]) -> bool:
+        """Whether the formulas are right where parameters have their values, and those that are wrong as they are lack some."""
+        wrong = [
+            pair for pair in zip(_flat(found), _flat(self.expected), strict=True) if not self.agree(*([one] for one in pair))
+        ]
+        if not all(self._in_numbers(mine, right) for mine, right in wrong):
+            return False
+        sides = ([with_values(one, self.values) for one in _flat(side)] for side in (found, self.expected))
+        return bool(_flat(self.expected)) and self.agree(*sides)
+
+    def _wrong(self, found: list[Any]) -> Result:
+        pairs = [_both(found, self.expected, place) for place in range(len(self.question.parts))]
+        right = [1 for mine, theirs in pairs if self.agree(mine, theirs) and not self._in_numbers(mine, theirs)]
+        share = len(right) / len(self.question.parts) if right else 0.0
+        times = self._times(found)
+        follows = self._follows(found)
+        if follows:
+            says = f"this step is right on top of your {' and '.join(follows)}; what is not right yet is there: look there first."
+            return self._says(WRONG, says, diagnosis=("follows",), share=share, follows=follows)
+        if self._numbers(found):
+            return self._says(WRONG, NUMBERS, diagnosis=("numbers",), share=share)
+        known = [(mistake, _wrong(mistake, self.exercise, self.arguments, self.expected)) for mistake in self.question.mistakes]
+        wrong = _Wrong(self.question, (self.key, self.answer), self.arguments, found, self.expected, known, self.agree)
+        message, names = wrong.told()
+        more = [] if names else [wrong.case(self.values)]
+        if times and self.question.advice:
+            more.insert(0, self.question.advice)
+        if times > (1 if self.question.advice else 0) and names:
+            more.append(wrong.case(self.values))
+        return self._says(WRONG, " ".join([message, *filter(None, more)]), diagnosis=tuple(names), share=share)
+
+    def _times(self, found: list[Any]) -> int:
+        """How many times in a row the same wrong results have come before."""
+        before, times = self.past.given.get(self.question.name, (None, 0))
+        again = before is not None and self.agree(found, before)
+        self.past.given[self.question.name] = found, times + 1 if again else 1
+        return times if again else 0
+
+    def _follows(self, found: list[Any]) -> tuple[str, ...]:
+        """Earlier questions on whose wrong answers this one is right: all of them, or one."""
+        on = self.question.on
+        if on is None:
+            return ()
+        earlier = {one.function: one for one in self.exercise.questions.values() if one.name in self.past.wrong}
+        own = [function for function in inspect.signature(on).parameters if function in earlier]
+        for chosen in ([own] if len(own) > 1 else []) + [[one] for one in own]:
+            try:
+                answers = {function: self._in_form(earlier[function]) for function in chosen}
+                step = answer_for(self.exercise, on(**answers))
+                with time_limit(self.seconds):
+                    theirs = [
+                        like(step(*copy.deepcopy(values)), wanted)
+                        for values, wanted in zip(self.arguments, self.expected, strict=True)
+                    ]
+                    if self.agree(found, theirs):
+                        return tuple(earlier[one].name for one in chosen)
+            except (Exception, OutOfTime):  # of the earlier answer
+                continue
+        return ()
+
+    def _in_form(self, question: Question) -> Answer:
+        """A wrong answer to an earlier question with results in the form of the key's, as our own functions take them."""
+        key, wrong = question.answer(self.exercise), self.past.wrong[question.name]
+        return lambda *values: like(wrong(*copy.deepcopy(values)), standard(key(*copy.deepcopy(values))))
+
+
+def _flat(result: Any) -> list[sp.Expr]:
+    """All formulas of a result, or of several; none of numbers."""
+    if isinstance(result, list | tuple | sp.MatrixBase):
+        return [formula for part in result for formula in _flat(part)]
+    return [result] if isinstance(result, sp.Basic) else []
+
+
+def _both(found: Sequence[Any], expected: Sequence[Any], place: int) -> tuple[list[Any], list[Any]]:
+    return _part(found, place), _part(expected, place)
 
 
 @dataclass(frozen=True)
 class _Wrong:
     """A wrong answer beside what was expected."""
 
-    parts: tuple[str, ...]
+    question: Question
     answers: tuple[Answer, Answer]  # the right one, and the wrong one
     arguments: Sequence[tuple]
     found: list[Any]
     expected: list[Any]
     known: Sequence[tuple[Mistake, list[Any] | None]]  # mistakes with their results, None where impossible
     agree: Agree
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        return self.question.parts
 
     def told(self) -> tuple[str, list[str]]:
         """What to say, and the names of the mistakes it looks like."""
@@ -199,25 +354,47 @@ class _Wrong:
 
         mine, theirs = of(self.found), of(self.expected)
         possible = [(mistake, of(wrong)) for mistake, wrong in self.known if wrong is not None]
-        seen = [mistake for mistake, wrong in possible if self.agree(mine, wrong)]
-        if seen:
-            return _named(seen), _said(seen)
+        first = next(i for i, (a, b) in enumerate(zip(mine, theirs, strict=True)) if not self.agree([a], [b]))
+        for calls in (slice(None), slice(first, first + 1)):  # in all calls; in the first that is wrong: more may be, later
+            seen = [mistake for mistake, wrong in possible if self.agree(mine[calls], wrong[calls])]
+            if seen:
+                return _named(seen), _said(seen)
         apart = [[not self.agree([a], [b]) for a, b in zip(wrong, theirs, strict=True)] for _, wrong in possible]
         apart = [row for row in apart if any(row)]
         telling = [2 * sum(column) >= len(apart) for column in zip(*apart, strict=True)] or [True] * len(theirs)
         others = [(name, _part(self.expected, i)) for i, name in enumerate(self.parts) if i != place]
         said = general(
-            Case(mine, theirs, self.agree, self.arguments, self.sensitivity.names, place or 0, others, telling, self.sensitivity)
+            Case(
+                *(mine, theirs, self.agree, self.arguments, self.names, place or 0, others, telling),
+                *(self.sensitivity, self.question.axes),
+            )
         )
         return ([said[0]], said[1]) if said else ([], "")
 
     @cached_property
+    def names(self) -> list[str]:
+        """What the arguments are called."""
+        return names_of(self.answers[0], len(self.arguments[0]))
+
+    @cached_property
     def sensitivity(self) -> Sensitivity:
-        """To the arguments of the first call that is not right."""
-        one = next(i for i, (a, b) in enumerate(zip(self.found, self.expected, strict=True)) if not self.agree([a], [b]))
-        names = names_of(self.answers[0], len(self.arguments[one]))
-        results = tuple(list(side[one]) if self.parts else [side[one]] for side in (self.expected, self.found))
-        return Sensitivity(names, self.answers, self.arguments[one], results, bool(self.parts))
+        """To the arguments of the calls."""
+        results = [
+            tuple(list(one) if self.parts else [one] for one in pair) for pair in zip(self.expected, self.found, strict=True)
+        ]
+        return Sensitivity(self.names, self.answers, self.arguments, results, bool(self.parts))
+
+    def case(self, values: Mapping[sp.Symbol, Any]) -> str:
+        """One input for which the answer is wrong, and what it gives there."""
+        right = [self.agree([a], [b]) for a, b in zip(self.found, self.expected, strict=True)]
+        size = [sum(np.size(value) for value in one) for one in self.arguments]
+        which = min((i for i, good in enumerate(right) if not good), key=size.__getitem__)
+        mine, theirs = self.found[which], self.expected[which]
+        parts = [place for place in range(len(self.parts)) if not self.agree([mine[place]], [theirs[place]])]
+        place = parts[0] if parts else None
+        mine, theirs = (one if place is None else one[place] for one in (mine, theirs))
+        what = "" if place is None else self.parts[place]
+        return shown(self.names, self.arguments[which], mine, theirs, what, self.question.axes, values)
 
 
 def _said(mistakes: Sequence[Mistake]) -> str:
@@ -259,6 +436,7 @@ def _wrong(mistake: Mistake, exercise: Exercise, arguments: Sequence[tuple], exp
         return None
 
 
+NUMBERS = "Right in numbers, but the parameters are asked for as symbols: type their letters where their values stand."
 GENERAL = (
     "It does not look like one of the usual mistakes. Check each step of the derivation, and try a case whose answer you know."
 )

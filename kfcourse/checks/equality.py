@@ -7,7 +7,7 @@ passes, and no simplification has to succeed.
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -59,8 +59,8 @@ def like(answer: Any, expected: Any) -> Any:
 
 
 def _formula(answer: Any) -> sp.Expr:
-    if isinstance(answer, sp.MatrixBase | np.ndarray) and getattr(answer, "size", len(answer)) == 1:
-        answer = np.asarray(answer).item() if isinstance(answer, np.ndarray) else answer[0]
+    if isinstance(answer, sp.MatrixBase | np.ndarray | list | tuple) and np.size(answer) == 1:  # in brackets of any kind
+        answer = np.ravel(np.array(answer, dtype=object))[0]
     if isinstance(answer, bool | str) or not isinstance(answer, sp.Expr | int | float | np.number):
         raise Unusable(f"expected a formula in the symbols of the exercise, got {describe(answer)}")
     formula = sp.nsimplify(answer, rational=True) if isinstance(answer, float | np.floating) else sp.sympify(answer)
@@ -74,6 +74,8 @@ def _formula(answer: Any) -> sp.Expr:
 def _formulas(answer: Any, expected: sp.MatrixBase) -> sp.ImmutableMatrix:
     try:
         matrix = answer if isinstance(answer, sp.MatrixBase) else sp.Matrix(answer)
+        if not isinstance(answer, sp.MatrixBase) and np.ndim(answer) == 1 and expected.rows == 1:  # a list is a row as well
+            matrix = matrix.T
     except (TypeError, ValueError, AttributeError):
         raise Unusable(
             f"expected a matrix of formulas with {expected.rows} rows and {expected.cols} columns, got {describe(answer)}"
@@ -134,9 +136,9 @@ def equal(first: Any, second: Any, tolerance: float, values: Mapping[sp.Symbol, 
     if isinstance(second, tuple):
         return all(equal(a, b, tolerance, values, places) for a, b in zip(first, second, strict=True))
     if isinstance(second, sp.MatrixBase):
-        return first.shape == second.shape and equal_formulas(list(first), list(second), values, places)
+        return getattr(first, "shape", None) == second.shape and equal_formulas(list(first), list(second), values, places)
     if isinstance(second, sp.Basic):
-        return equal_formulas([first], [second], values, places)
+        return isinstance(first, sp.Basic) and equal_formulas([first], [second], values, places)
     scale = np.max(np.abs(second[np.isfinite(second)]), initial=0.0)
     return first.shape == second.shape and bool(
         np.allclose(first, second, rtol=tolerance, atol=tolerance * scale, equal_nan=True)
@@ -168,6 +170,18 @@ def equal_formulas(
     except Exception:  # SymPy has many ways to stop at a formula that makes no sense
         return False
     return True
+
+
+def depends(formula: sp.Expr, names: Container[str]) -> list[str]:
+    """Names of the symbols, among these, on whose values a formula depends."""
+    found = [s for s in formula.free_symbols if s.name in names]
+    return sorted(s.name for s in found if not equal_formulas([formula.xreplace({s: s + 1})], [formula], {}))
+
+
+def with_values(formula: sp.Expr, values: Mapping[sp.Symbol, Any]) -> sp.Expr:
+    """The formula with numbers in the place of parameters, which are told by their names."""
+    numbers = {s.name: value for s, value in values.items()}
+    return formula.xreplace({s: sp.sympify(numbers[s.name]) for s in formula.free_symbols if s.name in numbers})
 
 
 @lru_cache(maxsize=20_000)  # an answer is compared with many mistakes, and a mistake with many answers

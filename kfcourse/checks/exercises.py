@@ -12,7 +12,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.engine import check
-from kfcourse.checks.question import Question, Result
+from kfcourse.checks.question import Past, Question, Result
 from kfcourse.checks.registry import sets
 from kfcourse.checks.steps import array_functions, noiseless_functions, places, telling_steps
 from kfcourse.lab.short_names import Structures
@@ -191,11 +191,16 @@ class Exercise:
         """Random numbers that belong to this variant and name: for personal numbers and hidden arguments."""
         return np.random.default_rng(zlib.crc32(f"{self.salt}{self.variant.name}/{name}".encode()))
 
+    @cached_property
+    def past(self) -> Past:
+        """What was handed in so far: the same wrong answer again gets a stronger hint, a later one may stand on it."""
+        return Past()
+
     def check(self, name: str, answer: Any) -> Result:
         """Check the answer to a question: right, or what kind of mistake it looks like."""
         if name not in self.questions:
             raise ExerciseError(f"set {self.letter} has no question {name!r}; it has {', '.join(self.questions)}")
-        return check(self.questions[name], self, answer)
+        return check(self.questions[name], self, answer, past=self.past)
 
 
 def exercise(letter: str, variant: str | Mapping[str, Any] = "53") -> Exercise:

@@ -6,143 +6,18 @@ sentence that is true of the answer, or None.  The engine asks them in turn when
 
 from __future__ import annotations
 
-import copy
-import inspect
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, TypeAlias
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import sympy as sp
 
-from kfcourse.checks.equality import equal
-from kfcourse.limits import OutOfTime
-
-Agree: TypeAlias = Callable[[Sequence[Any], Sequence[Any]], bool]
-Said: TypeAlias = tuple[str, str]
+from kfcourse.checks.case import Case, Said
+from kfcourse.checks.dependence import same
+from kfcourse.checks.equality import depends, equal
+from kfcourse.checks.relations import RELATIONS
 
 ROUGH = 1e-4  # relative difference that hints at a lower precision
-
-
-@dataclass(frozen=True)
-class Sensitivity:
-    """Which results depend on which argument: of the right answer, and of the student's.
-
-    answers : (right, student's)
-    arguments : hidden arguments, one tuple
-    results : what both give for them, each as a list of parts
-    several : whether answers have several results
-    """
-
-    names: Sequence[str]
-    answers: tuple[Callable, Callable]
-    arguments: tuple
-    results: tuple[list[Any], ...]
-    several: bool
-
-    @cached_property
-    def _table(self) -> list[tuple[str, list[bool], list[bool]]]:
-        rows = []
-        for place, (name, value) in enumerate(zip(self.names, self.arguments, strict=False)):
-            other = nudged(value)
-            if other is None:
-                continue
-            values = [*self.arguments[:place], other, *self.arguments[place + 1 :]]
-            try:
-                right, mine = (
-                    [not _same(a, b) for a, b in zip(self._parts(answer, values), before, strict=True)]
-                    for answer, before in zip(self.answers, self.results, strict=True)
-                )
-            except (OutOfTime, KeyboardInterrupt):
-                raise
-            except BaseException:  # the answer does not work for such an argument, or ends the program
-                continue
-            rows.append((name, right, mine))
-        return rows
-
-    def _parts(self, answer: Callable, values: Sequence[Any]) -> list[Any]:
-        result = answer(*copy.deepcopy(values))
-        return list(result) if self.several else [result]
-
-    def unused(self, part: int) -> list[str]:
-        """Arguments that the part should depend on and does not."""
-        return [name for name, right, mine in self._table if right[part] and not mine[part]]
-
-    def superfluous(self, part: int) -> list[str]:
-        """Arguments that it depends on and should not."""
-        return [name for name, right, mine in self._table if mine[part] and not right[part]]
-
-
-def names_of(answer: Callable, count: int) -> list[str]:
-    """Names of the arguments."""
-    try:
-        names = list(inspect.signature(answer).parameters)
-    except (TypeError, ValueError):
-        names = []
-    return names if len(names) == count else [f"number {place}" for place in range(1, count + 1)]
-
-
-def nudged(value: Any) -> Any:
-    """A hidden argument changed a little, covariances to covariances; None if it cannot be changed so."""
-    if isinstance(value, int | np.integer):
-        return None if isinstance(value, bool) else value + 1
-    if isinstance(value, float | np.floating):
-        return value * 1.05
-    if isinstance(value, np.ndarray) and value.dtype.kind == "f":
-        if value.ndim >= 2 and value.shape[-1] == value.shape[-2]:
-            scale = 1.03 + 0.01 * np.arange(value.shape[-1])
-            return scale[:, None] * value * scale
-        return value * np.linspace(1.03, 1.07, value.size).reshape(value.shape)
-    if inspect.isroutine(value):
-
-        def changed(*arguments: Any) -> Any:
-            result = value(*arguments)
-            return tuple(1.05 * part for part in result) if isinstance(result, tuple) else 1.05 * result
-
-        changed.__dict__.update(getattr(value, "__dict__", {}))  # whether it takes the step
-        return changed
-    return None
-
-
-def _same(first: Any, second: Any) -> bool:
-    a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
-    return a.shape == b.shape and bool(np.allclose(a, b, rtol=1e-12, atol=1e-12 * np.max(np.abs(b), initial=0.0), equal_nan=True))
-
-
-@dataclass(frozen=True)
-class Case:
-    """One result of a wrong answer.
-
-    found, expected : for every tuple of hidden arguments
-    arguments, names : these, and what they are called
-    part : its place among the results
-    others : the other results expected, by name
-    telling : for every tuple of hidden arguments, whether usual mistakes show there
-    """
-
-    found: Sequence[Any]
-    expected: Sequence[Any]
-    agree: Agree
-    arguments: Sequence[tuple]
-    names: Sequence[str]
-    part: int
-    others: Sequence[tuple[str, Sequence[Any]]]
-    telling: Sequence[bool]
-    sensitivity: Sensitivity
-
-    @property
-    def numeric(self) -> bool:
-        return isinstance(self.expected[0], np.ndarray)
-
-    @property
-    def pairs(self) -> list[tuple[Any, Any]]:
-        return list(zip(self.found, self.expected, strict=True))
-
-    @property
-    def formulas(self) -> list[tuple[list[sp.Expr], list[sp.Expr]]]:
-        """Entries of both sides."""
-        return [(list(a), list(b)) if isinstance(b, sp.MatrixBase) else ([a], [b]) for a, b in self.pairs]
 
 
 def _each(value: Any, change: Callable[[Any], Any]) -> Any:
@@ -158,6 +33,7 @@ TRANSFORMATIONS: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
     ("factor-2", "It is half of what it should be.", lambda v: v * 2),
     ("factor-half", "It is twice what it should be.", lambda v: v / 2),
     ("inverse", "It looks like the inverse of what it should be.", lambda v: _each(v, lambda entry: 1 / entry)),
+    ("complement", "It is one minus what it should be.", lambda v: _each(v, lambda entry: 1 - entry)),
 )
 
 
@@ -210,9 +86,7 @@ def dependence(case: Case) -> Said | None:
         missing, extra = case.sensitivity.unused(case.part), case.sensitivity.superfluous(case.part)
         form = "`{}`"
     else:
-        mine, theirs = (
-            set().union(*({s.name for f in side[which] for s in f.free_symbols} for side in case.formulas)) for which in (0, 1)
-        )
+        mine, theirs = (_symbols(case, which) for which in (0, 1))
         given = {s.name for values in case.arguments for v in values if hasattr(v, "free_symbols") for s in v.free_symbols}
         numbers = any(not n.is_integer for side in case.formulas for f in side[0] for n in f.atoms(sp.Number))
         missing, extra = sorted((theirs & given if numbers else theirs) - mine), sorted(mine - theirs)
@@ -225,14 +99,20 @@ def dependence(case: Case) -> Said | None:
     return None
 
 
+def _symbols(case: Case, which: int) -> set[str]:
+    """Names of the symbols on whose values a side depends."""
+    formulas = [f for side in case.formulas for f in side[which]]
+    return {name for f in formulas for name in depends(f, {s.name for s in f.free_symbols})}
+
+
 def improper(case: Case) -> Said | None:
     """A covariance that is none."""
     for found, expected in case.pairs:
         if isinstance(expected, sp.MatrixBase):
-            if expected.rows == expected.cols > 1 and expected == expected.T and found != found.T:
+            if expected.rows == expected.cols > 1 and case.agree([expected], [expected.T]) and not case.agree([found], [found.T]):
                 return "not-symmetric", "The result should be symmetric and is not: is a factor missing on one side?"
         elif case.numeric and expected.ndim > 1 and expected.shape[-1] == expected.shape[-2]:
-            if not _same(expected, expected.swapaxes(-1, -2)):
+            if not same(expected, expected.swapaxes(-1, -2)):
                 return None
             if not np.allclose(found, found.swapaxes(-1, -2)):
                 return "not-symmetric", "The result should be symmetric and is not: is a factor missing on one side?"
@@ -258,7 +138,7 @@ def sometimes(case: Case) -> Said | None:
 
 def first_step(case: Case) -> Said | None:
     """A run that starts well."""
-    if not case.numeric or not all(b.ndim and len(b) > 3 and not (b.ndim == 2 and len(b) == b.shape[1]) for _, b in case.pairs):
+    if not case.numeric or case.axes[:1] != ("step",) or not all(b.ndim and len(b) > 3 for _, b in case.pairs):
         return None
     if all(case.agree([a[:1]], [b[:1]]) for a, b in case.pairs):
         return "from-second-step", "The first step is right, later ones are not: what is handed on from one step to the next?"
@@ -268,7 +148,7 @@ def first_step(case: Case) -> Said | None:
 TERM = "It is right but for a term that is the same everywhere."
 
 
-def scaled(case: Case) -> Said | None:
+def factor_or_term(case: Case) -> Said | None:
     """A factor, or a term, that is the same everywhere."""
     if not case.numeric:
         return None
@@ -285,23 +165,48 @@ def scaled(case: Case) -> Said | None:
 
 
 def entries(case: Case) -> Said | None:
-    """Some rows of a matrix of formulas."""
-    found, expected = case.pairs[0]
-    if not isinstance(expected, sp.MatrixBase) or len(expected) < 2 or len(case.pairs) > 1:
+    """Some entries of a matrix, some rows of it, or some components of a vector."""
+    right = _right_entries(case)
+    if right is None or not right.any() or right.all():
         return None
-    wrong = [
-        (i + 1, j + 1)
-        for i in range(expected.rows)
-        for j in range(expected.cols)
-        if not case.agree([found[i, j]], [expected[i, j]])
-    ]
-    rows = sorted({i for i, _ in wrong})
-    if len(wrong) == 1:
-        return "entry", f"Only the entry in row {wrong[0][0]}, column {wrong[0][1]} is wrong."
-    if len(rows) < expected.rows:
-        one = len(rows) == 1
-        return "rows", f"Only row{'' if one else 's'} {', '.join(map(str, rows))} {'is' if one else 'are'} wrong."
+    if right.ndim == 1:
+        return "components", f"Only component{_numbers(~right)} wrong."
+    rows = right.all(axis=1)
+    if (~right).sum() == 1:
+        i, j = np.argwhere(~right)[0] + 1
+        return "entry", f"Only the entry in row {i}, column {j} is wrong."
+    if rows.any():
+        return "rows", f"Only row{_numbers(~rows)} wrong."
+    if right.all(axis=0).any():
+        return "columns", f"Only column{_numbers(~right.all(axis=0))} wrong."
+    if right.shape[0] == right.shape[1] and np.array_equal(right, np.eye(len(right), dtype=bool)):
+        return "off-diagonal", "The diagonal is right, the rest is not: what has one component to do with another?"
     return None
+
+
+def _right_entries(case: Case) -> np.ndarray | None:
+    """Which entries of a matrix, or of a vector, are right in every case and everywhere; None if it has no entries."""
+    if isinstance(case.expected[0], sp.MatrixBase):
+        found, expected = case.pairs[0]
+        if len(expected) < 2 or len(case.pairs) > 1:
+            return None
+        return np.reshape([case.agree([a], [b]) for a, b in zip(found, expected, strict=True)], expected.shape)
+    if not case.numeric:
+        return None
+    lead = len(case.axes)
+    shapes = {b.shape[lead:] for _, b in case.pairs if b.ndim > lead and b.size > b.shape[0]}
+    pairs = [(a, b) for a, b in case.pairs if b.shape[lead:] in shapes]
+    if len(shapes) != 1 or len(shape := shapes.pop()) not in (1, 2) or max(shape) > 6 or np.prod(shape) < 2:
+        return None
+    right = np.ones(shape, dtype=bool)
+    for place in np.ndindex(shape):
+        right[place] = all(case.agree([a[(..., *place)]], [b[(..., *place)]]) for a, b in pairs)
+    return right
+
+
+def _numbers(wrong: Any) -> str:
+    places = [str(i + 1) for i in np.flatnonzero(wrong)]
+    return f" {places[0]} is" if len(places) == 1 else f"s {', '.join(places)} are"
 
 
 HINTS: tuple[Callable[[Case], Said | None], ...] = (
@@ -313,8 +218,9 @@ HINTS: tuple[Callable[[Case], Said | None], ...] = (
     dependence,
     improper,
     first_step,
-    scaled,
+    factor_or_term,
     entries,
+    *RELATIONS,
 )
 
 

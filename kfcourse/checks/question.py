@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 ROUNDING = 1e-9  # relative difference of numbers that rounding alone explains
 
 PASSED, WRONG, UNUSABLE, MISSING = "passed", "wrong", "unusable", "not implemented"
+NOT_CHECKED = "not checked"  # the check itself failed: no fault of the answer
 MIME = "application/vnd.kfcourse.check+json"
 
 Answer = Callable[..., Any]
@@ -80,6 +81,12 @@ class Question:
         Names of the results, if the answer returns several; each is then diagnosed by itself.
     tolerance : float
         Relative difference of numbers that still counts as equal.
+    advice : str
+        Said when the same wrong answer comes again: where to look, never the answer.
+    on : callable, optional
+        The key on top of earlier answers, `on(gain=...)`: its parameters have the names of functions of earlier questions.
+    axes : tuple of str
+        What the leading axes of the results are, ("step", "trajectory"); of arguments of such a shape, too.
     """
 
     name: str
@@ -90,6 +97,9 @@ class Question:
     mistakes: tuple[Mistake, ...] = ()
     parts: tuple[str, ...] = ()
     tolerance: float = ROUNDING
+    advice: str = ""
+    on: Callable[..., Answer | ForVariant] | None = None
+    axes: tuple[str, ...] = ()
 
     @property
     def function(self) -> str:
@@ -101,6 +111,22 @@ class Question:
         return answer_for(exercise, self.key)
 
 
+@dataclass
+class Past:
+    """What a notebook has handed in so far.
+
+    Attributes
+    ----------
+    wrong : dict
+        Answers that are wrong, by question: later ones may stand on them.
+    given : dict
+        What the last wrong answer to a question gave, and how many times in a row.
+    """
+
+    wrong: dict[str, Answer] = field(default_factory=dict)
+    given: dict[str, tuple[Any, int]] = field(default_factory=dict)
+
+
 @dataclass(frozen=True)
 class Result:
     """Outcome of a check; shows itself as a line of text.
@@ -108,10 +134,17 @@ class Result:
     Attributes
     ----------
     question, title : str
-    status : {"passed", "wrong", "unusable", "not implemented"}
+    status : {"passed", "wrong", "unusable", "not implemented", "not checked"}
+        Not checked: the check failed in itself.
     message : str
     diagnosis : tuple of str
         Names of the mistakes it looks like.
+    share : float
+        Of the results that are right, from 0 to 1; a wrong answer may have right parts.
+    follows : tuple of str
+        Earlier questions whose answers are wrong, if this step is right on top of them.
+    trouble : str
+        For the teacher: how the check, or its search for a hint, failed in itself.
     """
 
     question: str
@@ -119,6 +152,9 @@ class Result:
     status: str
     message: str
     diagnosis: tuple[str, ...] = ()
+    share: float = 0.0
+    follows: tuple[str, ...] = ()
+    trouble: str = ""
 
     @property
     def passed(self) -> bool:
@@ -128,5 +164,13 @@ class Result:
         return f"{'✓' if self.passed else '✗'} {self.question} {self.title}: {self.message}"
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, Any]:
-        data = {"question": self.question, "status": self.status, "diagnosis": list(self.diagnosis), "message": self.message}
+        data = {
+            "question": self.question,
+            "status": self.status,
+            "diagnosis": list(self.diagnosis),
+            "message": self.message,
+            "share": self.share,
+            "follows": list(self.follows),
+        }
+        data |= {"trouble": self.trouble} if self.trouble else {}
         return {"text/plain": repr(self), MIME: data}

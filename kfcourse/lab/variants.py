@@ -122,6 +122,8 @@ def _tables(path: str | Path | None) -> tuple[str, dict[str, Any]]:
 
 def read_variant(name: str, table: Any, where: str) -> Variant:
     """A variant from its table; VariantError, naming the place, if it is not a model."""
+    if not name.isprintable():  # it goes to terminals
+        raise VariantError(f"variant {name!r} in {where}: a name with characters that cannot be seen; type it anew")
     prefix = f"variant {name} in {where}: "
     if not isinstance(table, Mapping):
         raise VariantError(f"{prefix}expected a table [variants.{name}], got {shown(table)}")
@@ -139,7 +141,8 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
         raise VariantError(f"{prefix}{error}") from None
     if problem := nothing_random(model):
         raise VariantError(f"{prefix}{problem}")
-    return Variant(name, str(table.get("title", "")), model, dict(table))
+    title = "".join(c if c.isprintable() else " " for c in str(table.get("title", "")))
+    return Variant(name, " ".join(title.split()), model, dict(table))
 
 
 def find_variant(name: str, path: str | Path | None = None) -> Variant:

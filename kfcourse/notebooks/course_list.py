@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from kfcourse.files import save
-from kfcourse.notebooks.jobs import safe
+from kfcourse.notebooks.texts import clean, plain, safe, write_csv
 
 LONGEST = 100  # characters of a name: it becomes the name of a folder
 
@@ -75,11 +74,7 @@ def assign(path: Path, variants: Sequence[str]) -> list[Student]:
 
 def save_assignment(students: Iterable[Student], path: Path) -> None:
     """Write who has which variant, and which sets: `read_assignment` reads it."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("name", "group", "variant", "sets"))
-    writer.writerows((one.name, one.group, one.variant, one.sets) for one in students)
-    save("\ufeff" + text.getvalue(), path)
+    write_csv(("name", "group", "variant", "sets"), map(vars, students), path)
 
 
 def read_assignment(path: Path, variants: Sequence[str]) -> list[Student]:
@@ -152,7 +147,7 @@ def _row(path: Path, line: int, values: Mapping[str | None, Any]) -> Iterator[Ro
     where = f"{path}, line {line}"
     if any("\n" in str(value) for value in values.values()):
         raise ValueError(f"{where}: a quote is opened and not closed on the line; remove it, or write it twice")
-    found = {key: (values.get(key) or "").strip() for key in ("name", "group", "variant", "sets")}
+    found = {key: plain((values.get(key) or "").strip()) for key in ("name", "group", "variant", "sets")}
     if any(str(value).strip() for value in values.get(None) or []):
         raise ValueError(f"{where}: more values than columns; put a name that has a comma in it into quotes")
     if not found["name"] and not found["group"]:
@@ -162,4 +157,7 @@ def _row(path: Path, line: int, values: Mapping[str | None, Any]) -> Iterator[Ro
             raise ValueError(f"{where}: {of} without a {key}" + (f" (got {found[key]!r})" if found[key] else ""))
         if len(found[key]) > LONGEST:
             raise ValueError(f"{where}: a {key} of more than {LONGEST} characters; is a quote or a line break missing?")
+    for key, value in found.items():
+        if clean(value, len(value)) != " ".join(value.split()):
+            raise ValueError(f"{where}: a {key} with characters that cannot be seen, {value!r}; type it anew")
     yield Row(line, **found)

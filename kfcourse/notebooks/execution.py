@@ -108,8 +108,11 @@ def html(executed: NotebookNode, title: str) -> str:
         if cell.cell_type == "markdown":
             cell.source = mathml(cell.source)
         for output in cell.get("outputs", []):
-            if "text/latex" in output.get("data", {}):
-                output.data["text/html"] = mathml(output.data["text/latex"])
+            data = output.get("data", {})
+            if "text/latex" in data:
+                data["text/html"] = mathml(data["text/latex"])
+            if "text/markdown" in data:
+                data["text/markdown"] = mathml(data["text/markdown"])
     body, resources = HTMLExporter(template_name="basic").from_notebook_node(copy)
     environment = jinja2.Environment(loader=jinja2.PackageLoader("kfcourse.notebooks"), autoescape=True)
     return environment.get_template("notebook.html.j2").render(title=title, body=body, colours=resources["inlining"]["css"][-1])

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
-import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -30,6 +28,7 @@ from kfcourse.notebooks.execution import NotebookFailed, execute, html, pdf, pic
 from kfcourse.notebooks.kernels import prefer_forked
 from kfcourse.notebooks.master import read, render, solution, student
 from kfcourse.notebooks.nbgrader import source_notebook
+from kfcourse.notebooks.texts import safe
 
 
 @dataclass(frozen=True)
@@ -202,10 +201,3 @@ def plan(
     return [
         Job(letter, name, folder / safe(name), kind, variants_file, masters, with_pdf) for name in variants for letter in letters
     ]
-
-
-def safe(name: str) -> str:
-    """A name as one component of a path, on every system: Windows keeps CON and others for devices."""
-    found = re.sub(r"[^\w.-]+", "-", unicodedata.normalize("NFC", name)).strip(".-") or "unnamed"
-    stem, *rest = found.split(".", 1)
-    return ".".join((f"{stem}_", *rest)) if re.fullmatch(r"(?i)con|prn|aux|nul|com\d|lpt\d", stem) else found

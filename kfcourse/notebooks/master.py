@@ -6,7 +6,8 @@ delimiters [= ... =] and [% ... %] that neither Python nor LaTeX uses; what is b
     # BEGIN SOLUTION            <!-- BEGIN SOLUTION -->
     # END SOLUTION              <!-- END SOLUTION -->
 
-of a code or text cell is the solution.  From a master come, for a variant,
+of a code or text cell is the solution; a cell of nothing else, such as the answer to a question in words, is left out for
+students.  From a master come, for a variant,
 
     render(...)     the complete notebook, with solutions
     student(...)    the same without: stubs that raise NotImplementedError, and the pictures to reach
@@ -34,7 +35,7 @@ from kfcourse.notebooks.written_code import Solutions
 from kfcourse.symbolic.model import Model
 
 BEGIN, END = "BEGIN SOLUTION", "END SOLUTION"
-STUB = "# YOUR CODE HERE"
+STUBS = STUB, _ = "# YOUR CODE HERE", "raise NotImplementedError"
 
 
 class MasterError(ValueError):
@@ -83,7 +84,7 @@ def render(text: str, exercise: Exercise) -> NotebookNode:
     for index, cell in enumerate(notebook.cells):
         cell.id = f"{exercise.letter}-{index:02d}"
         _check_markers(cell.source, f"master {name}, cell {index + 1}")
-        if cell.cell_type == "code" and BEGIN in cell.source:
+        if cell.cell_type == "code" and STUB in without_solution(cell.source, code=True):
             cell.metadata["kfcourse"] = {"answer": _defined(cell.source, next(answers, None))}
     notebook.metadata["kfcourse"] = {"set": exercise.letter, "variant": exercise.variant.name}
     notebook.metadata["kernelspec"] = {"display_name": "Python 3", "language": "python", "name": "python3"}
@@ -110,7 +111,7 @@ def _check_markers(source: str, where: str) -> None:
 
 
 def without_solution(source: str, code: bool) -> str:
-    """The text without what is between the markers; in code a stub takes its place."""
+    """The text without what is between the markers; in code a stub takes its place, unless there is nothing else."""
     kept: list[str] = []
     inside = False
     for line in source.splitlines():
@@ -118,12 +119,12 @@ def without_solution(source: str, code: bool) -> str:
             inside = True
             if code:
                 indent = line[: len(line) - len(line.lstrip())]
-                kept += [f"{indent}{STUB}", f"{indent}raise NotImplementedError"]
+                kept += [f"{indent}{line}" for line in STUBS]
         elif END in line:
             inside = False
         elif not inside:
             kept.append(line)
-    return "\n".join(kept)
+    return "\n".join(kept) if any(line.strip() not in ("", *STUBS) for line in kept) else ""
 
 
 def without_markers(source: str) -> str:

@@ -31,6 +31,8 @@ def source_notebook(notebook: NotebookNode) -> NotebookNode:
             call, question = asked.groups()
             cell.source = f"result = {call}\nassert result.passed, result"
             cell.metadata["nbgrader"] = _marked(question, grade=True, locked=True) | {"points": WEIGHTS[levels[question]]}
+        elif BEGIN in cell.source and not without_solution(cell.source, code=True):
+            cell.source = ""  # an answer in words
         elif BEGIN in cell.source:
             cell.metadata["nbgrader"] = _marked(f"{cell.id}-answer", solution=True)
     result.cells = [cell for cell in result.cells if cell.source.strip()]

@@ -26,7 +26,7 @@ def filtered(y, gain):
 
 
 CARRIED = asks(carried, [(A, P), (np.array([[1.3]]), np.array([[0.7]]))])
-FILTERED = asks(filtered, [(RUN, 0.4)])
+FILTERED = asks(filtered, [(RUN, 0.4)], axes=("step", "trajectory"))
 DIFFERENCE = asks(lambda P: -P, [(P,), (2 * P,)])  # no covariance: what is subtracted from one
 PAIR = asks(lambda a, b: (a + b, a * b), [(2.5, 1.5), (0.5, 3.0)], parts=("sum", "product"))
 FORMULAS = asks(lambda z, p: (c * z, c**2 * p + e**2), [(z, p)], parts=("tau", "Theta"))
@@ -48,7 +48,7 @@ FORMULAS = asks(lambda z, p: (c * z, c**2 * p + e**2), [(z, p)], parts=("tau", "
         (FILTERED, "some-signs", lambda y, gain: np.abs(filtered(y, gain))),
         (PAIR, "swapped", lambda a, b: (a * b, a + b)),
         (PAIR, "another-result", lambda a, b: (a + b, a + b)),
-        (asks(lambda a, b: a**2, [(2.0, 3.0), (4.0, 5.0)]), "superfluous", lambda a, b: a**2 + b),
+        (asks(lambda a, b: (a**2, b), [(2.0, 3.0)], parts=("first", "second")), "superfluous", lambda a, b: (a**2 + b, b)),
         (FORMULAS, "swapped", lambda z, p: (c**2 * p + e**2, c * z)),
         (FORMULAS, "unused", lambda z, p: (c * z, c**2 + e**2)),
         (FORMULAS, "unused", lambda z, p: (c * z, p + e**2)),

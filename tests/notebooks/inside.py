@@ -41,15 +41,15 @@ class InsideKernel:
         pass
 
     def cell(self, source, names=()):
-        self._answers = {}
-        self._namespace.update(dict.fromkeys(names, SimpleNamespace(check=self._answers.__setitem__)))
+        handed_in = {}
+        self._namespace.update(dict.fromkeys(names, SimpleNamespace(check=handed_in.__setitem__)))
         try:
             exec(source, self._namespace)
             error = None
         except Exception as raised:
             error = (type(raised).__name__, str(raised))
-        types = {name: "" if callable(one) else type(one).__name__ for name, one in self._answers.items()}
-        return Ran(error, types if names else {})
+        self._answers |= handed_in
+        return Ran(error, {name: "" if callable(one) else type(one).__name__ for name, one in handed_in.items()})
 
     def ask(self, question, arguments, seconds):
         functions = []

@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 import time
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,17 +16,17 @@ from click.testing import CliRunner
 from inside import InsideKernel
 
 from kfcourse import cli
-from kfcourse.checks import Exercise, exercise
+from kfcourse.checks import Exercise, exercise, sets
 from kfcourse.checks.question import MIME
-from kfcourse.notebooks import commands
-from kfcourse.notebooks.grading import marking, running, submissions
+from kfcourse.notebooks.course_list import Student
+from kfcourse.notebooks.grading import course, marking, running, submissions
 from kfcourse.notebooks.grading.assembly import assembled
 from kfcourse.notebooks.grading.marking import code_of
 from kfcourse.notebooks.grading.running import Place
 from kfcourse.notebooks.grading.sandbox import Sandbox
-from kfcourse.notebooks.grading.submissions import Cell, Unreadable, cells_of, claimed, clean
+from kfcourse.notebooks.grading.submissions import Cell, Unreadable, cells_of, claimed
 from kfcourse.notebooks.grading.table import RUNNING, WAITING, Grade, Told, grade_all, read_table, write_table
-from kfcourse.notebooks.master import render, solution, student
+from kfcourse.notebooks.master import read, render, solution, student
 
 FIXTURES = Path(__file__).parent / "fixtures"
 TINY = (FIXTURES / "b_aof" / "statement.md").read_text(encoding="utf-8")
@@ -181,6 +181,7 @@ def litters():
 
 
 MINE = {"name": "mine", "state": "q*x + v", "meter": "x + w", "parameters": {"q": 0.5}}
+MY_TOML = '[variants.mine]\nstate = "q*x + v"\nmeter = "x + w"\nparameters = { q = 0.5 }\n'
 
 
 def claims(**claim):
@@ -209,7 +210,7 @@ def fill(folder):
         "foreign": foreign,
         "unknown-set": claims(set="zz"),
         "unknown-variant": claims(variant="no \x1b[31m such"),
-        ".ipynb_checkpoints/wrong-checkpoint": wrong(),
+        ".ipynb_checkpoints/loops-checkpoint": wrong(),
     }
     for name, notebook in notebooks.items():
         path = folder / f"{name}.ipynb"
@@ -258,12 +259,16 @@ def row(graded, name):
 def graded_here(tmp_path):
     """Grades a notebook that does nothing to its process in this one: its grade, two marks and note."""
 
-    def graded(notebook):
+    def graded(notebook, given="", variants_file=None, whole=True, masters=FIXTURES):
         path = tmp_path / "x.ipynb"
         path.write_text(json.dumps(notebook), encoding="utf-8")  # as it is: nbformat would mend some of them
-        found = marking.grade(submissions.returned(tmp_path, masters=FIXTURES)[0], SETTING, start=InsideKernel)
-        assert found.status == "graded", found.note
-        return found, (found.marks["b1"], found.marks["b2"]), found.note
+        if variants_file:
+            (tmp_path / "my.toml").write_text(variants_file, encoding="utf-8")
+        options = {"variants_file": tmp_path / "my.toml" if variants_file else None, "given": lambda *_: given}
+        (work,) = submissions.returned(tmp_path, masters=masters, **options)
+        found = marking.grade(work, SETTING, start=InsideKernel)
+        assert found.status == "graded" or not whole, found.note
+        return found, (found.marks.get("b1"), found.marks.get("b2")), found.note
 
     return graded
 
@@ -271,7 +276,7 @@ def graded_here(tmp_path):
 def test_every_notebook_has_a_row(graded):
     assert graded.exit_code == 1  # some could not be graded
     names = {path.relative_to(graded.folder).with_suffix("").as_posix() for path in graded.folder.rglob("*.ipynb")}
-    assert set(graded.table) == names - {".ipynb_checkpoints/wrong-checkpoint"}
+    assert set(graded.table) == names - {".ipynb_checkpoints/loops-checkpoint"}
     assert "16 run, 0 unchanged since the last table" in graded.output
 
 
@@ -281,12 +286,12 @@ def test_a_new_notebook_is_not_implemented(graded):
 
 
 def test_a_solution_passes(graded):
-    assert row(graded, "М-1/Петров/b-aof") == (("passed", "passed"), "")
+    assert row(graded, "М-1/Петров/b-aof")[0] == ("passed", "passed")
     found = graded.table["М-1/Петров/b-aof"]
-    assert (found["set"], found["variant"], found["passed"], found["of"]) == ("b", "12", "2", "5")
+    assert (found["set"], found["variant"], found["passed"], found["of"]) == ("b", "53", "2", "5")
     assert found["q3"] == found["q4"] == "not run"  # the tiny master asks two of the set's five
     line = next(line for line in graded.output.splitlines() if line.startswith("М-1/Петров"))
-    assert line.split()[1:] == ["b", "12", "2", "of", "5", "✓✓–––"]
+    assert line.split()[1:7] == ["b", "53", "2", "of", "5", "✓✓–––"]
 
 
 @pytest.mark.quick
@@ -294,6 +299,51 @@ def test_wrong_answers_are_diagnosed(graded_here):
     _, marks, note = graded_here(wrong())
     assert marks == ("wrong", "wrong")
     assert note == "b1: gain-not-divided; b2: innovation-sign, covariance-added"
+
+
+@contextmanager
+def changed(name, **fields):
+    """A question of set b with other fields."""
+    question = next(one for one in sets()["b"].questions if one.name == name)
+    before = {field: getattr(question, field) for field in fields}
+    try:
+        for field, value in fields.items():
+            object.__setattr__(question, field, value)
+        yield
+    finally:
+        for field, value in before.items():
+            object.__setattr__(question, field, value)
+
+
+def test_a_check_that_fails_in_itself_costs_its_question_only(graded_here):
+    """The teacher reads how; the student, that it is not his fault."""
+
+    def broken(exercise):
+        raise AttributeError("'Mul' object has no attribute 'shape'")
+
+    with changed("b1", arguments=broken):
+        found, marks, note = graded_here(solved(), whole=False)
+    assert marks == ("not graded", "passed")
+    assert (found.status, found.digest, found.told["b1"].says) == ("graded in part", "", marking.LOOKED_AT)
+    assert note.startswith("look: b1 not graded: the check itself fails, please tell us: AttributeError: 'Mul' object")
+
+
+def test_a_step_on_a_wrong_one_and_right_parts_are_said(graded_here):
+    """The second stands on the student's own wrong gain; in the other notebook one of its two results is right."""
+
+    def on(gain):
+        return lambda lam, Psi, h, G, F, y: (
+            lam + (gain(Psi, G, F) @ (y - h)[..., None])[..., 0],
+            Psi - gain(Psi, G, F) @ G @ Psi,
+        )
+
+    with changed("b2", on=on):
+        found, marks, note = graded_here(change(solved(), "def gain", "np.linalg.solve(F, cross)", "cross"))
+    assert marks == ("wrong", "wrong")
+    assert (found.told["b2"].follows, found.told["b2"].share) == (("b1",), 0.0)
+    assert "b2: follows" in note and "right on top of your b1" in found.told["b2"].says
+    found, marks, _ = graded_here(change(solved(), "def correct", "Psi - K @ G @ Psi", "Psi + K @ G @ Psi"))
+    assert (marks, found.told["b2"].share) == (("passed", "wrong"), 0.5)
 
 
 def test_faked_results_do_not_count(graded, graded_here):
@@ -316,7 +366,7 @@ def test_answers_are_found_wherever_they_stand(graded, graded_here):
 def test_another_variant_is_noticed_and_does_not_count(graded_here):
     found, marks, note = graded_here(opens_another())
     assert marks == ("passed", "passed")
-    assert note == "opens set b, variant 1"
+    assert note == "look: opens set b, variant 1"
     assert found.variant == "53"
 
 
@@ -372,11 +422,14 @@ def test_notebooks_do_not_see_each_other(graded):
 
 
 def test_a_variant_of_the_courses_own(graded_here):
+    """Its table is in the teacher's file; the same in a notebook counts for nothing."""
     own = Exercise("b", exercise("b", MINE).variant)
-    found, marks, note = graded_here(solution(render(TINY, own)))
+    found, marks, note = graded_here(solution(render(TINY, own)), variants_file=MY_TOML)
     assert marks == ("passed", "passed")
-    assert found.variant == "mine"
-    assert "its own table" in note
+    assert (found.variant, note) == ("mine", "")
+    found, *_ = graded_here(solution(render(TINY, own)), whole=False)
+    assert (found.status, found.marks) == ("not graded", {})
+    assert "no variant 'mine'" in found.note and found.note.endswith("name that with --variants")
 
 
 def test_what_cannot_be_graded_is_named(graded):
@@ -396,7 +449,10 @@ def test_what_cannot_be_graded_is_named(graded):
 
 def test_a_course_list_tells_what_to_look_at(graded):
     told = [line for line in graded.output.splitlines() if line.startswith("look at")]
-    assert told == ["look at Петров: set b: variant 12, was given 53", "look at Сидоров: missing: b"]
+    assert told == [
+        "look at Петров: set b: marked as variant 53, which was given, and says that it is 12; set b: opens set b, variant 12",
+        "look at Сидоров: missing: b",
+    ]
     assert (graded.folder.parent / "report" / "feedback" / "М-1" / "Петров.html").exists()
     assert "Sandbox: none: notebooks run with your rights" in graded.output
 
@@ -405,13 +461,14 @@ def test_a_second_run_does_only_what_is_new(graded, tmp_path, monkeypatch):
     copied = tmp_path / "copy"
     shutil.copytree(graded.folder, copied)
     options = ["grade", str(copied), "--masters", str(FIXTURES), "--jobs", "1"]
+    options += ["--students", str(graded.folder.parent / "list.csv")]
     ran = []
 
     def instead(works, started):
         ran.extend(work.name for work in works)
         return [Grade(work.name, "graded", "b", "53", MARKS, "anew", work.digest) for work in works]
 
-    monkeypatch.setattr(commands, "grading", lambda *_: nullcontext(instead))
+    monkeypatch.setattr(course, "grading", lambda *_: nullcontext(instead))
     failed = ["cut.ipynb", "list.ipynb", "unknown-set.ipynb", "unknown-variant.ipynb"]
     again = CliRunner().invoke(cli.main, [*options, "--seconds", str(SECONDS)])
     assert again.exit_code == 0
@@ -422,7 +479,8 @@ def test_a_second_run_does_only_what_is_new(graded, tmp_path, monkeypatch):
     ran.clear()
     (copied / "shows-results.ipynb").rename(copied / "renamed.ipynb")
     change_file(copied / "rewrites.ipynb")
-    (copied / "loops.ipynb").unlink()
+    for name in ("loops.ipynb", ".ipynb_checkpoints/loops-checkpoint.ipynb"):  # without the one the other would be named
+        (copied / name).unlink()
     CliRunner().invoke(cli.main, [*options, "--seconds", str(SECONDS)])
     assert ran == ["rewrites.ipynb"]
     rows = {one.name for one in read_table(copied / "grades.csv").values()}
@@ -434,6 +492,87 @@ def test_a_second_run_does_only_what_is_new(graded, tmp_path, monkeypatch):
     ran.clear()
     CliRunner().invoke(cli.main, [*options, "--seconds", "99"])  # what was ended too early may come to its end
     assert len(ran) == 15
+
+
+def test_what_is_not_read_is_named(tmp_path):
+    """Links, hidden notebooks and archives get nothing, and each has a row; copies that programs make by themselves have none."""
+    folder, own = tmp_path / "returned", tmp_path / "solution.ipynb"
+    own.write_text(json.dumps(solved()), encoding="utf-8")
+    for name in ("A", "B/__MACOSX", "B/.ipynb_checkpoints", ".C", "pipe.ipynb"):
+        (folder / name).mkdir(parents=True)
+    (folder / "A" / "b.ipynb").symlink_to(own)
+    (folder / "linked").symlink_to(tmp_path)
+    for name in ("B/b", "B/__MACOSX/._b", "B/._b", "B/.ipynb_checkpoints/b-checkpoint", "B/.ipynb_checkpoints/lost-checkpoint"):
+        (folder / f"{name}.ipynb").write_bytes(own.read_bytes())
+    (folder / ".C" / "b.IPYNB").write_bytes(own.read_bytes())
+    (folder / "Петров.ZIP").write_bytes(b"PK")
+    found = {one.name: one for one in submissions.returned(folder, masters=FIXTURES)}
+    said = {
+        "A/b.ipynb": "a link, which is not followed",
+        "linked": "a link, which is not followed",
+        ".C/b.IPYNB": "hidden by the dot",
+        "B/.ipynb_checkpoints/lost-checkpoint.ipynb": "hidden by the dot",
+        "Петров.ZIP": "an archive: unpack it",
+        "B/b.ipynb": "",
+    }
+    assert {name: one.problem[: len(said.get(name, ""))] for name, one in found.items()} == said
+    grades = {name: marking.grade(one, SETTING, start=InsideKernel) for name, one in found.items()}
+    assert {name for name, one in grades.items() if one.marks} == {"B/b.ipynb"}
+    assert all(one.status == "not graded" and one.note and not one.digest for name, one in grades.items() if name != "B/b.ipynb")
+
+
+def test_a_file_that_becomes_a_link_is_not_followed(three, tmp_path):
+    work = submissions.returned(three, masters=FIXTURES)[0]
+    work.path.unlink()
+    work.path.symlink_to(three / "b.ipynb")
+    assert "link" in marking.grade(work, SETTING, start=InsideKernel).note
+
+
+@pytest.mark.parametrize("name", ["grades.csv", "report"])
+def test_a_returned_link_is_not_written_through(three, tmp_path, name):
+    (three / name).symlink_to(three / "elsewhere")
+    result = CliRunner().invoke(cli.main, ["grade", str(three), "--masters", str(FIXTURES)])
+    assert result.exit_code == 1 and "is a link" in result.output
+    assert not (three / "elsewhere").exists()
+
+
+EASY = {"name": "53", "state": "v", "meter": "x + w", "parameters": {}}
+
+
+def brings_its_own_variant():
+    """Set a solved for an easy table that the opening cell brings along under the name of the variant given."""
+    return solution(render(read("a"), exercise("a", EASY)))
+
+
+@pytest.mark.parametrize("given", ["", "53"])
+def test_a_table_of_its_own_gets_nothing(graded_here, given):
+    found, *_ = graded_here(brings_its_own_variant(), given, masters=None)
+    assert "passed" not in found.marks.values()
+    assert f"marked as variant 53{', which was given' * bool(given)}, and opens one of its own" in found.note
+
+
+def test_a_list_with_unknown_variants_is_refused(three):
+    (three / "list.csv").write_text("name,group,variant\nA,1,mine\n", encoding="utf-8")
+    options = ["grade", str(three), "--masters", str(FIXTURES), "--students", str(three / "list.csv")]
+    result = CliRunner().invoke(cli.main, options)
+    assert result.exit_code == 1
+    assert "gives A the variant mine, which is not known; name the file that you handed out with --variants" in result.output
+
+
+def test_whose_variant_it_is_tells_the_path_or_the_notebook(three):
+    for name, whom in (("a", "Иванов Иван, 1"), ("b", "Nobody, 1")):
+        notebook = claims(student=whom)
+        (three / f"{name}.ipynb").write_text(json.dumps(notebook), encoding="utf-8")
+    (three / "1" / "Петрова Анна").mkdir(parents=True)
+    (three / "1" / "Петрова Анна" / "x.ipynb").write_text(json.dumps(claims(student="Иванов Иван, 1")), encoding="utf-8")
+    listed = [Student("Иванов Иван", "1", "7"), Student("Петрова Анна", "1", "20")]
+    found = submissions.returned(three, masters=FIXTURES, given=course._given(listed))
+    assert {one.name: one.variant for one in found} == {
+        "a.ipynb": "7", "b.ipynb": "", "c.ipynb": "", "1/Петрова Анна/x.ipynb": "20"
+    }  # fmt: skip
+    other = submissions.returned(three, masters=FIXTURES, given=course._given(None))
+    digests = [{one.name: one.digest for one in some} for some in (found, other)]
+    assert {name for name in digests[0] if digests[0][name] != digests[1][name]} == {"a.ipynb", "1/Петрова Анна/x.ipynb"}
 
 
 def change_file(path):
@@ -559,10 +698,8 @@ def test_the_table_comes_back_as_it_was(tmp_path):
 
 
 def test_signs_of_a_screen_without_ticks(monkeypatch):
-    from kfcourse.notebooks import commands
-
-    monkeypatch.setattr(commands.sys, "stdout", io.TextIOWrapper(io.BytesIO(), encoding="cp1251"))
-    assert set(commands._signs().values()) == {"+", "x", "-"}
+    monkeypatch.setattr(course.sys, "stdout", io.TextIOWrapper(io.BytesIO(), encoding="cp1251"))
+    assert set(course._signs().values()) == {"+", "x", "-", "?"}
 
 
 def test_the_same_answers_in_another_order_are_the_same_work():
@@ -575,11 +712,6 @@ def test_the_same_answers_in_another_order_are_the_same_work():
     assert code_of([first, second], names) == code_of([other, first], names) != ""
     assert code_of([first], names) != code_of([first, second], names)
     assert code_of([first], {"three"}) == ""
-
-
-def test_text_of_students_is_cleaned():
-    assert clean("a\n\x1b[31mb\t\u202e c") == "a [31mb c"
-    assert len(clean("x" * 999, 50)) == 50
 
 
 @pytest.mark.parametrize(
@@ -615,27 +747,33 @@ def test_notebooks_without_cells_are_explained(document):
 
 @pytest.mark.parametrize("claim", [7, "b", [], {}, {"set": "b"}, {"set": ["b"], "variant": "53"}, {"set": "b", "variant": None}])
 def test_strange_claims_are_explained(claim):
-    with pytest.raises(ValueError, match=r"claims set|no variant 'None'"):
+    with pytest.raises(Unreadable, match=r"claims set|no variant 'None'"):
         claimed(claim, [], None)
 
 
 @pytest.mark.quick
-def test_claimed_variants(tmp_path):
-    table = {key: value for key, value in MINE.items() if key != "name"}
-    claim, cells = {"set": "b", "variant": "mine"}, [Cell(1, "", "", f'task = exercise("b", {MINE!r})')]
-    found, notes = claimed(claim, cells, None)
-    assert found.variant.table == table
-    assert notes == ["its variant is its own table: compare with yours by --variants"]
+def test_the_variant_is_the_one_that_was_given(tmp_path):
+    """Never the notebook's: not its name, and no table that it brings along."""
+    claim, easy = {"set": "b", "variant": "mine"}, {"name": "53", "state": "v", "meter": "x + w"}
     file = tmp_path / "mine.toml"
     file.write_text('[variants.mine]\nstate = "q*x + v"\nmeter = "x + w"\nparameters = { q = 0.9 }\n', encoding="utf-8")
-    found, notes = claimed(claim, cells, file)
-    assert (float(found.model.parameters["q"]), notes) == (0.9, [])
+    found, notes = claimed(claim, [Cell(1, "", "", f'task = exercise("b", {MINE!r})')], file)
+    assert float(found.model.parameters["q"]) == 0.9
+    assert notes == ["look: marked as variant mine, and opens one of its own that has this name"]
+    found, notes = claimed({"set": "b", "variant": "7"}, [Cell(1, "", "", f'task = exercise("b", {easy!r})')], None, "53")
+    assert found.variant == exercise("b", "53").variant
+    assert notes == [
+        "look: marked as variant 53, which was given, and says that it is 7",
+        "look: marked as variant 53, which was given, and opens one of its own that has this name",
+    ]
+    found, notes = claimed({"set": "b", "variant": "53"}, [Cell(1, "", "", f'task = exercise("b", {easy!r})')], None)
+    assert found.variant == exercise("b", "53").variant and len(notes) == 1
     with pytest.raises(ValueError, match="no variant 'mine'"):
         claimed(claim, [], None)
     _, notes = claimed({"set": "b", "variant": "53"}, [Cell(1, "", "", 'x = exercise("a", variant="7")')], None)
-    assert notes == ["opens set a, variant 7"]
-    _, notes = claimed({"set": "b", "variant": "53"}, [Cell(1, "", "", "exercise(letter, 1)\n!ls")], None)
-    assert notes == []
+    assert notes == ["look: opens set a, variant 7"]
+    for opening in ("exercise(letter, 1)\n!ls", 'task = exercise("b", "53")'):
+        assert claimed({"set": "b", "variant": "53"}, [Cell(1, "", "", opening)], None, "53")[1] == []
 
 
 def sources(cells, notebook=None):
@@ -727,9 +865,9 @@ def test_an_answer_with_an_error_is_known_by_its_cell():
 
 def test_the_kernels_environment(tmp_path, monkeypatch):
     monkeypatch.setenv("MY_TOKEN", "x")
-    found = running.environment(tmp_path, ["stage"])
+    monkeypatch.setenv("PYTHONPATH", "/home/teacher")
+    found = running.environment(tmp_path, Path("stage"))
+    assert found["PYTHONPATH"] == "stage"
     assert "MY_TOKEN" not in found
     assert found["PATH"] == os.environ["PATH"]
     assert found["HOME"] == str(tmp_path)
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(("here", "", str(tmp_path))))
-    assert running.packages_of(Path("stage")) == ["stage", str(Path("here").absolute()), str(tmp_path)]

@@ -4,16 +4,18 @@ import csv
 import io
 import re
 import zlib
+from dataclasses import replace
 
 import pytest
 
 from kfcourse.checks import sets
 from kfcourse.checks.question import PASSED, UNUSABLE, WRONG
 from kfcourse.notebooks.course_list import Student, read_assignment, save_assignment
-from kfcourse.notebooks.grading.owners import of_folder, owner, people
+from kfcourse.notebooks.grading.owners import Person, of_folder, owner, people
 from kfcourse.notebooks.grading.report import anonymous, drawing, feedback, question_rows, student_rows, unnamed, write_report
-from kfcourse.notebooks.grading.table import NOT_RUN, Grade, Told, cautious
-from kfcourse.notebooks.grading.weights import WEIGHTS, points, possible
+from kfcourse.notebooks.grading.table import NOT_RUN, Grade, Told
+from kfcourse.notebooks.grading.weights import USUAL, WEIGHTS, Credit, points, possible
+from kfcourse.notebooks.texts import cautious
 
 IVANOV = Student("Иванов Иван", "РТ-1", "53", "b c")
 PETROVA = Student("Петрова Анна", "РТ-1", "20", "b c")
@@ -31,7 +33,7 @@ def graded(name, letter="b", variant="53", passed=(), student="", work="", note=
 @pytest.mark.quick
 @pytest.mark.parametrize("begin", "=+-@")
 def test_no_text_is_a_formula_of_a_spreadsheet(begin):
-    assert cautious(f"{begin}SUM(A1)") == f" {begin}SUM(A1)"
+    assert cautious(f"{begin}SUM(A1)") == f"'{begin}SUM(A1)"
     assert cautious(f"SUM{begin}") == f"SUM{begin}" and cautious("") == ""
 
 
@@ -73,9 +75,13 @@ def test_whose_notebook(name, student, expected):
 
 def test_flags():
     grades = [
-        graded("РТ-1/Иванов Иван/b.ipynb", variant="7", work="x"),
+        graded("РТ-1/Иванов Иван/b.ipynb", work="x"),
         graded(
-            "РТ-1/Петрова Анна/b.ipynb", variant="20", work="x", student="Иванов Иван, РТ-1", note="look at cell 3: import os"
+            "РТ-1/Петрова Анна/b.ipynb",
+            variant="20",
+            work="x",
+            student="Иванов Иван, РТ-1",
+            note="look at cell 3: import os; b3: sign; look: b2 not graded: the check fails",
         ),
         graded("РТ-1/Петрова Анна/c.ipynb", "c", variant="20", passed=["c1"]),
         graded("РТ-1/Петрова Анна/c (1).ipynb", "c", variant="20", passed=["c1", "c2"]),
@@ -84,14 +90,15 @@ def test_flags():
         Grade("notes.ipynb", "not an exercise notebook"),
     ]
     (one, two, three), strangers = people(grades, COURSE)
-    assert one.flags == ["set b: variant 7, was given 53", "missing: c", "set b: the same code as Петрова Анна"]
+    assert one.flags == ["missing: c", "set b: the same code as Петрова Анна"]
     assert two.flags == [
         "set b: the notebook was handed out to Иванов Иван, РТ-1",
-        "set b: see the notes in the table of notebooks",
+        "set b: look at cell 3: import os",
+        "set b: b2 not graded: the check fails",
         "set c: came back more than once, the best counts",
         "set b: the same code as Иванов Иван",
     ]
-    assert points(two.grades["c"].marks) == 3
+    assert points([two.grades["c"]], USUAL) == 3
     assert three.flags == ["РТ-2/Иванов Иван/b.ipynb: not graded: it killed its process", "missing: b, c"]
     assert [grade.name for grade in strangers] == ["x.ipynb"]
 
@@ -110,9 +117,43 @@ def test_points_are_the_weights_of_the_levels():
     assert possible("b") == sum(WEIGHTS[one.level] for one in sets()["b"].questions)
     assert possible("abc") == sum(possible(letter) for letter in "abc") == sum(possible("abc", level) for level in WEIGHTS)
     everything = {one.name: PASSED for one in sets()["b"].questions}
-    assert points(everything) == possible("b")
-    assert points(everything | {"b1": WRONG, "b2": UNUSABLE}) == possible("b") - WEIGHTS["warm-up"] - WEIGHTS["core"]
+    assert points([Grade("x", "graded", "b", marks=everything)], USUAL) == possible("b")
+    some = Grade("x", "graded", "b", marks=everything | {"b1": WRONG, "b2": UNUSABLE})
+    assert points([some], USUAL) == possible("b") - WEIGHTS["warm-up"] - WEIGHTS["core"]
     assert {one.level for one in sets().values() for one in one.questions} <= set(WEIGHTS)
+
+
+@pytest.mark.quick
+def test_what_a_wrong_answer_is_worth_is_the_teachers_choice():
+    """b2 has a third of its results right, b3 is right on top of the wrong b1, b4 both."""
+    told = {"b1": Told("no"), "b2": Told("no", share=1 / 3), "b3": Told("no", follows=("b1",))}
+    grade = graded("x", **told, b4=Told("no", share=0.25, follows=("b2",)))
+    assert grade.marks["b3"] == WRONG
+    for credit, expected in (
+        (Credit(0.0, 0.0), 0),
+        (Credit(1.0, 0.0), 2 / 3 + 2 / 4),
+        (Credit(1.0, 0.5), 2 / 3 + 1 + 1),
+        (Credit(0.5, 1.0), 1 / 3 + 2 + 2),
+    ):
+        assert points([grade], credit) == pytest.approx(expected, abs=0.01)
+        assert points([grade], credit, "core") == points([grade], credit)
+    (row,) = student_rows([Person(IVANOV, {"b": grade})], "b", Credit(1.0, 0.5))
+    assert (row["set b"], row["points"], row["of"]) == (2.67, 2.67, possible("b"))
+    assert "0.67/2" in feedback(Person(IVANOV, {"b": grade}), "b", Credit(1.0, 0.5))
+    best = people([grade, replace(grade, name="y", told=told | {"b2": Told("no", share=2 / 3)})], None, Credit(1.0, 0.0))[0]
+    assert {one.grades["b"].name for one in best} <= {"x", "y"}
+    unusable = replace(grade, marks=dict.fromkeys(grade.marks, UNUSABLE))
+    assert points([unusable], Credit(1.0, 1.0)) == 0  # only what is wrong has right parts
+
+
+def test_right_parts_and_steps_on_wrong_ones_are_counted(tmp_path):
+    grade = graded("РТ-1/Иванов Иван/b.ipynb", b2=Told("no", share=0.5), b3=Told("no", ("follows",), follows=("b1",)))
+    write_report([grade], COURSE, tmp_path, "", Credit(1.0, 0.25))
+    rows = {row["question"]: row for row in table(tmp_path / "questions.csv")}
+    assert [rows[name][key] for name in ("b2", "b3") for key in ("in part", "follows")] == ["1", "0", "0", "1"]
+    page = (tmp_path / "overview.html").read_text(encoding="utf-8")
+    assert "100 % for the right parts of a wrong answer, 25 % if it is right on top" in page
+    assert "right in part 1" in page and "follows 1" in page
 
 
 @pytest.fixture

@@ -2,21 +2,24 @@
 
 import json
 import os
+import signal
 import socket
 import sys
+import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from test_grade import FIXTURES, cell, solved
 from tricks import CELLS, FUNCTIONS, PROCESSES
 
 from kfcourse.checks import Exercise, exercise, sets
-from kfcourse.notebooks.grading import marking, pool, running
+from kfcourse.notebooks.grading import keeper, marking, pool, running
 from kfcourse.notebooks.grading.assembly import Step
 from kfcourse.notebooks.grading.marking import Marking
 from kfcourse.notebooks.grading.pool import Family, Worker
-from kfcourse.notebooks.grading.running import Kernel, Opening, Place, packages_of
+from kfcourse.notebooks.grading.running import Kernel, Opening, Place
 from kfcourse.notebooks.grading.sandbox import Sandbox, chosen
 from kfcourse.notebooks.grading.staging import answers, personal_numbers, stage
 from kfcourse.notebooks.grading.submissions import returned
@@ -77,6 +80,15 @@ def marked(kernel, *steps):
 
 
 RIGHT = "def gain(Psi, G, F):\n    return np.swapaxes(np.linalg.solve(F, G @ Psi), -1, -2)"
+
+
+def test_later_steps_may_stand_on_earlier_answers(kernel):
+    """What was handed in stays there to be asked."""
+    kernel.cell(RIGHT)
+    assert kernel.cell(CHECK.source, CHECK.names).answers == {"b1": ""}
+    assert kernel.cell('task.check("b2", 5)', ("task",)).answers == {"b2": "int"}
+    (values, *_) = B1.arguments(TASK)
+    assert np.allclose(kernel.ask("b1", values, 10.0), B1.answer(TASK)(*values))
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -145,7 +157,7 @@ def test_what_the_masters_import_is_on_the_stage(staged):
 
 def bubblewrap(staged, folder, hidden):
     try:
-        return chosen("bwrap", hidden, folder, packages_of(staged))
+        return chosen("bwrap", hidden, folder, staged)
     except ValueError as reason:
         pytest.skip(str(reason))
 
@@ -211,10 +223,90 @@ def test_who_kills_its_process_is_named_and_the_next_is_graded(staged, tmp_path)
         grades = [worker(work) for work in returned(tmp_path, masters=FIXTURES)]
     finally:
         worker.end()
-    assert [(grade.status, grade.note) for grade in grades[:2]] == [("not graded", "it killed its process")] * 2
+    assert [grade.status for grade in grades[:2]] == ["not graded"] * 2
+    assert all("was killed, twice: by the notebook, or by somebody else" in grade.note for grade in grades[:2])
     assert grades[2].passed == 2
     if sys.platform == "linux":
         assert all(gone(int((tmp_path / f"flag{name}").read_text())) for name in "12")
+
+
+# -- processes that somebody kills
+
+
+class Shot(Kernel):
+    """A notebook's process that is killed, as by an administrator, while it does something, so many times."""
+
+    at, times = "ask", 1
+
+    def _request(self, message, until, functions):
+        if message["do"] == self.at and "SLOW" in str(message.get("source", "SLOW")) and self.times:
+            self.times -= 1
+            threading.Timer(0.5, self.shoot).start()
+        return super()._request(message, until, functions)
+
+    def shoot(self):
+        os.kill(keeper.below(self._process.popen.pid)[-1], signal.SIGKILL)
+
+
+SLOW = "import time\ntime.sleep(1)  # SLOW"
+STUB = "def gain(Psi, G, F):\n    import time\n    time.sleep(1)\n    raise NotImplementedError"
+
+
+@POSIX
+@pytest.mark.parametrize(("kind", "at", "source"), [("bwrap", "ask", STUB), ("none", "cell", SLOW + "\n" + STUB)])
+def test_a_killed_notebook_is_run_again_then_not_graded(staged, tmp_path, kind, at, source):
+    """It may be a stub that nobody has touched: what came of it must not count as an answer."""
+    sandbox = bubblewrap(staged, tmp_path, answers()) if kind == "bwrap" else Sandbox("none")
+    marks = []
+    for times in (1, 2):
+        marking, shot = Marking(TASK, SALT, (), lambda _: None), type("", (Shot,), {"at": at, "times": times})
+        with shot(Place(staged, sandbox), Opening(TASK.letter, opened(TASK), personal_numbers(TASK))) as kernel:
+            stopped = marking.run(kernel, [OPEN, Step(source, "answer", own=True), CHECK])
+        assert kernel.times == 0
+        marks.append(marking.marks["b1"])
+    assert marks == ["not implemented", "not graded"]
+    assert "was killed, twice" in " ".join([*stopped, *marking.failed()])
+
+
+@POSIX
+@pytest.mark.parametrize("times", [1, 2])
+def test_a_killed_grading_process_asks_again(staged, tmp_path, monkeypatch, times):
+    """With `kill -9`, while it compares the stub of b1; what it says of b2 holds."""
+    notebook = solved()
+    cell(notebook, "def gain").source = STUB
+    cell(notebook, "def correct").source = cell(notebook, "def correct").source.replace("gain(Psi, G, F)", "other(Psi, G, F)")
+    cell(notebook, "import matplotlib").source += "\n" + RIGHT.replace("gain", "other")
+    (tmp_path / "x.ipynb").write_text(json.dumps(notebook), encoding="utf-8")
+    worker, asked = Worker(marking.Setting(Place(staged, Sandbox("none")), SALT), Family()), []
+
+    def wait(channel, *arguments):
+        message = waited(channel, *arguments)
+        if message.get("at") == "b1":
+            asked.append(message)
+            if len(asked) <= times:
+                os.kill(worker._process.pid, signal.SIGKILL)
+        return message
+
+    waited = pool.Patient.wait
+    monkeypatch.setattr(pool.Patient, "wait", wait)
+    try:
+        grade = worker(returned(tmp_path, masters=FIXTURES)[0])
+    finally:
+        worker.end()
+    status, mark, digest = ("graded", "not implemented", True) if times == 1 else ("graded in part", "not graded", False)
+    assert (grade.status, grade.marks["b1"], grade.marks["b2"]) == (status, mark, "passed")
+    assert bool(grade.digest) is digest and ("look: b1 not graded" in grade.note) is not digest
+
+
+def test_nothing_of_the_teachers_path_is_in_the_sandbox(staged, tmp_path, monkeypatch):
+    """PYTHONPATH may be a home with everything in it."""
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "keys_of_the_exam.py").write_text("answer = 42", encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "mine"))
+    with kernel_in(bubblewrap(staged, tmp_path, answers()), staged) as kernel:
+        assert kernel.cell("import keys_of_the_exam").error[0] == "ModuleNotFoundError"
+        assert kernel.cell(f"open({str(tmp_path / 'mine' / 'keys_of_the_exam.py')!r})").error[0] == "FileNotFoundError"
+        assert kernel.cell("import os\nassert not os.environ['PYTHONPATH'].count(os.pathsep)").error is None
 
 
 # -- the grading process itself hangs or ends
@@ -261,5 +353,5 @@ def test_an_answer_that_stops_or_ends_the_grading_process_is_left_out(tmp_path, 
         grade = worker(work)
     finally:
         worker.end()
-    told = "the grading process hung" if "sleep" in fate else "it killed its process"
-    assert (grade.status, grade.note) == ("not graded", f"{told}, or its answer to b2 cannot be compared")
+    told = "the grading process hung; at b2" if "sleep" in fate else "the grading process was killed, twice"
+    assert grade.status == "not graded" and grade.note.startswith(told) and grade.note.endswith("at b2")

@@ -5,6 +5,7 @@ import hashlib
 import random
 import re
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -19,10 +20,10 @@ from kfcourse.checks import exercise, sets
 from kfcourse.checks.equality import equal_formulas
 from kfcourse.files import save
 from kfcourse.lab.variants import load_variants
-from kfcourse.notebooks import execution, jobs
+from kfcourse.notebooks import execution, handing_out, jobs
 from kfcourse.notebooks.course_list import assign
 from kfcourse.notebooks.execution import NotebookFailed, html, mathml, pictures, results
-from kfcourse.notebooks.jobs import Job, Outcome, make, run_all, safe
+from kfcourse.notebooks.jobs import Job, Outcome, make, run_all
 from kfcourse.notebooks.master import (
     STUB,
     MasterError,
@@ -35,6 +36,7 @@ from kfcourse.notebooks.master import (
     without_markers,
     without_solution,
 )
+from kfcourse.notebooks.texts import safe
 from kfcourse.notebooks.written_code import python
 
 FIXTURES = Path(__file__).parent / "fixtures"
@@ -544,14 +546,38 @@ def test_two_notebooks_never_share_a_file(call, tmp_path):
 
 
 def test_a_course_list_makes_a_folder_for_each_student(call, tmp_path, masters, monkeypatch):
-    from kfcourse.notebooks import commands
-
-    monkeypatch.setattr(commands, "run_all", lambda work, *_: [Outcome(job, "written") for job in work])
+    monkeypatch.setattr(handing_out, "run_all", lambda work, *_: [Outcome(job, "written") for job in work])
     (tmp_path / "list.csv").write_text("name;group\nИванов Иван;М-1\n../../evil;M\n", encoding="utf-8-sig")
     result = call("exercises", "--students", "list.csv", "--out", "o", "--sets", "b,c", "--masters", masters)
     assert result.exit_code == 0
     folders = [line.split()[0] for line in result.output.splitlines() if line.startswith("o/")]
     assert folders == ["o/М-1/Иванов-Иван", "o/M/evil"]
+
+
+def test_a_folder_has_its_line_as_soon_as_it_is_done(call, tmp_path, masters, monkeypatch):
+    """Also where the output is no terminal: a course takes long."""
+    lines = []
+
+    def slowly(work, *_):
+        for job in work:
+            lines.append((job.folder.name, len([line for line in printed if line.startswith("o/")])))
+            yield Outcome(job, "failed" if job.letter == "c" else "written", "no such solution\x1b[31m")
+
+    printed = []
+    monkeypatch.setattr(handing_out, "run_all", slowly)
+    monkeypatch.setattr(handing_out.click, "echo", lambda text, err=False: printed.append(text))
+    (tmp_path / "list.csv").write_text("name,group\nA,1\nB,1\nC,1\n", encoding="utf-8")
+    result = call("exercises", "--students", "list.csv", "--out", "o", "--sets", "b,c", "--masters", masters)
+    assert result.exit_code == 1
+    assert lines == [("A", 0), ("A", 0), ("B", 1), ("B", 1), ("C", 2), ("C", 2)]
+    assert [line.split() for line in printed if line.startswith("o/1/B")] == [["o/1/B", "1", "0", "1"]]
+    assert [line for line in printed if line.startswith("FAILED")] and "\x1b" not in "".join(printed)
+
+
+def test_commands_import_what_they_need_when_they_have_something_to_do():
+    slow = ["nbconvert", "nbformat", "jupytext", "joblib", "matplotlib.figure", "IPython"]
+    code = f"import sys, kfcourse.notebooks.commands; print([name for name in {slow} if name in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
 # -- course lists

@@ -17,4 +17,5 @@ owners        whose notebook it is, and what to look at
 weights       what an answer is worth
 report        tables and pages for students and lecturers
 table         all marks as a CSV table, resumed where it was interrupted
+course        from the folder to table, report and screen
 """

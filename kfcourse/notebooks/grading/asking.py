@@ -58,9 +58,13 @@ def steady(question: Question, asked: Exercise) -> bool:
 
 
 def _changed(value: Any, rng: np.random.Generator) -> Any:
-    """Numbers changed in the last place, equal ones alike: a symmetric matrix stays so, and what never varies; the rest stays."""
+    """Numbers changed in the last place, equal ones alike: a symmetric matrix stays so, and what never varies; the rest stays.
+
+    Whole numbers stay, too.  No rounding has made them, and a matrix of 1 and -1, which takes differences of nearly equal
+    numbers, would take no such any more: where a processor multiplies and adds at once, not even of equal ones.
+    """
     if not isinstance(value, float | np.floating | np.ndarray) or np.asarray(value).dtype.kind != "f":
         return copy.deepcopy(value)
     different, place = np.unique(value, return_inverse=True)
-    signs = rng.choice((-1.0, 1.0), different.shape)
+    signs = rng.choice((-1.0, 1.0), different.shape) * (different != np.round(different))
     return value * (1 + ULPS * np.finfo(float).eps * signs[place].reshape(np.shape(value)))

@@ -97,7 +97,8 @@ def main() -> None:
         os.killpg(child.pid, signal.SIGKILL)
     end(os.getpid())
     with suppress(subprocess.TimeoutExpired):
-        child.wait(5)
+        status = child.wait(5)
+        sys.exit(128 - status if status < 0 else status)  # as a shell says it
 
 
 if __name__ == "__main__":

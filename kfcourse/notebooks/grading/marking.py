@@ -11,26 +11,30 @@ import ast
 import hashlib
 import re
 from collections.abc import Callable, Container, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 from nbformat import NotebookNode
 
-from kfcourse.checks import Exercise, Result
+from kfcourse.checks import Exercise, Past, Result
 from kfcourse.checks.engine import SECONDS as CHECK
 from kfcourse.checks.engine import check
-from kfcourse.checks.question import UNUSABLE, WRONG
+from kfcourse.checks.question import NOT_CHECKED, UNUSABLE, WRONG
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.notebooks.grading.asking import salted
 from kfcourse.notebooks.grading.assembly import Step, assembled, generated
-from kfcourse.notebooks.grading.running import WHOLE, Answer, Kernel, Killed, Opening, Place, Stopped
+from kfcourse.notebooks.grading.running import WHOLE, Answer, Ended, Kernel, Killed, Opening, Place, Stopped
 from kfcourse.notebooks.grading.staging import opened_elsewhere, personal_numbers
-from kfcourse.notebooks.grading.submissions import Cell, Returned, cells_of, claimed, clean, openings, read_document, syntax
-from kfcourse.notebooks.grading.table import FAILED, GRADED, NOT_RUN, OTHER, Grade, Told
+from kfcourse.notebooks.grading.submissions import Cell, Returned, cells_of, claimed, openings, read_document, syntax
+from kfcourse.notebooks.grading.table import FAILED, GRADED, NOT_GRADED, NOT_RUN, OTHER, PARTLY, Grade, Told
 from kfcourse.notebooks.grading.values import Other
 from kfcourse.notebooks.master import opened, read
+from kfcourse.notebooks.texts import clean
 
-TOO_LARGE = "cannot be compared: too large, or too slow"
+ENDED = "the process that compares it was ended, or hung: too large an answer, or somebody ended it"
+LOOKED_AT = "not graded: your teacher is told"  # what a student reads of it
+TELL_US = "the check itself fails, please tell us"
 CODE = 4000  # characters of an answer that are kept
 
 
@@ -62,11 +66,13 @@ def grade(
     work : Returned
     setting : Setting
     skip : sequence of str
-        Questions whose answers this process could not compare: they count as unusable.
+        Questions whose answers earlier processes could not compare: they are not graded.
     progress : callable
     start : type
         Of the notebook's process.
     """
+    if work.problem:
+        return Grade(work.name, FAILED, note=work.problem)
     try:
         progress("")
         document = read_document(work.path)
@@ -74,6 +80,8 @@ def grade(
         claim = document.get("metadata", {}).get("kfcourse") or _claim(cells)
         if claim is None:
             return Grade(work.name, OTHER, digest=work.digest)
+        with suppress(Killed):  # by whom is not known: once more
+            return _grade(work, cells, claim, setting, skip, progress, start)
         return _grade(work, cells, claim, setting, skip, progress, start)
     except OutOfTime:
         problem = "the notebook of its variant cannot be made in time"
@@ -97,7 +105,7 @@ def _grade(
     work: Returned, cells: Sequence[Cell], claim: Any, setting: Setting, skip: Sequence[str], progress: Progress, start: Any
 ) -> Grade:
     with time_limit(WHOLE * work.seconds):
-        exercise, notes = claimed(claim, cells, work.variants_file)
+        exercise, notes = claimed(claim, cells, work.variants_file, work.variant)
         master = generated(read(exercise.letter, work.masters), exercise.letter, opened(exercise))
         elsewhere = opened_elsewhere(call for cell in cells for call in openings(cell.source))
         opening = Opening(exercise.letter, opened(exercise), personal_numbers(exercise, elsewhere))
@@ -105,16 +113,24 @@ def _grade(
     marking = Marking(exercise, setting.salt, skip, progress)
     with start(setting.place, opening, work.seconds) as kernel:
         stopped = marking.run(kernel, steps)
-    notes = [*stopped, *marking.errors[:2], *marking.reasons(), *notes, *_noted(kernel.notes), *strange_lines(own, master)]
+    noted = [*notes, *_noted(kernel.notes), *strange_lines(own, master)]
+    notes = [*stopped, *marking.failed(), *marking.errors[:2], *marking.reasons(), *noted]
     code = {question.name: question.function for question in exercise.questions.values()}
     told = {
-        name: Told(one.message, one.diagnosis, _code(own, code[name]) if one.status == WRONG and not one.diagnosis else "")
+        name: Told(
+            one.message,
+            one.diagnosis,
+            _code(own, code[name]) if one.status == WRONG and not one.diagnosis else "",
+            one.share,
+            one.follows,
+        )
         for name, one in marking.results.items()
     }
     variant, note = exercise.variant.name, "; ".join(dict.fromkeys(notes))
     whom = clean(str(claim.get("student", ""))) if isinstance(claim, dict) else ""
     done = code_of(own, set(code.values()))
-    return Grade(work.name, GRADED, exercise.letter, variant, marking.marks, note, work.digest, told, whom, done)
+    status, digest = (PARTLY, "") if NOT_GRADED in marking.marks.values() else (GRADED, work.digest)
+    return Grade(work.name, status, exercise.letter, variant, marking.marks, note, digest, told, whom, done)
 
 
 def _noted(notes: Iterable[str]) -> list[str]:
@@ -156,6 +172,8 @@ class Marking:
         self.results: dict[str, Result] = {}
         self.errors: list[str] = []
         self._reasons: dict[str, list[str]] = {}
+        self._failed: dict[str, list[str]] = {}
+        self._past = Past()
 
     def run(self, kernel: Kernel, steps: Iterable[Step]) -> list[str]:
         """Run all cells and ask for all answers; says where and why it did not come to its end, if it did not."""
@@ -164,7 +182,9 @@ class Marking:
             try:
                 ran = kernel.cell(step.source, step.names)
             except Stopped as reason:
-                return [f"{step.where}: {reason}"]
+                if isinstance(reason, Ended):  # what would have come is not known
+                    self.marks |= {name: NOT_GRADED for name, mark in self.marks.items() if mark == NOT_RUN}
+                return [f"{'look: ' * isinstance(reason, Ended)}{step.where}: {reason}"]
             if ran.error and (step.own or "import " in step.source) and ran.error[0] != "NotImplementedError":
                 self.errors.append(clean(f"{step.where}: {': '.join(ran.error)}"))
             for name in step.questions:
@@ -177,17 +197,34 @@ class Marking:
     def _check(self, name: str, kernel: Kernel, kind: str) -> None:
         question = self._exercise.questions[name]
         if name in self._skip:
-            result = Result(name, question.title, UNUSABLE, TOO_LARGE)
-        else:
-            self._progress(name)
-            answer: Any = type(kind, (Other,), {})() if kind else Answer(kernel, name)
-            asked = salted(self._exercise.letter, opened(self._exercise), name, self._salt)
-            result = check(question, asked, answer, CHECK)
+            self._not_graded(name, ENDED)
+            return
+        self._progress(name)
+        answer: Any = type(kind, (Other,), {})() if kind else Answer(kernel, name)
+        asked = salted(self._exercise.letter, opened(self._exercise), name, self._salt)
+        result = check(question, asked, answer, CHECK, self._past)
+        if getattr(answer, "lost", ""):
+            self._not_graded(name, answer.lost)
+            return
+        if result.status == NOT_CHECKED:
+            self._not_graded(name, f"{TELL_US}: {result.trouble}")
+            return
+        if result.trouble:
+            self._failed.setdefault(f"the hint is lost, and the mark holds; {TELL_US}: {result.trouble}", []).append(name)
         self.results[name], self.marks[name] = result, result.status
         if result.status == UNUSABLE:
             self._reason(result.message, name)
         elif result.status == WRONG and result.diagnosis:
             self._reason(", ".join(result.diagnosis), name)
+
+    def _not_graded(self, name: str, reason: str) -> None:
+        title = self._exercise.questions[name].title
+        self.results[name], self.marks[name] = Result(name, title, NOT_GRADED, LOOKED_AT), NOT_GRADED
+        self._failed.setdefault(f"not graded: {reason}", []).append(name)
+
+    def failed(self) -> list[str]:
+        """Which answers are not graded, and why."""
+        return [clean(f"look: {', '.join(names)} {reason}", 500) for reason, names in self._failed.items()]
 
     def _reason(self, reason: str, question: str) -> None:
         self._reasons.setdefault(reason, []).append(question)

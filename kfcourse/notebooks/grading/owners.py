@@ -10,8 +10,8 @@ from pathlib import PurePosixPath
 
 from kfcourse.checks import sets
 from kfcourse.notebooks.course_list import Student
-from kfcourse.notebooks.grading.table import GRADED, OTHER, Grade
-from kfcourse.notebooks.grading.weights import points
+from kfcourse.notebooks.grading.table import OTHER, Grade
+from kfcourse.notebooks.grading.weights import USUAL, Credit, points
 
 
 @dataclass
@@ -68,10 +68,13 @@ def of_folder(grade: Grade) -> Student:
     return Student(path.parent.name, "" if group == "." else group, "")
 
 
-def people(grades: Sequence[Grade], students: Sequence[Student] | None = None) -> tuple[list[Person], list[Grade]]:
+def people(
+    grades: Sequence[Grade], students: Sequence[Student] | None = None, credit: Credit = USUAL
+) -> tuple[list[Person], list[Grade]]:
     """Every student with the notebooks that came back, and the notebooks that belong to nobody.
 
-    `students` is the course list; without it every folder is a student.
+    `students` is the course list; without it every folder is a student.  Of several notebooks of a set the one counts that is
+    worth most by the `credit`.
     """
     persons = {one: Person(one) for one in students or ()}
     strangers = []
@@ -82,7 +85,7 @@ def people(grades: Sequence[Grade], students: Sequence[Student] | None = None) -
         if whose is None:
             strangers.append(grade)
         else:
-            _hand_in(persons.setdefault(whose, Person(whose)), grade)
+            _hand_in(persons.setdefault(whose, Person(whose)), grade, credit)
     for person in persons.values():
         asked = person.student.sets.split() or sorted({letter for one in persons.values() for letter in one.grades})
         missing = [letter for letter in asked if letter not in person.grades]
@@ -92,22 +95,20 @@ def people(grades: Sequence[Grade], students: Sequence[Student] | None = None) -
     return list(persons.values()), strangers
 
 
-def _hand_in(person: Person, grade: Grade) -> None:
+def _hand_in(person: Person, grade: Grade, credit: Credit) -> None:
     student = person.student
-    if grade.status != GRADED:
+    if not grade.marks:
         person.failed.append(grade)
         person.flags.append(f"{grade.name}: not graded: {grade.note}")
         return
-    if student.variant and grade.variant != student.variant:
-        person.flags.append(f"set {grade.letter}: variant {grade.variant}, was given {student.variant}")
     if grade.student and grade.student != f"{student.name}, {student.group}" and student.variant:
         person.flags.append(f"set {grade.letter}: the notebook was handed out to {grade.student}")
-    if any(part.startswith(("look", "its variant")) for part in grade.note.split("; ")):
-        person.flags.append(f"set {grade.letter}: see the notes in the table of notebooks")
+    looks = [part.removeprefix("look: ") for part in grade.note.split("; ") if part.startswith("look")]
+    person.flags += [f"set {grade.letter}: {part}" for part in looks]
     other = person.grades.get(grade.letter)
     if other is not None:
         person.flags.append(f"set {grade.letter}: came back more than once, the best counts")
-    if other is None or points(grade.marks) > points(other.marks):
+    if other is None or points([grade], credit) > points([other], credit):
         person.grades[grade.letter] = grade
 
 

@@ -24,7 +24,7 @@ from kfcourse.notebooks.grading.values import Strange
 from kfcourse.notebooks.grading.worker import grade_of, packed
 
 QUIET = 150.0  # seconds that a comparison, with the search for the kind of mistake, may take in all
-AGAIN = 3  # answers of a notebook that may end, or stop, the grading process before the notebook is given up
+AGAIN = 3  # answers of a notebook that are left out, because they end or stop the grading process, before it is given up
 
 
 class Family:
@@ -64,21 +64,27 @@ class Worker:
         self._process: subprocess.Popen | None = None
 
     def __call__(self, work: Returned) -> Grade:
-        """The grade; a process that ends or hangs is a row."""
+        """The grade; a process that ends or hangs is a row.
+
+        Nobody knows who has killed a process, so the same is done once more; an answer at which it ends again is not graded.
+        """
         skip: list[str] = []
+        ended = set[str]()
         while True:
             self._question = ""
             try:
                 return self._ask(work, skip)
             except Late:
-                problem = "the grading process hung"
+                problem, again = "the grading process hung", False
             except (Closed, Strange):
-                problem = "it killed its process"
-            if self._question:
-                problem += f", or its answer to {self._question} cannot be compared"
+                problem, again = "the grading process was killed, twice: by the notebook, or by somebody else", True
             self.end()
-            if not self._question or self._question in skip or len(skip) == AGAIN:
-                return Grade(work.name, FAILED, note=problem)
+            at = self._question or "its cells"
+            if again and at not in ended:
+                ended.add(at)
+                continue
+            if not self._question or len(skip) == AGAIN:
+                return Grade(work.name, FAILED, note=f"{problem}; at {at}")
             skip.append(self._question)
 
     def _ask(self, work: Returned, skip: Sequence[str]) -> Grade:

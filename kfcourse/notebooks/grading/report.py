@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import base64
-import csv
 import hashlib
 import io
 import re
@@ -22,14 +21,16 @@ from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG
 from kfcourse.files import save
 from kfcourse.notebooks.course_list import Student
 from kfcourse.notebooks.grading.owners import Person, known_sets, people, words
-from kfcourse.notebooks.grading.table import NOT_RUN, SIGNS, Grade, Told, cautious
-from kfcourse.notebooks.grading.weights import WEIGHTS, points, possible, questions
+from kfcourse.notebooks.grading.table import NOT_GRADED, NOT_RUN, SIGNS, Grade, Told
+from kfcourse.notebooks.grading.weights import USUAL, WEIGHTS, Credit, points, possible, questions, tidy, worth
+from kfcourse.notebooks.texts import write_csv
 
 KINDS = {  # of marks, as the picture has them: name and colour
     PASSED: ("right", "#0072b2"),
     WRONG: ("wrong", "#d55e00"),
     UNUSABLE: ("not usable", "#e69f00"),
     MISSING: ("not done", "#cccccc"),
+    NOT_GRADED: ("not graded", "#cc79a7"),
 }
 # How students write Russian names in code.
 _LETTERS = "a b v g d e zh z i y k l m n o p r s t u f kh ts ch sh shch _ y _ e yu ya".replace("_", "").split(" ")
@@ -37,7 +38,9 @@ LATIN = dict(zip(range(ord("а"), ord("я") + 1), _LETTERS, strict=True)) | {ord
 MOST = 12  # mistakes in the picture
 
 
-def write_report(grades: Sequence[Grade], students: Sequence[Student] | None, folder: Path, held: str) -> list[Person]:
+def write_report(
+    grades: Sequence[Grade], students: Sequence[Student] | None, folder: Path, held: str, credit: Credit = USUAL
+) -> list[Person]:
     """Write students.csv, questions.csv, overview.html, unnamed.md and feedback/<group>/<name>.html.
 
     Parameters
@@ -48,46 +51,40 @@ def write_report(grades: Sequence[Grade], students: Sequence[Student] | None, fo
     folder : Path
     held : str
         What kept the notebooks from doing harm.
+    credit : Credit
+        What wrong answers are worth.
 
     Returns
     -------
     list of Person
     """
-    persons, strangers = people(grades, students)
+    persons, strangers = people(grades, students, credit)
     letters = known_sets(persons)
     folder.mkdir(parents=True, exist_ok=True)
-    _table(student_rows(persons, letters), folder / "students.csv")
-    rows = question_rows(persons, letters)
-    _table(rows, folder / "questions.csv")
+    for rows, name in (
+        (student_rows(persons, letters, credit), "students.csv"),
+        (question_rows(persons, letters), "questions.csv"),
+    ):
+        write_csv(list(rows[0]) if rows else [], rows, folder / name)
     save(unnamed(persons, letters), folder / "unnamed.md")
     for person in persons:
         page = folder / "feedback" / person.student.folder.parent / f"{person.student.folder.name}.html"
         page.parent.mkdir(parents=True, exist_ok=True)
-        save(feedback(person, letters), page)
-    save(overview(persons, strangers, letters, held), folder / "overview.html")
+        save(feedback(person, letters, credit), page)
+    save(overview(persons, strangers, letters, held, credit), folder / "overview.html")
     return persons
 
 
-def _table(rows: Sequence[dict[str, Any]], path: Path) -> None:
-    text = io.StringIO()
-    if rows:
-        writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(
-            {key: cautious(value) if isinstance(value, str) else value for key, value in row.items()} for row in rows
-        )
-    save("\ufeff" + text.getvalue(), path)
-
-
-def student_rows(persons: Iterable[Person], letters: Sequence[str]) -> list[dict[str, Any]]:
+def student_rows(persons: Iterable[Person], letters: Sequence[str], credit: Credit = USUAL) -> list[dict[str, Any]]:
     """A row for each student: points of each set, of each level, and in all; what to look at."""
     rows = []
     for person in persons:
-        marks = _marks(person)
+        came = list(person.grades.values())
         row: dict[str, Any] = {"name": person.student.name, "group": person.student.group, "variant": person.student.variant}
-        row |= {f"set {letter}": points(person.grades[letter].marks) if letter in person.grades else "" for letter in letters}
-        row |= {level: points(marks, level) for level in WEIGHTS}
-        rows.append(row | {"points": points(marks), "of": possible(letters), "look at": "; ".join(person.flags)})
+        grades = person.grades
+        row |= {f"set {letter}": points([grades[letter]], credit) if letter in grades else "" for letter in letters}
+        row |= {level: points(came, credit, level) for level in WEIGHTS}
+        rows.append(row | {"points": points(came, credit), "of": possible(letters), "look at": "; ".join(person.flags)})
     return rows
 
 
@@ -104,6 +101,7 @@ def question_rows(persons: Sequence[Person], letters: Sequence[str]) -> list[dic
         mistakes = Counter(mistake for one in told for mistake in one.mistakes).most_common()
         row: dict[str, Any] = {"question": name, "title": question.title, "level": question.level}
         row |= {label: counts[kind] for kind, (label, _) in KINDS.items()}
+        row |= {"in part": sum(0 < one.share < 1 for one in told), "follows": sum(bool(one.follows) for one in told)}
         row["unnamed"] = sum(bool(one.code) for one in told)
         rows.append(row | {"mistakes": ", ".join(f"{mistake} {count}" for mistake, count in mistakes)})
     return rows
@@ -122,7 +120,7 @@ def _counts(persons: Iterable[Person], name: str) -> Counter[str]:
     return Counter(MISSING if mark == NOT_RUN else mark for mark in marks)
 
 
-def feedback(person: Person, letters: Sequence[str]) -> str:
+def feedback(person: Person, letters: Sequence[str], credit: Credit = USUAL) -> str:
     """The page of a student: every question with its mark, points, and what the check says; no solutions."""
     found = []
     for letter in letters:
@@ -132,21 +130,22 @@ def feedback(person: Person, letters: Sequence[str]) -> str:
             mark = grade.marks.get(question.name, NOT_RUN) if grade else NOT_RUN
             told = grade.told.get(question.name) if grade else None
             says = told.says if told else "" if grade is None else "not run: is there an error in a cell before it?"
-            rows.append((question, mark, WEIGHTS[question.level] * (mark == PASSED), WEIGHTS[question.level], says))
-        marks = grade.marks if grade else {}
-        found.append((sets()[letter], grade, rows, points(marks), possible([letter])))
-    marks = _marks(person)
-    levels = [(level, points(marks, level), possible(letters, level)) for level in WEIGHTS]
+            rows.append((question, mark, tidy(worth(grade, question, credit)), WEIGHTS[question.level], says))
+        found.append((sets()[letter], grade, rows, points([grade] if grade else [], credit), possible([letter])))
+    came = list(person.grades.values())
+    levels = [(level, points(came, credit, level), possible(letters, level)) for level in WEIGHTS]
     failed = [(one.name, one.note) for one in person.failed]
-    totals = {"points": points(marks), "of": possible(letters)}
+    totals = {"points": points(came, credit), "of": possible(letters)}
     return _page("feedback", person=person, sets=found, levels=levels, failed=failed, signs=SIGNS, **totals)
 
 
-def overview(persons: Sequence[Person], strangers: Sequence[Grade], letters: Sequence[str], held: str) -> str:
+def overview(
+    persons: Sequence[Person], strangers: Sequence[Grade], letters: Sequence[str], held: str, credit: Credit = USUAL
+) -> str:
     """The lecturer's page: picture, students with what to look at, questions with their mistakes."""
     rows = question_rows(persons, letters)
     students = sorted(
-        zip(student_rows(persons, letters), persons, strict=True), key=lambda row: (row[0]["group"], row[0]["name"])
+        zip(student_rows(persons, letters, credit), persons, strict=True), key=lambda row: (row[0]["group"], row[0]["name"])
     )
     picture = base64.b64encode(drawing(persons, letters)).decode() if letters else ""
     pages = [f"feedback/{person.student.folder.as_posix()}.html" for _, person in students]
@@ -161,6 +160,7 @@ def overview(persons: Sequence[Person], strangers: Sequence[Grade], letters: Seq
         levels=list(WEIGHTS),
         kinds=[label for label, _ in KINDS.values()],
         weights=WEIGHTS,
+        credit=credit,
         picture=picture,
         held=held,
     )

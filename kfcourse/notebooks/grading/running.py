@@ -22,8 +22,9 @@ from kfcourse.checks.equality import Unusable
 from kfcourse.limits import OutOfTime
 from kfcourse.notebooks.grading.channel import Closed, Late, Patient
 from kfcourse.notebooks.grading.sandbox import Process, Sandbox
-from kfcourse.notebooks.grading.submissions import SECONDS, clean
+from kfcourse.notebooks.grading.submissions import SECONDS
 from kfcourse.notebooks.grading.values import Strange, decode, encode
+from kfcourse.notebooks.texts import clean
 
 WHOLE = 5  # times as long may a notebook take
 MEMORY = 4 * 2**30  # bytes of a notebook's process
@@ -37,8 +38,16 @@ class Stopped(Exception):
     """The notebook does not go on; the message says why."""
 
 
+class Ended(Stopped):
+    """Its process was killed, and killed again when the same was asked once more: whose fault that is nobody knows."""
+
+
 class Killed(Exception):
-    """The notebook has killed the process that keeps its own."""
+    """The process that keeps the notebook's was killed."""
+
+
+class Lost(Unusable):
+    """An answer that got its process killed, twice."""
 
 
 class Opening(NamedTuple):
@@ -102,9 +111,9 @@ class Kernel:
         self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         folder = Path(os.path.realpath(self._folder.name))
         (folder / "work").mkdir()
-        packages, hidden = packages_of(self._place.stage), self._place.sandbox.hidden
-        command = [sys.executable, "-m", "kfcourse.notebooks.grading.session", *hidden, str(MEMORY)]
-        self._process = self._place.sandbox.start(command, folder, packages, environment(folder, packages))
+        stage, sandbox = self._place.stage, self._place.sandbox
+        command = [sys.executable, "-m", "kfcourse.notebooks.grading.session", *sandbox.hidden, str(MEMORY)]
+        self._process = sandbox.start(command, folder, stage, environment(folder, stage))
         assert self._process.popen.stdin and self._process.popen.stdout
         self._channel = Patient(self._process.popen.stdout, self._process.popen.stdin)
         self._pending = False
@@ -121,14 +130,14 @@ class Kernel:
         Raises
         ------
         Killed
-            It had killed what keeps it.
+            So was what keeps it.
         """
         process, self._process = self._process, None
         if process is not None:
             killed = process.end()
             self._folder.cleanup()
             if killed:
-                raise Killed("it killed its process")
+                raise Killed("the process that keeps it was killed, twice: by the notebook, or by somebody else")
 
     def cell(self, source: str, names: Sequence[str] = ()) -> Ran:
         """Run a cell; `names` are those by which a check cell calls the exercise.
@@ -137,10 +146,9 @@ class Kernel:
         ------
         Stopped, Killed
         """
-        self._revive()
-        until = min(time.monotonic() + self._seconds, self._deadline)
+        message = {"do": "cell", "source": source, "names": list(names)}
         try:
-            reply = self._request({"do": "cell", "source": source, "names": list(names)}, until, [])
+            reply = self._once_more(lambda: self._request(message, min(time.monotonic() + self._seconds, self._deadline), []))
         except OutOfTime:
             late = time.monotonic() >= self._deadline
             long = f"the notebook takes longer than {WHOLE * self._seconds:g} s" if late else ""
@@ -159,7 +167,6 @@ class Kernel:
         Missing, Unusable, OutOfTime
             As an answer that is called here would make `kfcourse.checks.engine.call` say.
         """
-        self._revive()
         functions: list[Callable] = []
 
         def number(function: Callable) -> int:
@@ -169,7 +176,9 @@ class Kernel:
         sent = encode(arguments, number)
         message = {"do": "ask", "question": question, "arguments": sent, "seconds": seconds}
         try:
-            reply = self._request(message, time.monotonic() + seconds + GRACE, functions)
+            reply = self._once_more(lambda: self._request(message, time.monotonic() + seconds + GRACE, functions))
+        except Ended as reason:
+            raise Lost(str(reason)) from None
         except Stopped as reason:
             raise Unusable(str(reason)) from None
         try:
@@ -182,6 +191,15 @@ class Kernel:
         if reply.get("fails") == "late":
             raise OutOfTime
         raise Unusable(clean(str(reply.get("says")), 300))
+
+    def _once_more(self, request: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """What a living process replies; one that is killed meanwhile is started anew, and asked again."""
+        self._revive()
+        try:
+            return request()
+        except Ended:
+            self._revive()
+            return request()
 
     def _revive(self) -> None:
         """Start anew, and run all cells again, if the process was ended in the midst of a question."""
@@ -214,10 +232,15 @@ class Kernel:
         except Late:
             self.close()
             raise OutOfTime from None
-        except (Closed, Strange, ValueError) as error:
+        except Closed:
+            killed = self._process is not None and self._process.killed()
             self.close()
-            died = "its process ended (out of memory, or ended by the notebook itself)"
-            raise Stopped(died if isinstance(error, Closed) else f"sends what is no answer: {clean(str(error))}") from None
+            if killed:
+                raise Ended("its process was killed, twice (out of memory, by the notebook, or by somebody else)") from None
+            raise Stopped("its process ended (ended by the notebook itself, or out of memory)") from None
+        except (Strange, ValueError) as error:
+            self.close()
+            raise Stopped(f"sends what is no answer: {clean(str(error))}") from None
 
     def _keeper_lives(self) -> None:
         if self._process is not None and self._process.keeper_killed:
@@ -241,6 +264,7 @@ class Answer:
 
     def __init__(self, kernel: Kernel, question: str):
         self._kernel, self._question, self._left = kernel, question, ANSWERS
+        self.lost = ""  # why no answer could be had
 
     def __call__(self, *arguments: Any) -> Any:
         if self._left <= 0:
@@ -248,6 +272,9 @@ class Answer:
         start = time.monotonic()
         try:
             return self._kernel.ask(self._question, arguments, min(ANSWER, self._left))
+        except Lost as reason:
+            self.lost = str(reason)
+            raise
         finally:
             self._left -= time.monotonic() - start
 
@@ -257,20 +284,14 @@ KEPT = re.compile(
 )
 
 
-def packages_of(stage: Path) -> list[str]:
-    """What is on the path of a notebook's process: the package as notebooks see it goes before yours."""
-    own = os.environ.get("PYTHONPATH", "").split(os.pathsep)
-    return [str(stage), *(os.path.abspath(path) for path in own if path)]
-
-
-def environment(folder: Path, packages: Sequence[str]) -> dict[str, str]:
+def environment(folder: Path, stage: Path) -> dict[str, str]:
     """Environment variables of a notebook's process: few of ours, and a home of its own."""
     fonts = folder / "matplotlib"
     fonts.mkdir()
     for path in Path(matplotlib.get_cachedir()).glob("fontlist*.json"):  # otherwise each process searches for fonts again
         shutil.copy(path, fonts)
     return {name: value for name, value in os.environ.items() if KEPT.fullmatch(name)} | {
-        "PYTHONPATH": os.pathsep.join(packages),
+        "PYTHONPATH": str(stage),  # nothing of yours
         "PYTHONDONTWRITEBYTECODE": "1",
         "HOME": str(folder),
         "USERPROFILE": str(folder),

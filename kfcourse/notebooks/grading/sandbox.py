@@ -39,10 +39,10 @@ class Sandbox:
     kind: str
     hidden: tuple[str, ...] = ()
 
-    def start(self, command: Sequence[str], folder: Path, packages: Sequence[str], environment: Mapping[str, str]) -> Process:
-        """Start a command in `folder/work`; it may write in `folder` and import from `packages`."""
+    def start(self, command: Sequence[str], folder: Path, stage: Path, environment: Mapping[str, str]) -> Process:
+        """Start a command in `folder/work`; it may write in `folder`, and read the package in `stage` and Python's libraries."""
         if self.kind == "bwrap":
-            return Process([*self._bubblewrap(folder, packages), *command], folder / "work", environment)
+            return Process([*self._bubblewrap(folder, stage), *command], folder / "work", environment)
         if os.name == "posix":
             read, write = os.pipe()
             parent = [sys.executable, "-I", "-S", str(Path(keeper.__file__)), str(read)]
@@ -52,7 +52,7 @@ class Sandbox:
                 os.close(read)
         return Process(command, folder / "work", environment)
 
-    def _bubblewrap(self, folder: Path, packages: Sequence[str]) -> list[str]:
+    def _bubblewrap(self, folder: Path, stage: Path) -> list[str]:
         found = ["bwrap", "--unshare-all", "--die-with-parent", "--new-session"]
         found += ["--proc", "/proc", "--dev", "/dev", "--tmpfs", "/tmp"]
         for place in SYSTEM:
@@ -67,15 +67,14 @@ class Sandbox:
             sys.prefix,
             *([sysconfig.get_path("purelib", f"{os.name}_user")] if site.ENABLE_USER_SITE else []),
         ]
-        for place in dict.fromkeys([*libraries, *packages]):
+        for place in dict.fromkeys(libraries):
             if not any(Path(place).is_relative_to(known) for known in SYSTEM):
                 found += ["--ro-bind-try", place, place]
         for place in self.hidden:
-            seen = (*SYSTEM, *libraries, *packages)
+            seen = (*SYSTEM, *libraries)
             if os.path.isdir(place) and any(Path(place).resolve().is_relative_to(os.path.realpath(known)) for known in seen):
                 found += ["--tmpfs", place]
-        for place in packages[:1]:
-            found += ["--ro-bind", place, place]  # the package as notebooks see it, whatever was hidden
+        found += ["--ro-bind", str(stage), str(stage)]  # the package as notebooks see it, whatever was hidden
         return [*found, "--bind", str(folder), str(folder), "--chdir", str(folder / "work")]
 
 
@@ -95,6 +94,12 @@ class Process:
             pass_fds=life[:1] if life else (),
             start_new_session=os.name == "posix",
         )
+
+    def killed(self) -> bool:
+        """Whether it was ended from outside, as an administrator or a system without memory does it: by SIGKILL."""
+        with suppress(subprocess.TimeoutExpired):
+            self.popen.wait(2)
+        return self.popen.poll() in (-signal.SIGKILL, 128 + signal.SIGKILL) if os.name == "posix" else False
 
     @property
     def keeper_killed(self) -> bool:
@@ -126,7 +131,7 @@ class Process:
         return killed
 
 
-def chosen(kind: str, hidden: Sequence[Path | str], folder: Path, packages: Sequence[str]) -> Sandbox:
+def chosen(kind: str, hidden: Sequence[Path | str], folder: Path, stage: Path) -> Sandbox:
     """The sandbox asked for; with "auto" bubblewrap's if it works here.
 
     Raises
@@ -141,7 +146,7 @@ def chosen(kind: str, hidden: Sequence[Path | str], folder: Path, packages: Sequ
     problem = "it is not installed (Debian, Ubuntu: apt install bubblewrap)"
     if shutil.which("bwrap"):
         (folder / "work").mkdir(exist_ok=True)
-        command = [*tried._bubblewrap(folder, packages), sys.executable, "-I", "-c", "import numpy"]
+        command = [*tried._bubblewrap(folder, stage), sys.executable, "-I", "-c", "import numpy"]
         done = subprocess.run(command, capture_output=True, text=True)
         if not done.returncode:
             return tried

@@ -76,15 +76,16 @@ class Session:
 
         `names` are those by which a check cell calls the exercise; they get it as it was handed out.
         """
+        handed_in: dict[str, Any] = {}
         if names:
-            self._answers = {}
-            self._shell.push(dict.fromkeys(names, Task(exercise(*self._opened), self._answers)))
+            self._shell.push(dict.fromkeys(names, Task(exercise(*self._opened), handed_in)))
         done = self._shell.run_cell(source)
         if "matplotlib.pyplot" in sys.modules:
             sys.modules["matplotlib.pyplot"].close("all")
         error = done.error_before_exec or done.error_in_exec
-        answers = {str(name): None if callable(one) else type(one).__name__ for name, one in self._answers.items()}
-        return {"error": error and [type(error).__name__, _text(error)], "answers": answers if names else {}}
+        self._answers |= handed_in  # earlier ones stay: later steps may stand on them
+        answers = {str(name): None if callable(one) else type(one).__name__ for name, one in handed_in.items()}
+        return {"error": error and [type(error).__name__, _text(error)], "answers": answers}
 
     def ask(self, question: str, arguments: Any, seconds: float) -> dict[str, Any]:
         """Call the function handed in for a question: its value, or how it fails."""

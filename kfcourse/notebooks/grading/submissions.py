@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import ast
+import errno
 import hashlib
 import json
+import os
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
 from kfcourse.checks import Exercise, sets
 from kfcourse.files import package_digest
-from kfcourse.lab.variants import find_variant, read_variant
+from kfcourse.lab.variants import VariantError, find_variant
+from kfcourse.notebooks.texts import clean
 
 SECONDS = 60.0  # a cell may take
 LARGEST = 64 * 2**20  # bytes of a returned file
+ARCHIVES = {".zip", ".7z", ".rar", ".tar", ".tgz", ".tbz2", ".txz", ".gz", ".bz2", ".xz", ".zst"}
+LINK = "a link, which is not followed: ask for the notebook itself"
 
 
 class Unreadable(ValueError):
@@ -40,6 +45,10 @@ class Returned:
         Time limit of a cell.
     variants_file : Path or None
     masters : Path or None
+    variant : str
+        That was given to the student, if that is known; else the notebook says it.
+    problem : str
+        Why it is not even read.
     """
 
     path: Path
@@ -48,26 +57,81 @@ class Returned:
     seconds: float = SECONDS
     variants_file: Path | None = None
     masters: Path | None = None
+    variant: str = ""
+    problem: str = ""
 
 
 def returned(
-    folder: Path, seconds: float = SECONDS, variants_file: Path | None = None, masters: Path | None = None
+    folder: Path,
+    seconds: float = SECONDS,
+    variants_file: Path | None = None,
+    masters: Path | None = None,
+    given: Callable[[str, Path], str] = lambda name, path: "",
 ) -> list[Returned]:
-    """The notebooks in a folder and the folders in it; hidden ones, such as .ipynb_checkpoints, are left out."""
+    """The notebooks in a folder and the folders in it, and what cannot be read of them: links, hidden ones, archives.
+
+    `given` says which variant the student of a notebook was given, from its name and path.
+    """
     folder, masters = folder.absolute(), masters and masters.absolute()
     variants_file = variants_file and variants_file.absolute()
     setting = hashlib.sha256(f"{package_digest()}{seconds}".encode())
     for path in (*sorted(masters.glob("*/statement.md") if masters else []), *([variants_file] if variants_file else [])):
         setting.update(path.read_bytes())
     found = []
-    for path in sorted(folder.rglob("*.ipynb")):
-        inside = path.relative_to(folder)
-        if path.is_file() and not any(part.startswith(".") for part in inside.parts):
-            digest = setting.copy()
+    for path, problem in sorted(_handed_in(folder)):
+        name, digest, variant = path.relative_to(folder).as_posix(), setting.copy(), ""
+        if not problem:
+            variant = given(name, path)
+            digest.update(f"{variant}\n".encode())
             with suppress(OSError):  # told when it is graded
-                digest.update(path.read_bytes())
-            found.append(Returned(path, inside.as_posix(), digest.hexdigest(), seconds, variants_file, masters))
+                digest.update(_content(path))
+        found.append(
+            Returned(path, name, "" if problem else digest.hexdigest(), seconds, variants_file, masters, variant, problem)
+        )
     return found
+
+
+def _handed_in(folder: Path) -> Iterator[tuple[Path, str]]:
+    """Files and folders in which a student may have handed in something, each with why it is not read, if it is not."""
+    unread: list[OSError] = []
+    for at, folders, files in os.walk(folder, onerror=unread.append):
+        for name in folders:
+            if (path := Path(at, name)).is_symlink():
+                yield path, LINK
+        for name in files:
+            path = Path(at, name)
+            if path.suffix.lower() in ARCHIVES:
+                yield path, "an archive: unpack it, or take it away, and grade again"
+            elif path.suffix.lower() == ".ipynb" and not _is_copy(path):
+                yield path, _unread(path, path.relative_to(folder))
+    for error in unread:
+        yield Path(error.filename), f"a folder that cannot be read: {error.strerror}"
+
+
+def _is_copy(path: Path) -> bool:
+    """Whether a program has made it beside a notebook that is there: Jupyter its checkpoints, a Mac its `._` files."""
+    if path.parent.name == ".ipynb_checkpoints":
+        return (path.parent.parent / f"{path.stem.removesuffix('-checkpoint')}.ipynb").exists()
+    at = Path(*(part for part in path.parent.parts if part != "__MACOSX"))
+    return path.name.startswith("._") and (at / path.name[2:]).exists()
+
+
+def _unread(path: Path, inside: PurePath) -> str:
+    if path.is_symlink():
+        return LINK
+    if not path.is_file():
+        return "no file, though its name says so"
+    hidden = any(part.startswith(".") for part in inside.parts)
+    return "hidden by the dot before its name: take that away, and grade again" if hidden else ""
+
+
+def _content(path: Path) -> bytes:
+    """Bytes of a returned file; OSError if it has become a link, or is too large to be one."""
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0))
+    with os.fdopen(handle, "rb") as file:
+        if os.fstat(handle).st_size > LARGEST:
+            raise OSError(errno.EFBIG, f"not read: larger than {LARGEST // 2**20} MB")
+        return file.read()
 
 
 class Cell(NamedTuple):
@@ -88,10 +152,10 @@ class Cell(NamedTuple):
 
 def read_document(path: Path) -> dict[str, Any]:
     """The notebook as a dict with a dict metadata."""
-    if path.stat().st_size > LARGEST:
-        raise Unreadable(f"not read: larger than {LARGEST // 2**20} MB")
     try:
-        document = json.loads(path.read_bytes())
+        document = json.loads(_content(path))
+    except OSError as error:
+        raise Unreadable(error.strerror or str(error)) from None
     except (ValueError, RecursionError):
         raise Unreadable("not a notebook: the file is not JSON; was it cut off, or saved as something else?") from None
     if not isinstance(document, dict) or not isinstance(document.get("metadata", {}), dict):
@@ -118,27 +182,29 @@ def cells_of(document: Mapping[str, Any]) -> list[Cell]:
     return found
 
 
-def claimed(claim: Any, cells: Sequence[Cell], variants_file: Path | None) -> tuple[Exercise, list[str]]:
-    """The set and variant that a notebook claims, and what is strange about that.
+def claimed(claim: Any, cells: Sequence[Cell], variants_file: Path | None, given: str = "") -> tuple[Exercise, list[str]]:
+    """The set that a notebook claims, for the variant that was given, and what is strange about that.
 
-    A variant that is not shipped has its table in the opening cell; a file of variants goes before it.
+    Without a course list the notebook has only a name of a variant to give; a table in it counts for nothing.
     """
     letter, name = (str(claim.get(key)) if isinstance(claim, dict) else "" for key in ("set", "variant"))
     if letter not in sets():
         raise Unreadable(f"claims set {letter!r}, variant {name!r}; the sets are {', '.join(sets())}")
-    calls = [call for cell in cells for call in openings(cell.source)]
-    tables = [table for _, table in calls if isinstance(table, dict) and table.get("name") == name]
-    if tables and variants_file is None:
-        table = {key: value for key, value in tables[0].items() if key != "name"}
-        variant = read_variant(name, table, "the notebook")
-        notes = ["its variant is its own table: compare with yours by --variants"]
-    else:
-        variant, notes = find_variant(name, variants_file), []
-    for other, what in calls:
+    try:
+        variant = find_variant(given or name, variants_file)
+    except VariantError as error:
+        hint = "" if variants_file else "; if it is of a file of yours, name that with --variants"
+        raise Unreadable(f"{error}{hint}") from None
+    marked = f"look: marked as variant {variant.name}" + ", which was given" * bool(given)
+    notes = [f"{marked}, and says that it is {name}"] if given and name != given else []
+    for other, what in (call for cell in cells for call in openings(cell.source)):
+        table = {key: value for key, value in what.items() if key != "name"} if isinstance(what, dict) else None
         other_name = what.get("name") if isinstance(what, dict) else what
-        if (other, other_name) != (letter, name):
-            notes.append(clean(f"opens set {other}, variant {other_name}"))
-    return Exercise(letter, variant), notes
+        if (other, other_name) != (letter, variant.name):
+            notes.append(f"look: opens set {other}, variant {other_name}")
+        elif table is not None and table != variant.table:
+            notes.append(f"{marked}, and opens one of its own that has this name")
+    return Exercise(letter, variant), [clean(note) for note in notes]
 
 
 def openings(source: str) -> Iterator[tuple[Any, Any]]:
@@ -159,10 +225,3 @@ def syntax(source: str) -> ast.Module | None:
             return ast.parse(source)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return None
-
-
-def clean(text: str, length: int = 200) -> str:
-    """Text of a student's on one line without control characters."""
-    line = "".join(c if c.isprintable() else " " for c in text)
-    line = " ".join(line.split())
-    return line if len(line) <= length else line[: length - 1] + "…"

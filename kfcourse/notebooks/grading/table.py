@@ -14,22 +14,37 @@ from typing import Any
 
 from kfcourse.checks import sets
 from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG
-from kfcourse.files import save
 from kfcourse.notebooks.grading.submissions import Returned
+from kfcourse.notebooks.texts import plain, write_csv
 
-NOT_RUN = "not run"
-GRADED, OTHER, FAILED = "graded", "not an exercise notebook", "not graded"
+NOT_RUN, NOT_GRADED = "not run", "not graded"  # of an answer: an error before it; the grader could not compare it
+GRADED, PARTLY, OTHER, FAILED = "graded", "graded in part", "not an exercise notebook", "not graded"
 WAITING, RUNNING = "the run ended before its turn", "the run ended while this one was graded"
-SIGNS = {PASSED: "✓", WRONG: "✗", UNUSABLE: "✗", MISSING: "–", NOT_RUN: "–"}
+SIGNS = {PASSED: "✓", WRONG: "✗", UNUSABLE: "✗", MISSING: "–", NOT_RUN: "–", NOT_GRADED: "?"}
 
 
 @dataclass(frozen=True)
 class Told:
-    """What was said of an answer: the sentences, the names of the mistakes, and the code if the mistake has no name."""
+    """What was said of an answer.
+
+    Attributes
+    ----------
+    says : str
+    mistakes : tuple of str
+        Their names.
+    code : str
+        If the mistake has no name.
+    share : float
+        Of its results that are right.
+    follows : tuple of str
+        The earlier questions on whose wrong answers it is right.
+    """
 
     says: str
     mistakes: tuple[str, ...] = ()
     code: str = ""
+    share: float = 0.0
+    follows: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -40,15 +55,16 @@ class Grade:
     ----------
     name : str
         Of the notebook: its path in the folder.
-    status : {"graded", "not an exercise notebook", "not graded"}
+    status : {"graded", "graded in part", "not an exercise notebook", "not graded"}
+        In part, if an answer could not be compared for no fault of its own that is known.
     letter, variant : str
-        As the notebook claims.
+        The set as the notebook claims, the variant by which it was marked.
     marks : dict
-        Question to "passed", "wrong", "unusable", "not implemented" or "not run".
+        Question to "passed", "wrong", "unusable", "not implemented", "not run" or "not graded".
     note : str
         Where it stopped, what the wrong answers look like, what to look at.
     digest : str
-        Empty if it was not graded.
+        Empty if it was not graded, or in part: it is tried again.
     told : dict
         Question to what was said of the answer.
     student : str
@@ -84,31 +100,25 @@ def columns() -> list[str]:
 
 def write_table(grades: Iterable[Grade], path: Path) -> None:
     """Write the table as CSV that spreadsheets open, completely or not at all."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, columns(), restval="", lineterminator="\n")
-    writer.writeheader()
+    rows = []
     for one in sorted(grades, key=lambda one: one.name):
-        row: dict[str, Any] = dict(zip(FIRST, (cautious(one.name), one.status, one.letter, cautious(one.variant)), strict=True))
+        row: dict[str, Any] = dict(zip(FIRST, (one.name, one.status, one.letter, one.variant), strict=True))
         row |= {f"q{i + 1}": mark for i, mark in enumerate(one.marks.values())}
-        passed, of = (one.passed, len(one.marks)) if one.status == GRADED else ("", "")
-        last = (passed, of, cautious(one.note), one.digest, cautious(one.student), one.work, details(one.told))
-        writer.writerow(row | dict(zip(LAST, last, strict=True)))
-    save("\ufeff" + text.getvalue(), path)
+        passed, of = (one.passed, len(one.marks)) if one.marks else ("", "")
+        last = (passed, of, one.note, one.digest, one.student, one.work, details(one.told))
+        rows.append(row | dict(zip(LAST, last, strict=True)))
+    write_csv(columns(), rows, path)
 
 
 def details(told: Mapping[str, Told]) -> str:
     """What was said of all answers, as one cell of the table."""
-    rows = {name: [one.says, one.mistakes, one.code] for name, one in told.items()}
+    rows = {name: [one.says, one.mistakes, one.code, round(one.share, 4), one.follows] for name, one in told.items()}
     return json.dumps(rows, ensure_ascii=False) if rows else ""
 
 
 def _told(text: str) -> dict[str, Told]:
-    return {name: Told(says, tuple(mistakes), code) for name, (says, mistakes, code) in json.loads(text or "{}").items()}
-
-
-def cautious(text: str) -> str:
-    """A spreadsheet takes what begins so for a formula."""
-    return f" {text}" if text[:1] in ("=", "+", "-", "@") else text
+    rows = json.loads(text or "{}").items()
+    return {name: Told(says, tuple(mistakes), code, share, tuple(on)) for name, (says, mistakes, code, share, on) in rows}
 
 
 def read_table(path: Path) -> dict[str, Grade]:
@@ -131,7 +141,7 @@ def read_table(path: Path) -> dict[str, Grade]:
             raise ValueError(
                 f"{path} is not a table of grades (or a spreadsheet has changed it); move it, or choose another --out"
             )
-        values = {key: (row.get(key) or "").strip() for key in (*FIRST, *LAST)}
+        values = {key: plain((row.get(key) or "").strip()) for key in (*FIRST, *LAST)}
         letter = values["set"]
         questions = [question.name for question in sets()[letter].questions] if letter in sets() else []
         marks = {name: row.get(f"q{i + 1}") or "" for i, name in enumerate(questions)}

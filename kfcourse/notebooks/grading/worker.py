@@ -48,7 +48,10 @@ def setting_of(data: dict[str, Any]) -> marking.Setting:
 
 def grade_of(data: dict[str, Any]) -> Grade:
     """A row of the table."""
-    told = {name: Told(one["says"], tuple(one["mistakes"]), one["code"]) for name, one in data["told"].items()}
+    told = {
+        name: Told(**(one | {"mistakes": tuple(one["mistakes"]), "follows": tuple(one["follows"])}))
+        for name, one in data["told"].items()
+    }
     return Grade(**(data | {"told": told}))
 
 

@@ -1,0 +1,114 @@
+"""Making a course's notebooks: which ones are wanted, and a line on the screen when a folder is done."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import click
+from tqdm import tqdm
+
+from kfcourse.checks import sets
+from kfcourse.lab.variants import chosen_variants
+from kfcourse.notebooks.course_list import assign, save_assignment
+from kfcourse.notebooks.jobs import Job, Outcome, make, plan, run_all
+from kfcourse.notebooks.texts import clean
+
+ASSIGNMENT = "assignment.csv"
+
+
+def hand_out(
+    kind: str,
+    names: Sequence[str],
+    everything: bool,
+    letters: str | None,
+    variants_file: Path | None,
+    students: Path | None,
+    out: Path,
+    masters: Path | None,
+    workers: int,
+    dask: str | None,
+    with_pdf: bool = False,
+) -> bool:
+    """Write the notebooks that `kfcourse exercises` or `solutions` is asked for; whether all could be made."""
+    wanted = _letters(letters)
+    variants = [v.name for v in chosen_variants(names, everything or bool(students and not names), variants_file)]
+    if students:
+        work = _for_students(kind, students, variants, wanted, out, variants_file, masters, with_pdf)
+    else:
+        work = plan(kind, out, variants, wanted, variants_file, masters, with_pdf)
+    _separate(work)
+    out.mkdir(parents=True, exist_ok=True)
+    failed = _show(run_all(work, make, workers, kind, dask), work)
+    for outcome in sorted(failed, key=lambda one: one.job.name):
+        click.echo(f"FAILED {clean(outcome.job.name)}: {clean(outcome.message, 2000)}", err=True)
+    return not failed
+
+
+def _letters(given: str | None) -> list[str]:
+    letters = list(sets()) if given is None else [letter.strip() for letter in given.split(",") if letter.strip()]
+    unknown = [letter for letter in letters if letter not in sets()]
+    if unknown or not letters:
+        raise click.UsageError(f"no exercise set {', '.join(unknown) or given}; there are {', '.join(sets())}")
+    return letters
+
+
+def _for_students(
+    kind: str,
+    students: Path,
+    variants: Sequence[str],
+    letters: Sequence[str],
+    out: Path,
+    variants_file: Path | None,
+    masters: Path | None,
+    with_pdf: bool,
+) -> list[Job]:
+    """A folder for each student, out/group/name, with their variant's notebooks; the assignment is printed."""
+    work = []
+    given = assign(students, variants)
+    click.echo("group       variant   name")
+    for one in given:
+        click.echo(f"{one.group:<11} {clean(one.variant):<9} {one.name}")
+        work += [
+            Job(letter, one.variant, out / one.folder, kind, variants_file, masters, with_pdf, f"{one.name}, {one.group}")
+            for letter in letters
+        ]
+    if kind == "exercises":
+        out.mkdir(parents=True, exist_ok=True)
+        save_assignment([replace(one, sets=" ".join(letters)) for one in given], out / ASSIGNMENT)
+        click.echo(f"\nWho has which variant: {out / ASSIGNMENT}, for `kfcourse grade --students`")
+    return work
+
+
+def _separate(work: Sequence[Job]) -> None:
+    """ValueError if two jobs would write the same file; some file systems take large and small letters for the same."""
+    seen: dict[str, Job] = {}
+    for job in work:
+        other = seen.setdefault(str(job.target).casefold(), job)
+        if other is not job:
+            raise ValueError(f"two notebooks would be {job.target}: of {other.name} and of {job.name}; change one of the names")
+
+
+def _show(outcomes: Iterable[Outcome], work: Sequence[Job]) -> list[Outcome]:
+    """Print a line for each folder as soon as it is done; what failed."""
+    left = Counter(job.folder for job in work)
+    count = {folder: Counter[str]() for folder in left}
+    failed = []
+    click.echo(f"\n{'folder':<28} written  up to date  failed")
+    for outcome in outcomes:
+        folder = outcome.job.folder
+        left[folder] -= 1
+        count[folder][outcome.status] += 1
+        failed += [outcome] * (outcome.status == "failed")
+        if not left[folder]:
+            written, old, wrong = (count[folder][status] for status in ("written", "up to date", "failed"))
+            with tqdm.external_write_mode():  # the progress bar stands aside
+                click.echo(f"{_relative(folder):<28} {written:>7} {old:>11} {wrong:>7}")
+    return failed
+
+
+def _relative(folder: Path) -> str:
+    """A folder as a user would name it: relative to where the command runs, if it is there."""
+    return str(folder.relative_to(Path.cwd()) if folder.is_relative_to(Path.cwd()) else folder)

@@ -1,0 +1,161 @@
+"""What a wrong answer gets: its own case, a stronger hint when it comes again, what it follows from, its share of right parts."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import sympy as sp
+from tiny import NOTHING, asks, c, d, outcome, p, x, y, z
+
+from kfcourse.checks.engine import GENERAL, check
+from kfcourse.checks.question import MIME, Past, Question, catalogue
+
+pytestmark = pytest.mark.quick
+
+A = np.array([2.0, 3.0])
+PAIR = asks(lambda a, b: (a + b, a * b), [(2.5, 1.5), (0.5, 3.0)], parts=("sum", "product"))
+
+
+def test_a_wrong_answer_that_no_hint_explains_gets_its_own_case():
+    message = outcome(asks(lambda a: a**3, [(2.5,)]), lambda a: a**3 - a - 1.125).message
+    assert message.startswith(f"not right. {GENERAL}")
+    assert message.endswith("An example: for a = 2.5 your function gives 12.")
+    assert "15.6" not in message  # the right one
+
+
+def test_the_case_of_a_formula_has_values_of_the_parameters():
+    exercise = SimpleNamespace(model=SimpleNamespace(values={c: sp.Rational(-1, 2)}), places=())
+    message = check(asks(lambda a: c + sp.exp(a), [(x,)]), exercise, lambda a: 3 * c - sp.exp(a)).message
+    assert message.endswith("An example: at x = 1.3, c = -0.5 your function gives -5.169.")
+
+
+def test_the_case_of_a_run_is_the_first_that_is_wrong():
+    y = np.arange(12.0).reshape(3, 2, 2)
+    question = asks(lambda y, m: y + m, [(y, 1.0)], axes=("step", "trajectory"))
+
+    def wrong(y, m):
+        found = y + m
+        found[1:, 1, 0] = 77
+        found[2:] **= 2
+        return found
+
+    message = outcome(question, wrong).message
+    assert "step 1, trajectory 1 (counted from 0): for y = [[2, 3], [6, 7]], m = 1 your function gives [77, 8]." in message
+
+
+def test_the_same_wrong_answer_again_gets_a_stronger_hint():
+    mistakes = catalogue((("minus", "the sign of b", lambda a, b: a - b),))
+    question = asks(lambda a, b: a + b, [(2.5, 1.5)], mistakes, advice="Think of b.")
+    past = Past()
+
+    def told(answer):
+        return check(question, NOTHING, answer, past=past).message
+
+    assert told(lambda a, b: a - b) == "not right. the sign of b"
+    assert told(lambda a, b: -b + a) == "not right. the sign of b Think of b."
+    assert told(lambda a, b: -b + a).startswith("not right. the sign of b Think of b. An example: for a = 2.5")
+    assert told(lambda a, b: 2 * (a + b)) == "not right. It is twice what it should be."
+    assert told(lambda a, b: a - b) == "not right. the sign of b"
+    assert told(lambda a, b: a + b) == "right"
+    assert told(lambda a, b: a - b) == "not right. the sign of b"
+
+
+def single(a):
+    return a**2 + 1
+
+
+def doubled(a):
+    return 2 * a**2 + 2
+
+
+def doubled_with(single=single):
+    return lambda a: 2 * single(a)
+
+
+def three(a):
+    return 3 * a**2 + 3
+
+
+def three_with(single=single, doubled=doubled):
+    return lambda a: single(a) + doubled(a)
+
+
+def named(name, key, on=None):
+    return Question(name, "", "core", key, lambda _: [(A,)], on=on)
+
+
+QUESTIONS = {one.name: one for one in (named("t1", single), named("t2", doubled, doubled_with), named("t3", three, three_with))}
+EXERCISE = SimpleNamespace(model=SimpleNamespace(values={}), places=(), questions=QUESTIONS)
+
+
+def test_a_right_step_on_a_wrong_one_is_marked_and_said():
+    past = Past()
+
+    def asked(name, answer):
+        return check(QUESTIONS[name], EXERCISE, answer, past=past)
+
+    def own(a):
+        return [7 * float(value) for value in a]  # a list: what follows takes it as an array
+
+    assert asked("t1", own).status == "wrong"
+    result = asked("t2", lambda a: 14 * a)
+    assert (result.status, result.follows, result.diagnosis) == ("wrong", ("t1",), ("follows",))
+    assert "right on top of your t1" in result.message
+    assert result._repr_mimebundle_()[MIME]["follows"] == ["t1"]
+    assert asked("t2", lambda a: 15 * a).follows == ()
+    assert asked("t3", lambda a: 22 * a).follows == ("t1", "t2")
+    asked("t1", single)
+    assert asked("t2", lambda a: 14 * a).follows == ()  # the step before is right now
+    asked("t1", lambda a: 1 / 0 if a[0] == 2 else a)  # unusable: nothing can stand on it
+    assert asked("t3", lambda a: a**2 + 1 + 14 * a).follows == ("t2",)
+
+
+def test_an_answer_has_the_share_of_its_right_parts():
+    assert outcome(PAIR, lambda a, b: (a + b, a * b)).share == 1
+    assert outcome(PAIR, lambda a, b: (a + b, a - b)).share == 0.5
+    assert outcome(PAIR, lambda a, b: (a * b, a + b)).share == 0
+    assert outcome(PAIR, lambda a, b: 1).share == 0
+
+
+def test_a_check_that_fails_in_itself_costs_nothing_but_itself():
+    def fails(*_):
+        raise AttributeError("of ours")
+
+    result = outcome(Question("t1", "", "core", fails, lambda _: [(2.0,)]), lambda a: a)
+    assert (result.status, result.passed, result.share) == ("not checked", False, 0)
+    assert "not your fault" in result.message and "AttributeError" not in result.message
+    assert "AttributeError: of ours" in result.trouble and "fails" in result.trouble
+    assert result._repr_mimebundle_()[MIME]["trouble"] == result.trouble
+
+
+def test_a_search_for_a_hint_that_fails_costs_the_hint():
+    question = asks(lambda a: a**2, [(2.0,)], [SimpleNamespace(answer=None)])  # a catalogue that is broken
+    object.__setattr__(question, "mistakes", (None,))
+    result = outcome(question, lambda a: a + 17.0)
+    assert result.status == "wrong"
+    assert result.message.startswith("not right.")
+
+
+def test_results_of_other_shapes_in_another_order_are_compared():
+    """A formula and matrices: exchanged, they have no common shape."""
+    row, square = sp.ImmutableMatrix([[1, 0]]), sp.ImmutableMatrix([[p, z], [z, d]])
+    question = asks(lambda z, p: (z, row * z, square), [(z, p)], parts=("h", "G", "F"))
+    result = outcome(question, lambda z, p: (z, sp.Matrix([[1, 0]]), square))
+    assert (result.status, result.trouble) == ("wrong", "")
+
+
+def test_a_covariance_is_symmetric_by_its_values():
+    J, P, s = sp.ImmutableMatrix([[1, x], [0, y]]), sp.ImmutableMatrix([[p, z], [z, d]]), sp.Symbol("s", real=True)
+    question = asks(lambda z: J * P * J.T, [(z,)])
+    message = outcome(question, lambda z: J * P * J.T + s**2 * sp.eye(2) + sp.Matrix([[0, (x + 1) ** 2], [x**2 + 2 * x + 1, 0]]))
+    assert "symmetric" not in message.message
+
+
+def test_an_argument_that_cancels_in_the_right_answer_may_stand_in_a_wrong_one():
+    question = asks(lambda a, b: a + 0 * b, [(A, A[::-1])])
+    assert "depend" not in outcome(question, lambda a, b: a**2 + b**3).message
+
+
+def test_an_integer_is_used_if_any_change_of_it_tells():
+    question = asks(lambda a, k: a ** (1 + k % 3), [(1.7, 1)])
+    assert "depend" not in outcome(question, lambda a, k: a * (1 + k % 2) + 0.3 * (k > 2)).message
