@@ -358,7 +358,8 @@ class _Wrong:
         for calls in (slice(None), slice(first, first + 1)):  # in all calls; in the first that is wrong: more may be, later
             seen = [mistake for mistake, wrong in possible if self.agree(mine[calls], wrong[calls])]
             if seen:
-                return _named(seen), _said(seen)
+                likely = [mistake for mistake in seen if mistake not in self.impossible]
+                return _named(likely or seen), _said(likely or seen)
         apart = [[not self.agree([a], [b]) for a, b in zip(wrong, theirs, strict=True)] for _, wrong in possible]
         apart = [row for row in apart if any(row)]
         telling = [2 * sum(column) >= len(apart) for column in zip(*apart, strict=True)] or [True] * len(theirs)
@@ -370,6 +371,16 @@ class _Wrong:
             )
         )
         return ([said[0]], said[1]) if said else ([], "")
+
+    @cached_property
+    def impossible(self) -> list[Mistake]:
+        """Mistakes that would have spoilt a result that is right."""
+        right = [place for place in range(len(self.parts)) if self._agrees(place, self.expected)]
+        return [
+            mistake
+            for mistake, wrong in self.known
+            if wrong is not None and not all(self.agree(_part(wrong, place), _part(self.expected, place)) for place in right)
+        ]
 
     @cached_property
     def names(self) -> list[str]:

@@ -123,22 +123,23 @@ def terms(case: Case) -> Said | None:
 
 def exchanged(case: Case) -> Said | None:
     """Right if two arguments change places."""
-    mine, several = case.sensitivity.answers[1], case.sensitivity.several
+    (right, mine), several = case.sensitivity.answers, case.sensitivity.several
     for i, j in combinations(range(len(case.names)), 2):
         if not all(_alike(values[i], values[j]) for values in case.arguments):
             continue
         try:
-            results = []
+            results: list[list[Any]] = [[], []]
             for values, wanted in zip(case.arguments, case.expected, strict=True):
-                other = list(copy.deepcopy(values))
+                other = list(values)
                 other[i], other[j] = other[j], other[i]
-                result = mine(*other)
-                results.append(like(result[case.part] if several else result, wanted))
+                for answer, found in zip((mine, right), results, strict=True):
+                    result = answer(*copy.deepcopy(other))
+                    found.append(like(result[case.part] if several else result, wanted))
         except (OutOfTime, KeyboardInterrupt):
             raise
         except BaseException:  # the answer does not work for them, or ends the program
             continue
-        if case.agree(results, case.expected):
+        if case.agree(results[0], case.expected) and not case.agree(results[1], case.expected):  # they do not simply commute
             return "exchanged", f"It is right with `{case.names[i]}` and `{case.names[j]}` exchanged: which is which?"
     return None
 
