@@ -33,8 +33,10 @@ def hidden_estimates(exercise: Exercise, name: str) -> tuple[Array, Array, Array
     """States, the estimates of two filters and the first one's covariances, on common trajectories."""
     x, y = exercise.simulate(RUNS, STEPS, name)
     first = run(aof(exercise.given.gaussian), y)
-    noise = exercise.rng(f"{name}-other").normal(size=x.shape) * x.std(axis=1, keepdims=True)
-    return x, first.mean + 0.03 * noise, first.mean + 0.08 * noise[::-1], first.cov
+    rng = exercise.rng(f"{name}-other")
+    noise = rng.normal(size=x.shape) * x.std(axis=1, keepdims=True)
+    each = rng.uniform(0.7, 1.3, (*x.shape[:2], 1, 1))  # a linear model's filter has one covariance for all trajectories
+    return x, first.mean + 0.03 * noise, first.mean + 0.08 * noise[::-1], each * first.cov
 
 
 MIXED = np.array([[1.0, 0.5], [-0.3, 1.0]])

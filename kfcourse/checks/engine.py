@@ -242,10 +242,11 @@ class _Check:
         known = [(mistake, _wrong(mistake, self.exercise, self.arguments, self.expected)) for mistake in self.question.mistakes]
         wrong = _Wrong(self.question, (self.key, self.answer), self.arguments, found, self.expected, known, self.agree)
         message, names = wrong.told()
-        more = [] if names else [wrong.case(self.values)]
+        explained = set(names) - {"too-large", "too-small"}  # which tell little
+        more = [] if explained else [wrong.case(self.values)]
         if times and self.question.advice:
             more.insert(0, self.question.advice)
-        if times > (1 if self.question.advice else 0) and names:
+        if times > (1 if self.question.advice else 0) and explained:
             more.append(wrong.case(self.values))
         return self._says(WRONG, " ".join([message, *filter(None, more)]), diagnosis=tuple(names), share=share)
 

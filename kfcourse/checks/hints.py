@@ -93,7 +93,10 @@ def dependence(case: Case) -> Said | None:
         form = "{}"
     if missing:
         which = ", ".join(map(form.format, missing))
-        return "unused", f"It does not depend on {which} and should: forgotten, or cancelled, or is something of the notebook used instead?"
+        return (
+            "unused",
+            f"It does not depend on {which} and should: forgotten, or cancelled, or is something of the notebook used instead?",
+        )
     if extra:
         return "superfluous", f"It depends on {', '.join(map(form.format, extra))} and should not."
     return None

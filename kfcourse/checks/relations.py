@@ -236,4 +236,18 @@ def mixed(case: Case) -> Said | None:
     return None
 
 
-RELATIONS: tuple[Callable[[Case], Said | None], ...] = (exchanged, ordered, alike, mixed, differs, limit, power, terms)
+def direction(case: Case) -> Said | None:
+    """Too large, or too small, wherever it is wrong."""
+    if not case.numeric:
+        return None
+    a, b = (np.concatenate([np.ravel(pair[which]) for pair in case.pairs]) for which in (0, 1))
+    told = np.isfinite(b) & ~np.isclose(a, b, rtol=1e-9, atol=0)
+    larger = np.abs(a[told]) > np.abs(b[told])
+    if np.sum(told) < 3 or (a[told] * b[told] < 0).any() or larger.any() != larger.all():
+        return None
+    if larger.all():
+        return "too-large", "It is too large wherever it is wrong: is something added that does not belong there, or not divided?"
+    return "too-small", "It is too small wherever it is wrong: is something missing, or divided once too often?"
+
+
+RELATIONS: tuple[Callable[[Case], Said | None], ...] = (exchanged, ordered, alike, mixed, differs, limit, power, terms, direction)
