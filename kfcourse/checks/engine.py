@@ -355,12 +355,19 @@ class _Wrong:
 
         mine, theirs = of(self.found), of(self.expected)
         possible = [(mistake, of(wrong)) for mistake, wrong in self.known if wrong is not None]
-        first = next(i for i, (a, b) in enumerate(zip(mine, theirs, strict=True)) if not self.agree([a], [b]))
-        for calls in (slice(None), slice(first, first + 1)):  # in all calls; in the first that is wrong: more may be, later
-            seen = [mistake for mistake, wrong in possible if self.agree(mine[calls], wrong[calls])]
-            if seen:
-                likely = [mistake for mistake in seen if mistake not in self.impossible]
-                return _named(likely or seen), _said(likely or seen)
+        right = [self.agree([a], [b]) for a, b in zip(mine, theirs, strict=True)]
+        first = slice(right.index(False), right.index(False) + 1)
+        seen = [mistake for mistake, wrong in possible if self.agree(mine, wrong)]
+        if not seen:  # in the first call that is wrong: more may be, later; and nothing that is right is spoilt by it
+            seen = [
+                mistake
+                for mistake, wrong in possible
+                if self.agree(mine[first], wrong[first])
+                and all(self.agree([a], [b]) for a, b, good in zip(wrong, theirs, right, strict=True) if good)
+            ]
+        if seen:
+            likely = [mistake for mistake in seen if mistake not in self.impossible]
+            return _named(likely or seen), _said(likely or seen)
         apart = [[not self.agree([a], [b]) for a, b in zip(wrong, theirs, strict=True)] for _, wrong in possible]
         apart = [row for row in apart if any(row)]
         telling = [2 * sum(column) >= len(apart) for column in zip(*apart, strict=True)] or [True] * len(theirs)

@@ -1,4 +1,4 @@
-"""Answers written from the statements alone, without looking at the catalogues: right ones pass, wrong ones are told something true.
+"""Answers written from the statements alone: right ones in unusual forms pass, wrong ones are told something true.
 
 A part of a larger collection, for the course's variant, two others of other kinds, and a generated one.
 """
