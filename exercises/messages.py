@@ -40,6 +40,7 @@ NOISE_BY_DEVIATION = "A standard deviation stands where the covariance of the me
 NOISE_SQUARED = "The covariance of the meter's noise enters squared."
 GAIN_MULTIPLIED = "The gain is multiplied by the covariance of the innovation; it is divided by it."
 ONE_COVARIANCE_TOO_MANY = "A covariance is added that the prediction's function has taken into account already."
+CORRECTION_ALONE = "That is the correction alone; it is added to the prediction."
 CORRECTION_SUBTRACTED = "The correction is subtracted; it is added to the prediction."
 
 # -- regressions

@@ -104,6 +104,31 @@ WRONG_LINEARISED: tuple[Row, ...] = (
         CORRELATION_FORGOTTEN,
         lambda s: sp.diag(*(_several(s).A * s.cov * s.A.T + noise_part(s)).diagonal()),
     ),
+    (
+        "powers",
+        "Both parts enter with the wrong power: a variance goes with the square of what multiplies.",
+        lambda s: _scalar(one(s.A) * one(s.cov) + one(s.B)),
+    ),
+    (
+        "product",
+        "The two parts are multiplied; variances of independent terms add.",
+        lambda s: _scalar(one(s.A) ** 2 * one(s.cov) * one(noise_part(s))),
+    ),
+    (
+        "variance-squared",
+        "The covariance of the state enters twice.",
+        lambda s: _several(s).A * s.cov * s.cov * s.A.T + noise_part(s),
+    ),
+    (
+        "variance-inverted",
+        "The inverse of the state's covariance stands there.",
+        lambda s: _several(s).A * s.cov.inv() * s.A.T + noise_part(s),
+    ),
+    (
+        "mean-and-variance",
+        "Mean and variance of the state have changed places.",
+        lambda s: _scalar(one(s.A) ** 2 * one(s.mean) ** 2 + one(noise_part(s)).subs(one(s.mean), sp.sqrt(one(s.cov)))),
+    ),
 )
 
 

@@ -61,6 +61,16 @@ WRONG_GAINS: tuple[tuple[str, str, Gain], ...] = (
         "There is one gain for all trajectories; each has its own.",
         lambda Psi, G, F: np.tile(gain(Psi, G, F).mean(axis=0), (len(Psi), 1, 1)),
     ),
+    (
+        "first-law",
+        "The covariances of the first trajectory are taken for all.",
+        lambda Psi, G, F: laws.gain(Psi[:1] @ transpose(G), F),
+    ),
+    (
+        "mean-of-F",
+        "F is averaged over the trajectories; each has its own.",
+        lambda Psi, G, F: laws.gain(Psi @ transpose(G), np.broadcast_to(F.mean(axis=0), F.shape)),
+    ),
 )
 
 
@@ -96,6 +106,11 @@ def _joseph_part(which: int) -> Answer:
     return answer
 
 
+def _prediction_forgotten(lam: Array, Psi: Array, h: Array, G: Array, F: Array, y: Array) -> tuple[Array, Array]:
+    z, p = correct(lam, Psi, h, G, F, y)
+    return z - lam, p
+
+
 WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
     *((name, says, correction_with(of_gain=wrong)) for name, says, wrong in WRONG_GAINS),
     ("innovation-sign", messages.INNOVATION_SIGN, correction_with(innovation=lambda y, h: h - y)),
@@ -120,6 +135,17 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
         "noise-of-meter-missing",
         messages.NOISE_INHERITED,
         correction_with(covariance=lambda Psi, K, G, F: _joseph_part(0)(Psi, G, F, None)),
+    ),
+    ("prediction-not-added", messages.CORRECTION_ALONE, _prediction_forgotten),
+    (
+        "information",
+        messages.INFORMATION_FOR_COVARIANCE,
+        correction_with(covariance=lambda Psi, K, G, F: np.linalg.inv(Psi) + transpose(G) @ np.linalg.solve(F, G)),
+    ),
+    (
+        "identity-for-Psi",
+        "The identity stands in the place of Psi: check the units.",
+        correction_with(covariance=lambda Psi, K, G, F: np.eye(Psi.shape[-1]) - K @ G @ Psi),
     ),
 )
 
@@ -183,6 +209,11 @@ WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
         messages.ONE_COVARIANCE_TOO_MANY,
         step_with(following=lambda lam, Psi, z, p, predict: predict(z, Psi + p)),
     ),
+    (
+        "predicted-twice",
+        "Two predictions are made; one leads to the next step.",
+        step_with(following=lambda lam, Psi, z, p, predict: predict(*predict(z, p))),
+    ),
 )
 
 
@@ -216,6 +247,19 @@ def _zeros_for_missing(y: Array, mean: Array, cov: Array, measure: Callable, pre
     return run_filter(np.nan_to_num(y), mean, cov, measure, predict)
 
 
+def _handed_on(y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable, after: bool) -> Array:
+    """The predictions of the next step; or a filter that goes on from its prediction, not from its estimate."""
+    lam, Psi = np.tile(mean, (y.shape[1], 1)), full(cov, y.shape[1])
+    found = []
+    for k, one in enumerate(y):
+        missing = np.isnan(one).any(axis=-1)
+        z, p, *_ = step(lam, Psi, np.where(missing[:, None], 0.0, one), at_step(measure, k), at_step(predict, k))
+        z, p = np.where(missing[:, None], lam, z), np.where(missing[:, None, None], Psi, p)
+        lam, Psi = at_step(predict, k)(z, p) if after else at_step(predict, k)(lam, Psi)
+        found.append(lam if after else z)
+    return np.array(found)
+
+
 WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
     ("predicted-first", messages.PREDICTED_FIRST, _predicted_first),
     ("predictions-returned", messages.PREDICTIONS_RETURNED, _predictions),
@@ -224,7 +268,7 @@ WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
     *(
         (name, says, lambda *a, wrong=wrong: run_with(step_with(wrong), *a))
         for name, says, wrong in WRONG_CORRECTIONS
-        if name in ("innovation-sign", "innovation-of-state", "covariance-kept")
+        if name not in ("gain-multiplied", "gain-not-divided")  # such a run overflows
     ),
     (
         "first-not-used",
@@ -236,10 +280,25 @@ WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
     ("input-of-step-before", messages.INPUT_OF_STEP_BEFORE, lambda *a: run_with(step, *a, measure_at=step_before)),
     ("input-of-step-before", messages.INPUT_OF_STEP_BEFORE, lambda *a: run_with(step, *a, predict_at=step_before)),
     ("steps-from-one", messages.STEPS_FROM_ONE, lambda *a: run_with(step, *a, next_step, next_step)),
+    (
+        "next-returned",
+        "These are the predictions of the next step; return the estimates of this one.",
+        lambda *a: _handed_on(*a, after=True),
+    ),
+    (
+        "estimate-not-handed-on",
+        "The filter goes on from its prediction: what a measurement tells is lost at the next step.",
+        lambda *a: _handed_on(*a, after=False),
+    ),
 )
 
 
 # -- b5: a covariance that rounding cannot make negative
+
+
+def _share_added(Psi: Array, G: Array, F: Array) -> Array:
+    more = np.eye(Psi.shape[-1]) + gain(Psi, G, F) @ G
+    return more @ Psi @ transpose(more)
 
 
 WRONG_COVARIANCES: tuple[tuple[str, str, Answer], ...] = (
@@ -274,5 +333,20 @@ WRONG_COVARIANCES: tuple[tuple[str, str, Answer], ...] = (
         "one-side-only",
         "What remains of the prediction's error enters once; a covariance has it on both sides.",
         lambda Psi, G, F, R: Psi - gain(Psi, G, F) @ G @ Psi + _joseph_part(1)(Psi, G, F, R),
+    ),
+    (
+        "share-added",
+        "What the measurement explains is added to the identity; it is subtracted from it.",
+        lambda Psi, G, F, R: _share_added(Psi, G, F) + _joseph_part(1)(Psi, G, F, R),
+    ),
+    (
+        "gain-forgotten",
+        "The meter's noise reaches the estimate through the gain, on both sides.",
+        lambda Psi, G, F, R: _joseph_part(0)(Psi, G, F, R) + R[..., :1, :1],
+    ),
+    (
+        "noise-by-deviation",
+        messages.NOISE_BY_DEVIATION,
+        lambda Psi, G, F, R: _joseph_part(0)(Psi, G, F, R) + _joseph_part(1)(Psi, G, F, np.sqrt(R)),
     ),
 )

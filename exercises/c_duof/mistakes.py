@@ -52,6 +52,7 @@ WRONG_STRUCTURES: tuple[tuple[str, str, Answer], ...] = (
         "The equations of state and meter are swapped.",
         lambda lam, z, y, a, b: (_alike(y, lam) - a(lam), b(z)),
     ),
+    ("twice", "The state equation is applied twice.", lambda lam, z, y, a, b: (y - b(lam), a(a(z)))),
 )
 
 
@@ -80,6 +81,19 @@ def _offset(of_means: Callable[[Array, Array], Array]) -> Fit:
 
     return fit
 
+
+def _left(t: Array, r: Array) -> Array:
+    matrix, offset, _ = regression(t, r)
+    return t - r @ matrix.T - offset
+
+
+def _whole_design(t: Array, r: Array) -> tuple[Array, Array, Array]:
+    """Least squares with a column of ones: where the regressor never varies, another one of the minimisers."""
+    found = np.linalg.pinv(np.column_stack([r, np.ones(len(r))])) @ t
+    return found[:-1].T, found[-1], regression(t, r)[2]
+
+
+SUM_FOR_MEAN = "A sum stands where a mean belongs."
 
 WRONG_REGRESSIONS: tuple[tuple[str, str, Fit], ...] = (
     ("means-not-subtracted", messages.MEANS_NOT_SUBTRACTED, MOMENTS_ABOUT_ZERO),
@@ -139,6 +153,29 @@ WRONG_REGRESSIONS: tuple[tuple[str, str, Fit], ...] = (
         "The matrix is not divided by the covariance of the regressor.",
         lambda t, r: (covariance_of(t, r), *regression(t, r)[1:]),
     ),
+    (
+        "another-minimiser",
+        "It is one of the best, but where the regressor never varies there are many: take the pseudo-inverse of its covariance.",
+        _whole_design,
+    ),
+    (
+        "regularised",
+        "Something was added to the covariance of the regressor; the pseudo-inverse needs no such help.",
+        regression_with(lambda t, r: (covariance_of(t, r), covariance_of(r, r) + 1e-6 * np.eye(r.shape[1]))),
+    ),
+    (
+        "multiplied",
+        "The matrix is multiplied by the covariance of the regressor; it is divided by it.",
+        regression_with(lambda t, r: (covariance_of(t, r) @ covariance_of(r, r) @ covariance_of(r, r), covariance_of(r, r))),
+    ),
+    (
+        "one-trajectory",
+        "What is left is taken from one trajectory; average over all.",
+        lambda t, r: (*regression(t, r)[:2], _left(t, r)[:1].T @ _left(t, r)[:1]),
+    ),
+    ("sum-for-mean", SUM_FOR_MEAN, _residual(lambda all_, part, t: len(t) * (all_ - part))),
+    ("sum-for-mean", SUM_FOR_MEAN, _residual(lambda all_, part, t: len(t) * all_ - part)),
+    ("sum-for-mean", SUM_FOR_MEAN, _residual(lambda all_, part, t: len(t) * (all_ - len(t) * part))),
 )
 
 
@@ -149,6 +186,12 @@ def _subtracted(lam: Array, x: Array, y: Array, x_next: Array, a: Callable, b: C
     H, e, _ = regression(x - lam, y - b(lam))
     z = lam - (y - b(lam)) @ H.T + e
     F, g, _ = regression(x_next, a(z))
+    return z, a(z) @ F.T + g
+
+
+def _change_fitted(lam: Array, x: Array, y: Array, x_next: Array, a: Callable, b: Callable) -> tuple[Array, Array]:
+    z, _ = duof_step_with()(lam, x, y, x_next, a, b)
+    F, g, _ = regression(x_next - z, a(z))
     return z, a(z) @ F.T + g
 
 
@@ -182,12 +225,18 @@ WRONG_DUOF_STEPS: tuple[tuple[str, str, Answer], ...] = (
         "The target of the second regression is the next state itself.",
         lambda lam, x, y, x_next, a, b: duof_step_with()(lam, x, y, x_next - lam, a, b),
     ),
+    ("change-fitted", "The target of the second regression is the next state itself, not how much it changes.", _change_fitted),
 )
 
 
 # -- c4: coefficients found on one ensemble, used on another
 
 Ensemble = tuple[Array, Array]
+
+
+def _undivided(t: Array, r: Array) -> tuple[Array, Array, Array]:
+    matrix = covariance_of(t, r)
+    return matrix, t.mean(axis=0) - matrix @ r.mean(axis=0), covariance_of(t, t)
 
 
 WRONG_DUOF_RUNS: tuple[tuple[str, str, Answer], ...] = (
@@ -214,4 +263,32 @@ WRONG_DUOF_RUNS: tuple[tuple[str, str, Answer], ...] = (
     ("input-of-step-before", messages.INPUT_OF_STEP_BEFORE, duof_run_with(a_at=step_before)),
     ("input-of-step-before", messages.INPUT_OF_STEP_BEFORE, duof_run_with(b_at=step_before)),
     ("steps-from-one", messages.STEPS_FROM_ONE, duof_run_with(a_at=next_step, b_at=next_step)),
+    (
+        "prediction-offset-not-used",
+        "The offset g of the prediction is not used when the filter runs.",
+        duof_run_with(prediction_offset=False),
+    ),
+    (
+        "prediction-not-added",
+        messages.CORRECTION_ALONE,
+        duof_run_with(base=lambda lam: 0 * lam),
+    ),
+    (
+        "state-for-error",
+        "The target of the first regression is the error of the prediction, not the state.",
+        duof_run_with(target=lambda x, lam: x),
+    ),
+    ("means-not-subtracted", messages.MEANS_NOT_SUBTRACTED, duof_run_with(fit=MOMENTS_ABOUT_ZERO)),
+    ("offset-forgotten", messages.OFFSET_FORGOTTEN, duof_run_with(fit=WITHOUT_OFFSET)),
+    (
+        "steps-reversed",
+        "The coefficients are those of the steps in the reverse order.",
+        lambda x, yd, *rest: design_and_run(x[::-1], yd[::-1], *rest),
+    ),
+    (
+        "part-of-ensemble",
+        "The coefficients come from a part of the design ensemble only; use all of its trajectories.",
+        lambda x, yd, *rest: design_and_run(x[:, : x.shape[1] // 3], yd[:, : x.shape[1] // 3], *rest),
+    ),
+    ("gain-not-divided", "The coefficients are not divided by the covariance of the regressor.", duof_run_with(fit=_undivided)),
 )

@@ -76,6 +76,31 @@ WRONG_CONDITIONS: tuple[tuple[str, str, Condition], ...] = (
         messages.UNBIASED_RESIDUAL,
         lambda x, z: (condition(x, z)[0], condition(x, z)[1] * len(x) / (len(x) - 1)),
     ),
+    (
+        "explained-only",
+        "That is what the estimate explains of the state; what it leaves is asked for.",
+        lambda x, z: (condition(x, z)[0], covariance_of(x, x) - condition(x, z)[1]),
+    ),
+    (
+        "residual-returned",
+        "That is what the regression leaves of the state; u is what it says.",
+        lambda x, z: (x - condition(x, z)[0], condition(x, z)[1]),
+    ),
+    (
+        "sum-for-mean",
+        "T is a sum over the trajectories, not a mean.",
+        lambda x, z: (condition(x, z)[0], len(x) * condition(x, z)[1]),
+    ),
+    (
+        "error-for-state",
+        "The error of the estimate is regressed; the state itself is asked for.",
+        lambda x, z: condition(x - z, z),
+    ),
+    (
+        "not-divided",
+        "Gamma is not divided by the covariance of the estimate.",
+        lambda x, z: (x.mean(axis=0) + (z - z.mean(axis=0)) @ covariance_of(z, x), condition(x, z)[1]),
+    ),
 )
 
 
@@ -114,6 +139,29 @@ WRONG_FOS_STEPS: tuple[tuple[str, str, Answer], ...] = (
     ("variance-from-prediction", VARIANCE_FROM_PREDICTION, _fos_law(lambda u, T, z, p, lam, Psi: (u, Psi))),
     ("covariances-added", messages.ONE_COVARIANCE_TOO_MANY, _fos_law(lambda u, T, z, p, lam, Psi: (u, T + p))),
     ("innovation-sign", messages.INNOVATION_SIGN, _fos_law(lambda u, T, z, p, lam, Psi: (u, T), sign=-1.0)),
+    (
+        "u-returned",
+        "z is the estimate of the correction; u is what the prediction starts from.",
+        lambda lam, Psi, x, y, measure, predict: (
+            condition(x, fos_step_with()(lam, Psi, x, y, measure, predict)[0])[0],
+            *fos_step_with()(lam, Psi, x, y, measure, predict)[1:],
+        ),
+    ),
+    (
+        "certain-state",
+        "The prediction starts as if u were the state itself: T is forgotten.",
+        fos_step_with(choose=lambda u, T, z, p: (u, 0 * T)),
+    ),
+    (
+        "state-for-u",
+        "The prediction starts from the state; a filter does not know it.",
+        lambda lam, Psi, x, y, measure, predict: (
+            fos_step_with()(lam, Psi, x, y, measure, predict)[0],
+            *predict(
+                x, np.array(np.broadcast_to(condition(x, fos_step_with()(lam, Psi, x, y, measure, predict)[0])[1], Psi.shape))
+            ),
+        ),
+    ),
 )
 
 

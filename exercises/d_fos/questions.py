@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import STEP, array_functions, full
-from kfcourse.exercises import follow_on, messages
+from kfcourse.exercises import follow_on
 from kfcourse.exercises.d_fos.keys import condition, condition_on_both, fos_step, mfos_step
 from kfcourse.exercises.d_fos.mistakes import WRONG_CONDITIONS, WRONG_FOS_STEPS, WRONG_MFOS_STEPS
 from kfcourse.exercises.shared import RUNS, covariance_of, ensemble, other_functions, predicted
@@ -55,6 +57,19 @@ def both_arguments(exercise: Exercise) -> list[tuple]:
     x, y, _ = ensemble(exercise, "d4")
     return [(x, y, predicted(exercise, "d4-z", x))]
 
+
+OF_ANY_REGRESSION = (  # mistakes of d1 that are possible here too
+    "explained-added",
+    "explained-only",
+    "residual-is-variance",
+    "deviation-for-variance",
+    "means-not-subtracted",
+    "offset-forgotten",
+    "residual-returned",
+    "unbiased-residual",
+    "sum-for-mean",
+    "not-divided",
+)
 
 QUESTIONS = (
     Question(
@@ -131,10 +146,20 @@ QUESTIONS = (
                     "T is what the estimate alone leaves; both together leave less.",
                     lambda x, y, z: (condition_on_both(x, y, z)[0], condition(x, z)[1]),
                 ),
+                *(
+                    (name, says, lambda x, y, z, wrong=wrong: wrong(x, np.concatenate([y, z], axis=1)))
+                    for name, says, wrong in WRONG_CONDITIONS
+                    if name in OF_ANY_REGRESSION
+                ),
                 (
-                    "unbiased-residual",
-                    messages.UNBIASED_RESIDUAL,
-                    lambda x, y, z: (condition_on_both(x, y, z)[0], condition_on_both(x, y, z)[1] * len(x) / (len(x) - 1)),
+                    "mean-of-both",
+                    "The two regressions are averaged; fit both together.",
+                    lambda x, y, z: ((condition(x, y)[0] + condition(x, z)[0]) / 2, condition_on_both(x, y, z)[1]),
+                ),
+                (
+                    "product-as-regressor",
+                    "The product of measurement and estimate is one regressor; put them side by side.",
+                    lambda x, y, z: condition(x, y[:, :1] * z),
                 ),
             )
         ),

@@ -23,6 +23,10 @@ MEDIAN = "That is a median; the mean is asked for."
 DEVIATION_IS_NO_ERROR = "That is made of D_k alone; how much a mean varies follows from the spread of the squares."
 VARIANCE_OF_SQUARES = "That is a variance of the squared errors; a standard error has the units of D_k."
 
+SUM_FOR_MEAN = "It is a sum over the trajectories, not a mean."
+ONE_COMPONENT = "Only the first component is there."
+ROOT_BEFORE_MEAN = "A root is taken before the mean; the mean of the squares is asked for."
+COMPONENTS_ADDED = "The components of the error are added before they are squared."
 WRONG_VARIANCES: tuple[tuple[str, str, Answer], ...] = (
     (
         "about-the-mean",
@@ -35,7 +39,7 @@ WRONG_VARIANCES: tuple[tuple[str, str, Answer], ...] = (
         "The mean is taken over the steps; it is over the trajectories, and there is one number a step.",
         lambda x, z: np.resize(squared_error(x, z).mean(axis=0), len(x)),
     ),
-    ("sum-for-mean", "It is a sum over the trajectories, not a mean.", lambda x, z: squared_error(x, z).sum(axis=1)),
+    ("sum-for-mean", SUM_FOR_MEAN, lambda x, z: squared_error(x, z).sum(axis=1)),
     ("absolute", "It is the mean of absolute values, not of squares.", lambda x, z: np.abs(x - z).sum(axis=2).mean(axis=1)),
     (
         "component-mean",
@@ -60,6 +64,26 @@ WRONG_VARIANCES: tuple[tuple[str, str, Answer], ...] = (
         lambda x, z: (x**2 - z**2).mean(axis=1).sum(axis=1),
     ),
     ("about-the-mean", BIAS_INCLUDED, lambda x, z: np.sum((x - z).var(axis=1, ddof=1), axis=1)),
+    ("root-before-mean", ROOT_BEFORE_MEAN, lambda x, z: np.sqrt(squared_error(x, z)).mean(axis=1)),
+    ("components-added", COMPONENTS_ADDED, lambda x, z: ((x - z).sum(axis=2) ** 2).mean(axis=1)),
+    ("components-added", COMPONENTS_ADDED, lambda x, z: (x - z).sum(axis=2).mean(axis=1) ** 2),
+    ("one-component", ONE_COMPONENT, lambda x, z: ((x - z)[:, :, 0] ** 2).mean(axis=1)),
+    ("one-component", ONE_COMPONENT, lambda x, z: (x - z)[:, :, 0].mean(axis=1)),
+    (
+        "cumulated",
+        "The values of the steps are added up; there is one for each step.",
+        lambda x, z: np.cumsum(error_variance(x, z)),
+    ),
+    (
+        "difference-of-variances",
+        "The variances of state and estimate are subtracted; take the square of their difference.",
+        lambda x, z: x.var(axis=1).sum(axis=1) - z.var(axis=1).sum(axis=1),
+    ),
+    (
+        "divided-by-N-1",
+        "It is divided by N - 1; the mean of N squares is asked for.",
+        lambda x, z: squared_error(x, z).sum(axis=1) / (x.shape[1] - 1),
+    ),
 )
 
 # -- e2: its standard error
@@ -111,6 +135,21 @@ WRONG_ERRORS: tuple[tuple[str, str, Answer], ...] = (
         "of-error",
         OF_ERROR,
         lambda x, z: (error_variance(x, z), spread_of_mean((x - z).sum(axis=2))),
+    ),
+    (
+        "over-steps",
+        "The spread is taken over the steps; it is over the trajectories.",
+        lambda x, z: (error_variance(x, z), squared_error(x, z).std(axis=0, ddof=1)[: len(x)] / np.sqrt(x.shape[1])),
+    ),
+    (
+        "one-component",
+        ONE_COMPONENT,
+        lambda x, z: (error_variance(x, z), (x - z)[:, :, 0].std(axis=1, ddof=1) / np.sqrt(x.shape[1])),
+    ),
+    (
+        "all-steps",
+        "One spread is taken for all steps; each has its own.",
+        lambda x, z: (error_variance(x, z), np.full(len(x), squared_error(x, z).std(ddof=1) / np.sqrt(x.shape[1]))),
     ),
 )
 
@@ -192,6 +231,14 @@ WRONG_DIFFERENCES: tuple[tuple[str, str, Answer], ...] = (
             ),
         )
     ),
+    *(
+        (
+            "errors-combined",
+            "The two standard errors are put together in some way; what is asked for does not follow from them.",
+            lambda x, z, o, combine=combine: (difference(x, z, o)[0], combine(*map(spread_of_mean, _pairs(x, z, o)))),
+        )
+        for combine in (np.subtract, np.maximum, lambda a, b: np.sqrt(a * b), lambda a, b: np.sqrt(np.abs(a**2 - b**2)))
+    ),
 )
 
 # -- e4: a ratio
@@ -250,6 +297,11 @@ WRONG_RATIOS: tuple[tuple[str, str, Answer], ...] = (
             ),
         )
     ),
+    (
+        "divided-twice",
+        "It is divided by the denominator once too often: check the units.",
+        lambda x, z, o: (ratio(x, z, o)[0], ratio(x, z, o)[1] / error_variance(x, o)),
+    ),
 )
 
 # -- e5: does the filter know its own error?
@@ -299,7 +351,7 @@ WRONG_NORMALISED: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "root-before-mean",
-        "A root is taken before the mean; the mean of the squares is asked for.",
+        ROOT_BEFORE_MEAN,
         lambda x, z, p: np.sqrt(_weighted(x, z, np.linalg.inv(p)) * x.shape[2]).mean(axis=1) / x.shape[2],
     ),
     (
@@ -317,4 +369,27 @@ WRONG_NORMALISED: tuple[tuple[str, str, Answer], ...] = (
         "The mean error is taken off first; a bias is an error too.",
         lambda x, z, p: normalised_error(x - (x - z).mean(axis=1, keepdims=True), z, p),
     ),
+    (
+        "by-trace",
+        "The square is divided by the sum of the variances; the inverse of the whole matrix belongs there.",
+        lambda x, z, p: (squared_error(x, z) / np.trace(p, axis1=-2, axis2=-1)).mean(axis=1),
+    ),
+    (
+        "mean-covariance",
+        "The covariances are averaged over the trajectories first; each error has its own.",
+        lambda x, z, p: _weighted(x, z, np.broadcast_to(np.linalg.inv(p.mean(axis=1, keepdims=True)), p.shape)).mean(axis=1),
+    ),
+    (
+        "mean-error",
+        messages.SQUARES_NOT_MEANS,
+        lambda x, z, p: _weighted(*(v.mean(axis=1, keepdims=True) for v in (x, z)), np.linalg.inv(p.mean(axis=1, keepdims=True)))[
+            :, 0
+        ],
+    ),
+    (
+        "divided-by-runs",
+        "The mean over the trajectories is divided by their number once more.",
+        lambda x, z, p: normalised_error(x, z, p) * x.shape[2] / x.shape[1],
+    ),
+    ("sum-for-mean", SUM_FOR_MEAN, lambda x, z, p: normalised_error(x, z, p) * x.shape[1]),
 )

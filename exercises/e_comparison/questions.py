@@ -23,7 +23,7 @@ from kfcourse.exercises.e_comparison.mistakes import (
     WRONG_VARIANCES,
 )
 from kfcourse.filters import aof
-from kfcourse.laws import Array
+from kfcourse.laws import Array, transpose
 from kfcourse.montecarlo.experiment import run
 
 RUNS, STEPS = 40, 5
@@ -33,11 +33,10 @@ def hidden_estimates(exercise: Exercise, name: str) -> tuple[Array, Array, Array
     """States, the estimates of two filters and the first one's covariances, on common trajectories."""
     x, y = exercise.simulate(RUNS, STEPS, name)
     first = run(aof(exercise.given.gaussian), y)
-    noise = exercise.rng(f"{name}-other").normal(size=x.shape) * x.std(axis=1, keepdims=True)
-    return x, first.mean + 0.03 * noise, first.mean + 0.08 * noise[::-1], first.cov
-
-
-MIXED = np.array([[1.0, 0.5], [-0.3, 1.0]])
+    rng = exercise.rng(f"{name}-other")
+    noise = rng.normal(size=x.shape) * x.std(axis=1, keepdims=True)
+    each = rng.uniform(0.7, 1.3, (*x.shape[:2], 1, 1))  # a linear model's filter has one covariance for all trajectories
+    return x, first.mean + 0.03 * noise, first.mean + 0.08 * noise[::-1], each * first.cov
 
 
 def asked(name: str, *places: int) -> Callable[[Exercise], list[tuple]]:
@@ -48,9 +47,10 @@ def asked(name: str, *places: int) -> Callable[[Exercise], list[tuple]]:
         found = [one]
         if exercise.model.n == 1:
             other = hidden_estimates(exercise, f"{name}-second")
-            *vectors, (p, q) = zip(one, other, strict=True)
-            blocks = np.concatenate([np.concatenate([p, 0 * p], axis=-1), np.concatenate([0 * q, q], axis=-1)], axis=-2)
-            found.append((*(np.concatenate(pair, axis=-1) @ MIXED.T for pair in vectors), MIXED @ blocks @ MIXED.T))
+            x, first, second, _ = (np.concatenate(pair[:2], axis=-1) for pair in zip(one, other, strict=True))
+            rng = exercise.rng(f"{name}-covariance")
+            roots = (np.eye(2) + 0.4 * rng.normal(size=(*x.shape, 2))) * np.abs(x - first).mean()
+            found.append((x, first, second, roots @ transpose(roots)))
         return [tuple(case[place] for place in places) for case in found]
 
     return arguments

@@ -136,4 +136,12 @@ WRONG_NODES: tuple[tuple[str, str, Answer], ...] = (
         "The logarithm stands under the root too: the step enters the exponent squared.",
         nodes_with(lambda sigma, error: np.pi * sigma * np.sqrt(2) / np.log(2 / error)),
     ),
+    *(
+        (
+            "pi",
+            "A factor in the exponent is wrong: solve for the step once more.",
+            nodes_with(lambda sigma, error, factor=factor: factor * sigma * np.sqrt(2 / np.log(2 / error))),
+        )
+        for factor in (1.0, np.pi**2, np.pi * np.sqrt(2), 2 * np.pi, np.pi / 2)
+    ),
 )

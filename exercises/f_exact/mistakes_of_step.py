@@ -69,6 +69,11 @@ WRONG_MOMENTS: tuple[tuple[str, str, Answer], ...] = (
         "The density is divided by its highest value; it is the integral that has to be one.",
         lambda density, x: _not_normalised(density / density.max(), x),
     ),
+    (
+        "mean-subtracted-twice",
+        "The mean is subtracted twice: the deviations are about it already.",
+        lambda density, x: (*moments(density, x)[:2], moments(density, x)[2] - moments(density, x)[1] ** 2),
+    ),
 )
 
 
@@ -110,6 +115,33 @@ WRONG_KERNELS: tuple[tuple[str, str, Kernel], ...] = (
         "half-a-factor",
         "The factor before the exponential is not complete: the variance depends on the state, and belongs there too.",
         lambda value, mean, variance: normal(value, mean, variance) * np.sqrt(variance),
+    ),
+    (
+        "exponent-sign",
+        "The exponent has the wrong sign: far away the density is small.",
+        lambda value, mean, variance: (
+            np.exp(np.minimum((value - mean) ** 2 / (2 * variance), 600)) / np.sqrt(2 * np.pi * variance)
+        ),
+    ),
+    (
+        "not-squared",
+        "The deviation is not squared in the exponent.",
+        lambda value, mean, variance: np.exp(-(value - mean) / (2 * variance)) / np.sqrt(2 * np.pi * variance),
+    ),
+    (
+        "half-variance",
+        "That is a normal density with half of the variance.",
+        lambda value, mean, variance: normal(value, mean, variance / 2),
+    ),
+    (
+        "double-exponential",
+        "That is another density than the normal one: its exponent is quadratic.",
+        lambda value, mean, variance: np.exp(-np.abs(value - mean) / variance) / (2 * variance),
+    ),
+    (
+        "mean-variance",
+        "One variance is taken for all states; it depends on the state.",
+        lambda value, mean, variance: normal(value, mean, np.mean(variance)),
     ),
 )
 
@@ -164,6 +196,19 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
         "signal-forgotten",
         "The measurement is compared with the state itself; its mean is what the meter makes of the state.",
         lambda predicted, y, x, see: correct(predicted, y, x, lambda nodes: (nodes, see(nodes)[1])),
+    ),
+    (
+        "largest-for-integral",
+        "The largest value of the product stands where its integral belongs.",
+        correction_with(finish=lambda joint, h: (joint / joint.max(), joint.max())),
+    ),
+    (
+        "normal-evidence",
+        "The density of the measurement is taken as normal; it is the integral of the product.",
+        lambda predicted, y, x, see: (
+            correct(predicted, y, x, see)[0],
+            normal(np.asarray(y), *((x[1] - x[0]) * part @ predicted for part in see(x))),
+        ),
     ),
 )
 
@@ -222,5 +267,10 @@ WRONG_PREDICTIONS: tuple[tuple[str, str, Answer], ...] = (
         "not-spread",
         "The nodes are moved, but the noise of the object does not spread them.",
         lambda posterior, x, move: np.interp(x, move(x)[0], posterior),
+    ),
+    (
+        "normal-prediction",
+        "A normal density with the right mean variance takes the place of the integral.",
+        lambda posterior, x, move: normal(x, *((x[1] - x[0]) * part @ posterior for part in move(x))),
     ),
 )

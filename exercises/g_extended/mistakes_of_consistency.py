@@ -82,6 +82,16 @@ WRONG_BOUNDS: tuple[tuple[str, str, Bounds], ...] = (
         "The bounds of the sum are divided by a root; a mean is a sum over the number of runs.",
         lambda degrees, runs, confidence: tuple(np.array(_interval(confidence, degrees * runs)) / np.sqrt(runs)),
     ),
+    (
+        "degrees-and-runs-added",
+        "The degrees of freedom of all runs add up: how many are there together?",
+        lambda degrees, runs, confidence: tuple(bound / runs for bound in _interval(confidence, degrees + runs)),
+    ),
+    (
+        "one-run-less",
+        "One run is left out: no mean has been estimated here.",
+        lambda degrees, runs, confidence: tuple(bound / (runs - 1) for bound in _interval(confidence, degrees * (runs - 1))),
+    ),
 )
 
 

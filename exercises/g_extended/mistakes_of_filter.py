@@ -51,6 +51,24 @@ WRONG_JACOBIANS: tuple[tuple[str, str, Answer], ...] = (
     ),
     ("multiplied-by-step", "The distance of the points is upside down.", jacobian_with(divisor=lambda step: 2 / step)),
     ("one-sided", messages.ONE_SIDED_DIFFERENCE, jacobian_with(backward=0.0)),
+    (
+        "half-step",
+        "The points are half a step away; take a whole step to either side.",
+        jacobian_with(forward=0.5, backward=-0.5, divisor=lambda step: step),
+    ),
+    (
+        "second-difference",
+        "That is the second derivative; the first is asked for.",
+        lambda function, x, step: (
+            jacobian_with(backward=0.0, divisor=lambda h: h**2)(function, x, step)
+            - jacobian_with(forward=0.0, divisor=lambda h: h**2)(function, x, step)
+        ),
+    ),
+    (
+        "higher-order",
+        "That is a formula of a higher order; the two points of the question's formula are asked for.",
+        lambda function, x, step: (4 * jacobian(function, x, step) - jacobian(function, x, 2 * step)) / 3,
+    ),
 )
 
 
@@ -124,6 +142,12 @@ WRONG_PREDICTIONS: tuple[tuple[str, str, Answer], ...] = (
         prediction_with(lambda Phi, p, g, D: spread(Phi, p, g, np.sqrt(np.abs(D)))),
     ),
     ("noise-sign", messages.NOISE_SIGN, prediction_with(lambda Phi, p, g, D: spread(Phi, p, g, -D))),
+    ("mean-twice", "The mean goes through the state equation twice.", prediction_with(mean=lambda z, f, Phi: f(f(z)))),
+    (
+        "product",
+        "The two parts of the covariance are multiplied; they add.",
+        prediction_with(cov=lambda Phi, p, g, D_xi: (Phi @ p @ transpose(Phi)) * (g @ D_xi @ transpose(g))),
+    ),
 )
 
 
@@ -217,6 +241,7 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
         messages.GAIN_MULTIPLIED,
         correction_with(lambda Psi, G, R: Psi @ transpose(G) @ (G @ Psi @ transpose(G) + R)),
     ),
+    ("covariance-explained", messages.EXPLAINED_ONLY, correction_with(covariance=lambda Psi, K, G: K @ G @ Psi)),
 )
 
 

@@ -134,6 +134,19 @@ WRONG_STEADY: tuple[tuple[str, str, Answer], ...] = (
         steady_with(c=lambda h, N: h**2 * N / 2, gain=lambda D, h, N: D * h * N / 2),
     ),
     ("root-forgotten", "A square root is missing in the solution of the quadratic equation.", _root_forgotten),
+    (
+        "not-divided",
+        "The root is not divided by the coefficient of the square.",
+        lambda a, s, h, S_xi, N: (2 * h**2 / N * steady_with()(a, s, h, S_xi, N)[0], steady_with()(a, s, h, S_xi, N)[1]),
+    ),
+    (
+        "quadratic-formula",
+        "A factor of the quadratic formula is wrong: write a, b, c of it down.",
+        lambda a, s, h, S_xi, N: (
+            (np.sqrt(4 * a**2 + h**2 * s**2 * S_xi / N) - 2 * a) / (4 * h**2 / N),
+            steady_with()(a, s, h, S_xi, N)[1],
+        ),
+    ),
 )
 
 
@@ -254,5 +267,15 @@ WRONG_DERIVATIVES: tuple[tuple[str, str, Answer], ...] = (
         "noise-inverted",
         NOISE_INVERTED,
         derivatives_with(lambda S, S1, S2, y, k: (S1 * (y - S) / k, (S2 * (y - S) - S1**2) / k)),
+    ),
+    (
+        "half-kept",
+        "The half before the square of the signal goes when it is differentiated.",
+        derivatives_with(lambda S, S1, S2, y, k: (k * S1 * (y - S / 2), k * S2 * (y - S / 2) - k * S1**2 / 2)),
+    ),
+    (
+        "signal-not-subtracted",
+        "The square of the signal is differentiated too.",
+        derivatives_with(lambda S, S1, S2, y, k: (k * S1 * y, k * S2 * y)),
     ),
 )

@@ -68,6 +68,26 @@ WRONG_MATRICES: tuple[tuple[str, str, Answer], ...] = (
         "H adds the velocities to the positions; the meter gives the positions alone.",
         lambda dt: (*matrices(dt)[:2], sp.ImmutableMatrix(SENSITIVITY + SENSITIVITY.extract([0, 1], [2, 3, 0, 1]))),
     ),
+    (
+        "identity-forgotten",
+        "A state that is left alone stays: the identity is missing.",
+        lambda dt: (matrices(dt)[0] - sp.eye(4), *matrices(dt)[1:]),
+    ),
+    (
+        "once-more-integrated",
+        "B is integrated once too often: check the units.",
+        with_input(lambda dt: dt**3 / 6, lambda dt: dt**2 / 2),
+    ),
+    ("velocity-for-acceleration", "B is integrated once too little: check the units.", with_input(lambda dt: dt, lambda dt: 1)),
+    (
+        "axes-mixed",
+        "An acceleration along one axis moves that axis only.",
+        lambda dt: (
+            matrices(dt)[0],
+            sp.ImmutableMatrix(sp.kronecker_product(sp.Matrix([dt**2 / 2, dt]), sp.ones(2))),
+            SENSITIVITY,
+        ),
+    ),
 )
 
 
@@ -118,6 +138,22 @@ WRONG_NOISES: tuple[tuple[str, str, Answer], ...] = (
         "half-missing",
         "A factor is wrong where the acceleration acts on the position: in its variance it is squared.",
         lambda dt, sigma_a: plane(sigma_a**2 * sp.Matrix([[dt**4 / 2, dt**3 / 2], [dt**3 / 2, dt**2]])),
+    ),
+    (
+        "transition-for-input",
+        "The transition stands where the input's matrix belongs.",
+        lambda dt, sigma_a: sigma_a**2 * matrices(dt)[0] * matrices(dt)[0].T,
+    ),
+    ("power-missing", "The column is integrated once too little: check the units.", noise_by(lambda dt: [dt, 1])),
+    *(
+        (
+            "covariance-of-two",
+            "The covariance of position and velocity has a wrong factor: multiply the two entries of B.",
+            lambda dt, sigma_a, factor=factor: plane(
+                sigma_a**2 * sp.Matrix([[dt**4 / 4, factor * dt**3], [factor * dt**3, dt**2]])
+            ),
+        )
+        for factor in (1, sp.Rational(1, 4), sp.Rational(1, 3))
     ),
 )
 

@@ -10,7 +10,7 @@ import sympy as sp
 
 from kfcourse.checks.question import Answer
 from kfcourse.exercises import messages
-from kfcourse.exercises.j_radar.keys import _lag, _stationary, closed_loop, lag, noise_left
+from kfcourse.exercises.j_radar.keys import _lag, _stationary, closed_loop, lag, noise_left, steady_gain
 from kfcourse.exercises.shared import substituted
 from kfcourse.filters.alphabeta import steady_beta, tracking_index
 from kfcourse.laws import Array
@@ -18,6 +18,8 @@ from kfcourse.laws import Array
 # -- j3: the constant gain
 
 INDEX_ROOT = "The root in the tracking index stands in another place: over which part of the fraction, above or below?"
+
+OTHER_RELATION = "beta is taken from another relation; alpha and beta follow from one stationary filter."
 
 WRONG_GAINS: tuple[tuple[str, str, Answer], ...] = (
     (
@@ -69,6 +71,13 @@ WRONG_GAINS: tuple[tuple[str, str, Answer], ...] = (
     ),
     ("index-rooted", INDEX_ROOT, lambda alpha: (steady_beta(alpha), np.sqrt(steady_beta(alpha) / (1 - alpha)))),
     ("index-rooted", INDEX_ROOT, lambda alpha: (steady_beta(alpha), steady_beta(alpha) * np.sqrt(1 - alpha))),
+    ("other-relation", OTHER_RELATION, lambda alpha: (alpha * (1 - alpha), alpha * np.sqrt(1 - alpha))),
+    ("other-relation", OTHER_RELATION, lambda alpha: (np.sqrt(2 * alpha), tracking_index(alpha))),
+    (
+        "root-of-alpha",
+        "The index is divided by the wrong root: by that of the share of the innovation that is noise.",
+        lambda alpha: (steady_gain(alpha)[0], steady_gain(alpha)[0] / np.sqrt(alpha)),
+    ),
 )
 
 
@@ -108,6 +117,8 @@ def _differences(y: Array, T: float, alpha: float, beta: float, r: Array, v: Arr
     positions = filter_with()(y, T, alpha, beta, r, v)[0]
     return positions, np.diff(positions, axis=0, prepend=np.broadcast_to(r, positions[:1].shape)) / T
 
+
+ALPHA_WITH_TIME = "alpha has no unit: the interval does not belong to it."
 
 WRONG_FILTERS: tuple[tuple[str, str, Answer], ...] = (
     (
@@ -159,6 +170,47 @@ WRONG_FILTERS: tuple[tuple[str, str, Answer], ...] = (
         filter_with(lambda r, v, y, T, alpha, beta: (r + alpha * (y - r), v + beta / T**2 * (y - r))),
     ),
     ("differences", "The velocity is a difference of positions; it has a gain of its own.", _differences),
+    (
+        "weights-exchanged",
+        "Prediction and measurement have changed their weights: for alpha = 1 the estimate is the measurement.",
+        filter_with(lambda r, v, y, T, alpha, beta: (r + (1 - alpha) * (y - r), v + beta / T * (y - r))),
+    ),
+    (
+        "alpha-with-time",
+        ALPHA_WITH_TIME,
+        filter_with(lambda r, v, y, T, alpha, beta: (r + alpha / T * (y - r), v + beta / T * (y - r))),
+    ),
+    (
+        "alpha-with-time",
+        ALPHA_WITH_TIME,
+        filter_with(lambda r, v, y, T, alpha, beta: (r + alpha * T * (y - r), v + beta / T * (y - r))),
+    ),
+    (
+        "half-of-beta",
+        "The velocity is corrected by half of what it should be.",
+        filter_with(lambda r, v, y, T, alpha, beta: (r + alpha * (y - r), v + beta / (2 * T) * (y - r))),
+    ),
+    (
+        "velocity-sign",
+        "The velocity is corrected the wrong way.",
+        filter_with(lambda r, v, y, T, alpha, beta: (r + alpha * (y - r), v - beta / T * (y - r))),
+    ),
+    (
+        "smoothed-twice",
+        "The measurement is mixed in twice.",
+        lambda y, T, alpha, beta, r, v: (
+            alpha * y + (1 - alpha) * filter_with()(y, T, alpha, beta, r, v)[0],
+            filter_with()(y, T, alpha, beta, r, v)[1],
+        ),
+    ),
+    (
+        "velocity-by-gradient",
+        "The velocity is a difference of the estimated positions; the filter has its own.",
+        lambda y, T, alpha, beta, r, v: (
+            filter_with()(y, T, alpha, beta, r, v)[0],
+            np.gradient(filter_with()(y, T, alpha, beta, r, v)[0], T, axis=0),
+        ),
+    ),
 )
 
 
@@ -214,6 +266,11 @@ WRONG_LAGS: tuple[tuple[str, str, Answer], ...] = (
         "Between measurements the velocity changes as well: half an interval's acceleration is counted otherwise.",
         lambda a, T, alpha, beta: (lag(a, T, alpha, beta)[0], lag(a, T, alpha, beta)[1] - a * T / 2),
     ),
+    (
+        "lag-over-time",
+        "The lag of the velocity is not that of the position over T.",
+        lambda a, T, alpha, beta: (lag(a, T, alpha, beta)[0], lag(a, T, alpha, beta)[0] / T),
+    ),
 )
 
 
@@ -221,6 +278,13 @@ def _uncorrelated(alpha: float, beta: float) -> float:
     rest, A = (np.array(matrix, dtype=float) for matrix in closed_loop(1, alpha, beta))
     return float(scipy.linalg.solve_discrete_lyapunov(rest @ A, np.diag([alpha**2, beta**2]))[0, 0])
 
+
+def _gains_not_squared(alpha: float, beta: float) -> float:
+    rest, A = (np.array(matrix, dtype=float) for matrix in closed_loop(1, alpha, beta))
+    return float(scipy.linalg.solve_discrete_lyapunov(rest @ A, np.diag([alpha, beta]))[0, 0])
+
+
+LAST_ALONE = "That is the noise of the last measurement alone; the earlier ones are still in the estimate."
 
 WRONG_SHARES: tuple[tuple[str, str, Answer], ...] = (
     (
@@ -231,7 +295,7 @@ WRONG_SHARES: tuple[tuple[str, str, Answer], ...] = (
     ("alpha-filter", "That is a filter without velocity; beta lets noise through too.", lambda alpha, beta: alpha / (2 - alpha)),
     (
         "one-step",
-        "That is the noise of the last measurement alone; the earlier ones are still in the estimate.",
+        LAST_ALONE,
         lambda alpha, beta: alpha**2,
     ),
     (
@@ -251,4 +315,24 @@ WRONG_SHARES: tuple[tuple[str, str, Answer], ...] = (
         lambda alpha, beta: float(_stationary(alpha, beta)[0][0, 1]),
     ),
     ("correlation-forgotten", "One and the same noise enters position and velocity: it is correlated.", _uncorrelated),
+    (
+        "both-variances",
+        "The variance of the velocity is added; that of the position is asked for.",
+        lambda alpha, beta: float(np.trace(_stationary(alpha, beta)[0])),
+    ),
+    ("one-step", LAST_ALONE, lambda alpha, beta: alpha**2 + beta**2),
+    (
+        "corrected-twice",
+        "The estimate is corrected a second time.",
+        lambda alpha, beta: (1 - alpha) ** 2 * noise_left(alpha, beta) + alpha**2,
+    ),
+    *(
+        ("slip", "The formula is nearly right: a sign or a factor is not. Put it into P = M P M^T + K K^T.", formula)
+        for formula in (
+            lambda alpha, beta: (2 * alpha**2 + beta * (2 - 3 * alpha)) / (alpha * (4 - alpha - beta)),
+            lambda alpha, beta: (2 * alpha**2 + beta * (2 + 3 * alpha)) / (alpha * (4 - 2 * alpha - beta)),
+            lambda alpha, beta: (2 * alpha + beta) / (4 - 2 * alpha - beta),
+        )
+    ),
+    ("gains-not-squared", "The gains enter the noise's part squared.", _gains_not_squared),
 )

@@ -187,6 +187,9 @@ WRONG_IMPROVEMENTS: tuple[tuple[str, str, Answer], ...] = (
         messages.DECIMAL_LOGARITHM,
         improvement_with(time=lambda K, T: -T * sp.log(10) / sp.log(1 + K)),
     ),
+    ("time-constant", TIME, improvement_with(time=lambda K, T: T * (1 + K))),
+    ("time-constant", TIME, improvement_with(time=lambda K, T: T / (1 + K))),
+    ("small-drift", messages.SMALL_DRIFT, lambda sigma_xi, sigma_n, T: (gained(sigma_xi, sigma_n, T)[0], T * sigma_n / sigma_xi)),
 )
 
 
@@ -274,7 +277,14 @@ WRONG_GROWTHS: tuple[tuple[str, str, Answer], ...] = (
         "The number of periods is divided by T; a time is the number times T.",
         growth_with(until=lambda p, xi, s, T: (s**2 - p) / (T * xi**2)),
     ),
+    (
+        "product",
+        "Variance and growth are multiplied; independent variances add.",
+        growth_with(sd=lambda p, sigma_xi, sigma_n, n, T: sp.sqrt(p * n * sigma_xi**2)),
+    ),
 )
+
+IN_LINE = "Each step passes on a share of what has not passed yet, not of the whole bias."
 
 WRONG_BIASES: tuple[tuple[str, str, Answer], ...] = (
     ("gain-sign", messages.LEFT_AFTER_A_STEP, lambda beta, K, j: beta * (1 - (1 - K) ** j)),
@@ -286,7 +296,7 @@ WRONG_BIASES: tuple[tuple[str, str, Answer], ...] = (
     ("limit", "That is the limit after a long time; the way there is asked for.", lambda beta, K, j: beta + 0 * (K + j)),
     (
         "in-line",
-        "Each step passes on a share of what has not passed yet, not of the whole bias.",
+        IN_LINE,
         lambda beta, K, j: -beta * K * j,
     ),
     ("one-step", "That is what the first biased measurement does.", lambda beta, K, j: -beta * K),
@@ -304,5 +314,16 @@ WRONG_BIASES: tuple[tuple[str, str, Answer], ...] = (
         "power-of-K",
         "What is left after a step is not K: take what has not passed yet to the power.",
         lambda beta, K, j: beta * (1 - K**j),
+    ),
+    (
+        "new-part",
+        "That is what the newest measurement adds; the earlier ones have passed on their shares already.",
+        lambda beta, K, j: -beta * K * (1 + K) ** j,
+    ),
+    ("in-line", IN_LINE, lambda beta, K, j: beta * j * (1 + K)),
+    (
+        "before-correction",
+        "That is divided by what a step leaves: the mean is asked for after the measurement.",
+        lambda beta, K, j: beta * (1 - (1 + K) ** j) / (1 + K),
     ),
 )

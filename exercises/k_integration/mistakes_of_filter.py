@@ -52,6 +52,16 @@ WRONG_METERS: tuple[tuple[str, str, Answer], ...] = (
         "The difference is reversed: it is the reading minus its error.",
         lambda signal, y, eps: (signal(eps - y), _slope(signal, eps - y)),
     ),
+    (
+        "second-derivative",
+        "The slope is the first derivative.",
+        lambda signal, y, eps: (signal(y - eps), sp.diff(signal(y - eps), eps, 2)),
+    ),
+    (
+        "reading-subtracted",
+        "The reading's own signal is subtracted; the signal function of the error is asked for.",
+        lambda signal, y, eps: (signal(y - eps) - signal(y), sp.diff(signal(y - eps), eps)),
+    ),
 )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from kfcourse.checks.question import Answer
@@ -72,8 +74,9 @@ def _least_squares(x: Array, y: Array) -> tuple[float, float]:
     return float(slope), float(y.mean() - slope * x.mean())
 
 
-def _mean_of_ratios(edges: Array, stamps: Array) -> tuple[float, float]:
-    rate = float(np.mean(np.diff(stamps) / np.diff(edges)))
+def _rate_of(edges: Array, stamps: Array, of_ratios: Callable[[Array], float]) -> tuple[float, float]:
+    """A rate made of the ratios of neighbours, and the shift that goes with it."""
+    rate = float(of_ratios(np.diff(stamps) / np.diff(edges)))
     return rate, float(np.mean(stamps - rate * edges))
 
 
@@ -120,5 +123,34 @@ WRONG_FITS: tuple[tuple[str, str, Answer], ...] = (
             -_least_squares(stamps, edges)[0] / _least_squares(stamps, edges)[1],
         ),
     ),
-    ("mean-of-ratios", "The rate is a mean of ratios of neighbours: short intervals rule it.", _mean_of_ratios),
+    (
+        "mean-of-ratios",
+        "The rate is a mean of ratios of neighbours: short intervals rule it.",
+        lambda edges, stamps: _rate_of(edges, stamps, np.mean),
+    ),
+    (
+        "spreads",
+        "The ratio of the two spreads is no least squares: the delays widen one of them.",
+        lambda edges, stamps: (stamps.std() / edges.std(), stamps.mean() - stamps.std() / edges.std() * edges.mean()),
+    ),
+    (
+        "median-of-ratios",
+        "The rate is a median of ratios of neighbours: least squares uses all pairs at once.",
+        lambda edges, stamps: _rate_of(edges, stamps, np.median),
+    ),
+    (
+        "one-pair",
+        "The shift is taken from one pair; the line goes through the means.",
+        lambda edges, stamps: (fit_clock(edges, stamps)[0], stamps[0] - fit_clock(edges, stamps)[0] * edges[0]),
+    ),
+    (
+        "inverse-slope",
+        "Rate and its inverse have changed places in the shift.",
+        lambda edges, stamps: (fit_clock(edges, stamps)[0], stamps.mean() - edges.mean() / fit_clock(edges, stamps)[0]),
+    ),
+    (
+        "different-divisors",
+        messages.DIFFERENT_DIVISORS,
+        lambda edges, stamps: _rate_of(edges, stamps, lambda _: np.cov(stamps, edges)[0, 1] / np.var(edges)),
+    ),
 )

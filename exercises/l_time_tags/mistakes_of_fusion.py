@@ -20,6 +20,8 @@ def dimension_where(both: Callable[[Array, int, int], Array], alone: float = 1, 
     return lambda steps, ratio, first: np.where(both(np.arange(steps), ratio, first), together, alone)
 
 
+SUM_FOR_DIFFERENCE = "first is added to the step: how many steps have passed since the first measurement?"
+
 WRONG_DIMENSIONS: tuple[tuple[str, str, Answer], ...] = (
     (
         "from-the-first-step",
@@ -66,6 +68,29 @@ WRONG_DIMENSIONS: tuple[tuple[str, str, Answer], ...] = (
         "receiver-only",
         "That says only whether the receiver is there; the number of components is asked for.",
         dimension_where(lambda k, ratio, first: k % ratio == first % ratio, 0, 1),
+    ),
+    ("sum-for-difference", SUM_FOR_DIFFERENCE, dimension_where(lambda k, ratio, first: (k + first) % ratio == 0)),
+    (
+        "sum-for-difference",
+        SUM_FOR_DIFFERENCE,
+        dimension_where(lambda k, ratio, first: (k >= first) & ((k + first) % ratio == 0)),
+    ),
+    (
+        "counted-from-zero",
+        "The period is counted from step 0; it begins with the first measurement.",
+        dimension_where(lambda k, ratio, first: (k >= first) & (k % ratio == 0)),
+    ),
+    ("subtracted", "Where the receiver measures the vector is longer, not shorter.", lambda *a: 2 - dimension(*a)),
+    ("receiver-twice", "The receiver counts as one component.", lambda *a: 2 * dimension(*a) - 1),
+    (
+        "cumulated",
+        "The measurements are added up over the steps; each step has its own vector.",
+        lambda *a: np.cumsum(dimension(*a) - 1) + 1,
+    ),
+    (
+        "period-shorter",
+        "The period is one step too short.",
+        dimension_where(lambda k, ratio, first: (k >= first) & ((k - first) % (ratio - 1) == 0)),
     ),
 )
 
@@ -350,5 +375,10 @@ WRONG_FUSIONS: tuple[tuple[str, str, Answer], ...] = (
         "values-reordered",
         "The tags are sorted, but not the values with them.",
         lambda tags, arrivals, values, *rest: _fusion_with(by_tag)(np.sort(tags), arrivals[np.argsort(tags)], values, *rest),
+    ),
+    (
+        "what-comes-later",
+        "What has not arrived yet is used, and what has arrived is not.",
+        _fusion_with(by_tag, used=lambda tags, arrivals, now: arrivals >= now),
     ),
 )

@@ -92,7 +92,7 @@ def fit_arguments(exercise: Exercise) -> list[tuple]:
     """Pairs of edge and stamp, the edges late."""
     rng = exercise.rng("l7")
     times = np.sort(rng.uniform(3, 40, 9))
-    return [(times + rng.uniform(0, 0.6, 9), rng.uniform(1.1, 1.4) * times + rng.uniform(2, 5))]
+    return [(times + rng.uniform(0, 4, 9), rng.uniform(1.1, 1.4) * times + rng.uniform(2, 5))]
 
 
 QUESTIONS = (

@@ -107,7 +107,7 @@ def names_of(answer: Callable, count: int) -> list[str]:
 def nudged(value: Any) -> list[Any]:
     """A hidden argument changed a little, covariances to covariances; nothing if it cannot be changed so."""
     if isinstance(value, int | np.integer):
-        return [] if isinstance(value, bool) else [value + 1, value + 2, value + 3]
+        return [] if isinstance(value, bool) else [value + 1, value + 2, value + 3, 2 * value + 1, 3 * value + 2]
     if isinstance(value, float | np.floating):
         return [value * 1.05, value * 0.9]
     if isinstance(value, np.ndarray) and value.dtype.kind == "f":

@@ -242,10 +242,11 @@ class _Check:
         known = [(mistake, _wrong(mistake, self.exercise, self.arguments, self.expected)) for mistake in self.question.mistakes]
         wrong = _Wrong(self.question, (self.key, self.answer), self.arguments, found, self.expected, known, self.agree)
         message, names = wrong.told()
-        more = [] if names else [wrong.case(self.values)]
+        explained = set(names) - {"too-large", "too-small"}  # which tell little
+        more = [] if explained else [wrong.case(self.values)]
         if times and self.question.advice:
             more.insert(0, self.question.advice)
-        if times > (1 if self.question.advice else 0) and names:
+        if times > (1 if self.question.advice else 0) and explained:
             more.append(wrong.case(self.values))
         return self._says(WRONG, " ".join([message, *filter(None, more)]), diagnosis=tuple(names), share=share)
 
@@ -354,11 +355,19 @@ class _Wrong:
 
         mine, theirs = of(self.found), of(self.expected)
         possible = [(mistake, of(wrong)) for mistake, wrong in self.known if wrong is not None]
-        first = next(i for i, (a, b) in enumerate(zip(mine, theirs, strict=True)) if not self.agree([a], [b]))
-        for calls in (slice(None), slice(first, first + 1)):  # in all calls; in the first that is wrong: more may be, later
-            seen = [mistake for mistake, wrong in possible if self.agree(mine[calls], wrong[calls])]
-            if seen:
-                return _named(seen), _said(seen)
+        right = [self.agree([a], [b]) for a, b in zip(mine, theirs, strict=True)]
+        first = slice(right.index(False), right.index(False) + 1)
+        seen = [mistake for mistake, wrong in possible if self.agree(mine, wrong)]
+        if not seen:  # in the first call that is wrong: more may be, later; and nothing that is right is spoilt by it
+            seen = [
+                mistake
+                for mistake, wrong in possible
+                if self.agree(mine[first], wrong[first])
+                and all(self.agree([a], [b]) for a, b, good in zip(wrong, theirs, right, strict=True) if good)
+            ]
+        if seen:
+            likely = [mistake for mistake in seen if mistake not in self.impossible]
+            return _named(likely or seen), _said(likely or seen)
         apart = [[not self.agree([a], [b]) for a, b in zip(wrong, theirs, strict=True)] for _, wrong in possible]
         apart = [row for row in apart if any(row)]
         telling = [2 * sum(column) >= len(apart) for column in zip(*apart, strict=True)] or [True] * len(theirs)
@@ -370,6 +379,16 @@ class _Wrong:
             )
         )
         return ([said[0]], said[1]) if said else ([], "")
+
+    @cached_property
+    def impossible(self) -> list[Mistake]:
+        """Mistakes that would have spoilt a result that is right."""
+        right = [place for place in range(len(self.parts)) if self._agrees(place, self.expected)]
+        return [
+            mistake
+            for mistake, wrong in self.known
+            if wrong is not None and not all(self.agree(_part(wrong, place), _part(self.expected, place)) for place in right)
+        ]
 
     @cached_property
     def names(self) -> list[str]:

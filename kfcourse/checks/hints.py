@@ -76,7 +76,7 @@ def rough(case: Case) -> Said | None:
                 "precision",
                 "It is right to the 7 digits of single precision (float32): compute in double precision (float64).",
             )
-        return "precision", "It is right to a few digits only: is something rounded?"
+        return "precision", "It is right to a few digits only: is something rounded, or a small number added?"
     return None
 
 
@@ -93,7 +93,10 @@ def dependence(case: Case) -> Said | None:
         form = "{}"
     if missing:
         which = ", ".join(map(form.format, missing))
-        return "unused", f"It does not depend on {which} and should: forgotten, or is something of the notebook used instead?"
+        return (
+            "unused",
+            f"It does not depend on {which} and should: forgotten, or cancelled, or is something of the notebook used instead?",
+        )
     if extra:
         return "superfluous", f"It depends on {', '.join(map(form.format, extra))} and should not."
     return None

@@ -123,22 +123,23 @@ def terms(case: Case) -> Said | None:
 
 def exchanged(case: Case) -> Said | None:
     """Right if two arguments change places."""
-    mine, several = case.sensitivity.answers[1], case.sensitivity.several
+    (right, mine), several = case.sensitivity.answers, case.sensitivity.several
     for i, j in combinations(range(len(case.names)), 2):
         if not all(_alike(values[i], values[j]) for values in case.arguments):
             continue
         try:
-            results = []
+            results: list[list[Any]] = [[], []]
             for values, wanted in zip(case.arguments, case.expected, strict=True):
-                other = list(copy.deepcopy(values))
+                other = list(values)
                 other[i], other[j] = other[j], other[i]
-                result = mine(*other)
-                results.append(like(result[case.part] if several else result, wanted))
+                for answer, found in zip((mine, right), results, strict=True):
+                    result = answer(*copy.deepcopy(other))
+                    found.append(like(result[case.part] if several else result, wanted))
         except (OutOfTime, KeyboardInterrupt):
             raise
         except BaseException:  # the answer does not work for them, or ends the program
             continue
-        if case.agree(results, case.expected):
+        if case.agree(results[0], case.expected) and not case.agree(results[1], case.expected):  # they do not simply commute
             return "exchanged", f"It is right with `{case.names[i]}` and `{case.names[j]}` exchanged: which is which?"
     return None
 
@@ -235,4 +236,18 @@ def mixed(case: Case) -> Said | None:
     return None
 
 
-RELATIONS: tuple[Callable[[Case], Said | None], ...] = (exchanged, ordered, alike, mixed, differs, limit, power, terms)
+def direction(case: Case) -> Said | None:
+    """Too large, or too small, wherever it is wrong."""
+    if not case.numeric:
+        return None
+    a, b = (np.concatenate([np.ravel(pair[which]) for pair in case.pairs]) for which in (0, 1))
+    told = np.isfinite(b) & ~np.isclose(a, b, rtol=1e-9, atol=0)
+    larger = np.abs(a[told]) > np.abs(b[told])
+    if np.sum(told) < 3 or (a[told] * b[told] < 0).any() or larger.any() != larger.all():
+        return None
+    if larger.all():
+        return "too-large", "It is too large wherever it is wrong: is something added that does not belong there, or not divided?"
+    return "too-small", "It is too small wherever it is wrong: is something missing, or divided once too often?"
+
+
+RELATIONS: tuple[Callable[[Case], Said | None], ...] = (exchanged, ordered, alike, mixed, differs, limit, power, terms, direction)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from kfcourse.checks import engine, exercise, sets
+from kfcourse.checks import ExerciseError, engine, exercise, sets
+from kfcourse.lab.variants import load_variants
 
 # Questions about the variant's model are asked for variants of all kinds.  The others are called with hidden functions, numbers:
 # two draws of them.  So are those of sets f and g, g's in the dimensions of the variant: a variant for each of them.
@@ -76,7 +77,7 @@ def test_every_answer_and_every_mistake(letter, question, variant):
         except ValueError:
             assert letter not in HIDDEN
             continue
-        result = lab.check(question.name, wrong)
+        result = engine.check(question, lab, wrong)  # as if nothing had been handed in before
         assert not [text for text in given_away if text in result.message.replace(" ", "")]
         fact = equal_in_fact(wrong, arguments, right)
         if letter in HIDDEN:
@@ -87,6 +88,31 @@ def test_every_answer_and_every_mistake(letter, question, variant):
         else:
             expected = {True: "passed", None: "unusable", False: "diagnosed"}[fact]
             assert result.status == expected, f"{mistake.name}: {result}"
+
+
+@pytest.mark.parametrize("letter", [letter for letter, one in sets().items() if one.about_variant and letter != "a"])
+def test_hidden_arguments_tell_every_mistake_apart_in_every_variant(letter):
+    """No known mistake gives the right numbers for any variant of the lab; a transposed number is no mistake.
+
+    Set a is called with the model's own formulas: where those are linear, the tangent is exact.
+    """
+    equal = set()
+    for name in load_variants():
+        try:
+            lab = opened(letter, name)
+        except ExerciseError:
+            continue
+        for question in lab.questions.values():
+            key, arguments = question.answer(lab), list(question.arguments(lab))
+            right = [key(*values) for values in arguments]
+            for mistake in question.mistakes:
+                try:
+                    wrong = mistake.answer(lab)
+                except ValueError:
+                    continue
+                if equal_in_fact(wrong, arguments, right) and not (lab.model.n == 1 and mistake.name == "gain-transposed"):
+                    equal.add((question.name, mistake.name, name))
+    assert equal == set()
 
 
 def equal_in_fact(wrong, arguments, right):
