@@ -247,7 +247,7 @@ def _zeros_for_missing(y: Array, mean: Array, cov: Array, measure: Callable, pre
     return run_filter(np.nan_to_num(y), mean, cov, measure, predict)
 
 
-def _handed_on(y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable, after: bool) -> Array:
+def _handed_on(after: bool, y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
     """The predictions of the next step; or a filter that goes on from its prediction, not from its estimate."""
     lam, Psi = np.tile(mean, (y.shape[1], 1)), full(cov, y.shape[1])
     found = []
@@ -283,12 +283,12 @@ WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
     (
         "next-returned",
         "These are the predictions of the next step; return the estimates of this one.",
-        lambda *a: _handed_on(*a, after=True),
+        lambda *a: _handed_on(True, *a),
     ),
     (
         "estimate-not-handed-on",
         "The filter goes on from its prediction: what a measurement tells is lost at the next step.",
-        lambda *a: _handed_on(*a, after=False),
+        lambda *a: _handed_on(False, *a),
     ),
 )
 

@@ -307,6 +307,11 @@ WRONG_RATIOS: tuple[tuple[str, str, Answer], ...] = (
 # -- e5: does the filter know its own error?
 
 
+def _mean(values: Array) -> Array:
+    """Over the trajectories."""
+    return values.mean(axis=1, keepdims=True)
+
+
 def _weighted(x: Array, z: Array, weight: Array) -> Array:
     """The quadratic form of every error, over the number of components."""
     return np.einsum("kni,knij,knj->kn", x - z, weight, x - z) / x.shape[2]
@@ -377,14 +382,12 @@ WRONG_NORMALISED: tuple[tuple[str, str, Answer], ...] = (
     (
         "mean-covariance",
         "The covariances are averaged over the trajectories first; each error has its own.",
-        lambda x, z, p: _weighted(x, z, np.broadcast_to(np.linalg.inv(p.mean(axis=1, keepdims=True)), p.shape)).mean(axis=1),
+        lambda x, z, p: _weighted(x, z, np.broadcast_to(np.linalg.inv(_mean(p)), p.shape)).mean(axis=1),
     ),
     (
         "mean-error",
         messages.SQUARES_NOT_MEANS,
-        lambda x, z, p: _weighted(*(v.mean(axis=1, keepdims=True) for v in (x, z)), np.linalg.inv(p.mean(axis=1, keepdims=True)))[
-            :, 0
-        ],
+        lambda x, z, p: _weighted(_mean(x), _mean(z), np.linalg.inv(_mean(p)))[:, 0],
     ),
     (
         "divided-by-runs",

@@ -30,6 +30,10 @@ def _interval(confidence: float, degrees: int) -> tuple[float, float]:
     return low, high
 
 
+def _over(bounds: tuple[float, float], divisor: float) -> tuple[float, float]:
+    return bounds[0] / divisor, bounds[1] / divisor
+
+
 def _normal_bounds(degrees: int, runs: int, confidence: float) -> tuple[float, float]:
     half = NormalDist().inv_cdf((1 + confidence) / 2) * np.sqrt(2 * degrees / runs)
     return degrees - half, degrees + half
@@ -80,17 +84,17 @@ WRONG_BOUNDS: tuple[tuple[str, str, Bounds], ...] = (
     (
         "divided-by-root",
         "The bounds of the sum are divided by a root; a mean is a sum over the number of runs.",
-        lambda degrees, runs, confidence: tuple(np.array(_interval(confidence, degrees * runs)) / np.sqrt(runs)),
+        lambda degrees, runs, confidence: _over(_interval(confidence, degrees * runs), np.sqrt(runs)),
     ),
     (
         "degrees-and-runs-added",
         "The degrees of freedom of all runs add up: how many are there together?",
-        lambda degrees, runs, confidence: tuple(bound / runs for bound in _interval(confidence, degrees + runs)),
+        lambda degrees, runs, confidence: _over(_interval(confidence, degrees + runs), runs),
     ),
     (
         "one-run-less",
         "One run is left out: no mean has been estimated here.",
-        lambda degrees, runs, confidence: tuple(bound / (runs - 1) for bound in _interval(confidence, degrees * (runs - 1))),
+        lambda degrees, runs, confidence: _over(_interval(confidence, degrees * (runs - 1)), runs - 1),
     ),
 )
 
