@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from kfcourse.pages.reader import is_relation, normal, relations
+from kfcourse.pages.reader import is_relation, normal, pieces
 from kfcourse.pages.relations import Formula, Letters, formulas, letters_of
 from kfcourse.pages.verification import Unverified
 
@@ -46,7 +46,7 @@ def planted(page: Path, chance: random.Random, most: int = 10**9) -> Iterator[Pl
     places = [
         (formula, piece)
         for formula in formulas(page.read_text(encoding="utf-8"))
-        for piece in (relations(formula.latex) if formula.kind in ("display", "box") else [normal(formula.latex)])
+        for piece in (pieces(formula.latex) if formula.kind in ("display", "box") else [normal(formula.latex)])
         if formula.kind in ("side", "name") or letters.speaks(piece)
     ]
     for formula, piece in chance.sample(places, min(most, len(places))):

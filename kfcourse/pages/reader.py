@@ -108,17 +108,17 @@ def normal(latex: str) -> str:
     return " ".join(text.split())
 
 
-def relations(latex: str) -> list[str]:
+def pieces(latex: str) -> list[str]:
     """The pieces of a formula that commas, spaces and lines separate, each without the mark that ends it."""
-    pieces: list[list[str]] = [[]]
+    found: list[list[str]] = [[]]
     depth = 0
     for one in normal(latex).split():
         depth += (one in _OPEN or one in ("{", r"\begin")) - (one in _CLOSE or one in ("}", r"\end"))
         if one in _BETWEEN and depth == 0:
-            pieces.append([])
+            found.append([])
         else:
-            pieces[-1].append(one)
-    texts = (" ".join(piece).removesuffix(" .").strip() for piece in pieces)
+            found[-1].append(one)
+    texts = (" ".join(piece).removesuffix(" .").strip() for piece in found)
     return [text for text in texts if text and text != "."]
 
 

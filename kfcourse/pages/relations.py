@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kfcourse.pages.reader import Unread, holds, is_relation, normal, relations
+from kfcourse.pages.reader import Unread, holds, is_relation, normal, pieces
 from kfcourse.pages.verification import Unverified
 
 COMPUTED = "both sides computed"
@@ -103,7 +103,7 @@ class Letters:
             raise Unverified(
                 _unsaid(formula.latex, "it is printed beside a checked equation, and nothing holds it; EQUALS or SAID may")
             )
-        return [self._judged(piece, formula) for piece in relations(formula.latex) if self.speaks(piece)]
+        return [self._judged(piece, formula) for piece in pieces(formula.latex) if self.speaks(piece)]
 
     def speaks(self, piece: str) -> bool:
         """Is there anything in it that can be wrong?  Not in a list of letters, nor where an index begins."""

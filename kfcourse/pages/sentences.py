@@ -32,7 +32,7 @@ class Sentence(NamedTuple):
     compares: bool
 
 
-def sentences(page: str) -> Iterator[Sentence]:
+def spoken(page: str) -> Iterator[Sentence]:
     """The sentences of all `claim` and `agree` of a page."""
     for code in cells(page):
         for call in calls(code, "claim", "agree"):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kfcourse.pages.letters import BENT, extended_run, given, kalman_run
-from kfcourse.pages.reader import Indexed, Of, Unread, holds, is_relation, normal, relations
+from kfcourse.pages.reader import Indexed, Of, Unread, holds, is_relation, normal, pieces
 from kfcourse.pages.verification import Unverified
 
 pytestmark = pytest.mark.quick
@@ -23,9 +23,9 @@ def test_what_tex_prints_alike_is_alike():
 
 def test_a_display_is_taken_apart():
     display = r"\begin{aligned} a&=f(b,c), & d&=\begin{pmatrix}1&2\\3&4\end{pmatrix},\\ e&\le g\text{ and so on}.\end{aligned}"
-    pieces = relations(display)
-    assert pieces[0] == normal("a=f(b,c)")
-    assert len(pieces) == 3 and all(map(is_relation, pieces))
+    found = pieces(display)
+    assert found[0] == normal("a=f(b,c)")
+    assert len(found) == 3 and all(map(is_relation, found))
     assert not is_relation(normal(r"\sum_{i=1}^n x_i")) and is_relation(normal(r"x\sim\mathcal N(0,1)"))
 
 

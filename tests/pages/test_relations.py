@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kfcourse.pages.relations import COMPUTED, DEFINITION, Formula, Letters, formulas, judged, letters_of
-from kfcourse.pages.sentences import COMPARING, sentences
+from kfcourse.pages.sentences import COMPARING, spoken
 from kfcourse.pages.verification import Unverified
 
 pytestmark = pytest.mark.quick
@@ -34,7 +34,7 @@ def test_what_a_page_says_of_its_relations_is_about_relations_that_it_has(page: 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_numbers_in_sentences_come_from_values_and_words_stand_beside_conditions(page: Path):
-    for sentence in sentences(page.read_text(encoding="utf-8")):
+    for sentence in spoken(page.read_text(encoding="utf-8")):
         unknown = [number for number in sentence.unknown if number not in letters_of(page).literals]
         assert unknown == [], f"no expression stands behind {unknown}: {sentence.text}"
         assert sentence.compares or not COMPARING.search(sentence.text), f"no condition compares: {sentence.text}"
@@ -91,7 +91,7 @@ verified((r"\\det A", x, y), names={x: "G^2"}, label="eq-b")
 
 def test_a_number_without_an_expression_is_found():
     cell = '```{code-cell} python\nclaim(f"To 12 digits 7 of {n:.3f} are larger at $k=2$.", abs(x[2] - y) < 1e-12)\n```\n'
-    (sentence,) = sentences(cell)
+    (sentence,) = spoken(cell)
     assert sentence.unknown == ["7"] and sentence.compares
-    (empty,) = sentences('```{code-cell} python\nclaim("It is larger.", True)\n```\n')
+    (empty,) = spoken('```{code-cell} python\nclaim("It is larger.", True)\n```\n')
     assert not empty.compares
