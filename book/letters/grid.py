@@ -30,7 +30,7 @@ def course(rng):
 
 
 def widths(rng):
-    """A likelihood, a prediction and a transition, all normal: the curvature of the logarithm of their product, by differences."""
+    """A likelihood, a prediction and a transition, all normal: the curvature of the logarithm of their product."""
     slope, move, g, D_n, D_xi = rng.uniform(0.5, 2, size=5)
 
     def logarithm(x):

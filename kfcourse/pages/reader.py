@@ -13,7 +13,7 @@ Products of matrices keep their order, and shapes must fit: a transposition that
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import pairwise, product
 from typing import Any, TypeAlias
@@ -59,7 +59,7 @@ class Unread(ValueError):
 class Indexed:
     """Values of a letter with an index, in one or several dimensions: `\\Psi_{k+1}`, `P_{ij}`; without one it is `plain`."""
 
-    def __init__(self, values: Sequence[Any] | Callable[..., Any], plain: Any = None) -> None:
+    def __init__(self, values: Any, plain: Any = None) -> None:
         self.values, self.plain = values, plain
 
     def __getitem__(self, index: tuple[Any, ...]) -> Value:

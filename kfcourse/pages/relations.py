@@ -26,10 +26,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kfcourse.pages.reader import Unread, holds, is_relation, normal, pieces
+from kfcourse.pages.verification import DEFINITION as DEFINITION
 from kfcourse.pages.verification import Unverified
 
 COMPUTED = "both sides computed"
-DEFINITION = "definition"
 STATED = "stated without proof"
 NOTATION = "notation"
 CONDITION = "condition"
