@@ -52,7 +52,7 @@ def planted(page: Path, chance: random.Random, most: int = 10**9) -> Iterator[Pl
         (formula, piece)
         for formula in formulas(page.read_text(encoding="utf-8"))
         for piece in (pieces(formula.latex) if formula.kind in ("display", "box") else [normal(formula.latex)])
-        if formula.kind in ("side", "name") or letters.speaks(piece)
+        if formula.kind in ("side", "name") or letters.says(piece)
     ]
     for formula, piece in chance.sample(places, min(most, len(places))):
         letters.judge(formula)  # what does not hold before notices everything

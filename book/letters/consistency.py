@@ -32,3 +32,10 @@ SAID = {
     r"\mathsf M(e^Tp^{-1}e)\big|_{P=p}": NOTATION,
     r"\mathsf M(\nu_{k+1}\nu_k)": NOTATION,
 }
+SAID |= dict.fromkeys(
+    (
+        r"\mathsf{M}(e^Tp^{-1}e)",
+        r"\operatorname{tr}(p^{-1}P)",
+    ),
+    NOTATION,
+)
