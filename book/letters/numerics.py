@@ -12,7 +12,7 @@ from kfcourse.pages.relations import DEFINITION, NOTATION
 
 
 def _corrected(rng, seen):
-    """The letters of one correction by the package's textbook step; K by the innovation's covariance, which is not that step's."""
+    """The letters of one correction by the package's textbook step; K = p H^T R^{-1}, which it does not compute with."""
     Psi, H, R, A = covariance(rng, 3), rng.normal(size=(seen, 3)), covariance(rng, seen), rng.normal(size=(3, 3))
     y, lam = rng.normal(size=seen), rng.normal(size=3)
     z, p = correct(LinearSystem(A, H, np.eye(3), R), Gaussian(lam, Psi), y)
@@ -33,7 +33,11 @@ def any_gain(rng):
 
 def wrong_gain(rng):
     found = _corrected(rng, 1)
-    return found | {r"\epsilon": 0.3, r"\gamma": rng.normal(size=(3, 1)), "F": found["H"] @ found[r"\Psi"] @ found["H"].T + found["R"]}
+    return found | {
+        r"\epsilon": 0.3,
+        r"\gamma": rng.normal(size=(3, 1)),
+        "F": found["H"] @ found[r"\Psi"] @ found["H"].T + found["R"],
+    }
 
 
 def array(rng):
@@ -69,7 +73,8 @@ def loop(rng):
     running = {
         r"\alpha": Indexed(alpha), "n": n, "j": range(1, n + 1), "r": r, "h": h, "U": Indexed([None, *unit.T[:, :, None]], unit),
         "f": Indexed([None, *f[:, 0]], f), "v": Indexed([None, *v[:, 0]], v), "D": Indexed([None, *diagonal], np.diag(diagonal)),
-        "K": Of(lambda j: before[j], "j"), r"K\leftarrow": Of(lambda j: after[j], "j"), r"U_j\leftarrow": Of(lambda j: columns[j], "j"),
+        "K": Of(lambda j: before[j], "j"), r"K\leftarrow": Of(lambda j: after[j], "j"),
+        r"U_j\leftarrow": Of(lambda j: columns[j], "j"),
         r"D_j\leftarrow": Of(lambda j: smaller[j], "j"), r"U_j^{\rm old}": Of(lambda j: unit[:, [j - 1]], "j"),
     }  # fmt: skip
     return found, running, {"U": U, "D": D, "K": K}
@@ -111,7 +116,7 @@ EQUALS = {
     r"p-\epsilon\,\gamma H\Psi": rf"(I-{_WRONG}H)\Psi",
     r"p+\epsilon^2F\,\gamma\gamma^T": rf"(I-{_WRONG}H)\Psi(I-{_WRONG}H)^T+{_WRONG}R{_WRONG}^T",
     rf"{_BEFORE}{_BEFORE}^T": _BLOCKS,
-    _BLOCKS: rf"\begin{{pmatrix}}X&0\\Y&Z\end{{pmatrix}}\begin{{pmatrix}}X&0\\Y&Z\end{{pmatrix}}^T",
+    _BLOCKS: r"\begin{pmatrix}X&0\\Y&Z\end{pmatrix}\begin{pmatrix}X&0\\Y&Z\end{pmatrix}^T",
     "YX^{-1}": "K",
     "ZZ^T": r"(I-KH)\Psi",
     r"(I-KH)\Psi": "p",

@@ -93,7 +93,8 @@ def step(rng):
     return {
         "T": found["T"], "r": states[2, 0], "s": states[2, 1], "r^-": (found["A"] @ states[2])[0], "y": y[3],
         r"\nu": y[3] - (found["A"] @ states[2])[0], r"\alpha": ALPHA, r"\beta": steady_beta(ALPHA),
-        r"\alpha_k": gains[r"\alpha"][4,], r"\beta_k": gains[r"\beta"][4,], r"r\leftarrow": states[3, 0], r"s\leftarrow": states[3, 1],
+        r"\alpha_k": gains[r"\alpha"][4,], r"\beta_k": gains[r"\beta"][4,], r"r\leftarrow": states[3, 0],
+        r"s\leftarrow": states[3, 1],
     }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""The letters of track-2d.md: a run of the package's filter of the track, with a known input; a lost sample; a telescoping sum."""
+"""The letters of track-2d.md: a run of the package's filter with a known input; a lost sample; a telescoping sum."""
 
 import numpy as np
 
