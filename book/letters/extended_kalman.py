@@ -30,10 +30,21 @@ def western(rng):
     g, D_xi, H = own["g"].values, own[r"D_\xi"], own["H"].values
     S = [slope_ @ cov @ slope_.T + own["D_n"] for slope_, cov in zip(H, own[r"\Psi"].values, strict=True)]
     return {
-        r"\hat x": x, "P": P, "K": own["K"], "H": own["H"], "F": own[r"\Phi"], "I": own["I"], "R": own["D_n"], "k": own["k"],
-        "Q": Of(lambda k: g[k] @ D_xi @ g[k].T, "k"), "S": Indexed(S), "v": own[r"\nu"], "z": own["y"],
-        "f": own["f"].plain, "h": own["S"].plain,
-    }  # fmt: skip
+        r"\hat x": x,
+        "P": P,
+        "K": own["K"],
+        "H": own["H"],
+        "F": own[r"\Phi"],
+        "I": own["I"],
+        "R": own["D_n"],
+        "k": own["k"],
+        "Q": Of(lambda k: g[k] @ D_xi @ g[k].T, "k"),
+        "S": Indexed(S),
+        "v": own[r"\nu"],
+        "z": own["y"],
+        "f": own["f"].plain,
+        "h": own["S"].plain,
+    }
 
 
 def beams(rng):

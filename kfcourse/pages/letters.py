@@ -110,3 +110,42 @@ def slope(function: Callable[[Any], np.ndarray], x: np.ndarray) -> np.ndarray:
 def given(before: Indexed, after: Indexed) -> Indexed:
     r"""A letter with two indices, as Western books write it: `P_{k|k-1}` is a prediction, `P_{k|k}` an estimate."""
     return Indexed(lambda at, until: (after if at == until else before)[at,])
+
+
+def normal_nodes(mean: float, variance: float, count: int = 60) -> tuple[np.ndarray, Callable[[Any], float]]:
+    r"""Nodes x for a normal law, and the mean of a function of x that is given at the nodes (Gauss and Hermite)."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(count)
+    weights = weights / weights.sum()
+    return mean + np.sqrt(variance) * nodes, lambda values: float(np.sum(weights * values))
+
+
+class Masses(np.ndarray):
+    r"""Masses of nodes as a row, (1, n): `\\mu_kP` is a product of matrices, `\\mu_k(j)` the mass of a node."""
+
+    @classmethod
+    def of(cls, values: Any) -> Masses:
+        return np.asarray(values, float).reshape(1, -1).view(cls)
+
+    def __call__(self, node: int) -> float:
+        return float(self[0, int(node)])
+
+
+def chain_run(
+    rng: np.random.Generator, nodes: Any, P: np.ndarray, start: Any, likelihood: Callable[[float, Any], Any]
+) -> dict[str, Any]:
+    r"""The letters of the Stratonovich equation on masses, \\mu, \\mu^-, C, z, p, y with the index k, and P, x with i and j.
+
+    A plain program: every sum is a loop over the nodes; likelihood(y, x) is p(y | x).
+    """
+    size = range(len(nodes))
+    mass, rows = [float(one) for one in start], []
+    for y in rng.normal(size=_STEPS):
+        joint = [mass[j] * likelihood(y, nodes[j]) for j in size]
+        after = [one / sum(joint) for one in joint]
+        z = sum(nodes[j] * after[j] for j in size)
+        p = sum(nodes[j] ** 2 * after[j] for j in size) - z**2
+        rows.append((Masses.of(mass), Masses.of(after), 1 / sum(joint), z, p, y))
+        mass = [sum(after[i] * P[i, j] for i in size) for j in size]
+    names = (r"\mu^-", r"\mu", "C", "z", "p", "y")
+    found = {name: Indexed([row[place] for row in rows]) for place, name in enumerate(names)}
+    return found | {"P": Indexed(P, P), "x": Indexed(nodes), "i": size, "j": size, "k": K_RANGE}

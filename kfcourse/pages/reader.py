@@ -13,7 +13,7 @@ Products of matrices keep their order, and shapes must fit: a transposition that
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import pairwise, product
 from typing import Any, TypeAlias
@@ -59,7 +59,7 @@ class Unread(ValueError):
 class Indexed:
     """Values of a letter with an index, in one or several dimensions: `\\Psi_{k+1}`, `P_{ij}`; without one it is `plain`."""
 
-    def __init__(self, values: Sequence[Any] | Callable[..., Any], plain: Any = None) -> None:
+    def __init__(self, values: Any, plain: Any = None) -> None:
         self.values, self.plain = values, plain
 
     def __getitem__(self, index: tuple[Any, ...]) -> Value:
@@ -78,6 +78,13 @@ class Of:
 
     def __init__(self, function: Callable[..., Any], *letters: str) -> None:
         self.function, self.letters = function, [normal(one) for one in letters]
+
+
+class Operator:
+    """What acts on all that is multiplied after it, powers and brackets: `\\mathsf M(x-z)^2` is the mean of a square."""
+
+    def __init__(self, function: Callable[[Any], Any]) -> None:
+        self.function = function
 
 
 def tokens(latex: str) -> list[str]:
@@ -144,14 +151,19 @@ def holds(relation: str, letters: Letters, within: float = ROUNDING, approximate
     Unverified
         If the relation does not hold; the message has both numbers.
     """
-    reader = _Reader(normal(relation).split(), letters)
+    text = normal(relation)
+    if r"\pm" in text.split():  # both signs
+        for sign in "+-":
+            holds(text.replace(r"\pm", sign), letters, within, approximately)
+        return
+    reader = _Reader(text.split(), letters)
     sides, signs, indices = reader.chain()
     first: list[Value] = []
     for chosen in product(*(letters[index] for index in indices)):
         at = dict(zip(indices, chosen, strict=True))
         try:
             values = [side(at) for side in sides]
-        except (TypeError, ValueError, AttributeError, np.linalg.LinAlgError) as error:
+        except (TypeError, ValueError, AttributeError, LookupError, np.linalg.LinAlgError) as error:
             if isinstance(error, Unread):
                 raise
             raise Unverified(f"cannot be computed, {error}: {relation}") from error
@@ -166,7 +178,7 @@ def holds(relation: str, letters: Letters, within: float = ROUNDING, approximate
 
 
 def _compare(text: str, left: Value, right: Value, sign: str, within: float, approximately: float, at: Mapping[str, Any]) -> None:
-    if callable(left) or callable(right):
+    if any(callable(side) and not isinstance(side, np.ndarray) for side in (left, right)):
         raise Unread(f"a function without its arguments: {text}")
     left, right = np.asarray(left, float), np.asarray(right, float)
     if left.size == 1 or (right.size == 1 and not right.any()):
@@ -279,11 +291,21 @@ class _Reader:
         return self.text[place + 1 : place + 1 + len(variable)] == variable
 
     def factor(self) -> _Side:
+        bracketed = self.next in _OPEN
         base = self.atom()
+        if bracketed and self.next == "_":  # a column of a matrix, counted from one
+            self.take()
+            base = self._column(base, self._inside(self._group()))
         while self.next == "^":
             self.take()
             base = self._power(base, self._group())
+        if self.next == "|" and self._after(1) == "_":  # where it is taken: for the letters to know
+            self.place += 2
+            self._group()
         return base
+
+    def _column(self, matrix: _Side, number: _Side) -> _Side:
+        return lambda at: matrix(at)[:, [_whole(number(at)) - 1]]
 
     def _power(self, base: _Side, exponent: list[str]) -> _Side:
         text = "".join(exponent)
@@ -295,6 +317,8 @@ class _Reader:
             return lambda at: _inverse(base(at))
         if text == "1/2":
             return lambda at: _root(base(at))
+        if text == "-1/2":
+            return lambda at: _inverse(_root(base(at)))
         power = self._inside(exponent)
         return lambda at: _raised(base(at), power(at))
 
@@ -368,7 +392,7 @@ class _Reader:
         if one == r"\mathcal" and self.text[self.place + 1] == "N":
             self.place += 2
             arguments = self._arguments()
-            return lambda at: _bell(*(argument(at) for argument in arguments))
+            return lambda at: bell(*(argument(at) for argument in arguments))
         if one in _NUMBERS:
             self.take()
             return lambda at: _NUMBERS[one]
@@ -406,6 +430,9 @@ class _Reader:
         if isinstance(value, range):
             return self._index(key)
         if isinstance(value, Of):
+            for name in value.letters:
+                if isinstance(self.letters.get(_key(self.letters, name)), range):
+                    self._index(name)
             return lambda at: value.function(
                 *(at[one] if one in at else self.letters[_key(self.letters, one)] for one in value.letters)
             )
@@ -413,7 +440,10 @@ class _Reader:
             self.take("_")
             indices = self._subscript(self._group())
             found: _Side = lambda at: value[tuple(_whole(index(at)) for index in indices)]  # noqa: E731
-            return self._applied(found) if self.next in ("(", "[") and callable(_sample(value)) else found
+            return self._applied(found) if callable(_sample(value)) and self._is_call() else found
+        if isinstance(value, Operator):
+            argument = self.product()
+            return lambda at: value.function(argument(at))
         if callable(value):
             return self._applied(lambda at: value)
         return lambda at: value
@@ -434,9 +464,16 @@ class _Reader:
     def _is_index(self, one: str) -> bool:
         return isinstance(self.letters.get(one), range)
 
+    def _is_call(self) -> bool:
+        """Does a bracket follow, perhaps after a power?"""
+        return self.next in ("(", "[") or (self.next == "^" and self._after(2) in ("(", "["))
+
     def _applied(self, function: _Side) -> _Side:
-        power = None
-        if self.next == "^" and self._after(1) not in ("T", "{"):
+        power, turned = None, False
+        if self.next == "^" and self._after(1) == "T" and self._after(2) == "(":
+            self.place += 2
+            turned = True
+        elif self.next == "^" and self._after(1) not in ("T", "{"):
             self.take()
             power = self._inside(self._group())
         if self.next in ("(", "["):
@@ -447,6 +484,8 @@ class _Reader:
             call = lambda at: function(at)(argument(at))  # noqa: E731
         else:
             return function
+        if turned:
+            return lambda at: _transposed(call(at))
         return call if power is None else lambda at: _raised(call(at), power(at))
 
     def _arguments(self) -> list[_Side]:
@@ -636,7 +675,7 @@ def _full(rows: list[list[Value]]) -> list[list[Value]]:
     ]
 
 
-def _bell(x: Value, mean: Value, variance: Value) -> Value:
+def bell(x: Value, mean: Value, variance: Value) -> Value:
     """The normal density; of a column and a covariance matrix, too."""
     if _is_matrix(variance):
         off = x - mean

@@ -26,12 +26,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kfcourse.pages.reader import Unread, holds, is_relation, normal, pieces
+from kfcourse.pages.verification import DEFINITION as DEFINITION
 from kfcourse.pages.verification import Unverified
 
 COMPUTED = "both sides computed"
-DEFINITION = "definition"
 STATED = "stated without proof"
 NOTATION = "notation"
+CONDITION = "condition"
 _SEEDS = (53, 54)  # what holds for two draws of the numbers is no accident
 _CELL = re.compile(r"^(`{3,})\{code-cell\}[^\n]*\n(.*?)^\1\s*$", re.DOTALL | re.MULTILINE)
 _BOX = re.compile(
@@ -110,7 +111,8 @@ class Letters:
         if is_relation(piece):
             left, _, right = piece.partition(" = ")
             return not (left in self.indices and re.fullmatch(r"[\d\w]( [\d\w])*|\\dots", right))
-        return bool(_OPERATOR.search(f" {_without_scripts(piece)}"))
+        letters = _without_scripts(piece)
+        return bool(_OPERATOR.search(f" {letters}")) and len(re.sub(r"\^ (?:\{[^{}]*\}|\S+)", "", letters).split()) > 1
 
     def _judged(self, piece: str, formula: Formula) -> Said:
         if piece in self.said:
