@@ -30,7 +30,7 @@ def _interval(confidence: float, degrees: int) -> tuple[float, float]:
     return low, high
 
 
-def _over(bounds: tuple[float, float], divisor: float) -> tuple[float, float]:
+def _scaled(bounds: tuple[float, float], divisor: float) -> tuple[float, float]:
     return bounds[0] / divisor, bounds[1] / divisor
 
 
@@ -84,17 +84,17 @@ WRONG_BOUNDS: tuple[tuple[str, str, Bounds], ...] = (
     (
         "divided-by-root",
         "The bounds of the sum are divided by a root; a mean is a sum over the number of runs.",
-        lambda degrees, runs, confidence: _over(_interval(confidence, degrees * runs), np.sqrt(runs)),
+        lambda degrees, runs, confidence: _scaled(_interval(confidence, degrees * runs), np.sqrt(runs)),
     ),
     (
         "degrees-and-runs-added",
         "The degrees of freedom of all runs add up: how many are there together?",
-        lambda degrees, runs, confidence: _over(_interval(confidence, degrees + runs), runs),
+        lambda degrees, runs, confidence: _scaled(_interval(confidence, degrees + runs), runs),
     ),
     (
         "one-run-less",
         "One run is left out: no mean has been estimated here.",
-        lambda degrees, runs, confidence: _over(_interval(confidence, degrees * (runs - 1)), runs - 1),
+        lambda degrees, runs, confidence: _scaled(_interval(confidence, degrees * (runs - 1)), runs - 1),
     ),
 )
 
