@@ -48,7 +48,7 @@ def parameter_map(
     steps: int = 3,
     exact_runs: int = 1000,
     seed: int = 1,
-    wide: float = 2.0,
+    wide: float | None = None,
     designs: int = 2,
     design_runs: int = 20_000,
 ) -> ParameterMap:
