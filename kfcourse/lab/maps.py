@@ -64,7 +64,7 @@ def parameter_map(
     exact_runs : int
         Trajectories of the exact AOF in each comparison.
     runs, steps, seed, wide, designs, design_runs
-        As of `kfcourse.compare`; with the initial states drawn twice as wide, 1000 trajectories tell as much as some 20,000.
+        As of `kfcourse.compare`.
 
     Raises
     ------
