@@ -52,6 +52,18 @@ class Measurement(NamedTuple):
         return y - self.h
 
 
+class Transition(NamedTuple):
+    """What looking back must know of the object: its structural functions at N(z, p), affine as the meter's are.
+
+    tau (..., n), A (..., n, n), Q (..., n, n): mean of the next state, its sensitivity dtau/dz, and Q = Theta - A p A^T, the part
+    of its covariance that this state does not explain.  Q is derived, not subtracted, as R is.
+    """
+
+    tau: Array
+    A: Array
+    Q: Array
+
+
 @cache
 def measurement_of(angles: Components) -> type[Measurement]:
     """`Measurement`, or one whose innovations know which components are angles."""
