@@ -15,6 +15,7 @@ from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, Trajectories, simulate
 from kfcourse.montecarlo.experiment import compare, predictions, run
+from kfcourse.records import smooth
 from kfcourse.symbolic.angular import AngleWarning
 from kfcourse.symbolic.formula import FormulaError
 from kfcourse.symbolic.model import Model
@@ -47,5 +48,6 @@ __all__ = [
     "predictions",
     "run",
     "simulate",
+    "smooth",
     "unscented",
 ]
