@@ -229,6 +229,19 @@ def normalised_square(vector: Array, cov: Array) -> Array:
     return np.einsum("...i,...i", apply(gain(np.eye(cov.shape[-1]), cov), vector), vector)
 
 
+def log_density(measurement: Measurement, y: Array) -> Array:
+    """Logarithm of the normal density N(y; h, F), (runs,); what is missing (NaN) does not enter.
+
+    -1/2 nu^T F^-1 nu - 1/2 ln det(2 pi F),      nu = y - h
+    """
+    innovation, F = measurement.innovation(y), measurement.F
+    missing = np.isnan(innovation)
+    if missing.any():
+        innovation, _, F, _ = without_missing(innovation, measurement.G, F, measurement.R)
+    present = (~missing).sum(axis=-1)
+    return -0.5 * (normalised_square(innovation, F) + np.linalg.slogdet(F).logabsdet + present * np.log(2 * np.pi))
+
+
 def stacked(laws: Sequence[Gaussian]) -> Gaussian:
     """Laws of successive steps as one: mean (steps, runs, n), cov (steps, runs, n, n).
 

@@ -46,6 +46,12 @@ class Advance(Protocol):
     def __call__(self, state: State, y: Array, /) -> State: ...
 
 
+class Evidence(Protocol):
+    """ln p(y_k | y_0, ..., y_{k-1}), (runs,), from the state before the measurement; 0 where it is missing."""
+
+    def __call__(self, state: State, y: Array, /) -> Array: ...
+
+
 @dataclass(frozen=True)
 class Filter:
     """A filter ready to run.
@@ -67,6 +73,8 @@ class Filter:
     structure : Structure, optional
         For a filter whose laws are normal ones: the structural functions by which it expects measurements from its prediction,
         and predicts from its posterior.  Looking back, likelihood and gates take from it what no filter needs while it runs.
+    evidence : Evidence, optional
+        Where it is another than the normal law's by `structure`: how likely a measurement was before it came.
     """
 
     name: str
@@ -76,6 +84,7 @@ class Filter:
     slow: bool = False
     instead: Filter | None = None
     structure: Structure | None = None
+    evidence: Evidence | None = None
 
     def __post_init__(self) -> None:
         if self.model.angles.x:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kfcourse.angles import difference, on_circle
+from kfcourse.angles import difference
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.base import Filter, State, structure_of
 from kfcourse.filters.iterated_ekf import seen_from
@@ -62,7 +62,7 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     >>> from kfcourse import Model, linearised
     >>> walk = Model.define("x + v", "x + w")
     >>> [round(z, 3) for z in smooth(aof(linearised(walk)), np.array([1.0, 2.0, np.nan, 4.0])).mean.ravel().tolist()]
-    [1.026, 2.077, 2.744, 3.41]
+    [0.944, 1.833, 2.556, 3.278]
     """
     structure = structure_of(one, "looking back")
     _, *visited, last = states(one, y)
@@ -122,7 +122,7 @@ def affine_at(structure: Structure, laws: Gaussian) -> Structure:
 
         def predict(z: Array, p: Array) -> Gaussian:
             shift = apply(A, difference(z, there.mean, model.angles.x))
-            return Gaussian(on_circle(tau + shift, model.angles.x), symmetric(product(product(A, p), transpose(A))) + Q)
+            return Gaussian(tau + shift, symmetric(product(product(A, p), transpose(A))) + Q)
 
         def measure(m: Array, d: Array) -> Measurement:
             return measurement_of(model.angles.y)(*seen_from(now.measure(*there), there, Gaussian(m, d), model.angles.x))
