@@ -1,6 +1,10 @@
 """What only the pages of the book call.
 
 verification equations, sentences and numbers that are checked where they are printed; a check that fails stops the build
+relations    what each typed relation of a page is: computed, a definition, quoted, stated
+reader       reads a relation in LaTeX and computes its sides
+letters      numbers for the letters that many pages share
+sentences    numbers and words in the sentences of a page
 exponents    squares completed in the exponents of normal laws
 tables       tables of numbers
 figures      the style of the figures, labels at the ends of curves

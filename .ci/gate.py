@@ -1,0 +1,151 @@
+r"""Plants changes in the relations that the book displays, and counts what nothing notices.
+
+    python .ci/gate.py                  each typed relation of each page, changed in each way it can be: by chapter and kind
+    python .ci/gate.py --seed 7         other places of the changes
+    python .ci/gate.py --checked 20     and 20 changes in checked expressions, for which cells are executed
+
+A change is a sign, a factor, an index, or a transposition.  It is noticed if the relation no longer holds, or is no longer what
+the page's file in book/letters/ says (kfcourse.pages.relations).  More than 5 % unnoticed is a failure.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import re
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from kfcourse.pages.reader import is_relation, normal, pieces
+from kfcourse.pages.relations import Formula, Letters, formulas, letters_of
+from kfcourse.pages.verification import Unverified
+
+BOOK = Path(__file__).resolve().parents[1] / "book"
+MOST = 0.05
+KINDS = ("sign", "factor", "index", "transposition")
+_NEVER_MATRICES = {"e", "d", "C", "T", "N", "M", "D", "V", "J", "I"}
+
+
+class Planted(NamedTuple):
+    """A changed relation of a page: where, which, how, and whether it was noticed."""
+
+    page: str
+    where: str
+    kind: str
+    before: str
+    after: str
+    noticed: bool
+
+
+def planted(page: Path, chance: random.Random, most: int = 10**9) -> Iterator[Planted]:
+    """One change of each kind in each typed relation of a page, in `most` relations of it."""
+    letters = letters_of(page)
+    places = [
+        (formula, piece)
+        for formula in formulas(page.read_text(encoding="utf-8"))
+        for piece in (pieces(formula.latex) if formula.kind in ("display", "box") else [normal(formula.latex)])
+        if formula.kind in ("side", "name") or letters.speaks(piece)
+    ]
+    for formula, piece in chance.sample(places, min(most, len(places))):
+        for kind in KINDS:
+            changed = change(piece, kind, chance)
+            if changed:
+                after = formula._replace(latex=changed)
+                yield Planted(page.stem, formula.kind, kind, piece, changed, noticed(letters, after))
+
+
+def noticed(letters: Letters, formula: Formula) -> bool:
+    """Does the page's gate stop at this formula?"""
+    try:
+        letters.judge(formula)
+    except Unverified:
+        return True
+    return False
+
+
+def change(piece: str, kind: str, chance: random.Random) -> str | None:
+    """A relation with one sign, factor, index or transposition changed; None if there is no place for it."""
+    text = piece.split()
+    inside = list(_scripts(text))
+    ways: list[tuple[int, int, list[str]]] = []  # from, to, what takes the place
+    for i, one in enumerate(text):
+        if kind == "sign" and not inside[i] and one in "+-":
+            ways.append((i, i + 1, ["-" if one == "+" else "+"]))
+        if kind == "factor" and not inside[i] and one.isdigit() and one != "0":
+            ways.append((i, i + 1, [str(int(one) % 9 + 1)]))
+        if kind == "index" and i and text[i - 1] == "_" and re.fullmatch(r"[a-z]", one):
+            ways.append((i, i + 1, ["{", one, "+", "1", "}"]))
+        if kind == "index" and inside[i] and one in "+-" and i + 1 < len(text) and text[i + 1].isdigit():
+            ways.append((i, i + 2, []) if text[i - 1] != "{" else (i, i, []))
+        if kind == "transposition" and i and text[i - 1] == "^" and one == "T":
+            ways.append((i - 1, i + 1, []))
+    if kind == "sign" and not ways and "=" in text:
+        place = text.index("=") + 1
+        ways.append((place, place, ["-"]))
+    if kind == "factor" and not ways and is_relation(piece) and "=" in text:
+        place = text.index("=") + 1
+        ways.append((place, place, ["2"]))
+    ways = [way for way in ways if way[0] != way[1] or way[2]]
+    if not ways:
+        return None
+    start, stop, new = chance.choice(ways)
+    return " ".join([*text[:start], *new, *text[stop:]])
+
+
+def _scripts(text: list[str]) -> Iterator[bool]:
+    """Is each token part of a subscript or a superscript?"""
+    depths: list[bool] = []
+    for i, one in enumerate(text):
+        if one == "{":
+            depths.append(bool(i) and text[i - 1] in ("_", "^"))
+        yield any(depths) or (i > 0 and text[i - 1] in ("_", "^"))
+        if one == "}" and depths:
+            depths.pop()
+
+
+def report(found: list[Planted]) -> str:
+    """Planted and unnoticed changes, by chapter and kind of display: a table."""
+    columns = [(where, kind) for where in ("display", "box", "side", "name", "checked") for kind in KINDS]
+    columns = [one for one in columns if any((row.where, row.kind) == one for row in found)]
+    wheres = list(dict.fromkeys(where for where, _ in columns))
+    lines = [f"{'unnoticed of planted':24}" + "".join(f"{where:>12}" for where in wheres) + f"{'all':>12}"]
+    for page in [*dict.fromkeys(row.page for row in found), "all chapters"]:
+        rows = [row for row in found if page in (row.page, "all chapters")]
+        lines.append(
+            f"{page:24}"
+            + "".join(f"{_share([row for row in rows if row.where == where]):>12}" for where in wheres)
+            + f"{_share(rows):>12}"
+        )
+    by_kind = Counter(row.kind for row in found)
+    missed = Counter(row.kind for row in found if not row.noticed)
+    lines.append("; ".join(f"{kind}: {missed[kind]} of {by_kind[kind]}" for kind in KINDS))
+    return "\n".join(lines)
+
+
+def _share(rows: list[Planted]) -> str:
+    return f"{sum(not row.noticed for row in rows)}/{len(rows)}" if rows else ""
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, default=53)
+    parser.add_argument("--show", action="store_true", help="print each change that nothing noticed")
+    parser.add_argument("pages", nargs="*", help="chapters, all without")
+    given = parser.parse_args()
+    chance = random.Random(given.seed)
+    pages = [BOOK / f"{name}.md" for name in given.pages] or sorted(BOOK.glob("*.md"))
+    found = [one for page in pages for one in planted(page, chance)]
+    for one in found:
+        if given.show and not one.noticed:
+            print(f"{one.page}, {one.where}, {one.kind}\n  {one.before}\n  {one.after}")
+    print(report(found))
+    missed = sum(not one.noticed for one in found)
+    print(f"{missed} of {len(found)} changes were not noticed: {missed / len(found):.1%}")
+    return missed > MOST * len(found)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

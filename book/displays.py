@@ -1,0 +1,74 @@
+"""Sphinx extension: what each typed relation is, under its display, and in a word at the end of its box.
+
+Displays and boxes that a page types are judged by the letters of the page (`kfcourse.pages.relations`, `letters/`).  A relation
+that does not hold, or of which nothing says what it is, is a warning, and warnings are errors.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+from docutils import nodes
+from sphinx.util import logging
+
+from kfcourse.pages.relations import Formula, Letters, Said, letters_file, letters_of, mark
+from kfcourse.pages.verification import Unverified
+
+BOXES = {"algorithm", "definition"}
+log = logging.getLogger(__name__)
+
+
+def say(app, doctree) -> None:
+    """Put the words where the reader looks for them."""
+    page = Path(app.srcdir, f"{app.env.docname}.md")
+    letters = letters_of(page)
+    app.env.note_dependency(str(letters_file(page)))
+    for display in list(doctree.findall(nodes.math_block)):
+        if not _made(display):
+            said = _judged(letters, Formula("display", display.astext(), display.get("label") or ""), display)
+            _below(display, mark(said))
+    for box in list(doctree.findall(nodes.Admonition)):
+        if BOXES & set(box.get("classes", [])):
+            formulas = (Formula("box", one.astext()) for one in box.findall(nodes.math))
+            said = [one for formula in formulas for one in _judged(letters, formula, box)]
+            if said:
+                box += _words(_counted(said))
+
+
+def _made(node: nodes.Node) -> bool:
+    """Has a cell made it?  Then its own mark says what it is."""
+    while (node := node.parent) is not None:
+        if "cell_output" in node.get("classes", []):
+            return True
+    return False
+
+
+def _judged(letters: Letters, formula: Formula, node: nodes.Node) -> list[Said]:
+    try:
+        return letters.judge(formula)
+    except Unverified as reason:
+        log.warning("%s", reason, location=node)
+        return []
+
+
+def _below(display: nodes.Element, words: str) -> None:
+    if words:
+        display.parent.insert(display.parent.index(display) + 1, _words(words))
+
+
+def _words(words: str) -> nodes.paragraph:
+    return nodes.paragraph("", words, classes=["kf-verified" if words.startswith("✓") else "kf-said"])
+
+
+def _counted(said: list[Said]) -> str:
+    """How many relations of a box are computed, and what the others are."""
+    computed = sum(one.computed for one in said)
+    others = Counter(one.what for one in said if not one.computed)
+    parts = [f"✓ {computed} relations computed"] if computed else []
+    return "; ".join([*parts, *(f"{what}: {count}" for what, count in others.items())])
+
+
+def setup(app) -> dict[str, bool]:
+    app.connect("doctree-read", say)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

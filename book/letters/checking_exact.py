@@ -1,0 +1,41 @@
+"""The letters of checking-exact.md: point masses as a plain program, for a noise that enters linearly."""
+
+import numpy as np
+
+from kfcourse.pages.reader import Of, bell
+from kfcourse.pages.relations import DEFINITION
+
+
+def masses(rng):
+    """One step of variant 53; new nodes x_i with masses mu_i from old ones, x_j and mu_j."""
+    old, mass, c, e = rng.normal(size=4), rng.dirichlet(np.ones(4)), 0.9, 0.5
+    t, middle, scale, y = np.linspace(-1, 1, 5), rng.normal(), 0.7, rng.normal()
+    new = middle + scale * (np.exp(t) - np.exp(-t)) / 2
+
+    def ahead(at):
+        return sum(one * bell(at, c * node, (e * node) ** 2 * 0.8) for one, node in zip(mass, old, strict=True))
+
+    def likelihood(at):
+        return bell(y, at, 0.1 + 0.2 * at**2)
+
+    joint = np.array([ahead(at) * likelihood(at) for at in new])
+    after = joint * scale * (np.exp(t) + np.exp(-t)) / 2
+    after = after / after.sum()
+    nodes = {
+        "x_i": Of(lambda i: new[i], "i"),
+        r"\mu_i": Of(lambda i: after[i], "i"),
+        "t_i": Of(lambda i: t[i], "i"),
+        "x_j": Of(lambda j: old[j], "j"),
+        r"\mu_j": Of(lambda j: mass[j], "j"),
+        "x": Of(lambda k: new[k], "k"),
+        r"p(x\mid y_{0:k})": Of(lambda k: joint[k], "k"),
+        r"p(y_k\mid x)": Of(lambda k: likelihood(new[k]), "k"),
+        r"p(y_k\mid x_i)": Of(lambda i: likelihood(new[i]), "i"),
+    }
+    model = {"a": lambda x, v=0: c * x + e * x * v, "a_v": lambda x: e * x, "D_v": 0.8, "m_v": 0.0, r"\pi": ahead}
+    found = {"z_k": after @ new, "p_k": after @ new**2 - (after @ new) ** 2}
+    return nodes | model | found | {"x_*": middle, "s": scale, "i": range(5), "j": range(4), "k": range(5)}
+
+
+LETTERS = (masses,)
+SAID = {r"a_v=\frac{\partial a}{\partial v}": DEFINITION, r"\frac{dx}{dt}": DEFINITION}

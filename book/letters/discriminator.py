@@ -1,0 +1,89 @@
+"""The letters of discriminator.md: a loop with several components in the gain form, and the characteristic of a carrier."""
+
+import numpy as np
+
+from kfcourse.pages.letters import K_RANGE, column, covariance, given, slope
+from kfcourse.pages.reader import Indexed, Of, Operator
+from kfcourse.pages.relations import NOTATION
+
+C = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+
+
+def S(phi):
+    return np.array([[phi[0, 0] + 0.2 * phi[1, 0] ** 2], [phi[0, 0] * phi[1, 0] + phi[1, 0]]])
+
+
+def f(x):
+    return np.array([[x[0, 0] + 0.3 * x[1, 0]], [0.9 * x[1, 0] + 0.1 * x[2, 0] ** 2], [x[2, 0] - 0.2 * x[0, 0]]])
+
+
+def run(rng):
+    """Rows of the gain form; u from the correction that it makes."""
+    law, Psi, D_n, D_xi, g = (
+        column(rng.normal(size=3)) / 2,
+        covariance(rng, 3) / 4,
+        covariance(rng, 2),
+        covariance(rng, 2),
+        rng.normal(size=(3, 2)),
+    )
+    names = (r"\lambda", r"\Psi", "y", "z", "p", "u", "S", "slope", r"\Phi")
+    rows = {name: [] for name in names}
+    for _ in range(5):
+        y, at = column(rng.normal(size=2)), slope(S, C @ law)
+        H = at @ C
+        K = Psi @ H.T @ np.linalg.inv(H @ Psi @ H.T + D_n)
+        z, p = law + K @ (y - S(C @ law)), (np.eye(3) - K @ H) @ Psi
+        u = np.linalg.lstsq(p @ C.T, z - law, rcond=None)[0]
+        for name, value in zip(names, (law, Psi, y, z, p, u, S(C @ law), at, slope(f, z)), strict=True):
+            rows[name].append(value)
+        law, Psi = f(z), slope(f, z) @ p @ slope(f, z).T + g @ D_xi @ g.T
+    letters = {name: Indexed(values) for name, values in rows.items() if name != "slope"}
+    slopes = Of(lambda k: rows["slope"][k], "k")
+    extra = {"c": C, "D_n": D_n, r"D_\xi": D_xi, "g": g, "f": f, "k": K_RANGE, r"\Phi": Of(lambda k: rows[r"\Phi"][k], "k")}
+    return letters | extra | {"S_k'": slopes, r"\frac{\partial S_k(c\lambda_k)}{\partial\varphi}": slopes}
+
+
+def display(rng):
+    return run(rng) | {"S": Indexed([S] * 5)}
+
+
+def western(rng):
+    own = run(rng)
+    return {r"\hat x": given(own[r"\lambda"], own["z"]), "P": given(own[r"\Psi"], own["p"]), "c": C, "u": own["u"], "k": own["k"]}
+
+
+def carrier(rng):
+    A, D_n, T, lam, delta, p = rng.uniform(0.5, 2, size=6)
+    errors = np.linspace(0, np.pi, 2001)
+
+    def U(at):
+        theta = 2 * np.pi * np.arange(64) / 64 + lam
+        return np.mean(-A * np.sin(theta) * A * (np.cos(theta + at) - np.cos(theta))) / D_n
+
+    highest = max(map(U, errors))
+    u = Of(lambda theta: -A * np.sin(theta + lam) * A * (np.cos(theta + lam + delta) - np.cos(theta + lam)) / D_n, r"\theta")
+    numbers = {
+        r"\Delta": delta,
+        r"p_{\varphi\varphi}": p,
+        r"U_{\max}": highest,
+        "T": T,
+        r"\Delta f_{\max}": highest * p / T / (2 * np.pi),
+    }
+    return numbers | {"U": U, "u": u, r"\mathsf M": Operator(lambda value: value)}
+
+
+LETTERS = (run, display, western, carrier)
+SAID = {
+    latex: NOTATION
+    for latex in (
+        r"\frac1p",
+        r"\frac{\partial\ln p(x\mid y)}{\partial x}\Big|_{\lambda}",
+        r"\mathsf D[u]_\text{carrier}",
+        r"\frac{d\,\mathsf M[u]}{d\Delta}\Big|_0",
+        r"\mathsf D[u]",
+        r"-\mathsf M\frac{\partial u}{\partial\varphi}",
+        r"\tfrac12\textstyle\sum_{k=0}^1\mathsf M[u]",
+        r"\mathsf M[u]",
+        "p_kc^T",
+    )
+}

@@ -1,0 +1,70 @@
+"""The letters of extended-kalman.md: a run of the package's extended filter, and the same filter in Western letters."""
+
+import numpy as np
+from scipy.stats import multivariate_normal
+
+from kfcourse.pages.letters import extended_run, given
+from kfcourse.pages.reader import Indexed, Of
+from kfcourse.pages.relations import DEFINITION, NOTATION
+
+
+def course(rng):
+    found = extended_run(rng)
+    x, lam, Psi = rng.normal(size=(3, 1)), found[r"\lambda"].plain, found[r"\Psi"].plain
+    y, S, D_n = found["y"].plain, found["S"].plain, found["D_n"]
+
+    def log_density(off, cov):
+        """Of a normal law, without its constant."""
+        law = multivariate_normal(cov=cov)
+        return law.logpdf(off.ravel()) - law.logpdf(np.zeros(len(off)))
+
+    def J(x):
+        return log_density(x - lam, Psi) + log_density(y - S(x), D_n)
+
+    return found | {"x": x, "J": J, "F": found["H"].plain @ Psi @ found["H"].plain.T + D_n}
+
+
+def western(rng):
+    own = extended_run(rng)
+    x, P = given(own[r"\lambda"], own["z"]), given(own[r"\Psi"], own["p"])
+    g, D_xi, H = own["g"].values, own[r"D_\xi"], own["H"].values
+    S = [slope_ @ cov @ slope_.T + own["D_n"] for slope_, cov in zip(H, own[r"\Psi"].values, strict=True)]
+    return {
+        r"\hat x": x,
+        "P": P,
+        "K": own["K"],
+        "H": own["H"],
+        "F": own[r"\Phi"],
+        "I": own["I"],
+        "R": own["D_n"],
+        "k": own["k"],
+        "Q": Of(lambda k: g[k] @ D_xi @ g[k].T, "k"),
+        "S": Indexed(S),
+        "v": own[r"\nu"],
+        "z": own["y"],
+        "f": own["f"].plain,
+        "h": own["S"].plain,
+    }
+
+
+def beams(rng):
+    """Two radars that see a body under the angles theta, each with its own variance."""
+    angles, D = rng.uniform(0, np.pi, size=3), rng.uniform(1, 2, size=3)
+    H = [np.array([[np.cos(one), np.sin(one)]]) for one in angles]
+    return {r"\theta": Indexed(angles), "H": Indexed(H), "D": Indexed(D), "i": range(1, 3)}
+
+
+LETTERS = (course, western, beams)
+SAID = {
+    r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k": DEFINITION,
+    r"y_k=S_k(x_k)+n_k": DEFINITION,
+    r"\Phi": NOTATION,
+    "H": NOTATION,
+}
+EQUALS = {
+    r"\bigl(\Psi^{-1}+H^TD_n^{-1}H\bigr)\bigl(\Psi-\Psi H^TF^{-1}H\Psi\bigr)": "I",
+    r"\bigl(\Psi-\Psi H^TF^{-1}H\Psi\bigr)H^TD_n^{-1}": r"\Psi H^TF^{-1}",
+    "p_k": r"\Psi_k-K_kH_k\Psi_k",
+    "K_k": r"p_kH_k^TD_n^{-1}",
+    r"\det\textstyle\sum_iH_i^TH_i/D_i": r"\frac{\sin^2(\theta_1-\theta_2)}{D_1D_2}",
+}

@@ -1,0 +1,142 @@
+"""The letters of lab-filters.md: three filters on an ensemble as plain programs with NumPy's fits, and a run of the package's."""
+
+import numpy as np
+
+from kfcourse.pages.letters import BENT, K_RANGE, extended_run
+from kfcourse.pages.reader import Indexed, Of
+from kfcourse.pages.relations import DEFINITION, NOTATION
+from kfcourse.symbolic.structure import linearised
+
+STEPS, RUNS = 5, 60
+
+
+def a(x, v):
+    return 0.9 * x + 0.2 * np.sin(x) + 0.3 * v
+
+
+def b(x, w):
+    return x + 0.1 * x**2 + 0.4 * w
+
+
+def tau(z, p):
+    return 0.9 * z + 0.2 * np.sin(z) * np.exp(-p / 2)
+
+
+def Theta(z, p):
+    return (0.9 + 0.2 * np.cos(z)) ** 2 * p + 0.09
+
+
+def measure(lam, Psi):
+    """h, G, F, to the second order."""
+    G = 1 + 0.2 * lam
+    return lam + 0.1 * (lam**2 + Psi), G, G**2 * Psi + 0.02 * Psi**2 + 0.16
+
+
+def ensemble(rng):
+    x = [rng.normal(size=RUNS)]
+    for _ in range(STEPS):
+        x.append(a(x[-1], rng.normal(size=RUNS)))
+    return x, [b(one, rng.normal(size=RUNS)) for one in x]
+
+
+def fitted(target, regressor):
+    """Slope, offset and the variance left, by NumPy's polynomial fit."""
+    slope, offset = np.polyfit(regressor, target, 1)
+    return slope, offset, np.var(target - slope * regressor - offset)
+
+
+def covariance(one, other=None):
+    return np.cov(one, one if other is None else other, bias=True)[0, 1]
+
+
+def collected(rows, **more):
+    names = list(rows[0])
+    return {name: Indexed([row[name] for row in rows]) for name in names} | {"k": range(1, STEPS - 1)} | more
+
+
+def two_step(rng):
+    """Pugachev's filter."""
+    x, y = ensemble(rng)
+    lam, rows = np.zeros(RUNS), []
+    for k in range(STEPS):
+        omega = y[k] - b(lam, 0)
+        H, e, _ = fitted(x[k] - lam, omega)
+        z = lam + np.polyval([H, e], omega)
+        alpha = a(z, 0)
+        F, g, _ = fitted(x[k + 1], alpha)
+        rows.append({r"\lambda": lam, r"\omega": omega, "H": H, "e": e, "z": z, r"\alpha": alpha, "F": F, "g": g, "y": y[k]})
+        lam = np.polyval([F, g], alpha)
+    return collected(rows, a=a, b=b, m_v=0.0, m_w=0.0)
+
+
+def optimal_structure(rng):
+    """Rudenko's filter, modified: what does without the second fits is the other one."""
+    x, y = ensemble(rng)
+    lam, Psi, rows = np.zeros(RUNS), np.ones(RUNS), []
+    for k in range(STEPS):
+        h, G, F = measure(lam, Psi)
+        sigma = Psi * G / F * (y[k] - h)
+        H, e, _ = fitted(x[k] - lam, sigma)
+        z = lam + np.polyval([H, e], sigma)
+        Gamma, chi, T = fitted(x[k], z)
+        u = np.polyval([Gamma, chi], z)
+        s = tau(u, T)
+        L, n, _ = fitted(x[k + 1], s)
+        row = {r"\lambda": lam, r"\Psi": Psi, r"\sigma": sigma, "H": H, "e": e, "z": z, "u": u, "T": T, "y": y[k], "x": x[k]}
+        rows.append(
+            row
+            | {r"\Gamma": Gamma, r"\chi": chi, "s": tau(rows[-1]["u"], rows[-1]["T"]) if rows else s, "hGFLn": (h, G, F, L, n)}
+        )
+        lam, Psi = np.polyval([L, n], s), Theta(u, T)
+    parts = {
+        name: Of(lambda k, place=place: rows[k]["hGFLn"][place], "k") for place, name in enumerate(("h", "G", "F", "L", "n"))
+    }
+    return collected(rows, tau=None) | parts | {r"\tau": tau, r"\Theta": Theta, r"\mathrm{Cov}": covariance}
+
+
+def plain_prediction(rng):
+    """The prediction of the filter of optimal structure, without the second fit."""
+    own = optimal_structure(rng)
+    u, T = own["u"].values, own["T"].values
+    ahead = [tau(*one) for one in zip(u, T, strict=True)]
+    return {"u": own["u"], "T": own["T"], r"\tau": tau, r"\lambda": Indexed([ahead[0], *ahead]), "k": own["k"]}
+
+
+def optimal(rng):
+    """The package's filter with several components."""
+    own = extended_run(rng, BENT)
+    H, lam, S, structure = own["H"].values, own[r"\lambda"].values, own["S"].plain, linearised(BENT)
+    F = [one @ Psi @ one.T + own["D_n"] for one, Psi in zip(H, own[r"\Psi"].values, strict=True)]
+
+    def moved(z, p):
+        law = structure.predict(z.T, p[None])
+        return law[0].T, law[1].reshape(p.shape)
+
+    functions = {r"\tau": lambda z, p: moved(z, p)[0], r"\Theta": lambda z, p: moved(z, p)[1]}
+    at_k = {"G": Of(lambda k: H[k], "k"), "F": Of(lambda k: F[k], "k"), "h": Of(lambda k: S(lam[k]), "k")}
+    return {name: own[name] for name in (r"\lambda", r"\Psi", "K", "z", "p", "y")} | functions | at_k | {"k": K_RANGE}
+
+
+def western(rng):
+    own = extended_run(rng, BENT)
+    H, Psi, K, lam = (own[name].plain for name in ("H", r"\Psi", "K", r"\lambda"))
+    S = H @ Psi @ H.T + own["D_n"]
+    names = {"P^-": Psi, "P": own["p"].plain, "H": H, "S": S, "F": S, "C": Psi @ H.T, "K": K, "m": own["z"].plain, "m^-": lam}
+    return names | {"y": own["y"].plain, r"\mu": own["S"].plain(lam)}
+
+
+LETTERS = (two_step, optimal_structure, plain_prediction, optimal, western)
+SAID = {
+    r"\lambda_0=m": DEFINITION,
+    r"\Psi_0=d": DEFINITION,
+    r"m^-=\mathrm E f": NOTATION,
+    r"P^-=\mathrm{Cov}f+Q": NOTATION,
+    r"e_k=\operatorname{line}(x_k-\lambda_k\mid\omega_k)": DEFINITION,
+    r"g_k=\operatorname{line}(x_{k+1}\mid\alpha_k)": DEFINITION,
+    r"T_k=\operatorname{line}(x_k\mid z_k)": DEFINITION,
+    r"e_k=\operatorname{line}(x_k-\lambda_k\mid\sigma_k)": DEFINITION,
+    r"n=\operatorname{line}(x_{k+1}\mid s_{k+1})": DEFINITION,
+    r"\mathsf{D}\sigma": NOTATION,
+    r"\bar{\sigma}": NOTATION,
+    r"\Psi G^T": NOTATION,
+}

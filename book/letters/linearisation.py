@@ -1,0 +1,62 @@
+"""The letters of linearisation.md: a run of the package's extended filter of a scalar model, in both notations."""
+
+import numpy as np
+
+from kfcourse.pages.letters import BENT_SCALAR, column, extended_run, slope
+from kfcourse.pages.reader import Indexed, Of
+from kfcourse.pages.relations import DEFINITION
+
+
+class AtEstimate(np.ndarray):
+    """g at the estimate, with and without its argument."""
+
+    def __call__(self, z):
+        return np.asarray(self)
+
+
+def course(rng):
+    run = extended_run(rng, BENT_SCALAR)
+    H, Phi, g = (run[name].values for name in ("H", r"\Phi", "g"))
+    functions = Indexed([now.view(AtEstimate) for now in g])
+    slopes = {"S'": Of(lambda k: H[k], "k"), "f'": Of(lambda k: Phi[k], "k")}
+    slopes |= {"S_k'": lambda at: slope(run["S"].plain, at), "f_k'": lambda at: slope(run["f"].plain, at)}
+    slopes |= {"m_0": column(BENT_SCALAR.prior.mean), "D_0": BENT_SCALAR.prior.cov}
+    return run | slopes | {"g": functions}
+
+
+def western(rng):
+    run = extended_run(rng, BENT_SCALAR)
+    H, Phi, g = (run[name].values for name in ("H", r"\Phi", "g"))
+    at_k = {
+        "H": Of(lambda k: H[k], "k"),
+        r"\partial h/\partial x": Of(lambda k: H[k], "k"),
+        "F": Of(lambda k: Phi[k], "k"),
+        r"\partial f/\partial x": Of(lambda k: Phi[k], "k"),
+        "Q": Of(lambda k: g[k] ** 2 * run[r"D_\xi"], "k"),
+        "g": Of(lambda k: g[k], "k"),
+    }
+    same = {
+        "K": run["K"],
+        "y": run["y"],
+        "m^-": run[r"\lambda"],
+        "m": run["z"],
+        "P^-": run[r"\Psi"],
+        "P": run["p"],
+        "R": run["D_n"],
+    }
+    return (
+        at_k
+        | same
+        | {"h": run["S"].plain, "f": run["f"].plain, "I": run["I"], "k": run["k"]}
+        | {n: run[n] for n in (r"D_\xi", "D_n")}
+    )
+
+
+LETTERS = (course, western)
+SAID = {
+    r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k": DEFINITION,
+    r"y_k=S_k(x_k)+n_k": DEFINITION,
+    r"\ln p(x_{k-1}\mid y_{0:k-1})": DEFINITION,
+    r"\ln p(x_k\mid x_{k-1})": DEFINITION,
+    r"\ln p(y_k\mid x_k)": DEFINITION,
+}

@@ -1,0 +1,84 @@
+"""The letters of stratonovich.md: a linear model whose densities are all known, and a chain as a plain program."""
+
+import numpy as np
+
+from kfcourse.pages.letters import chain_run
+from kfcourse.pages.reader import Of, bell
+from kfcourse.pages.relations import DEFINITION, NOTATION
+
+
+def densities(rng):
+    """One step of a linear model: the posterior by Kalman's formulas, the law of y by its variance."""
+    a, Q, H, R, z, p, y = 0.8, 0.5, 1.3, 0.4, *rng.normal(size=1), 0.6, *rng.normal(size=1)
+    ahead, spread = a * z, a**2 * p + Q
+    F = H**2 * spread + R
+    K = spread * H / F
+
+    def posterior(x):
+        return bell(x, ahead + K * (y - H * ahead), spread - K * H * spread)
+
+    def start(x):
+        return bell(x, z, p)
+
+    F_0 = H**2 * p + R
+    return {
+        "x_k": rng.normal(),
+        "x_{k-1}": rng.normal(),
+        "x_0": rng.normal(),
+        "C_k": 1 / bell(y, H * ahead, F),
+        "C_0": 1 / bell(y, H * z, F_0),
+        r"p(x_k\mid x_{k-1})": Of(lambda to, at: bell(to, a * at, Q), "x_k", "x_{k-1}"),
+        r"p(x_k\mid x_{k-1},y_{0:k-1})": Of(lambda to, at: bell(to, a * at, Q), "x_k", "x_{k-1}"),
+        r"p(x_{k-1}\mid y_{0:k-1})": Of(start, "x_{k-1}"),
+        r"p(x_k\mid y_{0:k-1})": Of(lambda x: bell(x, ahead, spread), "x_k"),
+        r"p(y_k\mid x_k)": Of(lambda x: bell(y, H * x, R), "x_k"),
+        r"p(x_k\mid y_{0:k})": Of(posterior, "x_k"),
+        r"p(y_k\mid y_{0:k-1})": bell(y, H * ahead, F),
+        "p(x_0)": Of(start, "x_0"),
+        r"p(y_0\mid x_0)": Of(lambda x: bell(y, H * x, R), "x_0"),
+        r"p(x_0\mid y_0)": Of(lambda x: bell(x, z + p * H / F_0 * (y - H * z), p * R / F_0), "x_0"),
+    }
+
+
+def joint(rng):
+    """The density of three states and measurements, from the covariance of all six."""
+    a, Q, H, R = 0.8, 0.5, 1.3, 0.4
+    xi = np.diag([1.0, Q, Q, R, R, R])
+    states = np.array([[1, 0, 0], [a, 1, 0], [a**2, a, 1]])
+    made = np.block([[states, np.zeros((3, 3))], [H * states, np.eye(3)]])
+    x, y = rng.normal(size=(2, 3))
+    whole = bell(np.concatenate([x, y])[:, None], np.zeros((6, 1)), made @ xi @ made.T)
+    return {
+        "k": 2,
+        "p(x_{0:k},y_{0:k})": whole,
+        "p(x_0)": bell(x[0], 0, 1.0),
+        r"p(y_0\mid x_0)": bell(y[0], H * x[0], R),
+        r"p(x_i\mid x_{i-1})": Of(lambda i: bell(x[i], a * x[i - 1], Q), "i"),
+        r"p(y_i\mid x_i)": Of(lambda i: bell(y[i], H * x[i], R), "i"),
+    }
+
+
+def chain(rng):
+    nodes = np.array([0.0, 1.0, 3.0])
+    P = rng.dirichlet(np.ones(3), size=3)
+
+    def seen(y, x):
+        return bell(y, x, 0.7)
+
+    run = chain_run(rng, nodes, P, rng.dirichlet(np.ones(3)), seen)
+    y, at = run["y"].values, run["x"].values
+    return run | {
+        r"p(y_k\mid j)": Of(lambda k, j: seen(y[k], at[j]), "k", "j"),
+        r"p(y_k\mid x_j)": Of(lambda k, j: seen(y[k], at[j]), "k", "j"),
+    }
+
+
+LETTERS = (densities, joint, chain)
+SAID = {
+    r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k": DEFINITION,
+    r"y_k=S_k(x_k)+n_k": DEFINITION,
+    r"x_0\sim\mathcal N(m_0,D_0)": DEFINITION,
+    r"P_{ij}=p(x_k=x_j\mid x_{k-1}=x_i)": DEFINITION,
+    r"Z_k=p(y_k\mid y_{1:k-1})": NOTATION,
+    r"\prod_kC_k^{-1}": NOTATION,
+}

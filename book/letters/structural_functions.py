@@ -1,0 +1,97 @@
+"""The letters of structural-functions.md: the structures of the package, and means by quadrature."""
+
+import numpy as np
+
+from kfcourse import Model, gaussian, linearised
+from kfcourse.pages.letters import normal_nodes
+from kfcourse.pages.reader import Indexed, Operator
+from kfcourse.pages.relations import DEFINITION, NOTATION
+
+MODEL = Model.define("c*x + 0.2*x**2 + e*x*v + 0.1*v", "g*x + f*x**2*w + 0.3*w", dict(c=0.9, e=0.5, g=1.2, f=0.4))
+
+
+def a(x, v):
+    return 0.9 * x + 0.2 * x**2 + 0.5 * x * v + 0.1 * v
+
+
+def b(x, w):
+    return 1.2 * x + 0.4 * x**2 * w + 0.3 * w
+
+
+def of_package(structure, z, p):
+    """The five functions at one law."""
+    at = structure.measure(np.full((1, 1), z), np.full((1, 1, 1), p))
+    moved = structure.predict(np.full((1, 1), z), np.full((1, 1, 1), p))
+    names = (r"\tau", r"\Theta", "h", "G", "F")
+    return dict(zip(names, (one.item() for one in (*moved, at.h, at.G, at.F)), strict=True))
+
+
+def by_tangents(rng):
+    z, p = rng.uniform(0.2, 0.9, size=2)
+    slopes = {r"\frac{\partial a}{\partial x}": 0.9 + 0.4 * z, r"\frac{\partial a}{\partial v}": 0.5 * z + 0.1}
+    return of_package(linearised(MODEL), z, p) | slopes | {"a": a, "z": z, "m_v": 0.0, "p": p, "D_v": 1.0}
+
+
+def over_noise(rng):
+    """Means over the noise at one x; the noise is standard."""
+    x = rng.normal()
+    noise, mean = normal_nodes(0, 1)
+    functions = {
+        r"\alpha": lambda x: 0.9 * x + 0.2 * x**2,
+        r"\gamma": lambda x: (0.9 * x + 0.2 * x**2) ** 2 + (0.5 * x + 0.1) ** 2,
+        r"\beta": lambda x: 1.2 * x,
+        r"\eta": lambda x: 1.44 * x**2 + (0.4 * x**2 + 0.3) ** 2,
+    }
+    return functions | {"x": x, "V": noise, "W": noise, "a": a, "b": b, r"\mathsf M": Operator(mean)}
+
+
+def in_short(rng):
+    """The same without arguments."""
+    own = over_noise(rng)
+    x, noise = own["x"], own["V"]
+    values = {name: own[name](x) for name in (r"\alpha", r"\beta", r"\gamma", r"\eta")}
+    return values | {"a": a(x, noise), "b": b(x, noise), r"\mathsf M": own[r"\mathsf M"]}
+
+
+def over_state(rng):
+    """Means over the state, and the package's exact structure; G by a difference of means."""
+    m, d = rng.uniform(0.2, 0.9, size=2)
+    x, mean = normal_nodes(m, d)
+    functions = over_noise(rng)
+    values = {name: functions[name](x) for name in (r"\alpha", r"\beta", r"\gamma", r"\eta")}
+    G = mean(values[r"\beta"] * (x - m)) / d
+    western = {"C": mean(values[r"\beta"] * (x - m)), "d": d}
+    slope = {r"\frac{\partial h}{\partial m}": G, r"\partial h/\partial m": G}
+    return of_package(gaussian(MODEL), m, d) | values | slope | western | {r"\mathsf M": Operator(mean)}
+
+
+def moments(rng):
+    m, d = rng.uniform(0.2, 0.9, size=2)
+    x, mean = normal_nodes(m, d)
+    return {"q": Indexed([mean(x**n) for n in range(8)]), "n": range(1, 6), "m": m, "d": d}
+
+
+def variant(rng):
+    """Variant 53 in both structures."""
+    e, f, g, p = *rng.uniform(0.3, 0.6, size=3), rng.uniform(0.3, 0.6)
+    z = rng.normal()
+    own = Model.define("0.9*x + e*x*v", "g*x + f*x**2*w", dict(e=e, f=f, g=g))
+    both = {"Gaussian": of_package(gaussian(own), z, p), "linearised": of_package(linearised(own), z, p)}
+    values = {
+        rf"{name}_\text{{{way}}}": found[key] for way, found in both.items() for name, key in ((r"\Theta", r"\Theta"), ("F", "F"))
+    }
+    return values | {"e": e, "f": f, "p": p, "d": p, "m": z}
+
+
+LETTERS = (by_tangents, over_noise, in_short, over_state, moments, variant)
+SAID = {
+    r"x_{k+1}=a(x_k,v_k)": DEFINITION,
+    r"y_k=b(x_k,w_k)": DEFINITION,
+    r"x\sim\mathcal N(z,p)": DEFINITION,
+    r"x\sim\mathcal N(m,d)": DEFINITION,
+    r"\mathsf M(x_{k+1}-\tau)^3": NOTATION,
+}
+EQUALS = {
+    r"\Theta_\text{Gaussian}-\Theta_\text{linearised}": "e^2p",
+    r"F_\text{Gaussian}-F_\text{linearised}": "3df^2(2m^2+d)",
+}

@@ -1,0 +1,52 @@
+"""The letters of when-linearisation-fails.md: a signal that is a parabola, its moments by quadrature."""
+
+import numpy as np
+
+from kfcourse.pages.letters import normal_nodes
+from kfcourse.pages.relations import CONDITION
+
+
+def course(rng):
+    """A bent signal; kappa from the error that the linearised correction really has."""
+    lam, Psi, D_n = rng.normal(), rng.uniform(0.2, 0.5), rng.uniform(0.3, 0.6)
+    first, second = -rng.uniform(1, 2), rng.uniform(0.2, 0.5)
+    x, mean = normal_nodes(lam, Psi)
+
+    def S(at):
+        return 1 + first * (at - lam) + second * (at - lam) ** 2 / 2
+
+    F = first**2 * Psi + D_n
+    K, p = Psi * first / F, Psi * D_n / F
+    excess = (mean((x - lam - K * (S(x) - S(lam))) ** 2) + K**2 * D_n) / p - 1
+    exact = mean(S(x) ** 2) - mean(S(x)) ** 2
+    c = np.sqrt(2 * (exact - first**2 * Psi) / D_n)
+    s = np.sqrt((F - D_n) / D_n)
+    derivatives = {"S'": first, "S''": second, "S": S(lam), "h": mean(S(x)), "F": exact + D_n, "G": mean((x - lam) * S(x)) / Psi}
+    return derivatives | {
+        r"\Psi": Psi,
+        "D_n": D_n,
+        "s": s,
+        "c": c,
+        r"\nu": np.sqrt(c**2 / s**2),
+        r"\kappa": np.sqrt(4 * excess / 3),
+    }
+
+
+def display(rng):
+    """Near the prediction the parabola in t."""
+    own = course(rng)
+    t = rng.normal()
+    first, second, Psi = abs(own["S'"]), own["S''"], own[r"\Psi"]
+    bend = 0.01 * np.sqrt(Psi) ** 3 * t**3  # what the series leaves out
+    ahead = first * np.sqrt(Psi) * t + second * Psi * t**2 / 2 + bend
+    return own | {"S(x)": own["S"] + ahead, r"S(\lambda)": own["S"], "t": t}
+
+
+def western(rng):
+    own = course(rng)
+    names = {r"\Psi": "P^-", "D_n": "R", "S'": "h'", "S''": "h''"}
+    return {names.get(name, name): value for name, value in own.items()}
+
+
+LETTERS = (course, display, western)
+SAID = {r"\nu\ll1": CONDITION, r"\frac34\kappa^2\ll1": CONDITION, r"S'\approx0": CONDITION}

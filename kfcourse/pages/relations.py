@@ -1,0 +1,214 @@
+r"""What each displayed relation of a page is: computed from the page's letters, a definition, quoted, or stated without proof.
+
+A page `my-chapter.md` that types relations in `$$` or in a box has a file `letters/my_chapter.py` beside it:
+
+    def course(rng): return {"p": Indexed(...), ...}     numbers for the letters, from the package or from a plain program
+    LETTERS = (course, western)                          a relation must hold in one of them, with all its letters
+    SAID = {r"x_0\sim\mathcal N(m_0,D_0)": DEFINITION,   what cannot be computed, letter by letter, and what it is
+            "eq-my-model": DEFINITION}                   by its label: computed all the same, but shown under this name
+    EQUALS = {r"\det M": r"ad-bc"}                       a string in a cell, and what the checked sides beside it say
+    LITERALS = ("1960",)                                 numbers in `claim` texts behind which no expression stands, and need not
+
+So a changed letter stops the build: what is computed no longer holds, or what was said is no longer there.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kfcourse.pages.reader import Unread, holds, is_relation, normal, pieces
+from kfcourse.pages.verification import Unverified
+
+COMPUTED = "both sides computed"
+DEFINITION = "definition"
+STATED = "stated without proof"
+NOTATION = "notation"
+CONDITION = "condition"
+_SEEDS = (53, 54)  # what holds for two draws of the numbers is no accident
+_CELL = re.compile(r"^(`{3,})\{code-cell\}[^\n]*\n(.*?)^\1\s*$", re.DOTALL | re.MULTILINE)
+_BOX = re.compile(
+    r"^(`{3,})\{admonition\} ([^\n]*)\n:class:[^\n]*\b(?:algorithm|definition)\b(.*?)^\1\s*$", re.DOTALL | re.MULTILINE
+)
+_DISPLAY = re.compile(r"^(?:\$\$|```\{math\})\n(.*?)\n(?:\$\$|```)(?: \(([\w-]+)\))?\s*$", re.DOTALL | re.MULTILINE)
+_INLINE = re.compile(r"(?<![\\$])\$([^$]+)\$(?!\$)")
+_OPERATOR = re.compile(r"(?:^|\s)([+/]|-|\\frac|\\sqrt|\^ (?:T|\d|\{ - 1 \}))(?=\s|$)")
+_SCRIPT = re.compile(r"[_^] (?:\{[^{}]*\}|[-+]|\S+)")
+
+
+class Formula(NamedTuple):
+    """A formula as a page types it: a "display", in a "box", or in a cell a "side" or "name" that is printed, not checked."""
+
+    kind: str
+    latex: str
+    label: str = ""
+
+
+class Said(NamedTuple):
+    """A piece of a formula, and what it is."""
+
+    piece: str
+    what: str
+    computed: bool
+
+
+def quoted(source: str) -> str:
+    """The word for a relation taken over from a source."""
+    return f"quoted from {source}"
+
+
+class Letters:
+    """The letters of a page with their numbers, and what its other relations are."""
+
+    def __init__(
+        self,
+        worlds: Sequence[Callable[[np.random.Generator], Mapping[str, Any]]] = (),
+        said: Mapping[str, str] = MappingProxyType({}),
+        equals: Mapping[str, str] = MappingProxyType({}),
+        literals: Sequence[str] = (),
+    ) -> None:
+        self.worlds = [[world(np.random.default_rng(seed)) for seed in _SEEDS] for world in worlds]
+        self.said = {normal(text): what for text, what in said.items()}
+        self.equals = {normal(text): f"{normal(text)} = {normal(other)}" for text, other in equals.items()}
+        self.literals = literals
+        self.labels = {text: what for text, what in said.items() if text.startswith("eq-")}
+        self.indices = {key for (first, *_) in self.worlds for key, value in first.items() if isinstance(value, range)}
+
+    @property
+    def listed(self) -> list[str]:
+        """What a page must have, as its file speaks of it."""
+        return [*(text for text in self.said if text not in map(normal, self.labels)), *self.labels, *self.equals.values()]
+
+    def judge(self, formula: Formula) -> list[Said]:
+        """What each relation of a formula is.
+
+        Raises
+        ------
+        Unverified
+            If one does not hold, or nothing says what it is.
+        """
+        whole = normal(formula.latex)
+        if whole in self.said:
+            return [Said(whole, self.said[whole], False)]
+        if whole in self.equals:
+            return [self._judged(self.equals[whole], formula)]
+        if formula.kind in ("side", "name"):
+            raise Unverified(
+                _unsaid(formula.latex, "it is printed beside a checked equation, and nothing holds it; EQUALS or SAID may")
+            )
+        return [self._judged(piece, formula) for piece in pieces(formula.latex) if self.speaks(piece)]
+
+    def speaks(self, piece: str) -> bool:
+        """Is there anything in it that can be wrong?  Not in a list of letters, nor where an index begins."""
+        if is_relation(piece):
+            left, _, right = piece.partition(" = ")
+            return not (left in self.indices and re.fullmatch(r"[\d\w]( [\d\w])*|\\dots", right))
+        letters = _without_scripts(piece)
+        return bool(_OPERATOR.search(f" {letters}")) and len(re.sub(r"\^ (?:\{[^{}]*\}|\S+)", "", letters).split()) > 1
+
+    def _judged(self, piece: str, formula: Formula) -> Said:
+        if piece in self.said:
+            return Said(piece, self.said[piece], False)
+        if not is_relation(piece):
+            raise Unverified(_unsaid(piece, "an expression that is no relation"))
+        reasons: list[Exception] = []
+        for world in self.worlds:
+            try:
+                for letters in world:
+                    holds(piece, letters)
+                return Said(piece, self.labels.get(formula.label, COMPUTED), True)
+            except (Unread, Unverified) as reason:
+                reasons.append(reason)
+        false = [reason for reason in reasons if isinstance(reason, Unverified)]
+        raise Unverified(str(false[0]) if false else _unsaid(piece, "; ".join(map(str, reasons)) or "the page has no letters"))
+
+
+def _unsaid(latex: str, why: str) -> str:
+    to_do = "give its letters numbers in LETTERS of the page's file in letters/, or list it in SAID"
+    return f"nothing says what this is: {latex}\n  {why}\n  {to_do}"
+
+
+def _without_scripts(piece: str) -> str:
+    """A piece without its indices; powers, transposes and inverses stay."""
+    return re.sub(r"_ (?:\{[^{}]*\}|\S+)|\^ [-+*]", "", piece)
+
+
+def letters_file(page: Path) -> Path:
+    """Where a page has its letters."""
+    return page.parent / "letters" / f"{page.stem.replace('-', '_')}.py"
+
+
+@cache
+def letters_of(page: Path) -> Letters:
+    """The letters of a page, from the folder `letters` beside it; none if it has no file there."""
+    path = letters_file(page)
+    if not path.exists():
+        return Letters()
+    spec = spec_from_file_location(f"letters.{path.stem}", path)
+    assert spec and spec.loader
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return Letters(
+        getattr(module, "LETTERS", ()),
+        getattr(module, "SAID", {}),
+        getattr(module, "EQUALS", {}),
+        getattr(module, "LITERALS", ()),
+    )
+
+
+def formulas(text: str) -> Iterator[Formula]:
+    """The formulas of a page that no expression of SymPy prints: displays, boxes, strings in `verified` and `typeset`."""
+    prose = _CELL.sub("", text)
+    for latex, label in _DISPLAY.findall(prose):
+        yield Formula("display", latex, label)
+    for *_, body in _BOX.findall(prose):
+        yield from (Formula("box", latex) for latex in _INLINE.findall(_DISPLAY.sub("", body)))
+    for code in cells(text):
+        yield from _printed(code)
+
+
+def cells(text: str) -> Iterator[str]:
+    """The Python of each cell of a page, without the options above it."""
+    for _, cell in _CELL.findall(text):
+        yield re.sub(r"\A(?:---\n.*?\n---\n|(?::[^\n]*\n)+\n?)", "", cell, flags=re.DOTALL)
+
+
+def calls(code: str, *names: str) -> Iterator[ast.Call]:
+    """The calls of these functions in a piece of Python."""
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", getattr(node.func, "attr", "")) in names:
+            yield node
+
+
+def _printed(code: str) -> Iterator[Formula]:
+    for call in calls(code, "verified", "typeset"):
+        for sides in (argument for argument in call.args if isinstance(argument, ast.Tuple)):
+            yield from (Formula("side", text) for text in _texts(sides.elts))
+        for keyword in call.keywords:
+            if keyword.arg == "names" and isinstance(keyword.value, ast.Dict):
+                yield from (Formula("name", text) for text in _texts(keyword.value.values))
+
+
+def _texts(nodes: Iterable[ast.expr]) -> list[str]:
+    return [one.value for one in nodes if isinstance(one, ast.Constant) and isinstance(one.value, str)]
+
+
+def judged(page: Path, text: str | None = None) -> Iterator[tuple[Formula, list[Said]]]:
+    """The formulas of a page, each with what its relations are; another text may take the place of the page's."""
+    letters = letters_of(page)
+    for formula in formulas(page.read_text(encoding="utf-8") if text is None else text):
+        yield formula, letters.judge(formula)
+
+
+def mark(said: Sequence[Said]) -> str:
+    """The words under a display: what its relations are, each once."""
+    computed = "✓ " if said and all(one.computed for one in said) else ""
+    return computed + "; ".join(dict.fromkeys(one.what for one in said))

@@ -1,0 +1,78 @@
+r"""Numbers and words in the sentences that `claim` and `agree` print, read from the code of a page.
+
+A number that is typed must also stand in the code of its cell outside of the sentence, as it is or as a tolerance (12 digits and
+1e-12, 95 % and 0.95, 10^{-6} and 1e-6); others come from values, `f"{x:.2f}"`.  What is left (years, names, units) the page's
+file in letters/ lists in LITERALS.  A sentence that compares needs a condition that compares.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from kfcourse.pages.relations import calls, cells
+
+COMPARING = re.compile(
+    r"\b(larger|smaller|more|less|most|least|none|never|always|all|every|each|no|worse|better|best|worst|above|below|lower|higher|"
+    r"narrower|wider|only|falls?|grows?|rises?|faster|slower|sooner|later|leads|first|last|same|agree|equal)\b"
+)
+_NUMBER = re.compile(r"(?<![\w.^_{\\])(\d+(?:[ \u00a0]\d{3})*(?:\.\d+)?)")
+_POWER = re.compile(r"10\^(?:\{(-?\d+)\}|(\d))")
+_FORMULA = re.compile(r"\$([^$]*)\$")
+_VALUE = re.compile(r"(?:=|<|>|\\l?eq?|\\ge?|\\approx|^)\s*(-?[\d.]+)\s*$")
+
+
+class Sentence(NamedTuple):
+    """What a call prints, with the numbers that it types and no code of its cell knows, and whether a condition compares."""
+
+    text: str
+    unknown: list[str]
+    compares: bool
+
+
+def spoken(page: str) -> Iterator[Sentence]:
+    """The sentences of all `claim` and `agree` of a page."""
+    for code in cells(page):
+        for call in calls(code, "claim", "agree"):
+            typed = list(_typed(call.args[0]))
+            known = _constants(ast.parse(code), {id(one) for one in ast.walk(call.args[0])})
+            unknown = [number for text in typed for number in _numbers(text) if not _stands(number, known)]
+            yield Sentence(
+                "…".join(typed), unknown, getattr(call.func, "id", "") == "agree" or any(map(_compares, call.args[1:]))
+            )
+
+
+def _typed(sentence: ast.expr) -> Iterator[str]:
+    """The text of a sentence without what is put in."""
+    values = {id(one) for node in ast.walk(sentence) if isinstance(node, ast.FormattedValue) for one in ast.walk(node)}
+    for node in ast.walk(sentence):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in values:
+            yield node.value
+
+
+def _numbers(text: str) -> Iterator[str]:
+    for formula in _FORMULA.findall(text):
+        for power in _POWER.findall(formula):
+            yield f"1e{''.join(power)}"
+        yield from (value[1] for part in re.split(r"[,;]|\\ ", formula) if (value := _VALUE.search(part)))
+    for number in _NUMBER.findall(_FORMULA.sub(" ", text)):
+        yield re.sub(r"[ \u00a0]", "", number)
+
+
+def _constants(tree: ast.AST, without: set[int]) -> set[float]:
+    found = {float(one.value) for one in ast.walk(tree)
+             if isinstance(one, ast.Constant) and isinstance(one.value, int | float) and id(one) not in without}  # fmt: skip
+    return found | {-one for one in found}
+
+
+def _stands(number: str, known: set[float]) -> bool:
+    value = float(number)
+    also = (value, value / 100, value / 1000, 1 - value / 100, 10.0**-value if value < 300 else value)
+    return any(abs(one - other) <= 1e-9 * abs(one) for one in also for other in known if one) or value in known
+
+
+def _compares(condition: ast.expr) -> bool:
+    """Is there a comparison in it, a call, or a name that holds one?"""
+    return any(isinstance(one, ast.Compare | ast.Call | ast.Name | ast.Attribute) for one in ast.walk(condition))

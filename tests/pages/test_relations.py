@@ -1,0 +1,97 @@
+"""Every relation that a page types says what it is; numbers in its sentences come from values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kfcourse.pages.relations import COMPUTED, DEFINITION, Formula, Letters, formulas, judged, letters_of
+from kfcourse.pages.sentences import COMPARING, spoken
+from kfcourse.pages.verification import Unverified
+
+pytestmark = pytest.mark.quick
+BOOK = Path(__file__).resolve().parents[2] / "book"
+PAGES = sorted(BOOK.glob("*.md"))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_each_typed_relation_says_what_it_is(page: Path):
+    for formula, said in judged(page):
+        assert said or formula.kind in ("box", "display")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_what_a_page_says_of_its_relations_is_about_relations_that_it_has(page: Path):
+    if letters_of(page).listed == []:
+        return
+    said = {one.piece for formula, pieces in judged(page) for one in pieces} | {
+        formula.label for formula in formulas(page.read_text())
+    }
+    assert [text for text in letters_of(page).listed if text not in said] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_numbers_in_sentences_come_from_values_and_words_stand_beside_conditions(page: Path):
+    for sentence in spoken(page.read_text(encoding="utf-8")):
+        unknown = [number for number in sentence.unknown if number not in letters_of(page).literals]
+        assert unknown == [], f"no expression stands behind {unknown}: {sentence.text}"
+        assert sentence.compares or not COMPARING.search(sentence.text), f"no condition compares: {sentence.text}"
+
+
+def letters(rng: np.random.Generator) -> dict[str, float]:
+    a = rng.normal()
+    return {"a": a, "b": 2 * a}
+
+
+def test_what_is_displayed_is_computed_or_listed():
+    page = Letters((letters,), {r"x\sim\mathcal N(0,1)": DEFINITION, "eq-b": DEFINITION}, {r"\det b": "2a"})
+    assert page.judge(Formula("display", r"b=2a,\qquad x\sim\mathcal N(0,1)"))[1].what == DEFINITION
+    assert page.judge(Formula("display", "b=2a"))[0].what == COMPUTED
+    assert page.judge(Formula("display", "b=2a", "eq-b"))[0] == ("b = 2 a", DEFINITION, True)
+    wrong = {
+        "display": ["b=3a", "c=a", r"x\sim\mathcal N(0,2)"],
+        "box": ["b=-2a", "b+a"],
+        "side": [r"\det a"],
+        "name": ["b^2"],
+    }
+    for kind, one in ((kind, one) for kind, ones in wrong.items() for one in ones):
+        with pytest.raises(Unverified):
+            page.judge(Formula(kind, one))
+
+
+def test_displays_boxes_and_strings_are_found():
+    page = """
+Text with $a=b$.
+
+$$
+a=b
+$$ (eq-a)
+
+```{admonition} Steps
+:class: algorithm
+
+1. $c=d$ and
+
+$$
+e=f
+$$
+```
+
+```{code-cell} python
+:tags: [hide-input]
+verified((r"\\det A", x, y), names={x: "G^2"}, label="eq-b")
+```
+"""
+    assert [tuple(one) for one in formulas(page)] == [
+        ("display", "a=b", "eq-a"), ("display", "e=f", ""), ("box", "c=d", ""), ("side", r"\det A", ""), ("name", "G^2", ""),
+    ]  # fmt: skip
+
+
+def test_a_number_without_an_expression_is_found():
+    cell = '```{code-cell} python\nclaim(f"To 12 digits 7 of {n:.3f} are larger at $k=2$.", abs(x[2] - y) < 1e-12)\n```\n'
+    (sentence,) = spoken(cell)
+    assert sentence.unknown == ["7"] and sentence.compares
+    (empty,) = spoken('```{code-cell} python\nclaim("It is larger.", True)\n```\n')
+    assert not empty.compares
