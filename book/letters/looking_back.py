@@ -40,4 +40,10 @@ def course(rng):
 
 
 LETTERS = (course,)
-SAID = {r"\bar z=z": NOTATION, r"\bar p=p": NOTATION}
+SAID = {
+    r"\bar z=z": NOTATION,
+    r"\bar p=p": NOTATION,
+    r"\frac{\partial\mathcal N(x;z,p)}{\partial z}": NOTATION,
+    r"\mathcal N(x;z,p)": NOTATION,
+    r"\Delta t": NOTATION,
+}
