@@ -29,7 +29,7 @@ STEP = 1e-3  # of the differences that stand for derivatives, in the coordinates
 FLAT = 0.01  # information that is none: the likelihood of an e times larger variance differs by half of this
 
 
-class Estimate(NamedTuple):
+class Likeliest(NamedTuple):
     """Parameters of the largest likelihood.
 
     Attributes
@@ -62,7 +62,7 @@ def estimate(
     unknown: Sequence[str],
     positive: Sequence[str] = (),
     build: Callable[[Model], Filter] = _normal_filter,
-) -> Estimate:
+) -> Likeliest:
     """Parameters of a model from measurements, by maximum likelihood.
 
     Parameters
@@ -80,7 +80,7 @@ def estimate(
 
     Returns
     -------
-    Estimate
+    Likeliest
         The nearest maximum uphill; start elsewhere to see whether there is another.
 
     Raises
@@ -131,7 +131,7 @@ def estimate(
     covariance, flat = _inverse(information, names)
     error = np.sqrt(covariance) * np.where(logs, value, unit)
     best = model.replace(**dict(zip(names, value.tolist(), strict=True)))
-    return Estimate(names, value, error, -float(found.fun), best, flat)
+    return Likeliest(names, value, error, -float(found.fun), best, flat)
 
 
 def profile(
