@@ -25,3 +25,7 @@ def analysis(rng):
 
 LETTERS = (analysis,)
 SAID = {"K_k=0": "a setting", r"\text{mean innovation}": NOTATION}
+SAID |= dict.fromkeys(
+    (r"{\lim_{\sigma_\xi\to0}\bar p/p}",),
+    NOTATION,
+)

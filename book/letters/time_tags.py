@@ -1,7 +1,7 @@
 """The letters of time-tags.md: a foreign clock, and the package's prediction over an interval."""
 
 from kfcourse.pages.letters import column, covariance
-from kfcourse.pages.relations import DEFINITION
+from kfcourse.pages.relations import DEFINITION, NOTATION
 from kfcourse.scenarios.navigation import Clock, Dynamics
 
 
@@ -29,3 +29,11 @@ SAID = {
     r"\hat V(t)=\dot s(t-\tau)": DEFINITION,
     r"\hat b(t)=u(t)-\ddot s(t-\tau)": DEFINITION,
 }
+SAID |= dict.fromkeys(
+    (
+        r"{\hat{s}-s}",
+        r"{\hat{V}-V}",
+        r"{\hat{b}-b}",
+    ),
+    NOTATION,
+)
