@@ -1,13 +1,16 @@
-"""The page of all verified equations, made from the outputs of the executed chapters.
+"""The page of all displayed equations, each with what it is.
 
-`verified` (kfcourse.pages) leaves a record beside each equation that it prints: LaTeX, how it was verified, its label.
+`verified` and `typeset` (kfcourse.pages) leave a record beside each equation that they print: LaTeX, how it was verified or
+what it is, its label.  Equations that a chapter types are judged with the letters of the page (kfcourse.pages.relations).
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
+from kfcourse.pages.relations import judged, mark
 from kfcourse.pages.verification import VERIFIED
 
 PAGE = Path(__file__).resolve().parent / "equations.md"
@@ -15,10 +18,14 @@ HEAD = """\
 (all-equations)=
 # All equations of this book
 
-Each equation on this page was verified when the book was built. Where its chapter prints it, SymPy has shown that the two
-sides are equal, or numbers have been compared to the digits that are named. If one did not hold, there would be no book.
+Each equation says what it is. A ✓ stands beside what was verified when the book was built: SymPy has shown that the two sides
+are equal, or numbers have been compared to the digits that are named. Where the text or a box types a relation, its letters
+were given numbers, by the package or by a plain program, and *both sides computed*. If one of these did not hold, there would
+be no book. The others are definitions, quotations, and statements without proof; they stand here letter by letter, and a
+changed letter stops the build, but nothing shows that they are true.
 
-{total} equations in {chapters} chapters, and {claims} statements in words whose conditions were evaluated.
+{total} equations in {chapters} chapters were verified by SymPy, {computed} typed relations computed, {others} are said to be
+something else; {claims} statements in words had their conditions evaluated.
 """
 
 
@@ -30,16 +37,30 @@ def records(notebook) -> list[dict]:
 
 def page(chapters: Iterable[tuple[str, list[dict]]]) -> str:
     """The page in Markdown, from pairs (document, records)."""
-    found = [(document, [one for one in made if one["equations"]], made) for document, made in chapters if made]
-    parts = []
-    for document, equations, made in found:
-        if equations:
-            parts.append(f"## {_title(document)}\n\n{_count(equations, made)}: {{doc}}`{document}`\n")
-            parts += [_entry(one) for one in equations]
-    total = sum(one["equations"] for _, equations, _ in found for one in equations)
-    claims = sum(len(made) - len(equations) for _, equations, made in found)
-    chapters_with = sum(bool(equations) for _, equations, _ in found)
-    return HEAD.format(total=total, chapters=chapters_with, claims=claims) + "\n" + "\n".join(parts)
+    parts, counted = [], Counter()
+    for document, made in chapters:
+        typed = list(judged(PAGE.parent / f"{document}.md"))
+        relations = [one for formula, said in typed if formula.kind in ("display", "box") for one in said]
+        here = Counter(
+            total=sum(one.get("equations", 0) for one in made),
+            claims=sum("sentence" in one for one in made),
+            computed=sum(one.computed for one in relations),
+            others=sum(not one.computed for one in relations) + sum("how" in one and not one["equations"] for one in made),
+        )
+        counted += here + Counter(chapters=bool(here["total"]))
+        shown = [
+            _entry(one["latex"], one["label"], ("✓ " if one["equations"] else "") + one["how"]) for one in made if "how" in one
+        ]
+        shown += [
+            _entry(formula.latex, formula.label, mark(said)) for formula, said in typed if formula.kind == "display" and said
+        ]
+        if shown:
+            parts += [f"## {_title(document)}\n\n{_count(here)}: {{doc}}`{document}`\n", *shown]
+    return (
+        HEAD.format(**{name: counted[name] for name in ("total", "chapters", "computed", "others", "claims")})
+        + "\n"
+        + "\n".join(parts)
+    )
 
 
 def _title(document: str) -> str:
@@ -47,11 +68,17 @@ def _title(document: str) -> str:
     return next(line[2:] for line in text.splitlines() if line.startswith("# "))
 
 
-def _count(equations: list[dict], made: list[dict]) -> str:
-    number, others = sum(one["equations"] for one in equations), len(made) - len(equations)
-    return f"{number} equations" + (f" and {others} statements in words" if others else "")
+def _count(here: Counter) -> str:
+    words = {
+        "total": "equations verified",
+        "computed": "typed relations computed",
+        "others": "definitions and the like",
+        "claims": "claims",
+    }
+    return ", ".join(f"{here[name]} {text}" for name, text in words.items() if here[name])
 
 
-def _entry(one: dict) -> str:
-    place = f"{{eq}}`{one['label']}` · " if one["label"] else ""
-    return f'$$\n{one["latex"]}\n$$\n\n{place}<span class="kf-claim">✓ {one["how"]}</span>\n'
+def _entry(latex: str, label: str | None, what: str) -> str:
+    place = f"{{eq}}`{label}` · " if label else ""
+    kind = "kf-claim" if what.startswith("✓") else "kf-said"
+    return f'$$\n{latex.strip()}\n$$\n\n{place}<span class="{kind}">{what}</span>\n'

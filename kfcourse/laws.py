@@ -116,8 +116,9 @@ def gain(cross: Array, cov: Array, broken: bool = False) -> Array:
         How small a variance may be depends on its units, which are free: 1e-32 is a good variance.  A variance that is only
         rounding must therefore be made 0 where it arises.
     broken : bool
-        Whether `cov` comes from a filter whose covariance may have broken down: the component of a negative variance then
-        gets the gain 0, as if it could not vary.
+        Whether `cov` comes from a filter whose covariance rounding may have broken.  A negative variance is then divided by
+        like any other: P^-1 + H^T R^-1 H holds for every P, so each measurement still adds its information, and the filter
+        finds back.  A gain of 0 there would stop the corrections for good.
 
     Raises
     ------
@@ -130,10 +131,10 @@ def gain(cross: Array, cov: Array, broken: bool = False) -> Array:
         if not broken:
             _refuse_negative(cov, 0.0)
         zero = np.zeros(np.broadcast_shapes(cross.shape, cov.shape), dtype=np.result_type(cross, cov))
-        return np.divide(cross, cov, out=zero, where=~(cov <= 0))
+        return np.divide(cross, cov, out=zero, where=cov != 0)
     # Scaling to correlations first: components may differ by orders of magnitude in size.
     variance = np.diagonal(cov, axis1=-2, axis2=-1)
-    scale = np.sqrt(np.maximum(variance, 0.0))
+    scale = np.sqrt(np.abs(variance))
     scale = np.where(scale > 0, scale, 1.0)
     correlation = cov / (scale[..., :, None] * scale[..., None, :])
     scaled_cross = cross / scale[..., None, :]
@@ -146,9 +147,7 @@ def gain(cross: Array, cov: Array, broken: bool = False) -> Array:
     if not broken:
         _refuse_negative(variance, singular**2)
     unknown = np.isnan(cov).any(axis=(-2, -1), keepdims=True)
-    usable = ~(variance < 0)
-    correlation = np.where(usable[..., :, None] & usable[..., None, :] & ~unknown, correlation, 0.0)
-    inverse = np.linalg.pinv(correlation, rcond=singular**2, hermitian=True)
+    inverse = np.linalg.pinv(np.where(unknown, 0.0, correlation), rcond=singular**2, hermitian=True)
     return np.where(unknown, np.nan, scaled_cross @ inverse / scale[..., None, :])
 
 
@@ -172,15 +171,15 @@ def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
 
     The last is evaluated as (I - K G) Psi (I - K G)^T + K R K^T (Joseph's form, with R = F - G Psi G^T), for
     scalars as Psi R / F: equal, but never negative.  A trajectory with a missing measurement (NaN) keeps
-    its prior for the missing components.  F may be negative where the prior covariance has broken down by rounding; such a
-    component corrects nothing.
+    its prior for the missing components.  Where rounding has broken the prior covariance F may be negative, and is divided by
+    (see `gain`); of one state and one measurement it is negative only if a rule of quadrature made it so, and corrects nothing.
     """
     innovation, (_, G, F, R) = measurement.innovation(y), measurement
     if any_missing(innovation):
         innovation, G, F, R = without_missing(innovation, G, F, R)
     if G.shape[-2:] == (1, 1):
         varies = np.minimum.reduce(F, axis=None) > 0
-        share = prior.cov / F if varies else gain(prior.cov, F, broken=True)
+        share = prior.cov / F if varies else gain(prior.cov, np.maximum(F, 0.0))
         K = share * G
         cov = share * R if varies else np.where(F <= 0, prior.cov, share * R)  # a meter that cannot vary tells nothing
     else:

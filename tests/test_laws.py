@@ -77,14 +77,37 @@ def test_an_unknown_variance_gives_an_unknown_correction():
     np.testing.assert_allclose((posterior.mean[1, 0], posterior.cov[1, 0, 0]), 0.5, rtol=1e-15)
 
 
-def test_where_a_filter_has_broken_down_a_negative_variance_gets_no_gain(rng):
+def test_where_a_filter_has_broken_down_a_negative_variance_is_divided_by(rng):
     cov = covariances(rng, 3, 2)
     cross = rng.normal(size=(3, 2, 2))
     cov[1, 1, 1] = -1.0
-    found = gain(cross, cov, broken=True)
-    np.testing.assert_allclose(found[[0, 2]], gain(cross[[0, 2]], cov[[0, 2]]), rtol=1e-11, atol=1e-11)  # as above
-    np.testing.assert_allclose(found[1], np.column_stack([cross[1, :, 0] / cov[1, 0, 0], np.zeros(2)]), rtol=1e-12)
-    np.testing.assert_array_equal(gain(np.ones((2, 1, 1)), np.array([[[-1.0]], [[2.0]]]), broken=True)[:, 0, 0], [0.0, 0.5])
+    np.testing.assert_allclose(gain(cross, cov, broken=True), cross @ np.linalg.inv(cov), rtol=1e-11, atol=1e-11)  # as above
+    variances = np.array([[[-1.0]], [[2.0]], [[0.0]]])
+    np.testing.assert_array_equal(gain(np.ones((3, 1, 1)), variances, broken=True)[:, 0, 0], [-1.0, 0.5, 0.0])
+
+
+@pytest.mark.parametrize(("n", "p"), [(2, 1), (3, 1), (3, 2)])
+def test_a_correction_adds_its_information_also_to_a_covariance_that_is_none(rng, n, p):
+    """p^-1 = Psi^-1 + G^T R^-1 G needs no sign of Psi: a broken filter finds back, unless its corrections stop."""
+    root, signs = rng.normal(size=(6, n, n)), np.array([1.0] * (n - 1) + [-1.0])
+    prior = Gaussian(rng.normal(size=(6, n)), symmetric(root @ (signs[:, None] * transpose(root))))
+    G, R, y = rng.normal(size=(6, p, n)), covariances(rng, 6, p), rng.normal(size=(6, p))
+    meter = measurement(G, R, prior)
+    assert (np.linalg.eigvalsh(meter.F)[:, 0] < 0).any()  # else nothing is tested
+    found = correct(prior, meter, y)
+    information = transpose(G) @ np.linalg.inv(R) @ G
+    cov = np.linalg.inv(np.linalg.inv(prior.cov) + information)
+    # condition numbers up to 1e4 here
+    np.testing.assert_allclose(found.cov, cov, rtol=1e-8, atol=1e-8 * abs(cov).max())
+    np.testing.assert_allclose(found.mean, prior.mean + apply(cov @ transpose(G) @ np.linalg.inv(R), y), rtol=1e-8, atol=1e-8)
+
+
+def test_one_variance_that_a_rule_of_quadrature_made_negative_corrects_nothing():
+    prior = Gaussian(np.zeros((2, 1)), np.ones((2, 1, 1)))
+    F = np.array([[[-1.0]], [[2.0]]])
+    posterior = correct(prior, Measurement(np.zeros((2, 1)), np.ones((2, 1, 1)), F, F - 1), np.ones((2, 1)))
+    np.testing.assert_array_equal(posterior.mean[:, 0], [0.0, 0.5])
+    np.testing.assert_array_equal(posterior.cov[:, 0, 0], [1.0, 0.5])
 
 
 def test_a_variance_that_is_small_in_its_units_tells():

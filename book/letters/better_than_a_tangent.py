@@ -52,3 +52,11 @@ def statistical(rng):
 
 LETTERS = (line, second_order, statistical)
 SAID = {r"x\sim\mathcal N(\lambda,\Psi)": DEFINITION, r"g^2D_\xi": NOTATION}
+SAID |= dict.fromkeys(
+    (
+        r"(\Theta-G^2p)_{1}",
+        r"(\Theta-G^2p)_{2}",
+        r"\mathsf{M}[e^2]",
+    ),
+    NOTATION,
+)

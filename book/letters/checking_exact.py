@@ -3,7 +3,7 @@
 import numpy as np
 
 from kfcourse.pages.reader import Of, bell
-from kfcourse.pages.relations import DEFINITION
+from kfcourse.pages.relations import DEFINITION, NOTATION
 
 
 def masses(rng):
@@ -38,4 +38,8 @@ def masses(rng):
 
 
 LETTERS = (masses,)
-SAID = {r"a_v=\frac{\partial a}{\partial v}": DEFINITION, r"\frac{dx}{dt}": DEFINITION}
+SAID = {r"a_v=\frac{\partial a}{\partial v}": DEFINITION}
+SAID |= dict.fromkeys(
+    (r"\frac{dx}{dt}",),
+    NOTATION,
+)

@@ -22,3 +22,4 @@ def exact(rng):
 
 LETTERS = (exact,)
 SAID = {}
+LITERALS = ("20",)

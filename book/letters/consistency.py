@@ -4,7 +4,7 @@ import numpy as np
 
 from kfcourse.pages.letters import kalman_run
 from kfcourse.pages.reader import Indexed
-from kfcourse.pages.relations import NOTATION
+from kfcourse.pages.relations import CONDITION, NOTATION
 
 
 def course(rng):
@@ -27,7 +27,15 @@ LETTERS = (course, western)
 SAID = {
     r"\chi^2_{N\dim x}/N": NOTATION,
     "Q/R": NOTATION,
+    r"H\Phi K>0": CONDITION,
     r"\mathsf P(e^Tp^{-1}e<\rho^2)": NOTATION,
     r"\mathsf M(e^Tp^{-1}e)\big|_{P=p}": NOTATION,
     r"\mathsf M(\nu_{k+1}\nu_k)": NOTATION,
 }
+SAID |= dict.fromkeys(
+    (
+        r"\mathsf{M}(e^Tp^{-1}e)",
+        r"\operatorname{tr}(p^{-1}P)",
+    ),
+    NOTATION,
+)

@@ -151,3 +151,7 @@ SAID = {
     r"\mathsf M[\text{middle}]-\mathsf M[\text{beginning}]": NOTATION,
 }
 EQUALS = {r"N\cdot\frac1{2T}": r"\frac N{2T}", r"D\big|_{a=0}": r"\sqrt{q/r}", "D_{4N}": "2D"}
+SAID |= dict.fromkeys(
+    (r"{\textstyle\frac12}",),
+    NOTATION,
+)

@@ -68,3 +68,12 @@ EQUALS = {
     "K_k": r"p_kH_k^TD_n^{-1}",
     r"\det\textstyle\sum_iH_i^TH_i/D_i": r"\frac{\sin^2(\theta_1-\theta_2)}{D_1D_2}",
 }
+SAID |= dict.fromkeys(
+    (
+        r"{p^{-1}}",
+        r"{\frac{\partial J}{\partial x}}",
+        r"{-\frac{\partial^2J}{\partial x^2}}",
+        r"{\textstyle\sum_i\frac{\partial^2S_i}{\partial x^2}\bigl(D_n^{-1}\nu\bigr)_i}",
+    ),
+    NOTATION,
+)

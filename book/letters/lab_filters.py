@@ -140,3 +140,11 @@ SAID = {
     r"\bar{\sigma}": NOTATION,
     r"\Psi G^T": NOTATION,
 }
+SAID |= dict.fromkeys(
+    (
+        r"\tfrac{1}{2}\,\partial J/\partial{H}_k",
+        r"\tfrac{1}{2}\,\partial J/\partial{e}_k",
+        r"J(1,0)-J_{\min}",
+    ),
+    NOTATION,
+)

@@ -95,3 +95,12 @@ SAID = {
     )
 }
 EQUALS = {r"\varepsilon^2": r"\frac{DS''^2}{S'^2}"}
+SAID |= dict.fromkeys(
+    (
+        r"{\textstyle\sum_i\bigl[2N^{-1}(y-S)\bigr]_i\frac{\partial^2S_i}{\partial x^2}}",
+        r"{(y-S)}",
+        r"{-T(y_k-S)^TN^{-1}(y_k-S)}",
+        r"{Ty_k^TN^{-1}y_k}",
+    ),
+    NOTATION,
+)

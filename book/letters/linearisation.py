@@ -4,7 +4,7 @@ import numpy as np
 
 from kfcourse.pages.letters import BENT_SCALAR, column, extended_run, slope
 from kfcourse.pages.reader import Indexed, Of
-from kfcourse.pages.relations import DEFINITION
+from kfcourse.pages.relations import DEFINITION, NOTATION
 
 
 class AtEstimate(np.ndarray):
@@ -60,3 +60,12 @@ SAID = {
     r"\ln p(x_k\mid x_{k-1})": DEFINITION,
     r"\ln p(y_k\mid x_k)": DEFINITION,
 }
+SAID |= dict.fromkeys(
+    (
+        r"f_{k-1}(x_{k-1})-O(x_{k-1}-z_{k-1})^2",
+        r"g_{k-1}^2(x_{k-1})-O(x_{k-1}-z_{k-1})",
+        r"S_{k}(x_k)-O(x_k-\lambda_k)^2",
+        r"\mathsf{M}\,g^2(z+u)-g^2(z)-O(p^2)",
+    ),
+    NOTATION,
+)

@@ -97,3 +97,4 @@ EQUALS = {
     r"\mathsf M(x-\lambda)^2": r"\sigma^2",
     r"\mathsf M(x-\lambda)^4\big|_{\kappa=2}": r"3\sigma^4",
 }
+LITERALS = ("2",)

@@ -82,3 +82,12 @@ SAID = {
     r"Z_k=p(y_k\mid y_{1:k-1})": NOTATION,
     r"\prod_kC_k^{-1}": NOTATION,
 }
+SAID |= dict.fromkeys(
+    (
+        r"\frac{p(x_2\mid y_{0:2})}{p(x_2,y_{0:2})/p(y_{0:2})}",
+        r"\frac{C_0^{-1}C_1^{-1}C_2^{-1}}{p(y_{0:2})}",
+        r"\mathsf{M}[x^2|y]",
+        r"\ln{C}_k^{-1}",
+    ),
+    NOTATION,
+)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from kfcourse.pages.letters import normal_nodes
-from kfcourse.pages.relations import CONDITION
+from kfcourse.pages.relations import CONDITION, NOTATION
 
 
 def course(rng):
@@ -50,3 +50,11 @@ def western(rng):
 
 LETTERS = (course, display, western)
 SAID = {r"\nu\ll1": CONDITION, r"\frac34\kappa^2\ll1": CONDITION, r"S'\approx0": CONDITION}
+SAID |= dict.fromkeys(
+    (
+        r"\mathsf{M}[e^2]/p",
+        r"(\mathsf{M}{e})^2/p",
+        r"\mathsf{M}[e^2]/\Psi",
+    ),
+    NOTATION,
+)

@@ -26,10 +26,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kfcourse.pages.reader import Unread, holds, is_relation, normal, pieces
+from kfcourse.pages.verification import DEFINITION as DEFINITION
 from kfcourse.pages.verification import Unverified
 
 COMPUTED = "both sides computed"
-DEFINITION = "definition"
 STATED = "stated without proof"
 NOTATION = "notation"
 CONDITION = "condition"
@@ -104,15 +104,12 @@ class Letters:
             raise Unverified(
                 _unsaid(formula.latex, "it is printed beside a checked equation, and nothing holds it; EQUALS or SAID may")
             )
-        return [self._judged(piece, formula) for piece in pieces(formula.latex) if self.speaks(piece)]
+        return [self._judged(piece, formula) for piece in pieces(formula.latex) if self.says(piece)]
 
-    def speaks(self, piece: str) -> bool:
-        """Is there anything in it that can be wrong?  Not in a list of letters, nor where an index begins."""
-        if is_relation(piece):
-            left, _, right = piece.partition(" = ")
-            return not (left in self.indices and re.fullmatch(r"[\d\w]( [\d\w])*|\\dots", right))
-        letters = _without_scripts(piece)
-        return bool(_OPERATOR.search(f" {letters}")) and len(re.sub(r"\^ (?:\{[^{}]*\}|\S+)", "", letters).split()) > 1
+    def says(self, piece: str) -> bool:
+        """Is there anything in it that can be wrong?  Not where an index begins."""
+        left, _, right = piece.partition(" = ")
+        return speaks(piece) and not (left in self.indices and re.fullmatch(r"[\d\w]( [\d\w])*|\\dots", right))
 
     def _judged(self, piece: str, formula: Formula) -> Said:
         if piece in self.said:
@@ -129,6 +126,14 @@ class Letters:
                 reasons.append(reason)
         false = [reason for reason in reasons if isinstance(reason, Unverified)]
         raise Unverified(str(false[0]) if false else _unsaid(piece, "; ".join(map(str, reasons)) or "the page has no letters"))
+
+
+def speaks(piece: str) -> bool:
+    """Does this piece say anything: a relation, a sum, a product, a power of several letters?  A name alone does not."""
+    if is_relation(piece):
+        return True
+    letters = _without_scripts(piece)
+    return bool(_OPERATOR.search(f" {letters}")) and len(re.sub(r"\^ (?:\{[^{}]*\}|\S+)", "", letters).split()) > 1
 
 
 def _unsaid(latex: str, why: str) -> str:
@@ -195,6 +200,10 @@ def _printed(code: str) -> Iterator[Formula]:
         for keyword in call.keywords:
             if keyword.arg == "names" and isinstance(keyword.value, ast.Dict):
                 yield from (Formula("name", text) for text in _texts(keyword.value.values))
+    for call in calls(code, "Symbol", "MatrixSymbol", "symbols"):
+        several = getattr(call.func, "attr", getattr(call.func, "id", "")) == "symbols"
+        names = [name for text in _texts(call.args[:1]) for name in (text.split() if several else [text])]
+        yield from (Formula("name", name) for name in dict.fromkeys(names) if re.search(r"[\\{]", name) and speaks(normal(name)))
 
 
 def _texts(nodes: Iterable[ast.expr]) -> list[str]:

@@ -3,7 +3,7 @@
     verified((p, Psi - K*S*Psi), where={p: p_k, K: K_k})     equations: printed, and shown to hold
     claim("The gain tends to 0.62.", abs(K - 0.62) < 0.005)  a sentence, printed if its conditions hold
     agree("Formula and filter agree.", a, b, within=1e-12)   a sentence about numbers that are equal within a tolerance
-    typeset((p, p_k))                                        equations that define something: printed only
+    typeset((p, p_k))                                        equations that define something: printed, and said to
 
 A printed equation carries a mark that says how it was verified.  The build of the book counts the marks and lists them.
 """
@@ -20,6 +20,7 @@ import sympy as sp
 from kfcourse.symbolic.typesetting import Equation, Side, equation_latex
 
 VERIFIED = "application/vnd.kfcourse.verified+json"  # what the build collects
+DEFINITION = "definition"
 BY_IDENTITY = "identity, by SymPy"
 _SEED = 53
 _GUARD = 15  # further digits with which numbers are computed
@@ -97,9 +98,13 @@ def verified(
     return Shown(f'{body}\n\n<p class="kf-verified">✓ {mark}</p>', record)
 
 
-def typeset(*equations: Equation | str, label: str | None = None, names: Mapping[Any, str] | None = None) -> Shown:
-    """Equations that define something, printed as `verified` prints them but without a mark."""
-    return Shown(_display([_sides(equation) for equation in equations], label, names))
+def typeset(
+    *equations: Equation | str, label: str | None = None, names: Mapping[Any, str] | None = None, what: str = DEFINITION
+) -> Shown:
+    """Equations that are not verified, printed as `verified` prints them; under them stands what they are."""
+    given = [_sides(equation) for equation in equations]
+    record = {"label": label, "latex": _block(given, names), "how": what, "equations": 0}
+    return Shown(f'{_display(given, label, names)}\n\n<p class="kf-said">{what}</p>', record)
 
 
 def claim(sentence: str, *conditions: Any) -> Shown:

@@ -1,6 +1,7 @@
 """Models on which the field compares its filters, and what was published of them.
 
 pendulum()               Särkkä and Svensson (2023), with their data: `pendulum_data()`
+car()                    from the same book, linear: `car_data()`
 growth_model(variance)   the univariate nonstationary growth model (Gordon, Salmond and Smith, 1993)
 stochastic_volatility()  a state that shows only in the measurement's variance
 bearings()               two bearings of a target (Hartikainen, Solin and Särkkä, 2011), with its course: `bearings_data(...)`
@@ -20,7 +21,16 @@ from kfcourse.laws import Array
 from kfcourse.symbolic.model import Model
 
 # Root mean square errors of the angle over the 500 steps of the data, as Särkkä and Svensson's notebooks print them.
-PENDULUM_ERRORS = {"EKF": 0.16830859061153763, "UKF": 0.09524392125923083, "Gauss-Hermite 5": 0.0998062421916222}
+PENDULUM_ERRORS = {
+    "EKF": 0.16830859061153763,
+    "UKF": 0.09524392125923083,
+    "Gauss-Hermite 5": 0.0998062421916222,
+    "cubature": 0.1141966031380275,
+    "iterated EKF": 0.16547516472119136,
+    "iterated posterior linearisation": 0.14055766458714145,
+}
+# And of the position of the car over its 100 steps.
+CAR_ERRORS = {"measurements": 0.7679855237247215, "Kalman": 0.4253824660526518}
 
 # Mean square errors on the growth model with a state noise of variance one, 100 runs of 500 steps: those that Hartikainen,
 # Solin and Särkkä (2011) print, and those computed with other programs.
@@ -53,10 +63,37 @@ def pendulum() -> Model:
 
 def pendulum_data() -> tuple[Array, Array]:
     """States (500, 2) and measurements (501, 1, 1) of the book's simulation; the first measurement is missing (NaN)."""
-    text = (resources.files("kfcourse.scenarios") / "data" / "pendulum.json").read_text(encoding="utf-8")
-    data = json.loads(text)
-    y = np.concatenate([[np.nan], np.ravel(data["Y"])])
-    return np.transpose(data["X"]), y[:, None, None]
+    return _simulation("pendulum")
+
+
+def car() -> Model:
+    """A car in the plane with nearly constant velocity, its position measured.
+
+    As of `pendulum`, the law is that before the first prediction.
+    """
+    dt = 0.1
+    wander = np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
+    return Model.define(
+        ["x + T*v_x + v1", "y + T*v_y + v2", "v_x + v3", "v_y + v4"],
+        ["x + w1", "y + w2"],
+        {"T": dt},
+        symbols={"x": ["x", "y", "v_x", "v_y"]},
+        prior={"mean": [0, 0, 1, -1], "variance": 1},
+        state_noise={"variance": np.kron(wander, np.eye(2))},
+        meter_noise={"variance": 0.25},
+    )
+
+
+def car_data() -> tuple[Array, Array]:
+    """States (100, 4) and measurements (101, 1, 2) of the book's simulation; the first measurement is missing (NaN)."""
+    return _simulation("car_track")
+
+
+def _simulation(name: str) -> tuple[Array, Array]:
+    """States and measurements of a simulation of the book, a missing measurement before them."""
+    data = json.loads((resources.files("kfcourse.scenarios") / "data" / f"{name}.json").read_text(encoding="utf-8"))
+    x, y = (np.atleast_2d(data[letter]).T for letter in "XY")
+    return x, np.concatenate([np.full((1, y.shape[1]), np.nan), y])[:, None]
 
 
 def growth_model(variance: float = 1) -> Model:

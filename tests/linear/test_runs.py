@@ -302,7 +302,7 @@ def ill_conditioned():
 
 @pytest.mark.parametrize("arithmetic", FORMS)
 def test_float32_stays_float32(arithmetic, ill_conditioned):
-    # In this case the variance of a measurement gets negative, and the gain is 0.
+    # In this case the variance of a measurement gets negative.
     short, prior, y, _ = ill_conditioned
     for laws in run(short, prior, y, arithmetic=arithmetic):
         assert (laws.mean.dtype, laws.cov.dtype) == (np.float32, np.float32)
@@ -326,29 +326,53 @@ def test_float32_is_float64_to_its_precision(arithmetic):
     assert not np.array_equal(found.cov, exact.cov)
 
 
-def lost(laws, right):
-    """Share of the runs in which the estimate is three standard deviations or more from the right one, after ten steps."""
+def lost(mean, right, since=0):
+    """Share of the runs in which the estimate is more than three standard deviations from the right one at some step."""
     sd = np.sqrt(np.diagonal(right.cov, axis1=-2, axis2=-1))
-    return (abs(laws.mean - right.mean)[10:] > 3 * sd[10:]).any(axis=(0, 2)).mean()
+    return (abs(mean - right.mean)[since:] > 3 * sd[since:]).any(axis=(0, 2)).mean()
+
+
+def in_a_loop(system, prior, y, guard):
+    """Means of the textbook's form in float32, one run after the other; guard: no correction where F <= 0."""
+    A, H, Q, R = (matrix.astype(np.float32) for matrix in (system.A, system.H, system.Q, system.R))
+    means = np.zeros((*y.shape[:2], len(A)), np.float32)
+    for r in range(y.shape[1]):
+        m, P = np.zeros(len(A), np.float32), prior.cov[r].astype(np.float32)
+        for k in range(len(y)):
+            F = (H @ P @ H.T + R)[0, 0]
+            K = (P @ H.T)[:, 0] / F if F > 0 or not guard else np.zeros(len(A), np.float32)
+            m, P = m + K * (y[k, r, 0] - (H @ m)[0]), P - np.outer(K, H @ P)
+            means[k, r] = m
+            m, P = A @ m, A @ P @ A.T + Q
+    return means
 
 
 @pytest.mark.parametrize("arithmetic", ["covariance", "symmetrised", "joseph"])
 def test_short_words_break_the_forms_with_covariances(arithmetic, ill_conditioned):
-    # The ratio of variances is 1e12, the word has 24 digits (1.7e7).  About 3 runs of 4 fail, on any processor more than 1 of 3.
+    # The ratio of variances is 1e12, the word has 24 digits (1.7e7).  About 2 runs of 3 are thrown off, on any processor more
+    # than 1 of 3.  They divide by negative variances and find back: 1 in 200 is off at the end, on any processor below 1 in 20.
     short, prior, y, right = ill_conditioned
     laws = run(short, prior, y, arithmetic=arithmetic).posterior
-    assert lost(laws, right) > 1 / 3
+    assert lost(laws.mean, right) > 1 / 3
+    assert lost(laws.mean, right, since=-5) < 1 / 20
     negative = (np.diagonal(laws.cov, axis1=-2, axis2=-1) < 0).any(axis=(0, 2))
     assert negative.mean() > 1 / 3
     symmetric_always = np.array_equal(laws.cov, laws.cov.swapaxes(-1, -2))
     assert symmetric_always == (arithmetic != "covariance")
 
 
+def test_a_guard_against_negative_variances_would_lose_the_object_for_good(ill_conditioned):
+    short, prior, y, right = ill_conditioned
+    few = Gaussian(prior.mean, prior.cov[:100]), y[:, :100], Gaussian(right.mean[:, :100], right.cov[:, :100])
+    assert lost(in_a_loop(short, *few[:2], guard=False), few[2], since=-5) < 1 / 20
+    assert lost(in_a_loop(short, *few[:2], guard=True), few[2], since=-5) > 1 / 2  # 3 of 4
+
+
 @pytest.mark.parametrize("arithmetic", ["square-root", "ud"])
 def test_short_words_do_not_break_the_factored_forms(arithmetic, ill_conditioned):
     short, prior, y, right = ill_conditioned
     laws = run(short, prior, y, arithmetic=arithmetic).posterior
-    assert lost(laws, right) == 0
+    assert lost(laws.mean, right) == 0
     # The condition number of the root is 1e6: with rounding of 6e-8 and 40 steps, below 0.3 for all 300 starts.
     np.testing.assert_allclose(laws.cov[5:], right.cov[5:], rtol=0.3, atol=0.3 * abs(right.cov[5:]).max())
     assert (np.diagonal(laws.cov, axis1=-2, axis2=-1) >= 0).all()
@@ -359,7 +383,7 @@ def test_a_well_conditioned_start_breaks_nothing(ill_conditioned):
     prior = Gaussian(np.zeros(3), 0.01 * np.eye(3))
     right = run(short.astype(float), prior, y.astype(float), arithmetic="square-root").posterior
     for arithmetic in FORMS:
-        assert lost(run(short, prior, y, arithmetic=arithmetic).posterior, right) == 0
+        assert lost(run(short, prior, y, arithmetic=arithmetic).posterior.mean, right) == 0
 
 
 def test_bierman_s_case_against_rational_numbers():

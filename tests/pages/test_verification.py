@@ -90,9 +90,10 @@ def test_there_must_be_something_to_verify() -> None:
         claim("Everything is well.")
 
 
-def test_definitions_have_no_mark() -> None:
+def test_definitions_say_so() -> None:
     shown = typeset((sp.Symbol("K"), p / (p + 1)), label="eq-gain")
-    assert "kf-verified" not in shown.markdown and VERIFIED not in shown._repr_mimebundle_()
+    assert "kf-verified" not in shown.markdown and shown.markdown.endswith('<p class="kf-said">definition</p>')
+    assert shown._repr_mimebundle_()[VERIFIED]["equations"] == 0
 
 
 def test_claims_hold_or_raise() -> None:

@@ -5,8 +5,18 @@ import pytest
 from scipy.linalg import expm
 
 from kfcourse import linearised, run, simulate
-from kfcourse.filters import aof
-from kfcourse.scenarios.benchmarks import BEARINGS_ERRORS, REENTRY_ERRORS, bearings, bearings_data, reentry
+from kfcourse.filters import aof, kalman_filter
+from kfcourse.scenarios.benchmarks import (
+    BEARINGS_ERRORS,
+    CAR_ERRORS,
+    REENTRY_ERRORS,
+    bearings,
+    bearings_data,
+    car,
+    car_data,
+    pendulum_data,
+    reentry,
+)
 
 
 @pytest.mark.quick
@@ -54,3 +64,27 @@ def test_the_reentry_of_the_source():
     error = (run(aof(linearised(reentry(known=False))), y).mean - x)[1:, :, :2]
     each = np.sqrt((error**2).sum(axis=-1).mean(axis=0))
     assert abs(each.mean() - REENTRY_ERRORS["EKF"]) < 4 * each.std() * np.sqrt(1 / 40 + 1 / 100) + 5e-5
+
+
+@pytest.mark.quick
+def test_the_car_of_the_source():
+    """The book's Kalman filter, written out, and its two published figures."""
+    x, y = car_data()
+    assert x.shape == (100, 4) and y.shape == (101, 1, 2) and np.isnan(y[0]).all()
+    A, H = np.eye(4) + 0.1 * np.eye(4, k=2), np.eye(2, 4)
+    Q = np.kron([[0.1**3 / 3, 0.1**2 / 2], [0.1**2 / 2, 0.1]], np.eye(2))
+    m, P, means = np.array([0, 0, 1, -1.0]), np.eye(4), []
+    for measured in y[1:, 0]:
+        m, P = A @ m, A @ P @ A.T + Q
+        K = np.linalg.solve(H @ P @ H.T + 0.25 * np.eye(2), H @ P).T
+        m, P = m + K @ (measured - H @ m), P - K @ H @ P
+        means.append(m)
+    np.testing.assert_allclose(run(kalman_filter(car()), y).mean[1:, 0], means, rtol=1e-11, atol=1e-11)  # 100 steps of rounding
+    for name, place in (("measurements", y[1:, 0]), ("Kalman", np.array(means)[:, :2])):
+        assert abs(np.sqrt(((place - x[:, :2]) ** 2).sum(axis=1).mean()) - CAR_ERRORS[name]) < 1e-12
+
+
+@pytest.mark.quick
+def test_the_pendulum_s_data_are_the_file_s():
+    x, y = pendulum_data()
+    assert x.shape == (500, 2) and y.shape == (501, 1, 1) and np.isnan(y[0, 0, 0]) and np.isfinite(y[1:]).all()

@@ -1,0 +1,33 @@
+"""The letters of before-measuring.md: a run of the Kalman filter; the same step with all noises scaled; a small index."""
+
+import numpy as np
+
+from kfcourse.filters.kalman import correct, predict
+from kfcourse.laws import Gaussian
+from kfcourse.linear.system import LinearSystem
+from kfcourse.pages.letters import covariance, kalman_run
+from kfcourse.pages.relations import NOTATION
+
+
+def scaled(rng):
+    """One step from Psi to Psi', with Q, R and Psi as they are and c times as large."""
+    A, H, c = rng.normal(size=(3, 3)), rng.normal(size=(1, 3)), 2.7
+    Psi, Q, R = covariance(rng, 3), covariance(rng, 3), covariance(rng, 1)
+
+    def step(size):
+        system = LinearSystem(A, H, size * Q, size * R)
+        return predict(system, correct(system, Gaussian(np.zeros(3), size * Psi), np.zeros(1))).cov
+
+    return {"c": c, r"\Psi'": step(1), r"\Psi'_c": step(c)}
+
+
+def small_index(rng):
+    """alpha = 1 - rho^2 without a difference of nearly equal numbers, at an index of 1e-18."""
+    index = rng.uniform(1, 2) * 1e-18
+    less = np.sqrt(index * (index + 8)) / 4 - index / 4  # 1 - rho
+    return {r"\lim_{\Lambda\to0}": 1.0, r"\Lambda": index, r"\alpha": less * (2 - less)}
+
+
+LETTERS = (kalman_run, scaled, small_index)
+SAID = {"Q=0": "a setting", r"\Psi'_c": NOTATION, r"\psi'_{22}": NOTATION, r"\sigma_r": NOTATION}
+EQUALS = {r"c\,\Psi'": r"\Psi'_c", r"\lim_{\Lambda\to0}\alpha\,/\sqrt{2\Lambda}": "1"}

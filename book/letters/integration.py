@@ -1,0 +1,109 @@
+"""The letters of integration.md: runs of the package's filter of an axis, its Western form with matrices, the accelerometer."""
+
+import numpy as np
+from scipy.integrate import quad
+
+from kfcourse.filters.kalman import correct, predict
+from kfcourse.laws import Gaussian
+from kfcourse.linear import LinearSystem, run
+from kfcourse.pages.letters import K_RANGE, column, covariance
+from kfcourse.pages.reader import Indexed, Of
+from kfcourse.pages.relations import DEFINITION, NOTATION
+from kfcourse.scenarios.navigation import Dynamics
+
+SENSOR, RADIO = r"y_{\mathrm{NR},k}", r"y_{\mathrm R,k}"
+
+
+def sensors(rng):
+    """What the two sensors read, and the error that the slow one has."""
+    lam, eps, n = rng.normal(size=(3, 5))
+    S = [np.sin, np.cos, np.exp, np.tanh, np.cosh]
+    slow, radio = lam + eps, [one(value) + noise for one, value, noise in zip(S, lam, n, strict=True)]
+    y, at = rng.normal(size=2)
+    step = 1e-20
+    return {
+        r"\lambda": Indexed(lam, at), r"\varepsilon": Indexed(eps), "n": Indexed(n), "S": Indexed(S), "k": K_RANGE,
+        SENSOR: Of(lambda k: slow[k], "k"), RADIO: Of(lambda k: radio[k], "k"), "S'": np.cos,
+        r"\frac{d}{d\varepsilon}S(y_{\mathrm{NR}}-\varepsilon)": np.sin(y - (y - at + 1j * step)).imag / step,
+    }  # fmt: skip
+
+
+def axis(rng):
+    """The package's filter of the inertial system's error, on one axis."""
+    xi, n, p0, V = 0.3, 0.7, 1.4, rng.normal(size=5)
+    drift = rng.normal(size=5)
+    ins, receiver = V + drift, V + rng.normal(size=5)
+    law = run(
+        LinearSystem([[1.0]], [[-1.0]], [[xi**2]], [[n**2]]),
+        Gaussian(np.zeros(1), np.array([[p0]])),
+        (receiver - ins)[:, None, None],
+    )
+    eps, p, Psi = law.posterior.mean[:, 0, 0], law.posterior.cov[:, 0, 0, 0], law.predicted.cov[:, 0, 0, 0]
+    innovation = receiver - ins + law.predicted.mean[:, 0, 0]
+    return {
+        r"\Psi": Indexed(Psi), "p": Indexed(p), "K": Indexed(-p / n**2), r"\hat\varepsilon": Indexed(eps),
+        r"\nu": Indexed(innovation),
+        r"\hat V": Indexed(ins - eps), r"\sigma_\xi": xi, r"\sigma_n": n, "k": K_RANGE,
+        r"y_{\mathrm{SR},k}": Of(lambda k: receiver[k], "k"), r"y_{\mathrm{INS},k}": Of(lambda k: ins[k], "k"),
+    }  # fmt: skip
+
+
+def errors(rng):
+    """One moment: the readings by what they are made of."""
+    V, n, e, guess = rng.normal(size=4)
+    return {
+        "V": V, "n": n, r"\varepsilon": e, r"\hat\varepsilon": guess, r"\hat V": V + e - guess, r"y_{\mathrm{SR}}": V + n,
+        r"y_{\mathrm{INS}}": V + e,
+    }  # fmt: skip
+
+
+def western(rng, after=True):
+    """Three axes together, as Western books write it."""
+    system = LinearSystem(np.eye(3), -np.eye(3), covariance(rng, 3), covariance(rng, 3))
+    P, before = covariance(rng, 3), rng.normal(size=3)
+    ahead = predict(system, Gaussian(before, P))
+    gnss, ins = rng.normal(size=(2, 3))
+    found = correct(system, ahead, gnss - ins)
+    K = -found.cov @ np.linalg.inv(system.R)
+    return {
+        "P^-": ahead.cov, "P": found.cov if after else P, "Q": system.Q, "R": system.R, "H": system.H, "I": np.eye(3), "K": K,
+        r"\delta z": column(gnss - ins), r"\delta\hat x^-": column(ahead.mean), r"\delta\hat x": column(found.mean),
+        r"(\cdot)": column(gnss - ins + ahead.mean), r"z_\text{GNSS}": column(gnss), r"z_\text{INS}": column(ins),
+        r"\hat v": column(ins - found.mean), r"v_\text{INS}": column(ins), r"\delta\hat v": column(found.mean),
+    }  # fmt: skip
+
+
+def western_before(rng):
+    return western(rng, after=False)
+
+
+def accelerometer(rng):
+    T = rng.uniform(0.5, 1)
+    moved = Dynamics(A=[[0, 1, 0], [0, 0, -1], [0, 0, 0]], B=[[0], [1], [0]], Qc=np.zeros((3, 3))).over(T)
+    return {"A": moved.A, "H": np.array([[1.0, 0, 0]]), "T_a": T}
+
+
+def failure(rng):
+    t, q = rng.uniform(1, 2, size=2)
+    spread = quad(lambda s: ((t - s) ** 2 / 2) ** 2 * q, 0, t)[0]
+    return {"t": t, "q_b": q, r"\textstyle\int_0^t\bigl(\frac12(t-s)^2\bigr)^2q_b\,ds": spread}
+
+
+LETTERS = (sensors, axis, errors, western, western_before, accelerometer, failure)
+SAID = {
+    r"x_k=f(x_{k-1},\,y_{\mathrm{NR},k-1}-\varepsilon_{k-1})+g\,\xi_{k-1}": DEFINITION,
+    r"\varepsilon_k=\varepsilon_{k-1}+\zeta_{k-1}": DEFINITION,
+    "p": NOTATION,
+}
+EQUALS = {
+    r"\frac{d}{d\varepsilon}S(y_{\mathrm{NR}}-\varepsilon)": r"-S'(\lambda)",
+    r"y_{\mathrm{SR}}-(y_{\mathrm{INS}}-\hat\varepsilon)": r"n-\varepsilon+\hat\varepsilon",
+    r"\hat V-V": r"\varepsilon-\hat\varepsilon",
+    r"\delta z-H\,\delta\hat x^-": r"(\cdot)",
+    r"\det\begin{pmatrix}H\\HA\\HA^2\end{pmatrix}": "-T_a^3",
+    r"\textstyle\int_0^t\bigl(\frac12(t-s)^2\bigr)^2q_b\,ds": "q_bt^5/20",
+}
+SAID |= dict.fromkeys(
+    (r"{\lim_{\sigma_\xi\to0}p/\sigma_\xi}",),
+    NOTATION,
+)

@@ -1,0 +1,31 @@
+"""The letters of integration-limits.md: the package's covariance analysis, and its filter along a constant bias."""
+
+import numpy as np
+
+from kfcourse.laws import Gaussian
+from kfcourse.linear import LinearSystem, covariances, run
+from kfcourse.pages.letters import K_RANGE
+from kfcourse.pages.reader import Indexed
+from kfcourse.pages.relations import NOTATION
+
+
+def analysis(rng):
+    """True variances of a filter that believes in another drift; the mean of its error under a bias alone."""
+    xi, n, beta, p0 = *rng.uniform(0.3, 1, size=3), 1.5
+    believed = LinearSystem([[1.0]], [[-1.0]], [[(2 * xi) ** 2]], [[n**2]])
+    true = LinearSystem([[1.0]], [[-1.0]], [[xi**2]], [[n**2]])
+    gains = covariances(believed, [[p0]], 5).gains
+    variances = covariances(true, [[p0]], 5, gains).posterior[:, 0, 0]
+    biased = run(believed, Gaussian(np.zeros(1), np.array([[p0]])), np.full((5, 1, 1), beta))
+    return {
+        r"\bar p": Indexed(variances), "K": Indexed(gains[:, 0, 0]), "m": Indexed(-biased.posterior.mean[:, 0, 0]), "k": K_RANGE,
+        r"\sigma_\xi": xi, r"\sigma_n": n, r"\beta": beta,
+    }  # fmt: skip
+
+
+LETTERS = (analysis,)
+SAID = {"K_k=0": "a setting", r"\text{mean innovation}": NOTATION}
+SAID |= dict.fromkeys(
+    (r"{\lim_{\sigma_\xi\to0}\bar p/p}",),
+    NOTATION,
+)

@@ -1,0 +1,64 @@
+"""The letters of manoeuvres.md: three modes with a joint table of probabilities; a place as a radar measures it."""
+
+import numpy as np
+from scipy.stats import multivariate_normal
+
+from kfcourse.pages.letters import column, covariance
+from kfcourse.pages.reader import Indexed, Of
+from kfcourse.pages.relations import NOTATION
+from kfcourse.scenarios.radar import spherical
+
+M, N = 3, 2
+
+
+def modes(rng):
+    """One cycle of three modes: L by SciPy, moments of the mixture as M(x x^T) - m m^T."""
+    z, p = rng.normal(size=(M, N)), np.array([covariance(rng, N) for _ in range(M)])
+    h, F, y = rng.normal(size=(M, N)), np.array([covariance(rng, N) for _ in range(M)]), rng.normal(size=N)
+    L = np.array([multivariate_normal(one, cov).pdf(y) for one, cov in zip(h, F, strict=True)])
+    c = rng.dirichlet(np.ones(M))
+    joint = c * L
+    mu = joint / np.add.reduce(joint)
+    mean = np.average(z, axis=0, weights=mu)
+    square = np.average(p + np.einsum("ia,ib->iab", z, z), axis=0, weights=mu)
+    return {
+        "i": range(M), "j": range(M), "L": Indexed(L), "c": Indexed(c), r"\mu": Indexed(mu), "y_k": column(y),
+        "h^j": Of(lambda j: column(h[j]), "j"), "F^j": Of(lambda j: F[j], "j"),
+        "z^j": Of(lambda j: column(z[j]), "j"), "p^j": Of(lambda j: p[j], "j"),
+        "z": column(mean), "p": square - np.outer(mean, mean),
+    }  # fmt: skip
+
+
+def mixing(rng):
+    """The joint table of the modes of two steps."""
+    pi, mu = rng.dirichlet(np.ones(M), size=M), rng.dirichlet(np.ones(M))
+    table = np.diag(mu) @ pi
+    c = np.ones(M) @ table
+    backwards = table @ np.diag(1 / c)
+    return {
+        "i": range(M), "j": range(M), r"\pi": Indexed(pi.tolist()), r"\mu_{i\mid j}": Of(lambda i, j: backwards[i, j], "i", "j"),
+        r"\mu": Indexed(mu), "c": Indexed(c),
+    }  # fmt: skip
+
+
+def place(rng):
+    x = rng.normal(size=3)
+    r, phi, epsilon = spherical(x)
+    return dict(zip((r"r_x", r"r_y", r"r_z", "r", r"\varphi", r"\epsilon"), (*x, r, phi, epsilon), strict=True))
+
+
+LETTERS = (modes, mixing, place)
+SAID = {
+    "L_j=1": "a setting",
+    r"\mu_{i|j}(k-1|k-1)": NOTATION,
+    "r_x": NOTATION,
+    "r_y": NOTATION,
+    "r_z": NOTATION,
+    r"\frac{\sin\eta}{\eta}-\frac{\eta^4}{120}+\dots": "a series",
+}
+EQUALS = {
+    r"\pi_{ij}\mu_i/c_j": r"\mu_{i\mid j}",
+    r"r\cos(\epsilon)\cos(\varphi)": "r_x",
+    r"r\cos(\epsilon)\sin(\varphi)": "r_y",
+    r"r\sin(\epsilon)": "r_z",
+}

@@ -1,0 +1,126 @@
+"""The letters of numerics.md: corrections of the package, Joseph's form for any gain, the array, Bierman's loop."""
+
+import numpy as np
+
+from kfcourse.filters.kalman import correct
+from kfcourse.laws import Gaussian
+from kfcourse.linear.factored import factors
+from kfcourse.linear.system import LinearSystem
+from kfcourse.pages.letters import column, covariance
+from kfcourse.pages.reader import Indexed, Of
+from kfcourse.pages.relations import DEFINITION, NOTATION
+
+
+def _corrected(rng, seen):
+    """The letters of one correction by the package's textbook step; K = p H^T R^{-1}, which it does not compute with."""
+    Psi, H, R, A = covariance(rng, 3), rng.normal(size=(seen, 3)), covariance(rng, seen), rng.normal(size=(3, 3))
+    y, lam = rng.normal(size=seen), rng.normal(size=3)
+    z, p = correct(LinearSystem(A, H, np.eye(3), R), Gaussian(lam, Psi), y)
+    return {
+        r"\Psi": Psi, "H": H, "R": R, "A": A, "I": np.eye(3), "p": p, "K": p @ H.T @ np.linalg.inv(R),
+        r"\lambda": column(lam), "z": column(z), "y": column(y),
+    }  # fmt: skip
+
+
+def any_gain(rng):
+    """Cov((I - K H) e - K w) for a gain that is not the optimal one."""
+    found = _corrected(rng, 2)
+    K = rng.normal(size=(3, 2))
+    both = np.hstack([np.eye(3) - K @ found["H"], -K])
+    joint = np.block([[found[r"\Psi"], np.zeros((3, 2))], [np.zeros((2, 3)), found["R"]]])
+    return found | {"K": K, "p": both @ joint @ both.T}
+
+
+def wrong_gain(rng):
+    found = _corrected(rng, 1)
+    return found | {
+        r"\epsilon": 0.3,
+        r"\gamma": rng.normal(size=(3, 1)),
+        "F": found["H"] @ found[r"\Psi"] @ found["H"].T + found["R"],
+    }
+
+
+def array(rng):
+    """The orthogonal matrix by NumPy's QR decomposition, for the correction and for the prediction."""
+    found = _corrected(rng, 2)
+    S, Q = np.linalg.cholesky(found[r"\Psi"]), covariance(rng, 3)
+    wide = np.block([[np.linalg.cholesky(found["R"]), found["H"] @ S], [np.zeros((3, 2)), S]])
+    T, right = np.linalg.qr(wide.T)
+    ahead = np.hstack([found["A"] @ S, np.linalg.cholesky(Q)])
+    turned, root = np.linalg.qr(ahead.T)
+    return found | {
+        "S": S, "Q": Q, "T": T, "X": right.T[:2, :2], "Y": right.T[2:, :2], "Z": right.T[2:, 2:], "S'": root.T, "T'": turned,
+        "F": np.linalg.solve(np.eye(2) - found["H"] @ found["K"], found["R"]),
+    }  # fmt: skip
+
+
+def loop(rng):
+    """Bierman's loop over the columns, column by column."""
+    found, n = _corrected(rng, 1), 3
+    unit, diagonal = factors(found[r"\Psi"])
+    h, r = found["H"].T, found["R"].item()
+    f = unit.T @ h
+    v = np.diag(diagonal) @ f
+    alpha, K, before, after, columns = [r], np.zeros((n, 1)), [None], [None], [None]
+    for j in range(n):
+        alpha.append(alpha[-1] + f[j, 0] * v[j, 0])
+        before.append(K)
+        columns.append(unit[:, [j]] - f[j, 0] / alpha[-2] * K)
+        K = K + v[j, 0] * unit[:, [j]]
+        after.append(K)
+    smaller = [None, *(diagonal * np.array(alpha[:-1]) / np.array(alpha[1:]))]
+    U, D = np.hstack(columns[1:]), np.diag(smaller[1:])
+    running = {
+        r"\alpha": Indexed(alpha), "n": n, "j": range(1, n + 1), "r": r, "h": h, "U": Indexed([None, *unit.T[:, :, None]], unit),
+        "f": Indexed([None, *f[:, 0]], f), "v": Indexed([None, *v[:, 0]], v), "D": Indexed([None, *diagonal], np.diag(diagonal)),
+        "K": Of(lambda j: before[j], "j"), r"K\leftarrow": Of(lambda j: after[j], "j"),
+        r"U_j\leftarrow": Of(lambda j: columns[j], "j"),
+        r"D_j\leftarrow": Of(lambda j: smaller[j], "j"), r"U_j^{\rm old}": Of(lambda j: unit[:, [j - 1]], "j"),
+    }  # fmt: skip
+    return found, running, {"U": U, "D": D, "K": K}
+
+
+def bierman(rng):
+    return loop(rng)[1]
+
+
+def at_the_end(rng):
+    found, running, last = loop(rng)
+    return found | {name: running[name] for name in (r"\alpha", "n", "h")} | last
+
+
+def at_the_beginning(rng):
+    return {"K": np.zeros((3, 1))}
+
+
+def two_measurements(rng):
+    """Bierman's case as a filter sees it: H = (1 1), A = diag(1, 1 + delta)."""
+    x, w, delta = rng.normal(size=2), rng.normal(size=2), 0.3
+    y = [x.sum() + w[0], (np.diag([1, 1 + delta]) @ x).sum() + w[1]]
+    return {"x": Indexed([None, *x]), "w": Indexed(w), "y": Indexed(y), r"\delta": delta}
+
+
+LETTERS = (any_gain, wrong_gain, array, bierman, at_the_end, at_the_beginning, two_measurements)
+_BEFORE = r"\begin{pmatrix}R^{1/2}&HS\\0&S\end{pmatrix}"
+_BLOCKS = r"\begin{pmatrix}F&H\Psi\\\Psi H^T&\Psi\end{pmatrix}"
+_WRONG = r"(K+\epsilon\gamma)"
+SAID = {
+    r"\mathsf Mw^2=\delta^2": DEFINITION,
+    "R>0": "a condition",
+    r"p_{\rm Joseph}": NOTATION,
+    r"p_{\rm textbook}": NOTATION,
+}
+EQUALS = {
+    _BEFORE: r"\begin{pmatrix}X&0\\Y&Z\end{pmatrix}T^T",
+    r"\begin{pmatrix}AS&Q^{1/2}\end{pmatrix}": "S'T'^T",
+    r"p-\epsilon\,\gamma H\Psi": rf"(I-{_WRONG}H)\Psi",
+    r"p+\epsilon^2F\,\gamma\gamma^T": rf"(I-{_WRONG}H)\Psi(I-{_WRONG}H)^T+{_WRONG}R{_WRONG}^T",
+    rf"{_BEFORE}{_BEFORE}^T": _BLOCKS,
+    _BLOCKS: r"\begin{pmatrix}X&0\\Y&Z\end{pmatrix}\begin{pmatrix}X&0\\Y&Z\end{pmatrix}^T",
+    "YX^{-1}": "K",
+    "ZZ^T": r"(I-KH)\Psi",
+    r"(I-KH)\Psi": "p",
+    "UDU^T": "p",
+    r"z-\lambda": r"K(y-H\lambda)",
+    r"K(y-H\lambda)": r"z-\lambda",
+}

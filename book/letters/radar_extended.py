@@ -1,0 +1,109 @@
+"""The letters of radar-extended.md: the package's filter with an acceleration made of measurements, and transfers by matrices."""
+
+import numpy as np
+
+from kfcourse.filters.alphabeta import steady_beta, tracking_index
+from kfcourse.laws import Gaussian
+from kfcourse.linear import LinearSystem, run
+from kfcourse.linear.system import linear_system
+from kfcourse.pages.letters import column, covariance
+from kfcourse.pages.reader import Indexed
+from kfcourse.pages.relations import NOTATION, quoted
+from kfcourse.scenarios.pointer import acceleration_from
+from kfcourse.scenarios.radar import kinematic
+
+SIGMA = 3.0
+
+
+def axis(rng):
+    T, alpha = rng.uniform(0.5, 1), 0.4
+    sigma_a = tracking_index(alpha) * SIGMA / T**2
+    system = linear_system(kinematic(T, noise_sd=sigma_a, measurement_sd=SIGMA))[0]
+    beta = steady_beta(alpha)
+    found = {"A": system.A[::3, ::3], "H": system.H[:1, ::3], "T": T, r"\alpha": alpha, r"\beta": beta, "I": np.eye(2)}
+    B = acceleration_to_state(T)
+    return found | {"B": B, "K": column([alpha, beta / T]), r"\sigma": SIGMA, r"\sigma_a": sigma_a}
+
+
+def acceleration_to_state(T):
+    """What an acceleration of one, constant over T, does to position and velocity: a fine sum."""
+    steps = 2**12
+    v = T / steps * (np.arange(steps) + 0.5)
+    return column([np.sum(v) * T / steps, T])
+
+
+def filtered(rng, k=3):
+    """A run with the control, and the step k of it in plain letters."""
+    found = axis(rng)
+    y = rng.normal(size=(6, 1, 2))
+    u = np.nan_to_num(acceleration_from(y, found["T"]))[..., :1]
+    A, H, B = found["A"], found["H"], found["B"]
+    Q = found[r"\sigma_a"] ** 2 * B @ B.T
+    system = LinearSystem(A, H, (Q + Q.T) / 2, np.array([[SIGMA**2]]), B)
+    law = run(system, Gaussian(rng.normal(size=2), covariance(rng, 2)), y[..., :1], u)
+    (z, p), (lam, Psi) = (
+        ([column(one) for one in laws.mean[:, 0]], [one[0] for one in laws.cov]) for laws in (law.posterior, law.predicted)
+    )
+    K = p[k] @ H.T / SIGMA**2
+    return found | {
+        r"\lambda": Indexed(lam, lam[k]), "z": Indexed(z, z[k]), "u": Indexed(u[:, 0, 0]), "y": Indexed(y[:, 0, 0]),
+        "k": range(2, 5), "p": p[k], r"\Psi": Psi[k], "K": K, "F": SIGMA**2 / (1 - (H @ K).item()), r"\Psi_{11}": Psi[k][0, 0],
+        r"\lambda\leftarrow": lam[k + 1], r"\Psi\leftarrow": Psi[k + 1],
+    }  # fmt: skip
+
+
+def in_one_step(rng, k=3):
+    """The same, with the index k fixed."""
+    found = filtered(rng, k)
+    y, u = found["y"], found["u"]
+    fixed = {"y_k": y[k,], "y_{k-1}": y[k - 1,], "y_{k-2}": y[k - 2,], "u_k": u[k,]}
+    return {name: value for name, value in found.items() if name not in ("y", "u", "k", r"\lambda", "z")} | fixed | {
+        r"\lambda": found[r"\lambda"].plain, "z": found["z"].plain
+    }  # fmt: skip
+
+
+def expanded(rng):
+    """The stationary filter with a linear meter, expanded about any point."""
+    found = axis(rng)
+    z, lam, y = [rng.normal(size=(2, 1))], [rng.normal(size=(2, 1))], rng.normal(size=6)
+    for k in range(1, 5):
+        lam.append(found["A"] @ z[-1])
+        z.append((np.eye(2) - found["K"] @ found["H"]) @ lam[-1] + found["K"] * y[k])
+    return found | {
+        r"\lambda": Indexed(lam), "z": Indexed(z), "y": Indexed(y, y[2]), "k": range(1, 4), r"\bar x": rng.normal(size=(2, 1)),
+        "h": lambda x: found["H"] @ x,
+    }  # fmt: skip
+
+
+def transfers(rng):
+    """What leads from y to the error, by matrices; the literal update by a long run."""
+    found = axis(rng)
+    A, B, H, K, T = (found[name] for name in "ABHKT")
+    rest = np.eye(2) - K @ H
+
+    def error(control):
+        def E(zeta):
+            taken = K + rest @ B * (1 - 1 / zeta) ** 2 / T**2 / zeta * control
+            return 1 - np.linalg.solve(np.eye(2) - rest @ A / zeta, taken)[0, 0]
+
+        return E
+
+    literal, state, behind = np.eye(2) - K @ H @ (2 * A - np.eye(2)), np.zeros((2, 1)), []
+    for k in range(400):
+        state = literal @ state + K * k
+        behind.append(k - state[0, 0])
+    return found | {"E": error(0), "E_u": error(1), r"\zeta": 1.7, r"E_{\rm literal}": lambda one: behind[-1] - behind[-2]}
+
+
+LETTERS = (axis, filtered, in_one_step, expanded, transfers)
+SAID = {
+    r"z_k=z_{k-1}+K\bigl[y_k-h(\lambda_k)-H(\hat x_{k-1}-z_{k-1})\bigr]": quoted("the radar paper"),
+    "u_k=0": "a setting",
+    r"E(\zeta)": NOTATION,
+}
+EQUALS = {
+    r"y-h(z_{k-1})-H(\lambda_k-z_{k-1})": r"y-H\lambda_k",
+    r"y-H\lambda_k": r"y-h(z_{k-1})-H(\lambda_k-z_{k-1})",
+    r"E_{\rm literal}(1)": r"\frac{2\beta}{\alpha+2\beta}",
+    r"\frac{E_u(\zeta)}{E(\zeta)}": r"\frac{(\zeta-1)(2\zeta+1)}{2\zeta^2}",
+}

@@ -1,0 +1,39 @@
+"""The letters of time-tags.md: a foreign clock, and the package's prediction over an interval."""
+
+from kfcourse.pages.letters import column, covariance
+from kfcourse.pages.relations import DEFINITION, NOTATION
+from kfcourse.scenarios.navigation import Clock, Dynamics
+
+
+def clock(rng):
+    rate, shift, read = rng.uniform(0.9, 1.1), *rng.normal(size=2)
+    return {"c": read, "c_0": shift, "r": rate, "t": Clock(rate, shift).time(read)}
+
+
+def prediction(rng):
+    """Over the interval in one step, against many short ones."""
+    motion = Dynamics(A=rng.normal(size=(3, 3)), B=rng.normal(size=(3, 1)), Qc=covariance(rng, 3))
+    z, p, u, delta = column(rng.normal(size=3)), covariance(rng, 3), rng.normal(size=(1, 1)), 0.4
+    lam, Psi, short = z, p, motion.over(delta / 8)
+    for _ in range(8):
+        lam, Psi = short.A @ lam + short.B @ u, short.A @ Psi @ short.A.T + short.Q
+    return {
+        "A": lambda d: motion.over(d).A, "B": lambda d: motion.over(d).B, "Q": lambda d: motion.over(d).Q, r"\Delta": delta,
+        "z": z, "p": p, "u": u, r"\lambda": lam, r"\Psi": Psi,
+    }  # fmt: skip
+
+
+LETTERS = (clock, prediction)
+SAID = {
+    r"\hat s(t)=s(t-\tau)": DEFINITION,
+    r"\hat V(t)=\dot s(t-\tau)": DEFINITION,
+    r"\hat b(t)=u(t)-\ddot s(t-\tau)": DEFINITION,
+}
+SAID |= dict.fromkeys(
+    (
+        r"{\hat{s}-s}",
+        r"{\hat{V}-V}",
+        r"{\hat{b}-b}",
+    ),
+    NOTATION,
+)

@@ -1,0 +1,83 @@
+"""The letters of track-2d.md: a run of the package's filter with a known input; a lost sample; a telescoping sum."""
+
+import numpy as np
+
+from kfcourse.laws import Gaussian
+from kfcourse.linear import run
+from kfcourse.pages.letters import K_RANGE, column, covariance
+from kfcourse.pages.reader import Indexed
+from kfcourse.pages.relations import DEFINITION, NOTATION
+from kfcourse.scenarios import pointer
+
+DELTA, SIGMA, INTENSITY = 0.3, 1.3, 2.0
+
+
+def _run(rng, lost=None):
+    system = pointer.uniform_acceleration(DELTA, np.sqrt(INTENSITY / DELTA), SIGMA)
+    y, u = rng.normal(size=(5, 1, 2)), rng.normal(size=(5, 1, 2))
+    if lost is not None:
+        y[lost] = np.nan
+    found = run(system, Gaussian(rng.normal(size=4), covariance(rng, 4)), y, u)
+    (z, p), (lam, Psi) = (
+        ([column(one[0]) for one in law.mean], [one[0] for one in law.cov]) for law in (found.posterior, found.predicted)
+    )
+    return system, y, u, z, p, lam, Psi
+
+
+def filtered(rng):
+    system, y, u, z, p, lam, Psi = _run(rng)
+    K = [one @ system.H.T @ np.linalg.inv(system.R) for one in p]
+    F = [np.linalg.solve(np.eye(2) - system.H @ gain, system.R) for gain in K]
+    nu = [np.linalg.lstsq(gain, after - before, rcond=None)[0] for gain, after, before in zip(K, z, lam, strict=True)]
+    rows = {"y": [column(one) for one in y], "u": [column(one) for one in u], "z": z, "p": p, r"\lambda": lam, r"\Psi": Psi}
+    rows |= {"K": K, "F": F, r"\nu": nu}
+    fixed = {"A": system.A, "B": system.B, "H": system.H, "Q": system.Q, "R": system.R, "I": np.eye(4)}
+    fixed |= {"S": INTENSITY, r"\Delta": DELTA, r"\sigma": SIGMA, "k": K_RANGE}
+    return fixed | {name: Indexed(values, values[2]) for name, values in rows.items()}
+
+
+def sample_lost(rng):
+    *_, z, p, lam, Psi = _run(rng, lost=2)
+    return {"z": z[2], "p": p[2], r"\lambda": lam[2], r"\Psi": Psi[2]}
+
+
+def axes(rng):
+    """The meter's covariance, and the input written twice."""
+    system, a = _run(rng)[0], rng.normal(size=2)
+    doubled = np.diag([DELTA**2 / 2] * 2 + [DELTA] * 2)
+    return {
+        "R": system.R, r"\sigma": SIGMA, "I": np.eye(2), "B": system.B, "G": doubled, r"\Delta": DELTA, "a_x": a[0], "a_y": a[1],
+        r"(a_x,a_y)^T": column(a), r"(a_x,a_y,a_x,a_y)^T": column([*a, *a]),
+    }  # fmt: skip
+
+
+def telescope(rng):
+    """What the prediction by second differences is off the mean of the last two measurements."""
+    y = rng.normal(size=9)
+    r, v = y[2], (3 * y[2] - 4 * y[1] + y[0]) / 2
+    off = {}
+    for k in range(2, 8):
+        u = y[k] - 2 * y[k - 1] + y[k - 2]
+        r, v = r + v + u / 2, v + u
+        off[k] = r - (y[k] + y[k - 1]) / 2
+    return {"y": Indexed(y), r"\delta": Indexed([0, 0, *off.values()]), "k": range(2, 7)}
+
+
+LETTERS = (filtered, sample_lost, axes, telescope)
+_INPUT = r"\begin{pmatrix}\Delta^2a_x/2\\\Delta^2a_y/2\\\Delta a_x\\\Delta a_y\end{pmatrix}"
+SAID = {
+    r"x_{k+1}=Ax_k+B\,(u_k+\xi_k)": DEFINITION,
+    "y_k=Hx_k+w_k": DEFINITION,
+    r"\xi_k\sim\mathcal N(0,\sigma_a^2I)": DEFINITION,
+    r"w_k\sim\mathcal N(0,R)": DEFINITION,
+    r"Q_{\rm const}": NOTATION,
+    r"Q_{\rm white}": NOTATION,
+    r"\delta^2": NOTATION,
+    r"s(\tau)": NOTATION,
+    "0": NOTATION,
+}
+EQUALS = {
+    r"G\,(a_x,a_y,a_x,a_y)^T": _INPUT,
+    r"B\,(a_x,a_y)^T": _INPUT,
+    r"\delta_{k+1}-\delta_k": r"\frac32(y_0-2y_1+y_2)",
+}

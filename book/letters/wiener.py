@@ -1,0 +1,72 @@
+"""The letters of wiener.md: spectra as sums over correlations, a limit by python-control, least squares for the amplitude."""
+
+import numpy as np
+from control import dare
+from scipy.stats import norm
+
+from kfcourse.filters.kalman import correct
+from kfcourse.laws import Gaussian
+from kfcourse.linear.system import LinearSystem
+from kfcourse.pages.reader import Indexed
+from kfcourse.pages.relations import DEFINITION, NOTATION, quoted
+
+
+def signal(rng):
+    """x' = a x + v in white noise; its spectrum at a real zeta, where the sum of the correlations converges, too."""
+    a, Q, R, zeta = rng.uniform(0.5, 0.8), rng.uniform(1, 2), rng.uniform(1, 2), 1.1
+    spectrum = sum(Q * a ** abs(k) / (1 - a**2) * zeta ** (-k) for k in range(-300, 301))
+    Psi = dare(*(np.array([[one]]) for one in (a, 1, Q, R)))[0].item()
+    K = Psi / (Psi + R)
+    z, y = rng.normal(size=2)
+    after = a * z + K * (y - a * z)
+    return {
+        "a": a, "Q": Q, "R": R, r"\zeta": zeta, r"S_x(\zeta)": spectrum, r"S_y(\zeta)": spectrum + R, "K": K,
+        r"\gamma": a * (1 - K),
+        "z": z, "y_k": y, r"z\leftarrow": after,
+    }  # fmt: skip
+
+
+def amplitude(rng):
+    """A pulse of which the package's Kalman filter finds the amplitude, sample by sample."""
+    s, y, R, d, b = rng.normal(size=4), rng.normal(size=4), 0.7, 1.9, 0.6
+    law = Gaussian(np.zeros(1), np.array([[d]]))
+    for one, measured in zip(s, y, strict=True):
+        law = correct(LinearSystem([[1.0]], [[one]], [[0.0]], [[R]]), law, np.array([measured]))
+    return {
+        "C": np.dot(s, y), "E": np.dot(s, s), "R": R, "d": d, "z": law.mean.item(), "p": law.cov.item(), "b": b,
+        r"\mathcal L": lambda b: np.prod(norm.pdf(y, b * s, np.sqrt(R))),
+    }  # fmt: skip
+
+
+def correlator(rng):
+    """The matched filter along a record, and the amplitude by least squares at each moment."""
+    n, s, y = 3, rng.normal(size=4), rng.normal(size=9)
+    C = [np.convolve(y, s[::-1])[k] for k in range(9)]
+    b = [np.nan] * n + [np.linalg.lstsq(s[:, None], y[k - n : k + 1], rcond=None)[0].item() for k in range(n, 9)]
+    return {"n": n, "s": Indexed(s), "y": Indexed(y), "C": Indexed(C), "i": range(n + 1), "k": range(n, 9), r"\hat b": Indexed(b)}
+
+
+def weights(rng):
+    g, s = rng.normal(size=(2, 4))
+    return {"g": Indexed(g), "s": Indexed(s), "k": range(4), "i": range(4), "j": range(4)}
+
+
+LETTERS = (signal, amplitude, correlator, weights)
+SAID = {
+    r"\zeta=e^{i\theta}": DEFINITION,
+    r"W(\zeta)=\frac{1-a\zeta^{-1}}{\rho\,(1-\gamma\zeta^{-1})}\left[\frac{Q}{(1-a\zeta^{-1})(1-\gamma\zeta)}\right]_+": quoted(
+        "Van Trees"
+    ),
+    r"\frac{b^2\left(\sum g_ks_k\right)^2}{R\sum g_k^2}\;\le\;\frac{b^2}{R}\sum s_k^2": "verified below, for four samples",
+    "x_{k+1}=ax_k+v_k": DEFINITION,
+    r"|\gamma|<1": "a condition",
+    r"\bigl[\,\cdot\,\bigr]": NOTATION,
+    r"W(\zeta)": NOTATION,
+    "|D|^2": NOTATION,
+    "|C|^2": NOTATION,
+}
+EQUALS = {
+    r"C_k/\sum s_i^2": r"\hat b_k",
+    r"\textstyle\sum g_k^2\sum s_k^2-(\sum g_ks_k)^2": r"\frac12\sum_i\sum_j(g_is_j-g_js_i)^2",
+    r"\ln\frac{\mathcal L(b)}{\mathcal L(0)}": r"(bC-b^2E/2)/R",
+}
