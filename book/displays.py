@@ -10,6 +10,7 @@ from collections import Counter
 from pathlib import Path
 
 from docutils import nodes
+from equations import PAGE
 from sphinx.util import logging
 
 from kfcourse.pages.relations import Formula, Letters, Said, letters_file, letters_of, mark
@@ -22,6 +23,8 @@ log = logging.getLogger(__name__)
 def say(app, doctree) -> None:
     """Put the words where the reader looks for them."""
     page = Path(app.srcdir, f"{app.env.docname}.md")
+    if page == PAGE:  # says so itself
+        return
     letters = letters_of(page)
     app.env.note_dependency(str(letters_file(page)))
     for display in list(doctree.findall(nodes.math_block)):

@@ -15,6 +15,7 @@ from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, Trajectories, simulate
 from kfcourse.montecarlo.experiment import compare, predictions, run
+from kfcourse.records import likelihood, smooth
 from kfcourse.symbolic.angular import AngleWarning
 from kfcourse.symbolic.formula import FormulaError
 from kfcourse.symbolic.model import Model
@@ -42,10 +43,12 @@ __all__ = [
     "gauss_hermite",
     "gaussian",
     "lab_filters",
+    "likelihood",
     "linearised",
     "load_variants",
     "predictions",
     "run",
     "simulate",
+    "smooth",
     "unscented",
 ]

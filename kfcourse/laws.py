@@ -56,6 +56,18 @@ class Measurement(NamedTuple):
         return y - self.h
 
 
+class Transition(NamedTuple):
+    """What looking back must know of the object: its structural functions at N(z, p), affine as the meter's are.
+
+    tau (..., n), A (..., n, n), Q (..., n, n): mean of the next state, its sensitivity dtau/dz, and Q = Theta - A p A^T, the part
+    of its covariance that this state does not explain.  Q is derived, not subtracted, as R is.
+    """
+
+    tau: Array
+    A: Array
+    Q: Array
+
+
 @cache
 def measurement_of(angles: Components) -> type[Measurement]:
     """`Measurement`, or one whose innovations know which components are angles."""
@@ -218,6 +230,19 @@ def normalised_square(vector: Array, cov: Array) -> Array:
     Directions in which cov is singular do not enter.
     """
     return np.einsum("...i,...i", apply(gain(np.eye(cov.shape[-1]), cov), vector), vector)
+
+
+def log_density(measurement: Measurement, y: Array) -> Array:
+    """Logarithm of the normal density N(y; h, F), (runs,); what is missing (NaN) does not enter.
+
+    -1/2 nu^T F^-1 nu - 1/2 ln det(2 pi F),      nu = y - h
+    """
+    innovation, F = measurement.innovation(y), measurement.F
+    missing = np.isnan(innovation)
+    if missing.any():
+        innovation, _, F, _ = without_missing(innovation, measurement.G, F, measurement.R)
+    present = (~missing).sum(axis=-1)
+    return -0.5 * (normalised_square(innovation, F) + np.linalg.slogdet(F).logabsdet + present * np.log(2 * np.pi))
 
 
 def stacked(laws: Sequence[Gaussian]) -> Gaussian:

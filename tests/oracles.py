@@ -150,3 +150,35 @@ def gaussian_mean(function, mean, cov, order: int = 40):
         weight = weight * w
     points = mean[:, None] + np.linalg.cholesky(cov) @ np.stack([g.ravel() for g in grids])
     return float(np.sum(weight.ravel() * function(list(points))))
+
+
+def joint_posterior(steps, prior, y):
+    """Means (N, n), covariances (N, n, n) of a linear model's states given a record, and its log density, by one regression.
+
+    `steps`: for each k (A, a, Q, H, b, R) of x' = A x + a + v, y = H x + b + w; y (N, p), NaN where missing.  All states are
+    linear functions of x_0 and the noises; the joint law of states and measurements is written down, and conditioned once.
+    """
+    m, P = prior
+    n, size = len(m), len(steps)
+    means, covs = [m], np.zeros((size * n, size * n))
+    covs[:n, :n] = P
+    for k, (A, a, Q, *_) in enumerate(steps[:-1]):
+        done, new = slice(0, (k + 1) * n), slice((k + 1) * n, (k + 2) * n)
+        means.append(A @ means[-1] + a)
+        covs[new, done] = A @ covs[k * n : (k + 1) * n, done]
+        covs[done, new] = covs[new, done].T
+        covs[new, new] = A @ covs[k * n : (k + 1) * n, k * n : (k + 1) * n] @ A.T + Q
+    mean = np.concatenate(means)
+    rows = [(k, i) for k in range(size) for i in range(y.shape[1]) if not np.isnan(y[k, i])]
+    H, noise = np.zeros((len(rows), size * n)), np.zeros((len(rows), len(rows)))
+    for r, (k, i) in enumerate(rows):
+        H[r, k * n : (k + 1) * n] = steps[k][3][i]
+        for s, (j, other) in enumerate(rows):
+            noise[r, s] = steps[k][5][i, other] if j == k else 0.0
+    residual = np.array([y[k, i] - steps[k][4][i] for k, i in rows]) - H @ mean
+    F = H @ covs @ H.T + noise
+    K = np.linalg.solve(F, H @ covs).T
+    mean, cov = mean + K @ residual, covs - K @ H @ covs
+    log_density = -0.5 * (residual @ np.linalg.solve(F, residual) + np.linalg.slogdet(2 * np.pi * F).logabsdet)
+    blocks = [slice(k * n, (k + 1) * n) for k in range(size)]
+    return np.array([mean[b] for b in blocks]), np.array([cov[b, b] for b in blocks]), log_density

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from kfcourse.filters.designed import Scatter
-from kfcourse.laws import Gaussian, Measurement, apply, correct, gain, product, square_root, symmetric, transpose
+from kfcourse.laws import Gaussian, Measurement, apply, correct, gain, log_density, product, square_root, symmetric, transpose
 
 pytestmark = pytest.mark.quick
 
@@ -331,3 +332,14 @@ def test_a_perfect_regression_leaves_no_negative_variance(rng):
         # Rounding of sums of 30 products and of a solution whose condition is below 1e2.
         assert abs(fit.residual).max() < 1e-13 * target.var(axis=0).sum()
         assert Scatter.of(0.7 * regressor[:, :1], regressor[:, :1]).regression(1).residual.item() >= 0
+
+
+def test_the_log_density_is_the_normal_law_s_of_what_was_measured():
+    F = np.array([[2.0, 0.6], [0.6, 1.0]])
+    h, y = np.array([[1.0, -1.0]]), np.array([[0.3, 0.2]])
+    measurement = Measurement(h, np.zeros((2, 2)), F, F)
+    expected = multivariate_normal(h[0], F).logpdf(y[0])
+    assert log_density(measurement, y) == pytest.approx([expected])
+    y[0, 0] = np.nan
+    assert log_density(measurement, y) == pytest.approx([-0.5 * (1.2**2 / 1.0 + np.log(2 * np.pi))])
+    assert log_density(measurement, np.full((1, 2), np.nan)) == pytest.approx([0.0])

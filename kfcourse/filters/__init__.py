@@ -9,6 +9,7 @@ modified_structure      its modification (MFOS)
 exact                   the AOF itself, on a grid (exact_kernels, exact_places, exact_batch; exact_adaptive checks it)
 particles               the same by sampling;  proposals: where to look;  densities, inverted: what all need
 iterated_ekf            the meter linearised again at the estimate
+gate, heavy_tails       measurements that are not believed: refused, by any filter; weighted
 alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving (IMM)
 notation                symbols in which the equations are printed
@@ -23,6 +24,8 @@ from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.designed import Design
 from kfcourse.filters.exact import pointmass
 from kfcourse.filters.exact_adaptive import adaptive_pointmass
+from kfcourse.filters.gate import gated
+from kfcourse.filters.heavy_tails import robust
 from kfcourse.filters.iterated_ekf import iterated
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.modified_structure import EQUATIONS as _MFOS
@@ -47,6 +50,7 @@ __all__ = [
     "aof",
     "duof",
     "fos",
+    "gated",
     "imm",
     "iterated",
     "kalman_filter",
@@ -54,4 +58,5 @@ __all__ = [
     "mfos",
     "particle",
     "pointmass",
+    "robust",
 ]

@@ -10,6 +10,7 @@ import numpy as np
 from kfcourse.angles import Components, on_circle
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.structure import Structure
 
 
 class State(NamedTuple):
@@ -45,6 +46,12 @@ class Advance(Protocol):
     def __call__(self, state: State, y: Array, /) -> State: ...
 
 
+class Evidence(Protocol):
+    """ln p(y_k | y_0, ..., y_{k-1}), (runs,), from the state before the measurement; 0 where it is missing."""
+
+    def __call__(self, state: State, y: Array, /) -> Array: ...
+
+
 @dataclass(frozen=True)
 class Filter:
     """A filter ready to run.
@@ -63,6 +70,11 @@ class Filter:
         Thousands of times the cost of the others: comparisons run it on a subset of the trajectories.
     instead : Filter, optional
         Of the same name: what comparisons run where a slow filter fails.
+    structure : Structure, optional
+        For a filter whose laws are normal ones: the structural functions by which it expects measurements from its prediction,
+        and predicts from its posterior.  Looking back, likelihood and gates take from it what no filter needs while it runs.
+    evidence : Evidence, optional
+        Where it is another than the normal law's by `structure`: how likely a measurement was before it came.
     """
 
     name: str
@@ -71,10 +83,22 @@ class Filter:
     step: Advance
     slow: bool = False
     instead: Filter | None = None
+    structure: Structure | None = None
+    evidence: Evidence | None = None
 
     def __post_init__(self) -> None:
         if self.model.angles.x:
             object.__setattr__(self, "step", _on_circle(self.step, self.model.angles.x))
+
+
+def structure_of(one: Filter, what: str) -> Structure:
+    """The structural functions of a filter; ValueError that tells what needs them if it has none."""
+    if one.structure is None:
+        raise ValueError(
+            f"{what} needs the structural functions by which a filter expects and predicts, and {one.name} has none of its own: "
+            "take one whose laws are normal, such as aof(linearised(model)), aof(unscented(model)) or kalman_filter(model)"
+        )
+    return one.structure
 
 
 def _on_circle(step: Advance, angles: Components) -> Advance:

@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
-from kfcourse.angles import difference
+from kfcourse.angles import Components, difference
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, product, symmetric, transpose
@@ -87,7 +87,7 @@ def iterated(structure: Structure, iterations: int = 5) -> Filter:
             posterior = correct(prior, *affine_meter(now, posterior, prior, y))
         return State(state.step + 1, posterior, now.predict(*posterior))
 
-    return Filter(f"iterated-{structure.name}", structure.model, initial_state(structure.model), step)
+    return Filter(f"iterated-{structure.name}", structure.model, initial_state(structure.model), step, structure=structure)
 
 
 def affine_meter(structure: Structure, at: Gaussian, prior: Gaussian, y: Array) -> tuple[Measurement, Array]:
@@ -97,8 +97,12 @@ def affine_meter(structure: Structure, at: Gaussian, prior: Gaussian, y: Array) 
 
     Components of y that are angles get the turns that bring them near h: at z, where the meter is affine, not at lambda.
     """
-    there = structure.measure(*at)
+    there, angles = structure.measure(*at), structure.model.angles
+    return seen_from(there, at, prior, angles.x), there.h + there.innovation(y) if angles.y else y
+
+
+def seen_from(there: Measurement, at: Gaussian, prior: Gaussian, angles: Components) -> Measurement:
+    """The affine meter that structural functions at the law `at` describe, seen from another law: without the turns of y."""
     h, G, _, R = there
     F = symmetric(product(product(G, prior.cov), transpose(G))) + R
-    shift = difference(prior.mean, at.mean, structure.model.angles.x)
-    return Measurement(h + apply(G, shift), G, F, R), h + there.innovation(y) if structure.model.angles.y else y
+    return Measurement(h + apply(G, difference(prior.mean, at.mean, angles)), G, F, R)

@@ -15,6 +15,7 @@ from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.laws import Array, Gaussian, any_missing, apply, gain, transpose, without_missing
 from kfcourse.linear.system import LinearSystem, linear_systems
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.structure import linearised
 
 
 def correct(system: LinearSystem, predicted: Gaussian, y: Array) -> Gaussian:
@@ -56,4 +57,4 @@ def kalman_filter(model: Model) -> Filter:
         mean, cov = predict(system, posterior)
         return State(state.step + 1, posterior, Gaussian(mean + shift, cov))
 
-    return Filter("kalman", model, initial_state(model), step)
+    return Filter("kalman", model, initial_state(model), step, structure=linearised(model))

@@ -24,7 +24,7 @@ import numpy as np
 
 from kfcourse.angles import Components, near, on_circle
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.laws import Array, Gaussian, Measurement, any_missing, correct, normalised_square, without_missing
+from kfcourse.laws import Array, Gaussian, Measurement, correct, log_density
 from kfcourse.symbolic.structure import Structure
 
 
@@ -79,15 +79,20 @@ def imm(structures: Sequence[Structure], transition: Array, probabilities: Array
         expected = np.tile(first, (runs, 1))
         return start._replace(memory=Modes(expected, expected, (start.predicted,) * len(models)))
 
+    def measurements(state: State) -> list[Measurement]:
+        """What each mode expects to be measured."""
+        each = zip(structures, state.memory.predicted, strict=True)
+        return [structure.at(state.step).measure(*prior) for structure, prior in each]
+
+    def evidence(state: State, y: Array) -> Array:
+        return _posterior(state.memory.expected, measurements(state), y)[1]
+
     def step(state: State, y: Array) -> State:
         memory: Modes = state.memory
-        corrected, likelihoods = [], []
         now = [structure.at(state.step) for structure in structures]
-        for structure, prior in zip(now, memory.predicted, strict=True):
-            measurement = structure.measure(*prior)
-            corrected.append(correct(prior, measurement, y))
-            likelihoods.append(log_likelihood(measurement, y))
-        mu = _posterior(memory.expected, np.stack(likelihoods, axis=-1))
+        expectations = measurements(state)
+        corrected = [correct(prior, one, y) for prior, one in zip(memory.predicted, expectations, strict=True)]
+        mu, _ = _posterior(memory.expected, expectations, y)
 
         expected = mu @ pi
         predicted = []
@@ -104,7 +109,7 @@ def imm(structures: Sequence[Structure], transition: Array, probabilities: Array
             Modes(mu, expected, tuple(predicted)),
         )
 
-    return Filter(name, models[0], init, step)
+    return Filter(name, models[0], init, step, evidence=evidence)
 
 
 def _checked(structures: Sequence[Structure], transition: Array, probabilities: Array | None) -> tuple[Array, Array]:
@@ -136,23 +141,14 @@ def _checked(structures: Sequence[Structure], transition: Array, probabilities: 
     return pi / pi.sum(axis=-1, keepdims=True), start / start.sum()
 
 
-def _posterior(expected: Array, log_likelihoods: Array) -> Array:
-    """c_j L_j / sum over the modes, (runs, M); in logarithms, as likelihoods far from the truth are 0 in floating point."""
+def _posterior(expected: Array, measurements: Sequence[Measurement], y: Array) -> tuple[Array, Array]:
+    """c_j L_j / sum over the modes, (runs, M), and ln of the sum; in logarithms, as likelihoods far from the truth are 0."""
     with np.errstate(divide="ignore"):  # a mode that is excluded stays so
-        log_weights = np.log(expected) + log_likelihoods
-    weights = np.exp(log_weights - log_weights.max(axis=-1, keepdims=True))
-    return weights / weights.sum(axis=-1, keepdims=True)
-
-
-def log_likelihood(measurement: Measurement, y: Array) -> Array:
-    """Logarithm of N(y; h, F) without the constant, (runs,); what is missing (NaN) does not enter.
-
-    -1/2 nu^T F^-1 nu - 1/2 ln det F
-    """
-    innovation, F = measurement.innovation(y), measurement.F
-    if any_missing(innovation):
-        innovation, _, F, _ = without_missing(innovation, measurement.G, F, measurement.R)
-    return -0.5 * (normalised_square(innovation, F) + np.linalg.slogdet(F).logabsdet)
+        logs = np.log(expected) + np.stack([log_density(one, y) for one in measurements], axis=-1)
+    peak = logs.max(axis=-1, keepdims=True)
+    weights = np.exp(logs - peak)
+    total = weights.sum(axis=-1, keepdims=True)
+    return weights / total, (peak + np.log(total))[..., 0]
 
 
 def mixture(laws: Sequence[Gaussian], weights: Array, angles: Components = ()) -> Gaussian:

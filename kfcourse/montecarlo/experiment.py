@@ -52,7 +52,7 @@ def run(one: Filter, y: Array) -> Gaussian:
     TypeError
         A `Design`, whose coefficients are still to be found.
     """
-    return stacked([state.posterior for state in _states(one, y)[1:]])
+    return stacked([state.posterior for state in states(one, y)[1:]])
 
 
 def predictions(one: Filter, y: Array) -> Gaussian:
@@ -60,11 +60,11 @@ def predictions(one: Filter, y: Array) -> Gaussian:
 
     Arguments as in `run`.  `kfcourse.linear.consistency` compares them with what then came.
     """
-    return stacked([state.predicted for state in _states(one, y)[:-1]])
+    return stacked([state.predicted for state in states(one, y)[:-1]])
 
 
-def _states(one: Filter, y: Array) -> list[State]:
-    """The filter's states: before the first measurement, and after each."""
+def states(one: Filter, y: Array) -> list[State]:
+    """The filter's states: before the first measurement, and after each.  Arguments and errors as of `run`."""
     if isinstance(one, Design):
         raise TypeError(
             f"{one.name} is a Design, whose coefficients are still to be found over an ensemble: "

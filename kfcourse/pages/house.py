@@ -24,6 +24,7 @@ LAYERS = (
     "lab",
     "scenarios",
     "continuous",
+    "records",
     "montecarlo",
     "filters",
     "linear",

@@ -203,7 +203,7 @@ def _printed(code: str) -> Iterator[Formula]:
     for call in calls(code, "Symbol", "MatrixSymbol", "symbols"):
         several = getattr(call.func, "attr", getattr(call.func, "id", "")) == "symbols"
         names = [name for text in _texts(call.args[:1]) for name in (text.split() if several else [text])]
-        yield from (Formula("name", name) for name in dict.fromkeys(names) if speaks(normal(name)))
+        yield from (Formula("name", name) for name in dict.fromkeys(names) if re.search(r"[\\{]", name) and speaks(normal(name)))
 
 
 def _texts(nodes: Iterable[ast.expr]) -> list[str]:

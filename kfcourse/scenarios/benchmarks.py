@@ -7,6 +7,7 @@ stochastic_volatility()  a state that shows only in the measurement's variance
 bearings()               two bearings of a target (Hartikainen, Solin and Särkkä, 2011), with its course: `bearings_data(...)`
 reentry(known)           a vehicle that enters the atmosphere (Julier and Uhlmann, 2004), seen by a radar
 passing_target(angles)   a target whose bearing jumps by a turn
+local_level(q, r)        a level that wanders, as the flow of the Nile 1871-1970 (Cobb, 1978): `nile()`
 """
 
 from __future__ import annotations
@@ -39,6 +40,9 @@ GROWTH_ELSEWHERE = {"EKF": 115.8, "Gauss-Hermite 5": 59.2, "Gauss-Hermite 10": 4
 # From the same manual: root mean square errors of the position, means over runs.  Bearings of 1000 runs; re-entry, km, of 100.
 BEARINGS_ERRORS = {"EKF": 0.114, "UKF": 0.113}
 REENTRY_ERRORS = {"EKF": 0.0084, "UKF": 0.0084}
+
+# The pendulum's errors again, of the smoothers.
+PENDULUM_SMOOTHED = {"EKF": 0.057446202494837, "UKF": 0.036617555415464256}
 
 
 def pendulum() -> Model:
@@ -180,3 +184,21 @@ def passing_target(angles: list[str]) -> Model:
         angles=angles,
         prior={"mean": [-10_000, 3_000, 20, -150], "variance": np.square([100, 100, 15, 15])},
     )
+
+
+def local_level(q: float = 1468.5, r: float = 15099.7) -> Model:
+    """x' = x + v, y = x + w with variances q and r; N(0, 10^7) before the first measurement."""
+    return Model.define(
+        "x + v",
+        "x + w",
+        {"q": q, "r": r},
+        prior={"mean": 0, "variance": 1e7},
+        state_noise={"variance": "q"},
+        meter_noise={"variance": "r"},
+    )
+
+
+def nile() -> Array:
+    """Annual flow of the Nile at Aswan from 1871 to 1970, 10^8 m^3, (100, 1, 1)."""
+    text = (resources.files("kfcourse.scenarios") / "data" / "nile.csv").read_text(encoding="utf-8")
+    return np.array([float(row.split(",")[1]) for row in text.split()[1:]])[:, None, None]

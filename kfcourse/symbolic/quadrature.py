@@ -16,7 +16,18 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import Components, difference, near, on_circle
-from kfcourse.laws import SINGULAR, Array, Gaussian, Measurement, apply, measurement_of, square_root, symmetric, transpose
+from kfcourse.laws import (
+    SINGULAR,
+    Array,
+    Gaussian,
+    Measurement,
+    Transition,
+    apply,
+    measurement_of,
+    square_root,
+    symmetric,
+    transpose,
+)
 from kfcourse.symbolic.choices import decides
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.known import Stepwise
@@ -259,23 +270,30 @@ def _of_step(name: str, model: Model, rules: Sequence[tuple[Array, Array]], equa
         _, _, tau, following = propagate(equations.state, z, p, points, weights)
         return Gaussian(tau, _weighted(weights, following) + equations.state.added)
 
-    def measure(m: Array, d: Array) -> Measurement:
-        points, weights = rules[1]
-        d = np.broadcast_to(d, (*m.shape, n))
+    def regressed(equation: _Equation, rule: tuple[Array, Array], mean: Array, cov: Array):
+        """Mean of the function, its slopes by x, covariance of what is not linear in x, the function's deviations."""
+        points, weights = rule
         # In directions that a singular covariance knows exactly there would be no points, and no slope.
-        spread = d if n == 1 else d * (1 + UNSEEN * np.finfo(float).eps * np.eye(n))
-        scale, dx, h, dy = propagate(equations.meter, m, spread, points, weights)
-        dx = np.broadcast_to(dx, (*dy.shape[:-1], n))
-        G = _slopes(transpose(dy * weights[:, None]) @ points[:, :n], scale)
-        # The part of y that is not linear in x: no difference of nearly equal matrices.
-        added = equations.meter.added
-        R = _weighted(weights, dy - dx @ transpose(G)) + added
+        spread = cov if n == 1 else cov * (1 + UNSEEN * np.finfo(float).eps * np.eye(n))
+        scale, dx, value, deviation = propagate(equation, mean, spread, points, weights)
+        dx = np.broadcast_to(dx, (*deviation.shape[:-1], n))
+        slopes = _slopes(transpose(deviation * weights[:, None]) @ points[:, :n], scale)
+        # No difference of nearly equal matrices.
+        return value, slopes, _weighted(weights, deviation - dx @ transpose(slopes)) + equation.added, deviation
+
+    def measure(m: Array, d: Array) -> Measurement:
+        d = np.broadcast_to(d, (*m.shape, n))
+        h, G, R, dy = regressed(equations.meter, rules[1], m, d)
         if n == 1:
-            return measurement(h, G, _weighted(weights, dy) + added, R)
+            return measurement(h, G, _weighted(rules[1][1], dy) + equations.meter.added, R)
         F = symmetric(G @ d @ transpose(G)) + R
         return measurement(h, *_without_rounding(G, d, F, R))
 
-    return Structure(name, model, predict, measure)
+    def transition(z: Array, p: Array) -> Transition:
+        tau, A, Q, _ = regressed(equations.state, rules[0], z, np.broadcast_to(p, (*z.shape, n)))
+        return Transition(tau, A, Q)
+
+    return Structure(name, model, predict, measure, transition)
 
 
 # Variances are enlarged by this many units of precision (2e-14 of themselves), so that a root has pivots of 1e-7 at least and

@@ -5,6 +5,8 @@ The first two conditional moments as functions of a Gaussian's mean and covarian
     tau(z, p), Theta(z, p)          mean and covariance of x_{k+1}  when x_k ~ N(z, p)
     h(m, d),  G(m, d),  F(m, d)     mean of y_k, its sensitivity dh/dm, its covariance when x_k ~ N(m, d)
 
+and, for who looks back, the sensitivity A = dtau/dz.  By Stein's lemma Cov(x, y) = d G^T and Cov(x_k, x_{k+1}) = p A^T.
+
 `linearised` and `gaussian` derive them symbolically from the model; `unscented` and `gauss_hermite`
 compute them numerically, for models without a closed form.  All four give a `Structure`, and one
 predict/correct step serves them all.
@@ -22,7 +24,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import Components, on_circle
-from kfcourse.laws import Array, Gaussian, Measurement, measurement_of
+from kfcourse.laws import Array, Gaussian, Measurement, Transition, measurement_of
 from kfcourse.symbolic.choices import jumps, masked
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.known import Stepwise
@@ -47,6 +49,8 @@ class Structure:
         (z (..., n), p (..., n, n)) -> Gaussian(tau, Theta).
     measure : callable
         (m (..., n), d (..., n, n)) -> Measurement(h (..., p), G (..., p, n), F (..., p, p), R).
+    transition : callable
+        (z (..., n), p (..., n, n)) -> Transition(tau (..., n), A (..., n, n), Q): what a smoother needs of the object.
     formulas : StructuralFormulas or None
         The symbolic functions; None for the numerical structures.
     at_step : callable, optional
@@ -59,6 +63,7 @@ class Structure:
     model: Model
     predict: Callable[[Array, Array], Gaussian]
     measure: Callable[[Array, Array], Measurement]
+    transition: Callable[[Array, Array], Transition]
     formulas: StructuralFormulas | None = None
     at_step: Callable[[int], Structure] | None = None
 
@@ -71,9 +76,9 @@ class Structure:
         return self if self.at_step is None else self.at_step(k)
 
     def __getitem__(self, function: str) -> sp.Expr | sp.MatrixBase:
-        """The formula of "tau", "Theta", "h", "G", "F" or "R": an expression if scalar, else a matrix."""
+        """The formula of "tau", "Theta", "h", "G", "F", "R", "A" or "Q": an expression if scalar, else a matrix."""
         formulas = self._derived()
-        matrix = formulas.R if function == "R" else formulas.functions[function]
+        matrix = getattr(formulas, function) if function in ("R", "A", "Q") else formulas.functions[function]
         return matrix[0] if matrix.shape == (1, 1) else matrix
 
     def latex(self) -> str:
@@ -142,6 +147,16 @@ class StructuralFormulas:
         return sp.ImmutableMatrix(F - G * self.d * G.T).applyfunc(sp.expand)
 
     @cached_property
+    def A(self) -> sp.ImmutableMatrix:
+        """dtau/dz, the twin of G = dh/dm: Cov(x_k, x_{k+1}) = p A^T."""
+        return sp.ImmutableMatrix(self.functions["tau"].jacobian(self.z))
+
+    @cached_property
+    def Q(self) -> sp.ImmutableMatrix:
+        """Theta - A p A^T, the part of the next state's covariance that this state does not explain."""
+        return sp.ImmutableMatrix(self.functions["Theta"] - self.A * self.p * self.A.T).applyfunc(sp.expand)
+
+    @cached_property
     def compiled_predict(self) -> Stepwise:
         return self._compile(
             "predict", {"z": self.z, "p": self.p}, {key: self.functions[key].subs(self.model.values) for key in ("tau", "Theta")}
@@ -157,6 +172,12 @@ class StructuralFormulas:
         named = sp.ImmutableMatrix(*R.shape, lambda i, j: auxiliary.get((min(i, j), max(i, j)), R[i, j]))
         outputs = {"h": h, "G": G, "F": explained + named, "R": named}
         return self._compile("measure", {"m": self.m, "d": self.d}, outputs, {name: R[ij] for ij, name in auxiliary.items()})
+
+    @cached_property
+    def compiled_transition(self) -> Stepwise:
+        parts = {"tau": self.functions["tau"], "A": self.A, "Q": self.Q}
+        outputs = {name: part.subs(self.model.values) for name, part in parts.items()}
+        return self._compile("transition", {"z": self.z, "p": self.p}, outputs)
 
     def _compile(
         self,
@@ -180,6 +201,7 @@ class StructuralFormulas:
             self.model,
             lambda z, p: _spread(Gaussian(*predict(z, p)), z, angles.x),
             lambda m, d: measurement(*measure(m, d)),
+            lambda z, p: Transition(*self.compiled_transition.at(k)(z, p)),  # compiled where it is asked for
             self,
         )
 
@@ -194,7 +216,7 @@ def of_steps(
     def refused(mean: Array, cov: Array) -> NoReturn:
         raise ModelError(f"{model} depends on the step: say which, as in structure.at(k).predict(z, p)")
 
-    return Structure(name, model, refused, refused, formulas, at)
+    return Structure(name, model, refused, refused, refused, formulas, at)
 
 
 def _spread(law: Gaussian, over: Array, angles: Components) -> Gaussian:

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from filterpy.kalman import IMMEstimator, KalmanFilter
 
-from kfcourse import Gaussian, Model, gaussian, linearised, run, simulate, unscented
+from kfcourse import Gaussian, Model, gaussian, likelihood, linearised, run, simulate, unscented
 from kfcourse.filters import aof
-from kfcourse.filters.multiple_models import imm, log_likelihood, mixture
-from kfcourse.laws import Measurement
+from kfcourse.filters.multiple_models import imm, mixture
+from kfcourse.laws import log_density
 from kfcourse.linear.system import linear_system
 
 pytestmark = pytest.mark.quick
@@ -86,7 +86,7 @@ def test_without_mixing_it_is_a_bank_of_filters_weighted_by_all_their_likelihood
         one = aof(structure)
         state, total, posterior = one.init(y.shape[1]), np.log(START[j]), []
         for measurement in y:
-            total = total + log_likelihood(structure.measure(*state.predicted), measurement)
+            total = total + log_density(structure.measure(*state.predicted), measurement)
             state = one.step(state, measurement)
             weights.append((j, np.broadcast_to(total, y.shape[1])))
             posterior.append(state.posterior.mean)
@@ -95,6 +95,8 @@ def test_without_mixing_it_is_a_bank_of_filters_weighted_by_all_their_likelihood
     expected = np.exp(logs - logs.max(axis=-1, keepdims=True))
     expected /= expected.sum(axis=-1, keepdims=True)
     np.testing.assert_allclose(probability, expected, atol=1e-9)
+    records = likelihood(imm(structures, np.eye(3), START), y).sum(axis=0)
+    np.testing.assert_allclose(records, np.logaddexp.reduce(logs[-1], axis=-1), rtol=1e-12)
     np.testing.assert_allclose(mean, sum(expected[..., j, None] * laws[j] for j in range(3)), atol=1e-9)
     assert np.linalg.eigvalsh(cov).min() > 0
 
@@ -274,19 +276,6 @@ def test_a_mixture_has_the_moments_of_its_sample():
     assert (np.abs(sample.mean(axis=0) - found.mean[0]) < 4 * sd / np.sqrt(size)).all()
     # fourth moments of this mixture are below those of a normal law, so sqrt(2/size) bounds the relative error
     assert (np.abs(np.cov(sample.T) - found.cov[0]) < 4 * np.sqrt(2 / size) * np.outer(sd, sd)).all()
-
-
-def test_the_likelihood_is_the_normal_density():
-    from scipy.stats import multivariate_normal
-
-    F = np.array([[2.0, 0.6], [0.6, 1.0]])
-    h, y = np.array([[1.0, -1.0]]), np.array([[0.3, 0.2]])
-    measurement = Measurement(h, np.zeros((2, 2)), F, F)
-    expected = multivariate_normal(h[0], F).logpdf(y[0]) + np.log(2 * np.pi)
-    assert log_likelihood(measurement, y) == pytest.approx([expected])
-    y[0, 0] = np.nan
-    assert log_likelihood(measurement, y) == pytest.approx([-0.5 * (1.2**2 / 1.0)])
-    assert log_likelihood(measurement, np.full((1, 2), np.nan)) == pytest.approx([0.0])
 
 
 # --- bad input

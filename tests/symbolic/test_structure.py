@@ -20,10 +20,20 @@ c, e, g, f, z, p, m, d = sp.symbols("c e g f z p m d", real=True)
 KINDS = {"linearised": linearised, "gaussian": gaussian, "unscented": unscented, "gauss-hermite": gauss_hermite}
 
 TABLE = {
-    "linearised": {"tau": c * z, "Theta": c**2 * p + e**2 * z**2, "h": g * m, "G": g, "F": g**2 * d + f**2 * m**4},
+    "linearised": {
+        "tau": c * z,
+        "Theta": c**2 * p + e**2 * z**2,
+        "A": c,
+        "Q": e**2 * z**2,
+        "h": g * m,
+        "G": g,
+        "F": g**2 * d + f**2 * m**4,
+    },
     "gaussian": {
         "tau": c * z,
         "Theta": c**2 * p + e**2 * z**2 + e**2 * p,
+        "A": c,
+        "Q": e**2 * (z**2 + p),
         "h": g * m,
         "G": g,
         "F": g**2 * d + f**2 * (m**4 + 6 * m**2 * d + 3 * d**2),
@@ -32,7 +42,7 @@ TABLE = {
 
 
 @pytest.mark.parametrize("kind", TABLE)
-@pytest.mark.parametrize("function", ["tau", "Theta", "h", "G", "F"])
+@pytest.mark.parametrize("function", ["tau", "Theta", "A", "Q", "h", "G", "F"])
 def test_variant_53_has_the_functions_of_the_page(variant53, kind, function):
     assert sp.simplify(KINDS[kind](variant53)[function] - TABLE[kind][function]) == 0
 
@@ -109,11 +119,15 @@ def test_gaussian_functions_are_what_quadrature_finds(name):
     mean, cov = model.prior.mean[None], model.prior.cov[None]
     tau, theta = structure.predict(mean, cov)
     # Ten points an axis integrate exponentials and sines of these variances to 1e-9.
-    expected_tau, expected_theta, _ = quadrature(model, model.state_equation, model.state_noise)
+    expected_tau, expected_theta, expected_A = quadrature(model, model.state_equation, model.state_noise)
     np.testing.assert_allclose(np.broadcast_to(tau, (1, model.n))[0], expected_tau, rtol=1e-8, atol=1e-9)
     np.testing.assert_allclose(np.broadcast_to(theta, (1, model.n, model.n))[0], expected_theta, rtol=1e-8, atol=1e-9)
+    # Stein: dtau/dz = Cov(a, x) P^-1, dh/dm = Cov(b, x) P^-1
+    np.testing.assert_allclose(
+        np.broadcast_to(structure.transition(mean, cov).A, (1, model.n, model.n))[0], expected_A, rtol=1e-8, atol=1e-9
+    )
     found = structure.measure(mean, cov)
-    h, F, G = quadrature(model, model.meter_equation, model.meter_noise)  # Stein: dh/dm = Cov(b, x) P^-1
+    h, F, G = quadrature(model, model.meter_equation, model.meter_noise)
     for array, expected in zip(found[:3], (h, G, F), strict=True):
         np.testing.assert_allclose(np.broadcast_to(array, (1, *expected.shape))[0], expected, rtol=1e-8, atol=1e-9)
 
@@ -133,6 +147,10 @@ def test_linearised_functions_are_values_and_difference_quotients(name):
     A, B = slopes(lambda t: state(t, v), x), slopes(lambda t: state(x, t), v)
     np.testing.assert_allclose(tau, state(x, v), rtol=1e-13)
     np.testing.assert_allclose(theta, A @ model.prior.cov @ A.T + B @ model.state_noise.cov @ B.T, rtol=1e-7, atol=1e-8)
+    following = structure.transition(x, model.prior.cov)
+    np.testing.assert_allclose(following.tau, tau, rtol=1e-15)
+    np.testing.assert_allclose(following.A, A, rtol=1e-7, atol=1e-8)
+    np.testing.assert_allclose(following.Q, B @ model.state_noise.cov @ B.T, rtol=1e-7, atol=1e-8)
     h, G, F = structure.measure(x, model.prior.cov)[:3]
     H, C = slopes(lambda t: meter(t, w), x), slopes(lambda t: meter(x, t), w)
     np.testing.assert_allclose(h, meter(x, w), rtol=1e-13)
@@ -147,8 +165,8 @@ def test_gauss_hermite_is_exact_for_polynomials(name):
     exact, numerical = gaussian(model), gauss_hermite(model, 4)
     # degree 3 at most, so squares of degree 6 < 2 * 4; rounding of some hundred summands
     for found, expected in zip(
-        (*numerical.predict(mean, cov), *numerical.measure(mean, cov)),
-        (*exact.predict(mean, cov), *exact.measure(mean, cov)),
+        (*numerical.predict(mean, cov), *numerical.measure(mean, cov), *numerical.transition(mean, cov)),
+        (*exact.predict(mean, cov), *exact.measure(mean, cov), *exact.transition(mean, cov)),
         strict=True,
     ):
         np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), rtol=1e-11, atol=1e-11)
@@ -169,8 +187,11 @@ def test_unscented_means_are_exact_for_quadratic_functions(kappa):
 def test_the_unexplained_part_is_what_sensitivity_leaves(kind, name):
     model = MODELS[name]()
     mean, cov = model.prior.mean[None], model.prior.cov[None]
-    _, G, F, R = KINDS[kind](model).measure(mean, cov)
+    structure = KINDS[kind](model)
+    _, G, F, R = structure.measure(mean, cov)
     np.testing.assert_allclose(R + G @ cov @ np.swapaxes(G, -1, -2), F, rtol=1e-12)
+    (_, theta), (_, A, Q) = structure.predict(mean, cov), structure.transition(mean, cov)
+    np.testing.assert_allclose(Q + A @ cov @ np.swapaxes(A, -1, -2), theta, rtol=1e-12, atol=1e-15)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -191,7 +212,9 @@ def test_results_broadcast_over_the_ensemble(kind, state, meter):
     for one in (cov, cov[0]):
         tau, theta = structure.predict(mean, one)
         h, G, F = structure.measure(mean, one)[:3]
-        for array, shape in ((tau, (7, 1)), (theta, (7, 1, 1)), (h, (7, 1)), (G, (7, 1, 1)), (F, (7, 1, 1))):
+        _, A, Q = structure.transition(mean, one)
+        square = (7, 1, 1)
+        for array, shape in ((tau, (7, 1)), (theta, square), (A, square), (Q, square), (h, (7, 1)), (G, square), (F, square)):
             assert np.broadcast_shapes(np.shape(array), shape) == shape
             assert np.isfinite(array).all()
 

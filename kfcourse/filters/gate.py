@@ -1,0 +1,147 @@
+r"""A gate before a filter: measurements too far from what it expects are refused, and a track that is lost is found again.
+
+If the filter is right, the square of its innovation in units of its covariance F is chi-squared with p degrees of freedom,
+
+    nu^T F^-1 nu <= gamma,      P(chi^2_p <= gamma) = probability
+
+and a measurement beyond gamma is taken for a fault and treated as missing.  That has a danger of its own.  Where the object has
+done what the model does not know of, every measurement lies beyond the gate, the filter refuses them all, and never hears that
+it is wrong.  So patience ends: after some refusals in a row the prediction is widened until the state alone explains the last
+innovation, and the next measurement is let through whatever it is,
+
+    Psi -> s Psi,      s = max(1, nu^T (G Psi G^T)^+ nu / p)
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy
+
+from kfcourse.filters.base import Filter, State, structure_of
+from kfcourse.laws import (
+    Array,
+    Gaussian,
+    Measurement,
+    any_missing,
+    log_density,
+    normalised_square,
+    product,
+    transpose,
+    without_missing,
+)
+from kfcourse.symbolic.structure import Structure
+
+
+class Gate(NamedTuple):
+    """What a gated filter remembers.
+
+    Attributes
+    ----------
+    weight : ndarray (runs,)
+        Of the last measurement: 1, or 0 if it was refused; NaN where there was none.
+    in_a_row : ndarray of int (runs,)
+        How many were refused since the last that was not.
+    inner : object
+        The memory of the filter behind the gate.
+    """
+
+    weight: Array
+    in_a_row: Array
+    inner: Any
+
+
+def gated(one: Filter, probability: float = 0.999, patience: int | None = 5, structure: Structure | None = None) -> Filter:
+    """The same filter behind a gate.
+
+    Parameters
+    ----------
+    one : Filter
+        Any filter: what is refused reaches it as missing (NaN).
+    probability : float
+        With which the gate lets a measurement pass if the filter is right.
+    patience : int, optional
+        After so many refusals in a row the track counts as lost, and the prediction is widened; None: never.
+    structure : Structure, optional
+        By which the gate knows what to expect, from the filter's prediction N(lambda, Psi); the filter's own by default.
+
+    Returns
+    -------
+    Filter
+        `state.memory` is a `Gate`; `kfcourse.records.weights` tells for a whole record what was refused.  In its likelihood
+        a refused measurement counts as one at the gate's edge.
+
+    Raises
+    ------
+    TypeError
+        A `Design`, whose coefficients are still to be found.
+    ValueError
+        A probability or a patience that is none; a filter without structural functions of its own, and no `structure`.
+
+    Examples
+    --------
+    >>> from kfcourse import Model, run
+    >>> from kfcourse.filters import kalman_filter
+    >>> one = kalman_filter(Model.define("x + 0.1*v", "x + w"))
+    >>> [round(run(each, np.array([0.1, 0.0, 90.0])).mean[-1].item(), 3) for each in (one, gated(one))]
+    [23.247, 0.033]
+    """
+    if not isinstance(one, Filter):
+        raise TypeError(
+            f"{getattr(one, 'name', one)} is no filter yet: find its coefficients with design(...), then put the gate before"
+        )
+    if not 0 < probability < 1:
+        raise ValueError(f"probability must lie between 0 and 1, got {probability!r}")
+    if patience is not None and (isinstance(patience, bool) or not isinstance(patience, int | np.integer) or patience < 1):
+        raise ValueError(f"patience must be a whole number of refusals, at least 1, or None for no end of it; got {patience!r}")
+    expecting = structure or structure_of(one, "a gate")
+    # For 0, ..., p components measured; with none there is nothing to refuse.
+    limits = np.array([np.inf, *scipy.special.chdtri(np.arange(1, one.model.p + 1), 1 - probability)])
+
+    def judged(state: State, y: Array) -> tuple[Measurement, Array, Array, Array]:
+        """What was expected, nu^T F^-1 nu, gamma, and whether it is beyond and the track not lost."""
+        expected = expecting.at(state.step).measure(*state.predicted)
+        size, limit = _size(expected, y), limits[(~np.isnan(y)).sum(axis=-1)]
+        lost = patience is not None and state.memory.in_a_row >= patience
+        return expected, size, limit, (size > limit) & ~np.asarray(lost)
+
+    def init(runs: int) -> State:
+        state = one.init(runs)
+        return state._replace(memory=Gate(np.full(runs, np.nan), np.zeros(runs, dtype=int), state.memory))
+
+    def step(state: State, y: Array) -> State:
+        expected, _, _, refused = judged(state, y)
+        after = one.step(state._replace(memory=state.memory.inner), np.where(refused[:, None], np.nan, y))
+        missing = np.isnan(y).all(axis=-1)
+        in_a_row = np.where(missing, state.memory.in_a_row, np.where(refused, state.memory.in_a_row + 1, 0))
+        memory = Gate(np.where(missing, np.nan, ~refused), in_a_row, after.memory)
+        if patience is not None and (losing := refused & (in_a_row == patience)).any():
+            wider = np.where(losing, _widening(expected, state.predicted, y), 1.0)
+            after = after._replace(predicted=Gaussian(after.predicted.mean, after.predicted.cov * wider[:, None, None]))
+        return after._replace(memory=memory)
+
+    def evidence(state: State, y: Array) -> Array:
+        expected, size, limit, refused = judged(state, y)
+        return log_density(expected, y) + 0.5 * np.where(refused, size - limit, 0.0)
+
+    return replace(one, name=f"gated-{one.name}", init=init, step=step, instead=None, evidence=evidence)
+
+
+def _size(expected: Measurement, y: Array) -> Array:
+    """nu^T F^-1 nu of what was measured, (runs,)."""
+    innovation, F = expected.innovation(y), expected.F
+    if any_missing(innovation):
+        innovation, _, F, _ = without_missing(innovation, expected.G, F, expected.R)
+    return normalised_square(innovation, F)
+
+
+def _widening(expected: Measurement, predicted: Gaussian, y: Array) -> Array:
+    """s, (runs,): with Psi -> s Psi the state alone explains the innovation."""
+    innovation, G = expected.innovation(y), expected.G
+    present = (~np.isnan(innovation)).sum(axis=-1)
+    if any_missing(innovation):
+        innovation, G, *_ = without_missing(innovation, G, expected.F, expected.R)
+    explained = product(product(G, predicted.cov), transpose(G))
+    return np.maximum(1.0, normalised_square(innovation, explained) / np.maximum(present, 1))

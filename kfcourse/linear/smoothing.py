@@ -1,0 +1,108 @@
+r"""Looking back: the backward pass of Rauch, Tung and Striebel (1965) along the laws that a filter left.
+
+When x_{k+1} is known, what the filter knew of x_k, N(z, p), can be corrected once more.  The regression of x_k on it is
+
+    S = Cov(x_k, x_{k+1}) Psi^+ = p A^T Psi^+,       A = dtau/dz,   lambda, Psi: prediction of x_{k+1}
+
+and since x_{k+1} itself is known only as N(z', p'), from all measurements, what they tell of x_k is
+
+    z_k^s = z + S (z' - lambda),      p_k^s = p + S (p' - Psi) S^T = (I - S A) p (I - S A)^T + S (Q + p') S^T
+
+with Q = Psi - A p A^T.  The last form is a sum of non-negative terms: a wide prior cannot make it negative by rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import accumulate
+from typing import NamedTuple
+
+import numpy as np
+
+from kfcourse.angles import Components, difference, on_circle
+from kfcourse.laws import Array, Gaussian, apply, gain, product, stacked, symmetric, transpose
+from kfcourse.linear.runs import Run
+from kfcourse.linear.system import LinearSystem
+
+
+class Passage(NamedTuple):
+    """A filter's way from one step to the next.
+
+    Attributes
+    ----------
+    posterior, predicted : Gaussian
+        Laws of x_k after its measurement, and of x_{k+1} before its own: means (runs, n), covariances (..., n, n).
+    A, Q : ndarray (..., n, n)
+        dtau/dz, and the part of the prediction's covariance that it does not explain.
+    """
+
+    posterior: Gaussian
+    predicted: Gaussian
+    A: Array
+    Q: Array
+
+
+def look_back(passages: Sequence[Passage], last: Gaussian, lag: int | None = None, angles: Components = ()) -> Gaussian:
+    """The laws of the states, given all measurements of the record.
+
+    Parameters
+    ----------
+    passages : sequence of Passage
+        From each step to the next.
+    last : Gaussian
+        The filter's law of the last state.
+    lag : int, optional
+        Only so many later measurements: the law of x_k given y_0, ..., y_{k + lag}.
+    angles : tuple
+        Numbers of the components of x that are.
+
+    Returns
+    -------
+    Gaussian
+        Means (steps, runs, n) and covariances (steps, runs, n, n).
+
+    Raises
+    ------
+    ValueError
+        A lag that is no whole number, or below 0.
+    """
+    back = [_towards(one, angles) for one in passages]
+    if lag is None:
+        return stacked([*accumulate(reversed(back), lambda after, one: one(after), initial=last)][::-1])
+    if isinstance(lag, bool) or not isinstance(lag, int | np.integer) or lag < 0:
+        raise ValueError(f"lag must be a whole number of steps, at least 0, or None for all that follow; got {lag!r}")
+    laws = [*(one.posterior for one in passages), last]
+    for _ in range(min(lag, len(back))):  # each round tells every state of one measurement more
+        laws = [*(one(after) for one, after in zip(back, laws[1:], strict=True)), last]
+    return stacked(laws)
+
+
+def _towards(passage: Passage, angles: Components) -> Callable[[Gaussian], Gaussian]:
+    """From the law of x_{k+1} to that of x_k."""
+    (z, p), (lam, Psi), A, Q = passage
+    S = gain(product(p, transpose(A)), Psi, broken=True)
+    rest = np.eye(z.shape[-1], dtype=p.dtype) - product(S, A)
+    own = product(product(rest, p), transpose(rest))
+
+    def back(after: Gaussian) -> Gaussian:
+        mean = z + apply(S, difference(after.mean, lam, angles))
+        return Gaussian(on_circle(mean, angles), symmetric(own + product(product(S, Q + after.cov), transpose(S))))
+
+    return back
+
+
+def smooth(system: LinearSystem, found: Run, lag: int | None = None) -> Gaussian:
+    """The states of a linear system given all measurements, from the filter's `run` over them.
+
+    Inputs are in its predictions already.  `lag`, result and errors as of `look_back`.
+    """
+    posterior, predicted = (
+        [Gaussian(*law) for law in zip(laws.mean, _once(laws.cov), strict=True)] for laws in (found.posterior, found.predicted)
+    )
+    passages = [Passage(*laws, system.A, system.Q) for laws in zip(posterior[:-1], predicted[1:], strict=True)]
+    return look_back(passages, posterior[-1], lag)
+
+
+def _once(cov: Array) -> Array:
+    """Covariances (steps, runs, n, n) that are shown to all runs, but stored once: (steps, 1, n, n)."""
+    return cov[:, :1] if cov.strides[1] == 0 else cov

@@ -1,0 +1,133 @@
+r"""One smoother for every filter with structural functions: the past of a record, once all of it is known.
+
+A filter's estimate z_k uses y_0, ..., y_k.  What the measurements after it tell of x_k comes to it through x_{k+1}, and all that
+takes is Cov(x_k, x_{k+1}).  If x_k ~ N(z, p), it is p A^T with A = dtau/dz, whatever the function a: by Stein's lemma
+
+    M (x - z) a(x, v)^T = p M (da/dx)^T = p (d M a / dz)^T
+
+The slope of the structural function stands to the object as G = dh/dm stands to the meter.  So the smoother of Rauch, Tung and
+Striebel (`kfcourse.linear.smoothing`) is at the same time the extended, the unscented, the quadrature and the normal one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kfcourse.angles import difference
+from kfcourse.filters.approximations import aof
+from kfcourse.filters.base import Filter, State, structure_of
+from kfcourse.filters.iterated_ekf import seen_from
+from kfcourse.laws import (
+    Array,
+    Gaussian,
+    Measurement,
+    Transition,
+    apply,
+    measurement_of,
+    product,
+    symmetric,
+    transpose,
+)
+from kfcourse.linear.smoothing import Passage, look_back
+from kfcourse.montecarlo.experiment import states
+from kfcourse.symbolic.structure import Structure
+
+
+def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
+    """The states given all measurements of a record: the fixed-interval smoother of a filter.
+
+    S = p A^T Psi'^+,   z^s = z + S (z'^s - lambda'),   p^s = p + S (p'^s - Psi') S^T,      ' : at the next step
+
+    Parameters
+    ----------
+    one : Filter
+        Whose laws are normal: `aof`, `iterated`, `kalman_filter`.
+    y : ndarray (steps, runs, p)
+        As for `run`; NaN where a measurement, or a component of it, is missing.
+    lag : int, optional
+        Use the measurements up to so many steps later only (fixed lag): what is known with that delay.
+
+    Returns
+    -------
+    Gaussian
+        Estimates (steps, runs, n) and covariances (steps, runs, n, n), as of `run`; the last step's are the filter's.
+
+    Raises
+    ------
+    ValueError
+        A filter without structural functions, a lag that is none, measurements of another shape.
+
+    Examples
+    --------
+    >>> from kfcourse import Model, linearised
+    >>> walk = Model.define("x + v", "x + w")
+    >>> [round(z, 3) for z in smooth(aof(linearised(walk)), np.array([1.0, 2.0, np.nan, 4.0])).mean.ravel().tolist()]
+    [0.944, 1.833, 2.556, 3.278]
+    """
+    structure = structure_of(one, "looking back")
+    _, *visited, last = states(one, y)
+    return look_back([_passage(structure, state) for state in visited], last.posterior, lag, one.model.angles.x)
+
+
+def _passage(structure: Structure, state: State) -> Passage:
+    """A filter's way to its prediction; what it has added of its own to the model's covariance counts as noise."""
+    now = structure.at(state.step - 1)
+    _, A, Q = now.transition(*state.posterior)
+    return Passage(state.posterior, state.predicted, A, Q + (state.predicted.cov - now.predict(*state.posterior).cov))
+
+
+def smooth_iterated(structure: Structure, y: Array, rounds: int = 5) -> Gaussian:
+    """The iterated smoother: object and meter linearised again where all measurements put the states.
+
+    With `linearised(model)` each round is a step of Gauss and Newton's method towards the likeliest whole trajectory, the
+    iterated extended smoother (Bell, 1994); with the moment structures it is the iterated posterior linearisation smoother
+    (Garcia-Fernandez, Svensson, Sarkka, 2017).
+
+    Parameters
+    ----------
+    structure : Structure
+    y : ndarray (steps, runs, p)
+        As for `run`.
+    rounds : int
+        1 is `smooth(aof(structure), y)`.  The rounds are not damped.
+
+    Returns
+    -------
+    Gaussian
+        As of `smooth`.
+
+    Raises
+    ------
+    ValueError
+        `rounds` is not a whole number above 0; measurements of another shape.
+    """
+    if isinstance(rounds, bool) or not isinstance(rounds, int | np.integer) or rounds < 1:
+        raise ValueError(f"rounds must be a whole number, at least 1 (which is smooth(aof(structure), y)); got {rounds!r}")
+    law = smooth(aof(structure), y)
+    for _ in range(rounds - 1):
+        law = smooth(aof(affine_at(structure, law)), y)
+    return law
+
+
+def affine_at(structure: Structure, laws: Gaussian) -> Structure:
+    """The affine object and meter that the structural functions describe at given laws, one for each step and run.
+
+    x' = tau + A (x - z) + q,  Cov(q) = Q;     y = h + G (x - z) + r,  Cov(r) = R;       all at the law N(z, p) of that step
+    """
+    model = structure.model
+
+    def at(k: int) -> Structure:
+        there, now = Gaussian(laws.mean[k], laws.cov[k]), structure.at(k)
+        tau, A, Q = now.transition(*there)
+
+        def predict(z: Array, p: Array) -> Gaussian:
+            shift = apply(A, difference(z, there.mean, model.angles.x))
+            return Gaussian(tau + shift, symmetric(product(product(A, p), transpose(A))) + Q)
+
+        def measure(m: Array, d: Array) -> Measurement:
+            return measurement_of(model.angles.y)(*seen_from(now.measure(*there), there, Gaussian(m, d), model.angles.x))
+
+        return Structure(structure.name, model, predict, measure, lambda z, p: Transition(tau, A, Q))
+
+    first = at(0)
+    return Structure(structure.name, model, first.predict, first.measure, first.transition, at_step=at)

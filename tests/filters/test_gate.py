@@ -1,0 +1,255 @@
+"""The gate: refusing is missing, as many as promised, in every filter; and how a lost track is found again."""
+
+import numpy as np
+import oracles
+import pytest
+from scipy.stats import chi2, multivariate_normal
+
+from kfcourse import Model, gaussian, likelihood, linearised, predictions, run, simulate, smooth, unscented
+from kfcourse.filters import alpha_beta, aof, duof, fos, gated, imm, iterated, kalman_filter, mfos, particle, pointmass, robust
+from kfcourse.linear.consistency import innovations, nis
+from kfcourse.montecarlo.designing import design
+from kfcourse.montecarlo.ensemble import Ensemble
+from kfcourse.records import weights
+from kfcourse.scenarios.radar import kinematic
+
+pytestmark = pytest.mark.quick
+
+
+def walk(**options):
+    return Model.define("0.95*x + 0.3*v", "x + 0.5*w", prior={"mean": 0.4, "variance": 0.7}, **options)
+
+
+@pytest.fixture(scope="module")
+def plane() -> Model:
+    """Two components measured, with noises of different size and correlated."""
+    return Model.define(
+        ["x1 + 0.5*x3 + 0.1*v1", "x2 + 0.5*x4 + 0.1*v2", "x3 + 0.3*v3", "x4 + 0.3*v4"], ["x1 + w1", "x2 + 0.2*x1 + w2"],
+        meter_noise={"variance": [[0.5, 0.2], [0.2, 0.3]]},
+    )  # fmt: skip
+
+
+def spoiled(y):
+    """Three gross errors, of one run each, and two measurements missing."""
+    y = y.copy()
+    y[2, 0] += 40.0
+    y[4, 1] -= 55.0
+    y[5, 1, 0] += 70.0
+    y[3, 2] = y[6, 0] = np.nan
+    return y
+
+
+def refused(one, y):
+    return weights(one, y) == 0
+
+
+def without(one, y):
+    """The record with what was refused missing."""
+    return np.where(refused(one, y)[..., None], np.nan, y)
+
+
+def every_filter():
+    model = walk()
+    designs = [duof(model), fos(gaussian(model)), mfos(linearised(model))]
+    designed = design(designs, Ensemble(model, 300, 9, seed=1).by_step())
+    modes = [linearised(walk()), linearised(Model.define("0.5*x + v", "x + 0.5*w", prior={"mean": 0.4, "variance": 0.7}))]
+    return [
+        aof(linearised(model)), aof(unscented(model)), iterated(gaussian(model), 3), kalman_filter(model),
+        robust(gaussian(model)), *designed, imm(modes, [[0.9, 0.1], [0.2, 0.8]]), pointmass(model), particle(model, 200, seed=3),
+    ]  # fmt: skip
+
+
+def test_in_every_filter_what_is_refused_is_missing():
+    y = spoiled(simulate(walk(), 4, 9, seed=2).y)
+    expected = np.zeros((9, 4), dtype=bool)
+    expected[2, 0] = expected[4:6, 1] = True
+    for one in every_filter():
+        guarded = gated(one, structure=linearised(walk()))
+        np.testing.assert_array_equal(refused(guarded, y), expected, err_msg=one.name)
+        np.testing.assert_array_equal(np.isnan(weights(guarded, y)), np.isnan(y[..., 0]))
+        found, behind = run(guarded, y), run(one, without(guarded, y))
+        np.testing.assert_array_equal(found.mean, behind.mean, err_msg=one.name)
+        np.testing.assert_array_equal(found.cov, behind.cov, err_msg=one.name)
+        assert np.abs(run(one, y).mean - found.mean).max() > 0.5 or one.name.startswith("robust")
+
+
+def test_the_alpha_beta_filter_has_a_gate_too():
+    model = kinematic(1.0, dimensions=2, noise_sd=0.1)
+    y = simulate(model, 3, 12, seed=4).y.copy()
+    y[8, 1] += 500.0
+    guarded = gated(alpha_beta(model, 0.5, 0.2), structure=linearised(model))
+    assert refused(guarded, y)[8, 1]
+    np.testing.assert_array_equal(run(guarded, y).mean, run(alpha_beta(model, 0.5, 0.2), without(guarded, y)).mean)
+
+
+@pytest.mark.parametrize("probability", [0.9, 0.99])
+def test_a_right_filter_loses_as_many_as_it_was_told(plane, probability):
+    """Two, one or no component measured; the model is linear, so the innovations are normal and F is right."""
+    y = simulate(plane, 400, 12, seed=5).y.copy()
+    rng = np.random.default_rng(6)
+    y[rng.random(y.shape) < 0.2] = np.nan
+    one = gated(kalman_filter(plane), probability)
+    found = refused(one, y)
+    for count in (1, 2):
+        # the first measurement of each kind in a record: what was refused before it would make F too small afterwards
+        first = (~np.isnan(y)).sum(axis=-1) == count
+        share, size = found[0][first[0]].mean(), first[0].sum()
+        assert abs(share - (1 - probability)) < 4 * np.sqrt(probability * (1 - probability) / size)
+    assert not found[np.isnan(y).all(axis=-1)].any()
+
+
+def test_the_edge_is_chi_squared_of_what_was_measured(plane):
+    one = kalman_filter(plane)
+    F = one.structure.measure(plane.prior.mean, plane.prior.cov).F
+    for parts, degrees in (([0, 1], 2), ([1], 1), ([0], 1)):
+        edge = np.zeros(2)
+        edge[parts] = np.linalg.cholesky(F[np.ix_(parts, parts)])[:, 0] * np.sqrt(chi2.ppf(0.99, degrees))
+        y = np.full((1, 2, 2), np.nan)
+        y[0, :, parts] = (np.array([0.9999, 1.0001])[:, None] * edge[parts]).T
+        np.testing.assert_array_equal(refused(gated(one, 0.99), y), [[False, True]])
+
+
+def test_where_nothing_is_refused_the_gate_is_not_seen(plane):
+    y = simulate(plane, 20, 10, seed=7).y
+    one = kalman_filter(plane)
+    guarded = gated(one, 1 - 1e-12)
+    np.testing.assert_array_equal(run(guarded, y).cov, run(one, y).cov)
+    np.testing.assert_array_equal(smooth(guarded, y).mean, smooth(one, y).mean)
+    np.testing.assert_array_equal(likelihood(guarded, y), likelihood(one, y))
+    assert (weights(guarded, y) == 1).all()
+    assert guarded.name == "gated-kalman"
+
+
+def test_an_innovation_of_a_turn_is_none():
+    model = Model.define("x + 0.1*v", "x + 0.2*w", angles={"x": ["x"], "y": ["y"]}, prior={"mean": 3.1, "variance": 0.01})
+    y = np.array([3.1, -3.1, 3.12, 1.0, -3.13])
+    np.testing.assert_array_equal(weights(gated(aof(linearised(model))), y).ravel(), [1, 1, 1, 0, 1])
+
+
+# ---------------------------------------------------------------- the lost track
+
+
+def jump():
+    """An object that jumps by 30 standard deviations of its measurement at step 10."""
+    model = Model.define("x + 0.1*v", "x + w", prior={"mean": 0.0, "variance": 1.0})
+    x, y = simulate(model, 50, 40, seed=8)
+    late = np.arange(40)[:, None, None] >= 10
+    return model, x + 30 * late, y + 30 * late
+
+
+def test_without_an_end_of_patience_a_lost_track_stays_lost():
+    model, x, y = jump()
+    one = gated(kalman_filter(model), patience=None)
+    assert refused(one, y)[10:30].all()
+    assert np.abs(run(one, y).mean - x)[29].min() > 25
+
+
+@pytest.mark.parametrize("patience", [1, 3, 5])
+def test_after_its_patience_the_gate_lets_the_next_one_through(patience):
+    model, x, y = jump()
+    y = y.copy()
+    y[10 + patience, 3] = np.nan  # for this one the measurement after is the next
+    one, plain = gated(kalman_filter(model), 1 - 1e-6, patience), kalman_filter(model)
+    found = refused(one, y)
+    assert found[10 : 10 + patience].all()
+    assert not found[10 + patience :].any()
+    assert not found[:10].any()
+    error = np.abs(run(one, y).mean - x)
+    # let through with a prediction as wide as the jump, so the estimate is the measurement: four standard deviations of it
+    assert error[10 + patience, np.arange(50) != 3].max() < 4.5
+    assert error[11 + patience, 3] < 4.5
+    # and is on the track long before the filter without a gate, whose gain has settled at a tenth
+    after = slice(11 + patience, 14 + patience)
+    assert (error[after] ** 2).mean() < 0.2 * (np.abs(run(plain, y).mean - x)[after] ** 2).mean()
+
+
+def test_widened_the_prediction_explains_what_was_refused(plane):
+    y = np.zeros((4, 2, 2))
+    y[1:3, 0], y[1:3, 1] = [30.0, -20.0], [np.nan, 25.0]
+    one = gated(kalman_filter(plane), patience=2)
+    state = one.init(2)
+    for k in range(3):
+        before, state = state, one.step(state, y[k])
+    np.testing.assert_array_equal(state.memory.in_a_row, [2, 2])
+    untouched = one.structure.predict(*state.posterior).cov
+    H = np.array([[1.0, 0, 0, 0], [0.2, 1, 0, 0]])
+    for i, rows in ((0, [0, 1]), (1, [1])):
+        nu = (y[2, i] - before.predicted.mean[i] @ H.T)[rows]
+        state_alone = (H @ np.broadcast_to(before.predicted.cov, (2, 4, 4))[i] @ H.T)[np.ix_(rows, rows)]
+        scale = nu @ np.linalg.solve(state_alone, nu) / len(rows)
+        np.testing.assert_allclose(state.predicted.cov[i], scale * untouched[i], rtol=1e-9)
+
+
+def test_a_smoother_takes_the_widening_for_noise_of_the_object():
+    """A lost track in one dense regression: what was refused is missing, and the object has so much more noise at that step."""
+    model, _, y = jump()
+    y = y[:20, :3]
+    one = gated(kalman_filter(model), 1 - 1e-6, patience=3)
+    found, before = smooth(one, y), predictions(one, y)
+    kept = without(one, y)
+    for i in range(3):
+        posterior = run(one, y).cov[:, i]
+        noise = before.cov[1:, i] - posterior[:-1]  # Psi' - p: 0.01, but where the track was lost
+        assert (np.flatnonzero(noise.ravel() > 0.011) == [12]).all()
+        steps = [(np.eye(1), np.zeros(1), Q, np.eye(1), np.zeros(1), np.eye(1)) for Q in [*noise, np.eye(1)]]
+        mean, cov, _ = oracles.joint_posterior(steps, (np.zeros(1), np.eye(1)), kept[:, i])
+        np.testing.assert_allclose(found.mean[:, i], mean, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(found.cov[:, i], cov, rtol=1e-8, atol=1e-12)
+
+
+def test_gaps_neither_feed_nor_calm_impatience_and_the_next_measurement_passes_whatever_it_is():
+    one = gated(kalman_filter(Model.define("x + 0.1*v", "x + w", prior={"mean": 0.0, "variance": 1.0})), patience=2)
+    gap = np.nan
+    y = np.array([0.0, 50.0, gap, gap, 51.0, gap, -4000.0, 0.0])
+    np.testing.assert_array_equal(weights(one, y).ravel(), [1, 0, gap, gap, 0, gap, 1, 0])
+
+
+# ---------------------------------------------------------------- what it does to tests and likelihood
+
+
+def test_in_the_likelihood_a_refused_measurement_stands_at_the_edge(plane):
+    y = simulate(plane, 4, 5, seed=9).y.copy()
+    y[2, 1] += [50, -80]
+    one = gated(kalman_filter(plane), 0.99)
+    found, law = likelihood(one, y), predictions(one, y)
+    expected = one.structure.measure(law.mean[2, 1], law.cov[2, 1])
+    at_edge = multivariate_normal(np.zeros(2), expected.F).logpdf(np.zeros(2)) - 0.5 * chi2.ppf(0.99, 2)
+    assert found[2, 1] == pytest.approx(at_edge, rel=1e-10)
+    others = np.ones((5, 4), dtype=bool)
+    others[2, 1] = False
+    np.testing.assert_allclose(found[others], likelihood(kalman_filter(plane), without(one, y))[others], rtol=1e-12)
+
+
+def test_the_tests_of_innovations_take_a_gated_record(plane):
+    y = simulate(plane, 200, 20, seed=10).y.copy()
+    y[np.random.default_rng(1).random(y.shape[:2]) < 0.05] += 60.0
+    sizes = []
+    for one in (kalman_filter(plane), gated(kalman_filter(plane))):
+        record = without(one, y) if one.name.startswith("gated") else y
+        sizes.append(np.nanmean(nis(innovations(one.structure.measure, predictions(one, y), record))))
+    assert sizes[0] > 20
+    assert sizes[1] == pytest.approx(2, abs=0.15)  # 4 sqrt(2 * 2 / 4000) and the thousandth that a right filter refuses
+
+
+# ---------------------------------------------------------------- what is refused
+
+
+@pytest.mark.parametrize("probability", [0, 1, -0.1, 1.5, float("nan")])
+def test_a_probability_that_is_none_is_refused(probability):
+    with pytest.raises(ValueError, match="probability must lie between 0 and 1"):
+        gated(kalman_filter(walk()), probability)
+
+
+@pytest.mark.parametrize("patience", [0, -1, 2.0, True, "3"])
+def test_a_patience_that_is_no_number_is_refused(patience):
+    with pytest.raises(ValueError, match="patience must be a whole number of refusals"):
+        gated(kalman_filter(walk()), patience=patience)
+
+
+def test_what_a_gate_cannot_stand_before_is_told():
+    with pytest.raises(TypeError, match=r"duof is no filter yet: find its coefficients with design"):
+        gated(duof(walk()))
+    with pytest.raises(ValueError, match=r"a gate needs the structural functions.*imm has none"):
+        gated(imm([linearised(walk())], [[1.0]]))
+    with pytest.raises(ValueError, match=r"kalman takes every measurement as it is: ask gated"):
+        weights(kalman_filter(walk()), np.zeros(3))

@@ -1,0 +1,99 @@
+"""Parameters of the largest likelihood: closed forms, the Nile, directions that nothing tells, and refusals."""
+
+import numpy as np
+import pytest
+
+from kfcourse import Model, ModelError, linearised, simulate
+from kfcourse.filters import aof
+from kfcourse.records import estimate, profile
+from kfcourse.scenarios.benchmarks import local_level, nile
+
+pytestmark = pytest.mark.quick
+
+
+def test_the_nile_s_variances():
+    found = estimate(local_level(3000, 3000), nile(), ["q", "r"], ["q", "r"], build=lambda one: aof(linearised(one)))
+    np.testing.assert_allclose(found.value, [1468.5, 15099.7], rtol=5e-5)  # five digits are published
+    assert found.log_likelihood == pytest.approx(-641.5856, abs=5e-5)
+    assert found.flat == ()
+    assert float(found.model.parameters["q"]) == found.value[0]
+
+
+def test_a_variance_alone_has_its_closed_form():
+    """A state known exactly: r is the mean square of the measurements, its standard error r sqrt(2 / N)."""
+    model = Model.define("x", "x + w", {"r": 1.0}, prior={"mean": 0.5, "variance": 0}, meter_noise={"variance": "r"})
+    y = 0.5 + 3 * np.random.default_rng(1).standard_normal((40, 5, 1))
+    y[3, 2] = y[7, 1] = np.nan
+    found = estimate(model, y, ["r"], ["r"])
+    expected = np.nanmean((y - 0.5) ** 2)
+    assert found.value[0] == pytest.approx(expected, rel=1e-6)
+    assert found.standard_error[0] == pytest.approx(expected * np.sqrt(2 / 198), rel=1e-5)
+
+
+def test_a_coefficient_alone_has_its_closed_form():
+    """A state seen without noise: c is the regression of each state on the one before, of either sign."""
+    model = Model.define("c*x + 0.3*v", "x", {"c": 0.3})
+    y = simulate(model.replace(c=-0.6), 4, 30, seed=2).y
+    found = estimate(model, y, "c", build=lambda one: aof(linearised(one)))
+    square = (y[:-1] ** 2).sum()
+    assert found.value[0] == pytest.approx((y[1:] * y[:-1]).sum() / square, rel=1e-6)
+    assert found.standard_error[0] == pytest.approx(0.3 / np.sqrt(square), rel=1e-5)
+
+
+def test_what_the_record_does_not_tell_is_named():
+    """Only the product of g and s reaches the measurements: one doubled and the other halved, nothing changes."""
+    model = Model.define("0.9*x + s*v", "g*x + r*w", {"g": 1.5, "s": 0.4, "r": 0.3}, prior={"mean": 0, "variance": 0})
+    y = simulate(model, 2, 30, seed=4).y
+    found = estimate(model, y, ["g", "s", "r"], ["g", "s", "r"])
+    (sentence,) = found.flat
+    assert sentence in {
+        "the record does not tell g (+1), s (-1) apart: changed together in these proportions they leave its likelihood as it is",
+        "the record does not tell g (-1), s (+1) apart: changed together in these proportions they leave its likelihood as it is",
+    }
+    np.testing.assert_array_equal(np.isinf(found.standard_error), [True, True, False])
+    # with one of them known, the other and r are what they are with both free
+    alone = estimate(model, y, ["s", "r"], ["s", "r"])
+    assert alone.flat == ()
+    assert found.value[0] * found.value[1] == pytest.approx(1.5 * alone.value[0], rel=1e-4)
+    assert found.standard_error[2] == pytest.approx(alone.standard_error[1], rel=1e-3)
+
+
+def test_a_noise_that_is_not_there_is_not_told():
+    y = np.random.default_rng(5).standard_normal((40, 1, 1)) * 2
+    y[::2] = -y[1::2]  # neighbours that differ in sign: no wandering level explains that
+    found = estimate(local_level(q=0.5, r=3.0), y, ["q", "r"], ["q", "r"])
+    assert found.flat == ("the record does not tell q: its likelihood does not depend on it here",)
+    assert found.value[0] < 1e-3
+    assert np.isinf(found.standard_error[0])
+
+
+def test_a_profile_is_the_best_over_the_others():
+    values = [900.0, 1468.5, 2500.0]
+    found = profile(local_level(), nile(), ["q", "r"], "q", values, ["q", "r"])
+    assert found[1] == pytest.approx(-641.5856, abs=5e-5)
+    assert (found[[0, 2]] < found[1]).all()
+    elsewhere = estimate(local_level(q=2500, r=10000), nile(), ["r"], ["r"])
+    assert elsewhere.log_likelihood == pytest.approx(found[2], abs=1e-6)
+    alone = profile(local_level(), nile(), ["q"], "q", [1468.5])
+    assert alone[0] == pytest.approx(-641.5856, abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("unknown", "positive", "message"),
+    [
+        (["q", "z"], [], "unknown must name parameters of the model, each once: it has q, r; got q, z"),
+        (["q", "q"], [], "each once"),
+        ([], [], "got none"),
+        (["q"], ["r"], "positive names r, which is not among the unknown"),
+        (["q"], ["q"], "what is positive must begin positive: q is not"),
+    ],
+)
+def test_names_that_do_not_fit_are_refused(unknown, positive, message):
+    with pytest.raises(ModelError, match=message):
+        estimate(local_level(q=0), nile(), unknown, positive)
+
+
+def test_a_start_without_a_likelihood_says_why():
+    model = Model.define("x", "g*x", {"g": 1.0}, prior={"mean": 1, "variance": 0})
+    with pytest.raises(ValueError, match="no density for the measurement of step 0"):
+        estimate(model, np.ones((3, 1, 1)), ["g"])

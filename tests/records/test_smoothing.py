@@ -1,0 +1,326 @@
+"""Smoothers: one dense regression on linear models, the likeliest trajectory, brute force, and published figures."""
+
+import numpy as np
+import oracles
+import pytest
+from scipy.optimize import least_squares
+
+from kfcourse import Model, gauss_hermite, gaussian, linearised, run, simulate, smooth, unscented
+from kfcourse.filters import aof, duof, imm, iterated, kalman_filter
+from kfcourse.laws import Gaussian
+from kfcourse.linear import LinearSystem
+from kfcourse.linear import run as run_linear
+from kfcourse.linear import smooth as smooth_linear
+from kfcourse.montecarlo.designing import design
+from kfcourse.montecarlo.ensemble import Ensemble
+from kfcourse.montecarlo.experiment import states
+from kfcourse.records import smooth_iterated
+from kfcourse.scenarios.benchmarks import PENDULUM_SMOOTHED, pendulum, pendulum_data
+
+pytestmark = pytest.mark.quick
+
+STRUCTURES = {
+    "linearised": linearised,
+    "gaussian": gaussian,
+    "unscented": unscented,
+    "cubature": lambda model: unscented(model, kappa=0),
+    "gauss-hermite": lambda model: gauss_hermite(model, 3),
+}
+FILTERS = {name: lambda model, build=build: aof(build(model)) for name, build in STRUCTURES.items()} | {
+    "kalman": kalman_filter,
+    "iterated": lambda model: iterated(linearised(model), 3),
+}
+STEPS = 9
+U = [0.7, -2.0, 3.0, 0.0, 1.5, -1.0, 0.4, -0.6, 2.2]  # of every step another value: a step too early or too late is seen
+PRIOR = np.array([1.0, -2.0]), np.array([[2.0, 0.5], [0.5, 1.0]])
+V, W = np.array([[1.0, 0.3], [0.3, 2.0]]), np.array([[1.0, 0.6], [0.6, 2.0]])
+
+
+@pytest.fixture(scope="module")
+def changing() -> Model:
+    """Linear; matrices, constants and noises change with time and input; noises are correlated and have means."""
+    return Model.define(
+        ["(0.9 + 0.05*k)*x1 + 0.4*x2 + (1 + 0.1*k)*v1 + u", "0.8*x2 - 0.3*x1 + v2"],
+        ["x1 + 2*x2 + w1 - u", "x2 - (0.5 + 0.1*k)*x1 + 0.3*w2"],
+        prior={"mean": PRIOR[0], "variance": PRIOR[1]},
+        state_noise={"mean": [0.2, -0.1], "variance": V},
+        meter_noise={"mean": [0.4, 0], "variance": W},
+        inputs={"u": U},
+    )
+
+
+def matrices(k):
+    """A, a, Q, H, b, R of `changing`, typed apart from it."""
+    A, B, C = np.array([[0.9 + 0.05 * k, 0.4], [-0.3, 0.8]]), np.diag([1 + 0.1 * k, 1.0]), np.diag([1, 0.3])
+    a, b = B @ [0.2, -0.1] + [U[k], 0], C @ [0.4, 0] + [-U[k], 0]
+    return A, a, B @ V @ B.T, np.array([[1, 2], [-(0.5 + 0.1 * k), 1]]), b, C @ W @ C.T
+
+
+def with_gaps(y):
+    """Whole measurements and components missing, others in each run; one run's first and another's last."""
+    y = y.copy()
+    y[3, 1] = y[5, 2, 0] = y[0, 3] = y[-1, 0, 1] = y[6:8, 4] = np.nan
+    return y
+
+
+@pytest.fixture(scope="module")
+def record(changing):
+    """Measurements with gaps (9, 5, 2), and what one dense regression finds in them."""
+    y = with_gaps(simulate(changing, 5, STEPS, seed=2).y)
+    found = [oracles.joint_posterior([matrices(k) for k in range(STEPS)], PRIOR, y[:, run]) for run in range(5)]
+    return y, Gaussian(np.stack([one[0] for one in found], axis=1), np.stack([one[1] for one in found], axis=1))
+
+
+def same(found, expected):
+    # nine steps of well-conditioned 2 x 2 solutions, and one 18 x 18
+    np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.parametrize("kind", FILTERS)
+def test_on_a_linear_model_every_smoother_is_the_regression_on_the_whole_record(changing, record, kind):
+    """The structural functions of a linear model are exact whatever the approximation, and all laws are normal."""
+    y, expected = record
+    same(smooth(FILTERS[kind](changing), y), expected)
+
+
+@pytest.mark.parametrize("kind", STRUCTURES)
+def test_on_a_linear_model_it_does_not_matter_where_it_is_linearised(changing, record, kind):
+    y, expected = record
+    same(smooth_iterated(STRUCTURES[kind](changing), y, rounds=3), expected)
+
+
+@pytest.mark.parametrize("lag", range(STEPS + 2))
+def test_with_a_lag_it_knows_so_many_measurements_more(changing, record, lag):
+    y, expected = record
+    one = aof(gaussian(changing))
+    found = smooth(one, y, lag=lag)
+    for k in range(STEPS):
+        same(Gaussian(*(part[k] for part in found)), Gaussian(*(part[k] for part in smooth(one, y[: k + lag + 1]))))
+    same(found, run(one, y) if lag == 0 else expected if lag >= STEPS - 1 else found)
+
+
+def test_given_matrices_are_smoothed_as_the_model_they_come_from():
+    A, _, Q, H, b, R = matrices(2)
+    system, rng = LinearSystem(A, H, Q, R, np.eye(2)), np.random.default_rng(5)
+    y, u = rng.normal(size=(STEPS, 3, 2)), rng.normal(size=(STEPS, 3, 2))
+    for measured in (y, with_gaps(np.concatenate([y, y], axis=1))[:, :3]):
+        found = smooth_linear(system, run_linear(system, Gaussian(*PRIOR), measured, u))
+        assert (found.cov.strides[1] == 0) == (measured is y)  # stored once where all runs miss nothing
+        for i in range(3):
+            steps = [(A, u[k, i], Q, H, 0 * b, R) for k in range(STEPS)]
+            mean, cov, _ = oracles.joint_posterior(steps, PRIOR, measured[:, i])
+            same(Gaussian(found.mean[:, i], found.cov[:, i]), Gaussian(mean, cov))
+
+
+def test_later_measurements_never_make_it_less_sure(changing, record):
+    y, _ = record
+    gained = run(kalman_filter(changing), y).cov - smooth(kalman_filter(changing), y).cov
+    assert np.linalg.eigvalsh(gained).min() > -1e-12  # rounding of variances below 10
+    assert np.trace(gained[:-1], axis1=-2, axis2=-1).min() > 0.005  # the least gain is no rounding
+    np.testing.assert_array_equal(gained[-1], 0)
+
+
+def test_a_wide_prior_spoils_no_variance():
+    """Straight motion from a start known to 1e4 on either side, measured to 0.1: the textbook's form has no right digit."""
+    T, wide, sigma, steps = 0.1, 1e8, 0.1, 30
+    model = Model.define(
+        ["x1 + T*x2", "x2"], "x1 + w1", {"T": T}, prior={"mean": [0, 0], "variance": wide}, meter_noise={"variance": sigma**2}
+    )
+    y = 3.0 + 0.7 * T * np.arange(steps) + sigma * np.random.default_rng(1).normal(size=steps)
+    one = aof(linearised(model))
+    found = smooth(one, y[:, None, None])
+    regressors = np.stack([np.ones(steps), T * np.arange(steps)], axis=1)
+    information = regressors.T @ regressors / sigma**2 + np.eye(2) / wide  # of x_0: all states follow from it
+    expected = np.linalg.inv(information)
+    # correlations of the first predictions are 1 - 1e-10, so the regression S on them has six digits
+    np.testing.assert_allclose(found.mean[0, 0], np.linalg.solve(information, regressors.T @ y / sigma**2), rtol=1e-6)
+    np.testing.assert_allclose(found.cov[0, 0], expected, rtol=1e-5)
+    assert np.linalg.eigvalsh(found.cov).min() > 0
+
+    A, *visited = np.array([[1, T], [0, 1]]), *states(one, y[:, None, None])[1:]
+    p_s = visited[-1].posterior.cov[0]
+    for state in visited[-2::-1]:
+        p, Psi = state.posterior.cov[0], state.predicted.cov[0]
+        S = p @ A.T @ np.linalg.inv(Psi)
+        p_s = p + S @ (p_s - Psi) @ S.T
+    assert np.abs(p_s / expected - 1).max() > 1  # what rounding makes of it differs between machines
+
+
+# ---------------------------------------------------------------- nonlinear
+
+
+@pytest.mark.parametrize(
+    ("name", "build"),
+    [("EKF", linearised), ("UKF", unscented)],
+)
+def test_the_pendulum_s_smoothers_have_their_published_errors(name, build):
+    x, y = pendulum_data()
+    mean = smooth(aof(build(pendulum())), y).mean[1:, 0, 0]
+    # 500 steps there and back round differently in another order of operations
+    assert np.sqrt(np.mean((mean - x[:, 0]) ** 2)) == pytest.approx(PENDULUM_SMOOTHED[name], rel=1e-12)
+
+
+@pytest.fixture(scope="module")
+def curved() -> Model:
+    """Object and meter curved, the object's noise multiplied by the state."""
+    return Model.define(
+        ["x1 + 0.3*sin(x2) + 0.2*v1", "0.9*x2 + 0.2*x1*x2 + (0.3 + 0.1*x1**2)*v2"], ["x1**2/2 + x2 + 0.3*w"],
+        prior={"mean": [0.8, 0.5], "variance": [[0.2, 0.05], [0.05, 0.3]]},
+    )  # fmt: skip
+
+
+def test_what_a_measured_next_state_tells_is_the_best_linear_estimate():
+    """x_0 is not measured, x_1 = a(x_0) + v is: exact moments make the smoother the regression of x_0 on y_1."""
+    model = Model.define(
+        ["x1 + sin(x2) + 0.2*v1", "x1*x2 + 0.3*x2*v2"], ["x1 + 0.5*x2 + 0.4*w"],
+        prior={"mean": [0.8, 0.5], "variance": [[0.2, 0.05], [0.05, 0.3]]},
+    )  # fmt: skip
+    y = np.array([np.nan, 1.7])[:, None, None]
+    mean, cov = np.r_[model.prior.mean, 0, 0], np.eye(4)
+    cov[:2, :2] = model.prior.cov
+
+    def measured(t):
+        return t[0] + np.sin(t[1]) + 0.2 * t[2] + 0.5 * (t[0] * t[1] + 0.3 * t[1] * t[3])
+
+    def moment(function):
+        return oracles.gaussian_mean(function, mean, cov, 12)  # ten points integrate this sine to 1e-12
+
+    expected = moment(measured)
+    cross = np.array([moment(lambda t, i=i: (t[i] - mean[i]) * measured(t)) for i in range(2)])
+    variance = moment(lambda t: (measured(t) - expected) ** 2) + 0.4**2
+    found = smooth(aof(gaussian(model)), y)
+    np.testing.assert_allclose(found.mean[0, 0], mean[:2] + cross / variance * (1.7 - expected), rtol=1e-9)
+    np.testing.assert_allclose(found.cov[0, 0], model.prior.cov - np.outer(cross, cross) / variance, rtol=1e-9)
+
+
+def test_the_iterated_extended_smoother_finds_the_likeliest_trajectory():
+    model = Model.define(
+        ["x1 + 0.3*sin(x2) + 0.2*v1", "0.9*x2 + 0.2*x1*x2 + 0.3*v2"], ["x1**2/2 + x2 + 0.3*w1"],
+        prior={"mean": [0.8, 0.5], "variance": [[0.2, 0.05], [0.05, 0.3]]},
+    )  # fmt: skip
+    y = simulate(model, 4, 5, seed=3).y.copy()
+    y[2, 1] = np.nan
+    prior_root = np.linalg.cholesky(np.linalg.inv(model.prior.cov))
+    found, once = smooth_iterated(linearised(model), y, rounds=60), smooth(aof(linearised(model)), y)
+    for i in range(4):
+
+        def residuals(flat, i=i):
+            x = flat.reshape(5, 2)
+            a = np.stack([x[:, 0] + 0.3 * np.sin(x[:, 1]), 0.9 * x[:, 1] + 0.2 * x[:, 0] * x[:, 1]], axis=1)
+            seen = np.nan_to_num((y[:, i, 0] - x[:, 0] ** 2 / 2 - x[:, 1]) / 0.3)
+            return np.concatenate([prior_root.T @ (x[0] - model.prior.mean), ((x[1:] - a[:-1]) / [0.2, 0.3]).ravel(), seen])
+
+        minimum = least_squares(
+            residuals, once.mean[:, i].ravel(), method="lm", jac="3-point", xtol=1e-15, ftol=1e-15, gtol=1e-15
+        )
+        # 3-point differences and the search are right to some 1e-8 of a standard deviation, times the condition
+        np.testing.assert_allclose(found.mean[:, i].ravel(), minimum.x, rtol=0, atol=1e-6)
+        cov = np.linalg.inv(minimum.jac.T @ minimum.jac)
+        blocks = np.stack([cov[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] for k in range(5)])
+        np.testing.assert_allclose(found.cov[:, i], blocks, rtol=1e-4, atol=1e-7)
+    assert np.abs(found.mean - once.mean).max() > 0.01  # one round is not the maximum
+
+
+def brute_force(e):
+    """Means and variances of three states given y_0 and y_2: the posterior density on 141^3 points."""
+    grid = np.linspace(-3, 4, 141)
+    x = np.meshgrid(grid, grid, grid, indexing="ij", sparse=True)
+    squares = [((x[0] - 0.5) / np.sqrt(0.3)) ** 2]
+    squares += [((x[k + 1] - x[k] - e * np.sin(x[k])) / 0.4) ** 2 for k in (0, 1)]
+    squares += [((y - x[k] - e * x[k] ** 2) / 0.5) ** 2 for k, y in ((0, 0.9), (2, -0.2))]
+    density = np.exp(-0.5 * sum(squares))
+    masses = [density.sum(axis=tuple({0, 1, 2} - {k})) / density.sum() for k in range(3)]
+    mean = np.array([mass @ grid for mass in masses])
+    return mean, np.array([mass @ (grid - m) ** 2 for mass, m in zip(masses, mean, strict=True)])
+
+
+@pytest.mark.parametrize(
+    "smoother", [lambda s, y: smooth(aof(s), y), lambda s, y: smooth(iterated(s, 5), y), lambda s, y: smooth_iterated(s, y, 5)]
+)
+@pytest.mark.parametrize("build", [gaussian, lambda model: gauss_hermite(model, 7)])
+def test_under_a_mild_curvature_it_is_the_posterior_but_for_the_curvature(smoother, build):
+    """No normal law is the posterior of a curved model: they part in proportion to the curvature, and by little."""
+    off = []
+    for e in (0.05, 0.025):
+        text = ["x + e*sin(x) + 0.4*v", "x + e*x**2 + 0.5*w"]
+        model = Model.define(*text, {"e": e}, prior={"mean": 0.5, "variance": 0.3})
+        found = smoother(build(model), np.array([0.9, np.nan, -0.2]))
+        mean, variance = brute_force(e)
+        off.append(np.concatenate([(found.mean[:, 0, 0] - mean) / np.sqrt(variance), found.cov[:, 0, 0, 0] / variance - 1]))
+    assert np.abs(off[0]).max() < 0.08
+    np.testing.assert_allclose(off[1], off[0] / 2, rtol=0, atol=0.15 * np.abs(off[0]).max())
+
+
+def test_looking_back_is_more_accurate_and_claims_to_be(curved):
+    x, y = simulate(curved, 4000, 12, seed=4)
+    one = aof(gaussian(curved))
+    filtered, smoothed = run(one, y), smooth(one, y)
+    gain = ((filtered.mean - x) ** 2 - (smoothed.mean - x) ** 2).sum(axis=-1)[:-1].mean(axis=0)  # a mean over steps for each run
+    assert gain.mean() > 4 * gain.std() / np.sqrt(gain.size)
+    claimed = np.trace(smoothed.cov - filtered.cov, axis1=-2, axis2=-1)
+    assert claimed.max() < 1e-12
+
+
+def test_angles_go_the_short_way_round_in_the_past_too():
+    """A heading that wanders about pi, and the same one seen from a zero that lies elsewhere: only whole turns differ."""
+
+    def turned(by):
+        model = Model.define(
+            ["x1 + 0.5*x2 + 0.1*v1", "x2 + 0.2*v2"], ["x1 + 0.3*w"], angles={"x": ["x1"], "y": ["y"]},
+            prior={"mean": [3.0 + by, 0.1], "variance": 0.2},
+        )  # fmt: skip
+        y = np.pi + by + 0.3 * np.sin(np.arange(40.0) ** 2)
+        return model, (y - 2 * np.pi * np.round(y / (2 * np.pi)))[:, None, None]
+
+    for build in (lambda model: aof(linearised(model)), lambda model: aof(unscented(model)), kalman_filter):
+        found, other = (smooth(build(model), y) for model, y in (turned(0.0), turned(-2.5)))
+        assert np.abs(found.mean[..., 0]).max() <= np.pi
+        np.testing.assert_allclose(found.cov, other.cov, rtol=1e-9)
+        apart = found.mean - other.mean - [2.5, 0]
+        np.testing.assert_allclose(np.cos(apart[..., 0]), 1, rtol=1e-12)
+        np.testing.assert_allclose(apart[..., 1], 0, atol=1e-9)
+    model, y = turned(0.0)
+    again, lagged = smooth_iterated(linearised(model), y, rounds=3), smooth(kalman_filter(model), y, lag=len(y))
+    for other in (again, lagged):
+        np.testing.assert_allclose(other.mean, smooth(kalman_filter(model), y).mean, atol=1e-9)
+
+
+def test_one_trajectory_gets_the_numbers_it_gets_in_the_ensemble(curved):
+    y = with_gaps(simulate(curved, 6, STEPS, seed=11).y.repeat(1, axis=2)[..., :1].repeat(2, axis=2))[..., :1]
+    one = aof(gaussian(curved))
+    together, alone = smooth(one, y), smooth(one, y[:, 2:3])
+    np.testing.assert_allclose(alone.mean[:, 0], together.mean[:, 2], rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(alone.cov[:, 0], together.cov[:, 2], rtol=1e-10, atol=1e-13)
+
+
+def test_a_record_of_one_step_has_no_past(curved):
+    y = simulate(curved, 3, 1, seed=1).y
+    one = aof(linearised(curved))
+    for lag in (None, 0, 5):
+        np.testing.assert_array_equal(smooth(one, y, lag).mean, run(one, y).mean)
+
+
+# ---------------------------------------------------------------- what is refused
+
+
+@pytest.mark.parametrize("lag", [-1, 1.5, True, "2", float("nan")])
+def test_a_lag_that_is_no_number_of_steps_is_refused(curved, lag):
+    with pytest.raises(ValueError, match="lag must be a whole number of steps, at least 0"):
+        smooth(aof(linearised(curved)), np.zeros((3, 1, 1)), lag=lag)
+
+
+@pytest.mark.parametrize("rounds", [0, -1, 1.5, True, None])
+def test_rounds_that_are_no_number_of_rounds_are_refused(curved, rounds):
+    with pytest.raises(ValueError, match="rounds must be a whole number, at least 1"):
+        smooth_iterated(linearised(curved), np.zeros((3, 1, 1)), rounds=rounds)
+
+
+def test_a_filter_whose_laws_are_not_normal_cannot_look_back(curved):
+    model = Model.define("0.9*x + v", "x + w")
+    (designed,) = design([duof(model)], Ensemble(model, 100, 3, seed=1).by_step())
+    for one in (designed, imm([linearised(model)], [[1.0]])):
+        with pytest.raises(ValueError, match=rf"looking back needs the structural functions.*{one.name} has none.*take one"):
+            smooth(one, np.zeros((3, 1, 1)))
+    with pytest.raises(ValueError, match="measurements must have the shape"):
+        smooth(aof(linearised(model)), np.zeros((3, 2)))
