@@ -89,13 +89,20 @@ def failure(rng):
     return {"t": t, "q_b": q, r"\textstyle\int_0^t\bigl(\frac12(t-s)^2\bigr)^2q_b\,ds": spread}
 
 
-LETTERS = (sensors, axis, errors, western, western_before, accelerometer, failure)
+def slow_drift(rng):
+    """The variance of the steady state, from its quadratic equation, at a drift of 1e-10."""
+    xi, n = rng.uniform(1, 2) * 1e-10, rng.uniform(1, 2)
+    return {r"\lim_{\sigma_\xi\to0}": 1.0, r"\sigma_\xi": xi, r"\sigma_n": n, "p": np.roots([1, xi**2, -((xi * n) ** 2)]).max()}
+
+
+LETTERS = (slow_drift, sensors, axis, errors, western, western_before, accelerometer, failure)
 SAID = {
     r"x_k=f(x_{k-1},\,y_{\mathrm{NR},k-1}-\varepsilon_{k-1})+g\,\xi_{k-1}": DEFINITION,
     r"\varepsilon_k=\varepsilon_{k-1}+\zeta_{k-1}": DEFINITION,
     "p": NOTATION,
 }
 EQUALS = {
+    r"{\lim_{\sigma_\xi\to0}p/\sigma_\xi}": r"\sigma_n",
     r"\frac{d}{d\varepsilon}S(y_{\mathrm{NR}}-\varepsilon)": r"-S'(\lambda)",
     r"y_{\mathrm{SR}}-(y_{\mathrm{INS}}-\hat\varepsilon)": r"n-\varepsilon+\hat\varepsilon",
     r"\hat V-V": r"\varepsilon-\hat\varepsilon",

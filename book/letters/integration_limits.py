@@ -23,7 +23,17 @@ def analysis(rng):
     }  # fmt: skip
 
 
-LETTERS = (analysis,)
+def slow_drift(rng):
+    """True and best variance of a filter that believes in c times a drift of 1e-9."""
+    xi, n, c = 1e-9, rng.uniform(1, 2), rng.uniform(2, 3)
+    size = c * xi / n
+    K = -(size * np.sqrt(size**2 + 4) - size**2) / 2  # Psi = K^2 n^2 / (1 + K) in the steady state
+    true = (K**2 * n**2 + (1 + K) ** 2 * xi**2) / (-K * (2 + K))
+    return {r"\lim_{\sigma_\xi\to0}": 1.0, r"\bar p": true, "p": np.roots([1, xi**2, -((xi * n) ** 2)]).max(), "c": c}
+
+
+LETTERS = (analysis, slow_drift)
+EQUALS = {r"{\lim_{\sigma_\xi\to0}\bar p/p}": r"\frac12(c+1/c)"}
 SAID = {"K_k=0": "a setting", r"\text{mean innovation}": NOTATION}
 SAID |= dict.fromkeys(
     (r"{\lim_{\sigma_\xi\to0}\bar p/p}",),

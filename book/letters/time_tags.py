@@ -1,5 +1,7 @@
 """The letters of time-tags.md: a foreign clock, and the package's prediction over an interval."""
 
+import numpy as np
+
 from kfcourse.pages.letters import column, covariance
 from kfcourse.pages.relations import DEFINITION, NOTATION
 from kfcourse.scenarios.navigation import Clock, Dynamics
@@ -23,7 +25,22 @@ def prediction(rng):
     }  # fmt: skip
 
 
-LETTERS = (clock, prediction)
+def late(rng):
+    """At the time 0: what a motion with a constant jerk was a moment tau before, beside what it is."""
+    s, V, a, j, tau, b = rng.normal(size=6)
+    was = np.polynomial.Polynomial([s, V, a / 2, j / 6])
+    return {
+        "s": s, "V": V, "b": b, "V_0": V, "a_0": a, "j": j, r"\tau": tau, r"\hat s": was(-tau), r"\hat V": was.deriv()(-tau),
+        r"\hat b": a + b - was.deriv(2)(-tau),
+    }  # fmt: skip
+
+
+LETTERS = (clock, prediction, late)
+EQUALS = {
+    r"{\hat{s}-s}": r"-V_0\tau+a_0\tau^2/2-j\tau^3/6",
+    r"{\hat{V}-V}": r"-a_0\tau+j\tau^2/2",
+    r"{\hat{b}-b}": r"j\tau",
+}
 SAID = {
     r"\hat s(t)=s(t-\tau)": DEFINITION,
     r"\hat V(t)=\dot s(t-\tau)": DEFINITION,
