@@ -363,19 +363,25 @@ class Comparison:
         return self._mean_square(name).plus(bound.times(-1.0))
 
     def _above_all(self, name: str) -> Terms:
-        """What a filter is above the bound, by its distance and by its errors; by what both differ from the carrier's."""
+        """What a filter is above the bound: what the closest one is, and what this one is above that."""
         if self._is_slow(name):
             return self._distance(name)
         near, far = self._ways(name)
         weighed = near.times(self._shares[name]).plus(far.times(1 - self._shares[name]))
-        return weighed if name == self.carrier else self._above_all(self.carrier).plus(weighed)
+        return weighed if name == self._anchor else self._above_all(self._anchor).plus(weighed)
 
     def _ways(self, name: str) -> tuple[Terms, Terms]:
-        """The two ways to what a filter is above the carrier, and the carrier above the bound: by distances, and by errors."""
+        """The two ways to what a filter is above the closest, and that above the bound: by distances, and by errors."""
         near, far = self._distance(name), self._above(name)
-        if name == self.carrier:
+        if name == self._anchor:
             return near, far
-        return near.plus(self._distance(self.carrier).times(-1.0)), far.plus(self._above(self.carrier).times(-1.0))
+        return near.plus(self._distance(self._anchor).times(-1.0)), far.plus(self._above(self._anchor).times(-1.0))
+
+    @cached_property
+    def _anchor(self) -> str:
+        """The fast filter that is the closest to the exact one: what it is above the bound is known best."""
+        bound = self._estimate(self._bound()).value
+        return min(self.fast, key=lambda name: float(ratio(self._estimate(self._distance(name)).value, bound, 0.0).mean()))
 
     @cached_property
     def _shares(self) -> dict[str, Array]:
