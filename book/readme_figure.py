@@ -41,14 +41,14 @@ plt.rcParams.update(
 matplotlib.set_loglevel("error")  # the page has the font, this machine need not
 model = find_variant("53").model
 filters = lab_filters(model, [*SHOWN, "aof-exact"])
-result = compare(filters, model, runs=100_000, steps=STEPS.stop, seed=1, subset_runs=20_000, designs=4, wide=2)
+result = compare(filters, model, runs=100_000, steps=STEPS.stop, seed=1, subset_runs=10_000, designs=4)
 figure, ax = plt.subplots(figsize=(7.2, 3.1))
 steps = np.arange(STEPS.stop)
 for name, label in SHOWN.items():
     gap, line = result.gap(name)[STEPS], style(name) | {"label": label}
-    middle, half = 100 * gap.value, 100 * gap.half_width(0.95)
+    middle, (low, high) = 100 * gap.value, (100 * limit for limit in gap.interval(0.95))
     ax.plot(steps, middle, markersize=4, **line)
-    ax.fill_between(steps, middle - half, middle + half, color=line["color"], alpha=0.16, linewidth=0)
+    ax.fill_between(steps, low, high, color=line["color"], alpha=0.16, linewidth=0)
 label_ends(ax, least=0.09, fontweight="semibold")
 ax.axhline(0, color="0.35", linewidth=1)
 ax.set(xticks=steps, xlabel="step $k$", ylabel="error variance above\nthe exact filter, %")
