@@ -110,7 +110,3 @@ EQUALS = {
     r"\det\begin{pmatrix}H\\HA\\HA^2\end{pmatrix}": "-T_a^3",
     r"\textstyle\int_0^t\bigl(\frac12(t-s)^2\bigr)^2q_b\,ds": "q_bt^5/20",
 }
-SAID |= dict.fromkeys(
-    (r"{\lim_{\sigma_\xi\to0}p/\sigma_\xi}",),
-    NOTATION,
-)

@@ -35,7 +35,3 @@ def slow_drift(rng):
 LETTERS = (analysis, slow_drift)
 EQUALS = {r"{\lim_{\sigma_\xi\to0}\bar p/p}": r"\frac12(c+1/c)"}
 SAID = {"K_k=0": "a setting", r"\text{mean innovation}": NOTATION}
-SAID |= dict.fromkeys(
-    (r"{\lim_{\sigma_\xi\to0}\bar p/p}",),
-    NOTATION,
-)

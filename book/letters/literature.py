@@ -2,4 +2,4 @@
 
 from kfcourse.pages.relations import NOTATION
 
-SAID = {"rho_1^2": NOTATION, r"\rho_1^2": NOTATION, "x_3'": NOTATION, r"\partial x_3'/\partial x_5": NOTATION}
+SAID = {r"\rho_1^2": NOTATION, "x_3'": NOTATION, r"\partial x_3'/\partial x_5": NOTATION}

@@ -3,7 +3,7 @@
 import numpy as np
 
 from kfcourse.pages.letters import column, covariance
-from kfcourse.pages.relations import DEFINITION, NOTATION
+from kfcourse.pages.relations import DEFINITION
 from kfcourse.scenarios.navigation import Clock, Dynamics
 
 
@@ -46,11 +46,3 @@ SAID = {
     r"\hat V(t)=\dot s(t-\tau)": DEFINITION,
     r"\hat b(t)=u(t)-\ddot s(t-\tau)": DEFINITION,
 }
-SAID |= dict.fromkeys(
-    (
-        r"{\hat{s}-s}",
-        r"{\hat{V}-V}",
-        r"{\hat{b}-b}",
-    ),
-    NOTATION,
-)

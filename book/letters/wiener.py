@@ -62,7 +62,6 @@ SAID = {
     r"|\gamma|<1": "a condition",
     r"\bigl[\,\cdot\,\bigr]": NOTATION,
     r"W(\zeta)": NOTATION,
-    "sigma^2": NOTATION,
     "|D|^2": NOTATION,
     "|C|^2": NOTATION,
 }

@@ -23,13 +23,14 @@ from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
+from kfcourse.montecarlo.subset import FEWEST
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite, unscented
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure
 
-RUNS, STEPS, SLOW = 512, 20, 16  # of a trial; trajectories of the slow filters
+RUNS, STEPS, SLOW = 512, 20, FEWEST  # of a trial; trajectories of the slow filters
 SECONDS = 10.0  # for them
 PARTICLES, FEW, OFTEN = 1000, 10.0, 0.05  # fewer effective particles than FEW at so many corrections are too few
 BLIND = 0.5  # of the unexplained variance, that must be seen

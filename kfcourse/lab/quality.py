@@ -150,7 +150,7 @@ def _simulated(found: Quality, structures: Structures, runs: int, seed: int) -> 
     if not moments.ok or not filters:
         return found
     try:
-        result = compare([*filters, unmeasured(model, x)], model, runs, STEPS, seed, threads=1, progress=False)
+        result = compare([*filters, unmeasured(model, x)], model, runs, STEPS, seed, wide=1, threads=1, progress=False)
     except FAILURES as error:
         return dataclasses.replace(found, bounded=Finding(False, str(error), moments.value))
     return dataclasses.replace(
@@ -200,7 +200,7 @@ def _fragile(result: Comparison, x: Array, filters: Sequence[Filter | Design], h
     if worse := [title(one) for one in measured(result) if shares(result, one).value.max() > 1]:
         yield f"worse than {UNMEASURED}: {', '.join(worse)}"
     try:
-        compare(filters, harsh, max(result.runs // 4, FEWEST), STEPS, seed, threads=1, progress=False)
+        compare(filters, harsh, max(result.runs // 4, FEWEST), STEPS, seed, wide=1, threads=1, progress=False)
     except FAILURES:
         yield f"a filter diverges when deviations are {STRESS:g} times larger"
 

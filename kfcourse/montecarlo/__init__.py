@@ -1,5 +1,6 @@
 """Monte Carlo: all filters on common trajectories, designed where they need it, compared with standard errors.
 
+widths       how wide to draw their initial states
 ensemble     the trajectories that a seed stands for, drawn in blocks
 designing    coefficients of DUOF, FOS, MFOS: regressions over an ensemble
 experiment   `run`, `predictions`, `compare`: splits the seed into designing and comparing, runs all filters together

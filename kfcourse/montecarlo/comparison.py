@@ -144,7 +144,9 @@ class Comparison:
         Where it is more than `HEAVY`, there are too few trajectories for the interval to be trusted.
         """
         sums, i = self._in_subset(name)
-        return ratio(sums.largest[i].max(axis=-1), sums.distance[i].sum(axis=-1), 0.0) * self._shares[name]
+        return ratio(sums.largest[i].max(axis=-1), sums.distance[i].sum(axis=-1), 0.0) * self._shares.get(
+            name, np.ones(self.steps)
+        )
 
     @property
     def designs(self) -> int:

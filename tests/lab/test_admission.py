@@ -76,7 +76,7 @@ def test_what_can_be_built_and_will_not_do_is_warned_of():
 
 
 def test_a_trial_finds_what_leaves_the_finite_numbers():
-    model = Model.define("0.9*x + 0.3*v", "x + x**3 + w")
+    model = Model.define("0.9*x + 0.3*v", "x + x**3/20 + w")
     found = on_trial(model, admissions(model, ["duof", "aof-exact"]))
     assert [one.verdict for one in found] == ["yes", "yes"]
     endless = Model.define("x**3 + v", "x + w")
@@ -145,7 +145,7 @@ def test_a_negative_variance_is_the_affair_of_its_filter():
     model = Model.define("0.9*x + 0.1*v", "(1 + x)**16*(1 + x)**8 + w")
 
     def compared(filters):
-        return compare(filters, model, 500, 40, 1, threads=1, progress=False)
+        return compare(filters, model, 500, 40, 1, wide=1, threads=1, progress=False)
 
     names = ("mfos-gaussian", "aof-gaussian", "aof-unscented")
     with warnings.catch_warnings():
@@ -153,7 +153,8 @@ def test_a_negative_variance_is_the_affair_of_its_filter():
         filters = lab_filters(model, names)
     found = without_failing(filters, compared, {})
     assert found.names == names[1:]
-    assert re.match(r"step \d+: mfos-gaussian failed: a covariance has the variance -", found.left_out["mfos-gaussian"])
+    failed = r"step \d+: mfos-gaussian (failed: a covariance has the variance -|became infinite)"
+    assert re.match(failed, found.left_out["mfos-gaussian"])
     expected = compared(filters[1:]).error_variance("aof-gaussian").value
     np.testing.assert_array_equal(found.error_variance("aof-gaussian").value, expected)
 

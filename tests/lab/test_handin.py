@@ -14,10 +14,12 @@ from kfcourse.filters import aof
 from kfcourse.lab import Variant, admission, handin, report
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.handin import CATALOGUE, FIGURES, LANGUAGES, write_handin
-from kfcourse.lab.handin_text import filled, inline_tex, ranges
+from kfcourse.lab.handin_text import filled, inline_tex
 from kfcourse.lab.refusals import cause
+from kfcourse.lab.report import ranges
 from kfcourse.lab.short_names import LAB, title
 from kfcourse.lab.written_out import scalar_equations
+from kfcourse.montecarlo.comparison import Verdict
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.statistics import Estimate
 
@@ -97,9 +99,8 @@ def test_numbers_and_verdicts_are_those_of_the_comparison(written, result):
     power = int(np.floor(np.log10(value.value)))
     assert rf"$({value.value / 10.0**power:.3f} \pm {value.standard_error / 10.0**power:.3f})\cdot 10^{{{power}}}$" in tex
     for k in range(result.steps):
-        best, *others = result.leaders(k)
-        last = max(result.entrants, key=lambda name: float(result.gap(name)[k].value))
-        last = "--" if last in (best, *others) else title(last)
+        best, others, worst = result.verdicts()[k]
+        last = title(worst) if worst else "--"
         assert rf"${k}$ & {title(best)} & {', '.join(map(title, others)) or '--'} & {last} \\" in tex
 
 
@@ -109,19 +110,19 @@ class Told:
     has_bound, control, steps, seed = True, "aof-gaussian", 51, 1
     entrants = ("aof-gaussian", "duof", "fos-gaussian")
 
-    def __init__(self, leaders, last):
+    def __init__(self):
         self.model, self.available = load_variants()["53"].model, self.entrants
-        self.leaders, self.last = leaders, last
-
-    def gap(self, name):
-        return Estimate(np.array([float(self.last(k) == name) for k in range(51)]), np.zeros(51), 9)
 
     def ranking(self):
-        return [(name, self.gap(name)[0]) for name in self.entrants]
+        return [(name, Estimate(np.array(0.1), np.array(0.01), 9)) for name in self.entrants]
 
 
 def sentences(leaders, last, language):
-    return list(handin._Report(Told(leaders, last), WORDS[language]).sentences())
+    """Of verdicts: who leads at step k, and who is last if it is none of those."""
+    verdicts = [
+        Verdict(best, others, "" if last(k) in (best, *others) else last(k)) for k in range(51) for best, *others in [leaders(k)]
+    ]
+    return list(handin._Report(Told(), WORDS[language]).sentences(verdicts))
 
 
 @pytest.mark.quick
@@ -298,7 +299,8 @@ def test_catalogue_numbers_are_the_courses():
 
 @pytest.mark.quick
 def test_runs_of_steps_are_joined():
-    assert ranges([1, 3, 4, 5, 8]) == "$1$, $3$–$5$, $8$"
+    assert ranges([1, 3, 4, 5, 8], "${}$") == "$1$, $3$–$5$, $8$"
+    assert ranges([2]) == "2"
 
 
 @pytest.mark.quick

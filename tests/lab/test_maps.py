@@ -42,7 +42,7 @@ def test_leaders_are_those_not_significantly_worse_than_the_best(found):
 def test_where_the_meter_is_poor_and_the_object_quiet_the_duof_leads(found):
     """The lab's conclusion is turned round; by how much: the GAOF is 100 % above the bound, the DUOF 10 %."""
     assert found[0.02, 0.05].leaders(2) == ["duof"]
-    assert found[0.05, 0.02].leaders(2)[0] == "aof-gaussian"
+    assert set(found[0.05, 0.02].leaders(2)[:2]) == {"aof-gaussian", "aof-linearised"}
 
 
 def test_the_map_is_drawn(found):

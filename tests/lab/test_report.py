@@ -248,7 +248,7 @@ def test_the_numbers_are_those_of_the_comparison(variants, result53, tmp_path):
         estimate = result53.error_variance(name)
         assert data["error_variance"][name] == estimate.value.tolist()  # every digit
         assert data["standard_error"][name] == estimate.standard_error.tolist()
-    assert (data["variant"], data["runs"], data["steps"], data["seed"], data["exact_runs"]) == ("53", 4000, 6, 1, 40)
+    assert (data["variant"], data["runs"], data["steps"], data["seed"], data["exact_runs"]) == ("53", 4000, 6, 1, 112)
     assert data["model"]["parameters"] == {"c": 0.9, "e": 0.05, "g": 1.0, "f": 0.02}
 
 
