@@ -15,7 +15,7 @@ posing      can every question be posed for a variant?
 """
 
 from kfcourse.checks.exercises import Exercise, ExerciseError, exercise
-from kfcourse.checks.question import Mistake, Past, Question, Result
+from kfcourse.checks.question import Attempts, Mistake, Question, Result
 from kfcourse.checks.registry import ExerciseSet, sets
 
-__all__ = ["Exercise", "ExerciseError", "ExerciseSet", "Mistake", "Past", "Question", "Result", "exercise", "sets"]
+__all__ = ["Attempts", "Exercise", "ExerciseError", "ExerciseSet", "Mistake", "Question", "Result", "exercise", "sets"]

@@ -32,8 +32,8 @@ from kfcourse.checks.question import (
     UNUSABLE,
     WRONG,
     Answer,
+    Attempts,
     Mistake,
-    Past,
     Question,
     Result,
     answer_for,
@@ -130,12 +130,12 @@ def told(error: BaseException) -> str:
     return f"{type(error).__name__}{': ' * bool(text)}{text}{where}"
 
 
-def check(question: Question, exercise: Exercise, answer: Any, seconds: float = SECONDS, past: Past | None = None) -> Result:
+def check(question: Question, exercise: Exercise, answer: Any, seconds: float = SECONDS, past: Attempts | None = None) -> Result:
     """Check an answer to a question; never raises, whatever the answer is, and whatever fails in the check itself.
 
     `past` is what was handed in before, of the same notebook; the answer is added to it.
     """
-    past = Past() if past is None else past
+    past = Attempts() if past is None else past
     past.wrong.pop(question.name, None)
     try:
         result = _Check(question, exercise, answer, seconds, past).result()
@@ -161,7 +161,7 @@ class _Check:
     exercise: Exercise
     answer: Any
     seconds: float
-    past: Past
+    past: Attempts
 
     def _says(self, status: str, message: str, **more: Any) -> Result:
         return Result(self.question.name, self.question.title, status, message, **more)

@@ -12,7 +12,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.engine import check
-from kfcourse.checks.question import Past, Question, Result
+from kfcourse.checks.question import Attempts, Question, Result
 from kfcourse.checks.registry import sets
 from kfcourse.checks.steps import array_functions, noiseless_functions, places, telling_steps
 from kfcourse.lab.short_names import Structures
@@ -192,9 +192,9 @@ class Exercise:
         return np.random.default_rng(zlib.crc32(f"{self.salt}{self.variant.name}/{name}".encode()))
 
     @cached_property
-    def past(self) -> Past:
+    def past(self) -> Attempts:
         """What was handed in so far: the same wrong answer again gets a stronger hint, a later one may stand on it."""
-        return Past()
+        return Attempts()
 
     def check(self, name: str, answer: Any) -> Result:
         """Check the answer to a question: right, or what kind of mistake it looks like."""

@@ -112,7 +112,7 @@ class Question:
 
 
 @dataclass
-class Past:
+class Attempts:
     """What a notebook has handed in so far.
 
     Attributes

@@ -8,7 +8,7 @@ import sympy as sp
 from tiny import NOTHING, asks, c, d, outcome, p, x, y, z
 
 from kfcourse.checks.engine import GENERAL, check
-from kfcourse.checks.question import MIME, Past, Question, catalogue
+from kfcourse.checks.question import MIME, Attempts, Question, catalogue
 
 pytestmark = pytest.mark.quick
 
@@ -46,7 +46,7 @@ def test_the_case_of_a_run_is_the_first_that_is_wrong():
 def test_the_same_wrong_answer_again_gets_a_stronger_hint():
     mistakes = catalogue((("minus", "the sign of b", lambda a, b: a - b),))
     question = asks(lambda a, b: a + b, [(2.5, 1.5)], mistakes, advice="Think of b.")
-    past = Past()
+    past = Attempts()
 
     def told(answer):
         return check(question, NOTHING, answer, past=past).message
@@ -89,7 +89,7 @@ EXERCISE = SimpleNamespace(model=SimpleNamespace(values={}), places=(), question
 
 
 def test_a_right_step_on_a_wrong_one_is_marked_and_said():
-    past = Past()
+    past = Attempts()
 
     def asked(name, answer):
         return check(QUESTIONS[name], EXERCISE, answer, past=past)

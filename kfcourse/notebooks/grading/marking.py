@@ -17,7 +17,7 @@ from typing import Any
 
 from nbformat import NotebookNode
 
-from kfcourse.checks import Exercise, Past, Result
+from kfcourse.checks import Attempts, Exercise, Result
 from kfcourse.checks.engine import SECONDS as CHECK
 from kfcourse.checks.engine import check
 from kfcourse.checks.question import NOT_CHECKED, UNUSABLE, WRONG
@@ -173,7 +173,7 @@ class Marking:
         self.errors: list[str] = []
         self._reasons: dict[str, list[str]] = {}
         self._failed: dict[str, list[str]] = {}
-        self._past = Past()
+        self._past = Attempts()
 
     def run(self, kernel: Kernel, steps: Iterable[Step]) -> list[str]:
         """Run all cells and ask for all answers; says where and why it did not come to its end, if it did not."""
