@@ -220,8 +220,8 @@ REMARKS = {
     "and means leave these steps out.",
     "doubtful": "At {steps} there is no bound: what ran in the place of the exact AOF errs by more than a tenth of its variance "
     "itself, or another filter is more accurate. Means leave these steps out.",
-    "heavy": "{name}: at {steps} one trajectory of {runs} makes up to {part} % of its distance from the exact AOF. The interval "
-    "there cannot be trusted; about {enough} trajectories would do (--exact-runs, --exact-seconds).",
+    "heavy": "{name}: at {steps} one trajectory makes up to {part} % of what its accuracy is found from. The interval there "
+    "cannot be trusted; about {runs} trajectories, {exact} of them with the exact AOF, would do.",
 }
 
 
@@ -231,12 +231,15 @@ def remarks(result: Comparison) -> Iterator[tuple[str, dict[str, Any]]]:
         yield "rounding", {"steps": result.without_error}
     if result.doubtful.any():
         yield "doubtful", {"steps": result.doubtful}
-    for name in result.entrants if result.has_bound else ():
+    for name in result.entrants:
         heavy = np.where(result.usable, result.heavy(name), 0.0)
         if heavy.max() > HEAVY:
-            enough = f"{result.subset_runs * heavy.max() / HEAVY:.1g}"
-            part = {"part": f"{100 * heavy.max():.0f}", "runs": result.subset_runs, "enough": f"{float(enough):.0f}"}
-            yield "heavy", {"name": name, "steps": heavy > HEAVY, **part}
+            times = heavy.max() / HEAVY
+            runs, exact = (f"{float(f'{times * one:.1g}'):.0f}" for one in (result.runs, result.subset_runs))
+            yield (
+                "heavy",
+                {"name": name, "steps": heavy > HEAVY, "part": f"{100 * heavy.max():.0f}", "runs": runs, "exact": exact},
+            )
 
 
 def remarks_in_words(result: Comparison) -> list[str]:

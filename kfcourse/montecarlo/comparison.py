@@ -139,14 +139,18 @@ class Comparison:
         return replace(self, subset=self.subset.without_exact(), left_out={**self.left_out, EXACT: why})
 
     def heavy(self, name: str) -> Array:
-        """Part that the largest single trajectory makes of what is known of the filter's distance from the exact one, (steps,).
+        """Part that the largest single trajectory makes of what is known of the filter, (steps,).
 
-        Where it is more than `HEAVY`, there are too few trajectories for the interval to be trusted.
+        Of its distances from the exact filter and of its errors, each by its weight.  Where it is more than `HEAVY`, there are
+        too few trajectories for the interval to be trusted.
         """
+        sums, i = self._where(name)
+        by_errors = ratio(sums.largest_square[i].max(axis=-1), sums.square[i].sum(axis=(1, 2)), 0.0)
+        if not self.has_bound:
+            return by_errors
         sums, i = self._in_subset(name)
-        return ratio(sums.largest[i].max(axis=-1), sums.distance[i].sum(axis=-1), 0.0) * self._shares.get(
-            name, np.ones(self.steps)
-        )
+        share = self._shares.get(name, np.ones(self.steps))
+        return share * ratio(sums.largest[i].max(axis=-1), sums.distance[i].sum(axis=-1), 0.0) + (1 - share) * by_errors
 
     @property
     def designs(self) -> int:

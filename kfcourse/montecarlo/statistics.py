@@ -150,8 +150,8 @@ class Sums:
         Sums of e^T p^-1 e / n.
     distance : ndarray (filters, steps, batches)
         Sums of |z - z_reference|^2, if there is a reference filter, else 0.
-    largest : ndarray (filters, steps, batches)
-        The largest single term of `distance`.
+    largest, largest_square : ndarray (filters, steps, batches)
+        The largest single term of `distance`, and of `square` summed over the components.
     """
 
     counts: Array
@@ -164,12 +164,13 @@ class Sums:
     normalised: Array
     distance: Array
     largest: Array
+    largest_square: Array
 
     @classmethod
     def empty(cls, filters: int, steps: int, n: int, counts: Array) -> Sums:
         """Room for the sums over batches of so many trajectories each."""
         full, plain = (filters, steps, n, len(counts)), (filters, steps, len(counts))
-        shapes = (plain[1:],) * 2 + (full,) * 3 + (plain,) * 3
+        shapes = (plain[1:],) * 2 + (full,) * 3 + (plain,) * 4
         return cls(counts.astype(float), counts.astype(float), *(np.zeros(shape) for shape in shapes))
 
     @classmethod
@@ -198,6 +199,8 @@ class Sums:
             square = error[:, i] * error[:, i]
             self.square[filter_index, step, i] = self._sums(square, weight)
             self.own[filter_index, step, i] = own[i] * self.weights if own.ndim == 1 else self._sums(own[:, i], weight)
+        total = square if error.shape[1] == 1 else (error * error).sum(axis=1)
+        self.largest_square[filter_index, step] = np.maximum.reduceat(total if weight is None else total * weight, self._starts)
         if error.shape[1] > 1:
             self.normalised[filter_index, step] = self._sums(normalised_square(error, cov), weight) / error.shape[1]
         elif own.ndim == 2:

@@ -92,7 +92,7 @@ def test_on_variant_53_it_tells_the_same_with_less_error(variant53):
         for ask in ("gap", "error_variance"):
             a, b = (getattr(result, ask)(name) for result in (plain, wide))
             assert (abs(a.value - b.value) < SIGMA * np.hypot(a.standard_error, b.standard_error)).all(), (name, ask)
-            assert np.median(a.standard_error / b.standard_error) > 1.5, (name, ask)
+            assert np.median(a.standard_error / b.standard_error) > 1.3, (name, ask)  # strata alone help, too
 
 
 def test_a_variance_that_serves_all_trajectories_is_weighted_too():
