@@ -265,10 +265,9 @@ class _Report:
             rows = [[f"${k}$", *(power_of_ten(one[k]) for one in estimates)] for k in table_steps(result)]
             yield Block("table", words["table_goes_on" if start else "table"], ["$k$", *map(self.title, names)], rows)
         for kind, values in remarks(result):
-            steps = self.at(np.flatnonzero(values["steps"]).tolist())
-            yield Block(
-                "text", filled(words[f"remark_{kind}"], **values | {"name": self.title(values.get("name", "")), "at": steps})
-            )
+            names = ", ".join(map(self.title, values.get("names", ())))
+            told = values | {"names": names, "at": self.at(np.flatnonzero(values["steps"]).tolist())}
+            yield Block("text", filled(words[f"remark_{kind}"], **told))
         reference = words["of_exact"] if result.has_bound else self.title(result.control)
         for name in self.figures:
             yield Block("figure", filled(words[f"figure_{name}"], reference=reference), [f"handin-{name}"])

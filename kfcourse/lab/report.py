@@ -220,7 +220,7 @@ REMARKS = {
     "and means leave these steps out.",
     "doubtful": "At {steps} there is no bound: what ran in the place of the exact AOF errs by more than a tenth of its variance "
     "itself, or another filter is more accurate. Means leave these steps out.",
-    "heavy": "{name}: at {steps} one trajectory makes up to {part} % of what its accuracy is found from. The interval there "
+    "heavy": "{names}: at {steps} one trajectory makes up to {part} % of what the accuracy is found from. The interval there "
     "cannot be trusted; about {runs} trajectories, {exact} of them with the exact AOF, would do.",
 }
 
@@ -231,21 +231,19 @@ def remarks(result: Comparison) -> Iterator[tuple[str, dict[str, Any]]]:
         yield "rounding", {"steps": result.without_error}
     if result.doubtful.any():
         yield "doubtful", {"steps": result.doubtful}
-    for name in result.entrants:
-        heavy = np.where(result.usable, result.heavy(name), 0.0)
-        if heavy.max() > HEAVY:
-            times = heavy.max() / HEAVY
-            runs, exact = (f"{float(f'{times * one:.1g}'):.0f}" for one in (result.runs, result.subset_runs))
-            yield (
-                "heavy",
-                {"name": name, "steps": heavy > HEAVY, "part": f"{100 * heavy.max():.0f}", "runs": runs, "exact": exact},
-            )
+    heavy = {name: np.where(result.usable, result.heavy(name), 0.0) for name in result.entrants}
+    heavy = {name: parts for name, parts in heavy.items() if parts.max() > HEAVY}
+    if heavy:
+        most = np.max(list(heavy.values()), axis=0)
+        runs, exact = (f"{float(f'{most.max() / HEAVY * one:.1g}'):.0f}" for one in (result.runs, result.subset_runs))
+        told = {"part": f"{100 * most.max():.0f}", "runs": runs, "exact": exact}
+        yield "heavy", {"names": list(heavy), "steps": most > HEAVY, **told}
 
 
 def remarks_in_words(result: Comparison) -> list[str]:
     """The remarks as sentences."""
     return [
-        REMARKS[kind].format(**values | {"name": title(values.get("name", "")), "steps": _at(values["steps"])})
+        REMARKS[kind].format(**values | {"names": ", ".join(map(title, values.get("names", ()))), "steps": _at(values["steps"])})
         for kind, values in remarks(result)
     ]
 

@@ -10,9 +10,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from kfcourse import compare, gaussian, lab_filters, linearised, load_variants
+from kfcourse import Model, compare, gaussian, lab_filters, linearised, load_variants
 from kfcourse.filters import aof
-from kfcourse.lab.report import conclusions, write_json, write_report
+from kfcourse.lab.handin import write_handin
+from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
 from kfcourse.lab.short_names import LAB, title
 from kfcourse.lab.variants import Variant
 
@@ -330,3 +331,21 @@ def test_the_variance_between_designs_is_reported(variants, no_figures, tmp_path
         text = (tmp_path / name).read_text(encoding="utf-8")
         assert "designed on 3 ensembles" in text
         assert "between designs" in text
+
+
+@pytest.mark.parametrize(
+    ("language", "rounding", "heavy"), [("en", "rounding", "one trajectory"), ("ru", "округления", "одну траекторию")]
+)
+def test_a_reader_is_told_where_nothing_is_told_and_whose_accuracy_hangs_on_one_trajectory(
+    variants, tmp_path, language, rounding, heavy
+):
+    """A state that is known has errors of rounding only; one error is given as large as all of them together."""
+    known = Model.define("0.9*x + 0.05*x*v", "x + 0.02*x**2*w", prior={"variance": 0})
+    for model, told, other in ((known, rounding, heavy), (variants["53"].model, heavy, rounding)):
+        result = compare(lab_filters(model, ["aof-gaussian", "aof-linearised"]), model, 400, 3, 1, progress=False)
+        result.sums.largest_square[:, 2] = 0.5 * result.sums.square[:, 2].sum()
+        found = " ".join(remarks_in_words(result))
+        assert ("rounding" in found, "one trajectory" in found) == (model is known, model is not known)
+        write_handin(variants["53"], result, tmp_path, language)
+        text = (tmp_path / "handin.html").read_text(encoding="utf-8")
+        assert told in text and other not in text
