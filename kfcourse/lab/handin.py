@@ -265,8 +265,8 @@ class _Report:
             rows = [[f"${k}$", *(power_of_ten(one[k]) for one in estimates)] for k in table_steps(result)]
             yield Block("table", words["table_goes_on" if start else "table"], ["$k$", *map(self.title, names)], rows)
         for kind, values in remarks(result):
-            names = ", ".join(map(self.title, values.get("names", ())))
-            told = values | {"names": names, "at": self.at(np.flatnonzero(values["steps"]).tolist())}
+            whose = ", ".join(map(self.title, values.get("names", ())))
+            told = values | {"names": whose, "at": self.at(np.flatnonzero(values["steps"]).tolist())}
             yield Block("text", filled(words[f"remark_{kind}"], **told))
         reference = words["of_exact"] if result.has_bound else self.title(result.control)
         for name in self.figures:
