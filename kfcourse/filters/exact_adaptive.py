@@ -17,7 +17,7 @@ import scipy
 
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
-from kfcourse.filters.exact_batch import Place
+from kfcourse.filters.exact_batch import ROUNDING, Place
 from kfcourse.filters.exact_kernels import NEGLIGIBLE, ROOT, WIDTH, Grid, Kernels, Unresolved
 from kfcourse.filters.exact_panels import MOST, SPLITS, Rule, resolve
 from kfcourse.filters.exact_places import Candidates, explanations
@@ -96,7 +96,10 @@ def on_panels(
             grids = resolve(borders, log_density, _wider_than_kernels(law), rule)
         cut = np.array([_cut_off(grid, np.unique(line)) for (grid, _), line in zip(grids, borders, strict=True)])
         for place, (grid, error), bad, known in zip(left.tolist(), grids, cut, narrow, strict=True):
-            found[place] = (Grid(grid.x[:1], np.ones(1), np.full(1, 1e300)), 0.0) if known else (grid, np.inf if bad else error)
+            if known:
+                found[place] = Grid(grid.x[:1], np.ones(1), np.full(1, 1e300)), 0.0
+            elif not bad and (variance := grid.variance()) > 0:
+                found[place] = grid, error + ROUNDING * abs(grid.mean()) / np.sqrt(variance)
         left = left[cut & ~narrow]
         if not len(left):
             break

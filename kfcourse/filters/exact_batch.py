@@ -8,11 +8,14 @@ As a function of t the posterior is smooth and vanishes at both ends; there the 
     Integral p(x) dx  =  h sum_i p(x_i) s cosh t_i,      error C exp(-a / h)
 
 With twice the step the error is about the root of that.  So every second node, used alone, and every fourth tell the error for
-nothing.  Where the density has a kink, a cusp or a spike, no error falls exponentially; that too is seen from these three.
+nothing.  Where the density has a kink, a cusp or a spike, no error falls exponentially; that is seen from these three, or, where by
+chance they agree, from how roughly the masses change from node to node.
 """
 
 from __future__ import annotations
 
+from functools import cache
+from math import comb
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +24,8 @@ from kfcourse.filters.densities import ScalarDensities
 from kfcourse.filters.exact_kernels import Kernels
 from kfcourse.laws import Array
 
+ORDER = 32  # of the differences that tell a rough density: of a normal one, of nodes half a deviation apart, 1e-5 is left
+KINK = 32.0  # times what halving the distance of the nodes may bring at a kink, by chance, more than it should
 ROUNDING = 10 * np.finfo(float).eps  # of a node and its density, relative to x
 INTERPOLATED = 16.0  # interpolation of order 8 at twice the distance errs 2^8 times as much, but near a zero of the density less
 
@@ -87,14 +92,33 @@ def posteriors(kernels: Kernels, y: Array, law: ScalarDensities, place: Place, c
         mean, variance = moments(x, mass)
         whole = Summary(mean, variance, total[:, 0])
         nested, coarse = (whole.distance(Summary.of(x[:, ::part], part * full[:, ::part])) for part in (2, 4))
-        inherited, rough = (whole.distance(Summary.of(x, one)) for one in (by_even, by_quarter))
+        inherited, by_few = (whole.distance(Summary.of(x, one)) for one in (by_even, by_quarter))
         beyond = (mass[:, 0] + mass[:, -1]) * np.maximum(mean - x[:, 0], x[:, -1] - mean) / np.sqrt(variance)
         rounding = ROUNDING * np.abs(mean) / np.sqrt(variance)
-        nested, inherited = (np.maximum(change - rounding, 0.0) for change in (nested, inherited))
-        error = extrapolated(nested, coarse) + beyond
-        inherited = rounding + np.where(kernels.spectral, extrapolated(inherited, rough), inherited / INTERPOLATED)
+        fine, wide = (roughness(x[:, ::part], part * mass[:, ::part], mean, variance) for part in (1, 2))
+        nested, fine, inherited = (np.maximum(change - rounding, 0.0) for change in (nested, fine, inherited))
+        error = np.maximum(extrapolated(nested, coarse), cautious(fine, wide)) + beyond
+        inherited = rounding + np.where(kernels.spectral, cautious(inherited, by_few), inherited / INTERPOLATED)
         density = mass / length
     return Posteriors(x, mass, density, mean, variance, *(np.where(np.isfinite(e), e, np.inf) for e in (error, inherited)))
+
+
+def roughness(x: Array, mass: Array, mean: Array, variance: Array) -> Array:
+    """The error that a kink, a jump or a spike of the density leaves, (T,), wherever between two nodes it is.
+
+    A high difference of the masses, over its middle coefficient, is nothing where they change smoothly from node to node; next
+    to a jump it is half of it, at a spike all of it.
+    """
+    away = (x - mean[:, None]) / np.sqrt(variance)[:, None]
+    return (np.abs(mass @ _differences(x.shape[1])) * (1 + np.abs(away) + np.abs(away * away - 1))).max(axis=1)
+
+
+@cache
+def _differences(count: int) -> Array:
+    """Masses (T, count) times this matrix are their central differences of order `ORDER`, over the middle coefficient."""
+    offset = np.subtract.outer(np.arange(count), np.arange(count)) + ORDER // 2
+    coefficients = np.array([(-1) ** i * comb(ORDER, i) for i in range(ORDER + 1)]) / comb(ORDER, ORDER // 2)
+    return np.where((offset >= 0) & (offset <= ORDER), coefficients[np.clip(offset, 0, ORDER)], 0.0)
 
 
 def extrapolated(change: Array, before: Array) -> Array:
@@ -105,6 +129,11 @@ def extrapolated(change: Array, before: Array) -> Array:
     """
     q = np.divide(change, before, out=np.ones_like(change), where=before > 0)
     return change * np.clip(q, np.minimum(change, 1.0) ** 0.75, 1.0)
+
+
+def cautious(change: Array, before: Array) -> Array:
+    """`extrapolated`, but where a kink or a spike would by chance be taken for what falls exponentially, far less of it."""
+    return np.minimum(change, KINK * extrapolated(change, before))
 
 
 class Summary(NamedTuple):

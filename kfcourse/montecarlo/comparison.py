@@ -142,7 +142,8 @@ class Comparison:
         """Part that the largest single trajectory makes of what is known of the filter, (steps,).
 
         Of its distances from the exact filter and of its errors, each by its weight.  Where it is more than `HEAVY`, there are
-        too few trajectories for the interval to be trusted.
+        too few trajectories for the interval to be trusted.  A distance from particles is a product that may be negative: then
+        a single one may be more than their sum, and counts as all of it.
         """
         sums, i = self._where(name)
         by_errors = ratio(sums.largest_square[i].max(axis=-1), sums.square[i].sum(axis=(1, 2)), 0.0)
@@ -150,7 +151,8 @@ class Comparison:
             return by_errors
         sums, i = self._in_subset(name)
         share = self._shares.get(name, np.ones(self.steps))
-        return share * ratio(sums.largest[i].max(axis=-1), sums.distance[i].sum(axis=-1), 0.0) + (1 - share) * by_errors
+        by_distances = ratio(sums.largest[i].max(axis=-1), np.abs(sums.distance[i].sum(axis=-1)), 0.0)
+        return share * np.minimum(by_distances, 1.0) + (1 - share) * by_errors
 
     @property
     def designs(self) -> int:
