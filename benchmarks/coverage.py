@@ -33,9 +33,15 @@ def estimates(result: Comparison) -> dict[str, tuple[Estimate, np.ndarray]]:
     entrants, control = result.entrants, result.control
     others = [name for name in entrants if name != control]
     trusted = {name: result.usable & (result.heavy(name) <= HEAVY) for name in entrants}
+    gaps = {name: result.gap(name) for name in entrants}
+
+    def worse(name: str) -> np.ndarray:
+        """Trust in the less accurate one's distances: they make up the difference."""
+        return np.where(gaps[name].value >= gaps[control].value, trusted[name], trusted[control])
+
     asked = {
-        "gap": [(result.gap(name), trusted[name]) for name in entrants],
-        "difference": [(result.difference(name, control), trusted[name] & trusted[control]) for name in others],
+        "gap": [(gaps[name], trusted[name]) for name in entrants],
+        "difference": [(result.difference(name, control), worse(name)) for name in others],
         "bound": [(result.bound(), result.usable)],
     }
     return {

@@ -8,8 +8,8 @@ As a function of t the posterior is smooth and vanishes at both ends; there the 
     Integral p(x) dx  =  h sum_i p(x_i) s cosh t_i,      error C exp(-a / h)
 
 With twice the step the error is about the root of that.  So every second node, used alone, and every fourth tell the error for
-nothing.  Where the density has a kink, a cusp or a spike, no error falls exponentially; that is seen from these three, or, where by
-chance they agree, from how roughly the masses change from node to node.
+nothing.  Where the density has a kink, a cusp or a spike, no error falls exponentially; that is seen from these three, or, where
+by chance they agree, from how roughly the masses change from node to node.
 """
 
 from __future__ import annotations
