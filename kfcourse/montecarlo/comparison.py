@@ -152,7 +152,7 @@ class Comparison:
         sums, i = self._in_subset(name)
         share = self._shares.get(name, np.ones(self.steps))
         by_distances = ratio(sums.largest[i].max(axis=-1), np.abs(sums.distance[i].sum(axis=-1)), 0.0)
-        return share * np.minimum(by_distances, 1.0) + (1 - share) * by_errors
+        return np.minimum(share * by_distances + (1 - share) * by_errors, 1.0)
 
     @property
     def designs(self) -> int:
