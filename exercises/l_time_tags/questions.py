@@ -74,7 +74,7 @@ def move_arguments(exercise: Exercise) -> list[tuple]:
 def fusion_arguments(exercise: Exercise) -> list[tuple]:
     """Eight measurements, the first soon: the third and fourth arrive in the reverse order; the sixth has not arrived yet."""
     rng = exercise.rng("l5")
-    tags = np.cumsum(rng.uniform(0.7, 1.3, 8)) - 0.6
+    tags = np.cumsum(rng.uniform([0.1, *[0.7] * 7], [0.4, *[1.3] * 7]))
     arrivals = tags + rng.uniform(0.2, 0.5, 8)
     arrivals[2] = arrivals[3] + rng.uniform(0.1, 0.3)
     now = arrivals[7] + 0.1
