@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import html
 import re
+import shutil
 from pathlib import Path
 
 import contents
@@ -132,9 +133,19 @@ def write_not_found(app, exception) -> None:
     (Path(app.outdir) / "404.html").write_text(page, encoding="utf-8")
 
 
+def leave_icons_out(app, exception) -> None:
+    """The theme loads a script of 1.5 MB, every icon there is, on each page; _static/icons.css draws the ten that are used."""
+    if not exception and app.builder.format == "html":
+        for path in (Path(app.outdir) / "_static" / "scripts").glob("fontawesome.js*"):
+            path.unlink()
+        (Path(app.outdir) / "_static" / "scripts" / "fontawesome.js").write_text("", encoding="utf-8")
+        shutil.rmtree(Path(app.outdir) / "_static" / "vendor" / "fontawesome")
+
+
 def setup(app) -> dict[str, bool]:
     app.connect("config-inited", use_templates, priority=900)
     app.connect("html-page-context", only_where_needed, priority=950)
     app.connect("build-finished", write_not_found)
+    app.connect("build-finished", leave_icons_out)
     app.connect("html-page-context", complete, priority=300)  # before the theme, which tries the templates
     return {"parallel_read_safe": True, "parallel_write_safe": True}

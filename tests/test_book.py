@@ -113,6 +113,11 @@ def window(browser):
 # Pictures that are shown wider or higher than they are, by more than the rounding of small ones.
 SQUEEZED = """() => [...document.querySelectorAll("article img")]
   .filter(e => Math.abs(e.clientWidth / e.clientHeight / (e.naturalWidth / e.naturalHeight) - 1) > 0.05).map(e => e.src)"""
+# Folds with something of their cell below them, or with another fold right below; and icons that the theme did not get from us.
+FOLDS = """() => [...document.querySelectorAll("article details.below-output")]
+  .filter(e => e.nextElementSibling || e.parentElement.nextElementSibling?.querySelector(":scope > details.below-output"))
+  .map(e => e.textContent)"""
+ICONS = """() => [...document.querySelectorAll(".fa-solid")].filter(e => getComputedStyle(e).maskImage === "none").map(e => e.outerHTML)"""
 # What sticks out of the page, or out of its own box, and by how much.
 FIT = """() => {
     const width = document.documentElement.clientWidth;
@@ -214,6 +219,9 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
         assert not tab.evaluate("Boolean(window.MathJax)"), "a page without formulas loads MathJax"
     tab.wait_for_load_state("networkidle")
     assert problems == []
+
+    assert tab.evaluate(FOLDS) == [], "code folded away twice in a row, or above what it shows"
+    assert tab.evaluate(ICONS) == [], "an icon that _static/icons.css does not draw"
 
     for width in (390, 768):
         tab.set_viewport_size({"width": width, "height": 1000})

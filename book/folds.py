@@ -1,0 +1,48 @@
+"""Sphinx extension: code that is folded away stands after what it shows, and neighbouring cells share one fold.
+
+A reader sees the figure, the equation or the sentence first, and under it a small mark that opens the code.
+"""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+from docutils import nodes
+from myst_nb.sphinx_ import HideCodeCellNode, HideInputCells
+from sphinx.transforms.post_transforms import SphinxPostTransform
+
+
+class FoldsBelow(SphinxPostTransform):
+    """One fold after each run of cells whose input is hidden."""
+
+    default_priority = HideInputCells.default_priority - 1  # which would put a fold above every cell
+    formats = ("html",)
+
+    def run(self, **kwargs) -> None:
+        for parent in {id(cell.parent): cell.parent for cell in self.document.findall(_folded)}.values():
+            for together, cells in groupby(list(parent.children), _folded):
+                if together:
+                    _fold(list(cells))
+
+
+def _folded(node: nodes.Node) -> bool:
+    return isinstance(node, nodes.container) and node.get("nb_element") == "cell_code" and node.get("hide_mode") == "input"
+
+
+def _fold(cells: list[nodes.container]) -> None:
+    last = cells[-1]
+    fold = HideCodeCellNode(prompt_show=last["prompt_show"], prompt_hide=last["prompt_hide"], classes=["below-output"])
+    for cell in cells:
+        cell["hide_mode"] = None
+        if cell.children and cell.children[0].get("nb_element") == "cell_code_source":
+            source = cell.children[0]
+            cell.remove(source)
+            fold.append(source)
+        if not cell.children and cell is not last:
+            cell.parent.remove(cell)
+    last.append(fold)
+
+
+def setup(app) -> dict[str, bool]:
+    app.add_post_transform(FoldsBelow)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
