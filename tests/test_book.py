@@ -117,7 +117,8 @@ SQUEEZED = """() => [...document.querySelectorAll("article img")]
 FOLDS = """() => [...document.querySelectorAll("article details.below-output")]
   .filter(e => e.nextElementSibling || e.parentElement.nextElementSibling?.querySelector(":scope > details.below-output"))
   .map(e => e.textContent)"""
-ICONS = """() => [...document.querySelectorAll(".fa-solid")].filter(e => getComputedStyle(e).maskImage === "none").map(e => e.outerHTML)"""
+ICONS = """() => [...document.querySelectorAll(".fa-solid")]
+  .filter(e => getComputedStyle(e).maskImage === "none").map(e => e.outerHTML)"""
 # What sticks out of the page, or out of its own box, and by how much.
 FIT = """() => {
     const width = document.documentElement.clientWidth;
