@@ -16,7 +16,7 @@ from kfcourse.pages.verification import VERIFIED
 PAGE = Path(__file__).resolve().parent / "equations.md"
 HEAD = """\
 (all-equations)=
-# All equations of this book
+# All equations
 
 Each equation says what it is. A ✓ stands beside what was verified when the book was built: SymPy has shown that the two sides
 are equal, or numbers have been compared to the digits that are named. Where the text or a box types a relation, its letters

@@ -9,6 +9,7 @@ import itertools
 import os
 import re
 import shutil
+from html import unescape
 from html.parser import HTMLParser
 from importlib import resources
 from pathlib import Path
@@ -61,6 +62,16 @@ def test_page_exists_and_loads_only_local_files(page: str) -> None:
             continue
         assert not re.match(r"([a-z]+:)?//", address), f"{page} loads {address} from the network"
         assert (path.parent / re.split("[?#]", address)[0]).exists(), f"{page} loads {address}, which is not there"
+
+
+@pytest.mark.parametrize(
+    "chapter", [c for part in TOC["parts"] for c in part["chapters"] if "title" in c], ids=lambda c: c["file"]
+)
+def test_a_page_is_called_in_the_contents_what_it_is_called_itself(chapter) -> None:
+    page = (HTML / f"{chapter['file']}.html").read_text(encoding="utf-8")
+    title = unescape(re.search(r"<title>(.*?) &#8212;", page)[1]).strip("★ ")
+    short = re.fullmatch(r"([a-z]): .*", chapter["title"])  # sets have long titles, with the Russian term
+    assert title.startswith(f"Set {short[1]}: ") if short else chapter["title"].strip("★ ") == title.replace("’", "'")
 
 
 def test_style_sheets_load_only_local_files() -> None:
