@@ -69,7 +69,7 @@ def test_page_exists_and_loads_only_local_files(page: str) -> None:
 )
 def test_a_page_is_called_in_the_contents_what_it_is_called_itself(chapter) -> None:
     page = (HTML / f"{chapter['file']}.html").read_text(encoding="utf-8")
-    title = unescape(re.search(r"<title>(.*?) &#8212;", page)[1]).strip("★ ")
+    title = unescape(re.search(r"<title>(?:\d+\. )?(.*?) &#8212;", page)[1]).strip("★ ")
     short = re.fullmatch(r"([a-z]): .*", chapter["title"])  # sets have long titles, with the Russian term
     assert title.startswith(f"Set {short[1]}: ") if short else chapter["title"].strip("★ ") == title.replace("’", "'")
 

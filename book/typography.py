@@ -1,0 +1,36 @@
+"""Sphinx extension: a number stays on one line with its unit, whether typed or printed by a cell."""
+
+from __future__ import annotations
+
+import re
+
+from docutils import nodes
+from sphinx.transforms.post_transforms import SphinxPostTransform
+
+UNIT = r"(?:%|°|(?:[kMG]?Hz|[kMG]?B|dB|px|deg|m?rad|CPU-s|[km]?m|m?s|min|h)(?:/(?:s|min|h))?[²³]?(?![\w-]))"
+AFTER_A_NUMBER = re.compile(rf"(?<=\d) (?={UNIT})|(?<=\d) (?=/ {UNIT})|(?<=\d /) (?={UNIT})|(?<=\d) (?=±)|(?<=±) (?=\d)")
+AFTER_A_FORMULA = re.compile(rf"^ (?={UNIT})")
+UNTOUCHED = (nodes.literal, nodes.literal_block, nodes.math, nodes.math_block, nodes.raw)
+
+
+class TogetherWithUnits(SphinxPostTransform):
+    """No line ends between a number, or a formula, and its unit."""
+
+    default_priority = 500
+    formats = ("html",)
+
+    def run(self, **kwargs) -> None:
+        for text in list(self.document.findall(nodes.Text)):
+            if text.parent is None or isinstance(text.parent, UNTOUCHED):
+                continue
+            place = text.parent.children.index(text)
+            found = AFTER_A_NUMBER.sub("\N{NO-BREAK SPACE}", text)
+            if place and isinstance(text.parent[place - 1], nodes.math):
+                found = AFTER_A_FORMULA.sub("\N{NO-BREAK SPACE}", found)
+            if found != text:
+                text.parent.children[place] = nodes.Text(found)
+
+
+def setup(app) -> dict[str, bool]:
+    app.add_post_transform(TogetherWithUnits)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
