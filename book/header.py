@@ -64,7 +64,7 @@ def print_line(app, doctree, name: str) -> None:
 
 def _items(app, name: str, line: chapter_line):
     if "minutes" in line:
-        yield f"{line['minutes']} min"
+        yield f"{line['minutes']}\N{NO-BREAK SPACE}min"
     needed = [_link(app, name, other, line) for other in _words(line.get("needs", ""))]
     yield needed and f"needs {', '.join(needed)}"
     known = sets()

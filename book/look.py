@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import html
 import re
-import shutil
 from pathlib import Path
 
 import contents
@@ -139,7 +138,6 @@ def leave_icons_out(app, exception) -> None:
         for path in (Path(app.outdir) / "_static" / "scripts").glob("fontawesome.js*"):
             path.unlink()
         (Path(app.outdir) / "_static" / "scripts" / "fontawesome.js").write_text("", encoding="utf-8")
-        shutil.rmtree(Path(app.outdir) / "_static" / "vendor" / "fontawesome")
 
 
 def setup(app) -> dict[str, bool]:

@@ -130,6 +130,10 @@ FOLDS = """() => [...document.querySelectorAll("article details.below-output")]
   .map(e => e.textContent)"""
 ICONS = """() => [...document.querySelectorAll(".fa-solid")]
   .filter(e => getComputedStyle(e).maskImage === "none").map(e => e.outerHTML)"""
+# Numbers that a line may part from their units.
+PARTED = r"""() => [...document.querySelectorAll("article :is(p, li, td, figcaption)")]
+  .filter(e => !e.closest("pre, .kf-live")).flatMap(e => [...e.childNodes]).filter(e => e.nodeType === Node.TEXT_NODE)
+  .flatMap(e => e.data.match(/\d (%|°|m|km|mm|s|ms|min|Hz|kHz|px|rad|mrad|deg|dB|m\/s)(?![\w-])/g) || [])"""
 # What sticks out of the page, or out of its own box, and by how much.
 FIT = """() => {
     const width = document.documentElement.clientWidth;
@@ -233,6 +237,7 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
     assert problems == []
 
     assert tab.evaluate(FOLDS) == [], "code folded away twice in a row, or above what it shows"
+    assert tab.evaluate(PARTED) == [], "numbers and units parted"
     assert tab.evaluate(ICONS) == [], "an icon that _static/icons.css does not draw"
 
     for width in (390, 768):
