@@ -16,6 +16,7 @@ exact_batch        nodes x = c + s sinh t there, Bayes' rule, and an estimate of
 exact_roots        or, for a meter without noise, the few states that explain it
 exact_adaptive     for what they do not resolve, one trajectory at a time: panels that are halved until they do (exact_panels)
 exact_evidence     and how likely the measurement was, for who asks
+exact_smoothing    what the whole record tells, once it is there
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ from kfcourse.filters.exact_kernels import Grid, Kernels, TooNarrow, Unresolved,
 from kfcourse.filters.exact_places import Candidates, hidden, likeliest, looked, spaced
 from kfcourse.filters.exact_predictions import predictions
 from kfcourse.filters.exact_roots import at_roots
+from kfcourse.filters.exact_smoothing import smoothed
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
@@ -143,7 +145,18 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
     def evidence(state: State, y: Array, after: State) -> Array:
         return log_evidence(before(state, len(y)), y, densities.at(state.step), after.memory.fine)
 
-    return Filter("aof-exact", model, init, step, slow=True, evidence=evidence)
+    def look_back(states: Iterable[State], y: Array) -> list[State]:
+        memories = [(state.memory.fine, state.memory.error) for state in states]  # without the predictions: these are large
+        posteriors, errors = zip(*memories, strict=True)
+
+        def predicted(k: int) -> Iterable[tuple[Array, Kernels]]:
+            return predictions(posteriors[k - 1], densities.at(k - 1)) if k else before(init(y.shape[1]), y.shape[1])
+
+        found = smoothed(posteriors, np.array(errors), y, predicted, densities, accuracy, bool(model.angles.x))
+        laws = [Gaussian(one.mean[:, None], one.variance[:, None, None]) for one in found]
+        return [State(k + 1, law, law, one) for k, (law, one) in enumerate(zip(laws, found, strict=True))]
+
+    return Filter("aof-exact", model, init, step, slow=True, evidence=evidence, look_back=look_back)
 
 
 def _on_circle(memory: PointMass, law: ScalarDensities) -> tuple[Gaussian, Gaussian]:
