@@ -15,13 +15,15 @@ without any contribution of the sampling: that is how particles bound other filt
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.angles import Components, difference, moments_on_circle, on_circle
+from kfcourse.angles import Components, difference, on_circle
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.filters.densities import likelihood
+from kfcourse.filters.densities import likelihood, transition
+from kfcourse.filters.particle_smoothing import backwards, weighted
 from kfcourse.filters.proposals import Look
 from kfcourse.laws import Array, Gaussian
 from kfcourse.seeds import Seed, seed_number
@@ -30,6 +32,7 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
 LARGEST = 1e150  # the squares of larger states are infinite
+PATHS = 200  # that each cloud draws when it looks back
 
 
 class Particles(NamedTuple):
@@ -53,6 +56,10 @@ class Particles(NamedTuple):
     effective: Array
     evidence: Array
     seed: np.random.SeedSequence
+
+    def discretisation_error(self) -> Array:
+        """Standard error of the estimates, (runs,): half the distance of both clouds."""
+        return np.asarray(0.5 * np.linalg.norm(self.halves[0] - self.halves[1], axis=1))
 
     def evidence_error(self) -> Array:
         """Standard error of the last ln p(y_k | y_0, ..., y_{k-1}), (runs,): half the distance of both clouds."""
@@ -127,25 +134,45 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
         with np.errstate(over="ignore", invalid="ignore"):  # what lies beyond the largest number has no weight
             x, logs = first(rng, y) if before is None else following(rng, before, y, state.step)
             weights, log_mean = _normalised(logs + log_likelihood(y[:, None, None, :], x, state.step))
-            mean, cov = _weighted(x, weights, angles)
-            apart = difference(mean[:, 0], mean[:, 1], angles)
-            posterior = Gaussian(
-                on_circle(mean[:, 1] + 0.5 * apart, angles), cov.mean(axis=1) + 0.5 * apart[:, :, None] * apart[:, None, :]
-            )
+            mean, cov = weighted(x, weights, angles)
+            posterior = _together(mean, cov, angles)
         flat, chosen = x.reshape(-1, size, model.n), _systematic(weights.reshape(-1, size), rng)
         kept = np.take_along_axis(flat, chosen[..., None], axis=1).reshape(x.shape)
         effective = (1 / (weights**2).sum(axis=-1)).sum(axis=1)
         s, _ = _plain(rng, x.shape[:-1], ahead)
         with np.errstate(over="ignore", invalid="ignore"):
             following_ones = moved(kept, s, state.step).reshape(len(y), particles, model.n)
-            predicted = _weighted(following_ones, np.full(following_ones.shape[:-1], 1.0 / particles), angles)
+            predicted = weighted(following_ones, np.full(following_ones.shape[:-1], 1.0 / particles), angles)
         memory = Particles(kept, np.moveaxis(mean, 1, 0), effective, log_mean.T, root)
         return State(state.step + 1, posterior, predicted, memory)
 
     def evidence(before: State, y: Array, after: State) -> Array:
         return np.where(np.isnan(y).any(axis=-1), 0.0, np.logaddexp(*after.memory.evidence) - np.log(2))
 
-    return Filter(name, model, init, step, slow=True, evidence=evidence)
+    def look_back(states: Iterable[State], y: Array) -> list[State]:
+        memories = [state.memory for state in states]
+        rng = _stream(memories[-1].seed, len(memories))
+        found = backwards([memory.x for memory in memories], transition(model), angles, min(size, PATHS), rng)
+        result: list[State] = []
+        for memory, (clouds, effective) in zip(reversed(memories), found, strict=True):
+            law = _together(*clouds, angles)
+            result.append(
+                State(
+                    len(memories) - len(result),
+                    law,
+                    law,
+                    memory._replace(x=None, halves=np.moveaxis(clouds.mean, 1, 0), effective=effective),
+                )
+            )
+        return result[::-1]
+
+    return Filter(name, model, init, step, slow=True, evidence=evidence, look_back=look_back)
+
+
+def _together(mean: Array, cov: Array, angles: Components) -> Gaussian:
+    """The law by both clouds, from theirs (runs, 2, ...)."""
+    apart = difference(mean[:, 0], mean[:, 1], angles)
+    return Gaussian(on_circle(mean[:, 1] + 0.5 * apart, angles), cov.mean(axis=1) + 0.5 * apart[:, :, None] * apart[:, None, :])
 
 
 def _plain(rng: np.random.Generator, shape: tuple[int, ...], look: Look) -> tuple[Array, Array]:
@@ -172,15 +199,6 @@ def _normalised(logs: Array) -> tuple[Array, Array]:
     with np.errstate(divide="ignore"):
         mean = peak + np.log(total / logs.shape[-1])
     return np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / logs.shape[-1]), mean[..., 0]
-
-
-def _weighted(x: Array, weights: Array, angles: Components) -> Gaussian:
-    """Mean (..., n) and covariance (..., n, n) of weighted particles (..., M, n)."""
-    mean = np.einsum("...m,...mi->...i", weights, x)
-    for i in angles:
-        mean[..., i], _ = moments_on_circle(x[..., i], weights)
-    deviation = difference(x, mean[..., None, :], angles)
-    return Gaussian(mean, np.einsum("...m,...mi,...mj->...ij", weights, deviation, deviation))
 
 
 def _systematic(weights: Array, rng: np.random.Generator) -> Array:

@@ -176,7 +176,7 @@ def run_block(
                     sums.record(i, k, near(instant.x, estimate.mean, one.model.angles.x), estimate, weight)
             if reference is not None:
                 twice = _twice(states[reference])
-                sums.record_doubt(k, _doubt(states[reference], twice), weight)
+                sums.record_doubt(k, _doubt(states[reference]), weight)
                 for i, state in enumerate(states):
                     if i != reference:
                         mean, angles = state.posterior.mean, filters[i].model.angles.x
@@ -193,12 +193,10 @@ def _twice(state: State) -> tuple[Array, Array]:
     return state.posterior.mean, state.posterior.mean
 
 
-def _doubt(state: State, twice: tuple[Array, Array]) -> Array:
+def _doubt(state: State) -> Array:
     """The reference's own error, (runs,): half the distance of two clouds; what discretisation leaves of the nodes' mean."""
-    if isinstance(state.memory, Particles):
-        return np.asarray(0.5 * np.linalg.norm(twice[0] - twice[1], axis=1))
     found = getattr(state.memory, "discretisation_error", None)
-    return np.zeros(len(twice[0])) if found is None else found()
+    return np.zeros(len(state.posterior.mean)) if found is None else found()
 
 
 @contextmanager
