@@ -90,7 +90,8 @@ def smoothing_error(one: Filter, y: Array) -> Array:
 
     Examples
     --------
-    >>> from kfcourse import Model, pointmass
+    >>> from kfcourse import Model
+    >>> from kfcourse.filters import pointmass
     >>> y, model = np.array([0.5, 1.0]), Model.define("sin(x) + 0.3*v", "x + 0.1*w")
     >>> bool((smoothing_error(pointmass(model, accuracy=1e-6), y) < 1e-6).all())
     True
