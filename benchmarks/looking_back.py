@@ -3,8 +3,8 @@
     .venv/bin/python benchmarks/looking_back.py [--repeats 9]
 
 Smoother over filter, and likelihood over filter (each runs the filter itself, too), for variant 53 and the pendulum of Sarkka and
-Svensson, one record and many; the median of the ratios of neighbouring measurements, of processor time, as machines change their speed.  A smoother
-of normal laws is to cost at most 2.5 times its filter.
+Svensson, one record and many: medians of ratios of processor times that were measured one after the other, as machines change
+their speed.  A smoother of normal laws is to cost at most 2.5 times its filter.
 """
 
 from __future__ import annotations

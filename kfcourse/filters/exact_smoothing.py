@@ -29,9 +29,9 @@ from kfcourse.filters.exact_narrow import DEAD, interpolated
 from kfcourse.filters.exact_roots import SHARP
 from kfcourse.laws import Array
 
-LOOKED = 33  # nodes of a look
+LOOKED = 25  # nodes of a look
 LOOKS = 8  # that may be needed until the width of a hump is seen
-SPACING = 0.25  # of the nodes at the highest hump, in its widths
+SPACING = 0.45  # of the nodes at the highest hump, in its widths
 NODES = (49, 65, 97, 129, 193, 257, 385, 513, 769, 1025)  # that a density may have
 MORE = 1.9  # times more nodes than did not do
 TAIL = 1e-18  # mass at a node beyond which a density has ended
@@ -208,7 +208,7 @@ class Density:
 
     def look(self, grids: Sequence[Grid]) -> tuple[Place, Array]:
         """Where the densities lie, and how many nodes they need: from the filter's nodes, and ever closer."""
-        chosen = [np.linspace(0, len(grid.x) - 1, LOOKED).astype(int) for grid in grids]
+        chosen = [np.arange(LOOKED) * (len(grid.x) - 1) // (LOOKED - 1) for grid in grids]
         x = np.array([grid.x[i] for grid, i in zip(grids, chosen, strict=True)])
         with np.errstate(divide="ignore"):
             logs = np.log(np.array([grid.density[i] for grid, i in zip(grids, chosen, strict=True)]))
@@ -227,7 +227,7 @@ class Density:
                 break
         scale = 2 * width
         span = np.arcsinh((high - centre) / scale) + np.arcsinh((centre - low) / scale)
-        wanted = span * np.hypot(scale, scale) / (SPACING * width) + 1
+        wanted = span * np.hypot(scale, 2 * width) / (SPACING * width) + 1
         return Place(centre, scale, low, high), wanted[:, 0]
 
     def on_nodes(self, place: Place, count: int) -> Nodes:
