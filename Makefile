@@ -73,6 +73,7 @@ figure: install
 benchmark: install
 	$(BIN)/python benchmarks/engine.py
 	$(BIN)/python benchmarks/exact.py
+	$(BIN)/python benchmarks/looking_back.py
 
 install:
 	@$(PYTHON) -c "" 2>/dev/null || { echo "$(PYTHON) does not start. Install Python 3.11 or newer, or name it: make PYTHON=/path/to/python3 $(MAKECMDGOALS)" >&2; exit 1; }

@@ -143,6 +143,13 @@ def gain(cross: Array, cov: Array, broken: bool = False) -> Array:
     correlation = cov / (scale[..., :, None] * scale[..., None, :])
     scaled_cross = cross / scale[..., None, :]
     singular = SINGULAR * np.sqrt(np.finfo(correlation.dtype).eps)
+    if cov.shape[-1] == 2:  # as below, without the calls that a small matrix is not worth
+        first, both = correlation[..., 0, 0], correlation[..., 0, 1]
+        rest = correlation[..., 1, 1] - both * both
+        if min(np.minimum.reduce(first, axis=None), np.minimum.reduce(rest, axis=None)) > singular**2:
+            left, right = scaled_cross[..., 0], scaled_cross[..., 1]
+            both, rest = both[..., None], rest[..., None]
+            return np.stack([(left - both * right) / rest, (right - both * left) / rest], axis=-1) / scale[..., None, :]
     try:
         if np.diagonal(np.linalg.cholesky(correlation), axis1=-2, axis2=-1).min() > singular:
             return transpose(np.linalg.solve(correlation, transpose(scaled_cross))) / scale[..., None, :]

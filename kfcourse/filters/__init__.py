@@ -7,6 +7,7 @@ conditionally_optimal   Pugachev's two-step conditionally optimal filter (DUOF)
 optimal_structure       Rudenko's filter of optimal structure (FOS)
 modified_structure      its modification (MFOS)
 exact                   the AOF itself, on a grid (exact_kernels, exact_places, exact_batch; exact_adaptive checks it)
+looking_back            what the whole record tells of each state (exact_smoothing, particle_smoothing)
 particles               the same by sampling;  proposals: where to look;  densities, inverted: what all need
 iterated_ekf            the meter linearised again at the estimate
 gate, heavy_tails       measurements that are not believed: refused, by any filter; weighted

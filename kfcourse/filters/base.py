@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -47,9 +48,18 @@ class Advance(Protocol):
 
 
 class Evidence(Protocol):
-    """ln p(y_k | y_0, ..., y_{k-1}), (runs,), from the state before the measurement; 0 where it is missing."""
+    """ln p(y_k | y_0, ..., y_{k-1}), (runs,), from the states before and after the measurement; 0 where it is missing."""
 
-    def __call__(self, state: State, y: Array, /) -> Array: ...
+    def __call__(self, before: State, y: Array, after: State, /) -> Array: ...
+
+
+class LookBack(Protocol):
+    """States (0, ..., K - 1) whose laws are those given the whole record, from the filter's after each measurement, and y.
+
+    Their memory may tell how good they are, `discretisation_error()`, (runs,), in the units of x.
+    """
+
+    def __call__(self, states: Iterable[State], y: Array, /) -> list[State]: ...
 
 
 @dataclass(frozen=True)
@@ -75,6 +85,8 @@ class Filter:
         and predicts from its posterior.  Looking back, likelihood and gates take from it what no filter needs while it runs.
     evidence : Evidence, optional
         Where it is another than the normal law's by `structure`: how likely a measurement was before it came.
+    look_back : LookBack, optional
+        Where it is another than the normal law's by `structure`: what the whole record tells of each state.
     """
 
     name: str
@@ -85,6 +97,7 @@ class Filter:
     instead: Filter | None = None
     structure: Structure | None = None
     evidence: Evidence | None = None
+    look_back: LookBack | None = None
 
     def __post_init__(self) -> None:
         if self.model.angles.x:

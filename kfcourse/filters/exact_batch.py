@@ -45,7 +45,7 @@ class Place(NamedTuple):
         x = self.centre + (0.5 * self.scale) * (grown - 1 / grown)
         return x, (0.5 * self.scale) * (grown + 1 / grown) * ((last - first) / (count - 1))
 
-    def distance(self, x: Array, count: int) -> Array:
+    def distance(self, x: Array, count: int | Array) -> Array:
         """Distance of neighbouring nodes at x; infinite beyond the ends."""
         span = np.arcsinh((self.high - self.centre) / self.scale) + np.arcsinh((self.centre - self.low) / self.scale)
         inside = (x >= self.low) & (x <= self.high)

@@ -66,19 +66,21 @@ def refined(x: Array, mass: Array, law: ScalarDensities, most: int) -> Finer:
     return Finer(*(array[kept] for array in (row, mu, np.maximum(sigma, widest), *masses)))
 
 
-def interpolated(values: Array, at: Array, row: Array | int = 0) -> Array:
+def interpolated(values: Array, at: Array, row: Array | int = 0, count: Array | None = None) -> Array:
     """Functions given at the numbers 0, 1, 2..., (n, T, N), between these, each for one trajectory: (n, M).
 
-    By the polynomials through the eight nearest; a second function, a logarithm, by lines where it falls steeply.
+    By the polynomials through the eight nearest; a second function, a logarithm, by lines where it falls steeply.  If the nodes
+    are filled up, `count` (M,) says how many there are.
     """
     result = np.empty((len(values), len(at)))
-    flat, count = values.reshape(len(values), -1), values.shape[2]
+    flat, size = values.reshape(len(values), -1), values.shape[2]
     for piece in chunks(len(at), len(BARYCENTRIC), CACHED):
-        result[:, piece] = _piece(flat, count, at[piece], count * (row if isinstance(row, int) else row[piece]))
+        known = size if count is None else count[piece]
+        result[:, piece] = _piece(flat, known, at[piece], size * (row if isinstance(row, int) else row[piece]))
     return result
 
 
-def _piece(flat: Array, count: int, at: Array, begin: Array | int) -> Array:
+def _piece(flat: Array, count: Array | int, at: Array, begin: Array | int) -> Array:
     points = len(BARYCENTRIC)
     number = at.astype(int)
     near = np.clip(number - points // 2 + 1, 0, count - points) + np.arange(points)[:, None]

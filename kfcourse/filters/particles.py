@@ -15,13 +15,15 @@ without any contribution of the sampling: that is how particles bound other filt
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.angles import Components, difference, moments_on_circle, on_circle
+from kfcourse.angles import Components, difference, on_circle
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.filters.densities import likelihood
+from kfcourse.filters.densities import likelihood, transition
+from kfcourse.filters.particle_smoothing import backwards, weighted
 from kfcourse.filters.proposals import Look
 from kfcourse.laws import Array, Gaussian
 from kfcourse.seeds import Seed, seed_number
@@ -30,6 +32,7 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
 LARGEST = 1e150  # the squares of larger states are infinite
+PATHS = 200  # that each cloud draws when it looks back
 
 
 class Particles(NamedTuple):
@@ -43,13 +46,24 @@ class Particles(NamedTuple):
         The estimate of each cloud.
     effective : ndarray (runs,)
         How many particles counted.
+    evidence : ndarray (2, runs)
+        ln p(y_k | y_0, ..., y_{k-1}) as each cloud has it: the logarithm of its mean weight.
     seed : numpy.random.SeedSequence
     """
 
     x: Array | None
     halves: Array
     effective: Array
+    evidence: Array
     seed: np.random.SeedSequence
+
+    def discretisation_error(self) -> Array:
+        """Standard error of the estimates, (runs,): half the distance of both clouds."""
+        return np.asarray(0.5 * np.linalg.norm(self.halves[0] - self.halves[1], axis=1))
+
+    def evidence_error(self) -> Array:
+        """Standard error of the last ln p(y_k | y_0, ..., y_{k-1}), (runs,): half the distance of both clouds."""
+        return 0.5 * np.abs(self.evidence[0] - self.evidence[1])
 
 
 def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: bool = True, name: str = "particle") -> Filter:
@@ -87,7 +101,7 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
         state = gaussian_init(runs)
         both = np.stack([state.posterior.mean] * 2)
         root = np.random.SeedSequence([number, runs])
-        return state._replace(memory=Particles(None, both, np.full(runs, float(particles)), root))
+        return state._replace(memory=Particles(None, both, np.full(runs, float(particles)), np.zeros((2, runs)), root))
 
     def first(rng: np.random.Generator, y: Array) -> tuple[Array, Array]:
         """x_0 (runs, 2, M/2, n), and the logarithms of p / q."""
@@ -96,7 +110,7 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
             found = start.proposal(np.zeros((len(y), model.n)), y, start.starts(), 0)
             heights = log_likelihood(y[:, None, :], start.noise_of(found.mean), 0) - 0.5 * (found.mean**2).sum(axis=-1)
             heights += np.log(np.diagonal(found.root, axis1=-2, axis2=-1)).sum(axis=-1)
-            for_both = found._replace(share=_normalised(heights)).of_clouds(2)
+            for_both = found._replace(share=_normalised(heights)[0]).of_clouds(2)
             s, logs = _where_measured(y, start.draw(for_both, rng, size), s)
         return on_circle(start.noise_of(s), angles), logs
 
@@ -115,26 +129,50 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
         return on_circle(np.broadcast_to(state_equation(x, ahead.noise_of(s), k), x.shape), angles)
 
     def step(state: State, y: Array) -> State:
-        before, _, _, root = state.memory
+        before, root = state.memory.x, state.memory.seed
         rng = _stream(root, state.step)
         with np.errstate(over="ignore", invalid="ignore"):  # what lies beyond the largest number has no weight
             x, logs = first(rng, y) if before is None else following(rng, before, y, state.step)
-            weights = _normalised(logs + log_likelihood(y[:, None, None, :], x, state.step))
-            mean, cov = _weighted(x, weights, angles)
-            apart = difference(mean[:, 0], mean[:, 1], angles)
-            posterior = Gaussian(
-                on_circle(mean[:, 1] + 0.5 * apart, angles), cov.mean(axis=1) + 0.5 * apart[:, :, None] * apart[:, None, :]
-            )
+            weights, log_mean = _normalised(logs + log_likelihood(y[:, None, None, :], x, state.step))
+            mean, cov = weighted(x, weights, angles)
+            posterior = _together(mean, cov, angles)
         flat, chosen = x.reshape(-1, size, model.n), _systematic(weights.reshape(-1, size), rng)
         kept = np.take_along_axis(flat, chosen[..., None], axis=1).reshape(x.shape)
         effective = (1 / (weights**2).sum(axis=-1)).sum(axis=1)
         s, _ = _plain(rng, x.shape[:-1], ahead)
         with np.errstate(over="ignore", invalid="ignore"):
             following_ones = moved(kept, s, state.step).reshape(len(y), particles, model.n)
-            predicted = _weighted(following_ones, np.full(following_ones.shape[:-1], 1.0 / particles), angles)
-        return State(state.step + 1, posterior, predicted, Particles(kept, np.moveaxis(mean, 1, 0), effective, root))
+            predicted = weighted(following_ones, np.full(following_ones.shape[:-1], 1.0 / particles), angles)
+        memory = Particles(kept, np.moveaxis(mean, 1, 0), effective, log_mean.T, root)
+        return State(state.step + 1, posterior, predicted, memory)
 
-    return Filter(name, model, init, step, slow=True)
+    def evidence(before: State, y: Array, after: State) -> Array:
+        return np.where(np.isnan(y).any(axis=-1), 0.0, np.logaddexp(*after.memory.evidence) - np.log(2))
+
+    def look_back(states: Iterable[State], y: Array) -> list[State]:
+        memories = [state.memory for state in states]
+        rng = _stream(memories[-1].seed, len(memories))
+        found = backwards([memory.x for memory in memories], transition(model), angles, min(size, PATHS), rng)
+        result: list[State] = []
+        for memory, (clouds, effective) in zip(reversed(memories), found, strict=True):
+            law = _together(*clouds, angles)
+            result.append(
+                State(
+                    len(memories) - len(result),
+                    law,
+                    law,
+                    memory._replace(x=None, halves=np.moveaxis(clouds.mean, 1, 0), effective=effective),
+                )
+            )
+        return result[::-1]
+
+    return Filter(name, model, init, step, slow=True, evidence=evidence, look_back=look_back)
+
+
+def _together(mean: Array, cov: Array, angles: Components) -> Gaussian:
+    """The law by both clouds, from theirs (runs, 2, ...)."""
+    apart = difference(mean[:, 0], mean[:, 1], angles)
+    return Gaussian(on_circle(mean[:, 1] + 0.5 * apart, angles), cov.mean(axis=1) + 0.5 * apart[:, :, None] * apart[:, None, :])
 
 
 def _plain(rng: np.random.Generator, shape: tuple[int, ...], look: Look) -> tuple[Array, Array]:
@@ -152,22 +190,15 @@ def _stream(root: np.random.SeedSequence, step: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(root.entropy, spawn_key=(step,)))
 
 
-def _normalised(logs: Array) -> Array:
-    """Weights (..., M) that sum to 1, all equal where nothing is left of them."""
+def _normalised(logs: Array) -> tuple[Array, Array]:
+    """Weights (..., M) that sum to 1, all equal where nothing is left of them, and the logarithm of their mean before (...)."""
     peak = logs.max(axis=-1, keepdims=True)
     weights = np.exp(logs - np.where(np.isfinite(peak), peak, 0.0))
     weights = np.where(np.isfinite(weights), weights, 0.0)
     total = weights.sum(axis=-1, keepdims=True)
-    return np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / logs.shape[-1])
-
-
-def _weighted(x: Array, weights: Array, angles: Components) -> Gaussian:
-    """Mean (..., n) and covariance (..., n, n) of weighted particles (..., M, n)."""
-    mean = np.einsum("...m,...mi->...i", weights, x)
-    for i in angles:
-        mean[..., i], _ = moments_on_circle(x[..., i], weights)
-    deviation = difference(x, mean[..., None, :], angles)
-    return Gaussian(mean, np.einsum("...m,...mi,...mj->...ij", weights, deviation, deviation))
+    with np.errstate(divide="ignore"):
+        mean = peak + np.log(total / logs.shape[-1])
+    return np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / logs.shape[-1]), mean[..., 0]
 
 
 def _systematic(weights: Array, rng: np.random.Generator) -> Array:

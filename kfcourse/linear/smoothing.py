@@ -24,16 +24,19 @@ from kfcourse.laws import Array, Gaussian, apply, gain, product, stacked, symmet
 from kfcourse.linear.runs import Run
 from kfcourse.linear.system import LinearSystem
 
+AT_ONCE = 512  # laws: so many that a call costs little beside them, so few that stacking them does, too
 
-class Passage(NamedTuple):
-    """A filter's way from one step to the next.
+
+class Passages(NamedTuple):
+    """A filter's ways from each step to the next.
 
     Attributes
     ----------
     posterior, predicted : Gaussian
-        Laws of x_k after its measurement, and of x_{k+1} before its own: means (runs, n), covariances (..., n, n).
+        Laws of x_k after its measurement, and of x_{k+1} before its own: means (steps, runs, n), covariances
+        (steps, runs, n, n), or (steps, 1, n, n) if all runs have the same.
     A, Q : ndarray (..., n, n)
-        dtau/dz, and the part of the prediction's covariance that it does not explain.
+        dtau/dz, and the part of the prediction's covariance that it does not explain: of each, or of all.
     """
 
     posterior: Gaussian
@@ -42,13 +45,19 @@ class Passage(NamedTuple):
     Q: Array
 
 
-def look_back(passages: Sequence[Passage], last: Gaussian, lag: int | None = None, angles: Components = ()) -> Gaussian:
+def blocks(steps: int, runs: int) -> list[slice]:
+    """Steps that are worth taking together."""
+    size = max(1, AT_ONCE // runs)
+    return [slice(start, start + size) for start in range(0, steps, size)]
+
+
+def look_back(passages: Sequence[Passages], last: Gaussian, lag: int | None = None, angles: Components = ()) -> Gaussian:
     """The laws of the states, given all measurements of the record.
 
     Parameters
     ----------
-    passages : sequence of Passage
-        From each step to the next.
+    passages : sequence of Passages
+        One after the other, through the whole record.
     last : Gaussian
         The filter's law of the last state.
     lag : int, optional
@@ -66,29 +75,37 @@ def look_back(passages: Sequence[Passage], last: Gaussian, lag: int | None = Non
     ValueError
         A lag that is no whole number, or below 0.
     """
-    back = [_towards(one, angles) for one in passages]
+    back = [one for part in passages for one in _regressions(part, angles)]
     if lag is None:
         return stacked([*accumulate(reversed(back), lambda after, one: one(after), initial=last)][::-1])
     if isinstance(lag, bool) or not isinstance(lag, int | np.integer) or lag < 0:
         raise ValueError(f"lag must be a whole number of steps, at least 0, or None for all that follow; got {lag!r}")
-    laws = [*(one.posterior for one in passages), last]
+    posteriors = [Gaussian(*law) for part in passages for law in zip(*part.posterior, strict=True)]
+    laws = [*posteriors, last]
     for _ in range(min(lag, len(back))):  # each round tells every state of one measurement more
         laws = [*(one(after) for one, after in zip(back, laws[1:], strict=True)), last]
     return stacked(laws)
 
 
-def _towards(passage: Passage, angles: Components) -> Callable[[Gaussian], Gaussian]:
-    """From the law of x_{k+1} to that of x_k."""
-    (z, p), (lam, Psi), A, Q = passage
+def _regressions(passages: Passages, angles: Components) -> list[Callable[[Gaussian], Gaussian]]:
+    """From the law of x_{k+1} to that of x_k, for each k.
+
+    The gain does not depend on what comes later: found for all steps together.
+    """
+    (z, p), (lam, Psi), A, Q = passages
     S = gain(product(p, transpose(A)), Psi, broken=True)
     rest = np.eye(z.shape[-1], dtype=p.dtype) - product(S, A)
     own = product(product(rest, p), transpose(rest))
+    each = np.broadcast_to(Q, (len(z), *Q.shape[-3:])) if Q.ndim < 4 else Q
 
-    def back(after: Gaussian) -> Gaussian:
-        mean = z + apply(S, difference(after.mean, lam, angles))
-        return Gaussian(on_circle(mean, angles), symmetric(own + product(product(S, Q + after.cov), transpose(S))))
+    def of_step(z: Array, lam: Array, S: Array, own: Array, Q: Array) -> Callable[[Gaussian], Gaussian]:
+        def back(after: Gaussian) -> Gaussian:
+            mean = z + apply(S, difference(after.mean, lam, angles))
+            return Gaussian(on_circle(mean, angles), symmetric(own + product(product(S, Q + after.cov), transpose(S))))
 
-    return back
+        return back
+
+    return [of_step(*one) for one in zip(z, lam, S, own, each, strict=True)]
 
 
 def smooth(system: LinearSystem, found: Run, lag: int | None = None) -> Gaussian:
@@ -96,11 +113,12 @@ def smooth(system: LinearSystem, found: Run, lag: int | None = None) -> Gaussian
 
     Inputs are in its predictions already.  `lag`, result and errors as of `look_back`.
     """
-    posterior, predicted = (
-        [Gaussian(*law) for law in zip(laws.mean, _once(laws.cov), strict=True)] for laws in (found.posterior, found.predicted)
-    )
-    passages = [Passage(*laws, system.A, system.Q) for laws in zip(posterior[:-1], predicted[1:], strict=True)]
-    return look_back(passages, posterior[-1], lag)
+    (mean, cov), (ahead, ahead_cov) = ((laws.mean, _once(laws.cov)) for laws in (found.posterior, found.predicted))
+    passages = [
+        Passages(Gaussian(mean[:-1][part], cov[:-1][part]), Gaussian(ahead[1:][part], ahead_cov[1:][part]), system.A, system.Q)
+        for part in blocks(len(mean) - 1, mean.shape[1])
+    ]
+    return look_back(passages, Gaussian(mean[-1], cov[-1]), lag)
 
 
 def _once(cov: Array) -> Array:

@@ -74,6 +74,9 @@ class Comparison:
         Slow filters without results although they were wanted: name to the reason.
     replicas : Replicas, optional
         The designed filters designed again, on ensembles of their own: what they differ by is in every standard error.
+    smoothing : Comparison, optional
+        The same of smoothers on the same trajectories, if `compare` was given any: their error variances given the whole record,
+        and how far they are above the exact smoother.
     """
 
     model: Model
@@ -86,6 +89,7 @@ class Comparison:
     subset: Subset | None
     left_out: Mapping[str, str] = field(default_factory=dict)
     replicas: Replicas | None = None
+    smoothing: Comparison | None = None
 
     @cached_property
     def available(self) -> tuple[str, ...]:

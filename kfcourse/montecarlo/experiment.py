@@ -8,9 +8,10 @@ batches of trajectories, never the trajectories themselves.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
-from itertools import accumulate, chain
+from dataclasses import replace
+from itertools import accumulate, chain, islice
 from typing import TypeVar
 
 import numpy as np
@@ -52,7 +53,7 @@ def run(one: Filter, y: Array) -> Gaussian:
     TypeError
         A `Design`, whose coefficients are still to be found.
     """
-    return stacked([state.posterior for state in states(one, y)[1:]])
+    return stacked([state.posterior for state in islice(walk(one, y), 1, None)])
 
 
 def predictions(one: Filter, y: Array) -> Gaussian:
@@ -60,11 +61,16 @@ def predictions(one: Filter, y: Array) -> Gaussian:
 
     Arguments as in `run`.  `kfcourse.linear.consistency` compares them with what then came.
     """
-    return stacked([state.predicted for state in states(one, y)[:-1]])
+    return stacked([state.predicted for state in walk(one, y)][:-1])
 
 
 def states(one: Filter, y: Array) -> list[State]:
     """The filter's states: before the first measurement, and after each.  Arguments and errors as of `run`."""
+    return list(walk(one, y))
+
+
+def walk(one: Filter, y: Array) -> Iterator[State]:
+    """The same one after the other: what the exact filter or particles remember of all steps may be gigabytes."""
     if isinstance(one, Design):
         raise TypeError(
             f"{one.name} is a Design, whose coefficients are still to be found over an ensemble: "
@@ -77,7 +83,7 @@ def states(one: Filter, y: Array) -> list[State]:
         raise ValueError(f"measurements must have the shape (steps, runs, {p}), got {y.shape}{_reshaped(y, p)}")
     if y.shape[2] != p:
         raise ValueError(f"{one.name} expects {p} measurement component(s), got {y.shape[2]}")
-    return list(accumulate(y, one.step, initial=one.init(y.shape[1])))
+    return accumulate(y, one.step, initial=one.init(y.shape[1]))
 
 
 def _reshaped(y: Array, p: int) -> str:
@@ -99,6 +105,7 @@ def compare(
     design_runs: int | None = None,
     designs: int = 1,
     same_ensemble: bool = False,
+    smoothers: Sequence[Filter] = (),
     wide: float | None = None,
     subset_runs: int = 2000,
     subset_seconds: float | None = None,
@@ -126,6 +133,9 @@ def compare(
     same_ensemble : bool
         Design on the very trajectories of the comparison, as the lab does: optimistic for the designed
         filters, by about the number of coefficients over `runs`.
+    smoothers : sequence of Filter
+        Filters that look back from the end of each record, such as `aof(gaussian(model))`, and `pointmass(model)` as their bound;
+        `Comparison.smoothing` tells how good they are.
     wide : float, optional
         Draw half of the initial states of the comparison from a law so many times as wide as the prior, all by strata, and weight
         every trajectory (importance sampling): where rare far starts dominate the error, that gives the standard errors of many
@@ -154,6 +164,8 @@ def compare(
     """
     _check_arguments(filters, model, subset_runs, subset_seconds, subset_memory)
     _check_designs(designs, same_ensemble, wide)
+    if smoothers:
+        _check_arguments(smoothers, model, subset_runs, subset_seconds, subset_memory)
     seed = seed_number(seed)
     names = [one.name for one in filters]
     slow = [one for one in filters if one.slow and subset_runs]
@@ -187,7 +199,29 @@ def compare(
             subset, left_out = run_subset(
                 ready, slow_ready, common, min(subset_runs, runs), subset_seconds, subset_memory, progress
             )
+        smoothing = None
+        if smoothers:
+            smoothing = _smoothing(
+                smoothers, common, seed, pool, (min(subset_runs, runs), subset_seconds, subset_memory), progress
+            )
     found = Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset, left_out, replicas)
+    return replace(found.without_unhealthy(), smoothing=smoothing)
+
+
+def _smoothing(
+    smoothers: Sequence[Filter],
+    common: Ensemble,
+    seed: int,
+    pool: Executor,
+    limits: tuple[int, float | None, float | None],
+    progress: bool | None,
+) -> Comparison:
+    """The comparison of smoothers on the same trajectories."""
+    slow, fast = ([one for one in smoothers if one.slow == which and (limits[0] or not one.slow)] for which in (True, False))
+    sums = _run_blocks(fast, common, pool, progress, back=True)
+    subset, left_out = run_subset(fast, slow, common, *limits, progress, back=True) if slow else (None, {})
+    names, quick = (tuple(one.name for one in some) for some in (smoothers, fast))
+    found = Comparison(common.model, names, quick, common.runs, common.steps, seed, sums, subset, left_out)
     return found.without_unhealthy()
 
 
@@ -250,14 +284,16 @@ def _designed(filters: Sequence[Filter | Design], ensemble: Ensemble, pool: Exec
     return [fitted[one.name] if isinstance(one, Design) else one for one in filters]
 
 
-def _run_blocks(filters: Sequence[Filter], ensemble: Ensemble, pool: Executor, progress: bool | None) -> Sums:
+def _run_blocks(
+    filters: Sequence[Filter], ensemble: Ensemble, pool: Executor, progress: bool | None, *, back: bool = False
+) -> Sums:
     """Sums over all trajectories, its blocks in parallel."""
 
     def block(index: int) -> Sums:
         size = ensemble.sizes[index]
         counts = batch_sizes(size, max(1, round(BATCHES * size / ensemble.runs)))
         sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, counts)
-        run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight)
+        run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight, back=back)
         return sums
 
     indices = range(len(ensemble.sizes))

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from importlib import import_module
+from itertools import accumulate, islice
 from typing import TypeVar
 
 import numpy as np
@@ -17,6 +18,7 @@ from tqdm import tqdm
 
 from kfcourse.angles import near
 from kfcourse.filters.base import Filter, State
+from kfcourse.filters.looking_back import looked_back
 from kfcourse.filters.particles import Particles
 from kfcourse.laws import Array, NegativeVariance
 from kfcourse.limits import OutOfTime, memory_limit, time_limit
@@ -58,10 +60,13 @@ def run_subset(
     seconds: float | None,
     memory: float | None,
     progress: bool | None,
+    *,
+    back: bool = False,
 ) -> tuple[Subset | None, dict[str, str]]:
     """All filters on at most `size` of the trajectories, one thread, as short operations gain nothing from more.
 
-    Also, by name, why slow filters were left out; the others then start again without them, or with what runs instead.
+    With `back` they look back from the end.  Also, by name, why slow filters were left out; the others then start again without
+    them, or with what runs instead.
     """
     data = _first(ensemble, size)
     end = None if seconds is None else time.monotonic() + seconds
@@ -75,7 +80,7 @@ def run_subset(
         while running := [one for name, one in chosen.items() if name not in left_out]:
             names = [one.name for one in running]
             try:
-                sums = _chunks_in_time([*fast, *running], ensemble, data, end, memory, progress)
+                sums = _chunks_in_time([*fast, *running], ensemble, data, end, memory, progress, back)
             except _Failed as failed:
                 other = chosen[failed.name].instead
                 (left_out if other is None else replaced)[failed.name] = failed.reason
@@ -100,6 +105,7 @@ def _chunks_in_time(
     end: float | None,
     memory: float | None,
     progress: bool | None,
+    back: bool,
 ) -> list[Sums]:
     """Sums over the chunks that are done in time; one that would take too much time or memory is done in smaller ones."""
     names = [one.name for one in filters]
@@ -122,7 +128,7 @@ def _chunks_in_time(
             try:
                 with _until(end):
                     sums = Sums.empty(len(filters), steps, n, np.diff([*range(0, count, BATCH), count]))
-                    run_block(filters, instants, sums, reference, ensemble.weight)
+                    run_block(filters, instants, sums, reference, ensemble.weight, back=back)
             except OutOfTime:
                 break
             except MemoryError as problem:
@@ -157,32 +163,53 @@ def run_block(
     sums: Sums,
     reference: int | None = None,
     weight_of: Callable[[Array], Array | None] = lambda x: None,
+    *,
+    back: bool = False,
 ) -> None:
-    """Advance all filters together over the steps of one block of trajectories.
+    """Advance all filters together over the steps of one block of trajectories; `back`: let them look back from its end.
 
     With a reference filter, the distance of every other estimate from its own is recorded too.  The initial states tell the
     weights of the trajectories.
     """
     size, weight = int(sums.counts.sum()), None
-    states = [one.init(size) for one in filters]
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
-        for k, instant in enumerate(instants):
+        for k, (instant, states) in enumerate((_back if back else _onward)(filters, instants, size)):
             weight = weight_of(instant.x) if k == 0 else weight
             sums.record_states(k, instant.x, weight)
-            for i, one in enumerate(filters):
+            for i, (one, state) in enumerate(zip(filters, states, strict=True)):
                 with _affair_of(one, k):
-                    states[i] = one.step(states[i], instant.y)
-                    estimate = states[i].posterior
+                    estimate = state.posterior
                     sums.record(i, k, near(instant.x, estimate.mean, one.model.angles.x), estimate, weight)
             if reference is not None:
                 twice = _twice(states[reference])
-                sums.record_doubt(k, _doubt(states[reference], twice), weight)
+                sums.record_doubt(k, _doubt(states[reference]), weight)
                 for i, state in enumerate(states):
                     if i != reference:
                         mean, angles = state.posterior.mean, filters[i].model.angles.x
                         first, second = (near(one, mean, angles) for one in twice)
                         sums.record_distance(i, k, mean, (first, second), weight)
     _check_finite(filters, sums)
+
+
+def _onward(filters: Sequence[Filter], instants: Iterable[Instant], size: int) -> Iterator[tuple[Instant, list[State]]]:
+    """The states of all filters after each measurement."""
+    states = [one.init(size) for one in filters]
+    for k, instant in enumerate(instants):
+        for i, one in enumerate(filters):
+            with _affair_of(one, k):
+                states[i] = one.step(states[i], instant.y)
+        yield instant, states
+
+
+def _back(filters: Sequence[Filter], instants: Iterable[Instant], size: int) -> Iterator[tuple[Instant, list[State]]]:
+    """What all filters tell of each step once they have seen the last."""
+    record = list(instants)
+    y = np.stack([instant.y for instant in record])
+    found = []
+    for one in filters:
+        with _affair_of(one, len(record) - 1):
+            found.append(looked_back(one, islice(accumulate(y, one.step, initial=one.init(size)), 1, None), y))
+    yield from zip(record, map(list, zip(*found, strict=True)), strict=True)
 
 
 def _twice(state: State) -> tuple[Array, Array]:
@@ -193,12 +220,10 @@ def _twice(state: State) -> tuple[Array, Array]:
     return state.posterior.mean, state.posterior.mean
 
 
-def _doubt(state: State, twice: tuple[Array, Array]) -> Array:
+def _doubt(state: State) -> Array:
     """The reference's own error, (runs,): half the distance of two clouds; what discretisation leaves of the nodes' mean."""
-    if isinstance(state.memory, Particles):
-        return np.asarray(0.5 * np.linalg.norm(twice[0] - twice[1], axis=1))
     found = getattr(state.memory, "discretisation_error", None)
-    return np.zeros(len(twice[0])) if found is None else found()
+    return np.zeros(len(state.posterior.mean)) if found is None else found()
 
 
 @contextmanager

@@ -7,16 +7,22 @@ takes is Cov(x_k, x_{k+1}).  If x_k ~ N(z, p), it is p A^T with A = dtau/dz, wha
 
 The slope of the structural function stands to the object as G = dh/dm stands to the meter.  So the smoother of Rauch, Tung and
 Striebel (`kfcourse.linear.smoothing`) is at the same time the extended, the unscented, the quadrature and the normal one.
+
+What none of them can beat is the mean of the density itself: the exact filter looks back on its nodes, and particles along their
+ancestors drawn anew (`kfcourse.filters.exact_smoothing`, `particle_smoothing`).
 """
 
 from __future__ import annotations
+
+from itertools import islice
 
 import numpy as np
 
 from kfcourse.angles import difference
 from kfcourse.filters.approximations import aof
-from kfcourse.filters.base import Filter, State, structure_of
+from kfcourse.filters.base import Filter, State
 from kfcourse.filters.iterated_ekf import seen_from
+from kfcourse.filters.looking_back import looked_back, normal_laws
 from kfcourse.laws import (
     Array,
     Gaussian,
@@ -25,11 +31,11 @@ from kfcourse.laws import (
     apply,
     measurement_of,
     product,
+    stacked,
     symmetric,
     transpose,
 )
-from kfcourse.linear.smoothing import Passage, look_back
-from kfcourse.montecarlo.experiment import states
+from kfcourse.montecarlo.experiment import walk
 from kfcourse.symbolic.structure import Structure
 
 
@@ -41,7 +47,7 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     Parameters
     ----------
     one : Filter
-        Whose laws are normal: `aof`, `iterated`, `kalman_filter`.
+        Whose laws are normal: `aof`, `iterated`, `kalman_filter`; `pointmass`, which looks back exactly; `particle`.
     y : ndarray (steps, runs, p)
         As for `run`; NaN where a measurement, or a component of it, is missing.
     lag : int, optional
@@ -55,7 +61,7 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     Raises
     ------
     ValueError
-        A filter without structural functions, a lag that is none, measurements of another shape.
+        A filter without structural functions, a lag that is none or that `one` has no way to keep, measurements of another shape.
 
     Examples
     --------
@@ -64,16 +70,41 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     >>> [round(z, 3) for z in smooth(aof(linearised(walk)), np.array([1.0, 2.0, np.nan, 4.0])).mean.ravel().tolist()]
     [0.944, 1.833, 2.556, 3.278]
     """
-    structure = structure_of(one, "looking back")
-    _, *visited, last = states(one, y)
-    return look_back([_passage(structure, state) for state in visited], last.posterior, lag, one.model.angles.x)
+    if one.look_back is None:
+        return normal_laws(one, list(walk(one, y))[1:], lag)
+    if lag is not None:
+        raise ValueError(f"{one.name} looks back from the end of the record only: leave lag out, or take a filter of normal laws")
+    return stacked([state.posterior for state in _looked_back(one, y)])
 
 
-def _passage(structure: Structure, state: State) -> Passage:
-    """A filter's way to its prediction; what it has added of its own to the model's covariance counts as noise."""
-    now = structure.at(state.step - 1)
-    _, A, Q = now.transition(*state.posterior)
-    return Passage(state.posterior, state.predicted, A, Q + (state.predicted.cov - now.predict(*state.posterior).cov))
+def smoothing_error(one: Filter, y: Array) -> Array:
+    """How far the estimates of `smooth` may be from the true means given the record, (steps, runs), in the units of x.
+
+    Of the exact filter the estimated error of its integrals; of particles the standard error, by the distance of two clouds that
+    know nothing of each other.  Arguments as of `smooth`.
+
+    Raises
+    ------
+    ValueError
+        Another filter: how good its normal laws are it does not know.
+
+    Examples
+    --------
+    >>> from kfcourse import Model
+    >>> from kfcourse.filters import pointmass
+    >>> y, model = np.array([0.5, 1.0]), Model.define("sin(x) + 0.3*v", "x + 0.1*w")
+    >>> bool((smoothing_error(pointmass(model, accuracy=1e-6), y) < 1e-6).all())
+    True
+    """
+    if one.look_back is None:
+        raise ValueError(
+            f"{one.name} does not know how good its laws are: ask pointmass(model), which is exact, or particle(model)"
+        )
+    return np.stack([state.memory.discretisation_error() for state in _looked_back(one, y)])
+
+
+def _looked_back(one: Filter, y: Array) -> list[State]:
+    return looked_back(one, islice(walk(one, y), 1, None), np.reshape(y, (len(y), -1, one.model.p)))
 
 
 def smooth_iterated(structure: Structure, y: Array, rounds: int = 5) -> Gaussian:

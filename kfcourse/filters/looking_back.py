@@ -1,0 +1,64 @@
+r"""Looking back from the states that a filter has left: what the whole record tells of each.
+
+A filter whose laws are normal takes the step of Rauch, Tung and Striebel (`kfcourse.linear.smoothing`), with Cov(x_k, x_{k+1}) =
+p A^T from its structural functions; the exact filter and particles have ways of their own, `Filter.look_back`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from kfcourse.filters.base import Filter, State, structure_of
+from kfcourse.laws import Array, Gaussian, Transition, product, transpose
+from kfcourse.linear.smoothing import Passages, blocks, look_back
+from kfcourse.symbolic.structure import Structure
+
+ROUNDING = 1e-8  # of a prediction's standard deviations: by so much A p A^T + Q may be another than Psi without a reason
+
+
+def looked_back(one: Filter, states: Iterable[State], y: Array) -> list[State]:
+    """States whose laws are those given the whole record y (steps, runs, p), from the filter's after each measurement.
+
+    ValueError for a filter that has no way to look back.
+    """
+    if one.look_back is not None:
+        return one.look_back(states, y)
+    mean, cov = normal_laws(one, states)
+    return [State(k + 1, law, law) for k, law in enumerate(map(Gaussian, mean, cov))]
+
+
+def normal_laws(one: Filter, states: Iterable[State], lag: int | None = None) -> Gaussian:
+    """The normal laws of the states (steps, runs, ...) given all measurements, or so many later ones."""
+    structure = structure_of(one, "looking back")
+    *visited, last = states
+    passages = [_passages(structure, visited[part]) for part in blocks(len(visited), len(last.posterior.mean))]
+    return look_back(passages, last.posterior, lag, one.model.angles.x)
+
+
+def _passages(structure: Structure, visited: Sequence[State]) -> Passages:
+    """A filter's ways to its predictions.  What one that remembers more than laws (`gated`) has added counts as noise."""
+    posterior, predicted = (_together([getattr(state, name) for state in visited]) for name in ("posterior", "predicted"))
+    if structure.at_step is None:
+        _, A, Q = structure.transition(*posterior)
+    else:
+        each = [structure.at(state.step - 1).transition(*state.posterior) for state in visited]
+        A, Q = (_by_step([getattr(one, name) for one in each]) for name in Transition._fields[1:])
+    if any(state.memory is not None for state in visited):
+        added = predicted.cov - product(product(A, posterior.cov), transpose(A)) - Q
+        sd = np.sqrt(np.abs(np.diagonal(predicted.cov, axis1=-2, axis2=-1)))
+        Q = Q + np.where(np.abs(added) > ROUNDING * sd[..., :, None] * sd[..., None, :], added, 0.0)
+    return Passages(posterior, predicted, A, Q)
+
+
+def _together(laws: Sequence[Gaussian]) -> Gaussian:
+    """Laws of successive steps: means (steps, runs, n), covariances (steps, runs, n, n), or (steps, 1, n, n) if all share it."""
+    mean = laws[0].mean[None] if len(laws) == 1 else np.stack([law.mean for law in laws])
+    return Gaussian(mean, _by_step([law.cov for law in laws]))
+
+
+def _by_step(matrices: Sequence[Array]) -> Array:
+    """Matrices of successive steps, (runs, n, n) or (n, n), as (steps, runs or 1, n, n)."""
+    whole = matrices[0][None] if len(matrices) == 1 else np.stack(np.broadcast_arrays(*matrices))
+    return whole if whole.ndim == 4 else whole[:, None]
