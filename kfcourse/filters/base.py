@@ -47,9 +47,9 @@ class Advance(Protocol):
 
 
 class Evidence(Protocol):
-    """ln p(y_k | y_0, ..., y_{k-1}), (runs,), from the state before the measurement; 0 where it is missing."""
+    """ln p(y_k | y_0, ..., y_{k-1}), (runs,), from the states before and after the measurement; 0 where it is missing."""
 
-    def __call__(self, state: State, y: Array, /) -> Array: ...
+    def __call__(self, before: State, y: Array, after: State, /) -> Array: ...
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ exact_places       where the new posterior lies: the states that explain the mea
 exact_batch        nodes x = c + s sinh t there, Bayes' rule, and an estimate of the error: for many trajectories at once
 exact_roots        or, for a meter without noise, the few states that explain it
 exact_adaptive     for what they do not resolve, one trajectory at a time: panels that are halved until they do (exact_panels)
+exact_evidence     and how likely the measurement was, for who asks
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
 from kfcourse.filters.exact_adaptive import check_scalar, on_panels
 from kfcourse.filters.exact_batch import Place, Posteriors, posteriors
+from kfcourse.filters.exact_evidence import log_evidence
 from kfcourse.filters.exact_kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, of_prior
 from kfcourse.filters.exact_places import Candidates, hidden, likeliest, looked, spaced
 from kfcourse.filters.exact_predictions import predictions
@@ -82,6 +84,10 @@ class PointMass(NamedTuple):
             for some, kernels in predictions([self.fine[i] for i in rows.tolist()], law):
                 yield rows[some], kernels
 
+    def evidence_error(self) -> Array:
+        """Estimated error of the last ln p(y_k | y_0, ..., y_{k-1}), (runs,): the total's relative error is part of `error`."""
+        return self.error
+
     def discretisation_error(self) -> Array:
         """Estimated error of the posterior means, (runs,), in the units of x."""
         return self.error * np.sqrt([grid.variance() for grid in self.fine])
@@ -114,22 +120,18 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
         raise ModelError(f"the point-mass filter needs 0 < accuracy < 1, got {accuracy}")
     densities, init, prior = scalar_densities(model), initial_state(model), of_prior(model.prior)
 
+    def before(state: State, runs: int) -> Iterable[tuple[Array, Kernels]]:
+        if state.memory:
+            return state.memory.predictions(densities.at(state.step - 1))
+        return [(np.arange(runs), prior.rows(np.zeros(runs, dtype=int)))]
+
     def step(state: State, y: Array) -> State:
-        first = np.zeros(len(y), dtype=int)
         law = densities.at(state.step)
-
-        def before() -> Iterable[tuple[Array, Kernels]]:
-            return (
-                state.memory.predictions(densities.at(state.step - 1))
-                if state.memory
-                else [(np.arange(len(y)), prior.rows(first))]
-            )
-
         try:
             try:
-                posterior, predicted, found = _step(before(), y, law, accuracy, FINE[0], memory)
+                posterior, predicted, found = _step(before(state, len(y)), y, law, accuracy, FINE[0], memory)
             except TooNarrow:
-                posterior, predicted, found = _step(before(), y, law, accuracy, FINE[1], memory)
+                posterior, predicted, found = _step(before(state, len(y)), y, law, accuracy, FINE[1], memory)
         except Unresolved as error:
             raise Unresolved(f"step {state.step} of {model}: {error}; leave the exact filter out (--exact-runs 0)") from None
         if model.angles.x:
@@ -138,7 +140,10 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
             found = found._replace(error=found.error + state.memory.error)
         return State(state.step + 1, posterior, predicted, found)
 
-    return Filter("aof-exact", model, init, step, slow=True)
+    def evidence(state: State, y: Array, after: State) -> Array:
+        return log_evidence(before(state, len(y)), y, densities.at(state.step), after.memory.fine)
+
+    return Filter("aof-exact", model, init, step, slow=True, evidence=evidence)
 
 
 def _on_circle(memory: PointMass, law: ScalarDensities) -> tuple[Gaussian, Gaussian]:

@@ -122,8 +122,8 @@ def gated(one: Filter, probability: float = 0.999, patience: int | None = 5, str
             after = after._replace(predicted=Gaussian(after.predicted.mean, after.predicted.cov * wider[:, None, None]))
         return after._replace(memory=memory)
 
-    def evidence(state: State, y: Array) -> Array:
-        expected, size, limit, refused = judged(state, y)
+    def evidence(before: State, y: Array, after: State) -> Array:
+        expected, size, limit, refused = judged(before, y)
         return log_density(expected, y) + 0.5 * np.where(refused, size - limit, 0.0)
 
     return replace(one, name=f"gated-{one.name}", init=init, step=step, instead=None, evidence=evidence)

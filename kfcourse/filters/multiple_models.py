@@ -84,8 +84,8 @@ def imm(structures: Sequence[Structure], transition: Array, probabilities: Array
         each = zip(structures, state.memory.predicted, strict=True)
         return [structure.at(state.step).measure(*prior) for structure, prior in each]
 
-    def evidence(state: State, y: Array) -> Array:
-        return _posterior(state.memory.expected, measurements(state), y)[1]
+    def evidence(before: State, y: Array, after: State) -> Array:
+        return _posterior(before.memory.expected, measurements(before), y)[1]
 
     def step(state: State, y: Array) -> State:
         memory: Modes = state.memory

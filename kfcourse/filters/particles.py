@@ -43,13 +43,20 @@ class Particles(NamedTuple):
         The estimate of each cloud.
     effective : ndarray (runs,)
         How many particles counted.
+    evidence : ndarray (2, runs)
+        ln p(y_k | y_0, ..., y_{k-1}) as each cloud has it: the logarithm of its mean weight.
     seed : numpy.random.SeedSequence
     """
 
     x: Array | None
     halves: Array
     effective: Array
+    evidence: Array
     seed: np.random.SeedSequence
+
+    def evidence_error(self) -> Array:
+        """Standard error of the last ln p(y_k | y_0, ..., y_{k-1}), (runs,): half the distance of both clouds."""
+        return 0.5 * np.abs(self.evidence[0] - self.evidence[1])
 
 
 def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: bool = True, name: str = "particle") -> Filter:
@@ -87,7 +94,7 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
         state = gaussian_init(runs)
         both = np.stack([state.posterior.mean] * 2)
         root = np.random.SeedSequence([number, runs])
-        return state._replace(memory=Particles(None, both, np.full(runs, float(particles)), root))
+        return state._replace(memory=Particles(None, both, np.full(runs, float(particles)), np.zeros((2, runs)), root))
 
     def first(rng: np.random.Generator, y: Array) -> tuple[Array, Array]:
         """x_0 (runs, 2, M/2, n), and the logarithms of p / q."""
@@ -96,7 +103,7 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
             found = start.proposal(np.zeros((len(y), model.n)), y, start.starts(), 0)
             heights = log_likelihood(y[:, None, :], start.noise_of(found.mean), 0) - 0.5 * (found.mean**2).sum(axis=-1)
             heights += np.log(np.diagonal(found.root, axis1=-2, axis2=-1)).sum(axis=-1)
-            for_both = found._replace(share=_normalised(heights)).of_clouds(2)
+            for_both = found._replace(share=_normalised(heights)[0]).of_clouds(2)
             s, logs = _where_measured(y, start.draw(for_both, rng, size), s)
         return on_circle(start.noise_of(s), angles), logs
 
@@ -115,11 +122,11 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
         return on_circle(np.broadcast_to(state_equation(x, ahead.noise_of(s), k), x.shape), angles)
 
     def step(state: State, y: Array) -> State:
-        before, _, _, root = state.memory
+        before, root = state.memory.x, state.memory.seed
         rng = _stream(root, state.step)
         with np.errstate(over="ignore", invalid="ignore"):  # what lies beyond the largest number has no weight
             x, logs = first(rng, y) if before is None else following(rng, before, y, state.step)
-            weights = _normalised(logs + log_likelihood(y[:, None, None, :], x, state.step))
+            weights, log_mean = _normalised(logs + log_likelihood(y[:, None, None, :], x, state.step))
             mean, cov = _weighted(x, weights, angles)
             apart = difference(mean[:, 0], mean[:, 1], angles)
             posterior = Gaussian(
@@ -132,9 +139,13 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
         with np.errstate(over="ignore", invalid="ignore"):
             following_ones = moved(kept, s, state.step).reshape(len(y), particles, model.n)
             predicted = _weighted(following_ones, np.full(following_ones.shape[:-1], 1.0 / particles), angles)
-        return State(state.step + 1, posterior, predicted, Particles(kept, np.moveaxis(mean, 1, 0), effective, root))
+        memory = Particles(kept, np.moveaxis(mean, 1, 0), effective, log_mean.T, root)
+        return State(state.step + 1, posterior, predicted, memory)
 
-    return Filter(name, model, init, step, slow=True)
+    def evidence(before: State, y: Array, after: State) -> Array:
+        return np.where(np.isnan(y).any(axis=-1), 0.0, np.logaddexp(*after.memory.evidence) - np.log(2))
+
+    return Filter(name, model, init, step, slow=True, evidence=evidence)
 
 
 def _plain(rng: np.random.Generator, shape: tuple[int, ...], look: Look) -> tuple[Array, Array]:
@@ -152,13 +163,15 @@ def _stream(root: np.random.SeedSequence, step: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(root.entropy, spawn_key=(step,)))
 
 
-def _normalised(logs: Array) -> Array:
-    """Weights (..., M) that sum to 1, all equal where nothing is left of them."""
+def _normalised(logs: Array) -> tuple[Array, Array]:
+    """Weights (..., M) that sum to 1, all equal where nothing is left of them, and the logarithm of their mean before (...)."""
     peak = logs.max(axis=-1, keepdims=True)
     weights = np.exp(logs - np.where(np.isfinite(peak), peak, 0.0))
     weights = np.where(np.isfinite(weights), weights, 0.0)
     total = weights.sum(axis=-1, keepdims=True)
-    return np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / logs.shape[-1])
+    with np.errstate(divide="ignore"):
+        mean = peak + np.log(total / logs.shape[-1])
+    return np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / logs.shape[-1]), mean[..., 0]
 
 
 def _weighted(x: Array, weights: Array, angles: Components) -> Gaussian:

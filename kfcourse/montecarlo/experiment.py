@@ -8,9 +8,9 @@ batches of trajectories, never the trajectories themselves.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
-from itertools import accumulate, chain
+from itertools import accumulate, chain, islice
 from typing import TypeVar
 
 import numpy as np
@@ -52,7 +52,7 @@ def run(one: Filter, y: Array) -> Gaussian:
     TypeError
         A `Design`, whose coefficients are still to be found.
     """
-    return stacked([state.posterior for state in states(one, y)[1:]])
+    return stacked([state.posterior for state in islice(walk(one, y), 1, None)])
 
 
 def predictions(one: Filter, y: Array) -> Gaussian:
@@ -60,11 +60,16 @@ def predictions(one: Filter, y: Array) -> Gaussian:
 
     Arguments as in `run`.  `kfcourse.linear.consistency` compares them with what then came.
     """
-    return stacked([state.predicted for state in states(one, y)[:-1]])
+    return stacked([state.predicted for state in walk(one, y)][:-1])
 
 
 def states(one: Filter, y: Array) -> list[State]:
     """The filter's states: before the first measurement, and after each.  Arguments and errors as of `run`."""
+    return list(walk(one, y))
+
+
+def walk(one: Filter, y: Array) -> Iterator[State]:
+    """The same one after the other: what the exact filter or particles remember of all steps may be gigabytes."""
     if isinstance(one, Design):
         raise TypeError(
             f"{one.name} is a Design, whose coefficients are still to be found over an ensemble: "
@@ -77,7 +82,7 @@ def states(one: Filter, y: Array) -> list[State]:
         raise ValueError(f"measurements must have the shape (steps, runs, {p}), got {y.shape}{_reshaped(y, p)}")
     if y.shape[2] != p:
         raise ValueError(f"{one.name} expects {p} measurement component(s), got {y.shape[2]}")
-    return list(accumulate(y, one.step, initial=one.init(y.shape[1])))
+    return accumulate(y, one.step, initial=one.init(y.shape[1]))
 
 
 def _reshaped(y: Array, p: int) -> str:

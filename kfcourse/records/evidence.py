@@ -3,17 +3,22 @@ r"""How likely a record is under a model: the sum of what each measurement added
     ln p(y_0, ..., y_N) = sum_k ln p(y_k | y_0, ..., y_{k-1}),        p(y_k | y_0, ..., y_{k-1}) = N(y_k; h, F)
 
 A filter knows each term before the measurement comes: its innovation and F.  For a linear model with normal noises the sum is
-exact; for others it is as good as the filter's normal laws.  Two models of the same measurements are compared by it, and
-`kfcourse.records.estimation` looks for the parameters that make it largest.
+exact; for others it is as good as the filter's normal laws.  The exact filter's terms are the constants of Bayes' rule
+themselves, those of particles estimates of them by the mean of their weights; `likelihood_error` tells how good both are.  Two
+models of the same measurements are compared by it, and `kfcourse.records.estimation` looks for the parameters that make it
+largest.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
 from kfcourse.filters.base import Evidence, Filter, State, structure_of
 from kfcourse.laws import Array, log_density
-from kfcourse.montecarlo.experiment import states
+from kfcourse.montecarlo.experiment import walk
 
 
 def likelihood(one: Filter, y: Array) -> Array:
@@ -24,7 +29,8 @@ def likelihood(one: Filter, y: Array) -> Array:
     Parameters
     ----------
     one : Filter
-        Whose laws are normal (`aof`, `iterated`, `kalman_filter`), or `imm`, for which it is the modes' mixture.
+        Whose laws are normal (`aof`, `iterated`, `kalman_filter`); `imm`, for which it is the modes' mixture; `pointmass`, for
+        which it is exact; `particle`.
     y : ndarray (steps, runs, p)
         As for `run`; a missing measurement (NaN) counts 0, a missing component does not enter.
 
@@ -46,10 +52,7 @@ def likelihood(one: Filter, y: Array) -> Array:
     -641.5856
     """
     evidence = one.evidence or _normal(one)
-    before = states(one, y)[:-1]
-    found = np.stack(
-        [evidence(state, now) for state, now in zip(before, np.reshape(y, (len(before), -1, one.model.p)), strict=True)]
-    )
+    found = np.stack([evidence(before, now, after) for before, now, after in _passages(one, y)])
     if not np.isfinite(found).all():
         k, run = np.argwhere(~np.isfinite(found))[0]
         raise ValueError(
@@ -59,10 +62,44 @@ def likelihood(one: Filter, y: Array) -> Array:
     return found
 
 
+def likelihood_error(one: Filter, y: Array) -> Array:
+    """How far the terms of `likelihood` may be from the true ones, (steps, runs).
+
+    Of the exact filter the estimated error of its integrals, of this step and all before; of particles the standard error, by
+    the distance of two clouds that know nothing of each other.  Arguments as of `likelihood`.
+
+    Raises
+    ------
+    ValueError
+        Another filter: how good its normal laws are it does not know.
+
+    Examples
+    --------
+    >>> from kfcourse import Model, pointmass
+    >>> y, model = np.array([0.5, 1.0]), Model.define("sin(x) + 0.3*v", "x + 0.1*w")
+    >>> bool((likelihood_error(pointmass(model, accuracy=1e-6), y) < 2e-6).all())
+    True
+    """
+    found = []
+    for _, _, after in _passages(one, y):
+        if not hasattr(after.memory, "evidence_error"):
+            raise ValueError(
+                f"{one.name} does not know how good its laws are: ask pointmass(model), which is exact, or particle(model)"
+            )
+        found.append(after.memory.evidence_error())
+    return np.stack(found)
+
+
+def _passages(one: Filter, y: Array) -> Iterator[tuple[State, Array, State]]:
+    """The states before and after each measurement, and it: (runs, p)."""
+    values = np.reshape(y, (len(y), -1, one.model.p))
+    return ((before, now, after) for (before, after), now in zip(pairwise(walk(one, y)), values, strict=True))
+
+
 def _normal(one: Filter) -> Evidence:
     structure = structure_of(one, "the likelihood")
 
-    def evidence(state: State, y: Array) -> Array:
-        return log_density(structure.at(state.step).measure(*state.predicted), y)
+    def evidence(before: State, y: Array, after: State) -> Array:
+        return log_density(structure.at(before.step).measure(*before.predicted), y)
 
     return evidence
