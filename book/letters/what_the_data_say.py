@@ -1,12 +1,12 @@
 """The letters of what-the-data-say.md: a level that wanders, its record's density at once, and one round of EM by a dense law."""
 
 import numpy as np
-from scipy.stats import multivariate_normal, norm
+from scipy.stats import multivariate_normal
 
 from kfcourse.filters import kalman_filter
 from kfcourse.linear.consistency import innovations
 from kfcourse.montecarlo.experiment import predictions, run
-from kfcourse.pages.reader import Indexed, Of
+from kfcourse.pages.reader import Indexed
 from kfcourse.pages.relations import NOTATION, STATED
 from kfcourse.records import smooth
 from kfcourse.symbolic.model import Model
