@@ -8,7 +8,8 @@ and those of filterpy, pykalman and stonesoup that are wanted; who is missing is
 Tracks are those of `kfcourse.scenarios.irregular`: 300 fixes, 0.1 to 1.5 s apart, 15 % missing, 5 % of the others wrong by twenty
 times the noise.  Each program gets the times, the fixes (NaN where missing), and the numbers of the model; the lines that are
 counted are those of its function below, from which everything else follows.  Where a library has no gate it is written by hand;
-pykalman filters all steps in one call, and has no place for one.  Nobody else ends the refusing of a track that is lost.
+pykalman filters all steps in one call, and has no place for one.  Nobody else ends the refusing of a track that is lost.  Stone
+Soup's smoother takes a step without a measurement for one that is smoothed already, and carries nothing across it (its 1.9).
 """
 
 from __future__ import annotations

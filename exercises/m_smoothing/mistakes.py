@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import scipy
@@ -305,7 +306,7 @@ WRONG_RECORDS: Rows = (
 # -- m6: a round of EM
 
 
-def _round(part: Callable[[Array, Array, Array], float]) -> Answer:
+def _round(part: Callable[[Array, Array, Array], Any]) -> Answer:
     """A mistake in what is done with the measurements that are there."""
 
     def answer(y: Array, z: Array, p: Array) -> float:
@@ -357,8 +358,8 @@ WRONG_ROUNDS: Rows = (
 
 
 def _weight(
-    size: Callable[[Array, Array], float] = lambda r, R: r @ np.linalg.inv(R) @ r,
-    unsure: Callable[[Array, Array, Array], float] = lambda R, G, p: np.trace(np.linalg.inv(R) @ G @ p @ G.T),
+    size: Callable[[Array, Array], Any] = lambda r, R: r @ np.linalg.inv(R) @ r,
+    unsure: Callable[[Array, Array, Array], Any] = lambda R, G, p: np.trace(np.linalg.inv(R) @ G @ p @ G.T),
     above: Callable[[float, int], float] = lambda s, m: s + m,
     below: float = 1,
 ) -> Answer:
