@@ -22,6 +22,7 @@ from kfcourse.exercises.g_extended import keys as extended
 from kfcourse.exercises.i_track import keys as track
 from kfcourse.exercises.k_integration import keys as integration
 from kfcourse.exercises.l_time_tags import keys as fusion
+from kfcourse.exercises.m_smoothing import keys as smoothing
 from kfcourse.exercises.shared import regression as fitted
 from kfcourse.laws import Array, transpose
 
@@ -104,7 +105,7 @@ def extended_run(predict: Answer = extended.predict, correct: Answer = extended.
     return extended.run_with(predict, correct)
 
 
-# -- sets i, k and l
+# -- sets i, k, l and m
 
 
 def process_noise(matrices: Answer = track.matrices) -> Answer:
@@ -141,3 +142,8 @@ def fuse(correct: Answer = fusion.correct, move: Answer = fusion.move) -> Answer
         return move(m, P, now - time, q)
 
     return answer
+
+
+def smoother(neighbours: Answer = smoothing.neighbours, step_back: Answer = smoothing.step_back) -> Answer:
+    """m5 with m3 and m4."""
+    return smoothing.smooth_with(neighbours, step_back)

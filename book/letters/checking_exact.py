@@ -40,6 +40,6 @@ def masses(rng):
 LETTERS = (masses,)
 SAID = {r"a_v=\frac{\partial a}{\partial v}": DEFINITION}
 SAID |= dict.fromkeys(
-    (r"\frac{dx}{dt}",),
+    (r"\frac{dx}{dt}", "I_y(x)"),
     NOTATION,
 )

@@ -10,6 +10,12 @@ The joint law of x and u given y has no closed form.  The nearest product of a l
 
 with the residual r = y - h - G (z - lambda), and is found by going round.  A measurement that fits has w of about 1, one that is
 ten standard deviations off next to none, and none is refused for ever.  Piche, Sarkka, Hartikainen (2012).
+
+Huber's (1964) weights are milder: within an edge c a residual costs its square, beyond it grows only linearly,
+
+    w = min(1, c / sqrt(r^T R^-1 r)):     z minimises (x - lambda)^T Psi^-1 (x - lambda) / 2 + rho(|R^-1/2 r|)
+
+An outlier then still pulls, but with a bounded force.
 """
 
 from __future__ import annotations
@@ -29,8 +35,8 @@ class Trust(NamedTuple):
     weight: Array
 
 
-def robust(structure: Structure, degrees: float = 4.0, rounds: int = 10) -> Filter:
-    """The Gaussian-approximated AOF with Student noise in the meter.
+def robust(structure: Structure, degrees: float = 4.0, rounds: int = 10, edge: float | None = None) -> Filter:
+    """The Gaussian-approximated AOF with Student noise in the meter, or with Huber's weights.
 
     w = 1;  `rounds` times:  K = Psi G^T (G Psi G^T + R / w)^+,  z = lambda + K (y - h),  p = Psi - K G Psi,  then w anew
 
@@ -42,6 +48,9 @@ def robust(structure: Structure, degrees: float = 4.0, rounds: int = 10) -> Filt
         one; at infinity it is `aof(structure)`.
     rounds : int
         Of weighting.
+    edge : float, optional
+        Huber's c, above 0, in standard deviations: his weights in the place of Student's.  1.5 is usual; at infinity it is
+        `aof(structure)`.
 
     Returns
     -------
@@ -51,10 +60,12 @@ def robust(structure: Structure, degrees: float = 4.0, rounds: int = 10) -> Filt
     Raises
     ------
     ValueError
-        Degrees that are not positive, rounds that are none.
+        Degrees or an edge that are not positive, rounds that are none.
     """
     if not degrees > 0:
         raise ValueError(f"degrees must be positive, got {degrees!r}")
+    if edge is not None and not edge > 0:
+        raise ValueError(f"edge must be positive, or None for Student's weights; got {edge!r}")
     if isinstance(rounds, bool) or not isinstance(rounds, int | np.integer) or rounds < 1:
         raise ValueError(f"rounds must be a whole number, at least 1; got {rounds!r}")
 
@@ -67,7 +78,7 @@ def robust(structure: Structure, degrees: float = 4.0, rounds: int = 10) -> Filt
         weight = np.ones(len(y))
         for _ in range(rounds):
             posterior = correct(state.predicted, _trusted(expected, weight), y)
-            weight = _weight(expected, state.predicted, posterior, y, degrees)
+            weight = _weight(expected, state.predicted, posterior, y, degrees, edge)
         posterior = correct(state.predicted, _trusted(expected, weight), y)
         missing = np.isnan(y).all(axis=-1)
         return State(state.step + 1, posterior, now.predict(*posterior), Trust(np.where(missing, np.nan, weight)))
@@ -81,11 +92,14 @@ def _trusted(expected: Measurement, weight: Array) -> Measurement:
     return expected._replace(F=expected.F - expected.R + R, R=R)
 
 
-def _weight(expected: Measurement, prior: Gaussian, posterior: Gaussian, y: Array, degrees: float) -> Array:
+def _weight(expected: Measurement, prior: Gaussian, posterior: Gaussian, y: Array, degrees: float, edge: float | None) -> Array:
     """w, (runs,), at this posterior; 1 where nothing was measured."""
     innovation, G, _, R = without_missing(expected.innovation(y), expected.G, expected.F, expected.R)
     present = (~np.isnan(y)).sum(axis=-1)
     residual = innovation - apply(G, posterior.mean - prior.mean)
-    second = residual[..., :, None] * residual[..., None, :] + product(product(G, posterior.cov), transpose(G))
     precision = gain(np.eye(R.shape[-1]), R)
-    return np.where(present > 0, (1 + present / degrees) / (1 + (precision * second).sum(axis=(-2, -1)) / degrees), 1.0)
+    size = (apply(precision, residual) * residual).sum(axis=-1)
+    if edge is not None:
+        return np.minimum(1.0, edge / np.maximum(np.sqrt(size), 1e-300))  # 1 where nothing is left to explain
+    unsure = (precision * product(product(G, posterior.cov), transpose(G))).sum(axis=(-2, -1))
+    return np.where(present > 0, (1 + present / degrees) / (1 + (size + unsure) / degrees), 1.0)

@@ -8,4 +8,5 @@ subset       the slow filters, on as many of the trajectories as a budget allows
 statistics   means over batches of trajectories, standard errors
 two_phase    the same where slow filters ran on a part of them, and where filters were designed several times
 comparison   `Comparison`: error variances, paired differences, ranking, distance from the exact filter
+cramer_rao   `posterior_bound`: what no filter can beat, without running one
 """

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 from scipy.stats import t as student
 
 from kfcourse import Model, gaussian, linearised, run, simulate, smooth, unscented
@@ -27,10 +28,12 @@ def test_with_infinite_degrees_it_is_the_filter_that_believes_all(build, variant
     for model in (variant53, plane):
         y = simulate(model, 6, 8, seed=2).y.copy()
         y[3, 1] = y[5, 2, 0] = np.nan
-        found, expected = run(robust(build(model), np.inf), y), run(aof(build(model)), y)
-        # F is put together from G Psi G^T and R anew: rounding, over eight steps
-        np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-9, atol=1e-11)
-        np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-9, atol=1e-13)
+        expected = run(aof(build(model)), y)
+        for one in (robust(build(model), np.inf), robust(build(model), edge=np.inf)):
+            found = run(one, y)
+            # F is put together from G Psi G^T and R anew: rounding, over eight steps
+            np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-9, atol=1e-11)
+            np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-9, atol=1e-13)
 
 
 @pytest.mark.parametrize("rows", [[0, 1], [0], [1]])
@@ -50,6 +53,28 @@ def test_it_settles_where_weight_and_law_agree(plane, rows):
         r = y[0, i, rows] - H @ z
         size = r @ np.linalg.solve(R, r) + np.trace(np.linalg.solve(R, H @ p @ H.T))
         assert w[i] == pytest.approx((degrees + len(rows)) / (degrees + size), rel=1e-9)
+
+
+@pytest.mark.parametrize("rows", [[0, 1], [0], [1]])
+def test_with_huber_s_weights_it_is_the_least_of_his_cost(plane, rows):
+    edge, H = 1.3, np.array([[1.0, 0.0], [0.2, 1.0]])[rows]
+    R, y = NOISE[np.ix_(rows, rows)], np.full((1, 3, 2), np.nan)
+    y[0][:, rows] = np.array([[0.9, -0.2], [-6.0, 7.0], [40.0, -90.0]])[:, rows]
+    one = robust(linearised(plane), rounds=400, edge=edge)
+    found, w = run(one, y), weights(one, y)[0]
+    for i in range(3):
+
+        def cost(z, i=i):
+            off, r = z - PRIOR_MEAN, y[0, i, rows] - H @ z
+            size = np.sqrt(r @ np.linalg.solve(R, r))
+            return off @ np.linalg.solve(PRIOR_COV, off) / 2 + (size**2 / 2 if size < edge else edge * size - edge**2 / 2)
+
+        best = minimize(cost, PRIOR_MEAN, method="BFGS", options={"gtol": 1e-9}).x
+        # where the search stops is known to the root of the rounding of the cost, some hundreds
+        np.testing.assert_allclose(found.mean[0, i], best, rtol=1e-5, atol=1e-5)
+        r = y[0, i, rows] - H @ found.mean[0, i]
+        assert w[i] == pytest.approx(min(1, edge / np.sqrt(r @ np.linalg.solve(R, r))), rel=1e-9)
+    assert w[0] == 1 > w[1] > w[2] > 0
 
 
 def test_the_further_off_the_less_it_counts():
@@ -116,6 +141,12 @@ def test_a_missing_measurement_has_no_weight_and_moves_nothing(plane):
 def test_degrees_that_are_not_positive_are_refused(plane, degrees):
     with pytest.raises(ValueError, match="degrees must be positive"):
         robust(linearised(plane), degrees)
+
+
+@pytest.mark.parametrize("edge", [0, -1.0, float("nan")])
+def test_an_edge_that_is_not_positive_is_refused(plane, edge):
+    with pytest.raises(ValueError, match="edge must be positive, or None"):
+        robust(linearised(plane), edge=edge)
 
 
 @pytest.mark.parametrize("rounds", [0, 1.5, True])

@@ -1,0 +1,37 @@
+"""The letters of outliers.md: one correction of a plain program, with a weight that has settled."""
+
+import numpy as np
+
+from kfcourse.pages.letters import column, covariance
+from kfcourse.pages.relations import CONDITION, NOTATION
+
+
+def doubting(rng, states=3, m=2):
+    """Student's weight by going round until nothing changes."""
+    G, s = rng.normal(size=(m, states)), 3.7
+    Psi, R, h, lam, y = covariance(rng, states), covariance(rng, m), *(column(rng.normal(size=n)) for n in (m, states, m))
+    nu, w = y - h, 1.0
+    for _ in range(500):
+        K = np.linalg.solve(G @ Psi @ G.T + R / w, G @ Psi).T
+        z, p = lam + K @ nu, Psi - K @ G @ Psi
+        r = nu - G @ (z - lam)
+        w = (s + m) / (s + (r.T @ np.linalg.solve(R, r)).item() + np.trace(np.linalg.solve(R, G @ p @ G.T)))
+    F = G @ Psi @ G.T + R
+    letters = {r"\nu": nu, "y": y, "h": h, "F": F, "G": G, r"\Psi": Psi, "R": R, "w": w, "K": K, "z": z, "p": p, "r": r}
+    return letters | {r"\lambda": lam, "s": s, "m": m, r"\operatorname{tr}": np.trace}
+
+
+LETTERS = (doubting,)
+SAID = {
+    "w=1": NOTATION,
+    r"\nu^TF^{-1}\nu>\gamma": CONDITION,
+    r"\mathsf P(\nu^TF^{-1}\nu<\gamma)": NOTATION,
+    r"\mathsf P\big|_{\gamma=-2\ln(1-\beta)}": NOTATION,
+    r"z\,(\text{from } y_1)": NOTATION,
+    r"\lim_{R_{22}\to\infty}z\,(\text{from } y_1,y_2)": NOTATION,
+    r"\Delta t_k": NOTATION,
+    "p(e)": NOTATION,
+    r"\mathsf M[u\mid e]": NOTATION,
+    r"w\big|_{t>c}": NOTATION,
+    r"\frac{d\rho}{dt}": NOTATION,
+}

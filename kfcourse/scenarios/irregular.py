@@ -1,0 +1,79 @@
+"""A track as it is recorded: fixes of a place in the plane at unequal intervals, some missing, some grossly wrong.
+
+x_{k+1} = x_k + dt_k V_k + ...,   V_{k+1} = V_k + ...     on each axis, pushed by white acceleration of intensity q
+y_k = position + w_k,             w_k ~ N(0, sigma^2);    an outlier has `times` that deviation
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from kfcourse.laws import Array
+from kfcourse.montecarlo.ensemble import simulate
+from kfcourse.seeds import Seed
+from kfcourse.symbolic.model import Model
+
+
+class IrregularTrack(NamedTuple):
+    """A recorded track.
+
+    Attributes
+    ----------
+    model : Model
+        State (x, y, v_x, v_y) in m and m/s; the interval of each step is its input dt, s.
+    time : ndarray (steps,)
+        s.
+    x : ndarray (steps, runs, 4)
+        The true states.
+    y : ndarray (steps, runs, 2)
+        Fixes, m; NaN where missing.
+    outlier : ndarray of bool (steps, runs)
+        Which are grossly wrong; none of those that are missing.
+    """
+
+    model: Model
+    time: Array
+    x: Array
+    y: Array
+    outlier: Array
+
+
+def irregular_track(
+    seed: Seed, runs: int = 1, steps: int = 300, missing: float = 0.15, outliers: float = 0.05, times: float = 20.0
+) -> IrregularTrack:
+    """Tracks of unequal intervals, 0.1 to 1.5 s, of whose fixes a part is missing and a part grossly wrong.
+
+    Parameters
+    ----------
+    seed : int or numpy.random.Generator
+    runs : int
+        Records with the same times.
+    steps : int
+    missing, outliers : float
+        Their shares; what is missing is no outlier.
+    times : float
+        How many times larger an outlier's errors are, on the average.
+    """
+    rng = np.random.default_rng(seed)
+    interval = rng.uniform(0.1, 1.5, steps)
+    model = Model.define(
+        [
+            "x + dt*v_x + sqrt(q*dt**3)*(v1/2 + v3/sqrt(12))",
+            "y + dt*v_y + sqrt(q*dt**3)*(v2/2 + v4/sqrt(12))",
+            "v_x + sqrt(q*dt)*v1",
+            "v_y + sqrt(q*dt)*v2",
+        ],
+        ["x + sigma*w1", "y + sigma*w2"],
+        {"q": 0.2, "sigma": 2.0},
+        symbols={"x": ["x", "y", "v_x", "v_y"]},
+        prior={"mean": [0, 0, 10, 0], "variance": [100, 100, 25, 25]},
+        inputs={"dt": interval.tolist()},
+    )
+    x, y = simulate(model, runs, steps, seed=rng)
+    wrong = rng.random((steps, runs)) < outliers
+    fixes = x[..., :2] + (y - x[..., :2]) * np.where(wrong, times, 1.0)[..., None]
+    gone = rng.random((steps, runs)) < missing
+    time = np.concatenate([[0.0], np.cumsum(interval[:-1])])
+    return IrregularTrack(model, time, x, np.where(gone[..., None], np.nan, fixes), wrong & ~gone)

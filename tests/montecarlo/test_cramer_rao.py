@@ -1,0 +1,91 @@
+"""The posterior bound: the Kalman covariance on linear models, an integral, below the exact filter, and where there is none."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from kfcourse import Model, compare, gaussian, run, simulate
+from kfcourse.filters import aof, kalman_filter
+from kfcourse.lab import find_variant, lab_filters
+from kfcourse.montecarlo.cramer_rao import posterior_bound
+
+pytestmark = pytest.mark.quick
+
+
+def test_on_a_linear_model_it_is_the_kalman_filter_s_covariance():
+    """Matrices that change with the step, correlated noises with means; no trajectory enters."""
+    model = Model.define(
+        ["(0.9 + 0.05*k)*x1 + 0.4*x2 + v1", "0.8*x2 - 0.3*x1 + v2 + 1"], ["x1 + 2*x2 + w1 - k", "x2 - (0.5 + 0.1*k)*x1 + w2"],
+        prior={"mean": [1.0, -2.0], "variance": [[2.0, 0.5], [0.5, 1.0]]}, state_noise={"variance": [[1.0, 0.3], [0.3, 2.0]]},
+        meter_noise={"mean": [0.4, 0], "variance": [[1.0, 0.6], [0.6, 2.0]]},
+    )  # fmt: skip
+    expected = run(kalman_filter(model), simulate(model, 1, 8, seed=1).y).cov[:, 0]
+    np.testing.assert_allclose(posterior_bound(model, 3, 8, seed=2), expected, rtol=1e-10)
+
+
+def test_the_first_step_is_an_integral():
+    """Meter and noise both depend on x: 1 + M(b'^2/s + s'^2/(2 s^2)), by a fine sum."""
+    model = Model.define("0.9*x + v", "sin(x) + 0.5*exp(0.3*x)*w")
+    x = np.linspace(-8, 8, 4001)
+    sd = 0.5 * np.exp(0.3 * x)
+    information = (np.cos(x) / sd) ** 2 + (2 * 0.3) ** 2 / 2
+    expected = 1 + (norm.pdf(x) * information).sum() * (x[1] - x[0])
+    runs = 40_000
+    error = np.sqrt((norm.pdf(x) * information**2).sum() * (x[1] - x[0]) / runs)
+    assert 1 / posterior_bound(model, runs, 1, seed=3).item() == pytest.approx(expected, abs=4 * error)
+
+
+def test_two_steps_are_the_corner_of_the_inverse_information_of_both_states():
+    """By derivatives of ln p(x_0, x_1, y_0, y_1) along the same trajectories, state noise and meter noise of varying size."""
+    model = Model.define(
+        "x + 0.2*sin(x) + 0.4*exp(0.2*x)*v", "x + 0.1*x**2 + 0.5*exp(0.3*x)*w", prior={"mean": 0.5, "variance": 0.3}
+    )
+    runs, h = 200_000, 1e-3
+    (x0, x1), (y0, y1) = (part[..., 0] for part in simulate(model, runs, 2, seed=4))
+
+    def density(a, b):
+        def meter(y, x):
+            return norm.logpdf(y, x + 0.1 * x**2, 0.5 * np.exp(0.3 * x))
+
+        start = norm.logpdf(a, 0.5, np.sqrt(0.3))
+        return start + meter(y0, a) + meter(y1, b) + norm.logpdf(b, a + 0.2 * np.sin(a), 0.4 * np.exp(0.2 * a))
+
+    slopes = np.stack([density(x0 + h, x1) - density(x0 - h, x1), density(x0, x1 + h) - density(x0, x1 - h)]) / (2 * h)
+    expected = np.linalg.inv(slopes @ slopes.T / runs)[1, 1]
+    # a mean of squares of scores: its spread over tenths of the runs gives the error
+    tenths = [np.linalg.inv(part @ part.T / part.shape[1])[1, 1] for part in np.split(slopes, 10, axis=1)]
+    assert posterior_bound(model, runs, 2, seed=4)[1].item() == pytest.approx(expected, abs=4 * np.std(tenths) / np.sqrt(10))
+
+
+@pytest.mark.parametrize("number", ["2", "3", "7", "10"])
+def test_no_exact_filter_is_below_it(number):
+    model = find_variant(number).model
+    exact = compare([aof(gaussian(model)), *lab_filters(model, ["aof-exact"])], model, 4000, 5, seed=5).bound()
+    bound = posterior_bound(model, 20_000, 5, seed=6)[:, 0, 0]
+    assert (bound < exact.value - 4 * exact.standard_error).all()
+    assert (bound > 0.2 * exact.value).all()
+
+
+@pytest.mark.parametrize(("number", "place"), [("53", "0"), ("6", "-2"), ("12", "0")])
+def test_a_noise_that_vanishes_tells_everything_and_so_bounds_nothing(number, place):
+    with pytest.raises(ValueError, match=rf"information is infinite, and .* \(its noise vanishes at x = {place}\)"):
+        posterior_bound(find_variant(number).model, 100, 2, seed=1)
+
+
+def test_an_infinite_mean_is_seen_in_several_dimensions_too():
+    model = Model.define(["x1 + v1", "x2 + v2"], ["x1 + x2*w1", "x2 + w2"])
+    with pytest.raises(ValueError, match=r"meter equation's information is infinite.* step 0 it hangs on one trajectory in 5000"):
+        posterior_bound(model, 5000, 2, seed=1)
+
+
+@pytest.mark.parametrize(
+    ("state", "meter", "message"),
+    [
+        (["x1 + x2", "x2 + v1"], ["x1 + w1"], "state equation leaves a component without noise"),
+        (["x1 + v1", "x2 + v2"], ["x1 + w1", "x2"], "meter equation leaves a component without noise"),
+        ("x + exp(v)", "x + w", "noise enters the state equation nonlinearly"),
+    ],
+)
+def test_without_a_normal_density_there_is_none(state, meter, message):
+    with pytest.raises(ValueError, match=message):
+        posterior_bound(Model.define(state, meter), 10, 2, seed=1)
