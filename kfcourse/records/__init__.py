@@ -4,11 +4,25 @@ smoothing    `smooth`: the states given all measurements, or some steps ahead; `
 evidence     `likelihood`: of each measurement, given all before it
 estimation   `estimate`: parameters and noise variances of the largest likelihood, and what the record does not tell; `profile`
 outliers     `weights`: how much each counted, behind a gate or where the filter doubts
+reading      `read_measurements`: measurements, times and inputs from a CSV file
+examination  `examine`: all that a filter says of a record; `findings`: whether the record bears it out
 """
 
 from kfcourse.records.estimation import estimate, profile
 from kfcourse.records.evidence import likelihood
+from kfcourse.records.examination import examine, findings
 from kfcourse.records.outliers import weights
+from kfcourse.records.reading import read_measurements
 from kfcourse.records.smoothing import smooth, smooth_iterated
 
-__all__ = ["estimate", "likelihood", "profile", "smooth", "smooth_iterated", "weights"]
+__all__ = [
+    "estimate",
+    "examine",
+    "findings",
+    "likelihood",
+    "profile",
+    "read_measurements",
+    "smooth",
+    "smooth_iterated",
+    "weights",
+]
