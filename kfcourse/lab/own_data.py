@@ -1,7 +1,7 @@
 """The report of a record: what a filter makes of measurements from a file (`kfcourse estimate`).
 
-`estimate_record` reads, estimates and judges; `write_record` puts into one folder: estimate.csv (numbers, a row for each row of the
-record), report.html (opens in any browser, without a network) and its figures.
+`estimate_record` reads, estimates and judges; `write_record` puts into one folder: estimate.csv (numbers, a row for each row of
+the record), report.html (opens in any browser, without a network) and its figures.
 """
 
 from __future__ import annotations
@@ -169,7 +169,8 @@ def write_record(told: Told, folder: Path, track: tuple[str, str] | None = None)
     names = [symbol.name for symbol in told.record.model.x]
     pictures = {}
     if track:
-        pictures["track"] = (f"The track: {track[1]} against {track[0]}.", partial(_track, told, *map(names.index, track)))
+        across, up = (names.index(name) for name in track)
+        pictures["track"] = (f"The track: {track[1]} against {track[0]}.", partial(_track, told, across, up))
     for i, name in enumerate(names):
         pictures[f"state-{name}"] = (
             f"{name}: the estimate with a band of two standard deviations, and smoothed, given the whole record.",

@@ -1,6 +1,6 @@
 r"""All that a filter says of a record, and whether the record bears it out.
 
-If the filter is right, its innovations nu_k are normal with the covariance F_k that it expects, and of different steps independent:
+If the filter is right, its innovations nu_k are normal with the covariance F_k that it expects, and independent of each other:
 
     size         sum of nu^T F^-1 nu       chi-squared with as many degrees of freedom as there are numbers measured
     mean         sum of s / sqrt(N)        N(0, 1), for the innovations s of one component over their deviations
@@ -59,7 +59,7 @@ class Finding(NamedTuple):
 
     @property
     def fits(self) -> bool:
-        return self.low <= self.value <= self.high
+        return bool(self.low <= self.value <= self.high)
 
 
 def examine(one: Filter, y: Array, edge: float = 1.0) -> Examination:

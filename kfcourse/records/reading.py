@@ -192,8 +192,8 @@ def _places(source: _Source, names: Sequence[str], model: Model, columns: dict[s
         if column not in names:
             remedy = "; give it a column time" if name == INTERVAL else ""
             raise RecordError(
-                f"{source.name} has no column {shown(column)}, which the model needs{remedy}; it has {_listed(names)}: rename one, "
-                f'or say which it is, as in columns={{"{name}": "..."}} or --column {name}=...'
+                f"{source.name} has no column {shown(column)}, which the model needs{remedy}; it has {_listed(names)}: rename "
+                f'one, or say which it is, as in columns={{"{name}": "..."}} or --column {name}=...'
             )
         places[name] = names.index(column)
     return places
@@ -213,7 +213,7 @@ def _rows(
         if len(cells) != len(names):
             raise RecordError(
                 f"{source.name}, line {number}: {len(cells)} cells, but the first line names {len(names)} columns"
-                + ("; where a comma separates decimals, separate cells by semicolons" if "," == delimiter else "")
+                + ("; where a comma separates decimals, separate cells by semicolons" if delimiter == "," else "")
             )
         yield number, [_number(source, number, names[place], cells[place], comma) for place in places.values()]
 
