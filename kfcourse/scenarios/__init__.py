@@ -8,5 +8,6 @@ errors       errors by part of the flight
 ballistic    a body thrown into the air, and the radar that sees it
 pointer      a pointer moved by hand, and the filter that cleans its track
 benchmarks   models on which the field compares its filters, with published figures
+drive        a recorded drive: receiver and gyroscope, no truth
 navigation   sensors of any rate, delay and clock, and the filter that fuses them
 """
