@@ -405,6 +405,7 @@ def estimate(
     if not all(columns.values()):
         raise click.UsageError("--column takes a name of the model and one of the file, such as --column y1=east")
     _check_places(folder, None)  # before the long part
+    click.echo(f"Model {variant.name}: {variant.title or variant.model}", err=True)
     told = estimate_record(
         file, variant, columns=columns, structure=structure, gate=gate, unknown=_names(unknown), positive=_names(positive)
     )

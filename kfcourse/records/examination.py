@@ -75,12 +75,18 @@ def examine(one: Filter, y: Array, edge: float = 1.0) -> Examination:
     Raises
     ------
     ValueError
-        A filter without structural functions, measurements of another shape, no likelihood (`kfcourse.likelihood`).
+        A filter without structural functions, measurements of another shape, no likelihood (`kfcourse.likelihood`), a noise with
+        a negative variance, as sqrt(u) has where an input u is negative.
     """
     structure = structure_of(one, "an examination of a record")
     visited = states(one, y)
     seen = np.reshape(y, (len(visited) - 1, -1, one.model.p))
     expected = [structure.at(state.step).measure(*state.predicted) for state in visited[:-1]]
+    for k, (each, after) in enumerate(zip(expected, visited[1:], strict=True)):
+        _noise_of(each.R, each.F, f"the meter's noise at step {k}")
+        if k < len(expected) - 1:
+            noise = structure.at(k).transition(*after.posterior).Q
+            _noise_of(noise, after.predicted.cov, f"the state's noise from step {k} to {k + 1}")
     innovations = np.stack([each.innovation(now) for each, now in zip(expected, seen, strict=True)])
     F = np.stack([np.broadcast_to(each.F, (*now.shape, now.shape[-1])) for each, now in zip(expected, seen, strict=True)])
     missing = np.isnan(seen).all(axis=-1)
@@ -93,6 +99,13 @@ def examine(one: Filter, y: Array, edge: float = 1.0) -> Examination:
         likelihood(one, y),
         edge,
     )
+
+
+def _noise_of(cov: Array, scale: Array, what: str) -> None:
+    """ValueError if a variance is negative by more than a rule of quadrature rounds."""
+    variance, whole = (np.diagonal(one, axis1=-2, axis2=-1) for one in (cov, scale))
+    if (variance < -1e-6 * np.abs(whole)).any():
+        raise ValueError(f"{what} has a negative variance, {variance.min():g}: look at its formula, and at the inputs there")
 
 
 def findings(told: Examination, confidence: float = 0.95, run: int = 0) -> list[Finding]:

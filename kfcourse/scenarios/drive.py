@@ -39,7 +39,7 @@ class Drive(NamedTuple):
 
 
 @cache
-def drive() -> Drive:
+def recorded() -> Drive:
     """The whole record.
 
     x = r cos(phi_0) (lambda - lambda_0),   y = r (phi - phi_0)       latitude phi, longitude lambda, in rad
@@ -61,13 +61,13 @@ def drive() -> Drive:
 
 def fixes(every: int = 1, start: float = 6.0) -> tuple[Array, Array]:
     """Times (steps,) and places (steps, 1, 2) of one fix in so many, from `start` on, when the car has begun to move."""
-    record = drive()
+    record = recorded()
     there = np.flatnonzero(~np.isnan(record.place[:, 0]) & (record.times >= start))[::every]
     return record.times[there], record.place[there, None]
 
 
 def turned(times: Array) -> Array:
     """The angle by which the car has turned since the record began, rad: the integral of the yaw rate, each reading held."""
-    record = drive()
+    record = recorded()
     angle = np.concatenate([[0.0], np.cumsum(np.diff(record.times) * record.yaw_rate[:-1])])
     return np.interp(times, record.times, angle)

@@ -16,7 +16,7 @@ import scipy.linalg
 from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem, run
 from kfcourse.linear.consistency import nees
-from kfcourse.scenarios.navigation import Clock, Dynamics, Inputs, Observation, Path, Sensor, fuse, observe, sample
+from kfcourse.scenarios.navigation import Clock, Dynamics, Inputs, Observation, Path, Sensor, follow, fuse, observe, sample
 
 pytestmark = pytest.mark.quick
 
@@ -587,3 +587,42 @@ def test_the_past_is_forgotten():
     finally:
         tracemalloc.stop()
     assert peak < 25e6
+
+
+# ---------------------------------------------------------------- recorded data: innovations, no period
+
+
+def test_innovations_are_those_of_the_filter_that_waits_for_everything():
+    """Late and early messages: in the end each innovation is that of the run in the order of capture."""
+    sensors = two_sensors(latency=0.3, jitter=0.2)
+    _, messages = measured(sensors, 3.0, 2, [0.0])
+    messages[5] = messages[5]._replace(value=np.full_like(messages[5].value, np.nan))
+    told = follow(FREE, sensors, PRIOR, messages, np.linspace(0.1, 4, 14))
+    np.testing.assert_array_equal(told.law.mean, fuse(FREE, sensors, PRIOR, messages, np.linspace(0.1, 4, 14)).mean)
+    ordered = sorted(messages, key=lambda message: message.tag)
+    assert [one.time for one in told.innovations] == pytest.approx([message.tag for message in ordered])
+    meters = {
+        "fast": (np.array([[-1.0, 2.0]]), np.array([[0.3]])),
+        "slow": (np.array([[1.0, 0], [1, 1]]), np.array([[0.5, 0.2], [0.2, 0.8]])),
+    }
+    mean, cov, now = np.tile(PRIOR.mean, (2, 1)), PRIOR.cov, 0.0
+    for message, one in zip(ordered, told.innovations, strict=True):
+        step = FREE.over(message.tag - now)
+        mean, cov, now = mean @ step.A.T, step.A @ cov @ step.A.T + step.Q, message.tag
+        H, R = meters[message.sensor]
+        F = H @ cov @ H.T + R
+        assert one.sensor == message.sensor
+        np.testing.assert_allclose(one.innovation, message.value - mean @ H.T, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(one.cov, np.broadcast_to(F, one.cov.shape), rtol=0, atol=ROUNDING)
+        if not np.isnan(message.value).any():
+            K = np.linalg.solve(F, H @ cov).T
+            mean, cov = mean + (message.value - mean @ H.T) @ K.T, cov - K @ H @ cov
+
+
+def test_a_recorded_sensor_needs_no_period():
+    given, free = (Sensor.define("s", STATES, "s + w", 0.5, *period) for period in ([0.25], []))
+    messages = [Observation("s", tag, tag, np.array([[value]])) for tag, value in ((0.1, 3.0), (0.75, 2.0), (0.8, 2.1))]
+    laws = [fuse(FREE, [one], PRIOR, messages, np.array([1.0])) for one in (given, free)]
+    np.testing.assert_array_equal(laws[0].mean, laws[1].mean)
+    with pytest.raises(ValueError, match="s has no period, as a recorded sensor"):
+        free.captures(1.0)
