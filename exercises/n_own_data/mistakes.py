@@ -15,6 +15,9 @@ from kfcourse.laws import Array
 
 # -- n1: intervals; n2: the noise of an interval
 
+ALIKE = "All steps are made alike; the intervals of the record are not."
+KEPT = "That is an acceleration which keeps its value over the interval; here it is white, and it changes all the time."
+
 WRONG_INTERVALS: tuple[tuple[str, str, Answer], ...] = (
     (
         "since-the-last",
@@ -23,10 +26,10 @@ WRONG_INTERVALS: tuple[tuple[str, str, Answer], ...] = (
     ),
     ("zero-first", "These are the intervals since the row before, none for the first.", lambda t: np.diff(t, prepend=t[0])),
     ("zero-last", "The last step has no length; give it that of the one before.", lambda t: np.diff(t, append=t[-1])),
-    ("mean", "All steps are made alike; the intervals of the record are not.", lambda t: np.full(len(t), np.diff(t).mean())),
+    ("mean", ALIKE, lambda t: np.full(len(t), np.diff(t).mean())),
     (
         "median",
-        "All steps are made alike; the intervals of the record are not.",
+        ALIKE,
         lambda t: np.full(len(t), np.median(np.diff(t))),
     ),
     ("times", "That is the time since the first row, not the length of each step.", lambda t: t - t[0]),
@@ -41,12 +44,12 @@ def noise_with(Q: Callable[[Array], list]) -> Answer:
 WRONG_NOISES: tuple[tuple[str, str, Answer], ...] = (
     (
         "constant-in-interval",
-        "That is an acceleration which keeps its value over the interval; here it is white, and changes within it.",
+        KEPT,
         noise_with(lambda t: [[t**4 / 4, t**3 / 2], [t**3 / 2, t**2]]),
     ),
     (
         "constant-in-interval",
-        "That is an acceleration which keeps its value over the interval; here it is white, and changes within it.",
+        KEPT,
         noise_with(lambda t: [[t**3 / 4, t**2 / 2], [t**2 / 2, t]]),
     ),
     (
@@ -118,7 +121,7 @@ WRONG_FILTERS: tuple[tuple[str, str, Answer], ...] = (
     ("missing-as-zero", messages.MISSING_AS_ZERO, filter_with(missing="zero")),
     (
         "missing-as-expected",
-        "In place of what is missing stands what was expected: the covariance then shrinks as if it had been measured.",
+        "A gap is filled by what was expected: the covariance then shrinks as if it had been measured.",
         filter_with(missing="expected"),
     ),
     (
@@ -243,7 +246,7 @@ WRONG_JUDGEMENTS: tuple[tuple[str, str, Answer], ...] = (
     (
         "mean-distance",
         "That is the mean distance; the root of the mean square is asked for.",
-        judged_with(lambda e: np.linalg.norm(e, axis=-1).mean()),
+        judged_with(lambda e: float(np.linalg.norm(e, axis=-1).mean())),
     ),
     (
         "per-component",
@@ -254,7 +257,7 @@ WRONG_JUDGEMENTS: tuple[tuple[str, str, Answer], ...] = (
     (
         "bias-only",
         "That is the length of the mean error; errors in all directions cancel in it.",
-        judged_with(lambda e: np.linalg.norm(e.mean(axis=0))),
+        judged_with(lambda e: float(np.linalg.norm(e.mean(axis=0)))),
     ),
     (
         "claimed-not-rooted",
