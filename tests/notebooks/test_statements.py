@@ -11,7 +11,21 @@ from kfcourse.notebooks.execution import results
 from kfcourse.notebooks.master import STUB, read, render, solution, student
 from kfcourse.notebooks.written_code import DEVIATIONS, Solutions
 
-ANSWERED = {"a": 2, "b": 1, "c": 1, "d": 1, "e": 1, "f": 2, "g": 2, "h": 2, "i": 1, "j": 1, "k": 2, "l": 1}  # questions in words
+ANSWERED = {
+    "a": 2,
+    "b": 1,
+    "c": 1,
+    "d": 1,
+    "e": 1,
+    "f": 2,
+    "g": 2,
+    "h": 2,
+    "i": 1,
+    "j": 1,
+    "k": 2,
+    "l": 1,
+    "n": 1,
+}  # questions in words
 SAID = re.compile(r"\*(What to expect|Why never negative|When is there an answer\?|What is left out)\.?\*|It goes to \$\\beta\$")
 
 

@@ -20,8 +20,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.angles import Components, on_circle
 from kfcourse.laws import Array, Gaussian, Measurement, correct, stacked
 from kfcourse.scenarios.navigation.dynamics import ROUNDING, Dynamics, Inputs, Predictor, predictor
+from kfcourse.scenarios.navigation.nonlinear import Motion
 from kfcourse.scenarios.navigation.sensors import Observation, Sensor, by_name
 
 
@@ -71,7 +73,7 @@ class Followed(NamedTuple):
 
 
 def fuse(
-    dynamics: Dynamics,
+    dynamics: Dynamics | Motion,
     sensors: Sequence[Sensor],
     prior: Gaussian,
     observations: Sequence[Observation],
@@ -86,7 +88,7 @@ def fuse(
 
     Parameters
     ----------
-    dynamics : Dynamics
+    dynamics : Dynamics or Motion
     sensors : sequence of Sensor
         As the filter believes them to be: their meters, and clocks that turn tags into the filter's time.
     prior : Gaussian
@@ -119,7 +121,7 @@ def fuse(
 
 
 def follow(
-    dynamics: Dynamics,
+    dynamics: Dynamics | Motion,
     sensors: Sequence[Sensor],
     prior: Gaussian,
     observations: Sequence[Observation],
@@ -145,7 +147,7 @@ def follow(
 
 
 def _run(
-    dynamics: Dynamics,
+    dynamics: Dynamics | Motion,
     sensors: Sequence[Sensor],
     prior: Gaussian,
     observations: Sequence[Observation],
@@ -159,13 +161,16 @@ def _run(
     """The estimates; `keep` hears of all that is forgotten, in the order of its moments, and of what is left in the end."""
     events = sorted(_events(sensors, observations, by, start), key=lambda event: event.arrival)
     depth = _checked_depth(events, depth)
-    predict = predictor(dynamics, inputs)
-    history = [Past(start, None, _checked_prior(prior, len(dynamics.A), events, inputs))]
+    if isinstance(dynamics, Motion):
+        predict, n, angles = dynamics.predictor(inputs), dynamics.n, dynamics.structure.model.angles.x
+    else:
+        predict, n, angles = predictor(dynamics, inputs), len(dynamics.A), ()
+    history = [Past(start, None, _checked_prior(prior, n, events, inputs))]
     laws, taken = [], 0
     for now in _checked_times(times, start):
         arrived = events[taken : bisect_right(events, now + ROUNDING, lo=taken, key=lambda event: event.arrival)]
         taken += len(arrived)
-        history = _with(history, arrived, predict)
+        history = _with(history, arrived, predict, angles)
         laws.append(predict(history[-1].law, history[-1].time, max(now, history[-1].time)))
         oldest = _oldest_needed(history, now - depth - ROUNDING)
         for past in history[:oldest]:
@@ -176,7 +181,7 @@ def _run(
     return stacked(laws)
 
 
-def _with(history: list[Past], arrived: list[Event], predict: Predictor) -> list[Past]:
+def _with(history: list[Past], arrived: list[Event], predict: Predictor, angles: Components) -> list[Past]:
     """The history with the events that have arrived: back to before the earliest of them, and forward again."""
     if not arrived:
         return history
@@ -186,7 +191,8 @@ def _with(history: list[Past], arrived: list[Event], predict: Predictor) -> list
     for event in sorted(again, key=lambda event: event.time):
         law = predict(history[-1].law, history[-1].time, event.time)
         expected = event.sensor.measure(*law)
-        history.append(Past(event.time, event, correct(law, expected, event.value), expected))
+        mean, cov = correct(law, expected, event.value)
+        history.append(Past(event.time, event, Gaussian(on_circle(mean, angles), cov), expected))
     return history
 
 
