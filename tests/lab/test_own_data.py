@@ -3,8 +3,6 @@
 import csv
 import re
 import signal
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -209,17 +207,21 @@ def test_a_report_that_fails_leaves_what_was_there(call, place, monkeypatch):
     assert {path: path.read_bytes() for path in (place / "out").iterdir()} == before
 
 
-def test_an_interrupt_leaves_nothing(place):
-    rows = "\n".join(f"{k},{k % 7}" for k in range(200_000))
-    (place / "long.csv").write_text("time,y\n" + rows)
-    command = [sys.executable, "-m", "kfcourse", "estimate", "long.csv", "--model", "my.toml", "--variant", "line"]
-    before = sorted(place.iterdir())
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    assert process.stderr.readline().startswith("Model line")  # then it reads, and runs for a minute
-    process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60)
-    assert process.returncode == 130 and "Interrupted" in said and "Traceback" not in said
-    assert sorted(place.iterdir()) == before
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("where", ["examine", "save_texts"])
+def test_an_interrupt_leaves_what_was_there(call, place, monkeypatch, number, where):
+    """While the filter runs, and while the report is being written."""
+    arguments = ("line.csv", "--model", "my.toml", "--variant", "line", "--out", "out")
+    assert call(*arguments).exit_code == 0
+    before = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
+    monkeypatch.setattr(own_data, where, lambda *_, **__: signal.raise_signal(number))
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job has it ignored
+    try:
+        result = call(*arguments, "--gate", 0.9)
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    assert result.exit_code == 128 + number and "files written before are as they were" in result.output
+    assert {path: path.read_bytes() for path in place.rglob("*") if path.is_file()} == before
 
 
 def test_the_model_of_a_file(place):
