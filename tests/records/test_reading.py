@@ -171,3 +171,8 @@ def test_inputs_of_a_model_are_replaced_by_name():
         WALK.with_inputs({"a": [np.nan]})
     x, y = simulate(WALK.with_inputs({"dt": [0.5] * 9, "a": [1.0] * 9}), 1, 9, seed=1)
     assert np.isfinite(x).all() and np.isfinite(y).all()
+
+
+def test_an_input_holds_until_the_next_one(read):
+    record = read("time,y1,y2,a\n0,1,2,3\n1,1,2,4\n2,1,2,\n3,1,2,\n4,1,2,5\n")
+    assert record.model.known.inputs["a"] == (3.0, 4.0, 4.0, 4.0, 5.0)
