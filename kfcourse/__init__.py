@@ -15,7 +15,7 @@ from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, Trajectories, simulate
 from kfcourse.montecarlo.experiment import compare, predictions, run
-from kfcourse.records import likelihood, smooth
+from kfcourse.records import likelihood, read_measurements, smooth
 from kfcourse.symbolic.angular import AngleWarning
 from kfcourse.symbolic.formula import FormulaError
 from kfcourse.symbolic.model import Model
@@ -47,6 +47,7 @@ __all__ = [
     "linearised",
     "load_variants",
     "predictions",
+    "read_measurements",
     "run",
     "simulate",
     "smooth",

@@ -22,6 +22,7 @@ from kfcourse.lab.admission import admissions, on_trial, without_failing
 from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.grammar import generate
 from kfcourse.lab.handin import LANGUAGES, write_handin
+from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
 from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
 from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
 from kfcourse.lab.short_names import FILTERS, LAB, has_bound, title
@@ -349,6 +350,80 @@ def filters(places: tuple[str, ...], variants_file: Path | None, trial: bool) ->
     found = admissions(chosen.model, seconds=DERIVATION)
     click.echo(f"Variant {chosen.name}: {chosen.title or chosen.model}", err=True)
     click.echo(table_of_filters(on_trial(chosen.model, found) if trial else found))
+
+
+@main.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--model", "model_file", type=click.Path(path_type=Path), required=True, help="TOML file with the model.")
+@click.option("--variant", "name", help="Its name in the file, if there are several.")
+@click.option(
+    "--column",
+    "pairs",
+    multiple=True,
+    metavar="NAME=COLUMN",
+    help="The model's name and the column's, where they differ, such as y1=east or time=time_s; may be repeated.",
+)
+@click.option(
+    "--filter",
+    "structure",
+    type=click.Choice([*STRUCTURES]),
+    default="linearised",
+    show_default=True,
+    help="Structural functions.",
+)
+@click.option(
+    "--gate",
+    type=click.FloatRange(0, 1, min_open=True, max_open=True),
+    metavar="PROBABILITY",
+    help="Refuse measurements that a right filter would not see with this probability, such as 0.999.",
+)
+@click.option("--unknown", default="", metavar="NAMES", help="Parameters to find by likelihood first, separated by commas.")
+@click.option("--positive", default="", metavar="NAMES", help="Those of them that are positive, such as variances.")
+@click.option("--track", metavar="X,Y", help="Two components of the state, drawn against each other.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: estimate-FILE]")
+def estimate(
+    file: Path,
+    model_file: Path,
+    name: str | None,
+    pairs: tuple[str, ...],
+    structure: str,
+    gate: float | None,
+    unknown: str,
+    positive: str,
+    track: str | None,
+    out: Path | None,
+) -> None:
+    """Estimate the states from your own measurements, FILE (CSV): forward, looking back, and judged.
+
+    A row is a step; its cells are found by the names in the first line: y (or y1, y2, ...), time, and the inputs.  An empty cell
+    is a missing measurement.  The model may use dt, the interval to the next row, with inputs = { dt = [1] }.
+    """
+    variant = model_of(model_file, name)
+    folder = out or Path("estimate-" + re.sub(r"[^\w.-]+", "-", file.stem))
+    drawn = _pair(track, [symbol.name for symbol in variant.model.x]) if track else None
+    columns = dict(pair.partition("=")[::2] for pair in pairs)
+    if not all(columns.values()):
+        raise click.UsageError("--column takes a name of the model and one of the file, such as --column y1=east")
+    _check_places(folder, None)  # before the long part
+    click.echo(f"Model {variant.name}: {variant.title or variant.model}", err=True)
+    told = estimate_record(
+        file, variant, columns=columns, structure=structure, gate=gate, unknown=_names(unknown), positive=_names(positive)
+    )
+    click.echo("\n".join(told.says()))
+    with _kept(folder), replacing_together(folder) as place:
+        write_record(told, place, drawn)
+    click.echo(f"Report: {folder / 'report.html'}; numbers: {folder / 'estimate.csv'}")
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def _pair(text: str, known: list[str]) -> tuple[str, str]:
+    names = _names(text)
+    if len(names) != 2 or not set(names) <= set(known):
+        raise click.UsageError(f"--track takes two components of the state, separated by a comma; there are {', '.join(known)}")
+    return names[0], names[1]
 
 
 def _check_places(folder: Path, json_file: Path | None) -> None:

@@ -42,6 +42,8 @@ def kfcourse(tmp_path_factory):
     )
     assert all(Path(line).is_relative_to(target) for line in where.stdout.split())
     assert (target / "kfcourse" / "py.typed").exists()
+    data = target / "kfcourse" / "scenarios" / "data"  # with a licence of its own, which must stand beside it
+    assert (data / "car-2014-03-26.csv").exists() and (data / "LICENSE-car-2014-03-26.txt").exists()
     return call, empty
 
 

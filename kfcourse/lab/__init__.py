@@ -8,6 +8,7 @@ maps         who leads, and how far from the bound, over two parameters
 plots        figures of a comparison, one colour and name for each filter
 report       what `kfcourse lab` writes;  handin: the student's report (handin_text, refusals in words,
              written_out: the AOF's equations with the model's functions in them)
+own_data     what `kfcourse estimate` writes of a record from a file
 """
 
 from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_bound, has_exact, lab_filters, title

@@ -5,11 +5,27 @@ smoothing    `smooth`: the states given all measurements, or some steps ahead; `
 evidence     `likelihood`: of each measurement, given all before it; `likelihood_error`: how good it is
 estimation   `estimate`: parameters and noise variances of the largest likelihood, and what the record does not tell; `profile`
 outliers     `weights`: how much each counted, behind a gate or where the filter doubts
+reading      `read_measurements`: measurements, times and inputs from a CSV file
+examination  `examine`: all that a filter says of a record; `findings`: whether the record bears it out
 """
 
 from kfcourse.records.estimation import estimate, profile
 from kfcourse.records.evidence import likelihood, likelihood_error
+from kfcourse.records.examination import examine, findings
 from kfcourse.records.outliers import weights
+from kfcourse.records.reading import read_measurements
 from kfcourse.records.smoothing import smooth, smooth_iterated, smoothing_error
 
-__all__ = ["estimate", "likelihood", "likelihood_error", "profile", "smooth", "smooth_iterated", "smoothing_error", "weights"]
+__all__ = [
+    "estimate",
+    "examine",
+    "findings",
+    "likelihood",
+    "likelihood_error",
+    "profile",
+    "read_measurements",
+    "smooth",
+    "smooth_iterated",
+    "smoothing_error",
+    "weights",
+]

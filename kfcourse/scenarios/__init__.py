@@ -9,5 +9,6 @@ ballistic    a body thrown into the air, and the radar that sees it
 irregular    a track in the plane at unequal intervals, with gaps and gross errors
 pointer      a pointer moved by hand, and the filter that cleans its track
 benchmarks   models on which the field compares its filters, with published figures
+drive        a recorded drive: receiver and gyroscope, no truth
 navigation   sensors of any rate, delay and clock, and the filter that fuses them
 """

@@ -44,7 +44,7 @@ class Known:
     end: tuple[float, str] = (np.inf, "")
 
     @classmethod
-    def read(cls, interval: Any, inputs: Mapping[str, Sequence[float]] | None) -> Known:
+    def read(cls, interval: Any, inputs: Mapping[str, Sequence[float] | Array] | None) -> Known:
         """The interval and the inputs as people give them; ModelError if they are none."""
         length = exact_number("interval", interval)
         if not length > 0:

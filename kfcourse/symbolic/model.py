@@ -22,7 +22,7 @@ from typing import Any
 import sympy as sp
 
 from kfcourse.angles import Angles
-from kfcourse.laws import Gaussian
+from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.angular import read_angles, warn_of_angles
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.known import Known, varying_law
@@ -205,6 +205,19 @@ class Model:
             raise ModelError(f"the model has no parameter {', '.join(unknown)}; it has {', '.join(self.parameters) or 'none'}")
         values = dict(self.parameters) | {name: exact_number(name, value) for name, value in parameters.items()}
         return dataclasses.replace(self, parameters=values)
+
+    def with_inputs(self, inputs: Mapping[str, Sequence[float] | Array]) -> Model:
+        """The same model with other values of its inputs, or of the time t: those of a record.
+
+        Raises
+        ------
+        ModelError
+            A name that is no input of the model, values that are no finite numbers.
+        """
+        if unknown := sorted(set(inputs) - {*self.known.inputs, "t"}):
+            raise ModelError(f"the model has no input {', '.join(unknown)}; it has {', '.join(self.known.inputs) or 'none'}")
+        given = Known.read(self.known.interval, inputs).inputs
+        return dataclasses.replace(self, known=dataclasses.replace(self.known, inputs={**self.known.inputs, **given}))
 
     def latex(self, values: bool = True, indexed: bool = False) -> str:
         """The two equations, and the parameters' values unless they are not wanted, as a LaTeX `aligned` block.

@@ -13,10 +13,27 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from kfcourse import Model, ModelError, NoClosedForm, gaussian, linearised, unscented
+from kfcourse import run as kfcourse_run
+from kfcourse.filters import aof
 from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem, run
 from kfcourse.linear.consistency import nees
-from kfcourse.scenarios.navigation import Clock, Dynamics, Inputs, Observation, Path, Sensor, fuse, observe, sample
+from kfcourse.records.reading import intervals
+from kfcourse.scenarios.drive import fixes, turned
+from kfcourse.scenarios.navigation import (
+    Clock,
+    Dynamics,
+    Inputs,
+    Motion,
+    Observation,
+    Path,
+    Sensor,
+    follow,
+    fuse,
+    observe,
+    sample,
+)
 
 pytestmark = pytest.mark.quick
 
@@ -587,3 +604,110 @@ def test_the_past_is_forgotten():
     finally:
         tracemalloc.stop()
     assert peak < 25e6
+
+
+# ---------------------------------------------------------------- recorded data: innovations, no period
+
+
+def test_innovations_are_those_of_the_filter_that_waits_for_everything():
+    """Late and early messages: in the end each innovation is that of the run in the order of capture."""
+    sensors = two_sensors(latency=0.3, jitter=0.2)
+    _, messages = measured(sensors, 3.0, 2, [0.0])
+    messages[5] = messages[5]._replace(value=np.full_like(messages[5].value, np.nan))
+    told = follow(FREE, sensors, PRIOR, messages, np.linspace(0.1, 4, 14))
+    np.testing.assert_array_equal(told.law.mean, fuse(FREE, sensors, PRIOR, messages, np.linspace(0.1, 4, 14)).mean)
+    ordered = sorted(messages, key=lambda message: message.tag)
+    assert [one.time for one in told.innovations] == pytest.approx([message.tag for message in ordered])
+    meters = {
+        "fast": (np.array([[-1.0, 2.0]]), np.array([[0.3]])),
+        "slow": (np.array([[1.0, 0], [1, 1]]), np.array([[0.5, 0.2], [0.2, 0.8]])),
+    }
+    mean, cov, now = np.tile(PRIOR.mean, (2, 1)), PRIOR.cov, 0.0
+    for message, one in zip(ordered, told.innovations, strict=True):
+        step = FREE.over(message.tag - now)
+        mean, cov, now = mean @ step.A.T, step.A @ cov @ step.A.T + step.Q, message.tag
+        H, R = meters[message.sensor]
+        F = H @ cov @ H.T + R
+        assert one.sensor == message.sensor
+        np.testing.assert_allclose(one.innovation, message.value - mean @ H.T, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(one.cov, np.broadcast_to(F, one.cov.shape), rtol=0, atol=ROUNDING)
+        if not np.isnan(message.value).any():
+            K = np.linalg.solve(F, H @ cov).T
+            mean, cov = mean + (message.value - mean @ H.T) @ K.T, cov - K @ H @ cov
+
+
+def test_a_recorded_sensor_needs_no_period():
+    given, free = (Sensor.define("s", STATES, "s + w", 0.5, *period) for period in ([0.25], []))
+    messages = [Observation("s", tag, tag, np.array([[value]])) for tag, value in ((0.1, 3.0), (0.75, 2.0), (0.8, 2.1))]
+    laws = [fuse(FREE, [one], PRIOR, messages, np.array([1.0])) for one in (given, free)]
+    np.testing.assert_array_equal(laws[0].mean, laws[1].mean)
+    with pytest.raises(ValueError, match="s has no period, as a recorded sensor"):
+        free.captures(1.0)
+
+
+# ---------------------------------------------------------------- nonlinear motion
+
+
+def test_a_linear_motion_written_as_a_model_is_the_dynamics():
+    """Velocity with friction and a known push; late messages, and inputs that change between them."""
+    model = Model.define(
+        ["s + dt*V + dt**2/2*u + sqrt(q*dt**3/12)*v1 + sqrt(q*dt)*dt/2*v2", "V + dt*u + sqrt(q*dt)*v2"],
+        "s + w",
+        {"q": 0.5},
+        symbols={"x": STATES},
+        inputs={"dt": [1], "u": [0]},
+    )
+    pushed = Dynamics([[0, 1], [0, 0]], np.diag([0, 0.5]), [[0], [1]])
+    inputs = Inputs(0.3 * np.arange(20), np.random.default_rng(3).normal(size=(20, 1, 1)))
+    sensors = two_sensors(latency=0.3, jitter=0.2)
+    _, messages = measured(sensors, 3.0, 2, [0.0], dynamics=pushed, inputs=inputs)
+    moments = np.linspace(0.1, 4, 14)
+    exact = follow(pushed, sensors, PRIOR, messages, moments, inputs=inputs)
+    for structure in (linearised, gaussian):
+        ours = follow(Motion(structure(model)), sensors, PRIOR, messages, moments, inputs=inputs)
+        np.testing.assert_allclose(ours.law.mean, exact.law.mean, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(ours.law.cov, exact.law.cov, rtol=0, atol=ROUNDING)
+        for one, other in zip(ours.innovations, exact.innovations, strict=True):
+            np.testing.assert_allclose(one.innovation, other.innovation, rtol=0, atol=ROUNDING)
+
+
+def test_a_nonlinear_motion_is_the_filter_s_that_steps_from_event_to_event():
+    """The drive through Dresden, by `fuse` and by `run`."""
+    times, place = fixes(every=10)
+    dt = intervals(times)
+    omega = np.append(np.diff(turned(times - 0.6)) / dt[:-1], 0)
+    model = Model.define(
+        [
+            "e + dt*V*cos(psi + dt*omega/2)",
+            "n + dt*V*sin(psi + dt*omega/2)",
+            "psi + dt*omega + sqrt(q*dt)*v1",
+            "V + sqrt(p*dt)*v2",
+        ],
+        ["e + sqrt(r)*w1", "n + sqrt(r)*w2"],
+        {"q": 0.015, "p": 1.6, "r": 0.035},
+        symbols={"x": ["e", "n", "psi", "V"]},
+        angles={"x": ["psi"]},
+        inputs={"dt": dt, "omega": omega},
+        prior={"mean": [*place[0, 0], 1.0, 10.0], "variance": [4, 4, 0.1, 1]},
+    )
+    expected = kfcourse_run(aof(linearised(model)), place)
+    receiver = Sensor.define("receiver", ["e", "n", "psi", "V"], ["e + w1", "n + w2"], 0.035)
+    messages = [Observation("receiver", t, t, y) for t, y in zip(times.tolist(), place, strict=True)]
+    inputs = Inputs(times, omega[:, None, None])
+    found = fuse(Motion(linearised(model)), [receiver], model.prior, messages, times, inputs=inputs, start=times[0])
+    np.testing.assert_allclose(found.mean, expected.mean, rtol=0, atol=1e-8)  # hundreds of metres to 1e-14, in 200 steps
+    np.testing.assert_allclose(found.cov, expected.cov, rtol=0, atol=1e-8)
+    with pytest.raises(ValueError, match="known inputs omega; give them"):
+        fuse(Motion(linearised(model)), [receiver], model.prior, messages, times, start=times[0])
+    with pytest.raises(ValueError, match="the inputs begin at"):
+        late = Inputs(times + 1, omega[:, None, None])
+        fuse(Motion(linearised(model)), [receiver], model.prior, messages, times, inputs=late, start=times[0])
+
+
+def test_a_motion_must_know_its_interval():
+    with pytest.raises(ModelError, match="write dt into the formulas"):
+        Motion(linearised(Model.define("x + v", "x + w")))
+    with pytest.raises(ModelError, match="t in the place of k"):
+        Motion(linearised(Model.define("x + k*dt*v", "x + w", inputs={"dt": [1]})))
+    with pytest.raises(NoClosedForm):
+        Motion(unscented(Model.define("x + dt*v", "x + w", inputs={"dt": [1]})))

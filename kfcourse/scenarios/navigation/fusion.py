@@ -15,13 +15,15 @@ Nothing is approximated; the price is memory for the longest delay, and the work
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.laws import Array, Gaussian, correct, stacked
+from kfcourse.angles import Components, on_circle
+from kfcourse.laws import Array, Gaussian, Measurement, correct, stacked
 from kfcourse.scenarios.navigation.dynamics import ROUNDING, Dynamics, Inputs, Predictor, predictor
+from kfcourse.scenarios.navigation.nonlinear import Motion
 from kfcourse.scenarios.navigation.sensors import Observation, Sensor, by_name
 
 
@@ -35,15 +37,43 @@ class Event(NamedTuple):
 
 
 class Past(NamedTuple):
-    """What the filter remembers: the law right after an event (the prior has none)."""
+    """What the filter remembers: the law right after an event (the prior has none), and what it expected of the measurement."""
 
     time: float
     event: Event | None
     law: Gaussian
+    expected: Measurement | None = None
+
+
+class Told(NamedTuple):
+    """What a measurement told beyond the prediction, at its moment of capture.
+
+    Attributes
+    ----------
+    sensor : str
+    time : float
+        Of the filter.
+    innovation : ndarray (runs, p)
+        NaN where missing.
+    cov : ndarray (runs, p, p) or (1, p, p)
+        F, as the filter expected it.
+    """
+
+    sensor: str
+    time: float
+    innovation: Array
+    cov: Array
+
+
+class Followed(NamedTuple):
+    """Estimates, as of `fuse`, and the innovations of all measurements, in the order of their moments."""
+
+    law: Gaussian
+    innovations: list[Told]
 
 
 def fuse(
-    dynamics: Dynamics,
+    dynamics: Dynamics | Motion,
     sensors: Sequence[Sensor],
     prior: Gaussian,
     observations: Sequence[Observation],
@@ -58,7 +88,7 @@ def fuse(
 
     Parameters
     ----------
-    dynamics : Dynamics
+    dynamics : Dynamics or Motion
     sensors : sequence of Sensor
         As the filter believes them to be: their meters, and clocks that turn tags into the filter's time.
     prior : Gaussian
@@ -87,21 +117,71 @@ def fuse(
         Sensors not known, moments not finite, before `start`, or after the arrival; a measurement older than `depth`;
         shapes that do not fit.
     """
+    return _run(dynamics, sensors, prior, observations, times, inputs, by, depth, start, lambda past: None)
+
+
+def follow(
+    dynamics: Dynamics | Motion,
+    sensors: Sequence[Sensor],
+    prior: Gaussian,
+    observations: Sequence[Observation],
+    times: Array,
+    *,
+    inputs: Inputs | None = None,
+    by: str = "tag",
+    depth: float | None = None,
+    start: float = 0.0,
+) -> Followed:
+    """As `fuse`, with the innovations: each as it was when all measurements captured before it had come.
+
+    Arguments and errors as of `fuse`.  What arrives after the last of `times` is not used, and told nothing.
+    """
+    told: list[Told] = []
+
+    def keep(past: Past) -> None:
+        if past.event and past.expected:
+            innovation, F = past.expected.innovation(past.event.value), past.expected.F
+            told.append(Told(past.event.sensor.name, past.event.time, innovation, F.reshape(-1, *F.shape[-2:])))
+
+    return Followed(_run(dynamics, sensors, prior, observations, times, inputs, by, depth, start, keep), told)
+
+
+def _run(
+    dynamics: Dynamics | Motion,
+    sensors: Sequence[Sensor],
+    prior: Gaussian,
+    observations: Sequence[Observation],
+    times: Array,
+    inputs: Inputs | None,
+    by: str,
+    depth: float | None,
+    start: float,
+    keep: Callable[[Past], None],
+) -> Gaussian:
+    """The estimates; `keep` hears of all that is forgotten, in the order of its moments, and of what is left in the end."""
     events = sorted(_events(sensors, observations, by, start), key=lambda event: event.arrival)
     depth = _checked_depth(events, depth)
-    predict = predictor(dynamics, inputs)
-    history = [Past(start, None, _checked_prior(prior, len(dynamics.A), events, inputs))]
+    if isinstance(dynamics, Motion):
+        predict, n, angles = dynamics.predictor(inputs), dynamics.n, dynamics.structure.model.angles.x
+    else:
+        predict, n, angles = predictor(dynamics, inputs), len(dynamics.A), ()
+    history = [Past(start, None, _checked_prior(prior, n, events, inputs))]
     laws, taken = [], 0
     for now in _checked_times(times, start):
         arrived = events[taken : bisect_right(events, now + ROUNDING, lo=taken, key=lambda event: event.arrival)]
         taken += len(arrived)
-        history = _with(history, arrived, predict)
+        history = _with(history, arrived, predict, angles)
         laws.append(predict(history[-1].law, history[-1].time, max(now, history[-1].time)))
-        history = history[_oldest_needed(history, now - depth - ROUNDING) :]
+        oldest = _oldest_needed(history, now - depth - ROUNDING)
+        for past in history[:oldest]:
+            keep(past)
+        history = history[oldest:]
+    for past in history:
+        keep(past)
     return stacked(laws)
 
 
-def _with(history: list[Past], arrived: list[Event], predict: Predictor) -> list[Past]:
+def _with(history: list[Past], arrived: list[Event], predict: Predictor, angles: Components) -> list[Past]:
     """The history with the events that have arrived: back to before the earliest of them, and forward again."""
     if not arrived:
         return history
@@ -110,7 +190,9 @@ def _with(history: list[Past], arrived: list[Event], predict: Predictor) -> list
     history = history[:kept]
     for event in sorted(again, key=lambda event: event.time):
         law = predict(history[-1].law, history[-1].time, event.time)
-        history.append(Past(event.time, event, correct(law, event.sensor.measure(*law), event.value)))
+        expected = event.sensor.measure(*law)
+        mean, cov = correct(law, expected, event.value)
+        history.append(Past(event.time, event, Gaussian(on_circle(mean, angles), cov), expected))
     return history
 
 

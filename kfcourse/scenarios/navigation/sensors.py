@@ -70,8 +70,8 @@ class Sensor:
     name : str
     model : Model
         Its meter equation is the sensor's; the state equation is not used.
-    period : float
-        Between samples, in s of its own clock.
+    period : float, optional
+        Between samples, in s of its own clock; None for recorded data, whose moments are those of their observations.
     offset : float
         Its clock's reading at some sample.
     latency, jitter : float
@@ -83,7 +83,7 @@ class Sensor:
 
     name: str
     model: Model
-    period: float
+    period: float | None = None
     offset: float = 0.0
     latency: float = 0.0
     jitter: float = 0.0
@@ -92,9 +92,9 @@ class Sensor:
 
     def __post_init__(self) -> None:
         for name in ("period", "offset", "latency", "jitter"):
-            if not math.isfinite(getattr(self, name)):
+            if not math.isfinite(getattr(self, name) or 0.0):
                 raise ValueError(f"{self.name}: {name} must be finite, got {getattr(self, name)}")
-        if self.period <= 0:
+        if self.period is not None and self.period <= 0:
             raise ValueError(f"{self.name}: the period must be positive, got {self.period}")
         if self.latency < 0 or self.jitter < 0:
             raise ValueError(
@@ -116,7 +116,7 @@ class Sensor:
         states: Sequence[str],
         meter: Formula | Sequence[Formula],
         variance: Any,
-        period: float,
+        period: float | None = None,
         *,
         parameters: Mapping[str, float] | None = None,
         angles: Sequence[str] | None = None,
@@ -133,7 +133,7 @@ class Sensor:
             In the states, the noise w (w1, w2, ... in a list) and the parameters.
         variance : float, list or matrix
             Of the noise.
-        period : float
+        period : float, optional
         parameters : dict, optional
         angles : list of names, optional
             Components of the measurement, y or y1, y2, ..., that are angles.
@@ -166,7 +166,11 @@ class Sensor:
         return self.structure(self.model).measure
 
     def captures(self, duration: float) -> Array:
-        """Moments of capture from 0 to duration, in the filter's time (s,)."""
+        """Moments of capture from 0 to duration, in the filter's time (s,); ValueError without a period."""
+        if self.period is None:
+            raise ValueError(
+                f"{self.name} has no period, as a recorded sensor: its observations have their moments; give one to simulate it"
+            )
         first = math.ceil((self.clock.reading(0.0) - self.offset) / self.period - ROUNDING)
         last = math.floor((self.clock.reading(duration) - self.offset) / self.period + ROUNDING)
         times = self.clock.time(self.offset + self.period * np.arange(first, last + 1))

@@ -1,0 +1,158 @@
+r"""All that a filter says of a record, and whether the record bears it out.
+
+If the filter is right, its innovations nu_k are normal with the covariance F_k that it expects, and independent of each other:
+
+    size         sum of nu^T F^-1 nu       chi-squared with as many degrees of freedom as there are numbers measured
+    mean         sum of s / sqrt(N)        N(0, 1), for the innovations s of one component over their deviations
+    neighbours   mean of s_j s_{j+1}       N(0, 1/(N - 1)), each s with the next one measured
+
+A gate lets pass what is small: behind it the size is that of a chi-squared number below the gate's edge.  None of this needs the
+true state.  It is what can be said of a recorded track, beside the likelihood, and what becomes of measurements held back.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+
+from kfcourse.filters.base import Filter, structure_of
+from kfcourse.laws import Array, Gaussian, normalised_square, stacked, without_missing
+from kfcourse.linear.consistency import Innovations
+from kfcourse.montecarlo.experiment import states
+from kfcourse.records.evidence import likelihood
+from kfcourse.records.smoothing import smooth
+
+
+class Examination(NamedTuple):
+    """What a filter says of a record.
+
+    Attributes
+    ----------
+    estimate, smoothed : Gaussian
+        Means (steps, runs, n) and covariances (steps, runs, n, n): at each step, and given the whole record.
+    found : Innovations
+        nu (steps, runs, p), NaN where nothing was measured, and F (steps, runs, p, p).
+    weight : ndarray (steps, runs)
+        How much each measurement counted: 1 in full, 0 refused, NaN where there was none.
+    log_likelihood : ndarray (steps, runs)
+    edge : float
+        Probability with which a gate lets pass; 1 without a gate.
+    """
+
+    estimate: Gaussian
+    smoothed: Gaussian
+    found: Innovations
+    weight: Array
+    log_likelihood: Array
+    edge: float = 1.0
+
+
+class Finding(NamedTuple):
+    """A quantity of a record beside the interval in which it lies, with a given probability, if the filter is right."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+
+    @property
+    def fits(self) -> bool:
+        return bool(self.low <= self.value <= self.high)
+
+
+def examine(one: Filter, y: Array, edge: float = 1.0) -> Examination:
+    """Run a filter over a record, look back, and keep what it expected.
+
+    Parameters
+    ----------
+    one : Filter
+        With structural functions of its own; `gated(...)` too, with its probability as `edge`.
+    y : ndarray (steps, runs, p)
+        As for `run`.
+
+    Raises
+    ------
+    ValueError
+        A filter without structural functions, measurements of another shape, no likelihood (`kfcourse.likelihood`), a noise with
+        a negative variance, as sqrt(u) has where an input u is negative.
+    """
+    structure = structure_of(one, "an examination of a record")
+    visited = states(one, y)
+    seen = np.reshape(y, (len(visited) - 1, -1, one.model.p))
+    expected = [structure.at(state.step).measure(*state.predicted) for state in visited[:-1]]
+    for k, (each, after) in enumerate(zip(expected, visited[1:], strict=True)):
+        _noise_of(each.R, each.F, f"the meter's noise at step {k}")
+        if k < len(expected) - 1:
+            noise = structure.at(k).transition(*after.posterior).Q
+            _noise_of(noise, after.predicted.cov, f"the state's noise from step {k} to {k + 1}")
+    innovations = np.stack([each.innovation(now) for each, now in zip(expected, seen, strict=True)])
+    F = np.stack([np.broadcast_to(each.F, (*now.shape, now.shape[-1])) for each, now in zip(expected, seen, strict=True)])
+    missing = np.isnan(seen).all(axis=-1)
+    weight = np.stack([getattr(state.memory, "weight", np.ones(seen.shape[1])) for state in visited[1:]])
+    return Examination(
+        stacked([state.posterior for state in visited[1:]]),
+        smooth(one, y),
+        Innovations(innovations, F),
+        np.where(missing, np.nan, weight),
+        likelihood(one, y),
+        edge,
+    )
+
+
+def _noise_of(cov: Array, scale: Array, what: str) -> None:
+    """ValueError if a variance is negative by more than a rule of quadrature rounds."""
+    variance, whole = (np.diagonal(one, axis1=-2, axis2=-1) for one in (cov, scale))
+    if (variance < -1e-6 * np.abs(whole)).any():
+        raise ValueError(f"{what} has a negative variance, {variance.min():g}: look at its formula, and at the inputs there")
+
+
+def findings(told: Examination, confidence: float = 0.95, run: int = 0) -> list[Finding]:
+    """Size, mean and neighbours of a record's innovations; those that a gate refused are left out.
+
+    The intervals are those of normal laws for sums of many terms: thirty measurements are enough.  Under weights that are
+    neither 0 nor 1 none of this holds; nothing is found of a record that was refused altogether.
+    """
+    used = told.weight[:, run] > 0
+    if not used.any():
+        return []
+    value, F = told.found.value[used, run], told.found.cov[used, run]
+    z = float(scipy.special.ndtri((1 + confidence) / 2))
+    degrees = (~np.isnan(value)).sum(axis=-1)
+    size = _sizes(value, F).sum() / degrees.sum()
+    mean, variance = _below(degrees, told.edge)
+    spread = z * np.sqrt(variance.sum()) / degrees.sum()
+    middle = mean.sum() / degrees.sum()
+    result = [Finding("size", float(size), float(middle - spread), float(middle + spread))]
+    for i, name in enumerate(_names(value.shape[-1])):
+        there = ~np.isnan(value[:, i])
+        s = value[there, i] / np.sqrt(F[there, i, i])
+        if len(s) > 2:
+            s = s / np.sqrt(np.mean(s**2))
+            near = float(np.mean(s[:-1] * s[1:]))
+            result.append(Finding(f"mean{name}", float(s.mean()), -z / np.sqrt(len(s)), z / np.sqrt(len(s))))
+            result.append(Finding(f"neighbours{name}", near, -z / np.sqrt(len(s) - 1), z / np.sqrt(len(s) - 1)))
+    return result
+
+
+def _names(p: int) -> list[str]:
+    return [""] if p == 1 else [f" of y{i + 1}" for i in range(p)]
+
+
+def _sizes(value: Array, F: Array) -> Array:
+    """nu^T F^-1 nu of the components measured, (steps,)."""
+    innovation, _, F, _ = without_missing(value, np.zeros_like(F), F, F)
+    return normalised_square(innovation, F)
+
+
+def _below(degrees: Array, edge: float) -> tuple[Array, Array]:
+    """Mean and variance of chi-squared numbers, of those that lie below the quantile `edge` of their law.
+
+    With the distribution function P_d of d degrees:  M[c; c < g] = d P_{d+2}(g),   M[c^2; c < g] = d (d + 2) P_{d+4}(g).
+    """
+    if edge == 1:
+        return degrees.astype(float), 2.0 * degrees
+    g = scipy.special.chdtri(degrees, 1 - edge)
+    mean = degrees * scipy.special.chdtr(degrees + 2, g) / edge
+    return mean, degrees * (degrees + 2) * scipy.special.chdtr(degrees + 4, g) / edge - mean**2

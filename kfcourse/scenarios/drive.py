@@ -1,0 +1,73 @@
+"""A drive through Dresden, recorded by Paul Balzer on 26 March 2014: a satellite receiver at 10 Hz, a yaw rate at 50 Hz.
+
+The data are his, under CC BY-SA 2.0: data/LICENSE-car-2014-03-26.txt.  There is no truth beside them.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import resources
+from typing import NamedTuple
+
+import numpy as np
+
+from kfcourse.laws import Array
+
+RADIUS = 6_371_000.0  # m, of a sphere as large as the Earth
+
+
+class Drive(NamedTuple):
+    """The record, a row for each reading of the gyroscope.
+
+    Attributes
+    ----------
+    times : ndarray (rows,)
+        s, ascending.
+    place : ndarray (rows, 2)
+        East and north of the first fix, m; NaN in rows without a new fix.
+    yaw_rate : ndarray (rows,)
+        rad/s, positive to the left.
+    speed, course : ndarray (rows,)
+        As the receiver finds them: m/s; rad, from the east to the left, as the heading.
+    """
+
+    times: Array
+    place: Array
+    yaw_rate: Array
+    speed: Array
+    course: Array
+
+
+@cache
+def recorded() -> Drive:
+    """The whole record.
+
+    x = r cos(phi_0) (lambda - lambda_0),   y = r (phi - phi_0)       latitude phi, longitude lambda, in rad
+    """
+    text = (resources.files("kfcourse.scenarios") / "data" / "car-2014-03-26.csv").read_text(encoding="utf-8")
+    names, *rows = (line.split(",") for line in text.splitlines())
+    table = dict(zip(names, np.array([[float(cell or "nan") for cell in row] for row in rows]).T, strict=True))
+    latitude, longitude = np.radians(table["latitude_deg"]), np.radians(table["longitude_deg"])
+    east = RADIUS * np.cos(latitude[0]) * (longitude - longitude[0])
+    course = np.pi / 2 - np.radians(table["course_deg"])
+    return Drive(
+        table["time_s"],
+        np.stack([east, RADIUS * (latitude - latitude[0])], axis=-1),
+        np.radians(table["yaw_rate_deg_s"]),
+        table["speed_km_h"] / 3.6,
+        course,
+    )
+
+
+def fixes(every: int = 1, start: float = 6.0) -> tuple[Array, Array]:
+    """Times (steps,) and places (steps, 1, 2) of one fix in so many, from `start` on, when the car has begun to move."""
+    record = recorded()
+    there = np.flatnonzero(~np.isnan(record.place[:, 0]) & (record.times >= start))[::every]
+    return record.times[there], record.place[there, None]
+
+
+def turned(times: Array) -> Array:
+    """The angle by which the car has turned since the record began, rad: the integral of the yaw rate, each reading held."""
+    record = recorded()
+    angle = np.concatenate([[0.0], np.cumsum(np.diff(record.times) * record.yaw_rate[:-1])])
+    return np.interp(times, record.times, angle)

@@ -1,0 +1,237 @@
+"""`kfcourse estimate`: a file of measurements, a model, and what comes out; nothing half-written."""
+
+import csv
+import re
+import signal
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from kfcourse import Model, cli, linearised, run, smooth
+from kfcourse.filters import aof, gated
+from kfcourse.lab import own_data
+from kfcourse.lab.own_data import estimate_record, judged, model_of
+from kfcourse.lab.variants import VariantError
+from kfcourse.records.examination import Finding
+from kfcourse.records.reading import read_measurements
+
+MODELS = """
+[variants.plane]
+title = "a walk <b>in</b> the plane"
+state = ["x + dt*u + dt*sqrt(q*dt)*v1/2", "z + dt*s + dt*sqrt(q*dt)*v2/2", "u + sqrt(q*dt)*v1", "s + sqrt(q*dt)*v2"]
+meter = ["x + sqrt(r)*w1", "z + sqrt(r)*w2"]
+symbols = { x = ["x", "z", "u", "s"] }
+parameters = { q = 0.1, r = 3.0 }
+inputs = { dt = [1] }
+prior = { mean = [0, 0, 0, 0], variance = [100, 100, 200, 200] }
+
+[variants.line]
+state = "x + dt*v"
+meter = "x + w"
+inputs = { dt = [1] }
+
+[variants.root]
+state = "x + sqrt(u)*v"
+meter = "x + w"
+inputs = { u = [1] }
+"""
+ONE = '[variants.only]\nstate = "0.9*x + v"\nmeter = "x + w"\n'
+
+
+def practitioner_s_track(seed):
+    """300 unequal steps, 15 % missing, 5 % outliers: times, states, measurements."""
+    rng = np.random.default_rng(seed)
+    dt = rng.uniform(0.1, 1.5, 299)
+    times, x = np.concatenate([[0], np.cumsum(dt)]), np.zeros((300, 4))
+    x[0] = [0, 0, 10, 5]
+    for k, step in enumerate(dt):
+        push = np.sqrt(0.1 * step) * rng.standard_normal(2)
+        x[k + 1, 2:] = x[k, 2:] + push
+        x[k + 1, :2] = x[k, :2] + step * x[k, 2:] + step * push / 2
+    y = x[:, :2] + np.sqrt(3) * rng.standard_normal((300, 2))
+    off = rng.random(300) < 0.05
+    y[off] += rng.normal(0, 45, size=(off.sum(), 2))
+    y[rng.random(300) < 0.15] = np.nan
+    return times, x, y
+
+
+def written(path, times, y):
+    cells = (",".join("" if np.isnan(one) else f"{one:.6f}" for one in (t, *row)) for t, row in zip(times, y, strict=True))
+    path.write_text("\n".join(["time,y1,y2" if y.shape[1] == 2 else "time,y", *cells]), encoding="utf-8")
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my.toml").write_text(MODELS, encoding="utf-8")
+    (tmp_path / "one.toml").write_text(ONE, encoding="utf-8")
+    (tmp_path / "line.csv").write_text("time,y\n0,1\n0.5,\n2,3\n2.5,300\n3,2\n", encoding="utf-8")
+    return tmp_path
+
+
+@pytest.fixture
+def call(place):
+    def invoke(*arguments):
+        return CliRunner().invoke(cli.main, ["estimate", *map(str, arguments)])
+
+    return invoke
+
+
+def numbers(path):
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    return {name: np.array([float(row[name] or "nan") for row in rows]) for name in rows[0]}
+
+
+def test_the_practitioner_s_track(place):
+    """Raw, without a gate, gated, smoothed: each step brings what it brings a practitioner who writes the loop by hand."""
+    times, x, y = practitioner_s_track(2)
+    written(place / "track.csv", times, y)
+    variant = model_of(place / "my.toml", "plane")
+
+    def error(law):
+        return np.sqrt(np.mean(np.sum((law[..., :2] - x[:, :2]) ** 2, axis=-1)))
+
+    raw = np.sqrt(np.nanmean(np.sum((y - x[:, :2]) ** 2, axis=-1)))
+    plain, behind = (estimate_record(place / "track.csv", variant, gate=gate).examined for gate in (None, 0.999))
+    assert 10 < raw < 20
+    assert 2 * error(behind.estimate.mean[:, 0]) < error(plain.estimate.mean[:, 0]) < raw
+    assert error(behind.estimate.mean[:, 0]) < 2.4 and error(behind.smoothed.mean[:, 0]) < 1.5
+    assert error(behind.smoothed.mean[:, 0]) < 0.75 * error(behind.estimate.mean[:, 0])
+    # and it is what the package's filters give for the model typed in Python
+    record = read_measurements(place / "track.csv", variant.model)
+    one = gated(aof(linearised(record.model)), 0.999)
+    np.testing.assert_array_equal(behind.estimate.mean, run(one, record.y).mean)
+    np.testing.assert_array_equal(behind.smoothed.mean, smooth(one, record.y).mean)
+
+
+def test_the_command_writes_numbers_and_a_report(call, place):
+    times, _, y = practitioner_s_track(3)
+    written(place / "track.csv", times[:60], y[:60])
+    result = call("track.csv", "--model", "my.toml", "--variant", "plane", "--gate", 0.999, "--track", "x,z", "--out", "out")
+    assert result.exit_code == 0, result.output
+    assert "60 rows, " in result.output and "The gate refused" in result.output and "Report: out/report.html" in result.output
+    told = estimate_record(place / "track.csv", model_of(place / "my.toml", "plane"), gate=0.999)
+    table = numbers(place / "out" / "estimate.csv")
+    assert len(table) == 1 + 4 * 4 + 2 * 2 + 2
+    for name, column in (
+        ("time", times[:60]),
+        ("z", told.examined.estimate.mean[:, 0, 1]),
+        ("u_smoothed_sd", np.sqrt(told.examined.smoothed.cov[:, 0, 2, 2])),
+        ("y2_innovation", told.examined.found.value[:, 0, 1]),
+        ("y1_innovation_sd", np.sqrt(told.examined.found.cov[:, 0, 0, 0])),
+        ("weight", told.examined.weight[:, 0]),
+        ("log_likelihood", told.examined.log_likelihood[:, 0]),
+    ):
+        np.testing.assert_allclose(table[name], column, rtol=1e-6, atol=1e-6)  # the file of measurements has six decimals
+    html = (place / "out" / "report.html").read_text(encoding="utf-8")
+    images = re.findall(r'<img src="([^"]+)" alt="([^"]+)"', html)
+    assert len(images) == 1 + 4 + 2 * 2 and all((place / "out" / name).is_file() for name, _ in images)
+    assert "<math" in html and "<b>" not in html and "a walk &lt;b&gt;in&lt;/b&gt; the plane" in html
+    assert not re.search(r"""(src|href)\s*=\s*["']?\s*(https?:)?//""", html)
+    for sentence in told.says():
+        assert sentence.split(":")[0] in html
+
+
+def test_unknown_parameters_are_found_first(call, place):
+    times, _, y = practitioner_s_track(4)
+    written(place / "line.csv", times, y[:, :1])
+    (place / "mine.toml").write_text(
+        '[variants.walk]\nstate = "x + sqrt(q*dt)*v"\nmeter = "x + sqrt(r)*w"\nparameters = { q = 100, r = 100 }\n'
+        "inputs = { dt = [1] }\nprior = { mean = 0, variance = 1e4 }\n"
+    )
+    result = call("line.csv", "--model", "mine.toml", "--unknown", "q,r", "--positive", "q, r")
+    assert result.exit_code == 0, result.output
+    found = {name: float(value) for name, value in re.findall(r"^(q|r) = (\S+) ±", result.output, re.MULTILINE)}
+    told = estimate_record(place / "line.csv", model_of(place / "mine.toml", None), unknown=["q", "r"], positive=["q", "r"])
+    assert found == pytest.approx(dict(zip(told.likeliest.names, told.likeliest.value, strict=True)), rel=1e-3)
+    assert (place / "estimate-line" / "estimate.csv").is_file()
+    unfit = call("line.csv", "--model", "mine.toml", "--unknown", "x")
+    assert unfit.exit_code == 1 and "unknown must name parameters" in unfit.output
+
+
+@pytest.mark.parametrize("structure", [*own_data.STRUCTURES])
+def test_every_filter_of_the_option(place, structure):
+    told = estimate_record(place / "line.csv", model_of(place / "my.toml", "line"), structure=structure)
+    expected = estimate_record(place / "line.csv", model_of(place / "my.toml", "line"))
+    np.testing.assert_allclose(told.examined.smoothed.mean, expected.examined.smoothed.mean, rtol=1e-9)  # a linear model
+    assert told.record.model == Model.define("x + dt*v", "x + w", inputs={"dt": [0.5, 1.5, 0.5, 0.5, 0.5]})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["missing.csv", "--model", "my.toml", "--variant", "line"], 1, ["no file of measurements at missing.csv"]),
+        (["line.csv", "--model", "missing.toml"], 1, ["no file of variants at missing.toml"]),
+        (["line.csv"], 2, ["--model"]),
+        (["line.csv", "--model", "my.toml"], 1, ["3 models; say which", "--variant plane"]),
+        (["line.csv", "--model", "my.toml", "--variant", "circle"], 1, ["circle"]),
+        (["line.csv", "--model", "my.toml", "--variant", "plane"], 1, ["no column 'y1'"]),
+        (["line.csv", "--model", "my.toml", "--variant", "line", "--gate", "1"], 2, ["--gate"]),
+        (["line.csv", "--model", "my.toml", "--variant", "line", "--filter", "magic"], 2, ["magic"]),
+        (["line.csv", "--model", "my.toml", "--variant", "line", "--column", "y"], 2, ["--column"]),
+        (["line.csv", "--model", "my.toml", "--variant", "line", "--track", "x,q"], 2, ["there are x"]),
+        (["bad.csv", "--model", "my.toml", "--variant", "line"], 1, ["bad.csv, line 3, column y"]),
+        (
+            ["negative.csv", "--model", "my.toml", "--variant", "root"],
+            1,
+            ["state's noise from step 1 to 2 has a negative variance, -1"],
+        ),
+        (["line.csv", "--model", "my.toml", "--variant", "line", "--out", "my.toml"], 1, ["cannot go to my.toml"]),
+        (["line.csv", "--model", "my.toml", "--variant", "line", "--out", "/proc/here"], 1, ["cannot go to /proc/here"]),
+    ],
+)
+def test_what_cannot_be_done_is_said_and_nothing_is_written(call, place, arguments, code, words):
+    (place / "bad.csv").write_text("time,y\n0,1\n1,one\n")
+    (place / "negative.csv").write_text("time,y,u\n0,1,1\n1,1,-1\n2,1,1\n")
+    before = sorted(place.iterdir())
+    result = call(*arguments)
+    assert result.exit_code == code and isinstance(result.exception, SystemExit)
+    assert "Traceback" not in result.output
+    for word in words:
+        assert word in result.output
+    assert sorted(place.iterdir()) == before
+
+
+def test_a_report_that_fails_leaves_what_was_there(call, place, monkeypatch):
+    assert call("line.csv", "--model", "my.toml", "--variant", "line", "--out", "out").exit_code == 0
+    before = {path: path.read_bytes() for path in (place / "out").iterdir()}
+
+    def broken(*_):
+        raise RuntimeError("no pictures today")
+
+    monkeypatch.setattr(own_data, "save_figure", broken)
+    result = call("line.csv", "--model", "my.toml", "--variant", "line", "--out", "out", "--gate", 0.9)
+    assert result.exit_code == 1 and "no pictures today" in result.output
+    assert {path: path.read_bytes() for path in (place / "out").iterdir()} == before
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("where", ["examine", "save_texts"])
+def test_an_interrupt_leaves_what_was_there(call, place, monkeypatch, number, where):
+    """While the filter runs, and while the report is being written."""
+    arguments = ("line.csv", "--model", "my.toml", "--variant", "line", "--out", "out")
+    assert call(*arguments).exit_code == 0
+    before = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
+    monkeypatch.setattr(own_data, where, lambda *_, **__: signal.raise_signal(number))
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job has it ignored
+    try:
+        result = call(*arguments, "--gate", 0.9)
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    assert result.exit_code == 128 + number and "files written before are as they were" in result.output
+    assert {path: path.read_bytes() for path in place.rglob("*") if path.is_file()} == before
+
+
+def test_the_model_of_a_file(place):
+    assert model_of(place / "one.toml", None).name == "only"
+    (place / "bad.toml").write_text(ONE.replace("0.9*x", "0.9*q"), encoding="utf-8")
+    with pytest.raises(VariantError, match="unknown symbol 'q'"):
+        model_of(place / "bad.toml", None)
+
+
+def test_a_finding_in_words():
+    fits, not_so = (judged(Finding("neighbours of y2", value, -0.1, 0.1)) for value in (0.05, 0.3))
+    assert "not so here" not in fits and "0.050 (a filter that is right has -0.100 to 0.100" in fits
+    assert "y2: 0.300" in not_so and "claims more than it knows" in not_so

@@ -1,0 +1,87 @@
+"""What is said of a record: the parts are those of the package, and the intervals cover."""
+
+import numpy as np
+import pytest
+import scipy.stats
+
+from kfcourse import Model, likelihood, linearised, predictions, run, simulate, smooth
+from kfcourse.filters import aof, gated
+from kfcourse.linear.consistency import innovations, nis
+from kfcourse.records import examine, findings
+from kfcourse.records.examination import _below
+
+MODEL = Model.define(["x + u", "u + 0.3*v"], ["x + w1", "u + w2"], symbols={"x": ["x", "u"]})
+STRUCTURE = linearised(MODEL)
+
+
+def holed(steps, runs, seed):
+    _, y = simulate(MODEL, runs, steps, seed=seed)
+    y[np.random.default_rng(seed).random(y.shape) < 0.2] = np.nan
+    return y
+
+
+def test_the_parts_are_those_of_the_package():
+    y, one = holed(40, 2, 1), aof(STRUCTURE)
+    told = examine(one, y)
+    found = innovations(STRUCTURE.measure, predictions(one, y), y)
+    for ours, theirs in (
+        (told.estimate.mean, run(one, y).mean),
+        (told.smoothed.cov, smooth(one, y).cov),
+        (told.found.value, found.value),
+        (told.found.cov, np.broadcast_to(found.cov, told.found.cov.shape)),
+        (told.log_likelihood, likelihood(one, y)),
+    ):
+        np.testing.assert_array_equal(ours, theirs)
+    np.testing.assert_array_equal(np.isnan(told.weight), np.isnan(y).all(axis=-1))
+    assert set(told.weight[~np.isnan(told.weight)]) == {1.0}
+
+
+def test_the_size_is_the_mean_nis_where_everything_is_measured():
+    _, y = simulate(MODEL, 1, 50, seed=3)
+    told = examine(aof(STRUCTURE), y)
+    size = findings(told)[0]
+    assert size.value == pytest.approx(nis(told.found).mean() / 2, rel=1e-12)
+    # 100 degrees of freedom: the normal interval for chi-squared's, its skewness of 0.28 moves the ends by some 0.01
+    assert (size.low, size.high) == pytest.approx(np.array(scipy.stats.chi2.interval(0.95, 100)) / 100, abs=0.02)
+
+
+@pytest.mark.parametrize("edge", [1.0, 0.999, 0.99])
+def test_the_intervals_cover(edge):
+    """300 records of 60 steps, a fifth of the cells empty: 95 % with a standard error of 1.3 %."""
+    y, one = holed(60, 300, 7), aof(STRUCTURE)
+    # with a narrower gate what it refuses, large in truth, makes the prediction after it too sure
+    told = examine(one if edge == 1 else gated(one, edge, patience=None), y, edge)
+    kept = [run for run in range(300) if (told.weight[:, run] > 0).sum() > 30]  # not those whose track was lost
+    assert len(kept) > 295
+    inside = np.mean([[one.fits for one in findings(told, run=run)] for run in kept], axis=0)
+    assert (np.abs(inside - 0.95) < 4 * np.sqrt(0.95 * 0.05 / len(kept))).all(), inside
+
+
+def test_a_wrong_filter_is_found():
+    rough = Model.define(["x + u", "u + 0.3*v"], ["x + 0.5*w1", "u + 0.5*w2"], symbols={"x": ["x", "u"]})
+    stiff = Model.define(["x + u", "u + 0.01*v"], ["x + w1", "u + w2"], symbols={"x": ["x", "u"]})
+    offset = simulate(MODEL, 1, 200, seed=5).y + np.array([0.0, 0.6])
+    _, y = simulate(MODEL, 1, 200, seed=5)
+
+    def failing(model, seen):
+        return {one.name for one in findings(examine(aof(linearised(model)), seen)) if not one.fits}
+
+    assert "size" in failing(rough, y)
+    assert {"neighbours of y1", "neighbours of y2"} & failing(stiff, y)
+    assert {"mean of y1", "mean of y2"} & failing(MODEL, offset)
+
+
+@pytest.mark.parametrize("degrees", [1, 2, 3])
+@pytest.mark.parametrize("edge", [0.6, 0.999])
+def test_chi_squared_below_an_edge(degrees, edge):
+    """By quadrature of the density."""
+    g = scipy.stats.chi2.ppf(edge, degrees)
+    first, second = (scipy.integrate.quad(lambda c, k=k: c**k * scipy.stats.chi2.pdf(c, degrees), 0, g)[0] / edge for k in (1, 2))
+    mean, variance = _below(np.array([degrees]), edge)
+    assert (mean[0], variance[0]) == pytest.approx((first, second - first**2), rel=1e-7)
+
+
+def test_nothing_is_found_of_a_record_that_is_refused():
+    y = np.full((5, 1, 2), 1e6)
+    told = examine(gated(aof(STRUCTURE), 0.99, patience=None), y, 0.99)
+    assert (told.weight == 0).all() and findings(told) == []

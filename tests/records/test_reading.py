@@ -1,0 +1,178 @@
+"""From a file to a filter: what is read is what stands there, and what cannot be used is named by line and column."""
+
+import re
+
+import numpy as np
+import pytest
+
+from kfcourse import Model, likelihood, linearised, read_measurements, run, simulate
+from kfcourse.filters import aof
+from kfcourse.records.reading import LARGEST, RecordError, RecordWarning, intervals
+from kfcourse.symbolic.reading import ModelError
+
+pytestmark = pytest.mark.quick
+
+WALK = Model.define(
+    ["x + dt*u", "u + a*dt + sqrt(q*dt)*v"],
+    ["x + w1", "u + w2"],
+    {"q": 0.3},
+    symbols={"x": ["x", "u"]},
+    inputs={"dt": [1], "a": [0]},
+)
+PLAIN = Model.define("0.9*x + v", "x + w")
+GOOD = "time,y1,y2,a\n0,1.5,,2\n0.5,,-3e0,\n2,1,nan,4\n2,7,8,5\n"
+
+
+@pytest.fixture
+def read(tmp_path):
+    def of(content, model=WALK, **options):
+        path = tmp_path / "mine.csv"
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return read_measurements(path, model, **options)
+
+    return of
+
+
+def expected(record):
+    np.testing.assert_array_equal(record.times, [0, 0.5, 2, 2])
+    np.testing.assert_array_equal(record.y[:, 0], [[1.5, np.nan], [np.nan, -3], [1, np.nan], [7, 8]])
+    assert record.model.known.inputs == {"dt": (0.5, 1.5, 0.0, 0.0), "a": (2.0, 2.0, 4.0, 5.0)}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        GOOD,
+        "\ufeff" + GOOD,
+        GOOD.replace("\n", "\r\n"),
+        GOOD.replace("\n", "\r"),
+        GOOD.replace(",", "\t"),
+        GOOD.replace(",", ";").replace(".", ","),
+        GOOD.replace(",", " ; "),
+        GOOD.replace("time", "t"),
+        GOOD.replace("1.5", '"1.5"').replace("\n2,1", "\n\n2,1"),
+        "other,a,y2,time,y1\nno,2,,0,1.5\nmatter,,-3,.5,\nwhat,4,,2,1.\n=1+1,5,8,2,7\n",
+    ],
+    ids=["plain", "bom", "crlf", "cr", "tabs", "decimal commas", "spaces", "t", "quotes, blank line", "other columns"],
+)
+def test_the_same_record_in_many_forms(read, content):
+    expected(read(content))
+
+
+def test_columns_may_have_other_names(read):
+    content = GOOD.replace("time,y1,y2,a", "seconds,east,y2,push")
+    expected(read(content, columns={"time": "seconds", "y1": "east", "a": "push"}))
+    with pytest.raises(RecordError, match=r"no column 'north'.*--column y1=\.\.\."):
+        read(content, columns={"time": "seconds", "y1": "north", "a": "push"})
+    with pytest.raises(RecordError, match="columns are given for b; the model needs a, dt, time, y1, y2"):
+        read(content, columns={"b": "push"})
+    with pytest.raises(RecordError, match="no column 'minutes'"):
+        read(GOOD, columns={"time": "minutes"})
+
+
+def test_the_interval_may_be_a_column_where_there_are_no_times(read):
+    record = read("dt,y1,y2,a\n0.5,1,2,3\n1.5,1,2,3\n1,1,2,3\n")
+    np.testing.assert_array_equal(record.times, [0, 0.5, 2])
+    assert record.model.known.inputs["dt"] == (0.5, 1.5, 1.0)
+
+
+def test_the_time_in_formulas_is_the_recorded_one(read):
+    model = Model.define("x + sin(t)*v", "x + w")
+    assert read("time,y\n5,1\n7.5,1\n", model).model.known.at(1) == [7.5]
+    assert read("y\n1\n1\n", model).model.known.at(1) == [1.0]
+
+
+def test_uneven_steps_that_the_model_does_not_know_of(read):
+    with pytest.warns(RecordWarning, match=r"intervals are 1 to 4.*dt = \[1\]"):
+        read("time,y\n0,1\n1,1\n5,1\n", PLAIN)
+    assert len(read("time,y\n0,1\n1,1\n2.001,1\n", PLAIN).y) == 3  # an hour of a clock's jitter is no warning
+
+
+def test_one_row_is_a_record(read):
+    assert read("time,y1,y2,a\n3,1,2,0\n").model.known.inputs["dt"] == (1.0,)
+    np.testing.assert_array_equal(intervals(np.array([3.0]), 0.25), [0.25])
+
+
+def test_a_filter_on_what_was_read_is_the_one_with_the_inputs_typed(read):
+    """Against the model built with the sequences themselves."""
+    rng = np.random.default_rng(1)
+    times = np.cumsum(rng.uniform(0.1, 1.5, 30))
+    push, y = rng.normal(size=30), rng.normal(size=(30, 2))
+    y[rng.random((30, 2)) < 0.3] = np.nan
+    rows = ["time,y1,y2,a"]
+    rows += [
+        ",".join("" if np.isnan(one) else repr(float(one)) for one in (t, *row, a))
+        for t, row, a in zip(times, y, push, strict=True)
+    ]
+    record = read("\n".join(rows))
+    dt = np.append(np.diff(times), np.diff(times)[-1])
+    typed = Model.define(
+        list(WALK.state_equation), list(WALK.meter_equation), {"q": 0.3}, symbols={"x": ["x", "u"]}, inputs={"dt": dt, "a": push}
+    )
+    for ours, theirs in zip(run(aof(linearised(record.model)), record.y), run(aof(linearised(typed)), y[:, None]), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    assert np.isfinite(likelihood(aof(linearised(record.model)), record.y)).all()
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "is empty"),
+        ("\n\n", "is empty"),
+        ("time,y1,y2,a\n", "no rows"),
+        ("time,y1,a\n0,1,2\n", "no column 'y2'"),
+        ("time,y1,y2\n0,1,2\n", "no column 'a'"),
+        ("Zeit,y1,y2,a\n0,1,2,3\n", r"no column 'dt', which the model needs; give it a column time"),
+        ("time,y1,y2,a,y1\n0,1,2,3,4\n", "two columns are named 'y1'"),
+        (GOOD.replace("-3e0", "three"), "line 3, column y2: expected a number or nothing, got 'three'"),
+        (GOOD.replace("-3e0", "1_0"), "line 3, column y2: expected a number"),
+        (GOOD.replace("-3e0", "٣"), "line 3, column y2: expected a number"),
+        (GOOD.replace("-3e0", "inf"), "line 3, column y2: expected a number"),
+        (GOOD.replace("-3e0", "1e999"), "line 3, column y2: '1e999' is beyond"),
+        (GOOD.replace("-3e0", '"1,5"'), "line 3, column y2:.*separate cells by semicolons"),
+        (GOOD.replace("-3e0", "1,5"), "line 3: 5 cells, but the first line names 4 columns; where a comma"),
+        (GOOD.replace(",", ";").replace("-3e0", "1.234,5"), "line 3, column y2"),
+        (GOOD.replace("0.5,,", "0.5,"), "line 3: 3 cells"),
+        (GOOD.replace("0.5,", ","), "line 3, column time: empty"),
+        (GOOD.replace("\n2,1", "\n0.25,1"), "line 4, column time: 0.25 comes after 0.5; sort"),
+        (GOOD.replace("0.5,", "2014-03-26,"), "line 3, column time: expected a number"),
+        (GOOD.replace(",2\n", ",\n"), "column a: an input needs a value from the first row"),
+        (GOOD.replace("1.5", '"1.5'), "line 2.*a quoted cell must end in its line"),
+        ("time,y1,y2,a\n0,1,,3\n1,2,,3\n", "column y2 has no number at all"),
+        ("dt,y1,y2,a\n1,1,2,3\n-1,1,2,3\n", "line 3, column dt: an interval must not be negative"),
+        (GOOD.encode("utf-16"), "is UTF-16"),
+        (GOOD.replace("-3e0", "é").encode("latin-1"), "line 3: a byte that is not UTF-8"),
+        (b"\x00" * 100, "no column"),
+    ],
+)  # fmt: skip
+def test_a_bad_file_is_refused_with_its_place(read, content, message):
+    with pytest.raises(RecordError, match=message) as refused:
+        read(content)
+    assert re.search(r"mine\.csv", str(refused.value)) and len(str(refused.value)) < 500
+
+
+def test_what_is_no_file(tmp_path, monkeypatch):
+    with pytest.raises(RecordError, match=r"no file of measurements at .*missing"):
+        read_measurements(tmp_path / "missing.csv", WALK)
+    with pytest.raises(RecordError, match="cannot be read: Is a directory"):
+        read_measurements(tmp_path, WALK)
+    monkeypatch.setattr("kfcourse.records.reading.LARGEST", 10)
+    (tmp_path / "large.csv").write_text(GOOD)
+    with pytest.raises(RecordError, match="more than 10 bytes"):
+        read_measurements(tmp_path / "large.csv", WALK)
+    assert LARGEST >= 10**7
+
+
+def test_inputs_of_a_model_are_replaced_by_name():
+    assert WALK.with_inputs({"a": [1.0, 2.0]}).known.inputs == {"dt": (1.0,), "a": (1.0, 2.0)}
+    with pytest.raises(ModelError, match="no input b; it has dt, a"):
+        WALK.with_inputs({"b": [1.0]})
+    with pytest.raises(ModelError, match="finite"):
+        WALK.with_inputs({"a": [np.nan]})
+    x, y = simulate(WALK.with_inputs({"dt": [0.5] * 9, "a": [1.0] * 9}), 1, 9, seed=1)
+    assert np.isfinite(x).all() and np.isfinite(y).all()
+
+
+def test_an_input_holds_until_the_next_one(read):
+    record = read("time,y1,y2,a\n0,1,2,3\n1,1,2,4\n2,1,2,\n3,1,2,\n4,1,2,5\n")
+    assert record.model.known.inputs["a"] == (3.0, 4.0, 4.0, 4.0, 5.0)
