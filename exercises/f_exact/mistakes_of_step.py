@@ -173,6 +173,11 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
         correction_with(combine=lambda predicted, likelihood: likelihood),
     ),
     (
+        "posterior-integrated",
+        "A posterior density integrates to one whatever was measured; the integral of the product, before division, is asked for.",
+        correction_with(finish=lambda joint, h: (joint / (h * joint.sum()), 1.0)),
+    ),
+    (
         "measurement-ignored",
         "The prediction comes back unchanged: the measurement is not used.",
         correction_with(combine=lambda predicted, likelihood: predicted),

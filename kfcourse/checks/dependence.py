@@ -109,7 +109,7 @@ def nudged(value: Any) -> list[Any]:
     if isinstance(value, int | np.integer):
         return [] if isinstance(value, bool) else [value + 1, value + 2, value + 3, 2 * value + 1, 3 * value + 2]
     if isinstance(value, float | np.floating):
-        return [value * 1.05, value * 0.9]
+        return [value * factor for factor in (1.05, 0.9, 5.0, 0.05, 1e-4)]  # what is rounded feels large changes only
     if isinstance(value, np.ndarray) and value.dtype.kind == "f":
         if value.ndim >= 2 and value.shape[-1] == value.shape[-2]:
             scale = 1.03 + 0.01 * np.arange(value.shape[-1])
@@ -119,8 +119,9 @@ def nudged(value: Any) -> list[Any]:
 
         def changed(*arguments: Any) -> Any:
             result = value(*arguments)
-            # a factor alone may cancel: a regression on it is the same
-            return tuple(1.05 * part for part in result) if isinstance(result, tuple) else 1.05 * result + 0.01 * result**2
+            # a factor alone may cancel: a regression on it is the same; entry by entry the square of a covariance is one
+            several = isinstance(result, tuple)
+            return tuple(1.05 * part + 0.01 * part**2 for part in result) if several else 1.05 * result + 0.01 * result**2
 
         changed.__dict__.update(getattr(value, "__dict__", {}))  # whether it takes the step
         return [changed]

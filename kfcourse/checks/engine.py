@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 PACKAGE = Path(__file__).resolve().parent.parent
 SECONDS = 20.0  # an answer may take
 DIAGNOSIS = 60.0  # the search for the kind of mistake
+MANY = 3  # numbers that are no coincidence
 
 
 class Missing(Exception):
@@ -241,8 +242,7 @@ class _Check:
             return self._says(WRONG, NUMBERS, diagnosis=("numbers",), share=share)
         known = [(mistake, _wrong(mistake, self.exercise, self.arguments, self.expected)) for mistake in self.question.mistakes]
         wrong = _Wrong(self.question, (self.key, self.answer), self.arguments, found, self.expected, known, self.agree)
-        message, names = wrong.told()
-        explained = set(names) - {"too-large", "too-small"}  # which tell little
+        message, names, explained = wrong.told()
         more = [] if explained else [wrong.case(self.values)]
         if times and self.question.advice:
             more.insert(0, self.question.advice)
@@ -312,31 +312,33 @@ class _Wrong:
     def parts(self) -> tuple[str, ...]:
         return self.question.parts
 
-    def told(self) -> tuple[str, list[str]]:
-        """What to say, and the names of the mistakes it looks like."""
+    def told(self) -> tuple[str, list[str], bool]:
+        """What to say, the names of the mistakes it looks like, and whether that explains the first result that is wrong."""
         parts = self.parts
-        right = [place for place in range(len(parts)) if self._agrees(place, self.expected)]
+        right = [place for place, good in enumerate(self._right) if good]
         start = f"{', '.join(parts[place] for place in right)} right, the rest not. " if right else "not right. "
         whole = [mistake for mistake, wrong in self.known if wrong is not None and self.agree(self.found, wrong)]
         if whole:
-            return start + _said(whole), _named(whole)
+            return start + _said(whole), _named(whole), True
         if not parts:
             seen, hint = self._diagnosis(None)
-            return start + (hint or GENERAL), seen
+            return start + (hint or GENERAL), seen, _tells(seen)
         if self._swapped():
-            return "not right. All results are right, but in another order.", ["swapped"]
-        names: list[str] = []
+            return "not right. All results are right, but in another order.", ["swapped"], True
+        found = [(parts[place], *self._diagnosis(place)) for place in range(len(parts)) if place not in right]
+        names = list(dict.fromkeys(name for _, seen, _ in found for name in seen))
         hints: dict[str, list[str]] = {}
-        for place in range(len(parts)):
-            if place not in right:
-                seen, hint = self._diagnosis(place)
-                names += seen
-                hints.setdefault(hint, []).append(parts[place])
-        unknown = hints.pop("", [])
+        for part, _, hint in found:
+            hints.setdefault(hint, []).append(part)
+        first, unknown = found[0], hints.pop("", [])
         told = [f"{', '.join(where)}: {hint}" for hint, where in hints.items()]
-        if unknown:
-            told.append(f"{', '.join(unknown)} may be wrong for the same reason." if told else GENERAL)
-        return start + " ".join(told), list(dict.fromkeys(names))
+        if unknown and not told:
+            told = [GENERAL]
+        elif first[0] in unknown:  # the others may be wrong because it is
+            told.insert(0, f"{', '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} wrong too: start there.")
+        elif unknown:
+            told.append(f"{', '.join(unknown)} may be wrong for the same reason.")
+        return start + " ".join(told), names, _tells(first[1])
 
     def _agrees(self, place: int, wanted: Sequence[Any]) -> bool:
         return self.agree(_part(self.found, place), _part(wanted, place))
@@ -354,21 +356,22 @@ class _Wrong:
             return results if place is None else _part(results, place)
 
         mine, theirs = of(self.found), of(self.expected)
-        possible = [(mistake, of(wrong)) for mistake, wrong in self.known if wrong is not None]
-        right = [self.agree([a], [b]) for a, b in zip(mine, theirs, strict=True)]
-        first = slice(right.index(False), right.index(False) + 1)
-        seen = [mistake for mistake, wrong in possible if self.agree(mine, wrong)]
-        if not seen:  # in the first call that is wrong: more may be, later; and nothing that is right is spoilt by it
+        possible = [(mistake, wrong) for mistake, wrong in self.known if wrong is not None]
+        seen = [(mistake, wrong) for mistake, wrong in possible if self.agree(mine, of(wrong))]
+        good = [self.agree([a], [b]) for a, b in zip(mine, theirs, strict=True)]
+        first = slice(good.index(False), good.index(False) + 1)
+        if not seen and isinstance(theirs[0], np.ndarray) and theirs[first][0].size >= MANY:
+            # as in the first call that is wrong: more may be, later
             seen = [
-                mistake
+                (mistake, wrong)
                 for mistake, wrong in possible
-                if self.agree(mine[first], wrong[first])
-                and all(self.agree([a], [b]) for a, b, good in zip(wrong, theirs, right, strict=True) if good)
+                if self.agree(mine[first], of(wrong)[first])
+                and all(self.agree([a], [b]) for a, b, right in zip(of(wrong), theirs, good, strict=True) if right)
             ]
         if seen:
-            likely = [mistake for mistake in seen if mistake not in self.impossible]
-            return _named(likely or seen), _said(likely or seen)
-        apart = [[not self.agree([a], [b]) for a, b in zip(wrong, theirs, strict=True)] for _, wrong in possible]
+            likely = self._likely(seen)
+            return _named(likely), _said(likely)
+        apart = [[not self.agree([a], [b]) for a, b in zip(of(wrong), theirs, strict=True)] for _, wrong in possible]
         apart = [row for row in apart if any(row)]
         telling = [2 * sum(column) >= len(apart) for column in zip(*apart, strict=True)] or [True] * len(theirs)
         others = [(name, _part(self.expected, i)) for i, name in enumerate(self.parts) if i != place]
@@ -380,15 +383,19 @@ class _Wrong:
         )
         return ([said[0]], said[1]) if said else ([], "")
 
+    def _likely(self, seen: Sequence[tuple[Mistake, list[Any]]]) -> list[Mistake]:
+        """Those that spoil the fewest results that are right; of these, those that explain the most of the wrong ones."""
+        ranks = [self._rank(wrong) for _, wrong in seen]
+        return [mistake for (mistake, _), rank in zip(seen, ranks, strict=True) if rank == max(ranks)]
+
+    def _rank(self, wrong: Sequence[Any]) -> tuple[int, int]:
+        fits = [self._agrees(place, wrong) for place in range(len(self.parts))]
+        return sum(fit and right for fit, right in zip(fits, self._right, strict=True)), sum(fits)
+
     @cached_property
-    def impossible(self) -> list[Mistake]:
-        """Mistakes that would have spoilt a result that is right."""
-        right = [place for place in range(len(self.parts)) if self._agrees(place, self.expected)]
-        return [
-            mistake
-            for mistake, wrong in self.known
-            if wrong is not None and not all(self.agree(_part(wrong, place), _part(self.expected, place)) for place in right)
-        ]
+    def _right(self) -> list[bool]:
+        """For each result, whether it is right."""
+        return [self._agrees(place, self.expected) for place in range(len(self.parts))]
 
     @cached_property
     def names(self) -> list[str]:
@@ -418,6 +425,11 @@ class _Wrong:
 
 def _said(mistakes: Sequence[Mistake]) -> str:
     return " Or: ".join(dict.fromkeys(mistake.says for mistake in mistakes))
+
+
+def _tells(names: Sequence[str]) -> bool:
+    """Whether a hint of one of these names tells more than that something is wrong."""
+    return bool(set(names) - {"too-large", "too-small"})
 
 
 def _named(mistakes: Sequence[Mistake]) -> list[str]:

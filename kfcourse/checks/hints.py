@@ -18,6 +18,7 @@ from kfcourse.checks.equality import depends, equal
 from kfcourse.checks.relations import RELATIONS
 
 ROUGH = 1e-4  # relative difference that hints at a lower precision
+ROUNDING = 1e-13  # of what cancels, beside what should be there
 
 
 def _each(value: Any, change: Callable[[Any], Any]) -> Any:
@@ -28,13 +29,24 @@ def _each(value: Any, change: Callable[[Any], Any]) -> Any:
 TRANSFORMATIONS: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
     ("sign", "The size is right, the sign is not.", lambda v: -v),
     ("transposed", "It looks transposed.", lambda v: v.T if isinstance(v, sp.MatrixBase) else np.swapaxes(v, -1, -2)),
-    ("root", "It looks like a standard deviation where a variance belongs.", lambda v: _each(v, lambda entry: entry**2)),
-    ("square", "It looks like a variance where a standard deviation belongs.", lambda v: _each(v, lambda entry: entry**0.5)),
+    ("root", "It is the square root of what it should be, as a standard deviation is of a variance.", lambda v: _each(v, lambda entry: entry**2)),
+    ("square", "It is the square of what it should be, as a variance is of a standard deviation.", lambda v: _each(v, lambda entry: entry**0.5)),
     ("factor-2", "It is half of what it should be.", lambda v: v * 2),
     ("factor-half", "It is twice what it should be.", lambda v: v / 2),
     ("inverse", "It looks like the inverse of what it should be.", lambda v: _each(v, lambda entry: 1 / entry)),
-    ("complement", "It is one minus what it should be.", lambda v: _each(v, lambda entry: 1 - entry)),
+    ("complement", "It is one minus what it should be.", lambda v: 1 - v),  # no matrix of formulas: zeros and ones say nothing
 )
+
+
+def vanishing(case: Case) -> Said | None:
+    """Nothing, or nothing but rounding."""
+    if case.numeric:
+        zero = all(np.abs(a).max(initial=0.0) <= ROUNDING * np.abs(b).max(initial=0.0) for a, b in case.pairs)
+        if not zero or not all(np.any(b) for b in case.expected):
+            return None
+    elif not case.agree(case.found, [0 * value for value in case.expected]):
+        return None
+    return "vanishing", "It is zero: is that what is left when all cancels, or is something multiplied by zero?"
 
 
 def transformed(case: Case) -> Said | None:
@@ -76,7 +88,7 @@ def rough(case: Case) -> Said | None:
                 "precision",
                 "It is right to the 7 digits of single precision (float32): compute in double precision (float64).",
             )
-        return "precision", "It is right to a few digits only: is something rounded, or a small number added?"
+        return "precision", "It is nearly right: is something rounded, or something small left out, added or divided otherwise?"
     return None
 
 
@@ -213,6 +225,7 @@ def _numbers(wrong: Any) -> str:
 
 
 HINTS: tuple[Callable[[Case], Said | None], ...] = (
+    vanishing,
     transformed,
     signs_lost,
     confused,
