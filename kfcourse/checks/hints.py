@@ -26,14 +26,16 @@ def _each(value: Any, change: Callable[[Any], Any]) -> Any:
     return value.applyfunc(change) if isinstance(value, sp.MatrixBase) else change(value)
 
 
+SQUARE = "It is the square of what it should be, as a variance is of a standard deviation."
+INVERSE = "It looks like the inverse of what it should be."
+
 TRANSFORMATIONS: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
     ("sign", "The size is right, the sign is not.", lambda v: -v),
     ("transposed", "It looks transposed.", lambda v: v.T if isinstance(v, sp.MatrixBase) else np.swapaxes(v, -1, -2)),
     ("root", "It is the square root of what it should be, as a standard deviation is of a variance.", lambda v: _each(v, lambda entry: entry**2)),
-    ("square", "It is the square of what it should be, as a variance is of a standard deviation.", lambda v: _each(v, lambda entry: entry**0.5)),
     ("factor-2", "It is half of what it should be.", lambda v: v * 2),
     ("factor-half", "It is twice what it should be.", lambda v: v / 2),
-    ("inverse", "It looks like the inverse of what it should be.", lambda v: _each(v, lambda entry: 1 / entry)),
+    ("inverse", INVERSE, lambda v: _each(v, lambda entry: 1 / entry)),
     ("complement", "It is one minus what it should be.", lambda v: 1 - v),  # no matrix of formulas: zeros and ones say nothing
 )
 
@@ -67,6 +69,24 @@ def signs_lost(case: Case) -> Said | None:
     return None
 
 
+def rounded(case: Case) -> Said | None:
+    """Right, and then rounded."""
+    if case.numeric:
+        for decimals in range(1, 9):
+            if all(np.array_equal(a, np.round(b, decimals)) for a, b in case.pairs):
+                return "precision", "It is rounded: hand in all digits."
+    return None
+
+
+def squared(case: Case) -> Said | None:
+    """The square, or the inverse of a matrix."""
+    if case.agree(case.found, [_each(b, lambda entry: entry**2) for b in case.expected]):
+        return "square", SQUARE
+    if case.numeric and case.agree([np.linalg.inv(a) for a in case.found], case.expected):
+        return "inverse", INVERSE
+    return None
+
+
 def confused(case: Case) -> Said | None:
     """Another of the results, or an argument as it came."""
     for name, expected in case.others:
@@ -96,6 +116,8 @@ def dependence(case: Case) -> Said | None:
     """Arguments or symbols that are missing, or too many."""
     if case.numeric:
         missing, extra = case.sensitivity.unused(case.part), case.sensitivity.superfluous(case.part)
+        if all(np.array_equal(b, np.round(b)) for b in case.expected):  # what is rounded does not feel a small change
+            missing = [name for name in missing if isinstance(case.arguments[0][case.names.index(name)], int)]
         form = "`{}`"
     else:
         mine, theirs = (_symbols(case, which) for which in (0, 1))
@@ -170,6 +192,8 @@ def factor_or_term(case: Case) -> Said | None:
     if all(np.ndim(b) > 1 and len(b) > 2 and np.ptp(a - b, axis=0).max() < 1e-9 * np.abs(b).max() for a, b in case.pairs):
         return "term", TERM
     a, b = (np.concatenate([np.ravel(pair[which]) for pair in case.pairs]) for which in (0, 1))
+    if all(np.size(b) > 2 and np.ptp(a - b) < 1e-9 * np.abs(b).max() for a, b in case.pairs):
+        return "term", "It is right but for a term that is one number for all that a call gives."
     if len(b) > 1 and np.ptp(b) > 1e-3 * np.abs(b).max():
         ratio = (a @ b) / (b @ b)
         if abs(ratio) > 1e-6 and np.allclose(a, ratio * b, rtol=1e-9, atol=1e-9 * np.abs(a).max()):
@@ -196,6 +220,8 @@ def entries(case: Case) -> Said | None:
         return "columns", f"Only column{_numbers(~right.all(axis=0))} wrong."
     if right.shape[0] == right.shape[1] and np.array_equal(right, np.eye(len(right), dtype=bool)):
         return "off-diagonal", "The diagonal is right, the rest is not: what has one component to do with another?"
+    if right.shape[0] == right.shape[1] and np.array_equal(right, ~np.eye(len(right), dtype=bool)):
+        return "diagonal", "Only the diagonal is wrong."
     return None
 
 
@@ -227,6 +253,8 @@ def _numbers(wrong: Any) -> str:
 HINTS: tuple[Callable[[Case], Said | None], ...] = (
     vanishing,
     transformed,
+    rounded,
+    squared,
     signs_lost,
     confused,
     rough,

@@ -14,7 +14,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.case import Case, Said
-from kfcourse.checks.dependence import same, scaled
+from kfcourse.checks.dependence import changed, same, scaled
 from kfcourse.checks.equality import depends, like
 from kfcourse.limits import OutOfTime
 
@@ -186,6 +186,39 @@ def _fits(value: Any, wanted: Any, numeric: bool) -> bool:
     return isinstance(value, sp.Basic | int | float) or np.shape(value) == np.shape(wanted)
 
 
+CHANGES: tuple[tuple[str, Callable[[Any], Any]], ...] = (
+    ("twice {}", lambda v: 2 * v),
+    ("half of {}", lambda v: v / 2),
+    ("{} with the other sign", lambda v: -v),
+    ("the square of {}", lambda v: v**2),
+    ("the root of {}", lambda v: v**0.5),
+    ("1 less {}", lambda v: 1 - v),
+)
+
+
+def replaced(case: Case) -> Said | None:
+    """What the right answer gives with something else in the place of an argument, or of what an argument returns."""
+    right, _ = case.sensitivity.answers
+    for place, name in enumerate(case.names if case.numeric else ()):
+        for words, change in CHANGES:
+            for which in range(3) if callable(case.arguments[0][place]) else (None,):
+                try:
+                    results = []
+                    for values, wanted in zip(case.arguments, case.expected, strict=True):
+                        other = list(copy.deepcopy(values))
+                        other[place] = changed(other[place], change, which)
+                        result = right(*other)
+                        results.append(like(result[case.part] if case.sensitivity.several else result, wanted))
+                except (OutOfTime, KeyboardInterrupt):
+                    raise
+                except Exception:  # the right answer does not work for it
+                    continue
+                if case.agree(case.found, results) and not case.agree(case.expected, results):
+                    instead = f"`{name}`" if which is None else f"result {which + 1} of `{name}`"
+                    return "replaced", f"It is as if {words.format(instead)} stood in its place."
+    return None
+
+
 REVERSED = "reversed", "All values are right, but in the reverse order."
 
 
@@ -295,6 +328,7 @@ def direction(case: Case) -> Said | None:
 
 RELATIONS: tuple[Callable[[Case], Said | None], ...] = (
     exchanged,
+    replaced,
     ordered,
     alike,
     mixed,
