@@ -174,7 +174,7 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "posterior-integrated",
-        "A posterior density integrates to one whatever was measured; the integral of the product, before division, is asked for.",
+        "A posterior density integrates to one whatever was measured; the integral of the product before that is asked for.",
         correction_with(finish=lambda joint, h: (joint / (h * joint.sum()), 1.0)),
     ),
     (

@@ -26,13 +26,14 @@ def _each(value: Any, change: Callable[[Any], Any]) -> Any:
     return value.applyfunc(change) if isinstance(value, sp.MatrixBase) else change(value)
 
 
+ROOT = "It is the square root of what it should be, as a standard deviation is of a variance."
 SQUARE = "It is the square of what it should be, as a variance is of a standard deviation."
 INVERSE = "It looks like the inverse of what it should be."
 
 TRANSFORMATIONS: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
     ("sign", "The size is right, the sign is not.", lambda v: -v),
     ("transposed", "It looks transposed.", lambda v: v.T if isinstance(v, sp.MatrixBase) else np.swapaxes(v, -1, -2)),
-    ("root", "It is the square root of what it should be, as a standard deviation is of a variance.", lambda v: _each(v, lambda entry: entry**2)),
+    ("root", ROOT, lambda v: _each(v, lambda entry: entry**2)),
     ("factor-2", "It is half of what it should be.", lambda v: v * 2),
     ("factor-half", "It is twice what it should be.", lambda v: v / 2),
     ("inverse", INVERSE, lambda v: _each(v, lambda entry: 1 / entry)),
