@@ -178,11 +178,6 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
         correction_with(finish=lambda joint, h: (joint / (h * joint.sum()), 1.0)),
     ),
     (
-        "measurement-ignored",
-        "The prediction comes back unchanged: the measurement is not used.",
-        correction_with(combine=lambda predicted, likelihood: predicted),
-    ),
-    (
         "constant-inverted",
         "You return the constant C itself; its inverse, the density of the measurement, is asked for.",
         correction_with(finish=lambda joint, h: (joint / (h * joint.sum()), 1 / (h * joint.sum()))),

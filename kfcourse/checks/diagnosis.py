@@ -59,13 +59,15 @@ class Wrong:
             hints.setdefault(hint, []).append(part)
         first, unknown = found[0], hints.pop("", [])
         told = [f"{', '.join(where)}: {hint}" for hint, where in hints.items()]
+        known = any(mistake.name in names for mistake, _ in self.known)
+        start_there = first[0] in unknown and not known  # what there are hints of may follow from it
         if unknown and not told:
             told = [GENERAL]
-        elif first[0] in unknown:  # the others may be wrong because it is
+        elif start_there:
             told.insert(0, f"{', '.join(unknown)} {'is' if len(unknown) == 1 else 'are'} wrong too: start there.")
         elif unknown:
             told.append(f"{', '.join(unknown)} may be wrong for the same reason.")
-        return start + " ".join(told), names, _tells(first[1])
+        return start + " ".join(told), names, _tells(names) and not start_there
 
     def _agrees(self, place: int, wanted: Sequence[Any]) -> bool:
         return self.agree(part_of(self.found, place), part_of(wanted, place))

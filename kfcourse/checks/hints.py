@@ -117,7 +117,9 @@ def dependence(case: Case) -> Said | None:
     """Arguments or symbols that are missing, or too many."""
     if case.numeric:
         missing, extra = case.sensitivity.unused(case.part), case.sensitivity.superfluous(case.part)
-        if all(np.array_equal(b, np.round(b)) for b in case.expected):  # what is rounded does not feel a small change
+        if all(
+            np.array_equal(one, np.round(one)) for pair in case.pairs for one in pair
+        ):  # what is rounded does not feel a small change
             missing = [name for name in missing if isinstance(case.arguments[0][case.names.index(name)], int)]
         form = "`{}`"
     else:

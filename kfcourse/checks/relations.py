@@ -215,7 +215,7 @@ def replaced(case: Case) -> Said | None:
                     continue
                 if case.agree(case.found, results) and not case.agree(case.expected, results):
                     instead = f"`{name}`" if which is None else f"result {which + 1} of `{name}`"
-                    return "replaced", f"It is as if {words.format(instead)} stood in its place."
+                    return "replaced", f"The right answer would give that with {words.format(instead)} in the place of {instead}."
     return None
 
 
@@ -260,15 +260,15 @@ def differentiated(case: Case) -> Said | None:
 
 
 def narrow(case: Case) -> Said | None:
-    """Right but for a factor, or a term, that depends on less than the right formula does."""
+    """Right but for a factor, or a term, that is a number or depends on one symbol, where the right formula has more."""
     if case.numeric or any(len(side[0]) > 1 for side in case.formulas):
         return None
     pairs = [(mine, theirs) for (mine,), (theirs,) in case.formulas]
     everything = {name for _, theirs in pairs for name in _depends(theirs)}
     for what, apart in (("factor", [a / b for a, b in pairs if b != 0]), ("term", [a - b for a, b in pairs])):
         on = {name for one in apart for name in _depends(one)}
-        if len(apart) == len(pairs) and on < everything:
-            which = f"depends on {', '.join(sorted(on))} only" if on else "is a number"
+        if len(apart) == len(pairs) and on < everything and len(on) < 2:
+            which = f"depends on {on.pop()} only" if on else "is a number"
             return f"{what}-of", f"It is right but for a {what} that {which}."
     return None
 
@@ -328,7 +328,6 @@ def direction(case: Case) -> Said | None:
 
 RELATIONS: tuple[Callable[[Case], Said | None], ...] = (
     exchanged,
-    replaced,
     ordered,
     alike,
     mixed,
@@ -338,5 +337,6 @@ RELATIONS: tuple[Callable[[Case], Said | None], ...] = (
     power,
     narrow,
     terms,
+    replaced,
     direction,
 )

@@ -43,10 +43,18 @@ def test_one_number_that_coincides_names_no_mistake(value, named):
 
 
 def test_the_first_result_without_a_hint_is_where_to_start():
-    mistake = Mistake("divided", "It is divided.", lambda a, b: (a + b, a / b))
-    question = asks(lambda a, b: (a + b, a * b), [(2.5, 1.5), (0.5, 3.0)], [mistake], ("sum", "product"))
-    message = outcome(question, lambda a, b: (np.cos(a) * b + 1, a / b)).message
-    assert "sum is wrong too: start there. product: It is divided." in message and "your sum is" in message
+    """A hint of a later result may tell what follows from the first; a mistake that is known by name may explain both."""
+    question = asks(lambda a, b: (a + b, a * b), [(2.5, 1.5), (0.5, 3.0)], (), ("sum", "product"))
+    message = outcome(question, lambda a, b: (np.cos(a) * b + 1, 3 * a * b)).message
+    assert "sum is wrong too: start there. product: It is right but for a factor" in message and "your sum is" in message
+    known = asks(
+        lambda a, b: (a + b, a * b),
+        [(2.5, 1.5), (0.5, 3.0)],
+        [Mistake("divided", "It is divided.", lambda a, b: (a + b, a / b))],
+        ("sum", "product"),
+    )
+    message = outcome(known, lambda a, b: (np.cos(a) * b + 1, a / b)).message
+    assert message == "not right. product: It is divided. sum may be wrong for the same reason."
 
 
 def test_what_is_but_rounding_is_zero():
@@ -76,18 +84,18 @@ def test_what_is_rounded_up_depends_on_its_arguments():
 @pytest.mark.parametrize(
     ("name", "words", "answer"),
     [
-        ("square", "the square", lambda a, law, s: (-a * s + law(a)[0]) ** 2),
-        ("precision", "rounded", lambda a, law, s: np.round(-a * s + law(a)[0], 2)),
-        ("term", "one number for all", lambda a, law, s: -a * s + law(a)[0] - a[0]),
-        ("replaced", "as if twice `s` stood in its place", lambda a, law, s: -2 * a * s + law(a)[0]),
-        ("replaced", "as if result 1 of `law` with the other sign stood", lambda a, law, s: -a * s - law(a)[0]),
+        ("square", "the square", lambda a, law, s: (-np.sin(a + 1) * s + 1 / law(a)[0]) ** 2),
+        ("precision", "rounded", lambda a, law, s: np.round(-np.sin(a + 1) * s + 1 / law(a)[0], 2)),
+        ("term", "one number for all", lambda a, law, s: -np.sin(a + 1) * s + 1 / law(a)[0] - a[0]),
+        ("replaced", "with 1 less `s` in the place of `s`", lambda a, law, s: -np.sin(a + 1) * (1 - s) + 1 / law(a)[0]),
+        ("replaced", "with twice result 1 of `law` in", lambda a, law, s: -np.sin(a + 1) * s + 0.5 / law(a)[0]),
     ],
 )
 def test_what_was_done_to_the_right_result_is_said(name, words, answer):
     def law(a):
         return a**2 + 1, a**2 + 2
 
-    question = asks(lambda a, law, s: -a * s + law(a)[0], [(MANY, law, 0.6), (MORE, law, 1.7)])
+    question = asks(lambda a, law, s: -np.sin(a + 1) * s + 1 / law(a)[0], [(MANY, law, 0.6), (MORE, law, 1.7)])
     result = outcome(question, answer)
     assert result.diagnosis == (name,) and words in result.message, result
 
