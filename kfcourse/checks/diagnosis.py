@@ -55,12 +55,13 @@ class Wrong:
         found = [(parts[place], *self._diagnosis(place)) for place in range(len(parts)) if place not in right]
         names = list(dict.fromkeys(name for _, seen, _ in found for name in seen))
         hints: dict[str, list[str]] = {}
-        for part, _, hint in found:
+        for part, seen, hint in found:
+            if self._known(seen) and not set(seen) & set(found[0][1]):  # its formula may be right, on a wrong result
+                hint += f" Or: it follows from {found[0][0]}."
             hints.setdefault(hint, []).append(part)
         first, unknown = found[0], hints.pop("", [])
         told = [f"{', '.join(where)}: {hint}" for hint, where in hints.items()]
-        known = any(mistake.name in names for mistake, _ in self.known)
-        start_there = first[0] in unknown and not known  # what there are hints of may follow from it
+        start_there = first[0] in unknown and not self._known(names)  # what there are hints of may follow from it
         if unknown and not told:
             told = [GENERAL]
         elif start_there:
@@ -68,6 +69,9 @@ class Wrong:
         elif unknown:
             told.append(f"{', '.join(unknown)} may be wrong for the same reason.")
         return start + " ".join(told), names, _tells(names) and not start_there
+
+    def _known(self, names: Sequence[str]) -> bool:
+        return any(mistake.name in names for mistake, _ in self.known)
 
     def _agrees(self, place: int, wanted: Sequence[Any]) -> bool:
         return self.agree(part_of(self.found, place), part_of(wanted, place))
