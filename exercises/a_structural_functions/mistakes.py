@@ -50,8 +50,16 @@ def _several(s: Side) -> Side:
     return s
 
 
+def _slope_of_noise(s: Side) -> sp.Expr:
+    """How the noise's factor changes with the state; ValueError if it does not: then it cannot get into the slope."""
+    slope = one(s.B).diff(one(s.mean))
+    if slope == 0:
+        raise ValueError("only where the noise's factor depends on the state")
+    return slope
+
+
 def _slope_with_noise(s: Side) -> sp.Matrix:
-    return _scalar((one(s.A) + one(s.B).diff(one(s.mean))) ** 2 * one(s.cov) + one(noise_part(s)))
+    return _scalar((one(s.A) + _slope_of_noise(s)) ** 2 * one(s.cov) + one(noise_part(s)))
 
 
 # The covariance of the linearised function: A cov A^T + B D B^T.
@@ -71,7 +79,7 @@ WRONG_LINEARISED: tuple[Row, ...] = (
     (
         "noise-in-slope",
         NOISE_IN_SLOPE,
-        lambda s: _scalar((one(s.A) ** 2 + one(s.B).diff(one(s.mean)) ** 2) * one(s.cov)),
+        lambda s: _scalar((one(s.A) ** 2 + _slope_of_noise(s) ** 2) * one(s.cov)),
     ),
     (
         "sum-squared",
@@ -153,13 +161,16 @@ def coefficient(instead: int) -> Callable[[int, int], sp.Expr]:
 
 
 def averaged(s: Side, moment: Moment) -> sp.Expr:
-    """The mean of the squared factor of the noise over the law, by a formula for the moments; ValueError if no polynomial."""
+    """The mean of the squared factor of the noise over the law, by a formula for the moments.
+
+    ValueError if the factor is no polynomial, or the same everywhere, so that no moment is taken.
+    """
     x = s.x[0]
     factor = one(s.equation.jacobian(sp.Matrix(s.noise))).subs(dict(zip(s.noise, s.law.mean, strict=True)))
     powers = sp.Poly(factor**2 * one(s.D), x)
     terms = [(k, c) for (k,), c in powers.terms()]
-    if any(k % 2 or k > 8 for k, _ in terms):
-        raise ValueError("no polynomial of even powers")
+    if any(k % 2 or k > 8 for k, _ in terms) or not any(k for k, _ in terms):
+        raise ValueError("no polynomial of even powers that depends on the state")
     return sum((c * moment(k, one(s.mean), one(s.cov)) for k, c in terms), sp.Integer(0))
 
 

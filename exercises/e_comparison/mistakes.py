@@ -25,6 +25,7 @@ VARIANCE_OF_SQUARES = "That is a variance of the squared errors; a standard erro
 
 SUM_FOR_MEAN = "It is a sum over the trajectories, not a mean."
 ONE_COMPONENT = "Only the first component is there."
+MEAN_ERROR = "The mean of the error says only whether there is a bias; square first."
 ROOT_BEFORE_MEAN = "A root is taken before the mean; the mean of the squares is asked for."
 COMPONENTS_ADDED = "The components of the error are added before they are squared."
 WRONG_VARIANCES: tuple[tuple[str, str, Answer], ...] = (
@@ -50,9 +51,10 @@ WRONG_VARIANCES: tuple[tuple[str, str, Answer], ...] = (
     ("largest", "That is the largest of the squares; their mean is asked for.", lambda x, z: squared_error(x, z).max(axis=1)),
     (
         "mean-error",
-        "The mean of the error says only whether there is a bias; square first.",
+        MEAN_ERROR,
         lambda x, z: (x - z).mean(axis=1).sum(axis=1),
     ),
+    ("mean-error", MEAN_ERROR, lambda x, z: (x - z)[:, :, 0].mean(axis=1)),
     (
         "square-of-mean",
         messages.SQUARES_NOT_MEANS,
@@ -68,7 +70,6 @@ WRONG_VARIANCES: tuple[tuple[str, str, Answer], ...] = (
     ("components-added", COMPONENTS_ADDED, lambda x, z: ((x - z).sum(axis=2) ** 2).mean(axis=1)),
     ("components-added", COMPONENTS_ADDED, lambda x, z: (x - z).sum(axis=2).mean(axis=1) ** 2),
     ("one-component", ONE_COMPONENT, lambda x, z: ((x - z)[:, :, 0] ** 2).mean(axis=1)),
-    ("one-component", ONE_COMPONENT, lambda x, z: (x - z)[:, :, 0].mean(axis=1)),
     (
         "cumulated",
         "The values of the steps are added up; there is one for each step.",
@@ -142,8 +143,8 @@ WRONG_ERRORS: tuple[tuple[str, str, Answer], ...] = (
         lambda x, z: (error_variance(x, z), squared_error(x, z).std(axis=0, ddof=1)[: len(x)] / np.sqrt(x.shape[1])),
     ),
     (
-        "one-component",
-        ONE_COMPONENT,
+        "of-error",
+        OF_ERROR,
         lambda x, z: (error_variance(x, z), (x - z)[:, :, 0].std(axis=1, ddof=1) / np.sqrt(x.shape[1])),
     ),
     (

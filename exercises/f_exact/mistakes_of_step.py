@@ -173,9 +173,9 @@ WRONG_CORRECTIONS: tuple[tuple[str, str, Answer], ...] = (
         correction_with(combine=lambda predicted, likelihood: likelihood),
     ),
     (
-        "measurement-ignored",
-        "The prediction comes back unchanged: the measurement is not used.",
-        correction_with(combine=lambda predicted, likelihood: predicted),
+        "posterior-integrated",
+        "A posterior density integrates to one whatever was measured; the integral of the product before that is asked for.",
+        correction_with(finish=lambda joint, h: (joint / (h * joint.sum()), 1.0)),
     ),
     (
         "constant-inverted",

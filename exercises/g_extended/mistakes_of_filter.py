@@ -66,7 +66,7 @@ WRONG_JACOBIANS: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "higher-order",
-        "That is a formula of a higher order; the two points of the question's formula are asked for.",
+        "That is nearer to the derivative than the question's formula is; its two points, h to either side, are asked for.",
         lambda function, x, step: (4 * jacobian(function, x, step) - jacobian(function, x, 2 * step)) / 3,
     ),
 )

@@ -4,7 +4,8 @@ question    what a question is: key, hidden arguments, known mistakes; what a ch
 registry    the sets that there are; they register, nothing here knows one
 exercises   a set for a variant: what a notebook opens
 steps       questions about a model with time and inputs: functions that take the step
-engine      is an answer right, and if not, what kind of mistake is it?  How long may it take?
+engine      is an answer right, or a step on top of a wrong one?  How long may it take?
+diagnosis   what kind of mistake does a wrong answer look like?
 case        one result of a wrong answer: what a hint looks at
 dependence  how a result depends on the arguments
 hints       what can be said of any wrong answer

@@ -109,7 +109,7 @@ def nudged(value: Any) -> list[Any]:
     if isinstance(value, int | np.integer):
         return [] if isinstance(value, bool) else [value + 1, value + 2, value + 3, 2 * value + 1, 3 * value + 2]
     if isinstance(value, float | np.floating):
-        return [value * 1.05, value * 0.9]
+        return [value * factor for factor in (1.05, 0.9)]
     if isinstance(value, np.ndarray) and value.dtype.kind == "f":
         if value.ndim >= 2 and value.shape[-1] == value.shape[-2]:
             scale = 1.03 + 0.01 * np.arange(value.shape[-1])
@@ -119,8 +119,9 @@ def nudged(value: Any) -> list[Any]:
 
         def changed(*arguments: Any) -> Any:
             result = value(*arguments)
-            # a factor alone may cancel: a regression on it is the same
-            return tuple(1.05 * part for part in result) if isinstance(result, tuple) else 1.05 * result + 0.01 * result**2
+            # a factor alone may cancel: a regression on it is the same; entry by entry the square of a covariance is one
+            several = isinstance(result, tuple)
+            return tuple(1.05 * part + 0.01 * part**2 for part in result) if several else 1.05 * result + 0.01 * result**2
 
         changed.__dict__.update(getattr(value, "__dict__", {}))  # whether it takes the step
         return [changed]
@@ -134,14 +135,31 @@ def same(first: Any, second: Any) -> bool:
 
 def scaled(value: Any, factor: float) -> Any:
     """A hidden argument times a factor: a number, an array, or a function with such results."""
+    return changed(value, lambda one: factor * one)
+
+
+def changed(value: Any, change: Callable[[Any], Any], which: int | None = None) -> Any:
+    """A hidden argument changed: a number, an array, or what a function returns, all of it or one of several results.
+
+    Raises
+    ------
+    TypeError
+        It is an integer, or nothing of the kind.
+    IndexError
+        There is no such result.
+    """
     if isinstance(value, float | np.floating) or (isinstance(value, np.ndarray) and value.dtype.kind == "f"):
-        return factor * value
+        return change(value)
     if not inspect.isroutine(value):
-        raise TypeError("an integer, or nothing that has a multiple")
+        raise TypeError("an integer, or nothing that can be changed so")
 
-    def times(*arguments: Any) -> Any:
+    def other(*arguments: Any) -> Any:
         result = value(*arguments)
-        return tuple(factor * part for part in result) if isinstance(result, tuple) else factor * result
+        if which is not None and which >= (len(result) if isinstance(result, tuple) else 1):
+            raise IndexError(which)
+        if not isinstance(result, tuple):
+            return change(result)
+        return tuple(change(part) if which in (None, place) else part for place, part in enumerate(result))
 
-    times.__dict__.update(getattr(value, "__dict__", {}))
-    return times
+    other.__dict__.update(getattr(value, "__dict__", {}))  # whether it takes the step
+    return other

@@ -20,11 +20,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.checks.case import Agree, Case
-from kfcourse.checks.dependence import Sensitivity, names_of
+from kfcourse.checks.case import Agree
+from kfcourse.checks.diagnosis import GENERAL, Wrong, part_of
 from kfcourse.checks.equality import Places, Unusable, depends, equal, like, with_values
-from kfcourse.checks.failing import shown
-from kfcourse.checks.hints import general
 from kfcourse.checks.question import (
     MISSING,
     NOT_CHECKED,
@@ -240,9 +238,8 @@ class _Check:
         if self._numbers(found):
             return self._says(WRONG, NUMBERS, diagnosis=("numbers",), share=share)
         known = [(mistake, _wrong(mistake, self.exercise, self.arguments, self.expected)) for mistake in self.question.mistakes]
-        wrong = _Wrong(self.question, (self.key, self.answer), self.arguments, found, self.expected, known, self.agree)
-        message, names = wrong.told()
-        explained = set(names) - {"too-large", "too-small"}  # which tell little
+        wrong = Wrong(self.question, (self.key, self.answer), self.arguments, found, self.expected, known, self.agree)
+        message, names, explained = wrong.told()
         more = [] if explained else [wrong.case(self.values)]
         if times and self.question.advice:
             more.insert(0, self.question.advice)
@@ -293,139 +290,7 @@ def _flat(result: Any) -> list[sp.Expr]:
 
 
 def _both(found: Sequence[Any], expected: Sequence[Any], place: int) -> tuple[list[Any], list[Any]]:
-    return _part(found, place), _part(expected, place)
-
-
-@dataclass(frozen=True)
-class _Wrong:
-    """A wrong answer beside what was expected."""
-
-    question: Question
-    answers: tuple[Answer, Answer]  # the right one, and the wrong one
-    arguments: Sequence[tuple]
-    found: list[Any]
-    expected: list[Any]
-    known: Sequence[tuple[Mistake, list[Any] | None]]  # mistakes with their results, None where impossible
-    agree: Agree
-
-    @property
-    def parts(self) -> tuple[str, ...]:
-        return self.question.parts
-
-    def told(self) -> tuple[str, list[str]]:
-        """What to say, and the names of the mistakes it looks like."""
-        parts = self.parts
-        right = [place for place in range(len(parts)) if self._agrees(place, self.expected)]
-        start = f"{', '.join(parts[place] for place in right)} right, the rest not. " if right else "not right. "
-        whole = [mistake for mistake, wrong in self.known if wrong is not None and self.agree(self.found, wrong)]
-        if whole:
-            return start + _said(whole), _named(whole)
-        if not parts:
-            seen, hint = self._diagnosis(None)
-            return start + (hint or GENERAL), seen
-        if self._swapped():
-            return "not right. All results are right, but in another order.", ["swapped"]
-        names: list[str] = []
-        hints: dict[str, list[str]] = {}
-        for place in range(len(parts)):
-            if place not in right:
-                seen, hint = self._diagnosis(place)
-                names += seen
-                hints.setdefault(hint, []).append(parts[place])
-        unknown = hints.pop("", [])
-        told = [f"{', '.join(where)}: {hint}" for hint, where in hints.items()]
-        if unknown:
-            told.append(f"{', '.join(unknown)} may be wrong for the same reason." if told else GENERAL)
-        return start + " ".join(told), list(dict.fromkeys(names))
-
-    def _agrees(self, place: int, wanted: Sequence[Any]) -> bool:
-        return self.agree(_part(self.found, place), _part(wanted, place))
-
-    def _swapped(self) -> bool:
-        orders = [order for order in permutations(range(len(self.parts))) if list(order) != sorted(order)]
-        return any(
-            all(self.agree(_part(self.found, i), _part(self.expected, j)) for i, j in enumerate(order)) for order in orders
-        )
-
-    def _diagnosis(self, place: int | None) -> tuple[list[str], str]:
-        """Names of the mistakes that one result looks like, and what to say: nothing if it looks like none."""
-
-        def of(results: Sequence[Any]) -> Sequence[Any]:
-            return results if place is None else _part(results, place)
-
-        mine, theirs = of(self.found), of(self.expected)
-        possible = [(mistake, of(wrong)) for mistake, wrong in self.known if wrong is not None]
-        right = [self.agree([a], [b]) for a, b in zip(mine, theirs, strict=True)]
-        first = slice(right.index(False), right.index(False) + 1)
-        seen = [mistake for mistake, wrong in possible if self.agree(mine, wrong)]
-        if not seen:  # in the first call that is wrong: more may be, later; and nothing that is right is spoilt by it
-            seen = [
-                mistake
-                for mistake, wrong in possible
-                if self.agree(mine[first], wrong[first])
-                and all(self.agree([a], [b]) for a, b, good in zip(wrong, theirs, right, strict=True) if good)
-            ]
-        if seen:
-            likely = [mistake for mistake in seen if mistake not in self.impossible]
-            return _named(likely or seen), _said(likely or seen)
-        apart = [[not self.agree([a], [b]) for a, b in zip(wrong, theirs, strict=True)] for _, wrong in possible]
-        apart = [row for row in apart if any(row)]
-        telling = [2 * sum(column) >= len(apart) for column in zip(*apart, strict=True)] or [True] * len(theirs)
-        others = [(name, _part(self.expected, i)) for i, name in enumerate(self.parts) if i != place]
-        said = general(
-            Case(
-                *(mine, theirs, self.agree, self.arguments, self.names, place or 0, others, telling),
-                *(self.sensitivity, self.question.axes),
-            )
-        )
-        return ([said[0]], said[1]) if said else ([], "")
-
-    @cached_property
-    def impossible(self) -> list[Mistake]:
-        """Mistakes that would have spoilt a result that is right."""
-        right = [place for place in range(len(self.parts)) if self._agrees(place, self.expected)]
-        return [
-            mistake
-            for mistake, wrong in self.known
-            if wrong is not None and not all(self.agree(_part(wrong, place), _part(self.expected, place)) for place in right)
-        ]
-
-    @cached_property
-    def names(self) -> list[str]:
-        """What the arguments are called."""
-        return names_of(self.answers[0], len(self.arguments[0]))
-
-    @cached_property
-    def sensitivity(self) -> Sensitivity:
-        """To the arguments of the calls."""
-        results = [
-            tuple(list(one) if self.parts else [one] for one in pair) for pair in zip(self.expected, self.found, strict=True)
-        ]
-        return Sensitivity(self.names, self.answers, self.arguments, results, bool(self.parts))
-
-    def case(self, values: Mapping[sp.Symbol, Any]) -> str:
-        """One input for which the answer is wrong, and what it gives there."""
-        right = [self.agree([a], [b]) for a, b in zip(self.found, self.expected, strict=True)]
-        size = [sum(np.size(value) for value in one) for one in self.arguments]
-        which = min((i for i, good in enumerate(right) if not good), key=size.__getitem__)
-        mine, theirs = self.found[which], self.expected[which]
-        parts = [place for place in range(len(self.parts)) if not self.agree([mine[place]], [theirs[place]])]
-        place = parts[0] if parts else None
-        mine, theirs = (one if place is None else one[place] for one in (mine, theirs))
-        what = "" if place is None else self.parts[place]
-        return shown(self.names, self.arguments[which], mine, theirs, what, self.question.axes, values)
-
-
-def _said(mistakes: Sequence[Mistake]) -> str:
-    return " Or: ".join(dict.fromkeys(mistake.says for mistake in mistakes))
-
-
-def _named(mistakes: Sequence[Mistake]) -> list[str]:
-    return list(dict.fromkeys(mistake.name for mistake in mistakes))
-
-
-def _part(results: Sequence[Any], place: int) -> list[Any]:
-    return [result[place] for result in results]
+    return part_of(found, place), part_of(expected, place)
 
 
 def _reference(answer: Answer, arguments: Sequence[tuple]) -> list[Any]:
@@ -456,6 +321,3 @@ def _wrong(mistake: Mistake, exercise: Exercise, arguments: Sequence[tuple], exp
 
 
 NUMBERS = "Right in numbers, but the parameters are asked for as symbols: type their letters where their values stand."
-GENERAL = (
-    "It does not look like one of the usual mistakes. Check each step of the derivation, and try a case whose answer you know."
-)

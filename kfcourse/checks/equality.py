@@ -174,8 +174,11 @@ def equal_formulas(
 
 def depends(formula: sp.Expr, names: Container[str]) -> list[str]:
     """Names of the symbols, among these, on whose values a formula depends."""
-    found = [s for s in formula.free_symbols if s.name in names]
-    return sorted(s.name for s in found if not equal_formulas([formula.xreplace({s: s + 1})], [formula], {}))
+
+    def changes(s: sp.Symbol) -> bool:  # the root of a square feels the sign alone
+        return any(not equal_formulas([formula.xreplace({s: other})], [formula], {}) for other in (s + 1, -s))
+
+    return sorted(s.name for s in formula.free_symbols if s.name in names and changes(s))
 
 
 def with_values(formula: sp.Expr, values: Mapping[sp.Symbol, Any]) -> sp.Expr:

@@ -18,6 +18,7 @@ from kfcourse.checks.equality import depends, equal
 from kfcourse.checks.relations import RELATIONS
 
 ROUGH = 1e-4  # relative difference that hints at a lower precision
+ROUNDING = 1e-13  # of what cancels, beside what should be there
 
 
 def _each(value: Any, change: Callable[[Any], Any]) -> Any:
@@ -25,16 +26,30 @@ def _each(value: Any, change: Callable[[Any], Any]) -> Any:
     return value.applyfunc(change) if isinstance(value, sp.MatrixBase) else change(value)
 
 
+ROOT = "It is the square root of what it should be, as a standard deviation is of a variance."
+SQUARE = "It is the square of what it should be, as a variance is of a standard deviation."
+INVERSE = "It looks like the inverse of what it should be."
+
 TRANSFORMATIONS: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
     ("sign", "The size is right, the sign is not.", lambda v: -v),
     ("transposed", "It looks transposed.", lambda v: v.T if isinstance(v, sp.MatrixBase) else np.swapaxes(v, -1, -2)),
-    ("root", "It looks like a standard deviation where a variance belongs.", lambda v: _each(v, lambda entry: entry**2)),
-    ("square", "It looks like a variance where a standard deviation belongs.", lambda v: _each(v, lambda entry: entry**0.5)),
+    ("root", ROOT, lambda v: _each(v, lambda entry: entry**2)),
     ("factor-2", "It is half of what it should be.", lambda v: v * 2),
     ("factor-half", "It is twice what it should be.", lambda v: v / 2),
-    ("inverse", "It looks like the inverse of what it should be.", lambda v: _each(v, lambda entry: 1 / entry)),
-    ("complement", "It is one minus what it should be.", lambda v: _each(v, lambda entry: 1 - entry)),
+    ("inverse", INVERSE, lambda v: _each(v, lambda entry: 1 / entry)),
+    ("complement", "It is one minus what it should be.", lambda v: 1 - v),  # no matrix of formulas: zeros and ones say nothing
 )
+
+
+def vanishing(case: Case) -> Said | None:
+    """Nothing, or nothing but rounding."""
+    if case.numeric:
+        zero = all(np.abs(a).max(initial=0.0) <= ROUNDING * np.abs(b).max(initial=0.0) for a, b in case.pairs)
+        if not zero or not all(np.any(b) for b in case.expected):
+            return None
+    elif not case.agree(case.found, [0 * value for value in case.expected]):
+        return None
+    return "vanishing", "It is zero: is that what is left when all cancels, or is something multiplied by zero?"
 
 
 def transformed(case: Case) -> Said | None:
@@ -52,6 +67,24 @@ def signs_lost(case: Case) -> Said | None:
     """Right but for the signs of some entries."""
     if case.numeric and case.agree([np.abs(a) for a in case.found], [np.abs(b) for b in case.expected]):
         return "some-signs", "All sizes are right, some signs are not."
+    return None
+
+
+def rounded(case: Case) -> Said | None:
+    """Right, and then rounded."""
+    if case.numeric:
+        for decimals in range(1, 9):
+            if all(np.array_equal(a, np.round(b, decimals)) for a, b in case.pairs):
+                return "precision", "It is rounded: hand in all digits."
+    return None
+
+
+def squared(case: Case) -> Said | None:
+    """The square, or the inverse of a matrix."""
+    if case.agree(case.found, [_each(b, lambda entry: entry**2) for b in case.expected]):
+        return "square", SQUARE
+    if case.numeric and case.agree([np.linalg.inv(a) for a in case.found], case.expected):
+        return "inverse", INVERSE
     return None
 
 
@@ -76,7 +109,7 @@ def rough(case: Case) -> Said | None:
                 "precision",
                 "It is right to the 7 digits of single precision (float32): compute in double precision (float64).",
             )
-        return "precision", "It is right to a few digits only: is something rounded, or a small number added?"
+        return "precision", "It is nearly right: is something rounded, or something small left out, added or divided otherwise?"
     return None
 
 
@@ -84,6 +117,10 @@ def dependence(case: Case) -> Said | None:
     """Arguments or symbols that are missing, or too many."""
     if case.numeric:
         missing, extra = case.sensitivity.unused(case.part), case.sensitivity.superfluous(case.part)
+        if all(
+            np.array_equal(one, np.round(one)) for pair in case.pairs for one in pair
+        ):  # what is rounded does not feel a small change
+            missing = [name for name in missing if isinstance(case.arguments[0][case.names.index(name)], int)]
         form = "`{}`"
     else:
         mine, theirs = (_symbols(case, which) for which in (0, 1))
@@ -143,7 +180,8 @@ def first_step(case: Case) -> Said | None:
     """A run that starts well."""
     if not case.numeric or case.axes[:1] != ("step",) or not all(b.ndim and len(b) > 3 for _, b in case.pairs):
         return None
-    if all(case.agree([a[:1]], [b[:1]]) for a, b in case.pairs):
+    later = [not case.agree([a[k : k + 1]], [b[k : k + 1]]) for a, b in case.pairs for k in range(1, len(b))]
+    if all(case.agree([a[:1]], [b[:1]]) for a, b in case.pairs) and 2 * sum(later) > len(later):
         return "from-second-step", "The first step is right, later ones are not: what is handed on from one step to the next?"
     return None
 
@@ -158,6 +196,8 @@ def factor_or_term(case: Case) -> Said | None:
     if all(np.ndim(b) > 1 and len(b) > 2 and np.ptp(a - b, axis=0).max() < 1e-9 * np.abs(b).max() for a, b in case.pairs):
         return "term", TERM
     a, b = (np.concatenate([np.ravel(pair[which]) for pair in case.pairs]) for which in (0, 1))
+    if all(np.size(b) > 2 and np.ptp(a - b) < 1e-9 * np.abs(b).max() for a, b in case.pairs):
+        return "term", "It is right but for a term that is one number for all that a call gives."
     if len(b) > 1 and np.ptp(b) > 1e-3 * np.abs(b).max():
         ratio = (a @ b) / (b @ b)
         if abs(ratio) > 1e-6 and np.allclose(a, ratio * b, rtol=1e-9, atol=1e-9 * np.abs(a).max()):
@@ -184,6 +224,8 @@ def entries(case: Case) -> Said | None:
         return "columns", f"Only column{_numbers(~right.all(axis=0))} wrong."
     if right.shape[0] == right.shape[1] and np.array_equal(right, np.eye(len(right), dtype=bool)):
         return "off-diagonal", "The diagonal is right, the rest is not: what has one component to do with another?"
+    if right.shape[0] == right.shape[1] and np.array_equal(right, ~np.eye(len(right), dtype=bool)):
+        return "diagonal", "Only the diagonal is wrong."
     return None
 
 
@@ -213,7 +255,10 @@ def _numbers(wrong: Any) -> str:
 
 
 HINTS: tuple[Callable[[Case], Said | None], ...] = (
+    vanishing,
     transformed,
+    rounded,
+    squared,
     signs_lost,
     confused,
     rough,

@@ -14,14 +14,17 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.case import Case, Said
-from kfcourse.checks.dependence import same, scaled
-from kfcourse.checks.equality import like
+from kfcourse.checks.dependence import changed, same, scaled
+from kfcourse.checks.equality import depends, like
 from kfcourse.limits import OutOfTime
 
 
 def limit(case: Case) -> Said | None:
     """Right where something is zero: what comes in with it is wrong."""
-    where = [name for name, found, expected in _at_zero(case) if not _empty(expected) and case.agree(found, expected)]
+    where = [name for name, found, expected in _near_zero(case, 0.0) if not _empty(expected) and case.agree(found, expected)]
+    if where and case.numeric:  # where nothing is brought in near zero either, that tells nothing
+        near = {name for name, found, expected in _near_zero(case, 0.01) if case.agree(found, expected)}
+        where = [name for name in where if name not in near]
     if not where:
         return None
     form = "`{}`" if case.numeric else "{}"
@@ -32,11 +35,11 @@ def limit(case: Case) -> Said | None:
     )
 
 
-def _at_zero(case: Case) -> Iterator[tuple[str, list[Any], list[Any]]]:
-    """For each argument, or symbol: both results where it is zero."""
+def _near_zero(case: Case, factor: float) -> Iterator[tuple[str, list[Any], list[Any]]]:
+    """For each argument, or symbol: both results where it is zero, or an argument is small."""
     if case.numeric:
         for place, name in enumerate(case.names):
-            called = case.sensitivity.called(place, lambda value: scaled(value, 0.0))
+            called = case.sensitivity.called(place, lambda value: scaled(value, factor))
             right, mine = ([pair[side][case.part] for pair in called] for side in (0, 1))
             if called and all(np.isfinite(one).all() and one.shape == two.shape for one, two in zip(mine, right, strict=True)):
                 yield name, mine, right
@@ -117,7 +120,7 @@ def terms(case: Case) -> Said | None:
     if theirs < mine:
         return "terms", "All terms that belong there are there, and something else besides."
     right = ", ".join(sorted(map(str, mine & theirs)))
-    more = "another is missing" if mine < theirs else "the rest is not"
+    more = "another is missing" if mine < theirs else "look at the rest"  # which may be right in another form, in part
     return "terms", f"Of your terms, multiplied out, {right} {'is' if len(mine & theirs) == 1 else 'are'} right; {more}."
 
 
@@ -183,13 +186,53 @@ def _fits(value: Any, wanted: Any, numeric: bool) -> bool:
     return isinstance(value, sp.Basic | int | float) or np.shape(value) == np.shape(wanted)
 
 
+CHANGES: tuple[tuple[str, Callable[[Any], Any]], ...] = (
+    ("twice {}", lambda v: 2 * v),
+    ("half of {}", lambda v: v / 2),
+    ("{} with the other sign", lambda v: -v),
+    ("the square of {}", lambda v: v**2),
+    ("the root of {}", lambda v: v**0.5),
+    ("1 less {}", lambda v: 1 - v),
+)
+
+
+def replaced(case: Case) -> Said | None:
+    """What the right answer gives with something else in the place of an argument, or of what an argument returns."""
+    right, _ = case.sensitivity.answers
+    for place, name in enumerate(case.names if case.numeric else ()):
+        for words, change in CHANGES:
+            for which in range(3) if callable(case.arguments[0][place]) else (None,):
+                try:
+                    results = []
+                    for values, wanted in zip(case.arguments, case.expected, strict=True):
+                        other = list(copy.deepcopy(values))
+                        other[place] = changed(other[place], change, which)
+                        result = right(*other)
+                        results.append(like(result[case.part] if case.sensitivity.several else result, wanted))
+                except (OutOfTime, KeyboardInterrupt):
+                    raise
+                except Exception:  # the right answer does not work for it
+                    continue
+                if case.agree(case.found, results) and not case.agree(case.expected, results):
+                    instead = f"`{name}`" if which is None else f"result {which + 1} of `{name}`"
+                    return "replaced", f"The right answer would give that with {words.format(instead)} in the place of {instead}."
+    return None
+
+
+REVERSED = "reversed", "All values are right, but in the reverse order."
+
+
 def ordered(case: Case) -> Said | None:
     """Right, but in another order, or a step too early or too late."""
+    if not case.numeric and len(case.formulas[0][1]) > 1:
+        for across in (False, True):
+            if case.agree([a[:, ::-1] if across else a[::-1, :] for a in case.found], case.expected):
+                return REVERSED
     if not case.numeric or not all(np.ndim(b) for b in case.expected):
         return None
     for axis in range(min(np.ndim(b) for b in case.expected)):
         if case.agree([np.flip(a, axis) for a in case.found], case.expected):
-            return "reversed", "All values are right, but in the reverse order."
+            return REVERSED
     square = all(b.ndim > 1 and b.shape[0] == b.shape[1] for b in case.expected)
     if square and case.agree([np.swapaxes(a, 0, 1) for a in case.found], case.expected):
         return "axes", "All values are right, but two axes are exchanged."
@@ -199,6 +242,39 @@ def ordered(case: Case) -> Said | None:
                 word = "late" if which.start else "early"
                 return "shifted", f"The values are right, but each stands one step too {word}."
     return None
+
+
+def differentiated(case: Case) -> Said | None:
+    """A derivative too many, or too few, or of another result."""
+    if case.numeric:
+        return None
+    for s in dict.fromkeys(v for values in case.arguments for v in values if isinstance(v, sp.Symbol)):
+        if case.agree([sp.diff(a, s) for a in case.found], case.expected):
+            return "not-differentiated", f"It has still to be differentiated by {s}."
+        for name, wanted in (("what should be there", case.expected), *case.others):
+            slopes = [sp.diff(b, s) for b in wanted]
+            shaped = all(np.shape(a) == np.shape(b) for a, b in zip(case.found, slopes, strict=True))
+            if shaped and not _empty(slopes) and case.agree(case.found, slopes):
+                return "derivative", f"It is the derivative of {name} by {s}."
+    return None
+
+
+def narrow(case: Case) -> Said | None:
+    """Right but for a factor, or a term, that is a number or depends on one symbol, where the right formula has more."""
+    if case.numeric or any(len(side[0]) > 1 for side in case.formulas):
+        return None
+    pairs = [(mine, theirs) for (mine,), (theirs,) in case.formulas]
+    everything = {name for _, theirs in pairs for name in _depends(theirs)}
+    for what, apart in (("factor", [a / b for a, b in pairs if b != 0]), ("term", [a - b for a, b in pairs])):
+        on = {name for one in apart for name in _depends(one)}
+        if len(apart) == len(pairs) and on < everything and len(on) < 2:
+            which = f"depends on {on.pop()} only" if on else "is a number"
+            return f"{what}-of", f"It is right but for a {what} that {which}."
+    return None
+
+
+def _depends(formula: sp.Expr) -> list[str]:
+    return depends(formula, {s.name for s in formula.free_symbols})
 
 
 def alike(case: Case) -> Said | None:
@@ -250,4 +326,17 @@ def direction(case: Case) -> Said | None:
     return "too-small", "It is too small wherever it is wrong: is something missing, or divided once too often?"
 
 
-RELATIONS: tuple[Callable[[Case], Said | None], ...] = (exchanged, ordered, alike, mixed, differs, limit, power, terms, direction)
+RELATIONS: tuple[Callable[[Case], Said | None], ...] = (
+    exchanged,
+    ordered,
+    alike,
+    mixed,
+    differs,
+    differentiated,
+    limit,
+    power,
+    narrow,
+    terms,
+    replaced,
+    direction,
+)

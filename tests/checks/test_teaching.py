@@ -7,7 +7,8 @@ import pytest
 import sympy as sp
 from tiny import NOTHING, asks, c, d, outcome, p, x, y, z
 
-from kfcourse.checks.engine import GENERAL, check
+from kfcourse.checks.diagnosis import GENERAL
+from kfcourse.checks.engine import check
 from kfcourse.checks.question import MIME, Attempts, Question, catalogue
 
 pytestmark = pytest.mark.quick

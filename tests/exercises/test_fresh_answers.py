@@ -186,6 +186,44 @@ def test_wrong_answers_are_told_something_true(name, variant, kinds, answer):
     assert result.diagnosis and set(result.diagnosis) <= set(kinds.split()), result
 
 
+def step_from(choose):
+    def answer(lam, Psi, y, measure, predict):
+        h, G, F = measure(lam, Psi)
+        K = gain(Psi, G, F)
+        z, p = lam + times(K, y - h), Psi - K @ G @ Psi
+        return z, p, *predict(*choose(z, p, lam, Psi))
+
+    return answer
+
+
+def mean_square(x, z):
+    return ((x - z) ** 2).sum(axis=2).mean(axis=1)
+
+
+def deviation(error):
+    return error[:, :, 0].std(axis=1, ddof=1) / np.sqrt(error.shape[1])
+
+
+def bayes(predicted, y, x, see):
+    mean, variance = see(x)
+    product = predicted * np.exp(-((y - mean) ** 2) / (2 * variance)) / np.sqrt(2 * np.pi * variance)
+    return product / product.sum() / (x[1] - x[0]), product.sum() * (x[1] - x[0])
+
+
+def moments_of(density, x):
+    weights = density / density.sum()
+    return weights / (x[1] - x[0]), weights @ x, weights @ (x - weights @ x) ** 2
+
+
+def first_moment_about_the_mean(density, x):
+    weights = density / density.sum()
+    return weights @ (x - weights @ x)
+
+
+def central(function, x, h):
+    return np.stack([(function(x + h * one) - function(x - h * one)) / (2 * h) for one in np.eye(x.shape[1])], axis=-1)
+
+
 FALSE = [
     ("a2", "20", "symmetric", WRONG[3][3]),
     ("b1", "53", "first step", lambda Psi, G, F: gain(Psi, G, F) + 0.1 * np.arange(len(Psi))[:, None, None]),
@@ -193,6 +231,20 @@ FALSE = [
     ("c4", "53", "depends on", lambda x, yd, y, mean, a, b: designed()(x, yd, y, mean, a, b) + mean**2),
     ("c2", "53", "transposed", with_ones),
     ("l1", "53", "does not depend", rates(lambda k, ratio, first: (k >= first) & (k % ratio == 0))),
+    # a mistake that this variant does not allow, or that is another one
+    ("a2", "5", "factor of the noise does not belong", lambda z, p: (c * z, c**2 * p)),
+    ("a6", "generated", "variance of the noise's factor", lambda m, d: 2 * q**2 * d**2),
+    ("b3", "5", "swapped", step_from(lambda z, p, lam, Psi: (lam, p))),
+    ("e1", "53", "first component", lambda x, z: (x - z)[:, :, 0].mean(axis=1)),
+    ("e2", "53", "first component", lambda x, z: (mean_square(x, z), deviation(x - z))),
+    ("f2", "53", "comes back unchanged", lambda q_, y, x, see: (bayes(q_, y, x, see)[0], 1.0)),
+    ("g1", "53", "higher order", lambda function, x, h: central(function, x, 1e-6)),
+    ("h1", "53", "step is missing", lambda S, N, step: (2 * S * step, 2 * N * step)),
+    ("k1", "53", "slow sensor is added", lambda S, y, eps: (S(y), sp.diff(S(y), y))),
+    ("k1", "53", "reversed", lambda S, y, eps: (-S(y - eps), -sp.diff(S(y - eps), eps))),
+    # what holds near the hidden arguments only
+    ("f5", "53", "does not depend", lambda a, b, sd, error: np.ceil((b - a) * sd * np.log(2 / error)) + 1),
+    ("f1", "5", "units", lambda density, x: (*moments_of(density, x)[:2], first_moment_about_the_mean(density, x))),
 ]
 
 
