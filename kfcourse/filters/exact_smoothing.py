@@ -108,7 +108,7 @@ def smoothed(
     for k in reversed(range(steps)):
         law, groups = densities.at(k), list(before(k))
         evidence = log_evidence(groups, y[k], law, posteriors[k])
-        found = _Step(runs)
+        found = Found(runs)
         for rows, kernels in groups:
             for chunk in chunks(len(rows), NODES[1] * kernels.mu.shape[1], ELEMENTS):
                 some = rows[chunk]
@@ -178,7 +178,7 @@ class Density:
             found = np.log(self.kernels.density(x, self.kernels.mass)[:, :, 0]) + by_measurement + np.log(later[:, :, 0])
         return np.where(np.isnan(found), -np.inf, found)
 
-    def resolve(self, grids: Sequence[Grid], rows: Array, found: _Step, accuracy: float) -> None:
+    def resolve(self, grids: Sequence[Grid], rows: Array, found: Found, accuracy: float) -> None:
         """Nodes for all, given the filter's posteriors: kept in `found`, in the places `rows`."""
         points = np.array([grid.density[0] >= SHARP for grid in grids])
         for i in np.flatnonzero(points).tolist():
@@ -253,7 +253,7 @@ class Density:
             logs = by_measurement + np.log(later[:, :, 0]) - np.log(total)
         return Nodes(x, length, mass, np.maximum(np.where(np.isnan(logs), -np.inf, logs), -DEAD), place, error)
 
-    def on_points(self, grid: Grid, row: int, found: _Step) -> None:
+    def on_points(self, grid: Grid, row: int, found: Found) -> None:
         """Of one trajectory whose meter has no noise: the same points with other masses."""
         x = grid.x[None]
         later = self.later(x)[:, :, 0]
@@ -280,7 +280,7 @@ class Nodes(NamedTuple):
     error: Array
 
 
-class _Step:
+class Found:
     """What has been found of one step, trajectory by trajectory."""
 
     def __init__(self, runs: int):

@@ -77,16 +77,16 @@ def robust(structure: Structure, degrees: float = 4.0, rounds: int = 10, edge: f
         expected = now.measure(*state.predicted)
         weight = np.ones(len(y))
         for _ in range(rounds):
-            posterior = correct(state.predicted, _trusted(expected, weight), y)
+            posterior = correct(state.predicted, trusted(expected, weight), y)
             weight = _weight(expected, state.predicted, posterior, y, degrees, edge)
-        posterior = correct(state.predicted, _trusted(expected, weight), y)
+        posterior = correct(state.predicted, trusted(expected, weight), y)
         missing = np.isnan(y).all(axis=-1)
         return State(state.step + 1, posterior, now.predict(*posterior), Trust(np.where(missing, np.nan, weight)))
 
     return Filter(f"robust-{structure.name}", structure.model, init, step, structure=structure)
 
 
-def _trusted(expected: Measurement, weight: Array) -> Measurement:
+def trusted(expected: Measurement, weight: Array) -> Measurement:
     """The measurement with the noise R / w."""
     R = expected.R / weight[:, None, None]
     return expected._replace(F=expected.F - expected.R + R, R=R)
@@ -94,12 +94,18 @@ def _trusted(expected: Measurement, weight: Array) -> Measurement:
 
 def _weight(expected: Measurement, prior: Gaussian, posterior: Gaussian, y: Array, degrees: float, edge: float | None) -> Array:
     """w, (runs,), at this posterior; 1 where nothing was measured."""
-    innovation, G, _, R = without_missing(expected.innovation(y), expected.G, expected.F, expected.R)
+    if edge is not None:
+        size = residual_square(expected, prior, posterior, y, unsure=False)
+        return np.minimum(1.0, edge / np.maximum(np.sqrt(size), 1e-300))  # 1 where nothing is left to explain
     present = (~np.isnan(y)).sum(axis=-1)
+    size = residual_square(expected, prior, posterior, y)
+    return np.where(present > 0, (1 + present / degrees) / (1 + size / degrees), 1.0)
+
+
+def residual_square(expected: Measurement, prior: Gaussian, posterior: Gaussian, y: Array, unsure: bool = True) -> Array:
+    """r^T R^-1 r, (runs,), of what was measured; with tr R^-1 G p G^T, its mean square over the posterior, by default."""
+    innovation, G, _, R = without_missing(expected.innovation(y), expected.G, expected.F, expected.R)
     residual = innovation - apply(G, posterior.mean - prior.mean)
     precision = gain(np.eye(R.shape[-1]), R)
     size = (apply(precision, residual) * residual).sum(axis=-1)
-    if edge is not None:
-        return np.minimum(1.0, edge / np.maximum(np.sqrt(size), 1e-300))  # 1 where nothing is left to explain
-    unsure = (precision * product(product(G, posterior.cov), transpose(G))).sum(axis=(-2, -1))
-    return np.where(present > 0, (1 + present / degrees) / (1 + (size + unsure) / degrees), 1.0)
+    return size + (precision * product(product(G, posterior.cov), transpose(G))).sum(axis=(-2, -1)) if unsure else size

@@ -15,7 +15,7 @@ from kfcourse.checks import Exercise, ExerciseError, exercise, sets
 from kfcourse.checks.steps import at_step
 from kfcourse.lab.variants import read_variant
 from kfcourse.notebooks.grading import marking, submissions
-from kfcourse.notebooks.grading.running import Place
+from kfcourse.notebooks.grading.running import Site
 from kfcourse.notebooks.grading.sandbox import Sandbox
 from kfcourse.notebooks.master import read, render, solution, student
 from kfcourse.symbolic.quadrature import QuadratureWarning
@@ -168,7 +168,7 @@ def test_returned_notebooks_are_graded(tmp_path):
         f"parameters = {{ {numbers} }}\n{inputs}\n",
         encoding="utf-8",
     )
-    setting = marking.Setting(Place(Path("stage"), Sandbox("none")), "salt")
+    setting = marking.Setting(Site(Path("stage"), Sandbox("none")), "salt")
     found = {
         work.path.stem: marking.grade(work, setting, start=InsideKernel)
         for work in submissions.returned(tmp_path, variants_file=variants)

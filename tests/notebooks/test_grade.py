@@ -22,7 +22,7 @@ from kfcourse.notebooks.course_list import Student
 from kfcourse.notebooks.grading import course, marking, running, submissions
 from kfcourse.notebooks.grading.assembly import assembled
 from kfcourse.notebooks.grading.marking import code_of
-from kfcourse.notebooks.grading.running import Place
+from kfcourse.notebooks.grading.running import Site
 from kfcourse.notebooks.grading.sandbox import Sandbox
 from kfcourse.notebooks.grading.submissions import Cell, Unreadable, cells_of, claimed
 from kfcourse.notebooks.grading.table import RUNNING, WAITING, Grade, Told, grade_all, read_table, write_table
@@ -31,7 +31,7 @@ from kfcourse.notebooks.master import read, render, solution, student
 FIXTURES = Path(__file__).parent / "fixtures"
 TINY = (FIXTURES / "b_aof" / "statement.md").read_text(encoding="utf-8")
 SECONDS = 15  # of a cell; the endless loop below takes so long
-SETTING = marking.Setting(Place(Path("stage"), Sandbox("none")), "salt")
+SETTING = marking.Setting(Site(Path("stage"), Sandbox("none")), "salt")
 MARKS = {f"b{i}": mark for i, mark in enumerate(("passed", "wrong", "unusable", "not implemented", "not run"), 1)}
 NEW = ("not implemented", "not implemented")
 

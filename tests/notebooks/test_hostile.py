@@ -19,7 +19,7 @@ from kfcourse.notebooks.grading import keeper, marking, pool, running
 from kfcourse.notebooks.grading.assembly import Step
 from kfcourse.notebooks.grading.marking import Marking
 from kfcourse.notebooks.grading.pool import Family, Worker
-from kfcourse.notebooks.grading.running import Kernel, Opening, Place
+from kfcourse.notebooks.grading.running import Kernel, Opening, Site
 from kfcourse.notebooks.grading.sandbox import Sandbox, chosen
 from kfcourse.notebooks.grading.staging import answers, personal_numbers, stage
 from kfcourse.notebooks.grading.submissions import returned
@@ -50,7 +50,7 @@ def staged(tmp_path_factory):
 
 def kernel_in(sandbox, staged, seconds=120.0, task=TASK):
     opening = Opening(task.letter, opened(task), personal_numbers(task))
-    return Kernel(Place(staged, sandbox), opening, seconds)
+    return Kernel(Site(staged, sandbox), opening, seconds)
 
 
 OPEN = Step("import numpy as np\nfrom kfcourse.checks import exercise\ntask = exercise('b', '53')", "opening")
@@ -218,7 +218,7 @@ def test_who_kills_its_process_is_named_and_the_next_is_graded(staged, tmp_path)
             daemon = filled(PROCESSES["leaves a daemon"], FLAG=str(tmp_path / f"flag{name}"))
             cell(notebook, "import matplotlib").source += "\n" + daemon + PROCESSES[trick]
         (tmp_path / f"{name}.ipynb").write_text(json.dumps(notebook), encoding="utf-8")
-    worker = Worker(marking.Setting(Place(staged, Sandbox("none")), SALT), Family())
+    worker = Worker(marking.Setting(Site(staged, Sandbox("none")), SALT), Family())
     try:
         grades = [worker(work) for work in returned(tmp_path, masters=FIXTURES)]
     finally:
@@ -260,7 +260,7 @@ def test_a_killed_notebook_is_run_again_then_not_graded(staged, tmp_path, kind, 
     marks = []
     for times in (1, 2):
         marking, shot = Marking(TASK, SALT, (), lambda _: None), type("", (Shot,), {"at": at, "times": times})
-        with shot(Place(staged, sandbox), Opening(TASK.letter, opened(TASK), personal_numbers(TASK))) as kernel:
+        with shot(Site(staged, sandbox), Opening(TASK.letter, opened(TASK), personal_numbers(TASK))) as kernel:
             stopped = marking.run(kernel, [OPEN, Step(source, "answer", own=True), CHECK])
         assert kernel.times == 0
         marks.append(marking.marks["b1"])
@@ -277,7 +277,7 @@ def test_a_killed_grading_process_asks_again(staged, tmp_path, monkeypatch, time
     cell(notebook, "def correct").source = cell(notebook, "def correct").source.replace("gain(Psi, G, F)", "other(Psi, G, F)")
     cell(notebook, "import matplotlib").source += "\n" + RIGHT.replace("gain", "other")
     (tmp_path / "x.ipynb").write_text(json.dumps(notebook), encoding="utf-8")
-    worker, asked = Worker(marking.Setting(Place(staged, Sandbox("none")), SALT), Family()), []
+    worker, asked = Worker(marking.Setting(Site(staged, Sandbox("none")), SALT), Family()), []
 
     def wait(channel, *arguments):
         message = waited(channel, *arguments)
@@ -345,7 +345,7 @@ def test_an_answer_that_stops_or_ends_the_grading_process_is_left_out(tmp_path, 
     monkeypatch.setattr(pool, "START", 3.0)
     monkeypatch.setattr(pool, "QUIET", 0.0)
     (tmp_path / "x.ipynb").write_text("{}", encoding="utf-8")
-    worker = Worker(marking.Setting(Place(staged, Sandbox("none")), SALT), Fake())
+    worker = Worker(marking.Setting(Site(staged, Sandbox("none")), SALT), Fake())
     (work,) = returned(tmp_path, seconds=0.0)
     try:
         assert worker(work).marks == {"b1": "b1,b2"}

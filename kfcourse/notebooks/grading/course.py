@@ -18,7 +18,7 @@ from kfcourse.notebooks.grading.marking import Setting
 from kfcourse.notebooks.grading.owners import Person, owner
 from kfcourse.notebooks.grading.pool import grading
 from kfcourse.notebooks.grading.report import write_report
-from kfcourse.notebooks.grading.running import Place
+from kfcourse.notebooks.grading.running import Site
 from kfcourse.notebooks.grading.sandbox import HELD, chosen
 from kfcourse.notebooks.grading.staging import answers, stage
 from kfcourse.notebooks.grading.submissions import Unreadable, read_document, returned
@@ -58,7 +58,7 @@ def grade_folder(
         hidden = [Path(str(resources.files("kfcourse"))), *answers(), folder.resolve(), *([masters] if masters else [])]
         held = chosen(sandbox, hidden, place, staged)
         salt = seed or secrets.token_hex(8)
-        with grading(Setting(Place(staged, held), salt), workers) as graded:
+        with grading(Setting(Site(staged, held), salt), workers) as graded:
             grades, old = grade_all(work, table, again, graded)
     _show(grades)
     click.echo(f"\n{len(grades) - old} run, {old} unchanged since the last table. Table: {table}")

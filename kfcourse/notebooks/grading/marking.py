@@ -24,7 +24,7 @@ from kfcourse.checks.question import NOT_CHECKED, UNUSABLE, WRONG
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.notebooks.grading.asking import salted
 from kfcourse.notebooks.grading.assembly import Step, assembled, generated
-from kfcourse.notebooks.grading.running import WHOLE, Answer, Ended, Kernel, Killed, Opening, Place, Stopped
+from kfcourse.notebooks.grading.running import WHOLE, Answer, Ended, Kernel, Killed, Opening, Site, Stopped
 from kfcourse.notebooks.grading.staging import opened_elsewhere, personal_numbers
 from kfcourse.notebooks.grading.submissions import Cell, Returned, cells_of, claimed, openings, read_document, syntax
 from kfcourse.notebooks.grading.table import FAILED, GRADED, NOT_GRADED, NOT_RUN, OTHER, PARTLY, Grade, Told
@@ -44,12 +44,12 @@ class Setting:
 
     Attributes
     ----------
-    place : Place
+    place : Site
     salt : str
         Of the hidden arguments.
     """
 
-    place: Place
+    place: Site
     salt: str
 
 

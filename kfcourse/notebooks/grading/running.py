@@ -66,7 +66,7 @@ class Ran(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Place:
+class Site:
     """Where notebooks run.
 
     Attributes
@@ -85,13 +85,13 @@ class Kernel:
 
     Parameters
     ----------
-    place : Place
+    place : Site
     opening : Opening
     seconds : float
         Time limit of a cell; all cells may take five times as long.
     """
 
-    def __init__(self, place: Place, opening: Opening, seconds: float = SECONDS):
+    def __init__(self, place: Site, opening: Opening, seconds: float = SECONDS):
         self.notes: list[str] = []
         self._place, self._opening, self._seconds = place, opening, seconds
         self._deadline = float("inf")

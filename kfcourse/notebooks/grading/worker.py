@@ -14,7 +14,7 @@ from typing import Any
 from kfcourse.checks import sets
 from kfcourse.notebooks.grading import keeper, marking
 from kfcourse.notebooks.grading.channel import Channel, Closed
-from kfcourse.notebooks.grading.running import MEMORY, Place
+from kfcourse.notebooks.grading.running import MEMORY, Site
 from kfcourse.notebooks.grading.sandbox import Sandbox
 from kfcourse.notebooks.grading.session import limit
 from kfcourse.notebooks.grading.submissions import Returned
@@ -43,7 +43,7 @@ def returned_of(data: dict[str, Any]) -> Returned:
 def setting_of(data: dict[str, Any]) -> marking.Setting:
     """Where and how."""
     sandbox = data["place"]["sandbox"]
-    return marking.Setting(Place(Path(data["place"]["stage"]), Sandbox(sandbox["kind"], tuple(sandbox["hidden"]))), data["salt"])
+    return marking.Setting(Site(Path(data["place"]["stage"]), Sandbox(sandbox["kind"], tuple(sandbox["hidden"]))), data["salt"])
 
 
 def grade_of(data: dict[str, Any]) -> Grade:
