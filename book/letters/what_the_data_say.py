@@ -44,4 +44,5 @@ SAID = {
     r"p(y_0,\dots,y_N)=\prod_kp(y_k\mid y_0,\dots,y_{k-1})": STATED,
     r"\ln p(y_0)+\ln p(y_1\mid y_0)": NOTATION,
     r"\ln p(y_0,y_1)": NOTATION,
+    r"\mathsf M r_k^2": NOTATION,
 }
