@@ -11,13 +11,12 @@ looking_back            what the whole record tells of each state (exact_smoothi
 particles               the same by sampling;  proposals: where to look;  densities, inverted: what all need
 iterated_ekf            the meter linearised again at the estimate
 gate, heavy_tails       measurements that are not believed: refused, by any filter; weighted
-adaptive                a noise of unknown size, learnt on the way
+learnt_noise            a noise of unknown size, learnt on the way
 alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving (IMM)
 notation                symbols in which the equations are printed
 """
 
-from kfcourse.filters.adaptive import adaptive
 from kfcourse.filters.alphabeta import alpha_beta, alpha_beta_gamma
 from kfcourse.filters.approximations import EQUATIONS as _AOF
 from kfcourse.filters.approximations import aof
@@ -31,6 +30,7 @@ from kfcourse.filters.gate import gated
 from kfcourse.filters.heavy_tails import robust
 from kfcourse.filters.iterated_ekf import iterated
 from kfcourse.filters.kalman import kalman_filter
+from kfcourse.filters.learnt_noise import adaptive
 from kfcourse.filters.modified_structure import EQUATIONS as _MFOS
 from kfcourse.filters.modified_structure import mfos
 from kfcourse.filters.multiple_models import imm

@@ -52,7 +52,7 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: Seed) -> Array:
     Examples
     --------
     >>> posterior_bound(Model.define("0.9*x + v", "x + 2*w"), runs=10, steps=2, seed=1).ravel().round(4).tolist()
-    [0.8, 1.1673]
+    [0.8, 1.1671]
     """
     object_ = _information(model, model.state_equation, model.v, model.state_noise, "state")
     meter = _information(model, model.meter_equation, model.w, model.meter_noise, "meter")

@@ -17,7 +17,7 @@ BY_VALUE = set(
         "mixed",
     ]
 )
-BY_VALUE |= set(["factor", "term", "too-large", "too-small"])
+BY_VALUE |= set(["diagonal", "factor", "term", "too-large", "too-small", "vanishing"])
 
 
 def test_right_answers_pass(told, name, answer):

@@ -120,7 +120,7 @@ WRONG = [
     ("k1", "unused sometimes reading-subtracted", k1(velocity=lambda y, eps: -eps)),
     ("k1", "sometimes", lambda signal, y, eps: (y - eps, sp.Integer(-1))),
     ("k1", "reading-minus-signal sometimes", lambda signal, y, eps: (signal(y) - signal(eps), -sp.diff(signal(eps), eps))),
-    ("k1", "slope-sign", lambda signal, y, eps: (signal(y - eps), sp.diff(signal(y), y))),
+    ("k1", "slope-sign unused", lambda signal, y, eps: (signal(y - eps), sp.diff(signal(y), y))),
     ("k1", "reading-minus-signal", lambda signal, y, eps: (signal(y - eps), -sp.diff(signal(eps), eps))),
     ("k1", "sometimes", lambda signal, y, eps: (signal(y - eps), sp.Integer(-1))),
     ("k1", "sometimes", lambda signal, y, eps: (signal(y) - eps, sp.Integer(-1))),
