@@ -134,9 +134,8 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
     for key in ("parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs"):
         if key in table and not isinstance(table[key], Mapping):
             raise VariantError(f"{prefix}`{key}` must be a table such as {{ c = 0.9 }}, got {shown(table[key])}")
-    options = {key: value for key, value in table.items() if key not in ("title", "state", "meter", "parameters")}
     try:
-        model = Model.define(table["state"], table["meter"], table.get("parameters"), **options)
+        model = Model.of_table(table)
     except (ValueError, TypeError, OverflowError) as error:  # FormulaError and ModelError are ValueErrors
         raise VariantError(f"{prefix}{error}") from None
     if problem := nothing_random(model):

@@ -10,9 +10,9 @@ With the normal laws of a nonlinear filter ln p is an approximation, and so is t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -57,7 +57,7 @@ def _normal_filter(model: Model) -> Filter:
 
 
 def estimate(
-    model: Model,
+    model: Model | Mapping[str, Any],
     y: Array,
     unknown: Sequence[str],
     positive: Sequence[str] = (),
@@ -67,7 +67,7 @@ def estimate(
 
     Parameters
     ----------
-    model : Model
+    model : Model, or a table as of [variants.NAME]
         Its values are where the search begins.  Variances are parameters too: `meter_noise={"variance": "r"}`.
     y : ndarray (steps, runs, p)
         As for `run`; several runs are independent records of the same object.
@@ -97,6 +97,7 @@ def estimate(
     >>> [round(value, 1) for value in found.value.tolist()], round(found.log_likelihood, 4)
     ([1468.5, 15099.7], -641.5856)
     """
+    model = model if isinstance(model, Model) else Model.of_table(model)
     names, logs, start = _checked(model, unknown, positive)
     # Coordinates: the logarithm of what is positive; what may have any sign in units of its start.
     unit = np.where(logs | (start == 0), 1.0, np.abs(start))

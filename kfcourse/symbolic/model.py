@@ -206,6 +206,16 @@ class Model:
         values = dict(self.parameters) | {name: exact_number(name, value) for name, value in parameters.items()}
         return dataclasses.replace(self, parameters=values)
 
+    @classmethod
+    def of_table(cls, table: Mapping[str, Any]) -> Model:
+        """The model of a table such as [variants.53]: its keys are the arguments of `define`; a title is no part of the model."""
+        try:
+            state, meter = table["state"], table["meter"]
+        except (KeyError, TypeError):
+            raise ModelError(f"expected a table with state and meter, got {shown(table)}") from None
+        options = {key: value for key, value in table.items() if key not in ("title", "state", "meter", "parameters")}
+        return cls.define(state, meter, table.get("parameters"), **options)
+
     def with_inputs(self, inputs: Mapping[str, Sequence[float] | Array]) -> Model:
         """The same model with other values of its inputs, or of the time t: those of a record.
 
