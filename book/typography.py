@@ -10,7 +10,9 @@ from sphinx.transforms.post_transforms import SphinxPostTransform
 UNIT = r"(?:%|°|(?:[kMG]?Hz|[kMG]?B|dB|px|deg|m?rad|CPU-s|[km]?m|m?s|min|h)(?:/(?:s|min|h))?[²³]?(?![\w-]))"
 AFTER_A_NUMBER = re.compile(rf"(?<=\d) (?={UNIT})|(?<=\d) (?=/ {UNIT})|(?<=\d /) (?={UNIT})|(?<=\d) (?=±)|(?<=±) (?=\d)")
 AFTER_A_FORMULA = re.compile(rf"^ (?={UNIT})")
-UNTOUCHED = (nodes.literal, nodes.literal_block, nodes.math, nodes.math_block, nodes.raw)
+UNTOUCHED = (nodes.literal, nodes.literal_block, nodes.math, nodes.math_block)
+BETWEEN_TAGS = re.compile(r"(?:^|(?<=>))[^<]+")  # of HTML that cells write themselves
+NO_TEXT = re.compile(r"<(script|style|svg|pre)\b")
 
 
 class TogetherWithUnits(SphinxPostTransform):
@@ -24,11 +26,18 @@ class TogetherWithUnits(SphinxPostTransform):
             if text.parent is None or isinstance(text.parent, UNTOUCHED):
                 continue
             place = text.parent.children.index(text)
-            found = AFTER_A_NUMBER.sub("\N{NO-BREAK SPACE}", text)
+            if isinstance(text.parent, nodes.raw):
+                found = text if NO_TEXT.search(text) else BETWEEN_TAGS.sub(lambda part: _together(part[0]), text)
+            else:
+                found = _together(text)
             if place and isinstance(text.parent[place - 1], nodes.math):
                 found = AFTER_A_FORMULA.sub("\N{NO-BREAK SPACE}", found)
             if found != text:
                 text.parent.children[place] = nodes.Text(found)
+
+
+def _together(text: str) -> str:
+    return AFTER_A_NUMBER.sub("\N{NO-BREAK SPACE}", text)
 
 
 def setup(app) -> dict[str, bool]:
