@@ -16,6 +16,7 @@ from kfcourse.symbolic.model import Model
 
 WIDTHS = (1.0, 1.5, 2.0, 3.0)  # that are tried
 RUNS = 2048  # trajectories of the pilot
+LOST = 0.5  # part of the mean square of the states that a single one may make
 
 
 def best_width(filters: Sequence[Filter], model: Model, runs: int, steps: int, seed: np.random.SeedSequence) -> float:
@@ -23,7 +24,8 @@ def best_width(filters: Sequence[Filter], model: Model, runs: int, steps: int, s
 
     A mean of w f over states drawn from q, with w = p / q, varies as M_q[(w f)^2] = M_p[w f^2] does.  So one sample, drawn with
     the largest width, tells it for all of them.  What is least is the mean of its logarithm over filters and steps.  A model
-    whose far states lead out of the finite numbers has them drawn from the prior.
+    whose far states lead out of the finite numbers, or to where one of them counts for more than all others though the prior
+    hardly ever has it, has them drawn from the prior.
     """
     if model.angles.x or not np.any(model.prior.cov):
         return 1.0
@@ -40,6 +42,9 @@ def best_width(filters: Sequence[Filter], model: Model, runs: int, steps: int, s
                 states = [one.step(state, y) for one, state in zip(filters, states, strict=True)]
             except (ValueError, ArithmeticError, np.linalg.LinAlgError):
                 return 1.0  # which filter it is is said where all of them run
+            square = weights[-1] * (x * x).sum(axis=1)
+            if square.max() > LOST * square.sum():
+                return 1.0
             first = states[0].posterior.mean
             for other in (x, *(state.posterior.mean for state in states[1:])):
                 square = ((first - other) ** 2).sum(axis=1)

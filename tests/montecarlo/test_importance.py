@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from kfcourse import Ensemble, Model, compare, lab_filters
+from kfcourse import Ensemble, Model, compare, lab_filters, load_variants
 from kfcourse.filters import aof, kalman_filter
 from kfcourse.lab import LAB
+from kfcourse.montecarlo.widths import best_width
 from kfcourse.symbolic.structure import gaussian
 
 SIGMA = 4
@@ -101,3 +102,11 @@ def test_a_variance_that_serves_all_trajectories_is_weighted_too():
     result = compare([one, each], model, 2000, 2, 1, wide=2, progress=False)
     for k in range(2):
         assert result.own_variance("aof-gaussian").value[k] == pytest.approx(result.own_variance("kalman").value[k], rel=1e-12)
+
+
+def test_states_that_the_prior_hardly_ever_has_are_not_drawn_where_they_lead_astray():
+    """x - 0.05 x^3 leaves for ever from beyond 6.3, nine deviations of the prior away; variant 53's far states are what matters."""
+    for name, wide in (("8", False), ("53", True)):
+        model = load_variants()[name].model
+        found = best_width(lab_filters(model, ["aof-gaussian", "aof-linearised"]), model, 20_000, 6, np.random.SeedSequence(1))
+        assert (found > 1) == wide
