@@ -16,7 +16,9 @@ from kfcourse.symbolic.model import Model
 
 WIDTHS = (1.0, 1.5, 2.0, 3.0)  # that are tried
 RUNS = 2048  # trajectories of the pilot
-LOST = 0.5  # part of the mean square of the states that a single one may make
+REACH = 5.0  # width with which so few reach as far as many do with the largest of them
+RARE = 1e-6  # weight of a state that the prior hardly ever has: six deviations away
+LOST = 0.5  # part of the mean square of the states that such may make
 
 
 def best_width(filters: Sequence[Filter], model: Model, runs: int, steps: int, seed: np.random.SeedSequence) -> float:
@@ -24,10 +26,12 @@ def best_width(filters: Sequence[Filter], model: Model, runs: int, steps: int, s
 
     A mean of w f over states drawn from q, with w = p / q, varies as M_q[(w f)^2] = M_p[w f^2] does.  So one sample, drawn with
     the largest width, tells it for all of them.  What is least is the mean of its logarithm over filters and steps.  A model
-    whose far states lead out of the finite numbers, or to where one of them counts for more than all others though the prior
-    hardly ever has it, has them drawn from the prior.
+    whose far states lead out of the finite numbers, or to where they count for more than all others though the prior
+    hardly ever has them, has them drawn from the prior.
     """
     if model.angles.x or not np.any(model.prior.cov):
+        return 1.0
+    if _astray(Ensemble(model, RUNS, steps, seed, REACH)):
         return 1.0
     *laws, widest = (Ensemble(model, min(runs, RUNS), steps, seed, wide) for wide in WIDTHS)
     loss, weights = np.zeros(len(WIDTHS)), np.empty((len(WIDTHS), widest.sizes[0]))
@@ -42,9 +46,6 @@ def best_width(filters: Sequence[Filter], model: Model, runs: int, steps: int, s
                 states = [one.step(state, y) for one, state in zip(filters, states, strict=True)]
             except (ValueError, ArithmeticError, np.linalg.LinAlgError):
                 return 1.0  # which filter it is is said where all of them run
-            square = weights[-1] * (x * x).sum(axis=1)
-            if square.max() > LOST * square.sum():
-                return 1.0
             first = states[0].posterior.mean
             for other in (x, *(state.posterior.mean for state in states[1:])):
                 square = ((first - other) ** 2).sum(axis=1)
@@ -54,3 +55,15 @@ def best_width(filters: Sequence[Filter], model: Model, runs: int, steps: int, s
                 if second.all():  # not so for a filter that is the same as the first
                     loss += np.log(second)
     return WIDTHS[int(np.argmin(loss))]
+
+
+def _astray(far: Ensemble) -> bool:
+    """Whether far states that the prior hardly ever has count for more than all others, or leave the finite numbers."""
+    with np.errstate(all="ignore"):
+        for k, (x, _, _) in enumerate(far.block(0)):
+            if k == 0:
+                weight = np.ones(len(x)) if (found := far.weight(x)) is None else found
+            square = weight * (x * x).sum(axis=1)
+            if not square[weight < RARE].sum() <= LOST * square.sum() < np.inf:
+                return True
+    return False
