@@ -194,8 +194,8 @@ def test_the_exact_filter_on_a_model_beyond_its_budget_is_left_out_within_second
     model = Model.define("x**3 + 1e-6*v", "x + w")
     start = time.monotonic()
     filters = [aof(linearised(model)), pointmass(model)]
-    result = compare(filters, model, 112, 2, 1, subset_runs=112, subset_seconds=5, progress=False)
-    assert time.monotonic() - start < 30  # 5 s of budget, and a slow machine
+    result = compare(filters, model, 112, 2, 1, subset_runs=112, subset_seconds=30, progress=False)
+    assert time.monotonic() - start < 60  # its nodes end it after 3 s, or ten times that on a slow machine
     assert re.search(r"^step \d of Model\(x' = .* nodes.*--exact-runs 0", result.left_out["aof-exact"])
 
 
