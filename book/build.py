@@ -18,6 +18,7 @@ from pathlib import Path
 import chapters
 import equations
 import manual
+import package
 
 from kfcourse.files import package_digest
 
@@ -60,6 +61,7 @@ def main() -> int:
         print(NOT_BUILT, file=sys.stderr)
         return 1
     manual.write()
+    package.write()
     made = chapters.executed(CACHE)
     equations.PAGE.write_text(equations.page((name, equations.records(notebook)) for name, notebook in made), encoding="utf-8")
     jupyter_book = [sys.executable, "-c", "from jupyter_book.cli.main import main; main()"]

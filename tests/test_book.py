@@ -23,8 +23,10 @@ ROOT = Path(__file__).resolve().parent.parent
 HTML = ROOT / "_build" / "html"
 EXECUTED = ROOT / "_build" / "jupyter_execute"
 TOC = yaml.safe_load((ROOT / "book" / "_toc.yml").read_text(encoding="utf-8"))
-PAGES = [TOC["root"], *(chapter["file"] for part in TOC["parts"] for chapter in part["chapters"])]
-NOTEBOOKS = [page for page in PAGES if "{code-cell}" in (ROOT / "book" / f"{page}.md").read_text(encoding="utf-8")]
+CHAPTERS = [chapter for part in TOC["parts"] for chapter in part["chapters"]]
+SHELF = [TOC["root"], *(chapter["file"] for chapter in CHAPTERS)]
+PAGES = [*SHELF, *(section["file"] for chapter in CHAPTERS for section in chapter.get("sections", []))]
+NOTEBOOKS = [page for page in SHELF if "{code-cell}" in (ROOT / "book" / f"{page}.md").read_text(encoding="utf-8")]
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chromium-browser"))), None)
 LOCAL = ("file:", "data:", "blob:")
 LOADS = {"script": "src", "link": "href", "img": "src", "iframe": "src", "source": "src", "object": "data", "image": "href"}
@@ -64,9 +66,7 @@ def test_page_exists_and_loads_only_local_files(page: str) -> None:
         assert (path.parent / re.split("[?#]", address)[0]).exists(), f"{page} loads {address}, which is not there"
 
 
-@pytest.mark.parametrize(
-    "chapter", [c for part in TOC["parts"] for c in part["chapters"] if "title" in c], ids=lambda c: c["file"]
-)
+@pytest.mark.parametrize("chapter", [chapter for chapter in CHAPTERS if "title" in chapter], ids=lambda c: c["file"])
 def test_a_page_is_called_in_the_contents_what_it_is_called_itself(chapter) -> None:
     page = (HTML / f"{chapter['file']}.html").read_text(encoding="utf-8")
     title = unescape(re.search(r"<title>(?:\d+\. )?(.*?) &#8212;", page)[1]).strip("★ ")
@@ -298,7 +298,7 @@ def test_an_address_that_does_not_exist(window):
     tab, _ = window
     tab.goto((HTML / "404.html").as_uri())
     links = tab.locator("nav a")
-    assert links.count() == len(PAGES) - 1
+    assert links.count() == len(SHELF) - 1
     for address in links.evaluate_all("links => links.map((link) => link.href)"):
         assert Path(unquote(urlsplit(address).path)).exists(), address
 
