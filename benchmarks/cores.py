@@ -2,8 +2,8 @@
 
     .venv/bin/python benchmarks/cores.py [--variants 53 20] [--runs 4000] [--steps 51] [--cores 1 2] [--repeats 3]
 
-The exact filter, or the particles that stand for it, beside the linearised AOF, as `kfcourse lab` runs them.  Of several times the
-shortest is taken; nothing else should run meanwhile.
+The exact filter, or the particles that stand for it, beside the linearised AOF, as `kfcourse lab` runs them.  Of several times
+the shortest is taken; nothing else should run meanwhile.
 """
 
 from __future__ import annotations

@@ -22,6 +22,7 @@ from multiprocessing.connection import Connection, Pipe
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 FORK = sys.platform == "linux"
 START = 0.5 if FORK else 5.0  # seconds of work that are worth the start of processes
@@ -41,12 +42,17 @@ def may_start() -> bool:
     return not multiprocessing.current_process().daemon
 
 
-def load_libraries() -> None:
-    """What limits must not stop half-way: parts of SciPy, and OpenBLAS' buffers, without which it ends the process."""
+def one_thread() -> threadpool_limits:
+    """Linear algebra in one thread from now on, or in a block: on small matrices others only wait, and take a core for it.
+
+    What limits must not stop half-way is loaded first: parts of SciPy, and OpenBLAS' buffers, without which it ends the process.
+    """
     for part in ("linalg", "ndimage", "special"):
         import_module(f"scipy.{part}")
+    limits = threadpool_limits(1, "blas")
     square = np.eye(512)
     np.linalg.cholesky(np.linalg.solve(square, square) @ square)
+    return limits
 
 
 @contextmanager
@@ -91,7 +97,7 @@ def _begin(work: Callable[..., Any]) -> None:
     global _work
     _work = work
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends this process
-    load_libraries()
+    one_thread()
 
 
 def _begin_fork(work: Callable[..., Any], over: Connection, end: Connection) -> None:

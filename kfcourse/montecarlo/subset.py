@@ -30,7 +30,7 @@ from kfcourse.limits import OutOfTime, memory_limit, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Subset
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import STRATA, Ensemble, Instant, Serial
-from kfcourse.montecarlo.processes import START, Submit, load_libraries, may_start, processes
+from kfcourse.montecarlo.processes import START, Submit, may_start, one_thread, processes
 from kfcourse.montecarlo.statistics import Sums
 
 BATCH = STRATA  # trajectories of a batch: their initial states share the prior out among them
@@ -84,35 +84,35 @@ def run_subset(
     them, or with what runs instead.
     """
     data = _first(ensemble, size)
-    load_libraries()
-    end = None if seconds is None else time.monotonic() + seconds
     left_out: dict[str, str] = {}
     replaced: dict[str, str] = {}
     chosen = {one.name: one for one in slow}
     if size < FEWEST and EXACT in chosen:
         left_out[EXACT] = f"on {size} trajectories the rare ones that matter are missing: take at least {FEWEST}, or 0"
-    while running := [one for name, one in chosen.items() if name not in left_out]:
-        names = [one.name for one in running]
-        try:
-            sums = _chunks_in_time([*fast, *running], ensemble, data, end, memory, jobs, progress, back)
-        except _Failed as failed:
-            other = chosen[failed.name].instead
-            (left_out if other is None else replaced)[failed.name] = failed.reason
-            chosen[failed.name] = other or chosen[failed.name]
-            continue
-        except BrokenProcessPool:
-            why = "a process that computed it was killed, perhaps as memory ran out: take fewer jobs at once, or less memory"
-            return None, left_out | dict.fromkeys(names, why)
-        done = sum(int(one.counts.sum()) for one in sums)
-        found = Subset(names, Sums.concatenate(sums), replaced) if sums else None
-        if found and (done >= FEWEST or EXACT not in names):
-            return found, left_out
-        reason = f"{done or min(size, CHUNKS[0])} trajectories take {'' if done else 'more than '}{seconds:g} s"
-        if not found:
-            return None, left_out | dict.fromkeys(names, reason)
-        left_out[EXACT] = f"{reason}, and of fewer than {FEWEST} the rare ones that matter are missing: give it more time"
-        return found.without_exact(), left_out
-    return None, left_out
+    with one_thread():
+        end = None if seconds is None else time.monotonic() + seconds
+        while running := [one for name, one in chosen.items() if name not in left_out]:
+            names = [one.name for one in running]
+            try:
+                sums = _chunks_in_time([*fast, *running], ensemble, data, end, memory, jobs, progress, back)
+            except _Failed as failed:
+                other = chosen[failed.name].instead
+                (left_out if other is None else replaced)[failed.name] = failed.reason
+                chosen[failed.name] = other or chosen[failed.name]
+                continue
+            except BrokenProcessPool:
+                why = "a process that computed it was killed, perhaps as memory ran out: take fewer jobs at once, or less memory"
+                return None, left_out | dict.fromkeys(names, why)
+            done = sum(int(one.counts.sum()) for one in sums)
+            found = Subset(names, Sums.concatenate(sums), replaced) if sums else None
+            if found and (done >= FEWEST or EXACT not in names):
+                return found, left_out
+            reason = f"{done or min(size, CHUNKS[0])} trajectories take {'' if done else 'more than '}{seconds:g} s"
+            if not found:
+                return None, left_out | dict.fromkeys(names, reason)
+            left_out[EXACT] = f"{reason}, and of fewer than {FEWEST} the rare ones that matter are missing: give it more time"
+            return found.without_exact(), left_out
+        return None, left_out
 
 
 def _chunks_in_time(
@@ -206,15 +206,15 @@ class _Work:
         """
         running: deque[tuple[int, Future[tuple[Sums, float] | MemoryError | None]]] = deque()
         while not (until_long and self.long()):
-            while sum(not future.done() for _, future in running) < jobs:
-                ahead = self.start + sum(count for count, _ in running)
-                if not (count := self.next(len(self.found) + len(running), ahead)):
-                    break
+            undone = [future for _, future in running if not future.done()]
+            ahead = self.start + sum(count for count, _ in running)
+            if len(undone) < jobs and (count := self.next(len(self.found) + len(running), ahead)):
                 running.append((count, submit(ahead, count)))
-            if not running:
+            elif undone:
+                wait(undone, return_when=FIRST_COMPLETED)
+            elif not running:
                 self.over = True
                 return
-            wait([future for _, future in running if not future.done()], return_when=FIRST_COMPLETED)
             while running and running[0][1].done():
                 count, future = running.popleft()
                 result = future.result()
