@@ -18,7 +18,7 @@ from kfcourse import Model, load_variants
 from kfcourse.lab.short_names import lab_filters
 from kfcourse.montecarlo.comparison import Subset
 from kfcourse.montecarlo.ensemble import Ensemble
-from kfcourse.montecarlo.processes import cores
+from kfcourse.montecarlo.parallel import cores
 from kfcourse.montecarlo.subset import run_subset
 
 

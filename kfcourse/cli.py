@@ -25,7 +25,7 @@ from kfcourse.lab.short_names import FILTERS, LAB, has_bound, title
 from kfcourse.lab.variants import find_variant, read_variants
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.experiment import compare
-from kfcourse.montecarlo.processes import cores
+from kfcourse.montecarlo.parallel import cores
 from kfcourse.montecarlo.subset import FEWEST as FEWEST_EXACT
 from kfcourse.montecarlo.subset import LEAST
 

@@ -22,7 +22,7 @@ from kfcourse.laws import Array, Gaussian, stacked
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, workers
-from kfcourse.montecarlo.processes import cores
+from kfcourse.montecarlo.parallel import cores
 from kfcourse.montecarlo.statistics import BATCHES, Sums, batch_sizes
 from kfcourse.montecarlo.subset import LEAST, progress_bar, run_block, run_subset
 from kfcourse.montecarlo.two_phase import Replicas

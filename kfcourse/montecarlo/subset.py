@@ -30,7 +30,7 @@ from kfcourse.limits import OutOfTime, memory_limit, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Subset
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import STRATA, Ensemble, Instant, Serial
-from kfcourse.montecarlo.processes import START, Submit, may_start, one_thread, processes
+from kfcourse.montecarlo.parallel import START, Submit, may_start, one_thread, processes
 from kfcourse.montecarlo.statistics import Sums
 
 BATCH = STRATA  # trajectories of a batch: their initial states share the prior out among them

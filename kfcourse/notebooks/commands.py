@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from kfcourse.montecarlo.processes import cores
+from kfcourse.montecarlo.parallel import cores
 from kfcourse.notebooks.grading.sandbox import KINDS
 from kfcourse.notebooks.grading.submissions import SECONDS
 
