@@ -1,22 +1,18 @@
-"""The command line: `kfcourse lab 53`, `kfcourse variants --check`."""
+"""The lab's commands: `kfcourse lab 53`, `kfcourse variants --check`."""
 
 from __future__ import annotations
 
-import errno
 import os
 import re
-import signal
 import sys
-import threading
-import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 
 import click
 
 from kfcourse.checks.posing import unposed
+from kfcourse.commands import main as main  # scripts that were installed before call it here
 from kfcourse.files import is_standard_output, read_only, replacing_together, save
 from kfcourse.lab.admission import admissions, on_trial, without_failing
 from kfcourse.lab.admission import table as table_of_filters
@@ -26,17 +22,13 @@ from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_r
 from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
 from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
 from kfcourse.lab.short_names import FILTERS, LAB, has_bound, title
-from kfcourse.lab.variants import VariantError, find_variant, read_variants
+from kfcourse.lab.variants import find_variant, read_variants
 from kfcourse.montecarlo.comparison import EXACT, Comparison
-from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare
+from kfcourse.montecarlo.parallel import cores
 from kfcourse.montecarlo.subset import FEWEST as FEWEST_EXACT
 from kfcourse.montecarlo.subset import LEAST
-from kfcourse.symbolic.formula import FormulaError
-from kfcourse.symbolic.moments import NoClosedForm
-from kfcourse.symbolic.reading import ModelError
 
-OF_NOTEBOOKS = ("exercises", "solutions", "grade")
 DERIVATION = 60.0  # seconds for the formulas of the filters
 
 _VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")
@@ -44,79 +36,7 @@ _VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_typ
 DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with more, the lab takes longer
 
 
-class _Ended(BaseException):
-    """A signal asks this process to end."""
-
-
-@contextmanager
-def _clear_errors() -> Iterator[None]:
-    """What went wrong is said in a sentence, not in a traceback; an end by a signal leaves no half files."""
-    try:
-        with _ended_by({signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)}), warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # NumPy's: what became infinite is reported by name
-            warnings.showwarning = lambda message, *_: click.echo(f"Warning: {message}", err=True)
-            yield
-    except (VariantError, FormulaError, ModelError, NoClosedForm, NotFinite, ValueError) as error:
-        raise click.ClickException(str(error)) from None
-    except MemoryError:
-        raise click.ClickException("this needs more memory than there is; take fewer --runs, --steps or --threads") from None
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        where = f": {error.filename}" if error.filename else ""
-        remedy = "; make room, and run it again" if error.errno == errno.ENOSPC else ""
-        raise click.ClickException(f"{error.strerror or error}{where}{remedy}") from None
-    except KeyboardInterrupt:
-        click.echo("Interrupted; files written before are as they were.", err=True)
-        sys.exit(130)
-    except _Ended as ended:
-        click.echo("Ended by a signal; files written before are as they were.", err=True)
-        sys.exit(128 + ended.args[0])
-
-
-@contextmanager
-def _ended_by(numbers: Iterable[int]) -> Iterator[None]:
-    """Signals that end a process as errors, so that what was begun is cleared away."""
-
-    def end(number: int, _: FrameType | None) -> None:
-        raise _Ended(number)
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = {number: signal.signal(number, end) for number in numbers}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-class _Group(click.Group):
-    """Every command says what a user did wrong in a sentence; those of notebooks import Jupyter, when they are asked for."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return sorted([*super().list_commands(ctx), *OF_NOTEBOOKS])
-
-    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
-        if name not in OF_NOTEBOOKS:
-            return super().get_command(ctx, name)
-        from kfcourse.notebooks import commands
-
-        return getattr(commands, name)
-
-    def invoke(self, ctx: click.Context) -> object:
-        with _clear_errors():
-            return super().invoke(ctx)
-
-
-@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="kfcourse")
-def main() -> None:
-    """Kalman and nonlinear suboptimal filtering: the lab from the command line."""
-
-
-@main.command()
+@click.command()
 @_VARIANTS
 @click.option("--variant", "names", multiple=True, help="Only this one; may be repeated.")
 @click.option("--check", is_flag=True, help="Say of each whether it is well posed, and how hard; exit status 1 if one is not.")
@@ -129,7 +49,7 @@ def main() -> None:
     show_default=True,
     help="Trajectories of a check, an eighth for vectors.",
 )
-@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Does not change the results.")
+@click.option("--jobs", type=click.IntRange(min=1), default=cores, show_default="all cores", help="Does not change the results.")
 @click.option("--out", type=click.Path(path_type=Path), help="New file for the proposed variants.  [default: print them]")
 def variants(
     variants_file: Path | None,
@@ -181,7 +101,7 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
         raise click.ClickException(f"only {len(found.variants)} of {wanted} variants found; ask for fewer, or try another --seed")
 
 
-@main.command()
+@click.command()
 @click.argument("variant")
 @_VARIANTS
 @click.option("--runs", type=click.IntRange(min=2), default=100_000, show_default=True, help="Trajectories.")
@@ -224,7 +144,13 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
     help="Draw half of the initial states from a law so many times as wide, and weight the trajectories.  [default: by a pilot]",
 )
 @click.option("--same-ensemble", is_flag=True, help="Design DUOF, FOS and MFOS on the trajectories they are compared on, once.")
-@click.option("--threads", type=click.IntRange(min=1), default=2, show_default=True, help="Does not change the numbers.")
+@click.option(
+    "--jobs",
+    "--threads",
+    "threads",
+    type=click.IntRange(min=1),
+    help="Processor cores to use; does not change the numbers.  [default: all]",
+)
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]")
 @click.option(
     "--report", "language", type=click.Choice(LANGUAGES), help="Also write the student's report, handin.html and handin.tex."
@@ -245,7 +171,7 @@ def lab(
     designs: int | None,
     wide: float | None,
     same_ensemble: bool,
-    threads: int,
+    threads: int | None,
     out: Path | None,
     language: str | None,
     json_file: Path | None,
@@ -338,7 +264,7 @@ def _kept(folder: Path) -> Iterator[None]:
         ) from None
 
 
-@main.command()
+@click.command()
 @click.argument("places", nargs=-1, required=True, metavar="[FILE] VARIANT")
 @_VARIANTS
 @click.option("--trial/--no-trial", default=True, show_default=True, help="Also run each filter on a few hundred trajectories.")
@@ -352,7 +278,7 @@ def filters(places: tuple[str, ...], variants_file: Path | None, trial: bool) ->
     click.echo(table_of_filters(on_trial(chosen.model, found) if trial else found))
 
 
-@main.command()
+@click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--model", "model_file", type=click.Path(path_type=Path), required=True, help="TOML file with the model.")
 @click.option("--variant", "name", help="Its name in the file, if there are several.")

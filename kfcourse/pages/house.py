@@ -17,6 +17,7 @@ from matplotlib.patches import Rectangle
 # From the top floor down: imports only run down this list.
 LAYERS = (
     "cli",
+    "commands",
     "notebooks",
     "exercises",
     "pages",
