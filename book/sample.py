@@ -25,4 +25,4 @@ def write() -> None:
         if path.suffix == ".pdf" or not path.name.startswith("handin"):
             path.unlink()
     lines = [line for line in done.stdout.splitlines() if str(REPORT) not in line]
-    said.write_text("\n".join([f"$ .venv/bin/kfcourse {' '.join(ARGUMENTS)}", *lines, ""]), encoding="utf-8")
+    said.write_text("\n".join([f"$ kfcourse {' '.join(ARGUMENTS)}", *lines, ""]), encoding="utf-8")
