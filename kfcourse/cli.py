@@ -1,109 +1,38 @@
-"""The lab's commands: `kfcourse lab 53`, `kfcourse variants --check`."""
+"""The lab's commands: `kfcourse lab 53`, `kfcourse filters 53`, `kfcourse estimate`."""
 
 from __future__ import annotations
 
-import os
 import re
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import click
 
-from kfcourse.checks.posing import unposed
 from kfcourse.commands import main as main  # scripts that were installed before call it here
-from kfcourse.files import is_standard_output, read_only, replacing_together, save
+from kfcourse.files import is_standard_output, read_only, replacing_together
 from kfcourse.lab.admission import admissions, on_trial, without_failing
 from kfcourse.lab.admission import table as table_of_filters
-from kfcourse.lab.grammar import generate
 from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
-from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
 from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
 from kfcourse.lab.short_names import FILTERS, LAB, has_bound, title
-from kfcourse.lab.variants import find_variant, read_variants
+from kfcourse.lab.variants import find_variant
+from kfcourse.listing import VARIANTS
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.experiment import compare
-from kfcourse.montecarlo.parallel import cores
 from kfcourse.montecarlo.subset import FEWEST as FEWEST_EXACT
 from kfcourse.montecarlo.subset import LEAST
 
 DERIVATION = 60.0  # seconds for the formulas of the filters
 
-_VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")
 
 DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with more, the lab takes longer
 
 
 @click.command()
-@_VARIANTS
-@click.option("--variant", "names", multiple=True, help="Only this one; may be repeated.")
-@click.option("--check", is_flag=True, help="Say of each whether it is well posed, and how hard; exit status 1 if one is not.")
-@click.option("--generate", "wanted", type=click.IntRange(1, 200), help="Propose so many new variants that are well posed.")
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of the trajectories and proposals.")
-@click.option(
-    "--runs",
-    type=click.IntRange(min=FEWEST),
-    default=RUNS,
-    show_default=True,
-    help="Trajectories of a check, an eighth for vectors.",
-)
-@click.option("--jobs", type=click.IntRange(min=1), default=cores, show_default="all cores", help="Does not change the results.")
-@click.option("--out", type=click.Path(path_type=Path), help="New file for the proposed variants.  [default: print them]")
-def variants(
-    variants_file: Path | None,
-    names: tuple[str, ...],
-    check: bool,
-    wanted: int | None,
-    seed: int,
-    runs: int,
-    jobs: int,
-    out: Path | None,
-) -> None:
-    """List the variants of the lab, check them, or propose new ones."""
-    if wanted is not None and (check or names or variants_file):
-        raise click.UsageError("--generate goes with --seed, --runs, --jobs and --out only")
-    if wanted is None and out:
-        raise click.UsageError("--out goes with --generate only")
-    if wanted is not None:
-        _generate(wanted, seed, runs, jobs, out)
-        return
-    chosen, faults = read_variants(variants_file, names)
-    good = not faults
-    if check and chosen:
-        found = list(examine_all(list(chosen.values()), runs, seed, jobs, unposed))
-        click.echo(table(found))
-        good &= all(one.well_posed for one in found)
-    else:
-        for variant in chosen.values():
-            state, meter = (", ".join(map(str, one)) for one in (variant.model.state_equation, variant.model.meter_equation))
-            click.echo(f"{variant.name:>6}  {variant.title or 'no title'}\n        x' = {state};  y = {meter}")
-    for fault in faults.values():
-        click.echo(f"Error: {fault}", err=True)
-    sys.exit(0 if good else 1)
-
-
-def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) -> None:
-    """Proposed variants to the file or to standard output, what was rejected to standard error."""
-    if out and (os.path.lexists(out) or not out.parent.is_dir()):
-        raise click.ClickException(f"the variants cannot go to {out}: name a new file in an existing folder with --out")
-    found = generate(wanted, seed, runs, jobs, unposed)
-    reasons = ", ".join(f"{number} {reason}" for reason, number in found.rejected.most_common())
-    click.echo(f"{found.rejected.total()} candidates rejected{': ' if reasons else ''}{reasons}", err=True)
-    if found.variants:
-        text = f"# Made by: kfcourse variants --generate {wanted} --seed {seed} --runs {runs}\n\n{found.toml()}"
-        if out:
-            save(text, out)
-        else:
-            click.echo(text, nl=False)
-    if len(found.variants) < wanted:
-        raise click.ClickException(f"only {len(found.variants)} of {wanted} variants found; ask for fewer, or try another --seed")
-
-
-@click.command()
 @click.argument("variant")
-@_VARIANTS
+@VARIANTS
 @click.option("--runs", type=click.IntRange(min=2), default=100_000, show_default=True, help="Trajectories.")
 @click.option("--steps", type=click.IntRange(min=1), default=51, show_default=True, help="Measurements of each trajectory.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="The same seed gives the same numbers.")
@@ -266,7 +195,7 @@ def _kept(folder: Path) -> Iterator[None]:
 
 @click.command()
 @click.argument("places", nargs=-1, required=True, metavar="[FILE] VARIANT")
-@_VARIANTS
+@VARIANTS
 @click.option("--trial/--no-trial", default=True, show_default=True, help="Also run each filter on a few hundred trajectories.")
 def filters(places: tuple[str, ...], variants_file: Path | None, trial: bool) -> None:
     """Say of each filter whether VARIANT, of FILE or of the lab, admits it, and why not."""

@@ -36,7 +36,7 @@ COMMANDS = {
     "grade": Place("kfcourse.notebooks.commands", "Run the returned notebooks in FOLDER and write a table of what passed."),
     "lab": Place("kfcourse.cli", "Compare the filters on VARIANT (such as 53) and write the report."),
     "solutions": Place("kfcourse.notebooks.commands", "Write the worked solutions: executed notebooks and HTML pages."),
-    "variants": Place("kfcourse.cli", "List the variants of the lab, check them, or propose new ones."),
+    "variants": Place("kfcourse.listing", "List the variants of the lab, check them, or propose new ones."),
 }
 
 
@@ -52,7 +52,13 @@ def _clear_errors() -> Iterator[None]:
             warnings.simplefilter("ignore", RuntimeWarning)  # NumPy's: what became infinite is reported by name
             warnings.showwarning = lambda message, *_: click.echo(f"Warning: {message}", err=True)
             yield
-    except _told() as error:
+    except ValueError as error:
+        raise click.ClickException(str(error)) from None
+    except ArithmeticError as error:
+        from kfcourse.montecarlo.designing import NotFinite
+
+        if not isinstance(error, NotFinite):
+            raise
         raise click.ClickException(str(error)) from None
     except MemoryError:
         raise click.ClickException("this needs more memory than there is; take fewer --runs, --steps or --jobs") from None
@@ -68,13 +74,6 @@ def _clear_errors() -> Iterator[None]:
     except _Ended as ended:
         click.echo("Ended by a signal; files written before are as they were.", err=True)
         sys.exit(128 + ended.args[0])
-
-
-def _told() -> tuple[type[Exception], ...]:
-    """Errors that say themselves what went wrong."""
-    from kfcourse.montecarlo.designing import NotFinite
-
-    return NotFinite, ValueError
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 import kfcourse
+from kfcourse.commands import COMMANDS, main
 from kfcourse.pages.house import LAYERS, imported, imports, layer, modules, sentence
 
 pytestmark = pytest.mark.quick
@@ -61,13 +62,26 @@ def test_what_notebooks_import_is_there():
 
 
 @pytest.mark.parametrize(
-    ("module", "slow"),
+    ("code", "slow"),
     [
-        ("kfcourse", ["matplotlib", "scipy.linalg", "scipy.ndimage", "scipy.special", "scipy.stats"]),
-        ("kfcourse.cli", ["jupyter_client", "jupytext", "nbclient", "nbconvert", "nbformat"]),
+        ("import kfcourse", ["numpy", "scipy", "sympy"]),
+        ("from kfcourse import *", ["joblib", "matplotlib", "scipy.linalg", "scipy.ndimage", "scipy.special", "scipy.stats"]),
+        ("import kfcourse.cli", ["jupyter_client", "jupytext", "nbclient", "nbconvert", "nbformat"]),
+        ("from kfcourse.commands import main; main(['--help'], standalone_mode=False)", ["numpy", "scipy", "sympy"]),
+        (
+            "from kfcourse.commands import main; main(['variants', '--variant', '53'])",
+            ["joblib", "kfcourse.checks", "kfcourse.filters", "matplotlib", "scipy.linalg", "scipy.special"],
+        ),
     ],
 )
-def test_what_is_slow_to_import_waits_until_it_is_used(module, slow):
+def test_what_is_slow_to_import_waits_until_it_is_used(code, slow):
     """Every command and every graded notebook imports the package; after `import scipy`, `scipy.special.erf` imports the rest."""
-    code = f"import sys, {module}; print([name for name in {slow} if name in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+    code = f"import atexit, sys; atexit.register(lambda: print([name for name in {slow} if name in sys.modules])); {code}"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.endswith("[]\n")
+
+
+def test_a_command_s_help_in_the_list_is_its_own():
+    for name, place in COMMANDS.items():
+        command = main.get_command(None, name)
+        assert command.name == name
+        assert " ".join(command.help.partition("\n\n")[0].split()) == place.says

@@ -10,6 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from kfcourse.montecarlo.statistics import BATCHES
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import shown
 from kfcourse.symbolic.sense import nothing_random
@@ -17,6 +18,8 @@ from kfcourse.symbolic.sense import nothing_random
 MODEL_KEYS = {"parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs", "interval", "angles"}
 VARIANT_KEYS = {"title", "state", "meter"} | MODEL_KEYS
 
+RUNS = 40_000  # trajectories by which a variant is checked
+FEWEST = 2 * BATCHES  # that have standard errors
 MANY = 40  # names that a message lists
 LARGEST_FILE = 1_000_000  # bytes; thousands of variants.  /dev/zero never ends
 

@@ -17,6 +17,7 @@ from matplotlib.patches import Rectangle
 # From the top floor down: imports only run down this list.
 LAYERS = (
     "cli",
+    "listing",
     "commands",
     "notebooks",
     "exercises",
@@ -35,6 +36,7 @@ LAYERS = (
     "limits",
     "files",
     "seeds",
+    "exports",
 )
 
 
