@@ -19,7 +19,6 @@ import sympy as sp
 
 from kfcourse.angles import Angles
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.equations import Noiseless, compile_noiseless
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.known import CHECKED, SURE, Known, Stepwise
 from kfcourse.symbolic.model import Model
@@ -195,19 +194,6 @@ class JumpModel:
                 f"the mode {never} is never reached from the first law {self.first.tolist()}; leave it out, or give it a "
                 "probability in `first` or in `transition`"
             )
-
-
-def averaged_equations(model: JumpModel) -> tuple[Noiseless, Noiseless]:
-    """a(x, m_v) and b(x, m_w), averaged over what the modes are before anything is measured: sum_j q_{k+1}^j a^j, sum_j q_k^j b^j."""
-    each = [compile_noiseless(mode) for mode in model.modes]
-
-    def state(x: Array, k: int | None = None) -> Array:
-        return sum(q * np.broadcast_to(one(x, k), x.shape) for q, (one, _) in zip(model.law_at((k or 0) + 1), each, strict=True))
-
-    def meter(x: Array, k: int | None = None) -> Array:
-        return sum(q * one(x, k) for q, (_, one) in zip(model.law_at(k or 0), each, strict=True))
-
-    return state, meter
 
 
 def model_of_table(given: Mapping[str, Any]) -> Model | JumpModel:
