@@ -24,8 +24,8 @@ from kfcourse.lab.grammar import generate
 from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
 from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
-from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
-from kfcourse.lab.short_names import FILTERS, LAB, has_bound, title
+from kfcourse.lab.report import conclusions, equations, remarks_in_words, write_json, write_report
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, has_bound, title
 from kfcourse.lab.variants import VariantError, find_variant, read_variants
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.designing import NotFinite
@@ -33,6 +33,7 @@ from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.subset import FEWEST as FEWEST_EXACT
 from kfcourse.montecarlo.subset import LEAST
 from kfcourse.symbolic.formula import FormulaError
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.reading import ModelError
 
@@ -157,8 +158,7 @@ def variants(
         good &= all(one.well_posed for one in found)
     else:
         for variant in chosen.values():
-            state, meter = (", ".join(map(str, one)) for one in (variant.model.state_equation, variant.model.meter_equation))
-            click.echo(f"{variant.name:>6}  {variant.title or 'no title'}\n        x' = {state};  y = {meter}")
+            click.echo(f"{variant.name:>6}  {variant.title or 'no title'}\n        {equations(variant.model)}")
     for fault in faults.values():
         click.echo(f"Error: {fault}", err=True)
     sys.exit(0 if good else 1)
@@ -190,7 +190,8 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
 @click.option(
     "--filters",
     "names",
-    help=f"Short names, separated by commas. Known: {', '.join(FILTERS)}.  [default: the lab's seven and the exact AOF]",
+    help=f"Short names, separated by commas. Known: {', '.join(FILTERS)}; for variants with modes: {', '.join(JUMP_FILTERS)}.  "
+    "[default: the lab's seven and the exact AOF; for variants with modes all]",
 )
 @click.option(
     "--exact-runs",
@@ -264,9 +265,12 @@ def lab(
     chosen = find_variant(variant, variants_file)
     model = chosen.model
     if names is None:
-        wanted = [*LAB, "aof-exact"] if exact_runs and has_bound(model) else list(LAB)
+        usual = JUMP_LAB if isinstance(model, JumpModel) else LAB
+        wanted = [*usual, "aof-exact"] if exact_runs and has_bound(model) else list(usual)
     else:
         wanted = [name.strip() for name in names.split(",") if name.strip()]
+    if language:
+        chosen.plain("student's reports")  # before the long part
     found = admissions(model, wanted, DERIVATION)
     refused = {one.name: one.reason for one in found if one.one is None}
     for one in found:

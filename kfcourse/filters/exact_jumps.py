@@ -190,10 +190,8 @@ def _together(parts: Sequence[Sequence[tuple[float, Kernels, int]]]) -> Kernels:
             np.stack([one[which][number] for one, number in zip(kernels, numbers, strict=True)]) for which in range(7)
         )
         spare = -mu.shape[1] % ALIGNED if len(parts[0]) > 1 else 0
-        columns.append(
-            [np.pad(one, ((0, 0), (0, spare)), mode) for one, mode in zip(
-                (mu, sigma, weight * mass, weight * even), ("edge", "edge", "constant", "constant"), strict=True)]
-        )
+        places = [np.pad(one, ((0, 0), (0, spare)), "edge") for one in (mu, sigma)]
+        columns.append([*places, *(np.pad(weight * one, ((0, 0), (0, spare))) for one in (mass, even))])
         middles.append((centre, width))
     mu, sigma, mass, even = (np.concatenate(arrays, axis=1) for arrays in zip(*columns, strict=True))
     centre, width = (np.take_along_axis(np.concatenate(one, axis=1), heaviest[:, None], axis=1) for one in zip(*middles, strict=True))

@@ -10,20 +10,19 @@ nothing is lost but the shape of that noise; where they last, all that the past 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 
 import numpy as np
 
 from kfcourse.laws import Array, Gaussian, Measurement, Transition, product, transpose
 from kfcourse.symbolic.equations import Noiseless, compile_noiseless
 from kfcourse.symbolic.jumping import JumpModel
-from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure, of_each_step
 
 
-def averaged(model: JumpModel, kind: Callable[[Model], Structure]) -> Structure:
-    """The structural functions averaged over the modes, those of each by `kind`: `gaussian`, `linearised`, ...
+def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
+    """The structural functions averaged over the modes, from those of each, such as [gaussian(mode) for mode in model.modes].
 
     Raises
     ------
@@ -32,11 +31,10 @@ def averaged(model: JumpModel, kind: Callable[[Model], Structure]) -> Structure:
     """
     if model.angles.x or model.angles.y:
         raise ModelError("components that are angles have no average over modes; take filters that know the modes")
-    each = [kind(mode) for mode in model.modes]
 
     def at(k: int) -> Structure:
         before, after = model.law_at(k), model.law_at(k + 1)
-        now = [one.at(k) for one in each]
+        now = [one.at(k) for one in structures]
 
         def predict(z: Array, p: Array) -> Gaussian:
             laws = [one.predict(z, p) for one in now]

@@ -294,7 +294,7 @@ def test_the_average_has_the_moments_of_the_next_state_and_the_measurement():
     s, g = np.where(after, 0.4, 0.8), np.where(now, 1.0, -1.0)
     x_next = x[:, 0] - 0.4 * np.sin(x[:, 0]) + s * v
     y = g * x[:, 0] + 0.3 * x[:, 0] ** 2 + 0.3 * (1 + x[:, 0] ** 2) * w
-    structure = averaged(CURVED, gaussian).at(k)
+    structure = averaged(CURVED, [gaussian(mode) for mode in CURVED.modes]).at(k)
     tau, theta = structure.predict(mean, cov)
     h, G, F, R = structure.measure(mean, cov)
     for sample, first, second in ((x_next, tau, theta), (y, h, F)):
@@ -315,7 +315,7 @@ def test_with_modes_drawn_anew_the_averaged_filter_is_the_best_linear_one():
     model = failing(transition=[0.8, 0.2], first=None)
     plain = Model.define("0.9*x + 0.7*v", "x + f*w", {"f": math.sqrt(0.8 + 20)}, prior={"mean": 3, "variance": 4})
     y = simulate(model, 5, 15, seed=1).y
-    found, expected = run(aof(averaged(model, gaussian)), y), run(aof(gaussian(plain)), y)
+    found, expected = run(aof(averaged(model, [gaussian(mode) for mode in model.modes])), y), run(aof(gaussian(plain)), y)
     np.testing.assert_allclose(found.mean, expected.mean, atol=ROUNDING)
     np.testing.assert_allclose(found.cov, np.broadcast_to(expected.cov, found.cov.shape), atol=ROUNDING)
 
@@ -323,7 +323,7 @@ def test_with_modes_drawn_anew_the_averaged_filter_is_the_best_linear_one():
 def test_who_wins():
     """Knowing the modes pays, nobody is below the bound, and merging later is better: the order of the theory."""
     model = failing()
-    structure = averaged(model, gaussian)
+    structure = averaged(model, [gaussian(mode) for mode in model.modes])
     result = compare(
         [of(logic_dynamic, model), of(gpb2, model), aof(structure), duof(model.modes[0], averaged_equations(model)),
          fos(structure), mfos(structure), jump_pointmass(model)],
@@ -342,4 +342,4 @@ def test_of_angles_there_is_no_average():
         "x + v", "x + C*w", {"C": 1}, modes={"a": {}, "b": {"parameters": {"C": 2}}}, transition=[0.5, 0.5], angles=["x"]
     )
     with pytest.raises(ModelError, match="angles have no average"):
-        averaged(model, linearised)
+        averaged(model, [linearised(mode) for mode in model.modes])
