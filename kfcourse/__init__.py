@@ -18,6 +18,7 @@ from kfcourse.montecarlo.experiment import compare, predictions, run
 from kfcourse.records import likelihood, read_measurements, smooth
 from kfcourse.symbolic.angular import AngleWarning
 from kfcourse.symbolic.formula import FormulaError
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite, unscented
@@ -31,6 +32,7 @@ __all__ = [
     "FormulaError",
     "Gaussian",
     "GaussianMoments",
+    "JumpModel",
     "Model",
     "ModelError",
     "NoClosedForm",
