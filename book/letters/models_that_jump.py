@@ -1,4 +1,4 @@
-"""The letters of models-that-jump.md: three modes with a joint table of probabilities, moments of a mixture from second moments."""
+"""The letters of models-that-jump.md: three modes with a joint table of probabilities, mixtures by their second moments."""
 
 import numpy as np
 from scipy.stats import multivariate_normal
@@ -48,5 +48,9 @@ LETTERS = (correcting, predicting)
 SAID = {
     r"x_{k+1}=a^{i_{k+1}}(x_k,v_k)": NOTATION,
     r"y_k=b^{i_k}(x_k,w_k)": NOTATION,
-    r"a(x)=x^2": NOTATION,
+    r"\lambda^{\text{before}}": NOTATION,
+    r"\lambda^{\text{after}}": NOTATION,
+    r"\Psi^{\text{before}}": NOTATION,
+    r"\Psi^{\text{after}}": NOTATION,
+    r"\bar R": NOTATION,
 }

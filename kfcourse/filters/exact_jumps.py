@@ -87,7 +87,9 @@ def jump_pointmass(model: JumpModel, accuracy: float = ACCURACY) -> Filter:
         if mode.angles.x:
             raise ModelError("the exact filter over modes holds no state that is an angle")
         if scalar_densities(mode).noiseless:
-            raise ModelError(f"mode {name}: without noise in the meter {list(mode.meter_equation)} there is no likelihood density")
+            raise ModelError(
+                f"mode {name}: without noise in the meter {list(mode.meter_equation)} there is no likelihood density"
+            )
     laws, prior, init = [scalar_densities(mode) for mode in model.modes], of_prior(model.prior), initial_state(model.modes[0])
 
     def start(runs: int) -> State:
@@ -125,8 +127,10 @@ def _step(state: State, y: Array, laws: Sequence[ScalarDensities], pi: Array, ac
     means, variances, errors = (
         np.where(counts, np.stack(columns, axis=1), 0.0) for columns in list(zip(*(part[1:4] for part in parts), strict=True))
     )
-    posterior = mixture([Gaussian(m[:, None], v[:, None, None]) for m, v in zip(means.T, variances.T, strict=True)],
-                        np.where(counts, probability, 0.0))
+    posterior = mixture(
+        [Gaussian(m[:, None], v[:, None, None]) for m, v in zip(means.T, variances.T, strict=True)],
+        np.where(counts, probability, 0.0),
+    )
     sd = np.sqrt(posterior.cov[:, 0, 0])
     # a mean errs by so many of its mode's standard deviations, the mode's probability by that part of itself
     moved = (probability * errors * (np.sqrt(variances) + np.abs(means - posterior.mean))).sum(axis=1)
@@ -194,7 +198,9 @@ def _together(parts: Sequence[Sequence[tuple[float, Kernels, int]]]) -> Kernels:
         columns.append([*places, *(np.pad(weight * one, ((0, 0), (0, spare))) for one in (mass, even))])
         middles.append((centre, width))
     mu, sigma, mass, even = (np.concatenate(arrays, axis=1) for arrays in zip(*columns, strict=True))
-    centre, width = (np.take_along_axis(np.concatenate(one, axis=1), heaviest[:, None], axis=1) for one in zip(*middles, strict=True))
+    centre, width = (
+        np.take_along_axis(np.concatenate(one, axis=1), heaviest[:, None], axis=1) for one in zip(*middles, strict=True)
+    )
     spectral = np.array([all(bool(kernels.spectral[number]) for _, kernels, number in row) for row in parts])
     found = Kernels(mu, sigma, mass, even, centre, width, spectral)
     if not any(kernels.pushed is not None for _, kernels, _ in parts[0]):

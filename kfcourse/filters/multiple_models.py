@@ -33,7 +33,6 @@ from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.laws import Array, Gaussian, Measurement, correct, log_density
 from kfcourse.symbolic.structure import Structure
 
-
 Chain: TypeAlias = Array | Callable[[int], Array]
 
 

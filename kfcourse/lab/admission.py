@@ -71,9 +71,7 @@ class Admission:
         return "; ".join([self.reason] if self.reason else [*self.warnings, *self.remarks])
 
 
-def admissions(
-    model: Model | JumpModel, names: Sequence[str] | None = None, seconds: float | None = None
-) -> list[Admission]:
+def admissions(model: Model | JumpModel, names: Sequence[str] | None = None, seconds: float | None = None) -> list[Admission]:
     """Which of the filters, all by default, can be built for the model, and what to know of them; each as the lab builds it.
 
     With `seconds`, the formulas of each must be derived in that time.

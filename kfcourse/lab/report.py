@@ -33,8 +33,8 @@ from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.comparison import EXACT, HEAVY, Comparison
 from kfcourse.montecarlo.modes import Recognised, recognised
 from kfcourse.montecarlo.statistics import Estimate, ratio
-from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.jumping import JumpModel
+from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.model import Model
 
 _FAMILIES = {
@@ -141,7 +141,11 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
 def _model_in_numbers(model: Model | JumpModel) -> dict[str, Any]:
     if isinstance(model, JumpModel):
         modes = {name: _model_in_numbers(mode) for name, mode in zip(model.names, model.modes, strict=True)}
-        return {"modes": modes, "transition": [[str(one) for one in row] for row in model.chain.tolist()], "first": model.first.tolist()}
+        return {
+            "modes": modes,
+            "transition": [[str(one) for one in row] for row in model.chain.tolist()],
+            "first": model.first.tolist(),
+        }
     return {
         "state": [str(f) for f in model.state_equation],
         "meter": [str(f) for f in model.meter_equation],

@@ -19,8 +19,8 @@ import sympy as sp
 
 from kfcourse.angles import Angles
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.formula import symbol
-from kfcourse.symbolic.known import CHECKED, SURE, Known, Stepwise
+from kfcourse.symbolic.formula import FormulaError, symbol
+from kfcourse.symbolic.known import CHECKED, SURE, Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import Formula, Formulas, ModelError, exact_number, read, shown, table
 
@@ -93,7 +93,7 @@ class JumpModel:
                 values = {**common, **table("parameters", change.get("parameters"))}
                 parts = change.get("state", state), change.get("meter", meter)
                 built.append(Model.define(*parts, values, **{**options, **own}))
-            except ModelError as error:
+            except (ModelError, FormulaError) as error:
                 raise ModelError(f"mode {name}: {error}") from None
         fitting = _fitting(tuple(tables), built)
         chain, rows = _chain(transition, len(built))
@@ -213,7 +213,9 @@ def model_of_table(given: Mapping[str, Any]) -> Model | JumpModel:
 
 def _tables(modes: Any) -> dict[str, dict[str, Any]]:
     if not isinstance(modes, Mapping) or not modes:
-        raise ModelError(f"`modes` must be a table of modes by name, such as {{sound = {{}}, faulty = {{...}}}}, got {shown(modes)}")
+        raise ModelError(
+            f"`modes` must be a table of modes by name, such as {{sound = {{}}, faulty = {{...}}}}, got {shown(modes)}"
+        )
     tables = {str(name): table(f"modes.{name}", change) for name, change in modes.items()}
     for name, change in tables.items():
         if unknown := sorted(set(change) - set(OF_A_MODE)):
@@ -232,10 +234,8 @@ def _fitting(names: tuple[str, ...], modes: Sequence[Model]) -> tuple[Model, ...
             ("noise(s) of the meter", len(first.w), len(mode.w)),
         ):
             if ours != theirs:
-                remedy = "; name them all by `symbols`, such as v = [\"v1\", \"v2\"]" if what.startswith("noise") else ""
-                raise ModelError(
-                    f"all modes need as many {what}: mode {names[0]} has {ours}, mode {name} has {theirs}{remedy}"
-                )
+                remedy = '; name them all by `symbols`, such as v = ["v1", "v2"]' if what.startswith("noise") else ""
+                raise ModelError(f"all modes need as many {what}: mode {names[0]} has {ours}, mode {name} has {theirs}{remedy}")
         if mode.x != first.x or mode.angles != first.angles:
             raise ModelError(f"modes {names[0]} and {name} differ in their state's symbols or angles")
     return tuple(modes)

@@ -222,8 +222,12 @@ def test_the_imm_is_the_logic_dynamic_filter_for_affine_objects_and_no_other():
 @pytest.mark.parametrize("build", SEQUENTIAL)
 def test_a_mode_that_stays_is_one_of_a_bank(build):
     model = JumpModel.define(
-        "x - 0.4*sin(x) + s*v", "x + w", {"s": 0.4}, modes={"calm": {}, "wild": {"parameters": {"s": 2}}},
-        transition=[[1, 0], [0, 1]], first=[0.7, 0.3],
+        "x - 0.4*sin(x) + s*v",
+        "x + w",
+        {"s": 0.4},
+        modes={"calm": {}, "wild": {"parameters": {"s": 2}}},
+        transition=[[1, 0], [0, 1]],
+        first=[0.7, 0.3],
     )
     y = simulate(model, 6, 20, seed=2).y
     mean, _, probability, *_ = follow(of(build, model), y)
@@ -255,11 +259,15 @@ def test_what_is_merged_when():
 def test_a_mode_that_is_observed_is_known(build):
     """The second component tells the mode: what is left is a filter that is told at each step which model holds."""
     model = JumpModel.define(
-        ["0.9*x + s*v"], ["x + C*w1", "b + 1e-3*w2"], {"s": 0.7, "b": 0, "C": 1},
-        modes={"sound": {}, "faulty": {"parameters": {"b": 1, "C": 10}}}, transition=LASTING, first=FIRST,
+        ["0.9*x + s*v"],
+        ["x + C*w1", "b + 1e-3*w2"],
+        {"s": 0.7, "b": 0, "C": 1},
+        modes={"sound": {}, "faulty": {"parameters": {"b": 1, "C": 10}}},
+        transition=LASTING,
+        first=FIRST,
         symbols={"x": ["x"], "w": ["w1", "w2"]},
     )
-    x, y, mode = simulate(model, 8, 25, seed=3)
+    _, y, mode = simulate(model, 8, 25, seed=3)
     mean, cov, probability, *_ = follow(of(build, model), y)
     np.testing.assert_allclose(np.take_along_axis(probability, mode[..., None].astype(int), axis=-1), 1.0, atol=1e-9)
     z, p = 0.0, 1.0
@@ -304,7 +312,7 @@ def test_the_average_has_the_moments_of_the_next_state_and_the_measurement():
     cross = (x[:, 0] - 0.7) * (y - y.mean())
     assert abs(cross.mean() - 0.5 * G.item()) < 4 * cross.std() / np.sqrt(size)
     np.testing.assert_allclose(F, G * 0.5 * G + R, rtol=1e-12)
-    tau_, A, Q = structure.transition(mean, cov)
+    _, A, Q = structure.transition(mean, cov)
     np.testing.assert_allclose(theta, A * 0.5 * A + Q, rtol=1e-12)
     cross = (x[:, 0] - 0.7) * (x_next - x_next.mean())
     assert abs(cross.mean() - 0.5 * A.item()) < 4 * cross.std() / np.sqrt(size)
@@ -325,9 +333,22 @@ def test_who_wins():
     model = failing()
     structure = averaged(model, [gaussian(mode) for mode in model.modes])
     result = compare(
-        [of(logic_dynamic, model), of(gpb2, model), aof(structure), duof(model.modes[0], averaged_equations(model)),
-         fos(structure), mfos(structure), jump_pointmass(model)],
-        model, 4000, 10, 1, subset_runs=200, progress=False, threads=1,
+        [
+            of(logic_dynamic, model),
+            of(gpb2, model),
+            aof(structure),
+            duof(model.modes[0], averaged_equations(model)),
+            fos(structure),
+            mfos(structure),
+            jump_pointmass(model),
+        ],
+        model,
+        4000,
+        10,
+        1,
+        subset_runs=200,
+        progress=False,
+        threads=1,
     )
     ranked = dict(result.ranking(slice(2, None)))
     assert list(ranked)[:2] == ["gpb2", "aof-jump-gaussian"]
