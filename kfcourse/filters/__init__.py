@@ -13,7 +13,8 @@ iterated_ekf            the meter linearised again at the estimate
 gate, heavy_tails       measurements that are not believed: refused, by any filter; weighted
 learnt_noise            a noise of unknown size, learnt on the way
 alphabeta               gains from a table, constant in the end
-multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2);  exact_jumps: exactly
+multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
+                        (jump_optimal: FOS with modes;  exact_jumps: the exact filter of state and mode)
 notation                symbols in which the equations are printed
 """
 

@@ -128,15 +128,15 @@ def _one_law_a_mode(
         return [structure.at(state.step).measure(*prior) for structure, prior in each]
 
     def evidence(before: State, y: Array, after: State) -> Array:
-        return _posterior(before.memory.expected, measurements(before), y)[1]
+        return modes_given(before.memory.expected, measurements(before), y)[1]
 
     def step(state: State, y: Array) -> State:
         memory: Modes = state.memory
         now = [structure.at(state.step) for structure in structures]
         expectations = measurements(state)
         corrected = [correct(prior, one, y) for prior, one in zip(memory.predicted, expectations, strict=True)]
-        mu, _ = _posterior(memory.expected, expectations, y)
-        expected, weights = _onward(mu, pi(state.step))
+        mu, _ = modes_given(memory.expected, expectations, y)
+        expected, weights = onward(mu, pi(state.step))
         predicted = [following(one, corrected, weights[:, :, j]) for j, one in enumerate(now)]
         return State(
             state.step + 1,
@@ -169,13 +169,13 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
         return [now[pair % size].measure(*prior) for pair, prior in enumerate(state.memory.predicted)]
 
     def evidence(before: State, y: Array, after: State) -> Array:
-        return _posterior(before.memory.expected, measurements(before), y)[1]
+        return modes_given(before.memory.expected, measurements(before), y)[1]
 
     def step(state: State, y: Array) -> State:
         memory: Modes = state.memory
         expectations = measurements(state)
         corrected = [correct(prior, one, y) for prior, one in zip(memory.predicted, expectations, strict=True)]
-        pairs = _posterior(memory.expected, expectations, y)[0].reshape(len(y), size, size)
+        pairs = modes_given(memory.expected, expectations, y)[0].reshape(len(y), size, size)
         mu = pairs.sum(axis=1)
         weights = _shares(pairs)
         laws = [mixture(corrected[j::size], weights[:, :, j], angles) for j in range(size)]
@@ -189,7 +189,7 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
     return Filter(name, models[0], init, step, evidence=evidence)
 
 
-def _onward(mu: Array, pi: Array) -> tuple[Array, Array]:
+def onward(mu: Array, pi: Array) -> tuple[Array, Array]:
     """c_j = sum_i mu_i pi_ij, (runs, M), and the weights mu_i|j, (runs, M, M)."""
     joint = mu[:, :, None] * pi
     # a mode that cannot come next starts from the combined law; nothing uses it
@@ -235,7 +235,7 @@ def _checked(
     return transition if callable(transition) else lambda k: pi, start / start.sum()
 
 
-def _posterior(expected: Array, measurements: Sequence[Measurement], y: Array) -> tuple[Array, Array]:
+def modes_given(expected: Array, measurements: Sequence[Measurement], y: Array) -> tuple[Array, Array]:
     """c_j L_j / sum over the modes, (runs, M), and ln of the sum; in logarithms, as likelihoods far from the truth are 0."""
     with np.errstate(divide="ignore"):  # a mode that is excluded stays so
         logs = np.log(expected) + np.stack([log_density(one, y) for one in measurements], axis=-1)

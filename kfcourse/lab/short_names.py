@@ -21,6 +21,7 @@ from kfcourse.filters import (
     particle,
     pointmass,
 )
+from kfcourse.filters.jump_optimal import logic_dynamic_fos
 from kfcourse.laws import Array
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 from kfcourse.symbolic.jumping import JumpModel
@@ -118,6 +119,8 @@ JUMP_FILTERS: dict[str, JumpEntry] = {
     "aof-jump-linearised": JumpEntry("LD-LAOF", "ЛАОФлд", lambda s: logic_dynamic(s.linearised, *s.chain)),
     "imm": JumpEntry("IMM", "АОФлд, смешивание до прогноза", lambda s: imm(s.best, *s.chain)),
     "gpb2": JumpEntry("GPB2", "АОФлд, пары режимов", lambda s: gpb2(s.best, *s.chain)),
+    "fos-jump-gaussian": JumpEntry("LD-GFOS", "ГФОСлд", lambda s: logic_dynamic_fos(s.model, s.gaussian)),
+    "fos-jump-linearised": JumpEntry("LD-LFOS", "ЛФОСлд", lambda s: logic_dynamic_fos(s.model, s.linearised)),
     "aof-averaged": JumpEntry("AOF, averaged", "АОФ, среднее по режимам", lambda s: aof(s.averaged)),
     "duof": JumpEntry("DUOF", "ДУОФ", lambda s: duof(s.model.modes[0], averaged_equations(s.model))),
     "fos-averaged": JumpEntry("FOS, averaged", "ФОС, среднее по режимам", lambda s: fos(s.averaged)),

@@ -219,7 +219,7 @@ def of_each_step(
     """The structure that `Structure.at` makes those of each step of."""
 
     def refused(mean: Array, cov: Array) -> NoReturn:
-        raise ModelError(f"the {name} functions of {model} depend on the step: say which, as in structure.at(k).predict(z, p)")
+        raise ModelError(f"what is found of {model} depends on the step: say which, as in structure.at(k).predict(z, p)")
 
     return Structure(name, model, refused, refused, refused, formulas, at)
 

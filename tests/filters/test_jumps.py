@@ -6,9 +6,23 @@ from itertools import product
 import numpy as np
 import pytest
 
-from kfcourse import Model, ModelError, compare, gaussian, likelihood, linearised, run, simulate, unscented
+from kfcourse import (
+    Ensemble,
+    Model,
+    ModelError,
+    NotFinite,
+    compare,
+    design,
+    gaussian,
+    likelihood,
+    linearised,
+    run,
+    simulate,
+    unscented,
+)
 from kfcourse.filters import aof, duof, fos, mfos, pointmass
 from kfcourse.filters.exact_jumps import jump_pointmass
+from kfcourse.filters.jump_optimal import logic_dynamic_fos
 from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
 from kfcourse.linear.system import linear_system
 from kfcourse.symbolic.averaging import averaged, averaged_equations
@@ -288,6 +302,60 @@ def test_a_chain_that_changes_with_time():
     for one in (of(logic_dynamic, model), of(gpb2, model), jump_pointmass(model)):
         probability = follow(one, y.y)[2]
         np.testing.assert_allclose(probability[..., 1], np.tile((np.arange(10) >= 5)[:, None], 3), atol=1e-12)
+
+
+# --- the FOS with modes
+
+
+def test_the_fos_of_one_mode_is_the_fos_bit_for_bit():
+    model = JumpModel.define("x - 0.4*sin(x) + 0.4*x*v", "x + 0.3*x**2*w", modes={"only": {}}, transition=[1])
+    plain = model.modes[0]
+    found, expected = (
+        compare([one], plain, 2000, 8, 1, progress=False, wide=1, threads=1).error_variance(one.name).value
+        for one in (logic_dynamic_fos(model, [gaussian(plain)]), fos(gaussian(plain)))
+    )
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_the_fos_with_modes_on_its_design_ensemble():
+    """The note's equations by hand: regressions and normal laws over the trajectories of each mode, for a scalar sensor."""
+    model, runs, steps = failing(), 500, 5
+    blocks = list(Ensemble(model, runs, steps, seed=3).by_step())
+    (one,) = design([logic_dynamic_fos(model, [gaussian(mode) for mode in model.modes])], blocks)
+    state, c = one.init(runs), np.tile(model.first, (runs, 1))
+    m, d = np.full((2, runs), 3.0), np.full((2, runs), 4.0)
+    variance, pi = np.array([1.0, 100.0]), np.array(LASTING)
+    for k, (block,) in enumerate(blocks):
+        x, y = block.x[:, 0], block.y[:, 0]
+        L = np.array([np.exp(-0.5 * (y - m[j]) ** 2 / (d[j] + variance[j])) / np.sqrt(d[j] + variance[j]) for j in (0, 1)])
+        mu = c.T * L / (c.T * L).sum(axis=0)
+        z = (mu * np.array([m[j] + d[j] / (d[j] + variance[j]) * (y - m[j]) for j in (0, 1)])).sum(axis=0)
+        state = one.step(state, block.y)
+        np.testing.assert_allclose(state.posterior.mean[:, 0], z, rtol=1e-8)
+        np.testing.assert_allclose(state.memory.probability, mu.T, rtol=1e-6, atol=1e-9)
+        u, T, xi = np.empty((2, runs)), np.empty(2), np.empty((2, runs))
+        for i in (0, 1):
+            there = block.mode == i
+            slope, offset = np.polyfit(z[there], x[there], 1)
+            u[i], T[i] = slope * z + offset, np.var(x[there] - slope * z[there] - offset)
+            deviation = z[there].std()
+            xi[i] = model.law_at(k)[i] * np.exp(-0.5 * ((z - z[there].mean()) / deviation) ** 2) / deviation
+        xi /= xi.sum(axis=0)
+        c = xi.T @ pi
+        for j in (0, 1):
+            w = xi * pi[:, [j]] / c[:, j]
+            tau = 0.9 * u
+            m[j] = (w * tau).sum(axis=0)
+            d[j] = (w * (0.81 * T[:, None] + 0.49 + (tau - m[j]) ** 2)).sum(axis=0)
+
+
+def test_the_fos_with_modes_says_what_it_cannot_do():
+    rare = failing(transition=[[1 - 1e-9, 1e-9], [0.5, 0.5]], first=[1, 0])
+    with pytest.raises(NotFinite, match="no trajectory of the design is in a mode"):
+        design([logic_dynamic_fos(rare, [gaussian(one) for one in rare.modes])], Ensemble(rare, 100, 3, seed=1).by_step())
+    turning = JumpModel.define("x + v", "x + w", modes={"a": {}}, transition=[1], angles=["x"])
+    with pytest.raises(ModelError, match="angles"):
+        logic_dynamic_fos(turning, [gaussian(turning.modes[0])])
 
 
 # --- the average over modes
