@@ -63,7 +63,7 @@ def table() -> str:
 
 
 def variants() -> str:
-    """The shipped variants with their equations, in Markdown."""
+    """The shipped variants without modes, with their equations, in Markdown."""
     rows = []
     for name, one in load_variants().items():
         state, meter = (", ".join(map(sp.latex, side)) for side in (one.model.state_equation, one.model.meter_equation))

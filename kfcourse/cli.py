@@ -16,13 +16,14 @@ from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
 from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
-from kfcourse.lab.short_names import FILTERS, LAB, has_bound, title
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, has_bound, title
 from kfcourse.lab.variants import find_variant
 from kfcourse.listing import VARIANTS
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.subset import FEWEST as FEWEST_EXACT
 from kfcourse.montecarlo.subset import LEAST
+from kfcourse.symbolic.jumping import JumpModel
 
 DERIVATION = 60.0  # seconds for the formulas of the filters
 
@@ -39,7 +40,8 @@ DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with m
 @click.option(
     "--filters",
     "names",
-    help=f"Short names, separated by commas. Known: {', '.join(FILTERS)}.  [default: the lab's seven and the exact AOF]",
+    help=f"Short names, separated by commas. Known: {', '.join(FILTERS)}; for variants with modes: {', '.join(JUMP_FILTERS)}.  "
+    "[default: the lab's seven and the exact AOF; for variants with modes all]",
 )
 @click.option(
     "--exact-runs",
@@ -119,9 +121,12 @@ def lab(
     chosen = find_variant(variant, variants_file)
     model = chosen.model
     if names is None:
-        wanted = [*LAB, "aof-exact"] if exact_runs and has_bound(model) else list(LAB)
+        usual = JUMP_LAB if isinstance(model, JumpModel) else LAB
+        wanted = [*usual, "aof-exact"] if exact_runs and has_bound(model) else list(usual)
     else:
         wanted = [name.strip() for name in names.split(",") if name.strip()]
+    if language:
+        chosen.plain("student's reports")  # before the long part
     found = admissions(model, wanted, DERIVATION)
     refused = {one.name: one.reason for one in found if one.one is None}
     for one in found:

@@ -13,7 +13,8 @@ iterated_ekf            the meter linearised again at the estimate
 gate, heavy_tails       measurements that are not believed: refused, by any filter; weighted
 learnt_noise            a noise of unknown size, learnt on the way
 alphabeta               gains from a table, constant in the end
-multiple_models         several ways of moving (IMM)
+multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
+                        (jump_optimal: FOS with modes;  exact_jumps: the exact filter of state and mode)
 notation                symbols in which the equations are printed
 """
 
@@ -26,6 +27,7 @@ from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.designed import Design
 from kfcourse.filters.exact import pointmass
 from kfcourse.filters.exact_adaptive import adaptive_pointmass
+from kfcourse.filters.exact_jumps import jump_pointmass
 from kfcourse.filters.gate import gated
 from kfcourse.filters.heavy_tails import robust
 from kfcourse.filters.iterated_ekf import iterated
@@ -33,7 +35,7 @@ from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.learnt_noise import adaptive
 from kfcourse.filters.modified_structure import EQUATIONS as _MFOS
 from kfcourse.filters.modified_structure import mfos
-from kfcourse.filters.multiple_models import imm
+from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
 from kfcourse.filters.notation import latex
 from kfcourse.filters.optimal_structure import EQUATIONS as _FOS
 from kfcourse.filters.optimal_structure import fos
@@ -55,10 +57,13 @@ __all__ = [
     "duof",
     "fos",
     "gated",
+    "gpb2",
     "imm",
     "iterated",
+    "jump_pointmass",
     "kalman_filter",
     "latex",
+    "logic_dynamic",
     "mfos",
     "particle",
     "pointmass",

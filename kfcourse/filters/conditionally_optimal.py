@@ -13,7 +13,7 @@ from kfcourse.angles import difference, near
 from kfcourse.filters import notation as s
 from kfcourse.filters.designed import Design, Equations, Regression, Step
 from kfcourse.laws import Array, Gaussian, where_measured
-from kfcourse.symbolic.equations import compile_noiseless
+from kfcourse.symbolic.equations import Noiseless, compile_noiseless
 from kfcourse.symbolic.model import Model
 
 _omega, _eps = s.matrix(r"\omega_{k}", s.p, s.ONE), s.matrix(r"\varepsilon_{k}", s.n, s.ONE)
@@ -32,17 +32,18 @@ EQUATIONS = (
 )
 
 
-def duof(model: Model) -> Design:
+def duof(model: Model, equations: tuple[Noiseless, Noiseless] | None = None) -> Design:
     """The two-step conditionally optimal filter.
 
     omega = y - b(lambda, m_w),   z = lambda + H omega + e       H, e: regression of x - lambda on omega
     alpha = a(z, m_v),            lambda' = F alpha + g          F, g: regression of x' on alpha
 
-    Its own covariance is the residual of each regression, (n, n): one for the whole ensemble.
+    Its own covariance is the residual of each regression, (n, n): one for the whole ensemble.  Given `equations` take the place
+    of a(z, m_v) and b(lambda, m_w).
     """
-    (a, b), angles = compile_noiseless(model), model.angles
+    (a, b), angles = equations or compile_noiseless(model), model.angles
 
-    def equations(predicted: Gaussian, y: Array, k: int) -> Equations:
+    def step(predicted: Gaussian, y: Array, k: int) -> Equations:
         lam = predicted.mean
         omega = difference(y, b(lam, k), angles.y)
         fit = yield Regression(lambda x, x_next: difference(x, lam, angles.x), omega)
@@ -52,4 +53,4 @@ def duof(model: Model) -> Design:
         fit = yield Regression(lambda x, x_next: near(x_next, alpha, angles.x), alpha)
         return Step(posterior, Gaussian(fit(alpha), fit.residual))
 
-    return Design("duof", model, equations)
+    return Design("duof", model, step)

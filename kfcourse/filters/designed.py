@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.filters.base import Filter, Init, State, initial_state
 from kfcourse.laws import Array, Gaussian, apply, gain, symmetric
 from kfcourse.symbolic.model import Model
 
@@ -45,6 +45,9 @@ class Scatter(NamedTuple):
     @classmethod
     def of(cls, target: Array, regressor: Array) -> Scatter:
         """Those of target (N, r) and regressor (N, s) stacked into one vector."""
+        if not len(target):
+            size = target.shape[1] + regressor.shape[1]
+            return cls(0, np.zeros(size), np.zeros((size, size)))
         columns = [target[:, i] for i in range(target.shape[1])] + [regressor[:, i] for i in range(regressor.shape[1])]
         count, size = len(target), len(columns)
         mean = [float(np.add.reduce(column)) / count for column in columns]
@@ -99,10 +102,13 @@ class Regression(NamedTuple):
         (x_k (N, n), x_{k+1} (N, n)) -> (N, r); known only while designing.
     regressor : ndarray (N, s)
         What the filter itself knows.
+    mode : int, optional
+        Of a model that jumps: over the trajectories that are in this mode at the step.
     """
 
     target: Callable[[Array, Array], Array]
     regressor: Array
+    mode: int | None = None
 
 
 class Step(NamedTuple):
@@ -110,6 +116,7 @@ class Step(NamedTuple):
 
     posterior: Gaussian
     predicted: Gaussian
+    memory: Any = None
 
 
 Equations = Generator[Regression, Affine, Step]
@@ -125,12 +132,26 @@ class Design:
     model : Model
     equations : callable
         (predicted: Gaussian, y, step) -> generator of one step: yields `Regression`, receives `Affine`, returns `Step`.
+    start : Init, optional
+        For a filter that carries more than a prediction: the state before the first measurement.  The equations then take the
+        state's memory as a fourth argument, and return the next in their `Step`.
     """
 
     name: str
     model: Model
-    equations: Callable[[Gaussian, Array, int], Equations]
+    equations: Callable[..., Equations]
     slow: bool = False
+    start: Init | None = None
+
+    @property
+    def init(self) -> Init:
+        """The state before the first measurement."""
+        return self.start or initial_state(self.model)
+
+    def running(self, state: State, y: Array) -> Equations:
+        """The equations of a step, started from a state."""
+        memory = () if self.start is None else (state.memory,)
+        return self.equations(state.predicted, y, state.step, *memory)
 
     def with_coefficients(self, coefficients: Sequence[Sequence[Affine]]) -> Filter:
         """The filter with the coefficients of every step, in the order the equations ask for them."""
@@ -141,10 +162,9 @@ class Design:
                 raise ValueError(
                     f"{self.name} was designed for {len(table)} steps; design it with more to run step {state.step + 1}"
                 )
-            result = _answer(self.equations(state.predicted, y, state.step), table[state.step])
-            return State(state.step + 1, result.posterior, result.predicted)
+            return State(state.step + 1, *_answer(self.running(state, y), table[state.step]))
 
-        return Filter(self.name, self.model, initial_state(self.model), step)
+        return Filter(self.name, self.model, self.init, step)
 
 
 def _answer(equations: Equations, fits: Sequence[Affine]) -> Step:

@@ -83,11 +83,12 @@ def write_handin(variant: Variant, result: Comparison, folder: Path, language: s
     Raises
     ------
     ValueError
-        An unknown language.
+        An unknown language, or a variant with modes, which the report's text does not know.
     """
     if language not in LANGUAGES:
         raise ValueError(f"the report is written in {' or '.join(LANGUAGES)}, not {language!r}")
     words = tomllib.loads((resources.files("kfcourse.lab") / "handin.toml").read_text(encoding="utf-8"))[language]
+    variant.plain("student's reports")
     report = _Report(result, words)
     content = {"blocks": list(report.blocks()), "words": words, "variant": variant, "language": language}
     labels = plots.Words(report.title, **{part: words[f"axis_{part}"] for part in plots.Words._fields[1:]})
@@ -103,7 +104,8 @@ class _Report:
 
     def __init__(self, result: Comparison, words: dict[str, str]) -> None:
         self.result, self.words = result, words
-        self.model: Model = result.model
+        assert isinstance(result.model, Model)  # `write_handin` has said so
+        self.model = result.model
         self.structures = Structures(self.model)
         self.kinds = [kind for kind in ("linearised", "gaussian") if any(name.endswith(kind) for name in result.available)]
 

@@ -3,11 +3,28 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
-from kfcourse.filters import Design, Filter, aof, duof, fos, mfos, particle, pointmass
+from kfcourse.filters import (
+    Design,
+    Filter,
+    aof,
+    duof,
+    fos,
+    gpb2,
+    imm,
+    jump_pointmass,
+    logic_dynamic,
+    mfos,
+    particle,
+    pointmass,
+)
+from kfcourse.filters.jump_optimal import logic_dynamic_fos
+from kfcourse.laws import Array
+from kfcourse.symbolic.averaging import averaged, averaged_equations
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.quadrature import gauss_hermite, unscented
@@ -30,12 +47,52 @@ class Structures:
         return gaussian(self.model)
 
 
+class JumpStructures:
+    """Those of a model that jumps: of each mode, and averaged over the modes."""
+
+    def __init__(self, model: JumpModel):
+        self.model = model
+
+    @cached_property
+    def linearised(self) -> list[Structure]:
+        return [linearised(mode) for mode in self.model.modes]
+
+    @cached_property
+    def gaussian(self) -> list[Structure]:
+        return [gaussian(mode) for mode in self.model.modes]
+
+    @property
+    def chain(self) -> tuple[Callable[[int], Array], Array]:
+        """Transition matrix by the step, and law of the first mode: what filters with modes take."""
+        return self.model.transition_at, self.model.first
+
+    @property
+    def best(self) -> list[Structure]:
+        """Gaussian ones if there is a closed form, else linearised ones."""
+        try:
+            return self.gaussian
+        except NoClosedForm:
+            return self.linearised
+
+    @cached_property
+    def averaged(self) -> Structure:
+        return averaged(self.model, self.best)
+
+
 class Entry(NamedTuple):
     """A filter of the lab: printed names and how to build it."""
 
     title: str
     russian: str
     build: Callable[[Structures], Filter | Design]
+
+
+class JumpEntry(NamedTuple):
+    """A filter of the lab for models that jump."""
+
+    title: str
+    russian: str
+    build: Callable[[JumpStructures], Filter | Design]
 
 
 # One line a filter: this is where a new one is added.
@@ -56,6 +113,20 @@ FILTERS: dict[str, Entry] = {
     "aof-exact": Entry("exact AOF", "АОФ", lambda s: exact(s.model)),
     "particle": Entry("particle", "АОФ, частицы", lambda s: particle(s.model)),
 }
+# The same for models that jump: filters that know the modes, and plain ones on the average over the modes.
+JUMP_FILTERS: dict[str, JumpEntry] = {
+    "aof-jump-gaussian": JumpEntry("LD-GAOF", "ГАОФлд", lambda s: logic_dynamic(s.gaussian, *s.chain)),
+    "aof-jump-linearised": JumpEntry("LD-LAOF", "ЛАОФлд", lambda s: logic_dynamic(s.linearised, *s.chain)),
+    "imm": JumpEntry("IMM", "АОФлд, смешивание до прогноза", lambda s: imm(s.best, *s.chain)),
+    "gpb2": JumpEntry("GPB2", "АОФлд, пары режимов", lambda s: gpb2(s.best, *s.chain)),
+    "fos-jump-gaussian": JumpEntry("LD-GFOS", "ГФОСлд", lambda s: logic_dynamic_fos(s.model, s.gaussian)),
+    "fos-jump-linearised": JumpEntry("LD-LFOS", "ЛФОСлд", lambda s: logic_dynamic_fos(s.model, s.linearised)),
+    "aof-averaged": JumpEntry("AOF, averaged", "АОФ, среднее по режимам", lambda s: aof(s.averaged)),
+    "duof": JumpEntry("DUOF", "ДУОФ", lambda s: duof(s.model.modes[0], averaged_equations(s.model))),
+    "fos-averaged": JumpEntry("FOS, averaged", "ФОС, среднее по режимам", lambda s: fos(s.averaged)),
+    "mfos-averaged": JumpEntry("MFOS, averaged", "МФОС, среднее по режимам", lambda s: mfos(s.averaged)),
+    "aof-exact": JumpEntry("exact AOF", "АОФ", lambda s: jump_pointmass(s.model)),
+}
 # Printed names of filters that are not among the lab's.
 TITLES = {
     "kalman": "Kalman",
@@ -63,15 +134,17 @@ TITLES = {
     "iterated-unscented": "iterated UKF",
     "alpha-beta": "alpha-beta",
     "alpha-beta-gamma": "alpha-beta-gamma",
-    "imm": "IMM",
 }
 BOUND = 1000  # particles of the exact AOF where there are no point masses
+WITH_MODES = ("aof-jump-gaussian", "aof-jump-linearised", "imm", "gpb2", "aof-exact")  # that carry their probabilities
+JUMP_LAB = tuple(name for name in JUMP_FILTERS if name != "aof-exact")
 LAB = ("aof-gaussian", "aof-linearised", "duof", "fos-gaussian", "fos-linearised", "mfos-gaussian", "mfos-linearised")
 
 
 def title(name: str) -> str:
     """The printed name of a filter: "GAOF" for "aof-gaussian"."""
-    return FILTERS[name].title if name in FILTERS else TITLES.get(name, name)
+    entry = FILTERS.get(name) or JUMP_FILTERS.get(name)
+    return entry.title if entry else TITLES.get(name, name)
 
 
 def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Design]:
@@ -95,11 +168,11 @@ def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Desig
     return built
 
 
-def check_names(names: Sequence[str]) -> None:
+def check_names(names: Sequence[str], known: Mapping[str, object] = FILTERS) -> None:
     """ValueError, which lists the known names, if a short name is not among them."""
-    unknown = [name for name in names if name not in FILTERS]
+    unknown = [name for name in names if name not in known]
     if unknown:
-        raise ValueError(f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(FILTERS)}")
+        raise ValueError(f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(known)}")
 
 
 def exact(model: Model) -> Filter:
@@ -131,10 +204,10 @@ def has_exact(model: Model) -> bool:
     return True
 
 
-def has_bound(model: Model) -> bool:
+def has_bound(model: Model | JumpModel) -> bool:
     """Whether the exact AOF can be computed for the model, by point masses or by particles."""
     try:
-        exact(model)
+        jump_pointmass(model) if isinstance(model, JumpModel) else exact(model)
     except ModelError:
         return False
     return True
