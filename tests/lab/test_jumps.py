@@ -86,10 +86,10 @@ def test_the_lab_compares_filters_and_tells_the_share_of_right_modes(tmp_path, o
 def test_listed_and_checked(own):
     listed = kfcourse("variants", "--variant", "J1").output
     assert listed.count("x' = ") == 1 and "        sound: C = 1\n        faulty: C = 10\n" in listed
-    gone = JumpModel.define(
-        "x + v", "x + w", modes={"sound": {}, "gone": {"meter": "w"}}, transition=[[0.9, 0.1], [0, 1]], first=[1, 0]
+    two = JumpModel.define(
+        "x + v", "x + w", modes={"sound": {}, "cubic": {"meter": "x**3 + w"}}, transition=[[0.9, 0.1], [0, 1]], first=[1, 0]
     )
-    assert equations(gone) == "sound: x' = v + x;  y = w + x\n        gone: x' = v + x;  y = w"
+    assert equations(two) == "sound: x' = v + x;  y = w + x\n        cubic: x' = v + x;  y = w + x**3"
     checked = kfcourse("variants", "--variants", own, "--variant", "mine", "--check", "--runs", 256)
     assert checked.exit_code == 0 and "has 2 modes: only whether it is bounded is checked" in checked.output
 
