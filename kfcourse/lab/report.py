@@ -26,7 +26,7 @@ from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
 from kfcourse.lab.admission import admissions
-from kfcourse.lab.short_names import FILTERS, Structures, title
+from kfcourse.lab.short_names import FILTERS, Structures, family, title
 from kfcourse.lab.variants import Variant
 from kfcourse.laws import Array
 from kfcourse.limits import OutOfTime, time_limit
@@ -40,6 +40,13 @@ _FAMILIES = {
     "duof": "DUOF, the two-step conditionally optimal filter",
     "fos": "FOS, the filter of optimal structure",
     "mfos": "MFOS, the modified filter of optimal structure",
+    "dfmp": "DFMP, the two-step filter of low order",
+    "mdfmp": "MDFMP, the modified two-step filter of low order",
+    "fkp": "FKP, the filter with finite memory",
+    "mfkp": "MFKP, the modified filter with finite memory",
+    "dfkp": "DFKP, the two-step filter with finite memory",
+    "mdfkp": "MDFKP, the modified two-step filter with finite memory",
+    "fbp": "FBP, the filter of high order",
 }
 _FIGURES: dict[str, tuple[str, Callable[[Comparison, Axes], Axes]]] = {
     "accuracy": ("Error variance of each filter against the step.", plots.accuracy),
@@ -210,8 +217,8 @@ def printed(structures: Structures, kind: str) -> str:
 
 
 def _equation_sections(names: tuple[str, ...]) -> list[Section]:
-    families = dict.fromkeys(name.split("-")[0].removesuffix("3") for name in names)
-    return [Section.of(_FAMILIES[family], equations_latex(EQUATIONS[family])) for family in families if family in EQUATIONS]
+    families = dict.fromkeys(map(family, names))
+    return [Section.of(_FAMILIES[one], equations_latex(EQUATIONS[one])) for one in families if one in EQUATIONS]
 
 
 # What a reader must know before he relies on distances from the bound, by kind.

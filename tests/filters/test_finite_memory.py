@@ -6,7 +6,7 @@ import pytest
 from test_filters import LINEAR, OF_MEASUREMENTS, STRUCTURES, designed_on, exact_ensemble
 
 from kfcourse.filters import aof, dfkp, dfmp, fbp, fkp, fos, kalman_filter, mdfkp, mdfmp, mfkp, mfos
-from kfcourse.filters.optimal_structure import Memory, Recipe, of_structure
+from kfcourse.filters.optimal_structure import Memory, Recipe, Remembered, of_structure
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble, Instant, simulate
 from kfcourse.montecarlo.experiment import run
@@ -180,6 +180,8 @@ def test_angles_are_kept_together_where_estimates_are_remembered():
     assert (x[-1] > np.pi).mean() > 0.9 and (np.abs(wrapped) <= np.pi).all()
     away = wrapped - unwrapped
     away -= 2 * np.pi * np.round(away / (2 * np.pi))
+    kept = Remembered((np.array([[3.1, 2.0]]),)).and_now(np.array([[-3.1, 2.1]]), np.empty((1, 0)), Memory(2), turning=(0,))
+    np.testing.assert_allclose(kept.regressor, [[-3.1, 2.1, 3.1 - 2 * np.pi, 2.0]])
     # Turns draw the coefficients of the angle towards 1, where they nearly are; a jump would be an error of 6 beside 0.04.
     assert np.sqrt((away**2).mean()) < 0.2 * np.sqrt(((unwrapped - x) ** 2).mean())
 
