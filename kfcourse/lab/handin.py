@@ -22,6 +22,7 @@ from kfcourse.files import replacing_together
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
+from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.handin_text import filled, in_percent, inline_html, inline_tex, law, lines_of, matrix, power_of_ten
 from kfcourse.lab.refusals import cause
 from kfcourse.lab.report import printed, ranges, remarks, save_figure, save_texts, table_steps
@@ -179,7 +180,7 @@ class _Report:
             if moments := self.moments():
                 yield Block("text", words["recursion"])
                 yield Block("formulas", lines=[r"q_0 &= 1,\quad q_1 = m,\quad q_{n+1} = m\,q_n + n\,d\,q_{n-1}", *moments])
-            else:
+            elif not self.structures.quadrature:
                 yield Block("text", words["exponentials"])
 
     def conditional(self) -> list[str]:
@@ -211,6 +212,9 @@ class _Report:
 
     def derived(self, kind: str) -> Iterator[Block]:
         """The five functions, with their numbers in the catalogue where it has them."""
+        if kind == "gaussian" and isinstance(found := self.structures.quadrature, Checked):
+            yield Block("text", filled(self.words["by_quadrature"], order=found.order))
+            return
         block = printed(self.structures, kind)
         yield Block("text", self.words["result"])
         if FUNCTION_LATEX["tau"] not in block:

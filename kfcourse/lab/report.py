@@ -34,6 +34,7 @@ from kfcourse.montecarlo.comparison import EXACT, HEAVY, Comparison
 from kfcourse.montecarlo.statistics import Estimate, ratio
 from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.moments import NoClosedForm
 
 _FAMILIES = {
     "aof": "AOF in Gaussian approximation",
@@ -206,6 +207,9 @@ def _structure_sections(model: Model, names: tuple[str, ...]) -> list[Section]:
     return [Section.of(kind.capitalize(), printed(structures, kind)) for kind in kinds]
 
 
+NO_FORMULAS = "No closed form: by quadrature, of the order told under Which filters this model admits."
+
+
 def printed(structures: Structures, kind: str) -> str:
     """The formulas in LaTeX, if they can be found and read."""
     try:
@@ -213,6 +217,8 @@ def printed(structures: Structures, kind: str) -> str:
             block = getattr(structures, kind).latex()
     except OutOfTime:
         return rf"\text{{They are not written within {FORMULAS:g} s.}}"
+    except NoClosedForm:
+        return rf"\text{{{NO_FORMULAS}}}"
     return block if len(block) <= LONGEST else rf"\text{{They are too long to print: {len(block)} characters of LaTeX.}}"
 
 

@@ -24,6 +24,7 @@ from kfcourse.filters import (
     particle,
     pointmass,
 )
+from kfcourse.lab.checked_quadrature import Checked, checked_quadrature
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.quadrature import gauss_hermite, unscented
@@ -45,6 +46,25 @@ class Structures:
     def gaussian(self) -> Structure:
         return gaussian(self.model)
 
+    @cached_property
+    def quadrature(self) -> Checked | NoClosedForm | None:
+        """What takes the place of the Gaussian functions if they have no closed form, or why nothing does; None if they have."""
+        try:
+            _ = self.gaussian
+        except NoClosedForm as why:
+            try:
+                return checked_quadrature(self.model, why)
+            except NoClosedForm as neither:
+                return neither
+        return None
+
+    @property
+    def normal(self) -> Structure:
+        """The Gaussian functions, by quadrature if they have no closed form; NoClosedForm if that does not do either."""
+        if isinstance(self.quadrature, NoClosedForm):
+            raise self.quadrature
+        return self.quadrature.structure if self.quadrature else self.gaussian
+
 
 class Entry(NamedTuple):
     """A filter of the lab: printed names and how to build it."""
@@ -57,7 +77,7 @@ class Entry(NamedTuple):
 def _twice(family: str, title: str, russian: str, build: Callable[[Structure], Filter | Design]) -> dict[str, Entry]:
     """The entries of a family: with Gaussian structural functions, and with linearised ones."""
     return {
-        f"{family}-gaussian": Entry(f"G{title}", f"Г{russian}", lambda s: build(s.gaussian)),
+        f"{family}-gaussian": Entry(f"G{title}", f"Г{russian}", lambda s: build(s.normal)),
         f"{family}-linearised": Entry(f"L{title}", f"Л{russian}", lambda s: build(s.linearised)),
     }
 
