@@ -57,7 +57,7 @@ class Checked(NamedTuple):
         )
 
 
-def checked_quadrature(model: Model, why: NoClosedForm) -> Checked:
+def of_checked_order(model: Model, why: NoClosedForm) -> Checked:
     """The Gaussian structural functions of a model for which there are no formulas, as `why` says.
 
     Raises

@@ -24,7 +24,7 @@ from kfcourse.filters import (
     particle,
     pointmass,
 )
-from kfcourse.lab.checked_quadrature import Checked, checked_quadrature
+from kfcourse.lab.checked_quadrature import Checked, of_checked_order
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.quadrature import gauss_hermite, unscented
@@ -53,7 +53,7 @@ class Structures:
             _ = self.gaussian
         except NoClosedForm as why:
             try:
-                return checked_quadrature(self.model, why)
+                return of_checked_order(self.model, why)
             except NoClosedForm as neither:
                 return neither
         return None
