@@ -132,6 +132,8 @@ def lab(
     for one in found:
         for warning in one.warnings:
             click.echo(f"Warning: {title(one.name)}: {warning}", err=True)
+    for remark in dict.fromkeys(remark for one in found if one.name.endswith("-gaussian") for remark in one.remarks):
+        click.echo(f"Gaussian filters: {remark}", err=True)
     if len(refused) == len(found):
         raise click.ClickException(
             "; ".join(f"{name}: {reason}" for name, reason in refused.items())

@@ -3,6 +3,7 @@
 pendulum()               Särkkä and Svensson (2023), with their data: `pendulum_data()`
 car()                    from the same book, linear: `car_data()`
 growth_model(variance)   the univariate nonstationary growth model (Gordon, Salmond and Smith, 1993)
+cubic_sensor(), logistic(), inverse_cube_root()   the conditionally minimax line (Pankov, Bosov and Borisov)
 stochastic_volatility()  a state that shows only in the measurement's variance
 bearings()               two bearings of a target (Hartikainen, Solin and Särkkä, 2011), with its course: `bearings_data(...)`
 reentry(known)           a vehicle that enters the atmosphere (Julier and Uhlmann, 2004), seen by a radar
@@ -106,6 +107,11 @@ def growth_model(variance: float = 1) -> Model:
         prior={"mean": 0, "variance": 5},
         state_noise={"variance": variance},
     )
+
+
+def cubic_sensor() -> Model:
+    """x' = x/(1 + x^2) + v,  y = x^3 + x + w;  x_0 ~ N(0.1, 1)."""
+    return Model.define("x/(1 + x**2) + v", "x**3 + x + w", prior={"mean": 0.1, "variance": 1})
 
 
 def stochastic_volatility() -> Model:
