@@ -37,6 +37,7 @@ BATCH = STRATA  # trajectories of a batch: their initial states share the prior 
 CHUNKS = (16, 16, 32, 64, 128, 256, 512)  # trajectories taken at once; after these always as many as the last
 FEWEST = 100  # trajectories that are a result: with fewer, the rare ones that make up a distance are missing
 LEAST = 10e6  # bytes that can be a limit: interpreter and libraries take some at any time
+WAIT = 0.5  # seconds, so that what waits can be interrupted: on Windows, and by a time limit in another thread
 MARGIN = 1.3  # how much longer than the chunks before the next one may take, for each trajectory
 
 T = TypeVar("T")
@@ -137,6 +138,7 @@ def _chunks_in_time(
                     with memory_limit(memory):
                         work.advance(partial(Serial().submit, chunk, None), 1, until_long=jobs > 1)
                 else:
+                    jobs = min(jobs, work.chunks())
                     with processes(jobs, partial(chunk, None if memory is None else memory / jobs)) as submit:
                         work.advance(submit, jobs)
             except _NoRoom as found:
@@ -211,7 +213,7 @@ class _Work:
             if len(undone) < jobs and (count := self.next(len(self.found) + len(running), ahead)):
                 running.append((count, submit(ahead, count)))
             elif undone:
-                wait(undone, return_when=FIRST_COMPLETED)
+                wait(undone, WAIT, FIRST_COMPLETED)
             elif not running:
                 self.over = True
                 return
@@ -237,6 +239,12 @@ class _Work:
         while each * count > left and count >= 2 * CHUNKS[0]:
             count = count // 2 // BATCH * BATCH
         return count if each * count <= left else 0
+
+    def chunks(self) -> int:
+        """How many are left, if there is time for all."""
+        sizes = [*CHUNKS[len(self.found) :], *[CHUNKS[-1]] * (self.size // BATCH)]
+        ends = np.cumsum(np.minimum(sizes, self.most))
+        return int(np.searchsorted(ends, self.size - self.start)) + 1
 
     def long(self) -> bool:
         """Whether what is left is worth the start of processes, by the time that the chunks took that are done."""
