@@ -31,6 +31,7 @@ from kfcourse.filters.exact_jumps import jump_pointmass
 from kfcourse.filters.gate import gated
 from kfcourse.filters.heavy_tails import robust
 from kfcourse.filters.iterated_ekf import iterated
+from kfcourse.filters.jump_optimal import logic_dynamic_fos
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.learnt_noise import adaptive
 from kfcourse.filters.modified_structure import EQUATIONS as _MFOS
@@ -64,6 +65,7 @@ __all__ = [
     "kalman_filter",
     "latex",
     "logic_dynamic",
+    "logic_dynamic_fos",
     "mfos",
     "particle",
     "pointmass",

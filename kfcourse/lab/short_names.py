@@ -17,11 +17,11 @@ from kfcourse.filters import (
     imm,
     jump_pointmass,
     logic_dynamic,
+    logic_dynamic_fos,
     mfos,
     particle,
     pointmass,
 )
-from kfcourse.filters.jump_optimal import logic_dynamic_fos
 from kfcourse.laws import Array
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 from kfcourse.symbolic.jumping import JumpModel
