@@ -1,5 +1,5 @@
 """`python -m kfcourse` is the command `kfcourse`."""
 
-from kfcourse.cli import main
+from kfcourse.commands import main
 
 main(prog_name="kfcourse")

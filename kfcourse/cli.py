@@ -1,189 +1,39 @@
-"""The command line: `kfcourse lab 53`, `kfcourse variants --check`."""
+"""The lab's commands: `kfcourse lab 53`, `kfcourse filters 53`, `kfcourse estimate`."""
 
 from __future__ import annotations
 
-import errno
-import os
 import re
-import signal
-import sys
-import threading
-import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 
 import click
 
-from kfcourse.checks.posing import unposed
-from kfcourse.files import is_standard_output, read_only, replacing_together, save
+from kfcourse.commands import main as main  # scripts that were installed before call it here
+from kfcourse.files import is_standard_output, read_only, replacing_together
 from kfcourse.lab.admission import admissions, on_trial, without_failing
 from kfcourse.lab.admission import table as table_of_filters
-from kfcourse.lab.grammar import generate
 from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
-from kfcourse.lab.quality import FEWEST, RUNS, examine_all, table
-from kfcourse.lab.report import conclusions, equations, remarks_in_words, write_json, write_report
+from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
 from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, has_bound, title
-from kfcourse.lab.variants import VariantError, find_variant, read_variants
+from kfcourse.lab.variants import find_variant
+from kfcourse.listing import VARIANTS
 from kfcourse.montecarlo.comparison import EXACT, Comparison
-from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.subset import FEWEST as FEWEST_EXACT
 from kfcourse.montecarlo.subset import LEAST
-from kfcourse.symbolic.formula import FormulaError
 from kfcourse.symbolic.jumping import JumpModel
-from kfcourse.symbolic.moments import NoClosedForm
-from kfcourse.symbolic.reading import ModelError
 
-OF_NOTEBOOKS = ("exercises", "solutions", "grade")
 DERIVATION = 60.0  # seconds for the formulas of the filters
 
-_VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")
 
 DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with more, the lab takes longer
 
 
-class _Ended(BaseException):
-    """A signal asks this process to end."""
-
-
-@contextmanager
-def _clear_errors() -> Iterator[None]:
-    """What went wrong is said in a sentence, not in a traceback; an end by a signal leaves no half files."""
-    try:
-        with _ended_by({signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)}), warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # NumPy's: what became infinite is reported by name
-            warnings.showwarning = lambda message, *_: click.echo(f"Warning: {message}", err=True)
-            yield
-    except (VariantError, FormulaError, ModelError, NoClosedForm, NotFinite, ValueError) as error:
-        raise click.ClickException(str(error)) from None
-    except MemoryError:
-        raise click.ClickException("this needs more memory than there is; take fewer --runs, --steps or --threads") from None
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        where = f": {error.filename}" if error.filename else ""
-        remedy = "; make room, and run it again" if error.errno == errno.ENOSPC else ""
-        raise click.ClickException(f"{error.strerror or error}{where}{remedy}") from None
-    except KeyboardInterrupt:
-        click.echo("Interrupted; files written before are as they were.", err=True)
-        sys.exit(130)
-    except _Ended as ended:
-        click.echo("Ended by a signal; files written before are as they were.", err=True)
-        sys.exit(128 + ended.args[0])
-
-
-@contextmanager
-def _ended_by(numbers: Iterable[int]) -> Iterator[None]:
-    """Signals that end a process as errors, so that what was begun is cleared away."""
-
-    def end(number: int, _: FrameType | None) -> None:
-        raise _Ended(number)
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = {number: signal.signal(number, end) for number in numbers}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-class _Group(click.Group):
-    """Every command says what a user did wrong in a sentence; those of notebooks import Jupyter, when they are asked for."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return sorted([*super().list_commands(ctx), *OF_NOTEBOOKS])
-
-    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
-        if name not in OF_NOTEBOOKS:
-            return super().get_command(ctx, name)
-        from kfcourse.notebooks import commands
-
-        return getattr(commands, name)
-
-    def invoke(self, ctx: click.Context) -> object:
-        with _clear_errors():
-            return super().invoke(ctx)
-
-
-@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="kfcourse")
-def main() -> None:
-    """Kalman and nonlinear suboptimal filtering: the lab from the command line."""
-
-
-@main.command()
-@_VARIANTS
-@click.option("--variant", "names", multiple=True, help="Only this one; may be repeated.")
-@click.option("--check", is_flag=True, help="Say of each whether it is well posed, and how hard; exit status 1 if one is not.")
-@click.option("--generate", "wanted", type=click.IntRange(1, 200), help="Propose so many new variants that are well posed.")
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of the trajectories and proposals.")
-@click.option(
-    "--runs",
-    type=click.IntRange(min=FEWEST),
-    default=RUNS,
-    show_default=True,
-    help="Trajectories of a check, an eighth for vectors.",
-)
-@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Does not change the results.")
-@click.option("--out", type=click.Path(path_type=Path), help="New file for the proposed variants.  [default: print them]")
-def variants(
-    variants_file: Path | None,
-    names: tuple[str, ...],
-    check: bool,
-    wanted: int | None,
-    seed: int,
-    runs: int,
-    jobs: int,
-    out: Path | None,
-) -> None:
-    """List the variants of the lab, check them, or propose new ones."""
-    if wanted is not None and (check or names or variants_file):
-        raise click.UsageError("--generate goes with --seed, --runs, --jobs and --out only")
-    if wanted is None and out:
-        raise click.UsageError("--out goes with --generate only")
-    if wanted is not None:
-        _generate(wanted, seed, runs, jobs, out)
-        return
-    chosen, faults = read_variants(variants_file, names)
-    good = not faults
-    if check and chosen:
-        found = list(examine_all(list(chosen.values()), runs, seed, jobs, unposed))
-        click.echo(table(found))
-        good &= all(one.well_posed for one in found)
-    else:
-        for variant in chosen.values():
-            click.echo(f"{variant.name:>6}  {variant.title or 'no title'}\n        {equations(variant.model)}")
-    for fault in faults.values():
-        click.echo(f"Error: {fault}", err=True)
-    sys.exit(0 if good else 1)
-
-
-def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) -> None:
-    """Proposed variants to the file or to standard output, what was rejected to standard error."""
-    if out and (os.path.lexists(out) or not out.parent.is_dir()):
-        raise click.ClickException(f"the variants cannot go to {out}: name a new file in an existing folder with --out")
-    found = generate(wanted, seed, runs, jobs, unposed)
-    reasons = ", ".join(f"{number} {reason}" for reason, number in found.rejected.most_common())
-    click.echo(f"{found.rejected.total()} candidates rejected{': ' if reasons else ''}{reasons}", err=True)
-    if found.variants:
-        text = f"# Made by: kfcourse variants --generate {wanted} --seed {seed} --runs {runs}\n\n{found.toml()}"
-        if out:
-            save(text, out)
-        else:
-            click.echo(text, nl=False)
-    if len(found.variants) < wanted:
-        raise click.ClickException(f"only {len(found.variants)} of {wanted} variants found; ask for fewer, or try another --seed")
-
-
-@main.command()
+@click.command()
 @click.argument("variant")
-@_VARIANTS
+@VARIANTS
 @click.option("--runs", type=click.IntRange(min=2), default=100_000, show_default=True, help="Trajectories.")
 @click.option("--steps", type=click.IntRange(min=1), default=51, show_default=True, help="Measurements of each trajectory.")
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="The same seed gives the same numbers.")
@@ -225,7 +75,13 @@ def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) ->
     help="Draw half of the initial states from a law so many times as wide, and weight the trajectories.  [default: by a pilot]",
 )
 @click.option("--same-ensemble", is_flag=True, help="Design DUOF, FOS and MFOS on the trajectories they are compared on, once.")
-@click.option("--threads", type=click.IntRange(min=1), default=2, show_default=True, help="Does not change the numbers.")
+@click.option(
+    "--jobs",
+    "--threads",
+    "threads",
+    type=click.IntRange(min=1),
+    help="Processor cores to use; does not change the numbers.  [default: all]",
+)
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]")
 @click.option(
     "--report", "language", type=click.Choice(LANGUAGES), help="Also write the student's report, handin.html and handin.tex."
@@ -246,7 +102,7 @@ def lab(
     designs: int | None,
     wide: float | None,
     same_ensemble: bool,
-    threads: int,
+    threads: int | None,
     out: Path | None,
     language: str | None,
     json_file: Path | None,
@@ -342,9 +198,9 @@ def _kept(folder: Path) -> Iterator[None]:
         ) from None
 
 
-@main.command()
+@click.command()
 @click.argument("places", nargs=-1, required=True, metavar="[FILE] VARIANT")
-@_VARIANTS
+@VARIANTS
 @click.option("--trial/--no-trial", default=True, show_default=True, help="Also run each filter on a few hundred trajectories.")
 def filters(places: tuple[str, ...], variants_file: Path | None, trial: bool) -> None:
     """Say of each filter whether VARIANT, of FILE or of the lab, admits it, and why not."""
@@ -356,7 +212,7 @@ def filters(places: tuple[str, ...], variants_file: Path | None, trial: bool) ->
     click.echo(table_of_filters(on_trial(chosen.model, found) if trial else found))
 
 
-@main.command()
+@click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--model", "model_file", type=click.Path(path_type=Path), required=True, help="TOML file with the model.")
 @click.option("--variant", "name", help="Its name in the file, if there are several.")

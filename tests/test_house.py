@@ -8,8 +8,10 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+import yaml
 
 import kfcourse
+from kfcourse.commands import COMMANDS, main
 from kfcourse.pages.house import LAYERS, imported, imports, layer, modules, sentence
 
 pytestmark = pytest.mark.quick
@@ -44,10 +46,11 @@ def test_a_module_says_what_it_is(name):
     assert said.endswith((".", "?", "!", '"', "`")) and len(said) > 20, said
 
 
-def test_the_page_of_the_package_has_every_module():
-    page = (Path(__file__).parent.parent / "book" / "api.md").read_text(encoding="utf-8")
-    missing = [name for name in MODULES if f".. automodule:: kfcourse.{name}\n" not in page and layer(name) != "exercises"]
-    assert missing == []
+def test_every_folder_has_its_page():
+    folders = {f"kfcourse.{name}" for name, path in MODULES.items() if path.name == "__init__.py" and layer(name) != "exercises"}
+    toc = yaml.safe_load((Path(__file__).parent.parent / "book" / "_toc.yml").read_text(encoding="utf-8"))
+    sections = next(chapter["sections"] for chapter in toc["parts"][-1]["chapters"] if chapter["file"] == "api")
+    assert {section["file"] for section in sections} == {f"package/{name}" for name in folders | {"kfcourse"}}
 
 
 def test_what_notebooks_import_is_there():
@@ -59,13 +62,26 @@ def test_what_notebooks_import_is_there():
 
 
 @pytest.mark.parametrize(
-    ("module", "slow"),
+    ("code", "slow"),
     [
-        ("kfcourse", ["matplotlib", "scipy.linalg", "scipy.ndimage", "scipy.special", "scipy.stats"]),
-        ("kfcourse.cli", ["jupyter_client", "jupytext", "nbclient", "nbconvert", "nbformat"]),
+        ("import kfcourse", ["numpy", "scipy", "sympy"]),
+        ("from kfcourse import *", ["joblib", "matplotlib", "scipy.linalg", "scipy.ndimage", "scipy.special", "scipy.stats"]),
+        ("import kfcourse.cli", ["jupyter_client", "jupytext", "nbclient", "nbconvert", "nbformat"]),
+        ("from kfcourse.commands import main; main(['--help'], standalone_mode=False)", ["numpy", "scipy", "sympy"]),
+        (
+            "from kfcourse.commands import main; main(['variants', '--variant', '53'])",
+            ["joblib", "kfcourse.checks", "kfcourse.filters", "matplotlib", "scipy.linalg", "scipy.special"],
+        ),
     ],
 )
-def test_what_is_slow_to_import_waits_until_it_is_used(module, slow):
+def test_what_is_slow_to_import_waits_until_it_is_used(code, slow):
     """Every command and every graded notebook imports the package; after `import scipy`, `scipy.special.erf` imports the rest."""
-    code = f"import sys, {module}; print([name for name in {slow} if name in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+    code = f"import atexit, sys; atexit.register(lambda: print([name for name in {slow} if name in sys.modules])); {code}"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.endswith("[]\n")
+
+
+def test_a_command_s_help_in_the_list_is_its_own():
+    for name, place in COMMANDS.items():
+        command = main.get_command(None, name)
+        assert command.name == name
+        assert " ".join(command.help.partition("\n\n")[0].split()) == place.says

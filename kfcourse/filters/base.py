@@ -114,6 +114,10 @@ def structure_of(one: Filter, what: str) -> Structure:
     return one.structure
 
 
+def unknown_error(one: Filter) -> ValueError:
+    return ValueError(f"{one.name} does not know how good its laws are: ask pointmass(model), which is exact, or particle(model)")
+
+
 def _on_circle(step: Advance, angles: Components) -> Advance:
     """The step with estimates and predictions of angles between -pi and pi."""
 

@@ -38,7 +38,7 @@ from kfcourse.lab.criteria import (
 )
 from kfcourse.lab.difficulty import Hardness, hardness
 from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_exact, title
-from kfcourse.lab.variants import Variant
+from kfcourse.lab.variants import FEWEST, RUNS, Variant
 from kfcourse.laws import Array, Gaussian
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.linear.system import is_linear
@@ -46,7 +46,6 @@ from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
-from kfcourse.montecarlo.statistics import BATCHES
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -54,8 +53,6 @@ from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.reading import ModelError
 
 STEPS = 51  # of the lab
-RUNS = 40_000  # trajectories of a check
-FEWEST = 2 * BATCHES  # that have standard errors
 VECTOR = 8  # a vector model takes that much longer, and gets that many times fewer
 STRESS = 1.5  # factor of all deviations
 HEAVY = 20.0  # kurtosis worth a remark; 3 is the normal law's

@@ -155,17 +155,6 @@ def _model_in_numbers(model: Model | JumpModel) -> dict[str, Any]:
     }
 
 
-def equations(model: Model | JumpModel) -> str:
-    """The equations on a line, or on one for each mode."""
-    if isinstance(model, JumpModel):
-        own = [key for key in model.modes[0].parameters if len({mode.parameters[key] for mode in model.modes}) > 1]
-        values = [";  ".join(["", *(f"{key} = {float(mode.parameters[key]):g}" for key in own)]) for mode in model.modes]
-        each = zip(model.names, model.modes, values, strict=True)
-        return "\n        ".join(f"{name}: {equations(mode)}{said}" for name, mode, said in each)
-    state, meter = (", ".join(map(str, one)) for one in (model.state_equation, model.meter_equation))
-    return f"x' = {state};  y = {meter}"
-
-
 def conclusions(result: Comparison, confidence: float = 0.95) -> list[str]:
     """The ranking in sentences: each filter against the next, significant or not at the confidence.
 

@@ -10,6 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from kfcourse.montecarlo.statistics import BATCHES
 from kfcourse.symbolic.jumping import JumpModel, model_of_table
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import shown
@@ -20,6 +21,8 @@ JUMP_KEYS = {"modes", "transition", "first"}
 VARIANT_KEYS = {"title", "state", "meter"} | MODEL_KEYS | JUMP_KEYS
 SHIPPED = ("variants.toml", "jumps.toml")
 
+RUNS = 40_000  # trajectories by which a variant is checked
+FEWEST = 2 * BATCHES  # that have standard errors
 MANY = 40  # names that a message lists
 LARGEST_FILE = 1_000_000  # bytes; thousands of variants.  /dev/zero never ends
 
@@ -178,3 +181,18 @@ def chosen_variants(names: Sequence[str], everything: bool, path: str | Path | N
     for fault in faults.values():
         raise fault
     return list(found.values())
+
+
+def equations(model: Model | JumpModel) -> str:
+    """The equations on a line; of a model with modes what differs on one for each, too."""
+    if isinstance(model, JumpModel):
+        own = [key for key in model.modes[0].parameters if len({mode.parameters[key] for mode in model.modes}) > 1]
+        formulas = [equations(mode) for mode in model.modes]
+        common = [formulas[0]] if len(set(formulas)) == 1 else []
+        values = [[f"{key} = {float(mode.parameters[key]):g}" for key in own] for mode in model.modes]
+        each = [[*([] if common else [formula]), *said] for formula, said in zip(formulas, values, strict=True)]
+        return "\n        ".join(
+            [*common, *(f"{name}: {';  '.join(said)}" for name, said in zip(model.names, each, strict=True))]
+        )
+    state, meter = (", ".join(map(str, one)) for one in (model.state_equation, model.meter_equation))
+    return f"x' = {state};  y = {meter}"

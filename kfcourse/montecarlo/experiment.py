@@ -22,6 +22,7 @@ from kfcourse.laws import Array, Gaussian, stacked
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, workers
+from kfcourse.montecarlo.parallel import cores
 from kfcourse.montecarlo.statistics import BATCHES, Sums, batch_sizes
 from kfcourse.montecarlo.subset import LEAST, progress_bar, run_block, run_subset
 from kfcourse.montecarlo.two_phase import Replicas
@@ -111,7 +112,7 @@ def compare(
     subset_runs: int = 2000,
     subset_seconds: float | None = None,
     subset_memory: float | None = None,
-    threads: int = 2,
+    threads: int | None = None,
     progress: bool | None = None,
 ) -> Comparison:
     """Compare filters on common trajectories of a model.
@@ -151,8 +152,9 @@ def compare(
     subset_memory : float, optional
         Bytes that the slow filters may take beyond what the process has (Linux).  They then take fewer trajectories at once,
         which changes nothing but the time; one that has not room for the first few is left out.
-    threads : int
-        Threads that share the blocks of trajectories.
+    threads : int, optional
+        How many processor cores to use, by default all there are: threads share the blocks of trajectories, and processes the
+        slow filters' chunks, as far as these take more than a moment.
     progress : bool, optional
         Show progress bars; by default if standard error is a terminal.
 
@@ -167,7 +169,7 @@ def compare(
     _check_designs(designs, same_ensemble, wide)
     if smoothers:
         _check_arguments(smoothers, model, subset_runs, subset_seconds, subset_memory)
-    seed = seed_number(seed)
+    seed, threads = seed_number(seed), cores() if threads is None else threads
     names = [one.name for one in filters]
     slow = [one for one in filters if one.slow and subset_runs]
     fast = [one for one in filters if not one.slow]
@@ -198,13 +200,12 @@ def compare(
         if slow:
             slow_ready = _designed(slow, design_ensemble, pool, progress)
             subset, left_out = run_subset(
-                ready, slow_ready, common, min(subset_runs, runs), subset_seconds, subset_memory, progress
+                ready, slow_ready, common, min(subset_runs, runs), subset_seconds, subset_memory, threads, progress
             )
         smoothing = None
         if smoothers:
-            smoothing = _smoothing(
-                smoothers, common, seed, pool, (min(subset_runs, runs), subset_seconds, subset_memory), progress
-            )
+            limits = (min(subset_runs, runs), subset_seconds, subset_memory, threads)
+            smoothing = _smoothing(smoothers, common, seed, pool, limits, progress)
     found = Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset, left_out, replicas)
     return replace(found.without_unhealthy(), smoothing=smoothing)
 
@@ -214,7 +215,7 @@ def _smoothing(
     common: Ensemble,
     seed: int,
     pool: Executor,
-    limits: tuple[int, float | None, float | None],
+    limits: tuple[int, float | None, float | None, int],
     progress: bool | None,
 ) -> Comparison:
     """The comparison of smoothers on the same trajectories."""

@@ -1,15 +1,20 @@
 """The slow filters of a comparison: on the first of the common trajectories, as many as budgets of time and memory allow.
 
 Chunks of trajectories grow from a few to hundreds, as far as the memory allows; results are kept by batches of a few
-trajectories, always the same ones.  So the time decides after which chunk the work stops, and nothing else.
+trajectories, always the same ones.  So the time decides after which chunk the work stops, and nothing else: chunks are the same
+whether they come one after the other or, once they are seen to take their time, from several processes.
 """
 
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from importlib import import_module
+from dataclasses import dataclass, field
+from functools import partial
 from itertools import accumulate, islice
 from typing import TypeVar
 
@@ -24,7 +29,8 @@ from kfcourse.laws import Array, NegativeVariance
 from kfcourse.limits import OutOfTime, memory_limit, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Subset
 from kfcourse.montecarlo.designing import NotFinite
-from kfcourse.montecarlo.ensemble import STRATA, Ensemble, Instant
+from kfcourse.montecarlo.ensemble import STRATA, Ensemble, Instant, Serial
+from kfcourse.montecarlo.parallel import START, Submit, may_start, one_thread, processes
 from kfcourse.montecarlo.statistics import Sums
 
 BATCH = STRATA  # trajectories of a batch: their initial states share the prior out among them
@@ -52,6 +58,14 @@ class _TooMuch(MemoryError):
         self.name, self.step = name, step
 
 
+class _NoRoom(Exception):
+    """So many trajectories, so many chunks at once, are too many for the memory."""
+
+    def __init__(self, count: int, jobs: int, problem: MemoryError):
+        super().__init__(count, jobs, problem)
+        self.count, self.jobs, self.problem = count, jobs, problem
+
+
 def run_subset(
     fast: Sequence[Filter],
     slow: Sequence[Filter],
@@ -59,33 +73,36 @@ def run_subset(
     size: int,
     seconds: float | None,
     memory: float | None,
+    jobs: int,
     progress: bool | None,
     *,
     back: bool = False,
 ) -> tuple[Subset | None, dict[str, str]]:
-    """All filters on at most `size` of the trajectories, one thread, as short operations gain nothing from more.
+    """All filters on at most `size` of the trajectories, in `jobs` processes, as threads would wait for one another.
 
     With `back` they look back from the end.  Also, by name, why slow filters were left out; the others then start again without
     them, or with what runs instead.
     """
     data = _first(ensemble, size)
-    end = None if seconds is None else time.monotonic() + seconds
     left_out: dict[str, str] = {}
     replaced: dict[str, str] = {}
     chosen = {one.name: one for one in slow}
     if size < FEWEST and EXACT in chosen:
         left_out[EXACT] = f"on {size} trajectories the rare ones that matter are missing: take at least {FEWEST}, or 0"
-    _load_libraries()
-    with memory_limit(memory):
+    with one_thread():
+        end = None if seconds is None else time.monotonic() + seconds
         while running := [one for name, one in chosen.items() if name not in left_out]:
             names = [one.name for one in running]
             try:
-                sums = _chunks_in_time([*fast, *running], ensemble, data, end, memory, progress, back)
+                sums = _chunks_in_time([*fast, *running], ensemble, data, end, memory, jobs, progress, back)
             except _Failed as failed:
                 other = chosen[failed.name].instead
                 (left_out if other is None else replaced)[failed.name] = failed.reason
                 chosen[failed.name] = other or chosen[failed.name]
                 continue
+            except BrokenProcessPool:
+                why = "a process that computed it was killed, perhaps as memory ran out: take fewer jobs at once, or less memory"
+                return None, left_out | dict.fromkeys(names, why)
             done = sum(int(one.counts.sum()) for one in sums)
             found = Subset(names, Sums.concatenate(sums), replaced) if sums else None
             if found and (done >= FEWEST or EXACT not in names):
@@ -95,7 +112,7 @@ def run_subset(
                 return None, left_out | dict.fromkeys(names, reason)
             left_out[EXACT] = f"{reason}, and of fewer than {FEWEST} the rare ones that matter are missing: give it more time"
             return found.without_exact(), left_out
-    return None, left_out
+        return None, left_out
 
 
 def _chunks_in_time(
@@ -104,53 +121,129 @@ def _chunks_in_time(
     data: tuple[Array, Array, Array],
     end: float | None,
     memory: float | None,
+    jobs: int,
     progress: bool | None,
     back: bool,
 ) -> list[Sums]:
     """Sums over the chunks that are done in time; one that would take too much time or memory is done in smaller ones."""
     names = [one.name for one in filters]
-    reference = names.index(EXACT) if EXACT in names else None
-    steps, size, n = data[0].shape
-    most = CHUNKS[-1]
-    found: list[Sums] = []
-    begun, start = time.monotonic(), 0
+    size, jobs = data[0].shape[1], jobs if may_start() else 1
+    chunk = partial(_chunk, filters, data, names.index(EXACT) if EXACT in names else None, ensemble.weight, back, end)
     with progress_bar("slow filters", size, "trajectory", progress) as bar:
-        while start < size:
-            count = min(CHUNKS[min(len(found), len(CHUNKS) - 1)], most, size - start)
-            now = time.monotonic()
-            if end is not None and found:
-                each = MARGIN * (now - begun) / start
-                while each * count > end - now and count >= 2 * CHUNKS[0]:
-                    count = count // 2 // BATCH * BATCH
-                if each * count > end - now:
-                    break
-            instants = [Instant(*(array[k, start : start + count] for array in data)) for k in range(steps)]
+        work = _Work(size, end, bar)
+        while not work.over:
             try:
-                with _until(end):
-                    sums = Sums.empty(len(filters), steps, n, np.diff([*range(0, count, BATCH), count]))
-                    run_block(filters, instants, sums, reference, ensemble.weight, back=back)
-            except OutOfTime:
-                break
-            except MemoryError as problem:
-                if count > CHUNKS[0]:
-                    most = max(count // 2 // BATCH * BATCH, CHUNKS[0])  # whole batches, so that they stay the same
-                    continue
-                most_of_it = "there is" if memory is None else f"the {memory / 1e6:g} MB that the slow filters may take"
-                # What another filter lacks a slow one has taken.
-                name, step = (problem.name, f"step {problem.step}: ") if isinstance(problem, _TooMuch) else (names[-1], "")
-                raise _Failed(name, f"{step}{count} trajectories need more memory than {most_of_it}") from None
-            found.append(sums)
-            start += count
-            bar.update(count)
-    return found
+                if jobs == 1 or not work.long():
+                    with memory_limit(memory):
+                        work.advance(partial(Serial().submit, chunk, None), 1, until_long=jobs > 1)
+                else:
+                    with processes(jobs, partial(chunk, None if memory is None else memory / jobs)) as submit:
+                        work.advance(submit, jobs)
+            except _NoRoom as found:
+                if found.jobs > 1:
+                    jobs //= 2  # fewer have more room each
+                elif found.count > CHUNKS[0]:
+                    work.most = max(found.count // 2 // BATCH * BATCH, CHUNKS[0])  # whole batches, so that they stay the same
+                else:
+                    most_of_it = "there is" if memory is None else f"the {memory / 1e6:g} MB that the slow filters may take"
+                    # What another filter lacks a slow one has taken.
+                    name, step = (
+                        (problem.name, f"step {problem.step}: ")
+                        if isinstance(problem := found.problem, _TooMuch)
+                        else (names[-1], "")
+                    )
+                    raise _Failed(name, f"{step}{found.count} trajectories need more memory than {most_of_it}") from None
+            except OSError:
+                if jobs == 1:
+                    raise
+                jobs = 1  # no more processes are to be had
+    return work.found
 
 
-def _load_libraries() -> None:
-    """What the limits must not stop half-way: parts of SciPy, and OpenBLAS' buffers, without which it ends the process."""
-    for part in ("linalg", "ndimage", "special"):
-        import_module(f"scipy.{part}")
-    square = np.eye(512)
-    np.linalg.cholesky(np.linalg.solve(square, square) @ square)
+def _chunk(
+    filters: Sequence[Filter],
+    data: tuple[Array, Array, Array],
+    reference: int | None,
+    weight_of: Callable[[Array], Array | None],
+    back: bool,
+    end: float | None,
+    memory: float | None,
+    start: int,
+    count: int,
+) -> tuple[Sums, float] | MemoryError | None:
+    """Sums over one chunk and the seconds it took; None if the time is over, or what is too large for the memory."""
+    begun = time.monotonic()
+    steps, _, n = data[0].shape
+    try:
+        with memory_limit(memory), _until(end):
+            instants = [Instant(*(array[k, start : start + count] for array in data)) for k in range(steps)]
+            sums = Sums.empty(len(filters), steps, n, np.diff([*range(0, count, BATCH), count]))
+            run_block(filters, instants, sums, reference, weight_of, back=back)
+    except OutOfTime:
+        return None
+    except MemoryError as problem:
+        return problem
+    return sums, time.monotonic() - begun
+
+
+@dataclass
+class _Work:
+    """Chunks that are done, and those to come."""
+
+    size: int
+    end: float | None
+    bar: tqdm[None]
+    found: list[Sums] = field(default_factory=list)
+    start: int = 0
+    seconds: float = 0.0
+    most: int = CHUNKS[-1]
+    over: bool = False
+
+    def advance(self, submit: Submit, jobs: int, until_long: bool = False) -> None:
+        """Do chunks, `jobs` at a time, until all are done or the time is over; or until what is left is seen to be long.
+
+        Behind a chunk that fails nothing counts: results are those of one chunk after the other.
+        """
+        running: deque[tuple[int, Future[tuple[Sums, float] | MemoryError | None]]] = deque()
+        while not (until_long and self.long()):
+            undone = [future for _, future in running if not future.done()]
+            ahead = self.start + sum(count for count, _ in running)
+            if len(undone) < jobs and (count := self.next(len(self.found) + len(running), ahead)):
+                running.append((count, submit(ahead, count)))
+            elif undone:
+                wait(undone, return_when=FIRST_COMPLETED)
+            elif not running:
+                self.over = True
+                return
+            while running and running[0][1].done():
+                count, future = running.popleft()
+                result = future.result()
+                if result is None:
+                    self.over = True
+                    return
+                if isinstance(result, MemoryError):
+                    raise _NoRoom(count, jobs, result)
+                self.found.append(result[0])
+                self.start += count
+                self.seconds += result[1]
+                self.bar.update(count)
+
+    def next(self, index: int, ahead: int) -> int:
+        """Trajectories of a chunk that begins there; 0 if none are left, or none in time."""
+        count = min(CHUNKS[min(index, len(CHUNKS) - 1)], self.most, self.size - ahead)
+        if self.end is None or not self.found:
+            return count
+        each, left = MARGIN * self.seconds / self.start, self.end - time.monotonic()
+        while each * count > left and count >= 2 * CHUNKS[0]:
+            count = count // 2 // BATCH * BATCH
+        return count if each * count <= left else 0
+
+    def long(self) -> bool:
+        """Whether what is left is worth the start of processes, by the time that the chunks took that are done."""
+        if not self.found:
+            return False
+        left = self.seconds / self.start * (self.size - self.start)
+        return min(left, np.inf if self.end is None else self.end - time.monotonic()) > START
 
 
 def _until(end: float | None) -> AbstractContextManager[None]:

@@ -10,7 +10,7 @@ from kfcourse import JumpModel, cli, load_variants, simulate
 from kfcourse.filters import jump_pointmass, logic_dynamic
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures, title
-from kfcourse.lab.variants import VariantError, chosen_variants, find_variant, read_variants
+from kfcourse.lab.variants import VariantError, chosen_variants, equations, find_variant, read_variants
 from kfcourse.montecarlo.modes import recognised
 
 JUMPS = {name: one for name, one in read_variants()[0].items() if isinstance(one.model, JumpModel)}
@@ -85,7 +85,11 @@ def test_the_lab_compares_filters_and_tells_the_share_of_right_modes(tmp_path, o
 
 def test_listed_and_checked(own):
     listed = kfcourse("variants", "--variant", "J1").output
-    assert "sound: x' = " in listed and "C = 10" in listed
+    assert listed.count("x' = ") == 1 and "        sound: C = 1\n        faulty: C = 10\n" in listed
+    two = JumpModel.define(
+        "x + v", "x + w", modes={"sound": {}, "cubic": {"meter": "x**3 + w"}}, transition=[[0.9, 0.1], [0, 1]], first=[1, 0]
+    )
+    assert equations(two) == "sound: x' = v + x;  y = w + x\n        cubic: x' = v + x;  y = w + x**3"
     checked = kfcourse("variants", "--variants", own, "--variant", "mine", "--check", "--runs", 256)
     assert checked.exit_code == 0 and "has 2 modes: only whether it is bounded is checked" in checked.output
 

@@ -75,7 +75,8 @@ def test_the_time_is_used(model, control, monkeypatch):
         return control.step(state, y)
 
     steady = replace(control, name="steady", slow=True, step=step)
-    result = compare([control, steady], model, 2000, STEPS, 1, subset_runs=2000, subset_seconds=1000 * STEPS, progress=False)
+    options = {"subset_runs": 2000, "subset_seconds": 1000 * STEPS, "threads": 1, "progress": False}
+    result = compare([control, steady], model, 2000, STEPS, 1, **options)
     # MARGIN leaves less than ten trajectories unused
     assert 990 <= result.subset_runs == clock.now / STEPS <= 1000
 
@@ -192,10 +193,10 @@ def test_hardly_any_memory_is_refused(model, control, memory):
 
 def test_the_exact_filter_on_a_model_beyond_its_budget_is_left_out_within_seconds():
     model = Model.define("x**3 + 1e-6*v", "x + w")
-    start = time.monotonic()
+    start = time.process_time()
     filters = [aof(linearised(model)), pointmass(model)]
-    result = compare(filters, model, 112, 2, 1, subset_runs=112, subset_seconds=5, progress=False)
-    assert time.monotonic() - start < 30  # 5 s of budget, and a slow machine
+    result = compare(filters, model, 112, 2, 1, subset_runs=112, subset_seconds=30, progress=False)
+    assert time.process_time() - start < 15  # it takes 3 to 5, and by the clock, on a busy machine, many times that
     assert re.search(r"^step \d of Model\(x' = .* nodes.*--exact-runs 0", result.left_out["aof-exact"])
 
 

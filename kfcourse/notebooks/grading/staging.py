@@ -12,7 +12,14 @@ from pathlib import Path
 
 from kfcourse.checks import Exercise, ExerciseError, exercise, sets
 
-LEFT_OUT = ("notebooks", "exercises", "cli.py", "__main__.py")  # what a student's notebook has no use for
+LEFT_OUT = (
+    "notebooks",
+    "exercises",
+    "cli.py",
+    "commands.py",
+    "listing.py",
+    "__main__.py",
+)  # what a student's notebook has no use for
 NEEDED = ("__init__.py", "grading/__init__.py", "grading/channel.py", "grading/session.py", "grading/values.py")  # of notebooks
 COMPANIONS = "companion.py"  # what the notebooks of a set import; never a key
 

@@ -1,0 +1,122 @@
+"""Work shared out among processes, for what threads slow down: much Python between operations on small arrays.
+
+On Linux they are forks of this process, which have all that it has at once, closures too.  Elsewhere a fork is not safe once
+libraries are loaded: there they are joblib's, which import the package first and are sent the work.
+"""
+
+from __future__ import annotations
+
+import gc
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from functools import partial
+from importlib import import_module
+from multiprocessing.connection import Connection, Pipe
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+FORK = sys.platform == "linux"
+START = 0.5 if FORK else 5.0  # seconds of work that are worth the start of processes
+
+Submit = Callable[..., Future[Any]]
+
+
+def cores() -> int:
+    """Cores that this process may use: those of its affinity and of its container."""
+    from joblib import cpu_count
+
+    return int(cpu_count())
+
+
+def may_start() -> bool:
+    """Whether this process may have others: a worker of `multiprocessing.Pool` may not."""
+    return not multiprocessing.current_process().daemon
+
+
+def one_thread() -> threadpool_limits:
+    """Linear algebra in one thread from now on, or in a block: on small matrices others only wait, and take a core for it.
+
+    What limits must not stop half-way is loaded first: parts of SciPy, and OpenBLAS' buffers, without which it ends the process.
+    """
+    for part in ("linalg", "ndimage", "special"):
+        import_module(f"scipy.{part}")
+    limits = threadpool_limits(1, "blas")
+    square = np.eye(512)
+    np.linalg.cholesky(np.linalg.solve(square, square) @ square)
+    return limits
+
+
+@contextmanager
+def processes(count: int, work: Callable[..., Any]) -> Iterator[Submit]:
+    """So many processes and a function with the arguments of `work`, which gives futures of its results.
+
+    None of them outlives this block, nor this process: what is under way is dropped at once.
+
+    Raises
+    ------
+    concurrent.futures.process.BrokenProcessPool
+        From a future: a process was killed.
+    OSError
+        No process can be started.
+    """
+    if not FORK:
+        from joblib.externals.loky import ProcessPoolExecutor as Loky
+
+        pool = Loky(count, initializer=_begin, initargs=(work,))
+        try:
+            yield partial(pool.submit, _do)
+        finally:
+            pool.shutdown(kill_workers=True)
+        return
+    over, end = Pipe(duplex=False)
+    forks = ProcessPoolExecutor(count, multiprocessing.get_context("fork"), _begin_fork, (work, over, end))
+    try:
+        with warnings.catch_warnings():
+            # Python 3.12 warns of locks that other threads hold; the forks compute and write to a pipe, and take none.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            forks.submit(int)  # the first starts them all
+        yield partial(forks.submit, _do)
+    finally:
+        end.send_bytes(b"over")
+        forks.shutdown(cancel_futures=True)
+        over.close()
+        end.close()
+
+
+def _begin(work: Callable[..., Any]) -> None:
+    """In a new process."""
+    global _work
+    _work = work
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends this process
+    one_thread()
+
+
+def _begin_fork(work: Callable[..., Any], over: Connection, end: Connection) -> None:
+    for number in (signal.SIGTERM, signal.SIGHUP):  # the parent's handlers clear away what is the parent's
+        signal.signal(number, signal.SIG_DFL)
+    end.close()  # now the parent alone has it
+    threading.Thread(target=_end_with, args=(over,), daemon=True).start()
+    gc.freeze()  # what there is stays: not to be looked through, nor copied for that, at every collection
+    _begin(work)
+
+
+def _end_with(over: Connection) -> None:
+    """End this process when the parent says so, or is no more; nobody reads the word, so that all forks see it."""
+    over.poll(None)
+    os._exit(1)
+
+
+def _do(*arguments: Any) -> Any:
+    return _work(*arguments)
+
+
+_work: Callable[..., Any]
