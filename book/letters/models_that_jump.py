@@ -52,5 +52,4 @@ SAID = {
     r"\lambda^{\text{after}}": NOTATION,
     r"\Psi^{\text{before}}": NOTATION,
     r"\Psi^{\text{after}}": NOTATION,
-    r"\bar R": NOTATION,
 }

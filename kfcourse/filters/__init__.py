@@ -33,6 +33,7 @@ from kfcourse.filters.finite_memory import dfkp, fbp, fkp, mdfkp, mfkp
 from kfcourse.filters.gate import gated
 from kfcourse.filters.heavy_tails import robust
 from kfcourse.filters.iterated_ekf import iterated
+from kfcourse.filters.jump_optimal import logic_dynamic_fos
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.learnt_noise import adaptive
 from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
@@ -68,6 +69,7 @@ __all__ = [
     "kalman_filter",
     "latex",
     "logic_dynamic",
+    "logic_dynamic_fos",
     "mdfkp",
     "mdfmp",
     "mfkp",

@@ -21,6 +21,7 @@ from kfcourse.filters import (
     imm,
     jump_pointmass,
     logic_dynamic,
+    logic_dynamic_fos,
     mdfkp,
     mdfmp,
     mfkp,
@@ -28,7 +29,6 @@ from kfcourse.filters import (
     particle,
     pointmass,
 )
-from kfcourse.filters.jump_optimal import logic_dynamic_fos
 from kfcourse.lab.checked_quadrature import Checked, of_checked_order
 from kfcourse.laws import Array
 from kfcourse.symbolic.averaging import averaged, averaged_equations

@@ -27,7 +27,7 @@ class Recognised(NamedTuple):
     guess : float
         The same for who always names the mode that is likeliest before anything is measured.
     mode : ndarray (steps,)
-        The true modes of the first trajectory.
+        The true modes of one trajectory: the first in which there are as many as in any.
     probability : dict
         Name of a filter to its probabilities of the modes there, (steps, J).
     """
@@ -44,18 +44,20 @@ def recognised(filters: Sequence[Filter], model: JumpModel, runs: int, steps: in
     The standard errors are those of means over independent trajectories.
     """
     _, y, mode = simulate(model, runs, steps, seed)
-    share, first = {}, {}
+    least = max(runs // SLOW, 2)
+    shown = int(np.argmax([len(np.unique(one)) for one in mode[:, :least].T]))
+    share, there = {}, {}
     for one in filters:
-        size = max(runs // SLOW, 2) if one.slow else runs
+        size = least if one.slow else runs
         state, right = one.init(size), np.zeros(size)
         probabilities = []
         for k in range(steps):
             state = one.step(state, y[k, :size])
             found = state.memory.probability
             right += found.argmax(axis=1) == mode[k, :size]
-            probabilities.append(found[0])
+            probabilities.append(found[shown])
         each = right / steps
         share[one.name] = Estimate(each.mean(), each.std(ddof=1) / np.sqrt(size), size - 1)
-        first[one.name] = np.array(probabilities)
+        there[one.name] = np.array(probabilities)
     guess = np.mean([(mode[k] == model.law_at(k).argmax()).mean() for k in range(steps)])
-    return Recognised(share, float(guess), mode[:, 0], first)
+    return Recognised(share, float(guess), mode[:, shown], there)
