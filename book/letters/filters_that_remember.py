@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from kfcourse.pages.reader import Indexed, Of
+from kfcourse.pages.reader import Indexed
 from kfcourse.pages.relations import DEFINITION, NOTATION
 
 STEPS, RUNS = 6, 80
@@ -46,15 +46,24 @@ def windowed(rng):
         L, n, _ = fitted(following, tau(u[0], T))
         before = ahead or (1.0, 0.0)
         rows.append(
-            {r"\lambda": lam, r"\Psi": Psi, r"\sigma": sigma, "H": H.item(), "e": e, "z": z, r"\zeta": np.array(zeta), "u": u}
-            | {r"\Gamma": Gamma, r"\chi": chi, "T": T, "L": before[0], "n": before[1], "y": y, "hGF": (h, G, F)}
+            {"y": y, "h": h, "G": G, "F": F}
+            | {r"\lambda": lam, r"\Psi": Psi, r"\sigma": sigma, "H": H.item(), "e": e, "z": z, r"\zeta": np.array(zeta), "u": u}
+            | {
+                r"\Gamma": Gamma,
+                r"\chi": np.full((1, RUNS), chi),
+                "T": T,
+                "L": before[0],
+                "n": before[1],
+                "y": y,
+                "h": h,
+                "G": G,
+                "F": F,
+            }
         )
         ahead = L.item(), n
         lam, Psi, x = ahead[0] * tau(u[0], T) + n, Theta(u[0], T), following
-    names = [name for name in rows[0] if name != "hGF"]
-    at_k = {name: Of(lambda k, place=place: rows[k]["hGF"][place], "k") for place, name in enumerate("hGF")}
-    every = {name: Indexed([row[name] for row in rows]) for name in names}
-    return every | at_k | {r"\tau": lambda u, T: tau(u[0], T), r"\Theta": lambda u, T: Theta(u[0], T), "k": range(1, STEPS - 1)}
+    every = {name: Indexed([row[name] for row in rows]) for name in rows[0]}
+    return every | {r"\tau": lambda u, T: tau(u[0], T), r"\Theta": lambda u, T: Theta(u[0], T), "k": range(1, STEPS - 1)}
 
 
 LETTERS = (windowed,)
@@ -65,5 +74,6 @@ SAID = {
     "n=0": DEFINITION,
     r"p_k\text{ of the filter begun anew}": NOTATION,
     r"\frac{\partial p_{k+1}}{\partial p_k}": NOTATION,
+    r"\Psi_{k+1}": NOTATION,
     r"\mathsf M\,\Theta(u_k,T_k)": NOTATION,
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -29,6 +30,7 @@ from kfcourse.filters import (
     particle,
     pointmass,
 )
+from kfcourse.filters.finite_memory import STEPS
 from kfcourse.lab.checked_quadrature import Checked, of_checked_order
 from kfcourse.laws import Array
 from kfcourse.symbolic.averaging import averaged, averaged_equations
@@ -140,11 +142,11 @@ FILTERS: dict[str, Entry] = {
     **_twice("mfos3", "MFOS3", "МФОС, 3 арг.", partial(mfos, arguments=3)),
     **_twice("dfmp", "DFMP", "ДФМП", dfmp),
     **_twice("mdfmp", "MDFMP", "МДФМП", mdfmp),
-    **_twice("fkp4", "FKP4", "ФКП, 4 шага", fkp),
-    **_twice("mfkp4", "MFKP4", "МФКП, 4 шага", mfkp),
-    **_twice("dfkp4", "DFKP4", "ДФКП, 4 шага", dfkp),
-    **_twice("mdfkp4", "MDFKP4", "МДФКП, 4 шага", mdfkp),
-    **_twice("fbp4", "FBP4", "ФБП, 4 шага", fbp),
+    **_twice(f"fkp{STEPS}", f"FKP{STEPS}", "ФКП, 4 шага", fkp),
+    **_twice(f"mfkp{STEPS}", f"MFKP{STEPS}", "МФКП, 4 шага", mfkp),
+    **_twice(f"dfkp{STEPS}", f"DFKP{STEPS}", "ДФКП, 4 шага", dfkp),
+    **_twice(f"mdfkp{STEPS}", f"MDFKP{STEPS}", "МДФКП, 4 шага", mdfkp),
+    **_twice(f"fbp{STEPS}", f"FBP{STEPS}", "ФБП, 4 шага", fbp),
     "aof-unscented": Entry("UKF", "АОФ, сигма-точки", lambda s: aof(unscented(s.model))),
     "aof-gauss-hermite": Entry("GHKF", "АОФ, Гаусс–Эрмит", lambda s: aof(gauss_hermite(s.model))),
     "aof-exact": Entry("exact AOF", "АОФ", lambda s: exact(s.model)),
@@ -179,9 +181,12 @@ LAB = ("aof-gaussian", "aof-linearised", "duof", "fos-gaussian", "fos-linearised
 
 
 def title(name: str) -> str:
-    """The printed name of a filter: "GAOF" for "aof-gaussian"."""
-    entry = FILTERS.get(name) or JUMP_FILTERS.get(name)
-    return entry.title if entry else TITLES.get(name, name)
+    """The printed name of a filter: "GAOF" for "aof-gaussian", "GFKP2" for "fkp2-gaussian"."""
+    if entry := FILTERS.get(name) or JUMP_FILTERS.get(name):
+        return entry.title
+    length = re.sub(r"\D", "", name.split("-")[0])
+    usual = f"{family(name)}{STEPS}-{name.partition('-')[2]}"
+    return FILTERS[usual].title.replace(str(STEPS), length) if usual in FILTERS else TITLES.get(name, name)
 
 
 def family(name: str) -> str:

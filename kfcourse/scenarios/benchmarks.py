@@ -42,6 +42,9 @@ GROWTH_ELSEWHERE = {"EKF": 115.8, "Gauss-Hermite 5": 59.2, "Gauss-Hermite 10": 4
 BEARINGS_ERRORS = {"EKF": 0.114, "UKF": 0.113}
 REENTRY_ERRORS = {"EKF": 0.0084, "UKF": 0.0084}
 
+# Of the cubic sensor, once it has settled: read from the curves that Pankov, Bosov and Borisov publish.
+CUBIC_SENSOR = {"error variance": 0.356, "state variance": 1.155}
+
 # The pendulum's errors again, of the smoothers.
 PENDULUM_SMOOTHED = {"EKF": 0.057446202494837, "UKF": 0.036617555415464256}
 # And of particles, which are random: another program's single run.
@@ -112,6 +115,18 @@ def growth_model(variance: float = 1) -> Model:
 def cubic_sensor() -> Model:
     """x' = x/(1 + x^2) + v,  y = x^3 + x + w;  x_0 ~ N(0.1, 1)."""
     return Model.define("x/(1 + x**2) + v", "x**3 + x + w", prior={"mean": 0.1, "variance": 1})
+
+
+def logistic(bound: float = 1e4) -> Model:
+    """x' = max(-b, x(1 - x)) + v,  y = x + w;  x_0 ~ N(0.1, 0.01).  x(1 - x) is at most 1/4: above there is nothing to bound."""
+    return Model.define("(-b if x*(1 - x) < -b else x*(1 - x)) + v", "x + w", {"b": bound}, prior={"mean": 0.1, "variance": 0.01})
+
+
+def inverse_cube_root(bound: float = 100) -> Model:
+    """x' = min(b, x^(-1/3)) + v with the odd root,  y = x + w;  x_0 ~ N(3.01, 1)."""
+    return Model.define(
+        "(b if 0 <= x < 1/b**3 else sign(x)/Abs(x)**(1/3)) + v", "x + w", {"b": bound}, prior={"mean": 3.01, "variance": 1}
+    )
 
 
 def stochastic_volatility() -> Model:
