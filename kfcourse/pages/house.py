@@ -21,6 +21,7 @@ LAYERS = (
     "exercises",
     "pages",
     "checks",
+    "derivations",
     "lab",
     "scenarios",
     "continuous",
