@@ -7,12 +7,10 @@ import numpy as np
 from kfcourse.derivations.exact import Exact, NotPolynomial
 from kfcourse.derivations.setting import Setting
 from kfcourse.derivations.terms import Node
-from kfcourse.derivations.values import NoMean, Values, agree
+from kfcourse.derivations.values import Values, agree
 
 EQUAL, DIFFERENT, IF_POSITIVE, NO_VALUE = "equal", "different", "equal if positive", "no value"
 FEWEST = 4  # points at which both have values
-
-__all__ = ["DIFFERENT", "EQUAL", "IF_POSITIVE", "NO_VALUE", "NoMean", "compare"]
 
 
 def compare(setting: Setting, first: Node, second: Node) -> str:
@@ -20,7 +18,7 @@ def compare(setting: Setting, first: Node, second: Node) -> str:
 
     Raises
     ------
-    NoMean
+    Uncomputed
         A mean is not computed here.
     """
     try:
@@ -30,7 +28,7 @@ def compare(setting: Setting, first: Node, second: Node) -> str:
         return NO_VALUE
     except NotPolynomial:
         values = Values(setting, [first, second])
-    pairs = [values.sized(one) for one in (first, second)]
+    pairs = values.sized(first), values.sized(second)
     defined = np.isfinite([value for value, _ in pairs])
     positive = np.arange(values.points) < values.points / 3
     same = agree(*pairs)

@@ -108,7 +108,7 @@ def find_slips(setting: Setting, line: Node, above: Node) -> list[Slip]:
     search = _Search(setting, line, _open(setting, above))
     found = search.best([*search.solved(), *search.noise()])
     if not found or found[0].cost > CERTAIN:
-        found = search.best([*found, *search.tried()])
+        found = search.best(one for one in search.tried() if not found or one.cost < found[0].cost) or found
     return found or search.best(search.misread())
 
 
@@ -126,7 +126,8 @@ class _Search:
     values: Values = field(init=False)
 
     def __post_init__(self) -> None:
-        free, waiting = set(), [self.line, self.above]
+        free: set[str] = set()
+        waiting = [self.line, self.above]
         while waiting:
             for name in letters(waiting.pop()) - free:
                 free.add(name)

@@ -106,9 +106,9 @@ class _Lines(Reader):
                 return self._flat(node, (ast.Mult, ast.Div), PRODUCT)
             case ast.BinOp(op=ast.Pow()):
                 return self._power(node)
-            case ast.Subscript(value=ast.Name(id=name), slice=inner) if name in MEANS:
-                return self._mean(node, name, list(inner.elts) if isinstance(inner, ast.Tuple) else [inner])
-            case ast.Call(func=ast.Name(id=name), keywords=[]) if name in MEANS and self.known(name) is not None:
+            case ast.Subscript(value=ast.Name(id=name), slice=of) if name in MEANS:
+                return self._mean(node, name, list(of.elts) if isinstance(of, ast.Tuple) else [of])
+            case ast.Call(func=ast.Name(id=name), keywords=[]) if name in MEANS:
                 return self._mean(node, name, node.args)
             case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
                 inner = self.read(argument)
@@ -137,7 +137,9 @@ class _Lines(Reader):
             inner = inner.left
             if len(parts) > LONGEST:
                 raise self.fail(node, f"the line has more than {LONGEST} numbers, letters and signs; split the step up")
-        signs, trees, minus = [], [], False
+        signs: list[int] = []
+        trees: list[Node] = []
+        minus = False
         for sign, part in [(1, inner), *reversed(parts)]:
             tree = self.read(part)
             if kind == SUM and tree.kind == SUM and len(tree.parts) == 1:  # -a + b: the sign of a term, not a sum in a sum

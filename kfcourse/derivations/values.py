@@ -21,24 +21,24 @@ FUNCTION_NODES = 32
 ROUNDING = 1e-10  # of the size of the terms: some thousand operations of 1e-16 each, and nodes and weights known to 1e-13
 TRIED = 18  # points; a third of them with all letters positive
 
+NO_MEAN = "in a mean only polynomials are computed, and exp, sin, cos, sinh, cosh of linear ones; take the rest out of M[...]"
+
 _FUNCTIONS = {
     name: getattr(np, {"atan": "arctan", "abs": "abs"}.get(name, name))
     for name in ("sin", "cos", "tan", "atan", "exp", "log", "sinh", "cosh", "tanh", "abs")
 }
 
 
-class NoMean(ValueError):
-    """A mean of something that is neither a polynomial nor an exponential, sine or cosine of a linear function."""
+class Uncomputed(ValueError):
+    """A line has no value that could be compared, or a mean that is not computed here."""
 
-    def __init__(self, node: Node):
-        super().__init__(
-            "in a mean only polynomials are computed, and exp, sin, cos, sinh, cosh of linear ones; take the rest out of M[...]"
-        )
+    def __init__(self, node: Node, says: str = NO_MEAN):
+        super().__init__(says)
         self.span = node.span
 
 
 def degrees(node: Node, setting: Setting) -> dict[str, float]:
-    """A bound on the degree in each random letter; infinite in the argument of a function; NoMean where no mean is computed."""
+    """A bound on the degree in each random letter; infinite inside a function; Uncomputed where no mean is computed."""
     if node.kind == NUMBER or node.kind == MEAN:
         if node.kind == MEAN:
             degrees(node.parts[0], setting)
@@ -52,16 +52,16 @@ def degrees(node: Node, setting: Setting) -> dict[str, float]:
         return {name: max(part.get(name, 0) for part in parts) for name in names}
     if node.kind == PRODUCT:
         if any(part and e < 0 for e, part in zip(node.data, parts, strict=True)):
-            raise NoMean(node)
+            raise Uncomputed(node)
         return {name: sum(part.get(name, 0) for part in parts) for name in names}
     if not names:
         return {}
     if node.kind == POWER:
         if node.data.denominator != 1 or node.data < 0:
-            raise NoMean(node)
+            raise Uncomputed(node)
         return {name: float(node.data) * parts[0][name] if node.data else 0 for name in names}
     if node.data not in ENTIRE or any(degree > 1 for degree in parts[0].values()):
-        raise NoMean(node)
+        raise Uncomputed(node)
     return dict.fromkeys(names, np.inf)
 
 
@@ -110,7 +110,8 @@ class Values:
         """Values, and the sizes of the terms that they are made of."""
         with np.errstate(all="ignore"):
             value, size = self._value(node, False, keep)
-        return tuple(np.broadcast_to(one.reshape(one.shape[0], -1)[:, 0], self.points) for one in (value, size))
+        first, second = (np.broadcast_to(one.reshape(one.shape[0], -1)[:, 0], self.points) for one in (value, size))
+        return first, second
 
     def _column(self, values: Array) -> Array:
         return values.reshape(-1, *[1] * len(self.axes))
@@ -190,7 +191,10 @@ class Values:
             return value, size
         parts = [self._value(part, inside, keep) for part in node.parts]
         if node.kind == SUM:
-            return sum(s * value for s, (value, _) in zip(node.data, parts, strict=True)), sum(size for _, size in parts)
+            value = size = self._column(np.zeros(1))
+            for sign, (one, its_size) in zip(node.data, parts, strict=True):
+                value, size = value + sign * one, size + its_size
+            return value, size
         if node.kind == PRODUCT:
             value = size = self._column(np.ones(1))
             for e, (one, its_size) in zip(node.data, parts, strict=True):
@@ -213,7 +217,7 @@ def hermite(count: int) -> tuple[Array, Array]:
     return nodes, weights / weights.sum()
 
 
-def agree(first: tuple[Array, Array], second: tuple[Array, Array], where: Array | None = None) -> Array:
+def agree(first: tuple[Array, Array], second: tuple[Array, Array]) -> Array:
     """At which points two values with their sizes are equal; where one of them has no value, they are not."""
     (a, size_a), (b, size_b) = first, second
     with np.errstate(all="ignore"):

@@ -7,13 +7,15 @@ itself; or it is right in itself, equal to what stood before the slip.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from kfcourse.derivations.chains import Chain, FindModel, Typed, read_chains
-from kfcourse.derivations.compared import DIFFERENT, EQUAL, IF_POSITIVE, NO_VALUE, NoMean, compare
+from kfcourse.derivations.compared import DIFFERENT, EQUAL, IF_POSITIVE, NO_VALUE, compare
 from kfcourse.derivations.said import UNEXPLAINED, rule, told
 from kfcourse.derivations.setting import Law, Setting, of_side
-from kfcourse.derivations.slips import find_slips
-from kfcourse.derivations.terms import LETTER, MEAN, Node, letter, walk
+from kfcourse.derivations.slips import find_slips, term_path
+from kfcourse.derivations.terms import LETTER, MEAN, Node, at, letter, walk
+from kfcourse.derivations.values import Uncomputed
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.symbolic.formula import FormulaError
 
@@ -40,6 +42,8 @@ class Verdict:
         Of slips that explain a line that differs; more than one only if two explain it equally well.
     terms : tuple of str
         The terms that they name.
+    spans : tuple of pairs
+        Where these stand in the text; none for a term of the line above.
     rule : str
         Which the right step uses.
     """
@@ -51,6 +55,7 @@ class Verdict:
     says: str = ""
     kinds: tuple[str, ...] = ()
     terms: tuple[str, ...] = ()
+    spans: tuple[tuple[int, int], ...] = ()
     rule: str = ""
 
     def __str__(self) -> str:
@@ -156,7 +161,7 @@ class _Chain:
             except FormulaError as error:
                 self._says(link, UNREADABLE, _marked(link, error))
                 continue
-            except NoMean as error:
+            except Uncomputed as error:
                 self._says(link, UNDECIDED, str(error))
                 continue
             except OutOfTime:
@@ -173,8 +178,8 @@ class _Chain:
         closed = previous is not None and not any(one.kind == MEAN for _, one in walk(previous))
         return Derived(name, tuple(self.found), meant or not name, closed)
 
-    def _says(self, link: Typed, status: str, says: str = "", **more: tuple[str, ...] | str) -> None:
-        self.found.append(Verdict(link.line, link.column, link.text, status, says, **more))  # type: ignore[arg-type]
+    def _says(self, link: Typed, status: str, says: str = "", **more: Any) -> None:
+        self.found.append(Verdict(link.line, link.column, link.text, status, says, **more))
 
     def _line(self, link: Typed, node: Node, previous: Node | None, above: str, name: str, broken: int) -> int:
         """Judge one line; returns the number of the line with the slip on which it stands, or 0."""
@@ -196,12 +201,9 @@ class _Chain:
             return 0
         where = f"what {name} means" if name else "the one above"
         if result == NO_VALUE:
-            self._says(
-                link,
-                UNDECIDED,
-                f"the line has no value to compare with {where}: a division by zero, or a root of something negative",
+            raise Uncomputed(
+                node, f"there is no value to compare with {where}: a division by zero, or a root of something negative"
             )
-            return broken
         if result == IF_POSITIVE:
             says = f"equal to {where} only for positive letters: declare them in a line of its own before the chain, positive ..."
             self._says(link, DIFFERS, says, kinds=("positive",))
@@ -209,6 +211,7 @@ class _Chain:
         slips = find_slips(self.setting, node, previous) if result == DIFFERENT else []
         said = [told(self.setting, slip, link.text, node, above, previous) for slip in slips]
         words = " or ".join(words for words, _ in said)
+        places = [at(node, term_path(node, slip.path)).span for slip in slips if not slip.above]
         says = f"the line differs from {where}: {words}" if said else UNEXPLAINED.format(above=where)
         self._says(
             link,
@@ -216,6 +219,7 @@ class _Chain:
             says,
             kinds=tuple(slip.kind for slip in slips),
             terms=tuple(term for _, term in said),
+            spans=tuple(place for place in places if place),
             rule=rule(self.setting, slips[0] if slips else None, node, previous, name),
         )
         return broken or link.line
@@ -223,6 +227,5 @@ class _Chain:
 
 def _marked(link: Typed, error: FormulaError) -> str:
     place = link.column + error.column
-    return (
-        f"cannot be read at column {place + 1}: {error.problem}\n       {link.text[:100]}\n       {' ' * min(error.column, 100)}^"
-    )
+    shown = link.text[max(0, error.column - 60) : error.column + 40]
+    return f"cannot be read at column {place + 1}: {error.problem}\n       {shown}\n       {' ' * min(error.column, 60)}^"
