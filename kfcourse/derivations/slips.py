@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 
@@ -47,7 +48,7 @@ from kfcourse.derivations.terms import (
     total,
     walk,
 )
-from kfcourse.derivations.values import ENTIRE, Values
+from kfcourse.derivations.values import ENTIRE, Uncomputed, Values
 from kfcourse.laws import Array
 
 CLOSE = 1e-7  # relative difference of values: what is found is made sure of exactly
@@ -152,13 +153,21 @@ class _Search:
             if kept and slip.cost > kept[0].cost:
                 break
             place = slip.above, term_path(self.above if slip.above else self.line, slip.path)
-            if place in places or compare(self.setting, slip.repaired, self.above) != EQUAL:
+            if any(place == (one[0], one[1][: len(place[1])]) for one in places):  # around a term that is named already
+                continue
+            if not self._equal(slip.repaired, self.above):
                 continue
             places.add(place)
             kept.append(slip)
         if kept and kept[0].kind == "doubled":  # either of the two
             return kept[-1:]
         return kept if len(kept) <= 2 else []
+
+    def _equal(self, first: Node, second: Node) -> bool:
+        try:
+            return compare(self.setting, first, second) == EQUAL
+        except Uncomputed:  # with the change a mean would be of something that is not computed
+            return False
 
     def _same(self, a: Array, b: Array) -> bool:
         with np.errstate(all="ignore"):
@@ -206,8 +215,10 @@ class _Search:
         scale = np.abs(self.target) + np.abs(t)
         if np.all(np.abs(tau) <= 1e-10 * scale):
             if in_sum:
+                beside = at(self.line, path[:-1])
                 twice = any(
-                    i != path[-1] and self._same(self.values.of(one), t) for i, one in enumerate(at(self.line, path[:-1]).parts)
+                    i != path[-1] and sign == beside.data[path[-1]] and self._same(self.values.of(one), t)
+                    for i, (sign, one) in enumerate(zip(beside.data, beside.parts, strict=True))
                 )
                 yield Slip("doubled" if twice else "extra", path, changed(self.line, path, number(0)))
             return
@@ -257,7 +268,7 @@ class _Search:
         elif q == 1 and len(powers) == 1:
             ((name, k),) = powers.items()
             kind = "power" if name in own else "lost-factor" if k > 0 else "combined"
-            yield kind, name, factor, 0.02 * (abs(k) - 1) if abs(k) <= 3 else 1.0
+            yield kind, name, factor, (0.02 * (abs(k) - 1) if abs(k) <= 3 else 1.0) + 0.15 * _gone(node, name, k)
         elif q == 1 and len(powers) == 2 and sum(powers.values()) == 0 and size <= 8:
             wrong = min(powers, key=powers.__getitem__)
             yield ("letter" if wrong in own else "combined"), wrong, factor, 0.02 * size
@@ -277,18 +288,23 @@ class _Search:
                 yield Slip("power", path, changed(self.line, path, other))
 
     def _lost(self, path: Path, node: Node, rest: Array) -> Iterator[Slip]:
-        for where, one in walk(self.above):
-            if where and at(self.above, where[:-1]).kind == SUM:
-                for sign in (1, -1):
-                    if self._same(sign * self.values.of(one, keep=True), rest):
-                        repaired = changed(self.line, path, total(node, one, signs=(1, sign)))
-                        yield Slip("lost", path, repaired, lost=one, extra=-0.01)
+        for one, term, value in self.could_be_lost:
+            for sign in (1, -1):
+                if self._same(sign * value, rest):
+                    repaired = changed(self.line, path, total(node, term, signs=(1, sign)))
+                    yield Slip("lost", path, repaired, lost=one, extra=-0.01)
         if found := self._monomial(rest):
             q, powers = found
             if max(abs(q.numerator), q.denominator) <= 60:
                 one = product(number(q), *(power(letter(name), k) for name, k in powers.items()))
                 extra = 0.02 * sum(map(abs, powers.values())) + 0.1 * (node.kind != SUM)  # in the sum where least is lost
                 yield Slip("lost", path, changed(self.line, path, total(node, one)), " and ".join(powers), extra=extra)
+
+    @cached_property
+    def could_be_lost(self) -> list[tuple[Node, Node, Array]]:
+        """Terms of the line above, or of a mean in it: the term, what would have to be added, and the values of that."""
+        terms = [one for path, one in walk(self.above) if path and at(self.above, path[:-1]).kind == SUM]
+        return [(one, new, self.values.of(new)) for one in terms for new in (one, mean(one))]
 
     def _moment_pairs(self) -> Iterator[tuple[Node, Node, int, tuple[Array, Array]]]:
         """Wrong and right moments of the normal law, with their values."""
@@ -321,7 +337,7 @@ class _Search:
                 continue
             for kind, value in (("noise-forgotten", 0), ("noise-mean", 1)):
                 other = replaced(self.above, {name: number(value)})
-                if self._same(self.values.of(other), mine) and compare(self.setting, self.line, other) == EQUAL:
+                if self._same(self.values.of(other), mine) and self._equal(self.line, other):
                     yield Slip(kind, (), self.above, name)
 
     # ---------------------------------------------------------------- tried
@@ -339,8 +355,13 @@ class _Search:
                 if count > MOST_TRIED:
                     return
                 other = changed(self.line, path, new)
-                if self._same(self.values.of(other), self.target):
+                if self._same(self.values.of(other), self.target) and not self._nothing(other, path):
                     yield Slip(kind, path, other, name)
+
+    def _nothing(self, line: Node, path: Path) -> bool:
+        """Whether a change leaves nothing of the mean or the power around it: then that does not belong there as a whole."""
+        outer = next(path[:i] for i in range(len(path)) if at(line, path[:i]).kind in (MEAN, CALL, POWER))
+        return bool(np.all(np.abs(self.values.of(at(line, outer))) <= 1e-9))
 
     # ---------------------------------------------------------------- of the line above
 
@@ -348,8 +369,14 @@ class _Search:
         """What was made of one term of the line above, spread over several terms of this one."""
         for slip in _Search(self.setting, self.above, self.line, mirrored=True).solved():
             a_mean = at(self.above, slip.path).kind == MEAN and slip.kind in ("sign", "factor", "power", "letter")
-            if (slip.kind == "moment" or a_mean) and compare(self.setting, slip.repaired, self.line) == EQUAL:
+            if (slip.kind == "moment" or a_mean) and self._equal(slip.repaired, self.line):
                 yield Slip(slip.kind, slip.path, self.above, slip.name, slip.order, above=True)
+
+
+def _gone(node: Node, name: str, k: int) -> bool:
+    """Whether nothing is left of a letter, or its power, times another power of it."""
+    base, own = (node.parts[0], node.data) if node.kind == POWER else (node, 1)
+    return base.kind == LETTER and base.data == name and own + k == 0
 
 
 def _changes(node: Node, pool: Sequence[str], terms: Sequence[Node]) -> Iterator[tuple[str, str, Node]]:

@@ -65,9 +65,11 @@ def difference(left: Node, right: Node) -> Node:
 
 def walk(node: Node, path: Path = ()) -> Iterator[tuple[Path, Node]]:
     """Every node with the way to it from the root."""
-    yield path, node
-    for i, part in enumerate(node.parts):
-        yield from walk(part, (*path, i))
+    waiting = [(path, node)]
+    while waiting:
+        path, node = waiting.pop()
+        yield path, node
+        waiting += [((*path, i), part) for i, part in enumerate(node.parts)][::-1]
 
 
 def at(node: Node, path: Path) -> Node:

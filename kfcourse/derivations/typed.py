@@ -85,7 +85,8 @@ class _Lines(Reader):
             raise self.fail(node, f"the line has more than {LONGEST} numbers, letters and signs; split the step up")
         start, end = node.col_offset, node.end_col_offset or node.col_offset + 1
         place = self.columns[self.offset + start], self.columns[self.offset + end - 1] + 1
-        tree = replace(self._tree(node), span=place)
+        tree = self._tree(node)
+        tree = replace(tree, span=place, parts=tuple(one if one.span else replace(one, span=place) for one in tree.parts))
         self.depth -= 1
         return tree
 

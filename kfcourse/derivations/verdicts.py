@@ -92,8 +92,9 @@ class Report:
         return all(chain.right for chain in self.chains)
 
     @property
-    def unreadable(self) -> bool:
-        return any(one.status == UNREADABLE for one in self.verdicts)
+    def undecided(self) -> bool:
+        """Whether a line cannot be read, or not be compared."""
+        return any(one.status in (UNREADABLE, UNDECIDED) for one in self.verdicts)
 
     @property
     def first(self) -> Verdict | None:

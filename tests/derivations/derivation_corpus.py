@@ -43,7 +43,7 @@ from kfcourse.derivations.typed import read_line
 from kfcourse.lab import load_variants
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.moments import GaussianMoments
+from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 
 M = sp.Function("M")
 LAWS = (("m", "d"), ("m", "d"), ("mu", "P"), ("lambda", "Psi"))
@@ -107,7 +107,9 @@ def stages(model: Model, name: str, mean: sp.MatrixBase, cov: sp.MatrixBase) -> 
     for term in sp.Add.make_args(sp.expand(inner)):
         outside, inside = term.as_independent(*model.x, *noises, as_Add=False)
         groups[inside] = groups.get(inside, 0) + outside
-    split = sp.Add(*(sp.factor(outside) * (1 if inside == 1 else M(inside)) for inside, outside in groups.items()), evaluate=False)
+    split = sp.Add(
+        *(sp.factor(outside) * (1 if inside == 1 else M(inside)) for inside, outside in groups.items()), evaluate=False
+    )
     quiet, closed = sp.S.Zero, sp.S.Zero
     for inside, outside in groups.items():
         of_noise, of_state = inside.as_independent(*model.x, as_Add=False)
@@ -128,7 +130,6 @@ def chains(seed: int, count: int) -> list[Chain]:
     variants = load_variants()
     wanted = [(name, function) for name, one in variants.items() for function in functions(one.model)]
     rng.shuffle(wanted)
-    cache: dict[tuple, tuple[list[sp.Expr], GaussianMoments]] = {}
     while len(found) < count:
         variant, function = wanted[len(found) % len(wanted)]
         model = variants[variant].model
@@ -137,9 +138,9 @@ def chains(seed: int, count: int) -> list[Chain]:
             law = None
         mean, cov = law or (("z", "p") if function[0] in "tT" else ("m", "d"))
         key = variant, function, mean
-        if key not in cache:
-            cache[key] = _staged(model, function, mean, cov)
-        formulas, moments = cache[key]
+        if key not in _STAGED:
+            _STAGED[key] = _staged(model, function, mean, cov)
+        formulas, moments = _STAGED[key]
         taken = set(model.parameters) | set(letters_of(model))
         name = function if function not in taken else "M[y]" if function == "h" else ""
         if not name:
@@ -154,6 +155,9 @@ def chains(seed: int, count: int) -> list[Chain]:
     return found
 
 
+_STAGED: dict[tuple[str, str, str], tuple[list[sp.Expr], GaussianMoments]] = {}
+
+
 def letters_of(model: Model) -> list[str]:
     return [s.name for s in (*model.x, *model.v, *model.w)]
 
@@ -162,7 +166,12 @@ def functions(model: Model) -> list[str]:
     if model.n == 1:
         return ["tau", "Theta", "h", "G", "F", "K"]
     components = range(1, model.n + 1)
-    return [*(f"tau{i}" for i in components), *(f"Theta{i}{j}" for i in components for j in components if i <= j), "h1", "F11"][: 5 + 2 * model.p]
+    entries = [f"{i}{j}" for i in components for j in components if i <= j]
+    return [
+        *(f"tau{i}" for i in components),
+        *(f"Theta{pair}" for pair in entries),
+        *(["h1", "F11"] if model.p > 1 else ["h", "F"]),
+    ]
 
 
 def _staged(model: Model, function: str, mean: str, cov: str) -> tuple[list[sp.Expr], GaussianMoments]:
@@ -174,10 +183,10 @@ def _staged(model: Model, function: str, mean: str, cov: str) -> tuple[list[sp.E
     if function != "K":
         name = function if model.n == 1 or function[0] != "F" or model.p > 1 else "F"
         return stages(model, name, m, P)
-    (*_, slope), law = stages(model, "G", m, P)
+    law, slope = stages(model, "G", m, P)[1], stages(model, "G", m, P)[0][-1]
     (*_, noise_state, whole), _ = stages(model, "F", m, P)
     gain = P[0] * slope / whole
-    return [P[0] * sp.Symbol("G_") / sp.Symbol("F_"), P[0] * slope / noise_state, gain, sp.cancel(gain) if not gain.has(sp.exp) else gain * 2 / 2][1:], law
+    return [P[0] * slope / noise_state, gain, sp.cancel(gain) if not gain.has(sp.exp) else gain], law
 
 
 # ---------------------------------------------------------------- unusual forms
@@ -186,7 +195,7 @@ def _staged(model: Model, function: str, mean: str, cov: str) -> tuple[list[sp.E
 def _rewritten(node: Node, rng: random.Random, times: int) -> Node:
     """The tree after some rules of algebra in random places."""
     for _ in range(times):
-        path, one = rng.choice([pair for pair in walk(node) if len(letters(node)) < 40])
+        path, one = rng.choice(list(walk(node)))
         rule = rng.choice(RULES)
         new = rule(one, rng)
         if new is not None and _size(node) < 150:
@@ -257,32 +266,45 @@ RULES = (_shuffled, _shuffled, _distributed, _distributed, _split, _unfolded, _d
 
 
 def planted(seed: int, count: int) -> list[Planted]:
-    """Chains with one slip each."""
-    rng, found = random.Random(seed), []
-    while len(found) < count:
-        for chain in chains(rng.randrange(10**6), count):
-            if len(found) < count and (one := _plant(chain, rng)):
-                found.append(one)
+    """Chains with one slip each; every kind of slip in turn, as far as chains allow it."""
+    rng, found, made = random.Random(seed), [], chains(seed, count + 20)
+    for chain in made:
+        kinds = [SLIPS[(len(found) + k) % len(SLIPS)] for k in range(len(SLIPS))]
+        planted_ones = (one for slip in kinds if (one := _plant(chain, slip, rng)))
+        if len(found) < count and (one := next(planted_ones, None)):
+            found.append(one)
     return found
 
 
-def _plant(chain: Chain, rng: random.Random) -> Planted | None:
-    for _ in range(30):
-        i = rng.randrange(1, len(chain.lines))
+def _plant(chain: Chain, slip, rng: random.Random) -> Planted | None:
+    places = [(i, *pair) for i in range(1, len(chain.lines)) for pair in walk(chain.lines[i])]
+    rng.shuffle(places)
+    for i, path, node in places:
         line = chain.lines[i]
-        path, node = rng.choice(list(walk(line)))
-        slip = rng.choice(SLIPS)
         made = slip(line, path, node, rng, chain)
         if made is None:
             continue
         where, new = made
         new = read_line(written(new))
-        if not differs(chain, line, new):
+        try:
+            if not differs(chain, line, new):
+                continue
+        except NoClosedForm:  # exp(x^2)
             continue
+        while not _there(new, where):  # brackets that are no longer needed are gone
+            where = where[:-1]
         follows = rng.random() < 0.5
         rest = [_rewritten(new if follows else one, rng, 2) for one in chain.lines[i + 1 :]]
         return Planted(replace(chain, lines=(*chain.lines[:i], new, *rest)), i, slip.__name__.strip("_"), where, follows)
     return None
+
+
+def _there(node: Node, path: Path) -> bool:
+    for i in path:
+        if i >= len(node.parts):
+            return False
+        node = node.parts[i]
+    return True
 
 
 def _term(line: Node, path: Path) -> Path:
@@ -327,7 +349,7 @@ def _lost_factor(line, path, node, rng, chain):
     if node.kind != PRODUCT or len(node.parts) < 2:
         return None
     i = rng.randrange(len(node.parts))
-    if node.parts[i].kind not in (LETTER, POWER) or node.parts[i].parts and node.parts[i].parts[0].kind != LETTER:
+    if node.parts[i].kind not in (LETTER, POWER) or (node.parts[i].parts and node.parts[i].parts[0].kind != LETTER):
         return None
     return _term(line, path), changed(line, (*path, i), number(1))
 
@@ -365,7 +387,9 @@ def _noise(line, path, node, rng, chain):
         return None
     parent = at(line, term[:-1])
     keep = [j for j in range(len(parent.parts)) if j != term[-1]]
-    return term[:-1], changed(line, term[:-1], Node(SUM, tuple(parent.parts[j] for j in keep), tuple(parent.data[j] for j in keep)))
+    return term[:-1], changed(
+        line, term[:-1], Node(SUM, tuple(parent.parts[j] for j in keep), tuple(parent.data[j] for j in keep))
+    )
 
 
 SLIPS = (_sign, _number, _power, _letter, _lost_factor, _lost_term, _twice, _moment, _noise)
@@ -389,7 +413,12 @@ def formula_of(node: Node, moments: GaussianMoments) -> sp.Expr:
         return parts[0] ** sp.Rational(node.data.numerator, node.data.denominator)
     if node.kind == CALL:
         return getattr(sp, node.data)(parts[0])
-    return plain(moments.mean_of(parts[0]))
+    if (moments, parts[0]) not in _MEANS:
+        _MEANS[moments, parts[0]] = plain(moments.mean_of(parts[0]))
+    return _MEANS[moments, parts[0]]
+
+
+_MEANS: dict[tuple[GaussianMoments, sp.Expr], sp.Expr] = {}
 
 
 def differs_formula(chain: Chain, node: Node, formula: sp.Expr) -> bool:
@@ -404,7 +433,7 @@ def differs(chain: Chain, first: Node, second: Node) -> bool:
 
 def _same(first: sp.Expr, second: sp.Expr) -> bool:
     """At three points, to 20 digits of 30."""
-    names = sorted((first - second).free_symbols, key=str)
+    names = sorted(first.free_symbols | second.free_symbols, key=str)
     for k in range(3):
         source = random.Random(k)
         point = {s: sp.Rational(source.randint(101, 397), source.randint(101, 397)) for s in names}
