@@ -108,8 +108,8 @@ def find_slips(setting: Setting, line: Node, above: Node) -> list[Slip]:
     """The slips that explain a line best, at most two of different terms; none if no single change does."""
     search = _Search(setting, line, _open(setting, above))
     found = search.best([*search.solved(), *search.noise()])
-    if not found or found[0].cost > CERTAIN:
-        found = search.best(one for one in search.tried() if not found or one.cost < found[0].cost) or found
+    if not found or search.cost > CERTAIN:
+        found = search.best(one for one in search.tried() if not found or one.cost < search.cost) or found
     return found or search.best(search.misread())
 
 
@@ -125,6 +125,7 @@ class _Search:
     above: Node
     mirrored: bool = False  # the line above has the wrong values, and the line the right ones
     values: Values = field(init=False)
+    cost: float = field(init=False, default=np.inf)  # of what was found best
 
     def __post_init__(self) -> None:
         free: set[str] = set()
@@ -149,9 +150,10 @@ class _Search:
         """The cheapest that hold, one for each term."""
         kept: list[Slip] = []
         places: set[tuple[bool, Path]] = set()
-        for slip in sorted(found, key=lambda one: (one.cost, -len(one.path))):
-            if kept and slip.cost > kept[0].cost:
-                break
+        priced = [(slip.cost + self._unlikely(slip), -len(slip.path), i, slip) for i, slip in enumerate(found)]
+        for cost, _, _, slip in sorted(priced):
+            if kept and cost > self.cost and slip.cost != kept[0].cost:
+                continue
             place = slip.above, term_path(self.above if slip.above else self.line, slip.path)
             if any(place == (one[0], one[1][: len(place[1])]) for one in places):  # around a term that is named already
                 continue
@@ -159,9 +161,25 @@ class _Search:
                 continue
             places.add(place)
             kept.append(slip)
+            self.cost = cost if len(kept) == 1 else self.cost
         if kept and kept[0].kind == "doubled":  # either of the two
             return kept[-1:]
         return kept if len(kept) <= 2 else []
+
+    def _unlikely(self, slip: Slip) -> float:
+        """An addition to the cost of changing a term that is nothing, or that stands in the line above as it is."""
+        if slip.above or slip.kind in ("doubled", "extra", "lost", "noise-forgotten", "noise-mean"):
+            return 0.0
+        path = term_path(self.line, slip.path)
+        value = self.values.of(at(self.line, path), keep=True)
+        stays = path and any(self._same(_sign(self.line, path) * value, other) for other in self.as_above)
+        return 0.35 if stays or np.all(np.abs(value) <= 1e-10) else 0.0
+
+    @cached_property
+    def as_above(self) -> list[Array]:
+        """Values of the terms of the line above, with their signs."""
+        paths = [path for path, _ in walk(self.above) if path and at(self.above, path[:-1]).kind == SUM]
+        return [_sign(self.above, path) * self.values.of(at(self.above, path)) for path in paths]
 
     def _equal(self, first: Node, second: Node) -> bool:
         try:
@@ -361,7 +379,7 @@ class _Search:
     def _nothing(self, line: Node, path: Path) -> bool:
         """Whether a change leaves nothing of the mean or the power around it: then that does not belong there as a whole."""
         outer = next(path[:i] for i in range(len(path)) if at(line, path[:i]).kind in (MEAN, CALL, POWER))
-        return bool(np.all(np.abs(self.values.of(at(line, outer))) <= 1e-9))
+        return bool(np.all(np.abs(self.values.of(at(line, outer).parts[0])) <= 1e-9))
 
     # ---------------------------------------------------------------- of the line above
 
@@ -371,6 +389,11 @@ class _Search:
             a_mean = at(self.above, slip.path).kind == MEAN and slip.kind in ("sign", "factor", "power", "letter")
             if (slip.kind == "moment" or a_mean) and self._equal(slip.repaired, self.line):
                 yield Slip(slip.kind, slip.path, self.above, slip.name, slip.order, above=True)
+
+
+def _sign(root: Node, path: Path) -> int:
+    """Of a term, in its sum."""
+    return at(root, path[:-1]).data[path[-1]]
 
 
 def _gone(node: Node, name: str, k: int) -> bool:
