@@ -18,6 +18,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
+from pathlib import Path
 
 import sympy as sp
 
@@ -29,6 +30,7 @@ from kfcourse.symbolic import javascript
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import Structure
 
+LAB_SCRIPT = Path(__file__).parent / "data" / "lab.js"  # trajectories, the exact filter, statistics: no formula of a model
 Rule = tuple[sp.Symbol, sp.Expr]
 
 _GIVEN = (s.x, s.x_next, s.y, s.lam, s.Psi)  # what a step is given; of a running filter without the states
@@ -205,3 +207,9 @@ def levels(model: Model) -> list[sp.Symbol]:
     silent = {one: 0 for one in (*model.v, *model.w)}
     quiet = set().union(*(e.subs(silent).free_symbols for e in (*model.state_equation, *model.meter_equation)))
     return [symbol for symbol, value in model.values.items() if symbol not in quiet and value > 0]
+
+
+def script(models: Mapping[str, Model], names: Sequence[str] = LAB) -> str:
+    """`kfLab` and `kfModels`, an object of the models by name, as the text of a script that loads nothing."""
+    each = [f"{json.dumps(name)}: {model_source(model, names)}" for name, model in models.items()]
+    return javascript.RUNTIME + LAB_SCRIPT.read_text(encoding="utf-8") + "const kfModels = {\n" + ",\n".join(each) + "\n};\n"

@@ -41,6 +41,13 @@ const kfLab = (() => {
     return { n, steps, start: each(0, n), v: over(1, n * ofState), w: over(2, n * ofMeter) };
   };
 
+  // Initial states for small standard errors: half from the prior, half from a law so many times as wide, for what makes filters
+  // differ is often what happens far out.  The weight, prior over the law drawn from, is between 0 and 2.
+  const widened = (drawn, wide) => {
+    const start = drawn.start.map((one, i) => (i % 2 ? wide : 1) * one);
+    return { ...drawn, start, weight: start.map((t) => 2 / (1 + Math.exp(0.5 * (1 - wide ** -2) * t * t) / wide)) };
+  };
+
   const simulate = (model, { values, prior }, { n, steps, start, v, w }) => {
     const x = [numbers(n).map((_, i) => prior.mean + Math.sqrt(prior.variance) * start[i])], y = [];
     for (let k = 0; k < steps; k++) {
@@ -88,9 +95,9 @@ const kfLab = (() => {
   };
 
   // Nodes where the density has its mass.  An interval is halved where most may be hidden: a log-concave density lies below the
-  // chords of the neighbouring intervals, drawn on, so a peak far narrower than the first nodes' distance is found from its slopes.
-  const place = (logDensity, low, high, first, most) => {
-    const x = Array.from({ length: first }, (_, i) => low + ((high - low) * i) / (first - 1));
+  // chords of the neighbouring intervals, drawn on, so a peak narrower than the first nodes' distance is found from its slopes.
+  const place = (logDensity, first, most) => {
+    const x = first.sort((a, b) => a - b).filter((one, i) => i === 0 || one > first[i - 1]);
     const l = x.map(logDensity);
     const hidden = (i) => {
       const [a, b, la, lb] = [x[i], x[i + 1], l[i], l[i + 1]];
@@ -116,6 +123,26 @@ const kfLab = (() => {
     return { x: Float64Array.from(x), l };
   };
 
+  // Where a measurement is explained without noise, in [low, high], and how well it tells the state there: nodes around each such
+  // place, for a sharp meter's peak may be a millionth of the range wide.
+  const WIDTHS = [-8, -4, -2, -1, 0, 1, 2, 4, 8];
+  const around = (meter, measured, nodes) => {
+    const residual = (x) => meter(x).h[0] - measured, found = [];
+    for (let i = 1; i < nodes.length; i++) {
+      let [a, b] = [nodes[i - 1], nodes[i]];
+      const below = residual(a) < 0;
+      if (below === residual(b) < 0) continue;
+      for (let step = 0; step < 60; step++) {
+        const middle = 0.5 * (a + b);
+        if (residual(middle) < 0 === below) a = middle;
+        else b = middle;
+      }
+      const { F, G } = meter(b), width = Math.sqrt(F[0]) / Math.abs(G[0]);
+      if (width > 0 && isFinite(width)) found.push(...WIDTHS.map((t) => b + t * width));
+    }
+    return found;
+  };
+
   // y: the measurements of one trajectory.  Means, variances, and the density's nodes after each.
   const exact = (model, { values, prior }, y, { first = 24, most = 80 } = {}) => {
     const one = { z: numbers(1), p: numbers(1), m: numbers(1), d: numbers(1), tau: numbers(1), Theta: numbers(1), h: numbers(1), G: numbers(1), F: numbers(1) };
@@ -131,14 +158,19 @@ const kfLab = (() => {
       }
       return sum > 0 ? Math.log(sum) : -800;
     };
+    const meter = (x) => {
+      one.m[0] = x;
+      model.linearised.measure(1, values, {}, one);
+      return one;
+    };
     const densities = [], z = [], p = [];
     for (const measured of y) {
+      const nodes = Array.from({ length: first }, (_, i) => low + ((high - low) * i) / (first - 1));
+      nodes.push(...around(meter, measured, nodes));
       const { x, l } = place((at) => {
-        one.m[0] = at;
-        model.linearised.measure(1, values, {}, one);
-        const variance = Math.max(one.F[0], LEAST);
-        return Math.max(predicted(at) - 0.5 * ((measured - one.h[0]) ** 2 / variance + Math.log(variance)), -1e30);
-      }, low, high, first, most);
+        const { h, F } = meter(at), variance = Math.max(F[0], LEAST);
+        return Math.max(predicted(at) - 0.5 * ((measured - h[0]) ** 2 / variance + Math.log(variance)), -1e30);
+      }, nodes, most);
       const size = x.length, top = l.reduce((a, b) => Math.max(a, b)), mass = numbers(size), density = l.map((one) => Math.exp(one - top));
       for (let i = 0; i < size; i++) mass[i] = 0.5 * density[i] * (x[Math.min(i + 1, size - 1)] - x[Math.max(i - 1, 0)]);
       const total = mass.reduce((a, b) => a + b);
@@ -180,36 +212,32 @@ const kfLab = (() => {
     return [kfMean(n, e), Math.sqrt(kfCov(n, e, e) / n)];
   };
 
-  // How far above the bound, D_k / D_k(exact) - 1, with its standard error.  The bound is the mean of the exact filter's own variance
-  // p on the first m trajectories, carried to all n by the Gaussian filter's; what a filter is above it is estimated twice, from
-  // its errors e^2 and, as the exact error is uncorrelated with all measurements, from its distance (z - z_exact)^2; each counts by
-  // its variance.
-  const aboveBound = (n, m, x, z, zExact, pExact, pCarrier) => {
-    const carried = pCarrier && isFinite(kfMean(n, pCarrier)) ? pCarrier : numbers(n);
-    const e = squares(n, x, z), distance = squares(m, z, zExact);
-    const over = numbers(n).map((_, i) => e[i] - carried[i]), rest = numbers(m).map((_, i) => pExact[i] - carried[i]);
-    const bound = kfMean(n, carried) + kfMean(m, rest);
-    const byErrors = kfMean(n, over) - kfMean(m, rest), byDistance = kfMean(m, distance);
-    const ofErrors = kfCov(n, over, over) / n + kfCov(m, rest, rest) / m - (2 * kfCov(m, over, rest)) / n;
-    const ofDistance = kfCov(m, distance, distance) / m;
-    const sum = ofErrors + ofDistance, share = sum > 0 ? ofErrors / sum : 1;
-    const ratio = (share * byDistance + (1 - share) * byErrors) / bound;
-    const everywhere = numbers(n).map((_, i) => (1 - share) * over[i] - ratio * carried[i]);
-    const onFew = numbers(m).map((_, i) => share * distance[i] - (1 - share + ratio) * rest[i]);
-    const variance = kfCov(n, everywhere, everywhere) / n + kfCov(m, onFew, onFew) / m + (2 * kfCov(m, everywhere, onFew)) / n;
-    return [ratio, Math.sqrt(Math.max(variance, 0)) / bound, bound];
+  // How far above the bound, D_k / D_k(exact) - 1, with its standard error.  `all` are many trajectories without the exact filter,
+  // `few` others with it, which count by their weights.  The bound is the mean of the exact filter's own variance: over all, that of
+  // the Gaussian filter, and over the few what the exact one has more.  What a filter is above it is estimated twice, from its
+  // errors e^2 and, as the exact error is uncorrelated with all measurements, from its distance (z - z_exact)^2; each counts by its
+  // variance.
+  const aboveBound = (all, few) => {
+    const { n } = all, m = few.n, finite = isFinite(kfMean(n, all.carrier)) && isFinite(kfMean(m, few.carrier));
+    const carried = finite ? all.carrier : numbers(n), of = finite ? few.carrier : numbers(m);
+    const e = squares(n, all.x, all.z), distance = squares(m, few.z, few.exact).map((d, i) => d * few.weight[i]);
+    const over = e.map((one, i) => one - carried[i]), rest = few.variance.map((p, i) => few.weight[i] * (p - of[i]));
+    const more = kfMean(m, rest), bound = kfMean(n, carried) + more;
+    const square = (size, values) => kfCov(size, values, values) / size;
+    const ofErrors = square(n, over) + square(m, rest), ofDistance = square(m, distance);
+    const share = ofErrors + ofDistance > 0 ? ofErrors / (ofErrors + ofDistance) : 1;
+    const ratio = (share * kfMean(m, distance) + (1 - share) * (kfMean(n, over) - more)) / bound;
+    const variance = square(n, over.map((one, i) => (1 - share) * one - ratio * carried[i]))
+      + square(m, distance.map((one, i) => share * one - (1 - share + ratio) * rest[i]));
+    return [ratio, Math.sqrt(variance) / bound, bound];
   };
 
-  // All filters of a model, designed on one ensemble and run on another.
-  const filters = (model, settings, designing, running) => {
-    const first = simulate(model, settings, designing), tracks = simulate(model, settings, running);
-    const found = {};
-    for (const name in model.filters) {
-      const coefficients = model.filters[name].design ? run(model, settings, name, first).coefficients : null;
-      found[name] = run(model, settings, name, tracks, coefficients);
-    }
-    return { tracks, found };
-  };
+  // All filters of a model: their coefficients, from trajectories of their own; and what they make of others.
+  const design = (model, settings, tracks) =>
+    Object.fromEntries(Object.keys(model.filters).map((name) =>
+      [name, model.filters[name].design ? run(model, settings, name, tracks).coefficients : null]));
+  const runAll = (model, settings, coefficients, tracks) =>
+    Object.fromEntries(Object.keys(model.filters).map((name) => [name, run(model, settings, name, tracks, coefficients[name])]));
 
-  return { CARRIER, normals, draws, simulate, run, exact, errorVariance, aboveBound, filters };
+  return { CARRIER, normals, draws, widened, simulate, run, exact, errorVariance, aboveBound, design, runAll };
 })();
