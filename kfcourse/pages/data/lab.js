@@ -65,8 +65,9 @@ const kfLab = (() => {
     const a = new Proxy({ lambda: filled(n, prior.mean), Psi: filled(n, prior.variance) }, {
       get: (arrays, key) => (arrays[key] ??= numbers(n)),
     });
-    const designing = filter.design && !coefficients, found = [], z = [], p = [];
+    const designing = filter.design && !coefficients, found = [], z = [], p = [], spread = [];
     for (let k = 0; k < steps; k++) {
+      spread.push(kfMean(n, a.Psi));
       a.z = numbers(n);
       if (name === CARRIER) a.p = numbers(n);
       a.y = y[k];
@@ -77,7 +78,7 @@ const kfLab = (() => {
       z.push(a.z);
       if (name === CARRIER) p.push(a.p);
     }
-    return { z, p, coefficients: found };
+    return { z, p, spread, coefficients: found };
   };
 
   // ------------------------------------------------------------------ the exact filter, one trajectory at a time
@@ -94,7 +95,7 @@ const kfLab = (() => {
     return a;
   };
 
-  // Nodes where the density has its mass.  An interval is halved where most may be hidden: a log-concave density lies below the
+  // Panels where the density has its mass, [from, to].  An interval is halved where most may be hidden: a log-concave density lies below the
   // chords of the neighbouring intervals, drawn on, so a peak narrower than the first nodes' distance is found from its slopes.
   const place = (logDensity, first, most) => {
     const x = first.sort((a, b) => a - b).filter((one, i) => i === 0 || one > first[i - 1]);
@@ -120,8 +121,10 @@ const kfLab = (() => {
       worth.splice(i + 1, 0, 0);
       for (let j = Math.max(0, i - 1); j <= Math.min(worth.length - 1, i + 2); j++) worth[j] = hidden(j);
     }
-    return { x: Float64Array.from(x), l };
+    const top = worth.reduce((a, b) => Math.max(a, b));
+    return worth.flatMap((one, i) => (one > top + Math.log(1e-7) ? [[x[i], x[i + 1]]] : []));
   };
+  const GAUSS = [[-Math.sqrt(0.6), 5 / 18], [0, 4 / 9], [Math.sqrt(0.6), 5 / 18]];  // exact for polynomials of degree 5
 
   // Where a measurement is explained without noise, in [low, high], and how well it tells the state there: nodes around each such
   // place, for a sharp meter's peak may be a millionth of the range wide.
@@ -144,7 +147,7 @@ const kfLab = (() => {
   };
 
   // y: the measurements of one trajectory.  Means, variances, and the density's nodes after each.
-  const exact = (model, { values, prior }, y, { first = 24, most = 80 } = {}) => {
+  const exact = (model, { values, prior }, y, { first = 20, most = 44 } = {}) => {
     const one = { z: numbers(1), p: numbers(1), m: numbers(1), d: numbers(1), tau: numbers(1), Theta: numbers(1), h: numbers(1), G: numbers(1), F: numbers(1) };
     const sd = Math.sqrt(prior.variance);
     let low = prior.mean - REACH * sd, high = prior.mean + REACH * sd, before = null;
@@ -167,13 +170,18 @@ const kfLab = (() => {
     for (const measured of y) {
       const nodes = Array.from({ length: first }, (_, i) => low + ((high - low) * i) / (first - 1));
       nodes.push(...around(meter, measured, nodes));
-      const { x, l } = place((at) => {
+      const logDensity = (at) => {
         const { h, F } = meter(at), variance = Math.max(F[0], LEAST);
         return Math.max(predicted(at) - 0.5 * ((measured - h[0]) ** 2 / variance + Math.log(variance)), -1e30);
-      }, nodes, most);
-      const size = x.length, top = l.reduce((a, b) => Math.max(a, b)), mass = numbers(size), density = l.map((one) => Math.exp(one - top));
-      for (let i = 0; i < size; i++) mass[i] = 0.5 * density[i] * (x[Math.min(i + 1, size - 1)] - x[Math.max(i - 1, 0)]);
-      const total = mass.reduce((a, b) => a + b);
+      };
+      const panels = place(logDensity, nodes, most), size = GAUSS.length * panels.length;
+      const x = numbers(size), weight = numbers(size);
+      panels.forEach(([from, to], i) => GAUSS.forEach(([t, part], j) => {
+        x[GAUSS.length * i + j] = 0.5 * (from + to + t * (to - from));
+        weight[GAUSS.length * i + j] = part * (to - from);
+      }));
+      const l = Array.from(x, logDensity), top = l.reduce((a, b) => Math.max(a, b)), density = l.map((one) => Math.exp(one - top));
+      const mass = weight.map((one, i) => one * density[i]), total = mass.reduce((a, b) => a + b);
       let mean = 0, variance = 0;
       for (let i = 0; i < size; i++) mean += (mass[i] / total) * x[i];
       for (let i = 0; i < size; i++) variance += (mass[i] / total) * (x[i] - mean) ** 2;
@@ -186,7 +194,7 @@ const kfLab = (() => {
       low = Infinity;
       high = -Infinity;
       for (let i = 0; i < size; i++) {
-        if (mass[i] < 1e-10 * total) continue;
+        if (mass[i] < 1e-9 * total) continue;
         const gap = 0.5 * Math.abs(law.tau[Math.min(i + 1, size - 1)] - law.tau[Math.max(i - 1, 0)]), j = before.count++;
         const width = Math.max(Math.sqrt(Math.max(law.Theta[i], 0)), 0.6 * gap, 1e-150);
         [before.mean[j], before.width[j], before.mass[j]] = [law.tau[i], width, mass[i] / total / width];
