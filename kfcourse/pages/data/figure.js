@@ -16,9 +16,12 @@ globalThis.kfFigure ??= (() => {
     return one;
   };
   const clip = (value, low, high) => Math.min(Math.max(value, low), high);
-  const short = (value) => {  // a number as people write it, with the true minus
-    const text = value === 0 ? "0" : Math.abs(value) < 1e-3 || Math.abs(value) >= 1e5 ? value.toExponential(1) : String(Number(value.toPrecision(3)));
-    return text.replaceAll("-", "−");
+  const short = (value) => {  // a number as people write it, with the true minus, and powers of ten
+    const size = Math.abs(value);
+    if (size >= 1e-3 && size < 1e5 || size === 0) return String(Number(value.toPrecision(3))).replace("-", "−");
+    const [digits, power] = value.toExponential(2).split("e"), part = Number(digits);
+    const raised = [...String(Number(power))].map((one) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(one)]).join("");
+    return `${part === 1 ? "" : `${part}·`.replace("-", "−")}10${raised}`;
   };
 
   const STYLE = `
@@ -30,7 +33,7 @@ globalThis.kfFigure ??= (() => {
 .kf-explore .kf-handle { cursor: grab; touch-action: none; outline: none; }
 .kf-explore .kf-handle:active { cursor: grabbing; }
 .kf-explore .kf-handle:focus-visible circle:last-child { stroke: ${INK}; stroke-width: 4px; }
-.kf-explore .kf-controls { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 14rem), 1fr)); gap: .35rem 1.2rem; margin: .5rem 0; }
+.kf-explore .kf-controls { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 9.5rem), 1fr)); gap: .35rem 1.2rem; margin: .5rem 0; }
 .kf-explore label { display: grid; grid-template-columns: 1fr auto; align-items: baseline; margin: 0; }
 .kf-explore label input, .kf-explore label select { grid-column: 1 / -1; width: 100%; margin: 0; accent-color: var(--accent, auto); min-height: 1.5rem; }
 .kf-explore select { font: inherit; color: inherit; background: var(--paper, Canvas); border: 1px solid var(--soft, GrayText); border-radius: 4px; padding: .15rem .3rem; }
@@ -76,7 +79,7 @@ globalThis.kfFigure ??= (() => {
     const sx = scale(x.log), sy = scale(y.log), parts = [];
     const limits = (of, [low, high]) => Object.assign(of, { low, high });
     limits(sx, x.range ?? [0, 1]);
-    limits(sy, y.range ?? [0, 1]);
+    limits(sy, y.range ?? (y.log ? [0.1, 1] : [0, 1]));
     const draw = () => {
       const width = svg.clientWidth || 600;
       svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
@@ -266,6 +269,7 @@ globalThis.kfFigure ??= (() => {
     ui.slider = (parent, key, of) => slider(ui, parent, key, of);
     ui.choice = (parent, key, of) => choice(ui, parent, key, of);
     ui.legend = (lines, parent = root) => legend(parent, lines);
+    ui.short = short;
     ui.says = () => make("p", { class: "kf-says", role: "status" }, root);
     ui.redraw = redraw;
     ui.clear = (parent) => {

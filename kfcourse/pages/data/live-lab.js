@@ -65,32 +65,31 @@ const kfLiveLab = (root, name, given) => {
     defaults[key(variant, "prior-mean")] = model.prior.mean;
     defaults[key(variant, "prior-variance")] = model.prior.variance;
   }
-  const say = (value) => Number(value.toPrecision(3)).toString().replace("-", MINUS);
   const percent = (value, error) => (isFinite(value) ? `${(100 * value).toFixed(2)} ± ${(100 * CONFIDENCE * error).toFixed(2)}`.replace("-", MINUS) : "diverges");
 
   kfFigure(root, name, defaults, (ui) => {
-    const above = ui.row(), sliders = ui.row(), status = ui.says(), charts = ui.row("kf-charts"), table = ui.make("div");
-    ui.legend([...names.map((one) => ({ label: titles[one], ...styles[one] })), { label: "exact, or truth", colour: "#1f2328" }], above.parentNode);
-    charts.before(root.querySelector(".kf-keys"));
-    ui.choice(above, "variant", { label: "Variant", options: Object.keys(kfModels).sort((a, b) => a - b).map((one) => [one, given.variants[one]]) });
-    ui.slider(above, "step", { label: "Step k to look at", low: 0, high: steps - 1, step: 1, say: String });
-    ui.choice(above, "function", { label: "Structural function", options: [["tau", "τ"], ["Theta", "Θ"], ["h", "h"], ["G", "G"], ["F", "F"]] });
-    ui.slider(above, "shown", { label: "Trajectory shown", low: 0, high: 98, step: 2, say: (value) => String(value / 2 + 1) });
-    ui.slider(above, "seed", { label: "Random numbers", low: 1, high: 50, step: 1, say: String });
+    const chosen = ui.row(), sliders = ui.row(), keys = ui.row("kf-lines"), main = ui.row("kf-charts"), status = ui.says(), table = ui.row("kf-numbers");
+    const looking = ui.row(), charts = ui.row("kf-charts");
+    ui.legend([...names.map((one) => ({ label: titles[one], ...styles[one] })), { label: "exact filter; truth", colour: "#1f2328" }], keys);
+    ui.choice(chosen, "variant", { label: "Variant", options: Object.keys(kfModels).sort((a, b) => a - b).map((one) => [one, given.variants[one]]) });
+    ui.slider(chosen, "seed", { label: "Random numbers", low: 1, high: 50, step: 1, say: String });
+    ui.slider(looking, "step", { label: "Step k", low: 0, high: steps - 1, step: 1, say: String });
+    ui.slider(looking, "shown", { label: "Trajectory", low: 0, high: 98, step: 2, say: (value) => String(value / 2 + 1) });
+    ui.choice(looking, "function", { label: "Structural function", options: [["tau", "τ"], ["Theta", "Θ"], ["h", "h"], ["G", "G"], ["F", "F"]] });
     const controls = (variant) => {
       ui.clear(sliders);
       const model = kfModels[variant];
       for (const [parameter, value] of Object.entries(model.parameters)) {
         const size = Math.abs(value), step = 10 ** Math.floor(Math.log10(size / 30)), end = Math.round((1.5 * value) / step) * step;
         const range = model.levels.includes(parameter) ? { low: value / 10, high: value * 10, log: true } : { low: Math.min(0, end), high: Math.max(0, end), step };
-        ui.slider(sliders, key(variant, parameter), { label: parameter, ...range, say });
+        ui.slider(sliders, key(variant, parameter), { label: parameter, ...range });
       }
       const { mean, variance } = model.prior, sd = Math.sqrt(variance);
-      ui.slider(sliders, key(variant, "prior-mean"), { label: "mean of the prior", low: mean - 3 * sd, high: mean + 3 * sd, step: sd / 10, say });
-      ui.slider(sliders, key(variant, "prior-variance"), { label: "variance of the prior", low: variance / 100, high: variance * 10, log: true, say });
+      ui.slider(sliders, key(variant, "prior-mean"), { label: "mean of the prior", low: mean - 3 * sd, high: mean + 3 * sd, step: sd / 10 });
+      ui.slider(sliders, key(variant, "prior-variance"), { label: "variance of the prior", low: variance / 100, high: variance * 10, log: true });
     };
-    const gap = ui.chart(charts, { height: 300, title: "Error above the bound", x: { label: "step k", range: [0, steps - 1] }, y: { label: "percent of the bound" }, says: "Error variance of each filter above the exact filter's, in percent, against the step, with 95 percent bands." });
-    const size = ui.chart(charts, { height: 300, title: "Error variance", x: { label: "step k", range: [0, steps - 1] }, y: { label: "mean square error", log: true }, left: 64, says: "Mean square error of each filter against the step, on a logarithmic scale." });
+    const gap = ui.chart(main, { height: 300, title: "Error above the bound", x: { label: "step k", range: [0, steps - 1] }, y: { label: "percent of the bound" }, says: "Error variance of each filter above the exact filter's, in percent, against the step, with 95 percent bands." });
+    const size = ui.chart(main, { height: 300, title: "Error variance", x: { label: "step k", range: [0, steps - 1] }, y: { label: "mean square error", log: true }, left: 64, says: "Mean square error of each filter against the step, on a logarithmic scale." });
     const track = ui.chart(charts, { title: "One trajectory", x: { label: "step k", range: [0, steps - 1] }, y: { label: "state x" }, says: "One trajectory and all its estimates against the step." });
     const density = ui.chart(charts, { title: "What the exact filter knows at step k", x: { label: "state x" }, y: { label: "density" }, left: 64, says: "The exact posterior density at the chosen step, the Gaussian filter's normal density, the truth and the estimates." });
     const gains = ui.chart(charts, { title: "Gain at step k", x: { label: "prediction λ" }, y: { label: "gain dz/dy" }, says: "The gain of each filter against its prediction." });
@@ -197,7 +196,7 @@ const kfLiveLab = (root, name, given) => {
       const shown = bounds && bounds.number === result.number;
       const rows = names.map((one) => {
         const value = result.errors[one][step][0], part = shown ? percent(...bounds.above[one][step]) : "…";
-        return `<tr><th scope="row">${titles[one]}</th><td>${isFinite(value) ? value.toExponential(3).replace("-", MINUS) : "diverges"}</td><td>${part}</td></tr>`;
+        return `<tr><th scope="row">${titles[one]}</th><td>${isFinite(value) ? ui.short(value) : "diverges"}</td><td>${part}</td></tr>`;
       });
       table.innerHTML = `<table class="table"><thead><tr><th scope="col">step ${step}</th><th scope="col">error variance</th><th scope="col">above the bound, %</th></tr></thead><tbody>${rows.join("")}</tbody></table>`;
     };
