@@ -191,7 +191,7 @@ globalThis.kfFigure ??= (() => {
   const slider = (ui, parent, key, { label, low, high, step, log = false, say = short }) => {
     const box = make("label", {}, parent);
     make("span", {}, box, label);
-    const shown = make("output", {}, box);
+    const shown = make("span", { "aria-hidden": "true" }, box);
     const ends = log ? { min: Math.log10(low), max: Math.log10(high), step: 0.02 } : { min: low, max: high, step };
     const input = make("input", { type: "range", ...ends, "aria-label": label }, box);
     input.addEventListener("input", () =>

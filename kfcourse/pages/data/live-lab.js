@@ -1,8 +1,8 @@
 // "The lab, live": all filters of a scalar model on common trajectories, as its parameters move.  The worker's part, then the page's.
 
 const kfServe = () => {
-  const WIDE = 2;
-  const GROWING = [50, 100, 200, 400];  // trajectories with the exact filter: the bands become narrower as they come
+  const WIDE = 2.5;
+  const GROWING = [200, 400];  // trajectories with the exact filter; of fewer the bands would cover too seldom
   const kept = new Map();
   const once = (key, make) => {
     if (!kept.has(key)) kept.set(key, make());
@@ -97,7 +97,7 @@ const kfLiveLab = (root, name, given) => {
     const of = (chart, more = {}) => Object.fromEntries(names.map((one) => [one, chart.curve({ ...styles[one], ...more })]));
     const bands = Object.fromEntries(names.map((one) => [one, gap.band({ colour: styles[one].colour, opacity: 0.13 })]));
     const lines = { gap: of(gap), size: of(size), track: of(track, { width: 1.4 }), gains: of(gains) };
-    const bound = size.curve({ width: 1.4 }), zero = gap.curve({ width: 1 }), truth = track.curve({ width: 2.4 }), here = track.curve({ width: 1, dash: "2 3" });
+    const bound = size.curve({ width: 1.4 }), zero = gap.curve({ width: 1 }), truth = track.curve({ width: 2.4 }), known = track.curve({ width: 1.2, dash: "2 2" }), here = track.curve({ width: 1, dash: "2 3" });
     const posterior = density.curve({ width: 2 }), normal = density.curve({ ...styles["aof-gaussian"], width: 1.4 }), at = density.curve({ width: 1.2, dash: "4 3" });
     const places = Object.fromEntries(names.map((one) => [one, density.dots({ colour: styles[one].colour, size: 4 })]));
     const exactly = functions.curve({ ...styles["aof-gaussian"] }), tangent = functions.curve({ ...styles["aof-linearised"] });
@@ -148,17 +148,18 @@ const kfLiveLab = (root, name, given) => {
     const drawTrack = ({ step }) => {
       const { x, exact, z, p } = result.track;
       truth(ks, x);
+      known(ks, exact.z);
       for (const one of names) lines.track[one](ks, z[one]);
       const range = spanned([...x.slice(0, steps), ...exact.z]);
       track.y(range);
       here([step, step], range);
-      const known = exact.densities[step];
+      const law = exact.densities[step];
       const [m, v] = [z["aof-gaussian"][step], p[step]], sd = Math.sqrt(exact.p[step]);
-      if (!known || !(sd > 0)) return;
+      if (!law || !(sd > 0)) return;
       const xs = Array.from({ length: 161 }, (_, i) => exact.z[step] + (i - 80) * 0.06 * sd);
-      posterior(known.x, known.density);
+      posterior(law.x, law.density);
       normal(xs, xs.map((one) => Math.exp((-0.5 * (one - m) ** 2) / v) / Math.sqrt(2 * Math.PI * v)));
-      const top = 1.15 * known.density.reduce((a, b) => Math.max(a, b));
+      const top = 1.15 * law.density.reduce((a, b) => Math.max(a, b));
       density.x([exact.z[step] - 4.8 * sd, exact.z[step] + 4.8 * sd]);
       density.y([0, top]);
       at([x[step], x[step]], [0, top]);
