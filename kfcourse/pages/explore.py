@@ -13,10 +13,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import sympy as sp
+
 from kfcourse.lab.plots import style
 from kfcourse.lab.short_names import LAB, title
 from kfcourse.lab.variants import Variant
 from kfcourse.pages.browser import script
+from kfcourse.symbolic import javascript
 
 DATA = Path(__file__).parent / "data"
 RUNS, STEPS = 10_000, 30  # of the live lab
@@ -81,3 +84,44 @@ def line_style(name: str) -> dict[str, str]:
     """A filter's colour and dash, as in every figure of the book."""
     line = style(name)
     return {"colour": line["color"], "dash": _DASHES[line["linestyle"]]}
+
+
+def two_beats(
+    name: str,
+    x: sp.Symbol,
+    y: sp.Symbol,
+    following: sp.Symbol,
+    prior: sp.Expr,
+    likelihood: sp.Expr,
+    transition: sp.Expr,
+    place: sp.Expr,
+    first: float,
+) -> str:
+    """The two beats of the Stratonovich equation, with the measurement under the reader's hand.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure.
+    x, y, following : Symbol
+        State, measurement, next state.
+    prior, likelihood, transition : Expr
+        Densities: of x; of y given x; of the next state given x.
+    place : Expr
+        The measurement without noise, of x: where the handle stands.
+    first : float
+        The measurement shown first.
+    """
+    loops = [
+        javascript.loop("prior", {"x": sp.Matrix([x])}, {"value": sp.Matrix([prior])}),
+        javascript.loop("likelihood", {"x": sp.Matrix([x])}, {"value": sp.Matrix([likelihood])}, coefficients={y: "y"}),
+        javascript.loop("transition", {"x": sp.Matrix([x]), "next": sp.Matrix([following])}, {"value": sp.Matrix([transition])}),
+        javascript.loop("place", {"x": sp.Matrix([x])}, {"value": sp.Matrix([place])}),
+    ]
+    code = javascript.RUNTIME + "".join(loops) + (DATA / "two-beats.js").read_text(encoding="utf-8")
+    return figure(name, "Correction and prediction", _closed("kfTwoBeats", code), f"(root, name) => kfTwoBeats(root, name, {first!r})")
+
+
+def _closed(name: str, code: str) -> str:
+    """A script that leaves nothing behind but the function with this name, which it defines."""
+    return f"const {name} = (() => {{\n{code}\nreturn {name};\n}})();"

@@ -149,8 +149,9 @@ globalThis.kfFigure ??= (() => {
       make("svg:circle", { r: 22, fill: "transparent" }, one);
       make("svg:circle", { r: 7.5, fill: "#ffffff", stroke: colour, "stroke-width": 3 }, one);
       const put = (axis, to) => {
+        if (keys[axis] === undefined) return {};
         const key = keys[axis], [low, high] = range[axis];
-        return key === undefined ? {} : { [key]: Number(clip(Math.round(to / step[axis]) * step[axis], low, high).toPrecision(12)) };
+        return { [key]: Number(clip(Math.round(to / step[axis]) * step[axis], low, high).toPrecision(12)) };
       };
       const toPointer = (event) => {
         const box = svg.getBoundingClientRect();
