@@ -107,7 +107,9 @@ def _design(
 
     def close() -> None:
         if group:
-            lines.append(_loop(f"loop{len(lines)}", group, _used_later(group, later, known, kept), ready, constants, coefficients))
+            lines.append(
+                _loop(f"loop{len(lines)}", group, _used_later(group, later, known, kept), ready, constants, coefficients)
+            )
             lines[-1] = f"({lines[-1].strip()})(n, v, c, a);"
             ready.extend(left for left, _ in group if array_name(left) not in arrays)
             group.clear()

@@ -67,7 +67,9 @@ def live_lab(name: str, variants: Mapping[str, Variant], first: str = "53", step
     step : int
         The step looked at first.
     """
-    source = script({key: variant.model for key, variant in variants.items()}) + (DATA / "live-lab.js").read_text(encoding="utf-8")
+    source = script({key: variant.model for key, variant in variants.items()}) + (DATA / "live-lab.js").read_text(
+        encoding="utf-8"
+    )
     given: dict[str, Any] = {
         "styles": {one: line_style(one) for one in LAB},
         "titles": {one: title(one) for one in LAB},
@@ -119,7 +121,9 @@ def two_beats(
         javascript.loop("place", {"x": sp.Matrix([x])}, {"value": sp.Matrix([place])}),
     ]
     code = javascript.RUNTIME + "".join(loops) + (DATA / "two-beats.js").read_text(encoding="utf-8")
-    return figure(name, "Correction and prediction", _closed("kfTwoBeats", code), f"(root, name) => kfTwoBeats(root, name, {first!r})")
+    return figure(
+        name, "Correction and prediction", _closed("kfTwoBeats", code), f"(root, name) => kfTwoBeats(root, name, {first!r})"
+    )
 
 
 def _closed(name: str, code: str) -> str:

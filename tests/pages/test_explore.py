@@ -35,7 +35,9 @@ def opened(browser, tmp_path, pages):
         tab.set_default_timeout(20_000)
         tab.on("console", lambda message: problems.append(message.text))
         tab.on("pageerror", lambda error: problems.append(str(error)))
-        tab.on("request", lambda one: one.url.startswith((path.as_uri(), "blob:", "data:")) or problems.append(f"loads {one.url}"))
+        tab.on(
+            "request", lambda one: one.url.startswith((path.as_uri(), "blob:", "data:")) or problems.append(f"loads {one.url}")
+        )
         tab.goto(path.as_uri() + fragment)
         if options.get("java_script_enabled", True):
             tab.wait_for_selector(".kf-explore[data-ready]")

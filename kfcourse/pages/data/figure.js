@@ -36,6 +36,7 @@ globalThis.kfFigure ??= (() => {
 .kf-explore .kf-controls { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 9.5rem), 1fr)); gap: .35rem 1.2rem; margin: .5rem 0; }
 .kf-explore label { display: grid; grid-template-columns: 1fr auto; align-items: baseline; margin: 0; }
 .kf-explore label input, .kf-explore label select { grid-column: 1 / -1; width: 100%; margin: 0; accent-color: var(--accent, auto); min-height: 1.5rem; }
+.kf-explore label:has(select) { grid-column: span 2; }
 .kf-explore select { font: inherit; color: inherit; background: var(--paper, Canvas); border: 1px solid var(--soft, GrayText); border-radius: 4px; padding: .15rem .3rem; }
 .kf-explore button { font: inherit; color: var(--accent, LinkText); background: none; border: 1px solid currentcolor; border-radius: 4px; padding: .15rem .6rem; }
 .kf-explore .kf-keys { display: flex; flex-wrap: wrap; gap: .1rem 1rem; list-style: none; padding: 0; margin: .3rem 0; }
@@ -88,7 +89,7 @@ globalThis.kfFigure ??= (() => {
       for (const [name, value] of [["x", left], ["y", top - 1], ["width", width - left - right + 1], ["height", height - top - bottom + 2]])
         rectangle.setAttribute(name, value);
       axes.replaceChildren();
-      for (const tick of sx.ticks(Math.max(2, Math.floor(width / 90)))) {
+      for (const tick of sx.ticks(Math.max(3, Math.floor(width / 70)))) {
         make("svg:path", { d: `M${sx.at(tick)} ${sy.from}v5`, stroke: INK }, axes);
         make("svg:path", { d: `M${sx.at(tick)} ${sy.from}V${top}`, stroke: LINE, "stroke-width": 0.6 }, axes);
         make("svg:text", { x: sx.at(tick), y: sy.from + 18, "text-anchor": "middle" }, axes, short(tick));
