@@ -57,11 +57,8 @@ def scalar_rules(family: str, structures: Structures, structure: Structure) -> l
     return [(scalar(one.lhs), scalar(one.rhs, javascript.inverse).xreplace(values)) for one in EQUATIONS[family]]
 
 
-def statistics(letters: Iterable[sp.MatrixSymbol]) -> dict[sp.Symbol, tuple[str, str]]:
-    """What the equations say about the ensemble: the symbol of each mean and covariance of the letters, printed in two ways.
-
-    The first is the value, the second for the pseudo-inverse of a variance.
-    """
+def statistics(letters: Iterable[sp.MatrixSymbol]) -> dict[sp.Symbol, str]:
+    """How the means, covariances and inverted variances of letters, which the equations hold as symbols, are computed."""
     found = {}
     for left, right in product(list(letters), repeat=2):
         one, other = array_name(scalar(left)), array_name(scalar(right))
@@ -101,16 +98,15 @@ def _design(
 ) -> str:
     """Loops and, between them, the coefficients: in the order of the equations."""
     ready = [scalar(one) for one in _GIVEN]
-    lines, group = [], list[Rule]()
+    lines, group = list[str](), list[Rule]()
     arrays = {array_name(symbol): symbol for symbol in ready}
     later = list(rules)
 
     def close() -> None:
         if group:
-            lines.append(
-                _loop(f"loop{len(lines)}", group, _used_later(group, later, known, kept), ready, constants, coefficients)
-            )
-            lines[-1] = f"({lines[-1].strip()})(n, v, c, a);"
+            wanted = _used_later(group, later, known, kept)
+            loop = _loop(f"loop{len(lines)}", group, wanted, ready, constants, coefficients)
+            lines.append(f"({loop.strip()})(n, v, c, a);")
             ready.extend(left for left, _ in group if array_name(left) not in arrays)
             group.clear()
 

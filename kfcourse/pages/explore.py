@@ -38,7 +38,7 @@ def figure(name: str, says: str, code: str, call: str) -> str:
     code, call : str
         JavaScript.
     """
-    helper = (DATA / "figure.js").read_text(encoding="utf-8")
+    helper = _read("figure.js")
     mount = f"""(() => {{
 const root = document.currentScript.parentElement.querySelector(".kf-explore");
 const start = () => ({call})(root, {json.dumps(name)});
@@ -120,10 +120,13 @@ def two_beats(
         javascript.loop("transition", {"x": sp.Matrix([x]), "next": sp.Matrix([following])}, {"value": sp.Matrix([transition])}),
         javascript.loop("place", {"x": sp.Matrix([x])}, {"value": sp.Matrix([place])}),
     ]
-    code = javascript.RUNTIME + "".join(loops) + (DATA / "two-beats.js").read_text(encoding="utf-8")
-    return figure(
-        name, "Correction and prediction", _closed("kfTwoBeats", code), f"(root, name) => kfTwoBeats(root, name, {first!r})"
-    )
+    code = javascript.RUNTIME + "".join(loops) + _read("two-beats.js")
+    call = f"(root, name) => kfTwoBeats(root, name, {first!r})"
+    return figure(name, "Correction and prediction", _closed("kfTwoBeats", code), call)
+
+
+def _read(name: str) -> str:
+    return (DATA / name).read_text(encoding="utf-8")
 
 
 def _closed(name: str, code: str) -> str:

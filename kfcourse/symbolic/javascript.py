@@ -1,4 +1,4 @@
-"""The second printer: the straight-line programs of `codegen.lower` as JavaScript, for figures that compute in the reader's browser.
+"""The second printer: the straight-line programs of `codegen.lower` as JavaScript, for figures that compute in a browser.
 
     loop("predict", {"z": z, "p": p}, {"tau": tau, "Theta": Theta}, constants=parameters)
 

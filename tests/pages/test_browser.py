@@ -152,8 +152,8 @@ def compared(page, id: str, designing, running, changed: dict | None = None) -> 
 
 @pytest.mark.parametrize("id", SCALAR)
 def test_the_same_draws_give_the_same_error_variances(page, id):
-    """The package's D_k to 1e-9, from the draws alone: rounding, which thirty steps of a filter and the division by small variances
-    may carry from 1e-16 to 1e-12 and more."""
+    """The package's D_k to 1e-9, from the draws alone: rounding of 1e-16, which thirty steps of a filter and the division by
+    small variances carry to 1e-12 and more."""
     designing, running = ensembles(id)
     found = compared(page, id, designing, running)
     assert tuple(found) == LAB
@@ -189,8 +189,8 @@ def test_what_diverges_diverges_at_the_same_step(page):
 
 @pytest.mark.parametrize("id", SCALAR)
 def test_the_exact_filter_is_the_package_s(page, id):
-    """Means within a hundredth of the posterior deviation and variances within 3 %, at the worst of steps; on average the means add
-    1e-5 to the bound and the variances are off by 1e-3: a tenth of a percent, far below what some hundred trajectories can tell."""
+    """Means within a hundredth of the posterior deviation and variances within 3 %, at the worst of steps; on average the means
+    add 1e-5 to the bound and the variances 1e-3: a tenth of a percent, far below what some hundred trajectories can tell."""
     model, rng, runs, steps = SCALAR[id], np.random.default_rng(5), 16, 12
     state, meter = compile_model(model)
     start = rng.standard_normal(runs) * np.tile([1, 2], runs // 2)
@@ -235,7 +235,8 @@ COVERAGE = (
     const column = (key, k) => Float64Array.from(exact, one => one[key][k]);
     return names.map(name => [0, 1, 2].map(k => kfLab.aboveBound(
         { n, x: tracks.x[k], z: all[name].z[k], carrier: all[C].p[k] },
-        { n: few, weight: start.weight, z: of[name].z[k], exact: column("z", k), variance: column("p", k), carrier: of[C].p[k] })));"""
+        { n: few, weight: start.weight, z: of[name].z[k], carrier: of[C].p[k], exact: column("z", k), variance: column("p", k) },
+    )));"""
 )
 
 

@@ -38,7 +38,7 @@ globalThis.kfFigure ??= (() => {
 .kf-explore label input, .kf-explore label select { grid-column: 1 / -1; width: 100%; margin: 0; accent-color: var(--accent, auto); min-height: 1.5rem; }
 .kf-explore label:has(select) { grid-column: span 2; }
 .kf-explore select { font: inherit; color: inherit; background: var(--paper, Canvas); border: 1px solid var(--soft, GrayText); border-radius: 4px; padding: .15rem .3rem; }
-.kf-explore button { font: inherit; color: var(--accent, LinkText); background: none; border: 1px solid currentcolor; border-radius: 4px; padding: .15rem .6rem; }
+button.kf-try { font: inherit; color: var(--accent, LinkText); background: none; border: 1px solid currentcolor; border-radius: 4px; padding: 0 .5rem; }
 .kf-explore .kf-keys { display: flex; flex-wrap: wrap; gap: .1rem 1rem; list-style: none; padding: 0; margin: .3rem 0; }
 .kf-explore .kf-keys li { margin: 0; } .kf-explore .kf-keys svg { filter: var(--picture, none); margin-right: .35rem; }
 .kf-explore p.kf-says { margin: .3rem 0; min-height: 1.4em; }
@@ -234,14 +234,17 @@ globalThis.kfFigure ??= (() => {
 
   // ------------------------------------------------------------------ a figure
 
-  const read = (name, defaults) => {  // what the address says of this figure; of each entry the kind of its default
-    const [before, after = ""] = decodeURIComponent(location.hash.slice(1)).split("?"), found = {};
-    if (before !== name) return null;
-    for (const [key, text] of new URLSearchParams(after)) {
-      const value = typeof defaults[key] === "number" ? Number(text) : text;
-      if (key in defaults && text !== "" && value === value) found[key] = value;
+  const parse = (text, defaults) => {  // of each entry the kind of its default
+    const found = {};
+    for (const [key, given] of new URLSearchParams(text)) {
+      const value = typeof defaults[key] === "number" ? Number(given) : given;
+      if (key in defaults && given !== "" && value === value) found[key] = value;
     }
     return found;
+  };
+  const read = (name, defaults) => {  // what the address says of this figure
+    const [before, after = ""] = decodeURIComponent(location.hash.slice(1)).split("?");
+    return before === name ? parse(after, defaults) : null;
   };
 
   return (root, name, defaults, build) => {
@@ -292,6 +295,12 @@ globalThis.kfFigure ??= (() => {
       const given = read(name, defaults);
       if (given) ui.set({ ...defaults, ...given });
     });
+    // What a sentence of the page tells to try.
+    for (const one of document.querySelectorAll(`button[data-figure="${name}"]`))
+      one.addEventListener("click", () => {
+        ui.set({ ...defaults, ...parse(one.dataset.state, defaults) });
+        root.scrollIntoView();
+      });
     if (read(name, defaults) && location.hash.includes("?")) root.scrollIntoView();
     root.dataset.ready = "";
     return ui;
