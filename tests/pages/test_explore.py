@@ -11,8 +11,9 @@ from kfcourse.pages import explore
 
 SCALAR = {name: variant for name, variant in load_variants().items() if variant.model.n == 1 == variant.model.p}
 STILL = "data:image/svg+xml," + "%3Csvg xmlns='http://www.w3.org/2000/svg' width='300' height='100'/%3E"
-ALONE = """<!doctype html><html lang="en"><head><meta charset="utf-8">
-<meta name="viewport" content="width=device-width"><title>Figure</title></head><body>{html}<figure id="{name}"><img src="{still}" alt="still"><figcaption>Caption</figcaption></figure></body></html>"""
+ALONE = """<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
+<title>Figure</title></head><body>{html}
+<figure id="{name}"><img src="{still}" alt="still"><figcaption>Caption</figcaption></figure></body></html>"""
 
 
 @pytest.fixture(scope="module")
