@@ -19,15 +19,14 @@ from kfcourse.symbolic.model import Model
 
 _omega, _eps = s.matrix(r"\omega_{k}", s.p, s.ONE), s.matrix(r"\varepsilon_{k}", s.n, s.ONE)
 _alpha = s.matrix(r"\alpha_{k}", s.n, s.ONE)
-_b_value, _a_value = s.matrix(r"b(\lambda_{k}, m_{w})", s.p, s.ONE), s.matrix(r"a(z_{k}, m_{v})", s.n, s.ONE)
 _F, _g = s.matrix(r"F_{k}", s.n, s.n), s.matrix(r"g_{k}", s.n, s.ONE)
 
 EQUATIONS = (
-    sp.Eq(_omega, s.y - _b_value),
+    sp.Eq(_omega, s.y - s.b_value),
     sp.Eq(_eps, s.x - s.lam),
     *s.regression(s.H, s.e, _eps, _omega),
     sp.Eq(s.z, s.lam + s.H * _omega + s.e),
-    sp.Eq(_alpha, _a_value),
+    sp.Eq(_alpha, s.a_value),
     *s.regression(_F, _g, s.x_next, _alpha),
     sp.Eq(s.lam_next, _F * _alpha + _g),
 )
