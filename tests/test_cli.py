@@ -167,8 +167,7 @@ def test_a_real_process_does_it_too(tmp_path):
     assert wrong.stderr.count("\n") == 1
 
 
-@pytest.mark.filterwarnings("ignore:No artists with labels")  # the control relative to itself is not drawn
-def test_without_exact_runs_the_exact_filter_is_left_out(call, tmp_path):
+def test_without_exact_runs_the_exact_filter_is_left_out(call, no_figures, tmp_path):
     assert call("lab", "53", *QUICK, "--json", "n.json").exit_code == 0
     data = json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))
     assert set(data["error_variance"]) == set(LAB)
@@ -499,7 +498,7 @@ def test_an_end_while_files_are_moved_mixes_no_old_and_new(tmp_path, monkeypatch
     )
 
 
-def test_an_end_while_the_report_is_written_leaves_the_one_that_was_there(call, tmp_path, monkeypatch):
+def test_an_end_while_the_report_is_written_leaves_the_one_that_was_there(call, no_figures, tmp_path, monkeypatch):
     """Of both reports: what is new appears when all of it is written."""
     assert call("lab", "53", *QUICK, "--filters", "duof", "--out", "r", "--report", "ru").exit_code == 0
     before = snapshot(tmp_path)
@@ -527,7 +526,8 @@ def test_a_read_only_file_of_the_report_is_not_replaced_nor_are_the_others(call,
 @pytest.mark.skipif(sys.platform == "win32", reason="no /dev/stdout")
 def test_numbers_and_ranking_to_one_place_lose_nothing(tmp_path, target):
     """Standard output is a file, and takes the numbers: the file has them and nothing else."""
-    lab = [sys.executable, "-m", "kfcourse", "lab", "53", *QUICK, "--filters", "aof-gaussian,duof", "--json", target]
+    code = "from kfcourse.lab import report; report._FIGURES = {}; from kfcourse.commands import main; main()"
+    lab = [sys.executable, "-c", code, "lab", "53", *QUICK, "--filters", "aof-gaussian,duof", "--json", target]
     with (tmp_path / "same.json").open("w", encoding="utf-8") as out:
         done = subprocess.run(lab, cwd=tmp_path, stdout=out, stderr=subprocess.PIPE, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr

@@ -133,12 +133,12 @@ def _chunks_in_time(
     with progress_bar("slow filters", size, "trajectory", progress) as bar:
         work = _Work(size, end, bar)
         while not work.over:
+            jobs = min(jobs, work.chunks())
             try:
                 if jobs == 1 or not work.long():
                     with memory_limit(memory):
                         work.advance(partial(Serial().submit, chunk, None), 1, until_long=jobs > 1)
                 else:
-                    jobs = min(jobs, work.chunks())
                     with processes(jobs, partial(chunk, None if memory is None else memory / jobs)) as submit:
                         work.advance(submit, jobs)
             except _NoRoom as found:
@@ -184,7 +184,7 @@ def _chunk(
     except OutOfTime:
         return None
     except MemoryError as problem:
-        return problem
+        return problem.with_traceback(None)  # that would keep what filled the memory
     return sums, time.monotonic() - begun
 
 
