@@ -157,6 +157,22 @@ def test_its_own_estimate_of_the_error_covers_what_finer_nodes_change():
     assert (states[1].memory.discretisation_error() < 1e-4).all()
 
 
+def test_every_second_and_fourth_kernel_of_all_modes_is_a_prediction_too():
+    """The rough looks of the exact filter take these; a mode whose kernels they missed would be looked for in vain."""
+    one, y = jump_pointmass(failing()), simulate(failing(), 30, 4, seed=2).y
+    state = one.init(30)
+    for measured in y:
+        state = one.step(state, measured)
+    for groups in state.memory.groups:
+        for _, kernels in groups:
+            mean, variance = kernels.moments()
+            thinned = kernels.thinned()
+            np.testing.assert_allclose(thinned.mass.sum(axis=1), 1.0, rtol=1e-12)
+            for rough in (thinned, kernels._replace(mass=kernels.quarter())):
+                # half and a quarter of the nodes: the first are as good as 1e-3, the second as its root
+                assert (np.abs(rough.moments()[0] - mean) < 0.03 * np.sqrt(variance)).all()
+
+
 def test_one_mode_is_the_exact_filter():
     plain = Model.define("0.9*x + 0.3*x*v", "x + 0.2*x**2*w")
     model = JumpModel.define("0.9*x + 0.3*x*v", "x + 0.2*x**2*w", modes={"only": {}}, transition=[1.0])

@@ -1,6 +1,9 @@
 """Variants with modes on the command line: listed, checked, compared, and refused where nothing knows modes."""
 
 import json
+import re
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -141,3 +144,10 @@ def test_the_share_of_right_modes_is_that_of_the_trajectories():
     shown = next(k for k in range(20) if 0 < mode[:, k].mean() < 1)  # the first with both modes
     np.testing.assert_array_equal(found.mode, mode[:, shown])
     assert found.probability[one.name].shape == (8, 2)
+
+
+def test_the_chapter_shows_the_shipped_table():
+    page = (Path(__file__).parents[2] / "book" / "models-that-jump.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    (name, shown), *_ = tomllib.loads(block)["variants"].items()
+    assert shown == {key: value for key, value in JUMPS[name].table.items() if key != "title"}
