@@ -73,6 +73,7 @@ figure: install
 benchmark: install
 	$(BIN)/python benchmarks/engine.py
 	$(BIN)/python benchmarks/exact.py
+	$(BIN)/python benchmarks/cores.py
 	$(BIN)/python benchmarks/looking_back.py
 
 install:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +11,8 @@ from pathlib import Path
 import click
 
 from kfcourse.commands import main as main  # scripts that were installed before call it here
+from kfcourse.derivations import check_text
+from kfcourse.derivations.setting import of_model
 from kfcourse.files import is_standard_output, read_only, replacing_together
 from kfcourse.lab.admission import admissions, on_trial, without_failing
 from kfcourse.lab.admission import table as table_of_filters
@@ -24,6 +27,7 @@ from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.subset import FEWEST as FEWEST_EXACT
 from kfcourse.montecarlo.subset import LEAST
 from kfcourse.symbolic.jumping import JumpModel
+from kfcourse.symbolic.model import Model
 
 DERIVATION = 60.0  # seconds for the formulas of the filters
 
@@ -132,6 +136,8 @@ def lab(
     for one in found:
         for warning in one.warnings:
             click.echo(f"Warning: {title(one.name)}: {warning}", err=True)
+    for remark in dict.fromkeys(remark for one in found if one.name.endswith("-gaussian") for remark in one.remarks):
+        click.echo(f"Gaussian filters: {remark}", err=True)
     if len(refused) == len(found):
         raise click.ClickException(
             "; ".join(f"{name}: {reason}" for name, reason in refused.items())
@@ -210,6 +216,25 @@ def filters(places: tuple[str, ...], variants_file: Path | None, trial: bool) ->
     found = admissions(chosen.model, seconds=DERIVATION)
     click.echo(f"Variant {chosen.name}: {chosen.title or chosen.model}", err=True)
     click.echo(table_of_filters(on_trial(chosen.model, found) if trial else found))
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@VARIANTS
+@click.option("--variant", help="Of which the derivation is; a heading of the file may name it as well.")
+def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
+    """Check a derivation line by line: FILE has chains of lines such as F = M[(g*x - h)^2] and = g^2*d.
+
+    Each line is compared with the one above it, and the term that is wrong is named.  Exit status 0 if all lines are right, 1
+    if one differs, 2 if one cannot be read or compared.
+    """
+
+    def model(name: str) -> Model:
+        return find_variant(name, variants_file).plain("derivations")
+
+    report = check_text(file.read_text(encoding="utf-8"), model, of_model(model(variant)) if variant else None)
+    click.echo(report)
+    sys.exit(2 if report.undecided else 0 if report.right else 1)
 
 
 @click.command()

@@ -167,8 +167,7 @@ def test_a_real_process_does_it_too(tmp_path):
     assert wrong.stderr.count("\n") == 1
 
 
-@pytest.mark.filterwarnings("ignore:No artists with labels")  # the control relative to itself is not drawn
-def test_without_exact_runs_the_exact_filter_is_left_out(call, tmp_path):
+def test_without_exact_runs_the_exact_filter_is_left_out(call, no_figures, tmp_path):
     assert call("lab", "53", *QUICK, "--json", "n.json").exit_code == 0
     data = json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))
     assert set(data["error_variance"]) == set(LAB)
@@ -253,6 +252,24 @@ def test_designing_on_the_same_ensemble_is_another_result(call, no_report, tmp_p
 
 
 @pytest.mark.quick
+def test_a_derivation_is_checked_line_by_line(call, tmp_path):
+    file = tmp_path / "F.txt"
+    right = "F = M[(g*x + f*x^2*w - h)^2]\n = g^2*M[(x-m)^2] + f^2*M[x^4]\n"
+    for line, status, says in (
+        ("g^2*d + f^2*(m^4 + 6*m^2*d + 3*d^2)", 0, "✓"),
+        ("g^2*d + 3*f^2*d^2", 1, "✗ g^2*d + 3*f^2*d^2"),
+        ("g^2*d + 3*f^2*k^2", 2, "unknown letter 'k'"),
+    ):
+        file.write_text(f"{right} = {line}\n", encoding="utf-8")
+        done = call("check", file, "--variant", "53")
+        assert done.exit_code == status
+        assert says in done.output
+    file.write_text("nonsense\n", encoding="utf-8")
+    done = call("check", file)
+    assert done.exit_code == 1
+    assert "line 1: 'nonsense' has no =, and is no heading" in done.output
+
+
 def test_an_unknown_variant_names_the_known_ones(call, no_computation):
     refused(call("lab", "999", *QUICK), "'999'", "53, 1, 2")
 
@@ -481,7 +498,7 @@ def test_an_end_while_files_are_moved_mixes_no_old_and_new(tmp_path, monkeypatch
     )
 
 
-def test_an_end_while_the_report_is_written_leaves_the_one_that_was_there(call, tmp_path, monkeypatch):
+def test_an_end_while_the_report_is_written_leaves_the_one_that_was_there(call, no_figures, tmp_path, monkeypatch):
     """Of both reports: what is new appears when all of it is written."""
     assert call("lab", "53", *QUICK, "--filters", "duof", "--out", "r", "--report", "ru").exit_code == 0
     before = snapshot(tmp_path)
@@ -509,7 +526,8 @@ def test_a_read_only_file_of_the_report_is_not_replaced_nor_are_the_others(call,
 @pytest.mark.skipif(sys.platform == "win32", reason="no /dev/stdout")
 def test_numbers_and_ranking_to_one_place_lose_nothing(tmp_path, target):
     """Standard output is a file, and takes the numbers: the file has them and nothing else."""
-    lab = [sys.executable, "-m", "kfcourse", "lab", "53", *QUICK, "--filters", "aof-gaussian,duof", "--json", target]
+    code = "from kfcourse.lab import report; report._FIGURES = {}; from kfcourse.commands import main; main()"
+    lab = [sys.executable, "-c", code, "lab", "53", *QUICK, "--filters", "aof-gaussian,duof", "--json", target]
     with (tmp_path / "same.json").open("w", encoding="utf-8") as out:
         done = subprocess.run(lab, cwd=tmp_path, stdout=out, stderr=subprocess.PIPE, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr

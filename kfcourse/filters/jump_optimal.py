@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kfcourse.filters.base import State, initial_state
-from kfcourse.filters.designed import Design, Equations, Regression, Step
+from kfcourse.filters.designed import Design, Equations, Regression
 from kfcourse.filters.multiple_models import Modes, mixture, modes_given, onward
 from kfcourse.laws import Array, Gaussian, Measurement, correct
 from kfcourse.symbolic.jumping import JumpModel
@@ -42,7 +42,8 @@ def logic_dynamic_fos(model: JumpModel, structures: Sequence[Structure]) -> Desi
         expected = np.tile(model.first, (runs, 1))
         return start._replace(memory=Modes(expected, expected, (start.predicted,) * len(structures)))
 
-    def equations(predicted: Gaussian, y: Array, k: int, memory: Modes) -> Equations:
+    def equations(state: State, y: Array) -> Equations:
+        k, memory = state.step, state.memory
         now = [structure.at(k) for structure in structures]
         expectations = [one.measure(*prior) for one, prior in zip(now, memory.predicted, strict=True)]
         corrected = [correct(prior, one, y) for prior, one in zip(memory.predicted, expectations, strict=True)]
@@ -67,7 +68,7 @@ def logic_dynamic_fos(model: JumpModel, structures: Sequence[Structure]) -> Desi
         xi, _ = modes_given(np.tile(weights, (len(y), 1)), densities, z)
         expected, shares = onward(xi, model.transition_at(k))
         following = [mixture([one.predict(*law) for law in laws], shares[:, :, j]) for j, one in enumerate(now)]
-        return Step(posterior, mixture(following, expected), Modes(mu, expected, tuple(following)))
+        return State(k + 1, posterior, mixture(following, expected), Modes(mu, expected, tuple(following)))
 
     return Design(f"fos-jump-{structures[0].name}", model.modes[0], equations, start=init)
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from kfcourse.filters import Design, Filter, pointmass
 from kfcourse.filters.particles import particle
+from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JumpStructures, Structures, check_names, has_exact, title
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.comparison import Comparison
@@ -117,7 +118,7 @@ def _admitted(name: str, structures: Structures | JumpStructures) -> Admission:
     found = [str(warning.message) for warning in caught]
     with np.errstate(all="ignore"):
         found += [text for kind, look in _LOOKS.items() if kind in name for text in look(structures)]
-        remarks = [text for kind, look in _REMARKS.items() if kind == name and not found for text in look(structures)]
+        remarks = [text for kind, look in _REMARKS.items() if name.endswith(kind) and not found for text in look(structures)]
     return Admission(name, one, "", tuple(found), tuple(remarks))
 
 
@@ -257,6 +258,12 @@ def _by_particles(structures: Structures) -> Iterator[str]:
         yield from _starved(structures)
 
 
+def _by_quadrature(structures: Structures) -> Iterator[str]:
+    """Gaussian structural functions that are no formulas."""
+    if isinstance(structures.quadrature, Checked):
+        yield structures.quadrature.says
+
+
 def _not_by_points(structures: Structures) -> Iterator[str]:
     """Why the exact filter is one of particles."""
     try:
@@ -272,7 +279,12 @@ _LOOKS: dict[str, Callable[[Structures], Iterator[str]]] = {
     "particle": _starved,
     "aof-exact": _by_particles,
 }
-_REMARKS: dict[str, Callable[[Structures], Iterator[str]]] = {"particle": _bootstrap, "aof-exact": _not_by_points}
+# By how it ends.
+_REMARKS: dict[str, Callable[[Structures], Iterator[str]]] = {
+    "-gaussian": _by_quadrature,
+    "particle": _bootstrap,
+    "aof-exact": _not_by_points,
+}
 
 
 def table(found: Sequence[Admission]) -> str:

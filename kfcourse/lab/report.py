@@ -26,7 +26,7 @@ from kfcourse.filters import EQUATIONS, Filter
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
 from kfcourse.lab.admission import admissions
-from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, WITH_MODES, JumpStructures, Structures, title
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, WITH_MODES, JumpStructures, Structures, family, title
 from kfcourse.lab.variants import Variant
 from kfcourse.laws import Array
 from kfcourse.limits import OutOfTime, time_limit
@@ -36,12 +36,20 @@ from kfcourse.montecarlo.statistics import Estimate, ratio
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.moments import NoClosedForm
 
 _FAMILIES = {
     "aof": "AOF in Gaussian approximation",
     "duof": "DUOF, the two-step conditionally optimal filter",
     "fos": "FOS, the filter of optimal structure",
     "mfos": "MFOS, the modified filter of optimal structure",
+    "dfmp": "DFMP, the two-step filter of low order",
+    "mdfmp": "MDFMP, the modified two-step filter of low order",
+    "fkp": "FKP, the filter with finite memory",
+    "mfkp": "MFKP, the modified filter with finite memory",
+    "dfkp": "DFKP, the two-step filter with finite memory",
+    "mdfkp": "MDFKP, the modified two-step filter with finite memory",
+    "fbp": "FBP, the filter of high order",
 }
 _FIGURES: dict[str, tuple[str, Callable[[Comparison, Axes], Axes]]] = {
     "accuracy": ("Error variance of each filter against the step.", plots.accuracy),
@@ -234,6 +242,9 @@ def _structure_sections(model: Model | JumpModel, names: tuple[str, ...]) -> lis
     return [Section.of(kind.capitalize(), printed(structures, kind)) for kind in kinds]
 
 
+NO_FORMULAS = "No closed form: by quadrature, of the order told under Which filters this model admits."
+
+
 def printed(structures: Structures, kind: str) -> str:
     """The formulas in LaTeX, if they can be found and read."""
     try:
@@ -241,12 +252,14 @@ def printed(structures: Structures, kind: str) -> str:
             block = getattr(structures, kind).latex()
     except OutOfTime:
         return rf"\text{{They are not written within {FORMULAS:g} s.}}"
+    except NoClosedForm:
+        return rf"\text{{{NO_FORMULAS}}}"
     return block if len(block) <= LONGEST else rf"\text{{They are too long to print: {len(block)} characters of LaTeX.}}"
 
 
 def _equation_sections(names: tuple[str, ...]) -> list[Section]:
-    families = dict.fromkeys(name.split("-")[0].removesuffix("3") for name in names)
-    return [Section.of(_FAMILIES[family], equations_latex(EQUATIONS[family])) for family in families if family in EQUATIONS]
+    families = dict.fromkeys(map(family, names))
+    return [Section.of(_FAMILIES[one], equations_latex(EQUATIONS[one])) for one in families if one in EQUATIONS]
 
 
 # What a reader must know before he relies on distances from the bound, by kind.

@@ -3,25 +3,35 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 from kfcourse.filters import (
     Design,
     Filter,
     aof,
+    dfkp,
+    dfmp,
     duof,
+    fbp,
+    fkp,
     fos,
     gpb2,
     imm,
     jump_pointmass,
     logic_dynamic,
     logic_dynamic_fos,
+    mdfkp,
+    mdfmp,
+    mfkp,
     mfos,
     particle,
     pointmass,
 )
+from kfcourse.filters.finite_memory import STEPS
+from kfcourse.lab.checked_quadrature import Checked, of_checked_order
 from kfcourse.laws import Array
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 from kfcourse.symbolic.jumping import JumpModel
@@ -45,6 +55,25 @@ class Structures:
     @cached_property
     def gaussian(self) -> Structure:
         return gaussian(self.model)
+
+    @cached_property
+    def quadrature(self) -> Checked | NoClosedForm | None:
+        """What takes the place of the Gaussian functions if they have no closed form, or why nothing does; None if they have."""
+        try:
+            _ = self.gaussian
+        except NoClosedForm as why:
+            try:
+                return of_checked_order(self.model, why)
+            except NoClosedForm as neither:
+                return neither
+        return None
+
+    @property
+    def normal(self) -> Structure:
+        """The Gaussian functions, by quadrature if they have no closed form; NoClosedForm if that does not do either."""
+        if isinstance(self.quadrature, NoClosedForm):
+            raise self.quadrature
+        return self.quadrature.structure if self.quadrature else self.gaussian
 
 
 class JumpStructures:
@@ -95,19 +124,29 @@ class JumpEntry(NamedTuple):
     build: Callable[[JumpStructures], Filter | Design]
 
 
+def _twice(family: str, title: str, russian: str, build: Callable[[Structure], Filter | Design]) -> dict[str, Entry]:
+    """The entries of a family: with Gaussian structural functions, and with linearised ones."""
+    return {
+        f"{family}-gaussian": Entry(f"G{title}", f"Г{russian}", lambda s: build(s.normal)),
+        f"{family}-linearised": Entry(f"L{title}", f"Л{russian}", lambda s: build(s.linearised)),
+    }
+
+
 # One line a filter: this is where a new one is added.
 FILTERS: dict[str, Entry] = {
-    "aof-gaussian": Entry("GAOF", "ГАОФ", lambda s: aof(s.gaussian)),
-    "aof-linearised": Entry("LAOF", "ЛАОФ", lambda s: aof(s.linearised)),
+    **_twice("aof", "AOF", "АОФ", aof),
     "duof": Entry("DUOF", "ДУОФ", lambda s: duof(s.model)),
-    "fos-gaussian": Entry("GFOS", "ГФОС", lambda s: fos(s.gaussian)),
-    "fos-linearised": Entry("LFOS", "ЛФОС", lambda s: fos(s.linearised)),
-    "mfos-gaussian": Entry("GMFOS", "ГМФОС", lambda s: mfos(s.gaussian)),
-    "mfos-linearised": Entry("LMFOS", "ЛМФОС", lambda s: mfos(s.linearised)),
-    "fos3-gaussian": Entry("GFOS3", "ГФОС, 3 арг.", lambda s: fos(s.gaussian, arguments=3)),
-    "fos3-linearised": Entry("LFOS3", "ЛФОС, 3 арг.", lambda s: fos(s.linearised, arguments=3)),
-    "mfos3-gaussian": Entry("GMFOS3", "ГМФОС, 3 арг.", lambda s: mfos(s.gaussian, arguments=3)),
-    "mfos3-linearised": Entry("LMFOS3", "ЛМФОС, 3 арг.", lambda s: mfos(s.linearised, arguments=3)),
+    **_twice("fos", "FOS", "ФОС", fos),
+    **_twice("mfos", "MFOS", "МФОС", mfos),
+    **_twice("fos3", "FOS3", "ФОС, 3 арг.", partial(fos, arguments=3)),
+    **_twice("mfos3", "MFOS3", "МФОС, 3 арг.", partial(mfos, arguments=3)),
+    **_twice("dfmp", "DFMP", "ДФМП", dfmp),
+    **_twice("mdfmp", "MDFMP", "МДФМП", mdfmp),
+    **_twice(f"fkp{STEPS}", f"FKP{STEPS}", "ФКП, 4 шага", fkp),
+    **_twice(f"mfkp{STEPS}", f"MFKP{STEPS}", "МФКП, 4 шага", mfkp),
+    **_twice(f"dfkp{STEPS}", f"DFKP{STEPS}", "ДФКП, 4 шага", dfkp),
+    **_twice(f"mdfkp{STEPS}", f"MDFKP{STEPS}", "МДФКП, 4 шага", mdfkp),
+    **_twice(f"fbp{STEPS}", f"FBP{STEPS}", "ФБП, 4 шага", fbp),
     "aof-unscented": Entry("UKF", "АОФ, сигма-точки", lambda s: aof(unscented(s.model))),
     "aof-gauss-hermite": Entry("GHKF", "АОФ, Гаусс–Эрмит", lambda s: aof(gauss_hermite(s.model))),
     "aof-exact": Entry("exact AOF", "АОФ", lambda s: exact(s.model)),
@@ -142,9 +181,17 @@ LAB = ("aof-gaussian", "aof-linearised", "duof", "fos-gaussian", "fos-linearised
 
 
 def title(name: str) -> str:
-    """The printed name of a filter: "GAOF" for "aof-gaussian"."""
-    entry = FILTERS.get(name) or JUMP_FILTERS.get(name)
-    return entry.title if entry else TITLES.get(name, name)
+    """The printed name of a filter: "GAOF" for "aof-gaussian", "GFKP2" for "fkp2-gaussian"."""
+    if entry := FILTERS.get(name) or JUMP_FILTERS.get(name):
+        return entry.title
+    length = re.sub(r"\D", "", name.split("-")[0])
+    usual = f"{family(name)}{STEPS}-{name.partition('-')[2]}"
+    return FILTERS[usual].title.replace(str(STEPS), length) if usual in FILTERS else TITLES.get(name, name)
+
+
+def family(name: str) -> str:
+    """The family of a filter, whose equations it shares: "fos" for "fos3-gaussian", "fkp" for "fkp4-linearised"."""
+    return name.split("-")[0].rstrip("0123456789")
 
 
 def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Design]:

@@ -1,4 +1,4 @@
-"""Finding the coefficients of the designed filters (DUOF, FOS, MFOS) over an ensemble.
+"""Finding the coefficients of the designed filters (DUOF, FOS and their kin) over an ensemble.
 
 All designs advance together, step by step.  At each step the equations of every block run until they
 ask for a regression; the moments of all blocks are merged, the regression solved, and its coefficients
@@ -12,10 +12,9 @@ from concurrent.futures import Executor
 
 import numpy as np
 
-from kfcourse.angles import on_circle
-from kfcourse.filters.base import Filter, State
-from kfcourse.filters.designed import Affine, Design, Scatter, Step
-from kfcourse.laws import Gaussian, NegativeVariance
+from kfcourse.filters.base import Filter, State, with_angles_on_circle
+from kfcourse.filters.designed import Affine, Design, Scatter
+from kfcourse.laws import NegativeVariance
 from kfcourse.montecarlo.ensemble import Instant, JumpInstant, Serial
 
 
@@ -61,7 +60,7 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: E
             states = [[one.init(len(block.x)) for one in designs] for block in blocks]
         runs = [_BlockStep(designs, before, block, k) for before, block in zip(states, blocks, strict=True)]
         fits = _fit_step(designs, runs, k, pool or Serial())
-        states = [run.states() for run in runs]
+        states = [run.after() for run in runs]
         for table, row in zip(coefficients, fits, strict=True):
             table.append(row)
     return [one.with_coefficients(table) for one, table in zip(designs, coefficients, strict=True)]
@@ -73,8 +72,8 @@ class _BlockStep:
     def __init__(self, designs: Sequence[Design], states: Sequence[State], block: Instant, k: int):
         self.block, self.names, self.k = block, [one.name for one in designs], k
         self.angles = [one.model.angles.x for one in designs]
-        self.running = [one.running(before, block.y) for one, before in zip(designs, states, strict=True)]
-        self.results: list[Step | None] = [None] * len(designs)
+        self.running = [one.equations(before, block.y) for one, before in zip(designs, states, strict=True)]
+        self.results: list[State | None] = [None] * len(designs)
 
     def advance(self, answers: dict[int, Affine | None]) -> list[Scatter | None]:
         """Answer the waiting designs; the moments of the regression each asks for next, None if it is through."""
@@ -95,14 +94,10 @@ class _BlockStep:
             target, regressor = target[there], regressor[there]
         return Scatter.of(target, regressor)
 
-    def states(self) -> list[State]:
-        """Of the designs, which are all through, after the step: predicted angles between -pi and pi, as when they run."""
-        done = [step for step in self.results if step is not None]
-        predicted = (
-            Gaussian(on_circle(step.predicted.mean, angles), step.predicted.cov)
-            for step, angles in zip(done, self.angles, strict=True)
-        )
-        return [State(self.k + 1, step.posterior, law, step.memory) for step, law in zip(done, predicted, strict=True)]
+    def after(self) -> list[State]:
+        """The states of the designs, which are all through: angles between -pi and pi, as when they run."""
+        done = [state for state in self.results if state is not None]
+        return [with_angles_on_circle(state, angles) for state, angles in zip(done, self.angles, strict=True)]
 
 
 def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int, pool: Executor) -> list[list[Affine]]:

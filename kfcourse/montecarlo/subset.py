@@ -37,6 +37,7 @@ BATCH = STRATA  # trajectories of a batch: their initial states share the prior 
 CHUNKS = (16, 16, 32, 64, 128, 256, 512)  # trajectories taken at once; after these always as many as the last
 FEWEST = 100  # trajectories that are a result: with fewer, the rare ones that make up a distance are missing
 LEAST = 10e6  # bytes that can be a limit: interpreter and libraries take some at any time
+WAIT = 0.5  # seconds, so that what waits can be interrupted: on Windows, and by a time limit in another thread
 MARGIN = 1.3  # how much longer than the chunks before the next one may take, for each trajectory
 
 T = TypeVar("T")
@@ -132,6 +133,7 @@ def _chunks_in_time(
     with progress_bar("slow filters", size, "trajectory", progress) as bar:
         work = _Work(size, end, bar)
         while not work.over:
+            jobs = min(jobs, work.chunks())
             try:
                 if jobs == 1 or not work.long():
                     with memory_limit(memory):
@@ -182,7 +184,7 @@ def _chunk(
     except OutOfTime:
         return None
     except MemoryError as problem:
-        return problem
+        return problem.with_traceback(None)  # that would keep what filled the memory
     return sums, time.monotonic() - begun
 
 
@@ -211,7 +213,7 @@ class _Work:
             if len(undone) < jobs and (count := self.next(len(self.found) + len(running), ahead)):
                 running.append((count, submit(ahead, count)))
             elif undone:
-                wait(undone, return_when=FIRST_COMPLETED)
+                wait(undone, WAIT, FIRST_COMPLETED)
             elif not running:
                 self.over = True
                 return
@@ -237,6 +239,12 @@ class _Work:
         while each * count > left and count >= 2 * CHUNKS[0]:
             count = count // 2 // BATCH * BATCH
         return count if each * count <= left else 0
+
+    def chunks(self) -> int:
+        """How many are left, if there is time for all."""
+        sizes = [*CHUNKS[len(self.found) :], *[CHUNKS[-1]] * (self.size // BATCH)]
+        ends = np.cumsum(np.minimum(sizes, self.most))
+        return int(np.searchsorted(ends, self.size - self.start)) + 1
 
     def long(self) -> bool:
         """Whether what is left is worth the start of processes, by the time that the chunks took that are done."""

@@ -23,6 +23,7 @@ LAYERS = (
     "exercises",
     "pages",
     "checks",
+    "derivations",
     "lab",
     "scenarios",
     "continuous",

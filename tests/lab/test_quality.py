@@ -601,7 +601,7 @@ def quick(monkeypatch):
         found = [read_variant(f"g{i + 1}", propose(seed, i), "the test") for i in range(min(wanted, 2))]
         return grammar.Generated(tuple(found), (GOOD,) * len(found), Counter({"not bounded": 3, "fragile": 1}))
 
-    monkeypatch.setattr(cli, "generate", made)
+    monkeypatch.setattr(grammar, "generate", made)
 
 
 def test_proposals_are_printed_and_rejections_are_not_among_them(call, quick):
@@ -627,7 +627,7 @@ def test_too_few_proposals_are_written_and_said(call, quick, tmp_path):
 
 @pytest.mark.parametrize("out", ["old.toml", ".", "no/such/folder/new.toml", "old.toml/new.toml", "dangling"])
 def test_a_bad_out_is_refused_before_the_computation(call, tmp_path, monkeypatch, out):
-    monkeypatch.setattr(cli, "generate", lambda *_: pytest.fail("the computation began"))
+    monkeypatch.setattr(grammar, "generate", lambda *_: pytest.fail("the computation began"))
     (tmp_path / "old.toml").write_text("precious", encoding="utf-8")
     (tmp_path / "dangling").symlink_to("nowhere")
     result = call("--generate", 1, "--out", out)
@@ -640,7 +640,7 @@ def test_an_interrupt_leaves_no_file(call, tmp_path, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "generate", interrupted)
+    monkeypatch.setattr(grammar, "generate", interrupted)
     assert call("--generate", 1, "--out", "new.toml").exit_code == 130
     assert list(tmp_path.iterdir()) == []
 
@@ -663,8 +663,8 @@ def test_an_interrupt_leaves_no_file(call, tmp_path, monkeypatch):
     ],
 )
 def test_impossible_options_are_usage_errors(call, monkeypatch, arguments):
-    for name in ("generate", "examine_all"):
-        monkeypatch.setattr(cli, name, lambda *_: pytest.fail("the computation began"))
+    for module, name in ((grammar, "generate"), (quality, "examine_all")):
+        monkeypatch.setattr(module, name, lambda *_: pytest.fail("the computation began"))
     result = call(*arguments)
     assert result.exit_code == 2
     assert "Traceback" not in result.output
