@@ -67,7 +67,7 @@ def live_lab(name: str, variants: Mapping[str, Variant], first: str = "53", step
     step : int
         The step looked at first.
     """
-    source = script({key: variant.model for key, variant in variants.items()}) + (DATA / "live-lab.js").read_text(
+    source = script({key: variant.plain("live figures") for key, variant in variants.items()}) + (DATA / "live-lab.js").read_text(
         encoding="utf-8"
     )
     given: dict[str, Any] = {

@@ -402,6 +402,16 @@ def test_the_average_has_the_moments_of_the_next_state_and_the_measurement():
     assert abs(cross.mean() - 0.5 * A.item()) < 4 * cross.std() / np.sqrt(size)
 
 
+def test_modes_that_move_apart_spread_the_average():
+    """tau = sum q (c z + r), Theta = sum q (c^2 p + s^2) + sum q (c z + r - tau)^2 with the modes of the step to come."""
+    z, p, q = 2.0, 0.3, AFFINE.law_at(4)
+    c, r, s = np.array([0.9, 1.1, 0.9]), np.array([0.0, 1.0, 0.0]), np.array([0.5, 0.5, 2.0])
+    each = c * z + r
+    tau, theta = averaged(AFFINE, [gaussian(mode) for mode in AFFINE.modes]).at(3).predict(np.array([z]), np.array([[p]]))
+    assert tau.item() == pytest.approx(q @ each, rel=1e-12)
+    assert theta.item() == pytest.approx(q @ (c * c * p + s * s) + q @ (each - q @ each) ** 2, rel=1e-12)
+
+
 def test_with_modes_drawn_anew_the_averaged_filter_is_the_best_linear_one():
     """Its noise has the variance sum q C^2, and the Kalman filter with it is the best affine filter, as DUOF finds by itself."""
     model = failing(transition=[0.8, 0.2], first=None)

@@ -59,7 +59,12 @@ def test_trajectories_follow_the_chain_and_the_mode_in_force():
     """x_{k+1} by the mode of step k + 1, y_k by that of step k."""
     model = JumpModel.define(
         "0.5*x + r + v", "x + b + 0.1*w", {"r": 0.0, "b": 0.0},
-        modes={"a": {}, "b": {"parameters": {"r": 100, "b": -1000}, "state_noise": {"variance": 9}}},
+        modes={
+            "a": {},
+            "b": {
+                "parameters": {"r": 100, "b": -1000}, "state_noise": {"variance": 9}, "meter_noise": {"mean": 5, "variance": 4},
+            },
+        },
         transition=[[0.9, 0.1], [0.3, 0.7]], first=[0.8, 0.2],
     )  # fmt: skip
     runs = 20_000
@@ -67,7 +72,10 @@ def test_trajectories_follow_the_chain_and_the_mode_in_force():
     mode = mode.astype(int)
     v = x[1:, :, 0] - 0.5 * x[:-1, :, 0] - 100 * mode[1:]
     w = y[:, :, 0] - x[:, :, 0] + 1000 * mode
-    assert np.abs(w).max() < 0.1 * 6
+    for j, mean, deviation in ((0, 0.0, 0.1), (1, 0.5, 0.2)):
+        sample = w[mode == j]
+        assert abs(sample.mean() - mean) < 4 * deviation / np.sqrt(len(sample))
+        assert abs(sample.std() / deviation - 1) < 4 / np.sqrt(2 * len(sample))
     for j, deviation in ((0, 1.0), (1, 3.0)):
         sample = v[mode[1:] == j]
         assert abs(sample.mean()) < 4 * deviation / np.sqrt(len(sample))
