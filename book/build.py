@@ -18,13 +18,15 @@ from pathlib import Path
 import chapters
 import equations
 import manual
+import package
+import sample
 
 from kfcourse.files import package_digest
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "_build"
 CACHE = BUILD / ".jupyter_cache"
-KEPT = (CACHE, BUILD / "solutions")  # made anew by themselves when stale
+KEPT = (CACHE, sample.FOLDER, BUILD / "solutions")  # made anew by themselves when stale
 KEY = BUILD / ".executed-with"
 NOT_BUILT = "\nThe book was NOT built: see the errors and warnings above."
 
@@ -39,7 +41,8 @@ def prepare() -> None:
     """Remove the last build, and the cached outputs if they may be stale."""
     key = fingerprint()
     if not (KEY.exists() and KEY.read_text() == key):
-        shutil.rmtree(CACHE, ignore_errors=True)
+        for stale in (CACHE, sample.FOLDER):
+            shutil.rmtree(stale, ignore_errors=True)
     for entry in BUILD.iterdir() if BUILD.exists() else ():
         if entry.is_dir() and entry not in KEPT:
             shutil.rmtree(entry)
@@ -60,6 +63,8 @@ def main() -> int:
         print(NOT_BUILT, file=sys.stderr)
         return 1
     manual.write()
+    package.write()
+    sample.write()
     made = chapters.executed(CACHE)
     equations.PAGE.write_text(equations.page((name, equations.records(notebook)) for name, notebook in made), encoding="utf-8")
     jupyter_book = [sys.executable, "-c", "from jupyter_book.cli.main import main; main()"]

@@ -1,7 +1,8 @@
 """The pages of the lab manual, made from the masters of the exercises for one variant.
 
 Into book/manual/ go, for every set, its page (questions, hints, no solutions), the pictures to reach, and the student's
-notebook to download; and the table of all sets.  The worked solutions, executed before, are kept in _build/solutions.
+notebook to download; and the tables of all sets and variants.  The worked solutions, executed before, are kept in
+_build/solutions.
 """
 
 from __future__ import annotations
@@ -10,8 +11,10 @@ import shutil
 from pathlib import Path
 
 import nbformat
+import sympy as sp
 
 from kfcourse.checks import exercise, sets
+from kfcourse.lab.variants import load_variants
 from kfcourse.notebooks.execution import pictures
 from kfcourse.notebooks.jobs import Job, plan
 from kfcourse.notebooks.master import read, render, statement, student
@@ -38,6 +41,7 @@ def write() -> None:
     shutil.rmtree(PAGES, ignore_errors=True)
     (PAGES / "notebooks").mkdir(parents=True)
     (PAGES / "sets.txt").write_text(table(), encoding="utf-8")
+    (PAGES / "variants.txt").write_text(variants(), encoding="utf-8")
     for job in solutions():
         notebook = render(read(job.letter), exercise(job.letter, VARIANT))
         found = pictures(nbformat.read(job.target, as_version=4))
@@ -56,3 +60,12 @@ def table() -> str:
         for letter, one in sets().items()
     ]
     return "\n".join(["| set | chapters |", "| --- | --- |", *rows, ""])
+
+
+def variants() -> str:
+    """The shipped variants without modes, with their equations, in Markdown."""
+    rows = []
+    for name, one in load_variants().items():
+        state, meter = (", ".join(map(sp.latex, side)) for side in (one.model.state_equation, one.model.meter_equation))
+        rows.append(f"| {name} | ${state}$ | ${meter}$ | {one.title} |")
+    return "\n".join(["| variant | $x_{k+1}=$ | $y_k=$ | what it is |", "| --- | --- | --- | --- |", *rows, ""])

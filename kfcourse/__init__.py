@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from kfcourse.records import likelihood, read_measurements, smooth
     from kfcourse.symbolic.angular import AngleWarning
     from kfcourse.symbolic.formula import FormulaError
+    from kfcourse.symbolic.jumping import JumpModel
     from kfcourse.symbolic.model import Model
     from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
     from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite, unscented
@@ -37,6 +38,7 @@ __all__ = [
     "FormulaError",
     "Gaussian",
     "GaussianMoments",
+    "JumpModel",
     "Model",
     "ModelError",
     "NoClosedForm",

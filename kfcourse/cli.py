@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,19 +11,23 @@ from pathlib import Path
 import click
 
 from kfcourse.commands import main as main  # scripts that were installed before call it here
+from kfcourse.derivations import check_text
+from kfcourse.derivations.setting import of_model
 from kfcourse.files import is_standard_output, read_only, replacing_together
 from kfcourse.lab.admission import admissions, on_trial, without_failing
 from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
 from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
-from kfcourse.lab.short_names import FILTERS, LAB, has_bound, title
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, has_bound, title
 from kfcourse.lab.variants import find_variant
 from kfcourse.listing import VARIANTS
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.subset import FEWEST as FEWEST_EXACT
 from kfcourse.montecarlo.subset import LEAST
+from kfcourse.symbolic.jumping import JumpModel
+from kfcourse.symbolic.model import Model
 
 DERIVATION = 60.0  # seconds for the formulas of the filters
 
@@ -39,7 +44,8 @@ DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with m
 @click.option(
     "--filters",
     "names",
-    help=f"Short names, separated by commas. Known: {', '.join(FILTERS)}.  [default: the lab's seven and the exact AOF]",
+    help=f"Short names, separated by commas. Known: {', '.join(FILTERS)}; for variants with modes: {', '.join(JUMP_FILTERS)}.  "
+    "[default: the lab's seven and the exact AOF; for variants with modes all]",
 )
 @click.option(
     "--exact-runs",
@@ -119,14 +125,19 @@ def lab(
     chosen = find_variant(variant, variants_file)
     model = chosen.model
     if names is None:
-        wanted = [*LAB, "aof-exact"] if exact_runs and has_bound(model) else list(LAB)
+        usual = JUMP_LAB if isinstance(model, JumpModel) else LAB
+        wanted = [*usual, "aof-exact"] if exact_runs and has_bound(model) else list(usual)
     else:
         wanted = [name.strip() for name in names.split(",") if name.strip()]
+    if language:
+        chosen.plain("student's reports")  # before the long part
     found = admissions(model, wanted, DERIVATION)
     refused = {one.name: one.reason for one in found if one.one is None}
     for one in found:
         for warning in one.warnings:
             click.echo(f"Warning: {title(one.name)}: {warning}", err=True)
+    for remark in dict.fromkeys(remark for one in found if one.name.endswith("-gaussian") for remark in one.remarks):
+        click.echo(f"Gaussian filters: {remark}", err=True)
     if len(refused) == len(found):
         raise click.ClickException(
             "; ".join(f"{name}: {reason}" for name, reason in refused.items())
@@ -205,6 +216,25 @@ def filters(places: tuple[str, ...], variants_file: Path | None, trial: bool) ->
     found = admissions(chosen.model, seconds=DERIVATION)
     click.echo(f"Variant {chosen.name}: {chosen.title or chosen.model}", err=True)
     click.echo(table_of_filters(on_trial(chosen.model, found) if trial else found))
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@VARIANTS
+@click.option("--variant", help="Of which the derivation is; a heading of the file may name it as well.")
+def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
+    """Check a derivation line by line: FILE has chains of lines such as F = M[(g*x - h)^2] and = g^2*d.
+
+    Each line is compared with the one above it, and the term that is wrong is named.  Exit status 0 if all lines are right, 1
+    if one differs, 2 if one cannot be read or compared.
+    """
+
+    def model(name: str) -> Model:
+        return find_variant(name, variants_file).plain("derivations")
+
+    report = check_text(file.read_text(encoding="utf-8"), model, of_model(model(variant)) if variant else None)
+    click.echo(report)
+    sys.exit(2 if report.undecided else 0 if report.right else 1)
 
 
 @click.command()

@@ -28,6 +28,9 @@ class Place(NamedTuple):
 
 # One line a command: this is where a new one is added.
 COMMANDS = {
+    "check": Place(
+        "kfcourse.cli", "Check a derivation line by line: FILE has chains of lines such as F = M[(g*x - h)^2] and = g^2*d."
+    ),
     "estimate": Place(
         "kfcourse.cli", "Estimate the states from your own measurements, FILE (CSV): forward, looking back, and judged."
     ),

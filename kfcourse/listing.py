@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from kfcourse.files import save
-from kfcourse.lab.variants import FEWEST, RUNS, read_variants
+from kfcourse.lab.variants import FEWEST, RUNS, equations, read_variants
 from kfcourse.montecarlo.parallel import cores
 
 VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")
@@ -59,8 +59,7 @@ def variants(
         good &= all(one.well_posed for one in found)
     else:
         for variant in chosen.values():
-            state, meter = (", ".join(map(str, one)) for one in (variant.model.state_equation, variant.model.meter_equation))
-            click.echo(f"{variant.name:>6}  {variant.title or 'no title'}\n        x' = {state};  y = {meter}")
+            click.echo(f"{variant.name:>6}  {variant.title or 'no title'}\n        {equations(variant.model)}")
     for fault in faults.values():
         click.echo(f"Error: {fault}", err=True)
     sys.exit(0 if good else 1)

@@ -140,6 +140,46 @@ def _condition(arguments: int, x, y, z):
     return matrix @ np.stack(regressors) + offset, t
 
 
+# Which parts the note's table fits: prediction, its variance, correction.
+RECIPES = {
+    "fos": (False, False, False),
+    "mfos": (True, False, True),
+    "dfmp": (True, True, False),
+    "mdfmp": (True, True, True),
+    "fkp": (False, False, False),
+    "mfkp": (True, False, True),
+    "dfkp": (True, True, False),
+    "mdfkp": (True, True, True),
+    "fbp": (False, False, False),
+}
+
+
+def remembering_ensemble(kind: str, family: str, memory: int, x, y, x_next):
+    """Estimates z (steps, N) of the filters of the note's table; a memory that is not yet full is padded with zeros."""
+    theta, f = STRUCTURES[kind]
+    fits_prediction, fits_variance, fits_correction = RECIPES[family]
+    runs = x.shape[1]
+    lam, psi = np.zeros(runs), np.ones(runs)
+    zeta = np.zeros((memory, runs))
+    estimates = []
+    for x_k, y_k, following in zip(x, y, x_next, strict=True):
+        sigma = psi * G / f(lam, psi) * (y_k - h(lam, psi))
+        z = lam + sigma
+        if fits_correction:
+            matrix, offset, _ = regression(x_k - lam, sigma)
+            z = lam + matrix[0] * sigma + offset
+        estimates.append(z)
+        zeta = np.vstack([y_k if "k" in family else z, zeta[:-1]])
+        matrix, offset, t = regression(x_k, *zeta)
+        u = matrix @ zeta + offset
+        lam, psi = tau(u, t), np.broadcast_to(theta(u, t), runs)
+        if fits_prediction:
+            matrix, offset, residual = regression(following, lam)
+            lam = matrix[0] * lam + offset
+            psi = np.full(runs, residual) if fits_variance else psi
+    return np.array(estimates)
+
+
 def gaussian_mean(function, mean, cov, order: int = 40):
     """M[function(x)], x ~ N(mean, cov), by a Gauss-Hermite product rule; function takes a list of components."""
     mean, cov = np.asarray(mean, dtype=float), np.asarray(cov, dtype=float)

@@ -13,7 +13,7 @@ from html import unescape
 from html.parser import HTMLParser
 from importlib import resources
 from pathlib import Path
-from urllib.parse import unquote, urlsplit
+from urllib.parse import quote, unquote, urlsplit
 
 import nbformat
 import pytest
@@ -23,8 +23,10 @@ ROOT = Path(__file__).resolve().parent.parent
 HTML = ROOT / "_build" / "html"
 EXECUTED = ROOT / "_build" / "jupyter_execute"
 TOC = yaml.safe_load((ROOT / "book" / "_toc.yml").read_text(encoding="utf-8"))
-PAGES = [TOC["root"], *(chapter["file"] for part in TOC["parts"] for chapter in part["chapters"])]
-NOTEBOOKS = [page for page in PAGES if "{code-cell}" in (ROOT / "book" / f"{page}.md").read_text(encoding="utf-8")]
+CHAPTERS = [chapter for part in TOC["parts"] for chapter in part["chapters"]]
+SHELF = [TOC["root"], *(chapter["file"] for chapter in CHAPTERS)]
+PAGES = [*SHELF, *(section["file"] for chapter in CHAPTERS for section in chapter.get("sections", []))]
+NOTEBOOKS = [page for page in SHELF if "{code-cell}" in (ROOT / "book" / f"{page}.md").read_text(encoding="utf-8")]
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chromium-browser"))), None)
 LOCAL = ("file:", "data:", "blob:")
 LOADS = {"script": "src", "link": "href", "img": "src", "iframe": "src", "source": "src", "object": "data", "image": "href"}
@@ -64,9 +66,7 @@ def test_page_exists_and_loads_only_local_files(page: str) -> None:
         assert (path.parent / re.split("[?#]", address)[0]).exists(), f"{page} loads {address}, which is not there"
 
 
-@pytest.mark.parametrize(
-    "chapter", [c for part in TOC["parts"] for c in part["chapters"] if "title" in c], ids=lambda c: c["file"]
-)
+@pytest.mark.parametrize("chapter", [chapter for chapter in CHAPTERS if "title" in chapter], ids=lambda c: c["file"])
 def test_a_page_is_called_in_the_contents_what_it_is_called_itself(chapter) -> None:
     page = (HTML / f"{chapter['file']}.html").read_text(encoding="utf-8")
     title = unescape(re.search(r"<title>(?:\d+\. )?(.*?) &#8212;", page)[1]).strip("★ ")
@@ -285,20 +285,41 @@ def test_a_chapter_is_downloaded_as_a_notebook(window):
     assert code == [cell.source for cell in nbformat.read(EXECUTED / "ten-minutes.ipynb", 4).cells if cell.cell_type == "code"]
 
 
-def test_search_finds_chapters(window):
+@pytest.mark.parametrize(
+    ("words", "page", "section"),
+    [
+        ("stratonovich equation", "stratonovich.html", ""),
+        ("variant 53 Russian report", "lab-manual.html", "the-report"),
+        ("ошибки фильтрации", "notation.html", "estimates-and-gains"),  # which says "ошибка", "фильтр"
+        ("likelihood_error", "package/kfcourse.records.html", "module-kfcourse.records.evidence"),
+    ],
+)
+def test_search_finds_sections_and_quotes_them(window, words, page, section):
+    """Among the best five; each quoted, the words marked, and led to a page that is there."""
     tab, problems = window
     problems.clear()
-    tab.goto((HTML / "search.html").as_uri() + "?q=stratonovich")
-    tab.wait_for_selector("#search-results li a")
-    assert any(text.endswith("The Stratonovich equation") for text in tab.locator("#search-results li a").all_inner_texts())
+    tab.goto((HTML / "search.html").as_uri() + f"?q={quote(words)}")
+    rows = tab.locator("#search-results li")
+    rows.first.wait_for()
+    found = [urlsplit(address) for address in rows.locator("a").evaluate_all("links => links.map((link) => link.href)")]
+    assert (page, section) in [(place.path.partition("/html/")[2], place.fragment) for place in found[:5]]
+    assert all((HTML / unquote(place.path).partition("/html/")[2]).exists() for place in found)
+    assert all(row.locator("p").inner_text() for row in rows.all()[:5])
+    assert tab.locator("#search-results mark").count() > 1  # of five: not where only a title has the words
     assert problems == []
+
+
+def test_search_says_that_it_finds_nothing(window):
+    tab, _ = window
+    tab.goto((HTML / "search.html").as_uri() + "?q=qwertz")
+    assert "Nothing found" in tab.locator("#kf-found").inner_text() and not tab.locator("#search-results li").count()
 
 
 def test_an_address_that_does_not_exist(window):
     tab, _ = window
     tab.goto((HTML / "404.html").as_uri())
     links = tab.locator("nav a")
-    assert links.count() == len(PAGES) - 1
+    assert links.count() == len(SHELF) - 1
     for address in links.evaluate_all("links => links.map((link) => link.href)"):
         assert Path(unquote(urlsplit(address).path)).exists(), address
 

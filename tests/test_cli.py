@@ -252,6 +252,24 @@ def test_designing_on_the_same_ensemble_is_another_result(call, no_report, tmp_p
 
 
 @pytest.mark.quick
+def test_a_derivation_is_checked_line_by_line(call, tmp_path):
+    file = tmp_path / "F.txt"
+    right = "F = M[(g*x + f*x^2*w - h)^2]\n = g^2*M[(x-m)^2] + f^2*M[x^4]\n"
+    for line, status, says in (
+        ("g^2*d + f^2*(m^4 + 6*m^2*d + 3*d^2)", 0, "✓"),
+        ("g^2*d + 3*f^2*d^2", 1, "✗ g^2*d + 3*f^2*d^2"),
+        ("g^2*d + 3*f^2*k^2", 2, "unknown letter 'k'"),
+    ):
+        file.write_text(f"{right} = {line}\n", encoding="utf-8")
+        done = call("check", file, "--variant", "53")
+        assert done.exit_code == status
+        assert says in done.output
+    file.write_text("nonsense\n", encoding="utf-8")
+    done = call("check", file)
+    assert done.exit_code == 1
+    assert "line 1: 'nonsense' has no =, and is no heading" in done.output
+
+
 def test_an_unknown_variant_names_the_known_ones(call, no_computation):
     refused(call("lab", "999", *QUICK), "'999'", "53, 1, 2")
 

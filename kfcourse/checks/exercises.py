@@ -86,7 +86,7 @@ class Exercise:
     @property
     def model(self) -> Model:
         """The variant's model."""
-        return self.variant.model
+        return self.variant.plain("the exercises")
 
     @cached_property
     def structures(self) -> Structures:

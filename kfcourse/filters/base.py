@@ -114,15 +114,22 @@ def structure_of(one: Filter, what: str) -> Structure:
     return one.structure
 
 
+def unknown_error(one: Filter) -> ValueError:
+    return ValueError(f"{one.name} does not know how good its laws are: ask pointmass(model), which is exact, or particle(model)")
+
+
 def _on_circle(step: Advance, angles: Components) -> Advance:
     """The step with estimates and predictions of angles between -pi and pi."""
 
-    def advance(state: State, y: Array) -> State:
-        after = step(state, y)
-        posterior, predicted = (Gaussian(on_circle(law.mean, angles), law.cov) for law in (after.posterior, after.predicted))
-        return after._replace(posterior=posterior, predicted=predicted)
+    return lambda state, y: with_angles_on_circle(step(state, y), angles)
 
-    return advance
+
+def with_angles_on_circle(state: State, angles: Components) -> State:
+    """The state with the angles of its means between -pi and pi."""
+    if not angles:
+        return state
+    posterior, predicted = (Gaussian(on_circle(law.mean, angles), law.cov) for law in (state.posterior, state.predicted))
+    return state._replace(posterior=posterior, predicted=predicted)
 
 
 def initial_state(model: Model) -> Init:

@@ -9,47 +9,46 @@ from __future__ import annotations
 import numpy as np
 import sympy as sp
 
-from kfcourse.angles import difference, near
+from kfcourse.angles import difference
 from kfcourse.filters import notation as s
-from kfcourse.filters.designed import Design, Equations, Regression, Step
-from kfcourse.laws import Array, Gaussian, where_measured
-from kfcourse.symbolic.equations import compile_noiseless
+from kfcourse.filters.base import State
+from kfcourse.filters.designed import Design, Equations, fitted_correction, fitted_prediction
+from kfcourse.laws import Array
+from kfcourse.symbolic.equations import Noiseless, compile_noiseless
 from kfcourse.symbolic.model import Model
 
 _omega, _eps = s.matrix(r"\omega_{k}", s.p, s.ONE), s.matrix(r"\varepsilon_{k}", s.n, s.ONE)
 _alpha = s.matrix(r"\alpha_{k}", s.n, s.ONE)
-_b_value, _a_value = s.matrix(r"b(\lambda_{k}, m_{w})", s.p, s.ONE), s.matrix(r"a(z_{k}, m_{v})", s.n, s.ONE)
 _F, _g = s.matrix(r"F_{k}", s.n, s.n), s.matrix(r"g_{k}", s.n, s.ONE)
 
 EQUATIONS = (
-    sp.Eq(_omega, s.y - _b_value),
+    sp.Eq(_omega, s.y - s.b_value),
     sp.Eq(_eps, s.x - s.lam),
     *s.regression(s.H, s.e, _eps, _omega),
     sp.Eq(s.z, s.lam + s.H * _omega + s.e),
-    sp.Eq(_alpha, _a_value),
+    sp.Eq(_alpha, s.a_value),
     *s.regression(_F, _g, s.x_next, _alpha),
     sp.Eq(s.lam_next, _F * _alpha + _g),
 )
 
 
-def duof(model: Model) -> Design:
+def duof(model: Model, equations: tuple[Noiseless, Noiseless] | None = None) -> Design:
     """The two-step conditionally optimal filter.
 
     omega = y - b(lambda, m_w),   z = lambda + H omega + e       H, e: regression of x - lambda on omega
     alpha = a(z, m_v),            lambda' = F alpha + g          F, g: regression of x' on alpha
 
-    Its own covariance is the residual of each regression, (n, n): one for the whole ensemble.
+    Its own covariance is the residual of each regression, (n, n): one for the whole ensemble.  Given `equations` take the place
+    of a(z, m_v) and b(lambda, m_w).
     """
-    (a, b), angles = compile_noiseless(model), model.angles
+    (a, b), angles = equations or compile_noiseless(model), model.angles
 
-    def equations(predicted: Gaussian, y: Array, k: int) -> Equations:
-        lam = predicted.mean
+    def step(state: State, y: Array) -> Equations:
+        lam, k = state.predicted.mean, state.step
         omega = difference(y, b(lam, k), angles.y)
-        fit = yield Regression(lambda x, x_next: difference(x, lam, angles.x), omega)
-        posterior = Gaussian(lam + where_measured(y, fit(omega)), fit.residual)
-
+        posterior = yield from fitted_correction(lam, omega, y, angles)
         alpha = np.broadcast_to(a(posterior.mean, k), lam.shape)
-        fit = yield Regression(lambda x, x_next: near(x_next, alpha, angles.x), alpha)
-        return Step(posterior, Gaussian(fit(alpha), fit.residual))
+        predicted = yield from fitted_prediction(alpha, angles)
+        return State(k + 1, posterior, predicted)
 
-    return Design("duof", model, equations)
+    return Design("duof", model, step)

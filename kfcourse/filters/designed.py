@@ -1,8 +1,9 @@
-"""Filters of given structure whose coefficients are regressions over an ensemble (DUOF, FOS, MFOS).
+"""Filters of given structure whose coefficients are regressions over an ensemble (DUOF, FOS and their kin).
 
 The equations of such a filter are written once, as a generator that yields each `Regression` it needs and receives the
 fitted `Affine`.  While it is designed the ensemble answers, through the `Scatter` of its blocks
-(`kfcourse.montecarlo.designing`); while it runs, the stored coefficients do.
+(`kfcourse.montecarlo.designing`); while it runs, the stored coefficients do.  Both steps of a filter may end in one:
+`fitted_correction`, `fitted_prediction`.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.laws import Array, Gaussian, apply, gain, symmetric
+from kfcourse.angles import Angles, difference, near
+from kfcourse.filters.base import Filter, Init, State, initial_state
+from kfcourse.laws import Array, Gaussian, apply, gain, symmetric, where_measured
 from kfcourse.symbolic.model import Model
 
 
@@ -45,6 +47,9 @@ class Scatter(NamedTuple):
     @classmethod
     def of(cls, target: Array, regressor: Array) -> Scatter:
         """Those of target (N, r) and regressor (N, s) stacked into one vector."""
+        if not len(target):
+            size = target.shape[1] + regressor.shape[1]
+            return cls(0, np.zeros(size), np.zeros((size, size)))
         columns = [target[:, i] for i in range(target.shape[1])] + [regressor[:, i] for i in range(regressor.shape[1])]
         count, size = len(target), len(columns)
         mean = [float(np.add.reduce(column)) / count for column in columns]
@@ -99,20 +104,29 @@ class Regression(NamedTuple):
         (x_k (N, n), x_{k+1} (N, n)) -> (N, r); known only while designing.
     regressor : ndarray (N, s)
         What the filter itself knows.
+    mode : int, optional
+        Of a model that jumps: over the trajectories that are in this mode at the step.
     """
 
     target: Callable[[Array, Array], Array]
     regressor: Array
+    mode: int | None = None
 
 
-class Step(NamedTuple):
-    """What the equations of one step return."""
-
-    posterior: Gaussian
-    predicted: Gaussian
+Equations = Generator[Regression, Affine, State]
+Part = Generator[Regression, Affine, Gaussian]
 
 
-Equations = Generator[Regression, Affine, Step]
+def fitted_correction(lam: Array, direction: Array, y: Array, angles: Angles) -> Part:
+    """z = lambda + H direction + e, H and e from the regression of x - lambda on the direction; p is its residual."""
+    fit = yield Regression(lambda x, x_next: difference(x, lam, angles.x), direction)
+    return Gaussian(lam + where_measured(y, fit(direction)), fit.residual)
+
+
+def fitted_prediction(s_next: Array, angles: Angles) -> Part:
+    """lambda' = L s' + n, L and n from the regression of x' on s'; Psi' is its residual."""
+    fit = yield Regression(lambda x, x_next: near(x_next, s_next, angles.x), s_next)
+    return Gaussian(fit(s_next), fit.residual)
 
 
 @dataclass(frozen=True)
@@ -124,13 +138,21 @@ class Design:
     name : str
     model : Model
     equations : callable
-        (predicted: Gaussian, y, step) -> generator of one step: yields `Regression`, receives `Affine`, returns `Step`.
+        (State, y) -> generator of one step: yields `Regression`, receives `Affine`, returns the next `State`.
+    start : Init, optional
+        For a filter that carries more than a prediction: the state before the first measurement.
     """
 
     name: str
     model: Model
-    equations: Callable[[Gaussian, Array, int], Equations]
+    equations: Callable[[State, Array], Equations]
     slow: bool = False
+    start: Init | None = None
+
+    @property
+    def init(self) -> Init:
+        """The state before the first measurement."""
+        return self.start or initial_state(self.model)
 
     def with_coefficients(self, coefficients: Sequence[Sequence[Affine]]) -> Filter:
         """The filter with the coefficients of every step, in the order the equations ask for them."""
@@ -141,13 +163,12 @@ class Design:
                 raise ValueError(
                     f"{self.name} was designed for {len(table)} steps; design it with more to run step {state.step + 1}"
                 )
-            result = _answer(self.equations(state.predicted, y, state.step), table[state.step])
-            return State(state.step + 1, result.posterior, result.predicted)
+            return _answer(self.equations(state, y), table[state.step])
 
-        return Filter(self.name, self.model, initial_state(self.model), step)
+        return Filter(self.name, self.model, self.init, step)
 
 
-def _answer(equations: Equations, fits: Sequence[Affine]) -> Step:
+def _answer(equations: Equations, fits: Sequence[Affine]) -> State:
     """Run the equations of one step, answering each regression with its stored coefficients."""
     try:
         next(equations)

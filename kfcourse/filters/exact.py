@@ -171,12 +171,22 @@ def _on_circle(memory: PointMass, law: ScalarDensities) -> tuple[Gaussian, Gauss
     return posterior, predicted
 
 
-def _step(
-    groups: Iterable[tuple[Array, Kernels]], y: Array, law: ScalarDensities, accuracy: float, fine_nodes: int, room: float
-) -> tuple[Gaussian, Gaussian, PointMass]:
-    """Posterior, prediction of the next state, and memory after the measurements y (runs, 1)."""
+class Corrected(NamedTuple):
+    """Posteriors of some trajectories: grids by number, and moments, estimated error, and whether adaptive, (runs,) each."""
+
+    grids: dict[int, Grid]
+    mean: Array
+    variance: Array
+    error: Array
+    adaptive: Array
+
+
+def corrected(
+    groups: Iterable[tuple[Array, Kernels]], y: Array, law: ScalarDensities, accuracy: float, fine_nodes: int
+) -> Corrected:
+    """The posteriors from predictions, (numbers of trajectories, kernels), and y (runs, 1); NaN for trajectories in no group."""
     grids: dict[int, Grid] = {}
-    mean, variance, error = np.empty((3, len(y)))
+    mean, variance, error = np.full((3, len(y)), np.nan)
     adaptive = np.zeros(len(y), dtype=bool)
     for rows, kernels in groups:
         if law.noiseless and not np.isnan(y[rows]).any():
@@ -202,6 +212,14 @@ def _step(
                 i = int(rows[chunk][left[row]])
                 grids[i], error[i], adaptive[i] = grid, error_there, True
                 mean[i], variance[i] = grid.mean(), grid.variance()
+    return Corrected(grids, mean, variance, error, adaptive)
+
+
+def _step(
+    groups: Iterable[tuple[Array, Kernels]], y: Array, law: ScalarDensities, accuracy: float, fine_nodes: int, room: float
+) -> tuple[Gaussian, Gaussian, PointMass]:
+    """Posterior, prediction of the next state, and memory after the measurements y (runs, 1)."""
+    grids, mean, variance, error, adaptive = corrected(groups, y, law, accuracy, fine_nodes)
     fine = [grids[place] for place in range(len(y))]
     predicted = np.empty((2, len(y)))
     following, later = [], [np.empty(0, dtype=int)]

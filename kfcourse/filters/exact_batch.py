@@ -86,21 +86,52 @@ def posteriors(kernels: Kernels, y: Array, law: ScalarDensities, place: Place, c
     with np.errstate(divide="ignore", invalid="ignore"):  # where nothing is seen, the error is not a number
         highest = (logs + np.log(predicted[:, :, 0])).max(axis=1, keepdims=True)
         likelihood = np.exp(logs - highest) * length
-        full, by_even, by_quarter = (predicted[:, :, i] * likelihood for i in range(3))
-        total = full.sum(axis=1, keepdims=True)
-        mass = full / total
-        mean, variance = moments(x, mass)
-        whole = Summary(mean, variance, total[:, 0])
-        nested, coarse = (whole.distance(Summary.of(x[:, ::part], part * full[:, ::part])) for part in (2, 4))
-        inherited, by_few = (whole.distance(Summary.of(x, one)) for one in (by_even, by_quarter))
-        beyond = (mass[:, 0] + mass[:, -1]) * np.maximum(mean - x[:, 0], x[:, -1] - mean) / np.sqrt(variance)
-        rounding = ROUNDING * np.abs(mean) / np.sqrt(variance)
+        mass, _, mean, variance, nested, inherited, beyond, rounding = summed(
+            x, *(predicted[:, :, i] * likelihood for i in range(3))
+        )
         fine, wide = (roughness(x[:, ::part], part * mass[:, ::part], mean, variance) for part in (1, 2))
-        nested, fine, inherited = (np.maximum(change - rounding, 0.0) for change in (nested, fine, inherited))
-        error = np.maximum(extrapolated(nested, coarse), cautious(fine, wide)) + beyond
-        inherited = rounding + np.where(kernels.spectral, cautious(inherited, by_few), inherited / INTERPOLATED)
+        error = np.maximum(extrapolated(*nested), cautious(np.maximum(fine - rounding, 0.0), wide)) + beyond
+        inherits = rounding + np.where(kernels.spectral, cautious(*inherited), inherited[0] / INTERPOLATED)
         density = mass / length
-    return Posteriors(x, mass, density, mean, variance, *(np.where(np.isfinite(e), e, np.inf) for e in (error, inherited)))
+    return Posteriors(x, mass, density, mean, variance, *(np.where(np.isfinite(e), e, np.inf) for e in (error, inherits)))
+
+
+class Summed(NamedTuple):
+    """Masses on nodes, their moments, and by how much less effort would have moved these, as a `Summary` tells it.
+
+    Attributes
+    ----------
+    mass : ndarray (T, N)
+    total : ndarray (T, 1)
+    mean, variance : ndarray (T,)
+    nested, inherited : tuple of ndarray (T,)
+        The distance with every second node, or kernel, beyond rounding; and that with every fourth.
+    beyond, rounding : ndarray (T,)
+        The parts of the error that lie outside the nodes, and in the numbers, in standard deviations.
+    """
+
+    mass: Array
+    total: Array
+    mean: Array
+    variance: Array
+    nested: tuple[Array, Array]
+    inherited: tuple[Array, Array]
+    beyond: Array
+    rounding: Array
+
+
+def summed(x: Array, full: Array, by_even: Array, by_quarter: Array) -> Summed:
+    """From masses on nodes (T, N) that all, every second and every fourth of the kernels give; not yet normalised."""
+    total = full.sum(axis=1, keepdims=True)
+    mass = full / total
+    mean, variance = moments(x, mass)
+    whole = Summary(mean, variance, total[:, 0])
+    nested, coarse = (whole.distance(Summary.of(x[:, ::part], part * full[:, ::part])) for part in (2, 4))
+    inherited, by_few = (whole.distance(Summary.of(x, one)) for one in (by_even, by_quarter))
+    beyond = (mass[:, 0] + mass[:, -1]) * np.maximum(mean - x[:, 0], x[:, -1] - mean) / np.sqrt(variance)
+    rounding = ROUNDING * np.abs(mean) / np.sqrt(variance)
+    nested, inherited = (np.maximum(change - rounding, 0.0) for change in (nested, inherited))
+    return Summed(mass, total, mean, variance, (nested, coarse), (inherited, by_few), beyond, rounding)
 
 
 def roughness(x: Array, mass: Array, mean: Array, variance: Array) -> Array:

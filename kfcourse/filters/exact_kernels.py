@@ -33,6 +33,14 @@ def chunks(rows: int, elements: int, most: int) -> Iterator[slice]:
     return (slice(start, start + size) for start in range(0, rows, size))
 
 
+def bells(u: Array) -> Array:
+    """exp(-u^2), in place of u; nothing below exp(-LOWEST)."""
+    u *= u
+    np.minimum(u, LOWEST, out=u)
+    np.negative(u, out=u)
+    return np.exp(u, out=u)
+
+
 class Unresolved(ModelError):
     """A posterior or a prediction needs more nodes than the budget has; the message says where."""
 
@@ -124,11 +132,7 @@ class Kernels(NamedTuple):
         for i in chunks(len(x), x.shape[1] * self.mu.shape[1], CACHED):
             kernel = x[i, :, None] * rate[i, None, :]
             kernel -= centre[i, None, :]
-            kernel *= kernel
-            np.minimum(kernel, LOWEST, out=kernel)
-            np.negative(kernel, out=kernel)
-            np.exp(kernel, out=kernel)
-            np.matmul(kernel, weights[i], out=result[i])
+            np.matmul(bells(kernel), weights[i], out=result[i])
         result[result <= 2 * np.exp(-LOWEST) * weights.sum(axis=1, keepdims=True)] = 0.0
         return result / np.sqrt(np.pi)
 

@@ -22,9 +22,9 @@ import numpy as np
 
 from kfcourse.angles import moments_on_circle
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_batch import Place, Summary, extrapolated, moments
+from kfcourse.filters.exact_batch import Place, extrapolated, moments, summed
 from kfcourse.filters.exact_evidence import log_evidence
-from kfcourse.filters.exact_kernels import CACHED, LOWEST, ROOT, Grid, Kernels, Unresolved, chunks
+from kfcourse.filters.exact_kernels import CACHED, LOWEST, ROOT, Grid, Kernels, Unresolved, bells, chunks
 from kfcourse.filters.exact_narrow import DEAD, interpolated
 from kfcourse.filters.exact_roots import SHARP
 from kfcourse.laws import Array
@@ -236,19 +236,11 @@ class Density:
         by_measurement, later = self.change(x)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             known = self.kernels.density(x, self.kernels.mass)[:, :, 0]
-            full, by_even, by_quarter = (
-                np.nan_to_num(known * np.exp(by_measurement) * later[:, :, i] * length, posinf=np.inf) for i in range(3)
+            seen = known * np.exp(by_measurement)
+            mass, total, _, _, nested, inherited, beyond, rounding = summed(
+                x, *(np.nan_to_num(seen * later[:, :, i] * length, posinf=np.inf) for i in range(3))
             )
-            total = full.sum(axis=1, keepdims=True)
-            mass = full / total
-            mean, variance = moments(x, mass)
-            whole = Summary(mean, variance, total[:, 0])
-            nested, coarse = (whole.distance(Summary.of(x[:, ::part], part * full[:, ::part])) for part in (2, 4))
-            inherited, rough = (whole.distance(Summary.of(x, one)) for one in (by_even, by_quarter))
-            beyond = (mass[:, 0] + mass[:, -1]) * np.maximum(mean - x[:, 0], x[:, -1] - mean) / np.sqrt(variance)
-            rounding = 10 * np.finfo(float).eps * np.abs(mean) / np.sqrt(variance)
-            error = extrapolated(np.maximum(nested - rounding, 0), coarse) + beyond + rounding
-            error += extrapolated(np.maximum(inherited - rounding, 0), rough)
+            error = extrapolated(*nested) + beyond + rounding + extrapolated(*inherited)
             error = np.where(np.isfinite(error), np.maximum(error, np.abs(total[:, 0] - 1)), np.inf)
             logs = by_measurement + np.log(later[:, :, 0]) - np.log(total)
         return Nodes(x, length, mass, np.maximum(np.where(np.isnan(logs), -np.inf, logs), -DEAD), place, error)
@@ -346,10 +338,6 @@ def _summed(nodes: Array, weights: Array, mu: Array, sigma: Array) -> Array:
     for i in chunks(len(mu), mu.shape[1] * nodes.shape[1], CACHED):
         kernel = nodes[i, None, :] * rate[i, :, None]
         kernel -= (mu[i] * rate[i])[:, :, None]
-        kernel *= kernel
-        np.minimum(kernel, LOWEST, out=kernel)
-        np.negative(kernel, out=kernel)
-        np.exp(kernel, out=kernel)
-        np.matmul(kernel, weights[i], out=found[i])
+        np.matmul(bells(kernel), weights[i], out=found[i])
     found[found <= 2 * np.exp(-LOWEST) * weights.sum(axis=1, keepdims=True)] = 0.0
     return found * (rate / np.sqrt(np.pi))[:, :, None]

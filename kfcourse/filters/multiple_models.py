@@ -1,24 +1,30 @@
-"""The interacting-multiple-model filter (IMM) for an object that changes its way of moving.
+r"""Filters for an object that changes its way of moving or of being measured: one normal law for each mode.
 
 The object is in one of M modes, each with its own model of the same state; the mode is a Markov chain,
 
     pi_ij = P(mode j at k + 1 | mode i at k)
 
-The exact filter would keep one normal law for each history of modes, M^k of them.  The IMM keeps M, by merging them once a
-step.  With mu_j the probability of mode j after y_k, c_j before it:
+The exact filter would keep one normal law for each history of modes, M^k of them.  These filters merge them once a step, a
+mixture into the normal law with its mean and covariance.  With mu_j the probability of mode j after y_k, c_j before it:
 
     correct     z_j, p_j and the likelihood L_j = N(y_k; h_j, F_j) in each mode;   mu_j = c_j L_j / sum
     combine     z = sum mu_j z_j,   p = sum mu_j (p_j + (z_j - z)(z_j - z)^T)
-    mix         c_j = sum_i pi_ij mu_i,   mu_i|j = pi_ij mu_i / c_j,   means and covariances as above with mu_i|j
-    predict     each mode from its own mixture
+    chain       c_j = sum_i pi_ij mu_i,   mu_i|j = pi_ij mu_i / c_j
 
-Blom and Bar-Shalom (1988); Bar-Shalom, Li, Kirubarajan (2001), section 11.6.6.
+and then they differ by when they merge:
+
+    imm                 the laws of the modes that may lead to j, before a prediction: tau_j, Theta_j of the mixture
+    logic_dynamic       after it: the mixture of tau_j(z_i, p_i), Theta_j(z_i, p_i)     (логико-динамический АОФ)
+    gpb2                after the next correction, J^2 laws in between (generalised pseudo-Bayes of order 2)
+
+The first two are the same for affine tau.  Blom and Bar-Shalom (1988); Bar-Shalom, Li, Kirubarajan (2001), section 11.6; for
+the second Rudenko's logic-dynamic filters.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -27,9 +33,11 @@ from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.laws import Array, Gaussian, Measurement, correct, log_density
 from kfcourse.symbolic.structure import Structure
 
+Chain: TypeAlias = Array | Callable[[int], Array]
+
 
 class Modes(NamedTuple):
-    """What an IMM remembers.
+    """What a filter of several models remembers.
 
     Attributes
     ----------
@@ -46,15 +54,15 @@ class Modes(NamedTuple):
     predicted: tuple[Gaussian, ...]
 
 
-def imm(structures: Sequence[Structure], transition: Array, probabilities: Array | None = None, name: str = "imm") -> Filter:
+def imm(structures: Sequence[Structure], transition: Chain, probabilities: Array | None = None, name: str = "imm") -> Filter:
     """The IMM filter with one structure a mode.
 
     Parameters
     ----------
     structures : sequence of M Structure
         Models with the same state, measurement and prior.
-    transition : ndarray (M, M)
-        pi, rows sum to 1.
+    transition : ndarray (M, M), or callable
+        pi, rows sum to 1; or the step k to the pi from k to k + 1.
     probabilities : ndarray (M,), optional
         Of the modes before the first measurement; equal by default.
     name : str
@@ -70,6 +78,41 @@ def imm(structures: Sequence[Structure], transition: Array, probabilities: Array
     ValueError
         Models that do not fit together, or numbers that are no probabilities.
     """
+    angles = structures[0].model.angles.x if structures else ()
+
+    def following(one: Structure, laws: Sequence[Gaussian], weights: Array) -> Gaussian:
+        return one.predict(*mixture(laws, weights, angles))
+
+    return _one_law_a_mode(name, structures, transition, probabilities, following)
+
+
+def logic_dynamic(
+    structures: Sequence[Structure], transition: Chain, probabilities: Array | None = None, name: str | None = None
+) -> Filter:
+    """The logic-dynamic AOF: as `imm`, but predictions are merged, not the laws before them.
+
+    lambda_j = sum_i mu_i|j tau_j(z_i, p_i)
+    Psi_j = sum_i mu_i|j [Theta_j(z_i, p_i) + (tau_j(z_i, p_i) - lambda_j)(...)^T]
+
+    Arguments, result and errors as of `imm`.
+    """
+    angles = structures[0].model.angles.x if structures else ()
+
+    def following(one: Structure, laws: Sequence[Gaussian], weights: Array) -> Gaussian:
+        return mixture([one.predict(*law) for law in laws], weights, angles)
+
+    given = name or (f"aof-jump-{structures[0].name}" if structures else "")
+    return _one_law_a_mode(given, structures, transition, probabilities, following)
+
+
+def _one_law_a_mode(
+    name: str,
+    structures: Sequence[Structure],
+    transition: Chain,
+    probabilities: Array | None,
+    following: Callable[[Structure, Sequence[Gaussian], Array], Gaussian],
+) -> Filter:
+    """A filter that merges what may lead to each mode by `following`: (structure of the mode, laws, weights) -> prediction."""
     models = [structure.model for structure in structures]
     angles = models[0].angles.x if models else ()
     pi, first = _checked(structures, transition, probabilities)
@@ -85,23 +128,16 @@ def imm(structures: Sequence[Structure], transition: Array, probabilities: Array
         return [structure.at(state.step).measure(*prior) for structure, prior in each]
 
     def evidence(before: State, y: Array, after: State) -> Array:
-        return _posterior(before.memory.expected, measurements(before), y)[1]
+        return modes_given(before.memory.expected, measurements(before), y)[1]
 
     def step(state: State, y: Array) -> State:
         memory: Modes = state.memory
         now = [structure.at(state.step) for structure in structures]
         expectations = measurements(state)
         corrected = [correct(prior, one, y) for prior, one in zip(memory.predicted, expectations, strict=True)]
-        mu, _ = _posterior(memory.expected, expectations, y)
-
-        expected = mu @ pi
-        predicted = []
-        for j, structure in enumerate(now):
-            joint = mu * pi[:, j]
-            # a mode that cannot come next starts from the combined law; nothing uses it
-            weights = np.where(expected[:, j, None] > 0, joint, mu)
-            mixed = mixture(corrected, weights / weights.sum(axis=-1, keepdims=True), angles)
-            predicted.append(structure.predict(*mixed))
+        mu, _ = modes_given(memory.expected, expectations, y)
+        expected, weights = onward(mu, pi(state.step))
+        predicted = [following(one, corrected, weights[:, :, j]) for j, one in enumerate(now)]
         return State(
             state.step + 1,
             mixture(corrected, mu, angles),
@@ -112,8 +148,65 @@ def imm(structures: Sequence[Structure], transition: Array, probabilities: Array
     return Filter(name, models[0], init, step, evidence=evidence)
 
 
-def _checked(structures: Sequence[Structure], transition: Array, probabilities: Array | None) -> tuple[Array, Array]:
-    """Transition matrix (M, M) and first probabilities (M,); ValueError if the parts do not fit."""
+def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Array | None = None, name: str = "gpb2") -> Filter:
+    """The generalised pseudo-Bayes filter of order 2: pairs of modes (i_{k-1}, i_k) are corrected each, and merged afterwards.
+
+    Weights mu_ij ~ mu_i pi_ij N(y; h_ij, F_ij) of M^2 laws; then those with the same j become one.
+
+    Arguments, result and errors as of `imm`; the memory's `predicted` holds the laws of the pairs, i first.
+    """
+    models = [structure.model for structure in structures]
+    angles, size = models[0].angles.x if models else (), len(models)
+    pi, first = _checked(structures, transition, probabilities)
+
+    def init(runs: int) -> State:
+        start = initial_state(models[0])(runs)
+        weights = np.tile(first / size, (runs, size))  # as if any mode had come before, the same law of each
+        return start._replace(memory=Modes(np.tile(first, (runs, 1)), weights, (start.predicted,) * size**2))
+
+    def measurements(state: State) -> list[Measurement]:
+        now = [structure.at(state.step) for structure in structures]
+        return [now[pair % size].measure(*prior) for pair, prior in enumerate(state.memory.predicted)]
+
+    def evidence(before: State, y: Array, after: State) -> Array:
+        return modes_given(before.memory.expected, measurements(before), y)[1]
+
+    def step(state: State, y: Array) -> State:
+        memory: Modes = state.memory
+        expectations = measurements(state)
+        corrected = [correct(prior, one, y) for prior, one in zip(memory.predicted, expectations, strict=True)]
+        pairs = modes_given(memory.expected, expectations, y)[0].reshape(len(y), size, size)
+        mu = pairs.sum(axis=1)
+        weights = _shares(pairs)
+        laws = [mixture(corrected[j::size], weights[:, :, j], angles) for j in range(size)]
+        now = [structure.at(state.step) for structure in structures]
+        predicted = [one.predict(*law) for law in laws for one in now]
+        expected = (mu[:, :, None] * pi(state.step)).reshape(len(y), -1)
+        return State(
+            state.step + 1, mixture(laws, mu, angles), mixture(predicted, expected, angles), Modes(mu, expected, tuple(predicted))
+        )
+
+    return Filter(name, models[0], init, step, evidence=evidence)
+
+
+def onward(mu: Array, pi: Array) -> tuple[Array, Array]:
+    """c_j = sum_i mu_i pi_ij, (runs, M), and the weights mu_i|j, (runs, M, M)."""
+    joint = mu[:, :, None] * pi
+    # a mode that cannot come next starts from the combined law; nothing uses it
+    expected = mu @ pi
+    return expected, _shares(np.where(expected[:, None, :] > 0, joint, mu[:, :, None]))
+
+
+def _shares(joint: Array) -> Array:
+    """joint_ij / sum_i joint_ij, (runs, M, M); equal ones where that is nothing."""
+    total = joint.sum(axis=1, keepdims=True)
+    return np.divide(joint, total, out=np.full_like(joint, 1.0 / joint.shape[1]), where=total > 0)
+
+
+def _checked(
+    structures: Sequence[Structure], transition: Chain, probabilities: Array | None
+) -> tuple[Callable[[int], Array], Array]:
+    """The step to the transition matrix (M, M), and first probabilities (M,); ValueError if the parts do not fit."""
     size = len(structures)
     if not size:
         raise ValueError("give at least one structure, such as linearised(model)")
@@ -129,7 +222,7 @@ def _checked(structures: Sequence[Structure], transition: Array, probabilities: 
             raise ValueError("all modes need the same components declared as angles")
         if not all(np.array_equal(ours, theirs) for ours, theirs in zip(model.prior, first.prior, strict=True)):
             raise ValueError("all modes need the same prior: before the first measurement there is one law of the state")
-    pi = np.asarray(transition, dtype=float)
+    pi = np.asarray(transition(0) if callable(transition) else transition, dtype=float)
     start = np.full(size, 1.0 / size) if probabilities is None else np.asarray(probabilities, dtype=float)
     for what, table, shape in (("transition", pi, (size, size)), ("probabilities", start, (size,))):
         if table.shape != shape:
@@ -138,10 +231,11 @@ def _checked(structures: Sequence[Structure], transition: Array, probabilities: 
             raise ValueError(
                 f"{what} must be probabilities that sum to 1{' in each row' * (table.ndim - 1)}, got {table.tolist()}"
             )
-    return pi / pi.sum(axis=-1, keepdims=True), start / start.sum()
+    pi = pi / pi.sum(axis=-1, keepdims=True)
+    return transition if callable(transition) else lambda k: pi, start / start.sum()
 
 
-def _posterior(expected: Array, measurements: Sequence[Measurement], y: Array) -> tuple[Array, Array]:
+def modes_given(expected: Array, measurements: Sequence[Measurement], y: Array) -> tuple[Array, Array]:
     """c_j L_j / sum over the modes, (runs, M), and ln of the sum; in logarithms, as likelihoods far from the truth are 0."""
     with np.errstate(divide="ignore"):  # a mode that is excluded stays so
         logs = np.log(expected) + np.stack([log_density(one, y) for one in measurements], axis=-1)

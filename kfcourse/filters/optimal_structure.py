@@ -1,38 +1,134 @@
-"""Rudenko's filter of optimal structure (FOS, ФОС), in Gaussian and linearised approximation.
+r"""Rudenko's filter of optimal structure (FOS, ФОС), and all that one construction makes of it.
 
-The FOS has the order of the object: its estimate is z_k = M[x_k | y_k, z_{k-1}], so all it carries from
-step to step is z.  What z says about x is the regression of x_k on z_k over the ensemble:
+At the end of a step such a filter remembers a vector zeta_k.  What zeta says about x is a regression over the ensemble,
 
-    u_k = Gamma_k z_k + chi_k  with residual covariance T_k
+    u_k = Gamma_k zeta_k + chi_k  with residual covariance T_k
 
-and (u_k, T_k) take the place of the AOF's (z_k, p_k) in the prediction.  T_k is one matrix for the whole
-ensemble, found off-line: on-line the filter carries no covariance equation.
+and (u_k, T_k) take the place of the AOF's (z_k, p_k) in the prediction.  T_k is one matrix for the whole ensemble, found
+off-line: on-line the filter carries no covariance equation.  Two choices make the filter:
+
+`Memory`   zeta: the last estimates, the last measurements, or both.  The FOS has the order of the object: its estimate is
+           z_k = M[x_k | y_k, z_{k-1}], so all it carries from step to step is z;
+`Recipe`   which parts of the two steps are left to structural functions, and which are corrected by a regression.
+
+Where the FOS trusts its approximate structural functions, the modified filters let a regression over the ensemble correct
+them: since "change nothing" is among the admissible coefficients, each regression can only lower the mean square error of its
+own step over the ensemble it was designed on.  The two-step filters take Psi from it, too: the covariance of x given lambda,
+one matrix for all.
+
+            lambda'      Psi'         z
+    FOS     s'           Theta(u, T)  lambda + sigma          s' = tau(u, T),  sigma = K (y - h)
+    MFOS    L s' + n     Theta(u, T)  lambda + H sigma + e
+    DFMP    L s' + n     residual     lambda + sigma
+    MDFMP   L s' + n     residual     lambda + H sigma + e
+
+`finite_memory` has those that remember more than the last estimate.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 import sympy as sp
 
 from kfcourse.angles import Components, near
 from kfcourse.filters import notation as s
-from kfcourse.filters.designed import Design, Equations, Regression, Step
-from kfcourse.laws import Array, Gaussian, Measurement, correct
+from kfcourse.filters.base import State
+from kfcourse.filters.designed import Design, Equations, Regression, fitted_correction, fitted_prediction
+from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, gain, product, transpose
+from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure
 
-CONDITION = (
-    *s.regression(s.Gamma, s.chi, s.x, s.z),
-    sp.Eq(s.T, s.cov(s.x) - s.Gamma * s.cov(s.x, s.z).T),
-    sp.Eq(s.u, s.Gamma * s.z + s.chi),
-)
-EQUATIONS = (
-    *s.MEASURE,
-    s.GAIN,
-    sp.Eq(s.z, s.lam + s.K * (s.y - s.h)),
-    *CONDITION,
-    sp.Eq(s.lam_next, s.tau_uT),
-    sp.Eq(s.Psi_next, s.Theta_uT),
-)
+
+class Recipe(NamedTuple):
+    """Which parts of a step are regressions over the ensemble; the others are structural functions as they are."""
+
+    mean: bool = False  # lambda' = L s' + n, not s'
+    spread: bool = False  # Psi' = residual of that regression, not Theta(u, T)
+    correction: bool = False  # z = lambda + H sigma + e, not lambda + sigma
+
+
+FOS, MFOS = Recipe(), Recipe(mean=True, correction=True)
+DFMP, MDFMP = Recipe(mean=True, spread=True), Recipe(mean=True, spread=True, correction=True)
+
+
+class Memory(NamedTuple):
+    """How many of the last estimates and measurements make zeta: (y_k, y_{k-1}, ..., z_k, z_{k-1}, ...)."""
+
+    estimates: int = 1
+    measurements: int = 0
+
+
+class Remembered(NamedTuple):
+    """What has been kept of both, newest first: arrays (runs, n) and (runs, p); fewer until the memory is full."""
+
+    estimates: tuple[Array, ...] = ()
+    measurements: tuple[Array, ...] = ()
+
+    def and_now(self, z: Array, y: Array, memory: Memory, turning: Components) -> Remembered:
+        """With the newest; the oldest drop out.  Older angles are kept within half a turn of the newest."""
+        older = (near(one, z, turning) for one in self.estimates)
+        return Remembered((z, *older)[: memory.estimates], (y, *self.measurements)[: memory.measurements])
+
+    @property
+    def regressor(self) -> Array:
+        """zeta, (runs, r)."""
+        both = (*self.measurements, *self.estimates)
+        return both[0] if len(both) == 1 else np.concatenate(both, axis=-1)
+
+
+def of_structure(name: str, structure: Structure, recipe: Recipe, memory: Memory) -> Design:
+    """The construction: (name, structural functions, what is fitted, what is remembered) -> Design.
+
+    Its own covariance is that of `correct`, or where the correction is a regression the residual, (n, n).
+    A missing measurement is remembered as its prediction: then zeta tells, in the mean, what it would have told.
+
+    Raises
+    ------
+    ModelError
+        Measurements alone are to be remembered, but the model has angles, which jump by a turn: no regression fits them.
+    """
+    angles = structure.model.angles
+    if not memory.estimates and (angles.x or angles.y):
+        raise ModelError(
+            f"{name} regresses the state on measurements, and angles jump by a turn: take a filter that remembers estimates, "
+            "fos(structure), mfos(structure) or fbp(structure, memory)"
+        )
+
+    def equations(state: State, y: Array) -> Equations:
+        now, lam = structure.at(state.step), state.predicted.mean
+        measurement = now.measure(*state.predicted)
+        if recipe.correction:
+            K = gain(product(state.predicted.cov, transpose(measurement.G)), measurement.F)
+            posterior = yield from fitted_correction(lam, apply(K, measurement.innovation(y)), y, angles)
+        else:
+            posterior = correct(state.predicted, measurement, y)
+
+        seen = expected_where_missing(y, measurement, angles.y) if memory.measurements else y
+        remembered = (state.memory or Remembered()).and_now(posterior.mean, seen, memory, angles.x)
+        zeta = remembered.regressor
+        fit = yield Regression(lambda x, x_next: near(x, posterior.mean, angles.x), zeta)
+        predicted = now.predict(fit(zeta), fit.residual)
+
+        if recipe.mean:
+            fitted = yield from fitted_prediction(predicted.mean, angles)
+            predicted = fitted if recipe.spread else Gaussian(fitted.mean, predicted.cov)
+        return State(state.step + 1, posterior, predicted, remembered)
+
+    return Design(f"{name}-{structure.name}", structure.model, equations)
+
+
+def expected_where_missing(y: Array, measurement: Measurement, turning: Components) -> Array:
+    """What a filter remembers of a measurement: its prediction h where it is missing.
+
+    In the place of components that are angles stand their innovations, which do not jump.
+    """
+    h = measurement.h
+    if turning:
+        which = np.isin(np.arange(y.shape[-1]), turning)
+        y, h = np.where(which, measurement.innovation(y), y), np.where(which, 0.0, h)
+    return np.where(np.isnan(y), h, y)
 
 
 def fos(structure: Structure, arguments: int = 2) -> Design:
@@ -48,32 +144,70 @@ def fos(structure: Structure, arguments: int = 2) -> Design:
     arguments : int
         2: x is regressed on z alone.  3: on (y, z).
     """
-    check_arguments(arguments)
-    angles = structure.model.angles
-
-    def equations(predicted: Gaussian, y: Array, k: int) -> Equations:
-        now = structure.at(k)
-        measurement = now.measure(*predicted)
-        posterior = correct(predicted, measurement, y)
-        regressor = posterior.mean if arguments == 2 else with_measurement(y, measurement, posterior.mean, angles.y)
-        fit = yield Regression(lambda x, x_next: near(x, posterior.mean, angles.x), regressor)
-        return Step(posterior, now.predict(fit(regressor), fit.residual))
-
-    return Design(f"{'fos' if arguments == 2 else 'fos3'}-{structure.name}", structure.model, equations)
+    return _of_last_estimate("fos", structure, FOS, arguments)
 
 
-def check_arguments(arguments: int) -> None:
+def mfos(structure: Structure, arguments: int = 2) -> Design:
+    """The modified filter of optimal structure (МФОС): the FOS with Pugachev's coefficients in both steps.
+
+    sigma = Psi G^T F^+ (y - h),   z = lambda + H sigma + e      regression of x - lambda on sigma
+    u = Gamma z + chi,  T = residual                             regression of x on z (or on (y, z))
+    s' = tau(u, T),   lambda' = L s' + n                         regression of x' on s'
+    Psi' = Theta(u, T)
+
+    Its own covariance is the residual of the first regression, (n, n).
+    """
+    return _of_last_estimate("mfos", structure, MFOS, arguments)
+
+
+def dfmp(structure: Structure) -> Design:
+    """The two-step filter of low order (ДФМП): lambda' = L s' + n, and Psi' is the residual of that regression, (n, n).
+
+    Prediction and correction are two problems of least mean square: lambda' the best from zeta, then z the best from y and
+    lambda.  So Psi is the covariance of x given lambda.
+    """
+    return _of_last_estimate("dfmp", structure, DFMP)
+
+
+def mdfmp(structure: Structure) -> Design:
+    """The modified two-step filter of low order (МДФМП): `dfmp` whose correction is fitted as the MFOS's is."""
+    return _of_last_estimate("mdfmp", structure, MDFMP)
+
+
+def _of_last_estimate(family: str, structure: Structure, recipe: Recipe, arguments: int = 2) -> Design:
     if arguments not in (2, 3):
         raise ValueError(f"the filter of optimal structure has 2 or 3 arguments, not {arguments!r}")
+    name = family if arguments == 2 else f"{family}3"
+    return of_structure(name, structure, recipe, Memory(estimates=1, measurements=arguments - 2))
 
 
-def with_measurement(y: Array, measurement: Measurement, z: Array, angles: Components) -> Array:
-    """The regressor (y, z) of the three-argument form; a missing measurement is replaced by its prediction.
+# ---------------------------------------------------------------- the same in symbols
 
-    In the place of components of y that are angles stand their innovations, which do not jump.
-    """
-    h = measurement.h
-    if angles:
-        turning = np.isin(np.arange(y.shape[-1]), angles)
-        y, h = np.where(turning, measurement.innovation(y), y), np.where(turning, 0.0, h)
-    return np.concatenate([np.where(np.isnan(y), h, y), z], axis=-1)
+_sigma, _eps = s.matrix(r"\sigma_{k}", s.n, s.ONE), s.matrix(r"\varepsilon_{k}", s.n, s.ONE)
+_s_next = s.matrix(r"s_{k+1}", s.n, s.ONE)
+_H = s.matrix(r"H_{k}", s.n, s.n)
+_L, _n = s.matrix(r"L_{k+1}", s.n, s.n), s.matrix(r"n_{k+1}", s.n, s.ONE)
+
+
+def printed(recipe: Recipe, zeta: sp.MatrixSymbol = s.z, *, consists_of: sp.MatrixSymbol | None = None) -> tuple[sp.Eq, ...]:
+    """The equations of a step; `consists_of` is what zeta is made of, if it is not the estimate."""
+    Gamma = s.matrix(s.Gamma.name, s.n, zeta.rows)
+    equations = [*s.MEASURE]
+    if recipe.correction:
+        equations += [sp.Eq(_sigma, s.Psi * s.G.T * s.F.I * (s.y - s.h)), sp.Eq(_eps, s.x - s.lam)]
+        equations += [*s.regression(_H, s.e, _eps, _sigma), sp.Eq(s.z, s.lam + _H * _sigma + s.e)]
+    else:
+        equations += [s.GAIN, sp.Eq(s.z, s.lam + s.K * (s.y - s.h))]
+    if consists_of is not None:
+        equations.append(sp.Eq(zeta, consists_of))
+    equations += s.regression(Gamma, s.chi, s.x, zeta)
+    equations += [sp.Eq(s.T, s.cov(s.x) - Gamma * s.cov(s.x, zeta).T), sp.Eq(s.u, Gamma * zeta + s.chi)]
+    if recipe.mean:
+        equations += [sp.Eq(_s_next, s.tau_uT), *s.regression(_L, _n, s.x_next, _s_next), sp.Eq(s.lam_next, _L * _s_next + _n)]
+    else:
+        equations.append(sp.Eq(s.lam_next, s.tau_uT))
+    residual = s.cov(s.x_next) - _L * s.cov(s.x_next, _s_next).T
+    return (*equations, sp.Eq(s.Psi_next, residual if recipe.spread else s.Theta_uT))
+
+
+EQUATIONS = {name: printed(one) for name, one in (("fos", FOS), ("mfos", MFOS), ("dfmp", DFMP), ("mdfmp", MDFMP))}

@@ -17,13 +17,15 @@ import numpy as np
 
 from kfcourse.filters import Design, Filter, pointmass
 from kfcourse.filters.particles import particle
-from kfcourse.lab.short_names import FILTERS, Structures, check_names, has_exact, title
+from kfcourse.lab.checked_quadrature import Checked
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JumpStructures, Structures, check_names, has_exact, title
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.subset import FEWEST
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite, unscented
@@ -70,8 +72,8 @@ class Admission:
         return "; ".join([self.reason] if self.reason else [*self.warnings, *self.remarks])
 
 
-def admissions(model: Model, names: Sequence[str] = tuple(FILTERS), seconds: float | None = None) -> list[Admission]:
-    """Which of the filters can be built for the model, and what to know of them; each as the lab builds it.
+def admissions(model: Model | JumpModel, names: Sequence[str] | None = None, seconds: float | None = None) -> list[Admission]:
+    """Which of the filters, all by default, can be built for the model, and what to know of them; each as the lab builds it.
 
     With `seconds`, the formulas of each must be derived in that time.
 
@@ -80,8 +82,10 @@ def admissions(model: Model, names: Sequence[str] = tuple(FILTERS), seconds: flo
     ValueError
         An unknown name; the message lists the known ones.
     """
-    check_names(names)
-    structures = Structures(model)
+    known = JUMP_FILTERS if isinstance(model, JumpModel) else FILTERS
+    names = list(known if names is None else names)
+    check_names(names, known)
+    structures = JumpStructures(model) if isinstance(model, JumpModel) else Structures(model)
     found, too_long = [], set[str]()
     for name in dict.fromkeys(names):
         kind = name.split("-")[-1]  # filters with the same structural functions share the time
@@ -102,23 +106,25 @@ _TOO_LONG = (
 )
 
 
-def _admitted(name: str, structures: Structures) -> Admission:
+def _admitted(name: str, structures: Structures | JumpStructures) -> Admission:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", QuadratureWarning)
         try:
+            if isinstance(structures, JumpStructures):
+                return Admission(name, JUMP_FILTERS[name].build(structures))
             one = FILTERS[name].build(structures)
         except (NoClosedForm, ModelError) as error:
             return Admission(name, None, str(error))
     found = [str(warning.message) for warning in caught]
     with np.errstate(all="ignore"):
         found += [text for kind, look in _LOOKS.items() if kind in name for text in look(structures)]
-        remarks = [text for kind, look in _REMARKS.items() if kind == name and not found for text in look(structures)]
+        remarks = [text for kind, look in _REMARKS.items() if name.endswith(kind) and not found for text in look(structures)]
     return Admission(name, one, "", tuple(found), tuple(remarks))
 
 
-def on_trial(model: Model, found: Sequence[Admission], seed: int = 1) -> list[Admission]:
+def on_trial(model: Model | JumpModel, found: Sequence[Admission], seed: int = 1) -> list[Admission]:
     """The same after a small comparison: a filter that leaves the finite numbers, or a slow one that fails, is warned of."""
-    last = int(min(STEPS, model.known.steps))
+    last = int(min(STEPS, model.steps if isinstance(model, JumpModel) else model.known.steps))
     tried = []
     for one in found:
         failure = _failure(model, one.one, last, seed) if one.one else ""
@@ -130,9 +136,9 @@ def _warned(one: Admission, text: str) -> Admission:
     return dataclasses.replace(one, warnings=(*one.warnings, text))
 
 
-def _failure(model: Model, one: Filter | Design, steps: int, seed: int) -> str:
+def _failure(model: Model | JumpModel, one: Filter | Design, steps: int, seed: int) -> str:
     """What goes wrong on a few hundred trajectories; empty if nothing."""
-    fast = [FILTERS["duof"].build(Structures(model))] if one.slow else []
+    fast = [admission.one for admission in admissions(model, ["duof"]) if admission.one] if one.slow else []
     try:
         found = compare(
             [*fast, one], model, RUNS, steps, seed, subset_runs=SLOW, subset_seconds=SECONDS, threads=1, progress=False
@@ -252,6 +258,12 @@ def _by_particles(structures: Structures) -> Iterator[str]:
         yield from _starved(structures)
 
 
+def _by_quadrature(structures: Structures) -> Iterator[str]:
+    """Gaussian structural functions that are no formulas."""
+    if isinstance(structures.quadrature, Checked):
+        yield structures.quadrature.says
+
+
 def _not_by_points(structures: Structures) -> Iterator[str]:
     """Why the exact filter is one of particles."""
     try:
@@ -267,7 +279,12 @@ _LOOKS: dict[str, Callable[[Structures], Iterator[str]]] = {
     "particle": _starved,
     "aof-exact": _by_particles,
 }
-_REMARKS: dict[str, Callable[[Structures], Iterator[str]]] = {"particle": _bootstrap, "aof-exact": _not_by_points}
+# By how it ends.
+_REMARKS: dict[str, Callable[[Structures], Iterator[str]]] = {
+    "-gaussian": _by_quadrature,
+    "particle": _bootstrap,
+    "aof-exact": _not_by_points,
+}
 
 
 def table(found: Sequence[Admission]) -> str:

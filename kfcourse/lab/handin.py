@@ -22,10 +22,11 @@ from kfcourse.files import replacing_together
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
+from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.handin_text import filled, in_percent, inline_html, inline_tex, law, lines_of, matrix, power_of_ten
 from kfcourse.lab.refusals import cause
 from kfcourse.lab.report import printed, ranges, remarks, save_figure, save_texts, table_steps
-from kfcourse.lab.short_names import FILTERS, Structures
+from kfcourse.lab.short_names import FILTERS, Structures, family
 from kfcourse.lab.variants import Variant
 from kfcourse.lab.written_out import written_lines
 from kfcourse.montecarlo.comparison import EXACT, Comparison, Verdict
@@ -83,11 +84,12 @@ def write_handin(variant: Variant, result: Comparison, folder: Path, language: s
     Raises
     ------
     ValueError
-        An unknown language.
+        An unknown language, or a variant with modes, which the report's text does not know.
     """
     if language not in LANGUAGES:
         raise ValueError(f"the report is written in {' or '.join(LANGUAGES)}, not {language!r}")
     words = tomllib.loads((resources.files("kfcourse.lab") / "handin.toml").read_text(encoding="utf-8"))[language]
+    variant.plain("student's reports")
     report = _Report(result, words)
     content = {"blocks": list(report.blocks()), "words": words, "variant": variant, "language": language}
     labels = plots.Words(report.title, **{part: words[f"axis_{part}"] for part in plots.Words._fields[1:]})
@@ -103,7 +105,8 @@ class _Report:
 
     def __init__(self, result: Comparison, words: dict[str, str]) -> None:
         self.result, self.words = result, words
-        self.model: Model = result.model
+        assert isinstance(result.model, Model)  # `write_handin` has said so
+        self.model = result.model
         self.structures = Structures(self.model)
         self.kinds = [kind for kind in ("linearised", "gaussian") if any(name.endswith(kind) for name in result.available)]
 
@@ -179,7 +182,7 @@ class _Report:
             if moments := self.moments():
                 yield Block("text", words["recursion"])
                 yield Block("formulas", lines=[r"q_0 &= 1,\quad q_1 = m,\quad q_{n+1} = m\,q_n + n\,d\,q_{n-1}", *moments])
-            else:
+            elif not self.structures.quadrature:
                 yield Block("text", words["exponentials"])
 
     def conditional(self) -> list[str]:
@@ -211,6 +214,9 @@ class _Report:
 
     def derived(self, kind: str) -> Iterator[Block]:
         """The five functions, with their numbers in the catalogue where it has them."""
+        if kind == "gaussian" and isinstance(found := self.structures.quadrature, Checked):
+            yield Block("text", filled(self.words["by_quadrature"], order=found.order))
+            return
         block = printed(self.structures, kind)
         yield Block("text", self.words["result"])
         if FUNCTION_LATEX["tau"] not in block:
@@ -231,19 +237,19 @@ class _Report:
         yield Block("text", words["start"])
         mean, cov = self.model.prior
         yield Block("formulas", lines=[rf"\lambda_0 &= m_0 = {matrix(mean[:, None])},\qquad \Psi_0 = D_0 = {matrix(cov)}"])
-        families = dict.fromkeys(name.split("-")[0].removesuffix("3") for name in self.result.entrants)
-        designed = next((family for family in families if family != "aof"), "")
-        for family in (family for family in families if family in EQUATIONS):
-            yield Block("subsection", words[family])
-            if family == "duof":
+        families = dict.fromkeys(map(family, self.result.entrants))
+        designed = next((one for one in families if one != "aof"), "")
+        for one in (one for one in families if one in EQUATIONS):
+            yield Block("subsection", words[one])
+            if one == "duof":
                 yield Block("text", words["criteria"])
                 yield Block("formulas", lines=words["criteria_formulas"].split("\n"))
-            yield Block("formulas", lines=lines_of(equations_latex(EQUATIONS[family])))
-            if family == "aof" and self.model.n == self.model.p == 1:
+            yield Block("formulas", lines=lines_of(equations_latex(EQUATIONS[one])))
+            if one == "aof" and self.model.n == self.model.p == 1:
                 for name in (f"aof-{kind}" for kind in self.derivable if f"aof-{kind}" in self.result.entrants):
                     yield Block("text", filled(words["written_out"], name=self.title(name)))
                     yield Block("formulas", lines=written_lines(getattr(self.structures, name.removeprefix("aof-"))))
-            if family == designed:
+            if one == designed:
                 yield Block("text", words["over_ensemble"])
 
     def experiment(self) -> Iterator[Block]:

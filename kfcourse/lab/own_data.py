@@ -142,7 +142,7 @@ def estimate_record(
     ValueError
         The file, the model or the parameters cannot be used, or the filter left the finite numbers; the message says where.
     """
-    record = read_measurements(path, variant.model, columns)
+    record = read_measurements(path, variant.plain("estimates from a record"), columns)
 
     def build(model: Model) -> Filter:
         one = aof(STRUCTURES[structure](model))

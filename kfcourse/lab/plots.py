@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 
-from kfcourse.lab.short_names import title
+from kfcourse.lab.short_names import family, title
 from kfcourse.laws import Array
 from kfcourse.montecarlo.comparison import EXACT, Comparison
+from kfcourse.montecarlo.modes import Recognised
 
-# Okabe and Ito's colours, distinguishable by the colour-blind; linearised forms are dashed.
+# Okabe and Ito's colours and Tol's muted ones, distinguishable by the colour-blind; linearised forms are dashed.
 _FAMILIES = {
     "aof": "#0072B2",
     "duof": "#D55E00",
@@ -20,13 +21,23 @@ _FAMILIES = {
     "mfos": "#CC79A7",
     "fos3": "#56B4E9",
     "mfos3": "#E69F00",
+    "dfmp": "#882255",
+    "mdfmp": "#AA4499",
+    "fkp": "#117733",
+    "mfkp": "#999933",
+    "dfkp": "#44AA99",
+    "mdfkp": "#332288",
+    "fbp": "#661100",
     "particle": "#F0E442",
     "kalman": "#000000",
     "iterated": "#E69F00",
     "alpha-beta": "#E69F00",
     "imm": "#D55E00",
+    "gpb2": "#009E73",
 }
-_MARKERS = {"aof": "o", "duof": "s", "fos": "^", "mfos": "D", "fos3": "v", "mfos3": "P", "particle": "*", "kalman": "x"}
+_MARKERS = {"aof": "o", "duof": "s", "fos": "^", "mfos": "D", "fos3": "v", "mfos3": "P", "particle": "*", "kalman": "x"} | {
+    "dfmp": "<", "mdfmp": ">", "fkp": "p", "mfkp": "h", "dfkp": "H", "mdfkp": "8", "fbp": "X",
+}  # fmt: skip
 
 
 class Words(NamedTuple):
@@ -45,14 +56,15 @@ ENGLISH = Words()
 
 def style(name: str) -> dict[str, Any]:
     """Line style of a filter: colour by family, dashes for the linearised approximation, black for the exact."""
-    family, _, approximation = (name, "", "") if name in _FAMILIES else name.partition("-")
+    kin, _, approximation = (name, "", "") if name in _FAMILIES else name.partition("-")
+    kin = kin if kin in _FAMILIES else family(name)  # whatever the length of its memory
     if approximation == "exact":
         return {"color": "black", "linestyle": "-", "marker": "*", "label": title(name)}
-    dashes = {"linearised": "--", "unscented": ":", "gauss-hermite": "-."}.get(approximation, "-")
+    dashes = {"linearised": "--", "unscented": ":", "gauss-hermite": "-.", "averaged": ":"}.get(approximation, "-")
     return {
-        "color": _FAMILIES.get(family, "#555555"),
+        "color": _FAMILIES.get(kin, "#555555"),
         "linestyle": dashes,
-        "marker": _MARKERS.get(family, "."),
+        "marker": _MARKERS.get(kin, "."),
         "label": title(name),
     }
 
@@ -131,6 +143,25 @@ def consistency(
     ax.set_xlabel(words.step)
     ax.set_ylabel(words.normalised)
     ax.grid(True, alpha=0.3)
+    ax.legend(fontsize="small", ncols=2)
+    return ax
+
+
+OF_MODES = "Probabilities of the modes on one trajectory; grey: the true mode (of two modes: where the second is in force)."
+
+
+def mode_probabilities(modes: Recognised, ax: Axes) -> Axes:
+    """Probabilities of all modes but the first against the step, on one trajectory, and the true mode."""
+    steps, size = np.arange(len(modes.mode)), next(iter(modes.probability.values())).shape[1]
+    dashes = ("-", "--", ":", "-.")
+    ax.fill_between(steps, modes.mode / (size - 1) if size > 1 else 0 * steps, step="mid", color="#dddddd", linewidth=0)
+    for name, probability in modes.probability.items():
+        for j in range(1, size):
+            label = title(name) + (f", mode {j + 1}" if size > 2 else "")
+            ax.plot(steps, probability[:, j], color=style(name)["color"], linestyle=dashes[(j - 1) % 4], label=label)
+    ax.set_xlabel("step $k$")
+    ax.set_ylabel("probability of the mode")
+    ax.set_ylim(-0.02, 1.02)
     ax.legend(fontsize="small", ncols=2)
     return ax
 

@@ -22,24 +22,34 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kfcourse.files import replacing_together, save
-from kfcourse.filters import EQUATIONS
+from kfcourse.filters import EQUATIONS, Filter
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
 from kfcourse.lab.admission import admissions
-from kfcourse.lab.short_names import FILTERS, Structures, title
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, WITH_MODES, JumpStructures, Structures, family, title
 from kfcourse.lab.variants import Variant
 from kfcourse.laws import Array
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.comparison import EXACT, HEAVY, Comparison
+from kfcourse.montecarlo.modes import Recognised, recognised
 from kfcourse.montecarlo.statistics import Estimate, ratio
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.moments import NoClosedForm
 
 _FAMILIES = {
     "aof": "AOF in Gaussian approximation",
     "duof": "DUOF, the two-step conditionally optimal filter",
     "fos": "FOS, the filter of optimal structure",
     "mfos": "MFOS, the modified filter of optimal structure",
+    "dfmp": "DFMP, the two-step filter of low order",
+    "mdfmp": "MDFMP, the modified two-step filter of low order",
+    "fkp": "FKP, the filter with finite memory",
+    "mfkp": "MFKP, the modified filter with finite memory",
+    "dfkp": "DFKP, the two-step filter with finite memory",
+    "mdfkp": "MDFKP, the modified two-step filter with finite memory",
+    "fbp": "FBP, the filter of high order",
 }
 _FIGURES: dict[str, tuple[str, Callable[[Comparison, Axes], Axes]]] = {
     "accuracy": ("Error variance of each filter against the step.", plots.accuracy),
@@ -53,6 +63,7 @@ _FIGURES: dict[str, tuple[str, Callable[[Comparison, Axes], Axes]]] = {
 
 
 FORMULAS = 60.0  # seconds that each kind of structural functions may take
+RECOGNISED = 1600  # trajectories on which modes are told
 LONGEST = 40_000  # characters of LaTeX: some ten pages
 
 
@@ -74,7 +85,10 @@ def write_report(variant: Variant, result: Comparison, folder: Path) -> list[Pat
     with replacing_together(folder) as place:
         for name, (_, draw) in _FIGURES.items():
             save_figure(partial(draw, result), place, name)
-        save_texts(("report.html", "report.tex"), place, _content(variant, result))
+        modes = _modes(result)
+        if modes:
+            save_figure(partial(plots.mode_probabilities, modes), place, "modes")
+        save_texts(("report.html", "report.tex"), place, _content(variant, result, modes))
         return [folder / path.name for path in place.iterdir()]
 
 
@@ -106,13 +120,7 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
     estimates = {name: result.error_variance(name) for name in result.available}
     data: dict[str, Any] = {
         "variant": variant.name,
-        "model": {
-            "state": [str(f) for f in result.model.state_equation],
-            "meter": [str(f) for f in result.model.meter_equation],
-            "parameters": {name: float(value) for name, value in result.model.parameters.items()},
-            "inputs": {name: list(values) for name, values in result.model.known.inputs.items()},
-            "interval": float(result.model.known.interval),
-        },
+        "model": _model_in_numbers(result.model),
         "runs": result.runs,
         "steps": result.steps,
         "seed": result.seed,
@@ -138,6 +146,23 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
     return path
 
 
+def _model_in_numbers(model: Model | JumpModel) -> dict[str, Any]:
+    if isinstance(model, JumpModel):
+        modes = {name: _model_in_numbers(mode) for name, mode in zip(model.names, model.modes, strict=True)}
+        return {
+            "modes": modes,
+            "transition": [[str(one) for one in row] for row in model.chain.tolist()],
+            "first": model.first.tolist(),
+        }
+    return {
+        "state": [str(f) for f in model.state_equation],
+        "meter": [str(f) for f in model.meter_equation],
+        "parameters": {name: float(value) for name, value in model.parameters.items()},
+        "inputs": {name: list(values) for name, values in model.known.inputs.items()},
+        "interval": float(model.known.interval),
+    }
+
+
 def conclusions(result: Comparison, confidence: float = 0.95) -> list[str]:
     """The ranking in sentences: each filter against the next, significant or not at the confidence.
 
@@ -157,9 +182,20 @@ def conclusions(result: Comparison, confidence: float = 0.95) -> list[str]:
     return sentences
 
 
-def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
+def _modes(result: Comparison) -> Recognised | None:
+    """What the filters that carry probabilities of modes know of them; None of a model without modes."""
+    model = result.model
+    if not isinstance(model, JumpModel):
+        return None
+    names = [name for name in result.available if name in WITH_MODES and name not in result.replaced]
+    known = [one.one for one in admissions(model, names) if isinstance(one.one, Filter)]
+    return recognised(known, model, min(result.runs, RECOGNISED), result.steps, result.seed) if known else None
+
+
+def _content(variant: Variant, result: Comparison, modes: Recognised | None) -> dict[str, Any]:
     # the bound before those that it bounds
     names = tuple(sorted(result.available, key=lambda name: name != EXACT))
+    entries = JUMP_FILTERS if isinstance(result.model, JumpModel) else FILTERS
     compared = [name for name in result.entrants if result.has_bound or name != result.control]
     return {
         "variant": variant,
@@ -171,7 +207,7 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
         "structures": _structure_sections(result.model, names),
         "equations": _equation_sections(names),
         "names": [
-            (name, title(name) + (", the bound" if name == EXACT else ""), FILTERS[name].russian if name in FILTERS else "")
+            (name, title(name) + (", the bound" if name == EXACT else ""), entries[name].russian if name in entries else "")
             for name in names
         ],
         "table": _table(result, [_cells(result, name) for name in names]),
@@ -188,15 +224,25 @@ def _content(variant: Variant, result: Comparison) -> dict[str, Any]:
         ],
         "reference": title(EXACT if result.has_bound else result.control),
         "conclusions": conclusions(result),
-        "figures": [(name, caption) for name, (caption, _) in _FIGURES.items()],
+        "modes": [] if modes is None else [(title(name), percent(share)) for name, share in modes.share.items()],
+        "guess": "" if modes is None else f"{100 * modes.guess:.1f}",
+        "figures": [(name, caption) for name, (caption, _) in _FIGURES.items()]
+        + ([] if modes is None else [("modes", plots.OF_MODES)]),
         "control": title(result.control),
     }
 
 
-def _structure_sections(model: Model, names: tuple[str, ...]) -> list[Section]:
+def _structure_sections(model: Model | JumpModel, names: tuple[str, ...]) -> list[Section]:
+    if isinstance(model, JumpModel):
+        kind = JumpStructures(model).best[0].name
+        each = zip(model.names, model.modes, strict=True)
+        return [Section.of(f"Mode {name}, {kind}", printed(Structures(mode), kind)) for name, mode in each]
     structures = Structures(model)
     kinds = [kind for kind in ("gaussian", "linearised") if any(name.endswith(kind) for name in names)]
     return [Section.of(kind.capitalize(), printed(structures, kind)) for kind in kinds]
+
+
+NO_FORMULAS = "No closed form: by quadrature, of the order told under Which filters this model admits."
 
 
 def printed(structures: Structures, kind: str) -> str:
@@ -206,12 +252,14 @@ def printed(structures: Structures, kind: str) -> str:
             block = getattr(structures, kind).latex()
     except OutOfTime:
         return rf"\text{{They are not written within {FORMULAS:g} s.}}"
+    except NoClosedForm:
+        return rf"\text{{{NO_FORMULAS}}}"
     return block if len(block) <= LONGEST else rf"\text{{They are too long to print: {len(block)} characters of LaTeX.}}"
 
 
 def _equation_sections(names: tuple[str, ...]) -> list[Section]:
-    families = dict.fromkeys(name.split("-")[0].removesuffix("3") for name in names)
-    return [Section.of(_FAMILIES[family], equations_latex(EQUATIONS[family])) for family in families if family in EQUATIONS]
+    families = dict.fromkeys(map(family, names))
+    return [Section.of(_FAMILIES[one], equations_latex(EQUATIONS[one])) for one in families if one in EQUATIONS]
 
 
 # What a reader must know before he relies on distances from the bound, by kind.

@@ -3,11 +3,38 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
-from functools import cached_property
+import re
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, partial
 from typing import NamedTuple
 
-from kfcourse.filters import Design, Filter, aof, duof, fos, mfos, particle, pointmass
+from kfcourse.filters import (
+    Design,
+    Filter,
+    aof,
+    dfkp,
+    dfmp,
+    duof,
+    fbp,
+    fkp,
+    fos,
+    gpb2,
+    imm,
+    jump_pointmass,
+    logic_dynamic,
+    logic_dynamic_fos,
+    mdfkp,
+    mdfmp,
+    mfkp,
+    mfos,
+    particle,
+    pointmass,
+)
+from kfcourse.filters.finite_memory import STEPS
+from kfcourse.lab.checked_quadrature import Checked, of_checked_order
+from kfcourse.laws import Array
+from kfcourse.symbolic.averaging import averaged, averaged_equations
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.quadrature import gauss_hermite, unscented
@@ -29,6 +56,57 @@ class Structures:
     def gaussian(self) -> Structure:
         return gaussian(self.model)
 
+    @cached_property
+    def quadrature(self) -> Checked | NoClosedForm | None:
+        """What takes the place of the Gaussian functions if they have no closed form, or why nothing does; None if they have."""
+        try:
+            _ = self.gaussian
+        except NoClosedForm as why:
+            try:
+                return of_checked_order(self.model, why)
+            except NoClosedForm as neither:
+                return neither
+        return None
+
+    @property
+    def normal(self) -> Structure:
+        """The Gaussian functions, by quadrature if they have no closed form; NoClosedForm if that does not do either."""
+        if isinstance(self.quadrature, NoClosedForm):
+            raise self.quadrature
+        return self.quadrature.structure if self.quadrature else self.gaussian
+
+
+class JumpStructures:
+    """Those of a model that jumps: of each mode, and averaged over the modes."""
+
+    def __init__(self, model: JumpModel):
+        self.model = model
+
+    @cached_property
+    def linearised(self) -> list[Structure]:
+        return [linearised(mode) for mode in self.model.modes]
+
+    @cached_property
+    def gaussian(self) -> list[Structure]:
+        return [gaussian(mode) for mode in self.model.modes]
+
+    @property
+    def chain(self) -> tuple[Callable[[int], Array], Array]:
+        """Transition matrix by the step, and law of the first mode: what filters with modes take."""
+        return self.model.transition_at, self.model.first
+
+    @property
+    def best(self) -> list[Structure]:
+        """Gaussian ones if there is a closed form, else linearised ones."""
+        try:
+            return self.gaussian
+        except NoClosedForm:
+            return self.linearised
+
+    @cached_property
+    def averaged(self) -> Structure:
+        return averaged(self.model, self.best)
+
 
 class Entry(NamedTuple):
     """A filter of the lab: printed names and how to build it."""
@@ -38,23 +116,55 @@ class Entry(NamedTuple):
     build: Callable[[Structures], Filter | Design]
 
 
+class JumpEntry(NamedTuple):
+    """A filter of the lab for models that jump."""
+
+    title: str
+    russian: str
+    build: Callable[[JumpStructures], Filter | Design]
+
+
+def _twice(family: str, title: str, russian: str, build: Callable[[Structure], Filter | Design]) -> dict[str, Entry]:
+    """The entries of a family: with Gaussian structural functions, and with linearised ones."""
+    return {
+        f"{family}-gaussian": Entry(f"G{title}", f"Г{russian}", lambda s: build(s.normal)),
+        f"{family}-linearised": Entry(f"L{title}", f"Л{russian}", lambda s: build(s.linearised)),
+    }
+
+
 # One line a filter: this is where a new one is added.
 FILTERS: dict[str, Entry] = {
-    "aof-gaussian": Entry("GAOF", "ГАОФ", lambda s: aof(s.gaussian)),
-    "aof-linearised": Entry("LAOF", "ЛАОФ", lambda s: aof(s.linearised)),
+    **_twice("aof", "AOF", "АОФ", aof),
     "duof": Entry("DUOF", "ДУОФ", lambda s: duof(s.model)),
-    "fos-gaussian": Entry("GFOS", "ГФОС", lambda s: fos(s.gaussian)),
-    "fos-linearised": Entry("LFOS", "ЛФОС", lambda s: fos(s.linearised)),
-    "mfos-gaussian": Entry("GMFOS", "ГМФОС", lambda s: mfos(s.gaussian)),
-    "mfos-linearised": Entry("LMFOS", "ЛМФОС", lambda s: mfos(s.linearised)),
-    "fos3-gaussian": Entry("GFOS3", "ГФОС, 3 арг.", lambda s: fos(s.gaussian, arguments=3)),
-    "fos3-linearised": Entry("LFOS3", "ЛФОС, 3 арг.", lambda s: fos(s.linearised, arguments=3)),
-    "mfos3-gaussian": Entry("GMFOS3", "ГМФОС, 3 арг.", lambda s: mfos(s.gaussian, arguments=3)),
-    "mfos3-linearised": Entry("LMFOS3", "ЛМФОС, 3 арг.", lambda s: mfos(s.linearised, arguments=3)),
+    **_twice("fos", "FOS", "ФОС", fos),
+    **_twice("mfos", "MFOS", "МФОС", mfos),
+    **_twice("fos3", "FOS3", "ФОС, 3 арг.", partial(fos, arguments=3)),
+    **_twice("mfos3", "MFOS3", "МФОС, 3 арг.", partial(mfos, arguments=3)),
+    **_twice("dfmp", "DFMP", "ДФМП", dfmp),
+    **_twice("mdfmp", "MDFMP", "МДФМП", mdfmp),
+    **_twice(f"fkp{STEPS}", f"FKP{STEPS}", "ФКП, 4 шага", fkp),
+    **_twice(f"mfkp{STEPS}", f"MFKP{STEPS}", "МФКП, 4 шага", mfkp),
+    **_twice(f"dfkp{STEPS}", f"DFKP{STEPS}", "ДФКП, 4 шага", dfkp),
+    **_twice(f"mdfkp{STEPS}", f"MDFKP{STEPS}", "МДФКП, 4 шага", mdfkp),
+    **_twice(f"fbp{STEPS}", f"FBP{STEPS}", "ФБП, 4 шага", fbp),
     "aof-unscented": Entry("UKF", "АОФ, сигма-точки", lambda s: aof(unscented(s.model))),
     "aof-gauss-hermite": Entry("GHKF", "АОФ, Гаусс–Эрмит", lambda s: aof(gauss_hermite(s.model))),
     "aof-exact": Entry("exact AOF", "АОФ", lambda s: exact(s.model)),
     "particle": Entry("particle", "АОФ, частицы", lambda s: particle(s.model)),
+}
+# The same for models that jump: filters that know the modes, and plain ones on the average over the modes.
+JUMP_FILTERS: dict[str, JumpEntry] = {
+    "aof-jump-gaussian": JumpEntry("LD-GAOF", "ГАОФлд", lambda s: logic_dynamic(s.gaussian, *s.chain)),
+    "aof-jump-linearised": JumpEntry("LD-LAOF", "ЛАОФлд", lambda s: logic_dynamic(s.linearised, *s.chain)),
+    "imm": JumpEntry("IMM", "АОФлд, смешивание до прогноза", lambda s: imm(s.best, *s.chain)),
+    "gpb2": JumpEntry("GPB2", "АОФлд, пары режимов", lambda s: gpb2(s.best, *s.chain)),
+    "fos-jump-gaussian": JumpEntry("LD-GFOS", "ГФОСлд", lambda s: logic_dynamic_fos(s.model, s.gaussian)),
+    "fos-jump-linearised": JumpEntry("LD-LFOS", "ЛФОСлд", lambda s: logic_dynamic_fos(s.model, s.linearised)),
+    "aof-averaged": JumpEntry("AOF, averaged", "АОФ, среднее по режимам", lambda s: aof(s.averaged)),
+    "duof": JumpEntry("DUOF", "ДУОФ", lambda s: duof(s.model.modes[0], averaged_equations(s.model))),
+    "fos-averaged": JumpEntry("FOS, averaged", "ФОС, среднее по режимам", lambda s: fos(s.averaged)),
+    "mfos-averaged": JumpEntry("MFOS, averaged", "МФОС, среднее по режимам", lambda s: mfos(s.averaged)),
+    "aof-exact": JumpEntry("exact AOF", "АОФ", lambda s: jump_pointmass(s.model)),
 }
 # Printed names of filters that are not among the lab's.
 TITLES = {
@@ -63,15 +173,25 @@ TITLES = {
     "iterated-unscented": "iterated UKF",
     "alpha-beta": "alpha-beta",
     "alpha-beta-gamma": "alpha-beta-gamma",
-    "imm": "IMM",
 }
 BOUND = 1000  # particles of the exact AOF where there are no point masses
+WITH_MODES = ("aof-jump-gaussian", "aof-jump-linearised", "imm", "gpb2", "aof-exact")  # that carry their probabilities
+JUMP_LAB = tuple(name for name in JUMP_FILTERS if name != "aof-exact")
 LAB = ("aof-gaussian", "aof-linearised", "duof", "fos-gaussian", "fos-linearised", "mfos-gaussian", "mfos-linearised")
 
 
 def title(name: str) -> str:
-    """The printed name of a filter: "GAOF" for "aof-gaussian"."""
-    return FILTERS[name].title if name in FILTERS else TITLES.get(name, name)
+    """The printed name of a filter: "GAOF" for "aof-gaussian", "GFKP2" for "fkp2-gaussian"."""
+    if entry := FILTERS.get(name) or JUMP_FILTERS.get(name):
+        return entry.title
+    length = re.sub(r"\D", "", name.split("-")[0])
+    usual = f"{family(name)}{STEPS}-{name.partition('-')[2]}"
+    return FILTERS[usual].title.replace(str(STEPS), length) if usual in FILTERS else TITLES.get(name, name)
+
+
+def family(name: str) -> str:
+    """The family of a filter, whose equations it shares: "fos" for "fos3-gaussian", "fkp" for "fkp4-linearised"."""
+    return name.split("-")[0].rstrip("0123456789")
 
 
 def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Design]:
@@ -95,11 +215,11 @@ def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Desig
     return built
 
 
-def check_names(names: Sequence[str]) -> None:
+def check_names(names: Sequence[str], known: Mapping[str, object] = FILTERS) -> None:
     """ValueError, which lists the known names, if a short name is not among them."""
-    unknown = [name for name in names if name not in FILTERS]
+    unknown = [name for name in names if name not in known]
     if unknown:
-        raise ValueError(f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(FILTERS)}")
+        raise ValueError(f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(known)}")
 
 
 def exact(model: Model) -> Filter:
@@ -131,10 +251,10 @@ def has_exact(model: Model) -> bool:
     return True
 
 
-def has_bound(model: Model) -> bool:
+def has_bound(model: Model | JumpModel) -> bool:
     """Whether the exact AOF can be computed for the model, by point masses or by particles."""
     try:
-        exact(model)
+        jump_pointmass(model) if isinstance(model, JumpModel) else exact(model)
     except ModelError:
         return False
     return True

@@ -11,12 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from kfcourse.montecarlo.statistics import BATCHES
+from kfcourse.symbolic.jumping import JumpModel, model_of_table
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import shown
 from kfcourse.symbolic.sense import nothing_random
 
 MODEL_KEYS = {"parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs", "interval", "angles"}
-VARIANT_KEYS = {"title", "state", "meter"} | MODEL_KEYS
+JUMP_KEYS = {"modes", "transition", "first"}
+VARIANT_KEYS = {"title", "state", "meter"} | MODEL_KEYS | JUMP_KEYS
+SHIPPED = ("variants.toml", "jumps.toml")
 
 RUNS = 40_000  # trajectories by which a variant is checked
 FEWEST = 2 * BATCHES  # that have standard errors
@@ -38,18 +41,28 @@ class Variant:
 
     name: str
     title: str
-    model: Model
+    model: Model | JumpModel
     table: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
+
+    def plain(self, what: str) -> Model:
+        """The model; VariantError, which says what knows no modes, if it has some."""
+        if isinstance(self.model, JumpModel):
+            raise VariantError(
+                f"variant {self.name} jumps between modes ({', '.join(self.model.names)}), for which {what} are not made; "
+                f"`kfcourse lab {self.name}` compares filters on it"
+            )
+        return self.model
 
 
 def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
-    """Read a TOML file of variants; the shipped one by default.
+    """Read the variants without modes of a TOML file; the shipped ones by default.
 
     Parameters
     ----------
     path : path, optional
         A file with tables ``[variants.NAME]``: `state`, `meter`, `parameters`, and optionally `title`,
         `symbols`, `prior`, `state_noise`, `meter_noise`, `inputs`, `interval`, `angles` (see `Model.define`).
+        Those with `modes`, `transition`, `first` (see `JumpModel.define`) are read by `read_variants` and `find_variant`.
 
     Raises
     ------
@@ -66,7 +79,7 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
         raise next(iter(faults.values()))
     for fault in faults.values():
         warnings.warn(str(fault), VariantWarning, stacklevel=2)
-    return found
+    return {name: one for name, one in found.items() if isinstance(one.model, Model)}
 
 
 def read_variants(
@@ -100,9 +113,13 @@ def _listed(names: list[str]) -> str:
 
 def _tables(path: str | Path | None) -> tuple[str, dict[str, Any]]:
     """What a file is called in messages, and its tables."""
-    where = "the shipped variants" if path is None else str(path)
+    if path is None:
+        folder = resources.files("kfcourse.lab")
+        shipped = [tomllib.loads((folder / name).read_text(encoding="utf-8"))["variants"] for name in SHIPPED]
+        return "the shipped variants", {name: table for tables in shipped for name, table in tables.items()}
+    where = str(path)
     try:
-        with (resources.files("kfcourse.lab") / "variants.toml" if path is None else Path(path)).open("rb") as file:
+        with Path(path).open("rb") as file:
             content = file.read(LARGEST_FILE + 1)
         if len(content) > LARGEST_FILE:
             raise VariantError(f"{where} has more than {LARGEST_FILE:,} bytes: it is no file of variants; check the path")
@@ -134,15 +151,16 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
     if unknown or missing:
         problem = f"unknown key {', '.join(unknown)}" if unknown else f"no {' and no '.join(missing)}"
         raise VariantError(f"{prefix}{problem}; the keys are {', '.join(sorted(VARIANT_KEYS))}")
-    for key in ("parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs"):
+    for key in ("parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs", "modes"):
         if key in table and not isinstance(table[key], Mapping):
             raise VariantError(f"{prefix}`{key}` must be a table such as {{ c = 0.9 }}, got {shown(table[key])}")
     try:
-        model = Model.of_table(table)
+        model = model_of_table(table)
     except (ValueError, TypeError, OverflowError) as error:  # FormulaError and ModelError are ValueErrors
         raise VariantError(f"{prefix}{error}") from None
-    if problem := nothing_random(model):
-        raise VariantError(f"{prefix}{problem}")
+    for mode in model.modes if isinstance(model, JumpModel) else (model,):
+        if problem := nothing_random(mode):
+            raise VariantError(f"{prefix}{problem}")
     title = "".join(c if c.isprintable() else " " for c in str(table.get("title", "")))
     return Variant(name, " ".join(title.split()), model, dict(table))
 
@@ -163,3 +181,18 @@ def chosen_variants(names: Sequence[str], everything: bool, path: str | Path | N
     for fault in faults.values():
         raise fault
     return list(found.values())
+
+
+def equations(model: Model | JumpModel) -> str:
+    """The equations on a line; of a model with modes what differs on one for each, too."""
+    if isinstance(model, JumpModel):
+        own = [key for key in model.modes[0].parameters if len({mode.parameters[key] for mode in model.modes}) > 1]
+        formulas = [equations(mode) for mode in model.modes]
+        common = [formulas[0]] if len(set(formulas)) == 1 else []
+        values = [[f"{key} = {float(mode.parameters[key]):g}" for key in own] for mode in model.modes]
+        each = [[*([] if common else [formula]), *said] for formula, said in zip(formulas, values, strict=True)]
+        return "\n        ".join(
+            [*common, *(f"{name}: {';  '.join(said)}" for name, said in zip(model.names, each, strict=True))]
+        )
+    state, meter = (", ".join(map(str, one)) for one in (model.state_equation, model.meter_equation))
+    return f"x' = {state};  y = {meter}"

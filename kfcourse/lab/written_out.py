@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import sympy as sp
 
 from kfcourse.filters import EQUATIONS
@@ -19,6 +21,8 @@ _VALUES = {
     s.F_value: ("F", s.lam, s.Psi),
     s.tau_zp: ("tau", s.z, s.P),
     s.Theta_zp: ("Theta", s.z, s.P),
+    s.tau_uT: ("tau", s.u, s.T),
+    s.Theta_uT: ("Theta", s.u, s.T),
 }
 
 
@@ -28,31 +32,37 @@ def scalar_equations(structure: Structure) -> list[tuple[sp.Symbol, sp.Expr]]:
     Those of the filter, `kfcourse.filters.EQUATIONS`, with the formulas of the structure; h_k and G_k have lines of their own
     only where they are long.
     """
-    formulas = structure.formulas
-    if formulas is None or structure.model.n != 1 or structure.model.p != 1:
-        raise ValueError(f"only scalar models with derived structural functions are written out, not {structure.model}")
-    values = {}
-    for value, (function, mean, cov) in _VALUES.items():
-        arguments = formulas.meter_arguments if function in "hGF" else formulas.state_arguments
-        taken = dict(zip(arguments, (_scalar(mean), _scalar(cov)), strict=True))
-        values[_scalar(value)] = structure[function].subs(taken, simultaneous=True)
+    values = function_values(structure)
     found: list[tuple[sp.Symbol, sp.Expr]] = []
     short: dict[sp.Symbol, sp.Expr] = {}
     for equation in EQUATIONS["aof"]:
-        name, formula = _scalar(equation.lhs), _scalar(equation.rhs).xreplace(values).xreplace(short)
-        if name in (_scalar(s.h), _scalar(s.G)) and symbols(formula_latex(formula, _VARIABLES)) <= SHORT:
+        name, formula = scalar(equation.lhs), scalar(equation.rhs).xreplace(values).xreplace(short)
+        if name in (scalar(s.h), scalar(s.G)) and symbols(formula_latex(formula, _VARIABLES)) <= SHORT:
             short[name] = formula
         else:
             found.append((name, formula))
     return found
 
 
+def function_values(structure: Structure) -> dict[sp.Symbol, sp.Expr]:
+    """The formulas that stand in the equations as h(lambda, Psi), tau(z, p), ..., of a scalar model."""
+    formulas = structure.formulas
+    if formulas is None or structure.model.n != 1 or structure.model.p != 1:
+        raise ValueError(f"only scalar models with derived structural functions are written out, not {structure.model}")
+    values = {}
+    for value, (function, mean, cov) in _VALUES.items():
+        arguments = formulas.meter_arguments if function in "hGF" else formulas.state_arguments
+        taken = dict(zip(arguments, (scalar(mean), scalar(cov)), strict=True))
+        values[scalar(value)] = structure[function].subs(taken, simultaneous=True)
+    return values
+
+
 def written_lines(structure: Structure) -> list[str]:
     """The same as lines of an `aligned` block."""
     lines = []
     for name, formula in scalar_equations(structure):
-        if formula.has(_scalar(s.K)):  # lambda + K (y - h): what is corrected comes first
-            terms = sorted(sp.Add.make_args(formula), key=lambda term: term.has(_scalar(s.K)))
+        if formula.has(scalar(s.K)):  # lambda + K (y - h): what is corrected comes first
+            terms = sorted(sp.Add.make_args(formula), key=lambda term: term.has(scalar(s.K)))
             first, *further = joined([formula_latex(term, _VARIABLES) for term in terms])
         else:
             first, *further = formula_lines(formula, _VARIABLES)
@@ -60,18 +70,19 @@ def written_lines(structure: Structure) -> list[str]:
     return lines
 
 
-def _scalar(expression: sp.Basic) -> sp.Expr:
+def scalar(expression: sp.Basic, inverse: Callable[[sp.Expr], sp.Expr] = lambda e: 1 / e) -> sp.Expr:
     """An expression in matrices as one in numbers: of one component they are the same."""
     if isinstance(expression, sp.MatrixSymbol):
         return sp.Symbol(expression.name, real=True)
     if isinstance(expression, sp.Transpose):
-        return _scalar(expression.arg)
+        return scalar(expression.arg, inverse)
     if isinstance(expression, sp.Inverse):
-        return 1 / _scalar(expression.arg)
-    if isinstance(expression, sp.MatMul):
-        return sp.Mul(*map(_scalar, expression.args))
-    return sp.Add(*map(_scalar, expression.args)) if isinstance(expression, sp.MatAdd) else expression
+        return inverse(scalar(expression.arg, inverse))
+    if isinstance(expression, sp.MatMul | sp.MatAdd):
+        parts = [scalar(one, inverse) for one in expression.args]
+        return sp.Mul(*parts) if isinstance(expression, sp.MatMul) else sp.Add(*parts)
+    return expression
 
 
 # In the order in which a product is written.
-_VARIABLES = [_scalar(one) for one in (s.K, s.lam, s.z, s.Psi, s.P, s.G, s.F, s.y, s.h)]
+_VARIABLES = [scalar(one) for one in (s.K, s.lam, s.z, s.Psi, s.P, s.G, s.F, s.y, s.h)]

@@ -12,6 +12,7 @@ import numpy as np
 from kfcourse.laws import Array
 from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean, ratio, rejected
 from kfcourse.montecarlo.two_phase import Replicas, Terms, batch_sums, estimate, with_design
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
 EXACT = "aof-exact"
@@ -79,7 +80,7 @@ class Comparison:
         and how far they are above the exact smoother.
     """
 
-    model: Model
+    model: Model | JumpModel
     names: tuple[str, ...]
     fast: tuple[str, ...]
     runs: int

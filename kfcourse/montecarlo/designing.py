@@ -1,4 +1,4 @@
-"""Finding the coefficients of the designed filters (DUOF, FOS, MFOS) over an ensemble.
+"""Finding the coefficients of the designed filters (DUOF, FOS and their kin) over an ensemble.
 
 All designs advance together, step by step.  At each step the equations of every block run until they
 ask for a regression; the moments of all blocks are merged, the regression solved, and its coefficients
@@ -12,11 +12,10 @@ from concurrent.futures import Executor
 
 import numpy as np
 
-from kfcourse.angles import on_circle
-from kfcourse.filters.base import Filter, initial_state
-from kfcourse.filters.designed import Affine, Design, Scatter, Step
-from kfcourse.laws import Gaussian, NegativeVariance
-from kfcourse.montecarlo.ensemble import Instant, Serial
+from kfcourse.filters.base import Filter, State, with_angles_on_circle
+from kfcourse.filters.designed import Affine, Design, Scatter
+from kfcourse.laws import NegativeVariance
+from kfcourse.montecarlo.ensemble import Instant, JumpInstant, Serial
 
 
 class NotFinite(ArithmeticError):
@@ -55,13 +54,13 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: E
         If a regression meets infinite or NaN values, or a filter a negative variance: the model or the filter diverges.
     """
     coefficients: list[list[list[Affine]]] = [[] for _ in designs]
-    predicted: list[list[Gaussian]] = []  # [block][design]
+    states: list[list[State]] = []  # [block][design]
     for k, blocks in enumerate(ensemble):
-        if not predicted:
-            predicted = [[initial_state(d.model)(len(b.x)).predicted for d in designs] for b in blocks]
-        runs = [_BlockStep(designs, before, block, k) for before, block in zip(predicted, blocks, strict=True)]
+        if not states:
+            states = [[one.init(len(block.x)) for one in designs] for block in blocks]
+        runs = [_BlockStep(designs, before, block, k) for before, block in zip(states, blocks, strict=True)]
         fits = _fit_step(designs, runs, k, pool or Serial())
-        predicted = [run.predictions() for run in runs]
+        states = [run.after() for run in runs]
         for table, row in zip(coefficients, fits, strict=True):
             table.append(row)
     return [one.with_coefficients(table) for one, table in zip(designs, coefficients, strict=True)]
@@ -70,11 +69,11 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: E
 class _BlockStep:
     """The equations of all designs over one step of one block of trajectories."""
 
-    def __init__(self, designs: Sequence[Design], predicted: Sequence[Gaussian], block: Instant, k: int):
+    def __init__(self, designs: Sequence[Design], states: Sequence[State], block: Instant, k: int):
         self.block, self.names, self.k = block, [one.name for one in designs], k
         self.angles = [one.model.angles.x for one in designs]
-        self.running = [one.equations(before, block.y, k) for one, before in zip(designs, predicted, strict=True)]
-        self.results: list[Step | None] = [None] * len(designs)
+        self.running = [one.equations(before, block.y) for one, before in zip(designs, states, strict=True)]
+        self.results: list[State | None] = [None] * len(designs)
 
     def advance(self, answers: dict[int, Affine | None]) -> list[Scatter | None]:
         """Answer the waiting designs; the moments of the regression each asks for next, None if it is through."""
@@ -89,15 +88,16 @@ class _BlockStep:
             return None
         except (NegativeVariance, np.linalg.LinAlgError) as error:
             raise NotFinite(f"step {self.k}: {self.names[i]} failed: {error}", self.names[i]) from None
-        return Scatter.of(request.target(self.block.x, self.block.x_next), request.regressor)
+        target, regressor = request.target(self.block.x, self.block.x_next), request.regressor
+        if request.mode is not None and isinstance(self.block, JumpInstant):
+            there = self.block.mode == request.mode
+            target, regressor = target[there], regressor[there]
+        return Scatter.of(target, regressor)
 
-    def predictions(self) -> list[Gaussian]:
-        """What the designs, which are all through, predict: angles between -pi and pi, as when they run."""
-        done = [step for step in self.results if step is not None]
-        return [
-            Gaussian(on_circle(step.predicted.mean, angles), step.predicted.cov)
-            for step, angles in zip(done, self.angles, strict=True)
-        ]
+    def after(self) -> list[State]:
+        """The states of the designs, which are all through: angles between -pi and pi, as when they run."""
+        done = [state for state in self.results if state is not None]
+        return [with_angles_on_circle(state, angles) for state, angles in zip(done, self.angles, strict=True)]
 
 
 def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int, pool: Executor) -> list[list[Affine]]:
@@ -111,8 +111,14 @@ def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int, poo
         for i, parts in zip(active, zip(*moments, strict=True), strict=True):
             if parts[0] is None:
                 continue
+            known = [part for part in parts if part is not None]
+            if not any(part.size for part in known):
+                raise NotFinite(
+                    f"step {k}: no trajectory of the design is in a mode that {designs[i].name} fits; take more trajectories",
+                    designs[i].name,
+                )
             with np.errstate(over="ignore", invalid="ignore"):
-                merged = Scatter.together([part for part in parts if part is not None])
+                merged = Scatter.together(known)
             if not np.isfinite(merged.scatter).all():
                 if not all(np.isfinite(run.block.x_next).all() and np.isfinite(run.block.y).all() for run in runs):
                     raise NotFinite(f"step {k}: the model's trajectories become infinite, check its equations and parameters")

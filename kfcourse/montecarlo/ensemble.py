@@ -13,7 +13,7 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 import scipy
@@ -22,6 +22,7 @@ from kfcourse.angles import on_circle
 from kfcourse.laws import Array, Gaussian, Trajectories, normalised_square, square_root
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
 # Largest and smallest block of trajectories: operations long enough to leave the interpreter to the other threads,
@@ -38,6 +39,30 @@ class Instant(NamedTuple):
     y: Array
     x_next: Array
 
+    @property
+    def after(self) -> tuple[Array, ...]:
+        """What the next step starts from."""
+        return (self.x_next,)
+
+
+class JumpInstant(Instant):
+    """The same of a model that jumps, with the modes i_k and i_{k+1} (N,), numbers from 0."""
+
+    mode: Array
+    mode_next: Array
+
+    @property
+    def after(self) -> tuple[Array, ...]:
+        return self.x_next, self.mode_next
+
+
+class JumpTrajectories(NamedTuple):
+    """Stored trajectories of a model that jumps: x (steps, runs, n), y (steps, runs, p), modes (steps, runs)."""
+
+    x: Array
+    y: Array
+    mode: Array
+
 
 @dataclass(frozen=True)
 class Ensemble:
@@ -45,7 +70,7 @@ class Ensemble:
 
     Attributes
     ----------
-    model : Model
+    model : Model or JumpModel
     runs, steps : int
         Trajectories, and measurements y_0 ... y_{steps-1} of each.
     seed : numpy.random.SeedSequence
@@ -56,7 +81,7 @@ class Ensemble:
         None: independently, without weights.
     """
 
-    model: Model
+    model: Model | JumpModel
     runs: int
     steps: int
     seed: np.random.SeedSequence
@@ -86,36 +111,44 @@ class Ensemble:
 
     def block(self, index: int) -> Iterator[Instant]:
         """The steps of one block of trajectories."""
-        x = self._initial(index)
+        start = self._start(index)
         for chunk, steps in enumerate(self._chunks):
-            for k, v, w in zip(steps, *self._draw(index, chunk), strict=True):
-                instant = self._simulator(k, x, v, w)
+            for k, *drawn in zip(steps, *self._draw(index, chunk), strict=True):
+                instant = self._simulator(k, *start, *drawn)
                 yield instant
-                x = instant.x_next
+                start = instant.after
 
     def by_step(self, pool: Executor | None = None) -> Iterator[list[Instant]]:
         """All blocks of a step together, step by step: for coefficients that need the whole ensemble."""
         pool = pool or Serial()
         blocks = range(len(self.sizes))
-        x = list(pool.map(self._initial, blocks))
+        starts = list(pool.map(self._start, blocks))
         drawn = [pool.submit(self._draw, b, 0) for b in blocks]
         for chunk, steps in enumerate(self._chunks):
-            noises = [future.result() for future in drawn]
+            noises = [future.result() for future in drawn]  # of each block: of each kind (steps, size, ...)
             if chunk + 1 < len(self._chunks):
                 drawn = [pool.submit(self._draw, b, chunk + 1) for b in blocks]  # ahead of time
             for i, k in enumerate(steps):
                 simulator = partial(self._simulator, k)
-                instants = list(pool.map(simulator, x, [v[i] for v, _ in noises], [w[i] for _, w in noises]))
+                given = [(*start, *(kind[i] for kind in kinds)) for start, kinds in zip(starts, noises, strict=True)]
+                instants = list(pool.map(lambda arrays, one=simulator: one(*arrays), given))
                 yield instants
-                x = [instant.x_next for instant in instants]
+                starts = [instant.after for instant in instants]
 
     @cached_property
-    def _simulator(self) -> _Simulator:
-        return _Simulator(self.model)
+    def _simulator(self) -> _Simulator | _JumpSimulator:
+        return _JumpSimulator(self.model) if isinstance(self.model, JumpModel) else _Simulator(self.model)
 
     def _stream(self, *key: int) -> np.random.Generator:
         spawned = np.random.SeedSequence(self.seed.entropy, spawn_key=(*self.seed.spawn_key, *key))
         return np.random.Generator(np.random.SFC64(spawned))
+
+    def _start(self, block: int) -> tuple[Array, ...]:
+        """Initial states, and modes if there are any; these from a stream of their own."""
+        x = self._initial(block)
+        if not isinstance(self.model, JumpModel):
+            return (x,)
+        return x, _chosen(self.model.first[None], self._stream(block, 0, 0).random(len(x)))
 
     def _initial(self, block: int) -> Array:
         rng, size, prior = self._stream(block, 0), self.sizes[block], self.model.prior
@@ -143,9 +176,13 @@ class Ensemble:
         exponent = 0.5 * (1 - self.wide**-2) * normalised_square(x - mean, cov) - rank * np.log(self.wide)
         return 2 * scipy.special.expit(-exponent)
 
-    def _draw(self, block: int, chunk: int) -> tuple[Array, Array]:
-        """Noises of a few steps of a block: v and w, (steps, size, r)."""
+    def _draw(self, block: int, chunk: int) -> tuple[Array, ...]:
+        """Noises of a few steps of a block: v and w, (steps, size, r); of a model that jumps also (steps, size) in 0 to 1."""
         rng, steps, size = self._stream(block, 1 + chunk), len(self._chunks[chunk]), self.sizes[block]
+        if isinstance(self.model, JumpModel):
+            first = self.model.modes[0]
+            standard = [rng.standard_normal((steps, len(noises), size)).swapaxes(1, 2) for noises in (first.v, first.w)]
+            return *standard, rng.random((steps, size))
         v = _draw(rng, self.model.state_noise, steps, size)
         return v, _draw(rng, self.model.meter_noise, steps, size)
 
@@ -165,13 +202,42 @@ class _Simulator:
         return Instant(x, on_circle(y, self.angles.y), on_circle(x_next, self.angles.x))
 
 
+class _JumpSimulator:
+    """One step of a model that jumps: (k, x, mode, v, w, u) -> y = b^mode(x, w), the next mode by u, x' = a^next(x, v)."""
+
+    def __init__(self, model: JumpModel):
+        self.model, self.modes = model, [compile_model(mode) for mode in model.modes]
+
+    def __call__(self, k: int, x: Array, mode: Array, v: Array, w: Array, u: Array) -> Instant:
+        model, angles = self.model, self.model.angles
+        mode_next = _chosen(model.transition_at(k)[mode], u)
+        y, x_next = np.empty((len(x), model.p)), np.empty((len(x), model.n))
+        with np.errstate(over="ignore", invalid="ignore"):
+            for j, (one, (state, meter)) in enumerate(zip(model.modes, self.modes, strict=True)):
+                here, there = mode == j, mode_next == j
+                y[here] = meter(x[here], _of_law(w[here], one.meter_noise), k)
+                x_next[there] = state(x[there], _of_law(v[there], one.state_noise), k)
+        found = JumpInstant(x, on_circle(y, angles.y), on_circle(x_next, angles.x))
+        found.mode, found.mode_next = mode, mode_next
+        return found
+
+
+def _chosen(probabilities: Array, u: Array) -> Array:
+    """A number for each of u (N,), between 0 and 1: j with the probability of column j, (N, J) or (1, J)."""
+    return (u[:, None] >= np.cumsum(probabilities, axis=1)[:, :-1]).sum(axis=1).astype(np.int8)
+
+
+def _of_law(standard: Array, law: Gaussian) -> Array:
+    return law.mean + standard @ square_root(law.cov).T
+
+
 def _draw(rng: np.random.Generator, law: Gaussian, steps: int, size: int) -> Array:
     """Gaussian noise (steps, size, r), every component contiguous in memory."""
     r = len(law.mean)
     standard = rng.standard_normal((steps, r, size)).swapaxes(1, 2)
     if not law.mean.any() and np.array_equal(law.cov, np.eye(r)):
         return standard
-    return law.mean + standard @ square_root(law.cov).T
+    return _of_law(standard, law)
 
 
 def _by_strata(rng: np.random.Generator, sets: int, r: int, wide: float) -> Array:
@@ -211,13 +277,22 @@ def workers(threads: int) -> Iterator[Executor]:
         pool.shutdown(cancel_futures=True)
 
 
-def simulate(model: Model, runs: int, steps: int, seed: Seed) -> Trajectories:
-    """Trajectories to look at: x (steps, runs, n) and y (steps, runs, p), the same for the same seed."""
+@overload
+def simulate(model: Model, runs: int, steps: int, seed: Seed) -> Trajectories: ...
+@overload
+def simulate(model: JumpModel, runs: int, steps: int, seed: Seed) -> JumpTrajectories: ...
+def simulate(model: Model | JumpModel, runs: int, steps: int, seed: Seed) -> Trajectories | JumpTrajectories:
+    """Trajectories to look at: x (steps, runs, n) and y (steps, runs, p), the same for the same seed.
+
+    Of a model that jumps also its modes (steps, runs).
+    """
     ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(seed_number(seed)))
-    x, y = np.empty((steps, runs, model.n)), np.empty((steps, runs, model.p))
+    x, y, mode = np.empty((steps, runs, model.n)), np.empty((steps, runs, model.p)), np.zeros((steps, runs), dtype=np.int8)
     start = 0
     for index, size in enumerate(ensemble.sizes):
         for k, instant in enumerate(ensemble.block(index)):
             x[k, start : start + size], y[k, start : start + size] = instant.x, instant.y
+            if isinstance(instant, JumpInstant):
+                mode[k, start : start + size] = instant.mode
         start += size
-    return Trajectories(x, y)
+    return JumpTrajectories(x, y, mode) if isinstance(model, JumpModel) else Trajectories(x, y)

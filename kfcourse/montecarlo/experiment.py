@@ -28,6 +28,7 @@ from kfcourse.montecarlo.subset import LEAST, progress_bar, run_block, run_subse
 from kfcourse.montecarlo.two_phase import Replicas
 from kfcourse.montecarlo.widths import best_width
 from kfcourse.seeds import Seed, seed_number
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
 T = TypeVar("T")
@@ -98,7 +99,7 @@ def _reshaped(y: Array, p: int) -> str:
 
 def compare(
     filters: Sequence[Filter | Design],
-    model: Model,
+    model: Model | JumpModel,
     runs: int,
     steps: int,
     seed: Seed,
@@ -228,7 +229,7 @@ def _smoothing(
 
 def _check_arguments(
     filters: Sequence[Filter | Design],
-    model: Model,
+    model: Model | JumpModel,
     subset_runs: int,
     subset_seconds: float | None,
     subset_memory: float | None,

@@ -12,6 +12,7 @@ import numpy as np
 
 from kfcourse.filters.base import Filter
 from kfcourse.montecarlo.ensemble import Ensemble
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
 WIDTHS = (1.0, 1.5, 2.0, 3.0)  # that are tried
@@ -21,7 +22,7 @@ RARE = 1e-6  # weight of a state that the prior hardly ever has: six deviations 
 LOST = 0.5  # part of the mean square of the states that such may make
 
 
-def best_width(filters: Sequence[Filter], model: Model, runs: int, steps: int, seed: np.random.SeedSequence) -> float:
+def best_width(filters: Sequence[Filter], model: Model | JumpModel, runs: int, steps: int, seed: np.random.SeedSequence) -> float:
     """The width of `Ensemble` with which the filters' errors, and their distances from the first filter, vary least.
 
     A mean of w f over states drawn from q, with w = p / q, varies as M_q[(w f)^2] = M_p[w f^2] does.  So one sample, drawn with

@@ -13,6 +13,8 @@ tables       tables of numbers
 figures      the style of the figures, labels at the ends of curves
 diagram      block diagrams from a description
 flights      pictures and tables of a flight and its estimates
+browser      the lab's filters as JavaScript, from their printed equations
+explore      figures that answer when they are touched
 live         the page on which a reader moves the pointer
 house        the structure of this package, read from its imports
 """

@@ -6,7 +6,7 @@ import ast
 import html
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 
@@ -23,6 +23,7 @@ LAYERS = (
     "exercises",
     "pages",
     "checks",
+    "derivations",
     "lab",
     "scenarios",
     "continuous",
@@ -90,22 +91,11 @@ def sentence(path: Path) -> str:
     return (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n\n")[0].replace("\n", " ")
 
 
-def contents() -> str:
-    """All modules with a sentence each, floor by floor: a table in HTML."""
-    rows = sorted(modules(), key=lambda row: (LAYERS.index(layer(row[0])), row[0]))
-    return _table("module", "what it is for", {name: sentence(path) for name, path in rows if layer(name) != "exercises"})
-
-
 def floors() -> str:
     """The floors with a sentence each, from the top down: a table in HTML."""
     said = {name: sentence(path) for name, path in modules() if name in LAYERS}
-    return _table("floor", "what lives there", {name: said[name] for name in LAYERS})
-
-
-def _table(first: str, second: str, rows: Mapping[str, str]) -> str:
-    """Names as code beside their sentences, in which `quoted` words are code too."""
-    body = "".join(f"<tr><td><code>{name}</code></td><td>{_coded(text)}</td></tr>" for name, text in rows.items())
-    return f'<table class="table"><thead><tr><th>{first}</th><th>{second}</th></tr></thead><tbody>{body}</tbody></table>'
+    body = "".join(f"<tr><td><code>{name}</code></td><td>{_coded(said[name])}</td></tr>" for name in LAYERS)
+    return f'<table class="table"><thead><tr><th>floor</th><th>what lives there</th></tr></thead><tbody>{body}</tbody></table>'
 
 
 def _coded(text: str) -> str:

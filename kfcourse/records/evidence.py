@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from kfcourse.filters.base import Evidence, Filter, State, structure_of
+from kfcourse.filters.base import Evidence, Filter, State, structure_of, unknown_error
 from kfcourse.laws import Array, log_density
 from kfcourse.montecarlo.experiment import walk
 
@@ -84,9 +84,7 @@ def likelihood_error(one: Filter, y: Array) -> Array:
     found = []
     for _, _, after in _passages(one, y):
         if not hasattr(after.memory, "evidence_error"):
-            raise ValueError(
-                f"{one.name} does not know how good its laws are: ask pointmass(model), which is exact, or particle(model)"
-            )
+            raise unknown_error(one)
         found.append(after.memory.evidence_error())
     return np.stack(found)
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from kfcourse.angles import difference
 from kfcourse.filters.approximations import aof
-from kfcourse.filters.base import Filter, State
+from kfcourse.filters.base import Filter, State, unknown_error
 from kfcourse.filters.iterated_ekf import seen_from
 from kfcourse.filters.looking_back import looked_back, normal_laws
 from kfcourse.laws import (
@@ -97,9 +97,7 @@ def smoothing_error(one: Filter, y: Array) -> Array:
     True
     """
     if one.look_back is None:
-        raise ValueError(
-            f"{one.name} does not know how good its laws are: ask pointmass(model), which is exact, or particle(model)"
-        )
+        raise unknown_error(one)
     return np.stack([state.memory.discretisation_error() for state in _looked_back(one, y)])
 
 

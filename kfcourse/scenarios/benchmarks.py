@@ -3,6 +3,7 @@
 pendulum()               Särkkä and Svensson (2023), with their data: `pendulum_data()`
 car()                    from the same book, linear: `car_data()`
 growth_model(variance)   the univariate nonstationary growth model (Gordon, Salmond and Smith, 1993)
+cubic_sensor(), logistic(), inverse_cube_root()   the conditionally minimax line (Pankov, Bosov and Borisov)
 stochastic_volatility()  a state that shows only in the measurement's variance
 bearings()               two bearings of a target (Hartikainen, Solin and Särkkä, 2011), with its course: `bearings_data(...)`
 reentry(known)           a vehicle that enters the atmosphere (Julier and Uhlmann, 2004), seen by a radar
@@ -40,6 +41,9 @@ GROWTH_ELSEWHERE = {"EKF": 115.8, "Gauss-Hermite 5": 59.2, "Gauss-Hermite 10": 4
 # From the same manual: root mean square errors of the position, means over runs.  Bearings of 1000 runs; re-entry, km, of 100.
 BEARINGS_ERRORS = {"EKF": 0.114, "UKF": 0.113}
 REENTRY_ERRORS = {"EKF": 0.0084, "UKF": 0.0084}
+
+# Of the cubic sensor, once it has settled: read from the curves that Pankov, Bosov and Borisov publish.
+CUBIC_SENSOR = {"error variance": 0.356, "state variance": 1.155}
 
 # The pendulum's errors again, of the smoothers.
 PENDULUM_SMOOTHED = {"EKF": 0.057446202494837, "UKF": 0.036617555415464256}
@@ -105,6 +109,23 @@ def growth_model(variance: float = 1) -> Model:
         "x**2/20 + w",
         prior={"mean": 0, "variance": 5},
         state_noise={"variance": variance},
+    )
+
+
+def cubic_sensor() -> Model:
+    """x' = x/(1 + x^2) + v,  y = x^3 + x + w;  x_0 ~ N(0.1, 1)."""
+    return Model.define("x/(1 + x**2) + v", "x**3 + x + w", prior={"mean": 0.1, "variance": 1})
+
+
+def logistic(bound: float = 1e4) -> Model:
+    """x' = max(-b, x(1 - x)) + v,  y = x + w;  x_0 ~ N(0.1, 0.01).  x(1 - x) is at most 1/4: above there is nothing to bound."""
+    return Model.define("(-b if x*(1 - x) < -b else x*(1 - x)) + v", "x + w", {"b": bound}, prior={"mean": 0.1, "variance": 0.01})
+
+
+def inverse_cube_root(bound: float = 100) -> Model:
+    """x' = min(b, x^(-1/3)) + v with the odd root,  y = x + w;  x_0 ~ N(3.01, 1)."""
+    return Model.define(
+        "(b if 0 <= x < 1/b**3 else sign(x)/Abs(x)**(1/3)) + v", "x + w", {"b": bound}, prior={"mean": 3.01, "variance": 1}
     )
 
 

@@ -4,12 +4,13 @@ formula      formulas typed by people, read without executing them
 reading      the other things that people write of a model: names, numbers, laws
 angular      which components are angles
 known        what is known of every step: its number, its time, inputs; functions that depend on it
-model        `Model`: object, meter, noises, prior
+model        `Model`: object, meter, noises, prior;  jumping: `JumpModel`, several of them and a chain
 equations    its two equations as functions of arrays
 choices      functions with kinks and jumps
 moments      exact moments of functions of normal variables
 structure    structural functions tau, Theta, h, G, F, derived: `linearised`, `gaussian`
-quadrature   the same by quadrature: `unscented`, `gauss_hermite`
+quadrature   the same by quadrature: `unscented`, `gauss_hermite`;  averaging: averaged over modes
 sides        object and meter at a normal law, in symbols: what derivations by hand start from
 codegen      expressions -> NumPy over the ensemble; the only place where formulas become code
+javascript   the same programs as JavaScript, for the pages
 """

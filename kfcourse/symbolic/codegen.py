@@ -2,7 +2,7 @@
 
 The only place where expressions become code.  `lower` splits expressions into elementary assignments
 (common subexpressions once, small powers as products) that any target could print; `numpy_source`
-prints them as NumPy.  A compiled target would be a second printer beside it.
+prints them as NumPy, `javascript.loop` as JavaScript.
 """
 
 from __future__ import annotations
@@ -179,6 +179,16 @@ def _in_order(assignments: list[tuple[sp.Symbol, sp.Expr]]) -> list[tuple[sp.Sym
     return ordered
 
 
+def float_text(number: sp.Rational) -> str:
+    """The float nearest to a rational number, as every target prints it; BeyondFloats if there is none."""
+    value = float(number) if abs(number) < 2**1023 else np.inf
+    if not np.isfinite(value) or (number and not value):
+        raise BeyondFloats(
+            f"the derived functions hold the number {sp.N(number, 3)!s}, beyond what a float can be; change the units"
+        )
+    return repr(value)
+
+
 class _Printer(NumPyPrinter):
     """NumPy with floats for rational numbers and readable products."""
 
@@ -197,12 +207,7 @@ class _Printer(NumPyPrinter):
     _print_Dummy = _print_Symbol
 
     def _print_Rational(self, expr: sp.Rational) -> str:
-        value = float(expr) if abs(expr) < 2**1023 else np.inf
-        if not np.isfinite(value) or (expr and not value):
-            raise BeyondFloats(
-                f"the derived functions hold the number {sp.N(expr, 3)!s}, beyond what a float can be; change the units"
-            )
-        return repr(value)
+        return float_text(expr)
 
     _print_Integer = _print_Rational
     _print_Half = _print_Rational

@@ -106,6 +106,28 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
     >>> parse("x - x**2*sin(v)", {"x": x, "v": v})
     -x**2*sin(v) + x
     """
+    formula, tree, offset = syntax(formula)
+    try:
+        expression = Reader(formula, symbols, offset).read(tree)
+    except RecursionError:
+        raise FormulaError(formula, "the formula is nested too deeply; split it up") from None
+    except TypeError:  # SymPy's, where numbers that are not real are compared
+        raise FormulaError(formula, "the formula compares what has no real value") from None
+    if _degree(expression) > MAX_DEGREE:
+        raise FormulaError(formula, f"the formula has products of powers above degree {MAX_DEGREE}; simplify it")
+    if expression.has(*NO_NUMBERS):
+        raise FormulaError(formula, "the formula has no finite real value (division by zero or root of a negative?)")
+    return expression
+
+
+def syntax(formula: str) -> tuple[str, ast.expr, int]:
+    """The formula on one line, its syntax tree, and the column at which that begins; nothing of it is run.
+
+    Raises
+    ------
+    FormulaError
+        It is too long, has characters that formulas have not, or is no expression of Python.
+    """
     if not isinstance(formula, str):
         raise FormulaError(str(formula), f"a formula must be a string, got {type(formula).__name__}")
     if not formula.strip():
@@ -125,17 +147,7 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
         raise FormulaError(formula, f"the formula cannot be read ({error.msg}){hint}", column) from None
     except (ValueError, MemoryError, RecursionError):
         raise FormulaError(formula, "the formula cannot be read: nested too deeply or has forbidden characters") from None
-    try:
-        expression = _Reader(formula, symbols, offset).read(tree)
-    except RecursionError:
-        raise FormulaError(formula, "the formula is nested too deeply; split it up") from None
-    except TypeError:  # SymPy's, where numbers that are not real are compared
-        raise FormulaError(formula, "the formula compares what has no real value") from None
-    if _degree(expression) > MAX_DEGREE:
-        raise FormulaError(formula, f"the formula has products of powers above degree {MAX_DEGREE}; simplify it")
-    if expression.has(*NO_NUMBERS):
-        raise FormulaError(formula, "the formula has no finite real value (division by zero or root of a negative?)")
-    return expression
+    return formula, tree, offset
 
 
 # Typed for what formulas are made of: Cyrillic letters that look Latin, and signs of printed mathematics.
@@ -158,7 +170,7 @@ def _check_characters(formula: str) -> None:
         raise FormulaError(formula, f"{shown} ({name}) has no meaning in a formula{'; write ' * bool(instead)}{instead}", column)
 
 
-class _Reader:
+class Reader:
     """Turns white-listed syntax nodes into SymPy; `read` recurses over the tree."""
 
     def __init__(self, formula: str, symbols: dict[str, sp.Symbol], offset: int):

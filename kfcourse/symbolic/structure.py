@@ -210,11 +210,16 @@ def of_steps(
     name: str, model: Model, at: Callable[[int | None], Structure], formulas: StructuralFormulas | None = None
 ) -> Structure:
     """The structure at every step, or for a model that depends on it the one that `Structure.at` makes those of."""
-    if not model.timed:
-        return at(None)
+    return of_each_step(name, model, at, formulas) if model.timed else at(None)
+
+
+def of_each_step(
+    name: str, model: Model, at: Callable[[int], Structure], formulas: StructuralFormulas | None = None
+) -> Structure:
+    """The structure that `Structure.at` makes those of each step of."""
 
     def refused(mean: Array, cov: Array) -> NoReturn:
-        raise ModelError(f"{model} depends on the step: say which, as in structure.at(k).predict(z, p)")
+        raise ModelError(f"what is found of {model} depends on the step: say which, as in structure.at(k).predict(z, p)")
 
     return Structure(name, model, refused, refused, refused, formulas, at)
 

@@ -1,5 +1,6 @@
 """The filters: linear-Gaussian theorem, slow loops from the page, the printed equations executed."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import control
@@ -17,13 +18,13 @@ from kfcourse.filters.conditionally_optimal import EQUATIONS as DUOF_EQUATIONS
 from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.designed import Design
 from kfcourse.filters.exact import pointmass
+from kfcourse.filters.finite_memory import EQUATIONS as REMEMBERING
+from kfcourse.filters.finite_memory import ESTIMATES, MEASUREMENTS, dfkp, fbp, fkp, mdfkp, mfkp
 from kfcourse.filters.iterated_ekf import iterated
 from kfcourse.filters.kalman import kalman_filter
-from kfcourse.filters.modified_structure import EQUATIONS as MFOS_EQUATIONS
-from kfcourse.filters.modified_structure import mfos
 from kfcourse.filters.multiple_models import imm
-from kfcourse.filters.optimal_structure import EQUATIONS as FOS_EQUATIONS
-from kfcourse.filters.optimal_structure import fos
+from kfcourse.filters.optimal_structure import EQUATIONS as OPTIMAL
+from kfcourse.filters.optimal_structure import dfmp, fos, mdfmp, mfos
 from kfcourse.filters.particles import particle
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Instant, simulate
@@ -94,6 +95,7 @@ LINEAR = {
     "n=1, p=2": linear(1, 2, 1, 2, 17),
 }
 STEPS = 6
+OF_MEASUREMENTS = (fkp, mfkp, dfkp, mdfkp)
 
 
 def exact_ensemble(one: Linear, steps: int, seed: int) -> list[Instant]:
@@ -127,6 +129,8 @@ def every_filter(model: Model):
     designs = [duof(model)]
     for name in ("linearised", "gaussian"):
         designs += [family(structures[name], arguments) for family in (fos, mfos) for arguments in (2, 3)]
+        designs += [dfmp(structures[name]), mdfmp(structures[name]), fbp(structures[name], 3)]
+        designs += [family(structures[name], STEPS) for family in OF_MEASUREMENTS]  # all that there are
     return ready, designs
 
 
@@ -419,8 +423,11 @@ def structural_values(model, structure):
 FAMILIES = {
     "aof": (AOF_EQUATIONS, aof),
     "duof": (DUOF_EQUATIONS, lambda structure: duof(structure.model)),
-    "fos": (FOS_EQUATIONS, fos),
-    "mfos": (MFOS_EQUATIONS, mfos),
+    "fos": (OPTIMAL["fos"], fos),
+    "mfos": (OPTIMAL["mfos"], mfos),
+    "dfmp": (OPTIMAL["dfmp"], dfmp),
+    "mdfmp": (OPTIMAL["mdfmp"], mdfmp),
+    **{family.__name__: (REMEMBERING[family.__name__], partial(family, memory=2)) for family in (*OF_MEASUREMENTS, fbp)},
 }
 
 
@@ -440,7 +447,11 @@ def test_the_printed_equations_are_what_runs(family, size, kind):
     functions = structural_values(model, structure)
     state = filter_.init(runs)
     lam, Psi = state.predicted.mean[..., None], np.broadcast_to(state.predicted.cov, (runs, 2, 2))
+    estimates = []
     for k in range(steps):
+        # what fills zeta: of two steps, or of what there is
+        functions[MEASUREMENTS] = lambda values, k=k: np.concatenate(y[k::-1][:2], axis=1)[..., None]
+        functions[ESTIMATES] = lambda values, old=tuple(estimates): np.concatenate([values[s.z], *old], axis=1)
         given = {s.lam: lam, s.Psi: Psi, s.x: x[k][..., None], s.y: y[k][..., None], s.x_next: x[k + 1][..., None]}
         printed = Interpreter(given, functions).execute(equations)
         state = filter_.step(state, y[k])
@@ -453,7 +464,7 @@ def test_the_printed_equations_are_what_runs(family, size, kind):
         if s.Psi_next in printed:
             np.testing.assert_allclose(np.broadcast_to(state.predicted.cov, (runs, 2, 2)), printed[s.Psi_next], **tolerance)
             Psi = printed[s.Psi_next]
-        lam = printed[s.lam_next]
+        lam, estimates = printed[s.lam_next], [printed[s.z]]
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -473,7 +484,12 @@ def filters_of(model, trajectories):
     ready = [aof(build(model)) for build in STRUCTURES.values()]
     structures = [linearised(model), gaussian(model)]
     return ready + designed_on(
-        [duof(model), *(f(one, a) for f in (fos, mfos) for one in structures for a in (2, 3))], trajectories
+        [
+            duof(model),
+            *(f(one, a) for f in (fos, mfos) for one in structures for a in (2, 3)),
+            *(f(one) for f in (dfmp, mdfmp, *OF_MEASUREMENTS, fbp) for one in structures),
+        ],
+        trajectories,
     )
 
 
@@ -632,6 +648,11 @@ def test_every_filter_has_its_name_counts_its_measurements_and_says_if_it_is_slo
     """Results are asked for by name, designs and random streams are looked up by step, and the slow run on a subset."""
     filters = filters_of(variant53, trajectories)
     designed = [f"{family}{a}-{kind}" for family in ("fos", "mfos") for kind in ("linearised", "gaussian") for a in ("", 3)]
+    designed += [
+        f"{family}-{kind}"
+        for family in ("dfmp", "mdfmp", "fkp4", "mfkp4", "dfkp4", "mdfkp4", "fbp4")
+        for kind in ("linearised", "gaussian")
+    ]
     assert [one.name for one in filters] == [*(f"aof-{kind}" for kind in STRUCTURES), "duof", *designed]
     structure = linearised(variant53)
     slow = [particle(variant53, 20), pointmass(variant53)]

@@ -12,11 +12,18 @@ from kfcourse.filters import (
     adaptive_pointmass,
     alpha_beta,
     aof,
+    dfkp,
+    dfmp,
     duof,
+    fbp,
+    fkp,
     fos,
     imm,
     iterated,
     kalman_filter,
+    mdfkp,
+    mdfmp,
+    mfkp,
     mfos,
     particle,
     pointmass,
@@ -99,6 +106,8 @@ def every_filter(model):
     ready.append(imm(structures[:2], [[0.9, 0.1], [0.1, 0.9]]))
     designs = [duof(model)]
     designs += [family(one, arguments) for one in structures[:2] for family in (fos, mfos) for arguments in (2, 3)]
+    designs += [family(one) for one in structures[:2] for family in (dfmp, mdfmp, fbp)]
+    designs += [family(one, STEPS) for one in structures[:2] for family in (fkp, mfkp, dfkp, mdfkp)]
     return ready, designs
 
 

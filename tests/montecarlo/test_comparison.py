@@ -11,8 +11,7 @@ from kfcourse.filters.approximations import aof
 from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.exact import pointmass
 from kfcourse.filters.kalman import kalman_filter
-from kfcourse.filters.modified_structure import mfos
-from kfcourse.filters.optimal_structure import fos
+from kfcourse.filters.optimal_structure import fos, mfos
 from kfcourse.laws import Gaussian
 from kfcourse.montecarlo.comparison import Comparison, Subset
 from kfcourse.montecarlo.ensemble import BLOCK, Ensemble

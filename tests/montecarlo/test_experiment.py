@@ -8,8 +8,7 @@ import pytest
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.kalman import kalman_filter
-from kfcourse.filters.modified_structure import mfos
-from kfcourse.filters.optimal_structure import fos
+from kfcourse.filters.optimal_structure import fos, mfos
 from kfcourse.filters.particles import particle
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import BLOCK, SMALL_BLOCK, Ensemble, simulate, workers

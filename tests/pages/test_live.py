@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import json
 import re
-import shutil
 from contextlib import contextmanager
 
 import numpy as np
@@ -18,7 +17,6 @@ from kfcourse.linear.consistency import innovations, nis
 from kfcourse.pages import live
 from kfcourse.scenarios import pointer
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chromium-browser"))), None)
 RECORDING = live.record(pointer.hand_track(seed=10), seed=6)
 SECONDS = live.GRID * (len(RECORDING.position) - 1)
 START = {"interval": 20, "sigma": 8, "decibels": 57}
@@ -98,18 +96,6 @@ def test_arguments_that_do_not_fit(call, message):
 
 
 # ---------------------------------------------------------------- the browser
-
-
-@pytest.fixture(scope="module")
-def browser():
-    if BROWSER is None:
-        pytest.skip("no Chromium or Chrome on this machine")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=BROWSER)
-        yield browser
-        browser.close()
 
 
 @contextmanager

@@ -14,9 +14,13 @@ from kfcourse.scenarios.benchmarks import (
     bearings_data,
     car,
     car_data,
+    cubic_sensor,
+    inverse_cube_root,
+    logistic,
     pendulum_data,
     reentry,
 )
+from kfcourse.symbolic.equations import compile_noiseless
 
 
 @pytest.mark.quick
@@ -88,3 +92,18 @@ def test_the_car_of_the_source():
 def test_the_pendulum_s_data_are_the_file_s():
     x, y = pendulum_data()
     assert x.shape == (500, 2) and y.shape == (501, 1, 1) and np.isnan(y[0, 0, 0]) and np.isfinite(y[1:]).all()
+
+
+def test_the_conditionally_minimax_models_are_those_of_the_source():
+    """Their equations typed apart: without noise, at states on both sides of every border."""
+    x = np.array([-300.0, -8.0, -0.001, 1e-7, 0.001, 0.4, 1.0, 27.0, 200.0])
+    for model, following, seen in (
+        (cubic_sensor(), x / (1 + x**2), x**3 + x),
+        (logistic(), np.maximum(-1e4, np.minimum(1e4, x * (1 - x))), x),
+        (inverse_cube_root(), np.minimum(100, 1 / np.cbrt(x)), x),
+    ):
+        a, b = compile_noiseless(model)
+        np.testing.assert_allclose(a(x[:, None])[:, 0], following, rtol=1e-12)
+        np.testing.assert_allclose(b(x[:, None])[:, 0], seen, rtol=1e-12)
+        for law in (model.state_noise, model.meter_noise):
+            assert (law.mean, law.cov) == (0, 1)

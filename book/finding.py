@@ -1,0 +1,67 @@
+"""Sphinx extension: what the search page searches, the text of every section.
+
+Sphinx's own index knows words and pages, no text; and a page read from a file cannot load another to show some.  So beside the
+scripts of book/search/ this writes sections.js, a list of [address, page, section, text], which search.js searches and quotes.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import contents
+from docutils import nodes
+from sphinx import addnodes
+
+SCRIPTS = Path(__file__).resolve().parent / "search"  # not in _static, whose scripts every page loads
+REPEATS = "equations"  # the page that repeats those of the others
+SILENT = (nodes.raw, nodes.math_block, nodes.comment, nodes.title, nodes.image, nodes.classifier, addnodes.toctree)
+SILENT += (addnodes.desc_parameterlist, addnodes.desc_returns)
+READABLE = re.compile(r"[\w+=-]{1,3}|[a-z]_[0-9k]|[a-z]_\{(k [+-] 1)\}")  # without TeX
+
+
+def collect(app, doctree, name: str) -> None:
+    """Address, titles of page and section, and text of each section of a page; the first has the page's own title."""
+    if name == REPEATS:
+        return
+    known = contents.page(app.env, name)
+    page = known[1].title if known else app.env.titles[name].astext()
+    for i, section in enumerate(doctree.findall(nodes.section)):
+        title = section[section.first_child_matching_class(nodes.title)].astext()
+        anchor = f"#{section['ids'][0]}" if i else ""
+        row = app.builder.get_target_uri(name) + anchor, page, title if i else "", " ".join("".join(_said(section)).split())
+        app.env.kf_sections.append(row)
+
+
+def _said(node: nodes.Element) -> Iterator[str]:
+    """The words of a node, without those of sections in it, of long formulas, and of cells: their code and what they print."""
+    for child in node.children:
+        if isinstance(child, nodes.Text):
+            yield child.astext()
+        elif isinstance(child, nodes.math):
+            yield text if READABLE.fullmatch(text := child.astext()) else "…"
+        elif not (isinstance(child, (*SILENT, nodes.section)) or "cell" in child.get("classes", [])):
+            yield from _said(child)
+            yield "" if isinstance(child, nodes.Inline) and not isinstance(child, addnodes.desc_signature) else " "
+
+
+def begin(app) -> None:
+    app.env.kf_sections = []
+
+
+def write(app, exception: Exception | None) -> None:
+    if exception is None and app.builder.format == "html":
+        text = json.dumps(sorted(app.env.kf_sections), ensure_ascii=False, separators=(",", ":"))
+        folder = Path(app.outdir, "_static", "search")
+        shutil.copytree(SCRIPTS, folder)
+        (folder / "sections.js").write_text(f"window.SECTIONS={text}", encoding="utf-8")
+
+
+def setup(app) -> dict[str, bool]:
+    app.connect("builder-inited", begin)
+    app.connect("doctree-resolved", collect, priority=100)  # before pages become HTML in part
+    app.connect("build-finished", write)
+    return {"parallel_read_safe": True, "parallel_write_safe": False}

@@ -1,0 +1,79 @@
+"""The letters of filters-that-remember.md: a filter that remembers two measurements, as a plain program with NumPy's fits."""
+
+import numpy as np
+
+from kfcourse.pages.reader import Indexed
+from kfcourse.pages.relations import DEFINITION, NOTATION
+
+STEPS, RUNS = 6, 80
+
+
+def tau(z, p):
+    return 0.9 * z + 0.2 * np.sin(z) * np.exp(-p / 2)
+
+
+def Theta(z, p):
+    return (0.9 + 0.2 * np.cos(z)) ** 2 * p + 0.09
+
+
+def measure(lam, Psi):
+    G = 1 + 0.2 * lam
+    return lam + 0.1 * (lam**2 + Psi), G, G**2 * Psi + 0.02 * Psi**2 + 0.16
+
+
+def fitted(target, *regressors):
+    """Slopes (1, r), offset and the variance left, by least squares."""
+    rows = np.vstack([*regressors, np.ones(RUNS)])
+    found = np.linalg.lstsq(rows.T, target, rcond=None)[0]
+    return found[None, :-1], found[-1], np.var(target - found @ rows)
+
+
+def windowed(rng):
+    """All parts fitted, but the variance."""
+    x = rng.normal(size=RUNS)
+    lam, Psi, zeta, rows = np.zeros(RUNS), np.ones(RUNS), [], []
+    ahead = None
+    for _ in range(STEPS):
+        y = x + 0.1 * x**2 + 0.4 * rng.normal(size=RUNS)
+        h, G, F = measure(lam, Psi)
+        sigma = Psi * G / F * (y - h)
+        H, e, _ = fitted(x - lam, sigma)
+        z = lam + H.item() * sigma + e
+        zeta = [y, *zeta][:2]
+        Gamma, chi, T = fitted(x, *zeta)
+        u = Gamma @ np.array(zeta) + chi
+        following = 0.9 * x + 0.2 * np.sin(x) + 0.3 * rng.normal(size=RUNS)
+        L, n, _ = fitted(following, tau(u[0], T))
+        before = ahead or (1.0, 0.0)
+        rows.append(
+            {"y": y, "h": h, "G": G, "F": F}
+            | {r"\lambda": lam, r"\Psi": Psi, r"\sigma": sigma, "H": H.item(), "e": e, "z": z, r"\zeta": np.array(zeta), "u": u}
+            | {
+                r"\Gamma": Gamma,
+                r"\chi": np.full((1, RUNS), chi),
+                "T": T,
+                "L": before[0],
+                "n": before[1],
+                "y": y,
+                "h": h,
+                "G": G,
+                "F": F,
+            }
+        )
+        ahead = L.item(), n
+        lam, Psi, x = ahead[0] * tau(u[0], T) + n, Theta(u[0], T), following
+    every = {name: Indexed([row[name] for row in rows]) for name in rows[0]}
+    return every | {r"\tau": lambda u, T: tau(u[0], T), r"\Theta": lambda u, T: Theta(u[0], T), "k": range(1, STEPS - 1)}
+
+
+LETTERS = (windowed,)
+SAID = {
+    "H=1": DEFINITION,
+    "e=0": DEFINITION,
+    "L=1": DEFINITION,
+    "n=0": DEFINITION,
+    r"p_k\text{ of the filter begun anew}": NOTATION,
+    r"\frac{\partial p_{k+1}}{\partial p_k}": NOTATION,
+    r"\Psi_{k+1}": NOTATION,
+    r"\mathsf M\,\Theta(u_k,T_k)": NOTATION,
+}

@@ -1,0 +1,55 @@
+"""The letters of models-that-jump.md: three modes with a joint table of probabilities, mixtures by their second moments."""
+
+import numpy as np
+from scipy.stats import multivariate_normal
+
+from kfcourse.pages.letters import column, covariance
+from kfcourse.pages.reader import Indexed, Of
+from kfcourse.pages.relations import NOTATION
+
+M, N = 3, 2
+
+
+def correcting(rng):
+    """Probabilities by the joint density of mode and measurement, L by SciPy."""
+    h, F, y = rng.normal(size=(M, N)), np.array([covariance(rng, N) for _ in range(M)]), rng.normal(size=N)
+    z = rng.normal(size=(M, N))
+    L = np.array([multivariate_normal(one, cov).pdf(y) for one, cov in zip(h, F, strict=True)])
+    c = rng.dirichlet(np.ones(M))
+    joint = np.diag(c) @ L
+    mu = joint / np.add.reduce(joint)
+    return {
+        "i": range(M), "j": range(M), "L": Indexed(L), "c": Indexed(c), r"\mu": Indexed(mu), "y_k": column(y),
+        "h": Indexed([column(one) for one in h]), "F": Indexed(F),
+        "h^j": Of(lambda j: column(h[j]), "j"), "F^j": Of(lambda j: F[j], "j"),
+        "z^j": Of(lambda j: column(z[j]), "j"), "z": column(np.average(z, axis=0, weights=mu)),
+    }  # fmt: skip
+
+
+def predicting(rng):
+    """The joint table of the modes of two steps; each mode's prediction as M(x x^T) - m m^T."""
+    pi, mu = rng.dirichlet(np.ones(M), size=M), rng.dirichlet(np.ones(M))
+    tau, Theta = rng.normal(size=(M, M, N)), np.array([[covariance(rng, N) for _ in range(M)] for _ in range(M)])
+    table = np.diag(mu) @ pi
+    c = np.ones(M) @ table
+    w = table @ np.diag(1 / c)
+    mean = np.einsum("ij,ija->ja", w, tau)
+    square = np.einsum("ij,ijab->jab", w, Theta + np.einsum("ija,ijb->ijab", tau, tau))
+    return {
+        "i": range(M), "j": range(M), r"\pi": Indexed(pi.tolist()), r"\mu": Indexed(mu), "c": Indexed(c),
+        "w": Indexed(w.tolist()),
+        r"\tau^{ij}": Of(lambda i, j: column(tau[i, j]), "i", "j"), r"\Theta^{ij}": Of(lambda i, j: Theta[i, j], "i", "j"),
+        r"\lambda^j": Of(lambda j: column(mean[j]), "j"),
+        r"\Psi^j": Of(lambda j: square[j] - np.outer(mean[j], mean[j]), "j"),
+    }  # fmt: skip
+
+
+LETTERS = (correcting, predicting)
+SAID = {
+    r"x_{k+1}=a^{i_{k+1}}(x_k,v_k)": NOTATION,
+    r"y_k=b^{i_k}(x_k,w_k)": NOTATION,
+    r"\lambda^{\text{before}}": NOTATION,
+    r"\lambda^{\text{after}}": NOTATION,
+    r"\Psi^{\text{before}}": NOTATION,
+    r"\Psi^{\text{after}}": NOTATION,
+}

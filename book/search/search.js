@@ -1,0 +1,66 @@
+// The search page: the sections that have all words, or else any, best first, each with the place where a word stands.
+const WORD = /[\p{L}\p{N}_]+/gu;
+const SHOWN = 30, AROUND = 110;
+const english = new Stemmer();  // Sphinx's, of language_data.js
+
+// A word without its ending: "errors" finds "error", "ошибки" finds "ошибка", "фильтрации" finds "фильтрация".
+function stem(word) {
+  word = word.toLowerCase().replace("ё", "е");
+  if (/^[a-z]+$/.test(word)) return english.stemWord(word);
+  return /^[а-я]{5,}$/.test(word) ? word.replace(/[аеиоуыэюяйьмхвс]{1,3}$/, "") : word;
+}
+
+const index = new MiniSearch({
+  fields: ["page", "section", "text"],
+  tokenize: (text) => text.match(WORD) || [],
+  processTerm: stem,
+  searchOptions: { boost: { page: 3, section: 4 }, prefix: (term) => term.length > 3, boostDocument: (id) => (SECTIONS[id][0].startsWith("package/") ? 0.3 : 1) },
+});
+index.addAll(SECTIONS.map(([, page, section, text], id) => ({ id, page, section, text })));
+
+// The text around the place with the most of the words, which are marked.
+function excerpt(text, stems) {
+  const places = [...text.matchAll(WORD)].filter(([word]) => stems.some((one) => stem(word).startsWith(one)));
+  const near = (place) => new Set(places.filter(({ index: at }) => Math.abs(at - place.index) < AROUND).map(([word]) => stem(word))).size;
+  const best = places.reduce((one, other) => (near(other) > near(one) ? other : one), places[0]);
+  const first = best ? Math.max(0, text.lastIndexOf(" ", best.index - AROUND) + 1) : 0;
+  const last = (best?.index ?? 0) + 2 * AROUND;
+  const box = document.createElement("p");
+  let at = first;
+  box.append(first ? "… " : "");
+  for (const { 0: word, index: start } of places.filter((place) => place.index >= first && place.index < last)) {
+    const mark = document.createElement("mark");
+    mark.textContent = word;
+    box.append(text.slice(at, start), mark);
+    at = start + word.length;
+  }
+  const end = last < text.length ? text.lastIndexOf(" ", last) : text.length;
+  box.append(text.slice(at, Math.max(at, end)), end < text.length ? " …" : "");
+  return box;
+}
+
+function show(query) {
+  const stems = (query.match(WORD) || []).map(stem);
+  const all = index.search(query, { combineWith: "AND" });
+  const found = all.length ? all : index.search(query);
+  const rows = found.slice(0, SHOWN).map(({ id }) => {
+    const [address, page, section, text] = SECTIONS[id];
+    const [path, anchor] = address.split("#");
+    const row = document.createElement("li"), link = document.createElement("a");
+    link.href = `${path}?highlight=${encodeURIComponent(query)}${anchor ? `#${anchor}` : ""}`;
+    link.textContent = section ? `${page} › ${section}` : page;
+    row.append(link, excerpt(text, stems));
+    return row;
+  });
+  document.getElementById("search-results").replaceChildren(...rows);
+  const many = `${found.length} section${found.length === 1 ? "" : "s"}${found.length > SHOWN ? `, the best ${SHOWN} of them` : ""}`;
+  const missing = all.length || stems.length < 2 ? "" : ", none with all the words";
+  document.getElementById("kf-found").textContent = !stems.length ? "" : found.length ? many + missing : "Nothing found: try fewer words, or their beginnings.";
+}
+
+addEventListener("DOMContentLoaded", () => {
+  const query = new URLSearchParams(location.search).get("q") || "";
+  for (const field of document.querySelectorAll("form.bd-search input")) field.value = query;
+  document.querySelector(".bd-search-container form.bd-search input").focus();
+  show(query);
+});

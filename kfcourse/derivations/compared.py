@@ -1,0 +1,40 @@
+"""Are two lines equal?  Quotients of polynomials exactly; what has other functions by values at random points."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kfcourse.derivations.exact import Exact, NotPolynomial
+from kfcourse.derivations.setting import Setting
+from kfcourse.derivations.terms import Node
+from kfcourse.derivations.values import Values, agree
+
+EQUAL, DIFFERENT, IF_POSITIVE, NO_VALUE = "equal", "different", "equal if positive", "no value"
+FEWEST = 4  # points at which both have values
+
+
+def compare(setting: Setting, first: Node, second: Node) -> str:
+    """Whether two trees are equal: "equal", "different", "equal if positive" letters are meant, or "no value".
+
+    Raises
+    ------
+    Uncomputed
+        A mean is not computed here.
+    """
+    try:
+        exact = Exact(setting, [first, second])
+        return EQUAL if exact.equal(exact.of(first), exact.of(second)) else DIFFERENT
+    except ZeroDivisionError:
+        return NO_VALUE
+    except NotPolynomial:
+        values = Values(setting, [first, second])
+    pairs = values.sized(first), values.sized(second)
+    defined = np.isfinite([value for value, _ in pairs])
+    positive = np.arange(values.points) < values.points / 3
+    same = agree(*pairs)
+    if (defined.all(axis=0) & positive).sum() < FEWEST:
+        return NO_VALUE
+    if not same[defined.all(axis=0) & positive].all():
+        return DIFFERENT
+    # Where only one side has a value, as log(c^2) has and 2 log(c) has not, they are equal for positive letters only.
+    return EQUAL if same[defined.any(axis=0)].all() else IF_POSITIVE

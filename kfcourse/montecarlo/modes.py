@@ -1,0 +1,63 @@
+"""How well filters know the mode of a model that jumps: the share of steps at which the likeliest mode is the true one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from kfcourse.filters.base import Filter
+from kfcourse.laws import Array
+from kfcourse.montecarlo.ensemble import simulate
+from kfcourse.montecarlo.statistics import Estimate
+from kfcourse.seeds import Seed
+from kfcourse.symbolic.jumping import JumpModel
+
+SLOW = 8  # a slow filter runs on so many times fewer trajectories
+
+
+class Recognised(NamedTuple):
+    """What filters know of the modes.
+
+    Attributes
+    ----------
+    share : dict
+        Name of a filter to the share of steps with the right mode, the mean over all steps and trajectories.
+    guess : float
+        The same for who always names the mode that is likeliest before anything is measured.
+    mode : ndarray (steps,)
+        The true modes of one trajectory: the first in which there are as many as in any.
+    probability : dict
+        Name of a filter to its probabilities of the modes there, (steps, J).
+    """
+
+    share: dict[str, Estimate]
+    guess: float
+    mode: Array
+    probability: dict[str, Array]
+
+
+def recognised(filters: Sequence[Filter], model: JumpModel, runs: int, steps: int, seed: Seed) -> Recognised:
+    """Run the filters that carry probabilities of modes on common trajectories; slow ones on an eighth of them.
+
+    The standard errors are those of means over independent trajectories.
+    """
+    _, y, mode = simulate(model, runs, steps, seed)
+    least = max(runs // SLOW, 2)
+    shown = int(np.argmax([len(np.unique(one)) for one in mode[:, :least].T]))
+    share, there = {}, {}
+    for one in filters:
+        size = least if one.slow else runs
+        state, right = one.init(size), np.zeros(size)
+        probabilities = []
+        for k in range(steps):
+            state = one.step(state, y[k, :size])
+            found = state.memory.probability
+            right += found.argmax(axis=1) == mode[k, :size]
+            probabilities.append(found[shown])
+        each = right / steps
+        share[one.name] = Estimate(each.mean(), each.std(ddof=1) / np.sqrt(size), size - 1)
+        there[one.name] = np.array(probabilities)
+    guess = np.mean([(mode[k] == model.law_at(k).argmax()).mean() for k in range(steps)])
+    return Recognised(share, float(guess), mode[:, shown], there)

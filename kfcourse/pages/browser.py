@@ -1,0 +1,213 @@
+"""The lab's filters as JavaScript, printed from the equations that the chapters derive and print.
+
+`kfcourse.filters.EQUATIONS` are statements of two kinds.  Some hold for each trajectory, such as z = lambda + K (y - h): the
+structural functions are put in, and they become loops over the ensemble.  Others find coefficients from means and
+covariances over the ensemble, such as H = Cov(eps, omega) Cov(omega)^+: they become assignments between the loops.  What comes
+out is, for each filter of a scalar model,
+
+    step(n, v, c, a)      estimates z and predictions of all trajectories, with the coefficients c
+    design(n, v, c, a)    the same, and finds the coefficients c, for which it reads the states x and the next ones
+
+with the model's parameters in v and an array for each letter in a.  So no formula is written twice, and a filter that runs
+in the browser is the one that the book derives.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
+from pathlib import Path
+
+import sympy as sp
+
+from kfcourse.filters import EQUATIONS
+from kfcourse.filters import notation as s
+from kfcourse.lab.short_names import LAB, Structures, title
+from kfcourse.lab.written_out import function_values, scalar
+from kfcourse.symbolic import javascript
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.structure import Structure
+
+LAB_SCRIPT = Path(__file__).parent / "data" / "lab.js"  # trajectories, the exact filter, statistics: no formula of a model
+Rule = tuple[sp.Symbol, sp.Expr]
+
+_GIVEN = (s.x, s.x_next, s.y, s.lam, s.Psi)  # what a step is given; of a running filter without the states
+_KEPT = (s.z, s.P, s.lam_next, s.Psi_next)  # what it leaves
+_ARRAYS = {scalar(s.x_next): "next", scalar(s.lam_next): "lambda", scalar(s.Psi_next): "Psi"}
+
+
+def array_name(symbol: sp.Symbol) -> str:
+    """The array that holds a letter of the equations: "lambda" for \\lambda_{k}; predictions take the place of their letter."""
+    if symbol in _ARRAYS:
+        return _ARRAYS[symbol]
+    name = re.sub(r"_\{k(\+1)?\}", "", symbol.name)
+    return "".join(re.findall(r"[A-Za-z]+", name))
+
+
+def scalar_rules(family: str, structures: Structures, structure: Structure) -> list[Rule]:
+    """The equations of a family in numbers, letter and value, with the formulas of the structural functions put in."""
+    values = function_values(structure)
+    at_means = structures.linearised  # a(z, m_v) and b(lambda, m_w) are its tau and h
+    formulas = at_means.formulas
+    assert formulas is not None
+    values[scalar(s.b_value)] = at_means["h"].subs(formulas.m[0], scalar(s.lam))
+    values[scalar(s.a_value)] = at_means["tau"].subs(formulas.z[0], scalar(s.z))
+    return [(scalar(one.lhs), scalar(one.rhs, javascript.inverse).xreplace(values)) for one in EQUATIONS[family]]
+
+
+def statistics(letters: Iterable[sp.MatrixSymbol]) -> dict[sp.Symbol, str]:
+    """How the means, covariances and inverted variances of letters, which the equations hold as symbols, are computed."""
+    found = {}
+    for left, right in product(list(letters), repeat=2):
+        one, other = array_name(scalar(left)), array_name(scalar(right))
+        found[scalar(s.cov(left, right))] = f"kfCov(n, a.{one}, a.{other})"
+    for left in letters:
+        one = array_name(scalar(left))
+        found[scalar(s.mean(left))] = f"kfMean(n, a.{one})"
+        found[scalar(s.cov(left))] = f"kfCov(n, a.{one}, a.{one})"
+        found[scalar(s.cov_pinv(left))] = f"kfInverse(kfCov(n, a.{one}, a.{one}))"
+    return found
+
+
+def filter_source(name: str, structures: Structures) -> str:
+    """A filter of the lab as the text of a JavaScript object { design, step }; `design` is null where nothing is to be found."""
+    family, _, approximation = name.partition("-")
+    structure = structures.gaussian if approximation == "gaussian" else structures.linearised
+    rules = scalar_rules(family, structures, structure)
+    letters = {*_GIVEN, *(one.lhs for one in EQUATIONS[family])}
+    known = statistics(sorted(letters, key=str))
+    kept = [scalar(one) for one in _KEPT if one in letters and any(scalar(one) == left for left, _ in rules)]
+    coefficients = {left: array_name(left) for left, right in rules if right.free_symbols & set(known)}
+    constants = list(structures.model.values)
+    running = [(left, right) for left, right in rules if left not in coefficients]
+    given = [scalar(one) for one in (s.y, s.lam, s.Psi)]
+    step = _loop("step", running, kept, given, constants, coefficients)
+    if not coefficients:
+        return f"{{ design: null, step: {step.strip()} }}"
+    return f"{{ design: {_design(rules, kept, known, constants, coefficients)}, step: {step.strip()} }}"
+
+
+def _design(
+    rules: Sequence[Rule],
+    kept: Sequence[sp.Symbol],
+    known: Mapping[sp.Symbol, str],
+    constants: Sequence[sp.Symbol],
+    coefficients: Mapping[sp.Symbol, str],
+) -> str:
+    """Loops and, between them, the coefficients: in the order of the equations."""
+    ready = [scalar(one) for one in _GIVEN]
+    lines, group = list[str](), list[Rule]()
+    arrays = {array_name(symbol): symbol for symbol in ready}
+    later = list(rules)
+
+    def close() -> None:
+        if group:
+            wanted = _used_later(group, later, known, kept)
+            loop = _loop(f"loop{len(lines)}", group, wanted, ready, constants, coefficients)
+            lines.append(f"({loop.strip()})(n, v, c, a);")
+            ready.extend(left for left, _ in group if array_name(left) not in arrays)
+            group.clear()
+
+    for left, right in rules:
+        later.pop(0)
+        if left not in coefficients:
+            group.append((left, right))
+            continue
+        close()
+        names = {one: text for one, text in known.items() if right.has(one)}
+        names |= {one: f"c.{key}" for one, key in coefficients.items()}
+        lines.append(f"c.{coefficients[left]} = {javascript.expression(right, names)};")
+    close()
+    return "function (n, v, c, a) {\n" + "\n".join(lines) + "\n}"
+
+
+def _used_later(
+    group: Sequence[Rule], later: Sequence[Rule], known: Mapping[sp.Symbol, str], kept: Sequence[sp.Symbol]
+) -> list[sp.Symbol]:
+    """Of a group's letters those that the later rules need, also through means and covariances, and those that are kept."""
+    needed = set(kept)
+    for _, right in later:
+        texts = " ".join(known[one] for one in right.free_symbols & set(known))
+        names = set(re.findall(r"a\.(\w+)", texts))
+        needed |= right.free_symbols | {left for left, _ in group if array_name(left) in names}
+    return [left for left, _ in group if left in needed]
+
+
+def _loop(
+    name: str,
+    rules: Sequence[Rule],
+    wanted: Sequence[sp.Symbol],
+    given: Sequence[sp.Symbol],
+    constants: Sequence[sp.Symbol],
+    coefficients: Mapping[sp.Symbol, str],
+) -> str:
+    """The loop that computes what is wanted; what nothing wanted needs is left out."""
+    by_letter, needed = dict(rules), set(wanted)
+    for left, right in reversed(rules):
+        if left in needed:
+            needed |= right.free_symbols
+    definitions = {left: right for left, right in rules if left in needed}
+    return javascript.loop(
+        name,
+        {array_name(one): sp.Matrix([one]) for one in given if one not in by_letter},
+        {array_name(one): sp.Matrix([one]) for one in wanted},
+        definitions,
+        constants,
+        coefficients,
+    )
+
+
+def model_source(model: Model, names: Sequence[str] = LAB) -> str:
+    """A scalar model as the text of a JavaScript object: its equations, its structural functions, its filters.
+
+    Raises
+    ------
+    ModelError
+        A function that the pages' JavaScript does not have.
+    NoClosedForm
+        No Gaussian moments.
+    ValueError
+        A model that is not scalar.
+    """
+    structures, constants = Structures(model), list(model.values)
+    parts = {
+        "simulate": javascript.loop(
+            "simulate",
+            {"x": sp.Matrix(model.x), "v": sp.Matrix(model.v), "w": sp.Matrix(model.w)},
+            {"y": model.meter_equation, "next": model.state_equation},
+            constants=constants,
+        )
+    }
+    for structure in (structures.linearised, structures.gaussian):
+        formulas = structure.formulas
+        assert formulas is not None
+        functions = formulas.functions
+        before, after = {"z": formulas.z, "p": formulas.p}, {"m": formulas.m, "d": formulas.d}
+        predict = javascript.loop("predict", before, {key: functions[key] for key in ("tau", "Theta")}, constants=constants)
+        measure = javascript.loop("measure", after, {key: functions[key] for key in ("h", "G", "F")}, constants=constants)
+        parts[structure.name] = f"{{ predict: {predict.strip()}, measure: {measure.strip()} }}"
+    filters = [f"{json.dumps(name)}: {filter_source(name, structures)}" for name in names]
+    settings = {
+        "parameters": {symbol.name: float(value) for symbol, value in model.values.items()},
+        "levels": [symbol.name for symbol in levels(model)],
+        "prior": {"mean": float(model.prior.mean[0]), "variance": float(model.prior.cov[0, 0])},
+        "noises": [len(model.v), len(model.w)],
+        "titles": {name: title(name) for name in names},
+    }
+    body = [f"{key}: {text.strip()}" for key, text in parts.items()]
+    return "{\n" + ",\n".join([*body, "filters: {\n" + ",\n".join(filters) + "}", f"...{json.dumps(settings)}"]) + "}"
+
+
+def levels(model: Model) -> list[sp.Symbol]:
+    """Parameters that only noises carry: sizes of noises, positive, for a logarithmic slider."""
+    silent = {one: 0 for one in (*model.v, *model.w)}
+    quiet = set().union(*(e.subs(silent).free_symbols for e in (*model.state_equation, *model.meter_equation)))
+    return [symbol for symbol, value in model.values.items() if symbol not in quiet and value > 0]
+
+
+def script(models: Mapping[str, Model], names: Sequence[str] = LAB) -> str:
+    """`kfLab` and `kfModels`, an object of the models by name, as the text of a script that loads nothing."""
+    each = [f"{json.dumps(name)}: {model_source(model, names)}" for name, model in models.items()]
+    return javascript.RUNTIME + LAB_SCRIPT.read_text(encoding="utf-8") + "const kfModels = {\n" + ",\n".join(each) + "\n};\n"

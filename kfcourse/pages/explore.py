@@ -1,0 +1,134 @@
+"""Figures that answer when they are touched: pieces of HTML that load nothing, beside the still pictures of the same cells.
+
+    display(HTML(live_lab("fig-live-lab", models)))      the figure; a picture with this name is its first frame, and its paper
+
+The helper, data/figure.js, has axes, curves, handles, sliders and the state in the address.  Formulas come from SymPy through
+`kfcourse.symbolic.javascript`; the scripts in data/ have none of their own.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import sympy as sp
+
+from kfcourse.lab.plots import style
+from kfcourse.lab.short_names import LAB, title
+from kfcourse.lab.variants import Variant
+from kfcourse.pages.browser import script
+from kfcourse.symbolic import javascript
+
+DATA = Path(__file__).parent / "data"
+RUNS, STEPS = 10_000, 30  # of the live lab
+_DASHES = {"--": "7 4", ":": "2 3", "-.": "7 3 2 3", "-": ""}
+
+
+def figure(name: str, says: str, code: str, call: str) -> str:
+    """A figure as HTML: `code` defines what `call`, a function of (root, name), draws with the helper.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure whose picture is the first frame; its state in the address begins with it.
+    says : str
+        What it is, for those who cannot see it.
+    code, call : str
+        JavaScript.
+    """
+    helper = _read("figure.js")
+    mount = f"""(() => {{
+const root = document.currentScript.parentElement.querySelector(".kf-explore");
+const start = () => ({call})(root, {json.dumps(name)});
+document.readyState === "loading" ? addEventListener("DOMContentLoaded", start) : start();
+}})();"""
+    for text in (helper, code, mount):
+        if "</script" in text.lower():
+            raise ValueError(f"{name}: a script within a page cannot hold </script")
+    return (
+        f'<div class="kf-explored"><div class="kf-explore" role="group" aria-label="{says}"></div>'
+        f'<script>{helper}</script><script class="kf-code">{code}</script><script>{mount}</script></div>'
+    )
+
+
+def live_lab(name: str, variants: Mapping[str, Variant], first: str = "53", step: int = 4) -> str:
+    """The lab under the reader's hand: all filters of a scalar variant, designed and compared while its parameters move.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure.
+    variants : dict
+        Scalar variants by name.
+    first : str
+        The one shown first.
+    step : int
+        The step looked at first.
+    """
+    source = script({key: variant.model for key, variant in variants.items()}) + (DATA / "live-lab.js").read_text(
+        encoding="utf-8"
+    )
+    given: dict[str, Any] = {
+        "styles": {one: line_style(one) for one in LAB},
+        "titles": {one: title(one) for one in LAB},
+        "variants": {key: f"{key}: {variant.title}" for key, variant in variants.items()},
+        "first": first,
+        "step": step,
+        "runs": RUNS,
+        "steps": STEPS,
+    }
+    return figure(name, "The lab, live", source, f"(root, name) => kfLiveLab(root, name, {json.dumps(given)})")
+
+
+def line_style(name: str) -> dict[str, str]:
+    """A filter's colour and dash, as in every figure of the book."""
+    line = style(name)
+    return {"colour": line["color"], "dash": _DASHES[line["linestyle"]]}
+
+
+def two_beats(
+    name: str,
+    x: sp.Symbol,
+    y: sp.Symbol,
+    following: sp.Symbol,
+    prior: sp.Expr,
+    likelihood: sp.Expr,
+    transition: sp.Expr,
+    place: sp.Expr,
+    first: float,
+) -> str:
+    """The two beats of the Stratonovich equation, with the measurement under the reader's hand.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure.
+    x, y, following : Symbol
+        State, measurement, next state.
+    prior, likelihood, transition : Expr
+        Densities: of x; of y given x; of the next state given x.
+    place : Expr
+        The measurement without noise, of x: where the handle stands.
+    first : float
+        The measurement shown first.
+    """
+    loops = [
+        javascript.loop("prior", {"x": sp.Matrix([x])}, {"value": sp.Matrix([prior])}),
+        javascript.loop("likelihood", {"x": sp.Matrix([x])}, {"value": sp.Matrix([likelihood])}, coefficients={y: "y"}),
+        javascript.loop("transition", {"x": sp.Matrix([x]), "next": sp.Matrix([following])}, {"value": sp.Matrix([transition])}),
+        javascript.loop("place", {"x": sp.Matrix([x])}, {"value": sp.Matrix([place])}),
+    ]
+    code = javascript.RUNTIME + "".join(loops) + _read("two-beats.js")
+    call = f"(root, name) => kfTwoBeats(root, name, {first!r})"
+    return figure(name, "Correction and prediction", _closed("kfTwoBeats", code), call)
+
+
+def _read(name: str) -> str:
+    return (DATA / name).read_text(encoding="utf-8")
+
+
+def _closed(name: str, code: str) -> str:
+    """A script that leaves nothing behind but the function with this name, which it defines."""
+    return f"const {name} = (() => {{\n{code}\nreturn {name};\n}})();"

@@ -1,0 +1,83 @@
+r"""A model that jumps, averaged over its modes: what a filter that knows of no modes may take for the model.
+
+With the probabilities q_j of the modes before anything is measured, and N(z, p) or N(m, d) in every one of them,
+
+    tau = sum q_j tau_j,    Theta = sum q_j [Theta_j + (tau_j - tau)(tau_j - tau)^T],     and so h, F;    G = sum q_j G_j
+
+are the moments of the next state and of the measurement: the mode is one noise more.  Where the modes are drawn anew at each step
+nothing is lost but the shape of that noise; where they last, all that the past tells of the mode is lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kfcourse.laws import Array, Gaussian, Measurement, Transition, product, transpose
+from kfcourse.symbolic.equations import Noiseless, compile_noiseless
+from kfcourse.symbolic.jumping import JumpModel
+from kfcourse.symbolic.reading import ModelError
+from kfcourse.symbolic.structure import Structure, of_each_step
+
+
+def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
+    """The structural functions averaged over the modes, from those of each, such as [gaussian(mode) for mode in model.modes].
+
+    Raises
+    ------
+    ModelError
+        A component is an angle, of which there is no such average.
+    """
+    if model.angles.x or model.angles.y:
+        raise ModelError("components that are angles have no average over modes; take filters that know the modes")
+
+    def at(k: int) -> Structure:
+        before, after = model.law_at(k), model.law_at(k + 1)
+        now = [one.at(k) for one in structures]
+
+        def predict(z: Array, p: Array) -> Gaussian:
+            laws = [one.predict(z, p) for one in now]
+            tau = _mean(after, [law.mean for law in laws])
+            return Gaussian(tau, _mean(after, [law.cov + _square(law.mean - tau) for law in laws]))
+
+        def measure(m: Array, d: Array) -> Measurement:
+            parts = [one.measure(m, d) for one in now]
+            h, G = _mean(before, [one.h for one in parts]), _mean(before, [one.G for one in parts])
+            R = _mean(before, [one.R + _form(one.G - G, d) + _square(one.h - h) for one in parts])
+            return Measurement(h, G, _form(G, d) + R, R)
+
+        def transition(z: Array, p: Array) -> Transition:
+            parts = [one.transition(z, p) for one in now]
+            tau, A = _mean(after, [one.tau for one in parts]), _mean(after, [one.A for one in parts])
+            return Transition(tau, A, _mean(after, [one.Q + _form(one.A - A, p) + _square(one.tau - tau) for one in parts]))
+
+        return Structure("averaged", model.modes[0], predict, measure, transition)
+
+    return of_each_step("averaged", model.modes[0], at)
+
+
+def averaged_equations(model: JumpModel) -> tuple[Noiseless, Noiseless]:
+    """a(x, m_v) and b(x, m_w), averaged over the modes: sum_j q_{k+1}^j a^j, sum_j q_k^j b^j."""
+    each = [compile_noiseless(mode) for mode in model.modes]
+
+    def state(x: Array, k: int | None = None) -> Array:
+        return sum(q * np.broadcast_to(one(x, k), x.shape) for q, (one, _) in zip(model.law_at((k or 0) + 1), each, strict=True))
+
+    def meter(x: Array, k: int | None = None) -> Array:
+        return sum(q * one(x, k) for q, (_, one) in zip(model.law_at(k or 0), each, strict=True))
+
+    return state, meter
+
+
+def _mean(weights: Array, values: list[Array]) -> Array:
+    return sum((q * value for q, value in zip(weights, values, strict=True)), np.zeros(()))
+
+
+def _square(vector: Array) -> Array:
+    return vector[..., :, None] * vector[..., None, :]
+
+
+def _form(matrix: Array, cov: Array) -> Array:
+    """M P M^T."""
+    return product(product(matrix, cov), transpose(matrix))

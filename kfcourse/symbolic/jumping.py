@@ -1,0 +1,302 @@
+r"""A model that jumps: several ways to move and to measure, its modes, of which one is in force at each step.
+
+    x_{k+1} = a^{i_{k+1}}(x_k, v_k)        y_k = b^{i_k}(x_k, w_k)
+    P(i_{k+1} = j | i_k = i) = pi_ij(k),    P(i_0 = j) = q_j
+
+Nobody sees the mode i_k.  (Systems with random structure, системы со случайной структурой; jump Markov systems.)  A mode is an
+ordinary `Model`, so that its structural functions, densities and code are derived as any model's are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import reduce
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from kfcourse.angles import Angles
+from kfcourse.laws import Array, Gaussian
+from kfcourse.symbolic.formula import FormulaError, symbol
+from kfcourse.symbolic.known import CHECKED, SURE, Stepwise
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import Formula, Formulas, ModelError, exact_number, read, shown, table
+
+OF_A_MODE = ("state", "meter", "parameters", "state_noise", "meter_noise")  # in which modes may differ
+SUM = 1e-9  # a row of probabilities written with ten digits sums to 1 within this
+
+
+@dataclass(frozen=True)
+class JumpModel:
+    """A model with modes; build it with `JumpModel.define`.
+
+    Attributes
+    ----------
+    names : tuple of J str
+    modes : tuple of J Model
+        Of one state, measurement and prior, with noises of the same names.
+    first : ndarray (J,)
+        q, law of the first mode.
+    """
+
+    names: tuple[str, ...]
+    modes: tuple[Model, ...]
+    first: Array = field(compare=False)
+    chain: sp.ImmutableMatrix = field(repr=False)
+    chain_of_step: Stepwise = field(repr=False, compare=False)
+
+    @classmethod
+    def define(
+        cls,
+        state: Formulas,
+        meter: Formulas,
+        parameters: Mapping[str, float] | None = None,
+        *,
+        modes: Mapping[str, Mapping[str, Any]],
+        transition: Sequence[Any],
+        first: Sequence[float] | None = None,
+        **options: Any,
+    ) -> JumpModel:
+        """Build a model with modes from formulas.
+
+        Parameters
+        ----------
+        state, meter, parameters, options
+            As of `Model.define`: what holds in every mode.
+        modes : dict
+            Name of a mode to what differs there: `state`, `meter`, `parameters`, `state_noise`, `meter_noise`.
+        transition : matrix, or list
+            pi, the rows of which sum to 1: numbers, or formulas of the step's number k, its time t, inputs and parameters.
+            A single row: at each step the mode is drawn anew with these probabilities.
+        first : list, optional
+            q, law of the mode of the first measurement.  By default a single row's own.
+
+        Raises
+        ------
+        FormulaError, ModelError
+            A mode is no model, modes do not fit together, or numbers are no probabilities.
+
+        Examples
+        --------
+        >>> JumpModel.define("0.9*x + v", "x + C*w", modes={"sound": {"parameters": {"C": 1}},
+        ...                  "faulty": {"parameters": {"C": 10}}}, transition=[0.8, 0.2])
+        JumpModel(sound: x' = v + 9*x/10, y = C*w + x; C = 1 | faulty: x' = v + 9*x/10, y = C*w + x; C = 10)
+        """
+        tables = _tables(modes)
+        common = table("parameters", parameters)
+        built = []
+        for name, change in tables.items():
+            own = {key: change[key] for key in change if key not in ("state", "meter", "parameters")}
+            try:
+                values = {**common, **table("parameters", change.get("parameters"))}
+                parts = change.get("state", state), change.get("meter", meter)
+                built.append(Model.define(*parts, values, **{**options, **own}))
+            except (ModelError, FormulaError) as error:
+                raise ModelError(f"mode {name}: {error}") from None
+        fitting = _fitting(tuple(tables), built)
+        chain, rows = _chain(transition, len(built))
+        changed = {name for change in tables.values() for name in table("parameters", change.get("parameters"))}
+        matrix, of_step = _compiled(chain, fitting[0], common, changed)
+        if rows == 1 and first is None:
+            first = np.asarray(of_step.at(0)()[0], dtype=float)[0].tolist()
+        found = cls(tuple(tables), fitting, _law(first, len(built)), matrix, of_step)
+        found._check()
+        return found
+
+    @property
+    def n(self) -> int:
+        """Number of state components."""
+        return self.modes[0].n
+
+    @property
+    def p(self) -> int:
+        """Number of measurement components."""
+        return self.modes[0].p
+
+    @property
+    def x(self) -> tuple[sp.Symbol, ...]:
+        """State components."""
+        return self.modes[0].x
+
+    @property
+    def prior(self) -> Gaussian:
+        """Law of x_0, the same in all modes."""
+        return self.modes[0].prior
+
+    @property
+    def angles(self) -> Angles:
+        """Components that are angles."""
+        return self.modes[0].angles
+
+    @property
+    def measured(self) -> list[str]:
+        """Names of the measurement's components."""
+        return self.modes[0].measured
+
+    @property
+    def steps(self) -> float:
+        """For how many steps the modes' inputs have values and their noises variances."""
+        return min(self.chain_of_step.known.steps, *(one.known.steps for one in self.modes))
+
+    def transition_at(self, k: int) -> Array:
+        """pi at step k, (J, J): from the mode of y_k to that of y_{k+1}."""
+        found = np.asarray(self.chain_of_step.at(k)()[0], dtype=float)
+        if problem := _not_probabilities(found):
+            raise ModelError(f"`transition` at step {k}: {problem}; change its formulas, or run at most {k} steps")
+        return found / found.sum(axis=1, keepdims=True)
+
+    def law_at(self, k: int) -> Array:
+        """q_k, (J,): the probabilities of the modes of y_k before anything is measured."""
+        if not self.chain_of_step.known.symbols:
+            return self.first @ np.linalg.matrix_power(self.transition_at(0), k)
+        return reduce(lambda law, step: law @ self.transition_at(step), range(k), self.first)
+
+    def replace(self, **parameters: float) -> JumpModel:
+        """The same model with parameters changed in all modes."""
+        modes = tuple(mode.replace(**parameters) for mode in self.modes)
+        if self.chain.has(*(symbol(name) for name in parameters)):
+            raise ModelError(f"`transition` contains {', '.join(parameters)}: define the model anew")
+        return JumpModel(self.names, modes, self.first, self.chain, self.chain_of_step)
+
+    def latex(self) -> str:
+        """Equations and values of each mode, the chain and the first law, as a LaTeX `aligned` block."""
+        lines = []
+        for name, mode in zip(self.names, self.modes, strict=True):
+            block = mode.latex().removeprefix("\\begin{aligned}\n").removesuffix("\n\\end{aligned}")
+            lines += [rf"\text{{mode {name}:}}\quad &", *block.split(" \\\\\n")]
+        first = sp.Matrix([[sp.Float(one, 4) for one in self.first]])
+        lines += [rf"\pi &= {sp.latex(self.chain)}", rf"q &= {sp.latex(first)}"]
+        return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
+
+    def __repr__(self) -> str:
+        said = (repr(mode).removeprefix("Model(").removesuffix(")") for mode in self.modes)
+        return f"JumpModel({' | '.join(f'{name}: {text}' for name, text in zip(self.names, said, strict=True))})"
+
+    def _check(self) -> None:
+        """ModelError if rows are no probabilities at some step, or a mode is never reached."""
+        known = self.chain_of_step.known
+        steps = int(min(CHECKED, self.steps)) if known.symbols else 1
+        reached = self.first > 0
+        for k in range(steps):
+            matrix = np.asarray(self.chain_of_step.at(k)()[0], dtype=float)
+            if problem := _not_probabilities(matrix):
+                where = f" at step {k}" if known.symbols else ""
+                if k >= SURE:
+                    break  # said when it runs so far
+                raise ModelError(f"`transition`{where}: {problem}")
+            for _ in range(1 if known.symbols else len(matrix)):
+                reached = reached | (reached.astype(float) @ matrix > 0)
+        if not reached.all():
+            never = ", ".join(name for name, one in zip(self.names, reached, strict=True) if not one)
+            raise ModelError(
+                f"the mode {never} is never reached from the first law {self.first.tolist()}; leave it out, or give it a "
+                "probability in `first` or in `transition`"
+            )
+
+
+def model_of_table(given: Mapping[str, Any]) -> Model | JumpModel:
+    """The model of a table such as [variants.53], or of one with `modes`."""
+    if "modes" not in given:
+        if spare := sorted({"transition", "first"} & set(given)):
+            raise ModelError(f"`{spare[0]}` is of a model with `modes`, and there are none")
+        return Model.of_table(given)
+    if "transition" not in given:
+        raise ModelError("a model with `modes` needs `transition`, a matrix of probabilities whose rows sum to 1")
+    missing = [key for key in ("state", "meter") if key not in given]
+    if missing:
+        raise ModelError(f"there is no {' and no '.join(missing)}: give what holds in all modes that have none of their own")
+    options = {key: value for key, value in given.items() if key not in ("title", "state", "meter", "parameters")}
+    return JumpModel.define(given["state"], given["meter"], given.get("parameters"), **options)
+
+
+def _tables(modes: Any) -> dict[str, dict[str, Any]]:
+    if not isinstance(modes, Mapping) or not modes:
+        raise ModelError(
+            f"`modes` must be a table of modes by name, such as {{sound = {{}}, faulty = {{...}}}}, got {shown(modes)}"
+        )
+    tables = {str(name): table(f"modes.{name}", change) for name, change in modes.items()}
+    for name, change in tables.items():
+        if unknown := sorted(set(change) - set(OF_A_MODE)):
+            raise ModelError(f"mode {name}: modes may differ in {', '.join(OF_A_MODE)}, not in {', '.join(unknown)}")
+    return tables
+
+
+def _fitting(names: tuple[str, ...], modes: Sequence[Model]) -> tuple[Model, ...]:
+    """The modes, if they are of one state, measurement and noises; ModelError if not."""
+    first = modes[0]
+    for name, mode in zip(names, modes, strict=True):
+        for what, ours, theirs in (
+            ("state component(s)", first.n, mode.n),
+            ("measurement component(s)", first.p, mode.p),
+            ("noise(s) of the object", len(first.v), len(mode.v)),
+            ("noise(s) of the meter", len(first.w), len(mode.w)),
+        ):
+            if ours != theirs:
+                remedy = '; name them all by `symbols`, such as v = ["v1", "v2"]' if what.startswith("noise") else ""
+                raise ModelError(f"all modes need as many {what}: mode {names[0]} has {ours}, mode {name} has {theirs}{remedy}")
+        if mode.x != first.x or mode.angles != first.angles:
+            raise ModelError(f"modes {names[0]} and {name} differ in their state's symbols or angles")
+    return tuple(modes)
+
+
+def _chain(given: Any, size: int) -> tuple[list[list[Formula]], int]:
+    """Rows of the matrix, (J, J), and how many were given."""
+    rows = list(given) if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) else []
+    nested = [isinstance(row, Sequence | np.ndarray) and not isinstance(row, str) for row in rows]
+    if rows and not any(nested):
+        rows, nested = [rows] * size, [True] * size
+        count = 1
+    else:
+        count = len(rows)
+    if not rows or not all(nested) or len(rows) != size or any(len(row) != size for row in rows):
+        raise ModelError(
+            f"`transition` must be {size} rows of {size} probabilities for {size} mode(s), or one row, got {shown(given)}"
+        )
+    return [list(row) for row in rows], count
+
+
+def _compiled(
+    rows: list[list[Formula]], model: Model, common: Mapping[str, float], changed: set[str]
+) -> tuple[sp.ImmutableMatrix, Stepwise]:
+    names = {name: symbol(name) for name in common if name not in changed}
+    of_step = model.known.names([*common, *changed, *(s.name for s in (*model.x, *model.v, *model.w))])
+    try:
+        matrix = sp.ImmutableMatrix([[_entry(one, names | of_step) for one in row] for row in rows])
+    except ModelError as error:
+        raise ModelError(f"`transition`: {error}") from None
+    known = model.known.used(matrix, of_step)
+    numeric = matrix.subs({symbol(name): exact_number(name, value) for name, value in common.items()})
+    return matrix, Stepwise.compile(known, "transition", {}, {"transition": numeric}, [])
+
+
+def _entry(one: Any, names: dict[str, sp.Symbol]) -> sp.Expr:
+    if isinstance(one, str | sp.Expr):
+        return read(one, names, "transition")
+    return exact_number("transition", one)
+
+
+def _law(first: Any, size: int) -> Array:
+    if first is None:
+        raise ModelError("`first` is missing: the probabilities of the modes at the first measurement")
+    try:
+        law = np.asarray(first, dtype=float)
+    except (TypeError, ValueError):
+        law = np.array(np.nan)
+    if law.shape != (size,):
+        raise ModelError(f"`first` must be {size} probabilities for {size} mode(s), got {shown(first)}")
+    if problem := _not_probabilities(law[None]):
+        raise ModelError(f"`first`: {problem}")
+    return law / law.sum()
+
+
+def _not_probabilities(matrix: Array) -> str:
+    """What is wrong with the rows; empty if nothing."""
+    for number, row in enumerate(matrix.tolist()):
+        which = f"row {number + 1}" if len(matrix) > 1 else "the row"
+        if not np.isfinite(row).all() or min(row) < 0:
+            return f"{which} has an entry that is no probability: {row}"
+        if abs(sum(row) - 1) > SUM:
+            return f"{which} sums to {sum(row):g}, not to 1: {row}"
+    return ""

@@ -1,0 +1,443 @@
+"""Derivations made by code, from the shipped variants: right ones in unusual forms, and the same with one planted slip.
+
+A chain goes, for a structural function or a gain of a variant, from its definition over the expanded mean and the means of the
+noises to the moments, and on to another form of the result; SymPy and `GaussianMoments` do these steps, neither of which the
+checker calls.  Each line is then rewritten at random, by rules of algebra that keep its value: terms and factors in another
+order, brackets multiplied out, a number split into two, a power into a product, doubled and halved, a sign taken out, ^ or **,
+M[..] or M(..), one step left out, other letters for mean and variance.
+
+A slip is one change of the tree of one line: a sign, a number, a power, a letter for another, a factor or a term lost, a term
+doubled, the fourth moment taken as 3 d^2, a noise's mean square forgotten.  `differs` makes sure, by SymPy, that it changes the
+value.  The lines after it are either rewritten from the line with the slip (right on top of it) or from the right one.
+"""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import sympy as sp
+
+from kfcourse.derivations.terms import (
+    CALL,
+    LETTER,
+    MEAN,
+    NUMBER,
+    POWER,
+    PRODUCT,
+    SUM,
+    Node,
+    Path,
+    at,
+    changed,
+    letters,
+    number,
+    power,
+    product,
+    total,
+    walk,
+    written,
+)
+from kfcourse.derivations.typed import read_line
+from kfcourse.lab import load_variants
+from kfcourse.symbolic.formula import symbol
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
+
+M = sp.Function("M")
+LAWS = (("m", "d"), ("m", "d"), ("mu", "P"), ("lambda", "Psi"))
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A derivation: its headings and lines, and how to compute a line independently of the checker."""
+
+    variant: str
+    law: tuple[str, str] | None  # letters of mean and variance that a heading names
+    name: str
+    lines: tuple[Node, ...]
+    moments: GaussianMoments
+    noises: tuple[sp.Symbol, ...]
+
+    def text(self, rng: random.Random) -> str:
+        heading = f"variant {self.variant}\n" + (f"x ~ N({self.law[0]}, {self.law[1]})\n" if self.law else "")
+        start = f"{self.name} = "
+        return heading + start + f"\n{' ' * rng.randint(0, 4)}= ".join(typed(line, rng) for line in self.lines)
+
+
+@dataclass(frozen=True)
+class Planted:
+    """A chain with a slip: number of the line (among the lines of the chain), kind, way to the term in its tree."""
+
+    chain: Chain
+    line: int
+    kind: str
+    path: Path
+    follows: bool
+
+
+def typed(line: Node, rng: random.Random) -> str:
+    text = written(line)
+    if rng.random() < 0.5:
+        text = text.replace("^", "**")
+    return text.replace(" ", "") if rng.random() < 0.3 else text
+
+
+# ---------------------------------------------------------------- chains by SymPy
+
+
+def stages(model: Model, name: str, mean: sp.MatrixBase, cov: sp.MatrixBase) -> tuple[list[sp.Expr], GaussianMoments]:
+    """The lines of a derivation as formulas, in which M(...) is a mean that is not yet computed."""
+    side = model.state_equation if name[0] in "tT" else model.meter_equation
+    noises = model.v if name[0] in "tT" else model.w
+    law = GaussianMoments([*model.x, *noises], [*mean, *[0] * len(noises)], sp.diag(cov, sp.eye(len(noises))))
+    digits = [int(c) - 1 for c in name if c.isdigit()] or [0]
+    a, b = side[digits[0]], side[digits[-1]]
+    if name[0] in "th":
+        inner, start = a, M(a)
+    elif name[0] == "G":
+        inner = sp.diff(a, model.x[digits[-1]])
+        start = M(inner)
+    else:
+        means = [plain(law.mean_of(one)) for one in (a, b)]
+        inner = (a - means[0]) * (b - means[1])
+        start = M(inner)
+    groups: dict[sp.Expr, sp.Expr] = {}
+    for term in sp.Add.make_args(sp.expand(inner)):
+        outside, inside = term.as_independent(*model.x, *noises, as_Add=False)
+        groups[inside] = groups.get(inside, 0) + outside
+    split = sp.Add(
+        *(sp.factor(outside) * (1 if inside == 1 else M(inside)) for inside, outside in groups.items()), evaluate=False
+    )
+    quiet, closed = sp.S.Zero, sp.S.Zero
+    for inside, outside in groups.items():
+        of_noise, of_state = inside.as_independent(*model.x, as_Add=False)
+        mean_of_noise = law.mean_of(of_noise)
+        quiet += sp.factor(outside) * mean_of_noise * (1 if of_state == 1 else M(of_state))
+        closed += sp.factor(outside) * mean_of_noise * plain(law.mean_of(of_state))
+    result = sp.expand(closed)
+    return [start, split, quiet, closed, result], law
+
+
+def plain(formula: sp.Expr) -> sp.Expr:
+    return formula.replace(lambda e: type(e).__name__ == "expm1", lambda e: sp.exp(e.args[0]) - 1)
+
+
+def chains(seed: int, count: int) -> list[Chain]:
+    """Right chains of the shipped variants, in turn."""
+    rng, found = random.Random(seed), []
+    variants = load_variants()
+    wanted = [(name, function) for name, one in variants.items() for function in functions(one.model)]
+    rng.shuffle(wanted)
+    while len(found) < count:
+        variant, function = wanted[len(found) % len(wanted)]
+        model = variants[variant].model
+        law = rng.choice(LAWS) if model.n == 1 else None
+        if law == ("m", "d") or law is None or set(law) & set(model.parameters):
+            law = None
+        mean, cov = law or (("z", "p") if function[0] in "tT" else ("m", "d"))
+        key = variant, function, mean
+        if key not in _STAGED:
+            _STAGED[key] = _staged(model, function, mean, cov)
+        formulas, moments = _STAGED[key]
+        taken = set(model.parameters) | set(letters_of(model))
+        name = function if function not in taken else "M[y]" if function == "h" else ""
+        if not name:
+            wanted.remove((variant, function))
+            continue
+        lines = [read_line(str(one)) for one in formulas]
+        if function != "K":
+            lines[2:] = [one for one in lines[2:] if rng.random() < 0.85] or lines[-1:]  # implicit steps
+        rewritten = tuple(_rewritten(one, rng, rng.randint(0, 3)) for one in lines)
+        noises = model.v if function[0] in "tT" else model.w
+        found.append(Chain(variant, law, name, rewritten, moments, noises))
+    return found
+
+
+_STAGED: dict[tuple[str, str, str], tuple[list[sp.Expr], GaussianMoments]] = {}
+
+
+def letters_of(model: Model) -> list[str]:
+    return [s.name for s in (*model.x, *model.v, *model.w)]
+
+
+def functions(model: Model) -> list[str]:
+    if model.n == 1:
+        return ["tau", "Theta", "h", "G", "F", "K"]
+    components = range(1, model.n + 1)
+    entries = [f"{i}{j}" for i in components for j in components if i <= j]
+    return [
+        *(f"tau{i}" for i in components),
+        *(f"Theta{pair}" for pair in entries),
+        *(["h1", "F11"] if model.p > 1 else ["h", "F"]),
+    ]
+
+
+def _staged(model: Model, function: str, mean: str, cov: str) -> tuple[list[sp.Expr], GaussianMoments]:
+    if model.n == 1:
+        m, P = sp.Matrix([symbol(mean)]), sp.Matrix([symbol(cov)])
+    else:
+        m = sp.Matrix([symbol(f"{mean}{i + 1}") for i in range(model.n)])
+        P = sp.Matrix(model.n, model.n, lambda i, j: symbol(f"{cov}{min(i, j) + 1}{max(i, j) + 1}"))
+    if function != "K":
+        name = function if model.n == 1 or function[0] != "F" or model.p > 1 else "F"
+        return stages(model, name, m, P)
+    law, slope = stages(model, "G", m, P)[1], stages(model, "G", m, P)[0][-1]
+    (*_, noise_state, whole), _ = stages(model, "F", m, P)
+    gain = P[0] * slope / whole
+    return [P[0] * slope / noise_state, gain, sp.cancel(gain) if not gain.has(sp.exp) else gain], law
+
+
+# ---------------------------------------------------------------- unusual forms
+
+
+def _rewritten(node: Node, rng: random.Random, times: int) -> Node:
+    """The tree after some rules of algebra in random places."""
+    for _ in range(times):
+        path, one = rng.choice(list(walk(node)))
+        rule = rng.choice(RULES)
+        new = rule(one, rng)
+        if new is not None and _size(node) < 150:
+            node = read_line(written(changed(node, path, new)))
+    return read_line(written(node))
+
+
+def _size(node: Node) -> int:
+    return sum(1 for _ in walk(node))
+
+
+def _shuffled(node: Node, rng: random.Random) -> Node | None:
+    if node.kind not in (SUM, PRODUCT) or len(node.parts) < 2:
+        return None
+    pairs = list(zip(node.parts, node.data, strict=True))
+    rng.shuffle(pairs)
+    return replace(node, parts=tuple(part for part, _ in pairs), data=tuple(data for _, data in pairs))
+
+
+def _distributed(node: Node, rng: random.Random) -> Node | None:
+    if node.kind != PRODUCT or any(e < 0 for e in node.data):
+        return None
+    sums = [i for i, part in enumerate(node.parts) if part.kind == SUM]
+    if not sums:
+        return None
+    i = rng.choice(sums)
+    rest = [part for j, part in enumerate(node.parts) if j != i]
+    return total(*(product(*rest, part) for part in node.parts[i].parts), signs=node.parts[i].data)
+
+
+def _split(node: Node, rng: random.Random) -> Node | None:
+    if node.kind != NUMBER or node.data.denominator != 1 or node.data < 2:
+        return None
+    part = rng.randint(1, int(node.data) - 1)
+    return total(number(part), number(node.data - part))
+
+
+def _unfolded(node: Node, rng: random.Random) -> Node | None:
+    if node.kind != POWER or node.data.denominator != 1 or node.data < 2:
+        return None
+    if node.data == 4 and rng.random() < 0.5:
+        return power(power(node.parts[0], 2), 2)
+    return product(node.parts[0], power(node.parts[0], node.data - 1) if node.data > 2 else node.parts[0])
+
+
+def _doubled(node: Node, rng: random.Random) -> Node | None:
+    return product(number(2), node, number(2), exponents=(1, 1, -1)) if node.kind in (PRODUCT, LETTER, POWER) else None
+
+
+def _negated(node: Node, rng: random.Random) -> Node | None:
+    if node.kind != SUM or len(node.parts) < 2:
+        return None
+    return Node(SUM, (Node(SUM, node.parts, tuple(-sign for sign in node.data)),), (-1,))
+
+
+def _squared(node: Node, rng: random.Random) -> Node | None:
+    """A square of a sum multiplied out."""
+    if node.kind != POWER or node.data != 2 or node.parts[0].kind != SUM or len(node.parts[0].parts) != 2:
+        return None
+    (a, b), (s, t) = node.parts[0].parts, node.parts[0].data
+    return total(power(a, 2), product(number(2), a, b), power(b, 2), signs=(1, s * t, 1))
+
+
+RULES = (_shuffled, _shuffled, _distributed, _distributed, _split, _unfolded, _doubled, _negated, _squared)
+
+
+# ---------------------------------------------------------------- slips
+
+
+def planted(seed: int, count: int) -> list[Planted]:
+    """Chains with one slip each; every kind of slip in turn, as far as chains allow it."""
+    rng, found, made = random.Random(seed), [], chains(seed, count + 20)
+    for chain in made:
+        kinds = [SLIPS[(len(found) + k) % len(SLIPS)] for k in range(len(SLIPS))]
+        planted_ones = (one for slip in kinds if (one := _plant(chain, slip, rng)))
+        if len(found) < count and (one := next(planted_ones, None)):
+            found.append(one)
+    return found
+
+
+def _plant(chain: Chain, slip, rng: random.Random) -> Planted | None:
+    places = [(i, *pair) for i in range(1, len(chain.lines)) for pair in walk(chain.lines[i])]
+    rng.shuffle(places)
+    for i, path, node in places:
+        line = chain.lines[i]
+        made = slip(line, path, node, rng, chain)
+        if made is None:
+            continue
+        where, new = made
+        new = read_line(written(new))
+        try:
+            if not differs(chain, line, new):
+                continue
+        except NoClosedForm:  # exp(x^2)
+            continue
+        while not _there(new, where):  # brackets that are no longer needed are gone
+            where = where[:-1]
+        follows = rng.random() < 0.5
+        rest = [_rewritten(new if follows else one, rng, 2) for one in chain.lines[i + 1 :]]
+        return Planted(replace(chain, lines=(*chain.lines[:i], new, *rest)), i, slip.__name__.strip("_"), where, follows)
+    return None
+
+
+def _there(node: Node, path: Path) -> bool:
+    for i in path:
+        if i >= len(node.parts):
+            return False
+        node = node.parts[i]
+    return True
+
+
+def _term(line: Node, path: Path) -> Path:
+    for length in range(len(path), 0, -1):
+        if at(line, path[: length - 1]).kind == SUM:
+            return path[:length]
+    return ()
+
+
+def _sign(line, path, node, rng, chain):
+    if node.kind != SUM:
+        return None
+    i = rng.randrange(len(node.parts))
+    data = tuple(-sign if i == j else sign for j, sign in enumerate(node.data))
+    return (*path, i), changed(line, path, replace(node, data=data))
+
+
+def _number(line, path, node, rng, chain):
+    if node.kind == NUMBER:
+        return _term(line, path), changed(line, path, number(node.data + rng.choice((1, 2, -1)) if node.data > 1 else 2))
+    if node.kind == PRODUCT:
+        return _term(line, path), changed(line, path, product(number(rng.choice((2, 3, Fraction(1, 2)))), node))
+    return None
+
+
+def _power(line, path, node, rng, chain):
+    if node.kind != POWER or node.data.denominator != 1 or node.data < 1:
+        return None
+    return _term(line, path), changed(line, path, power(node.parts[0], rng.choice([k for k in (1, 2, 3, 4) if k != node.data])))
+
+
+def _letter(line, path, node, rng, chain):
+    if node.kind != LETTER:
+        return None
+    others = sorted(letters(line) - {node.data})
+    if not others:
+        return None
+    return _term(line, path), changed(line, path, Node(LETTER, data=rng.choice(others)))
+
+
+def _lost_factor(line, path, node, rng, chain):
+    if node.kind != PRODUCT or len(node.parts) < 2:
+        return None
+    i = rng.randrange(len(node.parts))
+    if node.parts[i].kind not in (LETTER, POWER) or (node.parts[i].parts and node.parts[i].parts[0].kind != LETTER):
+        return None
+    return _term(line, path), changed(line, (*path, i), number(1))
+
+
+def _lost_term(line, path, node, rng, chain):
+    if node.kind != SUM or len(node.parts) < 2:
+        return None
+    i = rng.randrange(len(node.parts))
+    keep = [j for j in range(len(node.parts)) if j != i]
+    new = Node(SUM, tuple(node.parts[j] for j in keep), tuple(node.data[j] for j in keep))
+    return path, changed(line, path, new)
+
+
+def _twice(line, path, node, rng, chain):
+    if node.kind != SUM or len(node.parts) < 2:
+        return None
+    i = rng.randrange(len(node.parts))
+    return path, changed(line, path, Node(SUM, (*node.parts, node.parts[i]), (*node.data, node.data[i])))
+
+
+def _moment(line, path, node, rng, chain):
+    """Put 3 d^2, or the fourth power of the mean, in the place of a fourth moment that is computed in this line."""
+    mean, cov = chain.moments.mean[0], chain.moments.cov[0, 0]
+    if node.kind != SUM or differs_formula(chain, node, mean**4 + 6 * mean**2 * cov + 3 * cov**2):
+        return None
+    return _term(line, path), changed(line, path, read_line(str(rng.choice((3 * cov**2, mean**4, 3 * (mean**2 + cov) ** 2)))))
+
+
+def _noise(line, path, node, rng, chain):
+    """Forget the mean square of the noise: without the mean of w^2, what it multiplies is gone."""
+    if node.kind != MEAN or not any(s.name in letters(node) for s in chain.noises):
+        return None
+    term = _term(line, path)
+    if not term or len(at(line, term[:-1]).parts) < 2:
+        return None
+    parent = at(line, term[:-1])
+    keep = [j for j in range(len(parent.parts)) if j != term[-1]]
+    return term[:-1], changed(
+        line, term[:-1], Node(SUM, tuple(parent.parts[j] for j in keep), tuple(parent.data[j] for j in keep))
+    )
+
+
+SLIPS = (_sign, _number, _power, _letter, _lost_factor, _lost_term, _twice, _moment, _noise)
+
+
+# ---------------------------------------------------------------- an independent value of a line
+
+
+def formula_of(node: Node, moments: GaussianMoments) -> sp.Expr:
+    """The line in SymPy, means by `GaussianMoments`."""
+    parts = [formula_of(part, moments) for part in node.parts]
+    if node.kind == NUMBER:
+        return sp.Rational(node.data.numerator, node.data.denominator)
+    if node.kind == LETTER:
+        return symbol(node.data)
+    if node.kind == SUM:
+        return sp.Add(*(sign * part for sign, part in zip(node.data, parts, strict=True)))
+    if node.kind == PRODUCT:
+        return sp.Mul(*(part**e for e, part in zip(node.data, parts, strict=True)))
+    if node.kind == POWER:
+        return parts[0] ** sp.Rational(node.data.numerator, node.data.denominator)
+    if node.kind == CALL:
+        return getattr(sp, node.data)(parts[0])
+    if (moments, parts[0]) not in _MEANS:
+        _MEANS[moments, parts[0]] = plain(moments.mean_of(parts[0]))
+    return _MEANS[moments, parts[0]]
+
+
+_MEANS: dict[tuple[GaussianMoments, sp.Expr], sp.Expr] = {}
+
+
+def differs_formula(chain: Chain, node: Node, formula: sp.Expr) -> bool:
+    if any(one.kind == MEAN for _, one in walk(node)):
+        return True
+    return not _same(formula_of(node, chain.moments), formula)
+
+
+def differs(chain: Chain, first: Node, second: Node) -> bool:
+    return not _same(*(formula_of(one, chain.moments) for one in (first, second)))
+
+
+def _same(first: sp.Expr, second: sp.Expr) -> bool:
+    """At three points, to 20 digits of 30."""
+    names = sorted(first.free_symbols | second.free_symbols, key=str)
+    for k in range(3):
+        source = random.Random(k)
+        point = {s: sp.Rational(source.randint(101, 397), source.randint(101, 397)) for s in names}
+        a, b = (sp.N(one.xreplace(point), 30) for one in (first, second))
+        if not abs(a - b) <= sp.Float("1e-20") * (1 + abs(b)):
+            return False
+    return True

@@ -1,0 +1,450 @@
+"""Filters of models that jump: against all histories of modes, a plain grid, and the cases in which they are other filters."""
+
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+
+from kfcourse import (
+    Ensemble,
+    Model,
+    ModelError,
+    NotFinite,
+    compare,
+    design,
+    gaussian,
+    likelihood,
+    linearised,
+    run,
+    simulate,
+    unscented,
+)
+from kfcourse.filters import aof, duof, fos, mfos, pointmass
+from kfcourse.filters.exact_jumps import jump_pointmass
+from kfcourse.filters.jump_optimal import logic_dynamic_fos
+from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
+from kfcourse.linear.system import linear_system
+from kfcourse.symbolic.averaging import averaged, averaged_equations
+from kfcourse.symbolic.jumping import JumpModel
+
+pytestmark = pytest.mark.quick
+
+ROUNDING = 1e-10
+SEQUENTIAL = [imm, logic_dynamic, gpb2]
+SENSOR = {"sound": {"parameters": {"C": 1.0}}, "faulty": {"parameters": {"C": 10.0}}}
+LASTING, FIRST = [[0.9, 0.1], [0.3, 0.7]], [0.8, 0.2]
+
+
+def failing(modes=SENSOR, transition=LASTING, first=FIRST):
+    return JumpModel.define(
+        "0.9*x + s*v", "x + C*w", {"s": 0.7}, modes=modes, transition=transition, first=first, prior={"mean": 3, "variance": 4}
+    )
+
+
+AFFINE = JumpModel.define(
+    "c*x + r + s*v",
+    "g*x + f*w",
+    {"c": 0.9, "r": 0.0, "s": 0.5, "g": 1.0, "f": 0.5},
+    modes={"calm": {}, "carried": {"parameters": {"c": 1.1, "r": 1.0, "g": 0.5}}, "wild": {"parameters": {"s": 2.0, "f": 1.0}}},
+    transition=[[0.8, 0.15, 0.05], [0.3, 0.6, 0.1], [0.25, 0.25, 0.5]],
+    first=[0.5, 0.3, 0.2],
+)
+CURVED = JumpModel.define(
+    "x - 0.4*sin(x) + s*v",
+    "g*x + 0.3*x**2 + f*(1 + x**2)*w",
+    {"s": 0.4, "g": 1.0, "f": 0.3},
+    modes={"up": {}, "down": {"parameters": {"g": -1.0, "s": 0.8}}},
+    transition=LASTING,
+    first=FIRST,
+)
+
+
+def of(build, model, kind=gaussian):
+    return build([kind(mode) for mode in model.modes], model.transition_at, model.first)
+
+
+def follow(one, y):
+    state, found = one.init(y.shape[1]), []
+    for measured in y:
+        state = one.step(state, measured)
+        found.append((*state.posterior, state.memory.probability, state.memory.expected, *state.predicted))
+    return [np.stack(column) for column in zip(*found, strict=True)]
+
+
+def histories(model, y):
+    """Mean, variance and probabilities of the last mode, by a Kalman filter for each history of modes, for one trajectory."""
+    systems = [linear_system(mode) for mode in model.modes]
+    steps, size = len(y), len(model.modes)
+    logs, laws, last = [], [], []
+    for modes in product(range(size), repeat=steps):
+        log = math.log(model.first[modes[0]])
+        mean, variance = float(model.prior.mean[0]), float(model.prior.cov[0, 0])
+        for k, (mode, value) in enumerate(zip(modes, y, strict=True)):
+            system, *constants = systems[mode]
+            A, H, Q, R, a0, b0 = (float(np.squeeze(one)) for one in (system.A, system.H, system.Q, system.R, *constants))
+            if k:
+                log += math.log(model.transition_at(k - 1)[modes[k - 1], mode])
+                mean, variance = A * mean + a0, A * A * variance + Q
+            S = H * H * variance + R
+            log += -0.5 * ((value - H * mean - b0) ** 2 / S + math.log(2 * math.pi * S))
+            gain = variance * H / S
+            mean, variance = mean + gain * (value - H * mean - b0), variance * R / S
+        logs.append(log)
+        laws.append((mean, variance))
+        last.append(modes[-1])
+    weights = np.exp(np.array(logs) - max(logs))
+    evidence = max(logs) + math.log(weights.sum())
+    weights /= weights.sum()
+    mean, variance = np.array(laws).T
+    z = weights @ mean
+    return z, weights @ (variance + (mean - z) ** 2), np.bincount(last, weights, size), evidence
+
+
+# --- the exact filter
+
+
+@pytest.mark.parametrize("model", [failing(), AFFINE], ids=["sensor", "three modes"])
+def test_the_exact_filter_is_the_sum_over_all_histories(model):
+    y = simulate(model, 4, 6, seed=3).y
+    mean, cov, probability, *_ = follow(jump_pointmass(model), y)
+    total = likelihood(jump_pointmass(model), y).sum(axis=0)
+    for trajectory in range(4):
+        for k in (0, 1, 3, 5):
+            z, variance, expected, evidence = histories(model, y[: k + 1, trajectory, 0])
+            # the accuracy of a step is 1e-3 standard deviations, and estimated with caution
+            assert abs(mean[k, trajectory, 0] - z) < 1e-3 * math.sqrt(variance)
+            assert abs(cov[k, trajectory, 0, 0] / variance - 1) < 2e-3
+            np.testing.assert_allclose(probability[k, trajectory], expected, atol=1e-3)
+        assert abs(total[trajectory] - evidence) < 6e-3
+
+
+def test_the_exact_filter_is_a_plain_grid_of_both():
+    x = np.linspace(-9, 9, 4001)
+    y = simulate(CURVED, 3, 8, seed=5).y
+    mean, cov, probability, *_ = follow(jump_pointmass(CURVED), y)
+    for trajectory in range(3):
+        density = np.stack([q * np.exp(-0.5 * x * x) for q in CURVED.first])
+        for k, value in enumerate(y[:, trajectory, 0]):
+            if k:
+                for j, s in enumerate((0.4, 0.8)):  # kernels of both modes
+                    kernel = np.exp(-0.5 * ((x[:, None] - (x - 0.4 * np.sin(x))) / s) ** 2) / s
+                    if j == 0:
+                        following = np.empty_like(density)
+                    following[j] = kernel @ (np.array(LASTING)[:, j] @ density)
+                density = following
+            for j, g in enumerate((1.0, -1.0)):
+                f = 0.3 * (1 + x * x)
+                density[j] *= np.exp(-0.5 * ((value - g * x - 0.3 * x * x) / f) ** 2) / f
+            density /= density.sum()
+            total = density.sum(axis=0)
+            z = total @ x
+            variance = total @ (x - z) ** 2
+            assert abs(mean[k, trajectory, 0] - z) < 1e-3 * math.sqrt(variance), k
+            assert abs(cov[k, trajectory, 0, 0] / variance - 1) < 2e-3, k
+            np.testing.assert_allclose(probability[k, trajectory], density.sum(axis=1), atol=1e-3)
+
+
+def test_its_own_estimate_of_the_error_covers_what_finer_nodes_change():
+    y = simulate(failing(), 40, 15, seed=8).y
+    rough, fine = (jump_pointmass(failing(), accuracy) for accuracy in (1e-2, 1e-6))
+    states = [rough.init(40), fine.init(40)]
+    for measured in y:
+        states = [one.step(state, measured) for one, state in zip((rough, fine), states, strict=True)]
+    change = np.abs(states[0].posterior.mean - states[1].posterior.mean)[:, 0]
+    claimed = states[0].memory.discretisation_error()
+    assert (change <= claimed + 1e-12).all()
+    assert (states[1].memory.discretisation_error() < 1e-4).all()
+
+
+def test_every_second_and_fourth_kernel_of_all_modes_is_a_prediction_too():
+    """The rough looks of the exact filter take these; a mode whose kernels they missed would be looked for in vain."""
+    one, y = jump_pointmass(failing()), simulate(failing(), 30, 4, seed=2).y
+    state = one.init(30)
+    for measured in y:
+        state = one.step(state, measured)
+    for groups in state.memory.groups:
+        for _, kernels in groups:
+            mean, variance = kernels.moments()
+            thinned = kernels.thinned()
+            np.testing.assert_allclose(thinned.mass.sum(axis=1), 1.0, rtol=1e-12)
+            for rough in (thinned, kernels._replace(mass=kernels.quarter())):
+                # half and a quarter of the nodes: the first are as good as 1e-3, the second as its root
+                assert (np.abs(rough.moments()[0] - mean) < 0.03 * np.sqrt(variance)).all()
+
+
+def test_one_mode_is_the_exact_filter():
+    plain = Model.define("0.9*x + 0.3*x*v", "x + 0.2*x**2*w")
+    model = JumpModel.define("0.9*x + 0.3*x*v", "x + 0.2*x**2*w", modes={"only": {}}, transition=[1.0])
+    y = simulate(plain, 20, 8, seed=2).y
+    found, expected = run(jump_pointmass(model), y), run(pointmass(plain), y)
+    np.testing.assert_array_equal(found.mean, expected.mean)
+    np.testing.assert_array_equal(found.cov, expected.cov)
+
+
+def test_two_equal_modes_are_the_exact_filter():
+    model = failing(modes={"one": {"parameters": {"C": 1}}, "other": {"parameters": {"C": 1}}})
+    y = simulate(model, 10, 8, seed=2).y
+    found, expected = run(jump_pointmass(model), y), run(pointmass(model.modes[0]), y)
+    sd = np.sqrt(expected.cov[..., 0])
+    assert (np.abs(found.mean - expected.mean) < 1e-3 * sd).all()  # both of that accuracy
+
+
+def test_missing_measurements_leave_the_exact_filter_as_predicted():
+    y = simulate(failing(), 2, 4, seed=1).y
+    one = jump_pointmass(failing())
+    state = one.init(2)
+    for measured in y:
+        state = one.step(state, measured)
+    after = one.step(state, np.full((2, 1), np.nan))
+    np.testing.assert_allclose(after.memory.probability, state.memory.expected, atol=1e-9)
+    np.testing.assert_allclose(after.posterior.mean, state.predicted.mean, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("model", "message"),
+    [
+        (JumpModel.define(["x1 + v1", "x2 + v2"], "x1 + w", modes={"a": {}}, transition=[1]), "scalar models"),
+        (JumpModel.define("x + v", "x", modes={"a": {}}, transition=[1]), "without noise in the meter"),
+    ],
+)
+def test_the_exact_filter_says_what_it_cannot_do(model, message):
+    with pytest.raises(ModelError, match=message):
+        jump_pointmass(model)
+
+
+# --- filters of one law for each mode
+
+
+@pytest.mark.parametrize("build", SEQUENTIAL)
+@pytest.mark.parametrize("kind", [linearised, gaussian, unscented])
+def test_one_mode_is_the_plain_filter_bit_for_bit(build, kind):
+    model = Model.define("x - 0.4*sin(x) + 0.4*x*v", "x + 0.3*x**2*w")
+    y = simulate(model, 5, 20, seed=4).y
+    y[3, 0] = np.nan
+    found, expected = run(build([kind(model)], [[1.0]]), y), run(aof(kind(model)), y)
+    np.testing.assert_array_equal(found.mean, expected.mean)
+    np.testing.assert_array_equal(found.cov, expected.cov)
+
+
+@pytest.mark.parametrize("build", SEQUENTIAL)
+def test_equal_modes_are_the_plain_filter(build):
+    model = failing(modes={"one": {"parameters": {"C": 1}}, "other": {"parameters": {"C": 1}}})
+    y = simulate(model, 5, 20, seed=4).y
+    mean, cov, probability, *_ = follow(of(build, model), y)
+    expected = run(aof(gaussian(model.modes[0])), y)
+    np.testing.assert_allclose(mean, expected.mean, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(cov, np.broadcast_to(expected.cov, cov.shape), rtol=0, atol=ROUNDING)
+    for k in range(20):  # the measurements say nothing of the mode
+        np.testing.assert_allclose(probability[k], np.tile(model.law_at(k), (5, 1)), atol=1e-12)
+
+
+def test_the_imm_is_the_logic_dynamic_filter_for_affine_objects_and_no_other():
+    y = simulate(AFFINE, 6, 25, seed=1).y
+    one, other = (follow(of(build, AFFINE), y) for build in (imm, logic_dynamic))
+    for left, right in zip(one, other, strict=True):
+        np.testing.assert_allclose(left, right, rtol=1e-9, atol=ROUNDING)
+    y = simulate(CURVED, 6, 25, seed=1).y
+    one, other = (run(of(build, CURVED), y).mean for build in (imm, logic_dynamic))
+    assert np.abs(one - other).max() > 1e-3
+
+
+@pytest.mark.parametrize("build", SEQUENTIAL)
+def test_a_mode_that_stays_is_one_of_a_bank(build):
+    model = JumpModel.define(
+        "x - 0.4*sin(x) + s*v",
+        "x + w",
+        {"s": 0.4},
+        modes={"calm": {}, "wild": {"parameters": {"s": 2}}},
+        transition=[[1, 0], [0, 1]],
+        first=[0.7, 0.3],
+    )
+    y = simulate(model, 6, 20, seed=2).y
+    mean, _, probability, *_ = follow(of(build, model), y)
+    bank = [aof(gaussian(mode)) for mode in model.modes]
+    logs = np.log(model.first) + np.stack([np.cumsum(likelihood(one, y), axis=0) for one in bank], axis=-1)
+    weights = np.exp(logs - logs.max(axis=-1, keepdims=True))
+    weights /= weights.sum(axis=-1, keepdims=True)
+    np.testing.assert_allclose(probability, weights, atol=1e-9)
+    means = np.stack([run(one, y).mean[..., 0] for one in bank], axis=-1)
+    np.testing.assert_allclose(mean[..., 0], (weights * means).sum(axis=-1), atol=1e-9)
+
+
+def test_what_is_merged_when():
+    """Nothing is merged before y_0, pairs of modes by GPB2 only after y_1: so far they are exact."""
+    y = simulate(AFFINE, 5, 3, seed=6).y
+    for build, exact in ((imm, 1), (logic_dynamic, 1), (gpb2, 2)):
+        mean, cov, probability, *_ = follow(of(build, AFFINE), y)
+        for trajectory in range(5):
+            for k in range(3):
+                z, variance, expected, _ = histories(AFFINE, y[: k + 1, trajectory, 0])
+                same = abs(mean[k, trajectory, 0] - z) < 1e-9 * math.sqrt(variance)
+                assert same == (k < exact)
+                if k < exact:
+                    assert abs(cov[k, trajectory, 0, 0] / variance - 1) < 1e-9
+                    np.testing.assert_allclose(probability[k, trajectory], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("build", SEQUENTIAL)
+def test_a_mode_that_is_observed_is_known(build):
+    """The second component tells the mode: what is left is a filter that is told at each step which model holds."""
+    model = JumpModel.define(
+        ["0.9*x + s*v"],
+        ["x + C*w1", "b + 1e-3*w2"],
+        {"s": 0.7, "b": 0, "C": 1},
+        modes={"sound": {}, "faulty": {"parameters": {"b": 1, "C": 10}}},
+        transition=LASTING,
+        first=FIRST,
+        symbols={"x": ["x"], "w": ["w1", "w2"]},
+    )
+    _, y, mode = simulate(model, 8, 25, seed=3)
+    mean, cov, probability, *_ = follow(of(build, model), y)
+    np.testing.assert_allclose(np.take_along_axis(probability, mode[..., None].astype(int), axis=-1), 1.0, atol=1e-9)
+    z, p = 0.0, 1.0
+    for k in range(25):
+        R = np.where(mode[k] == 0, 1.0, 100.0)
+        gain = p / (p + R)
+        z, p = z + gain * (y[k, :, 0] - z), p * R / (p + R)
+        np.testing.assert_allclose(mean[k, :, 0], z, atol=1e-6)
+        np.testing.assert_allclose(cov[k, :, 0, 0], p, atol=1e-6)
+        z, p = 0.9 * z, 0.81 * p + 0.49
+
+
+def test_a_chain_that_changes_with_time():
+    """The sensor fails at step 5 and at no other: from then on the second mode is certain."""
+    model = failing(transition=[["Heaviside(3.5 - k)", "Heaviside(k - 3.5)"], [0, 1]], first=[1, 0])
+    y = simulate(model, 3, 10, seed=1)
+    assert (y.mode == (np.arange(10) >= 5)[:, None]).all()
+    for one in (of(logic_dynamic, model), of(gpb2, model), jump_pointmass(model)):
+        probability = follow(one, y.y)[2]
+        np.testing.assert_allclose(probability[..., 1], np.tile((np.arange(10) >= 5)[:, None], 3), atol=1e-12)
+
+
+# --- the FOS with modes
+
+
+def test_the_fos_of_one_mode_is_the_fos_bit_for_bit():
+    model = JumpModel.define("x - 0.4*sin(x) + 0.4*x*v", "x + 0.3*x**2*w", modes={"only": {}}, transition=[1])
+    plain = model.modes[0]
+    found, expected = (
+        compare([one], plain, 2000, 8, 1, progress=False, wide=1, threads=1).error_variance(one.name).value
+        for one in (logic_dynamic_fos(model, [gaussian(plain)]), fos(gaussian(plain)))
+    )
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_the_fos_with_modes_on_its_design_ensemble():
+    """The note's equations by hand: regressions and normal laws over the trajectories of each mode, for a scalar sensor."""
+    model, runs, steps = failing(), 500, 5
+    blocks = list(Ensemble(model, runs, steps, seed=3).by_step())
+    (one,) = design([logic_dynamic_fos(model, [gaussian(mode) for mode in model.modes])], blocks)
+    state, c = one.init(runs), np.tile(model.first, (runs, 1))
+    m, d = np.full((2, runs), 3.0), np.full((2, runs), 4.0)
+    variance, pi = np.array([1.0, 100.0]), np.array(LASTING)
+    for k, (block,) in enumerate(blocks):
+        x, y = block.x[:, 0], block.y[:, 0]
+        L = np.array([np.exp(-0.5 * (y - m[j]) ** 2 / (d[j] + variance[j])) / np.sqrt(d[j] + variance[j]) for j in (0, 1)])
+        mu = c.T * L / (c.T * L).sum(axis=0)
+        z = (mu * np.array([m[j] + d[j] / (d[j] + variance[j]) * (y - m[j]) for j in (0, 1)])).sum(axis=0)
+        state = one.step(state, block.y)
+        np.testing.assert_allclose(state.posterior.mean[:, 0], z, rtol=1e-8)
+        np.testing.assert_allclose(state.memory.probability, mu.T, rtol=1e-6, atol=1e-9)
+        u, T, xi = np.empty((2, runs)), np.empty(2), np.empty((2, runs))
+        for i in (0, 1):
+            there = block.mode == i
+            slope, offset = np.polyfit(z[there], x[there], 1)
+            u[i], T[i] = slope * z + offset, np.var(x[there] - slope * z[there] - offset)
+            deviation = z[there].std()
+            xi[i] = model.law_at(k)[i] * np.exp(-0.5 * ((z - z[there].mean()) / deviation) ** 2) / deviation
+        xi /= xi.sum(axis=0)
+        c = xi.T @ pi
+        for j in (0, 1):
+            w = xi * pi[:, [j]] / c[:, j]
+            tau = 0.9 * u
+            m[j] = (w * tau).sum(axis=0)
+            d[j] = (w * (0.81 * T[:, None] + 0.49 + (tau - m[j]) ** 2)).sum(axis=0)
+
+
+def test_the_fos_with_modes_says_what_it_cannot_do():
+    rare = failing(transition=[[1 - 1e-9, 1e-9], [0.5, 0.5]], first=[1, 0])
+    with pytest.raises(NotFinite, match="no trajectory of the design is in a mode"):
+        design([logic_dynamic_fos(rare, [gaussian(one) for one in rare.modes])], Ensemble(rare, 100, 3, seed=1).by_step())
+    turning = JumpModel.define("x + v", "x + w", modes={"a": {}}, transition=[1], angles=["x"])
+    with pytest.raises(ModelError, match="angles"):
+        logic_dynamic_fos(turning, [gaussian(turning.modes[0])])
+
+
+# --- the average over modes
+
+
+def test_the_average_has_the_moments_of_the_next_state_and_the_measurement():
+    k, size, rng = 2, 1_000_000, np.random.default_rng(1)
+    mean, cov = np.array([0.7]), np.array([[0.5]])
+    x = mean + np.sqrt(0.5) * rng.normal(size=(size, 1))
+    now, after = (rng.random(size) < CURVED.law_at(k + i)[0] for i in (0, 1))
+    v, w = rng.normal(size=(2, size))
+    s, g = np.where(after, 0.4, 0.8), np.where(now, 1.0, -1.0)
+    x_next = x[:, 0] - 0.4 * np.sin(x[:, 0]) + s * v
+    y = g * x[:, 0] + 0.3 * x[:, 0] ** 2 + 0.3 * (1 + x[:, 0] ** 2) * w
+    structure = averaged(CURVED, [gaussian(mode) for mode in CURVED.modes]).at(k)
+    tau, theta = structure.predict(mean, cov)
+    h, G, F, R = structure.measure(mean, cov)
+    for sample, first, second in ((x_next, tau, theta), (y, h, F)):
+        assert abs(sample.mean() - first.item()) < 4 * sample.std() / np.sqrt(size)
+        square = (sample - sample.mean()) ** 2
+        assert abs(square.mean() - second.item()) < 4 * square.std() / np.sqrt(size)
+    cross = (x[:, 0] - 0.7) * (y - y.mean())
+    assert abs(cross.mean() - 0.5 * G.item()) < 4 * cross.std() / np.sqrt(size)
+    np.testing.assert_allclose(F, G * 0.5 * G + R, rtol=1e-12)
+    _, A, Q = structure.transition(mean, cov)
+    np.testing.assert_allclose(theta, A * 0.5 * A + Q, rtol=1e-12)
+    cross = (x[:, 0] - 0.7) * (x_next - x_next.mean())
+    assert abs(cross.mean() - 0.5 * A.item()) < 4 * cross.std() / np.sqrt(size)
+
+
+def test_with_modes_drawn_anew_the_averaged_filter_is_the_best_linear_one():
+    """Its noise has the variance sum q C^2, and the Kalman filter with it is the best affine filter, as DUOF finds by itself."""
+    model = failing(transition=[0.8, 0.2], first=None)
+    plain = Model.define("0.9*x + 0.7*v", "x + f*w", {"f": math.sqrt(0.8 + 20)}, prior={"mean": 3, "variance": 4})
+    y = simulate(model, 5, 15, seed=1).y
+    found, expected = run(aof(averaged(model, [gaussian(mode) for mode in model.modes])), y), run(aof(gaussian(plain)), y)
+    np.testing.assert_allclose(found.mean, expected.mean, atol=ROUNDING)
+    np.testing.assert_allclose(found.cov, np.broadcast_to(expected.cov, found.cov.shape), atol=ROUNDING)
+
+
+def test_who_wins():
+    """Knowing the modes pays, nobody is below the bound, and merging later is better: the order of the theory."""
+    model = failing()
+    structure = averaged(model, [gaussian(mode) for mode in model.modes])
+    result = compare(
+        [
+            of(logic_dynamic, model),
+            of(gpb2, model),
+            aof(structure),
+            duof(model.modes[0], averaged_equations(model)),
+            fos(structure),
+            mfos(structure),
+            jump_pointmass(model),
+        ],
+        model,
+        4000,
+        10,
+        1,
+        subset_runs=200,
+        progress=False,
+        threads=1,
+    )
+    ranked = dict(result.ranking(slice(2, None)))
+    assert list(ranked)[:2] == ["gpb2", "aof-jump-gaussian"]
+    assert all(gap.value > -4 * gap.standard_error for gap in ranked.values())
+    for name in ("aof-averaged", "duof", "fos-averaged", "mfos-averaged"):
+        better = result.mean_gap_difference(name, "aof-jump-gaussian", slice(2, None))
+        assert better.value > 4 * better.standard_error, name
+
+
+def test_of_angles_there_is_no_average():
+    model = JumpModel.define(
+        "x + v", "x + C*w", {"C": 1}, modes={"a": {}, "b": {"parameters": {"C": 2}}}, transition=[0.5, 0.5], angles=["x"]
+    )
+    with pytest.raises(ModelError, match="angles have no average"):
+        averaged(model, [linearised(mode) for mode in model.modes])

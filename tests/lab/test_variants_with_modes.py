@@ -1,0 +1,153 @@
+"""Variants with modes on the command line: listed, checked, compared, and refused where nothing knows modes."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from kfcourse import JumpModel, cli, load_variants, simulate
+from kfcourse.filters import jump_pointmass, logic_dynamic
+from kfcourse.lab.admission import admissions
+from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures, title
+from kfcourse.lab.variants import VariantError, chosen_variants, equations, find_variant, read_variants
+from kfcourse.montecarlo.modes import recognised
+
+JUMPS = {name: one for name, one in read_variants()[0].items() if isinstance(one.model, JumpModel)}
+OWN = """
+[variants.mine]
+state = "0.9*x + v"
+meter = "x + C*w"
+modes = { sound = { parameters = { C = 1 } }, faulty = { parameters = { C = 5 } } }
+transition = [[0.9, 0.1], [0.4, 0.6]]
+first = [1, 0]
+
+[variants.plain]
+state = "0.9*x + v"
+meter = "x + w"
+"""
+
+
+def kfcourse(*arguments):
+    return CliRunner().invoke(cli.main, [str(one) for one in arguments])
+
+
+@pytest.fixture
+def own(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(OWN)
+    return path
+
+
+def test_they_are_shipped_beside_the_variants_that_the_exercises_ask_about(own):
+    assert list(JUMPS) == ["J1", "J1-lasting", "J2", "J-switching", "J3"]
+    assert not set(JUMPS) & set(load_variants())
+    assert list(load_variants(own)) == ["plain"] and isinstance(find_variant("mine", own).model, JumpModel)
+    assert [one.name for one in chosen_variants([], True, own)] == ["plain"]
+
+
+@pytest.mark.parametrize("name", JUMPS)
+def test_each_has_its_filters_and_finite_trajectories(name):
+    found = {one.name: one for one in admissions(JUMPS[name].model)}
+    scalar = JUMPS[name].model.n == 1
+    assert (found["aof-exact"].one is not None) == scalar
+    assert scalar or "scalar models" in found["aof-exact"].reason
+    assert all(found[one].one for one in ("aof-jump-linearised", "imm", "gpb2", "aof-averaged", "duof"))
+    assert np.isfinite(simulate(JUMPS[name].model, 200, 51, seed=1).x).all()
+
+
+def test_the_published_model_has_the_law_of_its_modes():
+    model = JUMPS["J-switching"].model
+    np.testing.assert_allclose(model.law_at(7), [0.25, 0.5, 0.25])
+    assert [[float(mode.parameters[key]) for key in "ds"] for mode in model.modes] == [[4, 1], [1, 1], [0.5, 3]]
+
+
+def test_the_lab_compares_filters_and_tells_the_share_of_right_modes(tmp_path, own):
+    few = ("--runs", 2000, "--steps", 6, "--exact-runs", 112, "--designs", 1)
+    result = kfcourse("lab", "mine", "--variants", own, *few, "--out", tmp_path / "r", "--json", tmp_path / "n.json")
+    assert result.exit_code == 0, result.output
+    for name in JUMP_FILTERS:
+        assert name == "aof-exact" or title(name) in result.output
+    assert "D_k above that of exact AOF" in result.output
+    for name in ("report.html", "report.tex"):
+        text = (tmp_path / "r" / name).read_text()
+        assert (
+            "Who guesses without measuring" in text
+            and "Mode sound, gaussian" in text
+            and ("ГАОФлд" in text or name == "report.tex")
+        )
+    assert (tmp_path / "r" / "modes.svg").is_file()
+    numbers = json.loads((tmp_path / "n.json").read_text())
+    assert list(numbers["model"]["modes"]) == ["sound", "faulty"] and numbers["model"]["first"] == [1, 0]
+    gaps = {name: gap["value"] for name, gap in numbers["mean_above_bound"].items()}
+    assert gaps["gpb2"] < gaps["aof-jump-gaussian"] < gaps["aof-averaged"]
+
+
+def test_listed_and_checked(own):
+    listed = kfcourse("variants", "--variant", "J1").output
+    assert listed.count("x' = ") == 1 and "        sound: C = 1\n        faulty: C = 10\n" in listed
+    two = JumpModel.define(
+        "x + v", "x + w", modes={"sound": {}, "cubic": {"meter": "x**3 + w"}}, transition=[[0.9, 0.1], [0, 1]], first=[1, 0]
+    )
+    assert equations(two) == "sound: x' = v + x;  y = w + x\n        cubic: x' = v + x;  y = w + x**3"
+    checked = kfcourse("variants", "--variants", own, "--variant", "mine", "--check", "--runs", 256)
+    assert checked.exit_code == 0 and "has 2 modes: only whether it is bounded is checked" in checked.output
+
+
+def test_filters_are_told_for_modes():
+    told = kfcourse("filters", "J1", "--no-trial").output
+    assert "LD-GAOF" in told and "GPB2" in told and "particle" not in told
+    wrong = kfcourse("lab", "J1", "--filters", "aof-gaussian")
+    assert wrong.exit_code == 1 and "unknown filter 'aof-gaussian'; known: aof-jump-gaussian" in wrong.output
+
+
+def test_where_nothing_knows_modes_it_is_said(tmp_path, own):
+    (tmp_path / "y.csv").write_text("y\n1\n2\n")
+    for arguments in (
+        ("exercises", "--sets", "a", "--jobs", 1, "--variant", "J1", "--out", tmp_path / "e"),
+        ("estimate", tmp_path / "y.csv", "--model", own, "--variant", "mine"),
+        ("lab", "J1", "--report", "en", "--runs", 100, "--exact-runs", 0, "--out", tmp_path / "r"),
+    ):
+        result = kfcourse(*arguments)
+        assert result.exit_code != 0 and "jumps between modes" in result.output, (arguments, result.output)
+        assert "Traceback" not in result.output
+    with pytest.raises(VariantError, match="jumps between modes"):
+        find_variant("J1").plain("the exercises")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [("0.1], [0.4", "0.2], [0.4"), ("first = [1, 0]", "first = [1, 1]"), ("first = [1, 0]\n", ""), ("transition", "transitions")],
+)
+def test_a_wrong_table_is_refused_with_its_name(tmp_path, change, message):
+    path = tmp_path / "wrong.toml"
+    path.write_text(OWN.replace(change, message))
+    result = kfcourse("lab", "mine", "--variants", path)
+    assert result.exit_code == 1 and "variant mine in" in result.output and "Traceback" not in result.output
+
+
+def test_the_share_of_right_modes_is_that_of_the_trajectories():
+    model = JUMPS["J1-lasting"].model
+    one = logic_dynamic(JumpStructures(model).gaussian, model.transition_at, model.first)
+    found = recognised([one, jump_pointmass(model)], model, 160, 8, 4)
+    _, y, mode = simulate(model, 160, 8, 4)
+    state, right = one.init(160), []
+    for k in range(8):
+        state = one.step(state, y[k])
+        right.append((state.memory.probability[:, 1] > 0.5) == (mode[k] == 1))
+    assert found.share[one.name].value == pytest.approx(np.mean(right), abs=1e-12)
+    assert found.guess == pytest.approx((mode == 0).mean(), abs=1e-12)
+    assert found.share["aof-exact"].freedom == 19  # on an eighth of them
+    shown = next(k for k in range(20) if 0 < mode[:, k].mean() < 1)  # the first with both modes
+    np.testing.assert_array_equal(found.mode, mode[:, shown])
+    assert found.probability[one.name].shape == (8, 2)
+
+
+def test_the_chapter_shows_the_shipped_table():
+    page = (Path(__file__).parents[2] / "book" / "models-that-jump.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    (name, shown), *_ = tomllib.loads(block)["variants"].items()
+    assert shown == {key: value for key, value in JUMPS[name].table.items() if key != "title"}

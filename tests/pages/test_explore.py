@@ -1,0 +1,168 @@
+"""Figures that answer, in a real browser: by keyboard, mouse and finger; from a file, offline; still without scripts."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from kfcourse.lab.variants import load_variants
+from kfcourse.pages import explore
+
+SCALAR = {name: variant for name, variant in load_variants().items() if variant.model.n == 1 == variant.model.p}
+STILL = "data:image/svg+xml," + "%3Csvg xmlns='http://www.w3.org/2000/svg' width='300' height='100'/%3E"
+ALONE = """<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
+<title>Figure</title></head><body>{html}
+<figure id="{name}"><img src="{still}" alt="still"><figcaption>Caption</figcaption></figure></body></html>"""
+
+
+@pytest.fixture(scope="module")
+def pages():
+    """Each figure of the book as a piece of HTML, by name; made once."""
+    return {"fig-live-lab": explore.live_lab("fig-live-lab", {name: SCALAR[name] for name in ("53", "2", "3")})}
+
+
+@pytest.fixture
+def opened(browser, tmp_path, pages):
+    """open_page(name, fragment, **options) -> a page opened from a file, without a network."""
+    contexts, problems = [], []
+
+    def open_page(name: str, fragment: str = "", **options):
+        path = tmp_path / f"{name}.html"
+        path.write_text(ALONE.format(html=pages[name], name=name, still=STILL), encoding="utf-8")
+        context = browser.new_context(offline=True, **({"viewport": {"width": 900, "height": 1000}} | options))
+        contexts.append(context)
+        tab = context.new_page()
+        tab.set_default_timeout(20_000)
+        tab.on("console", lambda message: problems.append(message.text))
+        tab.on("pageerror", lambda error: problems.append(str(error)))
+        tab.on(
+            "request", lambda one: one.url.startswith((path.as_uri(), "blob:", "data:")) or problems.append(f"loads {one.url}")
+        )
+        tab.goto(path.as_uri() + fragment)
+        if options.get("java_script_enabled", True):
+            tab.wait_for_selector(".kf-explore[data-ready]")
+        return tab
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert problems == []
+
+
+def fragment(tab) -> str:
+    return tab.evaluate("decodeURIComponent(location.hash)")
+
+
+def rounds(tab) -> str:
+    """The live lab's bound stands: its table as text."""
+    tab.wait_for_selector(".kf-explore[data-done='400']", timeout=60_000)
+    return tab.locator(".kf-numbers").inner_text()
+
+
+def drag(tab, handle, dx: float, dy: float) -> None:
+    box = handle.locator("circle").last.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    tab.mouse.move(x + dx, y + dy, steps=4)
+    tab.mouse.up()
+
+
+def state_of(tab, handle_or_slider) -> float:
+    return float(handle_or_slider.get_attribute("aria-valuenow") or handle_or_slider.input_value())
+
+
+# ---------------------------------------------------------------- every figure
+
+FIGURES = ["fig-live-lab"]
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_first_frame_paper_and_no_scripts(opened, name):
+    tab = opened(name)
+    assert not tab.locator("img").is_visible()  # the figure took its place, within the same figure
+    assert tab.locator(f"#{name} svg.kf-chart").first.is_visible()
+    assert tab.locator(f"#{name} figcaption").is_visible()
+    tab.emulate_media(media="print")
+    assert tab.locator("img").is_visible() and not tab.locator(".kf-explore").is_visible()
+    still = opened(name, java_script_enabled=False)
+    assert still.locator("img").is_visible() and still.locator(".kf-explore svg").count() == 0
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_it_fits_a_phone_and_says_what_it_is(opened, name):
+    tab = opened(name, viewport={"width": 390, "height": 800})
+    assert not tab.evaluate("document.documentElement.scrollWidth > innerWidth")
+    for control in tab.locator(".kf-explore :is(input, select, button, [role=slider])").all():
+        assert control.get_attribute("aria-label") or control.inner_text()
+    for chart in tab.locator("svg.kf-chart").all():
+        assert len(chart.get_attribute("aria-label")) > 30
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_nothing_moves_by_itself(opened, name):
+    tab = opened(name, reduced_motion="reduce")
+    assert tab.evaluate("document.getAnimations().length") == 0
+    assert not re.search(r"requestAnimationFrame|setInterval|transition|animation", explore.figure("x", "", "", "null"))
+
+
+# ---------------------------------------------------------------- the live lab
+
+
+def test_the_lab_is_compared_and_a_link_keeps_it(opened):
+    tab = opened("fig-live-lab", "#fig-live-lab?53.f=0.2&step=5")
+    first = rounds(tab)
+    rows = {row.split("\t")[0]: row.split("\t")[1:] for row in first.splitlines()[1:]}
+    assert set(rows) == {"GAOF", "LAOF", "DUOF", "GFOS", "LFOS", "GMFOS", "LMFOS"}
+    above = {name: float(cells[1].split(" ± ")[0]) for name, cells in rows.items()}
+    assert min(above, key=above.get) == "DUOF" and above["DUOF"] > 0  # what the page tells to look for
+    assert "10000 trajectories of 30 steps" in tab.get_by_role("status").inner_text()
+
+    slider = tab.get_by_role("slider", name="f", exact=True)
+    slider.press("Home")
+    tab.wait_for_function("!document.querySelector('[data-done]').dataset.done.match('400')")
+    assert rounds(tab) != first
+    tab.wait_for_function("location.hash.includes('f=0.002')")
+    again = opened("fig-live-lab", fragment(tab))
+    assert rounds(again) == rounds(tab)  # the same numbers, from the link alone
+    assert "step=5" in fragment(tab)
+
+
+def test_the_step_is_dragged_and_moved_by_keys(opened):
+    tab = opened("fig-live-lab")
+    rounds(tab)
+    handle = tab.get_by_role("slider", name="Step to look at")
+    before = tab.locator(".kf-numbers").inner_text()
+    handle.press("ArrowRight")
+    assert state_of(tab, handle) == 5 and tab.locator(".kf-numbers").inner_text() != before
+    handle.press("End")
+    assert state_of(tab, handle) == 29
+    handle.press("Home")
+    assert state_of(tab, handle) == 0
+    handle.scroll_into_view_if_needed()
+    drag(tab, handle, 100, 0)
+    assert 5 < state_of(tab, handle) < 15
+
+
+def test_another_variant_has_its_own_sliders(opened):
+    tab = opened("fig-live-lab")
+    rounds(tab)
+    tab.get_by_role("combobox", name="Variant").select_option("2")
+    tab.wait_for_function("!document.querySelector('[data-done]').dataset.done.match('400')")
+    assert rounds(tab)
+    assert tab.get_by_role("slider", name="h", exact=True).count() == 1
+    for wrong in ("#fig-live-lab?variant=77&53.c=x&53.e=1e9&nonsense=1", "#another"):  # an address that somebody mistyped
+        assert "GAOF" in rounds(opened("fig-live-lab", wrong))
+
+
+def test_ten_thousand_trajectories_in_half_a_second(opened):
+    """Of processor time of its worker alone; the least of five, for the machine may be busy."""
+    tab = opened("fig-live-lab")
+    found = []
+    for _ in range(5):
+        rounds(tab)
+        found.append(int(re.search(r"(\d+)\s*ms", tab.get_by_role("status").inner_text())[1]))
+        tab.get_by_role("slider", name="Random numbers").press("ArrowRight")
+        tab.wait_for_function("!document.querySelector('[data-done]').dataset.done.match('400')")
+    assert min(found) < 500
