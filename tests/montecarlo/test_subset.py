@@ -195,7 +195,7 @@ def test_the_exact_filter_on_a_model_beyond_its_budget_is_left_out_within_second
     model = Model.define("x**3 + 1e-6*v", "x + w")
     start = time.process_time()
     filters = [aof(linearised(model)), pointmass(model)]
-    result = compare(filters, model, 112, 2, 1, subset_runs=112, subset_seconds=30, progress=False)
+    result = compare(filters, model, 112, 2, 1, subset_runs=112, subset_seconds=300, progress=False)
     assert time.process_time() - start < 15  # it takes 3 to 5, and by the clock, on a busy machine, many times that
     assert re.search(r"^step \d of Model\(x' = .* nodes.*--exact-runs 0", result.left_out["aof-exact"])
 
