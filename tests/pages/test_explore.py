@@ -217,7 +217,7 @@ def test_the_measurement_is_moved_and_the_posterior_is_bayes(opened):
         assert found[4] == pytest.approx(expected[4], rel=0.02)
     drag(tab, handle, -60, 0)
     assert said(tab)[0] == pytest.approx(np.hypot(state_of(tab, handle), 1), abs=0.0051)
-    tab.wait_for_function("location.hash.includes('place=')")
+    tab.wait_for_function("place => location.hash.endsWith(`place=${place}`)", arg=handle.get_attribute("aria-valuenow"))
     assert said(opened("fig-two-beats", fragment(tab))) == said(tab)
 
 
