@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
+import sympy as sp
 
 from kfcourse.lab.variants import load_variants
 from kfcourse.pages import explore
@@ -16,10 +18,22 @@ ALONE = """<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name
 <figure id="{name}"><img src="{still}" alt="still"><figcaption>Caption</figcaption></figure></body></html>"""
 
 
+x, y, following = sp.symbols("x y x_next", real=True)
+PLACE = sp.sqrt(x**2 + 1)
+
+
+def bell(at, mean, sd):
+    return sp.exp(-((at - mean) ** 2) / (2 * sd**2)) / (sp.sqrt(2 * sp.pi) * sd)
+
+
+BEATS = (bell(x, -1, sp.sqrt(2)), bell(y, PLACE, 0.2), bell(following, x + 0.5, 0.3))
+
+
 @pytest.fixture(scope="module")
 def pages():
     """Each figure of the book as a piece of HTML, by name; made once."""
-    return {"fig-live-lab": explore.live_lab("fig-live-lab", {name: SCALAR[name] for name in ("53", "2", "3")})}
+    lab = explore.live_lab("fig-live-lab", {name: SCALAR[name] for name in ("53", "2", "3")})
+    return {"fig-live-lab": lab, "fig-two-beats": explore.two_beats("fig-two-beats", x, y, following, *BEATS, PLACE, 2.2)}
 
 
 @pytest.fixture
@@ -75,7 +89,7 @@ def state_of(tab, handle_or_slider) -> float:
 
 # ---------------------------------------------------------------- every figure
 
-FIGURES = ["fig-live-lab"]
+FIGURES = ["fig-live-lab", "fig-two-beats"]
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -166,3 +180,60 @@ def test_ten_thousand_trajectories_in_half_a_second(opened):
         tab.get_by_role("slider", name="Random numbers").press("ArrowRight")
         tab.wait_for_function("!document.querySelector('[data-done]').dataset.done.match('400')")
     assert min(found) < 500
+
+
+# ---------------------------------------------------------------- correction and prediction
+
+
+def said(tab) -> list[float]:
+    """Measurement, percent left of the beacon, mean, density there, top: the numbers of the status line."""
+    text = tab.get_by_role("status").inner_text().replace("−", "-")
+    return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", text)]
+
+
+def by_quadrature(measured: float) -> list[float]:
+    t = np.linspace(-6, 6, 20_001)
+    density = sp.lambdify(x, BEATS[0])(t) * sp.lambdify((x, y), BEATS[1])(t, measured)
+    density /= density.sum() * (t[1] - t[0])
+    mean = (t * density).sum() * (t[1] - t[0])
+    return [measured, 100 * density[t < 0].sum() * (t[1] - t[0]), mean, np.interp(mean, t, density), density.max()]
+
+
+def test_the_measurement_is_moved_and_the_posterior_is_bayes(opened):
+    tab = opened("fig-two-beats")
+    handle = tab.get_by_role("slider", name="Measured distance")
+    assert said(tab)[0] == pytest.approx(2.2, abs=0.005)
+    for key, times in (("ArrowLeft", 3), ("PageUp", 4), ("Home", 1), ("End", 1), ("PageDown", 10)):
+        for _ in range(times):
+            handle.press(key)
+        found, place = said(tab), state_of(tab, handle)
+        # printed to 0.01, to a percent and to three digits; the mean's density is read at the nearest of nodes 0.0375 apart,
+        # and changes by 1/sd times its top over a deviation of 0.2: by a tenth of the top at most
+        expected = by_quadrature(float(np.hypot(place, 1)))
+        assert found[0] == pytest.approx(expected[0], abs=0.0051)
+        assert found[1] == pytest.approx(expected[1], abs=1.0)
+        assert found[2] == pytest.approx(expected[2], abs=0.011)
+        assert found[3] == pytest.approx(expected[3], abs=0.1 * expected[4])
+        assert found[4] == pytest.approx(expected[4], rel=0.02)
+    drag(tab, handle, -60, 0)
+    assert said(tab)[0] == pytest.approx(np.hypot(state_of(tab, handle), 1), abs=0.0051)
+    tab.wait_for_function("place => location.hash.endsWith(`place=${place}`)", arg=handle.get_attribute("aria-valuenow"))
+    assert said(opened("fig-two-beats", fragment(tab))) == said(tab)
+
+
+def test_a_finger_moves_it_and_does_not_scroll(opened):
+    tab = opened("fig-two-beats", has_touch=True, is_mobile=True, viewport={"width": 390, "height": 500})
+    session, handle = tab.context.new_cdp_session(tab), tab.get_by_role("slider", name="Measured distance")
+    box, before = handle.locator("circle").last.bounding_box(), said(tab)[0]
+    at = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    for kind, points in [
+        ("touchStart", [at]),
+        *[("touchMove", [(at[0] + 4 * i, at[1] + i)]) for i in range(10)],
+        ("touchEnd", []),
+    ]:
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": a, "y": b} for a, b in points]})
+    tab.wait_for_function(
+        "before => !document.querySelector('[role=status]').textContent.startsWith(`y = ${before}`)", arg=f"{before:.2f}"
+    )
+    assert said(tab)[0] > before + 0.3
+    assert tab.evaluate("scrollY") == 0

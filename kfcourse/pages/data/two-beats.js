@@ -3,7 +3,7 @@
 
 const N = 321, LOW = -6, HIGH = 6;
 const BLUE = "#0072B2", BAND = "#56B4E9", ORANGE = "#D55E00", INK = "#1f2328";
-const x = Float64Array.from({ length: N }, (_, i) => LOW + ((HIGH - LOW) * i) / (N - 1)), step = (HIGH - LOW) / (N - 1);
+const x = Float64Array.from({ length: N }, (_, i) => (LOW * (N - 1 - i) + HIGH * i) / (N - 1)), step = (HIGH - LOW) / (N - 1);
 const values = (loop, arrays, c = {}) => {
   const a = { ...arrays, value: new Float64Array(Object.values(arrays)[0].length) };
   loop(a.value.length, {}, c, a);
@@ -48,7 +48,7 @@ function kfTwoBeats(root, name, first) {
       lines.predicted(x, none, predicted);
       lines.next([mean(predicted), mean(predicted)], [0, high]);
       for (const one of [left, right]) one.y([0, high]);
-      const at = posterior[Math.round((mean(posterior) - LOW) / step)], share = sum(posterior.filter((_, i) => x[i] < 0)) * step;
+      const at = posterior[Math.round((mean(posterior) - LOW) / step)], share = step * sum(posterior.map((one, i) => one * (1 - Math.sign(x[i])) / 2));
       says.textContent = `y = ${y.toFixed(2)}\u00a0km. ${Math.round(100 * share)}\u00a0% of the probability is left of the beacon. `
         + `Mean ${ui.short(Number(mean(posterior).toFixed(2)))}\u00a0km, where the density is ${ui.short(Number(at.toFixed(3)))}; its top is ${ui.short(Number(Math.max(...posterior).toFixed(2)))}.`;
     };

@@ -1,0 +1,56 @@
+"""The JavaScript printer: what it has not it refuses in words; tests/pages/test_browser.py runs what it prints."""
+
+import pytest
+import sympy as sp
+
+from kfcourse.symbolic import javascript
+from kfcourse.symbolic.reading import ModelError
+
+pytestmark = pytest.mark.quick
+
+x, y, c = sp.symbols("x y c", real=True)
+
+
+def printed(formula, **more):
+    return javascript.loop("f", {"x": sp.Matrix([x])}, {"value": sp.Matrix([formula])}, **more)
+
+
+def test_a_function_in_full():
+    assert printed(c * x**2 + sp.exp(-x) / 3, constants=[c]) == (
+        "function f(n, v, c, a) {\n"
+        "  const v_c = v.c;\n"
+        "  const a_x = a.x;\n"
+        "  const a_value = a.value;\n"
+        "  for (let i = 0; i < n; i++) {\n"
+        "    const x_0 = a_x[i];\n"
+        "    const s0 = (x_0 * x_0);\n"
+        "    a_value[i] = ((0.3333333333333333 * Math.exp(((-1.0) * x_0))) + (v_c * s0));\n"
+        "  }\n"
+        "}\n"
+    )
+
+
+def test_entries_of_vectors_and_what_is_written_in_place():
+    text = javascript.loop("turn", {"p": sp.Matrix([x, y])}, {"p": sp.Matrix([y, x])})
+    assert "const p_1 = a_p[2 * i + 1];" in text and text.count("const a_p = a.p;") == 1
+    # all is read before anything is written
+    assert text.index("a_p[2 * i + 0] = p_1") > text.index("const p_1")
+
+
+@pytest.mark.parametrize(
+    ("formula", "said"),
+    [
+        (sp.erf(x), r"erf, in erf\(x\), is nothing that the pages' JavaScript knows; it has Abs, .* tanh, and powers"),
+        (sp.gamma(x) + x, r"gamma, in gamma\(x\)"),
+        (sp.Integral(sp.exp(-(x**2)), (x, 0, 1)), "Integral"),
+        (sp.Sum(x, (y, 1, 3)), "Sum"),
+        (x + y, "the symbol y, which nothing defines,"),
+        (sp.I * x, "ImaginaryUnit|no finite real value"),
+        (sp.zoo * x, "no finite real value"),
+        (x * sp.Rational(10) ** 400, "beyond what a float can be"),
+        (sp.Piecewise((x, x > 0)), "Piecewise"),
+    ],
+)
+def test_what_it_does_not_have_is_refused(formula, said):
+    with pytest.raises(ModelError, match=said):
+        printed(formula)
