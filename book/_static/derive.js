@@ -10,7 +10,7 @@
   };
   const ENTIRE = ["exp", "sin", "cos", "sinh", "cosh"];
   const MEANS = ["M", "D", "Cov"];
-  const ROUNDING = 1e-10, CLOSE = 1e-7, TRIED = 18, FEWEST = 4, CERTAIN = 1.35, MOST_TRIED = 4000;
+  const ROUNDING = 1e-10, CLOSE = 1e-7, TRIED = 18, FEWEST = 4, CERTAIN = 1.35, MOST_TRIED = 4000, SECONDS = 3;
   const LONGEST = 600, DEEPEST = 60, MAX_LENGTH = 2000, MAX_EXPONENT = 16, MOST_LINES = 400;
   const COSTS = {
     sign: 1, doubled: 1.05, letter: 1.1, moment: 1.25, power: 1.2, factor: 1.2, "noise-forgotten": 1.22, "noise-mean": 1.45,
@@ -375,7 +375,7 @@
   // Values of trees at the same random points: each tree becomes a function of the letters' values.
   class Values {
     constructor(setting, points = TRIED, seed = "") {
-      Object.assign(this, { setting, points, seed, slots: {}, kept: new Map(), compiled: {} });
+      Object.assign(this, { setting, points, seed, slots: {}, kept: new WeakMap() });
       this.env = Array.from({ length: points }, () => []);
       const { states, cov } = setting, n = states.length;
       this.roots = Array.from({ length: points }, (_, p) => {
@@ -414,16 +414,21 @@
       return this.env.map((env) => env[k]);
     }
 
-    // [value, size of its terms] at one point; size only if wanted
-    compile(node, sized) {
+    // [value, size of its terms] at one point
+    compile(node) {
       if (node.kind === "number") { const one = [node.data, Math.abs(node.data)]; return () => one; }
       if (node.kind === "letter") {
         const meaning = this.setting.meanings[node.data];
-        if (meaning) return this.compile(meaning, sized);
+        if (meaning) return this.compile(meaning);
         const k = this.slot(node.data);
         return (env) => [env[k], Math.abs(env[k])];
       }
-      const parts = node.parts.map((part) => this.compile(part, sized)), data = node.data;
+      const parts = node.parts.map((part) => this.compile(part));
+      return node.kind === "mean" ? this.averaged(node.parts[0], parts[0]) : this.joined(node, parts);
+    }
+
+    joined(node, parts) {
+      const { data } = node;
       if (node.kind === "sum") {
         return (env) => {
           let value = 0, size = 0;
@@ -447,21 +452,20 @@
           return [value, data > 0 ? s ** data : Math.abs(value) * (s / Math.abs(v)) ** -data];
         };
       }
-      if (node.kind === "call") {
-        const f = FUNCTIONS[data];
-        return (env) => {
-          const [v, s] = parts[0](env), value = f(v);
-          return [value, Math.abs(value) + Math.max(1, Math.abs(value)) * s];
-        };
-      }
-      return this.averaged(node.parts[0], parts[0]);
+      const f = FUNCTIONS[data];
+      return (env) => {
+        const [v, s] = parts[0](env), value = f(v);
+        return [value, Math.abs(value) + Math.max(1, Math.abs(value)) * s];
+      };
     }
 
     averaged(node, inner) {
       const { states, noises, means } = this.setting, found = degrees(node, this.setting);
-      const most = Math.max(0, ...states.map((x) => found[x] || 0));
       const axes = [];
-      states.forEach((x, i) => { if (most && states.slice(i).some((one) => found[one])) axes.push(["state", i, most]); });
+      states.forEach((_, i) => { // a component is made of the normal numbers of the axes up to its own
+        const degree = states.slice(i).reduce((sum, x) => sum + (found[x] || 0), 0);
+        if (degree) axes.push(["state", i, degree]);
+      });
       noises.forEach((name) => { if (found[name]) axes.push(["noise", name, found[name]]); });
       const rules = axes.map(([, , degree]) => hermite(degree === Infinity ? 32 : degree + 2));
       const slots = states.map((x) => this.slot(x)), middle = means.map((name) => this.slot(name));
@@ -493,13 +497,15 @@
       };
     }
 
-    pairs(node) {
+    // values and sizes at all points, or at the first only; parts that were there before a change are not computed again
+    pairs(node, count = this.points) {
       let found = this.kept.get(node);
-      if (!found) {
-        const run = this.compile(node, true);
-        found = this.env.map((env) => run(env));
-        this.kept.set(node, found);
-      }
+      if (found && found.length >= count) return found;
+      const combined = ["sum", "product", "power", "call"].includes(node.kind);
+      const parts = combined ? node.parts.map((part) => this.pairs(part, count)) : [];
+      const run = combined ? this.joined(node, parts.map((_, i) => (p) => parts[i][p])) : this.compile(node);
+      found = this.env.slice(0, count).map((env, p) => run(combined ? p : env));
+      this.kept.set(node, found);
       return found;
     }
 
@@ -767,19 +773,28 @@
     tried() {
       const found = [], pool = [...new Set([...this.letters, ...letters(this.line), ...letters(this.above)])].sort();
       const terms = walk(this.above).filter(([path]) => path.length && at(this.above, path.slice(0, -1)).kind === "sum").map(([, one]) => one);
+      const end = Date.now() + 1000 * SECONDS;
       let count = 0;
       for (const [path, node] of walk(this.line)) {
         const outer = path.map((_, i) => path.slice(0, i)).find((one) => ["mean", "call", "power"].includes(at(this.line, one).kind));
         if (!outer) continue;
         for (const [kind, name, other] of changes(node, pool, terms)) {
-          if (++count > MOST_TRIED) return found;
+          if (++count > MOST_TRIED || Date.now() > end) return found;
           const line = changed(this.line, path, other);
+          if (!this.first(line)) continue;
           if (same(this.valuesOf(line), this.target) && !every(this.values.of(at(line, outer).parts[0]), (one) => Math.abs(one) <= 1e-9)) {
             found.push(this.slip(kind, path, line, { name }));
           }
         }
       }
       return found;
+    }
+
+    first(line) { // whether it has the right value at the first point: most have not
+      try { return same([this.values.pairs(line, 1)[0][0]], [this.target[0]]); } catch (error) {
+        if (error instanceof Uncomputed) return false;
+        throw error;
+      }
     }
 
     misread() {
@@ -1055,7 +1070,7 @@
       const bad = verdicts.filter((one) => MARKS[one.status] !== "✓" && one.status !== "begins").length;
       status.textContent = verdicts.length ? `${verdicts.length} lines, ${bad ? `${bad} to look at` : "each equal to the one above"}` : "type a line such as h = M[g*x]";
     } catch (error) {
-      if (!(error instanceof derive.DerivationError || error instanceof derive.Unreadable)) throw error;
+      if (![derive.DerivationError, derive.Unreadable, derive.Uncomputed].some((kind) => error instanceof kind)) throw error;
       status.textContent = error.message;
     }
   }

@@ -30,7 +30,8 @@ def shown(report: Report) -> str:
 def _item(verdict: Verdict) -> str:
     words = "".join(f"<p>{_coded(part)}</p>" for part in (verdict.says, verdict.rule) if part)
     state = verdict.status.replace(" ", "-")
-    return f'<li class="kf-{state}"><code>{_marked(verdict)}</code> <span>{MARKS[verdict.status]} {verdict.status}</span>{words}</li>\n'
+    said = f"<span>{MARKS[verdict.status]} {verdict.status}</span>"
+    return f'<li class="kf-{state}"><code>{_marked(verdict)}</code> {said}{words}</li>\n'
 
 
 def _marked(verdict: Verdict) -> str:
