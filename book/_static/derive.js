@@ -782,7 +782,8 @@
           if (++count > MOST_TRIED || Date.now() > end) return found;
           const line = changed(this.line, path, other);
           if (!this.first(line)) continue;
-          if (same(this.valuesOf(line), this.target) && !every(this.values.of(at(line, outer).parts[0]), (one) => Math.abs(one) <= 1e-9)) {
+          const around = at(line, outer), nothing = kind === "lost-factor" ? around.parts[0] : around;
+          if (same(this.valuesOf(line), this.target) && !every(this.values.of(nothing), (one) => Math.abs(one) <= 1e-9)) {
             found.push(this.slip(kind, path, line, { name }));
           }
         }

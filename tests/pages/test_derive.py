@@ -21,6 +21,7 @@ from derivation_corpus import chains, planted  # noqa: E402
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chromium-browser"))), None)
 SCRIPT = ROOT / "book" / "_static" / "derive.js"
+STYLE = (ROOT / "book" / "_static" / "book.css").read_text(encoding="utf-8")
 COUNT = 12
 BY_HAND = [
     "variant 53\nh = g*m\n = g*q\n = m*g\n = g*m/(m-m)\n = M[1/x]\n = (g*m",
@@ -57,8 +58,8 @@ def tab(browser, tmp_path):
     example = "F = M[(g*x + f*x^2*w - h)^2]\n = g^2*d + 3*f^2*d^2"
     script = SCRIPT.read_text(encoding="utf-8")
     body = f"{field(load_variants(), example)}<script>{script}</script>"
-    head = '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>x</title></head>'
-    path.write_text(f"{head}<body>{body}</body></html>", encoding="utf-8")
+    head = '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>x</title>'
+    path.write_text(f"{head}<style>{STYLE}</style></head><body>{body}</body></html>", encoding="utf-8")
     context = browser.new_context(offline=True, viewport={"width": 390, "height": 800})
     page = context.new_page()
     page.on("console", lambda message: problems.append(message.text))
@@ -118,7 +119,7 @@ def test_by_keyboard(tab):
 def test_without_scripts_the_field_is_hidden_and_a_report_is_plain_html():
     assert '<div class="kf-derive" hidden>' in field(load_variants(), "</textarea><script>")
     assert "</textarea><script>" not in field(load_variants(), "</textarea><script>")
-    text = shown(checked("variant 53\nF = g^2*d - f^2*m^4\n = 1 < 2"))
+    text = shown(checked("variant 53\nlinearised\nF = g^2*d - f^2*m^4\n = 1 < 2"))
     assert "<mark>" in text
     assert "1 &lt; 2" in text
     assert json.loads(described(load_variants()))["models"]["53"]["meter"] == ["f*w*x**2 + g*x"]
