@@ -21,7 +21,7 @@ from kfcourse.derivations.verdicts import Report
 from kfcourse.lab import find_variant, load_variants
 from kfcourse.symbolic.structure import gaussian, linearised
 
-COUNT = 200 if int(os.environ.get("KFCOURSE_CASES", "1000")) > 1000 else 60  # all 200 with `make fuzz`
+COUNT = 200 if int(os.environ.get("KFCOURSE_CASES", "1000")) > 1000 else 40  # all 200 with `make fuzz`
 NAMED = 0.9
 
 
