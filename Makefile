@@ -55,7 +55,7 @@ unit: install
 # Other cases each time; what fails is shown with the case, as small as can be.
 CASES := 20000
 fuzz: install
-	KFCOURSE_CASES=$(CASES) $(BIN)/pytest -q -n auto --hypothesis-show-statistics tests/test_generated.py
+	KFCOURSE_CASES=$(CASES) $(BIN)/pytest -q -n auto --hypothesis-show-statistics tests/test_generated.py tests/derivations
 
 # Executes every notebook of the built book once more and compares all outputs; so it does with the worked solutions of the
 # exercises, for variants of different kinds: multiplicative noises, a sine meter, a vector state.

@@ -373,13 +373,16 @@ class _Search:
                 if count > MOST_TRIED:
                     return
                 other = changed(self.line, path, new)
-                if self._same(self.values.of(other), self.target) and not self._nothing(other, path):
+                if self._same(self.values.of(other), self.target) and not self._nothing(other, path, kind):
                     yield Slip(kind, path, other, name)
 
-    def _nothing(self, line: Node, path: Path) -> bool:
-        """Whether a change leaves nothing of the mean or the power around it: then that does not belong there as a whole."""
-        outer = next(path[:i] for i in range(len(path)) if at(line, path[:i]).kind in (MEAN, CALL, POWER))
-        return bool(np.all(np.abs(self.values.of(at(line, outer).parts[0])) <= 1e-9))
+    def _nothing(self, line: Node, path: Path, kind: str) -> bool:
+        """Whether a change leaves nothing of the mean or the power around it: then that does not belong there as a whole.
+
+        With a noise that was lost a mean may be zero, and rightly so.
+        """
+        outer = at(line, next(path[:i] for i in range(len(path)) if at(line, path[:i]).kind in (MEAN, CALL, POWER)))
+        return bool(np.all(np.abs(self.values.of(outer.parts[0] if kind == "lost-factor" else outer)) <= 1e-9))
 
     # ---------------------------------------------------------------- of the line above
 

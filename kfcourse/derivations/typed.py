@@ -56,7 +56,7 @@ def read_line(text: str, name: Callable[[str], str | None] = lambda name: None) 
     for found in _OTHERWISE.finditer(text):
         new = _IN_PYTHON[found[0]]
         pieces += [text[end : found.start()], new]
-        columns += [*range(end, found.start()), *[found.start()] * len(new)]
+        columns += [*range(end, found.start()), *(min(found.start() + i, found.end() - 1) for i in range(len(new)))]
         end = found.end()
     python, columns = "".join([*pieces, text[end:]]), [*columns, *range(end, len(text) + 1)]
     try:

@@ -202,9 +202,7 @@ class _Chain:
             return 0
         where = f"what {name} means" if name else "the one above"
         if result == NO_VALUE:
-            raise Uncomputed(
-                node, f"there is no value to compare with {where}: a division by zero, or a root of something negative"
-            )
+            raise Uncomputed(node, f"no value to compare with {where}: a division by zero, or a root of something negative")
         if result == IF_POSITIVE:
             says = f"equal to {where} only for positive letters: declare them in a line of its own before the chain, positive ..."
             self._says(link, DIFFERS, says, kinds=("positive",))

@@ -1,0 +1,125 @@
+"""The page "Derive it" in a real browser: its verdicts are the checker's, and it works by keyboard, without a network."""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kfcourse.derivations.values import hermite
+from kfcourse.lab import load_variants
+from kfcourse.pages.derive import checked, described, field, shown
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "tests" / "derivations"))
+from derivation_corpus import chains, planted  # noqa: E402
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chromium-browser"))), None)
+SCRIPT = ROOT / "book" / "_static" / "derive.js"
+STYLE = (ROOT / "book" / "_static" / "book.css").read_text(encoding="utf-8")
+COUNT = 12
+BY_HAND = [
+    "variant 53\nh = g*m\n = g*q\n = m*g\n = g*m/(m-m)\n = M[1/x]\n = (g*m",
+    "S = sqrt(c^2*d)\n = c*sqrt(d)\n = d^(1/2)*c",
+    "variant 53\nlinearised\nF = g^2*d + f^2*m^4\n = G^2*d + f^2*m^2*m^2\n = (g^2 - f^2*m^3*m/d)*d",
+    "variant 53\nF = M[(g*x + f*x^2*w - g*m)^2]\n = g^2*M[(x-m)^2]\n = g^2*d",
+    "variant 53\nF = M[(g*x + f*x^2*w - h)^2]\n = g^2*d + f^2*m^4 + 2*f^2*m^2*d + f^2*d^2",
+    "variant 21\nlinearised\nF11 = cos(m1)^2*d11 + r^2\n = (1 - sin(m1)^2)*d11 + r",
+]
+
+
+def texts() -> list[str]:
+    rng = random.Random(6)
+    made = [one.text(rng) for one in chains(8, COUNT)] + [one.chain.text(rng) for one in planted(9, COUNT)]
+    return made + BY_HAND
+
+
+@pytest.fixture(scope="module")
+def browser():
+    if BROWSER is None:
+        pytest.skip("no Chromium or Chrome on this machine")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=BROWSER)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def tab(browser, tmp_path):
+    """The field and its script in a page from a file, without a network."""
+    path, problems = tmp_path / "derive.html", []
+    example = "F = M[(g*x + f*x^2*w - h)^2]\n = g^2*d + 3*f^2*d^2"
+    script = SCRIPT.read_text(encoding="utf-8")
+    body = f"{field(load_variants(), example)}<script>{script}</script>"
+    head = '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>x</title>'
+    path.write_text(f"{head}<style>{STYLE}</style></head><body>{body}</body></html>", encoding="utf-8")
+    context = browser.new_context(offline=True, viewport={"width": 390, "height": 800})
+    page = context.new_page()
+    page.on("console", lambda message: problems.append(message.text))
+    page.on("pageerror", lambda error: problems.append(str(error)))
+    page.on("request", lambda request: request.url == path.as_uri() or problems.append(f"loads {request.url}"))
+    page.goto(path.as_uri())
+    yield page
+    context.close()
+    assert problems == []
+
+
+def test_verdicts_are_those_of_the_checker(tab):
+    """Status, kinds, terms, places and words, on chains made by code and by hand; of what cannot be read, the status."""
+    every = texts()
+    run = """([texts, data]) => { const { models, texts: said } = JSON.parse(data);
+        return texts.map((text) => kfcourseDerive.checkText(text, models, said)); }"""
+    found = tab.evaluate(run, [every, described(load_variants())])
+    for text, theirs in zip(every, found, strict=True):
+        ours = checked(text).verdicts
+        assert [(one["line"], one["status"]) for one in theirs] == [(one.line, one.status) for one in ours], text
+        for one, other in zip(theirs, ours, strict=True):
+            if other.status != "unreadable":
+                wanted = [other.says, other.rule, list(other.kinds), list(other.terms), [list(span) for span in other.spans]]
+                assert [one[name] for name in ("says", "rule", "kinds", "terms", "spans")] == wanted, text
+    assert sum(one.status == "differs" for text in every for one in checked(text).verdicts) > COUNT
+
+
+@pytest.mark.parametrize("count", [2, 5, 12, 32])
+def test_nodes_and_weights(tab, count):
+    nodes, weights = tab.evaluate("n => kfcourseDerive.hermite(n)", count)
+    ours = hermite(count)
+    np.testing.assert_allclose(np.sort(nodes), ours[0], atol=1e-13 * count)
+    np.testing.assert_allclose(weights, ours[1], rtol=1e-10, atol=1e-15)  # the checker's tolerance
+
+
+def test_by_keyboard(tab):
+    assert "1 to look at" in tab.get_by_role("status").inner_text()
+    assert tab.locator(".kf-differs mark").count() == 1
+    tab.get_by_label("Your derivation, a step a line").fill("h = M[g*x + f*x^2*w]\n = g*m")
+    tab.get_by_label("Your derivation, a step a line").press("Control+Enter")
+    assert tab.get_by_role("status").inner_text() == "2 lines, each equal to the one above"
+    tab.get_by_label("Model").select_option("a model of my own")
+    tab.get_by_label("y =").fill("q*x + w")
+    tab.get_by_label("Your derivation, a step a line").fill("F = M[(q*x + w - h)^2]\n = q^2*d + 1\n = <b>")
+    tab.get_by_role("button", name="Check each line").press("Enter")
+    assert [one.get_attribute("class") for one in tab.locator(".kf-derived li").all()] == [
+        "kf-right",
+        "kf-right",
+        "kf-unreadable",
+    ]
+    tab.get_by_label("y =").fill("q**x")
+    tab.get_by_role("button", name="Check each line").press("Enter")
+    assert tab.get_by_role("status").inner_text().startswith("y = q**x: an exponent must be a plain number")
+    assert tab.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_without_scripts_the_field_is_hidden_and_a_report_is_plain_html():
+    assert '<div class="kf-derive" hidden>' in field(load_variants(), "</textarea><script>")
+    assert "</textarea><script>" not in field(load_variants(), "</textarea><script>")
+    text = shown(checked("variant 53\nlinearised\nF = g^2*d - f^2*m^4\n = 1 < 2"))
+    assert "<mark>" in text
+    assert "1 &lt; 2" in text
+    assert json.loads(described(load_variants()))["models"]["53"]["meter"] == ["f*w*x**2 + g*x"]
