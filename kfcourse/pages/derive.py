@@ -6,6 +6,7 @@ import html
 import json
 import re
 from collections.abc import Mapping
+from pathlib import Path
 
 from jinja2 import Environment, PackageLoader
 
@@ -14,12 +15,13 @@ from kfcourse.derivations.said import DEFINITIONS, RULES
 from kfcourse.derivations.verdicts import MARKS, Verdict
 from kfcourse.lab.variants import Variant, find_variant
 
+SCRIPT = Path(__file__).parent / "data" / "derive.js"
 _TEMPLATES = Environment(loader=PackageLoader("kfcourse.pages"), trim_blocks=True, lstrip_blocks=True, autoescape=True)
 
 
 def checked(text: str) -> Report:
     """The report on a text that names its variant."""
-    return check_text(text, lambda name: find_variant(name).model)
+    return check_text(text, lambda name: find_variant(name).plain("derivations"))
 
 
 def shown(report: Report) -> str:
@@ -50,17 +52,18 @@ def _coded(text: str) -> str:
 
 def described(variants: Mapping[str, Variant]) -> str:
     """What the script needs of the variants and of the rules, as JSON: formulas and names, no result."""
+    plain = {name: one.plain("derivations") for name, one in variants.items()}
     models = {
         name: {
-            "title": one.title,
-            "states": [s.name for s in one.model.x],
-            "v": [s.name for s in one.model.v],
-            "w": [s.name for s in one.model.w],
-            "parameters": list(one.model.parameters),
-            "state": [str(formula) for formula in one.model.state_equation],
-            "meter": [str(formula) for formula in one.model.meter_equation],
+            "title": variants[name].title,
+            "states": [s.name for s in model.x],
+            "v": [s.name for s in model.v],
+            "w": [s.name for s in model.w],
+            "parameters": list(model.parameters),
+            "state": [str(formula) for formula in model.state_equation],
+            "meter": [str(formula) for formula in model.meter_equation],
         }
-        for name, one in variants.items()
+        for name, model in plain.items()
     }
     return json.dumps({"models": models, "texts": {"rules": RULES, "definitions": DEFINITIONS}}, ensure_ascii=False)
 
@@ -68,4 +71,5 @@ def described(variants: Mapping[str, Variant]) -> str:
 def field(variants: Mapping[str, Variant], example: str) -> str:
     """The field in which a reader types a chain, in HTML; without scripts it stays hidden."""
     data = described(variants).replace("</", "<\\/")
-    return _TEMPLATES.get_template("derive.html.j2").render(data=data, example=example, variants=variants)
+    script = SCRIPT.read_text(encoding="utf-8")
+    return _TEMPLATES.get_template("derive.html.j2").render(data=data, script=script, example=example, variants=variants)

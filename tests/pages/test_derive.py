@@ -20,7 +20,6 @@ sys.path.append(str(ROOT / "tests" / "derivations"))
 from derivation_corpus import chains, planted  # noqa: E402
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chromium-browser"))), None)
-SCRIPT = ROOT / "book" / "_static" / "derive.js"
 STYLE = (ROOT / "book" / "_static" / "book.css").read_text(encoding="utf-8")
 COUNT = 12
 BY_HAND = [
@@ -56,8 +55,7 @@ def tab(browser, tmp_path):
     """The field and its script in a page from a file, without a network."""
     path, problems = tmp_path / "derive.html", []
     example = "F = M[(g*x + f*x^2*w - h)^2]\n = g^2*d + 3*f^2*d^2"
-    script = SCRIPT.read_text(encoding="utf-8")
-    body = f"{field(load_variants(), example)}<script>{script}</script>"
+    body = field(load_variants(), example)
     head = '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>x</title>'
     path.write_text(f"{head}<style>{STYLE}</style></head><body>{body}</body></html>", encoding="utf-8")
     context = browser.new_context(offline=True, viewport={"width": 390, "height": 800})
