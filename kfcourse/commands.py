@@ -19,7 +19,7 @@ from typing import NamedTuple
 import click
 
 
-class Place(NamedTuple):
+class Command(NamedTuple):
     """Where a command is, and the first sentence of its help."""
 
     module: str
@@ -28,18 +28,18 @@ class Place(NamedTuple):
 
 # One line a command: this is where a new one is added.
 COMMANDS = {
-    "check": Place(
+    "check": Command(
         "kfcourse.cli", "Check a derivation line by line: FILE has chains of lines such as F = M[(g*x - h)^2] and = g^2*d."
     ),
-    "estimate": Place(
+    "estimate": Command(
         "kfcourse.cli", "Estimate the states from your own measurements, FILE (CSV): forward, looking back, and judged."
     ),
-    "exercises": Place("kfcourse.notebooks.commands", "Write the students' notebooks, ready to run."),
-    "filters": Place("kfcourse.cli", "Say of each filter whether VARIANT, of FILE or of the lab, admits it, and why not."),
-    "grade": Place("kfcourse.notebooks.commands", "Run the returned notebooks in FOLDER and write a table of what passed."),
-    "lab": Place("kfcourse.cli", "Compare the filters on VARIANT (such as 53) and write the report."),
-    "solutions": Place("kfcourse.notebooks.commands", "Write the worked solutions: executed notebooks and HTML pages."),
-    "variants": Place("kfcourse.listing", "List the variants of the lab, check them, or propose new ones."),
+    "exercises": Command("kfcourse.notebooks.commands", "Write the students' notebooks, ready to run."),
+    "filters": Command("kfcourse.cli", "Say of each filter whether VARIANT, of FILE or of the lab, admits it, and why not."),
+    "grade": Command("kfcourse.notebooks.commands", "Run the returned notebooks in FOLDER and write a table of what passed."),
+    "lab": Command("kfcourse.cli", "Compare the filters on VARIANT (such as 53) and write the report."),
+    "solutions": Command("kfcourse.notebooks.commands", "Write the worked solutions: executed notebooks and HTML pages."),
+    "variants": Command("kfcourse.listing", "List the variants of the lab, check them, or propose new ones."),
 }
 
 
