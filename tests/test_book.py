@@ -289,7 +289,7 @@ def test_a_chapter_is_downloaded_as_a_notebook(window):
     ("words", "page", "section"),
     [
         ("stratonovich equation", "stratonovich.html", ""),
-        ("variant 53 Russian report", "lab-manual.html", "the-report"),
+        ("variant 53 Russian report", "sample-report.html", ""),
         ("ошибки фильтрации", "notation.html", "estimates-and-gains"),  # which says "ошибка", "фильтр"
         ("likelihood_error", "package/kfcourse.records.html", "module-kfcourse.records.evidence"),
     ],
