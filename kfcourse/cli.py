@@ -226,13 +226,25 @@ def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
     """Check a derivation line by line: FILE has chains of lines such as F = M[(g*x - h)^2] and = g^2*d.
 
     Each line is compared with the one above it, and the term that is wrong is named.  Exit status 0 if all lines are right, 1
-    if one differs, 2 if one cannot be read or compared.
+    if one differs, 2 if one, or the file, cannot be read or compared.
     """
 
     def model(name: str) -> Model:
         return find_variant(name, variants_file).plain("derivations")
 
-    report = check_text(file.read_text(encoding="utf-8"), model, of_model(model(variant)) if variant else None)
+    try:
+        report = check_text(file.read_text(encoding="utf-8-sig"), model, of_model(model(variant)) if variant else None)
+    except UnicodeDecodeError:
+        fault = f"{file} is no text in UTF-8: save it as such"
+    except OSError as error:
+        fault = f"{file}: {error.strerror}"
+    except ValueError as error:
+        fault = str(error)
+    else:
+        fault = "" if report.chains else f"{file} has no chain of lines, such as F = M[(g*x - h)^2] and, below it, = g^2*d"
+    if fault:
+        click.echo(f"Error: {fault}", err=True)
+        sys.exit(2)
     click.echo(report)
     sys.exit(2 if report.undecided else 0 if report.right else 1)
 

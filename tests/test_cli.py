@@ -264,10 +264,27 @@ def test_a_derivation_is_checked_line_by_line(call, tmp_path):
         done = call("check", file, "--variant", "53")
         assert done.exit_code == status
         assert says in done.output
-    file.write_text("nonsense\n", encoding="utf-8")
-    done = call("check", file)
-    assert done.exit_code == 1
-    assert "line 1: 'nonsense' has no =, and is no heading" in done.output
+    file.write_text(f"{right}\n", encoding="utf-8-sig")  # as Windows' Notepad may save it
+    assert call("check", file, "--variant", "53").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("content", "options", "says"),
+    [
+        (b"nonsense\n", (), "line 1: 'nonsense' has no =, and is no heading"),
+        (b"", (), "has no chain of lines, such as"),
+        (b"variant 53\n", (), "has no chain of lines, such as"),
+        (b"\xd6\xff", (), "is no text in UTF-8"),
+        (b"F = d\n", ("--variant", "999"), "no variant '999'"),
+        (None, (), "No such file"),
+    ],
+)
+def test_what_is_no_derivation_is_said_in_a_sentence(call, tmp_path, content, options, says):
+    file = tmp_path / "F.txt"
+    if content is not None:
+        file.write_bytes(content)
+    done = call("check", file, *options)
+    assert done.exit_code == 2 and says in done.output and "Traceback" not in done.output
 
 
 def test_an_unknown_variant_names_the_known_ones(call, no_computation):

@@ -7,10 +7,11 @@ import numpy as np
 from kfcourse.derivations.exact import Exact, NotPolynomial
 from kfcourse.derivations.setting import Setting
 from kfcourse.derivations.terms import Node
-from kfcourse.derivations.values import Values, agree
+from kfcourse.derivations.values import ROUNDING, Values, agree
 
 EQUAL, DIFFERENT, IF_POSITIVE, NO_VALUE = "equal", "different", "equal if positive", "no value"
 FEWEST = 4  # points at which both have values
+CLEAR = 1e-4  # of a value: what its rounding may be, that it can be compared; tan(1e16) has no value
 
 
 def compare(setting: Setting, first: Node, second: Node) -> str:
@@ -29,7 +30,7 @@ def compare(setting: Setting, first: Node, second: Node) -> str:
     except NotPolynomial:
         values = Values(setting, [first, second])
     pairs = values.sized(first), values.sized(second)
-    defined = np.isfinite([value for value, _ in pairs])
+    defined = np.array([np.isfinite(value) & (ROUNDING * size < CLEAR * (1 + np.abs(value))) for value, size in pairs])
     positive = np.arange(values.points) < values.points / 3
     same = agree(*pairs)
     if (defined.all(axis=0) & positive).sum() < FEWEST:

@@ -173,11 +173,20 @@ class _Chain:
             name
             and previous is not None
             and name not in self.setting.law.letters
-            and not (previous.kind == LETTER and previous.data == name)
+            and not self._comes_back(name, previous)
         ):
             self.derived[name] = self.setting.law, previous
         closed = previous is not None and not any(one.kind == MEAN for _, one in walk(previous))
         return Derived(name, tuple(self.found), meant or not name, closed)
+
+    def _comes_back(self, name: str, tree: Node) -> bool:
+        """Whether what stands for a name has the name in it again, as the letters mean here: nothing is derived in a circle."""
+        seen, waiting = set(), [tree]
+        while waiting:
+            new = {one.data for _, one in walk(waiting.pop()) if one.kind == LETTER} - seen
+            seen |= new
+            waiting += [self.setting.meanings[one] for one in new if one != name and one in self.setting.meanings]
+        return name in seen
 
     def _says(self, link: Typed, status: str, says: str = "", **more: Any) -> None:
         self.found.append(Verdict(link.line, link.column, link.text, status, says, **more))
@@ -202,7 +211,7 @@ class _Chain:
             return 0
         where = f"what {name} means" if name else "the one above"
         if result == NO_VALUE:
-            raise Uncomputed(node, f"no value to compare with {where}: a division by zero, or a root of something negative")
+            raise Uncomputed(node, f"no value to compare with {where}: a division by zero, a root of something negative, or numbers too large")
         if result == IF_POSITIVE:
             says = f"equal to {where} only for positive letters: declare them in a line of its own before the chain, positive ..."
             self._says(link, DIFFERS, says, kinds=("positive",))

@@ -224,11 +224,23 @@ def test_what_cannot_be_read_is_marked_in_words(line, says):
 
 @pytest.mark.parametrize(
     "line",
-    ["g*m/(m-m)", "M[abs(x)]", "M[1/x]", "M[exp(x^2)]", "M[x^0.5]", "log(-1-g^2)"],
+    ["g*m/(m-m)", "M[abs(x)]", "M[1/x]", "M[exp(x^2)]", "M[x^0.5]", "log(-1-g^2)", "tan(1e16)"],
 )
 def test_what_has_no_value_here_is_said_and_not_judged(line):
     found = check_text(f"{HEAD}h = g*m\n  = {line}\n  = m*g", find).verdicts
     assert [one.status for one in found] == ["right", "undecided", "right"]
+
+
+@pytest.mark.parametrize(
+    ("text", "right"),
+    [
+        ("variant 1\nh = M[g*x]\n = G*m\nG = h/m\nF = M[(g*x + f*w - h)^2]\n = g^2*d + f^2", True),
+        ("variant 1\nletters S\nh = S\nS = h\nF = S^2\n = h*S", False),
+        ("variant 1\nF = 2*h\nh = F\nG = g", False),
+    ],
+)
+def test_what_is_derived_in_a_circle_is_not_gone_round(text, right):
+    assert check_text(text, find).right == right
 
 
 def test_long_products_are_compared_by_value_and_in_time():

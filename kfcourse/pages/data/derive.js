@@ -10,7 +10,7 @@
   };
   const ENTIRE = ["exp", "sin", "cos", "sinh", "cosh"];
   const MEANS = ["M", "D", "Cov"];
-  const ROUNDING = 1e-10, CLOSE = 1e-7, TRIED = 18, FEWEST = 4, CERTAIN = 1.35, MOST_TRIED = 4000, SECONDS = 3;
+  const ROUNDING = 1e-10, CLEAR = 1e-4, CLOSE = 1e-7, TRIED = 18, FEWEST = 4, CERTAIN = 1.35, MOST_TRIED = 4000, SECONDS = 3;
   const LONGEST = 600, DEEPEST = 60, MAX_LENGTH = 2000, MAX_EXPONENT = 16, MOST_LINES = 400;
   const COSTS = {
     sign: 1, doubled: 1.05, letter: 1.1, moment: 1.25, power: 1.2, factor: 1.2, "noise-forgotten": 1.22, "noise-mean": 1.45,
@@ -519,8 +519,9 @@
   function compare(setting, first, second) {
     const values = new Values(setting), a = values.pairs(first), b = values.pairs(second);
     const same = (i) => Math.abs(a[i][0] - b[i][0]) <= ROUNDING * (a[i][1] + b[i][1]);
-    const defined = (i) => Number.isFinite(a[i][0]) && Number.isFinite(b[i][0]);
-    const either = (i) => Number.isFinite(a[i][0]) || Number.isFinite(b[i][0]);
+    const clear = ([value, size]) => Number.isFinite(value) && ROUNDING * size < CLEAR * (1 + Math.abs(value));
+    const defined = (i) => clear(a[i]) && clear(b[i]);
+    const either = (i) => clear(a[i]) || clear(b[i]);
     const all = [...a.keys()], positive = all.filter((i) => i < TRIED / 3 && defined(i));
     if (positive.length < FEWEST) return NO_VALUE;
     if (!positive.every(same)) return DIFFERENT;
@@ -964,6 +965,20 @@
     return verdicts;
   }
 
+  // Whether what stands for a name has the name in it again, as the letters mean here.
+  function comesBack(setting, name, tree) {
+    const seen = new Set(), waiting = [tree];
+    while (waiting.length) {
+      const node = waiting.pop();
+      if (node.kind !== "letter") waiting.push(...node.parts);
+      else if (!seen.has(node.data)) {
+        seen.add(node.data);
+        if (node.data !== name && setting.meanings[node.data]) waiting.push(setting.meanings[node.data]);
+      }
+    }
+    return seen.has(name);
+  }
+
   function checkChain(chain, derived, texts, verdicts) {
     const [first, ...rest] = chain.links, name = /^[A-Za-z_]\w*$/.test(first.text) ? first.text : "";
     let setting = ofSide(chain.setting, name);
@@ -993,7 +1008,7 @@
       previous = node;
       above = link.text;
     }
-    if (name && previous && !lawLetters(setting).has(name) && !(previous.kind === "letter" && previous.data === name)) derived[name] = { law, tree: previous };
+    if (name && previous && !lawLetters(setting).has(name) && !comesBack(setting, name, previous)) derived[name] = { law, tree: previous };
 
     function judge(link, node) {
       const key = above ? "" : name, result = compare(setting, node, previous);
@@ -1008,7 +1023,7 @@
         return;
       }
       const where = key ? `what ${key} means` : "the one above";
-      if (result === NO_VALUE) throw new Uncomputed(`no value to compare with ${where}: a division by zero, or a root of something negative`);
+      if (result === NO_VALUE) throw new Uncomputed(`no value to compare with ${where}: a division by zero, a root of something negative, or numbers too large`);
       if (result === IF_POSITIVE) {
         say(link, "differs", `equal to ${where} only for positive letters: declare them in a line of its own before the chain, positive ...`, { kinds: ["positive"] });
       } else {
