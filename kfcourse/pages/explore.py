@@ -125,6 +125,55 @@ def two_beats(
     return figure(name, "Correction and prediction", _closed("kfTwoBeats", code), call)
 
 
+def two_lines(
+    name: str,
+    x: sp.Symbol,
+    mean: sp.Symbol,
+    variance: sp.Symbol,
+    signal: sp.Expr,
+    density: sp.Expr,
+    tangent: tuple[sp.Expr, sp.Expr],
+    best: tuple[sp.Expr, sp.Expr],
+    left: sp.Expr,
+    first: Mapping[str, float],
+) -> str:
+    """A signal, its tangent and the line that is best on average, with the law of the state under the reader's hand.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure.
+    x, mean, variance : Symbol
+        State, and the moments of its law.
+    signal, density : Expr
+        Of x; of x and the moments.
+    tangent, best : (Expr, Expr)
+        Of the moments: value h at the mean and slope G, which make the line h + G (x - mean).
+    left : Expr
+        Of the moments: variance of the signal that the best line does not explain.
+    first : dict
+        The "mean" and the "variance" shown first.
+    """
+    numbers = dict(tangentMean=tangent[0], tangentSlope=tangent[1], bestMean=best[0], bestSlope=best[1], left=left)
+    curves = {
+        "signal": signal,
+        "density": density,
+        "tangent": tangent[0] + tangent[1] * (x - mean),
+        "best": best[0] + best[1] * (x - mean),
+    }
+    moments = {mean: "mean", variance: "variance"}
+    loops = [
+        *(
+            javascript.loop(one, {"x": sp.Matrix([x])}, {"value": sp.Matrix([e])}, coefficients=moments)
+            for one, e in curves.items()
+        ),
+        javascript.loop("numbers", {}, {key: sp.Matrix([e]) for key, e in numbers.items()}, coefficients=moments),
+    ]
+    code = javascript.RUNTIME + "".join(loops) + _read("two-lines.js")
+    call = f"(root, name) => kfTwoLines(root, name, {json.dumps(first)})"
+    return figure(name, "The tangent and the best line", _closed("kfTwoLines", code), call)
+
+
 def _read(name: str) -> str:
     return (DATA / name).read_text(encoding="utf-8")
 
