@@ -9,7 +9,7 @@ The helper, data/figure.js, has axes, curves, handles, sliders and the state in 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -172,6 +172,49 @@ def two_lines(
     code = javascript.RUNTIME + "".join(loops) + _read("two-lines.js")
     call = f"(root, name) => kfTwoLines(root, name, {json.dumps(first)})"
     return figure(name, "The tangent and the best line", _closed("kfTwoLines", code), call)
+
+
+def gains(
+    name: str,
+    prediction: sp.Symbol,
+    measurement: sp.Symbol,
+    variance: sp.Symbol,
+    estimates: Mapping[str, sp.Expr],
+    dots: Sequence[Iterable[float]],
+    variances: tuple[float, float],
+    first: Mapping[str, float],
+) -> str:
+    """Gains over the prediction, and the estimates made of a measurement; both can be moved.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure.
+    prediction, measurement, variance : Symbol
+        Of the measurement that is corrected with; the last is the variance of the estimate before, of a filter that has one.
+    estimates : dict
+        Of filters by their names of the lab, affine in the measurement: the slope is the gain.  Handles are on the first.
+    dots : (predictions, gains)
+        Of trajectories, under the curves.
+    variances : (float, float)
+        What the variance is moved between.
+    first : dict
+        "lambda", "y" and "p" shown first.
+    """
+    given, letters = {"lambda": sp.Matrix([prediction])}, {prediction: "lambda", variance: "p"}
+    each = []
+    for one, estimate in estimates.items():
+        slope = {"value": sp.Matrix([sp.diff(estimate, measurement)])}
+        gain = javascript.loop("gain", given, slope, coefficients={variance: "p"})
+        made = javascript.loop(
+            "estimate", {"y": sp.Matrix([measurement])}, {"value": sp.Matrix([estimate])}, coefficients=letters
+        )
+        each.append(f"{json.dumps(one)}: {{ gain: {gain.strip()}, estimate: {made.strip()} }}")
+    looks = {one: {"label": title(one), **line_style(one)} for one in estimates}
+    shown = [[float(f"{number:.4g}") for number in column] for column in dots]
+    settings = json.dumps({"first": first, "variances": variances, "dots": shown, "looks": looks})
+    code = javascript.RUNTIME + "const filters = {\n" + ",\n".join(each) + "\n};\n" + _read("gains.js")
+    return figure(name, "Gains of filters", _closed("kfGains", code), f"(root, name) => kfGains(root, name, {settings})")
 
 
 def _read(name: str) -> str:

@@ -50,12 +50,24 @@ def sine_and_lines() -> str:
     )
 
 
+def lab_gains() -> str:
+    """Three estimates at once, in the letters of the chapter on the lab's filters, with T = 0.001 and H = 0.8."""
+    lam, y, p = sp.symbols("lambda y p", real=True)
+    Psi = sp.Rational("0.8125") * p + sp.Rational("0.0025") * (lam / sp.Rational("0.9")) ** 2
+    F = Psi + sp.Rational("0.0004") * (lam**4 + 6 * lam**2 * Psi + 3 * Psi**2)
+    best = lam + Psi / F * (y - lam)
+    estimates = {"aof-gaussian": best, "fos-gaussian": best.subs(p, 0.001), "duof": lam + 0.8 * (y - lam) + 0.01}
+    return explore.gains(
+        "fig-lab-gains", lam, y, p, estimates, [[0, 1], [1, 0.9]], (1e-5, 0.02), {"lambda": 2, "y": 3, "p": 0.006}
+    )
+
+
 @pytest.fixture(scope="module")
 def pages():
     """Each figure of the book as a piece of HTML, by name; made once."""
     lab = explore.live_lab("fig-live-lab", {name: SCALAR[name] for name in ("53", "2", "3")})
     beats = explore.two_beats("fig-two-beats", x, y, following, *BEATS, PLACE, 2.2)
-    return {"fig-live-lab": lab, "fig-two-beats": beats, "fig-better-line": sine_and_lines()}
+    return {"fig-live-lab": lab, "fig-two-beats": beats, "fig-better-line": sine_and_lines(), "fig-lab-gains": lab_gains()}
 
 
 @pytest.fixture
@@ -111,7 +123,7 @@ def state_of(tab, handle_or_slider) -> float:
 
 # ---------------------------------------------------------------- every figure
 
-FIGURES = ["fig-live-lab", "fig-two-beats", "fig-better-line"]
+FIGURES = ["fig-live-lab", "fig-two-beats", "fig-better-line", "fig-lab-gains"]
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -307,3 +319,47 @@ def test_the_lines_are_drawn_where_they_are_said_to_be(opened):
     unit = tab.evaluate("document.querySelector('svg.kf-chart rect').height.baseVal.value - 2") / 4  # pixels
     assert tangent == pytest.approx(signal, abs=0.2)  # coordinates are written to 0.1
     assert best - tangent == pytest.approx(unit * (np.sin(1) * (1 - np.exp(-0.2))), abs=0.2)
+
+
+# ---------------------------------------------------------------- gains
+
+
+def gains_and_estimates(lam: float, measured: float, p: float) -> list[float]:
+    """One step of the AOF from the estimate and its variance p before, of the FOS with T, and of the DUOF."""
+    z = lam / 0.9
+    found = []
+    for spread in (p, 0.001):
+        Psi = 0.81 * spread + 0.05**2 * (z**2 + spread)
+        t, weights = np.polynomial.hermite_e.hermegauss(20)
+        F = Psi + 0.02**2 * ((lam + np.sqrt(Psi) * t) ** 4 @ weights) / weights.sum()
+        found.append(Psi / F)
+    found.append(0.8)
+    return [lam, measured, *found, *(lam + gain * (measured - lam) + e for gain, e in zip(found, (0, 0, 0.01), strict=True))]
+
+
+def test_gains_follow_the_prediction_but_the_duofs_does_not(opened):
+    tab = opened("fig-lab-gains")
+    lam, measured = tab.get_by_role("slider", name="Prediction λ"), tab.get_by_role("slider", name="Measurement y")
+    variance = tab.get_by_role("slider", name="p before, of the GAOF")
+    assert said(tab)[:2] == [2, 3]
+    for moved, key, place in [
+        (lam, "ArrowRight", (2.05, 3, 0.006)),
+        (measured, "PageDown", (2.05, 2.5, 0.006)),
+        (variance, "End", (2.05, 2.5, 0.02)),
+        (lam, "Home", (-2.8, 2.5, 0.02)),
+        (variance, "Home", (-2.8, 2.5, 1e-5)),
+        (measured, "Home", (-2.8, -3.8, 1e-5)),
+    ]:
+        before = said(tab)
+        moved.press(key)
+        assert said(tab) == pytest.approx(gains_and_estimates(*place), abs=0.00051)  # printed to 0.001
+        assert said(tab)[4] == before[4] == 0.8
+        if moved is measured:
+            assert said(tab)[2:5] == before[2:5]
+    drag(tab, lam, 90, 0)
+    assert -2.5 < state_of(tab, lam) < 0
+    assert said(tab) == pytest.approx(gains_and_estimates(state_of(tab, lam), -3.8, 1e-5), abs=0.00051)
+    drag(tab, measured, 60, 0)
+    assert said(tab) == pytest.approx(gains_and_estimates(state_of(tab, lam), state_of(tab, measured), 1e-5), abs=0.00051)
+    tab.wait_for_function("place => location.hash.includes(`y=${place}`)", arg=measured.get_attribute("aria-valuenow"))
+    assert said(opened("fig-lab-gains", fragment(tab))) == said(tab)
