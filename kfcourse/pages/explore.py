@@ -9,7 +9,7 @@ The helper, data/figure.js, has axes, curves, handles, sliders and the state in 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -123,6 +123,98 @@ def two_beats(
     code = javascript.RUNTIME + "".join(loops) + _read("two-beats.js")
     call = f"(root, name) => kfTwoBeats(root, name, {first!r})"
     return figure(name, "Correction and prediction", _closed("kfTwoBeats", code), call)
+
+
+def two_lines(
+    name: str,
+    x: sp.Symbol,
+    mean: sp.Symbol,
+    variance: sp.Symbol,
+    signal: sp.Expr,
+    density: sp.Expr,
+    tangent: tuple[sp.Expr, sp.Expr],
+    best: tuple[sp.Expr, sp.Expr],
+    left: sp.Expr,
+    first: Mapping[str, float],
+) -> str:
+    """A signal, its tangent and the line that is best on average, with the law of the state under the reader's hand.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure.
+    x, mean, variance : Symbol
+        State, and the moments of its law.
+    signal, density : Expr
+        Of x; of x and the moments.
+    tangent, best : (Expr, Expr)
+        Of the moments: value h at the mean and slope G, which make the line h + G (x - mean).
+    left : Expr
+        Of the moments: variance of the signal that the best line does not explain.
+    first : dict
+        The "mean" and the "variance" shown first.
+    """
+    numbers = dict(tangentMean=tangent[0], tangentSlope=tangent[1], bestMean=best[0], bestSlope=best[1], left=left)
+    curves = {
+        "signal": signal,
+        "density": density,
+        "tangent": tangent[0] + tangent[1] * (x - mean),
+        "best": best[0] + best[1] * (x - mean),
+    }
+    moments = {mean: "mean", variance: "variance"}
+    loops = [
+        *(
+            javascript.loop(one, {"x": sp.Matrix([x])}, {"value": sp.Matrix([e])}, coefficients=moments)
+            for one, e in curves.items()
+        ),
+        javascript.loop("numbers", {}, {key: sp.Matrix([e]) for key, e in numbers.items()}, coefficients=moments),
+    ]
+    code = javascript.RUNTIME + "".join(loops) + _read("two-lines.js")
+    call = f"(root, name) => kfTwoLines(root, name, {json.dumps(first)})"
+    return figure(name, "The tangent and the best line", _closed("kfTwoLines", code), call)
+
+
+def gains(
+    name: str,
+    prediction: sp.Symbol,
+    measurement: sp.Symbol,
+    variance: sp.Symbol,
+    estimates: Mapping[str, sp.Expr],
+    dots: Sequence[Iterable[float]],
+    variances: tuple[float, float],
+    first: Mapping[str, float],
+) -> str:
+    """Gains over the prediction, and the estimates made of a measurement; both can be moved.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure.
+    prediction, measurement, variance : Symbol
+        Of the measurement that is corrected with; the last is the variance of the estimate before, of a filter that has one.
+    estimates : dict
+        Of filters by their names of the lab, affine in the measurement: the slope is the gain.  Handles are on the first.
+    dots : (predictions, gains)
+        Of trajectories, under the curves.
+    variances : (float, float)
+        What the variance is moved between.
+    first : dict
+        "lambda", "y" and "p" shown first.
+    """
+    given, letters = {"lambda": sp.Matrix([prediction])}, {prediction: "lambda", variance: "p"}
+    each = []
+    for one, estimate in estimates.items():
+        slope = {"value": sp.Matrix([sp.diff(estimate, measurement)])}
+        gain = javascript.loop("gain", given, slope, coefficients={variance: "p"})
+        made = javascript.loop(
+            "estimate", {"y": sp.Matrix([measurement])}, {"value": sp.Matrix([estimate])}, coefficients=letters
+        )
+        each.append(f"{json.dumps(one)}: {{ gain: {gain.strip()}, estimate: {made.strip()} }}")
+    looks = {one: {"label": title(one), **line_style(one)} for one in estimates}
+    shown = [[float(f"{number:.4g}") for number in column] for column in dots]
+    settings = json.dumps({"first": first, "variances": variances, "dots": shown, "looks": looks})
+    code = javascript.RUNTIME + "const filters = {\n" + ",\n".join(each) + "\n};\n" + _read("gains.js")
+    return figure(name, "Gains of filters", _closed("kfGains", code), f"(root, name) => kfGains(root, name, {settings})")
 
 
 def _read(name: str) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from kfcourse import Model, gaussian, linearised
 from kfcourse.lab.variants import load_variants
 from kfcourse.pages import explore
 
@@ -29,11 +30,44 @@ def bell(at, mean, sd):
 BEATS = (bell(x, -1, sp.sqrt(2)), bell(y, PLACE, 0.2), bell(following, x + 0.5, 0.3))
 
 
+def sine_and_lines() -> str:
+    """As in the chapter on better lines."""
+    model = Model.define("x + 0.1*v", "sin(x) + 0.05*w")
+    tangent, best = linearised(model), gaussian(model)
+    (angle,), (m,), (d,) = model.x, best.formulas.m, best.formulas.d
+    lines = [(one["h"], one["G"]) for one in (tangent, best)]
+    left = (best["F"] - best["G"] ** 2 * d) - (tangent["F"] - tangent["G"] ** 2 * d)
+    return explore.two_lines(
+        "fig-better-line",
+        angle,
+        m,
+        d,
+        sp.sin(angle),
+        bell(angle, m, sp.sqrt(d)),
+        *lines,
+        sp.simplify(left),
+        dict(mean=1, variance=0.4),
+    )
+
+
+def lab_gains() -> str:
+    """Three estimates at once, in the letters of the chapter on the lab's filters, with T = 0.001 and H = 0.8."""
+    lam, y, p = sp.symbols("lambda y p", real=True)
+    Psi = sp.Rational("0.8125") * p + sp.Rational("0.0025") * (lam / sp.Rational("0.9")) ** 2
+    F = Psi + sp.Rational("0.0004") * (lam**4 + 6 * lam**2 * Psi + 3 * Psi**2)
+    best = lam + Psi / F * (y - lam)
+    estimates = {"aof-gaussian": best, "fos-gaussian": best.subs(p, 0.001), "duof": lam + 0.8 * (y - lam) + 0.01}
+    return explore.gains(
+        "fig-lab-gains", lam, y, p, estimates, [[0, 1], [1, 0.9]], (1e-5, 0.02), {"lambda": 2, "y": 3, "p": 0.006}
+    )
+
+
 @pytest.fixture(scope="module")
 def pages():
     """Each figure of the book as a piece of HTML, by name; made once."""
     lab = explore.live_lab("fig-live-lab", {name: SCALAR[name] for name in ("53", "2", "3")})
-    return {"fig-live-lab": lab, "fig-two-beats": explore.two_beats("fig-two-beats", x, y, following, *BEATS, PLACE, 2.2)}
+    beats = explore.two_beats("fig-two-beats", x, y, following, *BEATS, PLACE, 2.2)
+    return {"fig-live-lab": lab, "fig-two-beats": beats, "fig-better-line": sine_and_lines(), "fig-lab-gains": lab_gains()}
 
 
 @pytest.fixture
@@ -89,7 +123,7 @@ def state_of(tab, handle_or_slider) -> float:
 
 # ---------------------------------------------------------------- every figure
 
-FIGURES = ["fig-live-lab", "fig-two-beats"]
+FIGURES = ["fig-live-lab", "fig-two-beats", "fig-better-line", "fig-lab-gains"]
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -186,7 +220,7 @@ def test_ten_thousand_trajectories_in_half_a_second(opened):
 
 
 def said(tab) -> list[float]:
-    """Measurement, percent left of the beacon, mean, density there, top: the numbers of the status line."""
+    """The numbers of the status line: of the two beats measurement, percent left of the beacon, mean, density there, top."""
     text = tab.get_by_role("status").inner_text().replace("−", "-")
     return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", text)]
 
@@ -237,3 +271,95 @@ def test_a_finger_moves_it_and_does_not_scroll(opened):
     )
     assert said(tab)[0] > before + 0.3
     assert tab.evaluate("scrollY") == 0
+
+
+# ---------------------------------------------------------------- the tangent and the best line
+
+
+def lines_by_quadrature(mean: float, variance: float) -> list[float]:
+    """The tangent of the sine, and its best line by the normal equations."""
+    t, weights = np.polynomial.hermite_e.hermegauss(60)
+    u, of = np.sqrt(variance) * t, weights / weights.sum()
+    signal = np.sin(mean + u)
+    level, slope = np.linalg.lstsq(np.sqrt(of)[:, None] * np.c_[u**0, u], np.sqrt(of) * signal, rcond=None)[0]
+    size = np.sqrt(of @ (signal - level - slope * u) ** 2)
+    return [mean, variance, np.sin(mean), np.cos(mean), level, slope, size]
+
+
+def test_the_law_is_moved_and_the_line_is_of_least_squares(opened):
+    tab = opened("fig-better-line")
+    mean, variance = tab.get_by_role("slider", name="λ, mean of x"), tab.get_by_role("slider", name="Ψ, variance of x (rad²)")
+    assert said(tab)[:2] == [1, 0.4]
+    for moved, key, place in [
+        (mean, "ArrowLeft", (0.95, 0.4)),
+        (variance, "ArrowRight", (0.95, 0.42)),
+        (mean, "PageUp", (1.45, 0.42)),
+        (variance, "End", (1.45, 1)),
+        (mean, "Home", (-2, 1)),
+        (variance, "Home", (-2, 0.02)),
+        (mean, "End", (3.5, 0.02)),
+    ]:
+        moved.press(key)
+        assert (state_of(tab, mean), state_of(tab, variance)) == place
+        np.testing.assert_allclose(said(tab), lines_by_quadrature(*place), rtol=0, atol=0.00051)  # printed to 0.001
+    drag(tab, mean, -150, 40)
+    assert 1 < state_of(tab, mean) < 3
+    assert said(tab) == pytest.approx(lines_by_quadrature(state_of(tab, mean), 0.02), abs=0.00051)
+    tab.wait_for_function("place => location.hash.includes(`mean=${place}`)", arg=mean.get_attribute("aria-valuenow"))
+    assert said(opened("fig-better-line", fragment(tab))) == said(tab)
+
+
+def test_the_lines_are_drawn_where_they_are_said_to_be(opened):
+    """At the mean the tangent meets the signal, in the handle; the best line is below it, by the difference that is said."""
+    tab = opened("fig-better-line")
+    curves = tab.evaluate("""[...document.querySelectorAll("svg.kf-chart [clip-path] path[fill=none]")].map((one) =>
+        one.getAttribute("d").slice(1).split(/[ML]/).map((point) => point.split(" ").map(Number)))""")
+    place = tab.evaluate("document.querySelector('.kf-handle').transform.baseVal[0].matrix.e")
+    signal, tangent, best = (np.interp(place, *np.transpose(one)) for one in curves)
+    unit = tab.evaluate("document.querySelector('svg.kf-chart rect').height.baseVal.value - 2") / 4  # pixels
+    assert tangent == pytest.approx(signal, abs=0.2)  # coordinates are written to 0.1
+    assert best - tangent == pytest.approx(unit * (np.sin(1) * (1 - np.exp(-0.2))), abs=0.2)
+
+
+# ---------------------------------------------------------------- gains
+
+
+def gains_and_estimates(lam: float, measured: float, p: float) -> list[float]:
+    """One step of the AOF from the estimate and its variance p before, of the FOS with T, and of the DUOF."""
+    z = lam / 0.9
+    found = []
+    for spread in (p, 0.001):
+        Psi = 0.81 * spread + 0.05**2 * (z**2 + spread)
+        t, weights = np.polynomial.hermite_e.hermegauss(20)
+        F = Psi + 0.02**2 * ((lam + np.sqrt(Psi) * t) ** 4 @ weights) / weights.sum()
+        found.append(Psi / F)
+    found.append(0.8)
+    return [lam, measured, *found, *(lam + gain * (measured - lam) + e for gain, e in zip(found, (0, 0, 0.01), strict=True))]
+
+
+def test_gains_follow_the_prediction_but_the_duofs_does_not(opened):
+    tab = opened("fig-lab-gains")
+    lam, measured = tab.get_by_role("slider", name="Prediction λ"), tab.get_by_role("slider", name="Measurement y")
+    variance = tab.get_by_role("slider", name="p before, of the GAOF")
+    assert said(tab)[:2] == [2, 3]
+    for moved, key, place in [
+        (lam, "ArrowRight", (2.05, 3, 0.006)),
+        (measured, "PageDown", (2.05, 2.5, 0.006)),
+        (variance, "End", (2.05, 2.5, 0.02)),
+        (lam, "Home", (-2.8, 2.5, 0.02)),
+        (variance, "Home", (-2.8, 2.5, 1e-5)),
+        (measured, "Home", (-2.8, -3.8, 1e-5)),
+    ]:
+        before = said(tab)
+        moved.press(key)
+        assert said(tab) == pytest.approx(gains_and_estimates(*place), abs=0.00051)  # printed to 0.001
+        assert said(tab)[4] == before[4] == 0.8
+        if moved is measured:
+            assert said(tab)[2:5] == before[2:5]
+    drag(tab, lam, 90, 0)
+    assert -2.5 < state_of(tab, lam) < 0
+    assert said(tab) == pytest.approx(gains_and_estimates(state_of(tab, lam), -3.8, 1e-5), abs=0.00051)
+    drag(tab, measured, 60, 0)
+    assert said(tab) == pytest.approx(gains_and_estimates(state_of(tab, lam), state_of(tab, measured), 1e-5), abs=0.00051)
+    tab.wait_for_function("place => location.hash.includes(`y=${place}`)", arg=measured.get_attribute("aria-valuenow"))
+    assert said(opened("fig-lab-gains", fragment(tab))) == said(tab)

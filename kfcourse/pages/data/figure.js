@@ -6,7 +6,8 @@
 //   kfFigure(root, name, defaults, (ui) => { ...; return (state) => { draw } });
 
 globalThis.kfFigure ??= (() => {
-  const INK = "#1f2328", SOFT = "#57606a", LINE = "#d0d7de";  // the picture's own; the dark theme turns them with its pictures
+  // The picture's own; the dark theme turns them with its pictures.
+  const INK = "#1f2328", LINE = "#d0d7de", BLUE = "#0072B2", BAND = "#56B4E9", ORANGE = "#D55E00";
   const SVG = "http://www.w3.org/2000/svg";
   const make = (tag, attributes = {}, parent = null, text = null) => {
     const one = tag.startsWith("svg:") ? document.createElementNS(SVG, tag.slice(4)) : document.createElement(tag);
@@ -145,7 +146,7 @@ button.kf-try { font: inherit; color: var(--accent, LinkText); background: none;
 
     // A handle moves the entries `keys` of the state, {x: key} or {y: key} or both, each within `range`, by `step` with an arrow key.
     // `place(state)` is where it stands, `name` what is moved, `value(state)` how its value is said.
-    const handle = ({ keys, range, step, colour = "#D55E00", place, name, value }) => {
+    const handle = ({ keys, range, step, colour = ORANGE, place, name, value }) => {
       const one = make("svg:g", { class: "kf-handle", tabindex: 0, role: "slider", "aria-label": name }, above);
       make("svg:circle", { r: 22, fill: "transparent" }, one);
       make("svg:circle", { r: 7.5, fill: "#ffffff", stroke: colour, "stroke-width": 3 }, one);
@@ -247,7 +248,14 @@ button.kf-try { font: inherit; color: var(--accent, LinkText); background: none;
     return before === name ? parse(after, defaults) : null;
   };
 
-  return (root, name, defaults, build) => {
+  // What a printed loop writes into `value`, for arrays of its arguments and its coefficients.
+  const values = (loop, arrays, c = {}) => {
+    const a = { ...arrays, value: new Float64Array(Object.values(arrays)[0].length) };
+    loop(a.value.length, {}, c, a);
+    return a.value;
+  };
+
+  return Object.assign((root, name, defaults, build) => {
     const styled = "kf-explore-style";
     if (!document.getElementById(styled)) make("style", { id: styled }, document.head, STYLE);
     const state = { ...defaults, ...read(name, defaults) };
@@ -304,5 +312,5 @@ button.kf-try { font: inherit; color: var(--accent, LinkText); background: none;
     if (read(name, defaults) && location.hash.includes("?")) root.scrollIntoView();
     root.dataset.ready = "";
     return ui;
-  };
+  }, { values, INK, BLUE, BAND, ORANGE });
 })();

@@ -2,13 +2,8 @@
 // SymPy printed.
 
 const N = 321, LOW = -6, HIGH = 6;
-const BLUE = "#0072B2", BAND = "#56B4E9", ORANGE = "#D55E00", INK = "#1f2328";
+const { values, INK, BLUE, BAND, ORANGE } = kfFigure;
 const x = Float64Array.from({ length: N }, (_, i) => (LOW * (N - 1 - i) + HIGH * i) / (N - 1)), step = (HIGH - LOW) / (N - 1);
-const values = (loop, arrays, c = {}) => {
-  const a = { ...arrays, value: new Float64Array(Object.values(arrays)[0].length) };
-  loop(a.value.length, {}, c, a);
-  return a.value;
-};
 const sum = (a) => a.reduce((one, other) => one + other, 0);
 
 function kfTwoBeats(root, name, first) {
