@@ -169,12 +169,7 @@ class _Chain:
                 self._says(link, UNDECIDED, f"it cannot be compared within {SECONDS:g} s: split the step up")
                 continue
             previous, above = node, link.text
-        if (
-            name
-            and previous is not None
-            and name not in self.setting.law.letters
-            and not self._comes_back(name, previous)
-        ):
+        if name and previous is not None and name not in self.setting.law.letters and not self._comes_back(name, previous):
             self.derived[name] = self.setting.law, previous
         closed = previous is not None and not any(one.kind == MEAN for _, one in walk(previous))
         return Derived(name, tuple(self.found), meant or not name, closed)
@@ -211,7 +206,9 @@ class _Chain:
             return 0
         where = f"what {name} means" if name else "the one above"
         if result == NO_VALUE:
-            raise Uncomputed(node, f"no value to compare with {where}: a division by zero, a root of something negative, or numbers too large")
+            raise Uncomputed(
+                node, f"no value to compare with {where}: a division by zero, a root of something negative, or numbers too large"
+            )
         if result == IF_POSITIVE:
             says = f"equal to {where} only for positive letters: declare them in a line of its own before the chain, positive ..."
             self._says(link, DIFFERS, says, kinds=("positive",))

@@ -160,10 +160,10 @@ JUMP_FILTERS: dict[str, JumpEntry] = {
     "gpb2": JumpEntry("GPB2", "АОФлд, пары режимов", lambda s: gpb2(s.best, *s.chain)),
     "fos-jump-gaussian": JumpEntry("LD-GFOS", "ГФОСлд", lambda s: logic_dynamic_fos(s.model, s.gaussian)),
     "fos-jump-linearised": JumpEntry("LD-LFOS", "ЛФОСлд", lambda s: logic_dynamic_fos(s.model, s.linearised)),
-    "aof-averaged": JumpEntry("AOF, averaged", "АОФ, среднее по режимам", lambda s: aof(s.averaged)),
+    "aof-averaged": JumpEntry("AOF (averaged)", "АОФ (среднее по режимам)", lambda s: aof(s.averaged)),
     "duof": JumpEntry("DUOF", "ДУОФ", lambda s: duof(s.model.modes[0], averaged_equations(s.model))),
-    "fos-averaged": JumpEntry("FOS, averaged", "ФОС, среднее по режимам", lambda s: fos(s.averaged)),
-    "mfos-averaged": JumpEntry("MFOS, averaged", "МФОС, среднее по режимам", lambda s: mfos(s.averaged)),
+    "fos-averaged": JumpEntry("FOS (averaged)", "ФОС (среднее по режимам)", lambda s: fos(s.averaged)),
+    "mfos-averaged": JumpEntry("MFOS (averaged)", "МФОС (среднее по режимам)", lambda s: mfos(s.averaged)),
     "aof-exact": JumpEntry("exact AOF", "АОФ", lambda s: jump_pointmass(s.model)),
 }
 # Printed names of filters that are not among the lab's.

@@ -9,6 +9,7 @@ ordinary `Model`, so that its structural functions, densities and code are deriv
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
@@ -25,6 +26,8 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import Formula, Formulas, ModelError, exact_number, read, shown, table
 
 OF_A_MODE = ("state", "meter", "parameters", "state_noise", "meter_noise")  # in which modes may differ
+MOST = 20  # modes
+NAME = re.compile(r"(?=.*\S)[\w -]{1,40}")  # it stands in tables, reports and LaTeX
 SUM = 1e-9  # a row of probabilities written with ten digits sums to 1 within this
 
 
@@ -165,7 +168,7 @@ class JumpModel:
         lines = []
         for name, mode in zip(self.names, self.modes, strict=True):
             block = mode.latex().removeprefix("\\begin{aligned}\n").removesuffix("\n\\end{aligned}")
-            lines += [rf"\text{{mode {name}:}}\quad &", *block.split(" \\\\\n")]
+            lines += [rf"\text{{mode {name.replace('_', chr(92) + '_')}:}}\quad &", *block.split(" \\\\\n")]
         first = sp.Matrix([[sp.Float(one, 4) for one in self.first]])
         lines += [rf"\pi &= {sp.latex(self.chain)}", rf"q &= {sp.latex(first)}"]
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
@@ -216,6 +219,10 @@ def _tables(modes: Any) -> dict[str, dict[str, Any]]:
         raise ModelError(
             f"`modes` must be a table of modes by name, such as {{sound = {{}}, faulty = {{...}}}}, got {shown(modes)}"
         )
+    if len(modes) > MOST:
+        raise ModelError(f"{len(modes)} modes: at most {MOST} are compared, as the work grows with the square of their number")
+    if odd := [name for name in modes if not NAME.fullmatch(str(name))]:
+        raise ModelError(f"the mode {shown(odd[0])} needs a name of letters, digits, spaces, _ and -, at most 40 of them")
     tables = {str(name): table(f"modes.{name}", change) for name, change in modes.items()}
     for name, change in tables.items():
         if unknown := sorted(set(change) - set(OF_A_MODE)):
@@ -264,8 +271,9 @@ def _compiled(
     of_step = model.known.names([*common, *changed, *(s.name for s in (*model.x, *model.v, *model.w))])
     try:
         matrix = sp.ImmutableMatrix([[_entry(one, names | of_step) for one in row] for row in rows])
-    except ModelError as error:
-        raise ModelError(f"`transition`: {error}") from None
+    except (ModelError, FormulaError) as error:
+        differs = "".join(f"; {name} differs between the modes" for name in sorted(changed) if f"{name!r}" in str(error))
+        raise ModelError(f"`transition`: {error}{differs}") from None
     known = model.known.used(matrix, of_step)
     numeric = matrix.subs({symbol(name): exact_number(name, value) for name, value in common.items()})
     return matrix, Stepwise.compile(known, "transition", {}, {"transition": numeric}, [])

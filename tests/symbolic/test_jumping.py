@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kfcourse import FormulaError, JumpModel, Model, ModelError, simulate
+from kfcourse import JumpModel, Model, ModelError, simulate
 from kfcourse.symbolic.averaging import averaged_equations
 from kfcourse.symbolic.jumping import model_of_table
 
@@ -136,8 +136,26 @@ def test_what_does_not_fit_is_refused_in_words(changes, message):
 
 
 def test_a_formula_of_the_chain_that_cannot_be_read_is_pointed_at():
-    with pytest.raises(FormulaError):
-        define(transition=[["1 - x", "x"], [0.3, 0.7]])  # the chain does not know the state
+    with pytest.raises(ModelError, match=r"`transition`: .*unknown symbol 'x'"):  # the chain does not know the state
+        define(transition=[["1 - x", "x"], [0.3, 0.7]])
+    with pytest.raises(ModelError, match="C differs between the modes"):
+        define(transition=[["1 - C/9", "C/9"], [0.3, 0.7]])
+
+
+@pytest.mark.parametrize("name", ["", " ", "a\nb", "a | b", "a" * 41])
+def test_a_mode_needs_a_name_that_can_be_printed(name):
+    with pytest.raises(ModelError, match="needs a name of letters"):
+        define(modes={"sound": {}, name: {"parameters": {"C": 2}}})
+
+
+def test_hundreds_of_modes_are_refused():
+    with pytest.raises(ModelError, match="21 modes: at most 20"):
+        define(modes={f"m{i}": {"parameters": {"C": i + 1}} for i in range(21)})
+
+
+def test_names_of_modes_are_set_as_text():
+    model = define(modes={"sound": {"parameters": {"C": 1}}, "half_dead": {"parameters": {"C": 2}}})
+    assert r"\text{mode half\_dead:}" in model.latex()
 
 
 def test_a_chain_that_fails_late_says_so_when_it_comes_there():
