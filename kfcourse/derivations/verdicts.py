@@ -176,7 +176,8 @@ class _Chain:
 
     def _comes_back(self, name: str, tree: Node) -> bool:
         """Whether what stands for a name has the name in it again, as the letters mean here: nothing is derived in a circle."""
-        seen, waiting = set(), [tree]
+        seen: set[str] = set()
+        waiting = [tree]
         while waiting:
             new = {one.data for _, one in walk(waiting.pop()) if one.kind == LETTER} - seen
             seen |= new
