@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import random
-import shutil
 import sys
 from pathlib import Path
 
@@ -19,7 +18,6 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "tests" / "derivations"))
 from derivation_corpus import chains, planted  # noqa: E402
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chromium-browser"))), None)
 STYLE = (ROOT / "book" / "_static" / "book.css").read_text(encoding="utf-8")
 COUNT = 12
 BY_HAND = [
@@ -36,18 +34,6 @@ def texts() -> list[str]:
     rng = random.Random(6)
     made = [one.text(rng) for one in chains(8, COUNT)] + [one.chain.text(rng) for one in planted(9, COUNT)]
     return made + BY_HAND
-
-
-@pytest.fixture(scope="module")
-def browser():
-    if BROWSER is None:
-        pytest.skip("no Chromium or Chrome on this machine")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=BROWSER)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture
