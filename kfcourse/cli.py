@@ -30,8 +30,7 @@ from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
 DERIVATION = 60.0  # seconds for the formulas of the filters
-
-
+LONGEST = 1_000_000  # bytes of a derivation; /dev/zero never ends
 DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with more, the lab takes longer
 
 
@@ -233,7 +232,11 @@ def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
         return find_variant(name, variants_file).plain("derivations")
 
     try:
-        report = check_text(file.read_text(encoding="utf-8-sig"), model, of_model(model(variant)) if variant else None)
+        with file.open("rb") as stream:
+            content = stream.read(LONGEST + 1)
+        if len(content) > LONGEST:
+            raise ValueError(f"{file} has more than {LONGEST:,} bytes: it is no derivation; check the path")
+        report = check_text(content.decode("utf-8-sig"), model, of_model(model(variant)) if variant else None)
     except UnicodeDecodeError:
         fault = f"{file} is no text in UTF-8: save it as such"
     except OSError as error:

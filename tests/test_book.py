@@ -8,7 +8,6 @@ from __future__ import annotations
 import itertools
 import os
 import re
-import shutil
 from html import unescape
 from html.parser import HTMLParser
 from importlib import resources
@@ -18,6 +17,7 @@ from urllib.parse import quote, unquote, urlsplit
 import nbformat
 import pytest
 import yaml
+from browsers import chromium
 
 ROOT = Path(__file__).resolve().parent.parent
 HTML = ROOT / "_build" / "html"
@@ -27,7 +27,6 @@ CHAPTERS = [chapter for part in TOC["parts"] for chapter in part["chapters"]]
 SHELF = [TOC["root"], *(chapter["file"] for chapter in CHAPTERS)]
 PAGES = [*SHELF, *(section["file"] for chapter in CHAPTERS for section in chapter.get("sections", []))]
 NOTEBOOKS = [page for page in SHELF if "{code-cell}" in (ROOT / "book" / f"{page}.md").read_text(encoding="utf-8")]
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome", "chromium-browser"))), None)
 LOCAL = ("file:", "data:", "blob:")
 LOADS = {"script": "src", "link": "href", "img": "src", "iframe": "src", "source": "src", "object": "data", "image": "href"}
 
@@ -98,14 +97,8 @@ def test_no_notebook_is_left_out() -> None:
 
 @pytest.fixture(scope="module")
 def browser():
-    if BROWSER is None:
-        pytest.skip("no Chromium or Chrome on this machine")
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=BROWSER)
-        yield browser
-        browser.close()
+    with chromium() as one:
+        yield one
 
 
 @pytest.fixture(scope="module")

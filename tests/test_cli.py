@@ -276,6 +276,7 @@ def test_a_derivation_is_checked_line_by_line(call, tmp_path):
         (b"variant 53\n", (), "has no chain of lines, such as"),
         (b"\xd6\xff", (), "is no text in UTF-8"),
         (b"F = d\n", ("--variant", "999"), "no variant '999'"),
+        (b" " * 1_000_001, (), "has more than 1,000,000 bytes"),
         (None, (), "No such file"),
     ],
 )

@@ -115,6 +115,7 @@ def structure_of(one: Filter, what: str) -> Structure:
 
 
 def unknown_error(one: Filter) -> ValueError:
+    """What is raised where a filter is asked how far its laws are from the true ones, and cannot tell."""
     return ValueError(f"{one.name} does not know how good its laws are: ask pointmass(model), which is exact, or particle(model)")
 
 

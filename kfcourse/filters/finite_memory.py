@@ -1,6 +1,6 @@
 """Filters that remember: the last measurements (FKP, ФКП, finite memory) or the last estimates (FBP, ФБП, high order).
 
-The construction is that of `optimal_structure`; only zeta is longer:
+The construction is that of `optimal_structure`; only zeta is longer.  FKP and DFKP are the school's; the others come of it:
 
     FKP, MFKP, DFKP, MDFKP   zeta_k = (y_k, y_{k-1}, ..., y_{k-l+1})     the recipes of FOS, MFOS, DFMP, MDFMP
     FBP                      zeta_k = (z_k, z_{k-1}, ..., z_{k-l+1})     the recipe of the FOS

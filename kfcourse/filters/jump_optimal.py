@@ -49,7 +49,7 @@ def logic_dynamic_fos(model: JumpModel, structures: Sequence[Structure]) -> Desi
         corrected = [correct(prior, one, y) for prior, one in zip(memory.predicted, expectations, strict=True)]
         mu, _ = modes_given(memory.expected, expectations, y)
         posterior = mixture(corrected, mu)
-        z, constant = posterior.mean, np.zeros((len(y), 1))
+        z, constant, unit = posterior.mean, np.zeros((len(y), 1)), np.eye(posterior.mean.shape[1])
 
         def itself(x: Array, x_next: Array) -> Array:
             return z
@@ -58,21 +58,16 @@ def logic_dynamic_fos(model: JumpModel, structures: Sequence[Structure]) -> Desi
         for i in range(len(now)):
             if not weights[i] > 0:  # nobody is there
                 laws.append(posterior)
-                densities.append(Measurement(z, *_point(z)))
+                densities.append(Measurement(z, unit, unit, unit))
                 continue
             fit = yield Regression(lambda x, x_next: x, z, i)
             laws.append(Gaussian(fit(z), fit.residual))
             fit = yield Regression(itself, constant, i)  # mean and covariance of z
-            cov = fit.residual + RIDGE * max(fit.residual.max(), np.finfo(float).tiny) * np.eye(z.shape[1])
-            densities.append(Measurement(fit.offset, np.eye(z.shape[1]), cov, cov))
+            cov = fit.residual + RIDGE * max(fit.residual.max(), np.finfo(float).tiny) * unit
+            densities.append(Measurement(fit.offset, unit, cov, cov))
         xi, _ = modes_given(np.tile(weights, (len(y), 1)), densities, z)
         expected, shares = onward(xi, model.transition_at(k))
         following = [mixture([one.predict(*law) for law in laws], shares[:, :, j]) for j, one in enumerate(now)]
         return State(k + 1, posterior, mixture(following, expected), Modes(mu, expected, tuple(following)))
 
     return Design(f"fos-jump-{structures[0].name}", model.modes[0], equations, start=init)
-
-
-def _point(z: Array) -> tuple[Array, Array, Array]:
-    one = np.eye(z.shape[1])
-    return one, one, one

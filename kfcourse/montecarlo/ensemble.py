@@ -131,7 +131,7 @@ class Ensemble:
             for i, k in enumerate(steps):
                 simulator = partial(self._simulator, k)
                 given = [(*start, *(kind[i] for kind in kinds)) for start, kinds in zip(starts, noises, strict=True)]
-                instants = list(pool.map(lambda arrays, one=simulator: one(*arrays), given))
+                instants = list(pool.map(simulator, *zip(*given, strict=True)))
                 yield instants
                 starts = [instant.after for instant in instants]
 

@@ -149,11 +149,8 @@ def _chunks_in_time(
                 else:
                     most_of_it = "there is" if memory is None else f"the {memory / 1e6:g} MB that the slow filters may take"
                     # What another filter lacks a slow one has taken.
-                    name, step = (
-                        (problem.name, f"step {problem.step}: ")
-                        if isinstance(problem := found.problem, _TooMuch)
-                        else (names[-1], "")
-                    )
+                    problem = found.problem
+                    name, step = (problem.name, f"step {problem.step}: ") if isinstance(problem, _TooMuch) else (names[-1], "")
                     raise _Failed(name, f"{step}{found.count} trajectories need more memory than {most_of_it}") from None
             except OSError:
                 if jobs == 1:

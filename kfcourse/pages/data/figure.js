@@ -35,7 +35,7 @@ globalThis.kfFigure ??= (() => {
 .kf-explore .kf-handle:active { cursor: grabbing; }
 .kf-explore .kf-handle:focus-visible circle:last-child { stroke: ${INK}; stroke-width: 4px; }
 .kf-explore .kf-controls { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 9.5rem), 1fr)); gap: .35rem 1.2rem; margin: .5rem 0; }
-.kf-explore label { display: grid; grid-template-columns: 1fr auto; align-items: baseline; margin: 0; }
+.kf-explore label { display: grid; grid-template-columns: 1fr auto; align-items: baseline; column-gap: .6rem; margin: 0; }
 .kf-explore label input, .kf-explore label select { grid-column: 1 / -1; width: 100%; margin: 0; accent-color: var(--accent, auto); min-height: 1.5rem; }
 .kf-explore label:has(select) { grid-column: span 2; }
 .kf-explore select { font: inherit; color: inherit; background: var(--paper, Canvas); border: 1px solid var(--soft, GrayText); border-radius: 4px; padding: .15rem .3rem; }
