@@ -44,7 +44,6 @@ from kfcourse.symbolic.reading import (
 from kfcourse.symbolic.sense import not_computable
 from kfcourse.symbolic.writing import formula_latex, number_latex
 
-
 OF_A_VARIANT = ("title", "steps")  # keys of a variant's table that are not of its model
 
 

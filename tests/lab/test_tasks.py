@@ -88,7 +88,7 @@ def test_the_meter_of_the_landing_has_the_jacobian_of_the_note(name, k, sign):
     )
     for mode, gamma in modes:
         m, d = law(mode, 3)
-        h, G, F, R = linearised(mode).at(k).measure(m, d)
+        h, G, _, R = linearised(mode).at(k).measure(m, d)
         speed, angle, height = m[:3]
         density, lift, theta = (m[3], m[4], angle - m[5]) if name == "J4" else (0.0433333, 0.3, angle)
         E, kappa = density * speed**2 * np.exp(-0.09 * height), lift * sign
