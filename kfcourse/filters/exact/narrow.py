@@ -14,7 +14,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_kernels import CACHED, chunks
+from kfcourse.filters.exact.kernels import CACHED, chunks
 from kfcourse.laws import Array
 
 STEP = 3.0  # largest distance, in sigmas, that the centres of a panel of new nodes may cover

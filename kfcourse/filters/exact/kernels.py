@@ -2,7 +2,7 @@
 
     p(x') = Integral p(x) N(x'; m(x), sigma^2(x)) dx  =  sum_j mass_j N(x'; m(x_j), sigma^2(x_j))
 
-The sum is as good as the integral where the kernels of neighbouring nodes overlap.  Where they do not, `exact_narrow` puts more
+The sum is as good as the integral where the kernels of neighbouring nodes overlap.  Where they do not, `narrow` puts more
 nodes between them.
 """
 

@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_batch import Place
-from kfcourse.filters.exact_kernels import ROOT, Kernels, overlap
+from kfcourse.filters.exact.batch import Place
+from kfcourse.filters.exact.kernels import ROOT, Kernels, overlap
+from kfcourse.filters.exact.roots import halved
 from kfcourse.laws import Array
 
 HIDDEN = np.log(1e-12)  # mass of a hump that does not count
@@ -22,7 +23,7 @@ HUMP = 2.0  # widths of the highest hump, to both sides of its top, on which it 
 FRACTIONS = np.linspace(0.1, 1, 5)  # scales that are tried: powers of the support's width in the hump's
 MOST = 257  # nodes of a posterior
 SEARCHED = 33  # points of the support that are looked at for a change of sign
-SECTIONS = np.linspace(0, 1, 17)  # of a bracket
+HALVED = 8  # times a bracket is halved before Newton takes over
 EXPLANATIONS = 3  # roots that are followed: those nearest to the middle of the prediction
 
 
@@ -149,13 +150,7 @@ def explanations(
     places = np.argsort(np.where(change, middle, np.inf), axis=1, kind="stable")[:, :most]
     found = np.take_along_axis(change, places, axis=1)
     left, right = np.take_along_axis(x, places, axis=1), np.take_along_axis(x, places + 1, axis=1)
-    left_negative = np.take_along_axis(negative, places, axis=1)
-    for _ in range(2):
-        inner = left[:, :, None] + (right - left)[:, :, None] * SECTIONS
-        same = (law.residual(y[:, :, None], inner) > 0) == left_negative[:, :, None]
-        last = np.minimum(np.argmin(same, axis=2), len(SECTIONS) - 1)[:, :, None]
-        last = np.maximum(last, 1)
-        left, right = np.take_along_axis(inner, last - 1, axis=2)[:, :, 0], np.take_along_axis(inner, last, axis=2)[:, :, 0]
+    left, right = halved(lambda at: law.residual(y, at) > 0, left, right, HALVED)
     root = 0.5 * (left + right)
     for _ in range(2):
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,8 +1,8 @@
 """From posteriors to predictions: which of the three ways a trajectory takes.
 
-exact_kernels  a kernel for each node, where neighbouring kernels overlap
-exact_narrow   more nodes between these, where they do not
-exact_noise    the integral over the noise, where too many more would be needed
+kernels  a kernel for each node, where neighbouring kernels overlap
+narrow   more nodes between these, where they do not
+noise    the integral over the noise, where too many more would be needed
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, overlapping
-from kfcourse.filters.exact_narrow import Finer, refined
-from kfcourse.filters.exact_noise import by_noise
+from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, overlapping
+from kfcourse.filters.exact.narrow import Finer, refined
+from kfcourse.filters.exact.noise import by_noise
 from kfcourse.laws import Array
 
 FEW = 6144  # nodes with which a sum of kernels is cheaper than the integral over the noise

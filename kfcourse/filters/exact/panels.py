@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import legendre
 
-from kfcourse.filters.exact_kernels import NEGLIGIBLE, Grid, Unresolved
+from kfcourse.filters.exact.kernels import NEGLIGIBLE, Grid, Unresolved
 from kfcourse.laws import Array
 
 SPLITS = 40  # times a panel may be halved

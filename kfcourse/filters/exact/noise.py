@@ -20,8 +20,8 @@ import numpy as np
 import scipy
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_kernels import CACHED, OVERLAP, ROOT, Grid, Kernels, TooNarrow, Unresolved, chunks
-from kfcourse.filters.exact_narrow import DEAD, interpolated, panels
+from kfcourse.filters.exact.kernels import CACHED, OVERLAP, ROOT, Grid, Kernels, TooNarrow, Unresolved, chunks
+from kfcourse.filters.exact.narrow import DEAD, interpolated, panels
 from kfcourse.laws import Array
 
 STEP = 0.8  # of the trapezoidal rule in u: errs by 2 exp(-2 pi^2 / STEP^2) = 8e-14 where only phi varies

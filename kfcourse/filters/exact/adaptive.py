@@ -17,17 +17,17 @@ import scipy
 
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
-from kfcourse.filters.exact_batch import ROUNDING, Place
-from kfcourse.filters.exact_kernels import NEGLIGIBLE, ROOT, WIDTH, Grid, Kernels, Unresolved
-from kfcourse.filters.exact_panels import MOST, SPLITS, Rule, resolve
-from kfcourse.filters.exact_places import Candidates, explanations
+from kfcourse.filters.exact.batch import ROUNDING, Place
+from kfcourse.filters.exact.kernels import NEGLIGIBLE, ROOT, WIDTH, Grid, Kernels, Unresolved
+from kfcourse.filters.exact.panels import MOST, SPLITS, Rule, resolve
+from kfcourse.filters.exact.places import Candidates, explanations
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
 FAR = 37.0  # sigmas covered where a measurement contradicts the prediction: exp(-37^2 / 2) is the smallest number
 KERNEL = 3.0  # a panel is at most so many sigmas of the transition kernel wide, that the integral be smooth on it
-SECTIONS = np.linspace(0, 1, 257)  # of a bracket, in the search for a zero
+LAST_BIT = {"xtol": np.finfo(float).tiny, "rtol": 4 * np.finfo(float).eps, "maxiter": 2000}  # of a zero
 SCALES = (0.5, 2.0, WIDTH)  # distances, in kernel sigmas, of panel borders from the prediction's own centres
 QUANTILES = np.array([0.02, 0.25, 0.5, 0.75, 0.98])  # of the posterior, where those centres are
 BORDER = 1e-10  # of the density at the ends of the support, relative: beyond them there must be nothing
@@ -244,20 +244,14 @@ class _Bayes:
         residual = self.residual(y, x)
         result = []
         for i in np.flatnonzero(np.signbit(residual[1:]) != np.signbit(residual[:-1])):
-            low, high = x[i], x[i + 1]
-            while True:  # shrink the bracket 256 times at each pass, to the last bit
-                inner = low + (high - low) * SECTIONS
-                j = int(np.argmax(np.signbit(self.residual(y, inner[1:])) != np.signbit(residual[i])))
-                if not inner[j + 1] - inner[j] < high - low:
-                    break
-                low, high = inner[j], inner[j + 1]
+            root = scipy.optimize.brentq(lambda at: self.residual(y, np.array([at]))[0], x[i], x[i + 1], **LAST_BIT)
             offsets = (borders[-1] - borders[0]) * 0.5 ** np.arange(SPLITS)
-            near = np.concatenate([low - offsets, low + offsets])
+            near = np.concatenate([root - offsets, root + offsets])
             # Stop approaching where the log-likelihood has become flat.
-            drop = self.log_likelihood(y, np.array([low])) - self.log_likelihood(y, near)
+            drop = self.log_likelihood(y, np.array([root])) - self.log_likelihood(y, near)
             flat = (drop < 0.5).reshape(2, -1).all(axis=0)
             last = int(np.argmax(flat)) + 1 if flat.any() else SPLITS
-            result += [low - offsets[:last], low + offsets[:last]]
+            result += [root - offsets[:last], root + offsets[:last]]
         found = np.concatenate([*result, np.empty(0)])
         return found[(found > borders[0]) & (found < borders[-1])]
 

@@ -22,11 +22,11 @@ import numpy as np
 
 from kfcourse.angles import moments_on_circle
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_batch import Place, extrapolated, moments, summed
-from kfcourse.filters.exact_evidence import log_evidence
-from kfcourse.filters.exact_kernels import CACHED, LOWEST, ROOT, Grid, Kernels, Unresolved, bells, chunks
-from kfcourse.filters.exact_narrow import DEAD, interpolated
-from kfcourse.filters.exact_roots import SHARP
+from kfcourse.filters.exact.batch import Place, extrapolated, moments, summed
+from kfcourse.filters.exact.evidence import log_evidence
+from kfcourse.filters.exact.kernels import CACHED, LOWEST, ROOT, Grid, Kernels, Unresolved, bells, chunks
+from kfcourse.filters.exact.narrow import DEAD, interpolated
+from kfcourse.filters.exact.roots import SHARP
 from kfcourse.laws import Array
 
 LOOKED = 25  # nodes of a look
