@@ -1,5 +1,6 @@
 """The house keeps its order: imports run down its floors, no module hides behind a function, each room says what it is."""
 
+import ast
 import inspect
 import os
 import subprocess
@@ -45,6 +46,22 @@ def test_a_module_does_not_carry_the_name_of_what_it_exports(name):
 def test_a_module_says_what_it_is(name):
     said = sentence(MODULES[name])
     assert said.endswith((".", "?", "!", '"', "`")) and len(said) > 20, said
+
+
+def test_a_constant_of_the_exact_filter_has_one_value():
+    """Its files are read together: a name in capitals means the same in all of them."""
+    found = [
+        (target.id, name)
+        for name, path in MODULES.items()
+        if name.startswith("filters.exact.")
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.Assign)
+        for target in node.targets
+        if isinstance(target, ast.Name) and target.id.isupper()
+    ]
+    names = [name for name, _ in found]
+    assert len(names) > 30
+    assert [pair for pair in found if names.count(pair[0]) > 1] == []
 
 
 def test_every_folder_has_its_page():

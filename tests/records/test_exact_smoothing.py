@@ -148,7 +148,7 @@ def test_the_last_state_is_the_filter_s():
 def test_what_cannot_be_resolved_is_refused_in_words(monkeypatch):
     from kfcourse.filters.exact import smoothing
 
-    monkeypatch.setattr(smoothing, "NODES", (9, 17))
+    monkeypatch.setattr(smoothing, "SMOOTHING_NODES", (9, 17))
     monkeypatch.setattr(smoothing, "TOLERABLE", 1e-9)
     model = find_variant("53").model
     with pytest.raises(Unresolved, match=r"looking back to step \d: 17 nodes do not resolve.*smooth\(particle\(model\), y\)"):

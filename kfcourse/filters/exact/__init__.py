@@ -10,7 +10,7 @@ beginning, and within one step the posterior may be thousands of times narrower 
 fixed grid would see.  So each trajectory gets its own nodes at every step.  A step takes these ways, read in this order:
 
 pointmasses  the filter: a step, its ways, and the budget of its error
-predictions  from a posterior to the next prediction: a sum of normal kernels (kernels), also between the nodes (narrow), or
+prediction   from a posterior to the next prediction: a sum of normal kernels (kernels), also between the nodes (narrow), or
              an integral over the noise (noise)
 places       where the new posterior lies: the states that explain the measurement
 batch        nodes x = c + s sinh t there, Bayes' rule, and an estimate of the error: for many trajectories at once
@@ -19,4 +19,5 @@ adaptive     for what they do not resolve, one trajectory at a time: panels that
 evidence     and how likely the measurement was, for who asks
 smoothing    what the whole record tells, once it is there
 jumps        the same of state and mode, for models that jump
+constants    what several of these share
 """

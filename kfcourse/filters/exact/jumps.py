@@ -21,7 +21,7 @@ from kfcourse.filters.exact.adaptive import check_scalar
 from kfcourse.filters.exact.evidence import log_evidence
 from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved, of_prior
 from kfcourse.filters.exact.pointmasses import ACCURACY, FINE, corrected
-from kfcourse.filters.exact.predictions import predictions
+from kfcourse.filters.exact.prediction import predictions
 from kfcourse.filters.multiple_models import mixture
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.jumping import JumpModel

@@ -12,10 +12,11 @@ from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
 from kfcourse.filters.exact.adaptive import check_scalar, on_panels
 from kfcourse.filters.exact.batch import Place, Posteriors, posteriors
+from kfcourse.filters.exact.constants import ELEMENTS, MORE, NODES, TOLERABLE
 from kfcourse.filters.exact.evidence import log_evidence
 from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, of_prior
 from kfcourse.filters.exact.places import Candidates, hidden, likeliest, looked, spaced
-from kfcourse.filters.exact.predictions import predictions
+from kfcourse.filters.exact.prediction import predictions
 from kfcourse.filters.exact.roots import at_roots
 from kfcourse.filters.exact.smoothing import smoothed
 from kfcourse.laws import Array, Gaussian
@@ -25,12 +26,8 @@ from kfcourse.symbolic.reading import ModelError
 # Of the mean and the deviation at a step, in posterior standard deviations: their square, 1e-6 of the bound, is far below what
 # any number of trajectories tells.
 ACCURACY = 1e-3
-TOLERABLE = 1e-2  # error of a step that no way resolves better, before the filter gives up
-NODES = (33, 49, 65, 97, 129, 193, 257)  # that a posterior may have
-MORE = 1.9  # times more nodes than did not do
 SPACINGS = (0.5, 0.35, 0.25, 0.18, 0.12)  # of its nodes, tried one after the other
 FINE = (129, 257)  # nodes of a posterior that must be interpolated: the second if the first are too few to share its mass
-ELEMENTS = 2**20  # of kernels, that many trajectories at once
 MEMORY = 2**28  # bytes of predictions
 REMADE = 128  # trajectories whose predictions are made again at once
 

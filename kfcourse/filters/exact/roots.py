@@ -12,13 +12,12 @@ from collections.abc import Callable
 import numpy as np
 
 from kfcourse.filters.densities import ScalarDensities
+from kfcourse.filters.exact.constants import ELEMENTS, SHARP
 from kfcourse.filters.exact.kernels import Grid, Kernels, Unresolved, chunks
 from kfcourse.laws import Array
 
 SCANNED = 4097  # equidistant states of the support, between which signs may change
 HALVED = 60  # times a bracket is halved: to the last bit
-ELEMENTS = 2**20  # of the largest array
-SHARP = 1e300  # the density of a point
 
 
 def at_roots(kernels: Kernels, y: Array, law: ScalarDensities) -> list[Grid]:
