@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kfcourse.angles import Components, difference, on_circle
-from kfcourse.laws import Array, Gaussian, apply, gain, product, stacked, symmetric, transpose
+from kfcourse.laws import Array, Gaussian, apply, gain, identity, product, stacked, symmetric, transpose
 from kfcourse.linear.runs import Run
 from kfcourse.linear.system import LinearSystem
 
@@ -99,7 +99,7 @@ def _regressions(passages: Passages, angles: Components) -> list[Callable[[Gauss
     """
     (z, p), (lam, Psi), A, Q = passages
     S = gain(product(p, transpose(A)), Psi, broken=True)
-    rest = np.eye(z.shape[-1], dtype=p.dtype) - product(S, A)
+    rest = identity(z.shape[-1], p.dtype) - product(S, A)
     own = product(product(rest, p), transpose(rest))
     each = np.broadcast_to(Q, (len(z), *Q.shape[-3:])) if Q.ndim < 4 else Q
 
