@@ -233,7 +233,7 @@ class JumpModel:
         x = mean + np.concatenate([np.zeros((1, self.n)), away]) * np.sqrt(np.diagonal(cov))
         for k in range(min(steps, SURE)):
             ever = (self.transition_of(x, k) > 0).any(axis=0)
-            for _ in range(1 if self.chain_of_step.known.symbols else len(ever)):
+            for _ in range(1 if self.chain_of_step.known.symbols else len(self.names)):
                 reached = reached | (reached @ ever)
         self._check_reached(reached)
 
