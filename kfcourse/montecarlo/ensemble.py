@@ -19,7 +19,8 @@ import numpy as np
 import scipy
 
 from kfcourse.angles import on_circle
-from kfcourse.laws import Array, Gaussian, Trajectories, normalised_square, square_root
+from kfcourse.laws import Array, Gaussian, normalised_square, square_root
+from kfcourse.linear.runs import Trajectories
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.jumping import JumpModel
@@ -210,7 +211,10 @@ class _JumpSimulator:
 
     def __call__(self, k: int, x: Array, mode: Array, v: Array, w: Array, u: Array) -> Instant:
         model, angles = self.model, self.model.angles
-        mode_next = _chosen(model.transition_at(k)[mode], u)
+        if model.by_state:
+            mode_next = _chosen(model.transition_of(x, k)[np.arange(len(x)), mode], u)
+        else:
+            mode_next = _chosen(model.transition_at(k)[mode], u)
         y, x_next = np.empty((len(x), model.p)), np.empty((len(x), model.n))
         with np.errstate(over="ignore", invalid="ignore"):
             for j, (one, (state, meter)) in enumerate(zip(model.modes, self.modes, strict=True)):
