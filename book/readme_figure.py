@@ -49,7 +49,7 @@ for name, label in SHOWN.items():
     middle, (low, high) = 100 * gap.value, (100 * limit for limit in gap.interval(0.95))
     ax.plot(steps, middle, markersize=4, **line)
     ax.fill_between(steps, low, high, color=line["color"], alpha=0.16, linewidth=0)
-label_ends(ax, least=0.09, fontweight="semibold")
+label_ends(ax, least=0.09, lowest=0, weight="semibold")
 ax.axhline(0, color="0.35", linewidth=1)
 ax.set(xticks=steps, xlabel="step $k$", ylabel="error variance above\nthe exact filter, %")
 written = io.StringIO()
