@@ -22,7 +22,7 @@ from kfcourse.angles import Angles
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.formula import FormulaError, symbol
 from kfcourse.symbolic.known import CHECKED, SURE, Stepwise
-from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.model import OF_A_VARIANT, Model
 from kfcourse.symbolic.reading import Formula, Formulas, ModelError, exact_number, read, shown, table
 
 OF_A_MODE = ("state", "meter", "parameters", "state_noise", "meter_noise")  # in which modes may differ
@@ -210,7 +210,7 @@ def model_of_table(given: Mapping[str, Any]) -> Model | JumpModel:
     missing = [key for key in ("state", "meter") if key not in given]
     if missing:
         raise ModelError(f"there is no {' and no '.join(missing)}: give what holds in all modes that have none of their own")
-    options = {key: value for key, value in given.items() if key not in ("title", "state", "meter", "parameters")}
+    options = {key: value for key, value in given.items() if key not in ("state", "meter", "parameters", *OF_A_VARIANT)}
     return JumpModel.define(given["state"], given["meter"], given.get("parameters"), **options)
 
 

@@ -43,7 +43,7 @@ def own(tmp_path):
 
 
 def test_they_are_shipped_beside_the_variants_that_the_exercises_ask_about(own):
-    assert list(JUMPS) == ["J1", "J1-lasting", "J2", "J-switching", "J3"]
+    assert list(JUMPS) == ["J1", "J1-lasting", "J2", "J-switching", "J3", "J4"]
     assert not set(JUMPS) & set(load_variants())
     assert list(load_variants(own)) == ["plain"] and isinstance(find_variant("mine", own).model, JumpModel)
     assert [one.name for one in chosen_variants([], True, own)] == ["plain"]

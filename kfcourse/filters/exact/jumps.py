@@ -17,11 +17,11 @@ import numpy as np
 
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
-from kfcourse.filters.exact import ACCURACY, FINE, corrected
-from kfcourse.filters.exact_adaptive import check_scalar
-from kfcourse.filters.exact_evidence import log_evidence
-from kfcourse.filters.exact_kernels import Grid, Kernels, TooNarrow, Unresolved, of_prior
-from kfcourse.filters.exact_predictions import predictions
+from kfcourse.filters.exact.adaptive import check_scalar
+from kfcourse.filters.exact.evidence import log_evidence
+from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved, of_prior
+from kfcourse.filters.exact.pointmasses import ACCURACY, FINE, corrected
+from kfcourse.filters.exact.prediction import predictions
 from kfcourse.filters.multiple_models import mixture
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.jumping import JumpModel
