@@ -14,7 +14,8 @@ gate, heavy_tails       measurements that are not believed: refused, by any filt
 learnt_noise            a noise of unknown size, learnt on the way
 alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
-                        (jump_optimal: FOS with modes;  exact.jumps: the exact filter of state and mode)
+                        (state_transitions: those that depend on the state;  jump_optimal: FOS with modes;
+                        exact.jumps: the exact filter of state and mode)
 notation                symbols in which the equations are printed
 """
 
