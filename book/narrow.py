@@ -40,6 +40,7 @@ def choose(app, doctree, name: str) -> None:
         width, height = struct.unpack(">II", narrow[16:24])  # of a PNG; twice the pixels of a screen
         up = "../" * name.count("/")
         source = f'<source media="{WIDEST}" srcset="{up}_images/{file.name}" width="{width // 2}" height="{height // 2}">'
+        image["classes"].append("no-scaled-link")  # inside a link, the picture would not be the child of its element
         place = image.parent.index(image)
         image.parent.insert(place, nodes.raw("", f"<picture>{source}", format="html"))
         image.parent.insert(place + 2, nodes.raw("", "</picture>", format="html"))

@@ -20,8 +20,8 @@ COLOURS = {"truth": "#000000", "measurement": "#999999", "estimate": "#0072B2", 
 
 # Inches: the column of a page.  A figure of this width is shown at its own size, its labels as large as the page's notes.
 WIDTH = 7.2
-# A column of 355 px, on a screen of 390, shows a figure of this width with letters of 10 pt as 10.7 px, one of 7.2 as 6.8.
-NARROW = 4.6
+# A column of 338 px, on a screen of 390, shows a figure of this width with letters of 10 pt as 10.7 px, one of 7.2 as 6.5.
+NARROW = 4.4
 
 FONTS = sorted((Path(__file__).parent / "data").glob("*.ttf"))  # the pages' own, Source Sans 3 (OFL.txt)
 
@@ -63,7 +63,7 @@ def book_style() -> None:
     # The whole figure, as wide as it says: constrained layout has found room for everything.
     set_matplotlib_formats("retina", bbox_inches=None)
     rcParams.update(_STYLE)
-    formatter = InteractiveShell.instance().display_formatter.formatters["image/png"]
+    formatter = InteractiveShell.instance().display_formatter.formatters["image/png"]  # type: ignore[union-attr]
     wide = formatter.lookup_by_type(Figure)
 
     def both(figure: Figure) -> Any:
@@ -82,20 +82,18 @@ def lay_narrow(figure: Figure) -> bool:
     width, height = figure.get_size_inches()
     if width <= NARROW:
         return False
-    panels = [ax for ax in figure.axes if ax.get_subplotspec() is not None]
-    grids = {ax.get_gridspec() for ax in panels}
-    columns = 1
-    if len(grids) == 1:
-        columns = (grid := grids.pop()).ncols
-        stacked = figure.add_gridspec(grid.nrows * columns, 1)
-        for ax in panels if columns > 1 else ():
-            rows, across = (ax.get_subplotspec().rowspan, ax.get_subplotspec().colspan)
-            first = min(rows) * columns + min(across)
-            ax.set_subplotspec(stacked[first : first + len(rows) * len(across)])
-            left = panels[0]
-            if ax.get_shared_y_axes().joined(ax, left) and ax is not left:  # its neighbour at the left said it for both
+    panels = [(ax, spec) for ax in figure.axes if (spec := ax.get_subplotspec()) is not None]
+    grids = {spec.get_gridspec() for _, spec in panels}
+    columns = grids.pop().ncols if len(grids) == 1 else 1
+    if columns > 1:
+        first_ax, first_spec = panels[0]
+        stacked = figure.add_gridspec(first_spec.get_gridspec().nrows * columns, 1)
+        for ax, spec in panels:
+            first = min(spec.rowspan) * columns + min(spec.colspan)
+            ax.set_subplotspec(stacked[first : first + len(spec.rowspan) * len(spec.colspan)])
+            if ax is not first_ax and ax.get_shared_y_axes().joined(ax, first_ax):  # which stood at the left and said it for both
                 ax.tick_params(labelleft=True)
-                ax.set_ylabel(ax.get_ylabel() or left.get_ylabel())
+                ax.set_ylabel(ax.get_ylabel() or first_ax.get_ylabel())
     figure.set_size_inches(NARROW, 0.9 * height * columns if columns > 1 else height)
     return True
 

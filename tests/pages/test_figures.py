@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 
 from kfcourse.pages import book_style, label_ends
-from kfcourse.pages.figures import FONTS, lay_narrow
+from kfcourse.pages.figures import FONTS, NARROW, lay_narrow
 
 
 @pytest.fixture
@@ -77,7 +77,7 @@ def test_on_a_telephone_panels_stand_one_under_the_other_and_letters_have_ten_pi
     assert abs(above.x0 - below.x0) < 1
     assert right.get_ylabel() == "error"
     assert right.yaxis.get_tick_params()["labelleft"]
-    column = 355 / 96  # inches of CSS on a screen of 390 px
+    column = 338 / 96  # inches of CSS on a screen of 390 px
     letters = rcParams["font.size"] * 96 / 72 * column / figure.get_figwidth()
     assert letters > 10
     assert not lay_narrow(figure)  # is narrow already
@@ -91,7 +91,7 @@ def test_the_picture_of_a_wide_figure_carries_one_for_telephones(style) -> None:
     _, metadata = formatter(figure)
     narrow = base64.b64decode(metadata["narrow"])
     width, height = struct.unpack(">II", narrow[16:24])
-    assert width == pytest.approx(2 * 4.6 * rcParams["figure.dpi"], abs=1)
+    assert width == pytest.approx(2 * NARROW * rcParams["figure.dpi"], abs=1)
     assert height > width
     figure = Figure(figsize=(4, 3))
     figure.subplots()
