@@ -30,7 +30,10 @@ addEventListener("DOMContentLoaded", () => {
     box.hidden = false;
     link.setAttribute("aria-describedby", box.id);
     shown = link;
-    const at = link.getBoundingClientRect(), { width, height } = box.getBoundingClientRect(), page = document.documentElement;
+    place();
+  };
+  const place = () => {
+    const at = shown.getBoundingClientRect(), { width, height } = box.getBoundingClientRect(), page = document.documentElement;
     const below = at.bottom + 6 + height <= page.clientHeight || at.top < height + 6;
     box.style.left = `${Math.max(8, Math.min(at.left, page.clientWidth - width - 8))}px`;
     box.style.top = `${below ? at.bottom + 6 : at.top - height - 6}px`;
@@ -50,5 +53,5 @@ addEventListener("DOMContentLoaded", () => {
   box.addEventListener("pointerenter", () => clearTimeout(waiting));
   box.addEventListener("pointerleave", () => later(close, 250));
   addEventListener("keydown", (event) => event.key === "Escape" && close());
-  addEventListener("scroll", () => shown && close(), { passive: true });
+  addEventListener("scroll", () => shown && place(), { passive: true }); // the focus itself may have moved the page
 });

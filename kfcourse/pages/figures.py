@@ -20,7 +20,7 @@ COLOURS = {"truth": "#000000", "measurement": "#999999", "estimate": "#0072B2", 
 
 # Inches: the column of a page.  A figure of this width is shown at its own size, its labels as large as the page's notes.
 WIDTH = 7.2
-# A column of 338 px, on a screen of 390, shows a figure of this width with letters of 10 pt as 10.7 px, one of 7.2 as 6.5.
+# A column of 338 px, on a screen of 390, shows a figure of this width with letters of 10 pt as 10.2 px, one of 7.2 as 6.3.
 NARROW = 4.4
 
 FONTS = sorted((Path(__file__).parent / "data").glob("*.ttf"))  # the pages' own, Source Sans 3 (OFL.txt)
