@@ -92,9 +92,9 @@ class JumpStructures:
         return [gaussian(mode) for mode in self.model.modes]
 
     @property
-    def chain(self) -> tuple[Callable[[int], Array], Array]:
-        """Transition matrix by the step, and law of the first mode: what filters with modes take."""
-        return self.model.transition_at, self.model.first
+    def chain(self) -> tuple[JumpModel, Array]:
+        """The model, for its transitions, and the law of the first mode: what filters with modes take."""
+        return self.model, self.model.first
 
     @property
     def best(self) -> list[Structure]:

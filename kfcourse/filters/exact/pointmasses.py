@@ -1,27 +1,8 @@
-"""The absolutely optimal filter itself: the Stratonovich equation by point masses, for scalar models.
-
-    p(x_k | y_0..k) = C p(y_k | x_k) Integral p(x_{k-1} | y_0..k-1) p(x_k | x_{k-1}) dx_{k-1}
-
-The posterior is held as masses on nodes (point masses), so the integral is a sum of normal kernels, one for each node.  Its
-estimate, the posterior mean, has the least mean square error of all filters: it bounds what any approximation can reach.
-
-The lab's noises are multiplicative: densities are many orders of magnitude narrower at the end of a run than at its
-beginning, and within one step the posterior may be thousands of times narrower than the prediction, far narrower than any
-fixed grid would see.  So each trajectory gets its own nodes at every step.  A step takes these ways, read in this order:
-
-exact_predictions  from a posterior to the next prediction: a sum of normal kernels (exact_kernels), also between the nodes
-                   (exact_narrow), or an integral over the noise (exact_noise)
-exact_places       where the new posterior lies: the states that explain the measurement
-exact_batch        nodes x = c + s sinh t there, Bayes' rule, and an estimate of the error: for many trajectories at once
-exact_roots        or, for a meter without noise, the few states that explain it
-exact_adaptive     for what they do not resolve, one trajectory at a time: panels that are halved until they do (exact_panels)
-exact_evidence     and how likely the measurement was, for who asks
-exact_smoothing    what the whole record tells, once it is there
-"""
+"""The exact filter by point masses: a step, the ways it may take, and the error that is carried from step to step."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -29,14 +10,15 @@ import numpy as np
 from kfcourse.angles import moments_on_circle
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
-from kfcourse.filters.exact_adaptive import check_scalar, on_panels
-from kfcourse.filters.exact_batch import Place, Posteriors, posteriors
-from kfcourse.filters.exact_evidence import log_evidence
-from kfcourse.filters.exact_kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, of_prior
-from kfcourse.filters.exact_places import Candidates, hidden, likeliest, looked, spaced
-from kfcourse.filters.exact_predictions import predictions
-from kfcourse.filters.exact_roots import at_roots
-from kfcourse.filters.exact_smoothing import smoothed
+from kfcourse.filters.exact.adaptive import check_scalar, on_panels
+from kfcourse.filters.exact.batch import Place, Posteriors, posteriors
+from kfcourse.filters.exact.constants import ELEMENTS, MORE, NODES, TOLERABLE
+from kfcourse.filters.exact.evidence import log_evidence
+from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, of_prior
+from kfcourse.filters.exact.places import Candidates, hidden, likeliest, looked, spaced
+from kfcourse.filters.exact.prediction import predictions
+from kfcourse.filters.exact.roots import at_roots
+from kfcourse.filters.exact.smoothing import smoothed
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
@@ -44,12 +26,8 @@ from kfcourse.symbolic.reading import ModelError
 # Of the mean and the deviation at a step, in posterior standard deviations: their square, 1e-6 of the bound, is far below what
 # any number of trajectories tells.
 ACCURACY = 1e-3
-TOLERABLE = 1e-2  # error of a step that no way resolves better, before the filter gives up
-NODES = (33, 49, 65, 97, 129, 193, 257)  # that a posterior may have
-MORE = 1.9  # times more nodes than did not do
 SPACINGS = (0.5, 0.35, 0.25, 0.18, 0.12)  # of its nodes, tried one after the other
 FINE = (129, 257)  # nodes of a posterior that must be interpolated: the second if the first are too few to share its mass
-ELEMENTS = 2**20  # of kernels, that many trajectories at once
 MEMORY = 2**28  # bytes of predictions
 REMADE = 128  # trajectories whose predictions are made again at once
 
@@ -145,16 +123,21 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
     def evidence(state: State, y: Array, after: State) -> Array:
         return log_evidence(before(state, len(y)), y, densities.at(state.step), after.memory.fine)
 
-    def look_back(states: Iterable[State], y: Array) -> list[State]:
+    def look_back(states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
         memories = [(state.memory.fine, state.memory.error) for state in states]  # without the predictions: these are large
         posteriors, errors = zip(*memories, strict=True)
 
         def predicted(k: int) -> Iterable[tuple[Array, Kernels]]:
             return predictions(posteriors[k - 1], densities.at(k - 1)) if k else before(init(y.shape[1]), y.shape[1])
 
-        found = smoothed(posteriors, np.array(errors), y, predicted, densities, accuracy, bool(model.angles.x))
-        laws = [Gaussian(one.mean[:, None], one.variance[:, None, None]) for one in found]
-        return [State(k + 1, law, law, one) for k, (law, one) in enumerate(zip(laws, found, strict=True))]
+        def back(end: int) -> Iterator[State]:
+            known = posteriors[:end], np.array(errors[:end])
+            found = smoothed(*known, y, predicted, densities, accuracy, bool(model.angles.x))
+            for step, one in zip(range(end, 0, -1), found, strict=True):
+                law = Gaussian(one.mean[:, None], one.variance[:, None, None])
+                yield State(step, law, law, one)
+
+        return back
 
     return Filter("aof-exact", model, init, step, slow=True, evidence=evidence, look_back=look_back)
 
