@@ -75,6 +75,6 @@ def coefficients(x_0: Array, x: Array, z: Array) -> tuple[Array, Array, Array]:
     return regression(x, z)
 
 
-def moments(x: Array, mode: Array) -> tuple[Array, Array]:
+def moments(x: Array, mode: Array) -> tuple[float, float]:
     """Mean and variance of x over the whole ensemble, whatever the modes are."""
-    return np.mean(x), np.mean((x - np.mean(x)) ** 2)
+    return float(np.mean(x)), float(np.mean((x - np.mean(x)) ** 2))

@@ -251,8 +251,12 @@ WRONG_FITS: tuple[tuple[str, str, Answer], ...] = (
 
 def by_mode(x: Array, mode: Array) -> tuple[Array, Array, Array]:
     """Share, mean and variance of each mode that occurs."""
-    present = np.unique(mode)
-    return tuple(np.array([f(mode == i) for i in present]) for f in (np.mean, lambda i: x[i].mean(), lambda i: x[i].var()))
+    inside = [x[mode == i] for i in np.unique(mode)]
+    return (
+        np.array([len(one) / len(x) for one in inside]),
+        np.array([one.mean() for one in inside]),
+        np.array(list(map(np.var, inside))),
+    )
 
 
 def _printed_moments(x: Array, mode: Array) -> tuple[Array, Array]:
@@ -270,8 +274,8 @@ def _unweighted_with_spread(x: Array, mode: Array) -> tuple[Array, Array]:
     return means.mean(), variances.mean() + means.var()
 
 
-def _about_zero(x: Array, mode: Array) -> tuple[Array, Array]:
-    return np.mean(x), np.mean(x**2)
+def _about_zero(x: Array, mode: Array) -> tuple[float, float]:
+    return float(np.mean(x)), float(np.mean(x**2))
 
 
 WRONG_MOMENTS: tuple[tuple[str, str, Answer], ...] = (

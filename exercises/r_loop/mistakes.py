@@ -220,7 +220,7 @@ def slips_with(
 
 def _first(error: Array) -> tuple[Array, Array]:
     away = np.abs(error) >= 2 * np.pi
-    return away.argmax(axis=0), away.any(axis=0)
+    return away.argmax(axis=0), np.asarray(away.any(axis=0))
 
 
 WRONG_SLIPS: tuple[tuple[str, str, Answer], ...] = (
