@@ -8,6 +8,25 @@ would be so low, if all covered with 92 %; and on which side of the interval the
 which a report says that they cannot be trusted (`Comparison.trusted`) are counted apart: `told` is their share.  The truth is the
 mean over all seeds: its own error is a twentieth of one seed's, and costs a tenth of a per cent of coverage.  DUOF, FOS and MFOS
 are designed once: intervals of one design hold for the filters as they were designed.
+
+Found with 20,000 trajectories, the exact AOF on 2,000, 5 steps; of each kind the mean and, after the bar, the worst place:
+
+    variant      seeds       gap         difference        bound     told
+    53              80   .945 | .906   .959 | .900   .948 | .938      .02
+    2               31   .954 | .903   .954 | .871   .948 | .903      0
+    3               80   .950 | .912   .943 | .912   .965 | .950      .06
+    4               30   .946 | .867   .957 | .833   .967 | .933      .04
+    5               76   .933 | .882   .934 | .882   .963 | .947      0
+    6               11   .985 | .909   .973 | .909   .909 | .818      0
+    7               74   .928 | .878   .930 | .878   .939 | .904      0
+    9               80   .950 | .912   .945 | .900   .938 | .900      0
+    10              20   .974 | .900   .981 | .950   .929 | .895      0
+    11              80   .942 | .863   .942 | .875   .922 | .850      .01
+    J1-lasting      40   .921 | .903   .926 | .892   .985 | .950      .12
+
+No worst place is below .92 by more than chance: the least probable, of 11's bound, is so with .10, all others with .87 or more.
+J1-lasting ran with 10,000 trajectories and three filters.  With the exact AOF on 320 of them only, .57 of its gaps are told, and
+the others cover .936 (before these were told .83 at the worst place).
 """
 
 from __future__ import annotations
