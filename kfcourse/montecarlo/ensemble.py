@@ -19,7 +19,8 @@ import numpy as np
 import scipy
 
 from kfcourse.angles import on_circle
-from kfcourse.laws import Array, Gaussian, Trajectories, normalised_square, square_root
+from kfcourse.laws import Array, Gaussian, normalised_square, square_root
+from kfcourse.linear.runs import Trajectories
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.jumping import JumpModel
