@@ -217,7 +217,7 @@ def test_particles_look_back_as_well_as_they_say(plane):
 
 
 def told_of_it(plane, guided):
-    """What two clouds tell of their error over the true one, root mean squares: ten records, each with 15 pairs of 50 particles."""
+    """What two clouds tell of their error over the true one, root mean squares: ten records, 15 pairs of 50 particles each."""
     y = np.repeat(simulate(plane, 10, 6, seed=1).y, 15, axis=1)
     one = particle(plane, 100, seed=1, guided=guided)
     away = smooth(one, y).mean - smooth(kalman_filter(plane), y).mean
