@@ -85,6 +85,11 @@ DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with m
     type=click.IntRange(min=1),
     help="Processor cores to use; does not change the numbers.  [default: all]",
 )
+@click.option(
+    "--compiled",
+    is_flag=True,
+    help="Run compiled filters (scalar variants; needs numba): equal but for rounding, for many trajectories.",
+)
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]")
 @click.option(
     "--report", "language", type=click.Choice(LANGUAGES), help="Also write the student's report, handin.html and handin.tex."
@@ -106,6 +111,7 @@ def lab(
     wide: float | None,
     same_ensemble: bool,
     threads: int | None,
+    compiled: bool,
     out: Path | None,
     language: str | None,
     json_file: Path | None,
@@ -160,6 +166,7 @@ def lab(
             same_ensemble=same_ensemble,
             wide=wide,
             threads=threads,
+            compiled=compiled,
         ),
         refused,
     )

@@ -18,6 +18,7 @@ import numpy as np
 
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
+from kfcourse.filters.fused import fused, is_scalar
 from kfcourse.laws import Array, Gaussian, stacked
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite, design
@@ -28,6 +29,7 @@ from kfcourse.montecarlo.subset import LEAST, progress_bar, run_block, run_subse
 from kfcourse.montecarlo.two_phase import Replicas
 from kfcourse.montecarlo.widths import best_width
 from kfcourse.seeds import Seed, seed_number
+from kfcourse.symbolic.compiled import REMEDY
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
@@ -109,6 +111,7 @@ def compare(
     same_ensemble: bool = False,
     smoothers: Sequence[Filter] = (),
     wide: float | None = None,
+    compiled: bool = False,
     subset_runs: int = 2000,
     subset_seconds: float | None = None,
     subset_memory: float | None = None,
@@ -142,6 +145,9 @@ def compare(
         Draw half of the initial states of the comparison from a law so many times as wide as the prior, all by strata, and weight
         every trajectory (importance sampling): where rare far starts dominate the error, that gives the standard errors of many
         times the trajectories.  By default a pilot on the fast filters chooses among 1, 1.5, 2 and 3.
+    compiled : bool
+        Run compiled code (numba: `pip install kfcourse[fast]`) where a scalar model and its filters have formulas to compile.
+        The numbers are the same but for rounding; the first time, compiling takes seconds, and is kept.
     subset_runs : int
         Slow filters (exact, particle) run on this many of the common trajectories, at least 100; what they differ by from the
         Gaussian AOF (or else the most accurate fast filter) is found there.  0 leaves them out.
@@ -161,7 +167,7 @@ def compare(
     Raises
     ------
     ValueError
-        Filters of equal name, sizes that are not positive whole numbers.
+        Filters of equal name, sizes that are not positive whole numbers; `compiled` without numba.
     NotFinite
         A trajectory or a filter left the finite numbers.
     """
@@ -169,6 +175,8 @@ def compare(
     _check_designs(designs, same_ensemble, wide)
     if smoothers:
         _check_arguments(smoothers, model, subset_runs, subset_seconds, subset_memory)
+    if compiled:
+        filters = _compiled(filters)
     seed, threads = seed_number(seed), cores() if threads is None else threads
     names = [one.name for one in filters]
     slow = [one for one in filters if one.slow and subset_runs]
@@ -176,7 +184,9 @@ def compare(
     run_seed, pilot_seed, *design_seeds = np.random.SeedSequence(seed).spawn(2 + designs)
     size = runs if design_runs is None else design_runs
     design_ensemble, *others = (
-        [Ensemble(model, runs, steps, run_seed)] if same_ensemble else [Ensemble(model, size, steps, one) for one in design_seeds]
+        [Ensemble(model, runs, steps, run_seed, compiled=compiled)]
+        if same_ensemble
+        else [Ensemble(model, size, steps, one, compiled=compiled) for one in design_seeds]
     )
     to_design = [one for one in fast if isinstance(one, Design)]
     with workers(threads) as pool:
@@ -186,14 +196,14 @@ def compare(
             common = design_ensemble
         else:
             width = best_width(ready, model, runs, steps, pilot_seed) if wide is None else wide
-            common = Ensemble(model, runs, steps, run_seed, width)
+            common = Ensemble(model, runs, steps, run_seed, width, compiled)
         everyone = [*ready, *chain(*again)]
         try:
             everything = _run_blocks(everyone, common, pool, progress)
         except NotFinite:
             if wide is not None or not common.wide or common.wide == 1:
                 raise
-            common = Ensemble(model, runs, steps, run_seed, 1.0)  # some far start is too far: none but the prior's own
+            common = replace(common, wide=1.0)  # some far start is too far: none but the prior's own
             everything = _run_blocks(everyone, common, pool, progress)
         sums, replicas = _split(everything, fast, len(others))
         subset, left_out = None, dict[str, str]()
@@ -256,6 +266,14 @@ def _check_arguments(
             )
 
 
+def _compiled(filters: Sequence[Filter | Design]) -> list[Filter | Design]:
+    """The filters with compiled steps as far as that can be; ValueError if there is no numba."""
+    try:
+        return [fused(one) for one in filters]
+    except ImportError:
+        raise ValueError(REMEDY) from None
+
+
 def _check_designs(designs: int, same_ensemble: bool, wide: float | None) -> None:
     if isinstance(designs, bool) or not isinstance(designs, int | np.integer) or designs < 1:
         raise ValueError(f"designs must be a positive whole number, got {designs!r}")
@@ -291,11 +309,13 @@ def _run_blocks(
 ) -> Sums:
     """Sums over all trajectories, its blocks in parallel."""
 
+    record = Sums.record_by_loop if ensemble.compiled and is_scalar(ensemble.model) else Sums.record
+
     def block(index: int) -> Sums:
         size = ensemble.sizes[index]
         counts = batch_sizes(size, max(1, round(BATCHES * size / ensemble.runs)))
         sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, counts)
-        run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight, back=back)
+        run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight, back=back, record=record)
         return sums
 
     indices = range(len(ensemble.sizes))

@@ -263,11 +263,12 @@ def run_block(
     weight_of: Callable[[Array], Array | None] = lambda x: None,
     *,
     back: bool = False,
+    record: Callable[..., None] = Sums.record,
 ) -> None:
     """Advance all filters together over the steps of one block of trajectories; `back`: let them look back from its end.
 
     With a reference filter, the distance of every other estimate from its own is recorded too.  The initial states tell the
-    weights of the trajectories.
+    weights of the trajectories.  `record` is how the sums take an estimate.
     """
     size, weight = int(sums.counts.sum()), None
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
@@ -277,7 +278,7 @@ def run_block(
             for i, (one, state) in enumerate(zip(filters, states, strict=True)):
                 with _affair_of(one, k):
                     estimate = state.posterior
-                    sums.record(i, k, near(instant.x, estimate.mean, one.model.angles.x), estimate, weight)
+                    record(sums, i, k, near(instant.x, estimate.mean, one.model.angles.x), estimate, weight)
             if reference is not None:
                 twice = _twice(states[reference])
                 sums.record_doubt(k, _doubt(states[reference]), weight)
