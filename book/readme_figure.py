@@ -1,11 +1,13 @@
 """The picture of the front page and of README.md: the lab's filters of variant 53 above the best possible one (`make figure`).
 
-Its text stays text, in the fonts of the page that shows it.
+Its text stays text, in the fonts of the page that shows it.  On the screen the front page has a map of other noises too
+(`front.py`), whose numbers are computed here.
 """
 
 from __future__ import annotations
 
 import io
+import json
 import re
 from pathlib import Path
 
@@ -16,13 +18,17 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from kfcourse import compare, lab_filters
+from kfcourse.lab.maps import parameter_map
 from kfcourse.lab.plots import style
 from kfcourse.lab.variants import find_variant
 from kfcourse.pages.figures import label_ends
+from kfcourse.pages.scenes import leading
 
 PICTURE = Path(__file__).with_name("front-figure.svg")
 SHOWN = {"duof": "DUOF", "fos-gaussian": "GFOS", "mfos-linearised": "LMFOS", "aof-linearised": "LAOF", "aof-gaussian": "GAOF"}
 STEPS = slice(0, 11)
+MAP = Path(__file__).with_name("front-map.json")
+RATIOS = (0.1, 0.2, 0.4, 0.7, 1, 2, 4)  # f/e
 NAMESPACES = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
 
 plt.rcParams.update(
@@ -59,3 +65,8 @@ text = re.sub(
 ).strip()
 text = re.sub(r'<svg[^>]*?(viewBox="[^"]*")[^>]*>', rf'<svg {NAMESPACES} \1 stroke-linejoin="round">', text)
 PICTURE.write_text(text + "\n", encoding="utf-8")
+
+e = float(model.parameters["e"])
+grid = {"e": (e,), "f": tuple(round(e * ratio, 6) for ratio in RATIOS)}
+found = parameter_map(model, grid, steps=STEPS.stop, runs=100_000, exact_runs=4000)
+MAP.write_text(json.dumps(leading(found), separators=(",", ":")) + "\n", encoding="utf-8")

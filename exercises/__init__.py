@@ -16,7 +16,15 @@ keys and mistakes there too, as set a does.  Installed, this package is `kfcours
 from importlib import import_module
 from pathlib import Path
 
+import kfcourse
 from kfcourse.checks.registry import ExerciseSet, register
+
+_HERE, _PACKAGE = Path(__file__).resolve().parent, Path(kfcourse.__file__).resolve().parent
+if _HERE not in (_PACKAGE / "exercises", _PACKAGE.parent / "exercises"):  # installed, in a checkout
+    raise ImportError(
+        f"kfcourse is that of {_PACKAGE}, but its exercises are those of {_HERE}: two copies of the project are mixed. "
+        f"Install the one you want (`pip install -e {_PACKAGE.parent}`) or take it off PYTHONPATH."
+    )
 
 
 def discover(package: str, folder: Path) -> list[ExerciseSet]:

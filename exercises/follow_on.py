@@ -23,6 +23,8 @@ from kfcourse.exercises.i_track import keys as track
 from kfcourse.exercises.k_integration import keys as integration
 from kfcourse.exercises.l_time_tags import keys as fusion
 from kfcourse.exercises.m_smoothing import keys as smoothing
+from kfcourse.exercises.o_modes import keys as modes
+from kfcourse.exercises.o_modes.mistakes import mixed_with, two_steps_with
 from kfcourse.exercises.shared import regression as fitted
 from kfcourse.laws import Array, transpose
 
@@ -147,3 +149,16 @@ def fuse(correct: Answer = fusion.correct, move: Answer = fusion.move) -> Answer
 def smoother(neighbours: Answer = smoothing.neighbours, step_back: Answer = smoothing.step_back) -> Answer:
     """m5 with m3 and m4."""
     return smoothing.smooth_with(neighbours, step_back)
+
+
+# -- set o
+
+
+def two_steps(chain: Answer = modes.chain, posterior: Answer = modes.posterior) -> Answer:
+    """o3 with o1 and o2."""
+    return two_steps_with(weights=chain, given=posterior)
+
+
+def mixed(chain: Answer = modes.chain, merged: Answer = modes.merged) -> Answer:
+    """o6 with o1 and o4."""
+    return mixed_with(chain, merged)

@@ -20,7 +20,7 @@ from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
 from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
 from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, has_bound, title
-from kfcourse.lab.variants import find_variant
+from kfcourse.lab.variants import STEPS, find_variant
 from kfcourse.listing import VARIANTS
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.experiment import compare
@@ -38,7 +38,9 @@ DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with m
 @click.argument("variant")
 @VARIANTS
 @click.option("--runs", type=click.IntRange(min=2), default=100_000, show_default=True, help="Trajectories.")
-@click.option("--steps", type=click.IntRange(min=1), default=51, show_default=True, help="Measurements of each trajectory.")
+@click.option(
+    "--steps", type=click.IntRange(min=1), help=f"Measurements of each trajectory.  [default: {STEPS}, or what the variant says]"
+)
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="The same seed gives the same numbers.")
 @click.option(
     "--filters",
@@ -101,7 +103,7 @@ def lab(
     variant: str,
     variants_file: Path | None,
     runs: int,
-    steps: int,
+    steps: int | None,
     seed: int,
     names: str | None,
     exact_runs: int,
@@ -157,7 +159,7 @@ def lab(
             filters,
             model,
             runs,
-            steps,
+            steps or chosen.steps,
             seed,
             subset_runs=exact_runs,
             subset_seconds=exact_seconds,

@@ -1,6 +1,8 @@
 """The house keeps its order: imports run down its floors, no module hides behind a function, each room says what it is."""
 
+import ast
 import inspect
+import os
 import subprocess
 import sys
 from graphlib import TopologicalSorter
@@ -46,6 +48,22 @@ def test_a_module_says_what_it_is(name):
     assert said.endswith((".", "?", "!", '"', "`")) and len(said) > 20, said
 
 
+def test_a_constant_of_the_exact_filter_has_one_value():
+    """Its files are read together: a name in capitals means the same in all of them."""
+    found = [
+        (target.id, name)
+        for name, path in MODULES.items()
+        if name.startswith("filters.exact.")
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.Assign)
+        for target in node.targets
+        if isinstance(target, ast.Name) and target.id.isupper()
+    ]
+    names = [name for name, _ in found]
+    assert len(names) > 30
+    assert [pair for pair in found if names.count(pair[0]) > 1] == []
+
+
 def test_every_folder_has_its_page():
     folders = {f"kfcourse.{name}" for name, path in MODULES.items() if path.name == "__init__.py" and layer(name) != "exercises"}
     toc = yaml.safe_load((Path(__file__).parent.parent / "book" / "_toc.yml").read_text(encoding="utf-8"))
@@ -78,6 +96,21 @@ def test_what_is_slow_to_import_waits_until_it_is_used(code, slow):
     """Every command and every graded notebook imports the package; after `import scipy`, `scipy.special.erf` imports the rest."""
     code = f"import atexit, sys; atexit.register(lambda: print([name for name in {slow} if name in sys.modules])); {code}"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.endswith("[]\n")
+
+
+def test_two_copies_of_the_project_are_not_mixed(tmp_path):
+    """PYTHONPATH names another checkout than the one that is installed: its exercises would be the installed one's, silently."""
+    copy, package = tmp_path / "kfcourse", Path(kfcourse.__file__).parent
+    copy.mkdir()
+    for path in package.iterdir():
+        (copy / path.name).symlink_to(path)
+    (copy / "__init__.py").unlink()
+    (copy / "__init__.py").write_bytes((package / "__init__.py").read_bytes())
+    command = [sys.executable, "-c", "import kfcourse.exercises"]
+    other = os.environ | {"PYTHONPATH": str(tmp_path)}
+    mixed = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=other)
+    assert f"kfcourse is that of {copy}" in mixed.stderr.splitlines()[-1]
+    assert subprocess.run(command).returncode == 0
 
 
 def test_a_command_s_help_in_the_list_is_its_own():

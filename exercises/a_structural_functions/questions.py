@@ -11,6 +11,7 @@ from typing import TypeAlias
 
 import sympy as sp
 
+from kfcourse.checks.derived import Derivation, posed_by
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, ForVariant, Mistake, Question
 from kfcourse.checks.registry import ExerciseSet
@@ -373,6 +374,17 @@ QUESTIONS = (
             "the meter is a straight line?"
         ),
         on=follow_on.unexplained,
+    ),
+    Derivation(
+        "a7",
+        "the derivation, line by line",
+        "core",
+        ForVariant(lambda e: lambda: e.derivation.text, "derivation"),
+        lambda e: [()],
+        advice=(
+            "Write the line above and this line below each other, multiplied out, and cross out what both have: what is left?"
+        ),
+        posed=lambda e: posed_by(e.derivation.model, e.derivation.name),
     ),
 )
 

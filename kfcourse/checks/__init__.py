@@ -4,6 +4,7 @@ question    what a question is: key, hidden arguments, known mistakes; what a ch
 registry    the sets that there are; they register, nothing here knows one
 exercises   a set for a variant: what a notebook opens
 steps       questions about a model with time and inputs: functions that take the step
+derived     a question whose answer is a derivation, checked line by line
 engine      is an answer right, or a step on top of a wrong one?  How long may it take?
 diagnosis   what kind of mistake does a wrong answer look like?
 case        one result of a wrong answer: what a hint looks at
@@ -15,8 +16,20 @@ equality    are two formulas, two arrays equal?
 posing      can every question be posed for a variant?
 """
 
+from kfcourse.checks.derived import Derivation
 from kfcourse.checks.exercises import Exercise, ExerciseError, exercise
 from kfcourse.checks.question import Attempts, Mistake, Question, Result
 from kfcourse.checks.registry import ExerciseSet, sets
 
-__all__ = ["Attempts", "Exercise", "ExerciseError", "ExerciseSet", "Mistake", "Question", "Result", "exercise", "sets"]
+__all__ = [
+    "Attempts",
+    "Derivation",
+    "Exercise",
+    "ExerciseError",
+    "ExerciseSet",
+    "Mistake",
+    "Question",
+    "Result",
+    "exercise",
+    "sets",
+]

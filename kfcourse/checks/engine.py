@@ -21,6 +21,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.case import Agree
+from kfcourse.checks.derived import Derivation
 from kfcourse.checks.diagnosis import GENERAL, Wrong, part_of
 from kfcourse.checks.equality import Places, Unusable, depends, equal, like, with_values
 from kfcourse.checks.question import (
@@ -174,6 +175,8 @@ class _Check:
 
     @cached_property
     def expected(self) -> list[Any]:
+        if isinstance(self.question, Derivation):
+            return [""]  # a text: what it should say follows from its own lines
         return _reference(self.key, self.arguments)
 
     @cached_property
@@ -187,6 +190,8 @@ class _Check:
             return self._says(MISSING, "not implemented yet")
         except Unusable as reason:
             return self._says(UNUSABLE, str(reason))
+        if isinstance(self.question, Derivation):
+            return self._derived(self.question, found)
         try:
             with time_limit(self.seconds):
                 if self.agree(found, self.expected) and not self._in_numbers(found, self.expected):
@@ -201,6 +206,21 @@ class _Check:
             return self._says(WRONG, f"not right. {GENERAL}")
         except Exception as error:  # of ours: the answer is wrong all the same, only the hint is lost
             return self._says(WRONG, f"not right. {GENERAL}", trouble=_trouble(error))
+
+    def _derived(self, question: Derivation, found: list[str]) -> Result:
+        try:
+            with time_limit(DIAGNOSIS), np.errstate(all="ignore"):
+                judged = question.judge(self.exercise, found[0])
+        except Unusable as reason:
+            return self._says(UNUSABLE, str(reason))
+        except OutOfTime:
+            return self._says(UNUSABLE, f"cannot be compared within {DIAGNOSIS:g} s: take smaller steps")
+        message = judged.message
+        if judged.status == PASSED:
+            self.past.given.pop(question.name, None)
+        elif self._times(found) and question.advice:
+            message += f" {question.advice}"
+        return self._says(judged.status, message, diagnosis=judged.diagnosis, share=judged.share)
 
     @cached_property
     def values(self) -> dict[sp.Symbol, Any]:
@@ -299,10 +319,10 @@ def _reference(answer: Answer, arguments: Sequence[tuple]) -> list[Any]:
 
 
 def standard(value: Any) -> Any:
-    """A result in the form in which results are compared: formulas, arrays of floats, and tuples of them."""
+    """A result in the form in which results are compared: formulas, arrays of floats, texts, and tuples of them."""
     if isinstance(value, tuple | list):
         return tuple(standard(part) for part in value)
-    return value if isinstance(value, sp.Basic | sp.MatrixBase) else np.asarray(value, dtype=float)
+    return value if isinstance(value, sp.Basic | sp.MatrixBase | str) else np.asarray(value, dtype=float)
 
 
 def _agree(

@@ -30,7 +30,7 @@ class Unusable(Exception):
 
 
 def like(answer: Any, expected: Any) -> Any:
-    """The answer in the form of the expected one: a formula, an array, or a tuple of these.
+    """The answer in the form of the expected one: a formula, an array, a text, or a tuple of these.
 
     Raises
     ------
@@ -51,6 +51,10 @@ def like(answer: Any, expected: Any) -> Any:
             except Unusable as reason:
                 raise Unusable(f"result {place} of {len(expected)}: {reason}") from None
         return tuple(parts)
+    if isinstance(expected, str):
+        if not isinstance(answer, str):
+            raise Unusable(f"expected a text, in three quotes if it has several lines, got {describe(answer)}")
+        return str(answer)
     if isinstance(expected, sp.MatrixBase):
         return _formulas(answer, expected)
     if isinstance(expected, sp.Basic):
@@ -135,6 +139,8 @@ def equal(first: Any, second: Any, tolerance: float, values: Mapping[sp.Symbol, 
     """
     if isinstance(second, tuple):
         return all(equal(a, b, tolerance, values, places) for a, b in zip(first, second, strict=True))
+    if isinstance(second, str):
+        return bool(first == second)
     if isinstance(second, sp.MatrixBase):
         return getattr(first, "shape", None) == second.shape and equal_formulas(list(first), list(second), values, places)
     if isinstance(second, sp.Basic):

@@ -6,15 +6,16 @@ approximations          approximations of the absolutely optimal filter (AOF): E
 conditionally_optimal   Pugachev's two-step conditionally optimal filter (DUOF)
 optimal_structure       Rudenko's filter of optimal structure (FOS), modified (MFOS), in two steps (DFMP, MDFMP)
 finite_memory           the same with the last measurements (FKP) or the last estimates (FBP) in the place of the last one
-exact                   the AOF itself, on a grid (exact_kernels, exact_places, exact_batch; exact_adaptive checks it)
-looking_back            what the whole record tells of each state (exact_smoothing, particle_smoothing)
+exact                   the AOF itself, on a grid that follows each trajectory: a folder
+looking_back            what the whole record tells of each state (exact.smoothing, particle_smoothing)
 particles               the same by sampling;  proposals: where to look;  densities, inverted: what all need
 iterated_ekf            the meter linearised again at the estimate
 gate, heavy_tails       measurements that are not believed: refused, by any filter; weighted
 learnt_noise            a noise of unknown size, learnt on the way
 alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
-                        (jump_optimal: FOS with modes;  exact_jumps: the exact filter of state and mode)
+                        (state_transitions: those that depend on the state;  jump_optimal: FOS with modes;
+                        exact.jumps: the exact filter of state and mode)
 notation                symbols in which the equations are printed
 programs, fused, loops  the printed equations as rules and regressions; compiled steps made of them (numba)
 """
@@ -26,9 +27,9 @@ from kfcourse.filters.base import Filter, State
 from kfcourse.filters.conditionally_optimal import EQUATIONS as _DUOF
 from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.designed import Design
-from kfcourse.filters.exact import pointmass
-from kfcourse.filters.exact_adaptive import adaptive_pointmass
-from kfcourse.filters.exact_jumps import jump_pointmass
+from kfcourse.filters.exact.adaptive import adaptive_pointmass
+from kfcourse.filters.exact.jumps import jump_pointmass
+from kfcourse.filters.exact.pointmasses import pointmass
 from kfcourse.filters.finite_memory import EQUATIONS as _FINITE
 from kfcourse.filters.finite_memory import dfkp, fbp, fkp, mdfkp, mfkp
 from kfcourse.filters.gate import gated

@@ -32,8 +32,9 @@ def logic_dynamic_fos(model: JumpModel, structures: Sequence[Structure]) -> Desi
     Raises
     ------
     ModelError
-        A component is an angle.
+        A component is an angle; transitions depend on the state.
     """
+    model.without_state("the logic-dynamic FOS")
     if model.angles.x or model.angles.y:
         raise ModelError("the logic-dynamic FOS takes no components that are angles")
 

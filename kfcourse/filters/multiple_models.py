@@ -30,10 +30,13 @@ import numpy as np
 
 from kfcourse.angles import Components, near, on_circle
 from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.filters.state_transitions import by_state
 from kfcourse.laws import Array, Gaussian, Measurement, correct, log_density
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.structure import Structure
 
-Chain: TypeAlias = Array | Callable[[int], Array]
+Chain: TypeAlias = Array | Callable[[int], Array] | JumpModel
+Links: TypeAlias = Callable[[int, Sequence[Gaussian]], tuple[Array, list[list[Gaussian]]]]
 
 
 class Modes(NamedTuple):
@@ -61,8 +64,9 @@ def imm(structures: Sequence[Structure], transition: Chain, probabilities: Array
     ----------
     structures : sequence of M Structure
         Models with the same state, measurement and prior.
-    transition : ndarray (M, M), or callable
-        pi, rows sum to 1; or the step k to the pi from k to k + 1.
+    transition : ndarray (M, M), callable, or JumpModel
+        pi, rows sum to 1; or the step k to the pi from k to k + 1; or the model that has it, which may depend on the state
+        (`state_transitions`).
     probabilities : ndarray (M,), optional
         Of the modes before the first measurement; equal by default.
     name : str
@@ -76,7 +80,7 @@ def imm(structures: Sequence[Structure], transition: Chain, probabilities: Array
     Raises
     ------
     ValueError
-        Models that do not fit together, or numbers that are no probabilities.
+        Models that do not fit together, numbers that are no probabilities, or too abrupt functions of the state.
     """
     angles = structures[0].model.angles.x if structures else ()
 
@@ -115,7 +119,7 @@ def _one_law_a_mode(
     """A filter that merges what may lead to each mode by `following`: (structure of the mode, laws, weights) -> prediction."""
     models = [structure.model for structure in structures]
     angles = models[0].angles.x if models else ()
-    pi, first = _checked(structures, transition, probabilities)
+    links, first = _checked(structures, transition, probabilities)
 
     def init(runs: int) -> State:
         start = initial_state(models[0])(runs)
@@ -136,8 +140,9 @@ def _one_law_a_mode(
         expectations = measurements(state)
         corrected = [correct(prior, one, y) for prior, one in zip(memory.predicted, expectations, strict=True)]
         mu, _ = modes_given(memory.expected, expectations, y)
-        expected, weights = onward(mu, pi(state.step))
-        predicted = [following(one, corrected, weights[:, :, j]) for j, one in enumerate(now)]
+        pi, leading = links(state.step, corrected)
+        expected, weights = onward(mu, pi)
+        predicted = [following(one, [row[j] for row in leading], weights[:, :, j]) for j, one in enumerate(now)]
         return State(
             state.step + 1,
             mixture(corrected, mu, angles),
@@ -157,7 +162,7 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
     """
     models = [structure.model for structure in structures]
     angles, size = models[0].angles.x if models else (), len(models)
-    pi, first = _checked(structures, transition, probabilities)
+    links, first = _checked(structures, transition, probabilities)
 
     def init(runs: int) -> State:
         start = initial_state(models[0])(runs)
@@ -180,8 +185,9 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
         weights = _shares(pairs)
         laws = [mixture(corrected[j::size], weights[:, :, j], angles) for j in range(size)]
         now = [structure.at(state.step) for structure in structures]
-        predicted = [one.predict(*law) for law in laws for one in now]
-        expected = (mu[:, :, None] * pi(state.step)).reshape(len(y), -1)
+        pi, leading = links(state.step, laws)
+        predicted = [one.predict(*law) for row in leading for one, law in zip(now, row, strict=True)]
+        expected = (mu[:, :, None] * pi).reshape(len(y), -1)
         return State(
             state.step + 1, mixture(laws, mu, angles), mixture(predicted, expected, angles), Modes(mu, expected, tuple(predicted))
         )
@@ -190,10 +196,10 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
 
 
 def onward(mu: Array, pi: Array) -> tuple[Array, Array]:
-    """c_j = sum_i mu_i pi_ij, (runs, M), and the weights mu_i|j, (runs, M, M)."""
+    """c_j = sum_i mu_i pi_ij, (runs, M), and the weights mu_i|j, (runs, M, M); pi (M, M) or (runs, M, M)."""
     joint = mu[:, :, None] * pi
     # a mode that cannot come next starts from the combined law; nothing uses it
-    expected = mu @ pi
+    expected = mu @ pi if pi.ndim == 2 else joint.sum(axis=1)
     return expected, _shares(np.where(expected[:, None, :] > 0, joint, mu[:, :, None]))
 
 
@@ -203,10 +209,8 @@ def _shares(joint: Array) -> Array:
     return np.divide(joint, total, out=np.full_like(joint, 1.0 / joint.shape[1]), where=total > 0)
 
 
-def _checked(
-    structures: Sequence[Structure], transition: Chain, probabilities: Array | None
-) -> tuple[Callable[[int], Array], Array]:
-    """The step to the transition matrix (M, M), and first probabilities (M,); ValueError if the parts do not fit."""
+def _checked(structures: Sequence[Structure], transition: Chain, probabilities: Array | None) -> tuple[Links, Array]:
+    """Step and laws to pi and what leads from i to j; and first probabilities (M,); ValueError if the parts do not fit."""
     size = len(structures)
     if not size:
         raise ValueError("give at least one structure, such as linearised(model)")
@@ -222,7 +226,9 @@ def _checked(
             raise ValueError("all modes need the same components declared as angles")
         if not all(np.array_equal(ours, theirs) for ours, theirs in zip(model.prior, first.prior, strict=True)):
             raise ValueError("all modes need the same prior: before the first measurement there is one law of the state")
-    pi = np.asarray(transition(0) if callable(transition) else transition, dtype=float)
+    depends = isinstance(transition, JumpModel) and transition.by_state
+    of_step = transition.transition_at if isinstance(transition, JumpModel) else transition
+    pi = np.full((size, size), 1 / size) if depends else np.asarray(of_step(0) if callable(of_step) else of_step, dtype=float)
     start = np.full(size, 1.0 / size) if probabilities is None else np.asarray(probabilities, dtype=float)
     for what, table, shape in (("transition", pi, (size, size)), ("probabilities", start, (size,))):
         if table.shape != shape:
@@ -231,8 +237,15 @@ def _checked(
             raise ValueError(
                 f"{what} must be probabilities that sum to 1{' in each row' * (table.ndim - 1)}, got {table.tolist()}"
             )
+    start = start / start.sum()
+    if isinstance(transition, JumpModel) and transition.by_state:
+        return by_state(transition), start
     pi = pi / pi.sum(axis=-1, keepdims=True)
-    return transition if callable(transition) else lambda k: pi, start / start.sum()
+
+    def links(k: int, laws: Sequence[Gaussian]) -> tuple[Array, list[list[Gaussian]]]:
+        return of_step(k) if callable(of_step) else pi, [[law] * size for law in laws]
+
+    return links, start
 
 
 def modes_given(expected: Array, measurements: Sequence[Measurement], y: Array) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from kfcourse.angles import Components, difference, moments_on_circle
-from kfcourse.filters.exact_kernels import chunks
+from kfcourse.filters.exact.kernels import chunks
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.reading import ModelError
 

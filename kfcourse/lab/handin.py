@@ -23,10 +23,11 @@ from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
 from kfcourse.lab.checked_quadrature import Checked
+from kfcourse.lab.families import FAMILIES, family
 from kfcourse.lab.handin_text import filled, in_percent, inline_html, inline_tex, law, lines_of, matrix, power_of_ten
 from kfcourse.lab.refusals import cause
 from kfcourse.lab.report import printed, ranges, remarks, save_figure, save_texts, table_steps
-from kfcourse.lab.short_names import FILTERS, Structures, family
+from kfcourse.lab.short_names import FILTERS, Structures
 from kfcourse.lab.variants import Variant
 from kfcourse.lab.written_out import written_lines
 from kfcourse.montecarlo.comparison import EXACT, Comparison, Verdict
@@ -240,7 +241,8 @@ class _Report:
         families = dict.fromkeys(map(family, self.result.entrants))
         designed = next((one for one in families if one != "aof"), "")
         for one in (one for one in families if one in EQUATIONS):
-            yield Block("subsection", words[one])
+            heading = FAMILIES[one].russian_heading if words["language"] == "ru" else FAMILIES[one].heading
+            yield Block("subsection", heading)
             if one == "duof":
                 yield Block("text", words["criteria"])
                 yield Block("formulas", lines=words["criteria_formulas"].split("\n"))

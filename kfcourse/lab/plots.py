@@ -8,36 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 
-from kfcourse.lab.short_names import family, title
+from kfcourse.lab.families import look
+from kfcourse.lab.short_names import title
 from kfcourse.laws import Array
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.modes import Recognised
-
-# Okabe and Ito's colours and Tol's muted ones, distinguishable by the colour-blind; linearised forms are dashed.
-_FAMILIES = {
-    "aof": "#0072B2",
-    "duof": "#D55E00",
-    "fos": "#009E73",
-    "mfos": "#CC79A7",
-    "fos3": "#56B4E9",
-    "mfos3": "#E69F00",
-    "dfmp": "#882255",
-    "mdfmp": "#AA4499",
-    "fkp": "#117733",
-    "mfkp": "#999933",
-    "dfkp": "#44AA99",
-    "mdfkp": "#332288",
-    "fbp": "#661100",
-    "particle": "#F0E442",
-    "kalman": "#000000",
-    "iterated": "#E69F00",
-    "alpha-beta": "#E69F00",
-    "imm": "#D55E00",
-    "gpb2": "#009E73",
-}
-_MARKERS = {"aof": "o", "duof": "s", "fos": "^", "mfos": "D", "fos3": "v", "mfos3": "P", "particle": "*", "kalman": "x"} | {
-    "dfmp": "<", "mdfmp": ">", "fkp": "p", "mfkp": "h", "dfkp": "H", "mdfkp": "8", "fbp": "X",
-}  # fmt: skip
 
 
 class Words(NamedTuple):
@@ -56,17 +31,12 @@ ENGLISH = Words()
 
 def style(name: str) -> dict[str, Any]:
     """Line style of a filter: colour by family, dashes for the linearised approximation, black for the exact."""
-    kin, _, approximation = (name, "", "") if name in _FAMILIES else name.partition("-")
-    kin = kin if kin in _FAMILIES else family(name)  # whatever the length of its memory
+    approximation = name.partition("-")[2]
     if approximation == "exact":
         return {"color": "black", "linestyle": "-", "marker": "*", "label": title(name)}
+    colour, marker = look(name)
     dashes = {"linearised": "--", "unscented": ":", "gauss-hermite": "-.", "averaged": ":"}.get(approximation, "-")
-    return {
-        "color": _FAMILIES.get(kin, "#555555"),
-        "linestyle": dashes,
-        "marker": _MARKERS.get(kin, "."),
-        "label": title(name),
-    }
+    return {"color": colour, "linestyle": dashes, "marker": marker, "label": title(name)}
 
 
 def accuracy(result: Comparison, ax: Axes, names: Sequence[str] | None = None, words: Words = ENGLISH) -> Axes:

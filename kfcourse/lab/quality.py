@@ -52,7 +52,6 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.reading import ModelError
 
-STEPS = 51  # of the lab
 VECTOR = 8  # a vector model takes that much longer, and gets that many times fewer
 STRESS = 1.5  # factor of all deviations
 HEAVY = 20.0  # kurtosis worth a remark; 3 is the normal law's
@@ -124,7 +123,7 @@ def examine(variant: Variant, runs: int = RUNS, seed: Seed = 1, ask: Ask | None 
         raise ValueError(f"standard errors need at least {FEWEST} trajectories, got {runs}")
     seed = seed_number(seed)
     if isinstance(variant.model, JumpModel):
-        return _of_modes(variant.name, variant.model, runs, seed)
+        return _of_modes(variant, variant.model, runs, seed)
     model = variant.model
     structures = Structures(model)
     try:
@@ -137,30 +136,30 @@ def examine(variant: Variant, runs: int = RUNS, seed: Seed = 1, ask: Ask | None 
     with np.errstate(all="ignore"):  # what diverges is told in the findings
         if answers.ok:
             found = dataclasses.replace(found, solvable=(ask(variant) if ask else None) or answers, hardness=hardness(structures))
-        return _simulated(found, structures, runs if model.n == 1 else max(runs // VECTOR, FEWEST), seed)
+        return _simulated(found, structures, runs if model.n == 1 else max(runs // VECTOR, FEWEST), variant.steps, seed)
 
 
-def _of_modes(name: str, model: JumpModel, runs: int, seed: int) -> Quality:
+def _of_modes(variant: Variant, model: JumpModel, runs: int, seed: int) -> Quality:
     """Of a model that jumps only whether its moments stay finite: the exercises know no modes."""
     with np.errstate(all="ignore"):
-        moments = bounded(simulate(model, runs, int(min(STEPS, model.steps)), seed).x)
+        moments = bounded(simulate(model, runs, int(min(variant.steps, model.steps)), seed).x)
     remark = f"has {len(model.modes)} modes: only whether it is bounded is checked, and the exercises do not ask about it"
-    return Quality(name, moments, NOT_EXAMINED, NOT_EXAMINED, NOT_EXAMINED, remarks=(remark,))
+    return Quality(variant.name, moments, NOT_EXAMINED, NOT_EXAMINED, NOT_EXAMINED, remarks=(remark,))
 
 
-def _simulated(found: Quality, structures: Structures, runs: int, seed: int) -> Quality:
+def _simulated(found: Quality, structures: Structures, runs: int, steps: int, seed: int) -> Quality:
     """The criteria that need trajectories, and what is remarked about them."""
     model, harsh, filters = structures.model, _harsh(structures.model), _buildable(structures)
-    x = simulate(model, runs, STEPS, seed).x
+    x = simulate(model, runs, steps, seed).x
     moments = bounded(x)
-    if moments.ok and not np.isfinite(simulate(harsh, runs, STEPS, seed).x).all():
+    if moments.ok and not np.isfinite(simulate(harsh, runs, steps, seed).x).all():
         rare = f"trajectories become infinite when deviations are {STRESS:g} times larger, so a few of very many will"
         moments = Finding(False, rare, moments.value)
     found = dataclasses.replace(found, bounded=moments)
     if not moments.ok or not filters:
         return found
     try:
-        result = compare([*filters, unmeasured(model, x)], model, runs, STEPS, seed, wide=1, threads=1, progress=False)
+        result = compare([*filters, unmeasured(model, x)], model, runs, steps, seed, wide=1, threads=1, progress=False)
     except FAILURES as error:
         return dataclasses.replace(found, bounded=Finding(False, str(error), moments.value))
     return dataclasses.replace(
@@ -210,7 +209,7 @@ def _fragile(result: Comparison, x: Array, filters: Sequence[Filter | Design], h
     if worse := [title(one) for one in measured(result) if shares(result, one).value.max() > 1]:
         yield f"worse than {UNMEASURED}: {', '.join(worse)}"
     try:
-        compare(filters, harsh, max(result.runs // 4, FEWEST), STEPS, seed, wide=1, threads=1, progress=False)
+        compare(filters, harsh, max(result.runs // 4, FEWEST), result.steps, seed, wide=1, threads=1, progress=False)
     except FAILURES:
         yield f"a filter diverges when deviations are {STRESS:g} times larger"
 

@@ -26,7 +26,8 @@ from kfcourse.filters import EQUATIONS, Filter
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
 from kfcourse.lab.admission import admissions
-from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, WITH_MODES, JumpStructures, Structures, family, title
+from kfcourse.lab.families import FAMILIES, family
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, WITH_MODES, JumpStructures, Structures, title
 from kfcourse.lab.variants import Variant
 from kfcourse.laws import Array
 from kfcourse.limits import OutOfTime, time_limit
@@ -38,19 +39,6 @@ from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
 
-_FAMILIES = {
-    "aof": "AOF in Gaussian approximation",
-    "duof": "DUOF, the two-step conditionally optimal filter",
-    "fos": "FOS, the filter of optimal structure",
-    "mfos": "MFOS, the modified filter of optimal structure",
-    "dfmp": "DFMP, the two-step filter of low order",
-    "mdfmp": "MDFMP, the modified two-step filter of low order",
-    "fkp": "FKP, the filter with finite memory",
-    "mfkp": "MFKP, the modified filter with finite memory",
-    "dfkp": "DFKP, the two-step filter with finite memory",
-    "mdfkp": "MDFKP, the modified two-step filter with finite memory",
-    "fbp": "FBP, the filter of high order",
-}
 _FIGURES: dict[str, tuple[str, Callable[[Comparison, Axes], Axes]]] = {
     "accuracy": ("Error variance of each filter against the step.", plots.accuracy),
     "relative": (
@@ -259,7 +247,7 @@ def printed(structures: Structures, kind: str) -> str:
 
 def _equation_sections(names: tuple[str, ...]) -> list[Section]:
     families = dict.fromkeys(map(family, names))
-    return [Section.of(_FAMILIES[one], equations_latex(EQUATIONS[one])) for one in families if one in EQUATIONS]
+    return [Section.of(FAMILIES[one].heading, equations_latex(EQUATIONS[one])) for one in families if one in EQUATIONS]
 
 
 # What a reader must know before he relies on distances from the bound, by kind.

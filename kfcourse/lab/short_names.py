@@ -32,6 +32,7 @@ from kfcourse.filters import (
 )
 from kfcourse.filters.finite_memory import STEPS
 from kfcourse.lab.checked_quadrature import Checked, of_checked_order
+from kfcourse.lab.families import FAMILIES, family
 from kfcourse.laws import Array
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 from kfcourse.symbolic.jumping import JumpModel
@@ -91,9 +92,9 @@ class JumpStructures:
         return [gaussian(mode) for mode in self.model.modes]
 
     @property
-    def chain(self) -> tuple[Callable[[int], Array], Array]:
-        """Transition matrix by the step, and law of the first mode: what filters with modes take."""
-        return self.model.transition_at, self.model.first
+    def chain(self) -> tuple[JumpModel, Array]:
+        """The model, for its transitions, and the law of the first mode: what filters with modes take."""
+        return self.model, self.model.first
 
     @property
     def best(self) -> list[Structure]:
@@ -124,44 +125,52 @@ class JumpEntry(NamedTuple):
     build: Callable[[JumpStructures], Filter | Design]
 
 
-def _twice(family: str, title: str, russian: str, build: Callable[[Structure], Filter | Design]) -> dict[str, Entry]:
-    """The entries of a family: with Gaussian structural functions, and with linearised ones."""
+def _twice(short: str, build: Callable[[Structure], Filter | Design], russian: str = "") -> dict[str, Entry]:
+    """The entries of "fos", "fos3": with Gaussian structural functions, and with linearised ones; `russian` ends the name."""
+    of = FAMILIES[family(short)]
+    title, russian = of.title + short.removeprefix(family(short)), of.russian + russian
     return {
-        f"{family}-gaussian": Entry(f"G{title}", f"Г{russian}", lambda s: build(s.normal)),
-        f"{family}-linearised": Entry(f"L{title}", f"Л{russian}", lambda s: build(s.linearised)),
+        f"{short}-gaussian": Entry(f"G{title}", f"Г{russian}", lambda s: build(s.normal)),
+        f"{short}-linearised": Entry(f"L{title}", f"Л{russian}", lambda s: build(s.linearised)),
     }
 
 
+def _entry(short: str, build: Callable[[Structures], Filter | Design]) -> dict[str, Entry]:
+    """The entry of a family that is one filter."""
+    return {short: Entry(FAMILIES[short].title, FAMILIES[short].russian, build)}
+
+
+_MEMORY = f", {STEPS} шага"
 # One line a filter: this is where a new one is added.
 FILTERS: dict[str, Entry] = {
-    **_twice("aof", "AOF", "АОФ", aof),
-    "duof": Entry("DUOF", "ДУОФ", lambda s: duof(s.model)),
-    **_twice("fos", "FOS", "ФОС", fos),
-    **_twice("mfos", "MFOS", "МФОС", mfos),
-    **_twice("fos3", "FOS3", "ФОС, 3 арг.", partial(fos, arguments=3)),
-    **_twice("mfos3", "MFOS3", "МФОС, 3 арг.", partial(mfos, arguments=3)),
-    **_twice("dfmp", "DFMP", "ДФМП", dfmp),
-    **_twice("mdfmp", "MDFMP", "МДФМП", mdfmp),
-    **_twice(f"fkp{STEPS}", f"FKP{STEPS}", "ФКП, 4 шага", fkp),
-    **_twice(f"mfkp{STEPS}", f"MFKP{STEPS}", "МФКП, 4 шага", mfkp),
-    **_twice(f"dfkp{STEPS}", f"DFKP{STEPS}", "ДФКП, 4 шага", dfkp),
-    **_twice(f"mdfkp{STEPS}", f"MDFKP{STEPS}", "МДФКП, 4 шага", mdfkp),
-    **_twice(f"fbp{STEPS}", f"FBP{STEPS}", "ФБП, 4 шага", fbp),
+    **_twice("aof", aof),
+    **_entry("duof", lambda s: duof(s.model)),
+    **_twice("fos", fos),
+    **_twice("mfos", mfos),
+    **_twice("fos3", partial(fos, arguments=3), ", 3 арг."),
+    **_twice("mfos3", partial(mfos, arguments=3), ", 3 арг."),
+    **_twice("dfmp", dfmp),
+    **_twice("mdfmp", mdfmp),
+    **_twice(f"fkp{STEPS}", fkp, _MEMORY),
+    **_twice(f"mfkp{STEPS}", mfkp, _MEMORY),
+    **_twice(f"dfkp{STEPS}", dfkp, _MEMORY),
+    **_twice(f"mdfkp{STEPS}", mdfkp, _MEMORY),
+    **_twice(f"fbp{STEPS}", fbp, _MEMORY),
     "aof-unscented": Entry("UKF", "АОФ, сигма-точки", lambda s: aof(unscented(s.model))),
     "aof-gauss-hermite": Entry("GHKF", "АОФ, Гаусс–Эрмит", lambda s: aof(gauss_hermite(s.model))),
     "aof-exact": Entry("exact AOF", "АОФ", lambda s: exact(s.model)),
-    "particle": Entry("particle", "АОФ, частицы", lambda s: particle(s.model)),
+    **_entry("particle", lambda s: particle(s.model)),
 }
 # The same for models that jump: filters that know the modes, and plain ones on the average over the modes.
 JUMP_FILTERS: dict[str, JumpEntry] = {
     "aof-jump-gaussian": JumpEntry("LD-GAOF", "ГАОФлд", lambda s: logic_dynamic(s.gaussian, *s.chain)),
     "aof-jump-linearised": JumpEntry("LD-LAOF", "ЛАОФлд", lambda s: logic_dynamic(s.linearised, *s.chain)),
-    "imm": JumpEntry("IMM", "АОФлд, смешивание до прогноза", lambda s: imm(s.best, *s.chain)),
-    "gpb2": JumpEntry("GPB2", "АОФлд, пары режимов", lambda s: gpb2(s.best, *s.chain)),
+    "imm": JumpEntry(*FAMILIES["imm"][:2], lambda s: imm(s.best, *s.chain)),
+    "gpb2": JumpEntry(*FAMILIES["gpb2"][:2], lambda s: gpb2(s.best, *s.chain)),
     "fos-jump-gaussian": JumpEntry("LD-GFOS", "ГФОСлд", lambda s: logic_dynamic_fos(s.model, s.gaussian)),
     "fos-jump-linearised": JumpEntry("LD-LFOS", "ЛФОСлд", lambda s: logic_dynamic_fos(s.model, s.linearised)),
     "aof-averaged": JumpEntry("AOF (averaged)", "АОФ (среднее по режимам)", lambda s: aof(s.averaged)),
-    "duof": JumpEntry("DUOF", "ДУОФ", lambda s: duof(s.model.modes[0], averaged_equations(s.model))),
+    "duof": JumpEntry(*FAMILIES["duof"][:2], lambda s: duof(s.model.modes[0], averaged_equations(s.model))),
     "fos-averaged": JumpEntry("FOS (averaged)", "ФОС (среднее по режимам)", lambda s: fos(s.averaged)),
     "mfos-averaged": JumpEntry("MFOS (averaged)", "МФОС (среднее по режимам)", lambda s: mfos(s.averaged)),
     "aof-exact": JumpEntry("exact AOF", "АОФ", lambda s: jump_pointmass(s.model)),
@@ -187,11 +196,6 @@ def title(name: str) -> str:
     length = re.sub(r"\D", "", name.split("-")[0])
     usual = f"{family(name)}{STEPS}-{name.partition('-')[2]}"
     return FILTERS[usual].title.replace(str(STEPS), length) if usual in FILTERS else TITLES.get(name, name)
-
-
-def family(name: str) -> str:
-    """The family of a filter, whose equations it shares: "fos" for "fos3-gaussian", "fkp" for "fkp4-linearised"."""
-    return name.split("-")[0].rstrip("0123456789")
 
 
 def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Design]:

@@ -18,8 +18,9 @@ from kfcourse.symbolic.sense import nothing_random
 
 MODEL_KEYS = {"parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs", "interval", "angles"}
 JUMP_KEYS = {"modes", "transition", "first"}
-VARIANT_KEYS = {"title", "state", "meter"} | MODEL_KEYS | JUMP_KEYS
-SHIPPED = ("variants.toml", "jumps.toml")
+VARIANT_KEYS = {"title", "steps", "state", "meter"} | MODEL_KEYS | JUMP_KEYS
+SHIPPED = ("variants.toml", "tasks.toml", "jumps.toml")
+STEPS = 51  # of the lab, where a variant does not say another number
 
 RUNS = 40_000  # trajectories by which a variant is checked
 FEWEST = 2 * BATCHES  # that have standard errors
@@ -37,11 +38,12 @@ class VariantWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Variant:
-    """A variant of the lab: its name in the file, a title, its model, and the table of the file it was read from."""
+    """A variant of the lab: its name in the file, a title, its model, how many measurements, and the table it was read from."""
 
     name: str
     title: str
     model: Model | JumpModel
+    steps: int = STEPS
     table: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     def plain(self, what: str) -> Model:
@@ -55,14 +57,15 @@ class Variant:
 
 
 def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
-    """Read the variants without modes of a TOML file; the shipped ones by default.
+    """Read the variants without modes of a TOML file; by default the shipped ones that are made for the exercises.
 
     Parameters
     ----------
     path : path, optional
         A file with tables ``[variants.NAME]``: `state`, `meter`, `parameters`, and optionally `title`,
         `symbols`, `prior`, `state_noise`, `meter_noise`, `inputs`, `interval`, `angles` (see `Model.define`).
-        Those with `modes`, `transition`, `first` (see `JumpModel.define`) are read by `read_variants` and `find_variant`.
+        `steps` is how many measurements the lab takes.  Those with `modes`, `transition`, `first` (see `JumpModel.define`), and
+        the shipped tasks of the school's program, D1, D2 and D3, are read by `read_variants` and `find_variant`.
 
     Raises
     ------
@@ -74,7 +77,7 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     VariantWarning
         A variant is not a model; the others can be used.
     """
-    found, faults = read_variants(path)
+    found, faults = read_variants(path, [*_shipped(SHIPPED[0])] if path is None else ())
     if not found:
         raise next(iter(faults.values()))
     for fault in faults.values():
@@ -111,12 +114,15 @@ def _listed(names: list[str]) -> str:
     return ", ".join(names if len(names) <= MANY else [*names[:MANY], f"... ({len(names)} in all)"])
 
 
+def _shipped(file: str) -> dict[str, Any]:
+    text = (resources.files("kfcourse.lab") / file).read_text(encoding="utf-8")
+    return dict(tomllib.loads(text)["variants"])
+
+
 def _tables(path: str | Path | None) -> tuple[str, dict[str, Any]]:
     """What a file is called in messages, and its tables."""
     if path is None:
-        folder = resources.files("kfcourse.lab")
-        shipped = [tomllib.loads((folder / name).read_text(encoding="utf-8"))["variants"] for name in SHIPPED]
-        return "the shipped variants", {name: table for tables in shipped for name, table in tables.items()}
+        return "the shipped variants", {name: table for file in SHIPPED for name, table in _shipped(file).items()}
     where = str(path)
     try:
         with Path(path).open("rb") as file:
@@ -158,11 +164,14 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
         model = model_of_table(table)
     except (ValueError, TypeError, OverflowError) as error:  # FormulaError and ModelError are ValueErrors
         raise VariantError(f"{prefix}{error}") from None
+    steps = table.get("steps", STEPS)
+    if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
+        raise VariantError(f"{prefix}`steps` must be a positive whole number of measurements, got {shown(steps)}")
     for mode in model.modes if isinstance(model, JumpModel) else (model,):
         if problem := nothing_random(mode):
             raise VariantError(f"{prefix}{problem}")
     title = "".join(c if c.isprintable() else " " for c in str(table.get("title", "")))
-    return Variant(name, " ".join(title.split()), model, dict(table))
+    return Variant(name, " ".join(title.split()), model, steps, dict(table))
 
 
 def find_variant(name: str, path: str | Path | None = None) -> Variant:

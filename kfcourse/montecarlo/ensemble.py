@@ -233,7 +233,10 @@ class _JumpSimulator:
 
     def __call__(self, k: int, x: Array, mode: Array, v: Array, w: Array, u: Array) -> Instant:
         model, angles = self.model, self.model.angles
-        mode_next = _chosen(model.transition_at(k)[mode], u)
+        if model.by_state:
+            mode_next = _chosen(model.transition_of(x, k)[np.arange(len(x)), mode], u)
+        else:
+            mode_next = _chosen(model.transition_at(k)[mode], u)
         y, x_next = np.empty((len(x), model.p)), np.empty((len(x), model.n))
         with np.errstate(over="ignore", invalid="ignore"):
             for j, (one, (state, meter)) in enumerate(zip(model.modes, self.modes, strict=True)):

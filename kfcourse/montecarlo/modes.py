@@ -25,7 +25,8 @@ class Recognised(NamedTuple):
     share : dict
         Name of a filter to the share of steps with the right mode, the mean over all steps and trajectories.
     guess : float
-        The same for who always names the mode that is likeliest before anything is measured.
+        The same for who always names the mode that is likeliest before anything is measured; where transitions depend on the
+        state, the most frequent one.
     mode : ndarray (steps,)
         The true modes of one trajectory: the first in which there are as many as in any.
     probability : dict
@@ -59,5 +60,6 @@ def recognised(filters: Sequence[Filter], model: JumpModel, runs: int, steps: in
         each = right / steps
         share[one.name] = Estimate(each.mean(), each.std(ddof=1) / np.sqrt(size), size - 1)
         there[one.name] = np.array(probabilities)
-    guess = np.mean([(mode[k] == model.law_at(k).argmax()).mean() for k in range(steps)])
+    likeliest = [(np.bincount(mode[k]) if model.by_state else model.law_at(k)).argmax() for k in range(steps)]
+    guess = np.mean([(mode[k] == one).mean() for k, one in enumerate(likeliest)])
     return Recognised(share, float(guess), mode[:, shown], there)

@@ -131,7 +131,8 @@ def _chunks_in_time(
     size, jobs = data[0].shape[1], jobs if may_start() else 1
     chunk = partial(_chunk, filters, data, names.index(EXACT) if EXACT in names else None, ensemble.weight, back, end)
     with progress_bar("slow filters", size, "trajectory", progress) as bar:
-        work = _Work(size, end, bar)
+        replaceable = any(one.name == EXACT and one.instead is not None for one in filters)
+        work = _Work(size, end, bar, jobs if replaceable else 0)
         while not work.over:
             jobs = min(jobs, work.chunks())
             try:
@@ -192,6 +193,7 @@ class _Work:
     size: int
     end: float | None
     bar: tqdm[None]
+    cores: int  # for the exact filter if particles would take its place, else 0
     found: list[Sums] = field(default_factory=list)
     start: int = 0
     seconds: float = 0.0
@@ -226,6 +228,15 @@ class _Work:
                 self.start += count
                 self.seconds += result[1]
                 self.bar.update(count)
+                self._check_time()
+
+    def _check_time(self) -> None:
+        """_Failed after the first chunk, while there is time for particles, if the exact filter will not be through enough."""
+        if self.end is None or not self.cores or len(self.found) > 1:
+            return
+        each, wanted = self.seconds / self.start, min(FEWEST, self.size)
+        if each * (wanted - self.start) / self.cores > (left := self.end - time.monotonic()):
+            raise _Failed(EXACT, f"{self.start} trajectories take {self.seconds:.2g} s, {wanted} more than the {left:.2g} s left")
 
     def next(self, index: int, ahead: int) -> int:
         """Trajectories of a chunk that begins there; 0 if none are left, or none in time."""

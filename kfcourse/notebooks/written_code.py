@@ -75,6 +75,11 @@ class Solutions:
         """Body of a function of (m, d) that returns R = F - G d G^T of the Gaussian functions."""
         return self._body("meter", {"R": self.exercise.closed("gaussian")["R"]})
 
+    def derivation(self, name: str) -> str:
+        """Body of a function that returns a right derivation: the answer to the question of that name."""
+        text = self.exercise.questions[name].answer(self.exercise)()
+        return "\n".join(['return """', *(part for line in text.splitlines() for part in _continued(line)), '"""'])
+
     def apart(self) -> list[Apart]:
         """Where the linearised covariances differ most from the exact ones, at the prior mean: of Theta and of F."""
         model, known = self.exercise.model, (5,) if self.exercise.model.timed else ()
@@ -123,6 +128,14 @@ class Solutions:
             values = (folded(f"{python(formula)},  # {name}") for name, formula in formulas.items())
             lines += ["return (", *("    " + line for value in values for line in value), ")"]
         return "\n".join(lines)
+
+
+def _continued(line: str) -> list[str]:
+    """A line of a text in three quotes, in lines that fit the page: a backslash at the end of a line joins them."""
+    if line.startswith("#") or len(line) <= COLUMNS:
+        return [line]
+    lines = textwrap.wrap(line, COLUMNS - 4, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+    return [f"{part} \\" for part in lines[:-1]] + lines[-1:]
 
 
 def returned(code: str) -> list[str]:

@@ -15,6 +15,7 @@ diagram      block diagrams from a description
 flights      pictures and tables of a flight and its estimates
 browser      the lab's filters as JavaScript, from their printed equations
 explore      figures that answer when they are touched
+scenes       those of single chapters, and of the front page
 live         the page on which a reader moves the pointer
 house        the structure of this package, read from its imports
 """

@@ -53,6 +53,41 @@ document.readyState === "loading" ? addEventListener("DOMContentLoaded", start) 
     )
 
 
+def drawn(name: str, says: str, script: str, parts: Iterable[str], settings: Any) -> str:
+    """A figure of data/<script>.js, which defines kf<Script>(root, name, settings) and leaves nothing else behind.
+
+    Parameters
+    ----------
+    name, says : str
+        As of `figure`.
+    script : str
+        Name of the file, words with hyphens between them.
+    parts : iterable of str
+        What it calls: printed functions.
+    settings : object
+        Anything that JSON has.
+    """
+    maker = "kf" + "".join(word.capitalize() for word in script.split("-"))
+    code = javascript.RUNTIME + "".join(parts) + _read(f"{script}.js")
+    call = f"(root, name) => {maker}(root, name, {json.dumps(settings)})"
+    return figure(name, says, f"const {maker} = (() => {{\n{code}\nreturn {maker};\n}})();", call)
+
+
+def value(name: str, given: Mapping[str, sp.Symbol], e: sp.Expr, letters: Mapping[sp.Symbol, str] | None = None) -> str:
+    """A printed function of arrays and coefficients that writes one array, `value`, as `kfFigure.values` calls it."""
+    return javascript.loop(name, columns(given), columns({"value": e}), coefficients=letters)
+
+
+def columns(of: Mapping[str, sp.Expr]) -> dict[str, sp.Matrix]:
+    """Each entry as a matrix of one, as `javascript.loop` takes them."""
+    return {key: sp.Matrix([one]) for key, one in of.items()}
+
+
+def rounded(rows: Iterable[Iterable[float]], digits: int = 4) -> list[list[float]]:
+    """Numbers as a page holds them: with so many digits."""
+    return [[float(f"{number:.{digits}g}") for number in row] for row in rows]
+
+
 def live_lab(name: str, variants: Mapping[str, Variant], first: str = "53", step: int = 4) -> str:
     """The lab under the reader's hand: all filters of a scalar variant, designed and compared while its parameters move.
 
@@ -115,14 +150,12 @@ def two_beats(
         The measurement shown first.
     """
     loops = [
-        javascript.loop("prior", {"x": sp.Matrix([x])}, {"value": sp.Matrix([prior])}),
-        javascript.loop("likelihood", {"x": sp.Matrix([x])}, {"value": sp.Matrix([likelihood])}, coefficients={y: "y"}),
-        javascript.loop("transition", {"x": sp.Matrix([x]), "next": sp.Matrix([following])}, {"value": sp.Matrix([transition])}),
-        javascript.loop("place", {"x": sp.Matrix([x])}, {"value": sp.Matrix([place])}),
+        value("prior", {"x": x}, prior),
+        value("likelihood", {"x": x}, likelihood, {y: "y"}),
+        value("transition", {"x": x, "next": following}, transition),
+        value("place", {"x": x}, place),
     ]
-    code = javascript.RUNTIME + "".join(loops) + _read("two-beats.js")
-    call = f"(root, name) => kfTwoBeats(root, name, {first!r})"
-    return figure(name, "Correction and prediction", _closed("kfTwoBeats", code), call)
+    return drawn(name, "Correction and prediction", "two-beats", loops, first)
 
 
 def two_lines(
@@ -163,15 +196,10 @@ def two_lines(
     }
     moments = {mean: "mean", variance: "variance"}
     loops = [
-        *(
-            javascript.loop(one, {"x": sp.Matrix([x])}, {"value": sp.Matrix([e])}, coefficients=moments)
-            for one, e in curves.items()
-        ),
-        javascript.loop("numbers", {}, {key: sp.Matrix([e]) for key, e in numbers.items()}, coefficients=moments),
+        *(value(one, {"x": x}, e, moments) for one, e in curves.items()),
+        javascript.loop("numbers", {}, columns(numbers), coefficients=moments),
     ]
-    code = javascript.RUNTIME + "".join(loops) + _read("two-lines.js")
-    call = f"(root, name) => kfTwoLines(root, name, {json.dumps(first)})"
-    return figure(name, "The tangent and the best line", _closed("kfTwoLines", code), call)
+    return drawn(name, "The tangent and the best line", "two-lines", loops, dict(first))
 
 
 def gains(
@@ -201,26 +229,15 @@ def gains(
     first : dict
         "lambda", "y" and "p" shown first.
     """
-    given, letters = {"lambda": sp.Matrix([prediction])}, {prediction: "lambda", variance: "p"}
-    each = []
+    letters, each = {prediction: "lambda", variance: "p"}, []
     for one, estimate in estimates.items():
-        slope = {"value": sp.Matrix([sp.diff(estimate, measurement)])}
-        gain = javascript.loop("gain", given, slope, coefficients={variance: "p"})
-        made = javascript.loop(
-            "estimate", {"y": sp.Matrix([measurement])}, {"value": sp.Matrix([estimate])}, coefficients=letters
-        )
+        gain = value("gain", {"lambda": prediction}, sp.diff(estimate, measurement), {variance: "p"})
+        made = value("estimate", {"y": measurement}, estimate, letters)
         each.append(f"{json.dumps(one)}: {{ gain: {gain.strip()}, estimate: {made.strip()} }}")
     looks = {one: {"label": title(one), **line_style(one)} for one in estimates}
-    shown = [[float(f"{number:.4g}") for number in column] for column in dots]
-    settings = json.dumps({"first": first, "variances": variances, "dots": shown, "looks": looks})
-    code = javascript.RUNTIME + "const filters = {\n" + ",\n".join(each) + "\n};\n" + _read("gains.js")
-    return figure(name, "Gains of filters", _closed("kfGains", code), f"(root, name) => kfGains(root, name, {settings})")
+    settings = {"first": dict(first), "variances": variances, "dots": rounded(dots), "looks": looks}
+    return drawn(name, "Gains of filters", "gains", ["const filters = {\n" + ",\n".join(each) + "\n};\n"], settings)
 
 
 def _read(name: str) -> str:
     return (DATA / name).read_text(encoding="utf-8")
-
-
-def _closed(name: str, code: str) -> str:
-    """A script that leaves nothing behind but the function with this name, which it defines."""
-    return f"const {name} = (() => {{\n{code}\nreturn {name};\n}})();"

@@ -27,8 +27,9 @@ def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
     Raises
     ------
     ModelError
-        A component is an angle, of which there is no such average.
+        A component is an angle, of which there is no such average; transitions depend on the state.
     """
+    model.without_state("the average over the modes")
     if model.angles.x or model.angles.y:
         raise ModelError("components that are angles have no average over modes; take filters that know the modes")
 
@@ -58,7 +59,8 @@ def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
 
 
 def averaged_equations(model: JumpModel) -> tuple[Noiseless, Noiseless]:
-    """a(x, m_v) and b(x, m_w), averaged over the modes: sum_j q_{k+1}^j a^j, sum_j q_k^j b^j."""
+    """a(x, m_v) and b(x, m_w), averaged over the modes: sum_j q_{k+1}^j a^j, sum_j q_k^j b^j; errors as of `averaged`."""
+    model.without_state("the average over the modes")
     each = [compile_noiseless(mode) for mode in model.modes]
 
     def state(x: Array, k: int | None = None) -> Array:

@@ -1,7 +1,7 @@
 r"""A model that jumps: several ways to move and to measure, its modes, of which one is in force at each step.
 
     x_{k+1} = a^{i_{k+1}}(x_k, v_k)        y_k = b^{i_k}(x_k, w_k)
-    P(i_{k+1} = j | i_k = i) = pi_ij(k),    P(i_0 = j) = q_j
+    P(i_{k+1} = j | i_k = i, x_k = x) = pi_ij(k) or pi_ij(x, k),    P(i_0 = j) = q_j
 
 Nobody sees the mode i_k.  (Systems with random structure, системы со случайной структурой; jump Markov systems.)  A mode is an
 ordinary `Model`, so that its structural functions, densities and code are derived as any model's are.
@@ -22,12 +22,13 @@ from kfcourse.angles import Angles
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.formula import FormulaError, symbol
 from kfcourse.symbolic.known import CHECKED, SURE, Stepwise
-from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.reading import Formula, Formulas, ModelError, exact_number, read, shown, table
+from kfcourse.symbolic.model import OF_A_VARIANT, Model
+from kfcourse.symbolic.reading import Formula, Formulas, ModelError, by_name, exact_number, read, shown, table
 
 OF_A_MODE = ("state", "meter", "parameters", "state_noise", "meter_noise")  # in which modes may differ
 MOST = 20  # modes
 NAME = re.compile(r"(?=.*\S)[\w -]{1,40}")  # it stands in tables, reports and LaTeX
+TRIED, FAR = 200, 12.0  # states on which transitions are tried out, to so many deviations of the prior
 SUM = 1e-9  # a row of probabilities written with ten digits sums to 1 within this
 
 
@@ -71,7 +72,8 @@ class JumpModel:
         modes : dict
             Name of a mode to what differs there: `state`, `meter`, `parameters`, `state_noise`, `meter_noise`.
         transition : matrix, or list
-            pi, the rows of which sum to 1: numbers, or formulas of the step's number k, its time t, inputs and parameters.
+            pi, the rows of which sum to 1: numbers, or formulas of the state x_k, the step's number k, its time t, inputs and
+            parameters.
             A single row: at each step the mode is drawn anew with these probabilities.
         first : list, optional
             q, law of the mode of the first measurement.  By default a single row's own.
@@ -102,7 +104,7 @@ class JumpModel:
         chain, rows = _chain(transition, len(built))
         changed = {name for change in tables.values() for name in table("parameters", change.get("parameters"))}
         matrix, of_step = _compiled(chain, fitting[0], common, changed)
-        if rows == 1 and first is None:
+        if rows == 1 and first is None and not matrix.has(*fitting[0].x):
             first = np.asarray(of_step.at(0)()[0], dtype=float)[0].tolist()
         found = cls(tuple(tables), fitting, _law(first, len(built)), matrix, of_step)
         found._check()
@@ -143,15 +145,43 @@ class JumpModel:
         """For how many steps the modes' inputs have values and their noises variances."""
         return min(self.chain_of_step.known.steps, *(one.known.steps for one in self.modes))
 
+    @property
+    def by_state(self) -> bool:
+        """Whether the probabilities of transitions depend on the state."""
+        return self.chain.has(*self.x)
+
+    def without_state(self, what: str) -> None:
+        """ModelError, which names what needs them, if the modes' probabilities before any measurement are not known."""
+        if self.by_state:
+            raise ModelError(
+                f"{what}: with transitions that depend on the state nobody knows the probabilities of the modes before anything "
+                "is measured; take filters that carry them: aof-jump-gaussian, aof-jump-linearised, imm, gpb2"
+            )
+
+    def transition_of(self, x: Array, k: int) -> Array:
+        """pi at step k and states x (..., n), (..., J, J)."""
+        size = len(self.modes)
+        if not self.by_state:
+            return np.broadcast_to(self.transition_at(k), (*x.shape[:-1], size, size))
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            found = np.broadcast_to(self.chain_of_step.at(k)(x)[0], (*x.shape[:-1], size, size))
+            good = ((found >= 0).all(axis=-1) & (np.abs(found.sum(axis=-1) - 1) <= SUM)).all(axis=-1)
+        if (wrong := ~good & np.isfinite(x).all(axis=-1)).any():
+            problem, there = _not_probabilities(found[wrong][0]), ", ".join(f"{one:g}" for one in x[wrong][0])
+            raise ModelError(f"`transition` at step {k}, where {', '.join(s.name for s in self.x)} = {there}: {problem}")
+        return found / found.sum(axis=-1, keepdims=True)
+
     def transition_at(self, k: int) -> Array:
-        """pi at step k, (J, J): from the mode of y_k to that of y_{k+1}."""
+        """pi at step k, (J, J): from the mode of y_k to that of y_{k+1}; ModelError if it depends on the state."""
+        self.without_state("a matrix of transitions for all states")
         found = np.asarray(self.chain_of_step.at(k)()[0], dtype=float)
         if problem := _not_probabilities(found):
             raise ModelError(f"`transition` at step {k}: {problem}; change its formulas, or run at most {k} steps")
         return found / found.sum(axis=1, keepdims=True)
 
     def law_at(self, k: int) -> Array:
-        """q_k, (J,): the probabilities of the modes of y_k before anything is measured."""
+        """q_k, (J,): the probabilities of the modes of y_k before anything is measured; ModelError if they are not known."""
+        self.without_state("the law of the modes")
         if not self.chain_of_step.known.symbols:
             return self.first @ np.linalg.matrix_power(self.transition_at(0), k)
         return reduce(lambda law, step: law @ self.transition_at(step), range(k), self.first)
@@ -182,6 +212,9 @@ class JumpModel:
         known = self.chain_of_step.known
         steps = int(min(CHECKED, self.steps)) if known.symbols else 1
         reached = self.first > 0
+        if self.by_state:
+            self._check_states(steps, reached)
+            return
         for k in range(steps):
             matrix = np.asarray(self.chain_of_step.at(k)()[0], dtype=float)
             if problem := _not_probabilities(matrix):
@@ -191,6 +224,20 @@ class JumpModel:
                 raise ModelError(f"`transition`{where}: {problem}")
             for _ in range(1 if known.symbols else len(matrix)):
                 reached = reached | (reached.astype(float) @ matrix > 0)
+        self._check_reached(reached)
+
+    def _check_states(self, steps: int, reached: Array) -> None:
+        """The same on states as far as a dozen deviations of the prior, for the steps of a run of the lab."""
+        mean, cov = self.prior
+        away = np.random.default_rng(0).standard_normal((TRIED, self.n)) * np.geomspace(0.1, FAR, TRIED)[:, None]
+        x = mean + np.concatenate([np.zeros((1, self.n)), away]) * np.sqrt(np.diagonal(cov))
+        for k in range(min(steps, SURE)):
+            ever = (self.transition_of(x, k) > 0).any(axis=0)
+            for _ in range(1 if self.chain_of_step.known.symbols else len(self.names)):
+                reached = reached | (reached @ ever)
+        self._check_reached(reached)
+
+    def _check_reached(self, reached: Array) -> None:
         if not reached.all():
             never = ", ".join(name for name, one in zip(self.names, reached, strict=True) if not one)
             raise ModelError(
@@ -210,7 +257,7 @@ def model_of_table(given: Mapping[str, Any]) -> Model | JumpModel:
     missing = [key for key in ("state", "meter") if key not in given]
     if missing:
         raise ModelError(f"there is no {' and no '.join(missing)}: give what holds in all modes that have none of their own")
-    options = {key: value for key, value in given.items() if key not in ("title", "state", "meter", "parameters")}
+    options = {key: value for key, value in given.items() if key not in ("state", "meter", "parameters", *OF_A_VARIANT)}
     return JumpModel.define(given["state"], given["meter"], given.get("parameters"), **options)
 
 
@@ -270,13 +317,14 @@ def _compiled(
     names = {name: symbol(name) for name in common if name not in changed}
     of_step = model.known.names([*common, *changed, *(s.name for s in (*model.x, *model.v, *model.w))])
     try:
-        matrix = sp.ImmutableMatrix([[_entry(one, names | of_step) for one in row] for row in rows])
+        matrix = sp.ImmutableMatrix([[_entry(one, names | of_step | by_name(model.x)) for one in row] for row in rows])
     except (ModelError, FormulaError) as error:
         differs = "".join(f"; {name} differs between the modes" for name in sorted(changed) if f"{name!r}" in str(error))
         raise ModelError(f"`transition`: {error}{differs}") from None
     known = model.known.used(matrix, of_step)
+    arguments = {"x": sp.Matrix(model.x)} if matrix.has(*model.x) else {}
     numeric = matrix.subs({symbol(name): exact_number(name, value) for name, value in common.items()})
-    return matrix, Stepwise.compile(known, "transition", {}, {"transition": numeric}, [])
+    return matrix, Stepwise.compile(known, "transition", arguments, {"transition": numeric}, [*arguments])
 
 
 def _entry(one: Any, names: dict[str, sp.Symbol]) -> sp.Expr:

@@ -44,6 +44,8 @@ from kfcourse.symbolic.reading import (
 from kfcourse.symbolic.sense import not_computable
 from kfcourse.symbolic.writing import formula_latex, number_latex
 
+OF_A_VARIANT = ("title", "steps")  # keys of a variant's table that are not of its model
+
 
 @dataclass(frozen=True)
 class Model:
@@ -208,12 +210,12 @@ class Model:
 
     @classmethod
     def of_table(cls, table: Mapping[str, Any]) -> Model:
-        """The model of a table such as [variants.53]: its keys are the arguments of `define`; a title is no part of the model."""
+        """The model of a table such as [variants.53]: its keys are the arguments of `define`, but for title and steps."""
         try:
             state, meter = table["state"], table["meter"]
         except (KeyError, TypeError):
             raise ModelError(f"expected a table with state and meter, got {shown(table)}") from None
-        options = {key: value for key, value in table.items() if key not in ("title", "state", "meter", "parameters")}
+        options = {key: value for key, value in table.items() if key not in ("state", "meter", "parameters", *OF_A_VARIANT)}
         return cls.define(state, meter, table.get("parameters"), **options)
 
     def with_inputs(self, inputs: Mapping[str, Sequence[float] | Array]) -> Model:

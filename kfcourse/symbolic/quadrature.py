@@ -100,10 +100,10 @@ def gauss_hermite(model: Model, order: int = 5, root: str = "cholesky", augmente
     """
     if order < 2:
         raise ModelError(f"Gauss-Hermite quadrature needs an order of at least 2, got {order}")
-    return _checked("gauss-hermite", model, _product_rule(order), _Equations.of(model, augmented), root, order)
+    return _checked("gauss-hermite", model, product_rule(order), _Equations.of(model, augmented), root, order)
 
 
-def _product_rule(order: int) -> Rule:
+def product_rule(order: int) -> Rule:
     def rule(size: int) -> tuple[Array, Array]:
         if order**size > MOST_POINTS:
             raise ModelError(f"{order} points on each of {size} axes are too many; lower the order or use unscented(model)")
@@ -176,9 +176,9 @@ def _checked(name: str, model: Model, rule: Rule, equations: _Equations, root: s
             _warn(f"{name}: a function of {model} is not finite at the points of the prior law", stacklevel=4)
         elif (2 * order) ** size <= MOST_POINTS:
             coarse = (
-                found if name == "gauss-hermite" else _moments(_quadrature(name, model, _product_rule(order), equations, root))
+                found if name == "gauss-hermite" else _moments(_quadrature(name, model, product_rule(order), equations, root))
             )
-            fine = _moments(_quadrature(name, model, _product_rule(2 * order), equations, root))
+            fine = _moments(_quadrature(name, model, product_rule(2 * order), equations, root))
             for (what, less, *_), (_, more, scale, angles) in zip(coarse, fine, strict=True):
                 more = near(more, less, angles)
                 if not (np.abs(more - less) <= CONVERGED * scale).all():

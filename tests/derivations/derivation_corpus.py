@@ -40,12 +40,12 @@ from kfcourse.derivations.terms import (
     written,
 )
 from kfcourse.derivations.typed import read_line
+from kfcourse.derivations.worked import plain, stages
 from kfcourse.lab import load_variants
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
 
-M = sp.Function("M")
 LAWS = (("m", "d"), ("m", "d"), ("mu", "P"), ("lambda", "Psi"))
 
 
@@ -85,43 +85,6 @@ def typed(line: Node, rng: random.Random) -> str:
 
 
 # ---------------------------------------------------------------- chains by SymPy
-
-
-def stages(model: Model, name: str, mean: sp.MatrixBase, cov: sp.MatrixBase) -> tuple[list[sp.Expr], GaussianMoments]:
-    """The lines of a derivation as formulas, in which M(...) is a mean that is not yet computed."""
-    side = model.state_equation if name[0] in "tT" else model.meter_equation
-    noises = model.v if name[0] in "tT" else model.w
-    law = GaussianMoments([*model.x, *noises], [*mean, *[0] * len(noises)], sp.diag(cov, sp.eye(len(noises))))
-    digits = [int(c) - 1 for c in name if c.isdigit()] or [0]
-    a, b = side[digits[0]], side[digits[-1]]
-    if name[0] in "th":
-        inner, start = a, M(a)
-    elif name[0] == "G":
-        inner = sp.diff(a, model.x[digits[-1]])
-        start = M(inner)
-    else:
-        means = [plain(law.mean_of(one)) for one in (a, b)]
-        inner = (a - means[0]) * (b - means[1])
-        start = M(inner)
-    groups: dict[sp.Expr, sp.Expr] = {}
-    for term in sp.Add.make_args(sp.expand(inner)):
-        outside, inside = term.as_independent(*model.x, *noises, as_Add=False)
-        groups[inside] = groups.get(inside, 0) + outside
-    split = sp.Add(
-        *(sp.factor(outside) * (1 if inside == 1 else M(inside)) for inside, outside in groups.items()), evaluate=False
-    )
-    quiet, closed = sp.S.Zero, sp.S.Zero
-    for inside, outside in groups.items():
-        of_noise, of_state = inside.as_independent(*model.x, as_Add=False)
-        mean_of_noise = law.mean_of(of_noise)
-        quiet += sp.factor(outside) * mean_of_noise * (1 if of_state == 1 else M(of_state))
-        closed += sp.factor(outside) * mean_of_noise * plain(law.mean_of(of_state))
-    result = sp.expand(closed)
-    return [start, split, quiet, closed, result], law
-
-
-def plain(formula: sp.Expr) -> sp.Expr:
-    return formula.replace(lambda e: type(e).__name__ == "expm1", lambda e: sp.exp(e.args[0]) - 1)
 
 
 def chains(seed: int, count: int) -> list[Chain]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from kfcourse.checks import ExerciseError, engine, exercise, sets
+from kfcourse.checks import Derivation, ExerciseError, engine, exercise, sets
 from kfcourse.lab.variants import load_variants
 
 # Questions about the variant's model are asked for variants of all kinds.  The others are called with hidden functions, numbers:
@@ -55,7 +55,7 @@ def test_names_follow_the_set():
 def test_core_questions_know_five_mistakes(letter, question):
     for mistake in question.mistakes:
         assert len(mistake.says) > 15, mistake.name
-    if question.level == "core":
+    if question.level == "core" and not isinstance(question, Derivation):  # whose lines say what is wrong
         assert len({mistake.name for mistake in question.mistakes}) >= 5
 
 

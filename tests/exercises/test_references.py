@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from kfcourse import Model, linearised, predictions, run, simulate
+from kfcourse import Model, gaussian, linearised, predictions, run, simulate
 from kfcourse.checks import exercise
 from kfcourse.continuous import ContinuousModel, coarsen, extended_kalman_bucy
 from kfcourse.continuous import simulate as simulate_continuous
@@ -18,7 +18,9 @@ from kfcourse.exercises.g_extended.hidden import hidden_functions
 from kfcourse.exercises.h_continuous import keys as continuous_time
 from kfcourse.exercises.h_continuous import questions as continuous_questions
 from kfcourse.exercises.h_continuous.mistakes_of_filter import steady_with
-from kfcourse.filters import adaptive_pointmass, aof, kalman_filter
+from kfcourse.exercises.o_modes import keys as modes
+from kfcourse.exercises.o_modes import questions as modes_questions
+from kfcourse.filters import adaptive_pointmass, aof, kalman_filter, logic_dynamic
 from kfcourse.lab.variants import find_variant, load_variants
 from kfcourse.linear.consistency import innovations, nees, nis
 
@@ -149,3 +151,16 @@ def test_derivatives():
     u, U = continuous_time.derivatives(sp.sin(x), x, y, N)
     assert sp.simplify(u - 2 * sp.cos(x) * (y - sp.sin(x)) / N) == 0
     assert sp.simplify(U + 2 * sp.cos(x) ** 2 / N + 2 * sp.sin(x) * (y - sp.sin(x)) / N) == 0
+
+
+@pytest.mark.parametrize("variant", ["53", "21"])
+def test_two_steps_of_modes_are_the_package_s_filter(variant):
+    for y, m, d, a, q, C, pi, first in modes_questions.two_measurements(exercise("o", variant)):
+        models = [
+            Model.define("a*x + s*v", "x + C*w", {"a": a, "s": np.sqrt(q), "C": c}, prior={"mean": m, "variance": d}) for c in C
+        ]
+        one = logic_dynamic([gaussian(model) for model in models], pi, first)
+        before = one.step(one.init(1), y[:1, None])
+        after = one.step(before, y[1:, None])
+        found = modes.two_steps(y, m, d, a, q, C, pi, first)
+        np.testing.assert_allclose(found, [before.memory.probability[0], after.memory.probability[0]], rtol=1e-12)

@@ -8,7 +8,7 @@ import pytest
 
 from kfcourse import Model, ModelError, compare, filters, lab_filters, load_variants, run, simulate
 from kfcourse.filters import adaptive_pointmass, aof, kalman_filter
-from kfcourse.filters.exact_panels import Rule
+from kfcourse.filters.exact.panels import Rule
 from kfcourse.lab.short_names import LAB, has_exact
 from kfcourse.symbolic.structure import gaussian
 

@@ -17,7 +17,7 @@ from kfcourse.filters.approximations import aof
 from kfcourse.filters.conditionally_optimal import EQUATIONS as DUOF_EQUATIONS
 from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.designed import Design
-from kfcourse.filters.exact import pointmass
+from kfcourse.filters.exact.pointmasses import pointmass
 from kfcourse.filters.finite_memory import EQUATIONS as REMEMBERING
 from kfcourse.filters.finite_memory import ESTIMATES, MEASUREMENTS, dfkp, fbp, fkp, mdfkp, mfkp
 from kfcourse.filters.iterated_ekf import iterated

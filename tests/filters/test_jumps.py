@@ -21,7 +21,7 @@ from kfcourse import (
     unscented,
 )
 from kfcourse.filters import aof, duof, fos, mfos, pointmass
-from kfcourse.filters.exact_jumps import jump_pointmass
+from kfcourse.filters.exact.jumps import jump_pointmass
 from kfcourse.filters.jump_optimal import logic_dynamic_fos
 from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
 from kfcourse.linear.system import linear_system

@@ -9,7 +9,7 @@ from scipy import stats
 
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.conditionally_optimal import duof
-from kfcourse.filters.exact import pointmass
+from kfcourse.filters.exact.pointmasses import pointmass
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.optimal_structure import fos, mfos
 from kfcourse.laws import Gaussian

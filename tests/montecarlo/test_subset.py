@@ -217,6 +217,19 @@ def test_another_filter_runs_instead_of_one_that_fails(model, control):
     assert not expected.replaced
 
 
+def test_another_filter_runs_instead_of_one_that_would_not_come_through_in_time(model, control):
+    """It is told after the first sixteen, .5 s, while there is time: 84 more take 2.5.  What nothing can replace runs on."""
+    crawling, other = slow(control, "aof-exact", seconds=1e-2), slow(control, "aof-exact")
+    settings = {"subset_runs": 112, "subset_seconds": 2, "progress": False, "threads": 1}
+    result = compare([control, replace(crawling, instead=other)], model, 112, STEPS, 1, **settings)
+    assert re.search(r"^16 trajectories take .* s, 100 more than the .* s left$", result.replaced["aof-exact"])
+    assert result.subset_runs == 112
+    alone = compare([control, crawling], model, 112, STEPS, 1, **settings)
+    assert not alone.replaced and "fewer than 100" in alone.left_out["aof-exact"]
+    quick = replace(slow(control, "aof-exact", seconds=1e-4), instead=other)  # there is a minute for .03 s
+    assert not compare([control, quick], model, 112, STEPS, 1, **settings | {"subset_seconds": 60}).replaced
+
+
 def test_where_point_masses_fail_the_bound_is_found_by_particles():
     """A meter with thousands of humps is beyond the nodes; as a measurement it tells next to nothing."""
     model = Model.define("0.9*x + 0.1*v", "sin(1000*x) + w")

@@ -26,6 +26,7 @@ ANSWERED = {
     "l": 1,
     "m": 1,
     "n": 1,
+    "o": 1,
 }  # questions in words
 SAID = re.compile(r"\*(What to expect|Why never negative|When is there an answer\?|What is left out)\.?\*|It goes to \$\\beta\$")
 

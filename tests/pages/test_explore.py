@@ -7,126 +7,14 @@ import re
 import numpy as np
 import pytest
 import sympy as sp
+from answering import BEATS, MADE, drag, fragment, said, state_of, x, y
 
-from kfcourse import Model, gaussian, linearised
-from kfcourse.lab.variants import load_variants
 from kfcourse.pages import explore
-
-SCALAR = {name: variant for name, variant in load_variants().items() if variant.model.n == 1 == variant.model.p}
-STILL = "data:image/svg+xml," + "%3Csvg xmlns='http://www.w3.org/2000/svg' width='300' height='100'/%3E"
-ALONE = """<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-<title>Figure</title></head><body>{html}
-<figure id="{name}"><img src="{still}" alt="still"><figcaption>Caption</figcaption></figure></body></html>"""
-
-
-x, y, following = sp.symbols("x y x_next", real=True)
-PLACE = sp.sqrt(x**2 + 1)
-
-
-def bell(at, mean, sd):
-    return sp.exp(-((at - mean) ** 2) / (2 * sd**2)) / (sp.sqrt(2 * sp.pi) * sd)
-
-
-BEATS = (bell(x, -1, sp.sqrt(2)), bell(y, PLACE, 0.2), bell(following, x + 0.5, 0.3))
-
-
-def sine_and_lines() -> str:
-    """As in the chapter on better lines."""
-    model = Model.define("x + 0.1*v", "sin(x) + 0.05*w")
-    tangent, best = linearised(model), gaussian(model)
-    (angle,), (m,), (d,) = model.x, best.formulas.m, best.formulas.d
-    lines = [(one["h"], one["G"]) for one in (tangent, best)]
-    left = (best["F"] - best["G"] ** 2 * d) - (tangent["F"] - tangent["G"] ** 2 * d)
-    return explore.two_lines(
-        "fig-better-line",
-        angle,
-        m,
-        d,
-        sp.sin(angle),
-        bell(angle, m, sp.sqrt(d)),
-        *lines,
-        sp.simplify(left),
-        dict(mean=1, variance=0.4),
-    )
-
-
-def lab_gains() -> str:
-    """Three estimates at once, in the letters of the chapter on the lab's filters, with T = 0.001 and H = 0.8."""
-    lam, y, p = sp.symbols("lambda y p", real=True)
-    Psi = sp.Rational("0.8125") * p + sp.Rational("0.0025") * (lam / sp.Rational("0.9")) ** 2
-    F = Psi + sp.Rational("0.0004") * (lam**4 + 6 * lam**2 * Psi + 3 * Psi**2)
-    best = lam + Psi / F * (y - lam)
-    estimates = {"aof-gaussian": best, "fos-gaussian": best.subs(p, 0.001), "duof": lam + 0.8 * (y - lam) + 0.01}
-    return explore.gains(
-        "fig-lab-gains", lam, y, p, estimates, [[0, 1], [1, 0.9]], (1e-5, 0.02), {"lambda": 2, "y": 3, "p": 0.006}
-    )
-
-
-@pytest.fixture(scope="module")
-def pages():
-    """Each figure of the book as a piece of HTML, by name; made once."""
-    lab = explore.live_lab("fig-live-lab", {name: SCALAR[name] for name in ("53", "2", "3")})
-    beats = explore.two_beats("fig-two-beats", x, y, following, *BEATS, PLACE, 2.2)
-    return {"fig-live-lab": lab, "fig-two-beats": beats, "fig-better-line": sine_and_lines(), "fig-lab-gains": lab_gains()}
-
-
-@pytest.fixture
-def opened(browser, tmp_path, pages):
-    """open_page(name, fragment, **options) -> a page opened from a file, without a network."""
-    contexts, problems = [], []
-
-    def open_page(name: str, fragment: str = "", **options):
-        path = tmp_path / f"{name}.html"
-        path.write_text(ALONE.format(html=pages[name], name=name, still=STILL), encoding="utf-8")
-        context = browser.new_context(offline=True, **({"viewport": {"width": 900, "height": 1000}} | options))
-        contexts.append(context)
-        tab = context.new_page()
-        tab.set_default_timeout(20_000)
-        tab.on("console", lambda message: problems.append(message.text))
-        tab.on("pageerror", lambda error: problems.append(str(error)))
-        tab.on(
-            "request", lambda one: one.url.startswith((path.as_uri(), "blob:", "data:")) or problems.append(f"loads {one.url}")
-        )
-        tab.goto(path.as_uri() + fragment)
-        if options.get("java_script_enabled", True):
-            tab.wait_for_selector(".kf-explore[data-ready]")
-        return tab
-
-    yield open_page
-    for context in contexts:
-        context.close()
-    assert problems == []
-
-
-def fragment(tab) -> str:
-    return tab.evaluate("decodeURIComponent(location.hash)")
-
-
-def rounds(tab) -> str:
-    """The live lab's bound stands: its table as text."""
-    tab.wait_for_selector(".kf-explore[data-done='400']", timeout=60_000)
-    return tab.locator(".kf-numbers").inner_text()
-
-
-def drag(tab, handle, dx: float, dy: float) -> None:
-    box = handle.locator("circle").last.bounding_box()
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    tab.mouse.move(x, y)
-    tab.mouse.down()
-    tab.mouse.move(x + dx, y + dy, steps=4)
-    tab.mouse.up()
-
-
-def state_of(tab, handle_or_slider) -> float:
-    return float(handle_or_slider.get_attribute("aria-valuenow") or handle_or_slider.input_value())
-
 
 # ---------------------------------------------------------------- every figure
 
-FIGURES = ["fig-live-lab", "fig-two-beats", "fig-better-line", "fig-lab-gains"]
 
-
-@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize("name", MADE)
 def test_first_frame_paper_and_no_scripts(opened, name):
     tab = opened(name)
     assert not tab.locator("img").is_visible()  # the figure took its place, within the same figure
@@ -138,7 +26,7 @@ def test_first_frame_paper_and_no_scripts(opened, name):
     assert still.locator("img").is_visible() and still.locator(".kf-explore svg").count() == 0
 
 
-@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize("name", MADE)
 def test_it_fits_a_phone_and_says_what_it_is(opened, name):
     tab = opened(name, viewport={"width": 390, "height": 800})
     assert not tab.evaluate("document.documentElement.scrollWidth > innerWidth")
@@ -148,7 +36,7 @@ def test_it_fits_a_phone_and_says_what_it_is(opened, name):
         assert len(chart.get_attribute("aria-label")) > 30
 
 
-@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize("name", MADE)
 def test_nothing_moves_by_itself(opened, name):
     tab = opened(name, reduced_motion="reduce")
     assert tab.evaluate("document.getAnimations().length") == 0
@@ -156,6 +44,12 @@ def test_nothing_moves_by_itself(opened, name):
 
 
 # ---------------------------------------------------------------- the live lab
+
+
+def rounds(tab) -> str:
+    """The live lab's bound stands: its table as text."""
+    tab.wait_for_selector(".kf-explore[data-done='400']", timeout=60_000)
+    return tab.locator(".kf-numbers").inner_text()
 
 
 def test_the_lab_is_compared_and_a_link_keeps_it(opened):
@@ -217,12 +111,6 @@ def test_ten_thousand_trajectories_in_half_a_second(opened):
 
 
 # ---------------------------------------------------------------- correction and prediction
-
-
-def said(tab) -> list[float]:
-    """The numbers of the status line: of the two beats measurement, percent left of the beacon, mean, density there, top."""
-    text = tab.get_by_role("status").inner_text().replace("−", "-")
-    return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", text)]
 
 
 def by_quadrature(measured: float) -> list[float]:

@@ -5,7 +5,7 @@ import pytest
 
 from kfcourse import Model, compare, gaussian, linearised, run, simulate, smooth
 from kfcourse.filters import aof, kalman_filter, particle, pointmass
-from kfcourse.filters.exact_kernels import Unresolved
+from kfcourse.filters.exact.kernels import Unresolved
 from kfcourse.lab.variants import find_variant
 from kfcourse.records import smoothing_error
 from kfcourse.symbolic.reading import ModelError
@@ -146,10 +146,10 @@ def test_the_last_state_is_the_filter_s():
 
 
 def test_what_cannot_be_resolved_is_refused_in_words(monkeypatch):
-    from kfcourse.filters import exact_smoothing
+    from kfcourse.filters.exact import smoothing
 
-    monkeypatch.setattr(exact_smoothing, "NODES", (9, 17))
-    monkeypatch.setattr(exact_smoothing, "TOLERABLE", 1e-9)
+    monkeypatch.setattr(smoothing, "SMOOTHING_NODES", (9, 17))
+    monkeypatch.setattr(smoothing, "TOLERABLE", 1e-9)
     model = find_variant("53").model
     with pytest.raises(Unresolved, match=r"looking back to step \d: 17 nodes do not resolve.*smooth\(particle\(model\), y\)"):
         smooth(pointmass(model), simulate(model, 3, 3, seed=1).y)

@@ -136,8 +136,8 @@ def test_what_does_not_fit_is_refused_in_words(changes, message):
 
 
 def test_a_formula_of_the_chain_that_cannot_be_read_is_pointed_at():
-    with pytest.raises(ModelError, match=r"`transition`: .*unknown symbol 'x'"):  # the chain does not know the state
-        define(transition=[["1 - x", "x"], [0.3, 0.7]])
+    with pytest.raises(ModelError, match=r"`transition`: .*unknown symbol 'v'"):  # the chain does not know the noises
+        define(transition=[["1 - v", "v"], [0.3, 0.7]])
     with pytest.raises(ModelError, match="C differs between the modes"):
         define(transition=[["1 - C/9", "C/9"], [0.3, 0.7]])
 

@@ -21,6 +21,7 @@ LEFT_OUT = (
     "__main__.py",
 )  # what a student's notebook has no use for
 NEEDED = ("__init__.py", "grading/__init__.py", "grading/channel.py", "grading/session.py", "grading/values.py")  # of notebooks
+ANSWERS = "derivations/worked.py"  # writes right derivations
 COMPANIONS = "companion.py"  # what the notebooks of a set import; never a key
 
 REGISTRY = '''"""The exercise sets without their questions: what a notebook is graded with."""
@@ -58,6 +59,7 @@ def stage(folder: Path) -> Path:
     own = Path(str(resources.files("kfcourse")))
     target = folder / "kfcourse"
     shutil.copytree(own, target, ignore=lambda at, names: LEFT_OUT if Path(at) == own else ())
+    (target / ANSWERS).unlink()
     for name in NEEDED:
         copied = target / "notebooks" / name
         copied.parent.mkdir(parents=True, exist_ok=True)

@@ -70,7 +70,8 @@ button.kf-try { font: inherit; color: var(--accent, LinkText); background: none;
     return one;
   };
 
-  // A chart: axes with labels, and what is drawn on them; `says` is what it shows to those who cannot see it.
+  // A chart: axes with labels (and `ticks`, if they are not round numbers: pairs of value and text), and what is drawn on them;
+  // `says` is what it shows to those who cannot see it.
   const chart = (ui, parent, { height = 250, x, y, title = "", says, left = 52 }) => {
     const svg = make("svg:svg", { class: "kf-chart", height, role: "group", "aria-label": says }, parent);
     const top = title ? 26 : 10, bottom = 42, right = 12;
@@ -90,15 +91,16 @@ button.kf-try { font: inherit; color: var(--accent, LinkText); background: none;
       for (const [name, value] of [["x", left], ["y", top - 1], ["width", width - left - right + 1], ["height", height - top - bottom + 2]])
         rectangle.setAttribute(name, value);
       axes.replaceChildren();
-      for (const tick of sx.ticks(Math.max(3, Math.floor(width / 70)))) {
+      const marks = (axis, of, count) => axis.ticks ?? of.ticks(count).map((tick) => [tick, short(tick)]);
+      for (const [tick, label] of marks(x, sx, Math.max(3, Math.floor(width / 70)))) {
         make("svg:path", { d: `M${sx.at(tick)} ${sy.from}v5`, stroke: INK }, axes);
         make("svg:path", { d: `M${sx.at(tick)} ${sy.from}V${top}`, stroke: LINE, "stroke-width": 0.6 }, axes);
-        make("svg:text", { x: sx.at(tick), y: sy.from + 18, "text-anchor": "middle" }, axes, short(tick));
+        make("svg:text", { x: sx.at(tick), y: sy.from + 18, "text-anchor": "middle" }, axes, label);
       }
-      for (const tick of sy.ticks(Math.max(2, Math.floor(height / 50)))) {
+      for (const [tick, label] of marks(y, sy, Math.max(2, Math.floor(height / 50)))) {
         make("svg:path", { d: `M${left} ${sy.at(tick)}h-5`, stroke: INK }, axes);
         make("svg:path", { d: `M${left} ${sy.at(tick)}H${width - right}`, stroke: LINE, "stroke-width": 0.6 }, axes);
-        make("svg:text", { x: left - 8, y: sy.at(tick) + 4.5, "text-anchor": "end" }, axes, short(tick));
+        make("svg:text", { x: left - 8, y: sy.at(tick) + 4.5, "text-anchor": "end" }, axes, label);
       }
       make("svg:path", { d: `M${left} ${top}V${sy.from}H${width - right}`, fill: "none", stroke: INK, "stroke-width": 0.8 }, axes);
       make("svg:text", { x: (left + width - right) / 2, y: height - 5, "text-anchor": "middle" }, axes, x.label);
@@ -292,7 +294,7 @@ button.kf-try { font: inherit; color: var(--accent, LinkText); background: none;
     draw = build(ui);
     redraw();
     // The still picture of the same cell makes room on the screen, and stays for paper.
-    const still = document.getElementById(name)?.querySelector("img");
+    const still = document.getElementById(name)?.querySelector("img, [role=img]");
     if (still) {
       still.classList.add("kf-still");
       still.after(root);

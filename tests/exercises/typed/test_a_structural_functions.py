@@ -31,6 +31,11 @@ def a6(R):
     return lambda m, d: R
 
 
+def a7(*lines):
+    """A chain of variant 53's F, after its definition."""
+    return lambda: "\n = ".join(["F = M[(y - h)^2]", *lines])
+
+
 # The pendulum: x1' = x1 + T x2, x2' = x2 - T (b x2 + k sin x1) + s v, y = (sin x1 + r w1, x2 + q w2).
 
 T, b, k, s, r, q = sp.symbols("T b k s r q", real=True)
@@ -109,6 +114,8 @@ RIGHT = [
     ("a4", a4()),
     ("a5", a5()),
     ("a6", a6(f**2 * ((m**2 + 3 * d) ** 2 - 6 * d**2))),
+    ("a7", a7("M[(g*(x - m) + f*x^2*w)^2]", "g^2*d + f^2*M[x^4]", "g^2*d + f^2*(m^4 + 6*m^2*d + 3*d^2)")),
+    ("a7", a7("M[y^2] - h^2", "g^2*(m^2 + d) + f^2*M[x**4] - (g*m)^2", "d*g^2 + f^2*((m^2 + 3*d)^2 - 6*d^2)  # done")),
 ]
 RIGHT_OF_PENDULUM = [("a1", p1()), ("a2", p2()), ("a3", p3()), ("a4", p4()), ("a5", p5()), ("a6", p6())]
 
@@ -193,6 +200,12 @@ WRONG = [
     ("a6", "superfluous", a6(2 * g**2 * d + f**2 * (m**4 + 6 * m**2 * d + 3 * d**2))),
     ("a6", "noise-not-squared", a6(f * (m**4 + 6 * m**2 * d + 3 * d**2))),
     ("a6", "unused", a6(f**2)),
+    ("a7", "moment", a7("g^2*d + f^2*M[x^4]", "g^2*d + 3*f^2*d^2")),
+    ("a7", "factor", a7("g^2*d + f^2*M[x^4]", "g^2*d + f^2*(m^4 + 4*m^2*d + 3*d^2)")),
+    ("a7", "power", a7("g^2*d + f*M[x^4]", "g^2*d + f*(m^4 + 6*m^2*d + 3*d^2)")),
+    ("a7", "noise-forgotten", a7("M[(g*(x - m) + f*x^2*w)^2]", "g^2*M[(x - m)^2]", "g^2*d")),
+    ("a7", "open-end", a7("g^2*d + f^2*M[x^4]")),
+    ("a7", "steps-missing", lambda: "F = g^2*d + f^2*(m^4 + 6*m^2*d + 3*d^2)"),
 ]
 WRONG_OF_PENDULUM = [
     ("a1", "entry", p1(A=slope(sp.sin(z1)))),
@@ -267,6 +280,12 @@ UNUSABLE = [
     ("a2", "expected 2 results", lambda z, p: c**2 * p + e**2 * z**2),
     ("a3", "expected 3 results", lambda m, d: (g * m, g**2 * d + f**2 * m**4)),
     ("a6", "is `return` missing", lambda m, d: None),
+    ("a7", "expected a text", lambda: 3),
+    ("a7", "the derivation is empty", lambda: "\n"),
+    ("a7", "has no `=`", lambda: "variant 7\nF = M[(y - h)^2]"),
+    ("a7", "no chain with `F`", lambda: "G = g"),
+    ("a7", "cannot be read at column", lambda: "F = M[(y-h)^2"),
+    ("a7", "what x means is given", lambda: "x = 5\n" + a7("625*f^2")()),
 ]
 
 

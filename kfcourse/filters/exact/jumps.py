@@ -1,6 +1,6 @@
 r"""The exact filter of a scalar model that jumps: one density of the state for each mode, and the modes' probabilities.
 
-    p(x_k, i_k = j | y_0..k-1) = sum_i pi_ij Integral p(x_{k-1}, i_{k-1} = i | y_0..k-1) p_j(x_k | x_{k-1}) dx_{k-1}
+    p(x_k, i_k = j | y_0..k-1) = sum_i Integral pi_ij(x_{k-1}) p(x_{k-1}, i_{k-1} = i | y_0..k-1) p_j(x_k | x_{k-1}) dx_{k-1}
     p(x_k, i_k = j | y_0..k)   = C p_j(y_k | x_k) p(x_k, i_k = j | y_0..k-1)
 
 Each density is held and made as `kfcourse.filters.exact` does, with the same error control.  A prediction in mode j is a sum of
@@ -17,12 +17,13 @@ import numpy as np
 
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
-from kfcourse.filters.exact import ACCURACY, FINE, corrected
-from kfcourse.filters.exact_adaptive import check_scalar
-from kfcourse.filters.exact_evidence import log_evidence
-from kfcourse.filters.exact_kernels import Grid, Kernels, TooNarrow, Unresolved, of_prior
-from kfcourse.filters.exact_predictions import predictions
-from kfcourse.filters.multiple_models import mixture
+from kfcourse.filters.exact.adaptive import check_scalar
+from kfcourse.filters.exact.constants import TOLERABLE
+from kfcourse.filters.exact.evidence import log_evidence
+from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved, of_prior
+from kfcourse.filters.exact.pointmasses import ACCURACY, FINE, corrected
+from kfcourse.filters.exact.prediction import predictions
+from kfcourse.filters.multiple_models import mixture, onward
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
@@ -102,12 +103,11 @@ def jump_pointmass(model: JumpModel, accuracy: float = ACCURACY) -> Filter:
 
     def step(state: State, y: Array) -> State:
         now = [law.at(state.step) for law in laws]
-        pi = model.transition_at(state.step)
         try:
             try:
-                return _step(state, y, now, pi, accuracy, FINE[0])
+                return _step(state, y, now, model, accuracy, FINE[0])
             except TooNarrow:
-                return _step(state, y, now, pi, accuracy, FINE[1])
+                return _step(state, y, now, model, accuracy, FINE[1])
         except Unresolved as error:
             raise Unresolved(f"step {state.step} of {model}: {error}; leave the exact filter out (--exact-runs 0)") from None
 
@@ -118,7 +118,7 @@ def jump_pointmass(model: JumpModel, accuracy: float = ACCURACY) -> Filter:
     return Filter("aof-exact", model.modes[0], start, step, slow=True, evidence=evidence)
 
 
-def _step(state: State, y: Array, laws: Sequence[ScalarDensities], pi: Array, accuracy: float, nodes: int) -> State:
+def _step(state: State, y: Array, laws: Sequence[ScalarDensities], model: JumpModel, accuracy: float, nodes: int) -> State:
     memory: JumpMass = state.memory
     parts = [corrected(groups, y, law, accuracy, nodes) for groups, law in zip(memory.groups, laws, strict=True)]
     fine = [part.grids for part in parts]
@@ -134,18 +134,54 @@ def _step(state: State, y: Array, laws: Sequence[ScalarDensities], pi: Array, ac
     sd = np.sqrt(posterior.cov[:, 0, 0])
     # a mean errs by so many of its mode's standard deviations, the mode's probability by that part of itself
     moved = (probability * errors * (np.sqrt(variances) + np.abs(means - posterior.mean))).sum(axis=1)
-    expected = probability @ pi
-    groups = [_prediction(fine, law, probability * pi[:, j], expected[:, j]) for j, law in enumerate(laws)]
+    if model.by_state:
+        pi, leading, doubt = _by_state(fine, model, state.step)
+    else:
+        pi, leading, doubt = model.transition_at(state.step), [fine] * len(laws), np.zeros(1)
+    joint, (expected, _) = probability[:, :, None] * pi, onward(probability, pi)
+    groups = [_prediction(leading[j], law, joint[:, :, j], expected[:, j]) for j, law in enumerate(laws)]
     predicted = np.zeros((2, len(laws), len(y)))
     for j, some in enumerate(groups):
         for rows, kernels in some:
             predicted[:, j, rows] = kernels.moments()
+    ahead = mixture([Gaussian(m[:, None], v[:, None, None]) for m, v in zip(*predicted, strict=True)], expected)
+    # a transition's probability that errs moves its mode's law, and weighs it wrongly against the others
+    away = np.abs(predicted[0] - ahead.mean[:, 0]).max(axis=0) / np.sqrt(ahead.cov[:, 0, 0])
     return State(
         state.step + 1,
         posterior,
-        mixture([Gaussian(m[:, None], v[:, None, None]) for m, v in zip(*predicted, strict=True)], expected),
-        JumpMass(probability, expected, fine, groups, memory.error + moved / sd, sd),
+        ahead,
+        JumpMass(
+            probability, expected, fine, groups, memory.error + moved / sd + (1 + away) * (probability * doubt).sum(axis=1), sd
+        ),
     )
+
+
+def _by_state(fine: Sequence[dict[int, Grid]], model: JumpModel, k: int) -> tuple[Array, list[list[dict[int, Grid]]], Array]:
+    """nu_ij = Integral pi_ij(x) p(x | i) dx, (runs, J, J); for each j the posteriors weighted by pi_ij; and the error of nu.
+
+    It is what half the nodes change, (runs, J), where these are a rule of their own.
+    """
+    size, runs = len(fine), 1 + max(max(grids, default=0) for grids in fine)
+    nu, doubt = np.zeros((runs, size, size)), np.zeros((runs, size))
+    leading: list[list[dict[int, Grid]]] = [[{} for _ in fine] for _ in fine]
+    for i, grids in enumerate(fine):
+        if not grids:
+            continue
+        places, ends = list(grids), np.cumsum([len(grid.x) for grid in grids.values()])[:-1]
+        probabilities = np.split(model.transition_of(np.concatenate([grid.x for grid in grids.values()])[:, None], k), ends)
+        for place, grid, found in zip(places, grids.values(), probabilities, strict=True):
+            weighted = grid.mass[:, None] * found[:, i]
+            nu[place, i] = weighted.sum(axis=0)
+            if grid.uniform:
+                half = weighted[::2].sum(axis=0) / grid.mass[::2].sum()
+                doubt[place, i] = np.abs(half - nu[place, i]).max()
+            if doubt[place, i] > TOLERABLE:
+                raise Unresolved("the transitions change too abruptly with the state for the nodes of a posterior")
+            for j in np.flatnonzero(nu[place, i]).tolist():
+                mass, density = weighted[:, j] / nu[place, i, j], grid.density * found[:, i, j] / nu[place, i, j]
+                leading[j][i][place] = Grid(grid.x, mass, density, grid.uniform)
+    return nu, leading, doubt
 
 
 def _log_likelihoods(

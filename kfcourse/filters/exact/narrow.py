@@ -14,15 +14,15 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_kernels import CACHED, chunks
+from kfcourse.filters.exact.constants import CACHED, LOWEST
+from kfcourse.filters.exact.kernels import chunks
 from kfcourse.laws import Array
 
-STEP = 3.0  # largest distance, in sigmas, that the centres of a panel of new nodes may cover
+PANEL_STEP = 3.0  # largest distance, in sigmas, that the centres of a panel of new nodes may cover
 COARSE = 4  # old nodes' distances in the longest panels
 PANEL = legendre.leggauss(8)  # errs by 2e-9 on a normal kernel three sigmas wide
 BARYCENTRIC = np.array([(-1) ** i * comb(7, i) for i in range(8)], dtype=float)  # of polynomials through 8 equidistant points
 STEEP = 80.0  # change of a logarithm over 8 nodes from which on no polynomial is put through them
-DEAD = 700.0  # a logarithm this far below 0 is that of nothing
 LIGHT = 1e-20  # mass of a kernel that may be left out
 TINY = 1e-14  # keeps a node's own number from dividing by zero
 UNSEEN = 1e-10  # mass of a panel whose kernels need not overlap
@@ -54,7 +54,7 @@ def refined(x: Array, mass: Array, law: ScalarDensities, most: int) -> Finer:
     noise vanishes, left out.  A trajectory that would need more than `most` nodes is left out.
     """
     with np.errstate(divide="ignore"):
-        values = np.stack([x, np.maximum(np.log(mass), -DEAD)])
+        values = np.stack([x, np.maximum(np.log(mass), -LOWEST)])
     row, i, weight, widest = panels(x, mass, law, most)
     (place, full), (_, even) = interpolated(values, i, row), interpolated(values[:, :, ::2], 0.5 * i, row)
     masses = []
@@ -116,10 +116,10 @@ def panels(x: Array, mass: Array, law: ScalarDensities, most: int) -> tuple[Arra
         there = np.stack([*law.kernel(interpolated(x[None], middle, row)[0]), mass[row, np.round(middle).astype(int)]])
         (a, s, m), (b, t, n), (c, u, o) = known[0], there, known[1]
         covered = np.abs(b - a) + np.abs(c - b)
-        narrow = covered > STEP * np.minimum(np.minimum(s, t), u)
+        narrow = covered > PANEL_STEP * np.minimum(np.minimum(s, t), u)
         split = narrow & ((right - left) * np.maximum(np.maximum(m, n), o) > UNSEEN) & (middle > left) & (middle < right)
         kept = ~(split | narrow & (right - left < 1))
-        done.append((row[kept], left[kept], right[kept], covered[kept] / STEP))
+        done.append((row[kept], left[kept], right[kept], covered[kept] / PANEL_STEP))
         total = np.bincount(np.concatenate([*(one[0] for one in done), row[split], row[split]]), minlength=rows)
         fits &= total <= most // len(PANEL[0])
         split &= fits[row]

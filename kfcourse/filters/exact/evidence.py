@@ -14,8 +14,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_kernels import Grid, Kernels
-from kfcourse.filters.exact_roots import SHARP
+from kfcourse.filters.exact.constants import SHARP
+from kfcourse.filters.exact.kernels import Grid, Kernels
 from kfcourse.laws import Array
 
 

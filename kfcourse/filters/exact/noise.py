@@ -20,21 +20,21 @@ import numpy as np
 import scipy
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_kernels import CACHED, OVERLAP, ROOT, Grid, Kernels, TooNarrow, Unresolved, chunks
-from kfcourse.filters.exact_narrow import DEAD, interpolated, panels
+from kfcourse.filters.exact.constants import CACHED, FEW, LOWEST, ROOT
+from kfcourse.filters.exact.kernels import OVERLAP, Grid, Kernels, TooNarrow, Unresolved, chunks
+from kfcourse.filters.exact.narrow import interpolated, panels
 from kfcourse.laws import Array
 
-STEP = 0.8  # of the trapezoidal rule in u: errs by 2 exp(-2 pi^2 / STEP^2) = 8e-14 where only phi varies
-FINE = 0.5  # the same where the mass is shared, as the kernels there are not much narrower than the nodes' distance
+NOISE_STEP = 0.8  # of the trapezoidal rule in u: errs by 2 exp(-2 pi^2 / NOISE_STEP^2) = 8e-14 where only phi varies
+SHARED_STEP = 0.5  # the same where the mass is shared, as the kernels there are not much narrower than the nodes' distance
 SHIFT = 0.137  # of the rule, that no u be one at which f(., u) is constant by design
 DENSE = np.linspace(-8, 8, 161)  # noises for which turning points are looked for
 FINER = 8  # numbers between two nodes in the table that Newton's method starts from
 NEWTON = 2  # steps, each of which squares the error of a start good to 1e-3
-LOWEST = 37.0  # states and noises that together have a density lower than exp(-LOWEST) are taken for nothing
+FAINT = 37.0  # states and noises that together have a density lower than exp(-FAINT) are taken for nothing
 TURNS = 25.0  # the same for turning points: exp(-25) = 1e-11
 SOFT = 1.4  # nodes over which chi rises, as an error function: summed over the nodes, it errs by exp(-(pi SOFT)^2) = 4e-9
 EDGE = 6  # nodes from the middle of the rise to where chi is 0 or 1, up to 1e-9
-MOST = 6144  # nodes of the sum
 POLES = 1e-7  # mass at turning points that may be left to the integral
 ROUGH = 1e-4  # the same where the error is all that is wanted
 
@@ -95,7 +95,7 @@ class Pushed:
     def of(cls, x: Array, mass: Array, length: Array, law: ScalarDensities, poles: float) -> Pushed:
         """Raises `Unresolved` if there is more mass than `poles` at turning points, or the sum needs too many nodes."""
         with np.errstate(divide="ignore"):
-            logs = np.maximum(np.log(mass / mass.sum()), -DEAD)
+            logs = np.maximum(np.log(mass / mass.sum()), -LOWEST)
         values = np.stack([x, logs, length])
         table = np.linspace(0, len(x) - 1, FINER * (len(x) - 1) + 1)
         states, heights, _ = interpolated(values[:, None], table)
@@ -113,12 +113,12 @@ class Pushed:
             raise Unresolved("the transition kernel is far narrower than the posterior, and folds the state")
         with np.errstate(divide="ignore"):
             left = heights + np.log(np.maximum(rest, 0.0))
-        step = FINE if len(chi.begin) else STEP
+        step = SHARED_STEP if len(chi.begin) else NOISE_STEP
         noise = step * np.arange(-round(8 / step), round(8 / step) + 1) + SHIFT
         images = []
         for u in noise.tolist():
             image = mu + sigma * u
-            counts = left - 0.5 * u * u > -LOWEST
+            counts = left - 0.5 * u * u > -FAINT
             cuts = np.flatnonzero(np.diff(np.sign(np.diff(image)))) + 1
             for first, last in zip([0, *cuts.tolist()], [*(cuts + 1).tolist(), len(image)], strict=True):
                 inside = np.flatnonzero(counts[first:last])
@@ -174,7 +174,7 @@ def _summed(values: Array, chi: Chi, numbers: Array, law: ScalarDensities) -> tu
     """The kernels of chi p."""
     if not len(chi.begin):
         return np.empty(0), np.empty(0), np.empty(0)
-    _, at, weight, _ = panels(values[:1], (np.exp(values[1]) * chi(numbers))[None], law, MOST)
+    _, at, weight, _ = panels(values[:1], (np.exp(values[1]) * chi(numbers))[None], law, FEW)
     if not len(at):
         raise TooNarrow("the transition kernel is far narrower than the posterior")
     x, logs, _ = interpolated(values[:, None], at)

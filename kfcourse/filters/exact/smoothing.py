@@ -22,21 +22,16 @@ import numpy as np
 
 from kfcourse.angles import moments_on_circle
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_batch import Place, extrapolated, moments, summed
-from kfcourse.filters.exact_evidence import log_evidence
-from kfcourse.filters.exact_kernels import CACHED, LOWEST, ROOT, Grid, Kernels, Unresolved, bells, chunks
-from kfcourse.filters.exact_narrow import DEAD, interpolated
-from kfcourse.filters.exact_roots import SHARP
+from kfcourse.filters.exact.batch import Place, extrapolated, moments, summed
+from kfcourse.filters.exact.constants import CACHED, ELEMENTS, LOOKED, LOWEST, MORE, ROOT, SHARP, TAIL, TOLERABLE
+from kfcourse.filters.exact.evidence import log_evidence
+from kfcourse.filters.exact.kernels import Grid, Kernels, Unresolved, bells, chunks
+from kfcourse.filters.exact.narrow import interpolated
 from kfcourse.laws import Array
 
-LOOKED = 25  # nodes of a look
 LOOKS = 8  # that may be needed until the width of a hump is seen
 SPACING = 0.45  # of the nodes at the highest hump, in its widths
-NODES = (49, 65, 97, 129, 193, 257, 385, 513, 769, 1025)  # that a density may have
-MORE = 1.9  # times more nodes than did not do
-TAIL = 1e-18  # mass at a node beyond which a density has ended
-ELEMENTS = 2**20  # of kernels at once
-TOLERABLE = 1e-2  # error of a step, in standard deviations, from which on the smoother gives up
+SMOOTHING_NODES = (49, 65, 97, 129, 193, 257, 385, 513, 769, 1025)  # that a density may have
 HERMITE = np.polynomial.hermite_e.hermegauss(16)
 
 
@@ -110,7 +105,7 @@ def smoothed(
         evidence = log_evidence(groups, y[k], law, posteriors[k])
         found = Found(runs)
         for rows, kernels in groups:
-            for chunk in chunks(len(rows), NODES[1] * kernels.mu.shape[1], ELEMENTS):
+            for chunk in chunks(len(rows), SMOOTHING_NODES[1] * kernels.mu.shape[1], ELEMENTS):
                 some = rows[chunk]
                 density = Density(kernels.rows(chunk), y[k][some], evidence[some], law, ahead and ahead.rows(some))
                 try:
@@ -187,24 +182,24 @@ class Density:
         if not len(left):
             return
         place, wanted = self.rows(left).look([grids[i] for i in left.tolist()])
-        sizes = np.minimum(np.searchsorted(NODES, wanted), len(NODES) - 1)
+        sizes = np.minimum(np.searchsorted(SMOOTHING_NODES, wanted), len(SMOOTHING_NODES) - 1)
         while len(left):
             again = np.zeros(len(left), dtype=bool)
             for size in np.unique(sizes).tolist():
                 some = np.flatnonzero(sizes == size)
-                last = size == len(NODES) - 1
-                one = self.rows(left[some]).on_nodes(place.rows(some), NODES[size])
+                last = size == len(SMOOTHING_NODES) - 1
+                one = self.rows(left[some]).on_nodes(place.rows(some), SMOOTHING_NODES[size])
                 good = one.error <= (TOLERABLE if last else accuracy)
                 if last and not good.all():
                     raise Unresolved(
-                        f"{NODES[-1]:,} nodes do not resolve the density of trajectory {rows[left[some[~good]]][0]} given the "
-                        f"whole record, estimated error {one.error.max():.1g} standard deviations; take more noise, a shorter "
-                        "record, or particles: smooth(particle(model), y)"
+                        f"{SMOOTHING_NODES[-1]:,} nodes do not resolve the density of trajectory {rows[left[some[~good]]][0]} "
+                        f"given the whole record, estimated error {one.error.max():.1g} standard deviations; take more noise, "
+                        "a shorter record, or particles: smooth(particle(model), y)"
                     )
                 found.keep(rows[left[some[good]]], one, good)
                 again[some] = ~good
             left, sizes, place = left[again], sizes[again], place.rows(again)
-            sizes = np.searchsorted(NODES[:-1], MORE * np.array(NODES)[sizes])
+            sizes = np.searchsorted(SMOOTHING_NODES[:-1], MORE * np.array(SMOOTHING_NODES)[sizes])
 
     def look(self, grids: Sequence[Grid]) -> tuple[Place, Array]:
         """Where the densities lie, and how many nodes they need: from the filter's nodes, and ever closer."""
@@ -243,7 +238,7 @@ class Density:
             error = extrapolated(*nested) + beyond + rounding + extrapolated(*inherited)
             error = np.where(np.isfinite(error), np.maximum(error, np.abs(total[:, 0] - 1)), np.inf)
             logs = by_measurement + np.log(later[:, :, 0]) - np.log(total)
-        return Nodes(x, length, mass, np.maximum(np.where(np.isnan(logs), -np.inf, logs), -DEAD), place, error)
+        return Nodes(x, length, mass, np.maximum(np.where(np.isnan(logs), -np.inf, logs), -LOWEST), place, error)
 
     def on_points(self, grid: Grid, row: int, found: Found) -> None:
         """Of one trajectory whose meter has no noise: the same points with other masses."""
@@ -288,7 +283,7 @@ class Found:
     def ahead(self) -> Ahead:
         runs, most = len(self.error), max(part.x.shape[1] for _, part, _ in self.parts)
         x, weight = np.zeros((2, runs, most))
-        logs = np.full((runs, most), -DEAD)
+        logs = np.full((runs, most), -LOWEST)
         place = Place(*np.empty((4, runs, 1)))
         count, point = np.empty(runs, dtype=int), np.zeros(runs, dtype=bool)
         for rows, nodes, is_point in self.parts:

@@ -12,13 +12,12 @@ from collections.abc import Callable
 import numpy as np
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_kernels import Grid, Kernels, Unresolved, chunks
+from kfcourse.filters.exact.constants import ELEMENTS, SHARP
+from kfcourse.filters.exact.kernels import Grid, Kernels, Unresolved, chunks
 from kfcourse.laws import Array
 
 SCANNED = 4097  # equidistant states of the support, between which signs may change
 HALVED = 60  # times a bracket is halved: to the last bit
-ELEMENTS = 2**20  # of the largest array
-SHARP = 1e300  # the density of a point
 
 
 def at_roots(kernels: Kernels, y: Array, law: ScalarDensities) -> list[Grid]:
@@ -51,25 +50,25 @@ def _of_chunk(kernels: Kernels, y: Array, law: ScalarDensities) -> list[Grid]:
     dip = (size[:, 1:-1] <= size[:, 2:]) & (size[:, 1:-1] <= size[:, :-2]) & ~change[:, 1:] & ~change[:, :-1]
     row, place = np.nonzero(dip)
     left, right = x[row, place], x[row, place + 2]
-    turn = _changed(lambda at, _: law.slope(at) < 0, left, right, row)
+    turn = np.mean(halved(lambda at: law.slope(at) < 0, left, right), axis=0)
     crossed = (law.residual(y[row, 0], turn) < 0) != (law.residual(y[row, 0], left) < 0)
     brackets += [(row[crossed], left[crossed], turn[crossed]), (row[crossed], turn[crossed], right[crossed])]
     row, left, right = (np.concatenate(side) for side in zip(*brackets, strict=True))
-    root = _changed(lambda at, row: law.residual(y[row, 0], at) < 0, left, right, row)
+    root = np.mean(halved(lambda at: law.residual(y[row, 0], at) < 0, left, right), axis=0)
     found = [np.sort(root[row == i]) for i in range(len(y))]
     nearest = np.abs(residual).argmin(axis=1)
     roots = [one if len(one) else x[i, nearest[i] : nearest[i] + 1] for i, one in enumerate(found)]
     return [_weighed(one, kernels.rows(slice(i, i + 1)), law) for i, one in enumerate(roots)]
 
 
-def _changed(sign: Callable[[Array, Array], Array], left: Array, right: Array, row: Array) -> Array:
-    """Where a sign changes between left and right, by bisection."""
-    at_left = sign(left, row)
-    for _ in range(HALVED):
+def halved(sign: Callable[[Array], Array], left: Array, right: Array, times: int = HALVED) -> tuple[Array, Array]:
+    """Brackets in which a sign changes, after so many bisections; arrays of one shape."""
+    at_left = sign(left)
+    for _ in range(times):
         middle = 0.5 * (left + right)
-        same = sign(middle, row) == at_left
+        same = sign(middle) == at_left
         left, right = np.where(same, middle, left), np.where(same, right, middle)
-    return 0.5 * (left + right)
+    return left, right
 
 
 def _weighed(roots: Array, kernels: Kernels, law: ScalarDensities) -> Grid:

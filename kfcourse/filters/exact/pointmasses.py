@@ -1,23 +1,4 @@
-"""The absolutely optimal filter itself: the Stratonovich equation by point masses, for scalar models.
-
-    p(x_k | y_0..k) = C p(y_k | x_k) Integral p(x_{k-1} | y_0..k-1) p(x_k | x_{k-1}) dx_{k-1}
-
-The posterior is held as masses on nodes (point masses), so the integral is a sum of normal kernels, one for each node.  Its
-estimate, the posterior mean, has the least mean square error of all filters: it bounds what any approximation can reach.
-
-The lab's noises are multiplicative: densities are many orders of magnitude narrower at the end of a run than at its
-beginning, and within one step the posterior may be thousands of times narrower than the prediction, far narrower than any
-fixed grid would see.  So each trajectory gets its own nodes at every step.  A step takes these ways, read in this order:
-
-exact_predictions  from a posterior to the next prediction: a sum of normal kernels (exact_kernels), also between the nodes
-                   (exact_narrow), or an integral over the noise (exact_noise)
-exact_places       where the new posterior lies: the states that explain the measurement
-exact_batch        nodes x = c + s sinh t there, Bayes' rule, and an estimate of the error: for many trajectories at once
-exact_roots        or, for a meter without noise, the few states that explain it
-exact_adaptive     for what they do not resolve, one trajectory at a time: panels that are halved until they do (exact_panels)
-exact_evidence     and how likely the measurement was, for who asks
-exact_smoothing    what the whole record tells, once it is there
-"""
+"""The exact filter by point masses: a step, the ways it may take, and the error that is carried from step to step."""
 
 from __future__ import annotations
 
@@ -29,14 +10,15 @@ import numpy as np
 from kfcourse.angles import moments_on_circle
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
-from kfcourse.filters.exact_adaptive import check_scalar, on_panels
-from kfcourse.filters.exact_batch import Place, Posteriors, posteriors
-from kfcourse.filters.exact_evidence import log_evidence
-from kfcourse.filters.exact_kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, of_prior
-from kfcourse.filters.exact_places import Candidates, hidden, likeliest, looked, spaced
-from kfcourse.filters.exact_predictions import predictions
-from kfcourse.filters.exact_roots import at_roots
-from kfcourse.filters.exact_smoothing import smoothed
+from kfcourse.filters.exact.adaptive import check_scalar, on_panels
+from kfcourse.filters.exact.batch import Place, Posteriors, posteriors
+from kfcourse.filters.exact.constants import ELEMENTS, MORE, NODES, TOLERABLE
+from kfcourse.filters.exact.evidence import log_evidence
+from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, of_prior
+from kfcourse.filters.exact.places import Candidates, hidden, likeliest, looked, spaced
+from kfcourse.filters.exact.prediction import predictions
+from kfcourse.filters.exact.roots import at_roots
+from kfcourse.filters.exact.smoothing import smoothed
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
@@ -44,12 +26,8 @@ from kfcourse.symbolic.reading import ModelError
 # Of the mean and the deviation at a step, in posterior standard deviations: their square, 1e-6 of the bound, is far below what
 # any number of trajectories tells.
 ACCURACY = 1e-3
-TOLERABLE = 1e-2  # error of a step that no way resolves better, before the filter gives up
-NODES = (33, 49, 65, 97, 129, 193, 257)  # that a posterior may have
-MORE = 1.9  # times more nodes than did not do
 SPACINGS = (0.5, 0.35, 0.25, 0.18, 0.12)  # of its nodes, tried one after the other
 FINE = (129, 257)  # nodes of a posterior that must be interpolated: the second if the first are too few to share its mass
-ELEMENTS = 2**20  # of kernels, that many trajectories at once
 MEMORY = 2**28  # bytes of predictions
 REMADE = 128  # trajectories whose predictions are made again at once
 

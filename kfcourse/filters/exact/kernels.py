@@ -2,7 +2,7 @@
 
     p(x') = Integral p(x) N(x'; m(x), sigma^2(x)) dx  =  sum_j mass_j N(x'; m(x_j), sigma^2(x_j))
 
-The sum is as good as the integral where the kernels of neighbouring nodes overlap.  Where they do not, `exact_narrow` puts more
+The sum is as good as the integral where the kernels of neighbouring nodes overlap.  Where they do not, `narrow` puts more
 nodes between them.
 """
 
@@ -14,17 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from kfcourse.filters.densities import ScalarDensities
+from kfcourse.filters.exact.constants import CACHED, LOWEST, NEGLIGIBLE, ROOT, WIDTH
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.reading import ModelError
 
-WIDTH = 8.0  # sigmas covered: 1e-15 of a normal law lies outside
-NEGLIGIBLE = 1e-14  # mass that may be left out
-ROOT = np.sqrt(2 * np.pi)
 # Sigmas of a kernel, in distances of the centres: a sum over every second node errs by exp(-pi^2 / 2 OVERLAP^2) = 6e-5.
 OVERLAP = 1.4
 SEEN = 1e-10  # mass of a node whose kernel need not overlap with its neighbours'
-LOWEST = 700.0  # exponentials of -LOWEST and less are nothing; NumPy takes ten times as long for those that underflow
-CACHED = 2**15  # elements of the largest array, 256 kB: it stays in the processor's cache
 
 
 def chunks(rows: int, elements: int, most: int) -> Iterator[slice]:

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import legendre
 
-from kfcourse.filters.exact_kernels import NEGLIGIBLE, Grid, Unresolved
+from kfcourse.filters.exact.constants import NEGLIGIBLE
+from kfcourse.filters.exact.kernels import Grid, Unresolved
 from kfcourse.laws import Array
 
 SPLITS = 40  # times a panel may be halved
-MOST = 20_000  # nodes of a posterior
+PANEL_NODES = 20_000  # nodes of a posterior
 
 
 @dataclass(frozen=True)
@@ -67,8 +68,8 @@ def resolve(
         mass, unresolved = panels.masses()
         total = np.bincount(panels.row, mass, len(borders))[panels.row]
         kept = mass > NEGLIGIBLE * total
-        if rule.nodes.size * np.bincount(panels.row[kept], minlength=1).max() > MOST:
-            raise Unresolved(f"the posterior needs more than {MOST:,} nodes")
+        if rule.nodes.size * np.bincount(panels.row[kept], minlength=1).max() > PANEL_NODES:
+            raise Unresolved(f"the posterior needs more than {PANEL_NODES:,} nodes")
         middle = 0.5 * (panels.left + panels.right)
         split = kept & (unresolved > rule.tolerance * total)
         split |= kept & (mass > rule.tolerance * total) & too_wide(panels.left, panels.right)

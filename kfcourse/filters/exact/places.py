@@ -11,18 +11,17 @@ from typing import NamedTuple
 import numpy as np
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_batch import Place
-from kfcourse.filters.exact_kernels import ROOT, Kernels, overlap
+from kfcourse.filters.exact.batch import Place
+from kfcourse.filters.exact.constants import LOOKED, NODES, ROOT, TAIL
+from kfcourse.filters.exact.kernels import Kernels, overlap
+from kfcourse.filters.exact.roots import halved
 from kfcourse.laws import Array
 
 HIDDEN = np.log(1e-12)  # mass of a hump that does not count
-LOOKED = 25  # nodes of a look
-TAIL = 1e-18  # mass at a node that is beyond the end of a posterior
 HUMP = 2.0  # widths of the highest hump, to both sides of its top, on which it is resolved
 FRACTIONS = np.linspace(0.1, 1, 5)  # scales that are tried: powers of the support's width in the hump's
-MOST = 257  # nodes of a posterior
 SEARCHED = 33  # points of the support that are looked at for a change of sign
-SECTIONS = np.linspace(0, 1, 17)  # of a bracket
+COARSELY = 8  # times a bracket is halved before Newton takes over
 EXPLANATIONS = 3  # roots that are followed: those nearest to the middle of the prediction
 
 
@@ -106,7 +105,7 @@ def spaced(look: Look, candidates: Candidates, law: ScalarDensities, spacing: fl
     """The place with which the fewest nodes do, and how many (T,).
 
     They do if the nodes of the highest hump, to both sides of its top, are no farther apart than `spacing` of its width, those at
-    other humps than theirs, and if the kernels of all nodes overlap.  Where that takes more than MOST, kernels do not count.
+    other humps than theirs, and if the kernels of all nodes overlap.  Where that takes more than NODES[-1], kernels do not count.
     """
     x, mass, centre, width, low, high = look
     with np.errstate(divide="ignore", invalid="ignore"):  # a support that is a single point: its error will be infinite
@@ -117,10 +116,10 @@ def spaced(look: Look, candidates: Candidates, law: ScalarDensities, spacing: fl
         by_humps = _densest(np.where(candidates.matter(), 1 / candidates.width, 0.0), candidates.centre - centre, scale)
         by_humps = np.maximum(by_humps, np.hypot(scale, HUMP * width) / (spacing * width))
         wanted = span * np.maximum(by_humps, by_kernels)
-        wanted = np.where(wanted.min(axis=1, keepdims=True) < MOST, wanted, span * by_humps)
+        wanted = np.where(wanted.min(axis=1, keepdims=True) < NODES[-1], wanted, span * by_humps)
     best = np.where(np.isnan(wanted), np.inf, wanted).argmin(axis=1)[:, None]
     number = np.take_along_axis(wanted, best, axis=1)[:, 0] + 1
-    return Place(centre, np.take_along_axis(scale, best, axis=1), low, high), np.where(np.isnan(number), MOST, number)
+    return Place(centre, np.take_along_axis(scale, best, axis=1), low, high), np.where(np.isnan(number), NODES[-1], number)
 
 
 def _densest(dense: Array, distance: Array, scale: Array) -> Array:
@@ -149,13 +148,7 @@ def explanations(
     places = np.argsort(np.where(change, middle, np.inf), axis=1, kind="stable")[:, :most]
     found = np.take_along_axis(change, places, axis=1)
     left, right = np.take_along_axis(x, places, axis=1), np.take_along_axis(x, places + 1, axis=1)
-    left_negative = np.take_along_axis(negative, places, axis=1)
-    for _ in range(2):
-        inner = left[:, :, None] + (right - left)[:, :, None] * SECTIONS
-        same = (law.residual(y[:, :, None], inner) > 0) == left_negative[:, :, None]
-        last = np.minimum(np.argmin(same, axis=2), len(SECTIONS) - 1)[:, :, None]
-        last = np.maximum(last, 1)
-        left, right = np.take_along_axis(inner, last - 1, axis=2)[:, :, 0], np.take_along_axis(inner, last, axis=2)[:, :, 0]
+    left, right = halved(lambda at: law.residual(y, at) > 0, left, right, COARSELY)
     root = 0.5 * (left + right)
     for _ in range(2):
         with np.errstate(divide="ignore", invalid="ignore"):

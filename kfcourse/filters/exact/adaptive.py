@@ -17,30 +17,30 @@ import scipy
 
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
-from kfcourse.filters.exact_batch import ROUNDING, Place
-from kfcourse.filters.exact_kernels import NEGLIGIBLE, ROOT, WIDTH, Grid, Kernels, Unresolved
-from kfcourse.filters.exact_panels import MOST, SPLITS, Rule, resolve
-from kfcourse.filters.exact_places import Candidates, explanations
+from kfcourse.filters.exact.batch import ROUNDING, Place
+from kfcourse.filters.exact.constants import ELEMENTS, NEGLIGIBLE, ROOT, WIDTH
+from kfcourse.filters.exact.kernels import Grid, Kernels, Unresolved
+from kfcourse.filters.exact.panels import PANEL_NODES, SPLITS, Rule, resolve
+from kfcourse.filters.exact.places import Candidates, explanations
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
 FAR = 37.0  # sigmas covered where a measurement contradicts the prediction: exp(-37^2 / 2) is the smallest number
 KERNEL = 3.0  # a panel is at most so many sigmas of the transition kernel wide, that the integral be smooth on it
-SECTIONS = np.linspace(0, 1, 257)  # of a bracket, in the search for a zero
+LAST_BIT = {"xtol": np.finfo(float).tiny, "rtol": 4 * np.finfo(float).eps, "maxiter": 2000}  # of a zero
 SCALES = (0.5, 2.0, WIDTH)  # distances, in kernel sigmas, of panel borders from the prediction's own centres
 QUANTILES = np.array([0.02, 0.25, 0.5, 0.75, 0.98])  # of the posterior, where those centres are
 BORDER = 1e-10  # of the density at the ends of the support, relative: beyond them there must be nothing
-ROUGH, FINE = Rule.of_order(8, 1e-4), Rule.of_order(12, 1e-7)  # of `on_panels`
+ROUGH_RULE, FINE_RULE = Rule.of_order(8, 1e-4), Rule.of_order(12, 1e-7)  # of `on_panels`
 TENTH = 1e-4  # accuracy from which on the rough one does
 AROUND = 11  # borders of first panels towards a hump
-HUMPS, SEARCHED = (
+HUMPS, HUMPS_SEARCHED = (
     40,
     129,
 )  # states that explain the measurement, to which first panels lead, and points among which they are sought
 SOME = 24  # kernels at which there are borders
 WORK = 1e8  # nodes times kernels of a trajectory at a time: a second
-ELEMENTS = 2**20  # of the largest array, 8 MB
 
 
 class Panels(NamedTuple):
@@ -74,7 +74,7 @@ def on_panels(
     Each with an estimate of its error in posterior standard deviations, see `resolve`; infinite if y contradicts the prediction
     so much that the posterior lies beyond its support.
     """
-    rule = ROUGH if accuracy >= TENTH else FINE
+    rule = ROUGH_RULE if accuracy >= TENTH else FINE_RULE
     found: list[tuple[Grid, float]] = [(Grid(*np.empty((3, 0))), np.inf)] * len(y)
     left = np.arange(len(y))
     for sigmas in (WIDTH, FAR):
@@ -109,7 +109,7 @@ def on_panels(
 def _first_borders(kernels: Kernels, y: Array, law: ScalarDensities, candidates: Candidates, sigmas: float) -> Array:
     """Borders (T, B) of panels: ever closer towards where humps may be, and at some of the prediction's kernels."""
     low, high = kernels.support(sigmas)
-    roots = explanations(kernels, y, law, low, high, HUMPS, SEARCHED)
+    roots = explanations(kernels, y, law, low, high, HUMPS, HUMPS_SEARCHED)
     if np.isfinite(roots).all(axis=1).any():
         raise Unresolved(f"more than {HUMPS - 1} states explain a measurement: too many humps for any number of nodes")
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -218,7 +218,7 @@ class _Bayes:
         """
 
         def log_density(x: Array) -> Array:
-            if x.size > MOST or x.size * mu.size > WORK:
+            if x.size > PANEL_NODES or x.size * mu.size > WORK:
                 raise Unresolved(
                     f"the posterior needs more than {x.size:,} nodes, the prediction is a sum of {mu.size:,} kernels"
                 )
@@ -244,20 +244,14 @@ class _Bayes:
         residual = self.residual(y, x)
         result = []
         for i in np.flatnonzero(np.signbit(residual[1:]) != np.signbit(residual[:-1])):
-            low, high = x[i], x[i + 1]
-            while True:  # shrink the bracket 256 times at each pass, to the last bit
-                inner = low + (high - low) * SECTIONS
-                j = int(np.argmax(np.signbit(self.residual(y, inner[1:])) != np.signbit(residual[i])))
-                if not inner[j + 1] - inner[j] < high - low:
-                    break
-                low, high = inner[j], inner[j + 1]
+            root = scipy.optimize.brentq(lambda at: self.residual(y, np.array([at]))[0], x[i], x[i + 1], **LAST_BIT)
             offsets = (borders[-1] - borders[0]) * 0.5 ** np.arange(SPLITS)
-            near = np.concatenate([low - offsets, low + offsets])
+            near = np.concatenate([root - offsets, root + offsets])
             # Stop approaching where the log-likelihood has become flat.
-            drop = self.log_likelihood(y, np.array([low])) - self.log_likelihood(y, near)
+            drop = self.log_likelihood(y, np.array([root])) - self.log_likelihood(y, near)
             flat = (drop < 0.5).reshape(2, -1).all(axis=0)
             last = int(np.argmax(flat)) + 1 if flat.any() else SPLITS
-            result += [low - offsets[:last], low + offsets[:last]]
+            result += [root - offsets[:last], root + offsets[:last]]
         found = np.concatenate([*result, np.empty(0)])
         return found[(found > borders[0]) & (found < borders[-1])]
 

@@ -1,8 +1,8 @@
 """From posteriors to predictions: which of the three ways a trajectory takes.
 
-exact_kernels  a kernel for each node, where neighbouring kernels overlap
-exact_narrow   more nodes between these, where they do not
-exact_noise    the integral over the noise, where too many more would be needed
+kernels  a kernel for each node, where neighbouring kernels overlap
+narrow   more nodes between these, where they do not
+noise    the integral over the noise, where too many more would be needed
 """
 
 from __future__ import annotations
@@ -12,15 +12,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, overlapping
-from kfcourse.filters.exact_narrow import Finer, refined
-from kfcourse.filters.exact_noise import by_noise
+from kfcourse.filters.exact.constants import ELEMENTS, FEW
+from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, overlapping
+from kfcourse.filters.exact.narrow import Finer, refined
+from kfcourse.filters.exact.noise import by_noise
 from kfcourse.laws import Array
 
-FEW = 6144  # nodes with which a sum of kernels is cheaper than the integral over the noise
-ELEMENTS = 2**19  # nodes that are refined at once, or put together: some 50 MB while it lasts
-MOST = 24_576  # nodes with which the largest array has 50 MB, and a step takes 50 ms
-PACKED = (256, 512, 768, 1024, 1536, 2048, 4096, 8192, 16_384, MOST)  # kernels up to which predictions are taken together
+KERNELS = 24_576  # nodes with which the largest array has 50 MB, and a step takes 50 ms
+PACKED = (256, 512, 768, 1024, 1536, 2048, 4096, 8192, 16_384, KERNELS)  # kernels up to which predictions are taken together
 
 
 def predictions(grids: Sequence[Grid], law: ScalarDensities) -> Iterator[tuple[Array, Kernels]]:
@@ -32,7 +31,7 @@ def predictions(grids: Sequence[Grid], law: ScalarDensities) -> Iterator[tuple[A
     finer: list[Finer] = []
     middle = np.empty((2, len(grids), 1))  # centre and width of each prediction
     for (size, uniform), members in groups.items():
-        for some in chunks(len(members), size, ELEMENTS):
+        for some in chunks(len(members), size, ELEMENTS // 2):
             rows = np.array(members[some])
             x, mass, density = _stacked([grids[i] for i in rows.tolist()], size)
             kernels = overlapping(x, mass, density, uniform, law)
@@ -44,7 +43,7 @@ def predictions(grids: Sequence[Grid], law: ScalarDensities) -> Iterator[tuple[A
                 continue
             if not too_narrow.all():
                 yield rows[~too_narrow], kernels.rows(~too_narrow)
-            for chunk in chunks(len(narrow), FEW, ELEMENTS):
+            for chunk in chunks(len(narrow), FEW, ELEMENTS // 2):
                 i = narrow[chunk]
                 found = refined(x[i], mass[i], law, FEW)
                 finer.append(found._replace(row=rows[i[found.row]]))
@@ -54,7 +53,7 @@ def predictions(grids: Sequence[Grid], law: ScalarDensities) -> Iterator[tuple[A
                         finer.append(way._replace(row=np.full(len(way.row), rows[j])))
                     else:
                         yield rows[j : j + 1], way
-                if sum(len(one.row) for one in finer) > ELEMENTS:
+                if sum(len(one.row) for one in finer) > ELEMENTS // 2:
                     yield from _packed(finer, *middle)
                     finer = []
     if finer:
@@ -66,7 +65,7 @@ def _far_narrower(grid: Grid, law: ScalarDensities, rough: Kernels) -> Kernels |
     try:
         return by_noise(grid, law, rough)
     except Unresolved:
-        found = refined(grid.x[None], grid.mass[None], law, MOST)
+        found = refined(grid.x[None], grid.mass[None], law, KERNELS)
         if not len(found.row):
             raise TooNarrow("the transition kernel is far narrower than the posterior") from None
         return found

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kfcourse.filters.densities import ScalarDensities
-from kfcourse.filters.exact_kernels import Kernels
+from kfcourse.filters.exact.kernels import Kernels
 from kfcourse.laws import Array
 
 ORDER = 32  # of the differences that tell a rough density: of a normal one, of nodes half a deviation apart, 1e-5 is left

@@ -1,0 +1,23 @@
+"""The absolutely optimal filter itself: the Stratonovich equation by point masses, for scalar models.
+
+    p(x_k | y_0..k) = C p(y_k | x_k) Integral p(x_{k-1} | y_0..k-1) p(x_k | x_{k-1}) dx_{k-1}
+
+The posterior is held as masses on nodes (point masses), so the integral is a sum of normal kernels, one for each node.  Its
+estimate, the posterior mean, has the least mean square error of all filters: it bounds what any approximation can reach.
+
+The lab's noises are multiplicative: densities are many orders of magnitude narrower at the end of a run than at its
+beginning, and within one step the posterior may be thousands of times narrower than the prediction, far narrower than any
+fixed grid would see.  So each trajectory gets its own nodes at every step.  A step takes these ways, read in this order:
+
+pointmasses  the filter: a step, its ways, and the budget of its error
+prediction   from a posterior to the next prediction: a sum of normal kernels (kernels), also between the nodes (narrow), or
+             an integral over the noise (noise)
+places       where the new posterior lies: the states that explain the measurement
+batch        nodes x = c + s sinh t there, Bayes' rule, and an estimate of the error: for many trajectories at once
+roots        or, for a meter without noise, the few states that explain it
+adaptive     for what they do not resolve, one trajectory at a time: panels that are halved until they do (panels)
+evidence     and how likely the measurement was, for who asks
+smoothing    what the whole record tells, once it is there
+jumps        the same of state and mode, for models that jump
+constants    what several of these share
+"""

@@ -1,0 +1,224 @@
+"""Figures that answer, each of one chapter, made as those of `explore`.
+
+one_measurement    ten minutes: the band of a filter does not depend on what is measured
+hidden_fault       consistency: three tests of a filter, and what is wrong with it
+slip               cycle slips: the error of a loop as a ball on the potential of its discriminator
+grid_step          the grid: masses that fall between the humps of a density
+who_leads          the front page: the order of the lab's filters over the step and the noises
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from kfcourse.lab.maps import ParameterMap
+from kfcourse.lab.short_names import LAB, title
+from kfcourse.laws import Array
+from kfcourse.linear.consistency import chi_squared_bounds
+from kfcourse.pages.browser import model_source
+from kfcourse.pages.explore import columns, drawn, line_style, rounded, value
+from kfcourse.symbolic import javascript
+from kfcourse.symbolic.model import Model
+
+Z_95 = 1.96  # of the standard normal law
+FAULTS = {  # multiples of Q and R that a wrong filter has
+    "Q is too small": (0.1, 1.0),
+    "Q is too large": (10.0, 1.0),
+    "R is too small": (1.0, 0.25),
+    "R is too large": (1.0, 4.0),
+    "nothing is": (1.0, 1.0),
+}
+HIDDEN = ("R is too small", "Q is too large", "nothing is", "R is too large", "Q is too small")
+EXAMPLE = "Q is too small"
+
+
+def one_measurement(
+    name: str,
+    step: Callable[..., tuple[sp.Expr, ...]],
+    x: Sequence[float],
+    y: Sequence[float],
+    at: int,
+    first: float,
+    prior: tuple[float, float],
+    noises: tuple[float, float],
+) -> str:
+    """A filter over a record of which one measurement can be moved, and the noises that it believes in.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure.
+    step : function
+        (lambda, Psi, y, Q, R) -> (z, p, next lambda, next Psi), also of SymPy's symbols: what the page shows is what runs.
+    x, y : sequence of float
+        States and measurements.
+    at : int
+        The step whose measurement is moved.
+    first : float
+        Where that measurement is shown first.
+    prior : (float, float)
+        Mean and variance before the first measurement.
+    noises : (float, float)
+        Variances of the noises by which the sliders of Q and R begin.
+    """
+    lam, Psi, measured, Q, R = sp.symbols("lambda Psi y Q R")
+    z, p, lam_next, Psi_next = step(lam, Psi, measured, Q, R)
+    given = {"lambda": lam, "Psi": Psi, "y": measured}
+    made = {"z": z, "half": sp.Float(Z_95) * sp.sqrt(p), "lambda": lam_next, "Psi": Psi_next}
+    loop = javascript.loop("step", columns(given), columns(made), coefficients={Q: "Q", R: "R"})
+    settings = {
+        "x": rounded([x])[0],
+        "y": rounded([y])[0],
+        "at": at,
+        "prior": prior,
+        "first": {"y": first, "Q": noises[0], "R": noises[1]},
+        "noises": (0.01, 100.0),
+    }
+    return drawn(name, "A filter and one measurement", "one-measurement", [loop], settings)
+
+
+def hidden_fault(name: str, model: Model, x: Array, y: Array) -> str:
+    """Tests of a filter that has wrong noises, for a reader who says which.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure.
+    model : Model
+        c x + e v, g x + f w, of which the records are.
+    x, y : ndarray (steps, runs)
+        States and measurements.
+
+    Raises
+    ------
+    ValueError
+        Parameters with other names.
+    """
+    if set(model.parameters) != set("cegf"):
+        raise ValueError(f"expected a model with the parameters c, e, g, f, got {', '.join(model.parameters)}")
+    steps, runs = x.shape
+    state, z, p, measured, h, F = sp.symbols("x z p y h F")
+    parts = [
+        f"const model = {model_source(model, ['aof-linearised'])};\n",
+        value("nees", {"x": state, "z": z, "p": p}, (state - z) ** 2 / p),
+        value("white", {"y": measured, "h": h, "F": F}, (measured - h) / sp.sqrt(F)),
+    ]
+    one_step = chi_squared_bounds(1, runs)
+    spread = Z_95 / np.sqrt(runs * (steps - 1))
+    shown = [("example", f"Example: its {EXAMPLE}", EXAMPLE)]
+    settings = {
+        "x": rounded(x),
+        "y": rounded(y),
+        "faults": FAULTS,
+        "hidden": shown + [(letter, f"Hidden {letter}", kind) for letter, kind in zip("ABCDE", HIDDEN, strict=True)],
+        "bounds": {"nees": one_step, "nis": one_step, "correlation": (-spread, spread)},
+    }
+    return drawn(name, "Which noise is wrong?", "hidden-fault", parts, settings)
+
+
+def slip(
+    name: str,
+    error: sp.Symbol,
+    noises: tuple[sp.Symbol, sp.Symbol],
+    sigma: sp.Symbol,
+    following: sp.Expr,
+    potential: sp.Expr,
+    draws: Array,
+    first: Mapping[str, float],
+    levels: tuple[float, float],
+) -> str:
+    """The error of a loop as a ball on a potential, and its trace.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure.
+    error, noises, sigma : Symbol
+        The error; noises of the meter and of the phase; noise of the meter, which a slider moves.
+    following, potential : Expr
+        The next error, and the potential, of them.
+    draws : ndarray (records, 2, steps)
+        Standard normal numbers for the two noises.
+    first : dict
+        "sigma", "draw" (1, 2, ...) and step "k" shown first.
+    levels : (float, float)
+        What sigma is moved between.
+    """
+    letters = {sigma: "sigma"}
+    given = {"Delta": error, "n": noises[0], "v": noises[1]}
+    parts = [
+        javascript.loop("step", columns(given), columns({"Delta": following}), coefficients=letters),
+        value("potential", {"Delta": error}, potential, letters),
+    ]
+    settings = {"noises": [rounded(one) for one in draws], "first": dict(first), "range": levels}
+    return drawn(name, "A ball on the potential", "slip", parts, settings)
+
+
+def grid_step(
+    name: str, x: sp.Symbol, density: sp.Expr, first: float, places: tuple[float, float], steps: tuple[float, float]
+) -> str:
+    """A density and its masses on nodes whose distance can be moved.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure.
+    x : Symbol
+    density : Expr
+        Of x, up to a constant.
+    first : float
+        The distance shown first.
+    places, steps : (float, float)
+        Where the nodes are, and what their distance is moved between.
+    """
+    settings = {"first": first, "low": places[0], "high": places[1], "least": steps[0], "most": steps[1]}
+    return drawn(name, "Masses on a grid", "grid-step", [value("density", {"x": x}, density)], settings)
+
+
+def leading(found: ParameterMap, names: Iterable[str] = LAB) -> dict[str, Any]:
+    """What `who_leads` shows of a map whose first parameter has one value: in per cent, with 95 % intervals.
+
+    Returns
+    -------
+    dict
+        "trajectories" that the exact filter had; "ratios" of the second parameter to the first; "gaps", of each ratio and step
+        [value, low, high] by filter; "leaders", of each ratio and step the most accurate filter and how many others are not
+        significantly worse.
+    """
+    ratios, gaps, leaders = [], [], []
+    for (first, second), result in found.cells.items():
+        ratios.append(float(f"{second / first:.3g}"))
+        steps = range(len(result.gap(LAB[0]).value))
+        of = {name: (result.gap(name).value, *result.gap(name).interval(0.95)) for name in names}
+        gaps.append([{name: [round(100 * float(one[k]), 4) for one in parts] for name, parts in of.items()} for k in steps])
+        order = [result.leaders(k) for k in steps]
+        leaders.append([(best, len(others)) for best, *others in order])
+    exact = min(result.subset_runs for result in found.cells.values())
+    return {"trajectories": exact, "ratios": ratios, "gaps": gaps, "leaders": leaders}
+
+
+def who_leads(name: str, found: Mapping[str, Any], first: tuple[int, float]) -> str:
+    """The order of filters over the step and a ratio of noises.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure.
+    found : dict
+        As `leading` returns it.
+    first : (int, float)
+        Step and ratio shown first.
+    """
+    looks = {one: {"label": title(one), **line_style(one)} for one in found["gaps"][0][0]}
+    kinds = {look["colour"]: look["label"].lstrip("GL") for look in looks.values()}
+    settings = {
+        **found,
+        "looks": looks,
+        "kinds": [{"label": label, "colour": colour, "width": 9} for colour, label in kinds.items()],
+        "first": {"k": first[0], "ratio": found["ratios"].index(first[1])},
+    }
+    return drawn(name, "Which filter is the most accurate", "who-leads", [], settings)

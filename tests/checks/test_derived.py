@@ -1,0 +1,124 @@
+"""Derivations as answers: which line and which term are named, what right steps are worth, what is refused in words."""
+
+from functools import cache
+
+import pytest
+
+from kfcourse.checks import exercise
+from kfcourse.lab.variants import load_variants
+
+BEGIN = "F = M[(y - h)^2]"
+END = "g^2*d + f^2*(m^4 + 6*m^2*d + 3*d^2)"
+NOISE = {"state": "c*x + v", "meter": "x + x**2*w", "parameters": {"c": 0.5}, "meter_noise": {"variance": 2}}
+TIMED = {"state": "c*x + v + 0.1*k", "meter": "x + x**2*w", "parameters": {"c": 0.5}}
+ODD = {"state": "c*x + v", "meter": "x*(1 + w)**2", "parameters": {"c": 0.5}}  # its noise is squared: M[w^4]
+
+
+@cache
+def opened(variant="53"):
+    return exercise("a", variant)
+
+
+def told(*lines):
+    task = opened()
+    task.past.given.clear()
+    return task.check("a7", lambda: "\n = ".join(lines))
+
+
+@pytest.mark.parametrize("variant", load_variants())
+def test_every_variant_has_a_right_derivation(variant):
+    task = exercise("a", variant)
+    assert task.derivation.model == task.model
+    assert task.check("a7", lambda: task.derivation.text).passed
+
+
+@pytest.mark.parametrize(("table", "own"), [(NOISE, False), (TIMED, False), (ODD, True)])
+def test_where_derivations_are_not_checked_the_course_s_model_is_asked_for(table, own):
+    task = exercise("a", {"name": "mine", **table})
+    assert (task.derivation.model == task.model) is own
+    assert task.check("a7", lambda: task.derivation.text).passed
+
+
+def test_line_term_and_rule_are_named_and_what_stands_on_top_is_right():
+    result = told(BEGIN, "g^2*d + f^2*M[x^4]", "g^2*d + 3*f^2*d^2", "d*(g^2 + 3*f^2*d)")
+    assert (result.status, result.diagnosis, result.share) == ("wrong", ("moment",), 0.75)
+    named = ("line 3, `g^2*d + 3*f^2*d^2`", "`3*f^2*d^2` is not right", "Moments of a normal law", "right on top of it (1 step)")
+    assert all(words in result.message for words in named)
+    assert "3 of 4 steps are right" in result.message and "\n" not in result.message
+
+
+def test_a_second_slip_is_named_too_and_costs_another_step():
+    result = told(BEGIN, "g^2*d + f^2*M[x^4]", "g^2*d + 3*f^2*d^2", "d*(g^2 - 3*f^2*d)")
+    assert "slip of its own in line 4" in result.message
+    assert result.share == 0.5
+
+
+def test_the_hint_does_not_hold_the_right_line():
+    result = told(BEGIN, "g^2*d + f^2*M[x^4]", "g^2*d + 3*f^2*d^2")
+    assert not any(part in result.message.replace(" ", "") for part in ("6*m^2*d", "m^4", "6*d*m^2"))
+
+
+def test_the_same_again_gets_the_advice():
+    task = opened()
+    task.past.given.clear()
+    lines = lambda: f"{BEGIN}\n = g^2*d"  # noqa: E731
+    assert "cross out" not in task.check("a7", lines).message
+    assert "cross out" in task.check("a7", lines).message
+
+
+def test_a_step_can_be_split_up_at_will_and_earns_no_more():
+    """Rewriting one line again and again does not hide that the next is wrong, nor that there is no end."""
+    padding = [f"M[(y - h)^2] + {k} - {k}" for k in range(9)]
+    assert told(BEGIN, *padding, "g^2*d").share == 0.8
+    assert told(BEGIN, *padding).share == 0.4
+    assert told(BEGIN, *["M[(y - h)^2]"] * 9, "g^2*d").share == 0.5
+
+
+@pytest.mark.parametrize(
+    ("kind", "words", "lines"),
+    [
+        ("open-end", "a mean is still to be taken", [BEGIN, "M[y^2] - h^2"]),
+        ("open-end", "still has h in it", [BEGIN, "M[y^2] - h^2", "g^2*(m^2 + d) + f^2*(m^4 + 6*m^2*d + 3*d^2) - h^2"]),
+        ("open-end", "still has F in it", ["F = F", "F + 0"]),
+        ("steps-missing", "begin with a mean", [f"F = {END}", f"{END} + 0", f"0 + {END}"]),
+        ("steps-missing", "3 different lines", [BEGIN, END, END]),
+        ("unreadable", "cannot be read at column", [BEGIN, "g^2*d + f^2*M[x^4]", "g^2*d + 3*f^2*d^2*"]),
+    ],
+)
+def test_a_right_end_is_not_all(kind, words, lines):
+    result = told(*lines)
+    assert (result.status, result.diagnosis) == ("wrong", (kind,))
+    assert words in result.message and 0 < result.share < 1
+
+
+def test_other_chains_may_stand_before_but_give_no_letter_another_meaning():
+    assert told("h = M[y]", "g*M[x]", f"g*m\n{BEGIN}", "g^2*d + f^2*M[x^4]", END).passed
+    assert told(f"letters q\nq = M[x^4]\n = m^4 + 6*m^2*d + 3*d^2\n{BEGIN}", "g^2*d + f^2*q", END).passed
+    wrong = told(f"h = 0\n{BEGIN}", "M[y^2]", "g^2*(m^2 + d) + f^2*(m^4 + 6*m^2*d + 3*d^2)")
+    assert wrong.status == "wrong" and wrong.message.startswith("line 1, `0`: the line differs from what h means")
+    for name in ("x", "w", "m", "g"):
+        assert f"what {name} means is given" in told(f"{name} = 1\n{BEGIN}", END).message
+
+
+HOSTILE = {
+    "call": "F = __import__('os').system('true')",
+    "attribute": "F = x.__class__",
+    "deep": "F = " + "(" * 900 + "x" + ")" * 900,
+    "tower": "F = 9^9^9^9",
+    "long": "F = " + "+".join(["x"] * 9000),
+    "many": "F = x\n" + " = x\n" * 100,
+    "zero byte": "F = x\0",
+    "unicode": "F = х^2",  # Cyrillic
+    "no name": " = 5",
+    "lambda": "F = (lambda: 1)()",
+    "twice": f"{BEGIN}\n{BEGIN}",
+    "heading": f"x ~ N(a, b)\n{BEGIN}",
+    "division": "F = 1/(x - x)",
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_what_cannot_be_read_is_refused_in_words(name):
+    result = opened().check("a7", lambda: HOSTILE[name])
+    assert (result.status, result.trouble) == ("unusable", "")
+    assert 20 < len(result.message) < 600 and "\n" not in result.message

@@ -1,0 +1,219 @@
+"""Transitions that depend on the state: simulated, in the filters, in the exact one, and what is refused."""
+
+import numpy as np
+import pytest
+
+from kfcourse import JumpModel, Model, ModelError, compare, gaussian, linearised, run, simulate
+from kfcourse.filters import gpb2, imm, jump_pointmass, logic_dynamic, logic_dynamic_fos, pointmass
+from kfcourse.filters.state_transitions import by_state
+from kfcourse.laws import Gaussian
+from kfcourse.symbolic.averaging import averaged, averaged_equations
+
+pytestmark = pytest.mark.quick
+
+SENSOR = {"sound": {"parameters": {"C": 1.0}}, "faulty": {"parameters": {"C": 10.0}}}
+FAR = [["0.98*exp(-x**2/8)", "1 - 0.98*exp(-x**2/8)"], ["0.3*exp(-x**2/8)", "1 - 0.3*exp(-x**2/8)"]]
+
+
+def overloaded(transition=FAR, modes=SENSOR, state="0.9*x + 0.7*v", **options):
+    given = {"first": [0.9, 0.1], "prior": {"mean": 0.5, "variance": 3}} | options
+    return JumpModel.define(state, "x + C*w", modes=modes, transition=transition, **given)
+
+
+def probabilities(x):
+    """Of a failure next, from sound and from faulty, straight from the formulas."""
+    near = np.exp(-x * x / 8)
+    return np.stack([1 - 0.98 * near, 1 - 0.3 * near], axis=-1)
+
+
+def of(build, model, kind=gaussian):
+    return build([kind(mode) for mode in model.modes], model, model.first)
+
+
+@pytest.mark.parametrize("build", [imm, logic_dynamic, gpb2])
+def test_a_constant_formula_is_the_constant_matrix_bit_for_bit(build):
+    numbers = overloaded([[0.9, 0.1], [0.3, 0.7]])
+    formulas = overloaded([["0.9 + 0*x", "0.1 + x - x"], ["0.3*x/x", "0.35*2"]])
+    assert not formulas.by_state
+    drawn = [simulate(one, 20, 10, seed=1) for one in (numbers, formulas)]
+    for left, right in zip(*drawn, strict=True):
+        np.testing.assert_array_equal(left, right)
+    found = [run(of(build, one), drawn[0].y) for one in (numbers, formulas)]
+    for left, right in zip(*found, strict=True):
+        np.testing.assert_array_equal(left, right)
+
+
+@pytest.mark.parametrize("build", [imm, logic_dynamic, gpb2])
+@pytest.mark.parametrize("kind", [gaussian, linearised])
+def test_probabilities_that_hardly_vary_are_the_constant_ones(build, kind):
+    """1e-14 x changes nothing that is seen, but takes the way by quadrature."""
+    modes = SENSOR | {"third": {"state": "x - 0.4*sin(x) + 0.4*v", "parameters": {"C": 2}}}
+    rest, first = [[0.3, 0.6, 0.1], [0.2, 0.2, 0.6]], [0.8, 0.1, 0.1]
+    numbers = overloaded([[0.9, 0.06, 0.04], *rest], modes, first=first)
+    formulas = overloaded([["0.9 + 1e-14*x", "0.06 - 1e-14*x", 0.04], *rest], modes, first=first)
+    assert formulas.by_state
+    y = simulate(numbers, 6, 15, seed=1).y
+    y[4, 0] = np.nan
+    found = [run(of(build, one, kind), y) for one in (numbers, formulas)]
+    for left, right in zip(*found, strict=True):
+        np.testing.assert_allclose(left, right, rtol=1e-9, atol=1e-9)
+
+
+def test_trajectories_follow_the_state():
+    x, _, mode = simulate(overloaded(), 40_000, 4, seed=2)
+    for k in range(3):
+        for i in (0, 1):
+            there = mode[k] == i
+            p = probabilities(x[k, there, 0])[:, i]
+            away = (mode[k + 1, there] == 1) - p
+            for part in (away, away * (np.abs(x[k, there, 0]) > 1.5)):
+                assert abs(part.sum()) < 4 * np.sqrt((p * (1 - p)).sum())
+
+
+def test_the_prediction_has_the_weighted_moments():
+    """lambda_j, Psi_j, c_j after one measurement, by integrals on a fine grid: exact for an affine object."""
+    model = overloaded(modes={"sound": SENSOR["sound"], "faulty": {"state": "1.2*x + 1 + 0.3*v", "parameters": {"C": 3.0}}})
+    value, x = 1.7, np.linspace(-25, 25, 200_001)
+    state = of(logic_dynamic, model).step(of(logic_dynamic, model).init(1), np.array([[value]]))
+    density = []
+    for q, C in zip((0.9, 0.1), (1.0, 3.0), strict=True):
+        density.append(q * np.exp(-((x - 0.5) ** 2) / 6 - (value - x) ** 2 / (2 * C * C)) / C)
+    density = np.array(density) / np.sum(density)
+    to_faulty = probabilities(x).T
+    for j, (a, r, s) in enumerate(((0.9, 0.0, 0.7), (1.2, 1.0, 0.3))):
+        weight = (density * (to_faulty if j else 1 - to_faulty)).sum(axis=0)
+        c, moved = weight.sum(), a * x + r
+        mean = weight @ moved / c
+        assert state.memory.expected[0, j] == pytest.approx(c, rel=1e-6)
+        law = state.memory.predicted[j]
+        assert law.mean[0, 0] == pytest.approx(mean, rel=1e-6)
+        assert law.cov[0, 0, 0] == pytest.approx(weight @ (moved - mean) ** 2 / c + s * s, rel=1e-6)
+
+
+def test_components_that_the_chain_does_not_contain_follow_by_regression():
+    """Against the moments of drawn states, weighted by pi(x2), for a law whose components are correlated."""
+    model = JumpModel.define(
+        ["x1 + x2 + v1", "x2 + v2", "x3 + v3"], ["x1 + C*w1"], {"C": 1.0}, modes={"a": {}, "b": {"parameters": {"C": 3}}},
+        transition=[["1/(1 + exp(x2))", "1 - 1/(1 + exp(x2))"], ["0.5 + 0.4*sin(x2)", "0.5 - 0.4*sin(x2)"]], first=[0.5, 0.5],
+    )  # fmt: skip
+    rng, size = np.random.default_rng(1), 400_000
+    mean, root = np.array([[0.3, -0.8, 1.0]]), np.array([[1.0, 0.0, 0.0], [0.6, 0.9, 0.0], [-0.4, 0.5, 0.3]])
+    nu, laws = by_state(model)(0, [Gaussian(mean, (root @ root.T)[None])] * 2)
+    x = mean + rng.normal(size=(size, 3)) @ root.T
+    for i, first in enumerate((1 / (1 + np.exp(x[:, 1])), 0.5 + 0.4 * np.sin(x[:, 1]))):
+        for j, p in enumerate((first, 1 - first)):
+            assert abs(p.mean() - nu[0, i, j]) < 4 * p.std() / np.sqrt(size)
+            law = laws[i][j]
+            away = x - law.mean
+            pairs = [away[:, a] for a in range(3)]
+            pairs += [away[:, a] * away[:, b] - law.cov[0, a, b] for a in range(3) for b in range(a, 3)]
+            for part in pairs:  # M[part pi] = 0
+                assert abs((part * p).mean()) < 4 * (part * p).std() / np.sqrt(size)
+
+
+def test_the_exact_filter_is_a_plain_grid_of_both():
+    model, x = overloaded(), np.linspace(-14, 14, 3001)
+    y = simulate(model, 3, 8, seed=5).y
+    one = jump_pointmass(model)
+    state, step = one.init(3), x[1] - x[0]
+    prior = np.exp(-((x - 0.5) ** 2) / 6)
+    grids = [np.stack([0.9 * prior, 0.1 * prior]) for _ in range(3)]
+    kernel = np.exp(-0.5 * ((x[:, None] - 0.9 * x) / 0.7) ** 2) * step
+    to_faulty = probabilities(x).T
+    for k in range(8):
+        state = one.step(state, y[k])
+        for trajectory, value in enumerate(y[k, :, 0]):
+            density = grids[trajectory]
+            for j, C in enumerate((1.0, 10.0)):
+                density[j] *= np.exp(-0.5 * ((value - x) / C) ** 2) / C
+            density /= density.sum()
+            z = density.sum(axis=0) @ x
+            variance = density.sum(axis=0) @ (x - z) ** 2
+            assert abs(state.posterior.mean[trajectory, 0] - z) < 2e-3 * np.sqrt(variance), k
+            assert abs(state.posterior.cov[trajectory, 0, 0] / variance - 1) < 4e-3, k
+            np.testing.assert_allclose(state.memory.probability[trajectory], density.sum(axis=1), atol=2e-3)
+            faulty = (to_faulty * density).sum(axis=0)
+            grids[trajectory] = np.stack([kernel @ (density.sum(axis=0) - faulty), kernel @ faulty])
+    assert (state.memory.discretisation_error() < 1e-2).all()
+
+
+def test_equal_modes_say_nothing_of_the_state_however_they_follow_it():
+    model = overloaded(modes={"one": {"parameters": {"C": 1}}, "other": {"parameters": {"C": 1}}})
+    y = simulate(model, 8, 6, seed=3).y
+    found, expected = run(jump_pointmass(model), y), run(pointmass(model.modes[0]), y)
+    assert (np.abs(found.mean - expected.mean) < 2e-3 * np.sqrt(expected.cov[..., 0])).all()
+
+
+def test_who_knows_of_the_state_gains():
+    """Against the same filter with the mean of the probabilities; nobody is below the bound."""
+    model = overloaded()
+    mode = simulate(model, 20_000, 20, seed=9).mode
+    rows = [(mode[1:] == 1)[mode[:-1] == i].mean() for i in (0, 1)]
+    without = logic_dynamic([gaussian(one) for one in model.modes], [[1 - p, p] for p in rows], model.first, name="aof-without")
+    result = compare(
+        [of(logic_dynamic, model), of(gpb2, model), without, jump_pointmass(model)], model, 4000, 12, 1, subset_runs=160,
+        progress=False, threads=1,
+    )  # fmt: skip
+    gain = result.mean_gap_difference("aof-without", "aof-jump-gaussian", slice(3, None))
+    assert gain.value > 4 * gain.standard_error
+    for _, gap in result.ranking():
+        assert gap.value > -4 * gap.standard_error
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda model: averaged(model, []), "the average over the modes: .* nobody knows the probabilities"),
+        (averaged_equations, "nobody knows the probabilities.*aof-jump-gaussian"),
+        (lambda model: logic_dynamic_fos(model, []), "the logic-dynamic FOS"),
+        (lambda model: model.law_at(3), "the law of the modes"),
+        (lambda model: model.transition_at(3), "a matrix of transitions"),
+    ],
+)
+def test_what_needs_the_law_of_the_modes_is_refused(build, message):
+    with pytest.raises(ModelError, match=message):
+        build(overloaded())
+
+
+def test_jumps_of_the_probabilities_are_refused_by_who_integrates_them():
+    model = overloaded([["Heaviside(1 - x)", "1 - Heaviside(1 - x)"], [0.3, 0.7]])
+    with pytest.raises(ModelError, match="from mode sound change too abruptly"):
+        of(logic_dynamic, model)
+    with pytest.raises(ModelError, match=r"step \d of .* too abruptly .*--exact-runs 0"):
+        run(jump_pointmass(model), simulate(model, 40, 8, seed=1).y)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"transition": [["1 - x/20", "x/20"], [0.3, 0.7]]}, r"at step 0, where x = -?[\d.]+: row 1 has an entry that is no"),
+        ({"transition": [["exp(-x**2)", "0.5"], [0.3, 0.7]]}, r"at step 0, where x = [\d.]+: row 1 sums to"),
+        ({"transition": ["exp(-x**2)", "1 - exp(-x**2)"], "first": None}, "`first` is missing"),
+        ({"transition": [["1 - 0*x", "0*x"], [0.3, 0.7]], "first": [1, 0]}, "the mode faulty is never reached"),
+    ],
+)
+def test_what_is_no_probability_for_some_state_is_refused(changes, message):
+    with pytest.raises(ModelError, match=message):
+        overloaded(**changes)
+
+
+def test_transitions_of_many_components_are_refused():
+    names = [f"x{i + 1}" for i in range(4)]
+    p = "exp(-x1**2 - x2**2 - x3**2 - x4**2)"
+    model = JumpModel.define(
+        [f"{name} + v" for name in names], ["x1 + C*w"], {"C": 1}, modes={"a": {}, "b": {"parameters": {"C": 2}}},
+        transition=[[p, f"1 - {p}"], [0.5, 0.5]], first=[0.5, 0.5],
+    )  # fmt: skip
+    with pytest.raises(ModelError, match="depend on 4 components"):
+        of(imm, model, linearised)
+
+
+def test_a_chain_of_one_state_is_still_a_model():
+    """One mode: whatever the formula says it is 1."""
+    model = JumpModel.define("0.9*x + v", "x + w", modes={"only": {}}, transition=[["1 + 1e-99*x"]], first=[1])
+    plain = Model.define("0.9*x + v", "x + w")
+    y = simulate(plain, 4, 6, seed=1).y
+    assert model.by_state
+    np.testing.assert_allclose(
+        run(of(logic_dynamic, model), y).mean, run(logic_dynamic([gaussian(plain)], [[1.0]]), y).mean, rtol=1e-10
+    )

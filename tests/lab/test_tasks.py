@@ -1,0 +1,152 @@
+"""The school's test tasks: shipped as the note has them, with formulas worked out there by hand."""
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from kfcourse import JumpModel, Model, cli, compare, gaussian, lab_filters, linearised, load_variants, simulate
+from kfcourse.filters import aof, logic_dynamic
+from kfcourse.lab.short_names import JumpStructures
+from kfcourse.lab.variants import VariantError, find_variant, read_variant, read_variants
+
+pytestmark = pytest.mark.quick
+
+TASKS = {name: find_variant(name) for name in ("D1", "D2", "D3", "J1", "J2", "J3", "J4")}
+
+
+def law(model, seed, spread=0.1):
+    """A mean and a covariance such as a filter may meet, near the prior."""
+    rng = np.random.default_rng(seed)
+    root = np.sqrt(np.diagonal(model.prior.cov))
+    mixing = np.eye(model.n) + 0.3 * rng.normal(size=(model.n, model.n))
+    cov = mixing @ mixing.T * np.outer(root, root)
+    return model.prior.mean + spread * root * rng.normal(size=model.n), cov
+
+
+def test_each_is_a_variant_of_its_own_and_none_is_for_the_exercises():
+    assert set(TASKS) <= set(read_variants()[0])
+    assert not set(TASKS) & set(load_variants())
+    assert [name for name, one in TASKS.items() if isinstance(one.model, JumpModel)] == ["J1", "J2", "J3", "J4"]
+    assert (TASKS["D1"].steps, TASKS["D2"].steps, TASKS["D3"].steps) == (21, 51, 101)
+
+
+def test_each_stays_finite_for_as_long_as_the_lab_runs():
+    for name, task in TASKS.items():
+        assert np.isfinite(simulate(task.model, 20_000, task.steps, seed=1).x).all(), name
+
+
+def test_d1_has_the_structural_functions_of_the_note():
+    (m,), ((d,),) = law(TASKS["D1"].model, 1)
+    m, d = m + 2, d + 0.5
+    for kind, more in ((gaussian, 1), (linearised, 0)):
+        one = kind(TASKS["D1"].model)
+        tau, theta = one.predict(np.array([m]), np.array([[d]]))
+        h, G, F, _ = one.measure(np.array([m]), np.array([[d]]))
+        slope = 1.02 + 0.4 * m
+        expected = (
+            1.05 * m,
+            1.05**2 * d + 0.01**2 * (m**4 + more * (6 * m * m * d + 3 * d * d)),
+            1.02 * m + 0.2 * (m * m + more * d),
+            slope,
+            slope**2 * d + 1 + more * 2 * 0.2**2 * d * d,
+        )
+        np.testing.assert_allclose([np.squeeze(value) for value in (tau, theta, h, G, F)], expected, rtol=1e-12)
+
+
+def test_d2_has_the_structural_functions_of_the_note():
+    model, T = TASKS["D2"].model, 0.1
+    m, d = law(model, 2)
+    one = gaussian(model)
+    tau, theta = one.predict(m, d)
+    square = m[0] ** 2 * m[1] + 2 * m[0] * d[0, 1] + m[1] * d[0, 0]  # M[x1^2 x2]
+    drift = -((0.1 * np.pi) ** 2) * m[0] + m[1] - 0.25 * square
+    np.testing.assert_allclose(tau, [m[0] + T * m[1], m[1] + T * drift], rtol=1e-9)
+    # Cov of the noiseless part by quadrature, exact for its degree, and the noise of variance T (m1^2 + d11)
+    points, weights = np.polynomial.hermite_e.hermegauss(8)
+    s = np.stack(np.meshgrid(points, points), axis=-1).reshape(-1, 2)
+    w = np.outer(weights, weights).ravel() / (2 * np.pi)
+    x1, x2 = (m + s @ np.linalg.cholesky(d).T).T
+    moved = np.stack([x1 + T * x2, x2 + T * (-((0.1 * np.pi) ** 2) * x1 + x2 * (1 - 0.25 * x1 * x1))], axis=1)
+    away = moved - w @ moved
+    noise = np.diag([0, T * (m[0] ** 2 + d[0, 0])])
+    np.testing.assert_allclose(theta, (w[:, None] * away).T @ away + noise, rtol=1e-9, atol=1e-12)
+    h, G, F, _ = one.measure(m, d)
+    np.testing.assert_allclose(h, [m[0] ** 2 + d[0, 0], m[1]], rtol=1e-12)
+    np.testing.assert_allclose(G, [[2 * m[0], 0], [0, 1]], rtol=1e-12, atol=1e-15)
+    cross = 2 * m[0] * d[0, 1]
+    expected = [[4 * m[0] ** 2 * d[0, 0] + 2 * d[0, 0] ** 2 + 1, cross], [cross, d[1, 1] + 1]]
+    np.testing.assert_allclose(F, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("k", "sign"), [(20, -1), (45, 0), (46, 1)])
+@pytest.mark.parametrize("name", ["D3", "J3", "J4"])
+def test_the_meter_of_the_landing_has_the_jacobian_of_the_note(name, k, sign):
+    """Columns 2 E rho / x1, E (-rho_2, rho_1), -beta E rho; in J4 those of density, lift and vertical, all times gamma."""
+    model = TASKS[name].model
+    modes = (
+        [(model, 1.0)] if isinstance(model, Model) else list(zip(model.modes, (1.0, {"J3": 0.01, "J4": 0.1}[name]), strict=True))
+    )
+    for mode, gamma in modes:
+        m, d = law(mode, 3)
+        h, G, _, R = linearised(mode).at(k).measure(m, d)
+        speed, angle, height = m[:3]
+        density, lift, theta = (m[3], m[4], angle - m[5]) if name == "J4" else (0.0433333, 0.3, angle)
+        E, kappa = density * speed**2 * np.exp(-0.09 * height), lift * sign
+        rho = np.array([np.cos(theta) - kappa * np.sin(theta), np.sin(theta) + kappa * np.cos(theta)])
+        turned = np.array([-rho[1], rho[0]])
+        columns = [2 * E * rho / speed, E * turned, -0.09 * E * rho]
+        if name == "J4":
+            columns += [E * rho / density, E * sign * np.array([-np.sin(theta), np.cos(theta)]), -E * turned]
+        np.testing.assert_allclose(h, gamma * E * rho, rtol=1e-9)
+        np.testing.assert_allclose(G, gamma * np.column_stack(columns), rtol=1e-9, atol=1e-18)
+        additive = 4e-14 if name == "D3" else 4e-10
+        np.testing.assert_allclose(R, gamma**2 * np.diag(E**2 * rho**2 * 1e-4 + additive), rtol=1e-9, atol=1e-30)
+
+
+@pytest.mark.parametrize("name", ["D3", "J3", "J4"])
+def test_the_lift_is_switched_at_45_s(name):
+    """The path angle's step without what gravity and the planet's curvature make of it: c kappa(t) x1 exp(-beta x3)."""
+    model = TASKS[name].model
+    x = simulate(model, 50, 60, seed=2).x
+    one = model if isinstance(model, Model) else model.modes[0]
+    g0 = float(one.parameters["g0"])
+    speed, angle, height = np.moveaxis(x[..., :3], -1, 0)
+    density, lift = (x[..., 3], x[..., 4]) if name == "J4" else (0.0433333, 0.3)
+    turned = np.diff(angle, axis=0) - (np.cos(angle) * (speed / (3400 + height) - g0 / speed))[:-1]
+    push = (density * lift * speed * np.exp(-0.09 * height))[:-1]
+    signs = np.sign(np.arange(59) - 45.0)
+    np.testing.assert_allclose(turned, signs[:, None] * push, rtol=1e-6, atol=1e-12)
+
+
+def test_j4_knows_neither_density_nor_lift_nor_vertical():
+    x = simulate(TASKS["J4"].model, 4000, 3, seed=1).x
+    np.testing.assert_array_equal(x[0, :, 3:], x[2, :, 3:])
+    for column, mean, deviation in ((3, 0.0433333, 0.00433333), (4, 0.3, 0.02), (5, 0.0, 0.017453)):
+        sample = x[0, :, column]
+        assert abs(sample.mean() - mean) < 4 * deviation / np.sqrt(4000)
+        assert abs(sample.std() / deviation - 1) < 4 / np.sqrt(2 * 4000)
+
+
+def test_filters_of_the_tasks_gain_from_their_measurements():
+    """Each of the lab's on D2 is better than the state's own spread; with modes on J4, better than who only averages them."""
+    result = compare(lab_filters(TASKS["D2"].model), TASKS["D2"].model, 1000, 30, 1, progress=False, threads=1)
+    spread = simulate(TASKS["D2"].model, 1000, 30, seed=2).x[-1].var(axis=0).sum()
+    assert all(result.error_variance(name).value[-1] < 0.1 * spread for name in result.available)
+    found = JumpStructures(TASKS["J4"].model)
+    both = [logic_dynamic(found.linearised, *found.chain), aof(found.averaged)]
+    result = compare(both, TASKS["J4"].model, 1000, 40, 1, progress=False, threads=1)
+    gain = result.mean_gap_difference("aof-averaged", "aof-jump-linearised", slice(20, None))
+    assert gain.value > 4 * gain.standard_error
+
+
+@pytest.mark.parametrize("steps", [0, -3, 2.5, True, "many"])
+def test_a_variant_says_how_many_steps_in_a_whole_number(steps):
+    with pytest.raises(VariantError, match="variant a in here: `steps` must be a positive whole number of measurements, got"):
+        read_variant("a", {"state": "x + v", "meter": "x + w", "steps": steps}, "here")
+
+
+def test_the_lab_takes_the_steps_of_the_variant(tmp_path):
+    few = ("--runs", "300", "--exact-runs", "0", "--filters", "duof", "--designs", "1")
+    result = CliRunner().invoke(cli.main, ["lab", "D1", *few, "--out", str(tmp_path / "r"), "--json", str(tmp_path / "n")])
+    assert result.exit_code == 0, result.output
+    assert '"steps": 21,' in (tmp_path / "n").read_text()

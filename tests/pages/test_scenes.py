@@ -1,0 +1,290 @@
+"""Figures of chapters that answer, by keyboard and pointer: their numbers are the package's or NumPy's; a link keeps them."""
+
+from __future__ import annotations
+
+import gzip
+import json
+
+import numpy as np
+import pytest
+from answering import DRAWS, MADE, MAP, RECORD, WALK, WALKED, drag, fragment, functions, html, said, state_of
+from scipy.stats import norm
+
+from kfcourse import Model, compare, lab_filters, linearised, predictions, run
+from kfcourse.filters import aof, kalman_filter
+from kfcourse.lab.short_names import title
+from kfcourse.lab.variants import load_variants
+from kfcourse.linear.consistency import autocorrelation, innovations, nees, nis
+from kfcourse.pages.scenes import FAULTS, HIDDEN, hidden_fault
+
+# ---------------------------------------------------------------- what was printed is what NumPy computes
+
+REACH = dict(y=5, x=4, z=4, h=3, Delta=9, n=3, v=3) | {"lambda": 3}
+GRID = {key: np.random.default_rng(1).uniform(-reach, reach, 200) for key, reach in REACH.items()}
+GRID |= {key: np.random.default_rng(2).uniform(0.1, 4, 200) for key in ("Psi", "p", "F")}
+
+
+def kalman(Q, R, **of):
+    lam, Psi, y = of["lambda"], of["Psi"], of["y"]
+    p = 1 / (1 / Psi + 1 / R)
+    z = p * (lam / Psi + y / R)
+    return {"z": z, "half": 1.96 * np.sqrt(p), "lambda": 0.9 * z, "Psi": 0.81 * p + Q}
+
+
+PRINTED = [
+    ("fig-ten-minutes", "step", {"Q": 0.3, "R": 0.7}, kalman),
+    ("fig-consistency-faults", "nees", {}, lambda x, z, p, **_: {"value": (x - z) ** 2 / p}),
+    ("fig-consistency-faults", "white", {}, lambda y, h, F, **_: {"value": (y - h) / F**0.5}),
+    (
+        "fig-slips-ball",
+        "step",
+        {"sigma": 1.3},
+        lambda sigma, Delta, n, v, **_: {"Delta": Delta - np.sin(Delta) / (sigma**2 + 1) + n / 5 + v * sigma / 10},
+    ),
+    ("fig-slips-ball", "potential", {"sigma": 1.3}, lambda sigma, Delta, **_: {"value": (1 - np.cos(Delta)) / sigma}),
+    (
+        "fig-grid-nodes",
+        "density",
+        {},
+        lambda x, **_: {"value": norm.pdf(x, -1, 2**0.5) * norm.pdf(1.85, np.hypot(x, 1), 0.1)},
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "function", "c", "expected"), PRINTED, ids=lambda one: one if isinstance(one, str) else "")
+def test_printed_functions(browser, name, function, c, expected):
+    """1e-12 is some hundred roundings, of a few dozen operations; exponents of the bells, up to 500, carry them in full."""
+    tab = browser.new_page()
+    found = tab.evaluate(
+        """([text, arrays, c]) => {
+            const kfInverse = (x) => (x === 0 ? 0 : 1 / x), loop = eval(`(${text})`), n = Object.values(arrays)[0].length;
+            arrays = { ...arrays, value: Array(n), half: Array(n) };
+            loop(n, {}, c, arrays);
+            return JSON.stringify(arrays);
+        }""",
+        [functions(name)[function], {key: values.tolist() for key, values in GRID.items()}, c],
+    )
+    tab.close()
+    for key, values in expected(**c, **GRID).items():
+        np.testing.assert_allclose(np.array(json.loads(found)[key], dtype=float), values, rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_a_figure_is_small(name):
+    """At most 150 kB more for its page, compressed; these are read without compression too."""
+    assert len(gzip.compress(html(name).encode())) < 60_000
+
+
+def link_keeps(opened, tab, name: str, part: str) -> None:
+    """The address has this of the state, and another page opened with it says the same."""
+    tab.wait_for_function("part => decodeURIComponent(location.hash).includes(part)", arg=part)
+    assert said(opened(name, fragment(tab))) == said(tab)
+
+
+# ---------------------------------------------------------------- ten minutes
+
+
+def estimates(y20: float, Q: float, R: float) -> tuple[float, float]:
+    """By the package: the estimate at step 20 and the half width of its band."""
+    model = Model.define("c*x + e*v", "x + f*w", dict(c=0.9, e=Q**0.5, f=R**0.5))
+    y = RECORD[1].copy()
+    y[20] = y20
+    law = run(kalman_filter(model), y[:, None, None])
+    return law.mean[20, 0, 0], 1.96 * law.cov[20, 0, 0, 0] ** 0.5
+
+
+def test_one_measurement_moves_the_estimate_and_not_the_band(opened):
+    tab = opened("fig-ten-minutes")
+    ring = tab.get_by_role("slider", name="Measurement at step 20")
+    Q, R = tab.get_by_role("slider", name="Q, of the kicks"), tab.get_by_role("slider", name="R, of the meter")
+
+    def holds(measured, q, r):
+        numbers = said(tab)
+        moved, before = estimates(measured, q, r), estimates(RECORD[1, 20], q, r)
+        # printed to 0.01; the record is rounded to four digits
+        assert numbers == pytest.approx([20, measured, *moved, RECORD[1, 20], *before], abs=0.0056)
+        assert numbers[3] == numbers[6]
+
+    holds(5, 0.25, 1)
+    ring.press("ArrowDown")
+    holds(4.9, 0.25, 1)
+    ring.press("Home")
+    holds(-6, 0.25, 1)
+    Q.press("End")
+    holds(-6, 100, 1)
+    R.press("Home")
+    holds(-6, 100, 0.01)
+    R.press("End")
+    holds(-6, 100, 100)
+    drag(tab, ring, 30, -80)
+    assert -4 < state_of(tab, ring) < 2
+    holds(state_of(tab, ring), 100, 100)
+    link_keeps(opened, tab, "fig-ten-minutes", f"y={ring.get_attribute('aria-valuenow')}")
+
+
+# ---------------------------------------------------------------- consistency
+
+
+def three_tests(q: float, r: float) -> list[float]:
+    """By the package: means of NEES and NIS, and the correlation of neighbours."""
+    one = linearised(WALK.replace(e=0.3 * q**0.5, f=r**0.5))
+    seen = innovations(one.measure, predictions(aof(one), WALKED.y), WALKED.y)
+    size = nis(seen).mean()
+    return [nees(WALKED.x, run(aof(one), WALKED.y)).mean(), size, autocorrelation(seen, 1).value[0] / size]
+
+
+def test_the_three_tests_are_the_package_s(opened):
+    tab = opened("fig-consistency-faults")
+    Q, R = tab.get_by_role("slider", name="Multiply its Q by"), tab.get_by_role("slider", name="Multiply its R by")
+    assert said(tab) == pytest.approx(three_tests(0.1, 1), abs=0.0052)  # printed to 0.01; four digits of the records
+    Q.press("End")
+    assert said(tab) == pytest.approx(three_tests(1, 1), abs=0.0052)  # the cure
+    R.press("Home")
+    assert said(tab) == pytest.approx(three_tests(1, 0.1), abs=0.011)
+    link_keeps(opened, tab, "fig-consistency-faults", "q=10&r=0.1")
+
+
+@pytest.mark.parametrize("letter", "ABCDE")
+def test_a_hidden_fault_is_guessed(opened, letter):
+    tab = opened("fig-consistency-faults")
+    which, guess = tab.get_by_role("combobox", name="Filter"), tab.get_by_role("combobox", name="Which is wrong?")
+    right = dict(zip("ABCDE", HIDDEN, strict=True))[letter]
+    wrong = next(one for one in FAULTS if one != right)
+    which.select_option(letter)
+    assert said(tab) == pytest.approx(three_tests(*FAULTS[right]), abs=0.011)
+    status = tab.get_by_role("status")
+    assert right not in status.inner_text()
+    guess.select_option(wrong)
+    assert "No: with" in status.inner_text() and right not in status.inner_text().replace(wrong, "")
+    guess.select_option(right)
+    assert status.inner_text().endswith(f"Yes: {right}.")
+    which.select_option("example")
+    assert guess.input_value() == "–" and "Yes" not in status.inner_text()
+
+
+def test_a_model_with_other_letters_is_refused():
+    with pytest.raises(ValueError, match="c, e, g, f, got a"):
+        hidden_fault("x", Model.define("a*x + v", "x + w", dict(a=1)), *np.zeros((2, 3, 3)))
+
+
+# ---------------------------------------------------------------- cycle slips
+
+
+def trace(sigma: float, draw: int) -> np.ndarray:
+    way = [0.0]
+    for n, v in DRAWS[draw - 1].T:
+        way.append(way[-1] - np.sin(way[-1]) / (sigma**2 + 1) + n / 5 + v * sigma / 10)
+    return np.array(way) / (2 * np.pi)
+
+
+def test_the_ball_is_the_loop(opened):
+    tab = opened("fig-slips-ball")
+    step, draw = tab.get_by_role("slider", name="Step to look at"), tab.get_by_role("slider", name="Random numbers")
+    noise = tab.get_by_role("slider", name="σ of the meter (V)")
+
+    def holds(sigma, which, k):
+        way = trace(sigma, which)
+        status = tab.get_by_role("status").inner_text()
+        assert said(tab)[:3] == pytest.approx([k, way[k], 2 / sigma], abs=0.0051)
+        lost = abs(round(way[-1]))
+        assert {0: "no cycle is", 1: "one cycle is"}.get(lost, f"{lost} cycles are") in status
+
+    holds(2, 1, 30)
+    step.press("ArrowLeft")
+    holds(2, 1, 29)
+    noise.press("End")
+    holds(4, 1, 29)
+    draw.press("ArrowRight")
+    holds(4, 2, 29)
+    step.press("End")
+    holds(4, 2, 100)
+    drag(tab, step, -100, 30)
+    assert 30 < state_of(tab, step) < 90
+    holds(4, 2, int(state_of(tab, step)))
+    link_keeps(opened, tab, "fig-slips-ball", f"k={step.get_attribute('aria-valuenow')}")
+
+
+# ---------------------------------------------------------------- the grid
+
+
+def on_nodes(h: float) -> list[float]:
+    """Nodes, per cent on the heaviest, mean and standard deviation."""
+    j = np.arange(-200, 201)
+    x = h * j[np.abs(h * j) <= 5 + 1e-9]
+    mass = norm.pdf(x, -1, 2**0.5) * norm.pdf(1.85, np.hypot(x, 1), 0.1)
+    mass /= mass.sum()
+    mean = mass @ x
+    return [len(x), 100 * mass.max(), mean, np.sqrt(mass @ (x - mean) ** 2)]
+
+
+def test_the_step_of_the_grid_is_dragged(opened):
+    tab = opened("fig-grid-nodes")
+    node = tab.get_by_role("slider", name="Distance of the nodes")
+    exact = on_nodes(0.05)[2:]
+
+    def holds(h):
+        found, expected = said(tab), [h, *on_nodes(h), *exact]
+        assert found[:2] == pytest.approx(expected[:2], abs=0.0051)
+        assert found[2] == pytest.approx(expected[2], abs=0.51)
+        assert found[3:] == pytest.approx(expected[3:], abs=0.0051)
+
+    holds(1)
+    node.press("ArrowRight")
+    holds(1.05)
+    node.press("End")
+    holds(2)
+    node.press("Home")
+    holds(0.05)
+    drag(tab, node, 40, -30)
+    assert 0.5 < state_of(tab, node) < 2
+    holds(state_of(tab, node))
+    link_keeps(opened, tab, "fig-grid-nodes", f"h={node.get_attribute('aria-valuenow')}")
+
+
+# ---------------------------------------------------------------- the front page
+
+
+def test_the_bars_reorder(opened):
+    tab = opened("front")
+    ring = tab.get_by_role("slider", name="Step and ratio f/e")
+
+    def holds(k, row):
+        cell, (best, more) = MAP["gaps"][row][k], MAP["leaders"][row][k]
+        order = sorted(cell, key=lambda name: cell[name][0])
+        labels = tab.evaluate("""[...document.querySelectorAll("svg.kf-chart")[0].querySelectorAll("text[aria-hidden]")]
+            .filter((one) => /^[A-Z]+$/.test(one.textContent)).map((one) => [Number(one.getAttribute("y")), one.textContent])""")
+        assert [text for _, text in sorted(labels)] == [title(name) for name in order]
+        status = tab.get_by_role("status").inner_text()
+        assert status.startswith(f"Step {k}, f/e = {MAP['ratios'][row]:g}: {title(best)} leads")
+        assert (f"{more} not significantly worse" in status) == (more > 0)
+
+    holds(2, 2)
+    for key, place in [("ArrowUp", (2, 3)), ("ArrowRight", (3, 3)), ("Home", (0, 3)), ("ArrowUp", (0, 4)), ("End", (10, 4))]:
+        ring.press(key)
+        holds(*place)
+    drag(tab, ring, -100, 60)
+    k, row = int(state_of(tab, ring)), MAP["ratios"].index(float(ring.get_attribute("aria-valuetext").split("= ")[1]))
+    assert k < 9 and row < 4
+    holds(k, row)
+    link_keeps(opened, tab, "front", f"k={k}")
+
+
+def test_the_map_is_consistent():
+    assert MAP["trajectories"] >= 1000 and MAP["ratios"] == sorted(MAP["ratios"])
+    for row, leaders in zip(MAP["gaps"], MAP["leaders"], strict=True):
+        for cell, (best, more) in zip(row, leaders, strict=True):
+            assert best == min(cell, key=lambda name: cell[name][0]) and 0 <= more < len(cell)
+            assert all(low <= value <= high for value, low, high in cell.values())
+
+
+def test_the_map_is_what_the_book_s_code_computes():
+    """A small comparison with another seed agrees with a row of it, within four standard errors of both."""
+    row, steps = MAP["ratios"].index(2), 4
+    model = load_variants()["53"].model.replace(f=0.1)
+    names = ["duof", "aof-linearised", "mfos-gaussian"]
+    result = compare(lab_filters(model, [*names, "aof-exact"]), model, 20_000, steps, seed=9, subset_runs=400, progress=False)
+    for name in names:
+        gap = result.gap(name)
+        for k in range(1, steps):
+            value, low, high = (one / 100 for one in MAP["gaps"][row][k][name])
+            assert abs(gap.value[k] - value) < 4 * np.hypot(gap.standard_error[k], (high - low) / 3.92)
