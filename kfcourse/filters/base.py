@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -55,12 +55,13 @@ class Evidence(Protocol):
 
 
 class LookBack(Protocol):
-    """States (0, ..., K - 1) whose laws are those given the whole record, from the filter's after each measurement, and y.
+    """From the filter's states after each measurement, and y: what so many of these measurements tell, K -> states.
 
+    Their laws are those given y_0, ..., y_{K-1}, that of step K - 1 first and of step 0 last, each found when it is asked for.
     Their memory may tell how good they are, `discretisation_error()`, (runs,), in the units of x.
     """
 
-    def __call__(self, states: Iterable[State], y: Array, /) -> list[State]: ...
+    def __call__(self, states: Iterable[State], y: Array, /) -> Callable[[int], Iterator[State]]: ...
 
 
 @dataclass(frozen=True)

@@ -6,27 +6,33 @@ p A^T from its structural functions; the exact filter and particles have ways of
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Sequence
+from itertools import islice
 
 import numpy as np
 
 from kfcourse.filters.base import Filter, State, structure_of
 from kfcourse.laws import Array, Gaussian, Transition, product, transpose
-from kfcourse.linear.smoothing import Passages, blocks, look_back
+from kfcourse.linear.smoothing import Passages, blocks, check_lag, look_back
 from kfcourse.symbolic.structure import Structure
 
 ROUNDING = 1e-8  # of a prediction's standard deviations: by so much A p A^T + Q may be another than Psi without a reason
 
 
-def looked_back(one: Filter, states: Iterable[State], y: Array) -> list[State]:
+def looked_back(one: Filter, states: Iterable[State], y: Array, lag: int | None = None) -> list[State]:
     """States whose laws are those given the whole record y (steps, runs, p), from the filter's after each measurement.
 
-    ValueError for a filter that has no way to look back.
+    With a lag, given so many later measurements: a way of a filter's own then looks back as often as there are steps.
+    ValueError for a filter that has no way to look back, or a lag that is none.
     """
-    if one.look_back is not None:
-        return one.look_back(states, y)
-    mean, cov = normal_laws(one, states)
-    return [State(k + 1, law, law) for k, law in enumerate(map(Gaussian, mean, cov))]
+    if one.look_back is None:
+        mean, cov = normal_laws(one, states, lag)
+        return [State(k + 1, law, law) for k, law in enumerate(map(Gaussian, mean, cov))]
+    check_lag(lag)
+    back, reach = one.look_back(states, y), len(y) if lag is None else min(lag + 1, len(y))
+    early = [deque(islice(back(end), reach), maxlen=1)[0] for end in range(reach, len(y))]
+    return [*early, *reversed([*islice(back(len(y)), reach)])]
 
 
 def normal_laws(one: Filter, states: Iterable[State], lag: int | None = None) -> Gaussian:

@@ -15,7 +15,7 @@ without any contribution of the sampling: that is how particles bound other filt
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -149,22 +149,17 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
     def evidence(before: State, y: Array, after: State) -> Array:
         return np.where(np.isnan(y).any(axis=-1), 0.0, np.logaddexp(*after.memory.evidence) - np.log(2))
 
-    def look_back(states: Iterable[State], y: Array) -> list[State]:
+    def look_back(states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
         memories = [state.memory for state in states]
-        rng = _stream(memories[-1].seed, len(memories))
-        found = backwards([memory.x for memory in memories], transition(model), angles, min(size, PATHS), rng)
-        result: list[State] = []
-        for memory, (clouds, effective) in zip(reversed(memories), found, strict=True):
-            law = _together(*clouds, angles)
-            result.append(
-                State(
-                    len(memories) - len(result),
-                    law,
-                    law,
-                    memory._replace(x=None, halves=np.moveaxis(clouds.mean, 1, 0), effective=effective),
-                )
-            )
-        return result[::-1]
+
+        def back(end: int) -> Iterator[State]:
+            rng = _stream(memories[0].seed, end)
+            found = backwards([memory.x for memory in memories[:end]], transition(model), angles, min(size, PATHS), rng)
+            for step, (clouds, effective) in zip(range(end, 0, -1), found, strict=True):
+                law, halves = _together(*clouds, angles), np.moveaxis(clouds.mean, 1, 0)
+                yield State(step, law, law, memories[step - 1]._replace(x=None, halves=halves, effective=effective))
+
+        return back
 
     return Filter(name, model, init, step, slow=True, evidence=evidence, look_back=look_back)
 

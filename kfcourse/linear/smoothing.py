@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kfcourse.angles import Components, difference, on_circle
-from kfcourse.laws import Array, Gaussian, apply, gain, product, stacked, symmetric, transpose
+from kfcourse.laws import Array, Gaussian, apply, gain, identity, product, stacked, symmetric, transpose
 from kfcourse.linear.runs import Run
 from kfcourse.linear.system import LinearSystem
 
@@ -75,16 +75,21 @@ def look_back(passages: Sequence[Passages], last: Gaussian, lag: int | None = No
     ValueError
         A lag that is no whole number, or below 0.
     """
+    check_lag(lag)
     back = [one for part in passages for one in _regressions(part, angles)]
     if lag is None:
         return stacked([*accumulate(reversed(back), lambda after, one: one(after), initial=last)][::-1])
-    if isinstance(lag, bool) or not isinstance(lag, int | np.integer) or lag < 0:
-        raise ValueError(f"lag must be a whole number of steps, at least 0, or None for all that follow; got {lag!r}")
     posteriors = [Gaussian(*law) for part in passages for law in zip(*part.posterior, strict=True)]
     laws = [*posteriors, last]
     for _ in range(min(lag, len(back))):  # each round tells every state of one measurement more
         laws = [*(one(after) for one, after in zip(back, laws[1:], strict=True)), last]
     return stacked(laws)
+
+
+def check_lag(lag: int | None) -> None:
+    """ValueError for a lag that is no whole number, or below 0."""
+    if lag is not None and (isinstance(lag, bool) or not isinstance(lag, int | np.integer) or lag < 0):
+        raise ValueError(f"lag must be a whole number of steps, at least 0, or None for all that follow; got {lag!r}")
 
 
 def _regressions(passages: Passages, angles: Components) -> list[Callable[[Gaussian], Gaussian]]:
@@ -94,7 +99,7 @@ def _regressions(passages: Passages, angles: Components) -> list[Callable[[Gauss
     """
     (z, p), (lam, Psi), A, Q = passages
     S = gain(product(p, transpose(A)), Psi, broken=True)
-    rest = np.eye(z.shape[-1], dtype=p.dtype) - product(S, A)
+    rest = identity(z.shape[-1], p.dtype) - product(S, A)
     own = product(product(rest, p), transpose(rest))
     each = np.broadcast_to(Q, (len(z), *Q.shape[-3:])) if Q.ndim < 4 else Q
 

@@ -51,7 +51,8 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     y : ndarray (steps, runs, p)
         As for `run`; NaN where a measurement, or a component of it, is missing.
     lag : int, optional
-        Use the measurements up to so many steps later only (fixed lag): what is known with that delay.
+        Use the measurements up to so many steps later only (fixed lag): what is known with that delay.  Of the exact filter and
+        of particles that costs `lag` + 1 times as much as the whole record, as each step is looked back to for itself.
 
     Returns
     -------
@@ -61,7 +62,7 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     Raises
     ------
     ValueError
-        A filter without structural functions, a lag that is none or that `one` has no way to keep, measurements of another shape.
+        A filter without structural functions, a lag that is none, measurements of another shape.
 
     Examples
     --------
@@ -72,12 +73,10 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     """
     if one.look_back is None:
         return normal_laws(one, list(walk(one, y))[1:], lag)
-    if lag is not None:
-        raise ValueError(f"{one.name} looks back from the end of the record only: leave lag out, or take a filter of normal laws")
-    return stacked([state.posterior for state in _looked_back(one, y)])
+    return stacked([state.posterior for state in _looked_back(one, y, lag)])
 
 
-def smoothing_error(one: Filter, y: Array) -> Array:
+def smoothing_error(one: Filter, y: Array, lag: int | None = None) -> Array:
     """How far the estimates of `smooth` may be from the true means given the record, (steps, runs), in the units of x.
 
     Of the exact filter the estimated error of its integrals; of particles the standard error, by the distance of two clouds that
@@ -98,11 +97,11 @@ def smoothing_error(one: Filter, y: Array) -> Array:
     """
     if one.look_back is None:
         raise unknown_error(one)
-    return np.stack([state.memory.discretisation_error() for state in _looked_back(one, y)])
+    return np.stack([state.memory.discretisation_error() for state in _looked_back(one, y, lag)])
 
 
-def _looked_back(one: Filter, y: Array) -> list[State]:
-    return looked_back(one, islice(walk(one, y), 1, None), np.reshape(y, (len(y), -1, one.model.p)))
+def _looked_back(one: Filter, y: Array, lag: int | None) -> list[State]:
+    return looked_back(one, islice(walk(one, y), 1, None), np.reshape(y, (len(y), -1, one.model.p)), lag)
 
 
 def smooth_iterated(structure: Structure, y: Array, rounds: int = 5) -> Gaussian:

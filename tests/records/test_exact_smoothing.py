@@ -155,11 +155,41 @@ def test_what_cannot_be_resolved_is_refused_in_words(monkeypatch):
         smooth(pointmass(model), simulate(model, 3, 3, seed=1).y)
 
 
-def test_a_lag_is_for_normal_laws():
+@pytest.mark.parametrize("lag", [0, 1])
+def test_with_a_lag_it_is_the_posterior_of_a_shorter_record(lag):
+    """What brute force finds once later measurements are missing; the filter's own is the lag 0."""
+    model, *known = MODELS["curved"]
+    y = simulate(model, 4, 3, seed=6).y
+    found, error = smooth(pointmass(model), y, lag), smoothing_error(pointmass(model), y, lag)
+    for k in range(3):
+        seen = y.copy()
+        seen[k + lag + 1 :] = np.nan
+        for i in range(4):
+            sds = np.sqrt(smooth(pointmass(model), seen).cov[:, i, 0, 0])
+            mean, variance, _ = brute_force(seen[:, i, 0], *known, found.mean[:, i, 0], sds)
+            assert abs(found.mean[k, i, 0] - mean[k]) <= error[k, i] + 1e-6 * sds[k]  # what the cube leaves out
+            assert found.cov[k, i, 0, 0] == pytest.approx(variance[k], rel=1e-4)  # the accuracy asked for is 1e-3
+    later = smooth(pointmass(model), y)
+    assert np.abs(found.mean - later.mean)[0].min() > 0.01
+    np.testing.assert_array_equal(found.mean[3 - lag - 1 :], later.mean[3 - lag - 1 :])
+
+
+@pytest.mark.parametrize("one", [lambda model: pointmass(model), lambda model: particle(model, 40, seed=3)])
+@pytest.mark.parametrize("lag", [4, 5, 9])
+def test_a_lag_as_long_as_the_record_changes_nothing(one, lag):
     model = find_variant("53").model
-    for one in (pointmass(model), particle(model, 10)):
-        with pytest.raises(ValueError, match="looks back from the end of the record only"):
-            smooth(one, np.ones(3), lag=1)
+    y = simulate(model, 5, 5, seed=4).y
+    one = one(model)
+    for found, expected in zip(smooth(one, y, lag), smooth(one, y), strict=True):
+        np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(smoothing_error(one, y, lag), smoothing_error(one, y))
+
+
+def test_what_has_no_lag_and_what_is_none_are_refused():
+    model = find_variant("53").model
+    for one in (pointmass(model), particle(model, 10), aof(linearised(model))):
+        with pytest.raises(ValueError, match="lag must be a whole number of steps, at least 0"):
+            smooth(one, np.ones(3), lag=-1)
     with pytest.raises(ValueError, match="does not know how good its laws are"):
         smoothing_error(aof(linearised(model)), np.ones(3))
 
@@ -184,6 +214,18 @@ def test_particles_look_back_as_well_as_they_say(plane):
     assert np.sqrt(np.mean(away[:-1] ** 2)) < 0.3 * np.sqrt(np.mean((run(one, y).mean - found.mean)[:-1] ** 2))
     ratio = (np.trace(found.cov, axis1=-2, axis2=-1) / np.trace(expected.cov, axis1=-2, axis2=-1)).mean(axis=1)
     assert np.abs(ratio - 1).max() < 0.08  # 60 covariances of 1,000 particles, of which a few hundred count
+
+
+def test_particles_with_a_lag_are_near_the_kalman_smoother_with_that_lag(plane):
+    y = simulate(plane, 40, 5, seed=4).y
+    one, kalman = particle(plane, 500, seed=1), kalman_filter(plane)
+    found, expected = smooth(one, y, 2), smooth(kalman, y, 2)
+    away, error = np.linalg.norm(found.mean - expected.mean, axis=-1), smoothing_error(one, y, 2)
+    # 200 distances, half of them those of two clouds: root mean squares good to some 8 %, steps dependent
+    assert np.sqrt(np.mean(away**2)) == pytest.approx(np.sqrt(np.mean(error**2)), rel=0.25)
+    for other in (1, 3):  # steps 0 to 2 know nothing of the last; one measurement more or less is far more than that
+        wrong = np.linalg.norm(found.mean - smooth(kalman, y, other).mean, axis=-1)[:3]
+        assert np.sqrt(np.mean(wrong**2)) > 1.5 * np.sqrt(np.mean(away[:3] ** 2))
 
 
 def test_backward_weights_are_bayes_rule_over_the_particles():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -123,16 +123,21 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
     def evidence(state: State, y: Array, after: State) -> Array:
         return log_evidence(before(state, len(y)), y, densities.at(state.step), after.memory.fine)
 
-    def look_back(states: Iterable[State], y: Array) -> list[State]:
+    def look_back(states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
         memories = [(state.memory.fine, state.memory.error) for state in states]  # without the predictions: these are large
         posteriors, errors = zip(*memories, strict=True)
 
         def predicted(k: int) -> Iterable[tuple[Array, Kernels]]:
             return predictions(posteriors[k - 1], densities.at(k - 1)) if k else before(init(y.shape[1]), y.shape[1])
 
-        found = smoothed(posteriors, np.array(errors), y, predicted, densities, accuracy, bool(model.angles.x))
-        laws = [Gaussian(one.mean[:, None], one.variance[:, None, None]) for one in found]
-        return [State(k + 1, law, law, one) for k, (law, one) in enumerate(zip(laws, found, strict=True))]
+        def back(end: int) -> Iterator[State]:
+            known = posteriors[:end], np.array(errors[:end])
+            found = smoothed(*known, y, predicted, densities, accuracy, bool(model.angles.x))
+            for step, one in zip(range(end, 0, -1), found, strict=True):
+                law = Gaussian(one.mean[:, None], one.variance[:, None, None])
+                yield State(step, law, law, one)
+
+        return back
 
     return Filter("aof-exact", model, init, step, slow=True, evidence=evidence, look_back=look_back)
 

@@ -15,7 +15,7 @@ and every fourth node would have given, tell the error.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -73,8 +73,8 @@ def smoothed(
     densities: ScalarDensities,
     accuracy: float,
     angle: bool = False,
-) -> list[Smoothed]:
-    """The backward recursion: what is known of each step.
+) -> Iterator[Smoothed]:
+    """The backward recursion: what is known of each step, from the last to the first.
 
     Parameters
     ----------
@@ -97,7 +97,6 @@ def smoothed(
         A density that no number of nodes resolves, with the step.
     """
     steps, runs = len(posteriors), len(posteriors[0])
-    results: list[Smoothed] = []
     ahead: Ahead | None = None
     inherited = np.zeros(runs)
     for k in reversed(range(steps)):
@@ -113,8 +112,7 @@ def smoothed(
                 except Unresolved as problem:
                     raise Unresolved(f"looking back to step {k}: {problem}") from None
         ahead, inherited = found.ahead(), inherited + found.error
-        results.append(Smoothed(*found.moments(angle), error=inherited + filter_error[k]))
-    return results[::-1]
+        yield Smoothed(*found.moments(angle), error=inherited + filter_error[k])
 
 
 class Density:
