@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from kfcourse.angles import Components, difference
 
 Array: TypeAlias = NDArray[Any]
+CONFIDENCE = 0.95  # of intervals, ellipses and tests, where nothing else is asked for
 
 
 class NegativeVariance(ValueError):
@@ -28,13 +29,6 @@ class Gaussian(NamedTuple):
 
     mean: Array
     cov: Array
-
-
-class Trajectories(NamedTuple):
-    """Stored trajectories: states x (steps, runs, n), measurements y (steps, runs, p)."""
-
-    x: Array
-    y: Array
 
 
 class Measurement(NamedTuple):

@@ -6,12 +6,11 @@ A scalar meter that may fail: x' = a x + sqrt(q) v, y = x + C_i w in mode i.
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import norm
 
 from kfcourse.derivations.setting import Setting
 from kfcourse.derivations.typed import read_line
-from kfcourse.filters.multiple_models import mixture, onward
-from kfcourse.laws import Array, Gaussian
+from kfcourse.filters.multiple_models import mixture, modes_given, onward
+from kfcourse.laws import Array, Gaussian, Measurement
 
 
 def chain(mu: Array, pi: Array) -> tuple[Array, Array]:
@@ -22,8 +21,9 @@ def chain(mu: Array, pi: Array) -> tuple[Array, Array]:
 
 def posterior(c: Array, y: float, h: Array, F: Array) -> Array:
     """Probabilities of the modes after y, (J,)."""
-    joint = c * norm.pdf(y, h, np.sqrt(F))
-    return joint / joint.sum()
+    one = np.ones((1, 1))  # the density does not ask how the state is measured
+    expected = [Measurement(np.array([[h_j]]), one, np.array([[F_j]]), one) for h_j, F_j in zip(h, F, strict=True)]
+    return modes_given(c[None], expected, np.array([[y]]))[0][0]
 
 
 def merged(mu: Array, z: Array, p: Array) -> tuple[Array, Array]:

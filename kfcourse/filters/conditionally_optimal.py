@@ -1,7 +1,7 @@
 """Pugachev's two-step conditionally optimal filter (DUOF, ДУОФ).
 
 The structure of both steps is given, taken from the model itself, and the coefficients minimise the
-mean square error at each step over the ensemble: two affine regressions.
+mean square error at each step over the ensemble: two affine regressions.  Pugachev (1979); Pugachev and Sinitsyn (1987).
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ import sympy as sp
 from kfcourse.angles import TURN, Components, difference, wrapped
 from kfcourse.filters.inverted import by_change_of_variable
 from kfcourse.laws import Array, Gaussian
+from kfcourse.reasons import Reason
 from kfcourse.symbolic.choices import decides, jumps
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
@@ -245,22 +246,26 @@ def _conditional(
     if solved:  # the density is known otherwise; what is linear in the noise tells where it lies
         B = _at_mean(B, noise, law)
     elif B.has(*noise) or decides(equation, noise):
-        raise ModelError(
+        raise _no_density(
             f"{list(equation)}: the noise enters nonlinearly, so there is no simple {name} density; "
             "the Gaussian filters (gaussian, unscented, gauss_hermite) do not need one"
         )
     if not noiseless and (B * exact_matrix(law.cov) * B.T).subs(model.values).is_zero_matrix:
-        raise ModelError(
+        raise _no_density(
             f"{list(equation)}: without noise there is no {name} density; "
             "use the Gaussian filters (gaussian, unscented, gauss_hermite)"
         )
     mean = equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True)))
     cov = B * exact_matrix(law.cov) * B.T
     if name == "likelihood" and len(equation) > 1 and cov.subs(model.values).det().equals(0):
-        raise ModelError(
+        raise _no_density(
             f"{list(equation)}: the noises of these components depend on one another, so a combination of them has no noise and "
             f"there is no {name} density; leave a component out, or use the Gaussian filters (gaussian, unscented, gauss_hermite)"
         )
     outputs = {"mean": mean.subs(model.values), "cov": cov.subs(model.values)}
     x = sp.Matrix(model.x)
     return Stepwise.compile(model.known, name, {"x": x}, outputs, ["x", "mean"], f"{name} law of {model}")
+
+
+def _no_density(message: str) -> ModelError:
+    return ModelError(Reason(message, "no_density"))

@@ -6,7 +6,7 @@ The construction is that of `optimal_structure`; only zeta is longer.  FKP and D
     FBP                      zeta_k = (z_k, z_{k-1}, ..., z_{k-l+1})     the recipe of the FOS
 
 With measurements z is not fed back: what older ones knew is lost, and so are their errors.  Until the memory is full it
-holds what there is.
+holds what there is.  Rudenko (2010).
 """
 
 from __future__ import annotations

@@ -10,6 +10,8 @@ it is wrong.  So patience ends: after some refusals in a row the prediction is w
 innovation, and the next measurement is let through whatever it is,
 
     Psi -> s Psi,      s = max(1, nu^T (G Psi G^T)^+ nu / p)
+
+The gate: Bar-Shalom, Li, Kirubarajan (2001); the rule that ends it is ours.
 """
 
 from __future__ import annotations

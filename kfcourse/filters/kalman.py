@@ -5,7 +5,7 @@
 
 Read this file first.  Every filter of the course is this correction and prediction with other functions in the place of the
 matrices; on a linear model with normal noises each must give these numbers, and the tests pin it.  What rounding does to
-the step, and the forms that stand it better, is in `kfcourse.linear.arithmetic`.
+the step, and the forms that stand it better, is in `kfcourse.linear.arithmetic`.  Kalman (1960).
 """
 
 from __future__ import annotations

@@ -22,6 +22,8 @@ one matrix for all.
     DFMP    L s' + n     residual     lambda + sigma
     MDFMP   L s' + n     residual     lambda + H sigma + e
 
+Rudenko (2010, 2013).
+
 `finite_memory` has those that remember more than the last estimate.
 """
 

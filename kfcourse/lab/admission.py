@@ -25,6 +25,7 @@ from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.subset import FEWEST
+from kfcourse.reasons import Reason
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
@@ -96,7 +97,7 @@ def admissions(model: Model | JumpModel, names: Sequence[str] | None = None, sec
                 found.append(_admitted(name, structures))
         except OutOfTime:
             too_long.add(kind)
-            found.append(Admission(name, None, _TOO_LONG.format(seconds)))
+            found.append(Admission(name, None, Reason(_TOO_LONG.format(seconds), "too_long", seconds=f"{seconds:g}")))
     return found
 
 
@@ -114,7 +115,7 @@ def _admitted(name: str, structures: Structures | JumpStructures) -> Admission:
                 return Admission(name, JUMP_FILTERS[name].build(structures))
             one = FILTERS[name].build(structures)
         except (NoClosedForm, ModelError) as error:
-            return Admission(name, None, str(error))
+            return Admission(name, None, Reason.of(error))
     found = [str(warning.message) for warning in caught]
     with np.errstate(all="ignore"):
         found += [text for kind, look in _LOOKS.items() if kind in name for text in look(structures)]
@@ -172,7 +173,7 @@ def without_failing(
             rest = [one for one in filters if one.name != error.filter_name]
             if not error.filter_name or not [one for one in rest if not one.slow]:
                 raise
-            filters, reasons[error.filter_name] = rest, str(error)
+            filters, reasons[error.filter_name] = rest, Reason.of(error)
         else:
             return dataclasses.replace(found, left_out={**reasons, **found.left_out})
 

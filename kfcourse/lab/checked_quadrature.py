@@ -20,6 +20,7 @@ from kfcourse.laws import Array, Gaussian, Measurement, NegativeVariance
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, simulate
 from kfcourse.montecarlo.experiment import run
+from kfcourse.reasons import Reason
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite
@@ -80,7 +81,7 @@ def of_checked_order(model: Model, why: NoClosedForm) -> Checked:
             return Checked(_in_pieces(replace(coarse, name="gaussian"), max(1, PIECE // points)), order, apart)
         size = f"by {100 * apart:.2g} %" if apart < 1 else "without bound"
         found = f"; Gauss-Hermite quadrature with {order} points an axis still errs {size} on the laws that occur"
-    raise NoClosedForm(f"{why}{found}")
+    raise NoClosedForm(Reason.of(why).reworded(f"{why}{found}"))
 
 
 def _points(model: Model, order: int) -> int:

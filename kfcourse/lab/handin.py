@@ -26,7 +26,7 @@ from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.families import FAMILIES, family
 from kfcourse.lab.handin_text import filled, in_percent, inline_html, inline_tex, law, lines_of, matrix, power_of_ten
 from kfcourse.lab.refusals import cause
-from kfcourse.lab.report import printed, ranges, remarks, save_figure, save_texts, table_steps
+from kfcourse.lab.report import LEVEL, printed, ranges, remarks, save_figure, save_texts, table_steps
 from kfcourse.lab.short_names import FILTERS, Structures
 from kfcourse.lab.variants import Variant
 from kfcourse.lab.written_out import written_lines
@@ -278,7 +278,7 @@ class _Report:
             yield Block("text", filled(words[f"remark_{kind}"], **told))
         reference = words["of_exact"] if result.has_bound else self.title(result.control)
         for name in self.figures:
-            yield Block("figure", filled(words[f"figure_{name}"], reference=reference), [f"handin-{name}"])
+            yield Block("figure", filled(words[f"figure_{name}"], reference=reference, level=LEVEL), [f"handin-{name}"])
 
     def left_out(self) -> Iterator[str]:
         """The filters that do not take part, and why, those with the same reason together."""
@@ -295,7 +295,7 @@ class _Report:
             return
         verdicts = result.verdicts()
         yield Block("section", words["conclusion"])
-        yield Block("text", words["verdict_text"])
+        yield Block("text", filled(words["verdict_text"], level=LEVEL))
         heading = [words[key] for key in ("step", "best", "not_worse", "worst")]
         rows = [
             [f"${k}$", self.title(best), ", ".join(map(self.title, others)) or "–", self.title(worst) if worst else "–"]

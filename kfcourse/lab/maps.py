@@ -16,6 +16,7 @@ from matplotlib.patches import Rectangle
 from kfcourse.lab.plots import style
 from kfcourse.lab.report import percent
 from kfcourse.lab.short_names import LAB, lab_filters, title
+from kfcourse.laws import CONFIDENCE
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.symbolic.model import Model
@@ -94,7 +95,7 @@ def parameter_map(
     return ParameterMap((first, second), cells)
 
 
-def draw(found: ParameterMap, step: int, ax: Axes, confidence: float = 0.95) -> Axes:
+def draw(found: ParameterMap, step: int, ax: Axes, confidence: float = CONFIDENCE) -> Axes:
     """The map at a step: in each cell the most accurate filter and its distance from the bound, the least accurate and its.
 
     "and 2 more" counts those that are not significantly worse than the most accurate.

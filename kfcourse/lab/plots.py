@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from kfcourse.lab.families import look
 from kfcourse.lab.short_names import title
-from kfcourse.laws import Array
+from kfcourse.laws import CONFIDENCE, Array
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.modes import Recognised
 
@@ -57,7 +57,7 @@ def relative_accuracy(
     ax: Axes,
     names: Sequence[str] | None = None,
     steps: slice = slice(None),
-    confidence: float = 0.95,
+    confidence: float = CONFIDENCE,
     words: Words = ENGLISH,
 ) -> Axes:
     """How far D_k of every filter is above the exact AOF's, the zero line, in per cent, with bands of confidence.
@@ -82,7 +82,9 @@ def relative_accuracy(
     return ax
 
 
-def ranking(result: Comparison, ax: Axes, steps: slice = slice(None), confidence: float = 0.95, words: Words = ENGLISH) -> Axes:
+def ranking(
+    result: Comparison, ax: Axes, steps: slice = slice(None), confidence: float = CONFIDENCE, words: Words = ENGLISH
+) -> Axes:
     """Mean over steps of how far D_k is above the exact AOF's (without it, the control's), the best on top, with intervals."""
     ranked = result.ranking(steps)[::-1]
     for row, (name, gap) in enumerate(ranked):
@@ -99,7 +101,7 @@ def ranking(result: Comparison, ax: Axes, steps: slice = slice(None), confidence
 
 
 def consistency(
-    result: Comparison, ax: Axes, names: Sequence[str] | None = None, confidence: float = 0.95, words: Words = ENGLISH
+    result: Comparison, ax: Axes, names: Sequence[str] | None = None, confidence: float = CONFIDENCE, words: Words = ENGLISH
 ) -> Axes:
     """Normalised squared error M[e^T p^-1 e]/n per step: 1 if the filter's own covariance is right."""
     steps = np.arange(result.steps)

@@ -29,7 +29,7 @@ from kfcourse.lab.admission import admissions
 from kfcourse.lab.families import FAMILIES, family
 from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, WITH_MODES, JumpStructures, Structures, title
 from kfcourse.lab.variants import Variant
-from kfcourse.laws import Array
+from kfcourse.laws import CONFIDENCE, Array
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.comparison import EXACT, HEAVY, Comparison
 from kfcourse.montecarlo.modes import Recognised, recognised
@@ -39,13 +39,14 @@ from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
 
+LEVEL = f"{100 * CONFIDENCE:g} %"
 _FIGURES: dict[str, tuple[str, Callable[[Comparison, Axes], Axes]]] = {
     "accuracy": ("Error variance of each filter against the step.", plots.accuracy),
     "relative": (
-        "How far the error variance is above the exact filter's (if that was left out, the control's), with 95 % bands.",
+        f"How far the error variance is above the exact filter's (if that was left out, the control's), with {LEVEL} bands.",
         plots.relative_accuracy,
     ),
-    "ranking": ("The mean of the same over the steps, with 95 % confidence intervals.", plots.ranking),
+    "ranking": (f"The mean of the same over the steps, with {LEVEL} confidence intervals.", plots.ranking),
     "consistency": ("Normalised squared error: 1 if the filter's own covariance is right.", plots.consistency),
 }
 
@@ -151,7 +152,7 @@ def _model_in_numbers(model: Model | JumpModel) -> dict[str, Any]:
     }
 
 
-def conclusions(result: Comparison, confidence: float = 0.95) -> list[str]:
+def conclusions(result: Comparison, confidence: float = CONFIDENCE) -> list[str]:
     """The ranking in sentences: each filter against the next, significant or not at the confidence.
 
     In per cent of the bound, the exact AOF's error variance; without it, of the control's.

@@ -18,10 +18,10 @@ import numpy as np
 import scipy
 
 from kfcourse.angles import Components, difference
-from kfcourse.laws import Array, Gaussian, Measurement, normalised_square, square_root
+from kfcourse.laws import CONFIDENCE, Array, Gaussian, Measurement, normalised_square, square_root
 
 
-def confidence_ellipse(law: Gaussian, probability: float = 0.95, points: int = 200) -> Array:
+def confidence_ellipse(law: Gaussian, probability: float = CONFIDENCE, points: int = 200) -> Array:
     """Border of the smallest region that holds two components with the given probability, (2, points).
 
     e^T p^-1 e = rho^2 with e = x - mean and rho = sqrt(-2 ln(1 - probability)): e^T p^-1 e is chi-squared with two degrees.
@@ -102,7 +102,7 @@ def _regular(cov: Array) -> Array:
     return cov
 
 
-def chi_squared_bounds(degrees: int, runs: int, confidence: float = 0.95) -> tuple[float, float]:
+def chi_squared_bounds(degrees: int, runs: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
     """Interval in which the mean over `runs` of a chi-squared quantity lies with the given probability.
 
     The sum of independent chi-squared numbers is chi-squared with runs * degrees degrees of freedom.  Only *independent* terms
@@ -114,7 +114,7 @@ def chi_squared_bounds(degrees: int, runs: int, confidence: float = 0.95) -> tup
     return low / runs, high / runs
 
 
-def alarms(found: Innovations, confidence: float = 0.95) -> Array:
+def alarms(found: Innovations, confidence: float = CONFIDENCE) -> Array:
     """Which records fail the three tests of innovations: size, mean, whiteness; (3, runs) of bool.
 
     With N steps, p components and s_k = F^(-1/2) nu_k, a right filter makes

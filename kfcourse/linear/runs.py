@@ -12,10 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.laws import Array, Gaussian, Trajectories, apply, square_root, stacked
+from kfcourse.laws import Array, Gaussian, apply, square_root, stacked
 from kfcourse.linear.arithmetic import form
 from kfcourse.linear.system import LinearSystem
 from kfcourse.seeds import Seed
+
+
+class Trajectories(NamedTuple):
+    """Stored trajectories: states x (steps, runs, n), measurements y (steps, runs, p)."""
+
+    x: Array
+    y: Array
 
 
 class Run(NamedTuple):

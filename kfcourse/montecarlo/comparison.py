@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.laws import Array
+from kfcourse.laws import CONFIDENCE, Array
 from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean, ratio, rejected
 from kfcourse.montecarlo.two_phase import Replicas, Terms, batch_sums, estimate, with_design
 from kfcourse.symbolic.jumping import JumpModel
@@ -259,13 +259,13 @@ class Comparison:
         found = [(name, self.mean_gap(name, steps)) for name in self.entrants]
         return sorted(found, key=lambda item: float(item[1].value))
 
-    def leaders(self, step: int, confidence: float = 0.95) -> list[str]:
+    def leaders(self, step: int, confidence: float = CONFIDENCE) -> list[str]:
         """The most accurate entrant at a step, then those that are not significantly worse, each by its own paired interval."""
         found = {name: float(self.error_variance(name).value[step]) for name in self.entrants}
         best, *others = sorted(found, key=lambda name: found[name])
         return [best, *(name for name in others if self.difference(name, best)[step].interval(confidence)[0] <= 0)]
 
-    def verdicts(self, confidence: float = 0.95) -> list[Verdict]:
+    def verdicts(self, confidence: float = CONFIDENCE) -> list[Verdict]:
         """For each step the most accurate entrant, who is not significantly worse, and who is the least accurate.
 
         With the confidence all of them are right: Holm's test of everybody's difference from the most accurate, over all steps

@@ -16,6 +16,7 @@ from kfcourse.filters.base import Filter, State, with_angles_on_circle
 from kfcourse.filters.designed import Affine, Design, Scatter
 from kfcourse.laws import NegativeVariance
 from kfcourse.montecarlo.ensemble import Instant, JumpInstant, Serial
+from kfcourse.reasons import Reason
 
 
 class NotFinite(ArithmeticError):
@@ -30,6 +31,12 @@ class NotFinite(ArithmeticError):
     def __init__(self, message: str, filter_name: str = ""):
         super().__init__(message)
         self.filter_name = filter_name
+
+
+def failed(name: str, step: int, error: Exception) -> NotFinite:
+    """What a filter's linear algebra raised at a step, as the reason for which it is left out."""
+    kind = "negative" if isinstance(error, NegativeVariance) else ""
+    return NotFinite(Reason(f"step {step}: {name} failed: {error}", kind, step=step), name)
 
 
 def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: Executor | None = None) -> list[Filter]:
@@ -87,7 +94,7 @@ class _BlockStep:
             self.results[i] = stop.value
             return None
         except (NegativeVariance, np.linalg.LinAlgError) as error:
-            raise NotFinite(f"step {self.k}: {self.names[i]} failed: {error}", self.names[i]) from None
+            raise failed(self.names[i], self.k, error) from None
         target, regressor = request.target(self.block.x, self.block.x_next), request.regressor
         if request.mode is not None and isinstance(self.block, JumpInstant):
             there = self.block.mode == request.mode
@@ -122,10 +129,8 @@ def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int, poo
             if not np.isfinite(merged.scatter).all():
                 if not all(np.isfinite(run.block.x_next).all() and np.isfinite(run.block.y).all() for run in runs):
                     raise NotFinite(f"step {k}: the model's trajectories become infinite, check its equations and parameters")
-                raise NotFinite(
-                    f"{designs[i].name}, step {k}: the design met infinite or NaN values; the model or this filter diverges",
-                    designs[i].name,
-                )
+                said = f"{designs[i].name}, step {k}: the design met infinite or NaN values; the model or this filter diverges"
+                raise NotFinite(Reason(said, "infinite", step=k), designs[i].name)
             fits[i].append(merged.regression(designs[i].model.n))
             asked.append(i)
         active = asked

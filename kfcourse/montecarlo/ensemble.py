@@ -20,7 +20,8 @@ import scipy
 
 from kfcourse.angles import on_circle
 from kfcourse.filters.fused import is_scalar
-from kfcourse.laws import Array, Gaussian, Trajectories, column, normalised_square, square_root
+from kfcourse.laws import Array, Gaussian, column, normalised_square, square_root
+from kfcourse.linear.runs import Trajectories
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.compiled import load, loop
 from kfcourse.symbolic.equations import compile_model

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from kfcourse.laws import Array, Gaussian, column, normalised_square
+from kfcourse.laws import CONFIDENCE, Array, Gaussian, column, normalised_square
 from kfcourse.montecarlo.ensemble import STRATA
 
 BATCHES = 128  # standard errors from 128 batches are themselves good to 6 %
@@ -38,7 +38,7 @@ class Estimate:
     freedom: int | Array
     skewness: float | Array = 0.0
 
-    def interval(self, confidence: float = 0.95) -> tuple[Array, Array]:
+    def interval(self, confidence: float = CONFIDENCE) -> tuple[Array, Array]:
         """Lower and upper limit of the confidence interval.
 
         With the skewness a, t = (mean found - mean) / standard error follows no Student's law, but nearly
@@ -64,7 +64,7 @@ class Estimate:
             self.standard_error > 0, 2 * scipy.special.stdtr(self.freedom, -np.abs(g)), np.where(self.value == 0, 1.0, 0.0)
         )
 
-    def half_width(self, confidence: float = 0.95) -> Array:
+    def half_width(self, confidence: float = CONFIDENCE) -> Array:
         """Half the length of the interval."""
         lower, upper = self.interval(confidence)
         return 0.5 * (upper - lower)

@@ -28,10 +28,11 @@ from kfcourse.filters.particles import Particles
 from kfcourse.laws import Array, NegativeVariance
 from kfcourse.limits import OutOfTime, memory_limit, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Subset
-from kfcourse.montecarlo.designing import NotFinite
+from kfcourse.montecarlo.designing import NotFinite, failed
 from kfcourse.montecarlo.ensemble import STRATA, Ensemble, Instant, Serial
 from kfcourse.montecarlo.parallel import START, Submit, may_start, one_thread, processes
 from kfcourse.montecarlo.statistics import Sums
+from kfcourse.reasons import Reason
 
 BATCH = STRATA  # trajectories of a batch: their initial states share the prior out among them
 CHUNKS = (16, 16, 32, 64, 128, 256, 512)  # trajectories taken at once; after these always as many as the last
@@ -343,9 +344,9 @@ def _affair_of(one: Filter, step: int) -> Iterator[None]:
         yield
     except (ValueError, ArithmeticError, MemoryError) as error:
         if one.slow:
-            raise _TooMuch(one.name, step) if isinstance(error, MemoryError) else _Failed(one.name, str(error)) from None
+            raise _TooMuch(one.name, step) if isinstance(error, MemoryError) else _Failed(one.name, Reason.of(error)) from None
         if isinstance(error, NegativeVariance | np.linalg.LinAlgError):
-            raise NotFinite(f"step {step}: {one.name} failed: {error}", one.name) from None
+            raise failed(one.name, step, error) from None
         raise
 
 
@@ -359,10 +360,10 @@ def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
             f"step {step}: every filter fails; the model's trajectories become infinite, check its equations and parameters"
         )
     one = filters[int(np.argmin(finite[:, step]))]
-    reason = f"step {step}: {one.name} became infinite or NaN although the trajectories are finite"
+    said = f"step {step}: {one.name} became infinite or NaN although the trajectories are finite"
     if one.slow:
-        raise _Failed(one.name, reason)
-    raise NotFinite(f"{reason}; leave it out or check the model", one.name)
+        raise _Failed(one.name, Reason(said, "infinite", step=step))
+    raise NotFinite(Reason(f"{said}; leave it out or check the model", "infinite", step=step), one.name)
 
 
 def _first(ensemble: Ensemble, size: int) -> tuple[Array, Array, Array]:

@@ -22,6 +22,7 @@ from kfcourse.pages.browser import script
 from kfcourse.symbolic import javascript
 
 DATA = Path(__file__).parent / "data"
+HELPER = DATA / "figure.js"
 RUNS, STEPS = 10_000, 30  # of the live lab
 _DASHES = {"--": "7 4", ":": "2 3", "-.": "7 3 2 3", "-": ""}
 
@@ -38,7 +39,7 @@ def figure(name: str, says: str, code: str, call: str) -> str:
     code, call : str
         JavaScript.
     """
-    helper = _read("figure.js")
+    helper = HELPER.read_text(encoding="utf-8")
     mount = f"""(() => {{
 const root = document.currentScript.parentElement.querySelector(".kf-explore");
 const start = () => ({call})(root, {json.dumps(name)});

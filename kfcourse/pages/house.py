@@ -35,6 +35,7 @@ LAYERS = (
     "laws",
     "angles",
     "limits",
+    "reasons",
     "files",
     "seeds",
     "exports",

@@ -19,6 +19,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.laws import Array
+from kfcourse.pages import explore
 from kfcourse.scenarios import pointer
 from kfcourse.scenarios.pointer import HandTrack, sample
 from kfcourse.seeds import Seed
@@ -26,6 +27,16 @@ from kfcourse.seeds import Seed
 GRID = 0.01  # s between the points of a recording; sampling intervals are multiples of it
 SCREEN = (640, 400)  # px, the field of the page
 RUNS = (100, 10)  # ms, the sampling intervals of the paper's two runs
+SWITCHES = {
+    "dropouts": "lose 30 %",
+    "outliers": "5 % outliers",
+    "gate": "gate, 99.9 %",
+    "smooth": "smoothed at last",
+    "second": "second: S − 15 dB",
+    "blind": "hide the truth",
+    "input": "input by 3 samples",
+    "whole": "whole track",
+}
 _DECIMALS = 3
 
 
@@ -83,7 +94,7 @@ def record(track: HandTrack, seed: Seed) -> Recording:
     return Recording(position.round(_DECIMALS), (samples.y[:, 0] - position).round(_DECIMALS))
 
 
-def page(recording: Recording, interval: int = 20, sigma: int = 8, decibels: int = 57) -> str:
+def page(recording: Recording, interval: int = 20, sigma: int = 8, decibels: int = 57, name: str = "live") -> str:
     """The live page as a piece of HTML: markup, style, script and the recording; it loads nothing.
 
     Parameters
@@ -97,6 +108,8 @@ def page(recording: Recording, interval: int = 20, sigma: int = 8, decibels: int
     decibels : int
         Of the intensity S of the acceleration's white noise, 10^(decibels / 10) px^2/s^3: 30, 31, ..., 80.  The filter's Q is
         that of `pointer.uniform_acceleration` with acceleration_sd = sqrt(S / interval).
+    name : str
+        With which its state begins in the address; of the figure whose place it takes on the screen, if there is one.
 
     Returns
     -------
@@ -114,15 +127,18 @@ def page(recording: Recording, interval: int = 20, sigma: int = 8, decibels: int
     if not (np.isfinite(position).all() and np.isfinite(noise).all()):
         raise ValueError("a recording must be finite: the page has no missing samples; use record(track, seed)")
     settings = {"interval": interval, "sigma": sigma, "decibels": decibels}
-    for name, value in settings.items():
-        slider = SLIDERS[name]
+    for key, value in settings.items():
+        slider = SLIDERS[key]
         if value not in range(slider.low, slider.high + 1, slider.step):
-            raise ValueError(f"{name}: expected {slider.low}, {slider.low + slider.step}, ..., {slider.high}, got {value}")
+            raise ValueError(f"{key}: expected {slider.low}, {slider.low + slider.step}, ..., {slider.high}, got {value}")
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("kfcourse.pages"), trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
     content = {
+        "name": name,
+        "helper": explore.HELPER.read_text(encoding="utf-8"),
         "sliders": SLIDERS,
+        "switches": SWITCHES,
         "runs": list(RUNS),
         "settings": settings,
         "screen": SCREEN,

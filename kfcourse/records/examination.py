@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 
 from kfcourse.filters.base import Filter, structure_of
-from kfcourse.laws import Array, Gaussian, normalised_square, stacked, without_missing
+from kfcourse.laws import CONFIDENCE, Array, Gaussian, normalised_square, stacked, without_missing
 from kfcourse.linear.consistency import Innovations
 from kfcourse.montecarlo.experiment import states
 from kfcourse.records.evidence import likelihood
@@ -108,7 +108,7 @@ def _noise_of(cov: Array, scale: Array, what: str) -> None:
         raise ValueError(f"{what} has a negative variance, {variance.min():g}: look at its formula, and at the inputs there")
 
 
-def findings(told: Examination, confidence: float = 0.95, run: int = 0) -> list[Finding]:
+def findings(told: Examination, confidence: float = CONFIDENCE, run: int = 0) -> list[Finding]:
     """Size, mean and neighbours of a record's innovations; those that a gate refused are left out.
 
     The intervals are those of normal laws for sums of many terms: thirty measurements are enough.  Under weights that are

@@ -22,6 +22,8 @@ from typing import NamedTuple
 import sympy as sp
 from sympy.codegen.cfunctions import expm1
 
+from kfcourse.reasons import Reason
+
 MAX_DEGREE = 40
 
 
@@ -149,8 +151,11 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
     rewritten = sp.sympify(function).replace(with_variables, lambda e: e.rewrite(sp.exp))
     if _polynomial_degree(rewritten, variables) > MAX_DEGREE:
         raise NoClosedForm(
-            f"the degree of {function} is above {MAX_DEGREE}: its exact moments would be too long; "
-            "use a numerical structure, unscented(model) or gauss_hermite(model)"
+            Reason(
+                f"the degree of {function} is above {MAX_DEGREE}: its exact moments would be too long; "
+                "use a numerical structure, unscented(model) or gauss_hermite(model)",
+                "degree",
+            )
         )
     # Sums of parameters in a denominator are one symbol while the products are multiplied out.
     quotients: dict[sp.Basic, sp.Symbol] = {}
@@ -185,8 +190,12 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
 
 def _no_closed_form(factor: sp.Expr, function: sp.Expr) -> NoClosedForm:
     return NoClosedForm(
-        f"the package knows no closed-form Gaussian mean of the term {factor} in {function}; "
-        "use linearised(model), or a numerical structure: unscented(model) or gauss_hermite(model)"
+        Reason(
+            f"the package knows no closed-form Gaussian mean of the term {factor} in {function}; "
+            "use linearised(model), or a numerical structure: unscented(model) or gauss_hermite(model)",
+            "no_mean",
+            term=factor,
+        )
     )
 
 

@@ -25,6 +25,7 @@ import sympy as sp
 
 from kfcourse.angles import Components, on_circle
 from kfcourse.laws import Array, Gaussian, Measurement, Transition, measurement_of
+from kfcourse.reasons import Reason
 from kfcourse.symbolic.choices import jumps, masked
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.known import Stepwise
@@ -287,7 +288,11 @@ def _taylor(equation, x, mean, noise, noise_mean):
     for part in parts:
         if part.has(sp.Derivative, sp.DiracDelta) or any(jumps(one, [*x, *noise]) for one in equation.atoms(sp.Piecewise)):
             raise NoClosedForm(
-                f"{list(equation)} is not differentiable and cannot be linearised; use unscented(model) or gauss_hermite(model)"
+                Reason(
+                    f"{list(equation)} is not differentiable and cannot be linearised; "
+                    "use unscented(model) or gauss_hermite(model)",
+                    "no_slope",
+                )
             )
     return tuple(part.subs(point, simultaneous=True) for part in parts)
 
@@ -323,7 +328,9 @@ def _moments(equation, x, mean, cov, noise, noise_mean, noise_cov, known: tuple[
     try:
         means = sp.Matrix([joint.mean_of(formula) for formula in equation])
     except NoClosedForm as error:
-        raise NoClosedForm(reduce(lambda text, mask: text.replace(str(mask), str(masks[mask])), masks, str(error))) from None
+        why = Reason.of(error)
+        text = reduce(lambda text, mask: text.replace(str(mask), str(masks[mask])), masks, str(error))
+        raise NoClosedForm(Reason(text, why.kind, **{name: part.xreplace(masks) for name, part in why.parts.items()})) from None
     covs = sp.zeros(size, size)
     for i in range(size):
         for j in range(i, size):

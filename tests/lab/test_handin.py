@@ -1,6 +1,7 @@
 """The student's report: what it says is what was computed, in both languages, and its files are whole."""
 
 import dataclasses
+import pickle
 import re
 import tomllib
 from importlib import resources
@@ -11,7 +12,7 @@ from matplotlib.figure import Figure
 
 from kfcourse import Model, compare, gaussian, lab_filters, linearised, load_variants, run, simulate
 from kfcourse.filters import aof
-from kfcourse.lab import Variant, admission, handin, report
+from kfcourse.lab import Variant, handin, report
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.handin import CATALOGUE, FIGURES, LANGUAGES, write_handin
 from kfcourse.lab.handin_text import filled, inline_tex
@@ -19,9 +20,11 @@ from kfcourse.lab.refusals import cause
 from kfcourse.lab.report import ranges
 from kfcourse.lab.short_names import LAB, title
 from kfcourse.lab.written_out import scalar_equations
+from kfcourse.laws import NegativeVariance
 from kfcourse.montecarlo.comparison import Verdict
-from kfcourse.montecarlo.designing import NotFinite
+from kfcourse.montecarlo.designing import NotFinite, failed
 from kfcourse.montecarlo.statistics import Estimate
+from kfcourse.reasons import Reason
 
 WORDS = tomllib.loads((resources.files("kfcourse.lab") / "handin.toml").read_text(encoding="utf-8"))
 
@@ -237,7 +240,7 @@ LEFT_OUT = {
 
 @pytest.mark.parametrize("case", LEFT_OUT)
 def test_the_cause_of_a_refusal_is_said_in_the_report_s_words(case):
-    """The package's real messages: if their wording changes, the report would quote them instead."""
+    """The package's real messages; one without its kind would be quoted."""
     state, meter, name, english, russian = LEFT_OUT[case]
     model = Model.define(state, meter)
     (refused,) = admissions(model, [name])
@@ -253,11 +256,11 @@ def test_a_filter_that_diverges_and_other_reasons():
         cubic = Model.define("2*x + x**3 + v", "x + w")
         compare(lab_filters(cubic, ["aof-linearised"]), cubic, 50, 40, 1, progress=False)
     assert "trajectories" in cause(str(caught.value), model, WORDS["ru"])  # not the filter's fault: quoted
-    infinite = "step 7: duof became infinite or NaN although the trajectories are finite; leave it out or check the model"
-    assert "на шаге 7" in cause(infinite, model, WORDS["ru"]) and "at step 7" in cause(infinite, model, WORDS["en"])
-    negative = "step 28: mfos-gaussian failed: a covariance has the variance -165479, which must not be negative: check the"
+    negative = Reason.of(failed("mfos-gaussian", 28, NegativeVariance("a covariance has the variance -165479")))
     assert "на шаге 28" in cause(negative, model, WORDS["ru"]) and "at step 28" in cause(negative, model, WORDS["en"])
-    assert "60 с" in cause(admission._TOO_LONG.format(60), model, WORDS["ru"])
+    assert cause(pickle.loads(pickle.dumps(negative)), model, WORDS["ru"]) == cause(negative, model, WORDS["ru"])  # of a worker
+    (long,) = admissions(Model.define("0.9*x + v", "(1 + x)**14 + w"), ["aof-gaussian"], seconds=0.01)
+    assert "0.01 с" in cause(long.reason, model, WORDS["ru"])
     assert cause("50 % of $ & _", model, WORDS["en"]) == "50 % of $ & _"
 
 

@@ -27,6 +27,8 @@ ANSWERED = {
     "m": 1,
     "n": 1,
     "o": 1,
+    "p": 1,
+    "r": 1,
 }  # questions in words
 SAID = re.compile(r"\*(What to expect|Why never negative|When is there an answer\?|What is left out)\.?\*|It goes to \$\\beta\$")
 

@@ -6,12 +6,15 @@ import itertools
 import json
 import re
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from kfcourse import cli
 from kfcourse.laws import Gaussian, normalised_square
-from kfcourse.linear import covariances, steady_state
+from kfcourse.linear import covariances, smooth, steady_state
 from kfcourse.linear.arithmetic import predict_law
 from kfcourse.linear.consistency import innovations, nis
 from kfcourse.pages import live
@@ -19,6 +22,7 @@ from kfcourse.scenarios import pointer
 
 RECORDING = live.record(pointer.hand_track(seed=10), seed=6)
 SECONDS = live.GRID * (len(RECORDING.position) - 1)
+INTRODUCED = "300 in 5.99 s"  # of the recorded track, before anything is touched
 START = {"interval": 20, "sigma": 8, "decibels": 57}
 ALONE = '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Live</title></head><body>{}</body></html>'
 
@@ -65,11 +69,11 @@ def test_a_recording_is_the_track_and_its_noise():
 
 
 def test_a_page_loads_nothing_and_has_no_ids():
-    text = live.page(RECORDING)
-    assert not re.search(r"\b(src|href|srcset|url\()\s*=?", text)
+    text = live.page(RECORDING).replace("http://www.w3.org/2000/svg", "")  # a name, not an address
+    assert not re.search(r"<[^>]*\b(src|href|srcset)\s*=", text)
     assert not re.search(r"https?:|import\s*\(|fetch\s*\(|XMLHttpRequest|localStorage|document\.cookie", text)
     assert not re.search(r"<[^>]*\sid=", text)  # two pages may stand in one document
-    assert text == live.page(RECORDING)
+    assert live.page(RECORDING) == live.page(RECORDING)
     assert "{{" not in text and "{%" not in text
 
 
@@ -112,7 +116,7 @@ def opening(browser, folder):
         tab.set_default_timeout(20_000)
         tab.on("console", lambda message: problems.append(message.text))
         tab.on("pageerror", lambda error: problems.append(str(error)))
-        tab.on("request", lambda request: request.url == path.as_uri() or problems.append(f"loads {request.url}"))
+        tab.on("request", lambda one: one.url.startswith((path.as_uri(), "blob:")) or problems.append(f"loads {one.url}"))
         if not real_time:
             tab.clock.install(time=0)
         tab.goto(path.as_uri())
@@ -244,6 +248,68 @@ def test_lost_samples_and_an_input(script, interval, dropouts, accelerated):
     assert [("gain" in one["law"]) for one in found[3:]] == (~lost[3:]).tolist()
 
 
+def by_hand(system, y, interval: float, gate: bool):
+    """Means, whether each sample was refused, and where the filter began anew: the textbook's step in a loop."""
+    law, means, refused, begun, count = None, [], [], [], 0
+    for k in range(len(y)):
+        first = begun[-1] if begun else 0
+        if count == 5:
+            law, count, first = None, 0, k
+            begun.append(k)
+        if law is None:
+            if k >= first + 2:
+                start = pointer.start_up(y[k - 2 : k + 1, None], interval, system.R)
+                law = start.mean[0, :4], start.cov[:4, :4]
+            refused.append(False)
+        else:
+            mean, cov = system.A @ law[0], system.A @ law[1] @ system.A.T + system.Q
+            nu, F = y[k] - system.H @ mean, system.H @ cov @ system.H.T + system.R
+            refused.append(bool(gate and nu @ np.linalg.solve(F, nu) > -2 * np.log(0.001)))
+            K = np.linalg.solve(F, system.H @ cov).T
+            law = (mean, cov) if refused[-1] else (mean + K @ nu, cov - K @ F @ K.T)
+            count = count + 1 if refused[-1] else 0
+        means.append(law[0] if law else np.full(4, np.nan))
+    return np.array(means), refused, begun
+
+
+@pytest.mark.parametrize(("gate", "decibels"), [(False, 57), (True, 57), (True, 42)])
+def test_outliers_and_a_gate(script, gate, decibels):
+    settings = {"interval": 0.02, "sigma": 8, "intensity": 10 ** (decibels / 10), "outliers": True, "gate": gate}
+    found = page_s_run(script, settings)
+    y, clean = np.array([one["y"] for one in found["samples"]]), RECORDING.sampled(0.02, 8)[1][:, 0]
+    wild = np.hypot(*(y - clean).T) > 1e-9
+    np.testing.assert_allclose(np.hypot(*(y - clean)[wild].T), 15 * 8, rtol=1e-9)
+    assert abs(wild.mean() - 0.05) < 4 * np.sqrt(0.05 * 0.95 / len(y)) and not wild[:3].any()
+    means, refused, begun = by_hand(system_of(20, 8, decibels), y, 0.02, gate)
+    assert [one["refused"] for one in found["samples"]] == refused
+    assert bool(begun) == (decibels == 42)  # a filter that trusts straight motion refuses the truth, and begins anew
+    kept = ~np.isnan(means[:, 0])
+    assert [one["law"] is not None for one in found["samples"]] == kept.tolist()
+    mine = np.array([np.ravel(one["law"]["mean"]) for one in found["samples"] if one["law"]])
+    np.testing.assert_allclose(mine, means[kept], rtol=1e-9, atol=1e-6)
+    if gate and decibels == 57:
+        assert np.array(refused)[wild].mean() > 0.95 and np.array(refused)[~wild].mean() < 0.02
+
+
+@pytest.mark.parametrize(("interval", "dropouts"), [(20, False), (100, True)])
+def test_looking_back(script, interval, dropouts):
+    settings = {"interval": interval / 1000, "sigma": 8, "intensity": 5e5, "dropouts": dropouts}
+    found = page_s_run(script, settings)
+    truth, y = RECORDING.sampled(interval / 1000, 8)
+    y[[one["y"] is None for one in found["samples"]]] = np.nan
+    system = pointer.uniform_acceleration(interval / 1000, np.sqrt(5e5 / (interval / 1000)), 8)
+    later = smooth(system, pointer.follow(system, y, interval / 1000)).mean[:, 0, :2]
+    np.testing.assert_allclose([one["smoothed"] for one in found["samples"][3:]], later, rtol=1e-8, atol=1e-6)
+    error = np.sqrt(((later - truth[3:]) ** 2).sum(axis=-1).mean())
+    assert found["measures"]["smoothed"] == pytest.approx(error, rel=1e-8)
+
+
+def test_noisy_and_filtered_count_the_same_moments(script):
+    settings = {"interval": 0.02, "sigma": 8, "intensity": 5e5}
+    found, lossy = (page_s_run(script, settings | {"dropouts": lost})["measures"] for lost in (False, True))
+    assert found["noisy"] == lossy["noisy"] and found["filtered"] < lossy["filtered"]
+
+
 @pytest.mark.parametrize(
     "change",
     [{"interval": None}, {"interval": 0.015}, {"interval": 0}, {"sigma": None}, {"sigma": 0}, {"sigma": -1}, {"intensity": None}],
@@ -301,7 +367,9 @@ def test_the_pointer_between_its_events(script):
 def test_nothing_moves_by_itself(opened):
     tab = opened(reduced_motion="reduce")
     tab.clock.run_for(3000)
-    assert text(tab, "count") == "–" and text(tab, "phase") == "waiting"
+    assert text(tab, "count") == INTRODUCED and text(tab, "phase") == "ready"
+    part = live.Recording(*(values[:600] for values in RECORDING))
+    assert shown(tab) == written(reference(**START, recording=part))  # the first frame shows a filter at work
     assert status(tab).startswith("Move the mouse or a finger")
 
 
@@ -309,13 +377,13 @@ def test_the_recorded_track_by_keyboard(opened):
     tab = opened()
     focus = "document.activeElement.textContent + document.activeElement.tagName"
     order = []
-    for _ in range(13):
+    for _ in range(19):
         tab.keyboard.press("Tab")
         order.append(tab.evaluate(focus))
     assert [stop[-6:] for stop in order[:1]] == ["CANVAS"]
-    buttons = ["Play the recorded track", "Step", "Clear", "100 ms", "10 ms", "both"]
-    assert order[1:] == [*(name + "BUTTON" for name in buttons), *["INPUT"] * 6]
-    for _ in range(11):
+    buttons = ["Play the recorded track", "Step", "Clear", "CSV", "100 ms", "10 ms", "both"]
+    assert order[1:] == [*(name + "BUTTON" for name in buttons), *["INPUT"] * 11]
+    for _ in range(17):
         tab.keyboard.press("Shift+Tab")
     tab.keyboard.press("Enter")
     assert status(tab) == "Playing."
@@ -406,7 +474,7 @@ def test_the_two_runs_of_the_paper_side_by_side(opened):
     assert shown(tab) == written(reference(10, 8, 57))
     runs.get_by_role("button", name="both").press("Enter")
     assert tab.locator("canvas").count() == 2 and text(tab, "interval") == "100 and 10 ms"
-    assert tab.get_by_role("columnheader").all_inner_texts() == ["100 ms", "10 ms"]
+    assert tab.get_by_role("columnheader").all_inner_texts() == ["every 100 ms", "every 10 ms"]
     assert shown(tab, "recent") == written(reference(100, 8, 57)) and shown(tab) == written(reference(10, 8, 57))
     counts = [len(RECORDING.position[:: interval // 10]) for interval in live.RUNS]
     assert text(tab, "count") == f"{counts[0]} | {counts[1]} in {SECONDS:.2f} s"
@@ -429,20 +497,41 @@ def test_what_the_field_and_the_strip_show(opened):
     expected = laws.predicted.mean[6, 0, :2]  # of the tenth sample, when nine have come: a cross
     near = [pixel(tab, box["x"] + scale * (expected[0] + dx), box["y"] + scale * expected[1]) for dx in (-0.7, 0, 0.7)]
     assert np.abs(np.array(near) - [213, 94, 0]).sum(axis=1).min() <= 4  # the colour of the filter; drawn with rounding
-    dots = tab.locator("[data-line=nis]").get_attribute("d")
-    heights = [102 - float(place.split()[1].split("h")[0]) for place in dots.split("M")[1:]]
     found = nis(innovations(system.measure, laws.predicted, y[3:]))[:6, 0]
-    # 46 px for NIS 12, written with one decimal
-    np.testing.assert_allclose(heights, 46 * np.minimum(found / 12, 1), atol=0.051)
-    line = tab.locator("[data-line=filtered]").get_attribute("d")
-    assert line.count("L") == 5
+    errors, sizes = (marks(tab, chart) for chart in (0, 1))
+    times = 0.1 * np.arange(3, 9)
+    np.testing.assert_allclose(sizes[-2], np.c_[times, np.minimum(found, 12)], atol=0.03)  # written to 0.1 px, of 12 in some 60
+    error = np.hypot(*(laws.posterior.mean[:6, 0, :2] - RECORDING.position[30:90:10]).T)
+    np.testing.assert_allclose(errors[-2], np.c_[times, error], atol=0.1)  # to 0.1 px, of some 25 in some 60
+
+
+def marks(tab, chart: int) -> list[np.ndarray]:
+    """The curves and dots of a strip chart in units of its axes: (time, value) of each point."""
+    svg = tab.locator("svg.kf-chart").nth(chart)
+    paths = svg.evaluate("""(svg) => [...svg.querySelectorAll("[clip-path] path")]
+        .map((one) => [one.getAttribute("d") ?? "", one.getAttribute("fill") === "none"])""")
+    ticks = [
+        [float(one.replace("−", "-")) for one in axis]
+        for axis in svg.evaluate("""(svg) => ["middle", "end"].map((anchor) =>
+            [...svg.querySelectorAll(`text[text-anchor=${anchor}]`)].filter((one) => /^[\\d.]+$/.test(one.textContent))
+            .map((one) => [one.getAttribute(anchor === "middle" ? "x" : "y"), one.textContent]).flat())""")
+    ]
+    scales = [np.polyfit(axis[::2], axis[1::2], 1) for axis in ticks]
+    found = []
+    for path, is_line in paths:
+        numbers = [one.split("a")[0].split() for one in re.split("[ML]", path)[1:]]
+        places = np.array(numbers, dtype=float).reshape(-1, 2)
+        radius = 0 if is_line or not path else float(path.split("a")[1].split()[0])
+        found.append(np.c_[np.polyval(scales[0], places[:, 0] + radius), np.polyval(scales[1], places[:, 1] + 4.5)])
+    return found
 
 
 def test_field_and_controls_fit_a_screen(opened):
     tab = opened(viewport={"width": 1100, "height": 600})
     panel, field = (tab.locator(one).bounding_box() for one in (".kf-panel", "canvas"))
     assert panel["x"] >= field["x"] + field["width"] and field["width"] >= 620
-    assert tab.evaluate("document.documentElement.scrollHeight <= innerHeight")
+    answers = tab.locator(".kf-switches").bounding_box()  # the last of what is moved, and of what answers in numbers
+    assert answers["y"] + answers["height"] <= 600
 
 
 def test_extreme_settings_and_nonsense(opened):
@@ -488,6 +577,110 @@ def test_a_pointer_moved_by_arrow_keys(opened):
     assert 0.2 < longer - seconds <= 0.3 and status(tab).startswith(f"Your track, {longer:.2f}")
 
 
+# ---------------------------------------------------------------- switches, links, files
+
+
+def check(tab, *names: str) -> None:
+    for name in names:
+        tab.locator(f"input[data-set={name}]").press("Space")
+        assert tab.locator(f"input[data-set={name}]").is_checked()
+
+
+def test_the_strips_stay_within_their_axes_with_both_runs_and_the_whole_track(opened):
+    tab = opened(viewport={"width": 1100, "height": 768})
+    play_to_the_end(tab)
+    press(tab, "both")
+    check(tab, "whole")
+    for chart in (0, 1):
+        everything = np.concatenate([one for one in marks(tab, chart) if len(one)])
+        assert everything[:, 0].min() > 0.02 and everything[:, 0].max() < SECONDS + 0.02
+
+
+def test_a_second_filter_beside_the_first(opened):
+    tab = opened(viewport={"width": 1100, "height": 768})
+    play_to_the_end(tab)
+    check(tab, "second")
+    assert tab.get_by_role("columnheader").all_inner_texts() == ["S = 57 dB", "S = 42 dB"]
+    assert shown(tab, "recent") == written(reference(20, 8, 57)) and shown(tab) == written(reference(20, 8, 42))
+    assert re.match(r"At .* s: S = 57 dB, noisy .*; S = 42 dB, noisy", status(tab))
+    press(tab, "both")
+    assert not tab.locator("input[data-set=second]").is_checked()
+
+
+def test_the_truth_is_hidden(opened):
+    tab = opened()
+    play_to_the_end(tab)
+    check(tab, "blind")
+    expected = written(reference(**START))
+    assert shown(tab) == {"noisy": "hidden", "filtered": "hidden", "inside": "hidden", "nis": expected["nis"]}
+    assert status(tab) == f"At {SECONDS:.2f} s: mean NIS {expected['nis']}."
+    assert all(not len(one) for one in marks(tab, 0))
+    tab.locator("input[data-set=blind]").press("Space")
+    assert shown(tab) == expected
+
+
+def test_smoothed_at_the_end_only(opened):
+    tab = opened()
+    press(tab, "Play the recorded track")
+    check(tab, "smooth")
+    tab.clock.run_for(1000)
+    assert text(tab, "smoothed-all") == "–"
+    press(tab, "Pause")
+    assert float(text(tab, "smoothed-all").split()[0]) < float(text(tab, "filtered-all").split()[0])
+
+
+def test_a_slider_s_numbers_are_said_at_once_of_one_s_own_track(opened):
+    tab = opened()
+    circle(tab, tab.mouse.move, seconds=1.0)
+    tab.mouse.move(5, 5)
+    before = status(tab)
+    set_slider(tab, "sigma", 12)
+    assert re.match(r"Your track, \d", before) and status(tab) != before
+    assert status(tab).endswith("noisy {noisy}, filtered {filtered}.".format(**shown(tab)))
+
+
+def test_a_link_keeps_the_settings(opened):
+    tab = opened()
+    set_slider(tab, "decibels", 40)
+    check(tab, "gate")
+    tab.clock.run_for(500)
+    assert tab.evaluate("location.hash") == "#live?decibels=40&gate=1"
+    tab.evaluate("location.hash = '#live?sigma=17&outliers=1&interval=999'")
+    tab.wait_for_function("document.querySelector('[data-show=sigma]').textContent === '17 px'")
+    assert tab.locator("input[data-set=outliers]").is_checked() and not tab.locator("input[data-set=gate]").is_checked()
+    assert text(tab, "interval") == "200 ms" and text(tab, "decibels").startswith("57 dB")
+
+
+def test_its_file_is_read_by_the_command(opened, tmp_path, monkeypatch):
+    """With the model of the chapter, as it stands there."""
+    chapter = (Path(live.__file__).parents[2] / "book" / "live-track.md").read_text(encoding="utf-8")
+    (tmp_path / "pointer.toml").write_text(re.search(r"```toml\n(.*?)```", chapter, re.DOTALL)[1], encoding="utf-8")
+    tab = opened()
+    play_to_the_end(tab)
+    check(tab, "dropouts")
+    with tab.expect_download() as download:
+        press(tab, "CSV")
+    download.value.save_as(tmp_path / "track.csv")
+    assert download.value.suggested_filename == "track.csv"
+    lines = (tmp_path / "track.csv").read_text().splitlines()
+    assert lines[0] == "time,y1,y2" and len(lines) == 1 + len(RECORDING.position[::2])
+    assert status(tab).startswith(f"track.csv: {len(lines) - 1} samples")
+    assert 0.25 < np.mean([line.endswith(",,") for line in lines]) < 0.35
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "short.csv").write_text("\n".join(lines[:200]) + "\n")
+    result = CliRunner().invoke(cli.main, ["estimate", "short.csv", "--model", "pointer.toml", "--out", "out"])
+    assert result.exit_code == 0, result.output
+    assert "199 rows" in result.output and (tmp_path / "out" / "estimate.csv").is_file()
+
+
+def test_on_paper_its_picture_stays(opened):
+    picture = '<figure id="live"><img src="data:," alt="still"><figcaption>Caption</figcaption></figure>'
+    tab = opened(picture + live.page(RECORDING, **START))
+    assert not tab.locator("img").is_visible() and tab.locator("figure .kf-live canvas").is_visible()
+    tab.emulate_media(media="print")
+    assert tab.locator("img").is_visible() and not tab.locator(".kf-live").is_visible()
+
+
 # ---------------------------------------------------------------- by mouse and finger
 
 
@@ -518,7 +711,7 @@ def pixel(tab, x: float, y: float) -> list[int]:
 def test_the_mouse_is_followed_and_its_track_cleaned(opened):
     tab = opened()
     tab.mouse.move(5, 5)
-    assert text(tab, "phase") == "waiting"
+    assert text(tab, "count") == INTRODUCED
     circle(tab, tab.mouse.move)
     assert text(tab, "phase") == "ready" and status(tab) == "The filter is ready."
     tab.mouse.move(5, 5)
@@ -636,15 +829,16 @@ def test_every_control_has_a_name(opened):
     for name in ("Sampling interval Δ", "Noise of the meter σ", "Noise of the object S"):
         slider = tab.get_by_role("slider", name=name, exact=True)
         assert slider.count() == 1 and slider.get_attribute("aria-valuetext")
-    for name in ("whole track", "lose 30 %", "acceleration by three samples"):
-        assert tab.get_by_role("checkbox", name=re.compile(name)).count() == 1
-    assert tab.get_by_role("button").all_inner_texts() == ["Play the recorded track", "Step", "Clear", "100 ms", "10 ms", "both"]
+    for name in live.SWITCHES.values():
+        assert tab.get_by_role("checkbox", name=name, exact=True).count() == 1
+    buttons = ["Play the recorded track", "Step", "Clear", "CSV", "100 ms", "10 ms", "both"]
+    assert tab.get_by_role("button").all_inner_texts() == buttons
     assert tab.get_by_role("group", name="The paper's two runs").get_by_role("button").count() == 3
-    assert tab.get_by_role("img", name=re.compile("Strip chart")).count() == 1
+    assert tab.locator("svg.kf-chart[role=group][aria-label^='Strip chart']").count() == 2
     assert tab.get_by_role("status").count() == 1
-    assert tab.locator("input, button, canvas").count() == 13
+    assert tab.locator("input, button, canvas").count() == 19
     assert tab.get_by_role("columnheader").all_inner_texts() == ["last 3 s", "whole track"]
-    assert tab.get_by_role("rowheader").count() == 4
+    assert tab.get_by_role("rowheader").count() == 5
 
 
 def contrast(one: str, other: str) -> float:
@@ -682,9 +876,9 @@ def test_both_themes_are_legible(opened, theme, by):
 
 
 def test_two_pages_in_one_document(opened):
-    tab = opened(live.page(RECORDING, **START) + live.page(RECORDING, interval=100))
+    tab = opened(live.page(RECORDING, **START) + live.page(RECORDING, interval=100, name="other"))
     first, second = tab.locator(".kf-live").all()
     second.get_by_role("button", name="Step").press("Enter")
     assert second.locator("[data-show=count]").inner_text() == "1 in 0.00 s"
-    assert first.locator("[data-show=count]").inner_text() == "–"
+    assert first.locator("[data-show=count]").inner_text() == INTRODUCED
     assert second.locator("[data-show=interval]").inner_text() == "100 ms"

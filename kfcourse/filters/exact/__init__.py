@@ -4,6 +4,7 @@
 
 The posterior is held as masses on nodes (point masses), so the integral is a sum of normal kernels, one for each node.  Its
 estimate, the posterior mean, has the least mean square error of all filters: it bounds what any approximation can reach.
+Stratonovich (1960); the nodes that follow each trajectory are ours.
 
 The lab's noises are multiplicative: densities are many orders of magnitude narrower at the end of a run than at its
 beginning, and within one step the posterior may be thousands of times narrower than the prediction, far narrower than any
