@@ -87,6 +87,7 @@ DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with m
     type=click.IntRange(min=1),
     help="Processor cores to use; does not change the numbers.  [default: all]",
 )
+@click.option("--dask", help="Address of a Dask scheduler whose workers run the filters instead.")
 @click.option(
     "--compiled",
     is_flag=True,
@@ -113,6 +114,7 @@ def lab(
     wide: float | None,
     same_ensemble: bool,
     threads: int | None,
+    dask: str | None,
     compiled: bool,
     out: Path | None,
     language: str | None,
@@ -169,6 +171,7 @@ def lab(
             wide=wide,
             threads=threads,
             compiled=compiled,
+            dask=dask,
         ),
         refused,
     )
