@@ -90,7 +90,7 @@ class Filter:
     look_back : LookBack, optional
         Where it is another than the normal law's by `structure`: what the whole record tells of each state.
     printed : (Advance, tuple of Eq), optional
-        A step and the equations that it computes, no more: of them `fused` makes a compiled one, as long as it is this filter's.
+        A step and the equations that it computes, no more: of them `fuse` makes a compiled one, as long as it is this filter's.
     """
 
     name: str

@@ -149,7 +149,7 @@ class Design:
     structure : Structure, optional
         The structural functions that the equations use.
     printed : (equations, tuple of Eq), optional
-        Equations, and how they are printed if that is all: of them `fused` makes compiled ones, while they are this design's.
+        Equations, and how they are printed if that is all: of them `fuse` makes compiled ones, while they are this design's.
     known : callable, optional
         Coefficients of a step -> the step, where that is quicker than `answered`.
     """

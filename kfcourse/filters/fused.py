@@ -36,7 +36,7 @@ _X, _NEXT, _Y, _LAM, _PSI, _Z, _P, _LAM_NEXT, _PSI_NEXT, _F = map(
 _KEPT = {_Z, _P, _LAM_NEXT, _PSI_NEXT}
 
 
-def fused(one: Filter | Design) -> Filter | Design:
+def fuse(one: Filter | Design) -> Filter | Design:
     """The same filter with compiled steps, equal up to rounding; the filter itself where there is no formula to compile.
 
     Compiled are AOF, DUOF, FOS, MFOS and their kin in two steps, of scalar models whose structural functions have formulas.

@@ -18,7 +18,7 @@ import numpy as np
 
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
-from kfcourse.filters.fused import fused, is_scalar
+from kfcourse.filters.fused import fuse, is_scalar
 from kfcourse.laws import Array, Gaussian, stacked
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite, design
@@ -277,7 +277,7 @@ def _check_arguments(
 def _compiled(filters: Sequence[Filter | Design]) -> list[Filter | Design]:
     """The filters with compiled steps as far as that can be; ValueError if there is no numba."""
     try:
-        return [fused(one) for one in filters]
+        return [fuse(one) for one in filters]
     except ImportError:
         raise ValueError(REMEDY) from None
 

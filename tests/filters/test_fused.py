@@ -14,7 +14,7 @@ import sympy as sp
 from kfcourse import Model, compare, gaussian, linearised, load_variants, run, simulate, unscented
 from kfcourse.filters import aof, dfmp, duof, fos, gated, mdfmp, mfos
 from kfcourse.filters.designed import Design
-from kfcourse.filters.fused import fused, is_scalar
+from kfcourse.filters.fused import fuse, is_scalar
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble
 from kfcourse.symbolic import compiled
@@ -59,7 +59,7 @@ def check(model, runs, filters):
     """
     y = simulate(model, runs, STEPS, seed=2).y
     y[2, ::7] = np.nan
-    quick = [fused(one) for one in filters]
+    quick = [fuse(one) for one in filters]
     assert all(one is not other for one, other in zip(filters, quick, strict=True))
     with np.errstate(all="ignore"):
         pairs = zip(ready(filters, model, runs), ready(quick, model, runs), strict=True)
@@ -101,7 +101,7 @@ def test_a_meter_that_cannot_vary_and_one_that_never_does():
     """F = 0 at x = 0: no correction there; and the same p = Psi R / F, never negative, where the meter is sharp."""
     model = Model.define("c*x + e*v*x", "g*x**2 + f*x**2*w", {"c": 0.9, "e": 0.05, "g": 1, "f": 1e-9}, prior={"mean": 0.0})
     one = aof(linearised(model))
-    other, y = fused(one), simulate(model, 300, STEPS, seed=3).y
+    other, y = fuse(one), simulate(model, 300, STEPS, seed=3).y
     plain, found = run(one, y), run(other, y)
     np.testing.assert_allclose(found.mean, plain.mean, rtol=1e-9, atol=1e-12)
     assert (found.cov >= 0).all()
@@ -116,7 +116,7 @@ def test_what_has_no_formulas_or_another_step_stays_as_it_is():
     others += [aof(linearised(vector)), duof(vector), aof(linearised(timed))]
     assert not is_scalar(vector) and not is_scalar(timed) and is_scalar(model)
     for other in others:
-        assert fused(other) is other
+        assert fuse(other) is other
 
 
 def test_what_cannot_be_compiled_runs_as_it_is_and_says_so(monkeypatch):
@@ -127,7 +127,7 @@ def test_what_cannot_be_compiled_runs_as_it_is_and_says_so(monkeypatch):
     monkeypatch.setattr("kfcourse.filters.fused._PRINTED", {})
     one = aof(gaussian(SCALAR["53"]))
     with pytest.warns(UserWarning, match=r"aof-gaussian is not compiled, and runs as without compiled=True: no such function"):
-        assert fused(one) is one
+        assert fuse(one) is one
 
 
 def test_without_numba_it_is_said_what_is_missing(monkeypatch):
@@ -144,7 +144,7 @@ def test_a_second_process_finds_what_was_compiled(tmp_path):
     """Nothing is compiled again: numba counts what it read from its cache."""
     code = (
         "import json; from kfcourse import load_variants, linearised; from kfcourse.filters import aof; "
-        "from kfcourse.filters.fused import _program, fused; one = aof(linearised(load_variants()['1'].model)); "
+        "from kfcourse.filters.fused import _program; one = aof(linearised(load_variants()['1'].model)); "
         "f = _program(one, one.printed[1]).whole.function.stats; print(json.dumps([len(f.cache_hits), len(f.cache_misses)]))"
     )
     environment = {"XDG_CACHE_HOME": str(tmp_path), "LOCALAPPDATA": str(tmp_path), "HOME": str(tmp_path)}
