@@ -24,8 +24,6 @@ from kfcourse.filters.designed import Affine, Design, Equations, Regression
 from kfcourse.filters.programs import Rule, array_name, in_numbers, needed, scalar, stages, value_of
 from kfcourse.laws import Array, Gaussian, column
 from kfcourse.symbolic import compiled
-from kfcourse.symbolic.jumping import JumpModel
-from kfcourse.symbolic.model import Model
 
 Letters = Sequence[sp.Symbol]
 Equalities = tuple[sp.Eq, ...]
@@ -49,7 +47,12 @@ def fuse(one: Filter | Design) -> Filter | Design:
     """
     model, structure = one.model, one.structure
     own = one.step if isinstance(one, Filter) else one.equations
-    if one.printed is None or one.printed[0] is not own or not is_scalar(model) or (structure and structure.formulas is None):
+    if (
+        one.printed is None
+        or one.printed[0] is not own
+        or not compiled.is_scalar(model)
+        or (structure and structure.formulas is None)
+    ):
         return one
     try:
         program = _program(one, one.printed[1])
@@ -65,11 +68,6 @@ def fuse(one: Filter | Design) -> Filter | Design:
         equations=lambda state, y: program.equations(one.equations, state, y),
         known=lambda fits: program.known(one.answered(fits), fits),
     )
-
-
-def is_scalar(model: Model | JumpModel) -> bool:
-    """Whether loops over numbers are all that a model needs: one state, one measurement, no angles, no step, no modes."""
-    return isinstance(model, Model) and model.n == model.p == 1 and not model.timed and not (model.angles.x or model.angles.y)
 
 
 Arrays = dict[str, Array]  # of each trajectory, by the name of the letter

@@ -19,11 +19,10 @@ import numpy as np
 import scipy
 
 from kfcourse.angles import on_circle
-from kfcourse.filters.fused import is_scalar
 from kfcourse.laws import Array, Gaussian, column, normalised_square, square_root
 from kfcourse.linear.runs import Trajectories
 from kfcourse.seeds import Seed, seed_number
-from kfcourse.symbolic.compiled import load, loop
+from kfcourse.symbolic.compiled import is_scalar, load, loop
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model

@@ -18,7 +18,7 @@ import numpy as np
 
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
-from kfcourse.filters.fused import fuse, is_scalar
+from kfcourse.filters.fused import fuse
 from kfcourse.laws import Array, Gaussian, stacked
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite, design
@@ -29,7 +29,7 @@ from kfcourse.montecarlo.subset import LEAST, progress_bar, run_block, run_subse
 from kfcourse.montecarlo.two_phase import Replicas
 from kfcourse.montecarlo.widths import best_width
 from kfcourse.seeds import Seed, seed_number
-from kfcourse.symbolic.compiled import REMEDY
+from kfcourse.symbolic.compiled import REMEDY, is_scalar
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 

@@ -26,6 +26,8 @@ from sympy.core.relational import Relational
 
 from kfcourse.files import save
 from kfcourse.symbolic.codegen import BeyondFloats, NumbersPrinter, Program, lower
+from kfcourse.symbolic.jumping import JumpModel
+from kfcourse.symbolic.model import Model
 
 REMEDY = "compiled=True needs numba: pip install 'kfcourse[fast]', or leave it out"
 NAN = sp.Symbol("nan")  # what a formula gives where it has no value
@@ -36,6 +38,11 @@ from numba import njit
 
 nan = np.nan
 '''
+
+
+def is_scalar(model: Model | JumpModel) -> bool:
+    """Whether loops over numbers are all that a model needs: one state, one measurement, no angles, no step, no modes."""
+    return isinstance(model, Model) and model.n == model.p == 1 and not model.timed and not (model.angles.x or model.angles.y)
 
 
 class _Printer(NumbersPrinter):

@@ -14,7 +14,7 @@ import sympy as sp
 from kfcourse import Model, compare, gaussian, linearised, load_variants, run, simulate, unscented
 from kfcourse.filters import aof, dfmp, duof, fos, gated, mdfmp, mfos
 from kfcourse.filters.designed import Design
-from kfcourse.filters.fused import fuse, is_scalar
+from kfcourse.filters.fused import fuse
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble
 from kfcourse.symbolic import compiled
@@ -114,7 +114,7 @@ def test_what_has_no_formulas_or_another_step_stays_as_it_is():
     timed = Model.define("x + v/(1 + k)", "x + w")
     others = [aof(unscented(model)), gated(one), replace(one, step=lambda state, y: state), fos(gaussian(model), arguments=3)]
     others += [aof(linearised(vector)), duof(vector), aof(linearised(timed))]
-    assert not is_scalar(vector) and not is_scalar(timed) and is_scalar(model)
+    assert [compiled.is_scalar(one) for one in (vector, timed, model)] == [False, False, True]
     for other in others:
         assert fuse(other) is other
 
