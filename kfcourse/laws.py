@@ -79,6 +79,13 @@ def measurement_of(angles: Components) -> type[Measurement]:
     return AngularMeasurement
 
 
+def column(array: Array) -> Array:
+    """The only component of vectors (N, 1) or matrices (N, 1, 1), (N,), as compiled loops take it."""
+    flat = array.reshape(-1)
+    fits = flat.flags.c_contiguous and flat.flags.writeable and flat.dtype == float
+    return flat if fits else np.array(flat, dtype=float)
+
+
 @cache
 def identity(n: int, dtype: np.dtype[Any]) -> Matrices:
     """The unit matrix, read-only and made once: a step on few trajectories costs little more than making it."""

@@ -281,6 +281,7 @@ def test_a_reference_shows_what_it_leads_to(window):
     figure = tab.locator('article a.reference.internal[href^="#fig-"]').first
     formula.hover()
     box.locator("mjx-container").wait_for()
+    assert "#" not in box.inner_text()  # the mark beside a number, which is a link
     tab.keyboard.press("Escape")
     assert not box.is_visible()
     figure.focus()

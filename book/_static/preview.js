@@ -24,8 +24,8 @@ addEventListener("DOMContentLoaded", () => {
     const copy = target(link).cloneNode(true);
     for (const one of [copy, ...copy.querySelectorAll("*")])
       for (const name of ["id", "tabindex", "role", "aria-label"]) one.removeAttribute(name);
-    for (const one of copy.querySelectorAll("a")) one.replaceWith(...one.childNodes);
     for (const one of copy.querySelectorAll("button, details, .headerlink")) one.remove();
+    for (const one of copy.querySelectorAll("a")) one.replaceWith(...one.childNodes);
     box.replaceChildren(copy);
     box.hidden = false;
     link.setAttribute("aria-describedby", box.id);
