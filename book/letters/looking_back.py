@@ -8,42 +8,77 @@ from kfcourse.pages.letters import K_RANGE, column, covariance
 from kfcourse.pages.reader import Indexed
 from kfcourse.pages.relations import NOTATION
 
-STEPS = 6
+STEPS, STATES, SEEN = 6, 3, 2
+
+
+def _record(rng):
+    A, H = rng.normal(size=(STATES, STATES)), rng.normal(size=(SEEN, STATES))
+    system = LinearSystem(A, H, covariance(rng, STATES), covariance(rng, SEEN))
+    prior, y = Gaussian(rng.normal(size=STATES), covariance(rng, STATES)), rng.normal(size=(STEPS, 1, SEEN))
+    found = run(system, prior, y)
+    back = smooth(system, found)
+    letters = {
+        "z": _columns(found.posterior.mean),
+        "p": Indexed(found.posterior.cov[:, 0]),
+        r"\bar z": _columns(back.mean),
+        r"\bar p": Indexed(back.cov[:, 0]),
+        "I": np.eye(STATES),
+        "k": K_RANGE,
+    }
+    return system, y, found, letters
+
+
+def _columns(means):
+    return Indexed([column(mean) for mean in means[:, 0]])
 
 
 def course(rng):
-    states, seen = 3, 2
-    A, H = rng.normal(size=(states, states)), rng.normal(size=(seen, states))
-    system = LinearSystem(A, H, covariance(rng, states), covariance(rng, seen))
-    prior = Gaussian(rng.normal(size=states), covariance(rng, states))
-    found = run(system, prior, rng.normal(size=(STEPS, 1, seen)))
-    back = smooth(system, found)
+    system, _, found, letters = _record(rng)
     p, Psi = found.posterior.cov[:, 0], found.predicted.cov[:, 0]
-    gains = [np.linalg.solve(Psi[k + 1], A @ p[k]).T for k in range(STEPS - 1)]
-
-    def columns(means):
-        return Indexed([column(mean) for mean in means[:, 0]])
-
-    return {
-        "z": columns(found.posterior.mean),
-        "p": Indexed(p),
-        r"\lambda": columns(found.predicted.mean),
+    return letters | {
+        r"\lambda": _columns(found.predicted.mean),
         r"\Psi": Indexed(Psi),
-        r"\bar z": columns(back.mean),
-        r"\bar p": Indexed(back.cov[:, 0]),
-        "S": Indexed(gains),
-        "A": Indexed([A] * STEPS),
+        "S": Indexed([np.linalg.solve(Psi[k + 1], system.A @ p[k]).T for k in range(STEPS - 1)]),
+        "A": Indexed([system.A] * STEPS),
         "Q": Indexed([system.Q] * STEPS),
-        "I": np.eye(states),
-        "k": K_RANGE,
     }
 
 
-LETTERS = (course,)
+def meeting(rng):
+    """The information about x_k by one regression: of all that is measured from the first step on, with its whole covariance."""
+    system, y, _, letters = _record(rng)
+    A, H, Q, R = system.A, system.H, system.Q, system.R
+
+    def of_later(first, k):
+        reach = np.arange(first - k, STEPS - k)
+        powers = [np.linalg.matrix_power(A, j) for j in range(STEPS)]
+
+        def rows(since):  # what the stacked measurements see of the state `since` steps after x_k
+            return np.vstack([np.empty((0, STATES)), *(H @ powers[j - since] if j >= since else 0 * H for j in reach)])
+
+        noise = np.kron(np.eye(len(reach)), R) + sum(rows(i) @ Q @ rows(i).T for i in range(1, STEPS))
+        weighed = rows(0).T @ np.linalg.inv(noise)
+        return weighed @ rows(0), weighed @ column(y[first:])
+
+    later, own = ([of_later(k + shift, k) for k in range(STEPS)] for shift in (1, 0))
+    information = {
+        "J": Indexed([J for J, _ in later]),
+        r"\eta": Indexed([eta for _, eta in later]),
+        r"\tilde J": Indexed([J for J, _ in own]),
+        r"\tilde\eta": Indexed([eta for _, eta in own]),
+    }
+    return letters | information | {"A": A, "H": H, "Q": Q, "R": R, "y": _columns(y)}
+
+
+LETTERS = (course, meeting)
 SAID = {
     r"\bar z=z": NOTATION,
     r"\bar p=p": NOTATION,
     r"\frac{\partial\mathcal N(x;z,p)}{\partial z}": NOTATION,
     r"\mathcal N(x;z,p)": NOTATION,
     r"\Delta t": NOTATION,
+    "J_k": NOTATION,
+    r"\tilde J_{k+1}": NOTATION,
+    r"\tilde\eta_{k+1}": NOTATION,
+    r"\eta_k": NOTATION,
 }
