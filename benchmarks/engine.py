@@ -5,7 +5,8 @@
 Prints
 - the linearised AOF, random numbers included, against filterpy's extended Kalman filter in a loop;
 - all seven filters of the lab, designed on one ensemble and compared on another, against the time one NumPy
-  Generator needs to draw as many normal numbers (four for each trajectory and step);
+  Generator needs to draw as many normal numbers (four for each trajectory and step), plain and compiled (numba), also in
+  processor time, which other work on the machine disturbs less;
 - how the cost grows with runs and steps, and what share drawing and each filter take.
 
 Absolute figures move with the machine; the ratios are what to keep.  Nothing else should run meanwhile.
@@ -28,13 +29,13 @@ from kfcourse.montecarlo.ensemble import Ensemble
 STEPS = 51
 
 
-def best(work: Callable[[], object], repeats: int) -> float:
+def best(work: Callable[[], object], repeats: int, clock: Callable[[], float] = time.perf_counter) -> float:
     """Shortest time of several, in seconds: the least disturbed one."""
     times = []
     for _ in range(repeats):
-        start = time.perf_counter()
+        start = clock()
         work()
-        times.append(time.perf_counter() - start)
+        times.append(clock() - start)
     return min(times)
 
 
@@ -77,9 +78,13 @@ def main() -> None:
     model = find_variant("53").model
     filters = lab_filters(model)
 
-    def lab(names=LAB, runs=options.runs[0], steps=STEPS) -> Callable[[], object]:
+    def lab(names=LAB, runs=options.runs[0], steps=STEPS, compiled=False) -> Callable[[], object]:
         chosen = [one for one in filters if one.name in names]
-        return lambda: compare(chosen, model, runs, steps, seed=1, threads=options.threads, progress=False)
+        return lambda: compare(chosen, model, runs, steps, seed=1, threads=options.threads, progress=False, compiled=compiled)
+
+    start = time.process_time()
+    lab(runs=1000, compiled=True)()
+    print(f"compiling the seven filters, or reading them from the cache: {time.process_time() - start:.1f} s of a processor")
 
     loop = best(filterpy_loop(200), options.repeats) / (200 * STEPS)
     print(f"filterpy EKF loop: {1e6 * loop:.1f} us a trajectory-step")
@@ -87,12 +92,19 @@ def main() -> None:
         count = runs * STEPS
         one = best(lab(["aof-linearised"], runs), options.repeats) / count
         drawing = best(draw(4 * count), options.repeats)
-        seven = best(lab(runs=runs), options.repeats)
+        of_drawing = best(draw(4 * count), options.repeats, time.process_time)
         print(f"\n{runs} trajectories x {STEPS} steps")
         print(f"  linearised AOF, drawing included: {1e9 * one:.1f} ns a trajectory-step")
         print(f"  filterpy's loop takes {loop / one:.0f} times as long")
         print(f"  drawing 4 normals a trajectory-step with one Generator: {1e9 * drawing / count:.1f} ns")
-        print(f"  seven filters, designed and compared: {1e9 * seven / count:.1f} ns = {seven / drawing:.2f} times that")
+        for compiled in (False, True):
+            what = "compiled" if compiled else "plain"
+            seven = best(lab(runs=runs, compiled=compiled), options.repeats)
+            of_seven = best(lab(runs=runs, compiled=compiled), options.repeats, time.process_time)
+            print(f"  seven filters, designed and run, {what}: {1e9 * seven / count:.1f} ns = {seven / drawing:.2f} times that,")
+            print(f"    {of_seven / of_drawing:.2f} times in processor time, of {options.threads} threads")
+        alone = best(lab(["aof-linearised"], runs, compiled=True), options.repeats) / count
+        print(f"  linearised AOF, compiled: {1e9 * alone:.1f} ns, {one / alone:.2f} times the plain rate")
 
     print("\nGrowth of the cost of all seven filters")
     for runs, steps in ((50_000, STEPS), (100_000, STEPS), (200_000, STEPS), (400_000, STEPS), (100_000, 102), (100_000, 204)):

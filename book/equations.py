@@ -55,12 +55,17 @@ def page(chapters: Iterable[tuple[str, list[dict]]]) -> str:
             _entry(formula.latex, formula.label, mark(said)) for formula, said in typed if formula.kind == "display" and said
         ]
         if shown:
-            parts += [f"## {_title(document)}\n\n{_count(here)}: {{doc}}`{document}`\n", *shown]
+            parts += [f"({place_of(document)})=\n## {_title(document)}\n\n{_count(here)}: {{doc}}`{document}`\n", *shown]
     return (
         HEAD.format(**{name: counted[name] for name in ("total", "chapters", "computed", "others", "claims")})
         + "\n"
         + "\n".join(parts)
     )
+
+
+def place_of(document: str) -> str:
+    """Where a chapter's equations stand on the page."""
+    return f"equations-of-{document}"
 
 
 def _title(document: str) -> str:

@@ -22,7 +22,7 @@ import nbformat
 from docutils import nodes
 from docutils.parsers.rst import directives
 from downloads import plain
-from equations import records
+from equations import PAGE, place_of, records
 from sphinx import addnodes
 from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
@@ -79,7 +79,8 @@ def _items(app, name: str, line: chapter_line):
         notebook = nbformat.read(executed, as_version=4)
         yield embedded(f"{name}.ipynb", nbformat.writes(plain(notebook)).encode(), "↓ notebook")
         count = sum(one["equations"] for one in records(notebook))
-        yield count and f'<span class="kf-count">✓ {count} equation{"s" * (count > 1)} verified</span>'
+        place = f"{app.builder.get_relative_uri(name, PAGE.stem)}#{place_of(name)}"
+        yield count and f'<a class="kf-count" href="{place}">✓ {count} equation{"s" * (count > 1)} verified</a>'
 
 
 def _link(app, name: str, other: str, line: chapter_line, text: str = "") -> str:

@@ -87,6 +87,12 @@ DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with m
     type=click.IntRange(min=1),
     help="Processor cores to use; does not change the numbers.  [default: all]",
 )
+@click.option("--dask", help="Address of a Dask scheduler whose workers run the filters instead.")
+@click.option(
+    "--compiled",
+    is_flag=True,
+    help="Run compiled filters (scalar variants; needs numba): equal but for rounding, for many trajectories.",
+)
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]")
 @click.option(
     "--report", "language", type=click.Choice(LANGUAGES), help="Also write the student's report, handin.html and handin.tex."
@@ -108,6 +114,8 @@ def lab(
     wide: float | None,
     same_ensemble: bool,
     threads: int | None,
+    dask: str | None,
+    compiled: bool,
     out: Path | None,
     language: str | None,
     json_file: Path | None,
@@ -162,6 +170,8 @@ def lab(
             same_ensemble=same_ensemble,
             wide=wide,
             threads=threads,
+            compiled=compiled,
+            dask=dask,
         ),
         refused,
     )

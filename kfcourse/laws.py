@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from kfcourse.angles import Components, difference
 
 Array: TypeAlias = NDArray[Any]
+Vectors: TypeAlias = Array  # (..., n)
+Matrices: TypeAlias = Array  # (..., r, c)
 CONFIDENCE = 0.95  # of intervals, ellipses and tests, where nothing else is asked for
 
 
@@ -27,8 +29,8 @@ class NegativeVariance(ValueError):
 class Gaussian(NamedTuple):
     """A normal law N(mean, cov): mean (..., n), cov (..., n, n)."""
 
-    mean: Array
-    cov: Array
+    mean: Vectors
+    cov: Matrices
 
 
 class Measurement(NamedTuple):
@@ -40,12 +42,12 @@ class Measurement(NamedTuple):
     subtracted: where the meter is far sharper than the prediction the difference would be rounding.
     """
 
-    h: Array
-    G: Array
-    F: Array
-    R: Array
+    h: Vectors
+    G: Matrices
+    F: Matrices
+    R: Matrices
 
-    def innovation(self, y: Array) -> Array:
+    def innovation(self, y: Vectors) -> Vectors:
         """y - h, (..., p); for components that are angles the short way round."""
         return y - self.h
 
@@ -57,9 +59,9 @@ class Transition(NamedTuple):
     of its covariance that this state does not explain.  Q is derived, not subtracted, as R is.
     """
 
-    tau: Array
-    A: Array
-    Q: Array
+    tau: Vectors
+    A: Matrices
+    Q: Matrices
 
 
 @cache
@@ -71,45 +73,52 @@ def measurement_of(angles: Components) -> type[Measurement]:
     class AngularMeasurement(Measurement):
         __slots__ = ()
 
-        def innovation(self, y: Array) -> Array:
+        def innovation(self, y: Vectors) -> Vectors:
             return difference(y, self.h, angles)
 
     return AngularMeasurement
 
 
+def column(array: Array) -> Array:
+    """The only component of vectors (N, 1) or matrices (N, 1, 1), (N,), as compiled loops take it."""
+    flat = array.reshape(-1)
+    fits = flat.flags.c_contiguous and flat.flags.writeable and flat.dtype == float
+    return flat if fits else np.array(flat, dtype=float)
+
+
 @cache
-def identity(n: int, dtype: np.dtype[Any]) -> Array:
+def identity(n: int, dtype: np.dtype[Any]) -> Matrices:
     """The unit matrix, read-only and made once: a step on few trajectories costs little more than making it."""
     found = np.eye(n, dtype=dtype)
     found.flags.writeable = False
     return found
 
 
-def apply(matrix: Array, vector: Array) -> Array:
+def apply(matrix: Matrices, vector: Vectors) -> Vectors:
     """matrix @ vector: (..., r, c), (..., c) -> (..., r)."""
     if matrix.shape[-2:] == (1, 1):
         return matrix[..., 0] * vector
     return (matrix @ vector[..., None])[..., 0]
 
 
-def product(left: Array, right: Array) -> Array:
+def product(left: Matrices, right: Matrices) -> Matrices:
     """left @ right: (..., r, m), (..., m, c) -> (..., r, c)."""
     if left.shape[-2:] == (1, 1) == right.shape[-2:]:
         return left * right
     return left @ right
 
 
-def transpose(matrix: Array) -> Array:
+def transpose(matrix: Matrices) -> Matrices:
     """The transpose of the last two axes, row by row in memory: products of many small matrices are then twice as fast."""
     return matrix if matrix.shape[-2:] == (1, 1) else np.ascontiguousarray(matrix.swapaxes(-1, -2))
 
 
-def symmetric(matrix: Array) -> Array:
+def symmetric(matrix: Matrices) -> Matrices:
     """(P + P^T) / 2: rounding must not make a covariance asymmetric."""
     return matrix if matrix.shape[-1] == 1 else 0.5 * (matrix + transpose(matrix))
 
 
-def gain(cross: Array, cov: Array, broken: bool = False) -> Array:
+def gain(cross: Matrices, cov: Matrices, broken: bool = False) -> Matrices:
     """The regression gain cross cov^+, the solution K of K cov = cross of least norm.
 
     Parameters
@@ -179,7 +188,7 @@ def _refuse_negative(variance: Array, rounding: float) -> None:
         )
 
 
-def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
+def correct(prior: Gaussian, measurement: Measurement, y: Vectors) -> Gaussian:
     """The correction of the normal (Gaussian) filter, N(lambda, Psi) -> N(z, p).
 
     K = Psi G^T F^+,   z = lambda + K (y - h),   p = Psi - K G Psi
@@ -204,7 +213,7 @@ def correct(prior: Gaussian, measurement: Measurement, y: Array) -> Gaussian:
     return Gaussian(prior.mean + apply(K, innovation), cov)
 
 
-def without_missing(innovation: Array, G: Array, F: Array, R: Array) -> tuple[Array, Array, Array, Array]:
+def without_missing(innovation: Vectors, G: Matrices, F: Matrices, R: Matrices) -> tuple[Vectors, Matrices, Matrices, Matrices]:
     """Take missing components out: no innovation, no sensitivity, a variance of their own."""
     missing = np.isnan(innovation)
     either = missing[..., :, None] | missing[..., None, :]
@@ -222,20 +231,20 @@ def any_missing(y: Array) -> bool:
     return bool(np.isnan(np.minimum.reduce(y, axis=None)))
 
 
-def where_measured(y: Array, correction: Array) -> Array:
+def where_measured(y: Vectors, correction: Vectors) -> Vectors:
     """The correction, or 0 for trajectories whose measurement is missing (NaN)."""
     if any_missing(y):
         return np.where(np.isnan(y).any(axis=-1, keepdims=True), 0.0, correction)
     return correction
 
 
-def square_root(cov: Array) -> Array:
+def square_root(cov: Matrices) -> Matrices:
     """A matrix S with S S^T = cov, for any non-negative cov (..., n, n), singular or not."""
     values, vectors = np.linalg.eigh(cov)
     return vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]
 
 
-def normalised_square(vector: Array, cov: Array) -> Array:
+def normalised_square(vector: Vectors, cov: Matrices) -> Array:
     """vector^T cov^+ vector: (..., n), (..., n, n) -> (...); NaN where a component is NaN.
 
     Directions in which cov is singular do not enter.
@@ -243,7 +252,7 @@ def normalised_square(vector: Array, cov: Array) -> Array:
     return np.einsum("...i,...i", apply(gain(np.eye(cov.shape[-1]), cov), vector), vector)
 
 
-def log_density(measurement: Measurement, y: Array) -> Array:
+def log_density(measurement: Measurement, y: Vectors) -> Array:
     """Logarithm of the normal density N(y; h, F), (runs,); what is missing (NaN) does not enter.
 
     -1/2 nu^T F^-1 nu - 1/2 ln det(2 pi F),      nu = y - h

@@ -29,6 +29,7 @@ VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type
     help="Trajectories of a check, an eighth for vectors.",
 )
 @click.option("--jobs", type=click.IntRange(min=1), help="Does not change the results.  [default: all cores]")
+@click.option("--dask", help="Address of a Dask scheduler whose workers check instead.")
 @click.option("--out", type=click.Path(path_type=Path), help="New file for the proposed variants.  [default: print them]")
 def variants(
     variants_file: Path | None,
@@ -38,9 +39,12 @@ def variants(
     seed: int,
     runs: int,
     jobs: int | None,
+    dask: str | None,
     out: Path | None,
 ) -> None:
     """List the variants of the lab, check them, or propose new ones."""
+    if dask and not check:
+        raise click.UsageError("--dask goes with --check")
     if wanted is not None and (check or names or variants_file):
         raise click.UsageError("--generate goes with --seed, --runs, --jobs and --out only")
     if wanted is None and out:
@@ -54,7 +58,7 @@ def variants(
         from kfcourse.checks.posing import unposed
         from kfcourse.lab.quality import examine_all, table
 
-        found = list(examine_all(list(chosen.values()), runs, seed, jobs or cores(), unposed))
+        found = list(examine_all(list(chosen.values()), runs, seed, jobs or cores(), unposed, dask))
         click.echo(table(found))
         good &= all(one.well_posed for one in found)
     else:

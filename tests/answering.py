@@ -88,7 +88,7 @@ MADE = {
     "fig-two-beats": lambda: explore.two_beats("fig-two-beats", x, y, following, *BEATS, PLACE, 2.2),
     "fig-better-line": sine_and_lines,
     "fig-lab-gains": lab_gains,
-    "fig-ten-minutes": lambda: scenes.one_measurement("fig-ten-minutes", kalman_step, *RECORD, 20, 5.0, (0, 1), (0.25, 1)),
+    "fig-ten-minutes": lambda: scenes.one_measurement("fig-ten-minutes", kalman_step, *RECORD, 1, 5.0, (0, 1), (0.25, 1)),
     "fig-consistency-faults": lambda: scenes.hidden_fault("fig-consistency-faults", WALK, WALKED.x[..., 0], WALKED.y[..., 0]),
     "fig-slips-ball": lambda: scenes.slip(
         "fig-slips-ball", Delta, (n, v), sigma, SHAKEN, HILLS, DRAWS, dict(sigma=2.0, draw=1, k=30), (0.5, 4.0)

@@ -142,6 +142,10 @@ FIT = """() => {
             .map((e) => e.outerHTML.slice(0, 80)),
     };
 }"""
+# Figures whose letters of 10 pt are smaller than 10 px, of those that have a picture for telephones; all wide ones of cells have.
+TOO_SMALL = """() => [...document.querySelectorAll("article .cell_output figure img")]
+    .map((e) => [e.currentSrc.slice(-30), e.clientWidth / (e.naturalWidth / 2) * 10 * 96 / 72])
+    .filter(([, size]) => size < 10)"""
 # A sheet of A4 less its margins, in px of CSS.
 PAPER = 673
 AXE = resources.files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
@@ -233,6 +237,9 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
     assert tab.evaluate(PARTED) == [], "numbers and units parted"
     assert tab.evaluate(ICONS) == [], "an icon that _static/icons.css does not draw"
 
+    if page in NOTEBOOKS:
+        tab.wait_for_function("[...document.querySelectorAll('article picture img')].every((e) => e.complete)")
+        assert tab.evaluate(TOO_SMALL) == [], "letters in figures too small to be read on a telephone"
     for width in (390, 768):
         tab.set_viewport_size({"width": width, "height": 1000})
         assert tab.evaluate(FIT)["page"] <= 0, f"the page scrolls sideways at {width} px"
@@ -260,6 +267,46 @@ def test_the_keyboard_reaches_the_text_first(window):
     tab.wait_for_selector("html[data-formulas=ready]")
     formulas = tab.locator("div.math")
     assert formulas.count() == tab.locator("div.math mjx-container[tabindex='0'][aria-label]").count() > 0
+
+
+def test_a_reference_shows_what_it_leads_to(window):
+    """Under the mouse and on the keyboard's way, not under a finger; Escape closes it, and the link stays a link."""
+    tab, problems = window
+    problems.clear()
+    show_on(tab, "screen", 1280)
+    tab.goto((HTML / "comparison.html").as_uri())
+    tab.wait_for_selector("html[data-formulas=ready]")
+    box = tab.locator("#kf-preview")
+    formula = tab.locator('article a.reference.internal[href^="#equation-"]').first
+    figure = tab.locator('article a.reference.internal[href^="#fig-"]').first
+    formula.hover()
+    box.locator("mjx-container").wait_for()
+    assert "#" not in box.inner_text()  # the mark beside a number, which is a link
+    tab.keyboard.press("Escape")
+    assert not box.is_visible()
+    figure.focus()
+    tab.keyboard.press("Shift+Tab")
+    tab.keyboard.press("Tab")
+    assert box.locator("img").is_visible()
+    assert figure.get_attribute("aria-describedby") == "kf-preview"
+    assert tab.evaluate("new Set([...document.querySelectorAll('[id]')].map((e) => e.id)).size") == tab.locator("[id]").count()
+    left, right = box.evaluate("e => [e.getBoundingClientRect().left, e.getBoundingClientRect().right]")
+    assert 0 <= left < right <= 1280
+    tab.keyboard.press("Escape")
+    assert not box.is_visible() and figure.get_attribute("aria-describedby") is None
+    figure.dispatch_event("pointerenter", {"pointerType": "touch"})
+    tab.wait_for_timeout(300)  # twice as long as the mouse has to wait
+    assert not box.is_visible()
+    figure.click()
+    assert urlsplit(tab.url).fragment.startswith("fig-")
+    assert problems == []
+
+
+@pytest.mark.parametrize("page", NOTEBOOKS)
+def test_the_number_of_verified_equations_leads_to_them(page):
+    found = re.search(r'class="kf-count" href="equations.html#([^"]+)"', (HTML / f"{page}.html").read_text(encoding="utf-8"))
+    if found:
+        assert f'id="{found[1]}"' in (HTML / "equations.html").read_text(encoding="utf-8")
 
 
 def test_a_chapter_is_downloaded_as_a_notebook(window):

@@ -123,6 +123,17 @@ def test_help_and_version(call, option):
 # --- the lab
 
 
+def test_the_lab_compiled(call, tmp_path):
+    """The same numbers but for rounding."""
+    usual = ["lab", "53", "--runs", 500, "--steps", 3, "--exact-runs", 0, "--filters", "aof-linearised", "--out", "out"]
+    found = []
+    for more in ([], ["--compiled"]):
+        result = call(*usual, *more, "--json", tmp_path / "numbers.json")
+        assert result.exit_code == 0, result.output
+        found.append(json.loads((tmp_path / "numbers.json").read_text("utf-8"))["error_variance"]["aof-linearised"])
+    assert found[1] == pytest.approx(found[0], rel=1e-12)
+
+
 def test_the_lab_of_variant_53(call, tmp_path):
     result = call("lab", "53", "--runs", 4000, "--steps", 12, "--exact-runs", 112, "--out", "report", "--json", "n.json")
     assert result.exit_code == 0, result.output

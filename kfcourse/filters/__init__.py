@@ -17,6 +17,7 @@ multiple_models         several ways of moving, one normal law each (IMM, logic-
                         (state_transitions: those that depend on the state;  jump_optimal: FOS with modes;
                         exact.jumps: the exact filter of state and mode)
 notation                symbols in which the equations are printed
+programs, fused, loops  the printed equations as rules and regressions; compiled steps made of them (numba)
 """
 
 from kfcourse.filters.alphabeta import alpha_beta, alpha_beta_gamma

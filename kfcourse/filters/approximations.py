@@ -44,4 +44,5 @@ def aof(structure: Structure) -> Filter:
         posterior = correct(state.predicted, now.measure(*state.predicted), y)
         return State(state.step + 1, posterior, now.predict(*posterior))
 
-    return Filter(f"aof-{structure.name}", structure.model, initial_state(structure.model), step, structure=structure)
+    model = structure.model
+    return Filter(f"aof-{structure.name}", model, initial_state(model), step, structure=structure, printed=(step, EQUATIONS))

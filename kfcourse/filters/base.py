@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+import sympy as sp
 
 from kfcourse.angles import Components, on_circle
 from kfcourse.laws import Array, Gaussian
@@ -88,6 +89,8 @@ class Filter:
         Where it is another than the normal law's by `structure`: how likely a measurement was before it came.
     look_back : LookBack, optional
         Where it is another than the normal law's by `structure`: what the whole record tells of each state.
+    printed : (Advance, tuple of Eq), optional
+        A step and the equations that it computes, no more: of them `fuse` makes a compiled one, as long as it is this filter's.
     """
 
     name: str
@@ -99,6 +102,7 @@ class Filter:
     structure: Structure | None = None
     evidence: Evidence | None = None
     look_back: LookBack | None = None
+    printed: tuple[Advance, tuple[sp.Eq, ...]] | None = None
 
     def __post_init__(self) -> None:
         if self.model.angles.x:

@@ -13,11 +13,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import sympy as sp
 
 from kfcourse.angles import Angles, difference, near
-from kfcourse.filters.base import Filter, Init, State, initial_state
+from kfcourse.filters.base import Advance, Filter, Init, State, initial_state
 from kfcourse.laws import Array, Gaussian, apply, gain, symmetric, where_measured
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.structure import Structure
 
 
 class Affine(NamedTuple):
@@ -106,11 +108,14 @@ class Regression(NamedTuple):
         What the filter itself knows.
     mode : int, optional
         Of a model that jumps: over the trajectories that are in this mode at the step.
+    scatter : callable
+        How the moments of target and regressor are found.
     """
 
     target: Callable[[Array, Array], Array]
     regressor: Array
     mode: int | None = None
+    scatter: Callable[[Array, Array], Scatter] = Scatter.of
 
 
 Equations = Generator[Regression, Affine, State]
@@ -141,6 +146,12 @@ class Design:
         (State, y) -> generator of one step: yields `Regression`, receives `Affine`, returns the next `State`.
     start : Init, optional
         For a filter that carries more than a prediction: the state before the first measurement.
+    structure : Structure, optional
+        The structural functions that the equations use.
+    printed : (equations, tuple of Eq), optional
+        Equations, and how they are printed if that is all: of them `fuse` makes compiled ones, while they are this design's.
+    known : callable, optional
+        Coefficients of a step -> the step, where that is quicker than `answered`.
     """
 
     name: str
@@ -148,6 +159,9 @@ class Design:
     equations: Callable[[State, Array], Equations]
     slow: bool = False
     start: Init | None = None
+    structure: Structure | None = None
+    printed: tuple[Callable[[State, Array], Equations], tuple[sp.Eq, ...]] | None = None
+    known: Callable[[Sequence[Affine]], Advance] | None = None
 
     @property
     def init(self) -> Init:
@@ -156,24 +170,28 @@ class Design:
 
     def with_coefficients(self, coefficients: Sequence[Sequence[Affine]]) -> Filter:
         """The filter with the coefficients of every step, in the order the equations ask for them."""
-        table = tuple(tuple(fits) for fits in coefficients)
+        steps = [(self.known or self.answered)(tuple(fits)) for fits in coefficients]
 
         def step(state: State, y: Array) -> State:
-            if state.step >= len(table):
+            if state.step >= len(steps):
                 raise ValueError(
-                    f"{self.name} was designed for {len(table)} steps; design it with more to run step {state.step + 1}"
+                    f"{self.name} was designed for {len(steps)} steps; design it with more to run step {state.step + 1}"
                 )
-            return _answer(self.equations(state, y), table[state.step])
+            return steps[state.step](state, y)
 
         return Filter(self.name, self.model, self.init, step)
 
+    def answered(self, fits: Sequence[Affine]) -> Advance:
+        """A step of the equations, each regression answered with its stored coefficients."""
 
-def _answer(equations: Equations, fits: Sequence[Affine]) -> State:
-    """Run the equations of one step, answering each regression with its stored coefficients."""
-    try:
-        next(equations)
-        for fit in fits:
-            equations.send(fit)
-    except StopIteration as stop:
-        return stop.value
-    raise ValueError("the equations ask for more regressions than were designed")
+        def step(state: State, y: Array) -> State:
+            equations = self.equations(state, y)
+            try:
+                next(equations)
+                for fit in fits:
+                    equations.send(fit)
+            except StopIteration as stop:
+                return stop.value
+            raise ValueError("the equations ask for more regressions than were designed")
+
+        return step

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from kfcourse.lab.families import look
 from kfcourse.lab.short_names import title
@@ -39,13 +40,19 @@ def style(name: str) -> dict[str, Any]:
     return {"color": colour, "linestyle": dashes, "marker": marker, "label": title(name)}
 
 
+def _steps(ax: Axes, label: str = "step $k$") -> None:
+    """The axis of steps: whole numbers."""
+    ax.set_xlabel(label)
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
 def accuracy(result: Comparison, ax: Axes, names: Sequence[str] | None = None, words: Words = ENGLISH) -> Axes:
     """Error variance D_k of every filter against the step, on a logarithmic scale."""
     steps = np.arange(result.steps)
     for name in names or result.available:
         line = style(name) | {"label": words.title(name), "markersize": 4, "markevery": max(1, result.steps // 10)}
         ax.semilogy(steps, result.error_variance(name).value, **line)
-    ax.set_xlabel(words.step)
+    _steps(ax, words.step)
     ax.set_ylabel(words.variance)
     ax.grid(True, which="major", alpha=0.3)
     ax.legend(fontsize="small", ncols=2)
@@ -75,7 +82,7 @@ def relative_accuracy(
         ax.plot(k, 100 * gap.value, markersize=4, markevery=max(1, len(k) // 12), **line)
         ax.fill_between(k, 100 * low, 100 * high, color=line["color"], alpha=0.15, linewidth=0)
     ax.axhline(0, color="black", linewidth=0.8, label=words.title(zero))
-    ax.set_xlabel(words.step)
+    _steps(ax, words.step)
     ax.set_ylabel(words.above.replace("{name}", words.title(zero)))
     ax.grid(True, alpha=0.3)
     ax.legend(fontsize="small", ncols=2)
@@ -112,7 +119,7 @@ def consistency(
         ax.fill_between(steps, *value.interval(confidence), color=line["color"], alpha=0.15, linewidth=0)
     ax.axhline(1, color="black", linewidth=0.8)
     ax.set_yscale("log")
-    ax.set_xlabel(words.step)
+    _steps(ax, words.step)
     ax.set_ylabel(words.normalised)
     ax.grid(True, alpha=0.3)
     ax.legend(fontsize="small", ncols=2)
@@ -131,7 +138,7 @@ def mode_probabilities(modes: Recognised, ax: Axes) -> Axes:
         for j in range(1, size):
             label = title(name) + (f", mode {j + 1}" if size > 2 else "")
             ax.plot(steps, probability[:, j], color=style(name)["color"], linestyle=dashes[(j - 1) % 4], label=label)
-    ax.set_xlabel("step $k$")
+    _steps(ax)
     ax.set_ylabel("probability of the mode")
     ax.set_ylim(-0.02, 1.02)
     ax.legend(fontsize="small", ncols=2)
@@ -145,7 +152,7 @@ def trajectory(x: Array, y: Array, estimates: dict[str, Array], ax: Axes) -> Axe
     ax.plot(steps, y, ".", color="#999999", label="measurement $y_k$")
     for name, estimate in estimates.items():
         ax.plot(steps, estimate, markersize=0, **style(name))
-    ax.set_xlabel("step $k$")
+    _steps(ax)
     ax.set_ylabel("state (units of $x$)")
     ax.grid(True, alpha=0.3)
     ax.legend(fontsize="small")

@@ -17,6 +17,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import joblib
 import numpy as np
@@ -46,6 +47,7 @@ from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
+from kfcourse.montecarlo.parallel import cluster
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -215,11 +217,23 @@ def _fragile(result: Comparison, x: Array, filters: Sequence[Filter | Design], h
 
 
 def examine_all(
-    variants: Sequence[Variant], runs: int = RUNS, seed: int = 1, jobs: int = 2, ask: Ask | None = None
+    variants: Sequence[Variant],
+    runs: int = RUNS,
+    seed: int = 1,
+    jobs: int = 2,
+    ask: Ask | None = None,
+    dask: str | None = None,
 ) -> Iterator[Quality]:
-    """`examine` every variant, in order, in so many processes, on which no number depends; with a progress bar."""
-    with joblib.Parallel(n_jobs=max(1, min(jobs, len(variants))), return_as="generator") as parallel:
-        done = parallel(joblib.delayed(examine)(one, runs, seed, ask) for one in variants)
+    """`examine` every variant, in order, in so many processes, on which no number depends; with a progress bar.
+
+    `dask` is the address of a Dask scheduler whose workers do it instead.
+    """
+    with cluster(dask) as far:
+        if far is None:
+            parallel = joblib.Parallel(n_jobs=max(1, min(jobs, len(variants))), return_as="generator")
+            done = parallel(joblib.delayed(examine)(one, runs, seed, ask) for one in variants)
+        else:
+            done = far.executor.map(partial(examine, runs=runs, seed=seed, ask=ask), variants)
         yield from tqdm(done, desc="checking", total=len(variants), unit="variant", disable=None)
 
 

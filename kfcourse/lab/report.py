@@ -31,7 +31,7 @@ from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, WITH_MODES, JumpStru
 from kfcourse.lab.variants import Variant
 from kfcourse.laws import CONFIDENCE, Array
 from kfcourse.limits import OutOfTime, time_limit
-from kfcourse.montecarlo.comparison import EXACT, HEAVY, Comparison
+from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.modes import Recognised, recognised
 from kfcourse.montecarlo.statistics import Estimate, ratio
 from kfcourse.symbolic.jumping import JumpModel
@@ -257,8 +257,8 @@ REMARKS = {
     "and means leave these steps out.",
     "doubtful": "At {steps} there is no bound: what ran in the place of the exact AOF errs by more than a tenth of its variance "
     "itself, or another filter is more accurate. Means leave these steps out.",
-    "heavy": "{names}: at {steps} one trajectory makes up to {part} % of what the accuracy is found from. The interval there "
-    "cannot be trusted; about {runs} trajectories, {exact} of them with the exact AOF, would do.",
+    "heavy": "{names}: at {steps} rare trajectories make what the accuracy is found from, one trajectory up to {part} % of it. "
+    "The interval there cannot be trusted; about {runs} trajectories, {exact} of them with the exact AOF, would do.",
 }
 
 
@@ -268,13 +268,14 @@ def remarks(result: Comparison) -> Iterator[tuple[str, dict[str, Any]]]:
         yield "rounding", {"steps": result.without_error}
     if result.doubtful.any():
         yield "doubtful", {"steps": result.doubtful}
-    heavy = {name: np.where(result.usable, result.heavy(name), 0.0) for name in result.entrants}
-    heavy = {name: parts for name, parts in heavy.items() if parts.max() > HEAVY}
-    if heavy:
-        most = np.max(list(heavy.values()), axis=0)
-        runs, exact = (f"{float(f'{most.max() / HEAVY * one:.1g}'):.0f}" for one in (result.runs, result.subset_runs))
-        told = {"part": f"{100 * most.max():.0f}", "runs": runs, "exact": exact}
-        yield "heavy", {"names": list(heavy), "steps": most > HEAVY, **told}
+    gaps = {name: result.gap(name) for name in result.entrants}
+    bad = {name: result.usable & ~result.trusted(gap, name) for name, gap in gaps.items()}
+    if names := [name for name, steps in bad.items() if steps.any()]:
+        part = max(float(result.heavy(name)[bad[name]].max()) for name in names)
+        more = max(result.missing(gaps[name], name) for name in names)
+        runs, exact = (f"{float(f'{more * one:.1g}'):.0f}" for one in (result.runs, result.subset_runs))
+        told = {"part": f"{100 * part:.0f}", "runs": runs, "exact": exact}
+        yield "heavy", {"names": names, "steps": np.any([bad[name] for name in names], axis=0), **told}
 
 
 def remarks_in_words(result: Comparison) -> list[str]:

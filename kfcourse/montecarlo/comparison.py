@@ -20,6 +20,8 @@ ROUNDING = (64 * np.finfo(float).eps) ** 2  # an error variance less than this p
 UNHEALTHY = 0.1  # squared error of the exact filter's substitute, in its variance, from which on it bounds nothing
 BEATEN = 5.0  # standard errors by which a filter must be better than the "exact" one to refute it, at any step
 HEAVY = 0.1  # part of a sum over trajectories that a single one makes where its interval cannot be trusted
+SKEWED = 0.5  # skewness of an error with which the transformation of `Estimate.interval` does not do any more
+FEW = 250  # batches: of fewer, the skewness is itself so uncertain that only as many 250ths are admitted
 
 
 @dataclass(frozen=True)
@@ -158,6 +160,35 @@ class Comparison:
         share = self._shares.get(name, np.ones(self.steps))
         by_distances = ratio(sums.largest[i].max(axis=-1), np.abs(sums.distance[i].sum(axis=-1)), 0.0)
         return np.minimum(share * by_distances + (1 - share) * by_errors, 1.0)
+
+    def trusted(self, found: Estimate, *names: str) -> Array:
+        """Whether the interval of what was found of these filters (`gap`, `difference`, `bound`) can be trusted, (steps,).
+
+        Not where rare trajectories make it: where a single one makes more than `HEAVY` of what the least accurate of the filters
+        is known from, or where the error is `SKEWED`, of `FEW` batches less: there the standard error hangs on whether a
+        rare trajectory has come.  `benchmarks/coverage.py` counts how often the others hold the truth.
+        """
+        good = self.usable & (np.abs(found.skewness) <= self.skewness_limit)
+        if names:
+            gaps = np.array([np.nan_to_num(self.gap(name).value, nan=-np.inf) for name in names])
+            heavy = np.array([self.heavy(name) for name in names])
+            good = good & (np.take_along_axis(heavy, gaps.argmax(axis=0)[None], axis=0)[0] <= HEAVY)
+        return np.asarray(good)
+
+    @property
+    def skewness_limit(self) -> float:
+        """The largest skewness of an error whose interval can be trusted."""
+        sums = self.sums if self.subset is None else self.subset.sums
+        return min(SKEWED, len(sums.counts) / FEW)
+
+    def missing(self, found: Estimate, *names: str) -> float:
+        """How many times as many trajectories would make the interval trusted at every usable step; 1 if it is.
+
+        A share falls as 1 / n, a skewness as 1 / sqrt(n), and what is admitted of it rises with n up to `SKEWED`.
+        """
+        skewness = float(np.max(np.where(self.usable, np.abs(found.skewness), 0.0), initial=0.0))
+        heavy = max((float(np.max(np.where(self.usable, self.heavy(name), 0.0), initial=0.0)) for name in names), default=0.0)
+        return max(1.0, heavy / HEAVY, (skewness / SKEWED) ** 2, (skewness / self.skewness_limit) ** (2 / 3))
 
     @property
     def designs(self) -> int:

@@ -99,7 +99,7 @@ class _BlockStep:
         if request.mode is not None and isinstance(self.block, JumpInstant):
             there = self.block.mode == request.mode
             target, regressor = target[there], regressor[there]
-        return Scatter.of(target, regressor)
+        return request.scatter(target, regressor)
 
     def after(self) -> list[State]:
         """The states of the designs, which are all through: angles between -pi and pi, as when they run."""

@@ -19,9 +19,10 @@ import numpy as np
 import scipy
 
 from kfcourse.angles import on_circle
-from kfcourse.laws import Array, Gaussian, normalised_square, square_root
+from kfcourse.laws import Array, Gaussian, column, normalised_square, square_root
 from kfcourse.linear.runs import Trajectories
 from kfcourse.seeds import Seed, seed_number
+from kfcourse.symbolic.compiled import is_scalar, load, loop
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -80,6 +81,8 @@ class Ensemble:
         Initial states drawn for small standard errors, in sets of `STRATA`: half of them from the prior, half from a law so many
         times as wide, each half by strata of equal probability.  `weight` makes up for it.  1: by strata of the prior alone;
         None: independently, without weights.
+    compiled : bool
+        Compiled by numba, which changes the last digits: of scalar models; others are as without.
     """
 
     model: Model | JumpModel
@@ -87,6 +90,7 @@ class Ensemble:
     steps: int
     seed: np.random.SeedSequence
     wide: float | None = None
+    compiled: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.seed, np.random.SeedSequence):
@@ -137,8 +141,10 @@ class Ensemble:
                 starts = [instant.after for instant in instants]
 
     @cached_property
-    def _simulator(self) -> _Simulator | _JumpSimulator:
-        return _JumpSimulator(self.model) if isinstance(self.model, JumpModel) else _Simulator(self.model)
+    def _simulator(self) -> _Simulator | _JumpSimulator | _CompiledSimulator:
+        if isinstance(self.model, JumpModel):
+            return _JumpSimulator(self.model)
+        return _CompiledSimulator(self.model) if self.compiled and is_scalar(self.model) else _Simulator(self.model)
 
     def _stream(self, *key: int) -> np.random.Generator:
         spawned = np.random.SeedSequence(self.seed.entropy, spawn_key=(*self.seed.spawn_key, *key))
@@ -201,6 +207,22 @@ class _Simulator:
         # A formula without noise and state is one constant for all trajectories.
         y, x_next = np.broadcast_to(y, (len(x), self.p)), np.broadcast_to(x_next, (len(x), self.n))
         return Instant(x, on_circle(y, self.angles.y), on_circle(x_next, self.angles.x))
+
+
+class _CompiledSimulator:
+    """The same of a scalar model in one pass."""
+
+    def __init__(self, model: Model):
+        noises = [*model.v, *model.w]
+        given = {"x": model.x[0]} | {f"noise{i}": one for i, one in enumerate(noises)}
+        made = {"y": model.meter_equation[0], "next": model.state_equation[0]}
+        self.constants = np.array([float(value) for value in model.values.values()])
+        self.step = load(loop("simulate", given, made, list(model.values))).simulate
+
+    def __call__(self, k: int, x: Array, v: Array, w: Array) -> Instant:
+        y, x_next = np.empty((2, len(x), 1))
+        self.step(self.constants, *(column(one) for one in (x, *v.T, *w.T)), y[:, 0], x_next[:, 0])
+        return Instant(x, y, x_next)
 
 
 class _JumpSimulator:

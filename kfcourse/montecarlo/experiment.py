@@ -18,18 +18,22 @@ import numpy as np
 
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
+from kfcourse.filters.fused import fuse
 from kfcourse.laws import Array, Gaussian, stacked
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, workers
-from kfcourse.montecarlo.parallel import cores
+from kfcourse.montecarlo.parallel import Cluster, cluster, cores
 from kfcourse.montecarlo.statistics import BATCHES, Sums, batch_sizes
 from kfcourse.montecarlo.subset import LEAST, progress_bar, run_block, run_subset
 from kfcourse.montecarlo.two_phase import Replicas
 from kfcourse.montecarlo.widths import best_width
 from kfcourse.seeds import Seed, seed_number
+from kfcourse.symbolic.compiled import REMEDY, is_scalar
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
+
+DESIGN_RUNS = 1_000_000  # more find coefficients no comparison could tell from these
 
 T = TypeVar("T")
 
@@ -109,10 +113,12 @@ def compare(
     same_ensemble: bool = False,
     smoothers: Sequence[Filter] = (),
     wide: float | None = None,
+    compiled: bool = False,
     subset_runs: int = 2000,
     subset_seconds: float | None = None,
     subset_memory: float | None = None,
     threads: int | None = None,
+    dask: str | None = None,
     progress: bool | None = None,
 ) -> Comparison:
     """Compare filters on common trajectories of a model.
@@ -128,7 +134,8 @@ def compare(
         The same seed gives the same numbers, bit by bit, whatever the number of threads.  Another NumPy or processor may do
         linear algebra by another kernel (BLAS): then vector models differ by rounding, up to some 1e-12, and scalar ones hardly.
     design_runs : int, optional
-        Size of the design ensemble; `runs` by default.
+        Size of the design ensemble, which is held at once, some 0.3 kB a trajectory.  By default `runs`, at most a million:
+        coefficients from so many cost a filter about a millionth of its accuracy, and memory does not grow with `runs`.
     designs : int
         Designed filters are designed on so many ensembles.  The first design is reported; how the others differ from it on the
         common trajectories goes into the standard errors.  With 1 these hold for the filters just as they were designed.
@@ -142,6 +149,9 @@ def compare(
         Draw half of the initial states of the comparison from a law so many times as wide as the prior, all by strata, and weight
         every trajectory (importance sampling): where rare far starts dominate the error, that gives the standard errors of many
         times the trajectories.  By default a pilot on the fast filters chooses among 1, 1.5, 2 and 3.
+    compiled : bool
+        Run compiled code (numba: `pip install kfcourse[fast]`) where a scalar model and its filters have formulas to compile.
+        The numbers are the same but for rounding; the first time, compiling takes seconds, and is kept.
     subset_runs : int
         Slow filters (exact, particle) run on this many of the common trajectories, at least 100; what they differ by from the
         Gaussian AOF (or else the most accurate fast filter) is found there.  0 leaves them out.
@@ -155,13 +165,16 @@ def compare(
     threads : int, optional
         How many processor cores to use, by default all there are: threads share the blocks of trajectories, and processes the
         slow filters' chunks, as far as these take more than a moment.
+    dask : str, optional
+        Address of a Dask scheduler, such as "tcp://scheduler:8786": its workers run the filters, in blocks of trajectories and in
+        chunks of the slow filters'; the numbers are the same.  Designed is here.  `subset_memory` is theirs to keep, not limited.
     progress : bool, optional
         Show progress bars; by default if standard error is a terminal.
 
     Raises
     ------
     ValueError
-        Filters of equal name, sizes that are not positive whole numbers.
+        Filters of equal name, sizes that are not positive whole numbers; `compiled` without numba.
     NotFinite
         A trajectory or a filter left the finite numbers.
     """
@@ -169,43 +182,47 @@ def compare(
     _check_designs(designs, same_ensemble, wide)
     if smoothers:
         _check_arguments(smoothers, model, subset_runs, subset_seconds, subset_memory)
+    if compiled:
+        filters = _compiled(filters)
     seed, threads = seed_number(seed), cores() if threads is None else threads
     names = [one.name for one in filters]
     slow = [one for one in filters if one.slow and subset_runs]
     fast = [one for one in filters if not one.slow]
     run_seed, pilot_seed, *design_seeds = np.random.SeedSequence(seed).spawn(2 + designs)
-    size = runs if design_runs is None else design_runs
+    size = min(runs, DESIGN_RUNS) if design_runs is None else design_runs
     design_ensemble, *others = (
-        [Ensemble(model, runs, steps, run_seed)] if same_ensemble else [Ensemble(model, size, steps, one) for one in design_seeds]
+        [Ensemble(model, runs, steps, run_seed, compiled=compiled)]
+        if same_ensemble
+        else [Ensemble(model, size, steps, one, compiled=compiled) for one in design_seeds]
     )
     to_design = [one for one in fast if isinstance(one, Design)]
-    with workers(threads) as pool:
+    with workers(threads) as pool, cluster(dask) as far:
         ready = _designed(fast, design_ensemble, pool, progress)
         again = [_designed(to_design, one, pool, progress) for one in others]
         if same_ensemble:
             common = design_ensemble
         else:
             width = best_width(ready, model, runs, steps, pilot_seed) if wide is None else wide
-            common = Ensemble(model, runs, steps, run_seed, width)
+            common = Ensemble(model, runs, steps, run_seed, width, compiled)
         everyone = [*ready, *chain(*again)]
         try:
-            everything = _run_blocks(everyone, common, pool, progress)
+            everything = _run_blocks(everyone, common, far.executor if far else pool, progress)
         except NotFinite:
             if wide is not None or not common.wide or common.wide == 1:
                 raise
-            common = Ensemble(model, runs, steps, run_seed, 1.0)  # some far start is too far: none but the prior's own
-            everything = _run_blocks(everyone, common, pool, progress)
+            common = replace(common, wide=1.0)  # some far start is too far: none but the prior's own
+            everything = _run_blocks(everyone, common, far.executor if far else pool, progress)
         sums, replicas = _split(everything, fast, len(others))
         subset, left_out = None, dict[str, str]()
         if slow:
             slow_ready = _designed(slow, design_ensemble, pool, progress)
             subset, left_out = run_subset(
-                ready, slow_ready, common, min(subset_runs, runs), subset_seconds, subset_memory, threads, progress
+                ready, slow_ready, common, min(subset_runs, runs), subset_seconds, subset_memory, threads, progress, far=far
             )
         smoothing = None
         if smoothers:
             limits = (min(subset_runs, runs), subset_seconds, subset_memory, threads)
-            smoothing = _smoothing(smoothers, common, seed, pool, limits, progress)
+            smoothing = _smoothing(smoothers, common, seed, pool, limits, progress, far)
     found = Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset, left_out, replicas)
     return replace(found.without_unhealthy(), smoothing=smoothing)
 
@@ -217,11 +234,12 @@ def _smoothing(
     pool: Executor,
     limits: tuple[int, float | None, float | None, int],
     progress: bool | None,
+    far: Cluster | None,
 ) -> Comparison:
     """The comparison of smoothers on the same trajectories."""
     slow, fast = ([one for one in smoothers if one.slow == which and (limits[0] or not one.slow)] for which in (True, False))
-    sums = _run_blocks(fast, common, pool, progress, back=True)
-    subset, left_out = run_subset(fast, slow, common, *limits, progress, back=True) if slow else (None, {})
+    sums = _run_blocks(fast, common, far.executor if far else pool, progress, back=True)
+    subset, left_out = run_subset(fast, slow, common, *limits, progress, back=True, far=far) if slow else (None, {})
     names, quick = (tuple(one.name for one in some) for some in (smoothers, fast))
     found = Comparison(common.model, names, quick, common.runs, common.steps, seed, sums, subset, left_out)
     return found.without_unhealthy()
@@ -254,6 +272,14 @@ def _check_arguments(
                 f"{one.name} was built for a model with {one.model.n} states and {one.model.p} measurements; "
                 f"this one has {model.n} and {model.p}"
             )
+
+
+def _compiled(filters: Sequence[Filter | Design]) -> list[Filter | Design]:
+    """The filters with compiled steps as far as that can be; ValueError if there is no numba."""
+    try:
+        return [fuse(one) for one in filters]
+    except ImportError:
+        raise ValueError(REMEDY) from None
 
 
 def _check_designs(designs: int, same_ensemble: bool, wide: float | None) -> None:
@@ -291,11 +317,13 @@ def _run_blocks(
 ) -> Sums:
     """Sums over all trajectories, its blocks in parallel."""
 
+    record = Sums.record_by_loop if ensemble.compiled and is_scalar(ensemble.model) else Sums.record
+
     def block(index: int) -> Sums:
         size = ensemble.sizes[index]
         counts = batch_sizes(size, max(1, round(BATCHES * size / ensemble.runs)))
         sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, counts)
-        run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight, back=back)
+        run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight, back=back, record=record)
         return sums
 
     indices = range(len(ensemble.sizes))

@@ -1,7 +1,8 @@
 """Work shared out among processes, for what threads slow down: much Python between operations on small arrays.
 
 On Linux they are forks of this process, which have all that it has at once, closures too.  Elsewhere a fork is not safe once
-libraries are loaded: there they are joblib's, which import the package first and are sent the work.
+libraries are loaded: there they are joblib's, which import the package first and are sent the work.  On a cluster they are the
+workers of a Dask scheduler: `Cluster`.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
@@ -35,6 +36,70 @@ def cores() -> int:
     from joblib import cpu_count
 
     return int(cpu_count())
+
+
+class Cluster:
+    """The workers of a Dask scheduler.
+
+    What a worker that is lost was doing, another does again.  No number depends on who does what, as long as all workers have
+    this package, the same versions of its libraries and processors alike.
+    """
+
+    def __init__(self, client: Any):
+        self.client = client
+
+    @property
+    def executor(self) -> Executor:
+        """The workers as an executor, for functions that know all they need."""
+        return self.client.get_executor()
+
+    @property
+    def cores(self) -> int:
+        """Pieces of work that can be done at once."""
+        return max(sum(self.client.nthreads().values()), 1)
+
+    @contextmanager
+    def processes(self, count: int, work: Callable[..., Any]) -> Iterator[Submit]:
+        """As `processes`: what the work needs is sent to each worker once."""
+        sent = self.client.scatter(work, broadcast=True, hash=False)
+        yield partial(self.executor.submit, _do_far, sent)
+
+
+def _do_far(work: Callable[..., Any], *arguments: Any) -> Any:
+    with one_thread():
+        return work(*arguments)
+
+
+@contextmanager
+def cluster(address: str | None) -> Iterator[Cluster | None]:
+    """The cluster of the Dask scheduler at an address, such as tcp://scheduler:8786; None if there is no address.
+
+    Raises
+    ------
+    ValueError
+        Dask is not installed, no scheduler answers, it has no workers; or workers were lost again and again.
+    """
+    if address is None:
+        yield None
+        return
+    try:
+        from dask.distributed import Client
+        from distributed.scheduler import KilledWorker
+    except ImportError:
+        raise ValueError("--dask needs the package `distributed`: pip install 'kfcourse[dask]'") from None
+    try:
+        client = Client(address, timeout=10, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise ValueError(f"no Dask scheduler answers at {address}: {error}") from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=60)
+        except TimeoutError:
+            raise ValueError(f"the Dask scheduler at {address} has no workers: start some with `dask worker {address}`") from None
+        try:
+            yield Cluster(client)
+        except KilledWorker:
+            raise ValueError(f"workers of {address} were lost again and again: give each more memory, or fewer threads") from None
 
 
 def may_start() -> bool:

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from kfcourse.laws import CONFIDENCE, Array, Gaussian, normalised_square
+from kfcourse.laws import CONFIDENCE, Array, Gaussian, column, normalised_square
 from kfcourse.montecarlo.ensemble import STRATA
 
 BATCHES = 128  # standard errors from 128 batches are themselves good to 6 %
@@ -211,6 +211,20 @@ class Sums:
             self.normalised[filter_index, step] = quotients
         else:  # one variance for the whole ensemble: the sums of squares are there already
             self.normalised[filter_index, step] = _quotient(self.square[filter_index, step, 0], own)
+
+    def record_by_loop(self, filter_index: int, step: int, x: Array, estimate: Gaussian, weight: Array | None = None) -> None:
+        """`record` of a scalar state by a compiled loop."""
+        from kfcourse.filters.loops import record
+
+        arrays = (x, estimate.mean, estimate.cov, np.ones(len(x)) if weight is None else weight)
+        kept = (self.error, self.square, self.own)
+        record(
+            *(column(one) for one in (*arrays, self.weights)),
+            self._starts,
+            *(one[filter_index, step, 0] for one in kept),
+            self.normalised[filter_index, step],
+            self.largest_square[filter_index, step],
+        )
 
     def record_distance(
         self, filter_index: int, step: int, mean: Array, reference: tuple[Array, Array], weight: Array | None = None

@@ -30,7 +30,7 @@ from kfcourse.limits import OutOfTime, memory_limit, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Subset
 from kfcourse.montecarlo.designing import NotFinite, failed
 from kfcourse.montecarlo.ensemble import STRATA, Ensemble, Instant, Serial
-from kfcourse.montecarlo.parallel import START, Submit, may_start, one_thread, processes
+from kfcourse.montecarlo.parallel import START, Cluster, Submit, may_start, one_thread, processes
 from kfcourse.montecarlo.statistics import Sums
 from kfcourse.reasons import Reason
 
@@ -79,11 +79,12 @@ def run_subset(
     progress: bool | None,
     *,
     back: bool = False,
+    far: Cluster | None = None,
 ) -> tuple[Subset | None, dict[str, str]]:
     """All filters on at most `size` of the trajectories, in `jobs` processes, as threads would wait for one another.
 
-    With `back` they look back from the end.  Also, by name, why slow filters were left out; the others then start again without
-    them, or with what runs instead.
+    With `back` they look back from the end; `far` away if there is a cluster.  Also, by name, why slow filters were left out; the
+    others then start again without them, or with what runs instead.
     """
     data = _first(ensemble, size)
     left_out: dict[str, str] = {}
@@ -96,7 +97,7 @@ def run_subset(
         while running := [one for name, one in chosen.items() if name not in left_out]:
             names = [one.name for one in running]
             try:
-                sums = _chunks_in_time([*fast, *running], ensemble, data, end, memory, jobs, progress, back)
+                sums = _chunks_in_time([*fast, *running], ensemble, data, end, memory, jobs, progress, back, far)
             except _Failed as failed:
                 other = chosen[failed.name].instead
                 (left_out if other is None else replaced)[failed.name] = failed.reason
@@ -126,18 +127,22 @@ def _chunks_in_time(
     jobs: int,
     progress: bool | None,
     back: bool,
+    far: Cluster | None,
 ) -> list[Sums]:
     """Sums over the chunks that are done in time; one that would take too much time or memory is done in smaller ones."""
     names = [one.name for one in filters]
-    size, jobs = data[0].shape[1], jobs if may_start() else 1
-    chunk = partial(_chunk, filters, data, names.index(EXACT) if EXACT in names else None, ensemble.weight, back, end)
+    size, jobs = data[0].shape[1], far.cores if far else jobs if may_start() else 1
+    chunk = partial(_chunk, filters, data, names.index(EXACT) if EXACT in names else None, ensemble.weight, back)
     with progress_bar("slow filters", size, "trajectory", progress) as bar:
         replaceable = any(one.name == EXACT and one.instead is not None for one in filters)
         work = _Work(size, end, bar, jobs if replaceable else 0)
         while not work.over:
             jobs = min(jobs, work.chunks())
             try:
-                if jobs == 1 or not work.long():
+                if far:
+                    with far.processes(jobs, partial(chunk, None)) as submit:
+                        work.advance(submit, jobs)
+                elif jobs == 1 or not work.long():
                     with memory_limit(memory):
                         work.advance(partial(Serial().submit, chunk, None), 1, until_long=jobs > 1)
                 else:
@@ -167,16 +172,16 @@ def _chunk(
     reference: int | None,
     weight_of: Callable[[Array], Array | None],
     back: bool,
-    end: float | None,
     memory: float | None,
+    seconds: float | None,
     start: int,
     count: int,
 ) -> tuple[Sums, float] | MemoryError | None:
-    """Sums over one chunk and the seconds it took; None if the time is over, or what is too large for the memory."""
+    """Sums over one chunk and the seconds it took; None if it has not as many, or what is too large for the memory."""
     begun = time.monotonic()
     steps, _, n = data[0].shape
     try:
-        with memory_limit(memory), _until(end):
+        with memory_limit(memory), _within(seconds):
             instants = [Instant(*(array[k, start : start + count] for array in data)) for k in range(steps)]
             sums = Sums.empty(len(filters), steps, n, np.diff([*range(0, count, BATCH), count]))
             run_block(filters, instants, sums, reference, weight_of, back=back)
@@ -211,7 +216,8 @@ class _Work:
             undone = [future for _, future in running if not future.done()]
             ahead = self.start + sum(count for count, _ in running)
             if len(undone) < jobs and (count := self.next(len(self.found) + len(running), ahead)):
-                running.append((count, submit(ahead, count)))
+                left = None if self.end is None else self.end - time.monotonic()
+                running.append((count, submit(left, ahead, count)))
             elif undone:
                 wait(undone, WAIT, FIRST_COMPLETED)
             elif not running:
@@ -263,8 +269,8 @@ class _Work:
         return min(left, np.inf if self.end is None else self.end - time.monotonic()) > START
 
 
-def _until(end: float | None) -> AbstractContextManager[None]:
-    return nullcontext() if end is None else time_limit(max(end - time.monotonic(), 1e-3))
+def _within(seconds: float | None) -> AbstractContextManager[None]:
+    return nullcontext() if seconds is None else time_limit(max(seconds, 1e-3))
 
 
 def run_block(
@@ -275,11 +281,12 @@ def run_block(
     weight_of: Callable[[Array], Array | None] = lambda x: None,
     *,
     back: bool = False,
+    record: Callable[..., None] = Sums.record,
 ) -> None:
     """Advance all filters together over the steps of one block of trajectories; `back`: let them look back from its end.
 
     With a reference filter, the distance of every other estimate from its own is recorded too.  The initial states tell the
-    weights of the trajectories.
+    weights of the trajectories.  `record` is how the sums take an estimate.
     """
     size, weight = int(sums.counts.sum()), None
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
@@ -289,7 +296,7 @@ def run_block(
             for i, (one, state) in enumerate(zip(filters, states, strict=True)):
                 with _affair_of(one, k):
                     estimate = state.posterior
-                    sums.record(i, k, near(instant.x, estimate.mean, one.model.angles.x), estimate, weight)
+                    record(sums, i, k, near(instant.x, estimate.mean, one.model.angles.x), estimate, weight)
             if reference is not None:
                 twice = _twice(states[reference])
                 sums.record_doubt(k, _doubt(states[reference]), weight)

@@ -24,6 +24,7 @@ from kfcourse.checks import Exercise, sets
 from kfcourse.checks.question import PASSED
 from kfcourse.files import package_digest, replacing, save
 from kfcourse.lab.variants import find_variant
+from kfcourse.montecarlo.parallel import cluster
 from kfcourse.notebooks.execution import NotebookFailed, execute, html, pdf, pictures, results
 from kfcourse.notebooks.kernels import prefer_forked
 from kfcourse.notebooks.master import read, render, solution, student
@@ -176,16 +177,10 @@ def _backend(dask: str | None, workers: int) -> Iterator[joblib.Parallel]:
         prefer_forked()
         yield joblib.Parallel(n_jobs=workers, return_as="generator_unordered")
         return
-    try:
-        from dask.distributed import Client
-    except ImportError:
-        raise ValueError("--dask needs the package `distributed`: pip install distributed") from None
-    try:
-        client = Client(dask, timeout=10)
-    except (OSError, TimeoutError, ValueError) as error:
-        raise ValueError(f"no Dask scheduler answers at {dask}: {error}") from None
-    with client, joblib.parallel_config(backend="dask", wait_for_workers_timeout=60):
-        yield joblib.Parallel(return_as="generator_unordered")
+    with cluster(dask) as far:
+        assert far is not None
+        with far.client.as_current(), joblib.parallel_config(backend="dask", wait_for_workers_timeout=60):
+            yield joblib.Parallel(return_as="generator_unordered")
 
 
 def plan(

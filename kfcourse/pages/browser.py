@@ -1,8 +1,7 @@
 """The lab's filters as JavaScript, printed from the equations that the chapters derive and print.
 
-`kfcourse.filters.EQUATIONS` are statements of two kinds.  Some hold for each trajectory, such as z = lambda + K (y - h): the
-structural functions are put in, and they become loops over the ensemble.  Others find coefficients from means and
-covariances over the ensemble, such as H = Cov(eps, omega) Cov(omega)^+: they become assignments between the loops.  What comes
+`kfcourse.filters.programs` makes numbers of the equations.  Those that hold for each trajectory become loops over the ensemble;
+those that find coefficients from means and covariances become assignments between the loops.  What comes
 out is, for each filter of a scalar model,
 
     step(n, v, c, a)      estimates z and predictions of all trajectories, with the coefficients c
@@ -24,37 +23,15 @@ import sympy as sp
 
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import notation as s
+from kfcourse.filters.programs import Rule, array_name, in_numbers, needed, scalar
 from kfcourse.lab.short_names import LAB, Structures, title
-from kfcourse.lab.written_out import function_values, scalar
 from kfcourse.symbolic import javascript
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import Structure
 
 LAB_SCRIPT = Path(__file__).parent / "data" / "lab.js"  # trajectories, the exact filter, statistics: no formula of a model
-Rule = tuple[sp.Symbol, sp.Expr]
 
 _GIVEN = (s.x, s.x_next, s.y, s.lam, s.Psi)  # what a step is given; of a running filter without the states
 _KEPT = (s.z, s.P, s.lam_next, s.Psi_next)  # what it leaves
-_ARRAYS = {scalar(s.x_next): "next", scalar(s.lam_next): "lambda", scalar(s.Psi_next): "Psi"}
-
-
-def array_name(symbol: sp.Symbol) -> str:
-    """The array that holds a letter of the equations: "lambda" for \\lambda_{k}; predictions take the place of their letter."""
-    if symbol in _ARRAYS:
-        return _ARRAYS[symbol]
-    name = re.sub(r"_\{k(\+1)?\}", "", symbol.name)
-    return "".join(re.findall(r"[A-Za-z]+", name))
-
-
-def scalar_rules(family: str, structures: Structures, structure: Structure) -> list[Rule]:
-    """The equations of a family in numbers, letter and value, with the formulas of the structural functions put in."""
-    values = function_values(structure)
-    at_means = structures.linearised  # a(z, m_v) and b(lambda, m_w) are its tau and h
-    formulas = at_means.formulas
-    assert formulas is not None
-    values[scalar(s.b_value)] = at_means["h"].subs(formulas.m[0], scalar(s.lam))
-    values[scalar(s.a_value)] = at_means["tau"].subs(formulas.z[0], scalar(s.z))
-    return [(scalar(one.lhs), scalar(one.rhs, javascript.inverse).xreplace(values)) for one in EQUATIONS[family]]
 
 
 def statistics(letters: Iterable[sp.MatrixSymbol]) -> dict[sp.Symbol, str]:
@@ -75,7 +52,7 @@ def filter_source(name: str, structures: Structures) -> str:
     """A filter of the lab as the text of a JavaScript object { design, step }; `design` is null where nothing is to be found."""
     family, _, approximation = name.partition("-")
     structure = structures.gaussian if approximation == "gaussian" else structures.linearised
-    rules = scalar_rules(family, structures, structure)
+    rules = in_numbers(EQUATIONS[family], structures.model, structure, javascript.inverse)
     letters = {*_GIVEN, *(one.lhs for one in EQUATIONS[family])}
     known = statistics(sorted(letters, key=str))
     kept = [scalar(one) for one in _KEPT if one in letters and any(scalar(one) == left for left, _ in rules)]
@@ -127,12 +104,12 @@ def _used_later(
     group: Sequence[Rule], later: Sequence[Rule], known: Mapping[sp.Symbol, str], kept: Sequence[sp.Symbol]
 ) -> list[sp.Symbol]:
     """Of a group's letters those that the later rules need, also through means and covariances, and those that are kept."""
-    needed = set(kept)
+    used = set(kept)
     for _, right in later:
         texts = " ".join(known[one] for one in right.free_symbols & set(known))
         names = set(re.findall(r"a\.(\w+)", texts))
-        needed |= right.free_symbols | {left for left, _ in group if array_name(left) in names}
-    return [left for left, _ in group if left in needed]
+        used |= right.free_symbols | {left for left, _ in group if array_name(left) in names}
+    return [left for left, _ in group if left in used]
 
 
 def _loop(
@@ -144,16 +121,12 @@ def _loop(
     coefficients: Mapping[sp.Symbol, str],
 ) -> str:
     """The loop that computes what is wanted; what nothing wanted needs is left out."""
-    by_letter, needed = dict(rules), set(wanted)
-    for left, right in reversed(rules):
-        if left in needed:
-            needed |= right.free_symbols
-    definitions = {left: right for left, right in rules if left in needed}
+    by_letter = dict(rules)
     return javascript.loop(
         name,
         {array_name(one): sp.Matrix([one]) for one in given if one not in by_letter},
         {array_name(one): sp.Matrix([one]) for one in wanted},
-        definitions,
+        needed(rules, wanted),
         constants,
         coefficients,
     )

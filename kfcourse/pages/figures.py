@@ -1,4 +1,4 @@
-"""One style for the figures of the book, and labels at the ends of curves."""
+"""One style for the figures of the book, each also as a telephone shows it, and labels at the ends of curves."""
 
 from __future__ import annotations
 
@@ -6,9 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from IPython.core.interactiveshell import InteractiveShell
 from matplotlib import rcParams
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
 from matplotlib_inline.backend_inline import set_matplotlib_formats
 
 # Fixed colours (Okabe and Ito's, distinguishable by the colour-blind); those of the filters are in kfcourse.lab.plots.
@@ -16,6 +20,8 @@ COLOURS = {"truth": "#000000", "measurement": "#999999", "estimate": "#0072B2", 
 
 # Inches: the column of a page.  A figure of this width is shown at its own size, its labels as large as the page's notes.
 WIDTH = 7.2
+# A column of 338 px, on a screen of 390, shows a figure of this width with letters of 10 pt as 10.2 px, one of 7.2 as 6.3.
+NARROW = 4.4
 
 FONTS = sorted((Path(__file__).parent / "data").glob("*.ttf"))  # the pages' own, Source Sans 3 (OFL.txt)
 
@@ -48,16 +54,56 @@ _STYLE: dict[Any, Any] = {
 
 
 def book_style() -> None:
-    """Figures of this notebook in the style of the book: its font, twice the pixels, transparent, no frame above and right."""
+    """Figures of this notebook in the style of the book: its font, twice the pixels, transparent, no frame above and right.
+
+    The picture of each wider than `NARROW` carries a second one, for telephones, in its output's metadata (book/narrow.py).
+    """
     for font in FONTS:
         fontManager.addfont(font)
     # The whole figure, as wide as it says: constrained layout has found room for everything.
     set_matplotlib_formats("retina", bbox_inches=None)
     rcParams.update(_STYLE)
+    formatter = InteractiveShell.instance().display_formatter.formatters["image/png"]  # type: ignore[union-attr]
+    wide = formatter.lookup_by_type(Figure)
+
+    def both(figure: Figure) -> Any:
+        if not (made := wide(figure)):  # of a figure without axes
+            return None
+        data, metadata = made
+        if lay_narrow(figure):
+            metadata = metadata | {"narrow": wide(figure)[0]}
+        return data, metadata
+
+    formatter.for_type(Figure, both)
 
 
-def label_ends(ax: Axes, least: float = 0.07, **text: Any) -> None:
-    """Write each curve's label at its right end, in its colour; labels are at least the fraction `least` of the height apart."""
+def lay_narrow(figure: Figure) -> bool:
+    """Make a figure `NARROW`, its panels one under the other, in their order; False if it is not wider than that already."""
+    width, height = figure.get_size_inches()
+    if width <= NARROW:
+        return False
+    panels = [(ax, spec) for ax in figure.axes if (spec := ax.get_subplotspec()) is not None]
+    grids = {spec.get_gridspec() for _, spec in panels}
+    columns = grids.pop().ncols if len(grids) == 1 else 1
+    if columns > 1:
+        first_ax, first_spec = panels[0]
+        stacked = figure.add_gridspec(first_spec.get_gridspec().nrows * columns, 1)
+        for ax, spec in panels:
+            first = min(spec.rowspan) * columns + min(spec.colspan)
+            ax.set_subplotspec(stacked[first : first + len(spec.rowspan) * len(spec.colspan)])
+            if ax is not first_ax and ax.get_shared_y_axes().joined(ax, first_ax):  # which stood at the left and said it for both
+                ax.tick_params(labelleft=True)
+                ax.set_ylabel(ax.get_ylabel() or first_ax.get_ylabel())
+    figure.set_size_inches(NARROW, 0.9 * height * columns if columns > 1 else height)
+    return True
+
+
+def label_ends(ax: Axes, least: float = 0.07, lowest: float = -np.inf, **text: Any) -> None:
+    """Write each curve's label at its right end, with a piece of the curve: its colour, dashes and marker.
+
+    Labels are at least the fraction `least` of the height apart, a thin line leads to each that stands beside its curve's end,
+    and none stands below the value `lowest` (a line of zero that all curves are above, say).
+    """
     lines = [line for line in ax.get_lines() if not str(line.get_label()).startswith("_")]
     ends = []
     for line in lines:
@@ -66,15 +112,25 @@ def label_ends(ax: Axes, least: float = 0.07, **text: Any) -> None:
         if len(points):
             ends.append((line, *points[-1]))
     ax.autoscale_view()  # limits are final
-    heights = [ax.transAxes.inverted().transform(ax.transData.transform((x, y)))[1] for _, x, y in ends]
-    places = dict(zip(np.argsort(heights), _apart(np.sort(heights), least), strict=True))
+    corner = ax.transAxes.inverted()
+    found = np.array([corner.transform(ax.transData.transform((x, y))) for _, x, y in ends]).reshape(-1, 2)
+    floor = corner.transform(ax.transData.transform((0, lowest)))[1] if np.isfinite(lowest) else -np.inf
+    heights = found[:, 1]
+    places = dict(zip(np.argsort(heights), _apart(np.sort(heights), least, floor), strict=True))
     for number, (line, _, _) in enumerate(ends):
-        style = {"color": line.get_color(), "va": "center", "ha": "left", "clip_on": False} | text
-        ax.text(1.01, places[number], str(line.get_label()), transform=ax.transAxes, **style)
+        place = places[number]
+        if abs(place - heights[number]) > 0.01:
+            leader = {"color": line.get_color(), "linewidth": 0.6, "alpha": 0.6, "transform": ax.transAxes, "clip_on": False}
+            ax.add_line(Line2D([found[number, 0], 1.02], [heights[number], place], label="_leader", **leader))
+        label = Legend(
+            ax, [line], [line.get_label()], loc="center left", bbox_to_anchor=(1.02, place), frameon=False, borderpad=0,
+            borderaxespad=0, handlelength=2.2, handletextpad=0.4, labelcolor="linecolor", prop=text or None,
+        )  # fmt: skip
+        ax.add_artist(label).set_clip_on(False)  # else constrained layout leaves it no room
 
 
-def _apart(heights: np.ndarray, least: float) -> np.ndarray:
-    """Ascending heights moved as little as it takes to be `least` apart."""
+def _apart(heights: np.ndarray, least: float, floor: float) -> np.ndarray:
+    """Ascending heights moved as little as it takes to be `least` apart, the first not below `floor`."""
     steps = least * np.arange(len(heights))
     free = heights - steps  # must not descend: pool neighbours that do
     pools: list[tuple[float, int]] = []
@@ -83,4 +139,4 @@ def _apart(heights: np.ndarray, least: float) -> np.ndarray:
         while len(pools) > 1 and pools[-2][0] > pools[-1][0]:
             (one, n), (other, m) = pools[-2], pools[-1]
             pools[-2:] = [((one * n + other * m) / (n + m), n + m)]
-    return np.concatenate([np.full(n, mean) for mean, n in pools]) + steps if pools else free
+    return np.maximum(np.concatenate([np.full(n, mean) for mean, n in pools]), floor) + steps if pools else free

@@ -4,6 +4,7 @@ pendulum()               Särkkä and Svensson (2023), with their data: `pendulu
 car()                    from the same book, linear: `car_data()`
 growth_model(variance)   the univariate nonstationary growth model (Gordon, Salmond and Smith, 1993)
 cubic_sensor(), logistic(), inverse_cube_root()   the conditionally minimax line (Pankov, Bosov and Borisov)
+lorenz(noise)            the attractor of Lorenz (1963), and measurements of it: `lorenz_data(...)`
 stochastic_volatility()  a state that shows only in the measurement's variance
 bearings()               two bearings of a target (Hartikainen, Solin and Särkkä, 2011), with its course: `bearings_data(...)`
 reentry(known)           a vehicle that enters the atmosphere (Julier and Uhlmann, 2004), seen by a radar
@@ -19,6 +20,7 @@ from importlib import resources
 import numpy as np
 
 from kfcourse.laws import Array
+from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.symbolic.model import Model
 
 # Root mean square errors of the angle over the 500 steps of the data, as Särkkä and Svensson's notebooks print them.
@@ -44,6 +46,11 @@ REENTRY_ERRORS = {"EKF": 0.0084, "UKF": 0.0084}
 
 # Of the cubic sensor, once it has settled: read from the curves that Pankov, Bosov and Borisov publish.
 CUBIC_SENSOR = {"error variance": 0.356, "state variance": 1.155}
+
+# Of the Lorenz attractor, root mean square errors after a measurement: those that the DAPPER package states for Sakov's settings.
+# The ensemble filter has ten members, the particle filter four thousand.
+LORENZ_ERRORS = {"EKF": 0.92, "ensemble filter": 0.60, "particles": 0.27}
+LORENZ_EVERY = 25  # steps between measurements
 
 # The pendulum's errors again, of the smoothers.
 PENDULUM_SMOOTHED = {"EKF": 0.057446202494837, "UKF": 0.036617555415464256}
@@ -127,6 +134,34 @@ def inverse_cube_root(bound: float = 100) -> Model:
     return Model.define(
         "(b if 0 <= x < 1/b**3 else sign(x)/Abs(x)**(1/3)) + v", "x + w", {"b": bound}, prior={"mean": 3.01, "variance": 1}
     )
+
+
+def lorenz(noise: float) -> Model:
+    """x1' = 10(x2 - x1), x2' = 28 x1 - x2 - x1 x3, x3' = x1 x2 - 8/3 x3 over .01 by Heun's rule, + noise v; y = x + sqrt(2) w.
+
+    The attractor has no noise; a filter needs some, or it becomes sure of itself and loses what runs apart.
+    """
+
+    def slope(x: str, y: str, z: str) -> tuple[str, str, str]:
+        return f"10*(({y}) - ({x}))", f"28*({x}) - ({y}) - ({x})*({z})", f"({x})*({y}) - 8*({z})/3"
+
+    state = ("x1", "x2", "x3")
+    first = slope(*state)
+    second = slope(*(f"{x} + T*({k})" for x, k in zip(state, first, strict=True)))
+    return Model.define(
+        [f"{x} + T/2*({k} + {m}) + s*v{i}" for i, x, k, m in zip((1, 2, 3), state, first, second, strict=True)],
+        [f"{x} + sqrt(2)*w{i}" for i, x in zip((1, 2, 3), state, strict=True)],
+        {"T": 0.01, "s": noise},
+        prior={"mean": [1.509, -1.531, 25.46], "variance": [2, 2, 2]},
+    )
+
+
+def lorenz_data(runs: int, measured: int, seed: int) -> tuple[Array, Array]:
+    """Trajectories of the attractor, x (25 measured + 1, runs, 3), and y, which is NaN but at every 25th step from the 25th."""
+    x, y = simulate(lorenz(0), runs, LORENZ_EVERY * measured + 1, seed)
+    seen = np.zeros((len(y), 1, 1), dtype=bool)
+    seen[LORENZ_EVERY::LORENZ_EVERY] = True
+    return x, np.where(seen, y, np.nan)
 
 
 def stochastic_volatility() -> Model:

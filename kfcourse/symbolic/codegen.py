@@ -2,7 +2,7 @@
 
 The only place where expressions become code.  `lower` splits expressions into elementary assignments
 (common subexpressions once, small powers as products) that any target could print; `numpy_source`
-prints them as NumPy, `javascript.loop` as JavaScript.
+prints them as NumPy, `javascript.loop` as JavaScript, `compiled.loop` for numba.
 """
 
 from __future__ import annotations
@@ -189,7 +189,7 @@ def float_text(number: sp.Rational) -> str:
     return repr(value)
 
 
-class _Printer(NumPyPrinter):
+class NumbersPrinter(NumPyPrinter):
     """NumPy with floats for rational numbers and readable products."""
 
     _module = "np"
@@ -252,7 +252,7 @@ def numpy_source(name: str, arguments: Mapping[str, sp.MatrixBase], program: Pro
             rename[entry] = f"{argument}_{row + 1}" if argument in program.vectors else f"{argument}_{row + 1}{column + 1}"
             where = f"{row}" if argument in program.vectors else f"{row}, {column}"
             lines.append(f"    {rename[entry]} = {argument}[..., {where}]")
-    printer = _Printer(rename)
+    printer = NumbersPrinter(rename)
     lines += [f"    {rename[target]} = {printer.doprint(value)}" for target, value in program.assignments]
     for output, entries in program.outputs.items():
         lines += _assemble(output, entries, output in program.vectors, arguments, program.vectors, printer)
@@ -266,7 +266,7 @@ def _assemble(
     is_vector: bool,
     arguments: Mapping[str, sp.MatrixBase],
     vectors: frozenset[str],
-    printer: _Printer,
+    printer: NumbersPrinter,
 ) -> list[str]:
     """Lines that put the entries of one output together."""
     rows, columns = entries.shape

@@ -42,6 +42,7 @@ from kfcourse.symbolic.reading import (
     table,
 )
 from kfcourse.symbolic.sense import not_computable
+from kfcourse.symbolic.typesetting import with_index
 from kfcourse.symbolic.writing import formula_latex, number_latex
 
 OF_A_VARIANT = ("title", "steps")  # keys of a variant's table that are not of its model
@@ -236,19 +237,22 @@ class Model:
 
         Indexed: x_{k+1} = c x_k + e x_k v_k, as on paper, for x_{k+1} = c x + e x v.
         """
-        x, v, w = ([sp.Symbol(f"{{{sp.latex(s)}}}_{{k}}") if indexed else s for s in some] for some in (self.x, self.v, self.w))
+        x, v, w = ([sp.Symbol(with_index(sp.latex(s), "k")) if indexed else s for s in some] for some in (self.x, self.v, self.w))
         at_k = dict(zip((*self.x, *self.v, *self.w), (*x, *v, *w), strict=True))
-        state = ["{" + sp.latex(x) + "}" for x in self.x]  # braces: a name may have an index of its own
-        meter = ["y"] if self.p == 1 else [f"{{y_{{{i + 1}}}}}" for i in range(self.p)]
+        state = [sp.latex(x) for x in self.x]
+        meter = ["y"] if self.p == 1 else [f"y_{{{i + 1}}}" for i in range(self.p)]
         lines = [
-            rf"{name}_{{k+1}} &= {formula_latex(formula.xreplace(at_k), x, v)}"
+            rf"{with_index(name, 'k+1')} &= {formula_latex(formula.xreplace(at_k), x, v)}"
             for name, formula in zip(state, self.state_equation, strict=True)
         ]
         lines += [
-            rf"{name}_k &= {formula_latex(formula.xreplace(at_k), x, w)}"
+            rf"{with_index(name, 'k')} &= {formula_latex(formula.xreplace(at_k), x, w)}"
             for name, formula in zip(meter, self.meter_equation, strict=True)
         ]
-        lines += [rf"{name}_k &\in [-\pi, \pi]" for name in [state[i] for i in self.angles.x] + [meter[i] for i in self.angles.y]]
+        lines += [
+            rf"{with_index(name, 'k')} &\in [-\pi, \pi]"
+            for name in [state[i] for i in self.angles.x] + [meter[i] for i in self.angles.y]
+        ]
         if values:
             lines += [
                 rf"{sp.latex(name)} &= {number_latex(float(value))}" for name, value in self.values.items()

@@ -18,6 +18,8 @@ WIDTH = 62  # symbols in a line of the page's column
 
 _OPERATORS = {"+", "-", "=", r"\cdot", r"\approx", r"\le", r"\ge"}  # with the space around them
 _TOKEN = re.compile(r"\\[a-zA-Z]+|\\.|.", re.DOTALL)
+_NAME_BEFORE_A_FACTOR = re.compile(r"(\\mathit\{[A-Za-z]+\}(?:\^\{[^{}]*\})?) (?!\\(?:right|cdot)\b)(?=[A-Za-z\\{])")
+_WORD_BELOW = re.compile(r"_\{([a-z]{4,})(?=[ }])")  # G_{best}: a word, no product of letters
 _WITHOUT_WIDTH = {
     r"\left",
     r"\right",
@@ -30,6 +32,7 @@ _WITHOUT_WIDTH = {
     "&",
     " ",
     r"\mathrm",
+    r"\mathit",
     r"\operatorname",
     r"\tilde",
     r"\hat",
@@ -82,10 +85,34 @@ def joined(terms: Sequence[str], width: float = WIDTH) -> list[str]:
 def latex(expression: Any, names: Mapping[Any, str] | None = None) -> str:
     """LaTeX of an expression in the conventions of the book: transposes as T, no brackets around derivatives."""
     settings = {"symbol_names": dict(names or {}), "diff_operator": "d", "mat_delim": "(", "fold_short_frac": False}
-    return str(_Printer(settings).doprint(expression))
+    return str(_Ordered(settings).doprint(expression))
 
 
-class _Printer(LatexPrinter):
+def with_index(name: str, index: str) -> str:
+    """LaTeX of a name with one more index: x_{1,k} for x_{1} and k."""
+    own = re.fullmatch(r"(.*)_\{([^{}]*)\}", name)
+    return f"{own[1]}_{{{own[2]},{index}}}" if own else f"{{{name}}}_{{{index}}}"
+
+
+class Printer(LatexPrinter):
+    """SymPy's, with one letter for the identity, \\ln, and names of several letters told apart from products."""
+
+    def __init__(self, settings: dict[str, Any] | None = None) -> None:
+        super().__init__({"ln_notation": True} | (settings or {}))
+
+    def doprint(self, expr: Any) -> str:
+        return _NAME_BEFORE_A_FACTOR.sub(r"\1\, ", super().doprint(expr))
+
+    def _print_Symbol(self, expr: sp.Symbol, style: str = "plain") -> str:
+        printed = _WORD_BELOW.sub(r"_{\\mathrm{\1}", super()._print_Symbol(expr, style))
+        several = len(printed) > 1 and printed.isascii() and printed.isalpha()
+        return rf"\mathit{{{printed}}}" if several and expr not in self._settings["symbol_names"] else printed
+
+    def _print_Identity(self, expr: sp.Identity) -> str:
+        return "I"
+
+
+class _Ordered(Printer):
     def _as_ordered_terms(self, expr: sp.Add, order: str | None = None) -> list[sp.Expr]:
         return _ordered(super()._as_ordered_terms(expr, order=order))
 

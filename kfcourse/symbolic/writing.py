@@ -10,9 +10,8 @@ from itertools import groupby
 
 import sympy as sp
 from sympy.codegen.cfunctions import expm1
-from sympy.printing.latex import LatexPrinter
 
-from kfcourse.symbolic.typesetting import WIDTH, joined, symbols
+from kfcourse.symbolic.typesetting import WIDTH, Printer, joined, symbols
 
 
 def formula_latex(expression: sp.Expr, variables: Sequence[sp.Symbol], noises: Sequence[sp.Symbol] = ()) -> str:
@@ -26,7 +25,7 @@ def formula_latex(expression: sp.Expr, variables: Sequence[sp.Symbol], noises: S
     noises : sequence of symbols
         Variables that are written last in a product, and whose terms are written last in a sum.
     """
-    printer = LatexPrinter({"order": "none", "fold_func_brackets": True})
+    printer = Printer({"order": "none", "fold_func_brackets": True})
     return str(printer.doprint(_Writer([*variables, *noises], noises).arranged(_readable(sp.sympify(expression)))))
 
 

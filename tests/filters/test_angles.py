@@ -70,7 +70,7 @@ def test_components_are_named_in_a_list_or_by_x_and_y():
             angles(given)
     model = Model.define(state, meter, symbols=names, angles=["y1", "psi"])
     assert repr(model).endswith("angles psi, y1)")
-    assert r"{\psi}_k &\in [-\pi, \pi]" in model.latex() and r"{y_{1}}_k &\in [-\pi, \pi]" in model.latex()
+    assert r"{\psi}_{k} &\in [-\pi, \pi]" in model.latex() and r"y_{1,k} &\in [-\pi, \pi]" in model.latex()
     assert model.replace().angles == model.angles
 
 

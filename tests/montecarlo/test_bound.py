@@ -8,7 +8,7 @@ import pytest
 from kfcourse import Ensemble, Model, compare, design, lab_filters
 from kfcourse.filters import duof, kalman_filter
 from kfcourse.lab import LAB
-from kfcourse.montecarlo.comparison import Comparison, Subset
+from kfcourse.montecarlo.comparison import HEAVY, Comparison, Subset
 from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean
 from kfcourse.montecarlo.two_phase import Replicas, Terms, with_design
 
@@ -73,6 +73,53 @@ def test_a_distance_that_hangs_on_one_trajectory_hardly_counts(counted, largest)
     assert far.gap("other").value.item() == pytest.approx((0.5 + s * 1 + (1 - s) * 5) / 4.5, rel=1e-12)
     assert far.heavy("other").item() == pytest.approx(s * largest / 3, rel=1e-12)
     assert (s < 0.01) == (largest == 200)
+
+
+def skewed(batches, *, rare, factor, seed):
+    """A filter beside another, whose error is `factor` times as large on a few of sixteen trajectories a batch."""
+    rng = np.random.default_rng(seed)
+    square = rng.normal(size=(2, batches, 16)) ** 2 * np.where(rng.random((2, batches, 16)) < rare, factor**2, 1.0)
+    sums = Sums.empty(2, 1, 1, np.full(batches, 16))
+    sums.size[:] = 1.0
+    sums.square[:, 0, 0], sums.largest_square[:, 0] = square.sum(axis=2), square.max(axis=2)
+    names = ("aof-gaussian", "other")
+    return Comparison(Model.define("0.9*x + v", "x + w"), names, names, batches * 16, 1, 0, sums, None)
+
+
+def test_few_intervals_mislead_where_rare_trajectories_make_the_error():
+    """One trajectory in sixty makes six times the error, 20 batches, 200 seeds: 16 % of the intervals miss and look light.
+
+    A sample that lacks them shows no heavy one, so what the largest tells does not do; its skewness does.  5 % may mislead, by
+    chance 10 (3.2 standard errors).  Where nothing is rare, all of 128 batches are trusted.
+    """
+    light = misleading = 0
+    for seed in range(200):
+        one = skewed(20, rare=1 / 60, factor=6.0, seed=seed)
+        found = one.error_variance("other")
+        low, high = found.interval()
+        missed = not low[0] <= 1 + (6**2 - 1) / 60 <= high[0]
+        light += missed and one.heavy("other")[0] <= HEAVY
+        misleading += missed and one.trusted(found, "other")[0]
+    assert misleading / 200 < 0.1 < light / 200
+    plain = [skewed(128, rare=0, factor=1.0, seed=seed) for seed in range(100)]
+    assert all(one.trusted(one.difference("other", "aof-gaussian"), "other", "aof-gaussian").all() for one in plain)
+
+
+def test_how_many_more_trajectories_would_do():
+    """20 batches admit a skewness of .08; it falls with the root of their number, and what is admitted rises up to .5."""
+    one = skewed(20, rare=0, factor=1.0, seed=1)
+    one.sums.largest_square[:] = 0.0
+    assert one.skewness_limit == pytest.approx(20 / 250)
+    for skewness in (0.05, 0.2, -0.2, 0.9):
+        found = Estimate(np.array([1.0]), np.array([0.1]), 19, np.array([skewness]))
+        more = one.missing(found, "other")
+        assert one.trusted(found, "other")[0] == (more == 1)
+        enough = min(0.5, 20 * more / 250)
+        assert more == 1 or abs(skewness) / np.sqrt(more) == pytest.approx(enough, rel=1e-12)
+    one.sums.largest_square[1, 0, 3] = one.sums.square[1].sum() / 2
+    found = Estimate(np.array([1.0]), np.array([0.1]), 19, np.array([0.0]))
+    assert not one.trusted(found, "other")[0]
+    assert one.missing(found, "other") == pytest.approx(5, rel=1e-12)  # half of it where a tenth may be
 
 
 def test_table_ranking_and_verdict_are_one_estimate(lab53):

@@ -521,7 +521,7 @@ def test_dask_has_to_be_installed(call, masters, monkeypatch):
     result = call(
         "exercises", "--variant", "53", "--sets", "b", "--masters", masters, "--out", "out", "--dask", "tcp://nowhere:1"
     )
-    refused(result, "--dask needs the package `distributed`: pip install distributed")
+    refused(result, "--dask needs the package `distributed`: pip install 'kfcourse[dask]'")
 
 
 def test_unknown_names_are_refused(call, tmp_path):

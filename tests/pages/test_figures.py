@@ -1,17 +1,20 @@
 """The style of the figures."""
 
+import base64
 import logging
+import struct
 
 import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from IPython.core.interactiveshell import InteractiveShell
-from matplotlib import font_manager
+from matplotlib import font_manager, rcParams
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 
 from kfcourse.pages import book_style, label_ends
-from kfcourse.pages.figures import FONTS
+from kfcourse.pages.figures import FONTS, NARROW, lay_narrow
 
 
 @pytest.fixture
@@ -39,8 +42,58 @@ def test_labels_at_the_ends_are_apart_and_in_order() -> None:
     _, ax = plt.subplots()
     for end, name in ((1.0, "low"), (1.01, "middle"), (1.02, "high"), (5.0, "far")):
         ax.plot([0, 1], [0, end], label=name)
-    label_ends(ax, least=0.1)
-    heights = {text.get_text(): text.get_position()[1] for text in ax.texts}
+    label_ends(ax, least=0.1, lowest=0)
+    labels = [one for one in ax.get_children() if isinstance(one, Legend)]
+    heights = {one.get_texts()[0].get_text(): one.get_bbox_to_anchor().y0 / ax.bbox.height for one in labels}
+    heights = {name: height - ax.bbox.y0 / ax.bbox.height for name, height in heights.items()}
     assert list(sorted(heights, key=heights.__getitem__)) == ["low", "middle", "high", "far"]
     assert np.diff(sorted(heights.values())).min() > 0.1 - 1e-9
+    assert heights["low"] >= ax.transAxes.inverted().transform(ax.transData.transform((0, 0)))[1] - 1e-9
     plt.close()
+
+
+def test_a_label_has_the_dashes_and_the_marker_of_its_curve_and_a_line_to_it_where_it_stands_aside() -> None:
+    _, ax = plt.subplots()
+    ax.plot([0, 1], [0, 1], "b--s", label="one")
+    ax.plot([0, 1], [0, 1.001], "b-o", label="other")
+    label_ends(ax, least=0.2)
+    handles = {one.get_texts()[0].get_text(): one.get_lines()[0] for one in ax.get_children() if isinstance(one, Legend)}
+    assert {name: (line.get_linestyle(), line.get_marker()) for name, line in handles.items()} == {
+        "one": ("--", "s"), "other": ("-", "o"),
+    }  # fmt: skip
+    leaders = [line for line in ax.get_lines() if line.get_label() == "_leader"]
+    assert len(leaders) == 2
+    assert all(abs(np.diff(line.get_ydata())[0]) > 0.05 for line in leaders)
+    plt.close()
+
+
+def test_on_a_telephone_panels_stand_one_under_the_other_and_letters_have_ten_pixels(style) -> None:
+    figure, (left, right) = plt.subplots(1, 2, figsize=(7.2, 3), sharey=True)
+    left.set(ylabel="error", xlabel="step")
+    assert lay_narrow(figure)
+    figure.canvas.draw()
+    above, below = (ax.get_window_extent() for ax in (left, right))
+    assert above.y0 > below.y1
+    assert abs(above.x0 - below.x0) < 1
+    assert right.get_ylabel() == "error"
+    assert right.yaxis.get_tick_params()["labelleft"]
+    column = 338 / 96  # inches of CSS on a screen of 390 px
+    letters = rcParams["font.size"] * 96 / 72 * column / figure.get_figwidth()
+    assert letters > 10
+    assert not lay_narrow(figure)  # is narrow already
+    plt.close()
+
+
+def test_the_picture_of_a_wide_figure_carries_one_for_telephones(style) -> None:
+    formatter = InteractiveShell.instance().display_formatter.formatters["image/png"]
+    figure = Figure(figsize=(7.2, 3))
+    figure.subplots(1, 2)
+    _, metadata = formatter(figure)
+    narrow = base64.b64decode(metadata["narrow"])
+    width, height = struct.unpack(">II", narrow[16:24])
+    assert width == pytest.approx(2 * NARROW * rcParams["figure.dpi"], abs=1)
+    assert height > width
+    figure = Figure(figsize=(4, 3))
+    figure.subplots()
+    _, metadata = formatter(figure)
+    assert "narrow" not in metadata

@@ -145,10 +145,10 @@ def test_a_vector_model_prints_every_component():
     model = Model.define(["a*x1 + x2", "x2 + v"], ["x1 + w1", "2*x2 + w2"], {"a": 0.5})
     assert repr(model) == "Model(x1' = a*x1 + x2, x2' = v + x2, y1 = w1 + x1, y2 = w2 + 2*x2; a = 1/2)"
     equations = [
-        r"{x_{1}}_{k+1} &= a x_{1} + x_{2} \\",
-        r"{x_{2}}_{k+1} &= x_{2} + v \\",
-        r"{y_{1}}_k &= x_{1} + w_{1} \\",
-        r"{y_{2}}_k &= 2 x_{2} + w_{2}",
+        r"x_{1,k+1} &= a x_{1} + x_{2} \\",
+        r"x_{2,k+1} &= x_{2} + v \\",
+        r"y_{1,k} &= x_{1} + w_{1} \\",
+        r"y_{2,k} &= 2 x_{2} + w_{2}",
     ]
     assert model.latex(values=False).splitlines()[1:-1] == equations
     assert model.latex().splitlines()[1:-1] == [*equations[:3], equations[3] + r" \\", "a &= 0.5"]
@@ -156,7 +156,7 @@ def test_a_vector_model_prints_every_component():
 
 def test_the_latex_of_a_scalar_model_has_no_indices(variant53):
     lines = variant53.latex().splitlines()
-    assert lines[1:3] == [r"{x}_{k+1} &= c x + e x v \\", r"y_k &= g x + f x^{2} w \\"]
+    assert lines[1:3] == [r"{x}_{k+1} &= c x + e x v \\", r"{y}_{k} &= g x + f x^{2} w \\"]
     assert lines[-2] == "f &= 0.02"
 
 

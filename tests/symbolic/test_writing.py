@@ -6,6 +6,7 @@ from sympy.codegen.cfunctions import expm1
 
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import gaussian
+from kfcourse.symbolic.typesetting import latex, with_index
 from kfcourse.symbolic.writing import _Writer, formula_latex, formula_lines, number_latex
 
 pytestmark = pytest.mark.quick
@@ -63,3 +64,20 @@ def test_the_code_s_expm1_is_written_as_people_do():
     assert "expm" not in printed
     assert printed == formula_latex(sp.expand(F.replace(expm1, lambda u: sp.exp(u) - 1)), (m, d))
     assert "expm" not in " ".join(formula_lines(F, (m, d)))
+
+
+def test_what_a_name_of_several_letters_multiplies_stands_apart() -> None:
+    dt = sp.Symbol("dt")
+    assert formula_latex(x + dt * z + v, [x, z], [v]) == r"x + \mathit{dt}\, z + v"
+    assert formula_latex(dt**2 * z, [z]) == r"\mathit{dt}^{2}\, z"
+
+
+def test_one_logarithm_one_identity_and_words_upright_below() -> None:
+    assert latex(sp.log(x)) == r"\ln{\left(x \right)}"
+    assert latex(sp.Identity(3)) == "I"
+    assert latex(sp.Symbol("G_tangent")) == latex(sp.Symbol("G_{tangent}")) == r"G_{\mathrm{tangent}}"
+
+
+def test_a_name_with_an_index_gets_another_behind_a_comma() -> None:
+    assert with_index("x_{1}", "k+1") == "x_{1,k+1}"
+    assert with_index(r"\psi", "k") == r"{\psi}_{k}"

@@ -1,0 +1,128 @@
+"""The printed equations of a filter as what is computed: formulas for each trajectory and, between them, regressions.
+
+`kfcourse.filters.EQUATIONS` are statements of two kinds.  Some hold for each trajectory, such as z = lambda + K (y - h): of a
+scalar model they are rules (`in_numbers`), letter and value, with the formulas of the structural functions put in.  Others find
+coefficients from means and covariances over the ensemble, such as H = Cov(eps, omega) Cov(omega)^+ (`stages`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from itertools import product
+from typing import NamedTuple
+
+import sympy as sp
+
+from kfcourse.filters import notation as s
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import exact_matrix
+from kfcourse.symbolic.structure import Structure
+
+Rule = tuple[sp.Symbol, sp.Expr]
+
+_ARRAYS = {s.x_next: "next", s.lam_next: "lambda", s.Psi_next: "Psi"}  # predictions take the place of their letter
+
+# The functions' values in the equations, and where each is taken.
+_VALUES = {
+    s.h_value: ("h", s.lam, s.Psi),
+    s.G_value: ("G", s.lam, s.Psi),
+    s.F_value: ("F", s.lam, s.Psi),
+    s.tau_zp: ("tau", s.z, s.P),
+    s.Theta_zp: ("Theta", s.z, s.P),
+    s.tau_uT: ("tau", s.u, s.T),
+    s.Theta_uT: ("Theta", s.u, s.T),
+}
+
+
+def scalar(expression: sp.Basic, inverse: Callable[[sp.Expr], sp.Expr] = lambda e: 1 / e) -> sp.Expr:
+    """An expression in matrices as one in numbers: of one component they are the same."""
+    if isinstance(expression, sp.MatrixSymbol):
+        return sp.Symbol(expression.name, real=True)
+    if isinstance(expression, sp.Transpose):
+        return scalar(expression.arg, inverse)
+    if isinstance(expression, sp.Inverse):
+        return inverse(scalar(expression.arg, inverse))
+    if isinstance(expression, sp.MatMul | sp.MatAdd):
+        parts = [scalar(one, inverse) for one in expression.args]
+        return sp.Mul(*parts) if isinstance(expression, sp.MatMul) else sp.Add(*parts)
+    return expression
+
+
+def array_name(symbol: sp.Symbol) -> str:
+    """The array that holds a letter of the equations: "lambda" for \\lambda_{k}; predictions take the place of their letter."""
+    if named := next((name for one, name in _ARRAYS.items() if scalar(one) == symbol), None):
+        return named
+    return "".join(re.findall(r"[A-Za-z]+", re.sub(r"_\{k(\+1)?\}", "", symbol.name)))
+
+
+def function_values(structure: Structure) -> dict[sp.Symbol, sp.Expr]:
+    """The formulas that stand in the equations as h(lambda, Psi), tau(z, p), ..., of a scalar model."""
+    formulas = structure.formulas
+    if formulas is None or structure.model.n != 1 or structure.model.p != 1:
+        raise ValueError(f"only scalar models with derived structural functions are written out, not {structure.model}")
+    return {scalar(value): value_of(structure, *where) for value, where in _VALUES.items()}
+
+
+def value_of(structure: Structure, function: str, mean: sp.MatrixSymbol, cov: sp.MatrixSymbol) -> sp.Expr:
+    """A structural function of a scalar model, as a formula in the letters of the equations."""
+    formulas = structure.formulas
+    assert formulas is not None
+    arguments = formulas.meter_arguments if function in "hGFR" else formulas.state_arguments
+    return structure[function].subs(dict(zip(arguments, (scalar(mean), scalar(cov)), strict=True)), simultaneous=True)
+
+
+def in_numbers(
+    equations: Sequence[sp.Eq],
+    model: Model,
+    structure: Structure | None,
+    inverse: Callable[[sp.Expr], sp.Expr] = lambda e: 1 / e,
+) -> list[Rule]:
+    """The equations of a filter in numbers, letter and value, with the formulas of the model put in."""
+    values = function_values(structure) if structure else {}
+    for value, equation, state, noises, law, at in (
+        (s.a_value, model.state_equation, model.x, model.v, model.state_noise, s.z),
+        (s.b_value, model.meter_equation, model.x, model.w, model.meter_noise, s.lam),
+    ):
+        taken = {state[0]: scalar(at)} | dict(zip(noises, exact_matrix(law.mean), strict=True))
+        values[scalar(value)] = equation[0].subs(taken, simultaneous=True)
+    return [(scalar(one.lhs), scalar(one.rhs, inverse).xreplace(values)) for one in equations]
+
+
+class Fit(NamedTuple):
+    """Letters of a regression: what is predicted, from what, and what is found: matrix, offset, and residual if it is used."""
+
+    target: sp.Symbol
+    regressor: sp.Symbol
+    found: list[sp.Symbol]
+
+
+def stages(equations: Sequence[sp.Eq], given: Sequence[Rule]) -> tuple[list[list[Rule]], list[Fit]]:
+    """The rules in groups, and the regressions between them, in the order of the equations.
+
+    A residual is a coefficient of the regression before it, though other equations may stand between.
+    """
+    letters = {*(one.lhs for one in equations), s.x, s.x_next}
+    pairs = {scalar(s.cov(left, right)): (scalar(left), scalar(right)) for left, right in product(letters, letters)}
+    inverses = {scalar(s.cov_pinv(one)) for one in letters}
+    ensemble = {*pairs, *inverses, *(scalar(s.mean(one)) for one in letters), *(scalar(s.cov(one)) for one in letters)}
+    groups, fits = [list[Rule]()], list[Fit]()
+    for left, right in given:
+        used = right.free_symbols & ensemble
+        if not used:
+            groups[-1].append((left, right))
+        elif used & inverses:
+            fits.append(Fit(*next(pairs[one] for one in used if one in pairs), [left]))
+            groups.append([])
+        else:
+            fits[-1].found.append(left)
+    return groups, fits
+
+
+def needed(rules: Sequence[Rule], wanted: Iterable[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
+    """Those of the rules that what is wanted needs."""
+    letters = set(wanted)
+    for left, right in reversed(rules):
+        if left in letters:
+            letters |= right.free_symbols
+    return {left: right for left, right in rules if left in letters}

@@ -1,0 +1,139 @@
+"""The third printer: the straight-line programs of `codegen.lower` as loops that numba compiles (`pip install kfcourse[fast]`).
+
+    loop("step", {"y": y, "z": z}, {"next": a*z + g*y}, [a, g])
+
+prints a function of one pass over an ensemble of scalars,
+
+    step(c, y, z, next):    for each i:  next[i] from y[i], z[i] and the constants c,
+
+where NumPy needs a pass for each operation; it returns how many entries of the first array are missing (NaN).  The text is kept
+as a module in the user's cache, where numba keeps the machine code beside it: a function made in memory would be compiled anew
+by every process.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from hashlib import sha256
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+
+import sympy as sp
+from sympy.core.relational import Relational
+
+from kfcourse.files import save
+from kfcourse.symbolic.codegen import BeyondFloats, NumbersPrinter, Program, lower
+from kfcourse.symbolic.jumping import JumpModel
+from kfcourse.symbolic.model import Model
+
+REMEDY = "compiled=True needs numba: pip install 'kfcourse[fast]', or leave it out"
+NAN = sp.Symbol("nan")  # what a formula gives where it has no value
+_HEADER = '''"""Printed by kfcourse.symbolic.compiled; it may be removed at any time."""
+
+import numpy as np
+from numba import njit
+
+nan = np.nan
+'''
+
+
+def is_scalar(model: Model | JumpModel) -> bool:
+    """Whether loops over numbers are all that a model needs: one state, one measurement, no angles, no step, no modes."""
+    return isinstance(model, Model) and model.n == model.p == 1 and not model.timed and not (model.angles.x or model.angles.y)
+
+
+class _Printer(NumbersPrinter):
+    """One number at a time: cases and comparisons as Python has them."""
+
+    def _print_Piecewise(self, expr: sp.Piecewise) -> str:
+        *cases, last = expr.args
+        text = "".join(f"{self._print(one.expr)} if {self._print(one.cond)} else " for one in cases)
+        return f"({text}{self._print(last.expr) if last.cond == sp.true else 'nan'})"
+
+    def _print_Relational(self, expr: Relational) -> str:
+        return f"({self._print(expr.lhs)} {expr.rel_op} {self._print(expr.rhs)})"
+
+    def _print_And(self, expr: sp.And) -> str:
+        return "(" + " and ".join(map(self._print, expr.args)) + ")"
+
+    def _print_Or(self, expr: sp.Or) -> str:
+        return "(" + " or ".join(map(self._print, expr.args)) + ")"
+
+    def _print_Max(self, expr: sp.Max) -> str:
+        return f"max({', '.join(map(self._print, expr.args))})"
+
+    def _print_Min(self, expr: sp.Min) -> str:
+        return f"min({', '.join(map(self._print, expr.args))})"
+
+
+def loop(
+    name: str,
+    given: Mapping[str, sp.Symbol],
+    made: Mapping[str, sp.Expr],
+    constants: Sequence[sp.Symbol],
+    definitions: Mapping[sp.Symbol, sp.Expr] | None = None,
+) -> str:
+    """A function `name(c, given arrays, made arrays)` of one loop over their entries, as text; it counts the first array's NaN.
+
+    Parameters
+    ----------
+    name : str
+    given, made : dict
+        Name of an array, (N,), to the symbol of its entries, and to the expression that is written into it.
+    constants : sequence of Symbol
+        Numbers that are the same for all entries: those of the array c, in this order.
+    definitions : dict, optional
+        Auxiliary symbols that the expressions may use.
+    """
+    outputs = {key: sp.ImmutableMatrix([value]) for key, value in made.items()}
+    try:
+        program = lower(outputs, (), definitions or {})
+    except BeyondFloats:  # as in codegen: a factor that was taken out of a power
+        program = lower(outputs, (), definitions or {}, factor=False)
+    return _text(name, given, program, constants)
+
+
+def _text(name: str, given: Mapping[str, sp.Symbol], program: Program, constants: Sequence[sp.Symbol]) -> str:
+    entries = {output: matrix[0] for output, matrix in program.outputs.items()}
+    used = set().union(*(e.free_symbols for e in (*(value for _, value in program.assignments), *entries.values())))
+    names = {target: f"s{i}" for i, (target, _) in enumerate(program.assignments)} | {NAN: "nan"}
+    names |= {one: f"c{i}" for i, one in enumerate(constants)} | {one: f"{array}_i" for array, one in given.items()}
+    printer, arrays = _Printer(names), [*given, *entries]
+    lines = [f"    {names[one]} = c[{i}]  # {one}" for i, one in enumerate(constants) if one in used]
+    lines += ["    missing = 0", f"    for i in range(len({arrays[0]})):", f"        missing += {arrays[0]}[i] != {arrays[0]}[i]"]
+    lines += [f"        {names[one]} = {array}[i]" for array, one in given.items() if one in used]
+    lines += [f"        {names[target]} = {printer.doprint(value)}" for target, value in program.assignments]
+    lines += [f"        {output}[i] = {printer.doprint(entry)}" for output, entry in entries.items()]
+    lines += ["    return missing"]
+    signature = ", ".join(["float64[::1]"] * (1 + len(arrays)))
+    options = 'cache=True, nogil=True, error_model="numpy"'
+    return "\n".join([f'\n\n@njit("int64({signature})", {options})', f"def {name}(c, {', '.join(arrays)}):", *lines, ""])
+
+
+@lru_cache(maxsize=256)
+def load(*functions: str) -> ModuleType:
+    """The module of these functions, compiled, or read from the user's cache if they have been compiled before.
+
+    Raises
+    ------
+    ImportError
+        There is no numba.
+    """
+    import numba
+    from platformdirs import user_cache_path
+
+    text = _HEADER + "".join(functions)
+    name = f"kfcourse_{sha256((text + numba.__version__).encode()).hexdigest()[:20]}"
+    place = Path(user_cache_path("kfcourse")) / "compiled" / f"{name}.py"
+    if not place.exists():
+        place.parent.mkdir(parents=True, exist_ok=True)
+        save(text, place)
+    spec = spec_from_file_location(name, place)
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    sys.modules[name] = module  # numba finds what it has kept by the module's name
+    spec.loader.exec_module(module)
+    return module

@@ -1,0 +1,88 @@
+"""Beyond one machine: the work on the workers of a Dask cluster, here two processes of this one."""
+
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from distributed import LocalCluster
+
+from kfcourse import Model, compare, gaussian, linearised, load_variants
+from kfcourse.filters import aof, duof, pointmass
+from kfcourse.lab.quality import examine_all
+from kfcourse.lab.short_names import LAB, lab_filters
+from kfcourse.montecarlo import ensemble
+from kfcourse.montecarlo.parallel import cluster
+
+STEPS = 3
+
+
+@pytest.fixture(scope="module")
+def address():
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as workers:
+        yield workers.scheduler_address
+
+
+@pytest.fixture
+def model():
+    return Model.define("c*x + e*x*v", "g*x + f*x**2*w", {"c": 0.9, "e": 0.05, "g": 1, "f": 0.02})
+
+
+def same(one, other):
+    for sums, others in [(one.sums, other.sums), (one.subset.sums, other.subset.sums)]:
+        for name in sums.__dataclass_fields__:
+            np.testing.assert_array_equal(getattr(others, name), getattr(sums, name), err_msg=name)
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_the_same_numbers_bit_for_bit(address, model, compiled, capsys):
+    filters = [*lab_filters(model, LAB), pointmass(model)]
+    work = {"subset_runs": 160, "compiled": compiled, "designs": 2}
+    runs = 2 * ensemble.SMALL_BLOCK  # two blocks
+    here = compare(filters, model, runs, STEPS, 1, **work, threads=1, progress=False)
+    there = compare(filters, model, runs, STEPS, 1, **work, dask=address, progress=True)
+    same(here, there)
+    assert there.subset_runs == 160
+
+
+def test_a_lost_worker(address, model, tmp_path):
+    """The first worker to take a chunk ends; what it had begun is done by another, with the same result."""
+    exact, lost = pointmass(model), tmp_path / "lost"
+
+    def step(state, y):
+        try:
+            lost.touch(exist_ok=False)
+        except FileExistsError:
+            return exact.step(state, y)
+        os._exit(1)
+
+    filters = [aof(gaussian(model)), exact]
+    here = compare(filters, model, 400, STEPS, 1, subset_runs=160, threads=1, progress=False)
+    there = compare([filters[0], replace(exact, step=step)], model, 400, STEPS, 1, subset_runs=160, dask=address, progress=False)
+    assert lost.exists()
+    same(here, there)
+
+
+def test_time_is_kept(address, model):
+    result = compare(
+        [aof(linearised(model)), duof(model), pointmass(model)],
+        model,
+        400,
+        STEPS,
+        1,
+        subset_runs=400,
+        subset_seconds=1e-6,
+        dask=address,
+        progress=False,
+    )
+    assert "take more than" in result.left_out["aof-exact"]
+
+
+def test_checks_of_variants(address):
+    chosen = [load_variants()[name] for name in ("1", "2")]
+    assert list(examine_all(chosen, 2000, dask=address)) == list(examine_all(chosen, 2000, jobs=1))
+
+
+def test_nobody_answers():
+    with pytest.raises(ValueError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1:"), cluster("tcp://127.0.0.1:1"):
+        pass
