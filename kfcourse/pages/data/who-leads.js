@@ -45,7 +45,7 @@ function kfWhoLeads(root, name, { ratios, gaps, leaders, trajectories, looks, ki
       const [best, more] = leaders[ratio][k];
       says.textContent = `Step ${k}, f/e = ${ratios[ratio]}: ${looks[best].label} ${more === 0 ? "leads" : `leads, ${more} not significantly worse`}; `
         + `last ${looks[order.at(-1)].label}, ${found[order.at(-1)][0].toFixed(1).replace("-", "−")} % above the best possible. `
-        + `95 % intervals, of ${trajectories} exact trajectories.`;
+        + `95 % intervals, of ${trajectories} exact trajectories; who leads is judged by differences on the same trajectories, which are surer than the bars.`;
     };
   });
 }
