@@ -76,6 +76,11 @@ WRONG_BY_HAND = [
     ("a5", "variance-squared", lambda m, d: (g * m, g, g**2 * d**2 + f**2 * (m**4 + 6 * m**2 * d**2 + 3 * d**4))),
     ("a5", "variance-root", lambda m, d: (g * m, g, g**2 * sp.sqrt(d) + f**2 * (m**4 + 6 * m**2 * sp.sqrt(d) + 3 * d))),
     ("a5", "sign", lambda m, d: (g * m, -g, g**2 * d + f**2 * (m**4 + 6 * m**2 * d + 3 * d**2))),
+    ("a7", "moment", lambda: "F = M[(y - h)^2]\n = g^2*d + f^2*M[x^4]\n = g^2*d + 3*f^2*d^2"),
+    ("a7", "factor", lambda: "F = M[(y - h)^2]\n = g^2*d + f^2*M[x^4]\n = g^2*d + f^2*(m^4 + 3*m^2*d + 3*d^2)"),
+    ("a7", "power", lambda: "F = M[(y - h)^2]\n = g*d + f^2*M[x^4]\n = g*d + f^2*(m^4 + 6*m^2*d + 3*d^2)"),
+    ("a7", "noise-forgotten", lambda: "F = M[(y - h)^2]\n = M[(g*(x - m) + f*x^2*w)^2]\n = g^2*M[(x - m)^2]\n = g^2*d"),
+    ("a7", "open-end", lambda: "F = M[(y - h)^2]\n = g^2*d + f^2*M[x^4]"),
     ("b2", "innovation-sign", b2(innovation=lambda y, h: h - y)),
     ("b2", "innovation-without-h", b2(innovation=lambda y, h: y)),
     ("b2", "covariance-kept", b2(cov=lambda Psi, K, G: Psi)),
@@ -176,6 +181,10 @@ def test_five_by_hand_for_every_core_question_of_the_first_sets():
 
 
 RIGHT_BY_HAND = [
+    (
+        "a7",
+        lambda: "F = M[(y - h)^2]\n = M[(g*(x - m) + f*x^2*w)^2]\n = g^2*d + f^2*M[x^4]\n = g^2*d + f^2*(m^4 + 6*d*m^2 + 3*d^2)",
+    ),
     ("a2", lambda z, p: (z * c, p * c**2 + (e * z) ** 2)),
     ("a3", lambda m, d: [g * m, g, g**2 * d + (f * m**2) ** 2]),
     ("a4", lambda z, p: (c * z, p * (c**2 + e**2) + e**2 * z**2)),
