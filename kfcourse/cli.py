@@ -14,7 +14,7 @@ from kfcourse.commands import main as main  # scripts that were installed before
 from kfcourse.derivations import check_text
 from kfcourse.derivations.setting import of_model
 from kfcourse.files import is_standard_output, read_only, replacing_together
-from kfcourse.lab.admission import admissions, on_trial, without_failing
+from kfcourse.lab.admission import admissions, on_trial
 from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
@@ -23,7 +23,7 @@ from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, has_b
 from kfcourse.lab.variants import STEPS, find_variant
 from kfcourse.listing import VARIANTS
 from kfcourse.montecarlo.comparison import EXACT, Comparison
-from kfcourse.montecarlo.experiment import compare
+from kfcourse.montecarlo.experiment import without_failing
 from kfcourse.montecarlo.subset import FEWEST as FEWEST_EXACT
 from kfcourse.montecarlo.subset import LEAST
 from kfcourse.symbolic.jumping import JumpModel
@@ -157,23 +157,20 @@ def lab(
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
     result = without_failing(
         [one.one for one in found if one.one],
-        lambda filters: compare(
-            filters,
-            model,
-            runs,
-            steps or chosen.steps,
-            seed,
-            subset_runs=exact_runs,
-            subset_seconds=exact_seconds,
-            subset_memory=1e6 * exact_memory,
-            designs=1 if same_ensemble else designs or DESIGNS,
-            same_ensemble=same_ensemble,
-            wide=wide,
-            threads=threads,
-            compiled=compiled,
-            dask=dask,
-        ),
-        refused,
+        model,
+        runs,
+        steps or chosen.steps,
+        seed,
+        left_out=refused,
+        subset_runs=exact_runs,
+        subset_seconds=exact_seconds,
+        subset_memory=1e6 * exact_memory,
+        designs=1 if same_ensemble else designs or DESIGNS,
+        same_ensemble=same_ensemble,
+        wide=wide,
+        threads=threads,
+        compiled=compiled,
+        dask=dask,
     )
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)

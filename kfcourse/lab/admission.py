@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 
@@ -20,7 +20,6 @@ from kfcourse.filters.particles import particle
 from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JumpStructures, Structures, check_names, has_exact, title
 from kfcourse.limits import OutOfTime, time_limit
-from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
@@ -149,33 +148,6 @@ def _failure(model: Model | JumpModel, one: Filter | Design, steps: int, seed: i
             finite = np.isfinite(simulate(model, RUNS, steps, seed).x).all()
         return f"on a trial of {RUNS} trajectories it left the finite numbers" if finite else str(error)
     return found.left_out.get(one.name, "")
-
-
-def without_failing(
-    filters: Sequence[Filter | Design],
-    compared: Callable[[Sequence[Filter | Design]], Comparison],
-    left_out: Mapping[str, str],
-) -> Comparison:
-    """The comparison of the filters that do not fail, which names the others in `left_out`, beside those given.
-
-    A filter that leaves the finite numbers is taken out, and the comparison starts again.
-
-    Raises
-    ------
-    NotFinite
-        The model's trajectories become infinite, or no filter is left.
-    """
-    reasons = dict(left_out)
-    while True:
-        try:
-            found = compared(filters)
-        except NotFinite as error:
-            rest = [one for one in filters if one.name != error.filter_name]
-            if not error.filter_name or not [one for one in rest if not one.slow]:
-                raise
-            filters, reasons[error.filter_name] = rest, Reason.of(error)
-        else:
-            return dataclasses.replace(found, left_out={**reasons, **found.left_out})
 
 
 # ---------------------------------------------------------------- what can be seen without a trial

@@ -8,11 +8,11 @@ batches of trajectories, never the trajectories themselves.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from itertools import accumulate, chain, islice
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,14 +20,16 @@ from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
 from kfcourse.filters.fused import fuse
 from kfcourse.laws import Array, Gaussian, stacked
+from kfcourse.montecarlo.blocks import progress_bar, run_block
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, workers
 from kfcourse.montecarlo.parallel import Cluster, cluster, cores
 from kfcourse.montecarlo.statistics import BATCHES, Sums, batch_sizes
-from kfcourse.montecarlo.subset import LEAST, progress_bar, run_block, run_subset
+from kfcourse.montecarlo.subset import LEAST, run_subset
 from kfcourse.montecarlo.two_phase import Replicas
 from kfcourse.montecarlo.widths import best_width
+from kfcourse.reasons import Reason
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.compiled import REMEDY, is_scalar
 from kfcourse.symbolic.jumping import JumpModel
@@ -225,6 +227,31 @@ def compare(
             smoothing = _smoothing(smoothers, common, seed, pool, limits, progress, far)
     found = Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset, left_out, replicas)
     return replace(found.without_unhealthy(), smoothing=smoothing)
+
+
+def without_failing(
+    filters: Sequence[Filter | Design], *common: Any, left_out: Mapping[str, str] | None = None, **options: Any
+) -> Comparison:
+    """`compare` of the filters that do not fail; the others are named in `left_out`, beside those given.
+
+    A filter that leaves the finite numbers is taken out, and the comparison starts again.  Other arguments as of `compare`.
+
+    Raises
+    ------
+    NotFinite
+        The model's trajectories become infinite, or no filter is left.
+    """
+    reasons = dict(left_out or {})
+    while True:
+        try:
+            found = compare(filters, *common, **options)
+        except NotFinite as error:
+            rest = [one for one in filters if one.name != error.filter_name]
+            if not error.filter_name or not [one for one in rest if not one.slow]:
+                raise
+            filters, reasons[error.filter_name] = rest, Reason.of(error)
+        else:
+            return replace(found, left_out={**reasons, **found.left_out})
 
 
 def _smoothing(

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from kfcourse.filters import aof, duof
-from kfcourse.lab.admission import admissions, on_trial, table, without_failing
+from kfcourse.lab.admission import admissions, on_trial, table
 from kfcourse.lab.short_names import FILTERS, LAB, has_bound, lab_filters
 from kfcourse.laws import gain
 from kfcourse.montecarlo.designing import NotFinite
-from kfcourse.montecarlo.experiment import compare
+from kfcourse.montecarlo.experiment import compare, without_failing
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import gaussian
@@ -124,19 +124,19 @@ def test_a_comparison_goes_on_without_the_filters_that_fail():
 
         return type(good)(name, model, good.init, step)
 
-    def compared(filters):
-        return compare(filters, model, 300, 4, 1, threads=1, progress=False)
-
+    size, options = (model, 300, 4, 1), {"threads": 1, "progress": False}
     good = [duof(model), aof(gaussian(model))]
-    found = without_failing([broken("one"), good[0], broken("two"), good[1]], compared, {"aof-exact": "reason"})
+    found = without_failing([broken("one"), good[0], broken("two"), good[1]], *size, left_out={"aof-exact": "reason"}, **options)
     assert found.names == ("duof", "aof-gaussian") and list(found.left_out) == ["aof-exact", "one", "two"]
     assert "one became infinite or NaN" in found.left_out["one"] and found.left_out["one"].kind == "infinite"
-    np.testing.assert_array_equal(found.error_variance("duof").value, compared(good).error_variance("duof").value)
+    np.testing.assert_array_equal(
+        found.error_variance("duof").value, compare(good, *size, **options).error_variance("duof").value
+    )
     with pytest.raises(NotFinite, match="every filter fails"):
-        without_failing([broken("two")], compared, {})
+        without_failing([broken("two")], *size, **options)
     endless = Model.define("x**3 + v", "x + w")
     with pytest.raises(NotFinite, match="trajectories become infinite"):
-        without_failing([duof(endless)], lambda f: compare(f, endless, 300, 20, 1, threads=1, progress=False), {})
+        without_failing([duof(endless)], endless, 300, 20, 1, **options)
     assert set(LAB) <= set(FILTERS)
 
 
@@ -144,18 +144,16 @@ def test_a_negative_variance_is_the_affair_of_its_filter():
     """The Gaussian formulas of this meter cancel in doubles; the other filters are compared as if it were not there."""
     model = Model.define("0.9*x + 0.1*v", "(1 + x)**16*(1 + x)**8 + w")
 
-    def compared(filters):
-        return compare(filters, model, 500, 40, 1, wide=1, threads=1, progress=False)
-
+    size, options = (model, 500, 40, 1), {"wide": 1, "threads": 1, "progress": False}
     names = ("mfos-gaussian", "aof-gaussian", "aof-unscented")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         filters = lab_filters(model, names)
-    found = without_failing(filters, compared, {})
+    found = without_failing(filters, *size, **options)
     assert found.names == names[1:]
     failed = r"step \d+: mfos-gaussian (failed: a covariance has the variance -|became infinite)"
     assert re.match(failed, found.left_out["mfos-gaussian"])
-    expected = compared(filters[1:]).error_variance("aof-gaussian").value
+    expected = compare(filters[1:], *size, **options).error_variance("aof-gaussian").value
     np.testing.assert_array_equal(found.error_variance("aof-gaussian").value, expected)
 
 
