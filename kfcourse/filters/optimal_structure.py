@@ -29,6 +29,7 @@ Rudenko (2010, 2013).
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -192,6 +193,7 @@ _H = s.matrix(r"H_{k}", s.n, s.n)
 _L, _n = s.matrix(r"L_{k+1}", s.n, s.n), s.matrix(r"n_{k+1}", s.n, s.ONE)
 
 
+@cache  # each filter of a family has the same
 def printed(recipe: Recipe, zeta: sp.MatrixSymbol = s.z, *, consists_of: sp.MatrixSymbol | None = None) -> tuple[sp.Eq, ...]:
     """The equations of a step; `consists_of` is what zeta is made of, if it is not the estimate."""
     Gamma = s.matrix(s.Gamma.name, s.n, zeta.rows)

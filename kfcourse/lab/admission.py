@@ -35,6 +35,7 @@ from kfcourse.symbolic.structure import Structure
 RUNS, STEPS, SLOW = 512, 20, FEWEST  # of a trial; trajectories of the slow filters
 SECONDS = 10.0  # for them
 PARTICLES, FEW, OFTEN = 1000, 10.0, 0.05  # fewer effective particles than FEW at so many corrections are too few
+SOME = 32  # trajectories, with some 600 corrections, that tell how often
 BLIND = 0.5  # of the unexplained variance, that must be seen
 
 
@@ -217,8 +218,8 @@ _TOO_FEW = f"fewer than {FEW:.0f} of {PARTICLES} particles count"
 def _share_starved(model: Model, guided: bool) -> float:
     """Share of the corrections of some trajectories after which too few particles count."""
     steps = int(min(STEPS, model.known.steps))
-    one, y = particle(model, PARTICLES, guided=guided), simulate(model, SLOW, steps, seed=1).y
-    state, effective = one.init(SLOW), np.empty((steps, SLOW))
+    one, y = particle(model, PARTICLES, guided=guided), simulate(model, SOME, steps, seed=1).y
+    state, effective = one.init(SOME), np.empty((steps, SOME))
     for k, measured in enumerate(y):
         state = one.step(state, measured)
         effective[k] = state.memory.effective
