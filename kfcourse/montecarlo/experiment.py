@@ -191,9 +191,10 @@ def compare(
     slow = [one for one in filters if one.slow and subset_runs]
     fast = [one for one in filters if not one.slow]
     run_seed, pilot_seed, *design_seeds = np.random.SeedSequence(seed).spawn(2 + designs)
+    common = Ensemble(model, runs, steps, run_seed, compiled=compiled)
     size = min(runs, DESIGN_RUNS) if design_runs is None else design_runs
     design_ensemble, *others = (
-        [Ensemble(model, runs, steps, run_seed, compiled=compiled)]
+        [common]
         if same_ensemble
         else [Ensemble(model, size, steps, one, compiled=compiled) for one in design_seeds]
     )
@@ -201,11 +202,8 @@ def compare(
     with workers(threads) as pool, cluster(dask) as far:
         ready = _designed(fast, design_ensemble, pool, progress)
         again = [_designed(to_design, one, pool, progress) for one in others]
-        if same_ensemble:
-            common = design_ensemble
-        else:
-            width = best_width(ready, model, runs, steps, pilot_seed) if wide is None else wide
-            common = Ensemble(model, runs, steps, run_seed, width, compiled)
+        if not same_ensemble:
+            common = replace(common, wide=best_width(ready, model, runs, steps, pilot_seed) if wide is None else wide)
         everyone = [*ready, *chain(*again)]
         try:
             everything = _run_blocks(everyone, common, far.executor if far else pool, progress)

@@ -117,7 +117,7 @@ def hidden_fault(name: str, model: Model, x: Array, y: Array) -> str:
         "hidden": shown + [(letter, f"Hidden {letter}", kind) for letter, kind in zip("ABCDE", HIDDEN, strict=True)],
         "bounds": {"nees": one_step, "nis": one_step, "correlation": (-spread, spread)},
     }
-    return drawn(name, "Which noise is wrong?", "hidden-fault", parts, settings)
+    return drawn(name, "Which noise is wrong?", "faults", parts, settings)
 
 
 def slip(

@@ -64,7 +64,7 @@ def test_the_report_of_variant_53(written, language):
     tex = written[language]["handin.tex"]
     for formula in (
         r"{x}_{k+1} &= a(x_k, v_k) = c {x}_{k} + e {x}_{k} {v}_{k}",
-        r"y_k &= b(x_k, w_k) = g {x}_{k} + f {x}_{k}^{2} {w}_{k}",
+        r"{y}_{k} &= b(x_k, w_k) = g {x}_{k} + f {x}_{k}^{2} {w}_{k}",
         r"x_0 &\sim \mathcal{N}(0,\; 1)",
         r"\frac{\partial a}{\partial x} &= c + e v",
         r"\eta(x) &= g^{2} x^{2} + f^{2} x^{4}",

@@ -4,7 +4,7 @@
 const { values, INK, BLUE, BAND, ORANGE } = kfFigure;
 const LAGS = 10, RANGE = [0.2, 20], NONE = "–";
 
-function kfHiddenFault(root, name, { x, y, faults, hidden, bounds }) {
+function kfFaults(root, name, { x, y, faults, hidden, bounds }) {
   const n = x[0].length, steps = x.map((_, k) => k), lags = Array.from({ length: LAGS }, (_, l) => l + 1);
   const average = (one) => one.reduce((sum, value) => sum + value, 0) / one.length;
   const { c, e, g, f } = model.parameters;
