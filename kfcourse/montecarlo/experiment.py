@@ -194,9 +194,7 @@ def compare(
     common = Ensemble(model, runs, steps, run_seed, compiled=compiled)
     size = min(runs, DESIGN_RUNS) if design_runs is None else design_runs
     design_ensemble, *others = (
-        [common]
-        if same_ensemble
-        else [Ensemble(model, size, steps, one, compiled=compiled) for one in design_seeds]
+        [common] if same_ensemble else [Ensemble(model, size, steps, one, compiled=compiled) for one in design_seeds]
     )
     to_design = [one for one in fast if isinstance(one, Design)]
     with workers(threads) as pool, cluster(dask) as far:
