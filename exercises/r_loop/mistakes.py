@@ -52,7 +52,7 @@ WRONG_DISCRIMINATORS: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "measurement-for-innovation",
-        messages.MEASUREMENT_FOR_INNOVATION,
+        "The measurement itself is multiplied by the slope; subtract what was expected.",
         lambda lam, y, theta, A, s: -A * np.sin(theta + lam) * y / s**2,
     ),
 )
