@@ -168,12 +168,26 @@ def chain_before(y: Array, m: float, d: float, a: float, q: float, C: Array, pi:
     return two_steps_with()(y, m, d, a, q, C, pi, first @ pi)
 
 
+def mixture_kept(y: Array, m: float, d: float, a: float, q: float, C: Array, pi: Array, first: Array) -> tuple[Array, Array]:
+    """Bayes' formula with the mixtures as they are."""
+    K = d / (d + C**2)
+    before = posterior(first, y[0], np.full(len(C), m), d + C**2)
+    z, p = a * (m + K * (y[0] - m)), a**2 * (d - K * d) + q
+    joint = before[:, None] * pi * normal(y[1] - z[:, None], p[:, None] + C**2)
+    return before, joint.sum(axis=0) / joint.sum()
+
+
 WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
     ("chain-forgotten", CHAIN_FORGOTTEN, two_steps_with(weights=lambda mu, pi: (mu, np.eye(len(mu))))),
     ("transposed", TRANSPOSED, two_steps_with(weights=lambda mu, pi: chain(mu, pi.T / pi.T.sum(axis=1, keepdims=True)))),
     ("transposed", TRANSPOSED, two_steps_with(weights=lambda mu, pi: (pi @ mu, (pi.T * mu[:, None]) / (pi @ mu)))),
     ("spread-forgotten", SPREAD_FORGOTTEN, two_steps_with(merge=covariances_alone)),
     ("not-mixed", NOT_MIXED, two_steps_with(own=True)),
+    (
+        "mixture-kept",
+        "The mixtures are kept as they are, and that is exact; here a normal law takes the place of each before the measurement.",
+        mixture_kept,
+    ),
     (
         "first-law-again",
         "The second step begins with the first law of the modes again: what has the first measurement told?",

@@ -17,6 +17,7 @@ from kfcourse.symbolic.moments import GaussianMoments
 A, Q, Z, P = sp.symbols("a q z p", real=True)
 GAMMA, SLOPE, D, R = sp.symbols("gamma G d r", real=True)
 M1, M2, D11, D12, D22 = sp.symbols("m1 m2 d11 d12 d22", real=True)
+Z1, Z2, P11, P12, P22 = sp.symbols("z1 z2 p11 p12 p22", real=True)
 FORCE, KAPPA, ANGLE = sp.symbols("E kappa x2", real=True)
 _X, _V = sp.symbols("x v", real=True)
 _PAIR = sp.symbols("x1 x2", real=True)
@@ -40,9 +41,9 @@ def scaled_meter(gamma: sp.Expr, G: sp.Expr, d: sp.Expr, r: sp.Expr) -> sp.Expr:
 
 def noise_intensity(z1: sp.Expr, z2: sp.Expr, p11: sp.Expr, p12: sp.Expr, p22: sp.Expr) -> sp.Expr:
     """M[B B^T] in its second row and column, where B = (0, x1)^T and x ~ N(z, p)."""
-    law = GaussianMoments(_PAIR, [M1, M2], sp.Matrix([[D11, D12], [D12, D22]]))
+    law = GaussianMoments(_PAIR, [Z1, Z2], sp.Matrix([[P11, P12], [P12, P22]]))
     found = sp.Matrix([law.mean_of(_PAIR[0] ** 2)])
-    return substituted(found, (M1, M2, D11, D12, D22))(z1, z2, p11, p12, p22)[0]
+    return substituted(found, (Z1, Z2, P11, P12, P22))(z1, z2, p11, p12, p22)[0]
 
 
 @lru_cache(maxsize=1)

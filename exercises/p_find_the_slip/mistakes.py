@@ -147,7 +147,7 @@ WRONG_SLOPES: tuple[tuple[str, str, Answer], ...] = (
     ("as-printed", AS_PRINTED, lambda E, k, x2: (-E * sp.sin(x2), E * sp.cos(x2))),
     (
         "other-lift",
-        "The lift has the other sign: it is that of the printed meters, with the second one's mistaken sign.",
+        "The term with the lift has the other sign: which sign has it in the meter, and which one does its derivative bring?",
         lambda E, k, x2: (E * (-sp.sin(x2) + k * sp.cos(x2)), E * (sp.cos(x2) + k * sp.sin(x2))),
     ),
     (

@@ -72,6 +72,7 @@ def symbols(*names: sp.Symbol) -> list[tuple]:
 
 
 LAW = (keys.M1, keys.M2, keys.D11, keys.D12, keys.D22)
+LAW_OF_STATE = (keys.Z1, keys.Z2, keys.P11, keys.P12, keys.P22)
 
 QUESTIONS = (
     Question(
@@ -97,7 +98,7 @@ QUESTIONS = (
         "the variance of which component?",
         "core",
         keys.noise_intensity,
-        lambda e: symbols(*LAW),
+        lambda e: symbols(*LAW_OF_STATE),
         catalogue(WRONG_INTENSITIES),
         advice="Which component stands in B? Write the mean of its square, and nothing else.",
     ),

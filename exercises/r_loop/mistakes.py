@@ -13,16 +13,18 @@ from kfcourse.exercises import messages
 from kfcourse.exercises.r_loop.keys import characteristic, discriminator, lock_in, mean_time, slips, steady
 from kfcourse.laws import Array
 
+SIGN = "The sign is wrong: of the innovation, what came minus what was expected, or of the derivative of a cosine?"
 HALF = "The mean of a squared sine over a period is not one."
 AMPLITUDE = "The amplitude enters twice: in the signal, and in its slope."
 SLOW = "That is the limit of a slow loop; the exact value is asked for."
 DISCRIMINANT = "Solve the quadratic equation once more: what stands under the root is wrong."
+AT_THE_END = "The runs that are off at the end are counted; one that has slipped and come back has slipped too."
 ROUNDED_DOWN = "It is rounded down: a loop that is a little below zero has not lost a cycle."
 
 # -- r1: the discriminator
 
 WRONG_DISCRIMINATORS: tuple[tuple[str, str, Answer], ...] = (
-    ("innovation-sign", messages.INNOVATION_SIGN, lambda lam, y, theta, A, s: -discriminator(lam, y, theta, A, s)),
+    ("innovation-sign", SIGN, lambda lam, y, theta, A, s: -discriminator(lam, y, theta, A, s)),
     (
         "slope-forgotten",
         "That is the innovation over its variance; what would a change of the phase do to the signal?",
@@ -50,7 +52,7 @@ WRONG_DISCRIMINATORS: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "measurement-for-innovation",
-        messages.MEASUREMENT_FOR_INNOVATION,
+        "The measurement itself is multiplied by the slope; subtract what was expected.",
         lambda lam, y, theta, A, s: -A * np.sin(theta + lam) * y / s**2,
     ),
 )
@@ -86,7 +88,7 @@ WRONG_CHARACTERISTICS: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "noise-of-meter",
-        "That is the noise of the meter, in volts; the equivalent noise is one of the phase.",
+        "That is the noise of the meter, in squared volts; the equivalent noise is one of the phase.",
         lambda x, A, D: (*characteristic(x, A, D)[:2], D),
     ),
     (
@@ -121,7 +123,7 @@ WRONG_STEADY: tuple[tuple[str, str, Answer], ...] = (
     ("before-and-after", "Before a correction the variance is larger than after it.", lambda q, r: steady(q, r)[::-1]),
     (
         "correction-forgotten",
-        "Both are the same; what does a correction do to the variance?",
+        "What stands after the correction is the variance before it; what does a correction do to it?",
         lambda q, r: (steady(q, r)[0],) * 2,
     ),
     (
@@ -151,7 +153,11 @@ WRONG_RANGES: tuple[tuple[str, str, Answer], ...] = (
         lambda p, A, D, T: lock_in(p, A, D, T) / p,
     ),
     ("gain-by-deviation", "p is a variance, and is the gain as it is.", lambda p, A, D, T: lock_in(p, A, D, T) / sp.sqrt(p)),
-    ("half-forgotten", HALF, lambda p, A, D, T: 2 * lock_in(p, A, D, T)),
+    (
+        "half-forgotten",
+        "It is twice what it should be: is the mean of a squared sine over a period taken as one, or half a cycle as a whole?",
+        lambda p, A, D, T: 2 * lock_in(p, A, D, T),
+    ),
     (
         "half-a-cycle",
         "The characteristic is taken along its tangent to half a cycle; it bends, and has a largest value.",
@@ -195,7 +201,7 @@ WRONG_TIMES: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "half-a-cycle",
-        "That is about the time to half a cycle away, where the loop may still fall back.",
+        "It is half of what it should be: half a cycle away is no slip yet, every second loop falls back from there.",
         lambda s, q: mean_time(s, q) / 2,
     ),
     ("wrong-bessel", "It is the Bessel function of order zero.", lambda s, q: 2 * np.pi**2 / q * iv(1, 1 / s) ** 2),
@@ -223,6 +229,12 @@ def _first(error: Array) -> tuple[Array, Array]:
     return away.argmax(axis=0), np.asarray(away.any(axis=0))
 
 
+def _lasted(error: Array, back: Array | bool = False) -> Array:
+    """Steps of each run before its first slip; all of them of those that come back, if these are given."""
+    first, slipped = _first(error)
+    return np.where(slipped & ~np.asarray(back), first, len(error))
+
+
 WRONG_SLIPS: tuple[tuple[str, str, Answer], ...] = (
     ("rounded-down", ROUNDED_DOWN, slips_with(whole=np.floor)),
     ("rounded-down", ROUNDED_DOWN, slips_with(whole=np.trunc)),
@@ -234,6 +246,16 @@ WRONG_SLIPS: tuple[tuple[str, str, Answer], ...] = (
     ),
     ("sign-lost", "A loop may slip to either side: say which.", slips_with(whole=lambda c: np.abs(np.round(c)))),
     ("one-side", "Slips to one side only are counted.", slips_with(size=lambda e: e)),
+    (
+        "away-at-the-end",
+        AT_THE_END,
+        lambda error: (slips(error)[0], _lasted(error).sum() / np.sum(slips(error)[0] != 0)),
+    ),
+    (
+        "away-at-the-end",
+        AT_THE_END,
+        lambda error: (slips(error)[0], _lasted(error, slips(error)[0] == 0).sum() / np.sum(slips(error)[0] != 0)),
+    ),
     (
         "slipped-runs-only",
         "Only the runs that slipped are averaged; those that lasted to the end are the good ones, and their steps count.",

@@ -46,12 +46,13 @@ def variances(exercise: Exercise) -> list[tuple]:
 
 
 def paths(exercise: Exercise) -> list[tuple]:
-    """Errors of loops that rest near whole cycles, and slip to either side: 60 steps, nine runs, five of which slip."""
+    """Errors of loops that rest near whole cycles, and slip to either side: 60 steps, nine runs; six slip, one of them back."""
     rng = exercise.rng("r6")
     error = 0.9 * np.sin(rng.normal(size=(60, 9)))
     error[rng.integers(5, 20, 9), np.arange(9)] = 4.2 * rng.choice((-1, 1), 9)  # beyond the unstable zero, and back
     for run, cycles in enumerate(rng.permutation([1, -1, 2, -1, 1])):
         error[rng.integers(22, 50) :, run] += 2 * np.pi * cycles
+    error[30:40, 5] = 2 * np.pi + np.abs(error[30:40, 5])  # and is where it was, at the end
     error[-1] = 2 * np.pi * np.round(error[-1] / (2 * np.pi)) + 0.4 * rng.permutation([1, -1, 1, -1, 1, -1, 1, -1, -1])
     return [(error,)]
 

@@ -85,14 +85,24 @@ class Sensitivity:
 
     def unused(self, part: int) -> list[str]:
         """Arguments that the part should depend on and does not."""
-        return [name for name, right, mine in self._table if right[part] and not mine[part]]
+        found = [name for name, right, mine in self._table if right[part] and not mine[part]]
+        return [name for name in found if not self._jumps(name, part, 1)]
 
     def superfluous(self, part: int) -> list[str]:
         """Arguments that it depends on and should not, as another part does.
 
         An argument that changes no result of the right answer may stand in its formula all the same, and cancel there.
         """
-        return [name for name, right, mine in self._table if mine[part] and any(right) and not right[part]]
+        found = [name for name, right, mine in self._table if mine[part] and any(right) and not right[part]]
+        return [name for name in found if not self._jumps(name, part, 0)]
+
+    def _jumps(self, name: str, part: int, side: int) -> bool:
+        """Whether the right answer (0) or the student's (1) changes if an argument is five times as large.
+
+        What is counted or rounded does not feel a small change, and depends on the argument all the same.
+        """
+        called = self.called(list(self.names).index(name), lambda value: scaled(value, 5.0))
+        return any(not same(new[side][part], old[side][part]) for new, old in zip(called, self.results, strict=False))
 
 
 def names_of(answer: Callable, count: int) -> list[str]:

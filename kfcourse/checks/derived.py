@@ -227,7 +227,8 @@ def _place(slip: Verdict) -> str:
 
 def _words(slip: Verdict) -> str:
     """In one line: the pointer of the command line's report has no place here."""
-    return f"{slip.says.split(chr(10))[0].removesuffix('.')}. {slip.rule}".strip()
+    says = slip.says.split(chr(10))[0].removesuffix(".")
+    return f"{says}{'' if says.endswith('?') else '.'} {slip.rule}".strip()
 
 
 def _says(report: Report, slip: Verdict, right: int, steps: int) -> str:
