@@ -142,8 +142,8 @@ FIT = """() => {
             .map((e) => e.outerHTML.slice(0, 80)),
     };
 }"""
-# Figures whose letters of 10 pt are smaller than 10 px, of those that have a picture for telephones; all wide ones of cells have.
-TOO_SMALL = """() => [...document.querySelectorAll("article .cell_output figure img")]
+# Figures in sight whose letters of 10 pt are smaller than 10 px, of those with a picture for telephones; all wide ones have one.
+TOO_SMALL = """() => [...document.querySelectorAll("article .cell_output figure img")].filter((e) => e.checkVisibility())
     .map((e) => [e.currentSrc.slice(-30), e.clientWidth / (e.naturalWidth / 2) * 10 * 96 / 72])
     .filter(([, size]) => size < 10)"""
 # A sheet of A4 less its margins, in px of CSS.

@@ -9,6 +9,7 @@ The helper, data/figure.js, has axes, curves, handles, sliders and the state in 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,9 @@ document.readyState === "loading" ? addEventListener("DOMContentLoaded", start) 
     )
 
 
+_UNIT = re.compile(r"(?<=[\d}]) (?=(?:%|km|rad)(?![\w-]))")  # the space before it, which must not break
+
+
 def drawn(name: str, says: str, script: str, parts: Iterable[str], settings: Any) -> str:
     """A figure of data/<script>.js, which defines kf<Script>(root, name, settings) and leaves nothing else behind.
 
@@ -69,7 +73,7 @@ def drawn(name: str, says: str, script: str, parts: Iterable[str], settings: Any
         Anything that JSON has.
     """
     maker = "kf" + "".join(word.capitalize() for word in script.split("-"))
-    code = javascript.RUNTIME + "".join(parts) + _read(f"{script}.js")
+    code = javascript.RUNTIME + "".join(parts) + _UNIT.sub("\u00a0", _read(f"{script}.js"))
     call = f"(root, name) => {maker}(root, name, {json.dumps(settings)})"
     return figure(name, says, f"const {maker} = (() => {{\n{code}\nreturn {maker};\n}})();", call)
 
