@@ -24,6 +24,7 @@ PARAMETERS = re.compile(r"<dl>\s*(<dd><em class=\"sig-param.*?)</dl>", re.DOTALL
 NO_MEANING = re.compile(r"</dt>\s*</dl>")  # of a parameter, say
 ROLES = re.compile(r' role="(?:list|doc-biblioentry)"')  # of a bibliography, not those of today's HTML
 FIGURE = re.compile(r'(<span class="caption-number">[^<]*\d) </span>')
+EMPTY_HEAD = re.compile(r'<th( class="head[^"]*")><p></p></th>')  # the corner of a table is no heading
 TICK = re.compile(r'(<p class="kf-claim">)\s*✓')
 SMALL_TICK = r'\1<span class="kf-tick">✓</span>'
 SMALL_STAR = '\\1<span class="kf-star">★</span>\u00a0'  # never alone at the end of a line
@@ -51,6 +52,7 @@ def complete(app, pagename: str, templatename: str, context: dict, doctree) -> N
         (FIGURE, r"\1.</span> "),
         (CAPTION, r'\2<table class="kf-table \3"><caption>\1</caption>'),
         (TICK, SMALL_TICK),
+        (EMPTY_HEAD, r"<td\1></td>"),
         (PARAMETERS, _lines),
         (NO_MEANING, "</dt><dd></dd></dl>"),
         (ROLES, ""),

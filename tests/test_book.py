@@ -257,6 +257,21 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
     assert [*whole, *itertools.chain(*found)] == []
 
 
+def test_every_page_begins_where_the_others_do(window):
+    """Also one without contents of its own at the right."""
+    tab, _ = window
+    tab.set_viewport_size({"width": 1280, "height": 1000})
+    begins = []
+    for page in ("comparison", "references"):
+        tab.goto((HTML / f"{page}.html").as_uri())
+        begins.append(tab.locator("article h1").bounding_box()["x"])
+    assert begins[0] == begins[1]
+
+
+def test_no_heading_of_a_table_is_empty():
+    assert [path.name for path in HTML.glob("*.html") if '"><p></p></th>' in path.read_text(encoding="utf-8")] == []
+
+
 def test_the_keyboard_reaches_the_text_first(window):
     tab, _ = window
     tab.goto((HTML / "linearisation.html").as_uri())
