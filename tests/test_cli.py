@@ -60,7 +60,7 @@ def no_computation(monkeypatch):
     def never(*_, **__):
         raise AssertionError("the computation began")
 
-    monkeypatch.setattr(cli, "compare", never)
+    monkeypatch.setattr(cli, "without_failing", never)
 
 
 @pytest.fixture
@@ -407,7 +407,7 @@ def end_by(request, monkeypatch):
     number = signal.SIGINT if request.param == "interrupt" else signal.SIGTERM
 
     def arranged():
-        monkeypatch.setattr(cli, "compare", lambda *_, **__: signal.raise_signal(number))
+        monkeypatch.setattr(cli, "without_failing", lambda *_, **__: signal.raise_signal(number))
         return 128 + number
 
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job has it ignored
@@ -479,7 +479,7 @@ def test_what_the_machine_has_not_is_said_in_a_line(call, monkeypatch, error, wo
     def failing(*_, **__):
         raise error
 
-    monkeypatch.setattr(cli, "compare", failing)
+    monkeypatch.setattr(cli, "without_failing", failing)
     refused(call("lab", "53", *QUICK), *words)
 
 
