@@ -102,8 +102,8 @@ def browser():
 
 
 @pytest.fixture(scope="module")
-def window(browser):
-    """One tab for all pages, without a network, and what it complained of since the last look."""
+def only_tab(browser):
+    """One tab for all pages, without a network, and what it complains of."""
     problems: list[str] = []
     with browser.new_context(offline=True) as context:
         tab = context.new_page()
@@ -112,6 +112,16 @@ def window(browser):
         tab.on("requestfailed", lambda request: problems.append(f"failed: {request.url}"))
         tab.on("request", lambda request: request.url.startswith(LOCAL) or problems.append(f"external: {request.url}"))
         yield tab, problems
+
+
+@pytest.fixture
+def window(only_tab):
+    """The tab, empty, and what it complained of since: a page that is made narrow begins to load its narrow pictures, which fails
+    when the page is left, and is no complaint of the next one."""
+    tab, problems = only_tab
+    tab.goto("about:blank")
+    problems.clear()
+    return tab, problems
 
 
 # Pictures that are shown wider or higher than they are, by more than the rounding of small ones.
@@ -220,7 +230,6 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
     """Loads without a complaint; fits screens and paper; axe-core finds nothing, light and dark; formulas are formulas."""
     tab, problems = window
     path = HTML / f"{page}.html"
-    problems.clear()
     tab.set_viewport_size({"width": 390, "height": 1000})
     tab.goto(path.as_uri(), wait_until="load")
     if 'class="math' in path.read_text(encoding="utf-8"):
@@ -287,7 +296,6 @@ def test_the_keyboard_reaches_the_text_first(window):
 def test_a_reference_shows_what_it_leads_to(window):
     """Under the mouse and on the keyboard's way, not under a finger; Escape closes it, and the link stays a link."""
     tab, problems = window
-    problems.clear()
     show_on(tab, "screen", 1280)
     tab.goto((HTML / "comparison.html").as_uri())
     tab.wait_for_selector("html[data-formulas=ready]")
@@ -352,7 +360,6 @@ def test_a_chapter_is_downloaded_as_a_notebook(window):
 def test_search_finds_sections_and_quotes_them(window, words, page, section):
     """Among the best five; each quoted, the words marked, and led to a page that is there."""
     tab, problems = window
-    problems.clear()
     tab.goto((HTML / "search.html").as_uri() + f"?q={quote(words)}")
     rows = tab.locator("#search-results li")
     rows.first.wait_for()

@@ -145,7 +145,7 @@ def _read(posed: Posed, text: str) -> tuple[Report, Derived]:
         if typed and "=" not in typed and typed.split()[0] not in HEADINGS:
             raise Unusable(f"line {number}, `{_short(typed)}`, has no `=`; {begin}. A remark stands after #")
     try:
-        report = check_text(text, _no_variant, posed.setting)
+        report = check_text(text, None, posed.setting)
     except DerivationError as error:
         raise Unusable(" ".join(str(error).split())) from None
     law = posed.setting.law
@@ -156,10 +156,6 @@ def _read(posed: Posed, text: str) -> tuple[Report, Derived]:
     if len(chains) != 1:
         raise Unusable(f"{len(chains) or 'no'} chain{'s' * (len(chains) != 1)} with `{posed.name}` at the left; {begin}")
     return report, chains[0]
-
-
-def _no_variant(name: str) -> Model:
-    raise DerivationError(f"the model is given: leave out `variant {name}`")
 
 
 def _tree(text: str) -> Node | None:

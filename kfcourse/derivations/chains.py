@@ -52,14 +52,14 @@ class Chain:
     links: list[Typed] = field(default_factory=list)
 
 
-def read_chains(text: str, find: FindModel, setting: Setting | None = None) -> Iterator[Chain]:
+def read_chains(text: str, find: FindModel | None, setting: Setting | None = None) -> Iterator[Chain]:
     """The chains of a text.
 
     Parameters
     ----------
     text : str
-    find : callable
-        Name of a variant -> its model.
+    find : callable or None
+        Name of a variant -> its model; None where no heading may name one.
     setting : Setting, optional
         What letters mean before any heading.
 
@@ -108,10 +108,12 @@ def _pieces(line: str, number: int) -> list[Typed]:
     return pieces
 
 
-def _heading(line: str, number: int, setting: Setting, find: FindModel) -> Setting:
+def _heading(line: str, number: int, setting: Setting, find: FindModel | None) -> Setting:
     """The setting after a heading."""
     word, _, rest = line.partition(" ")
     if word == "variant" and rest.strip():
+        if find is None:
+            raise DerivationError(f"line {number}: the model is given: leave out {line[:60]!r}")
         return of_model(find(rest.strip()), setting.kind)
     if line in KINDS:
         return replace(setting, kind=line) if setting.model is None else of_model(setting.model, line)

@@ -105,15 +105,15 @@ class Report:
         return "\n\n".join("\n".join(map(str, chain.verdicts)) for chain in self.chains)
 
 
-def check_text(text: str, find: FindModel, setting: Setting | None = None) -> Report:
+def check_text(text: str, find: FindModel | None, setting: Setting | None = None) -> Report:
     """Check a derivation.
 
     Parameters
     ----------
     text : str
         Headings and chains of lines (see `chains`).
-    find : callable
-        Name of a variant -> its model.
+    find : callable or None
+        Name of a variant -> its model; None where no heading may name one.
     setting : Setting, optional
         What letters mean before any heading.
 

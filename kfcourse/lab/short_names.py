@@ -177,10 +177,10 @@ JUMP_FILTERS: dict[str, JumpEntry] = {
 }
 # Printed names of filters that are not among the lab's.
 TITLES = {
-    "kalman": "Kalman",
-    "iterated-linearised": "iterated EKF",
+    "kalman": FAMILIES["kalman"].title,
+    "iterated-linearised": FAMILIES["iterated"].title,
     "iterated-unscented": "iterated UKF",
-    "alpha-beta": "alpha-beta",
+    "alpha-beta": FAMILIES["alpha"].title,
     "alpha-beta-gamma": "alpha-beta-gamma",
 }
 BOUND = 1000  # particles of the exact AOF where there are no point masses

@@ -166,7 +166,7 @@ class Comparison:
 
         Not where rare trajectories make it: where a single one makes more than `HEAVY` of what the least accurate of the filters
         is known from, or where the error is `SKEWED`, of `FEW` batches less: there the standard error hangs on whether a
-        rare trajectory has come.  `benchmarks/coverage.py` counts how often the others hold the truth.
+        rare trajectory has come.  `benchmarks/intervals.py` counts how often the others hold the truth.
         """
         good = self.usable & (np.abs(found.skewness) <= self.skewness_limit)
         if names:

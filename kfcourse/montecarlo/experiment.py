@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from itertools import accumulate, chain, islice
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -36,8 +36,6 @@ from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
 DESIGN_RUNS = 1_000_000  # more find coefficients no comparison could tell from these
-
-T = TypeVar("T")
 
 
 def run(one: Filter, y: Array) -> Gaussian:

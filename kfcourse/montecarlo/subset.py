@@ -15,7 +15,6 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 from tqdm import tqdm
@@ -35,8 +34,6 @@ FEWEST = 100  # trajectories that are a result: with fewer, the rare ones that m
 LEAST = 10e6  # bytes that can be a limit: interpreter and libraries take some at any time
 WAIT = 0.5  # seconds, so that what waits can be interrupted: on Windows, and by a time limit in another thread
 MARGIN = 1.3  # how much longer than the chunks before the next one may take, for each trajectory
-
-T = TypeVar("T")
 
 
 class _NoRoom(Exception):

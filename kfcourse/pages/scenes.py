@@ -12,17 +12,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import sympy as sp
 
+from kfcourse.filters import aof
 from kfcourse.lab.maps import ParameterMap
 from kfcourse.lab.short_names import LAB, title
 from kfcourse.laws import Array
-from kfcourse.linear.consistency import chi_squared_bounds
+from kfcourse.linear.consistency import autocorrelation, chi_squared_bounds, innovations
+from kfcourse.montecarlo.experiment import predictions
 from kfcourse.pages.browser import model_source
 from kfcourse.pages.explore import columns, drawn, line_style, rounded, value
 from kfcourse.symbolic import javascript
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.structure import linearised
 
 Z_95 = 1.96  # of the standard normal law
 FAULTS = {  # multiples of Q and R that a wrong filter has
@@ -34,6 +36,7 @@ FAULTS = {  # multiples of Q and R that a wrong filter has
 }
 HIDDEN = ("R is too small", "Q is too large", "nothing is", "R is too large", "Q is too small")
 EXAMPLE = "Q is too small"
+LAGS = 10  # steps between the innovations that are compared
 
 
 def one_measurement(
@@ -107,15 +110,17 @@ def hidden_fault(name: str, model: Model, x: Array, y: Array) -> str:
         value("nees", {"x": state, "z": z, "p": p}, (state - z) ** 2 / p),
         value("white", {"y": measured, "h": h, "F": F}, (measured - h) / sp.sqrt(F)),
     ]
-    one_step = chi_squared_bounds(1, runs)
-    spread = Z_95 / np.sqrt(runs * (steps - 1))
+    right, seen = linearised(model), y[..., None]
+    white = autocorrelation(innovations(right.measure, predictions(aof(right), seen), seen), LAGS)
+    by_lag = Z_95 * white.standard_deviation
+    one_step = [[limit] * steps for limit in chi_squared_bounds(1, runs)]
     shown = [("example", f"Example: its {EXAMPLE}", EXAMPLE)]
     settings = {
         "x": rounded(x),
         "y": rounded(y),
         "faults": FAULTS,
         "hidden": shown + [(letter, f"Hidden {letter}", kind) for letter, kind in zip("ABCDE", HIDDEN, strict=True)],
-        "bounds": {"nees": one_step, "nis": one_step, "correlation": (-spread, spread)},
+        "bounds": {"nees": one_step, "nis": one_step, "correlation": [(-by_lag).tolist(), by_lag.tolist()]},
     }
     return drawn(name, "Which noise is wrong?", "faults", parts, settings)
 
@@ -193,7 +198,7 @@ def leading(found: ParameterMap, names: Iterable[str] = LAB) -> dict[str, Any]:
     for (first, second), result in found.cells.items():
         ratios.append(float(f"{second / first:.3g}"))
         steps = range(len(result.gap(LAB[0]).value))
-        of = {name: (result.gap(name).value, *result.gap(name).interval(0.95)) for name in names}
+        of = {name: (result.gap(name).value, *result.gap(name).interval()) for name in names}
         gaps.append([{name: [round(100 * float(one[k]), 4) for one in parts] for name, parts in of.items()} for k in steps])
         order = [result.leaders(k) for k in steps]
         leaders.append([(best, len(others)) for best, *others in order])

@@ -100,9 +100,7 @@ def _compiled(
                 "number taken; use unscented(model) or gauss_hermite(model), or another mean of the noise"
             )
     try:
-        source = numpy_source(name, arguments, lower(outputs, vectors, definitions), doc)
-    except BeyondFloats:  # a factor that was taken out of a power: (x + 1e-99)**4 = 1e-396*(1e99*x + 1)**4
-        source = numpy_source(name, arguments, lower(outputs, vectors, definitions, factor=False), doc)
+        source = printed(lambda program: numpy_source(name, arguments, program, doc), outputs, vectors, definitions)
     except PrintMethodNotImplementedError as error:  # of a solution that SymPy found, with LambertW
         raise ModelError(f"{name}: {str(error).splitlines()[0].rpartition(' ')[2]} is no function of NumPy") from None
     namespace: dict[str, Any] = {"np": np}
@@ -112,6 +110,22 @@ def _compiled(
 
 class BeyondFloats(ModelError):
     """The functions hold a number that is no float."""
+
+
+def printed(
+    text_of: Callable[[Program], str],
+    outputs: Mapping[str, sp.MatrixBase],
+    vectors: Sequence[str],
+    definitions: Mapping[sp.Symbol, sp.Expr],
+) -> str:
+    """What a target prints of the functions.  Common factors stay where they are if one of them is beyond what a float can be:
+
+    (x + 1e-99)**4 = 1e-396*(1e99*x + 1)**4
+    """
+    try:
+        return text_of(lower(outputs, vectors, definitions))
+    except BeyondFloats:
+        return text_of(lower(outputs, vectors, definitions, factor=False))
 
 
 def lower(

@@ -25,7 +25,7 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 from kfcourse.files import save
-from kfcourse.symbolic.codegen import BeyondFloats, NumbersPrinter, Program, lower
+from kfcourse.symbolic.codegen import NumbersPrinter, Program, printed
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
@@ -89,11 +89,7 @@ def loop(
         Auxiliary symbols that the expressions may use.
     """
     outputs = {key: sp.ImmutableMatrix([value]) for key, value in made.items()}
-    try:
-        program = lower(outputs, (), definitions or {})
-    except BeyondFloats:  # as in codegen: a factor that was taken out of a power
-        program = lower(outputs, (), definitions or {}, factor=False)
-    return _text(name, given, program, constants)
+    return printed(lambda program: _text(name, given, program, constants), outputs, (), definitions or {})
 
 
 def _text(name: str, given: Mapping[str, sp.Symbol], program: Program, constants: Sequence[sp.Symbol]) -> str:

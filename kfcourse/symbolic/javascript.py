@@ -19,7 +19,7 @@ import sympy as sp
 from sympy.codegen.cfunctions import expm1, log1p
 from sympy.core.relational import Relational
 
-from kfcourse.symbolic.codegen import BeyondFloats, Program, float_text, lower
+from kfcourse.symbolic.codegen import Program, float_text, printed
 from kfcourse.symbolic.formula import NO_NUMBERS
 from kfcourse.symbolic.reading import ModelError
 
@@ -147,11 +147,9 @@ def loop(
     for entry in (*(definitions or {}).values(), *matrices.values()):
         if entry.has(*NO_NUMBERS):
             raise ModelError(f"{name}: no finite real value, so there is nothing for a page to compute: {sp.sstr(entry)}")
-    try:
-        return _text(name, arguments, lower(matrices, (), definitions or {}), constants, coefficients or {})
-    except BeyondFloats:  # as in codegen: a factor that was taken out of a power
-        program = lower(matrices, (), definitions or {}, factor=False)
-        return _text(name, arguments, program, constants, coefficients or {})
+    return printed(
+        lambda program: _text(name, arguments, program, constants, coefficients or {}), matrices, (), definitions or {}
+    )
 
 
 def _text(

@@ -4,7 +4,9 @@ from functools import cache
 
 import pytest
 
-from kfcourse.checks import exercise
+from kfcourse.checks import derived, exercise
+from kfcourse.derivations import check_text
+from kfcourse.derivations.setting import of_model
 from kfcourse.lab.variants import load_variants
 
 BEGIN = "F = M[(y - h)^2]"
@@ -56,6 +58,16 @@ def test_a_second_slip_is_named_too_and_costs_another_step():
 def test_the_hint_does_not_hold_the_right_line():
     result = told(BEGIN, "g^2*d + f^2*M[x^4]", "g^2*d + 3*f^2*d^2")
     assert not any(part in result.message.replace(" ", "") for part in ("6*m^2*d", "m^4", "6*d*m^2"))
+
+
+def test_an_end_that_is_not_what_was_asked_for_does_not_pass(monkeypatch):
+    """Whatever the lines may have made the checker believe: here it reads them as another variant's."""
+    formulas = {"state": "c*x + v", "meter": "g*x + 2*f*x**2*w", "parameters": {"c": 1, "g": 1, "f": 1}}
+    other = exercise("a", {"name": "mine", **formulas})
+    setting = of_model(other.model)
+    monkeypatch.setattr(derived, "check_text", lambda text, find, _: check_text(text, find, setting))
+    result = told(BEGIN, "g^2*d + 4*f^2*M[x^4]", "g^2*d + 4*f^2*(m^4 + 6*m^2*d + 3*d^2)")
+    assert (result.status, result.diagnosis, result.share) == ("wrong", ("other-meaning",), 0.0)
 
 
 def test_the_same_again_gets_the_advice():

@@ -196,7 +196,7 @@ def test_intervals_of_variant_53_cover_the_truth_as_often_as_they_say(variant53)
 
     The truth is the mean of 60 comparisons.  Nine places, no two of which agree altogether: the share of the intervals that hold
     it varies by less than one place's sqrt(.95 .05 / 60) = .03, and .95 less three of it is .86.  All variants, with sizes as
-    the command has: benchmarks/coverage.py.
+    the command has: benchmarks/intervals.py.
     """
     gaussian, linearised, unfinished, exact = lab_filters(variant53, ["aof-gaussian", "aof-linearised", "duof", "aof-exact"])
     designed = design([unfinished], Ensemble(variant53, 20_000, 3, 0).by_step())  # once: another design is another filter

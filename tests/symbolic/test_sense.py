@@ -6,6 +6,7 @@ import sympy as sp
 
 from kfcourse import FormulaError, Model, ModelError, NoClosedForm, gaussian, linearised
 from kfcourse.limits import time_limit
+from kfcourse.symbolic import compiled, javascript
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.sense import is_covariance, nothing_random, unfit
 
@@ -95,6 +96,10 @@ def test_no_number_is_taken_out_of_a_power_beyond_the_floats():
     """(x + 1e-99)**4 is not 1e-396*(1e99*x + 1)**4: the one is 1 at x = 1, the other no float."""
     state, _ = compile_model(Model.define("(x + 1e-99)**4 + v", "x + w"))
     assert state(np.array([1.0]), np.array([0.5])) == 1.5
+    x, v = sp.symbols("x v", real=True)
+    power = (x + sp.Rational(1, 10**99)) ** 4 + v
+    assert "e-396" not in compiled.loop("f", {"x": x, "v": v}, {"y": power}, [])
+    assert "e-396" not in javascript.loop("f", {"x": sp.Matrix([x]), "v": sp.Matrix([v])}, {"y": sp.Matrix([power])})
 
 
 @pytest.mark.parametrize(

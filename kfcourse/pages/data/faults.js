@@ -2,10 +2,10 @@
 // are values of expressions that SymPy printed.
 
 const { values, INK, BLUE, BAND, ORANGE } = kfFigure;
-const LAGS = 10, RANGE = [0.2, 20], NONE = "–";
+const RANGE = [0.2, 20], NONE = "–";
 
 function kfFaults(root, name, { x, y, faults, hidden, bounds }) {
-  const n = x[0].length, steps = x.map((_, k) => k), lags = Array.from({ length: LAGS }, (_, l) => l + 1);
+  const n = x[0].length, steps = x.map((_, k) => k), lags = Array.from({ length: bounds.correlation[0].length }, (_, l) => l + 1);
   const average = (one) => one.reduce((sum, value) => sum + value, 0) / one.length;
   const { c, e, g, f } = model.parameters;
   const test = (q, r) => {
@@ -32,13 +32,12 @@ function kfFaults(root, name, { x, y, faults, hidden, bounds }) {
     const each = [
       ["nees", "NEES: asks the truth", along, { label: "mean over its due", ...ratio }, steps],
       ["nis", "NIS: asks the record", along, { label: "mean over its due", ...ratio }, steps],
-      ["correlation", "Correlation of innovations", { label: "steps apart", range: [0.5, LAGS + 0.5] }, { label: "correlation", range: [-0.6, 1] }, lags],
+      ["correlation", "Correlation of innovations", { label: "steps apart", range: [0.5, lags.length + 0.5] }, { label: "correlation", range: [-0.6, 1] }, lags],
     ].map(([key, title, x, y, at]) => {
       const chart = ui.chart(charts, { title, height, x, y, says: `${title}: the filter's, with the band in which nineteen of twenty right ones are.` });
-      const ends = x.range, [low, high] = bounds[key].map((one) => [one, one]);
       const limits = chart.band({ colour: "#999999", opacity: 0.35 });
       const guess = chart.curve({ colour: ORANGE, width: 1.6, dash: "5 3" }), line = chart.curve({ colour: BLUE, width: 2 });
-      return { key, at, show: () => limits(ends, low, high), line, guess };
+      return { key, at, show: () => limits(at, ...bounds[key]), line, guess };
     });
     ui.legend([
       { label: "the filter", colour: BLUE }, { label: "95 % of right ones", colour: "#999999", width: 8, opacity: 0.35 },

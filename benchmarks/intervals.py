@@ -1,6 +1,6 @@
 """How often the 95 % intervals of a comparison hold the truth, over many seeds.
 
-    .venv/bin/python benchmarks/coverage.py [--variants 53 2] [--seeds 400] [--runs 100000] [--exact-runs 4000] [--steps 12]
+    .venv/bin/python benchmarks/intervals.py [--variants 53 2] [--seeds 400] [--runs 100000] [--exact-runs 4000] [--steps 12]
 
 For every variant that is shipped and has an exact filter: the share of the intervals of `gap`, `difference` and `bound` that hold
 the truth, over seeds, filters and steps, and for the step and filter where it is lowest; with what chance one of so many places
