@@ -46,7 +46,7 @@ def likelihood(model: Model) -> LogLikelihood:
 
     The law of a component that is an angle is wound around the circle: the densities of y and of y plus whole turns add up.
     """
-    if _nonlinear(model) and (solved := by_change_of_variable(model)):
+    if is_nonlinear(model) and (solved := by_change_of_variable(model)):
         return lambda y, x, k=None: solved(y, x)
     law = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model)
 
@@ -139,7 +139,7 @@ def scalar_densities(model: Model) -> ScalarDensities:
     Of a model that depends on the step they are those of step 0, and `at(k)` those of step k.
     """
     next_state = _conditional("transition", model.state_equation, model.v, model.state_noise, model, noiseless=True)
-    solved = by_change_of_variable(model) if _nonlinear(model) else None
+    solved = by_change_of_variable(model) if is_nonlinear(model) else None
     meter = _conditional(
         "likelihood", model.meter_equation, model.w, model.meter_noise, model, noiseless=True, solved=bool(solved)
     )
@@ -229,7 +229,8 @@ def _spread(values: Array, shape: tuple[int, ...]) -> Array:
     return values if values.shape == shape else np.broadcast_to(values, shape)
 
 
-def _nonlinear(model: Model) -> bool:
+def is_nonlinear(model: Model) -> bool:
+    """Whether the meter's noise enters nonlinearly."""
     return model.meter_equation.jacobian(sp.Matrix(model.w)).has(*model.w)
 
 

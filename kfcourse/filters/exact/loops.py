@@ -8,7 +8,8 @@ The numbers are those of NumPy but for rounding: sums are taken in another order
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numba import njit, types
@@ -30,7 +31,7 @@ _LOG2, _HIGH, _LOW = 1 / np.log(2), 0.693145751953125, 1.42860682030941723212e-6
 
 @njit(error_model="numpy", fastmath={"contract"})
 def _exp(u):
-    """exp(u), -708 < u < 708, to the last bit but one: 2^k exp(r), |r| < .35, by Taylor's polynomial, that loops do eight at once."""
+    """exp(u), |u| < 708, to the last bit but one: 2^k exp(r), |r| < .35, by Taylor's polynomial, that loops do many at once."""
     k = np.floor(u * _LOG2 + 0.5)
     r = (u - k * _HIGH) - k * _LOW
     p = 1 / 6227020800
@@ -325,7 +326,7 @@ def _cautious(change, before):
 
 
 @njit(**_ANY_ORDER)
-def _posterior(meter, c, y, x, length, shown, kernel, parts, found, mass, density):
+def _posterior(meter, c, y, x, length, shown, away, kernel, parts, found, mass, density):
     """`posteriors` on nodes: mean, variance, and estimated error, of these nodes and inherited."""
     count = len(x)
     mean, variance, signal, slope = _first(shown, count)
@@ -349,13 +350,16 @@ def _posterior(meter, c, y, x, length, shown, kernel, parts, found, mass, densit
     for i in range(count):
         v += mass[i] * (x[i] - m) * (x[i] - m)
     whole, rounding = (m, v, total), ROUNDING * np.abs(m) / np.sqrt(v)
-    nested, coarse = max(_distance(x, found[2], 2, whole) - rounding, 0.0), _distance(x, found[2], 4, whole)
-    inherited, by_few = max(_distance(x, found[1], 1, whole) - rounding, 0.0), _distance(x, found[0], 1, whole)
-    fine = _roughness(x, mass, 1, m, v, variance, signal)
-    wide = _roughness(x, mass, 2, m, v, variance, signal)
-    error = max(_extrapolated(nested, coarse), _cautious(max(fine - rounding, 0.0), wide))
+    # By every second and fourth node, by every second and fourth kernel; roughness of all and of every second.
+    for i, (part, step) in enumerate(((2, 2), (2, 4), (1, 1), (0, 1))):
+        away[i] = _distance(x, found[part], step, whole)
+    for step in (1, 2):
+        away[3 + step] = _roughness(x, mass, step, m, v, variance, signal)
+    for i in (0, 2, 4):
+        away[i] = max(away[i] - rounding, 0.0)
+    error = max(_extrapolated(away[0], away[1]), _cautious(away[4], away[5]))
     error += (mass[0] + mass[-1]) * max(m - x[0], x[-1] - m) / np.sqrt(v)
-    return m, v, error, rounding + _cautious(inherited, by_few)
+    return m, v, error, rounding + _cautious(away[2], away[3])
 
 
 @njit(**_ANY_ORDER)
@@ -389,65 +393,77 @@ _MOVES = types.FunctionType(types.int64(*[_VALUES] * 5))  # the printed loops: c
 _METER = types.FunctionType(types.int64(*[_VALUES] * 6))
 
 
-@njit(
-    types.int64(
-        _MOVES, _METER, _VALUES, types.boolean, _MANY, _NUMBERS, _NUMBERS, _VALUES, types.float64, types.float64,
-        _MANY, _MANY, _NUMBERS, _NUMBERS,
-    ),
-    cache=True,
-    nogil=True,
-    **_ANY_ORDER,
-)  # fmt: skip
-def steps(moves, meter, c, of_noise, before, start, count, y, accuracy, fine_nodes, after, numbers, size, status):
-    """One step of many trajectories: the length of `after` that is filled.
+def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
+    """The loop, for numba to keep beside these constants: what is in a closure is looked at when machine code is read again."""
 
-    moves, meter : the state's and the meter's loops, with their constants c; whether the signal is the noise's deviation
-    before (3, M), start, count (T,) : nodes, masses and densities; where those of each trajectory begin, and how many
-    y (T,), accuracy, fine_nodes : as of `pointmasses`
-    after (3, T * most) : as `before`, one after the other; numbers (5, T) : mean, variance, error; mean and variance predicted;
-    size, status (T,)
-    """
-    most, filled = NODES[-1], 0
-    kernel, moved, found, parts = np.empty((3, most)), np.empty((3, most)), np.empty((3, most)), np.empty((3, 3))
-    shown, few, nodes, candidates = np.empty((4, most)), np.empty((6, most)), np.empty((4, most)), np.empty((3, 4))
-    dense = np.empty(LOOKED)
-    for t in range(len(y)):
-        status[t], n = LEFT, count[t]
-        end = start[t] + n
-        x, mass, density = before[0, start[t] : end], before[1, start[t] : end], before[2, start[t] : end]
-        moves(c, x, moved[0, :n], moved[1, :n], moved[2, :n])
-        place = _kernels(x, mass, density, moved, kernel, parts)
-        if not -np.inf < place[2] < place[3] < np.inf or np.isnan(place[1]):
-            continue
-        known = _explanations(meter, c, of_noise, y[t], place, few, shown)
-        place = _candidates(meter, c, y[t], known, place, few, shown, kernel, parts, found, candidates)
-        hump = _looked(moves, meter, c, y[t], place, few, shown, moved, kernel, parts, found, dense)
-        if np.isnan(hump[1]):
-            continue
-        least = 0.0
-        for spacing in SPACINGS:
-            place, wanted = _spaced(hump, few[0], dense, candidates, known, spacing)
-            n = most
-            for number in NODES[::-1]:
-                n = number if number >= max(wanted, least) else n
-            x, length = nodes[0, :n], nodes[1, :n]
-            mass, density = nodes[2, :n], nodes[3, :n]
-            _nodes(place, x, length)
-            m, v, error, inherited = _posterior(meter, c, y[t], x, length, shown, kernel, parts, found, mass, density)
+    @njit(
+        types.int64(
+            _MOVES, _METER, _VALUES, types.boolean, _MANY, _NUMBERS, _NUMBERS, _VALUES, types.float64, types.float64,
+            _MANY, _MANY, _NUMBERS, _NUMBERS,
+        ),
+        cache=True,
+        nogil=True,
+        **_ANY_ORDER,
+    )  # fmt: skip
+    def steps(moves, meter, c, of_noise, before, start, count, y, accuracy, fine_nodes, after, numbers, size, status):
+        """One step of many trajectories: the length of `after` that is filled.
+
+        moves, meter : the state's and the meter's loops, with their constants c; whether the signal is the noise's deviation
+        before (3, M), start, count (T,) : nodes, masses and densities; where those of each trajectory begin, and how many
+        y (T,), accuracy, fine_nodes : as of `pointmasses`
+        after (3, T * most) : as `before`, one after the other
+        numbers (5, T), size, status (T,) : mean, variance, error, mean and variance predicted; nodes; LEFT, DONE or NARROW
+        """
+        most, filled = constants[0][-1], 0
+        kernel, moved, found, parts = np.empty((3, most)), np.empty((3, most)), np.empty((3, most)), np.empty((3, 3))
+        shown, few, nodes, candidates = np.empty((4, most)), np.empty((6, most)), np.empty((4, most)), np.empty((3, 4))
+        dense, changes = np.empty(LOOKED), np.empty(6)
+        for t in range(len(y)):
+            status[t], n = LEFT, count[t]
+            end = start[t] + n
+            x, mass, density = before[0, start[t] : end], before[1, start[t] : end], before[2, start[t] : end]
             moves(c, x, moved[0, :n], moved[1, :n], moved[2, :n])
-            apart = _apart(mass, moved)
-            least_now = (n - 1) * apart + 1
-            least_now = least_now if least_now <= most else fine_nodes
-            seen = error <= accuracy and inherited < np.inf and not _hidden(candidates, known, place, n)
-            if seen and least_now <= n:
-                status[t], size[t] = NARROW if apart > 1 else DONE, n
-                numbers[0, t], numbers[1, t], numbers[2, t] = m, v, error + inherited
-                numbers[3, t], numbers[4, t] = _predicted(mass, moved)
-                for i in range(n):
-                    after[0, filled], after[1, filled], after[2, filled] = x[i], mass[i], density[i]
-                    filled += 1
-                break
-            if n == most:
-                break
-            least = max(least_now, 0.0 if seen and least_now <= n else MORE * n)
-    return filled
+            place = _kernels(x, mass, density, moved, kernel, parts)
+            if not -np.inf < place[2] < place[3] < np.inf or np.isnan(place[1]):
+                continue
+            known = _explanations(meter, c, of_noise, y[t], place, few, shown)
+            place = _candidates(meter, c, y[t], known, place, few, shown, kernel, parts, found, candidates)
+            hump = _looked(moves, meter, c, y[t], place, few, shown, moved, kernel, parts, found, dense)
+            if np.isnan(hump[1]):
+                continue
+            least = 0.0
+            for spacing in SPACINGS:
+                place, wanted = _spaced(hump, few[0], dense, candidates, known, spacing)
+                n = 0
+                for number in NODES:
+                    n = number if n < max(wanted, least) else n
+                x, length = nodes[0, :n], nodes[1, :n]
+                mass, density = nodes[2, :n], nodes[3, :n]
+                _nodes(place, x, length)
+                m, v, error, inherited = _posterior(
+                    meter, c, y[t], x, length, shown, changes, kernel, parts, found, mass, density
+                )
+                moves(c, x, moved[0, :n], moved[1, :n], moved[2, :n])
+                apart = _apart(mass, moved)
+                least_now = (n - 1) * apart + 1
+                least_now = least_now if least_now <= most else fine_nodes
+                seen = error <= accuracy and inherited < np.inf and not _hidden(candidates, known, place, n)
+                if seen and least_now <= n:
+                    status[t], size[t] = NARROW if apart > 1 else DONE, n
+                    numbers[0, t], numbers[1, t], numbers[2, t] = m, v, error + inherited
+                    numbers[3, t], numbers[4, t] = _predicted(mass, moved)
+                    for i in range(n):
+                        after[0, filled], after[1, filled], after[2, filled] = x[i], mass[i], density[i]
+                        filled += 1
+                    break
+                if n == most:
+                    break
+                least = max(least_now, 0.0 if seen and least_now <= n else MORE * n)
+        return filled
+
+    return steps
+
+
+_OF_DENSITIES = WIDTH, NEGLIGIBLE, TAIL, LOWEST, ROOT, TINY, OVERLAP, SEEN, KINK, ROUNDING, ORDER, tuple(COEFFICIENTS)
+_OF_PLACES = MORE, LOOKED, SEARCHED, COARSELY, EXPLANATIONS, HIDDEN, HUMP, tuple(FRACTIONS)
+steps = _with((NODES, SPACINGS, _OF_DENSITIES, _OF_PLACES))

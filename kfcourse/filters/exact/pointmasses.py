@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from kfcourse.angles import moments_on_circle
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.filters.densities import ScalarDensities, scalar_densities
+from kfcourse.filters.densities import ScalarDensities, is_nonlinear, scalar_densities
 from kfcourse.filters.exact.adaptive import check_scalar, on_panels
 from kfcourse.filters.exact.batch import Place, Posteriors, posteriors
 from kfcourse.filters.exact.constants import ELEMENTS, MORE, NODES, SPACINGS, TOLERABLE
@@ -22,6 +23,7 @@ from kfcourse.filters.exact.roots import at_roots
 from kfcourse.filters.exact.smoothing import smoothed
 from kfcourse.filters.exact.usual import Packed, UsualWay, compiled_usual_way
 from kfcourse.laws import Array, Gaussian
+from kfcourse.symbolic.compiled import is_scalar
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
@@ -77,7 +79,7 @@ class PointMass(NamedTuple):
         return self.error * np.sqrt(self.variance)
 
 
-def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY, *, quick: bool = False) -> Filter:
+def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) -> Filter:
     """The exact AOF of a scalar model by point masses.
 
     Parameters
@@ -102,7 +104,6 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY, 
     check_scalar(model)
     if not 0 < accuracy < 1:
         raise ModelError(f"the point-mass filter needs 0 < accuracy < 1, got {accuracy}")
-    usual_way = compiled_usual_way(model) if quick else None
     densities, init, prior = scalar_densities(model), initial_state(model), of_prior(model.prior)
 
     def before(state: State, runs: int) -> Iterable[tuple[Array, Kernels]]:
@@ -110,7 +111,7 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY, 
             return state.memory.predictions(densities.at(state.step - 1))
         return [(np.arange(runs), prior.rows(np.zeros(runs, dtype=int)))]
 
-    def step(state: State, y: Array) -> State:
+    def step(state: State, y: Array, usual_way: UsualWay | None = None) -> State:
         law = densities.at(state.step)
         way = partial(_quick_step, usual_way, state.memory) if usual_way else _step
         try:
@@ -145,7 +146,10 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY, 
 
         return back
 
-    return Filter("aof-exact", model, init, step, slow=True, evidence=evidence, look_back=look_back)
+    found = Filter("aof-exact", model, init, step, slow=True, evidence=evidence, look_back=look_back)
+    if not is_scalar(model) or densities.noiseless or is_nonlinear(model):
+        return found
+    return replace(found, quick=(step, lambda: partial(step, usual_way=compiled_usual_way(model))))
 
 
 def _on_circle(memory: PointMass, law: ScalarDensities) -> tuple[Gaussian, Gaussian]:
@@ -213,7 +217,8 @@ def _step(
     predicted = np.empty((2, len(y)))
     following, later = _following(fine, np.arange(len(y)), law, room, predicted)
     memory = PointMass(fine, error, variance, adaptive, following, later)
-    return *(Gaussian(m[:, None], v[:, None, None]) for m, v in ((mean, variance), predicted)), memory
+    posterior, prediction = (Gaussian(m[:, None], v[:, None, None]) for m, v in ((mean, variance), predicted))
+    return posterior, prediction, memory
 
 
 def _following(
@@ -251,7 +256,7 @@ def _quick_step(
     """`_step` with the usual way compiled: what it leaves goes here as there, and so do its predictions that are not usual."""
     numbers, size, usual = np.empty((5, len(y))), np.zeros(len(y), dtype=int), np.zeros(len(y), dtype=bool)
     values = np.empty((3, 0))
-    if memory:
+    if memory and isinstance(memory.fine, Packed):
         rows = np.flatnonzero(memory.fine.usual)
         done = usual_way(memory.fine, rows, y[rows, 0], accuracy, fine_nodes)
         values, numbers[:, rows], size[rows], usual[rows] = done.values, done.numbers, done.size, done.usual
@@ -265,7 +270,8 @@ def _quick_step(
     mean, variance, error, *predicted = numbers
     later = np.union1d(later, np.flatnonzero(usual))
     after = PointMass(fine, error, variance, found.adaptive, following, later)
-    return *(Gaussian(m[:, None], v[:, None, None]) for m, v in ((mean, variance), predicted)), after
+    posterior, prediction = (Gaussian(m[:, None], v[:, None, None]) for m, v in ((mean, variance), predicted))
+    return posterior, prediction, after
 
 
 def _in_batch(

@@ -6,6 +6,7 @@ Posteriors stay in the arrays that the loop has filled; a grid is cut out when i
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,8 +28,8 @@ class Packed(Sequence[Grid]):
     `usual` tells those whose nodes are a rule and whose kernels overlap.
     """
 
-    def __init__(self, values: Array, start: Array, count: Array, usual: Array, uniform: Array):
-        self.values, self.start, self.count, self.usual, self.uniform = values, start, count, usual, uniform
+    def __init__(self, values: Array, start: Array, size: Array, usual: Array, uniform: Array):
+        self.values, self.start, self.size, self.usual, self.uniform = values, start, size, usual, uniform
 
     def __len__(self) -> int:
         return len(self.start)
@@ -39,7 +40,8 @@ class Packed(Sequence[Grid]):
         if not 0 <= place < len(self):
             raise IndexError(place)
         begin = self.start[place]
-        return Grid(*self.values[:, begin : begin + self.count[place]], uniform=bool(self.uniform[place]))
+        x, mass, density = self.values[:, begin : begin + self.size[place]]
+        return Grid(x, mass, density, bool(self.uniform[place]))
 
     @classmethod
     def together(cls, values: Array, size: Array, usual: Array, grids: Mapping[int, Grid]) -> Packed:
@@ -50,14 +52,16 @@ class Packed(Sequence[Grid]):
         for place, grid in grids.items():
             count[place], start[place], uniform[place] = len(grid.x), end, grid.uniform
             end += len(grid.x)
-        return cls(np.concatenate([values, *(np.array(grid[:3]) for grid in grids.values())], axis=1), start, count, usual, uniform)
+        return cls(
+            np.concatenate([values, *(np.array(grid[:3]) for grid in grids.values())], axis=1), start, count, usual, uniform
+        )
 
 
 class Done(NamedTuple):
     """What the loops made of some trajectories, of size 0 where they made nothing.
 
-    Nodes, masses, densities (3, M); mean, variance, error, and mean and variance predicted (5, T); how many nodes, and whether the
-    next prediction is usual, too, (T,).
+    Nodes, masses, densities (3, M); mean, variance, error, and mean and variance predicted (5, T); how many nodes (T,), and
+    whether the next prediction is usual, too.
     """
 
     values: Array
@@ -77,8 +81,7 @@ def compiled_usual_way(model: Model) -> UsualWay:
     ImportError
         There is no numba.
     """
-    from kfcourse.filters.exact.loops import DONE, steps
-
+    import_module("kfcourse.filters.exact.loops")  # now, while there is one process
     (x,), of_model = model.x, formulas(model)
     of_noise = not of_model.meter.has(x)
     signal = sp.sqrt(of_model.meter_variance) if of_noise else of_model.meter
@@ -86,16 +89,19 @@ def compiled_usual_way(model: Model) -> UsualWay:
     meter = {"mean": of_model.meter, "variance": of_model.meter_variance, "signal": signal, "slope": signal.diff(x)}
     printed = (compiled.loop(name, {"x": x}, made, list(model.values)) for name, made in (("moves", moves), ("meter", meter)))
     laws = compiled.load(*printed)
+    moves_of, meter_of = laws.moves, laws.meter
     constants = np.array([float(value) for value in model.values.values()])
 
     def step(before: Packed, rows: Array, y: Array, accuracy: float, fine_nodes: int) -> Done:
+        from kfcourse.filters.exact.loops import DONE, steps
+
         numbers, (size, status) = np.empty((5, len(rows))), np.zeros((2, len(rows)), dtype=int)
-        values, start, count = [np.empty((3, 0))], before.start[rows], before.count[rows]
+        values, start, count = [np.empty((3, 0))], before.start[rows], before.size[rows]
         for some in chunks(len(rows), 1, AT_ONCE):
             after = np.empty((3, len(rows[some]) * NODES[-1]))
             given = before.values, start[some], count[some], y[some], accuracy, fine_nodes
             here = np.empty((5, len(rows[some])))
-            filled = steps(laws.moves, laws.meter, constants, of_noise, *given, after, here, size[some], status[some])
+            filled = steps(moves_of, meter_of, constants, of_noise, *given, after, here, size[some], status[some])
             numbers[:, some] = here
             values.append(after[:, :filled])
         return Done(np.concatenate(values, axis=1), numbers, size, status == DONE)
