@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import reduce
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -145,7 +145,7 @@ class JumpModel:
         """For how many steps the modes' inputs have values and their noises variances."""
         return min(self.chain_of_step.known.steps, *(one.known.steps for one in self.modes))
 
-    @property
+    @cached_property
     def by_state(self) -> bool:
         """Whether the probabilities of transitions depend on the state."""
         return self.chain.has(*self.x)
