@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import time
 
-from benchmarks.engine import best
+from engine import best
 from kfcourse import JumpModel, NoClosedForm, simulate
 from kfcourse.filters import Filter, aof
 from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures
