@@ -14,6 +14,7 @@ import argparse
 import time
 
 from engine import best
+
 from kfcourse import JumpModel, NoClosedForm, simulate
 from kfcourse.filters import Filter, aof
 from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures
