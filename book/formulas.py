@@ -9,20 +9,21 @@ import shutil
 from importlib import resources
 from pathlib import Path
 
-PARTS = {  # MathJax's name of a part -> its file
-    "core": "core.js",
-    "input/tex-base": "input/tex-base.js",
-    "[tex]/ams": "input/tex/extensions/ams.js",
-    "output/chtml": "output/chtml.js",
-    "output/chtml/fonts/tex": "output/chtml/fonts/tex.js",
-    "a11y/assistive-mml": "a11y/assistive-mml.js",
+PARTS = {  # MathJax's name of a part -> its file, and the part that must be there before
+    "core": ("core.js", None),
+    "input/tex-base": ("input/tex-base.js", "core"),
+    "[tex]/ams": ("input/tex/extensions/ams.js", "input/tex-base"),
+    "output/chtml": ("output/chtml.js", "core"),
+    "a11y/assistive-mml": ("a11y/assistive-mml.js", "core"),
 }
+ASKED_FOR = "output/chtml/fonts/tex.js"  # by the output, of itself
 FONTS = "output/chtml/fonts/woff-v2"
 
 
 def configure(app, config) -> None:
     config.mathjax_path = "mathjax/startup.js"
-    config.mathjax3_config = {"loader": {"load": list(PARTS)}, "tex": {"packages": ["base", "ams"]}}
+    before = {part: [other] for part, (_, other) in PARTS.items() if other}
+    config.mathjax3_config = {"loader": {"load": list(PARTS), "dependencies": before}, "tex": {"packages": ["base", "ams"]}}
 
 
 def copy(app, error) -> None:
@@ -30,7 +31,7 @@ def copy(app, error) -> None:
         return
     whole = Path(str(resources.files("sphinx-mathjax-offline"))) / "static" / "mathjax"
     mine = Path(app.outdir, "_static", "mathjax")
-    for name in ("startup.js", *PARTS.values()):
+    for name in ("startup.js", ASKED_FOR, *(file for file, _ in PARTS.values())):
         (mine / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(whole / name, mine / name)
     shutil.copytree(whole / FONTS, mine / FONTS, dirs_exist_ok=True)
