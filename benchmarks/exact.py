@@ -3,8 +3,9 @@
     .venv/bin/python benchmarks/exact.py [--runs 512] [--steps 51] [--checked 8] [--variants 53 2]
 
 For every variant that is shipped, and variant 53 with a meter ten times worse (53/f=.2): microseconds a trajectory-step of one
-thread, plain and compiled (numba), how many times faster than the adaptive filter, which was the exact filter once, the plain one
-is, nodes of a posterior, the share of steps left to the adaptive filter, and the estimated errors, in posterior standard deviations: 50 %, 99 % and the worst of all steps.
+thread, plain and compiled (numba); how many times faster than the adaptive filter, which was the exact filter once, the plain one
+is; nodes of a posterior, the share of steps left to the adaptive filter, and the estimated errors, in posterior standard
+deviations: 50 %, 99 % and the worst of all steps.
 Vector variants are done by particles; the error is half the distance of the two clouds' estimates.
 """
 
@@ -79,9 +80,8 @@ def main() -> None:
     options = parser.parse_args()
     models = {name: variant.model for name, variant in load_variants().items()}
     models["53/f=.2"] = models["53"].replace(f=0.2)
-    print(
-        f"{'variant':>8} {'us':>8} {'compiled':>8} {'times':>8} {'nodes':>8} {'adaptive':>9}{'error 50 %':>12}{'99 %':>10}{'worst':>10}"
-    )
+    errors = f"{'error 50 %':>12}{'99 %':>10}{'worst':>10}"
+    print(f"{'variant':>8} {'us':>8} {'compiled':>8} {'times':>8} {'nodes':>8} {'adaptive':>9}{errors}")
     for name in options.variants or models:
         if models[name].n == models[name].p == 1:
             print(line(name, models[name], options.runs, options.steps, options.checked, options.repeats), flush=True)
