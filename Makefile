@@ -75,6 +75,7 @@ benchmark: install
 	$(BIN)/python benchmarks/exact.py
 	$(BIN)/python benchmarks/cores.py
 	$(BIN)/python benchmarks/looking_back.py
+	$(BIN)/python benchmarks/jumps.py
 
 install:
 	@$(PYTHON) -c "" 2>/dev/null || { echo "$(PYTHON) does not start. Install Python 3.11 or newer, or name it: make PYTHON=/path/to/python3 $(MAKECMDGOALS)" >&2; exit 1; }

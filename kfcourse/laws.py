@@ -258,11 +258,12 @@ def log_density(measurement: Measurement, y: Vectors) -> Array:
     -1/2 nu^T F^-1 nu - 1/2 ln det(2 pi F),      nu = y - h
     """
     innovation, F = measurement.innovation(y), measurement.F
-    missing = np.isnan(innovation)
-    if missing.any():
+    present: Array | int = F.shape[-1]
+    if any_missing(innovation):
+        present = (~np.isnan(innovation)).sum(axis=-1)
         innovation, _, F, _ = without_missing(innovation, measurement.G, F, measurement.R)
-    present = (~missing).sum(axis=-1)
-    return -0.5 * (normalised_square(innovation, F) + np.linalg.slogdet(F).logabsdet + present * np.log(2 * np.pi))
+    size = np.log(np.abs(F[..., 0, 0])) if F.shape[-1] == 1 else np.linalg.slogdet(F).logabsdet
+    return -0.5 * (normalised_square(innovation, F) + size + present * np.log(2 * np.pi))
 
 
 def stacked(laws: Sequence[Gaussian]) -> Gaussian:

@@ -24,6 +24,15 @@ def test_every_question_has_right_and_wrong_answers(name):
         assert wrong[question.name] >= (3 if question.level == "core" else 2), question.name
 
 
+@pytest.mark.parametrize("name", FILES[:5])
+def test_five_kinds_of_mistakes_for_every_core_question_of_the_first_sets(name):
+    known = {(question.name, mistake.name) for question in sets()[name[len("test_")]].questions for mistake in question.mistakes}
+    typed = {(row[0], kind) for row in importlib.import_module(name).WRONG for kind in row[1].split()} & known
+    for question in sets()[name[len("test_")]].questions:
+        if question.level == "core" and question.mistakes:  # a derivation's lines say what is wrong
+            assert len([kind for one, kind in typed if one == question.name]) >= 5, question.name
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_nine_of_ten_wrong_answers_are_named(name):
     wrong = importlib.import_module(name).WRONG
