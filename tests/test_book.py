@@ -368,7 +368,7 @@ def test_a_figure_of_another_page_is_shown_with_its_picture(window):
 
 
 # Sheets of A4 of chapters that had pages half empty: long code that went overleaf as a whole, figures as large as on a screen.
-SHEETS = {"comparison": 8, "extended-kalman": 9}
+SHEETS = {"comparison": 8, "sigma-points": 6}
 
 
 @pytest.mark.parametrize("page", SHEETS)
