@@ -19,6 +19,7 @@ import yaml
 from docutils import nodes
 from sphinx.transforms.post_transforms import SphinxPostTransform
 from sphinx.util.docutils import SphinxDirective
+from typography import together
 
 HERE = Path(__file__).resolve().parent
 PAGE = "glossary"
@@ -196,7 +197,7 @@ def _list(app, name: str) -> nodes.definition_list:
         title = contents.page(app.env, page)[1].title.replace(" ★", "")
         where = nodes.reference("", f"{number}. {title}" if number else title, internal=True)
         where["refuri"] = app.builder.get_relative_uri(name, page) + ("" if term.page else f"#first-{term.identity}")
-        meaning = nodes.paragraph("", f"{term.said} ", nodes.inline("", "", where, classes=["kf-where"]))
+        meaning = nodes.paragraph("", f"{together(term.said)} ", nodes.inline("", "", where, classes=["kf-where"]))
         found += nodes.definition_list_item("", head, nodes.definition("", meaning))
     return found
 

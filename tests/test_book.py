@@ -18,6 +18,7 @@ import nbformat
 import pytest
 import yaml
 from browsers import chromium
+from bs4 import BeautifulSoup
 
 ROOT = Path(__file__).resolve().parent.parent
 HTML = ROOT / "_build" / "html"
@@ -403,6 +404,20 @@ def test_the_number_of_verified_equations_leads_to_them(page):
     found = re.search(r'class="kf-count" href="equations.html#([^"]+)"', (HTML / f"{page}.html").read_text(encoding="utf-8"))
     if found:
         assert f'id="{found[1]}"' in (HTML / "equations.html").read_text(encoding="utf-8")
+
+
+def displayed(page: str) -> list[str]:
+    """TeX of the displayed formulas of a page, without what only numbers or aligns them."""
+    found = BeautifulSoup((HTML / f"{page}.html").read_text(encoding="utf-8"), "html.parser").select("article div.math")
+    tex = ["".join(formula.find_all(string=True, recursive=False)) for formula in found]
+    return [re.sub(r"\\(begin|end)\{(split|aligned)\}|\\\[|\\\]|\s", "", one) for one in tex]
+
+
+def test_the_page_of_all_equations_has_them_all():
+    """Whether typed, verified, or printed from the package: numbered or not."""
+    known = set(displayed("equations"))
+    assert [(page, tex) for page in NOTEBOOKS for tex in displayed(page) if tex not in known] == []
+    assert any("L_{k+1}" in tex for tex in known)  # of the modified filter of optimal structure
 
 
 def test_a_chapter_is_downloaded_as_a_notebook(window):
