@@ -94,9 +94,10 @@ def lay_narrow(figure: Figure) -> bool:
                 ax.tick_params(labelleft=True)
                 ax.set_ylabel(ax.get_ylabel() or first_ax.get_ylabel())
     for legend in list(figure.legends):  # below all panels, in more columns than there is room for
-        shown = legend.legend_handles, [text.get_text() for text in legend.get_texts()]
+        handles = [handle for handle in legend.legend_handles if handle is not None]
+        labels = [text.get_text() for text in legend.get_texts()]
         legend.remove()
-        figure.legend(*shown, loc="outside lower center", ncols=2)
+        figure.legend(handles, labels, loc="outside lower center", ncols=2)
     figure.set_size_inches(NARROW, 0.9 * height * columns if columns > 1 else height)
     return True
 
