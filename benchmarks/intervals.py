@@ -56,14 +56,12 @@ def estimates(result: Comparison) -> dict[str, tuple[Estimate, np.ndarray]]:
     """What is asked of a comparison, each (filters, steps), and whether the report lets its interval be trusted."""
     entrants, control = result.entrants, result.control
     others = [name for name in entrants if name != control]
-    gaps = {name: result.gap(name) for name in entrants}
     differences = {name: result.difference(name, control) for name in others}
-    bound = result.bound()
-    asked = {
-        "gap": [(gaps[name], result.trusted(gaps[name], name)) for name in entrants],
-        "difference": [(differences[name], result.trusted(differences[name], name, control)) for name in others],
-        "bound": [(bound, result.trusted(bound))],
-    }
+    asked = {"difference": [(differences[name], result.trusted(differences[name], name, control)) for name in others]}
+    if EXACT in result.names:
+        gaps, bound = {name: result.gap(name) for name in entrants}, result.bound()
+        asked["gap"] = [(gaps[name], result.trusted(gaps[name], name)) for name in entrants]
+        asked["bound"] = [(bound, result.trusted(bound))]
     return {
         what: (
             Estimate(*(np.array([np.broadcast_to(getattr(one, field), result.steps) for one, _ in found]) for field in FIELDS)),

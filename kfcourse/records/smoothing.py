@@ -72,7 +72,7 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     [0.944, 1.833, 2.556, 3.278]
     """
     if one.look_back is None:
-        return normal_laws(one, list(walk(one, y))[1:], lag)
+        return normal_laws(one, islice(walk(one, y), 1, None), lag)
     return stacked([state.posterior for state in _looked_back(one, y, lag)])
 
 
@@ -148,7 +148,7 @@ def affine_at(structure: Structure, laws: Gaussian) -> Structure:
 
     def at(k: int) -> Structure:
         there, now = Gaussian(laws.mean[k], laws.cov[k]), structure.at(k)
-        tau, A, Q = now.transition(*there)
+        tau, (A, Q) = now.predict(*there).mean, now.transition(*there)
 
         def predict(z: Array, p: Array) -> Gaussian:
             shift = apply(A, difference(z, there.mean, model.angles.x))
@@ -157,7 +157,7 @@ def affine_at(structure: Structure, laws: Gaussian) -> Structure:
         def measure(m: Array, d: Array) -> Measurement:
             return measurement_of(model.angles.y)(*seen_from(now.measure(*there), there, Gaussian(m, d), model.angles.x))
 
-        return Structure(structure.name, model, predict, measure, lambda z, p: Transition(tau, A, Q))
+        return Structure(structure.name, model, predict, measure, lambda z, p: Transition(A, Q))
 
     first = at(0)
     return Structure(structure.name, model, first.predict, first.measure, first.transition, at_step=at)
