@@ -53,7 +53,7 @@ class Measurement(NamedTuple):
 
 
 class Transition(NamedTuple):
-    """What looking back must know of the object beside tau and Theta: its structural functions at N(z, p), as the meter's G and R.
+    """What looking back must know of the object beside tau and Theta: its structural functions at N(z, p), like G and R.
 
     A (..., n, n), Q (..., n, n): the sensitivity dtau/dz of the next state's mean, and Q = Theta - A p A^T, the part of its
     covariance that this state does not explain.  Q is derived, not subtracted, as R is.

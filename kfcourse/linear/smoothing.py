@@ -14,7 +14,7 @@ state it is p Q / Psi + S^2 p', of more L (I - S A)^T + S (Q + p') S^T with L = 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -91,9 +91,7 @@ def blocks(steps: int, runs: int) -> list[slice]:
     return [slice(start, start + size) for start in range(0, steps, size)]
 
 
-def look_back(
-    back: list[Regression], laws: Sequence[Gaussian], lag: int | None = None, angles: Components = ()
-) -> Gaussian:
+def look_back(back: list[Regression], laws: Sequence[Gaussian], lag: int | None = None, angles: Components = ()) -> Gaussian:
     """The laws of the states, given all measurements of the record.
 
     Parameters
