@@ -19,7 +19,6 @@ NUMBERED = re.compile(r"\$\$[ \t]*\(([\w:-]+)\)")
 TITLED = re.compile(r"\{(?:doc|ref|numref|term|download)\}`([^`<]+?)\s*<[^`>]*>`")
 ROLE = re.compile(r"\{[\w:]+\}`([^`]*)`")
 DROPPED = ("chapter", "toctree", "map", "bibliography")
-LABEL = {"admonition": "", "figure": "Figure: ", "code-block": "", "list-table": ""}
 
 
 def plain(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:

@@ -263,7 +263,8 @@ def log_density(measurement: Measurement, y: Vectors) -> Array:
 
     -1/2 nu^T F^-1 nu - 1/2 ln det(2 pi F),      nu = y - h
     """
-    innovation, F, present = measurement.innovation(y), measurement.F, measurement.F.shape[-1]
+    innovation, F = measurement.innovation(y), measurement.F
+    present: Array | int = F.shape[-1]
     if any_missing(innovation):
         present = (~np.isnan(innovation)).sum(axis=-1)
         innovation, _, F, _ = without_missing(innovation, measurement.G, F, measurement.R)

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from kfcourse.pages.letters import slope
+from kfcourse import linearised
+from kfcourse.continuous import to_discrete
+from kfcourse.pages.letters import column, covariance, slope
 from kfcourse.pages.relations import NOTATION
 
 _spec = importlib.util.spec_from_file_location("letters.continuous", Path(__file__).with_name("continuous.py"))
@@ -70,6 +72,23 @@ def sizes(rng):
     return {"D": D, "S'": first, "S''": second, "N": N, r"\varepsilon": np.sqrt(share)}
 
 
+def step(rng):
+    """A prediction of the discrete filter, and the law whose exponent is the prediction's and T F, by differences of it."""
+    own, T = shared.model(rng), 0.1
+    letters, f, _ = shared.rates(own)
+    z = letters["z"]
+    law = linearised(to_discrete(own, T)).predict(z.T, letters["D"][None])
+    Psi, U = law.cov.reshape(2, 2), covariance(rng, 2)
+
+    def exponent(e):
+        return T * e @ U @ e / 2 - e @ np.linalg.solve(Psi, e) / 2
+
+    bend = [[exponent(a + b) - exponent(a) - exponent(b) for b in np.eye(2)] for a in np.eye(2)]  # exact for a square
+    after = {r"\lambda": column(law.mean), r"\Psi": Psi, "U": U, "D_+": -np.linalg.inv(bend), "T": T, "f": f(z)}
+    x = rng.normal(size=(2, 1))
+    return letters | after | {"x": x, "e": x - after[r"\lambda"]}
+
+
 def western(rng):
     own = shared.western(rng)
     return {name: own[name] for name in ("R", "Q", r"S_\xi", "N")}
@@ -80,7 +99,7 @@ def start(rng):
     return {"z(0)": m, "m": m, "D(0)": d, "d": d, "x": z, "z": z}
 
 
-LETTERS = (derivatives, likelihood, in_short, sizes, western, start)
+LETTERS = (derivatives, likelihood, in_short, sizes, step, western, start)
 SAID = {
     latex: NOTATION
     for latex in (
@@ -99,6 +118,7 @@ SAID |= dict.fromkeys(
     (
         r"{\textstyle\sum_i\bigl[2N^{-1}(y-S)\bigr]_i\frac{\partial^2S_i}{\partial x^2}}",
         r"{(y-S)}",
+        r"{\textstyle\frac12}",
         r"{-T(y_k-S)^TN^{-1}(y_k-S)}",
         r"{Ty_k^TN^{-1}y_k}",
     ),

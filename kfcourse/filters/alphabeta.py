@@ -46,11 +46,6 @@ def steady_beta(alpha: float) -> float:
     return 2 * (_between(alpha) / (1 + np.sqrt(1 - alpha))) ** 2
 
 
-def steady_gamma(alpha: float) -> float:
-    """gamma = beta^2 / alpha, of the stationary alpha-beta-gamma filter with this alpha."""
-    return steady_beta(alpha) ** 2 / alpha
-
-
 def tracking_index(alpha: float) -> float:
     """Lambda = beta / sqrt(1 - alpha), the tracking index that leads to this alpha; the inverse of `steady_alpha`."""
     return steady_beta(alpha) / float(np.sqrt(1 - alpha))

@@ -17,7 +17,7 @@ import numpy as np
 
 from kfcourse.filters.base import State, initial_state
 from kfcourse.filters.designed import Design, Equations, Regression
-from kfcourse.filters.multiple_models import Modes, mixture, modes_given, onward
+from kfcourse.filters.multiple_models import Modes, each_once, mixture, modes_given, moving_alike, onward
 from kfcourse.laws import Array, Gaussian, Measurement, correct
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
@@ -37,6 +37,8 @@ def logic_dynamic_fos(model: JumpModel, structures: Sequence[Structure]) -> Desi
     model.without_state("the logic-dynamic FOS")
     if model.angles.x or model.angles.y:
         raise ModelError("the logic-dynamic FOS takes no components that are angles")
+
+    alike = moving_alike(structures)
 
     def init(runs: int) -> State:
         start = initial_state(model.modes[0])(runs)
@@ -68,7 +70,8 @@ def logic_dynamic_fos(model: JumpModel, structures: Sequence[Structure]) -> Desi
             densities.append(Measurement(fit.offset, unit, cov, cov))
         xi, _ = modes_given(np.tile(weights, (len(y), 1)), densities, z)
         expected, shares = onward(xi, model.transition_at(k))
-        following = [mixture([one.predict(*law) for law in laws], shares[:, :, j]) for j, one in enumerate(now)]
+        predict = each_once(now, alike)
+        following = [mixture([predict(j, law) for law in laws], shares[:, :, j]) for j in range(len(now))]
         return State(k + 1, posterior, mixture(following, expected), Modes(mu, expected, tuple(following)))
 
     return Design(f"fos-jump-{structures[0].name}", model.modes[0], equations, start=init)

@@ -24,6 +24,7 @@ the second Rudenko's logic-dynamic filters.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -36,6 +37,7 @@ from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.structure import Structure
 
 Chain: TypeAlias = Array | Callable[[int], Array] | JumpModel
+Predict: TypeAlias = Callable[[Gaussian], Gaussian]
 Links: TypeAlias = Callable[[int, Sequence[Gaussian]], tuple[Array, list[list[Gaussian]]]]
 
 
@@ -84,8 +86,8 @@ def imm(structures: Sequence[Structure], transition: Chain, probabilities: Array
     """
     angles = structures[0].model.angles.x if structures else ()
 
-    def following(one: Structure, laws: Sequence[Gaussian], weights: Array) -> Gaussian:
-        return one.predict(*mixture(laws, weights, angles))
+    def following(predict: Predict, laws: Sequence[Gaussian], weights: Array) -> Gaussian:
+        return predict(mixture(laws, weights, angles))
 
     return _one_law_a_mode(name, structures, transition, probabilities, following)
 
@@ -102,8 +104,8 @@ def logic_dynamic(
     """
     angles = structures[0].model.angles.x if structures else ()
 
-    def following(one: Structure, laws: Sequence[Gaussian], weights: Array) -> Gaussian:
-        return mixture([one.predict(*law) for law in laws], weights, angles)
+    def following(predict: Predict, laws: Sequence[Gaussian], weights: Array) -> Gaussian:
+        return mixture([predict(law) for law in laws], weights, angles)
 
     given = name or (f"aof-jump-{structures[0].name}" if structures else "")
     return _one_law_a_mode(given, structures, transition, probabilities, following)
@@ -114,12 +116,13 @@ def _one_law_a_mode(
     structures: Sequence[Structure],
     transition: Chain,
     probabilities: Array | None,
-    following: Callable[[Structure, Sequence[Gaussian], Array], Gaussian],
+    following: Callable[[Predict, Sequence[Gaussian], Array], Gaussian],
 ) -> Filter:
-    """A filter that merges what may lead to each mode by `following`: (structure of the mode, laws, weights) -> prediction."""
+    """A filter that merges what may lead to each mode by `following`: (the mode's tau, Theta; laws; weights) -> prediction."""
     models = [structure.model for structure in structures]
     angles = models[0].angles.x if models else ()
     links, first = _checked(structures, transition, probabilities)
+    alike = moving_alike(structures)
 
     def init(runs: int) -> State:
         start = initial_state(models[0])(runs)
@@ -142,7 +145,13 @@ def _one_law_a_mode(
         mu, _ = modes_given(memory.expected, expectations, y)
         pi, leading = links(state.step, corrected)
         expected, weights = onward(mu, pi)
-        predicted = [following(one, [row[j] for row in leading], weights[:, :, j]) for j, one in enumerate(now)]
+        predict, predicted = each_once(now, alike), list[Gaussian]()
+        drawn_anew = pi.ndim == 2 and bool((pi == pi[0]).all())  # then nothing that leads to a mode tells it from another
+        for j, first_alike in enumerate(alike):
+            if drawn_anew and first_alike < j:
+                predicted.append(predicted[first_alike])
+            else:
+                predicted.append(following(partial(predict, j), [row[j] for row in leading], weights[:, :, j]))
         return State(
             state.step + 1,
             mixture(corrected, mu, angles),
@@ -163,6 +172,7 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
     models = [structure.model for structure in structures]
     angles, size = models[0].angles.x if models else (), len(models)
     links, first = _checked(structures, transition, probabilities)
+    alike = moving_alike(structures)
 
     def init(runs: int) -> State:
         start = initial_state(models[0])(runs)
@@ -186,7 +196,8 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
         laws = [mixture(corrected[j::size], weights[:, :, j], angles) for j in range(size)]
         now = [structure.at(state.step) for structure in structures]
         pi, leading = links(state.step, laws)
-        predicted = [one.predict(*law) for row in leading for one, law in zip(now, row, strict=True)]
+        predict = each_once(now, alike)
+        predicted = [predict(j, law) for row in leading for j, law in enumerate(row)]
         expected = (mu[:, :, None] * pi).reshape(len(y), -1)
         return State(
             state.step + 1, mixture(laws, mu, angles), mixture(predicted, expected, angles), Modes(mu, expected, tuple(predicted))
@@ -195,17 +206,49 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
     return Filter(name, models[0], init, step, evidence=evidence)
 
 
+def moving_alike(structures: Sequence[Structure]) -> list[int]:
+    """For each mode the first one with the same tau and Theta: of meters that fail, say, there is one object."""
+    keys = [_object(one) for one in structures]
+    return [next(i for i, other in enumerate(keys) if other == key) for key in keys]
+
+
+def _object(one: Structure) -> object:
+    """What tau and Theta hang on; without formulas they are nobody else's."""
+    if one.formulas is None:
+        return id(one)
+    known = one.model.known
+    formulas = [one.formulas.functions[name].subs(one.model.values) for name in ("tau", "Theta")]
+    return one.name, *formulas, known.interval, tuple(known.inputs.items())
+
+
+def each_once(now: Sequence[Structure], alike: Sequence[int]) -> Callable[[int, Gaussian], Gaussian]:
+    """(mode, law) -> N(tau, Theta) of the next state, found once for modes that move alike."""
+    found: dict[tuple[int, int], tuple[Gaussian, Gaussian]] = {}
+
+    def predict(j: int, law: Gaussian) -> Gaussian:
+        key = alike[j], id(law)
+        if key not in found:
+            found[key] = law, now[j].predict(*law)  # while it is kept, no other law has its id
+        return found[key][1]
+
+    return predict
+
+
 def onward(mu: Array, pi: Array) -> tuple[Array, Array]:
     """c_j = sum_i mu_i pi_ij, (runs, M), and the weights mu_i|j, (runs, M, M); pi (M, M) or (runs, M, M)."""
     joint = mu[:, :, None] * pi
-    # a mode that cannot come next starts from the combined law; nothing uses it
-    expected = mu @ pi if pi.ndim == 2 else joint.sum(axis=1)
-    return expected, _shares(np.where(expected[:, None, :] > 0, joint, mu[:, :, None]))
+    expected = joint.sum(axis=1)
+    if not np.minimum.reduce(expected, axis=None) > 0:
+        # a mode that cannot come next starts from the combined law; nothing uses it
+        joint = np.where(expected[:, None, :] > 0, joint, mu[:, :, None])
+    return expected, _shares(joint)
 
 
 def _shares(joint: Array) -> Array:
     """joint_ij / sum_i joint_ij, (runs, M, M); equal ones where that is nothing."""
     total = joint.sum(axis=1, keepdims=True)
+    if np.minimum.reduce(total, axis=None) > 0:
+        return joint / total
     return np.divide(joint, total, out=np.full_like(joint, 1.0 / joint.shape[1]), where=total > 0)
 
 
@@ -249,13 +292,16 @@ def _checked(structures: Sequence[Structure], transition: Chain, probabilities: 
 
 
 def modes_given(expected: Array, measurements: Sequence[Measurement], y: Array) -> tuple[Array, Array]:
-    """c_j L_j / sum over the modes, (runs, M), and ln of the sum; in logarithms, as likelihoods far from the truth are 0."""
+    """c_j L_j / sum over the modes, (runs, M), and ln of the sum; in logarithms, as likelihoods far from the truth are 0.
+
+    In memory the trajectories of a mode are neighbours, which all that follows inherits: sums over few modes are then fast.
+    """
     with np.errstate(divide="ignore"):  # a mode that is excluded stays so
-        logs = np.log(expected) + np.stack([log_density(one, y) for one in measurements], axis=-1)
-    peak = logs.max(axis=-1, keepdims=True)
+        logs = np.stack([np.log(expected[:, j]) + log_density(one, y) for j, one in enumerate(measurements)])
+    peak = logs.max(axis=0)
     weights = np.exp(logs - peak)
-    total = weights.sum(axis=-1, keepdims=True)
-    return weights / total, (peak + np.log(total))[..., 0]
+    total = weights.sum(axis=0)
+    return (weights / total).T, peak + np.log(total)
 
 
 def mixture(laws: Sequence[Gaussian], weights: Array, angles: Components = ()) -> Gaussian:
@@ -265,6 +311,8 @@ def mixture(laws: Sequence[Gaussian], weights: Array, angles: Components = ()) -
 
     Of components that are angles the mean is near the most probable law's.
     """
+    if all(law is laws[0] for law in laws):
+        return laws[0]
     columns = [weights[:, j, None] for j in range(len(laws))]
     means = [law.mean for law in laws]
     if angles:

@@ -70,13 +70,15 @@ def _weighted(
         some = slice(start, start + chunk)
         x = np.repeat(mean[some, None], len(nodes), axis=1)
         x[..., used] += nodes @ transpose(root[some])
-        found = weights[:, None] * model.transition_of(x, k)[..., i, :]
-        nu[some] = found.sum(axis=1)
-        total = nu[some, None]
-        share = np.divide(found, total, out=np.broadcast_to(weights[:, None], found.shape).copy(), where=total > 0)
-        first[some] = np.einsum("rlj,ls->rjs", share, nodes)
-        away = nodes[None, :, None] - first[some, None]
-        second[some] = np.einsum("rlj,rljs,rljt->rjst", share, away, away)
+        for j, column in enumerate(np.moveaxis(model.transition_of(x, k)[..., i, :], -1, 0)):
+            found = weights * column
+            nu[some, j] = total = found.sum(axis=1)
+            if not np.minimum.reduce(total, axis=None) > 0:  # where j cannot come the law stays as it is
+                found = np.where(total[:, None] > 0, found, weights)
+            share = found / found.sum(axis=1, keepdims=True)
+            first[some, j] = share @ nodes
+            away = nodes - first[some, j, None]
+            second[some, j] = transpose(share[..., None] * away) @ away
     second -= np.eye(len(used))
     laws = []
     for j in range(size):

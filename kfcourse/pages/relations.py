@@ -41,7 +41,6 @@ _BOX = re.compile(
 _DISPLAY = re.compile(r"^(?:\$\$|```\{math\})\n(.*?)\n(?:\$\$|```)(?: \(([\w-]+)\))?\s*$", re.DOTALL | re.MULTILINE)
 _INLINE = re.compile(r"(?<![\\$])\$([^$]+)\$(?!\$)")
 _OPERATOR = re.compile(r"(?:^|\s)([+/]|-|\\frac|\\sqrt|\^ (?:T|\d|\{ - 1 \}))(?=\s|$)")
-_SCRIPT = re.compile(r"[_^] (?:\{[^{}]*\}|[-+]|\S+)")
 
 
 class Formula(NamedTuple):

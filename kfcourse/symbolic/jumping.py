@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import reduce
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -145,7 +145,7 @@ class JumpModel:
         """For how many steps the modes' inputs have values and their noises variances."""
         return min(self.chain_of_step.known.steps, *(one.known.steps for one in self.modes))
 
-    @property
+    @cached_property
     def by_state(self) -> bool:
         """Whether the probabilities of transitions depend on the state."""
         return self.chain.has(*self.x)
@@ -165,11 +165,14 @@ class JumpModel:
             return np.broadcast_to(self.transition_at(k), (*x.shape[:-1], size, size))
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             found = np.broadcast_to(self.chain_of_step.at(k)(x)[0], (*x.shape[:-1], size, size))
-            good = ((found >= 0).all(axis=-1) & (np.abs(found.sum(axis=-1) - 1) <= SUM)).all(axis=-1)
-        if (wrong := ~good & np.isfinite(x).all(axis=-1)).any():
+            total = sum(np.moveaxis(found, -1, 0))[..., None]  # over few columns: many times as fast as a reduction
+            if np.minimum.reduce(found, axis=None) >= 0 and np.maximum.reduce(np.abs(total - 1), axis=None) <= SUM:
+                return found / total
+            wrong = ~((found >= 0).all(axis=(-2, -1)) & (np.abs(total - 1) <= SUM).all(axis=(-2, -1)))
+        if (wrong := wrong & np.isfinite(x).all(axis=-1)).any():
             problem, there = _not_probabilities(found[wrong][0]), ", ".join(f"{one:g}" for one in x[wrong][0])
             raise ModelError(f"`transition` at step {k}, where {', '.join(s.name for s in self.x)} = {there}: {problem}")
-        return found / found.sum(axis=-1, keepdims=True)
+        return found / total
 
     def transition_at(self, k: int) -> Array:
         """pi at step k, (J, J): from the mode of y_k to that of y_{k+1}; ModelError if it depends on the state."""

@@ -12,7 +12,6 @@ from kfcourse.filters.alphabeta import (
     growing_memory,
     steady_alpha,
     steady_beta,
-    steady_gamma,
     tracking_index,
 )
 from kfcourse.linear import covariances
@@ -32,7 +31,7 @@ ROUNDING = 1e-12  # relative, after some tens of steps of a stable recursion
 @pytest.mark.parametrize("order", [1, 2])
 def test_the_coefficients_are_the_stationary_kalman_gain(alpha, order):
     """python-control's solution of the Riccati equation."""
-    beta, gamma = steady_beta(alpha), steady_gamma(alpha)
+    beta, gamma = steady_beta(alpha), steady_beta(alpha) ** 2 / alpha
     index = tracking_index(alpha) if order == 1 else gamma / (2 * np.sqrt(1 - alpha))
     sigma = 30.0
     model = kinematic(T, dimensions=1, order=order, noise_sd=index * sigma / T**2, measurement_sd=sigma)
@@ -55,7 +54,7 @@ def test_alpha_and_index_are_inverse():
 
 @pytest.mark.parametrize("alpha", [0.0, 1.0, -0.1, np.nan])
 def test_coefficients_outside_their_range_are_refused(alpha):
-    for function in (steady_beta, steady_gamma, tracking_index):
+    for function in (steady_beta, tracking_index):
         with pytest.raises(ValueError, match="between 0 and 1"):
             function(alpha)
     with pytest.raises(ValueError, match="tracking index"):
@@ -155,7 +154,7 @@ def test_a_growing_memory_is_the_polynomial_through_all_measurements(order):
     model = kinematic(T, dimensions=1, order=order, measurement_sd=5.0)
     alpha = 1e-3
     beta = steady_beta(alpha)
-    one = alpha_beta(model, alpha, beta) if order == 1 else alpha_beta_gamma(model, alpha, beta, steady_gamma(alpha))
+    one = alpha_beta(model, alpha, beta) if order == 1 else alpha_beta_gamma(model, alpha, beta, beta**2 / alpha)
     y = simulate(model, 1, 30, seed=8).y
     found = run(one, y).mean[:, 0]
     for k in range(order, 30):

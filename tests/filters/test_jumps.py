@@ -1,6 +1,7 @@
 """Filters of models that jump: against all histories of modes, a plain grid, and the cases in which they are other filters."""
 
 import math
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -23,7 +24,7 @@ from kfcourse import (
 from kfcourse.filters import aof, duof, fos, mfos, pointmass
 from kfcourse.filters.exact.jumps import jump_pointmass
 from kfcourse.filters.jump_optimal import logic_dynamic_fos
-from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
+from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic, moving_alike
 from kfcourse.linear.system import linear_system
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 from kfcourse.symbolic.jumping import JumpModel
@@ -458,3 +459,50 @@ def test_of_angles_there_is_no_average():
     )
     with pytest.raises(ModelError, match="angles have no average"):
         averaged(model, [linearised(mode) for mode in model.modes])
+
+
+# --- what modes share is found once
+
+CARRIED = {"sound": {}, "deaf": {"parameters": {"f": 3.0}}, "thrown": {"state": "x - 0.4*sin(x) + 1 + 0.8*v"}}
+
+
+def bent(transition, first=(0.5, 0.3, 0.2)):
+    return JumpModel.define(
+        "x - 0.4*sin(x) + s*v", "x + f*w", {"s": 0.4, "f": 0.5}, modes=CARRIED, transition=transition, first=list(first)
+    )
+
+
+CHAINED = [[0.8, 0.15, 0.05], [0.3, 0.6, 0.1], [0.25, 0.25, 0.5]]
+
+
+@pytest.mark.parametrize("transition", [CHAINED, [0.5, 0.3, 0.2]], ids=["chain", "drawn anew"])
+@pytest.mark.parametrize("build", SEQUENTIAL)
+def test_modes_with_one_object_share_its_predictions_and_nothing_changes(build, transition):
+    model, count = bent(transition), []
+    structures = [gaussian(mode) for mode in model.modes]
+    assert moving_alike(structures) == [0, 0, 2]
+
+    def counted(one):
+        def predict(z, p):
+            count.append(one)
+            return one.predict(z, p)
+
+        return replace(one, predict=predict)
+
+    shared = build([counted(one) for one in structures], model, model.first)
+    alone = build([replace(one, formulas=None) for one in structures], model, model.first)  # without formulas nobody knows
+    y = simulate(model, 20, 8, seed=4).y
+    for found, expected in zip(follow(shared, y), follow(alone, y), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=ROUNDING, atol=ROUNDING)
+    drawn_anew = transition != CHAINED
+    each_step = {imm: 2 if drawn_anew else 3, logic_dynamic: 6, gpb2: 6}[build]  # two objects, of 3 modes or 9 pairs of them
+    assert len(count) == each_step * len(y)
+
+
+def test_objects_are_alike_only_with_the_same_numbers_inputs_and_approximation():
+    modes = bent(CHAINED).modes
+    assert moving_alike([gaussian(modes[0]), linearised(modes[0])]) == [0, 1]
+    assert moving_alike([gaussian(modes[0]), gaussian(modes[0].replace(s=0.5))]) == [0, 1]
+    assert moving_alike([unscented(modes[0]), unscented(modes[1])]) == [0, 1]
+    driven = [Model.define("x + u + v", "x + w", inputs={"u": values}) for values in ([0, 1], [0, 1], [1, 0])]
+    assert moving_alike([gaussian(one) for one in driven]) == [0, 0, 2]

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 from answers import test_no_wrong_kind_of_mistake_is_named, test_right_answers_pass, test_what_cannot_be_compared_is_explained  # noqa: F401
+from numpy import matrix_transpose as T
 
 from kfcourse.checks import exercise
 
@@ -12,10 +13,6 @@ from kfcourse.checks import exercise
 def OWN(variant="53"):
     """What the notebook calls measure and predict."""
     return exercise("b", variant).functions("gaussian")
-
-
-def T(matrix):
-    return np.swapaxes(matrix, -1, -2)
 
 
 def times(matrix, vector):
@@ -73,14 +70,19 @@ def b3_not_corrected(lam, Psi, y, measure, predict):
     return lam, Psi, *predict(lam, Psi)
 
 
-def b3_added(lam, Psi, y, measure, predict):
-    z, p, lam, Theta = b3()(lam, Psi, y, measure, predict)
-    return z, p, lam, Theta + p
+def b3_predicted_first(lam, Psi, y, measure, predict):
+    lam, Psi = predict(lam, Psi)
+    return *correct(lam, Psi, *measure(lam, Psi), y), lam, Psi
 
 
-def b3_nothing_predicted(lam, Psi, y, measure, predict):
-    z, p = correct(lam, Psi, *measure(lam, Psi), y)
-    return z, p, z, p
+def b3_then(change):
+    """A right step; `change` gets z, p, and lam, Psi of the next one."""
+
+    def answer(*arguments):
+        z, p, lam, Psi = b3()(*arguments)
+        return z, p, *change(z, p, lam, Psi)
+
+    return answer
 
 
 def b4(
@@ -112,6 +114,11 @@ def b4(
         return np.array(found)
 
     return answer
+
+
+def b4_predicted_first(y, mean, cov, measure, predict):
+    lam, Psi = predict(mean[None], cov[None])
+    return b4()(y, lam[0], Psi[0], measure, predict)
 
 
 def b4_first_not_used(y, mean, cov, measure, predict):
@@ -169,6 +176,16 @@ WRONG = [
     ("b1", "inverse", b1(lambda Psi, G, F: np.linalg.inv(gain(Psi, G, F)))),
     ("b1", "one-for-all", b1(lambda Psi, G, F: np.tile(gain(Psi, G, F).mean(axis=0), (len(Psi), 1, 1)))),
     ("b1", "gain-without-G", b1(lambda Psi, G, F: Psi @ np.linalg.inv(F))),
+    ("b2", "innovation-sign", b2(innovation=lambda y, h, lam, G: h - y)),
+    ("b2", "innovation-without-h", b2(innovation=lambda y, h, lam, G: y)),
+    ("b2", "covariance-kept", b2(cov=lambda Psi, K, G, F: Psi)),
+    ("b2", "covariance-added", b2(cov=lambda Psi, K, G, F: Psi + K @ G @ Psi)),
+    ("b2", "covariance-once", b2(cov=lambda Psi, K, G, F: Psi - K @ G)),
+    ("b2", "gain-not-divided", b2(gain=lambda Psi, G, F: Psi @ T(G))),
+    ("b2", "gain-by-standard-deviation", b2(gain=lambda Psi, G, F: Psi @ T(G) / np.sqrt(F))),
+    ("b2", "gain-without-G", b2(gain=lambda Psi, G, F: Psi / F)),
+    ("b2", "gain-without-Psi", b2(gain=lambda Psi, G, F: T(G) / F)),
+    ("b2", "gain-of-noise", b2(gain=lambda Psi, G, F: Psi @ T(G) / (F - G @ Psi @ T(G)))),
     ("b2", "innovation-of-state", b2(innovation=lambda y, h, lam, G: y - lam)),
     ("b2", "innovation-plus", b2(innovation=lambda y, h, lam, G: y + h)),
     ("b2", "prediction-not-added", b2(base=lambda lam, h: 0)),
@@ -191,8 +208,13 @@ WRONG = [
     ("b3", "superfluous", b3_corrected_twice),
     ("b3", "swapped", b3_pairs_swapped),
     ("b3", "unchanged covariance-kept beats-swapped predicted-from-prediction", b3_not_corrected),
-    ("b3", "covariances-added", b3_added),
-    ("b3", "mean-not-predicted covariance-not-predicted", b3_nothing_predicted),
+    ("b3", "covariances-added", b3_then(lambda z, p, lam, Psi: (lam, Psi + p))),
+    ("b3", "mean-not-predicted covariance-not-predicted", b3_then(lambda z, p, lam, Psi: (z, p))),
+    ("b3", "mean-not-predicted", b3_then(lambda z, p, lam, Psi: (z, Psi))),
+    ("b3", "covariance-not-predicted", b3_then(lambda z, p, lam, Psi: (lam, p))),
+    ("b3", "beats-swapped", b3_predicted_first),
+    ("b3", "predicted-from-prediction", b3(carried=lambda z, p, lam, Psi: (lam, Psi))),
+    ("b3", "variance-mixed", b3(carried=lambda z, p, lam, Psi: (z, Psi))),
     ("b3", "beats-swapped predicted-from-prediction unused", b3(carried=lambda z, p, lam, Psi: (lam, p))),
     ("b3", "covariances-added", b3(carried=lambda z, p, lam, Psi: (z, Psi + p))),
     ("b3", "innovation-sign", b3(correct=b2(innovation=lambda y, h, lam, G: h - y))),
@@ -202,6 +224,11 @@ WRONG = [
     ("b3", "unused", lambda lam, Psi, y, measure, predict: b3()(lam, Psi, y, *OWN())),
     ("b3", "unused", lambda lam, Psi, y, measure, predict: b3()(lam, Psi, y, measure, OWN()[1])),
     ("b3", "unused", lambda lam, Psi, y, measure, predict: b3()(lam, Psi, y, OWN()[0], predict)),
+    ("b4", "predicted-first", b4_predicted_first),
+    ("b4", "predictions-returned", b4(returned=lambda z, p, lam, y: lam)),
+    ("b4", "covariance-frozen", b4(carried=lambda z, p, lam, Psi, predict: (predict(z, p)[0], Psi))),
+    ("b4", "missing-as-zero", lambda y, *others: b4()(np.nan_to_num(y), *others)),
+    ("b4", "innovation-sign", b4(correct=b2(innovation=lambda y, h, lam, G: h - y))),
     ("b4", "unused", lambda *arguments: b4(own=OWN())(*arguments)),
     ("b4", "unused", lambda y, mean, cov, measure, predict: b4()(y, mean, cov, OWN()[0], predict)),
     ("b4", "sometimes", b4(covariance=lambda Psi, p: p)),

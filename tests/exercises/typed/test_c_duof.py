@@ -40,6 +40,14 @@ def c2_by_least_squares(target, regressor):
 
 
 fit = c2()
+without_offset = c2(offset=lambda t, r, A: t.mean(axis=0))
+
+
+def about_zero(a, b):
+    return a.T @ b / len(a)
+
+
+of_moments = c2(cross=about_zero, own=about_zero, residual=lambda t, r, A, C, R: cov(t, t) - A @ cov(t, r).T)
 
 
 def c3(
@@ -51,6 +59,7 @@ def c3(
     prediction=lambda alpha, F, g: alpha @ F.T + g,
     own=None,
     returned=lambda z, lam: (z, lam),
+    fit=fit,
 ):
     def answer(lam, x, y, x_next, a, b):
         if own is not None:
@@ -72,12 +81,6 @@ def c3_from_the_other_regressor(lam, x, y, x_next, a, b):
     return z, a(z) @ F.T + g
 
 
-def c3_estimate_carried(lam, x, y, x_next, a, b):
-    z, _ = c3()(lam, x, y, x_next, a, b)
-    F, g, _ = fit(x_next, z)
-    return z, z @ F.T + g
-
-
 def c4(
     omega=lambda y, b, lam: y - b(lam),
     use=lambda other, omega, H, e: other + omega @ H.T + e,
@@ -88,7 +91,8 @@ def c4(
     carried=lambda z, lam: z,
     first=lambda x, lam: x - lam,
     returned=lambda designed, used: used,
-    last=False,
+    kept=lambda estimate, other: estimate,
+    one_gain=False,
 ):
     def answer(x, y_design, y, mean, a, b):
         if own is not None:
@@ -97,11 +101,12 @@ def c4(
         lam, other = np.tile(start(mean), (x.shape[1], 1)), np.tile(start(mean), (y.shape[1], 1))
         designed, used = [], []
         for k in range(len(x)):
-            H, e, _ = fit(first(x[k], lam), y_design[k] - b(lam))
+            if k == 0 or not one_gain:
+                H, e, _ = fit(first(x[k], lam), y_design[k] - b(lam))
             z = lam + (y_design[k] - b(lam)) @ H.T + e
             estimate = use(other, omega(y[k], b, other), H, e)
             designed.append(z)
-            used.append(estimate)
+            used.append(kept(estimate, other))
             if k + 1 < len(x):
                 F, g, _ = fit(x[k + 1], a(carried(z, lam)))
                 lam, other = a(carried(z, lam)) @ F.T + g, ahead(a, carried(estimate, other), F, g)
@@ -118,19 +123,6 @@ def c4_not_predicted_by_fit(x, y_design, y, mean, a, b):
         z = lam + (y_design[k] - b(lam)) @ H.T + e
         found.append(other + (y[k] - b(other)) @ H.T + e)
         lam, other = a(z), a(found[-1])
-    return np.array(found)
-
-
-def c4_predicted_first(x, y_design, y, mean, a, b):
-    lam, other = np.tile(mean, (x.shape[1], 1)), np.tile(mean, (y.shape[1], 1))
-    found = []
-    for k in range(len(x)):
-        F, g, _ = fit(x[k], a(lam))
-        lam, other = a(lam) @ F.T + g, a(other) @ F.T + g
-        H, e, _ = fit(x[k] - lam, y_design[k] - b(lam))
-        lam = lam + (y_design[k] - b(lam)) @ H.T + e
-        other = other + (y[k] - b(other)) @ H.T + e
-        found.append(other)
     return np.array(found)
 
 
@@ -154,10 +146,17 @@ WRONG = [
     ("c1", "superfluous", lambda lam, z, y, a, b: (y - b(lam), a(z) - lam)),
     ("c1", "equations-swapped", lambda lam, z, y, a, b: (y - a(lam), b(z))),
     ("c2", "biased", c2(cross=lambda a, b: cov(a, b, len(a) - 1))),
-    ("c2", "sometimes", c2(own=lambda a, b: a.T @ b / len(a))),
-    ("c2", "factor negative-variance", c2(cross=lambda a, b: a.T @ b / len(a))),
+    ("c2", "sometimes", c2(own=about_zero)),
+    ("c2", "factor negative-variance", c2(cross=about_zero)),
+    ("c2", "means-not-subtracted", of_moments),
+    ("c2", "offset-forgotten", without_offset),
+    ("c2", "regularised", c2(own=lambda a, b: cov(a, b) + 1e-3 * np.eye(a.shape[1]))),
+    ("c2", "biased", c2(own=lambda a, b: cov(a, b, len(a) - 1))),
+    ("c2", "residual-is-variance", c2(residual=lambda t, r, A, C, R: cov(t, t))),
+    ("c2", "unbiased-residual", c2(residual=lambda t, r, A, C, R: (cov(t, t) - A @ C.T) * len(t) / (len(t) - 1))),
+    ("c2", "another-minimiser", c2_by_least_squares),
     ("c2", "offset-sign", c2(offset=lambda t, r, A: t.mean(axis=0) + A @ r.mean(axis=0))),
-    ("c2", "unused", c2(offset=lambda t, r, A: 0 * t.mean(axis=0))),
+    ("c2", "vanishing", c2(offset=lambda t, r, A: 0 * t.mean(axis=0))),
     ("c2", "target-mean-forgotten", c2(offset=lambda t, r, A: A @ r.mean(axis=0))),
     ("c2", "explained-added", c2(residual=lambda t, r, A, C, R: cov(t, t) + A @ C.T)),
     ("c2", "explained-only", c2(residual=lambda t, r, A, C, R: A @ C.T)),
@@ -173,6 +172,12 @@ WRONG = [
         "correction-subtracted",
         c3(omega=lambda y, b, lam: b(lam) - y, estimate=lambda lam, omega, H, e: lam - omega @ H.T + e),
     ),
+    ("c3", "state-for-error", c3(first=lambda x, lam: x)),
+    ("c3", "prediction-not-added", c3(estimate=lambda lam, omega, H, e: omega @ H.T + e)),
+    ("c3", "alpha-from-prediction", c3(alpha=lambda a, z, lam: a(lam))),
+    ("c3", "alpha-is-z", c3(alpha=lambda a, z, lam: z)),
+    ("c3", "means-not-subtracted", c3(fit=of_moments)),
+    ("c3", "offset-forgotten", c3(fit=without_offset)),
     ("c3", "unused", c3(omega=lambda y, b, lam: y - lam)),
     ("c3", "unused", c3(omega=lambda y, b, lam: y)),
     ("c3", "term", c3(estimate=lambda lam, omega, H, e: lam + omega @ H.T)),
@@ -181,15 +186,20 @@ WRONG = [
     ("c3", "term", c3(prediction=lambda alpha, F, g: alpha @ F.T)),
     ("c3", "unused", c3(prediction=lambda alpha, F, g: alpha)),
     ("c3", "prediction-of-error", c3(second=lambda x_next, lam, z, alpha: x_next - lam)),
-    ("c3", "superfluous", c3(second=lambda x_next, lam, z, alpha: x_next - alpha)),
+    ("c3", "limit", c3(second=lambda x_next, lam, z, alpha: x_next - alpha)),
     ("c3", "", c3(second=lambda x_next, lam, z, alpha: x_next - alpha, prediction=lambda s, F, g: s - s @ F.T - g)),
     ("c3", "swapped", c3(returned=lambda z, lam: (lam, z))),
     ("c3", "unused", lambda *arguments: c3(own=OWN())(*arguments)),
     ("c3", "unused", c3_from_the_other_regressor),
     ("c3", "unused", lambda lam, x, y, x_next, a, b: (c3()(lam, x, y, x_next, a, b)[0], a(c3()(lam, x, y, x_next, a, b)[0]))),
-    ("c4", "from-second-step", c4(omega=lambda y, b, lam: y - lam)),
+    ("c4", "part-of-ensemble", lambda x, y, *others: c4()(x[:, :5], y[:, :5], *others)),
+    ("c4", "one-gain", c4(one_gain=True)),
+    ("c4", "predictions-returned", c4(kept=lambda estimate, other: other)),
+    ("c4", "offset-not-used", c4(use=lambda other, omega, H, e: other + omega @ H.T)),
+    ("c4", "sign", c4(kept=lambda estimate, other: -estimate)),
+    ("c4", "limit", c4(omega=lambda y, b, lam: y - lam)),
     ("c4", "innovation-sign", c4(omega=lambda y, b, lam: b(lam) - y)),
-    ("c4", "from-second-step", c4(omega=lambda y, b, lam: y)),
+    ("c4", "limit", c4(omega=lambda y, b, lam: y)),
     ("c4", "prediction-not-added", c4(use=lambda other, omega, H, e: omega @ H.T + e)),
     ("c4", "prediction-not-fitted", c4(ahead=lambda a, z, F, g: a(z))),
     ("c4", "prediction-offset-not-used", c4(ahead=lambda a, z, F, g: a(z) @ F.T)),

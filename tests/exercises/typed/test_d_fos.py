@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 from answers import test_no_wrong_kind_of_mistake_is_named, test_right_answers_pass, test_what_cannot_be_compared_is_explained  # noqa: F401
+from numpy import matrix_transpose as T
 
 from kfcourse.checks import exercise
 
@@ -12,10 +13,6 @@ from kfcourse.checks import exercise
 def OWN(variant="53"):
     """What the notebook calls measure and predict."""
     return exercise("d", variant).functions("gaussian")
-
-
-def T(matrix):
-    return np.swapaxes(matrix, -1, -2)
 
 
 def cov(a, b, N=None):
@@ -63,6 +60,15 @@ def d2(
     return answer
 
 
+def without_offset(t, r):
+    return regression(t, r)[0], t.mean(axis=0), None
+
+
+def of_moments(t, r):
+    A = t.T @ r @ np.linalg.pinv(r.T @ r)
+    return A, t.mean(axis=0) - A @ r.mean(axis=0), None
+
+
 def d3(
     fitted=lambda lam, sigma, H, e: lam + sigma @ H.T + e,
     first=lambda x, lam, sigma: (x - lam, sigma),
@@ -72,18 +78,19 @@ def d3(
     law=lambda u, left, z, p, Psi: (u, left),
     own=None,
     returned=lambda z, raw, lam, Psi, u: (z, lam, Psi),
+    fit=regression,
 ):
     def answer(lam, Psi, x, y, x_next, measure, predict):
         if own is not None:
             measure, predict = own
         raw, p = correct(lam, Psi, y, measure)
         sigma = raw - lam
-        H, e, _ = regression(*first(x, lam, sigma))
+        H, e, _ = fit(*first(x, lam, sigma))
         z = fitted(lam, sigma, H, e)
         u, left = condition(x, of(z, raw))
         mean, cov = law(u, left, z, p, Psi)
         s, Psi_next = predict(mean, np.broadcast_to(cov, Psi.shape))
-        F, g, _ = regression(*second(x_next, s, u))
+        F, g, _ = fit(*second(x_next, s, u))
         return returned(z, raw, predicted(s, F, g), Psi_next, u)
 
     return answer
@@ -130,6 +137,13 @@ WRONG = [
     ("d1", "explained-added", d1(left=lambda x, z, Gamma, rest: cov(x, x) + Gamma @ cov(x, z).T)),
     ("d1", "deviation-for-variance", d1(left=lambda x, z, Gamma, rest: np.sqrt(np.abs(rest)))),
     ("d1", "regressed-the-other-way", lambda x, z: condition(z, x)),
+    ("d2", "predicted-as-aof", d2(law=lambda u, left, lam, Psi, z, p: (z, p))),
+    ("d2", "mean-from-estimate estimate-itself", d2(law=lambda u, left, lam, Psi, z, p: (z, left))),
+    ("d2", "variance-from-aof", d2(law=lambda u, left, lam, Psi, z, p: (u, p))),
+    ("d2", "regressed-the-other-way", d2(condition=lambda x, z: condition(z, x))),
+    ("d2", "residual-is-variance", d2(condition=d1(left=lambda x, z, Gamma, rest: cov(x, x)))),
+    ("d2", "deviation-for-variance", d2(condition=d1(left=lambda x, z, Gamma, rest: np.sqrt(rest)))),
+    ("d2", "offset-forgotten", d2(condition=d1(u=lambda x, z, Gamma, chi: z @ Gamma.T + x.mean(axis=0)))),
     ("d2", "unused", d2(what=lambda x, lam, z, y: (x, lam))),
     ("d2", "unused", d2(what=lambda x, lam, z, y: (x, y))),
     ("d2", "variance-from-prediction", d2(law=lambda u, left, lam, Psi, z, p: (u, Psi))),
@@ -145,15 +159,21 @@ WRONG = [
     ("d2", "covariances-added", d2(law=lambda u, left, lam, Psi, z, p: (u, p + left))),
     ("d2", "scale-forgotten", d2(condition=d1(u=lambda x, z, Gamma, chi: z + chi))),
     ("d2", "unchanged unused", d2(correct=lambda lam, Psi, y, measure: (lam, Psi))),
+    ("d3", "prediction-not-fitted", d3(predicted=lambda s, F, g: s)),
+    ("d3", "state-for-error", d3(first=lambda x, lam, sigma: (x, sigma))),
+    ("d3", "variance-from-aof", d3(law=lambda u, left, z, p, Psi: (u, p))),
+    ("d3", "offset-forgotten", d3(fit=without_offset)),
+    ("d3", "means-not-subtracted", d3(fit=of_moments)),
+    ("d3", "correction-not-fitted", d3(fitted=lambda lam, sigma, H, e: lam + sigma)),
     ("d3", "correction-not-fitted", d3(of=lambda z, raw: raw)),
     ("d3", "correction-not-fitted", d3(returned=lambda z, raw, lam, Psi, u: (raw, lam, Psi))),
     ("d3", "estimate-conditioned", d3(returned=lambda z, raw, lam, Psi, u: (u, lam, Psi))),
     ("d3", "term", d3(fitted=lambda lam, sigma, H, e: lam + sigma @ H.T)),
-    ("d3", "unused", d3(fitted=lambda lam, sigma, H, e: sigma @ H.T + e)),
+    ("d3", "term", d3(fitted=lambda lam, sigma, H, e: sigma @ H.T + e)),
     ("d3", "correction-not-fitted", d3(fitted=lambda lam, sigma, H, e: lam + sigma + e)),
     ("d3", "term", d3(predicted=lambda s, F, g: s @ F.T)),
-    ("d3", "superfluous", d3(predicted=lambda s, F, g: s + g)),
-    ("d3", "superfluous", d3(second=lambda x_next, s, u: (x_next - s, s))),
+    ("d3", "limit", d3(predicted=lambda s, F, g: s + g)),
+    ("d3", "limit", d3(second=lambda x_next, s, u: (x_next - s, s))),
     ("d3", "estimate-itself mean-from-estimate", d3(law=lambda u, left, z, p, Psi: (z, left))),
     ("d3", "predicted-as-aof", d3(law=lambda u, left, z, p, Psi: (z, p))),
     ("d3", "variance-from-prediction", d3(law=lambda u, left, z, p, Psi: (u, Psi))),

@@ -218,7 +218,7 @@ WRONG = [
         l5(order=lambda tags, arrivals: np.argsort(arrivals), moment=lambda tags, arrivals, i: arrivals[i]),
     ),
     ("l5", "arrival-for-tag", l5(moment=lambda tags, arrivals, i: arrivals[i], order=in_order_of_arrival)),
-    ("l5", "unused", l5_stops_at_the_first_not_arrived),
+    ("l5", "limit", l5_stops_at_the_first_not_arrived),
     ("l5", "time-runs-backwards", l5(order=in_order_of_arrival)),
     ("l5", "future-used", l5(use=lambda tags, arrivals, i, now: True)),
     ("l5", "future-used", l5(use=lambda tags, arrivals, i, now: tags[i] <= now)),

@@ -93,7 +93,7 @@ WRONG = [
     ("o2", "densities-added", o2(joint=lambda c, L: c + L)),
     ("o3", "spread-forgotten", o3(spread=0.0)),
     ("o3", "chain-forgotten", o3(chain=False)),
-    ("o3", "not-corrected", o3(correct=False)),
+    ("o3", "limit", o3(correct=False)),
     ("o3", "meter-noise-forgotten", o3(noise=0.0)),
     ("o3", "unused", o3(q_added=False)),
     ("o3", "", o3(a_squared=False)),
@@ -122,5 +122,6 @@ UNUSABLE = [
     ("o2", "got the shape", lambda c, y, h, F: o2()(c, y, h, F)[0]),
     ("o4", "result 2 of 2", o4(lambda mu, z, p: np.diagonal(deviations(mu, z, p)))),
     ("o5", "has no `=`", lambda: "the spread"),
+    ("o5", "known here: W, mu, p1, p2, z, z1, z2. Declare", lambda: "W = mu*d + (1 - mu)*p2"),  # nothing is random: no m, no d
     ("o5", "what z1 means is given", lambda: "z1 = 0\n" + o5("p2")()),
 ]
