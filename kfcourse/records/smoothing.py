@@ -80,9 +80,11 @@ def smoothing_error(one: Filter, y: Array, lag: int | None = None) -> Array:
     """How far the estimates of `smooth` may be from the true means given the record, (steps, runs), in the units of x.
 
     Of the exact filter the estimated error of its integrals; of particles the standard error, by the distance of two clouds that
-    know nothing of each other.  It is right to a tenth with a hundred particles whose proposal looks at the measurement.  With
-    `guided=False` both clouds miss far measurements alike, and what they share their distance does not show: there it is
-    a third too small.  Arguments as of `smooth`.
+    know nothing of each other.  It is right to a tenth where tens of particles count at every step (`state.memory.effective`), as
+    they do where the proposal looks at the measurement.  Where fewer do, as with `guided=False` at a far measurement, both clouds
+    miss the same states: there it is a third too small.  Of two clouds it has one degree of freedom: an interval of 95 % reaches
+    12.7 standard errors (Student), not 2.  Over 400 trajectories of each kind, 400 particles, such intervals held the exact
+    smoother's components in .95 of the cases, and in .91 where fewer than 20 particles counted.  Arguments as of `smooth`.
 
     Raises
     ------
