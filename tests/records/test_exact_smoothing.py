@@ -5,6 +5,7 @@ import pytest
 
 from kfcourse import Model, compare, gaussian, linearised, run, simulate, smooth
 from kfcourse.filters import aof, kalman_filter, particle, pointmass
+from kfcourse.filters.exact import pointmasses
 from kfcourse.filters.exact.kernels import Unresolved
 from kfcourse.lab.variants import find_variant
 from kfcourse.montecarlo.experiment import states
@@ -193,6 +194,18 @@ def test_what_has_no_lag_and_what_is_none_are_refused():
             smooth(one, np.ones(3), lag=-1)
     with pytest.raises(ValueError, match="does not know how good its laws are"):
         smoothing_error(aof(linearised(model)), np.ones(3))
+
+
+def test_predictions_are_made_again_only_where_there_is_no_room_for_them(monkeypatch):
+    model, made, predictions = Model.define("sin(x) + 0.3*v", "x + 0.1*w"), [], pointmasses.predictions
+    y = simulate(model, 5, 4, seed=1).y
+    monkeypatch.setattr(pointmasses, "predictions", lambda *given: made.append(1) or predictions(*given))
+    found = smooth(pointmass(model), y)
+    assert len(made) == 4  # the filter's own
+    again = smooth(pointmass(model, memory=1), y)
+    assert len(made) == 4 + 4 + 2 * 3
+    np.testing.assert_array_equal(again.mean, found.mean)
+    np.testing.assert_array_equal(again.cov, found.cov)
 
 
 # ---------------------------------------------------------------- particles
