@@ -14,7 +14,7 @@ gate, heavy_tails       measurements that are not believed: refused, by any filt
 learnt_noise            a noise of unknown size, learnt on the way
 alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
-                        (state_transitions: those that depend on the state;  jump_optimal: FOS with modes;
+                        (jump_equations: as printed;  state_transitions: by the state;  jump_optimal: FOS with modes;
                         exact.jumps: the exact filter of state and mode;  jump_particles: the same by sampling)
 initial_states          the exact filter of an object without noise, with modes of its meter or not
 notation                symbols in which the equations are printed

@@ -112,7 +112,6 @@ def test_where_nothing_knows_modes_it_is_said(tmp_path, own):
     for arguments in (
         ("exercises", "--sets", "a", "--jobs", 1, "--variant", "J1", "--out", tmp_path / "e"),
         ("estimate", tmp_path / "y.csv", "--model", own, "--variant", "mine"),
-        ("lab", "J1", "--report", "en", "--runs", 100, "--exact-runs", 0, "--out", tmp_path / "r"),
     ):
         result = kfcourse(*arguments)
         assert result.exit_code != 0 and "jumps between modes" in result.output, (arguments, result.output)
