@@ -8,7 +8,7 @@ import sympy as sp
 
 from kfcourse.filters import latex as equations_latex
 from kfcourse.filters.jump_equations import combination, correction, prediction
-from kfcourse.lab.handin_sections import Block, Report
+from kfcourse.lab.handin_sections import Block, StudentReport
 from kfcourse.lab.handin_text import filled, law, lines_of, matrix
 from kfcourse.lab.report import percent, printed, recognised_modes
 from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures, Structures
@@ -19,7 +19,7 @@ from kfcourse.symbolic.structure import FUNCTION_LATEX
 from kfcourse.symbolic.writing import number_latex
 
 
-class JumpReport(Report):
+class JumpReport(StudentReport):
     """The report of a model with modes."""
 
     entries = JUMP_FILTERS

@@ -10,7 +10,7 @@ from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.families import FAMILIES, family
-from kfcourse.lab.handin_sections import Block, Report
+from kfcourse.lab.handin_sections import Block, StudentReport
 from kfcourse.lab.handin_text import filled, law, lines_of, matrix
 from kfcourse.lab.report import printed
 from kfcourse.lab.short_names import Structures
@@ -36,7 +36,7 @@ CATALOGUE = {
 }
 
 
-class PlainReport(Report):
+class PlainReport(StudentReport):
     """The report of a model without modes."""
 
     def __init__(self, result: Comparison, words: dict[str, str]) -> None:

@@ -28,7 +28,7 @@ class Block:
     rows: list[list[str]] = field(default_factory=list)
 
 
-class Report:
+class StudentReport:
     """The blocks of the report, section by section; a subclass has the task, the functions and the filters."""
 
     entries: Mapping[str, Entry | JumpEntry] = FILTERS  # where filters have their names from

@@ -16,7 +16,7 @@ from kfcourse.lab import Variant, handin, report
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.handin import FIGURES, LANGUAGES, write_handin
 from kfcourse.lab.handin_plain import CATALOGUE
-from kfcourse.lab.handin_sections import Report
+from kfcourse.lab.handin_sections import StudentReport
 from kfcourse.lab.handin_text import filled, inline_tex
 from kfcourse.lab.refusals import cause
 from kfcourse.lab.report import ranges
@@ -127,7 +127,7 @@ def sentences(leaders, last, language):
     verdicts = [
         Verdict(best, others, "" if last(k) in (best, *others) else last(k)) for k in range(51) for best, *others in [leaders(k)]
     ]
-    return list(Report(Told(), WORDS[language]).sentences(verdicts))
+    return list(StudentReport(Told(), WORDS[language]).sentences(verdicts))
 
 
 @pytest.mark.quick
