@@ -100,6 +100,7 @@ SAID = {
     r"x_k=f(x_{k-1},\,y_{\mathrm{NR},k-1}-\varepsilon_{k-1})+g\,\xi_{k-1}": DEFINITION,
     r"\varepsilon_k=\varepsilon_{k-1}+\zeta_{k-1}": DEFINITION,
     "p": NOTATION,
+    r"S(\lambda)-S(\lambda+\delta)": NOTATION,
 }
 EQUALS = {
     r"{\lim_{\sigma_\xi\to0}p/\sigma_\xi}": r"\sigma_n",

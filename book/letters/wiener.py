@@ -2,6 +2,7 @@
 
 import numpy as np
 from control import dare
+from scipy.linalg import solve_continuous_are
 from scipy.stats import norm
 
 from kfcourse.filters.kalman import correct
@@ -46,12 +47,32 @@ def correlator(rng):
     return {"n": n, "s": Indexed(s), "y": Indexed(y), "C": Indexed(C), "i": range(n + 1), "k": range(n, 9), r"\hat b": Indexed(b)}
 
 
+def bucy(rng):
+    """The stationary continuous filter of an axis, its gain by SciPy, as a function of the frequency."""
+    Omega, nu, p = rng.uniform(1, 2), rng.uniform(1, 2), rng.uniform(1, 2)
+    A, H = np.array([[0.0, 1], [0, 0]]), np.array([[1.0, 0]])
+    K = solve_continuous_are(A.T, H.T, np.diag([0, nu * Omega**4]), np.array([[nu]])) @ H.T / nu
+    C = [np.linalg.det(sign * p * np.eye(2) - A + K @ H) for sign in (1, -1)]
+    return {
+        "p": p, "A": A, "H": H, "K": K, "I": np.eye(2), r"\Omega": Omega, r"\nu": nu, "C(p)": C[0], "C(-p)": C[1],
+        "W(p)": 1 - p**2 / C[0],
+    }  # fmt: skip
+
+
+def shrinking(rng):
+    """The gains of the alpha-beta filter at an interval of 1e-10, where they are those of the limit."""
+    T, Omega = 1e-10, rng.uniform(1, 2)
+    index = (Omega * T) ** 2
+    missing = (np.sqrt(index**2 + 8 * index) - index) / 4  # 1 - sqrt(1 - alpha), without its cancellation
+    return {r"\lim_{T\to0}": 1.0, "T": T, r"\Omega": Omega, r"\alpha": missing * (2 - missing), r"\beta": 2 * missing**2}
+
+
 def weights(rng):
     g, s = rng.normal(size=(2, 4))
     return {"g": Indexed(g), "s": Indexed(s), "k": range(4), "i": range(4), "j": range(4)}
 
 
-LETTERS = (signal, amplitude, correlator, weights)
+LETTERS = (signal, amplitude, correlator, weights, bucy, shrinking)
 SAID = {
     r"\zeta=e^{i\theta}": DEFINITION,
     r"W(\zeta)=\frac{1-a\zeta^{-1}}{\rho\,(1-\gamma\zeta^{-1})}\left[\frac{Q}{(1-a\zeta^{-1})(1-\gamma\zeta)}\right]_+": quoted(
@@ -62,10 +83,16 @@ SAID = {
     r"|\gamma|<1": "a condition",
     r"\bigl[\,\cdot\,\bigr]": NOTATION,
     r"W(\zeta)": NOTATION,
+    "W(p)": NOTATION,
+    "C(p)": NOTATION,
+    "C(-p)": NOTATION,
     "|D|^2": NOTATION,
     "|C|^2": NOTATION,
 }
 EQUALS = {
+    r"H(pI-A+KH)^{-1}K": "W(p)",
+    r"\lim_{T\to0}\frac{\alpha}{T}": r"\sqrt2\Omega",
+    r"\lim_{T\to0}\frac{\beta}{T^2}": r"\Omega^2",
     r"C_k/\sum s_i^2": r"\hat b_k",
     r"\textstyle\sum g_k^2\sum s_k^2-(\sum g_ks_k)^2": r"\frac12\sum_i\sum_j(g_is_j-g_js_i)^2",
     r"\ln\frac{\mathcal L(b)}{\mathcal L(0)}": r"(bC-b^2E/2)/R",

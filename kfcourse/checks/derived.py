@@ -112,7 +112,7 @@ class Derivation(Question):
         posed = self.posed(exercise)
         report, chain = _read(posed, text)
         slip = next((one for one in report.verdicts if one.status in (DIFFERS, UNREADABLE, UNDECIDED)), None)
-        right, steps = _counted(report)
+        right, steps = _counted(report, posed.name)
         tree = _last(chain)
         if not right and slip is not None and slip.status != DIFFERS:
             raise Unusable(f"{_place(slip)}: {_words(slip)}")
@@ -122,7 +122,8 @@ class Derivation(Question):
         if slip is not None:
             return Judged(WRONG, _says(report, slip, right, steps), slip.kinds or (slip.status,), share)
         if open_end:
-            return Judged(WRONG, f"right so far, {steps} of {steps} steps. {open_end}", ("open-end",), share)
+            so_far = f"right so far, {steps} of {steps} steps. " if steps else "nothing is derived yet. "
+            return Judged(WRONG, so_far + open_end, ("open-end",), share)
         if tree is None or not _is(posed, tree):
             says = f"each line follows from the one above it, but the end is not {posed.name}: a name was given another meaning."
             return Judged(WRONG, says, ("other-meaning",), 0.0)
@@ -169,14 +170,14 @@ def _last(chain: Derived) -> Node | None:
     return _tree(chain.verdicts[-1].text) if chain.verdicts else None
 
 
-def _counted(report: Report) -> tuple[int, int]:
-    """Right steps, and all; a line that repeats the one above it is no step."""
+def _counted(report: Report, name: str) -> tuple[int, int]:
+    """Right steps, and all; a line that repeats the one above it is no step, nor is one that still has the name in it."""
     right = steps = 0
     for chain in report.chains:
         above = ""
         for one in chain.verdicts:
             same, above = one.text == above, one.text
-            if one.status == BEGINS or same:
+            if one.status == BEGINS or same or ((tree := _tree(one.text)) is not None and name in letters(tree)):
                 continue
             steps += 1
             right += one.status in (RIGHT, FOLLOWS, AGAIN)

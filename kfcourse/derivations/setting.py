@@ -97,10 +97,13 @@ class Setting:
 
     def problem(self, name: str) -> str | None:
         """What is wrong with a letter; None if it may be used."""
-        known = self.known
-        if known is None or name in known or name in self.meanings or name in self.law.letters:
+        if self.known is None:
             return None
-        names = ", ".join(sorted({*known, *self.meanings, *self.law.letters}))
+        of_law = self.law.letters if self.known.intersection(self.law.random) else ()  # nothing is random: there is no law either
+        known = {*self.known, *self.meanings, *of_law}
+        if name in known:
+            return None
+        names = ", ".join(sorted(known))
         return f"unknown letter {name!r}; known here: {names}. Declare another one in a line of its own: letters {name}"
 
     def at(self, mean_name: str, cov_name: str) -> Setting:

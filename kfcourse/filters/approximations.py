@@ -13,8 +13,6 @@ Stratonovich (1960); Jazwinski (1970); Julier and Uhlmann (2004); all of them as
 
 from __future__ import annotations
 
-import sympy as sp
-
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.laws import Array, correct
@@ -23,10 +21,10 @@ from kfcourse.symbolic.structure import Structure
 EQUATIONS = (
     *s.MEASURE,
     s.GAIN,
-    sp.Eq(s.z, s.lam + s.K * (s.y - s.h)),
-    sp.Eq(s.P, s.Psi - s.K * s.G * s.Psi),
-    sp.Eq(s.lam_next, s.tau_zp),
-    sp.Eq(s.Psi_next, s.Theta_zp),
+    s.equation(s.z, s.lam + s.K * (s.y - s.h)),
+    s.equation(s.P, s.Psi - s.K * s.G * s.Psi),
+    s.equation(s.lam_next, s.tau_zp),
+    s.equation(s.Psi_next, s.Theta_zp),
 )
 
 

@@ -7,7 +7,6 @@ mean square error at each step over the ensemble: two affine regressions.  Pugac
 from __future__ import annotations
 
 import numpy as np
-import sympy as sp
 
 from kfcourse.angles import difference
 from kfcourse.filters import notation as s
@@ -22,13 +21,13 @@ _alpha = s.matrix(r"\alpha_{k}", s.n, s.ONE)
 _F, _g = s.matrix(r"F_{k}", s.n, s.n), s.matrix(r"g_{k}", s.n, s.ONE)
 
 EQUATIONS = (
-    sp.Eq(_omega, s.y - s.b_value),
-    sp.Eq(_eps, s.x - s.lam),
+    s.equation(_omega, s.y - s.b_value),
+    s.equation(_eps, s.x - s.lam),
     *s.regression(s.H, s.e, _eps, _omega),
-    sp.Eq(s.z, s.lam + s.H * _omega + s.e),
-    sp.Eq(_alpha, s.a_value),
+    s.equation(s.z, s.lam + s.H * _omega + s.e),
+    s.equation(_alpha, s.a_value),
     *s.regression(_F, _g, s.x_next, _alpha),
-    sp.Eq(s.lam_next, _F * _alpha + _g),
+    s.equation(s.lam_next, _F * _alpha + _g),
 )
 
 

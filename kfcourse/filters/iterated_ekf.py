@@ -17,7 +17,6 @@ posterior linearisation filter (Garcia-Fernandez, Svensson, Morelande, Sarkka, 2
 from __future__ import annotations
 
 import numpy as np
-import sympy as sp
 
 from kfcourse.angles import Components, difference
 from kfcourse.filters import notation as s
@@ -36,13 +35,13 @@ _at = r"(z^{(i)}, p^{(i)})"
 
 # One round of the correction; it starts from z^(0) = lambda, p^(0) = Psi.
 EQUATIONS = (
-    sp.Eq(_h_i, s.matrix(f"h{_at}", s.p, s.ONE)),
-    sp.Eq(_G_i, s.matrix(f"G{_at}", s.p, s.n)),
-    sp.Eq(_R_i, s.matrix(f"F{_at}", s.p, s.p) - _G_i * _P_i * _G_i.T),
-    sp.Eq(_F_i, _G_i * s.Psi * _G_i.T + _R_i),
-    sp.Eq(_K_i, s.Psi * _G_i.T * _F_i.I),
-    sp.Eq(_z_next, s.lam + _K_i * (s.y - _h_i - _G_i * (s.lam - _z_i))),
-    sp.Eq(_P_next, s.Psi - _K_i * _G_i * s.Psi),
+    s.equation(_h_i, s.matrix(f"h{_at}", s.p, s.ONE)),
+    s.equation(_G_i, s.matrix(f"G{_at}", s.p, s.n)),
+    s.equation(_R_i, s.matrix(f"F{_at}", s.p, s.p) - _G_i * _P_i * _G_i.T),
+    s.equation(_F_i, _G_i * s.Psi * _G_i.T + _R_i),
+    s.equation(_K_i, s.Psi * _G_i.T * _F_i.I),
+    s.equation(_z_next, s.lam + _K_i * (s.y - _h_i - _G_i * (s.lam - _z_i))),
+    s.equation(_P_next, s.Psi - _K_i * _G_i * s.Psi),
 )
 
 

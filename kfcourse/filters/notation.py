@@ -19,6 +19,11 @@ def matrix(latex: str, rows: sp.Expr, columns: sp.Expr) -> sp.MatrixSymbol:
     return sp.MatrixSymbol(latex if "{" in latex else "{" + latex + "}", rows, columns)
 
 
+def equation(left: sp.MatrixExpr, right: sp.MatrixExpr) -> sp.Eq:
+    """left = right as it is written: SymPy would first look whether their difference is zero, for a third of a start's time."""
+    return sp.Eq(left, right, evaluate=False)
+
+
 ONE = sp.Integer(1)
 y = matrix(r"y_{k}", p, ONE)
 x = matrix(r"x_{k}", n, ONE)
@@ -49,8 +54,8 @@ chi = matrix(r"\chi_{k}", n, ONE)
 H = matrix(r"H_{k}", n, p)
 e = matrix(r"e_{k}", n, ONE)
 
-MEASURE = (sp.Eq(h, h_value), sp.Eq(G, G_value), sp.Eq(F, F_value))
-GAIN = sp.Eq(K, Psi * G.T * F.I)
+MEASURE = (equation(h, h_value), equation(G, G_value), equation(F, F_value))
+GAIN = equation(K, Psi * G.T * F.I)
 
 
 def mean(of: sp.MatrixSymbol) -> sp.MatrixSymbol:
@@ -75,8 +80,8 @@ def regression(
 ) -> tuple[sp.Eq, sp.Eq]:
     """The two equations of an affine regression of target on regressor."""
     return (
-        sp.Eq(coefficient, cov(target, regressor) * cov_pinv(regressor)),
-        sp.Eq(offset, mean(target) - coefficient * mean(regressor)),
+        equation(coefficient, cov(target, regressor) * cov_pinv(regressor)),
+        equation(offset, mean(target) - coefficient * mean(regressor)),
     )
 
 

@@ -199,20 +199,24 @@ def printed(recipe: Recipe, zeta: sp.MatrixSymbol = s.z, *, consists_of: sp.Matr
     Gamma = s.matrix(s.Gamma.name, s.n, zeta.rows)
     equations = [*s.MEASURE]
     if recipe.correction:
-        equations += [sp.Eq(_sigma, s.Psi * s.G.T * s.F.I * (s.y - s.h)), sp.Eq(_eps, s.x - s.lam)]
-        equations += [*s.regression(_H, s.e, _eps, _sigma), sp.Eq(s.z, s.lam + _H * _sigma + s.e)]
+        equations += [s.equation(_sigma, s.Psi * s.G.T * s.F.I * (s.y - s.h)), s.equation(_eps, s.x - s.lam)]
+        equations += [*s.regression(_H, s.e, _eps, _sigma), s.equation(s.z, s.lam + _H * _sigma + s.e)]
     else:
-        equations += [s.GAIN, sp.Eq(s.z, s.lam + s.K * (s.y - s.h))]
+        equations += [s.GAIN, s.equation(s.z, s.lam + s.K * (s.y - s.h))]
     if consists_of is not None:
-        equations.append(sp.Eq(zeta, consists_of))
+        equations.append(s.equation(zeta, consists_of))
     equations += s.regression(Gamma, s.chi, s.x, zeta)
-    equations += [sp.Eq(s.T, s.cov(s.x) - Gamma * s.cov(s.x, zeta).T), sp.Eq(s.u, Gamma * zeta + s.chi)]
+    equations += [s.equation(s.T, s.cov(s.x) - Gamma * s.cov(s.x, zeta).T), s.equation(s.u, Gamma * zeta + s.chi)]
     if recipe.mean:
-        equations += [sp.Eq(_s_next, s.tau_uT), *s.regression(_L, _n, s.x_next, _s_next), sp.Eq(s.lam_next, _L * _s_next + _n)]
+        equations += [
+            s.equation(_s_next, s.tau_uT),
+            *s.regression(_L, _n, s.x_next, _s_next),
+            s.equation(s.lam_next, _L * _s_next + _n),
+        ]
     else:
-        equations.append(sp.Eq(s.lam_next, s.tau_uT))
+        equations.append(s.equation(s.lam_next, s.tau_uT))
     residual = s.cov(s.x_next) - _L * s.cov(s.x_next, _s_next).T
-    return (*equations, sp.Eq(s.Psi_next, residual if recipe.spread else s.Theta_uT))
+    return (*equations, s.equation(s.Psi_next, residual if recipe.spread else s.Theta_uT))
 
 
 EQUATIONS = {name: printed(one) for name, one in (("fos", FOS), ("mfos", MFOS), ("dfmp", DFMP), ("mdfmp", MDFMP))}

@@ -49,15 +49,39 @@ def flight_and_errors(track: Track, estimates: Mapping[str, Array], shown: str) 
     return fig
 
 
+def space_and_plan(track: Track, y: Array, estimates: Mapping[str, Array]) -> Figure:
+    """Truth, measurements (steps, runs, 3) and estimates of one run along the whole flight, in space and in plan."""
+    fig = plt.figure(figsize=(WIDTH, 3.9))
+    grid = fig.add_gridspec(1, 2, width_ratios=[1.15, 1])
+    space: Any = fig.add_subplot(grid[0], projection="3d")
+    plan = fig.add_subplot(grid[1])
+    space.set_box_aspect(None, zoom=1.2)
+    for ax, axes in ((space, 3), (plan, 2)):
+        ax.plot(*(y[:, 0, :axes] / 1000).T, ".", color=COLOURS["measurement"], markersize=1.5, label="measurements")
+        ax.plot(*(track.position[:, :axes] / 1000).T, color=COLOURS["estimate"], linewidth=1.2, label="true path")
+        for name, positions in estimates.items():
+            ax.plot(*(positions[:, 0, :axes] / 1000).T, linewidth=1.2, label=name, **LOOKS[name])
+    space.set(xlabel="east, km", ylabel="north, km", zlim=(0, 10), title="in space, altitude in km")
+    plan.set(xlabel="east, km", ylabel="north, km", title="in plan")
+    plan.set_aspect("equal", adjustable="datalim")
+    for part in range(1, 6):
+        middle = np.median(np.flatnonzero(track.part == part)).astype(int)
+        east, north, _ = track.position[middle] / 1000
+        plan.annotate(str(part), (east, north), xytext=(6, 6), textcoords="offset points")
+    fig.legend(*plan.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return fig
+
+
 def in_plan(track: Track, y: Array, estimates: Mapping[str, Array]) -> Figure:
-    """Truth, measurements (steps, runs, 3) and estimates of one run, in plan, on pieces of parts 1, 2 and 4."""
-    second, fourth = (track.time[track.part == part][0] for part in (2, 4))
+    """Truth, measurements (steps, runs, 3) and estimates of one run, in plan, on pieces of parts 1 to 4."""
+    second, third, fourth = (track.time[track.part == part][0] for part in (2, 3, 4))
     pieces = {
         "part 1": (60.0, 75.0),
         "part 2": (second + 40, second + 100),
+        "part 3": (third + 15, third + 45),
         "part 4": (fourth + 80, fourth + 140),
     }
-    fig, axes = plt.subplots(1, len(pieces), figsize=(WIDTH, 2.9))
+    fig, axes = plt.subplots(1, len(pieces), figsize=(WIDTH, 2.9), width_ratios=[1.2, 1, 0.7, 1.2])
     for ax, (title, (start, end)) in zip(axes, pieces.items(), strict=True):
         inside = (track.time >= start) & (track.time <= end)
         ax.plot(*(y[inside, 0, :2] / 1000).T, ".", color=COLOURS["measurement"], markersize=3)
@@ -66,6 +90,7 @@ def in_plan(track: Track, y: Array, estimates: Mapping[str, Array]) -> Figure:
             ax.plot(*(positions[inside, 0, :2] / 1000).T, linewidth=1.3, label=name, **LOOKS[name])
         ax.set(title=title, xlabel="east, km")
         ax.set_aspect("equal", adjustable="datalim")
+        ax.locator_params(axis="x", nbins=3)
     axes[0].set_ylabel("north, km")
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(estimates))
     return fig

@@ -84,6 +84,9 @@ def test_a_step_can_be_split_up_at_will_and_earns_no_more():
     assert told(BEGIN, *padding, "g^2*d").share == 0.8
     assert told(BEGIN, *padding).share == 0.4
     assert told(BEGIN, *["M[(y - h)^2]"] * 9, "g^2*d").share == 0.5
+    nothing = told("F = F", "F + 0", "2*F/2")
+    assert (nothing.diagnosis, nothing.share) == (("open-end",), 0.0)
+    assert nothing.message.startswith("nothing is derived yet. The last line still has F in it")
 
 
 @pytest.mark.parametrize(
@@ -91,7 +94,7 @@ def test_a_step_can_be_split_up_at_will_and_earns_no_more():
     [
         ("open-end", "a mean is still to be taken", [BEGIN, "M[y^2] - h^2"]),
         ("open-end", "still has h in it", [BEGIN, "M[y^2] - h^2", "g^2*(m^2 + d) + f^2*(m^4 + 6*m^2*d + 3*d^2) - h^2"]),
-        ("open-end", "still has F in it", ["F = F", "F + 0"]),
+        ("open-end", "still has F in it", [BEGIN, "F"]),
         ("steps-missing", "begin with a mean", [f"F = {END}", f"{END} + 0", f"0 + {END}"]),
         ("steps-missing", "3 different lines", [BEGIN, END, END]),
         ("unreadable", "cannot be read at column", [BEGIN, "g^2*d + f^2*M[x^4]", "g^2*d + 3*f^2*d^2*"]),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib import pyplot as plt
 
-from kfcourse.pages.flights import by_part, flight_and_errors, in_plan
+from kfcourse.pages.flights import by_part, flight_and_errors, in_plan, space_and_plan
 from kfcourse.scenarios.errors import rms_by_part
 from kfcourse.scenarios.flight import aircraft
 
@@ -26,11 +26,25 @@ def test_errors_over_time(track):
     plt.close(fig)
 
 
+def test_the_whole_flight_in_space_and_in_plan(track):
+    y = track.position[:, None] + 5.0
+    fig = space_and_plan(track, y, {"Kalman": y + 1000.0, "extended": y})
+    space, plan = fig.axes
+    for axes, found in ((3, [np.transpose(line.get_data_3d()) for line in space.get_lines()]),
+                        (2, [line.get_xydata() for line in plan.get_lines()])):  # fmt: skip
+        for drawn, shift in zip(found, (5, 0, 1005, 5), strict=True):  # measurements, truth, filters
+            np.testing.assert_allclose(drawn, (track.position[:, :axes] + shift) / 1000)
+    for number in plan.texts:  # each stands at its own part
+        on_part = track.position[track.part == int(number.get_text()), :2] / 1000
+        assert np.abs(on_part - number.xy).sum(axis=1).min() < 1e-12
+    plt.close(fig)
+
+
 def test_pieces_in_plan_are_of_their_parts(track):
     y = track.position[:, None]
     fig = in_plan(track, y, {"Kalman": y + np.array([1000.0, 0, 0])})
-    assert [ax.get_title(loc="left") or ax.get_title() for ax in fig.axes] == ["part 1", "part 2", "part 4"]
-    for ax, part in zip(fig.axes, (1, 2, 4), strict=True):
+    assert [ax.get_title(loc="left") or ax.get_title() for ax in fig.axes] == ["part 1", "part 2", "part 3", "part 4"]
+    for ax, part in zip(fig.axes, (1, 2, 3, 4), strict=True):
         path, estimate = ax.get_lines()[1].get_xydata(), curves(ax)["Kalman"].get_xydata()
         np.testing.assert_allclose(estimate - path, np.tile([1.0, 0], (len(path), 1)), atol=1e-12)  # km
         on_part = track.position[track.part == part, :2] / 1000

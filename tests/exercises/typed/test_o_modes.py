@@ -122,5 +122,6 @@ UNUSABLE = [
     ("o2", "got the shape", lambda c, y, h, F: o2()(c, y, h, F)[0]),
     ("o4", "result 2 of 2", o4(lambda mu, z, p: np.diagonal(deviations(mu, z, p)))),
     ("o5", "has no `=`", lambda: "the spread"),
+    ("o5", "known here: W, mu, p1, p2, z, z1, z2. Declare", lambda: "W = mu*d + (1 - mu)*p2"),  # nothing is random: no m, no d
     ("o5", "what z1 means is given", lambda: "z1 = 0\n" + o5("p2")()),
 ]
