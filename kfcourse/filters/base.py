@@ -94,6 +94,8 @@ class Filter:
         Where it is another than the normal law's by `structure`: what the whole record tells of each state.
     printed : (Advance, tuple of Eq), optional
         A step and the equations that it computes, no more: of them `fuse` makes a compiled one, as long as it is this filter's.
+    quick : (Advance, callable), optional
+        A step, and what makes the same one compiled, for `fuse`, as long as it is this filter's.
     """
 
     name: str
@@ -106,6 +108,7 @@ class Filter:
     evidence: Evidence | None = None
     look_back: LookBack | None = None
     printed: tuple[Advance, tuple[sp.Eq, ...]] | None = None
+    quick: tuple[Advance, Callable[[], Advance]] | None = None
 
     def __post_init__(self) -> None:
         if self.model.angles.x:
