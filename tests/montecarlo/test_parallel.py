@@ -14,23 +14,13 @@ import numpy as np
 import psutil
 import pytest
 
-from kfcourse import Model, compare, gaussian, linearised
+from kfcourse import Model, compare, linearised
 from kfcourse.filters import aof, particle, pointmass
 from kfcourse.montecarlo import parallel, subset
 from kfcourse.symbolic.reading import ModelError
 
 STEPS = 3
 linux = pytest.mark.skipif(sys.platform != "linux", reason="forks, and limits of memory, are Linux's")
-
-
-@pytest.fixture(scope="module")
-def model():
-    return Model.define("c*x + e*x*v", "g*x + f*x**2*w", {"c": 0.9, "e": 0.05, "g": 1, "f": 0.02})
-
-
-@pytest.fixture(scope="module")
-def control(model):
-    return aof(gaussian(model))
 
 
 @pytest.fixture

@@ -10,23 +10,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kfcourse import Model, compare, gaussian, linearised
+from kfcourse import Model, compare, linearised
 from kfcourse.filters import aof, pointmass
 from kfcourse.lab.short_names import exact
 from kfcourse.montecarlo import subset
 from kfcourse.symbolic.reading import ModelError
 
 STEPS = 3
-
-
-@pytest.fixture(scope="module")
-def model():
-    return Model.define("c*x + e*x*v", "g*x + f*x**2*w", {"c": 0.9, "e": 0.05, "g": 1, "f": 0.02})
-
-
-@pytest.fixture(scope="module")
-def control(model):
-    return aof(gaussian(model))
 
 
 def slow(one, name, seconds=0.0, error=None, at=0):

@@ -2,8 +2,11 @@
 
 import pytest
 import sympy as sp
-from answers import (
+from answers import (  # noqa: F401
     BY_VALUE,
+    test_no_wrong_kind_of_mistake_is_named,
+    test_right_answers_pass,
+    test_what_cannot_be_compared_is_explained,
 )
 
 z, p, m, d, x, v = sp.symbols("z p m d x v", real=True)
@@ -129,7 +132,7 @@ WRONG = [
     ("a1", "superfluous", lambda z: (c * z, e * z)),
     ("a1", "superfluous", lambda z: (c + e, e * z)),
     ("a1", "superfluous", lambda z: (c + e * v, e * z)),
-    ("a1", "unused", lambda z: (c, 0)),
+    ("a1", "vanishing", lambda z: (c, 0)),
     ("a1", "unused", lambda z: (c, e * x)),
     ("a1", "unused", lambda z: (1, e * z)),
     ("a1", "swapped", lambda z: (e * z, c)),
@@ -161,7 +164,7 @@ WRONG = [
     ("a2", "variance-root", a2(Theta=c**2 * sp.sqrt(p) + e**2 * z**2)),
     ("a2", "sign", a2(tau=-c * z)),
     ("a3", "noise-forgotten", a3(F=g**2 * d)),
-    ("a3", "noise-power", lambda m, d: (m, 1, d + 0.02 * m**2)),
+    ("a3", "noise-power powers", lambda m, d: (m, 1, d + 0.02 * m**2)),
     ("a3", "slope-power", a3(F=g * d + f**2 * m**4)),
     ("a3", "state-forgotten", a3(F=f**2 * m**4)),
     ("a3", "variance-squared", a3(F=g**2 * d**2 + f**2 * m**4)),
@@ -180,8 +183,8 @@ WRONG = [
     ("a3", "noise-times-variance", a3(F=g**2 * d + f**2 * m**4 * d)),
     ("a3", "root", a3(F=sp.sqrt(g**2 * d + f**2 * m**4))),
     ("a3", "function-for-derivative", a3(F=g * d * g * m**2 + f**2 * m**4)),
-    ("a4", "noise-not-averaged", a4(noise=e**2 * z**2)),
-    ("a4", "linearised", lambda z, p: (0.9 * z, 0.81 * p + 0.0025 * z**2)),
+    ("a4", "noise-not-averaged linearised", a4(noise=e**2 * z**2)),
+    ("a4", "linearised noise-not-averaged", lambda z, p: (0.9 * z, 0.81 * p + 0.0025 * z**2)),
     ("a4", "noise-forgotten", a4(noise=0)),
     ("a4", "second-moment", lambda z, p: (c * z, (c**2 + e**2) * (z**2 + p))),
     ("a4", "variance-squared", a4(state=c**2 * p**2, noise=e**2 * (z**2 + p**2))),
@@ -202,7 +205,7 @@ WRONG = [
     ("a4", "noise-times-variance", a4(noise=e**2 * z**2 * p)),
     ("a4", "power-of-moment", a4(noise=3 * e**2 * (z**2 + p))),
     ("a4", "unused", a4(state=p)),
-    ("a5", "noise-not-averaged", a5(fourth=m**4)),
+    ("a5", "noise-not-averaged linearised", a5(fourth=m**4)),
     ("a5", "noise-forgotten", a5(noise=0)),
     ("a5", "second-moment", a5(state=g**2 * (d + m**2))),
     ("a5", "variance-squared", a5(state=g**2 * d**2, fourth=m**4 + 6 * m**2 * d**2 + 3 * d**4)),
@@ -318,7 +321,7 @@ UNUSABLE = [
     ("a7", "expected a text", lambda: 3),
     ("a7", "the derivation is empty", lambda: "\n"),
     ("a7", "has no `=`", lambda: "variant 7\nF = M[(y - h)^2]"),
-    ("a7", "no chain with `F`", lambda: "G = g"),
+    ("a7", "no chains with `F`", lambda: "G = g"),
     ("a7", "cannot be read at column", lambda: "F = M[(y-h)^2"),
     ("a7", "what x means is given", lambda: "x = 5\n" + a7("625*f^2")()),
 ]

@@ -5,6 +5,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from answers import ROWS
 
 from kfcourse.checks import sets
 
@@ -19,6 +20,7 @@ def test_every_set_has_a_file():
 def test_every_question_has_right_and_wrong_answers(name):
     file, letter = importlib.import_module(name), name[len("test_")]
     right, wrong = ({row[0] for row in file.RIGHT}, Counter(row[0] for row in [*file.WRONG, *file.UNUSABLE]))
+    assert {*ROWS} <= {*dir(file)}  # else nothing is done with its rows
     for question in sets()[letter].questions:
         assert question.name in right
         assert wrong[question.name] >= (3 if question.level == "core" else 2), question.name
