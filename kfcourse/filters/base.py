@@ -10,7 +10,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import Components, on_circle
-from kfcourse.laws import Array, Gaussian
+from kfcourse.laws import Array, Gaussian, Measurement
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import Structure
 
@@ -28,12 +28,15 @@ class State(NamedTuple):
         Prediction lambda (runs, n) of the next state, and Psi (..., n, n).
     memory : object
         What else the filter remembers (grid, particles); None for most.
+    expected : Measurement, optional
+        What a filter whose laws are normal expected of the last measurement: its likelihood needs no more.
     """
 
     step: int
     posterior: Gaussian
     predicted: Gaussian
     memory: Any = None
+    expected: Measurement | None = None
 
 
 class Init(Protocol):
@@ -91,6 +94,8 @@ class Filter:
         Where it is another than the normal law's by `structure`: what the whole record tells of each state.
     printed : (Advance, tuple of Eq), optional
         A step and the equations that it computes, no more: of them `fuse` makes a compiled one, as long as it is this filter's.
+    quick : (Advance, callable), optional
+        A step, and what makes the same one compiled, for `fuse`, as long as it is this filter's.
     """
 
     name: str
@@ -103,6 +108,7 @@ class Filter:
     evidence: Evidence | None = None
     look_back: LookBack | None = None
     printed: tuple[Advance, tuple[sp.Eq, ...]] | None = None
+    quick: tuple[Advance, Callable[[], Advance]] | None = None
 
     def __post_init__(self) -> None:
         if self.model.angles.x:

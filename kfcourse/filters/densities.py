@@ -22,6 +22,7 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
 
 TINY = 1e-300  # in place of a variance of exactly 0
+TRIALS, ROUNDING = 50, 1e-12  # states on which a covariance is tried; eigenvalue of correlations that is none
 MOST_TURNS = 50  # of an angle whose noise is so large that it tells nothing
 
 
@@ -46,7 +47,7 @@ def likelihood(model: Model) -> LogLikelihood:
 
     The law of a component that is an angle is wound around the circle: the densities of y and of y plus whole turns add up.
     """
-    if _nonlinear(model) and (solved := by_change_of_variable(model)):
+    if is_nonlinear(model) and (solved := by_change_of_variable(model)):
         return lambda y, x, k=None: solved(y, x)
     law = _conditional("likelihood", model.meter_equation, model.w, model.meter_noise, model)
 
@@ -113,28 +114,39 @@ class ScalarDensities(NamedTuple):
         return self if self.at_step is None else self.at_step(k)
 
 
+class Moments(NamedTuple):
+    """Of a scalar model, as formulas of x and the parameters: mean and variance of the next state, and of the measurement."""
+
+    state: sp.Expr
+    variance: sp.Expr
+    meter: sp.Expr
+    meter_variance: sp.Expr
+
+
+def formulas(model: Model) -> Moments:
+    """Of a noise that enters nonlinearly what is linear in it, at its mean."""
+
+    def both(equation: sp.MatrixBase, noise: tuple[sp.Symbol, ...], law: Gaussian) -> tuple[sp.Expr, sp.Expr]:
+        B = _at_mean(equation.jacobian(sp.Matrix(noise)), noise, law)
+        return _at_mean(equation, noise, law)[0], (B * exact_matrix(law.cov) * B.T)[0]
+
+    state = both(model.state_equation, model.v, model.state_noise)
+    return Moments(*state, *both(model.meter_equation, model.w, model.meter_noise))
+
+
 def scalar_densities(model: Model) -> ScalarDensities:
     """The densities of a model of one state and one measurement; ModelError if a noise enters nonlinearly.
 
     Of a model that depends on the step they are those of step 0, and `at(k)` those of step k.
     """
     next_state = _conditional("transition", model.state_equation, model.v, model.state_noise, model, noiseless=True)
-    solved = by_change_of_variable(model) if _nonlinear(model) else None
+    solved = by_change_of_variable(model) if is_nonlinear(model) else None
     meter = _conditional(
         "likelihood", model.meter_equation, model.w, model.meter_noise, model, noiseless=True, solved=bool(solved)
     )
-    x, B = model.x[0], model.state_equation.jacobian(sp.Matrix(model.v))
-    mean, b = (
-        equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True))).subs(model.values)
-        for equation, noise, law in (
-            (model.state_equation, model.v, model.state_noise),
-            (model.meter_equation, model.w, model.meter_noise),
-        )
-    )
-    variance = (B * exact_matrix(model.state_noise.cov) * B.T).subs(model.values)
-    B_w = _at_mean(model.meter_equation.jacobian(sp.Matrix(model.w)), model.w, model.meter_noise)
-    meter_variance = (B_w * exact_matrix(model.meter_noise.cov) * B_w.T).subs(model.values)
-    outputs = {"state": mean.diff(x), "variance": variance.diff(x), "meter": b.diff(x), "meter_variance": meter_variance.diff(x)}
+    x, (mean, variance, b, meter_variance) = model.x[0], (part.subs(model.values) for part in formulas(model))
+    parts = {"state": mean, "variance": variance, "meter": b, "meter_variance": meter_variance}
+    outputs = {name: sp.Matrix([part.diff(x)]) for name, part in parts.items()}
     choices = {*model.state_equation.atoms(sp.Piecewise), *model.meter_equation.atoms(sp.Piecewise)}
     rough = any(part.has(sp.Derivative, sp.DiracDelta) for part in outputs.values())
     if rough or any(jumps(one, model.x) for one in choices):
@@ -143,7 +155,7 @@ def scalar_densities(model: Model) -> ScalarDensities:
             "filter, unscented(model)"
         )
     lacks_x = not b.has(x)
-    if lacks_x and meter_variance.is_zero_matrix:
+    if lacks_x and meter_variance.is_zero:
         raise ModelError(f"{list(model.meter_equation)}: the meter shows neither the state nor any noise")
     slopes = Stepwise.compile(model.known, "slopes", {"x": sp.Matrix(model.x)}, outputs, ["x", "state", "meter"])
 
@@ -152,7 +164,7 @@ def scalar_densities(model: Model) -> ScalarDensities:
         found = _elementwise(model, *functions, lacks_x=lacks_x, at_step=at if model.timed else None)
         if solved is not None:
             found = found._replace(log_likelihood=lambda y, x: solved(y[..., None], x[..., None]))
-        return found._replace(noiseless=meter_variance.is_zero_matrix is True)
+        return found._replace(noiseless=meter_variance.is_zero is True)
 
     return at(0)
 
@@ -218,7 +230,8 @@ def _spread(values: Array, shape: tuple[int, ...]) -> Array:
     return values if values.shape == shape else np.broadcast_to(values, shape)
 
 
-def _nonlinear(model: Model) -> bool:
+def is_nonlinear(model: Model) -> bool:
+    """Whether the meter's noise enters nonlinearly."""
     return model.meter_equation.jacobian(sp.Matrix(model.w)).has(*model.w)
 
 
@@ -257,14 +270,26 @@ def _conditional(
         )
     mean = equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True)))
     cov = B * exact_matrix(law.cov) * B.T
-    if name == "likelihood" and len(equation) > 1 and cov.subs(model.values).det().equals(0):
+    outputs = {"mean": mean.subs(model.values), "cov": cov.subs(model.values)}
+    x = sp.Matrix(model.x)
+    found = Stepwise.compile(model.known, name, {"x": x}, outputs, ["x", "mean"], f"{name} law of {model}")
+    if name == "likelihood" and len(equation) > 1 and _singular(found, model):
         raise _no_density(
             f"{list(equation)}: the noises of these components depend on one another, so a combination of them has no noise and "
             f"there is no {name} density; leave a component out, or use the Gaussian filters (gaussian, unscented, gauss_hermite)"
         )
-    outputs = {"mean": mean.subs(model.values), "cov": cov.subs(model.values)}
-    x = sp.Matrix(model.x)
-    return Stepwise.compile(model.known, name, {"x": x}, outputs, ["x", "mean"], f"{name} law of {model}")
+    return found
+
+
+def _singular(law: Stepwise, model: Model) -> bool:
+    """Whether the covariance is singular at all states tried: the determinant of long formulas takes SymPy minutes."""
+    x = model.prior.mean + np.random.default_rng(0).standard_normal((TRIALS, model.n)) * np.sqrt(np.diagonal(model.prior.cov))
+    with np.errstate(all="ignore"):
+        cov = law.at(0)(x)[1]
+        deviation = np.sqrt(np.diagonal(cov, axis1=-2, axis2=-1))
+        correlation = cov / (deviation[..., :, None] * deviation[..., None, :])
+    good = np.isfinite(correlation).all(axis=(-2, -1))
+    return not (np.linalg.eigvalsh(correlation[good])[..., 0] > ROUNDING).any()
 
 
 def _no_density(message: str) -> ModelError:

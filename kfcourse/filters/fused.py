@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import sympy as sp
@@ -25,6 +25,7 @@ from kfcourse.filters.programs import Rule, array_name, in_numbers, needed, scal
 from kfcourse.laws import Array, Gaussian, column
 from kfcourse.symbolic import compiled
 
+T = TypeVar("T")
 Letters = Sequence[sp.Symbol]
 Equalities = tuple[sp.Eq, ...]
 
@@ -37,7 +38,8 @@ _KEPT = {_Z, _P, _LAM_NEXT, _PSI_NEXT}
 def fuse(one: Filter | Design) -> Filter | Design:
     """The same filter with compiled steps, equal up to rounding; the filter itself where there is no formula to compile.
 
-    Compiled are AOF, DUOF, FOS, MFOS and their kin in two steps, of scalar models whose structural functions have formulas.
+    Compiled are AOF, DUOF, FOS, MFOS and their kin in two steps, of scalar models whose structural functions have formulas; and
+    what has a compiled step of its own, the exact filter by point masses.
     One that cannot be compiled runs as it is, with a warning that tells why.
 
     Raises
@@ -47,6 +49,9 @@ def fuse(one: Filter | Design) -> Filter | Design:
     """
     model, structure = one.model, one.structure
     own = one.step if isinstance(one, Filter) else one.equations
+    if isinstance(one, Filter) and one.quick and one.quick[0] is one.step:
+        step = _or_warning(one, one.quick[1])
+        return replace(one, step=step) if step else one
     if (
         one.printed is None
         or one.printed[0] is not own
@@ -54,12 +59,8 @@ def fuse(one: Filter | Design) -> Filter | Design:
         or (structure and structure.formulas is None)
     ):
         return one
-    try:
-        program = _program(one, one.printed[1])
-    except ImportError:
-        raise
-    except Exception as error:  # whatever a compiler may say of a formula: it runs without, too
-        warnings.warn(f"{one.name} is not compiled, and runs as without compiled=True: {error}", stacklevel=2)
+    program = _or_warning(one, partial(_program, one, one.printed[1]))
+    if program is None:
         return one
     if isinstance(one, Filter):
         return replace(one, step=program.known(one.step, ()))
@@ -68,6 +69,16 @@ def fuse(one: Filter | Design) -> Filter | Design:
         equations=lambda state, y: program.equations(one.equations, state, y),
         known=lambda fits: program.known(one.answered(fits), fits),
     )
+
+
+def _or_warning(one: Filter | Design, compile: Callable[[], T]) -> T | None:
+    try:
+        return compile()
+    except ImportError:
+        raise
+    except Exception as error:  # whatever a compiler may say of a formula: it runs without, too
+        warnings.warn(f"{one.name} is not compiled, and runs as without compiled=True: {error}", stacklevel=3)
+        return None
 
 
 Arrays = dict[str, Array]  # of each trajectory, by the name of the letter

@@ -25,6 +25,7 @@ from kfcourse.filters.exact.kernels import Kernels
 from kfcourse.laws import Array
 
 ORDER = 32  # of the differences that tell a rough density: of a normal one, of nodes half a deviation apart, 1e-5 is left
+COEFFICIENTS = np.array([(-1) ** i * comb(ORDER, i) for i in range(ORDER + 1)]) / comb(ORDER, ORDER // 2)
 KINK = 32.0  # times what halving the distance of the nodes may bring at a kink, by chance, more than it should
 ROUNDING = 10 * np.finfo(float).eps  # of a node and its density, relative to x
 INTERPOLATED = 16.0  # interpolation of order 8 at twice the distance errs 2^8 times as much, but near a zero of the density less
@@ -148,8 +149,7 @@ def roughness(x: Array, mass: Array, mean: Array, variance: Array) -> Array:
 def _differences(count: int) -> Array:
     """Masses (T, count) times this matrix are their central differences of order `ORDER`, over the middle coefficient."""
     offset = np.subtract.outer(np.arange(count), np.arange(count)) + ORDER // 2
-    coefficients = np.array([(-1) ** i * comb(ORDER, i) for i in range(ORDER + 1)]) / comb(ORDER, ORDER // 2)
-    return np.where((offset >= 0) & (offset <= ORDER), coefficients[np.clip(offset, 0, ORDER)], 0.0)
+    return np.where((offset >= 0) & (offset <= ORDER), COEFFICIENTS[np.clip(offset, 0, ORDER)], 0.0)
 
 
 def extrapolated(change: Array, before: Array) -> Array:

@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from kfcourse.angles import moments_on_circle
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.filters.densities import ScalarDensities, scalar_densities
+from kfcourse.filters.densities import ScalarDensities, is_nonlinear, scalar_densities
 from kfcourse.filters.exact.adaptive import check_scalar, on_panels
 from kfcourse.filters.exact.batch import Place, Posteriors, posteriors
-from kfcourse.filters.exact.constants import ELEMENTS, MORE, NODES, TOLERABLE
+from kfcourse.filters.exact.constants import ELEMENTS, MORE, NODES, SPACINGS, TOLERABLE
 from kfcourse.filters.exact.evidence import log_evidence
 from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, of_prior
 from kfcourse.filters.exact.places import Candidates, hidden, likeliest, looked, spaced
 from kfcourse.filters.exact.prediction import predictions
 from kfcourse.filters.exact.roots import at_roots
 from kfcourse.filters.exact.smoothing import smoothed
+from kfcourse.filters.exact.usual import Packed, UsualWay, compiled_usual_way
 from kfcourse.laws import Array, Gaussian
+from kfcourse.symbolic.compiled import is_scalar
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
 # Of the mean and the deviation at a step, in posterior standard deviations: their square, 1e-6 of the bound, is far below what
 # any number of trajectories tells.
 ACCURACY = 1e-3
-SPACINGS = (0.5, 0.35, 0.25, 0.18, 0.12)  # of its nodes, tried one after the other
 FINE = (129, 257)  # nodes of a posterior that must be interpolated: the second if the first are too few to share its mass
 MEMORY = 2**28  # bytes of predictions
 REMADE = 128  # trajectories whose predictions are made again at once
@@ -37,11 +40,13 @@ class PointMass(NamedTuple):
 
     Attributes
     ----------
-    fine : list of Grid
+    fine : sequence of Grid
         The posterior of each trajectory.
     error : ndarray (runs,)
         Estimated error of mean and deviation, in posterior standard deviations: that of this step and of all before it, as if
         the filter never forgot one.
+    variance : ndarray (runs,)
+        Of the posteriors.
     adaptive : ndarray (runs,)
         Whether this step was left to the adaptive filter.
     groups : list of (ndarray, Kernels)
@@ -50,8 +55,9 @@ class PointMass(NamedTuple):
         Trajectories whose predictions are made again in the next step, as there is no room for them.
     """
 
-    fine: list[Grid]
+    fine: Sequence[Grid]
     error: Array
+    variance: Array
     adaptive: Array
     groups: list[tuple[Array, Kernels]]
     later: Array
@@ -64,13 +70,21 @@ class PointMass(NamedTuple):
             for some, kernels in predictions([self.fine[i] for i in rows.tolist()], law):
                 yield rows[some], kernels
 
+    def bytes(self) -> int:
+        """That the predictions hold."""
+        return sum(kernels.bytes() for _, kernels in self.groups)
+
+    def without_predictions(self) -> PointMass:
+        """The same, all predictions to be made again."""
+        return self._replace(groups=[], later=np.arange(len(self.fine)))
+
     def evidence_error(self) -> Array:
         """Estimated error of the last ln p(y_k | y_0, ..., y_{k-1}), (runs,): the total's relative error is part of `error`."""
         return self.error
 
     def discretisation_error(self) -> Array:
         """Estimated error of the posterior means, (runs,), in the units of x."""
-        return self.error * np.sqrt([grid.variance() for grid in self.fine])
+        return self.error * np.sqrt(self.variance)
 
 
 def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) -> Filter:
@@ -85,8 +99,8 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
         Largest estimated error of a step, in posterior standard deviations; a step with a larger one is left to the
         adaptive filter.
     memory : float
-        Bytes that predictions may take from one step to the next; those of further trajectories are made twice, a chunk of some
-        50 MB at a time.  A posterior is some kB, 10 MB at most, and not counted.
+        Bytes that predictions may take from one step to the next, and those of all steps for who looks back; further ones are
+        made twice, a chunk of some 50 MB at a time.  A posterior is some kB, 10 MB at most, and not counted.
 
     Raises
     ------
@@ -105,13 +119,14 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
             return state.memory.predictions(densities.at(state.step - 1))
         return [(np.arange(runs), prior.rows(np.zeros(runs, dtype=int)))]
 
-    def step(state: State, y: Array) -> State:
+    def step(state: State, y: Array, usual_way: UsualWay | None = None) -> State:
         law = densities.at(state.step)
+        way = partial(_quick_step, usual_way, state.memory) if usual_way else _step
         try:
             try:
-                posterior, predicted, found = _step(before(state, len(y)), y, law, accuracy, FINE[0], memory)
+                posterior, predicted, found = way(before(state, len(y)), y, law, accuracy, FINE[0], memory)
             except TooNarrow:
-                posterior, predicted, found = _step(before(state, len(y)), y, law, accuracy, FINE[1], memory)
+                posterior, predicted, found = way(before(state, len(y)), y, law, accuracy, FINE[1], memory)
         except Unresolved as error:
             raise Unresolved(f"step {state.step} of {model}: {error}; leave the exact filter out (--exact-runs 0)") from None
         if model.angles.x:
@@ -124,22 +139,25 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
         return log_evidence(before(state, len(y)), y, densities.at(state.step), after.memory.fine)
 
     def look_back(states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
-        memories = [(state.memory.fine, state.memory.error) for state in states]  # without the predictions: these are large
-        posteriors, errors = zip(*memories, strict=True)
-
-        def predicted(k: int) -> Iterable[tuple[Array, Kernels]]:
-            return predictions(posteriors[k - 1], densities.at(k - 1)) if k else before(init(y.shape[1]), y.shape[1])
+        runs, room, visited = y.shape[1], memory, [init(y.shape[1])]
+        for state in states:
+            room -= state.memory.bytes()
+            visited.append(state if room >= 0 else state._replace(memory=state.memory.without_predictions()))
 
         def back(end: int) -> Iterator[State]:
-            known = posteriors[:end], np.array(errors[:end])
-            found = smoothed(*known, y, predicted, densities, accuracy, bool(model.angles.x))
+            memories = [state.memory for state in visited[1 : end + 1]]
+            known = [one.fine for one in memories], np.array([one.error for one in memories])
+            found = smoothed(*known, y, lambda k: before(visited[k], runs), densities, accuracy, bool(model.angles.x))
             for step, one in zip(range(end, 0, -1), found, strict=True):
                 law = Gaussian(one.mean[:, None], one.variance[:, None, None])
                 yield State(step, law, law, one)
 
         return back
 
-    return Filter("aof-exact", model, init, step, slow=True, evidence=evidence, look_back=look_back)
+    found = Filter("aof-exact", model, init, step, slow=True, evidence=evidence, look_back=look_back)
+    if not is_scalar(model) or densities.noiseless or is_nonlinear(model):
+        return found
+    return replace(found, quick=(step, lambda: partial(step, usual_way=compiled_usual_way(model))))
 
 
 def _on_circle(memory: PointMass, law: ScalarDensities) -> tuple[Gaussian, Gaussian]:
@@ -205,16 +223,63 @@ def _step(
     grids, mean, variance, error, adaptive = corrected(groups, y, law, accuracy, fine_nodes)
     fine = [grids[place] for place in range(len(y))]
     predicted = np.empty((2, len(y)))
-    following, later = [], [np.empty(0, dtype=int)]
-    for rows, kernels in predictions(fine, law):
-        predicted[:, rows] = kernels.moments()
-        room -= kernels.bytes()
-        if room >= 0:
-            following.append((rows, kernels))
-        else:
-            later.append(rows)
+    following, later = _following(fine, np.arange(len(y)), law, room, predicted)
+    memory = PointMass(fine, error, variance, adaptive, following, later)
     posterior, prediction = (Gaussian(m[:, None], v[:, None, None]) for m, v in ((mean, variance), predicted))
-    return posterior, prediction, PointMass(fine, error, adaptive, following, np.sort(np.concatenate(later)))
+    return posterior, prediction, memory
+
+
+def _following(
+    grids: Sequence[Grid], rows: Array, law: ScalarDensities, room: float, moments: Array, usual: Array | None = None
+) -> tuple[list[tuple[Array, Kernels]], Array]:
+    """The predictions from posteriors of these numbers as far as there is room, and the others' numbers; writes their moments.
+
+    `usual` is told which are sums of kernels that overlap, and these are not kept: loops make them again.
+    """
+    kept, later = [], [np.empty(0, dtype=int)]
+    for places, kernels in predictions(grids, law):
+        some = rows[places]
+        moments[:, some] = kernels.moments()
+        again = usual is not None and kernels.spectral.all()
+        if usual is not None:
+            usual[some] = again
+        room -= 0 if again else kernels.bytes()
+        if again or room < 0:
+            later.append(some)
+        else:
+            kept.append((some, kernels))
+    return kept, np.sort(np.concatenate(later))
+
+
+def _quick_step(
+    usual_way: UsualWay,
+    memory: PointMass | None,
+    groups: Iterable[tuple[Array, Kernels]],
+    y: Array,
+    law: ScalarDensities,
+    accuracy: float,
+    fine_nodes: int,
+    room: float,
+) -> tuple[Gaussian, Gaussian, PointMass]:
+    """`_step` with the usual way compiled: what it leaves goes here as there, and so do its predictions that are not usual."""
+    numbers, size, usual = np.empty((5, len(y))), np.zeros(len(y), dtype=int), np.zeros(len(y), dtype=bool)
+    values = np.empty((3, 0))
+    if memory and isinstance(memory.fine, Packed):
+        rows = np.flatnonzero(memory.fine.usual)
+        done = usual_way(memory.fine, rows, y[rows, 0], accuracy, fine_nodes)
+        values, numbers[:, rows], size[rows], usual[rows] = done.values, done.numbers, done.size, done.usual
+        groups = memory._replace(later=memory.later[size[memory.later] == 0]).predictions(law)
+    found = corrected(groups, y, law, accuracy, fine_nodes)
+    others = size == 0
+    numbers[:3, others] = np.array(found[1:4])[:, others]
+    fine = Packed.together(values, size, usual, found.grids)
+    rest = np.flatnonzero(~usual)
+    following, later = _following([fine[i] for i in rest.tolist()], rest, law, room, numbers[3:], usual)
+    mean, variance, error, *predicted = numbers
+    later = np.union1d(later, np.flatnonzero(usual))
+    after = PointMass(fine, error, variance, found.adaptive, following, later)
+    posterior, prediction = (Gaussian(m[:, None], v[:, None, None]) for m, v in ((mean, variance), predicted))
+    return posterior, prediction, after
 
 
 def _in_batch(

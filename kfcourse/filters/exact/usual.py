@@ -1,0 +1,109 @@
+"""The step of the exact filter with its usual way compiled: `loops` takes most trajectories, `pointmasses` what these leave.
+
+Posteriors stay in the arrays that the loop has filled; a grid is cut out when it is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import numpy as np
+import sympy as sp
+
+from kfcourse.filters.densities import formulas
+from kfcourse.filters.exact.constants import NODES
+from kfcourse.filters.exact.kernels import Grid, chunks
+from kfcourse.laws import Array
+from kfcourse.symbolic import compiled
+from kfcourse.symbolic.model import Model
+
+AT_ONCE = 512  # trajectories: 3 MB of nodes
+
+
+class Packed(Sequence[Grid]):
+    """Posteriors one after the other in one array (3, M): nodes, masses, densities; where each begins, how many nodes it has.
+
+    `usual` tells those whose nodes are a rule and whose kernels overlap.
+    """
+
+    def __init__(self, values: Array, start: Array, size: Array, usual: Array, uniform: Array):
+        self.values, self.start, self.size, self.usual, self.uniform = values, start, size, usual, uniform
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def __getitem__(self, place: Any) -> Any:
+        if isinstance(place, slice):
+            return [self[i] for i in range(*place.indices(len(self)))]
+        if not 0 <= place < len(self):
+            raise IndexError(place)
+        begin = self.start[place]
+        x, mass, density = self.values[:, begin : begin + self.size[place]]
+        return Grid(x, mass, density, bool(self.uniform[place]))
+
+    @classmethod
+    def together(cls, values: Array, size: Array, usual: Array, grids: Mapping[int, Grid]) -> Packed:
+        """Those in the order of the sizes (T,), where these are not 0, and the grids of the others."""
+        count, start = size.copy(), np.cumsum(size) - size
+        uniform = usual | (size > 0)
+        end = values.shape[1]
+        for place, grid in grids.items():
+            count[place], start[place], uniform[place] = len(grid.x), end, grid.uniform
+            end += len(grid.x)
+        return cls(
+            np.concatenate([values, *(np.array(grid[:3]) for grid in grids.values())], axis=1), start, count, usual, uniform
+        )
+
+
+class Done(NamedTuple):
+    """What the loops made of some trajectories, of size 0 where they made nothing.
+
+    Nodes, masses, densities (3, M); mean, variance, error, and mean and variance predicted (5, T); how many nodes (T,), and
+    whether the next prediction is usual, too.
+    """
+
+    values: Array
+    numbers: Array
+    size: Array
+    usual: Array
+
+
+UsualWay = Callable[[Packed, Array, Array, float, int], Done]
+
+
+def compiled_usual_way(model: Model) -> UsualWay:
+    """(posteriors, numbers of trajectories, y (T,), accuracy, fine nodes) -> one step of these, compiled.
+
+    Raises
+    ------
+    ImportError
+        There is no numba.
+    """
+    import_module("kfcourse.filters.exact.loops")  # now, while there is one process
+    (x,), of_model = model.x, formulas(model)
+    of_noise = not of_model.meter.has(x)
+    signal = sp.sqrt(of_model.meter_variance) if of_noise else of_model.meter
+    moves = {"mean": of_model.state, "variance": of_model.variance, "slope": of_model.state.diff(x)}
+    meter = {"mean": of_model.meter, "variance": of_model.meter_variance, "signal": signal, "slope": signal.diff(x)}
+    printed = (compiled.loop(name, {"x": x}, made, list(model.values)) for name, made in (("moves", moves), ("meter", meter)))
+    laws = compiled.load(*printed)
+    moves_of, meter_of = laws.moves, laws.meter
+    constants = np.array([float(value) for value in model.values.values()])
+
+    def step(before: Packed, rows: Array, y: Array, accuracy: float, fine_nodes: int) -> Done:
+        from kfcourse.filters.exact.loops import DONE, steps
+
+        numbers, (size, status) = np.empty((5, len(rows))), np.zeros((2, len(rows)), dtype=int)
+        values, start, count = [np.empty((3, 0))], before.start[rows], before.size[rows]
+        for some in chunks(len(rows), 1, AT_ONCE):
+            after = np.empty((3, len(rows[some]) * NODES[-1]))
+            given = before.values, start[some], count[some], y[some], accuracy, fine_nodes
+            here = np.empty((5, len(rows[some])))
+            filled = steps(moves_of, meter_of, constants, of_noise, *given, after, here, size[some], status[some])
+            numbers[:, some] = here
+            values.append(after[:, :filled])
+        return Done(np.concatenate(values, axis=1), numbers, size, status == DONE)
+
+    return step

@@ -1,0 +1,114 @@
+"""The exact filter with its usual way compiled: the numbers of the plain one but for rounding, for every scalar variant."""
+
+import ast
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kfcourse import Model, compare, gaussian, load_variants, simulate
+from kfcourse.filters import aof, pointmass
+from kfcourse.filters.exact import loops
+from kfcourse.filters.fused import fuse
+from kfcourse.lab.short_names import exact
+from kfcourse.records.evidence import likelihood
+from kfcourse.records.smoothing import smooth
+from kfcourse.symbolic.model import Model as PlainModel
+
+SCALAR = {
+    name: one.model
+    for name, one in load_variants().items()
+    if isinstance(one.model, PlainModel) and one.model.n == one.model.p == 1
+}
+EPSILON = np.finfo(float).eps
+STEPS = 6
+
+
+def both(model, runs, seed=2):
+    """States of the plain filter and of the compiled one after every step."""
+    plain, y = pointmass(model), simulate(model, runs, STEPS, seed).y
+    y[2, ::7] = np.nan
+    quick = fuse(plain)
+    assert quick is not plain
+    assert quick.step is not plain.step
+    one, other = plain.init(runs), quick.init(runs)
+    for k in range(STEPS):
+        one, other = plain.step(one, y[k]), quick.step(other, y[k])
+        yield one, other
+
+
+@pytest.mark.parametrize("name", SCALAR)
+def test_every_scalar_variant(name):
+    """In posterior deviations: 1e-9 and the rounding of x itself, which is a part of each density's exponent.
+
+    A node x is known to EPSILON x, and the logarithm of its density changes by EPSILON x / deviation; and that once a step.
+    """
+    for plain, quick in both(SCALAR[name], 64):
+        deviation = np.sqrt(plain.posterior.cov[:, 0, 0])
+        rounding = 50 * EPSILON * (np.abs(plain.posterior.mean[:, 0]) / deviation + 1)
+        mean = np.abs(quick.posterior.mean - plain.posterior.mean)[:, 0] / deviation
+        assert (mean < 1e-9 + rounding).all()
+        np.testing.assert_allclose(quick.posterior.cov, plain.posterior.cov, rtol=1e-9)
+        np.testing.assert_allclose(quick.predicted.cov, plain.predicted.cov, rtol=1e-9)
+        np.testing.assert_array_equal([len(grid.x) for grid in quick.memory.fine], [len(grid.x) for grid in plain.memory.fine])
+        np.testing.assert_array_equal(quick.memory.adaptive, plain.memory.adaptive)
+        np.testing.assert_allclose(quick.memory.error, plain.memory.error, rtol=1e-3, atol=1e-9 + rounding.max())
+    assert quick.memory.fine.usual.mean() > 0.5  # else nothing was tried
+
+
+def test_what_the_loop_leaves_is_done_as_without_it():
+    """A noise that vanishes where the state is near 0: narrow kernels beside usual ones, and a sharp meter on panels."""
+    model = Model.define("0.9*x + 0.05*x*v", "x + 0.02*x**2*w", prior={"variance": 0.01})
+    kinds = set()
+    for plain, quick in both(model, 200):
+        kinds |= set(quick.memory.fine.usual.tolist())
+        np.testing.assert_allclose(quick.posterior.mean, plain.posterior.mean, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(quick.posterior.cov, plain.posterior.cov, rtol=1e-9, atol=1e-300)
+    assert kinds == {True, False}
+
+
+def test_evidence_and_smoothing_take_its_posteriors():
+    model = SCALAR["53"]
+    plain, y = pointmass(model), simulate(model, 40, STEPS, 1).y
+    quick = fuse(plain)
+    one, other = (smooth(each, y) for each in (plain, quick))
+    np.testing.assert_allclose(other.mean, one.mean, rtol=1e-7)
+    one, other = (likelihood(each, y) for each in (plain, quick))
+    np.testing.assert_allclose(other, one, rtol=1e-9, atol=1e-9)
+
+
+def test_a_comparison_has_the_same_bound():
+    model = SCALAR["53"]
+    plain, quick = (
+        compare([aof(gaussian(model)), exact(model)], model, 2000, STEPS, 1, subset_runs=160, progress=False, compiled=which)
+        for which in (False, True)
+    )
+    assert quick.has_bound
+    assert not quick.replaced
+    for name in ("square", "distance", "doubt"):
+        one, other = getattr(plain.subset.sums, name), getattr(quick.subset.sums, name)
+        np.testing.assert_allclose(other, one, rtol=1e-6, atol=1e-9 * np.abs(one).max(), err_msg=name)
+
+
+def test_what_the_loop_cannot_take_stays_as_it_is():
+    timed = Model.define("x + v/(1 + k)", "x + w")
+    noiseless = Model.define("x + v", "x**3")
+    solved = Model.define("0.9*x + v", "exp(x + w)")
+    other = pointmass(SCALAR["53"])
+    other = replace(other, step=lambda state, y: state)
+    for one in (pointmass(timed), pointmass(noiseless), pointmass(solved), other):
+        assert fuse(one) is one
+
+
+def test_machine_code_is_kept_beside_every_constant():
+    """What a loop takes from elsewhere is in its closure, or a changed one would be read from the cache with its old value."""
+    kept = set()
+    for one in loops.steps.py_func.__closure__[0].cell_contents:
+        kept |= {one} | ({part for part in one if isinstance(part, tuple | float | int)} if isinstance(one, tuple) else set())
+    taken = ast.parse(Path(loops.__file__).read_text()).body
+    names = [name.name for part in taken if isinstance(part, ast.ImportFrom) for name in part.names if name.name.isupper()]
+    assert len(names) > 15
+    for name in names:
+        value = getattr(loops, name)
+        assert (tuple(value) if isinstance(value, np.ndarray) else value) in kept, name
