@@ -20,6 +20,7 @@ import equations
 import manual
 import package
 import sample
+import terms
 
 from kfcourse.files import package_digest
 
@@ -52,6 +53,11 @@ def prepare() -> None:
 
 def main() -> int:
     prepare()
+    try:
+        terms.check()
+    except terms.Disagreement as found:
+        print(f"{found}\n{NOT_BUILT}", file=sys.stderr)
+        return 1
     # Small matrices: several threads inside one kernel cost more than they gain, and the kernels share the processors.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     # On a new machine matplotlib announces its font cache on stderr; not in a chapter, please.

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import nbformat
 import sympy as sp
+from narrow import ENDING, shown_size
 
 from kfcourse.checks import exercise, sets
 from kfcourse.lab.variants import load_variants
@@ -43,12 +44,16 @@ def write() -> None:
     (PAGES / "sets.txt").write_text(table(), encoding="utf-8")
     (PAGES / "variants.txt").write_text(variants(), encoding="utf-8")
     for job in solutions():
-        notebook = render(read(job.letter), exercise(job.letter, VARIANT))
-        found = pictures(nbformat.read(job.target, as_version=4))
+        notebook, executed = render(read(job.letter), exercise(job.letter, VARIANT)), nbformat.read(job.target, as_version=4)
+        found = pictures(executed)
         for name, png in found.items():
             (PAGES / f"{name}.png").write_bytes(png)
+        for name, png in pictures(executed, narrow=True).items():
+            (PAGES / f"{name}{ENDING}").write_bytes(png)
         file = sets()[job.letter].name
-        heading, rest = statement(notebook, {name: f"{name}.png" for name in found}).split("\n", 1)
+        heading, rest = statement(notebook, {name: (f"{name}.png", shown_size(png)[0]) for name, png in found.items()}).split(
+            "\n", 1
+        )
         (PAGES / f"{file}.md").write_text(f"{heading}\n{NOTE.format(variant=VARIANT, file=file)}{rest}", encoding="utf-8")
         nbformat.write(student(notebook, found), PAGES / "notebooks" / f"{file}.ipynb")
 

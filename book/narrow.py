@@ -1,7 +1,8 @@
 """Sphinx extension: a screen of a telephone shows the narrow picture of a figure, panels one under the other.
 
 The pictures of cells carry theirs in the metadata of the output (`kfcourse.pages.figures.book_style`); MyST-NB calls the file
-of a picture by the hash of its bytes, and the narrow one stands beside it.
+of a picture by the hash of its bytes, and the narrow one stands beside it.  Those of the exercise sets are files beside the
+page's own pictures (manual.py).
 """
 
 from __future__ import annotations
@@ -15,6 +16,13 @@ import nbformat
 from docutils import nodes
 
 WIDEST = "(max-width: 600px)"
+ENDING = "-narrow.png"  # what follows the name of the wide one, without its ending
+
+
+def shown_size(png: bytes) -> tuple[int, int]:
+    """Width and height of a picture on a page: it has twice the pixels of a screen."""
+    width, height = struct.unpack(">II", png[16:24])
+    return width // 2, height // 2
 
 
 def collect(app, env) -> None:
@@ -31,15 +39,16 @@ def collect(app, env) -> None:
 def choose(app, doctree, name: str) -> None:
     """Put both pictures where there are two."""
     for image in list(doctree.findall(nodes.image)):
-        narrow = app.env.kf_narrow.get(Path(image["uri"]).stem)
+        beside = Path(app.srcdir, image["uri"]).with_name(Path(image["uri"]).stem + ENDING)
+        narrow = beside.read_bytes() if beside.exists() else app.env.kf_narrow.get(Path(image["uri"]).stem)
         if narrow is None or app.builder.format != "html":
             continue
-        file = Path(app.outdir, "_images", f"{Path(image['uri']).stem}-narrow.png")
+        file = Path(app.outdir, "_images", Path(image["uri"]).stem + ENDING)
         file.parent.mkdir(exist_ok=True)
         file.write_bytes(narrow)
-        width, height = struct.unpack(">II", narrow[16:24])  # of a PNG; twice the pixels of a screen
+        width, height = shown_size(narrow)
         up = "../" * name.count("/")
-        source = f'<source media="{WIDEST}" srcset="{up}_images/{file.name}" width="{width // 2}" height="{height // 2}">'
+        source = f'<source media="{WIDEST}" srcset="{up}_images/{file.name}" width="{width}" height="{height}">'
         image["classes"].append("no-scaled-link")  # inside a link, the picture would not be the child of its element
         place = image.parent.index(image)
         image.parent.insert(place, nodes.raw("", f"<picture>{source}", format="html"))

@@ -27,16 +27,16 @@ class TogetherWithUnits(SphinxPostTransform):
                 continue
             place = text.parent.children.index(text)
             if isinstance(text.parent, nodes.raw):
-                found = text if NO_TEXT.search(text) else BETWEEN_TAGS.sub(lambda part: _together(part[0]), text)
+                found = text if NO_TEXT.search(text) else BETWEEN_TAGS.sub(lambda part: together(part[0]), text)
             else:
-                found = _together(text)
+                found = together(text)
             if place and isinstance(text.parent[place - 1], nodes.math):
                 found = AFTER_A_FORMULA.sub("\N{NO-BREAK SPACE}", found)
             if found != text:
                 text.parent.children[place] = nodes.Text(found)
 
 
-def _together(text: str) -> str:
+def together(text: str) -> str:
     return AFTER_A_NUMBER.sub("\N{NO-BREAK SPACE}", text)
 
 

@@ -138,8 +138,6 @@ def lab(
         wanted = [*usual, "aof-exact"] if exact_runs and has_bound(model) else list(usual)
     else:
         wanted = [name.strip() for name in names.split(",") if name.strip()]
-    if language:
-        chosen.plain("student's reports")  # before the long part
     found = admissions(model, wanted, DERIVATION)
     refused = {one.name: one.reason for one in found if one.one is None}
     for one in found:

@@ -53,13 +53,12 @@ class Measurement(NamedTuple):
 
 
 class Transition(NamedTuple):
-    """What looking back must know of the object: its structural functions at N(z, p), affine as the meter's are.
+    """What looking back must know of the object beside tau and Theta: its structural functions at N(z, p), like G and R.
 
-    tau (..., n), A (..., n, n), Q (..., n, n): mean of the next state, its sensitivity dtau/dz, and Q = Theta - A p A^T, the part
-    of its covariance that this state does not explain.  Q is derived, not subtracted, as R is.
+    A (..., n, n), Q (..., n, n): the sensitivity dtau/dz of the next state's mean, and Q = Theta - A p A^T, the part of its
+    covariance that this state does not explain.  Q is derived, not subtracted, as R is.
     """
 
-    tau: Vectors
     A: Matrices
     Q: Matrices
 
@@ -98,7 +97,7 @@ def apply(matrix: Matrices, vector: Vectors) -> Vectors:
     """matrix @ vector: (..., r, c), (..., c) -> (..., r)."""
     if matrix.shape[-2:] == (1, 1):
         return matrix[..., 0] * vector
-    return (matrix @ vector[..., None])[..., 0]
+    return np.einsum("...ij,...j", matrix, vector)  # of many small matrices twice as fast as their products
 
 
 def product(left: Matrices, right: Matrices) -> Matrices:
@@ -193,24 +192,31 @@ def correct(prior: Gaussian, measurement: Measurement, y: Vectors) -> Gaussian:
 
     K = Psi G^T F^+,   z = lambda + K (y - h),   p = Psi - K G Psi
 
-    The last is evaluated as (I - K G) Psi (I - K G)^T + K R K^T (Joseph's form, with R = F - G Psi G^T), for
-    scalars as Psi R / F: equal, but never negative.  A trajectory with a missing measurement (NaN) keeps
-    its prior for the missing components.  Where rounding has broken the prior covariance F may be negative, and is divided by
-    (see `gain`); of one state and one measurement it is negative only if a rule of quadrature made it so, and corrects nothing.
+    K and p as of `regression`.  A trajectory with a missing measurement (NaN) keeps its prior for the missing components.
     """
     innovation, (_, G, F, R) = measurement.innovation(y), measurement
     if any_missing(innovation):
         innovation, G, F, R = without_missing(innovation, G, F, R)
+    K, cov = regression(prior.cov, G, F, R)
+    return Gaussian(prior.mean + apply(K, innovation), cov)
+
+
+def regression(cov: Matrices, G: Matrices, F: Matrices, R: Matrices) -> tuple[Matrices, Matrices]:
+    """The regression of a state with this covariance on y = G x + e, Cov(y) = F, Cov(e) = R: its gain, and what y leaves of cov.
+
+    K = cov G^T F^+,   cov - K G cov
+
+    The last is evaluated as (I - K G) cov (I - K G)^T + K R K^T (Joseph's form, with R = F - G cov G^T), for
+    scalars as cov R / F: equal, but never negative.  Where rounding has broken the covariance F may be negative, and is divided
+    by (see `gain`); of one state and one measurement it is negative only if a rule of quadrature made it so, and tells nothing.
+    """
     if G.shape[-2:] == (1, 1):
         varies = np.minimum.reduce(F, axis=None) > 0
-        share = prior.cov / F if varies else gain(prior.cov, np.maximum(F, 0.0))
-        K = share * G
-        cov = share * R if varies else np.where(F <= 0, prior.cov, share * R)  # a meter that cannot vary tells nothing
-    else:
-        K = gain(product(prior.cov, transpose(G)), F, broken=True)
-        rest = identity(prior.cov.shape[-1], prior.cov.dtype) - product(K, G)
-        cov = symmetric(product(product(rest, prior.cov), transpose(rest)) + product(product(K, R), transpose(K)))
-    return Gaussian(prior.mean + apply(K, innovation), cov)
+        share = cov / F if varies else gain(cov, np.maximum(F, 0.0))
+        return share * G, share * R if varies else np.where(F <= 0, cov, share * R)  # what cannot vary tells nothing
+    K = gain(product(cov, transpose(G)), F, broken=True)
+    rest = identity(cov.shape[-1], cov.dtype) - product(K, G)
+    return K, symmetric(product(product(rest, cov), transpose(rest)) + product(product(K, R), transpose(K)))
 
 
 def without_missing(innovation: Vectors, G: Matrices, F: Matrices, R: Matrices) -> tuple[Vectors, Matrices, Matrices, Matrices]:
@@ -249,7 +255,7 @@ def normalised_square(vector: Vectors, cov: Matrices) -> Array:
 
     Directions in which cov is singular do not enter.
     """
-    return np.einsum("...i,...i", apply(gain(np.eye(cov.shape[-1]), cov), vector), vector)
+    return apply(gain(vector[..., None, :], cov), vector)[..., 0]
 
 
 def log_density(measurement: Measurement, y: Vectors) -> Array:
@@ -262,8 +268,15 @@ def log_density(measurement: Measurement, y: Vectors) -> Array:
     if any_missing(innovation):
         present = (~np.isnan(innovation)).sum(axis=-1)
         innovation, _, F, _ = without_missing(innovation, measurement.G, F, measurement.R)
-    size = np.log(np.abs(F[..., 0, 0])) if F.shape[-1] == 1 else np.linalg.slogdet(F).logabsdet
-    return -0.5 * (normalised_square(innovation, F) + size + present * np.log(2 * np.pi))
+    return -0.5 * (normalised_square(innovation, F) + _log_determinant(F) + present * np.log(2 * np.pi))
+
+
+def _log_determinant(cov: Matrices) -> Array:
+    """ln |det cov|, (...), -inf where it is singular; of one component without a factorisation."""
+    if cov.shape[-1] > 1:
+        return np.linalg.slogdet(cov).logabsdet
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(np.abs(cov[..., 0, 0])))
 
 
 def stacked(laws: Sequence[Gaussian]) -> Gaussian:

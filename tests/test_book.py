@@ -18,6 +18,7 @@ import nbformat
 import pytest
 import yaml
 from browsers import chromium
+from bs4 import BeautifulSoup
 
 ROOT = Path(__file__).resolve().parent.parent
 HTML = ROOT / "_build" / "html"
@@ -325,11 +326,98 @@ def test_a_reference_shows_what_it_leads_to(window):
     assert problems == []
 
 
+def test_what_a_link_to_another_page_leads_to_is_shown_too(window):
+    """Equations are set, terms say what they mean, in both languages; nothing is loaded but what is there."""
+    tab, problems = window
+    show_on(tab, "screen", 1280)
+    tab.goto((HTML / "grid.html").as_uri())
+    tab.wait_for_selector("html[data-formulas=ready]")
+    box = tab.locator("#kf-preview")
+    tab.locator('article a.reference.internal[href^="stratonovich.html#equation-"]').first.hover()
+    box.locator("mjx-container").wait_for()
+    assert "(1." in box.inner_text() and box.locator("[id], a").count() == 0
+    tab.keyboard.press("Escape")
+    tab.locator('article a.kf-term[href="glossary.html#term-likelihood"]').hover()
+    box.get_by_text("likelihood", exact=True).wait_for()
+    assert "функция правдоподобия" in box.inner_text() and "as a function of what is sought" in box.inner_text()
+    assert tab.locator("a.kf-term").count() > 2
+    tab.locator('article a.kf-term[href="glossary.html#term-likelihood"]').click()
+    assert tab.locator("dt#term-likelihood").is_visible()
+    where = tab.locator("dt#term-likelihood + dd a")
+    where.click()
+    assert urlsplit(tab.url).path.endswith("stratonovich.html") and tab.locator(f"#{urlsplit(tab.url).fragment}").count() == 1
+    assert problems == []
+
+
+def test_a_figure_of_another_page_is_shown_with_its_picture(window):
+    tab, problems = window
+    show_on(tab, "screen", 1280)
+    shown = 0
+    for page in NOTEBOOKS:
+        found = re.search(r'href="(?!#)([^"#]+\.html#fig-[^"]+)"', (HTML / f"{page}.html").read_text(encoding="utf-8"))
+        if not found:
+            continue
+        tab.goto((HTML / f"{page}.html").as_uri())
+        tab.locator(f'article a.reference.internal[href="{found[1]}"]').first.hover()
+        picture = tab.locator("#kf-preview img")
+        picture.wait_for()
+        tab.wait_for_function("e => e.complete && e.naturalWidth > 0", arg=picture.element_handle())
+        shown += 1
+        tab.mouse.move(0, 0)
+    assert shown
+    assert problems == []
+
+
+# Sheets of A4 of a chapter that had one more, and two half empty: code went overleaf as a whole, figures were as on a screen.
+SHEETS = {"comparison": 9}
+
+
+@pytest.mark.parametrize("page", SHEETS)
+def test_sheets_are_full(window, page):
+    tab, _ = window
+    show_on(tab, "print", 1280)
+    tab.goto((HTML / f"{page}.html").as_uri())
+    tab.wait_for_selector("html[data-formulas=ready]")
+    printed = tab.pdf(prefer_css_page_size=True)
+    assert len(re.findall(rb"/Type\s*/Page\b", printed)) <= SHEETS[page]
+    alone = "e => [getComputedStyle(e.querySelector('.admonition-title')).breakAfter, getComputedStyle(e).breakInside]"
+    assert tab.locator(".admonition.keypoints").first.evaluate(alone) == ["avoid", "avoid"]
+
+
+def test_hints_are_open_on_paper_and_the_code_of_pictures_is_not_there(window):
+    tab, _ = window
+    tab.goto((HTML / "manual" / "b-aof.html").as_uri())
+    tab.wait_for_selector("html[data-formulas=ready]")
+    closed = "() => [...document.querySelectorAll('article details:not(.kf-code)')].map((e) => e.open)"
+    assert not any(tab.evaluate(closed))
+    tab.evaluate("addEventListener('beforeprint', () => { window.atPrint = (" + closed + ")(); })")
+    tab.pdf()
+    at_print = tab.evaluate("window.atPrint")
+    assert len(at_print) > 3 and all(at_print)
+    assert not any(tab.evaluate(closed)), "closed again on the screen"
+    show_on(tab, "print", PAPER)
+    assert tab.locator("details.kf-code").count() == 1 and not tab.locator("details.kf-code").is_visible()
+
+
 @pytest.mark.parametrize("page", NOTEBOOKS)
 def test_the_number_of_verified_equations_leads_to_them(page):
     found = re.search(r'class="kf-count" href="equations.html#([^"]+)"', (HTML / f"{page}.html").read_text(encoding="utf-8"))
     if found:
         assert f'id="{found[1]}"' in (HTML / "equations.html").read_text(encoding="utf-8")
+
+
+def displayed(page: str) -> list[str]:
+    """TeX of the displayed formulas of a page, without what only numbers or aligns them."""
+    found = BeautifulSoup((HTML / f"{page}.html").read_text(encoding="utf-8"), "html.parser").select("article div.math")
+    tex = ["".join(formula.find_all(string=True, recursive=False)) for formula in found]
+    return [re.sub(r"\\(begin|end)\{(split|aligned)\}|\\\[|\\\]|\s", "", one) for one in tex]
+
+
+def test_the_page_of_all_equations_has_them_all():
+    """Whether typed, verified, or printed from the package: numbered or not."""
+    known = set(displayed("equations"))
+    assert [(page, tex) for page in NOTEBOOKS for tex in displayed(page) if tex not in known] == []
+    assert any("L_{k+1}" in tex for tex in known)  # of the modified filter of optimal structure
 
 
 def test_a_chapter_is_downloaded_as_a_notebook(window):

@@ -28,3 +28,14 @@ addEventListener("DOMContentLoaded", () => {
     if (bracket) before.data = before.data.slice(0, -bracket.length);
   }
 });
+
+// On paper hints are open: nobody can click there.  What the reader had closed is closed again.
+let opened = [];
+addEventListener("beforeprint", () => {
+  opened = [...document.querySelectorAll("article details:not([open], .hide, .kf-code)")];
+  for (const one of opened) one.open = true;
+});
+addEventListener("afterprint", () => {
+  for (const one of opened) one.open = false;
+  opened = [];
+});

@@ -1,5 +1,6 @@
-// What a reference to an equation or a figure of this page leads to, shown beside it: under the mouse, or when the keyboard comes
-// to the link.  Escape closes it.  A finger follows the link, as without this script.
+// What a reference to an equation, a figure or a term leads to, shown beside it: under the mouse, or when the keyboard comes to
+// the link.  Escape closes it.  A finger follows the link, as without this script.  What stands on another page, the build has
+// printed into this one (previews.py).
 addEventListener("DOMContentLoaded", () => {
   const box = document.createElement("div");
   box.className = "kf-preview";
@@ -7,9 +8,12 @@ addEventListener("DOMContentLoaded", () => {
   box.setAttribute("role", "tooltip");
   box.hidden = true;
   document.body.append(box);
+  const elsewhere = JSON.parse(document.getElementById("kf-previews")?.textContent ?? "{}");
   let shown = null, waiting = 0;
 
   const target = (link) => {
+    const address = link.getAttribute("href");
+    if (!address.startsWith("#")) return Object.hasOwn(elsewhere, address) && elsewhere[address];
     const found = document.getElementById(decodeURIComponent(link.hash.slice(1)));
     return found?.closest("figure") ?? found?.closest("div.math") ?? found?.querySelector(":scope > div.math");
   };
@@ -21,16 +25,29 @@ addEventListener("DOMContentLoaded", () => {
   };
   const open = (link) => {
     close();
-    const copy = target(link).cloneNode(true);
-    for (const one of [copy, ...copy.querySelectorAll("*")])
-      for (const name of ["id", "tabindex", "role", "aria-label"]) one.removeAttribute(name);
-    for (const one of copy.querySelectorAll("button, details, .headerlink")) one.remove();
-    for (const one of copy.querySelectorAll("a")) one.replaceWith(...one.childNodes);
-    box.replaceChildren(copy);
+    const found = target(link);
+    if (typeof found === "string") print(found);
+    else copy(found.cloneNode(true));
     box.hidden = false;
     link.setAttribute("aria-describedby", box.id);
     shown = link;
     place();
+  };
+  const copy = (found) => {
+    for (const one of [found, ...found.querySelectorAll("*")])
+      for (const name of ["id", "tabindex", "role", "aria-label"]) one.removeAttribute(name);
+    for (const one of found.querySelectorAll("button, details, .headerlink")) one.remove();
+    for (const one of found.querySelectorAll("a")) one.replaceWith(...one.childNodes);
+    box.replaceChildren(found);
+  };
+  const print = async (html) => {
+    window.MathJax?.typesetClear?.([box]);
+    box.innerHTML = html;
+    for (const picture of box.querySelectorAll("img")) picture.onload = () => shown && place(); // only now it has its height
+    if (!box.querySelector(".math")) return;
+    await window.MathJax?.startup?.promise;
+    await window.MathJax?.typesetPromise?.([box]);
+    if (shown) place();
   };
   const place = () => {
     const at = shown.getBoundingClientRect(), { width, height } = box.getBoundingClientRect(), page = document.documentElement;
@@ -43,7 +60,7 @@ addEventListener("DOMContentLoaded", () => {
     waiting = setTimeout(what, delay);
   };
 
-  for (const link of document.querySelectorAll('article a.reference.internal[href^="#"]')) {
+  for (const link of document.querySelectorAll('article a.reference.internal[href*="#"]')) {
     if (!target(link)) continue;
     link.addEventListener("pointerenter", (event) => event.pointerType === "mouse" && later(() => open(link), 150));
     link.addEventListener("pointerleave", () => later(close, 250)); // time to go over to the box, to read or to copy

@@ -14,8 +14,9 @@ gate, heavy_tails       measurements that are not believed: refused, by any filt
 learnt_noise            a noise of unknown size, learnt on the way
 alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
-                        (state_transitions: those that depend on the state;  jump_optimal: FOS with modes;
-                        exact.jumps: the exact filter of state and mode)
+                        (jump_equations: as printed;  state_transitions: by the state;  jump_optimal: FOS with modes;
+                        exact.jumps: the exact filter of state and mode;  jump_particles: the same by sampling)
+initial_states          the exact filter of an object without noise, with modes of its meter or not
 notation                symbols in which the equations are printed
 programs, fused, loops  the printed equations as rules and regressions; compiled steps made of them (numba)
 """
@@ -34,8 +35,10 @@ from kfcourse.filters.finite_memory import EQUATIONS as _FINITE
 from kfcourse.filters.finite_memory import dfkp, fbp, fkp, mdfkp, mfkp
 from kfcourse.filters.gate import gated
 from kfcourse.filters.heavy_tails import robust
+from kfcourse.filters.initial_states import undisturbed
 from kfcourse.filters.iterated_ekf import iterated
 from kfcourse.filters.jump_optimal import logic_dynamic_fos
+from kfcourse.filters.jump_particles import jump_particle
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.learnt_noise import adaptive
 from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
@@ -67,6 +70,7 @@ __all__ = [
     "gpb2",
     "imm",
     "iterated",
+    "jump_particle",
     "jump_pointmass",
     "kalman_filter",
     "latex",
@@ -79,4 +83,5 @@ __all__ = [
     "particle",
     "pointmass",
     "robust",
+    "undisturbed",
 ]

@@ -39,8 +39,9 @@ def aof(structure: Structure) -> Filter:
 
     def step(state: State, y: Array) -> State:
         now = structure.at(state.step)
-        posterior = correct(state.predicted, now.measure(*state.predicted), y)
-        return State(state.step + 1, posterior, now.predict(*posterior))
+        expected = now.measure(*state.predicted)
+        posterior = correct(state.predicted, expected, y)
+        return State(state.step + 1, posterior, now.predict(*posterior), expected=expected)
 
     model = structure.model
     return Filter(f"aof-{structure.name}", model, initial_state(model), step, structure=structure, printed=(step, EQUATIONS))

@@ -10,7 +10,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import Components, on_circle
-from kfcourse.laws import Array, Gaussian
+from kfcourse.laws import Array, Gaussian, Measurement
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import Structure
 
@@ -28,12 +28,15 @@ class State(NamedTuple):
         Prediction lambda (runs, n) of the next state, and Psi (..., n, n).
     memory : object
         What else the filter remembers (grid, particles); None for most.
+    expected : Measurement, optional
+        What a filter whose laws are normal expected of the last measurement: its likelihood needs no more.
     """
 
     step: int
     posterior: Gaussian
     predicted: Gaussian
     memory: Any = None
+    expected: Measurement | None = None
 
 
 class Init(Protocol):

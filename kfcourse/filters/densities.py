@@ -22,6 +22,7 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
 
 TINY = 1e-300  # in place of a variance of exactly 0
+TRIALS, ROUNDING = 50, 1e-12  # states on which a covariance is tried; eigenvalue of correlations that is none
 MOST_TURNS = 50  # of an angle whose noise is so large that it tells nothing
 
 
@@ -269,14 +270,26 @@ def _conditional(
         )
     mean = equation.subs(dict(zip(noise, exact_matrix(law.mean), strict=True)))
     cov = B * exact_matrix(law.cov) * B.T
-    if name == "likelihood" and len(equation) > 1 and cov.subs(model.values).det().equals(0):
+    outputs = {"mean": mean.subs(model.values), "cov": cov.subs(model.values)}
+    x = sp.Matrix(model.x)
+    found = Stepwise.compile(model.known, name, {"x": x}, outputs, ["x", "mean"], f"{name} law of {model}")
+    if name == "likelihood" and len(equation) > 1 and _singular(found, model):
         raise _no_density(
             f"{list(equation)}: the noises of these components depend on one another, so a combination of them has no noise and "
             f"there is no {name} density; leave a component out, or use the Gaussian filters (gaussian, unscented, gauss_hermite)"
         )
-    outputs = {"mean": mean.subs(model.values), "cov": cov.subs(model.values)}
-    x = sp.Matrix(model.x)
-    return Stepwise.compile(model.known, name, {"x": x}, outputs, ["x", "mean"], f"{name} law of {model}")
+    return found
+
+
+def _singular(law: Stepwise, model: Model) -> bool:
+    """Whether the covariance is singular at all states tried: the determinant of long formulas takes SymPy minutes."""
+    x = model.prior.mean + np.random.default_rng(0).standard_normal((TRIALS, model.n)) * np.sqrt(np.diagonal(model.prior.cov))
+    with np.errstate(all="ignore"):
+        cov = law.at(0)(x)[1]
+        deviation = np.sqrt(np.diagonal(cov, axis1=-2, axis2=-1))
+        correlation = cov / (deviation[..., :, None] * deviation[..., None, :])
+    good = np.isfinite(correlation).all(axis=(-2, -1))
+    return not (np.linalg.eigvalsh(correlation[good])[..., 0] > ROUNDING).any()
 
 
 def _no_density(message: str) -> ModelError:

@@ -81,7 +81,7 @@ def robust(structure: Structure, degrees: float = 4.0, rounds: int = 10, edge: f
             weight = _weight(expected, state.predicted, posterior, y, degrees, edge)
         posterior = correct(state.predicted, trusted(expected, weight), y)
         missing = np.isnan(y).all(axis=-1)
-        return State(state.step + 1, posterior, now.predict(*posterior), Trust(np.where(missing, np.nan, weight)))
+        return State(state.step + 1, posterior, now.predict(*posterior), Trust(np.where(missing, np.nan, weight)), expected)
 
     return Filter(f"robust-{structure.name}", structure.model, init, step, structure=structure)
 

@@ -81,10 +81,11 @@ def iterated(structure: Structure, iterations: int = 5) -> Filter:
 
     def step(state: State, y: Array) -> State:
         prior, now = state.predicted, structure.at(state.step)
-        posterior = correct(prior, now.measure(*prior), y)
+        expected = now.measure(*prior)
+        posterior = correct(prior, expected, y)
         for _ in range(iterations - 1):
             posterior = correct(prior, *affine_meter(now, posterior, prior, y))
-        return State(state.step + 1, posterior, now.predict(*posterior))
+        return State(state.step + 1, posterior, now.predict(*posterior), expected=expected)
 
     return Filter(f"iterated-{structure.name}", structure.model, initial_state(structure.model), step, structure=structure)
 

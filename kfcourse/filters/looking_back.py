@@ -14,8 +14,8 @@ from itertools import islice
 import numpy as np
 
 from kfcourse.filters.base import Filter, State, structure_of
-from kfcourse.laws import Array, Gaussian, Transition, product, transpose
-from kfcourse.linear.smoothing import Passages, blocks, check_lag, look_back
+from kfcourse.laws import Array, Gaussian, product, transpose
+from kfcourse.linear.smoothing import AT_ONCE, Passages, Regression, check_lag, look_back, regressions
 from kfcourse.symbolic.structure import Structure
 
 ROUNDING = 1e-8  # of a prediction's standard deviations: by so much A p A^T + Q may be another than Psi without a reason
@@ -39,19 +39,26 @@ def looked_back(one: Filter, states: Iterable[State], y: Array, lag: int | None 
 def normal_laws(one: Filter, states: Iterable[State], lag: int | None = None) -> Gaussian:
     """The normal laws of the states (steps, runs, ...) given all measurements, or so many later ones."""
     structure = structure_of(one, "looking back")
-    *visited, last = states
-    passages = [_passages(structure, visited[part]) for part in blocks(len(visited), len(last.posterior.mean))]
-    return look_back(passages, last.posterior, lag, one.model.angles.x)
+    back, waiting, laws = list[Regression](), list[State](), list[Gaussian]()
+    for state in states:
+        if waiting and len(waiting) * len(state.posterior.mean) >= AT_ONCE:
+            back += regressions(_passages(structure, waiting))
+            waiting = []
+        waiting.append(state)
+        laws = [*(laws if lag is not None else ()), state.posterior]  # all are kept only if needed
+    if waiting[:-1]:
+        back += regressions(_passages(structure, waiting[:-1]))
+    return look_back(back, laws, lag, one.model.angles.x)
 
 
 def _passages(structure: Structure, visited: Sequence[State]) -> Passages:
     """A filter's ways to its predictions.  What one that remembers more than laws (`gated`) has added counts as noise."""
     posterior, predicted = (_together([getattr(state, name) for state in visited]) for name in ("posterior", "predicted"))
     if structure.at_step is None:
-        _, A, Q = structure.transition(*posterior)
+        A, Q = structure.transition(*posterior)
     else:
         each = [structure.at(state.step - 1).transition(*state.posterior) for state in visited]
-        A, Q = (_by_step([getattr(one, name) for one in each]) for name in Transition._fields[1:])
+        A, Q = (_by_step(parts) for parts in zip(*each, strict=True))
     if any(state.memory is not None for state in visited):
         added = predicted.cov - product(product(A, posterior.cov), transpose(A)) - Q
         sd = np.sqrt(np.abs(np.diagonal(predicted.cov, axis1=-2, axis2=-1)))

@@ -90,7 +90,7 @@ class _Printer(LatexPrinter):
 
     def _print_MatAdd(self, expr: sp.MatAdd) -> str:
         def negative(term: sp.MatrixExpr) -> bool:
-            return bool(term.as_coeff_mmul()[0] < 0)
+            return bool(term.as_coeff_mmul()[0].is_negative)
 
         terms = sorted(expr.args, key=lambda term: (negative(term), not isinstance(term, sp.MatrixSymbol)))
         text = self._print(terms[0])

@@ -59,7 +59,7 @@ class Particles(NamedTuple):
 
     def discretisation_error(self) -> Array:
         """Standard error of the estimates, (runs,): half the distance of both clouds."""
-        return np.asarray(0.5 * np.linalg.norm(self.halves[0] - self.halves[1], axis=1))
+        return half_apart(self.halves)
 
     def evidence_error(self) -> Array:
         """Standard error of the last ln p(y_k | y_0, ..., y_{k-1}), (runs,): half the distance of both clouds."""
@@ -89,8 +89,7 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
     Filter
         Its covariance is an unbiased estimate of the posterior's.
     """
-    if particles < 2 or particles % 2:
-        raise ModelError(f"a particle filter needs an even number of at least 2 particles, got {particles}")
+    even(particles)
     number, log_likelihood, angles = seed_number(seed), likelihood(model), model.angles.x
     state_equation, _ = compile_model(model)
     gaussian_init = initial_state(model)
@@ -105,21 +104,21 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
 
     def first(rng: np.random.Generator, y: Array) -> tuple[Array, Array]:
         """x_0 (runs, 2, M/2, n), and the logarithms of p / q."""
-        s, logs = _plain(rng, (len(y), 2, size), start)
+        s, logs = plain(rng, (len(y), 2, size), start)
         if guided and not start.blind:
             found = start.proposal(np.zeros((len(y), model.n)), y, start.starts(), 0)
             heights = log_likelihood(y[:, None, :], start.noise_of(found.mean), 0) - 0.5 * (found.mean**2).sum(axis=-1)
             heights += np.log(np.diagonal(found.root, axis1=-2, axis2=-1)).sum(axis=-1)
-            for_both = found._replace(share=_normalised(heights)[0]).of_clouds(2)
-            s, logs = _where_measured(y, start.draw(for_both, rng, size), s)
+            for_both = found._replace(share=normalised(heights)[0]).of_clouds(2)
+            s, logs = where_measured(y, start.draw(for_both, rng, size), s)
         return on_circle(start.noise_of(s), angles), logs
 
     def following(rng: np.random.Generator, x: Array, y: Array, k: int) -> tuple[Array, Array]:
         """x_k (runs, 2, M/2, n) from the particles of the step before, and the logarithms of p / q."""
-        s, logs = _plain(rng, x.shape[:-1], ahead)
+        s, logs = plain(rng, x.shape[:-1], ahead)
         if guided and not ahead.blind:
             found = ahead.proposal(x, y[:, None, None, :], np.zeros((1, s.shape[-1])), k)
-            s, logs = _where_measured(y, ahead.draw_each(found, rng), s)
+            s, logs = where_measured(y, ahead.draw_each(found, rng), s)
         after = moved(x, s, k - 1)
         lost = ~np.logical_and.reduce(np.abs(after) < LARGEST, axis=-1)
         return np.where(lost[..., None], x, after), np.where(lost, -np.inf, logs)
@@ -130,16 +129,16 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
 
     def step(state: State, y: Array) -> State:
         before, root = state.memory.x, state.memory.seed
-        rng = _stream(root, state.step)
+        rng = stream(root, state.step)
         with np.errstate(over="ignore", invalid="ignore"):  # what lies beyond the largest number has no weight
             x, logs = first(rng, y) if before is None else following(rng, before, y, state.step)
-            weights, log_mean = _normalised(logs + log_likelihood(y[:, None, None, :], x, state.step))
+            weights, log_mean = normalised(logs + log_likelihood(y[:, None, None, :], x, state.step))
             mean, cov = weighted(x, weights, angles)
-            posterior = _together(mean, cov, angles)
-        flat, chosen = x.reshape(-1, size, model.n), _systematic(weights.reshape(-1, size), rng)
+            posterior = of_both(mean, cov, angles)
+        flat, chosen = x.reshape(-1, size, model.n), systematic(weights.reshape(-1, size), rng)
         kept = np.take_along_axis(flat, chosen[..., None], axis=1).reshape(x.shape)
         effective = (1 / (weights**2).sum(axis=-1)).sum(axis=1)
-        s, _ = _plain(rng, x.shape[:-1], ahead)
+        s, _ = plain(rng, x.shape[:-1], ahead)
         with np.errstate(over="ignore", invalid="ignore"):
             following_ones = moved(kept, s, state.step).reshape(len(y), particles, model.n)
             predicted = weighted(following_ones, np.full(following_ones.shape[:-1], 1.0 / particles), angles)
@@ -153,10 +152,10 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
         memories = [state.memory for state in states]
 
         def back(end: int) -> Iterator[State]:
-            rng = _stream(memories[0].seed, end)
+            rng = stream(memories[0].seed, end)
             found = backwards([memory.x for memory in memories[:end]], transition(model), angles, min(size, PATHS), rng)
             for step, (clouds, effective) in zip(range(end, 0, -1), found, strict=True):
-                law, halves = _together(*clouds, angles), np.moveaxis(clouds.mean, 1, 0)
+                law, halves = of_both(*clouds, angles), np.moveaxis(clouds.mean, 1, 0)
                 yield State(step, law, law, memories[step - 1]._replace(x=None, halves=halves, effective=effective))
 
         return back
@@ -164,28 +163,39 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
     return Filter(name, model, init, step, slow=True, evidence=evidence, look_back=look_back)
 
 
-def _together(mean: Array, cov: Array, angles: Components) -> Gaussian:
+def even(particles: int) -> None:
+    """ModelError if so many particles are not two clouds of equal size."""
+    if particles < 2 or particles % 2:
+        raise ModelError(f"a particle filter needs an even number of at least 2 particles, got {particles}")
+
+
+def half_apart(halves: Array) -> Array:
+    """Half the distance of the estimates (2, runs, n) of two clouds, (runs,): the standard error of their mean."""
+    return np.asarray(0.5 * np.linalg.norm(halves[0] - halves[1], axis=1))
+
+
+def of_both(mean: Array, cov: Array, angles: Components) -> Gaussian:
     """The law by both clouds, from theirs (runs, 2, ...)."""
     apart = difference(mean[:, 0], mean[:, 1], angles)
     return Gaussian(on_circle(mean[:, 1] + 0.5 * apart, angles), cov.mean(axis=1) + 0.5 * apart[:, :, None] * apart[:, None, :])
 
 
-def _plain(rng: np.random.Generator, shape: tuple[int, ...], look: Look) -> tuple[Array, Array]:
+def plain(rng: np.random.Generator, shape: tuple[int, ...], look: Look) -> tuple[Array, Array]:
     """Standard normal numbers (..., r): a proposal that is the law itself."""
     return rng.standard_normal((*shape, len(look.noise.mean))), np.zeros(shape)
 
 
-def _where_measured(y: Array, guided: tuple[Array, Array], plain: Array) -> tuple[Array, Array]:
+def where_measured(y: Array, guided: tuple[Array, Array], plain: Array) -> tuple[Array, Array]:
     """The proposal's s and logarithms, but the law itself for trajectories whose measurement is missing."""
     missing = np.logical_and.reduce(np.isnan(y), axis=-1)[:, None, None]
     return np.where(missing[..., None], plain, guided[0]), np.where(missing, 0.0, guided[1])
 
 
-def _stream(root: np.random.SeedSequence, step: int) -> np.random.Generator:
+def stream(root: np.random.SeedSequence, step: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(root.entropy, spawn_key=(step,)))
 
 
-def _normalised(logs: Array) -> tuple[Array, Array]:
+def normalised(logs: Array) -> tuple[Array, Array]:
     """Weights (..., M) that sum to 1, all equal where nothing is left of them, and the logarithm of their mean before (...)."""
     peak = logs.max(axis=-1, keepdims=True)
     weights = np.exp(logs - np.where(np.isfinite(peak), peak, 0.0))
@@ -196,7 +206,7 @@ def _normalised(logs: Array) -> tuple[Array, Array]:
     return np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / logs.shape[-1]), mean[..., 0]
 
 
-def _systematic(weights: Array, rng: np.random.Generator) -> Array:
+def systematic(weights: Array, rng: np.random.Generator) -> Array:
     """Indices (clouds, M) of systematic resampling: one uniform number a cloud, M equal steps."""
     clouds, m = weights.shape
     cumulative = np.cumsum(weights, axis=1)

@@ -166,7 +166,7 @@ class Look:
         if self.affine:
             s = mean[..., 0, None, :] + (root[..., 0, None, :, :] @ normal[..., None])[..., 0]
             return s, _log_normal(s) - _log_laws(s, mean, root, None)[..., 0]
-        which = _component(share, rng.random(size))
+        which = component(share, rng.random(size))
         student = normal * np.sqrt(FREEDOM / rng.chisquare(FREEDOM, size))[..., None]
         chosen_mean = np.take_along_axis(mean, which[..., None], axis=-2)
         chosen_root = np.take_along_axis(root, which[..., None, None], axis=-3)
@@ -178,7 +178,7 @@ class Look:
         return s, prior - np.logaddexp(np.logaddexp.reduce(laws, axis=-1), prior + np.log(PRIOR))
 
 
-def _component(share: Array, uniform: Array) -> Array:
+def component(share: Array, uniform: Array) -> Array:
     """Numbers (..., M) of the components that uniform numbers (..., M) fall into."""
     return (uniform[..., None] > np.cumsum(share, axis=-1)[..., None, :-1]).sum(axis=-1)
 

@@ -7,8 +7,9 @@ short_names  the lab's filters: "duof" -> how to build it, "DUOF" in tables;  ch
 quality      is a variant well posed?  criteria: each criterion;  difficulty: how hard;  grammar: new ones
 maps         who leads, and how far from the bound, over two parameters
 plots        figures of a comparison, one colour and name for each filter
-report       what `kfcourse lab` writes;  handin: the student's report (handin_text, refusals in words,
-             written_out: the AOF's equations with the model's functions in them)
+report       what `kfcourse lab` writes;  handin: the student's report (handin_sections; handin_plain, handin_modes: of
+             models without and with modes; handin_text, refusals in words; written_out: the AOF's equations with the model's
+             functions in them)
 own_data     what `kfcourse estimate` writes of a record from a file
 """
 

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kfcourse.filters import Design, Filter, pointmass
+from kfcourse.filters import Design, Filter, jump_pointmass, pointmass
+from kfcourse.filters.initial_states import is_undisturbed
 from kfcourse.filters.particles import particle
 from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JumpStructures, Structures, check_names, has_exact, title
@@ -112,7 +113,8 @@ def _admitted(name: str, structures: Structures | JumpStructures) -> Admission:
         warnings.simplefilter("always", QuadratureWarning)
         try:
             if isinstance(structures, JumpStructures):
-                return Admission(name, JUMP_FILTERS[name].build(structures))
+                one = JUMP_FILTERS[name].build(structures)
+                return Admission(name, one, remarks=tuple(_not_by_points(structures)) if name == "aof-exact" else ())
             one = FILTERS[name].build(structures)
         except (NoClosedForm, ModelError) as error:
             return Admission(name, None, Reason.of(error))
@@ -228,7 +230,7 @@ def _share_starved(model: Model, guided: bool) -> float:
 
 def _by_particles(structures: Structures) -> Iterator[str]:
     """The exact filter where point masses do not reach."""
-    if not has_exact(structures.model):
+    if not has_exact(structures.model) and not is_undisturbed(structures.model):
         yield from _starved(structures)
 
 
@@ -238,12 +240,14 @@ def _by_quadrature(structures: Structures) -> Iterator[str]:
         yield structures.quadrature.says
 
 
-def _not_by_points(structures: Structures) -> Iterator[str]:
+def _not_by_points(structures: Structures | JumpStructures) -> Iterator[str]:
     """Why the exact filter is one of particles."""
+    model = structures.model
     try:
-        pointmass(structures.model)
+        jump_pointmass(model) if isinstance(model, JumpModel) else pointmass(model)
     except ModelError as error:
-        yield f"by particles: {error}"
+        drawn = "initial states, as no noise enters the object" if is_undisturbed(model) else "particles"
+        yield f"by {drawn}: {error}"
 
 
 # By a part of the short name.

@@ -25,6 +25,7 @@ class Words(NamedTuple):
     above: str = "$D_k$ above {name}, %"
     mean_above: str = "mean of $D_k$ above {name}, %"
     normalised: str = r"normalised squared error $\mathsf{M}[e^2/p]$"
+    mode: str = "probability of the mode"
 
 
 ENGLISH = Words()
@@ -129,17 +130,17 @@ def consistency(
 OF_MODES = "Probabilities of the modes on one trajectory; grey: the true mode (of two modes: where the second is in force)."
 
 
-def mode_probabilities(modes: Recognised, ax: Axes) -> Axes:
+def mode_probabilities(modes: Recognised, ax: Axes, words: Words = ENGLISH) -> Axes:
     """Probabilities of all modes but the first against the step, on one trajectory, and the true mode."""
     steps, size = np.arange(len(modes.mode)), next(iter(modes.probability.values())).shape[1]
     dashes = ("-", "--", ":", "-.")
     ax.fill_between(steps, modes.mode / (size - 1) if size > 1 else 0 * steps, step="mid", color="#dddddd", linewidth=0)
     for name, probability in modes.probability.items():
         for j in range(1, size):
-            label = title(name) + (f", mode {j + 1}" if size > 2 else "")
+            label = words.title(name) + (f", $j={j + 1}$" if size > 2 else "")
             ax.plot(steps, probability[:, j], color=style(name)["color"], linestyle=dashes[(j - 1) % 4], label=label)
-    _steps(ax)
-    ax.set_ylabel("probability of the mode")
+    _steps(ax, words.step)
+    ax.set_ylabel(words.mode)
     ax.set_ylim(-0.02, 1.02)
     ax.legend(fontsize="small", ncols=2)
     return ax

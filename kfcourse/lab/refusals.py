@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from kfcourse.reasons import Reason
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.writing import formula_latex
 
 
-def cause(reason: str, model: Model, words: Mapping[str, str]) -> str:
+def cause(reason: str, model: Model | JumpModel, words: Mapping[str, str]) -> str:
     """The sentence for a `Reason`, `left_KIND` of the report's words; a message of no kind is quoted."""
     if not (isinstance(reason, Reason) and reason.kind):
         return words["left_other"].format(reason=reason)

@@ -32,7 +32,7 @@ from kfcourse.lab.variants import Variant
 from kfcourse.laws import CONFIDENCE, Array
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.comparison import EXACT, Comparison
-from kfcourse.montecarlo.modes import Recognised, recognised
+from kfcourse.montecarlo.modes import SLOW, Recognised, recognised
 from kfcourse.montecarlo.statistics import Estimate, ratio
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.markup import mathml
@@ -74,7 +74,7 @@ def write_report(variant: Variant, result: Comparison, folder: Path) -> list[Pat
     with replacing_together(folder) as place:
         for name, (_, draw) in _FIGURES.items():
             save_figure(partial(draw, result), place, name)
-        modes = _modes(result)
+        modes = recognised_modes(result)
         if modes:
             save_figure(partial(plots.mode_probabilities, modes), place, "modes")
         save_texts(("report.html", "report.tex"), place, _content(variant, result, modes))
@@ -171,14 +171,19 @@ def conclusions(result: Comparison, confidence: float = CONFIDENCE) -> list[str]
     return sentences
 
 
-def _modes(result: Comparison) -> Recognised | None:
-    """What the filters that carry probabilities of modes know of them; None of a model without modes."""
+def recognised_modes(result: Comparison) -> Recognised | None:
+    """What the filters that carry probabilities of modes know of them; None of a model without modes.
+
+    The exact filter tells only if it came through as many trajectories in its time.
+    """
     model = result.model
     if not isinstance(model, JumpModel):
         return None
-    names = [name for name in result.available if name in WITH_MODES and name not in result.replaced]
+    runs = min(result.runs, RECOGNISED)
+    short = {EXACT} if result.subset_runs < runs // SLOW else set()
+    names = [name for name in result.available if name in WITH_MODES and name not in {*result.replaced, *short}]
     known = [one.one for one in admissions(model, names) if isinstance(one.one, Filter)]
-    return recognised(known, model, min(result.runs, RECOGNISED), result.steps, result.seed) if known else None
+    return recognised(known, model, runs, result.steps, result.seed) if known else None
 
 
 def _content(variant: Variant, result: Comparison, modes: Recognised | None) -> dict[str, Any]:

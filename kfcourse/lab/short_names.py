@@ -20,6 +20,7 @@ from kfcourse.filters import (
     fos,
     gpb2,
     imm,
+    jump_particle,
     jump_pointmass,
     logic_dynamic,
     logic_dynamic_fos,
@@ -29,8 +30,10 @@ from kfcourse.filters import (
     mfos,
     particle,
     pointmass,
+    undisturbed,
 )
 from kfcourse.filters.finite_memory import STEPS
+from kfcourse.filters.initial_states import is_undisturbed
 from kfcourse.lab.checked_quadrature import Checked, of_checked_order
 from kfcourse.lab.families import FAMILIES, family
 from kfcourse.laws import Array
@@ -173,7 +176,7 @@ JUMP_FILTERS: dict[str, JumpEntry] = {
     "duof": JumpEntry(*FAMILIES["duof"][:2], lambda s: duof(s.model.modes[0], averaged_equations(s.model))),
     "fos-averaged": JumpEntry("FOS (averaged)", "ФОС (среднее по режимам)", lambda s: fos(s.averaged)),
     "mfos-averaged": JumpEntry("MFOS (averaged)", "МФОС (среднее по режимам)", lambda s: mfos(s.averaged)),
-    "aof-exact": JumpEntry("exact AOF", "АОФ", lambda s: jump_pointmass(s.model)),
+    "aof-exact": JumpEntry("exact AOF", "АОФ", lambda s: exact(s.model)),
 }
 # Printed names of filters that are not among the lab's.
 TITLES = {
@@ -226,7 +229,7 @@ def check_names(names: Sequence[str], known: Mapping[str, object] = FILTERS) -> 
         raise ValueError(f"unknown filter {', '.join(map(repr, unknown))}; known: {', '.join(known)}")
 
 
-def exact(model: Model) -> Filter:
+def exact(model: Model | JumpModel) -> Filter:
     """The exact AOF, by point masses where they reach, else by particles, whose own error does not enter the bound.
 
     Where point masses fail in the middle of a comparison, particles take over (`Filter.instead`).
@@ -237,13 +240,22 @@ def exact(model: Model) -> Filter:
         Neither can be had: there is no density of y given x.
     """
     try:
-        found = pointmass(model)
+        found = jump_pointmass(model) if isinstance(model, JumpModel) else pointmass(model)
     except ModelError:
-        return particle(model, BOUND, name="aof-exact")
+        return _sampled(model)
     try:
-        return dataclasses.replace(found, instead=particle(model, BOUND, name="aof-exact"))
+        return dataclasses.replace(found, instead=_sampled(model))
     except ModelError:  # without noise in the meter there are no weights
         return found
+
+
+def _sampled(model: Model | JumpModel) -> Filter:
+    """The exact AOF by sampling: of initial states if they tell all that follows."""
+    if is_undisturbed(model):
+        return undisturbed(model, name="aof-exact")
+    if isinstance(model, JumpModel):
+        return jump_particle(model, BOUND, name="aof-exact")
+    return particle(model, BOUND, name="aof-exact")
 
 
 def has_exact(model: Model) -> bool:
@@ -258,7 +270,7 @@ def has_exact(model: Model) -> bool:
 def has_bound(model: Model | JumpModel) -> bool:
     """Whether the exact AOF can be computed for the model, by point masses or by particles."""
     try:
-        jump_pointmass(model) if isinstance(model, JumpModel) else exact(model)
+        exact(model)
     except ModelError:
         return False
     return True

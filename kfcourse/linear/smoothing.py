@@ -8,19 +8,19 @@ and since x_{k+1} itself is known only as N(z', p'), from all measurements, what
 
     z_k^s = z + S (z' - lambda),      p_k^s = p + S (p' - Psi) S^T = (I - S A) p (I - S A)^T + S (Q + p') S^T
 
-with Q = Psi - A p A^T.  The last form is a sum of non-negative terms: a wide prior cannot make it negative by rounding.
+with Q = Psi - A p A^T.  The last form is a sum of non-negative terms: a wide prior cannot make it negative by rounding.  Of one
+state it is p Q / Psi + S^2 p', of more L (I - S A)^T + S (Q + p') S^T with L = (I - S A) p = Cov(x_k | x_{k+1}).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from itertools import accumulate
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from kfcourse.angles import Components, difference, on_circle
-from kfcourse.laws import Array, Gaussian, apply, gain, identity, product, stacked, symmetric, transpose
+from kfcourse.laws import Array, Gaussian, apply, gain, product, regression, stacked, symmetric, transpose
 from kfcourse.linear.runs import Run
 from kfcourse.linear.system import LinearSystem
 
@@ -45,21 +45,61 @@ class Passages(NamedTuple):
     Q: Array
 
 
+class Regression(NamedTuple):
+    """What a filter knew of x_k, and how it changes with what becomes known of x_{k+1}.
+
+    Attributes
+    ----------
+    z, expected : ndarray (runs, n)
+        Its estimate, and lambda, the prediction of x_{k+1}.
+    S, left : ndarray (..., n, n)
+        Its gain, and Cov(x_k | x_{k+1}).
+    Q, forth : ndarray (..., n, n), or None of one state
+        The noise, and left A^T, which is S Q but for rounding.
+    """
+
+    z: Array
+    expected: Array
+    S: Array
+    left: Array
+    Q: Array | None = None
+    forth: Array | None = None
+
+    def given(self, after: Gaussian, angles: Components = ()) -> Gaussian:
+        """The law of x_k, from that of x_{k+1}."""
+        mean = self.z + apply(self.S, difference(after.mean, self.expected, angles))
+        further = product(self.S, after.cov if self.Q is None else self.Q + after.cov)
+        further = further if self.forth is None else further - self.forth
+        return Gaussian(on_circle(mean, angles), symmetric(self.left + product(further, transpose(self.S))))
+
+
+def regressions(passages: Passages) -> list[Regression]:
+    """Of each step on the next.  They do not depend on what comes later: found for all steps together."""
+    (z, p), (lam, Psi), A, Q = passages
+    if z.shape[-1] == 1:
+        return list(map(Regression, z, lam, *regression(p, A, Psi, Q)))
+    Ap = product(A, p)
+    S = gain(transpose(Ap), Psi, broken=True)
+    left = p - product(S, Ap)
+    noise = Q if Q.ndim == p.ndim else np.broadcast_to(Q, (len(z), *Q.shape))
+    return list(map(Regression, z, lam, S, left, noise, product(left, transpose(A))))
+
+
 def blocks(steps: int, runs: int) -> list[slice]:
     """Steps that are worth taking together."""
     size = max(1, AT_ONCE // runs)
     return [slice(start, start + size) for start in range(0, steps, size)]
 
 
-def look_back(passages: Sequence[Passages], last: Gaussian, lag: int | None = None, angles: Components = ()) -> Gaussian:
+def look_back(back: list[Regression], laws: Sequence[Gaussian], lag: int | None = None, angles: Components = ()) -> Gaussian:
     """The laws of the states, given all measurements of the record.
 
     Parameters
     ----------
-    passages : sequence of Passages
-        One after the other, through the whole record.
-    last : Gaussian
-        The filter's law of the last state.
+    back : list of Regression
+        Of all steps but the last.  Without a lag it is used up, so that what is found needs no memory beside it.
+    laws : sequence of Gaussian
+        The filter's, of each step; without a lag that of the last one is enough.
     lag : int, optional
         Only so many later measurements: the law of x_k given y_0, ..., y_{k + lag}.
     angles : tuple
@@ -76,13 +116,13 @@ def look_back(passages: Sequence[Passages], last: Gaussian, lag: int | None = No
         A lag that is no whole number, or below 0.
     """
     check_lag(lag)
-    back = [one for part in passages for one in _regressions(part, angles)]
     if lag is None:
-        return stacked([*accumulate(reversed(back), lambda after, one: one(after), initial=last)][::-1])
-    posteriors = [Gaussian(*law) for part in passages for law in zip(*part.posterior, strict=True)]
-    laws = [*posteriors, last]
+        found = [laws[-1]]
+        while back:
+            found.append(back.pop().given(found[-1], angles))
+        return stacked(found[::-1])
     for _ in range(min(lag, len(back))):  # each round tells every state of one measurement more
-        laws = [*(one(after) for one, after in zip(back, laws[1:], strict=True)), last]
+        laws = [*(one.given(after, angles) for one, after in zip(back, laws[1:], strict=True)), laws[-1]]
     return stacked(laws)
 
 
@@ -92,38 +132,17 @@ def check_lag(lag: int | None) -> None:
         raise ValueError(f"lag must be a whole number of steps, at least 0, or None for all that follow; got {lag!r}")
 
 
-def _regressions(passages: Passages, angles: Components) -> list[Callable[[Gaussian], Gaussian]]:
-    """From the law of x_{k+1} to that of x_k, for each k.
-
-    The gain does not depend on what comes later: found for all steps together.
-    """
-    (z, p), (lam, Psi), A, Q = passages
-    S = gain(product(p, transpose(A)), Psi, broken=True)
-    rest = identity(z.shape[-1], p.dtype) - product(S, A)
-    own = product(product(rest, p), transpose(rest))
-    each = np.broadcast_to(Q, (len(z), *Q.shape[-3:])) if Q.ndim < 4 else Q
-
-    def of_step(z: Array, lam: Array, S: Array, own: Array, Q: Array) -> Callable[[Gaussian], Gaussian]:
-        def back(after: Gaussian) -> Gaussian:
-            mean = z + apply(S, difference(after.mean, lam, angles))
-            return Gaussian(on_circle(mean, angles), symmetric(own + product(product(S, Q + after.cov), transpose(S))))
-
-        return back
-
-    return [of_step(*one) for one in zip(z, lam, S, own, each, strict=True)]
-
-
 def smooth(system: LinearSystem, found: Run, lag: int | None = None) -> Gaussian:
     """The states of a linear system given all measurements, from the filter's `run` over them.
 
     Inputs are in its predictions already.  `lag`, result and errors as of `look_back`.
     """
     (mean, cov), (ahead, ahead_cov) = ((laws.mean, _once(laws.cov)) for laws in (found.posterior, found.predicted))
-    passages = [
+    each = [
         Passages(Gaussian(mean[:-1][part], cov[:-1][part]), Gaussian(ahead[1:][part], ahead_cov[1:][part]), system.A, system.Q)
         for part in blocks(len(mean) - 1, mean.shape[1])
     ]
-    return look_back(passages, Gaussian(mean[-1], cov[-1]), lag)
+    return look_back([one for part in each for one in regressions(part)], list(map(Gaussian, mean, cov)), lag)
 
 
 def _once(cov: Array) -> Array:

@@ -13,7 +13,6 @@ from tqdm import tqdm
 from kfcourse.angles import near
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.looking_back import looked_back
-from kfcourse.filters.particles import Particles
 from kfcourse.laws import Array, NegativeVariance
 from kfcourse.montecarlo.designing import NotFinite, failed
 from kfcourse.montecarlo.ensemble import Instant
@@ -97,10 +96,8 @@ def _back(filters: Sequence[Filter], instants: Iterable[Instant], size: int) -> 
 
 def _twice(state: State) -> tuple[Array, Array]:
     """Two estimates of the reference whose errors, if it has any, are independent: those of both clouds of particles."""
-    if isinstance(state.memory, Particles):
-        first, second = state.memory.halves
-        return first, second
-    return state.posterior.mean, state.posterior.mean
+    first, second = getattr(state.memory, "halves", (state.posterior.mean,) * 2)
+    return first, second
 
 
 def _doubt(state: State) -> Array:

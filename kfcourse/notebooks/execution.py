@@ -85,14 +85,16 @@ def _running(notebook: NotebookNode) -> str:
     return str(notebook.cells[-1].id)
 
 
-def pictures(executed: NotebookNode) -> dict[str, bytes]:
-    """PNG of every cell tagged `picture`, by cell id."""
+def pictures(executed: NotebookNode, narrow: bool = False) -> dict[str, bytes]:
+    """PNG of every cell tagged `picture`, by cell id; `narrow`: those for telephones (`kfcourse.pages.figures.book_style`)."""
     found = {}
     for cell in executed.cells:
         if "picture" in cell.metadata.get("tags", []):
             for output in cell.outputs:
-                if "image/png" in output.get("data", {}):
-                    found[cell.id] = base64.b64decode(output.data["image/png"])
+                wide = output.get("data", {}).get("image/png")
+                png = output.get("metadata", {}).get("image/png", {}).get("narrow") if narrow else wide
+                if png:
+                    found[cell.id] = base64.b64decode(png)
     return found
 
 

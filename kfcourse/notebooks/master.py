@@ -176,18 +176,23 @@ def _picture(drawn_by: NotebookNode, png: bytes) -> NotebookNode:
     return cell
 
 
-def statement(notebook: NotebookNode, pictures: Mapping[str, str]) -> str:
-    """The set as a page of the book: text, stubs and checks as plain code; `pictures`: cell id to the image's path."""
+def statement(notebook: NotebookNode, pictures: Mapping[str, tuple[str, int]]) -> str:
+    """The set as a page of the book: text, stubs and checks as plain code, what draws a picture folded under it.
+
+    `pictures`: cell id to the path of the image and its width in pixels of a screen.
+    """
     parts = []
     for cell in notebook.cells:
         source = without_solution(cell.source, cell.cell_type == "code").strip()
         if not source:
             continue
         if cell.cell_type == "code":
-            if cell.id in pictures:
-                seen = cell.metadata.get("alt", "")
-                parts.append(f"```{{figure}} {pictures[cell.id]}\n:alt: {seen}\n\nThe picture to reach.\n```")
             source = f"```python\n{source}\n```"
+            if cell.id in pictures:
+                path, width = pictures[cell.id]
+                seen = cell.metadata.get("alt", "")
+                parts.append(f"```{{figure}} {path}\n:alt: {seen}\n:width: {width}px\n\nThe picture to reach.\n```")
+                source = f'<details class="kf-code"><summary>Show the code</summary>\n\n{source}\n\n</details>'
         parts.append(source)
     return "\n\n".join(parts) + "\n"
 

@@ -27,9 +27,6 @@ FONTS = sorted((Path(__file__).parent / "data").glob("*.ttf"))  # the pages' own
 
 _STYLE: dict[Any, Any] = {
     "figure.figsize": (WIDTH, 3.4),
-    "figure.facecolor": "none",  # the page shows through, light or dark
-    "axes.facecolor": "none",
-    "savefig.facecolor": "none",
     "figure.constrained_layout.use": True,
     "font.family": ["Source Sans 3", "DejaVu Sans"],  # the second has the signs that the first lacks
     "mathtext.fontset": "custom",
@@ -53,8 +50,10 @@ _STYLE: dict[Any, Any] = {
 }
 
 
-def book_style() -> None:
+def book_style(ground: str = "none") -> None:
     """Figures of this notebook in the style of the book: its font, twice the pixels, transparent, no frame above and right.
+
+    A `ground`, "white" say, makes them readable wherever a notebook is opened, also where the page is dark.
 
     The picture of each wider than `NARROW` carries a second one, for telephones, in its output's metadata (book/narrow.py).
     """
@@ -62,7 +61,7 @@ def book_style() -> None:
         fontManager.addfont(font)
     # The whole figure, as wide as it says: constrained layout has found room for everything.
     set_matplotlib_formats("retina", bbox_inches=None)
-    rcParams.update(_STYLE)
+    rcParams.update(_STYLE | {f"{of}.facecolor": ground for of in ("figure", "axes", "savefig")})
     formatter = InteractiveShell.instance().display_formatter.formatters["image/png"]  # type: ignore[union-attr]
     wide = formatter.lookup_by_type(Figure)
 
@@ -94,6 +93,11 @@ def lay_narrow(figure: Figure) -> bool:
             if ax is not first_ax and ax.get_shared_y_axes().joined(ax, first_ax):  # which stood at the left and said it for both
                 ax.tick_params(labelleft=True)
                 ax.set_ylabel(ax.get_ylabel() or first_ax.get_ylabel())
+    for legend in list(figure.legends):  # below all panels, in more columns than there is room for
+        handles = [handle for handle in legend.legend_handles if handle is not None]
+        labels = [text.get_text() for text in legend.get_texts()]
+        legend.remove()
+        figure.legend(handles, labels, loc="outside lower center", ncols=2)
     figure.set_size_inches(NARROW, 0.9 * height * columns if columns > 1 else height)
     return True
 

@@ -99,6 +99,7 @@ def _normal(one: Filter) -> Evidence:
     structure = structure_of(one, "the likelihood")
 
     def evidence(before: State, y: Array, after: State) -> Array:
-        return log_density(structure.at(before.step).measure(*before.predicted), y)
+        known = after.expected
+        return log_density(structure.at(before.step).measure(*before.predicted) if known is None else known, y)
 
     return evidence

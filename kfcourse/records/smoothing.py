@@ -72,7 +72,7 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     [0.944, 1.833, 2.556, 3.278]
     """
     if one.look_back is None:
-        return normal_laws(one, list(walk(one, y))[1:], lag)
+        return normal_laws(one, islice(walk(one, y), 1, None), lag)
     return stacked([state.posterior for state in _looked_back(one, y, lag)])
 
 
@@ -80,9 +80,11 @@ def smoothing_error(one: Filter, y: Array, lag: int | None = None) -> Array:
     """How far the estimates of `smooth` may be from the true means given the record, (steps, runs), in the units of x.
 
     Of the exact filter the estimated error of its integrals; of particles the standard error, by the distance of two clouds that
-    know nothing of each other.  It is right to a tenth with a hundred particles whose proposal looks at the measurement.  With
-    `guided=False` both clouds miss far measurements alike, and what they share their distance does not show: there it is
-    a third too small.  Arguments as of `smooth`.
+    know nothing of each other.  It is right to a tenth where tens of particles count at every step (`state.memory.effective`), as
+    they do where the proposal looks at the measurement.  Where fewer do, as with `guided=False` at a far measurement, both clouds
+    miss the same states: there it is a third too small.  Of two clouds it has one degree of freedom: an interval of 95 % reaches
+    12.7 standard errors (Student), not 2.  Over 400 trajectories of each kind, 400 particles, such intervals held the exact
+    smoother's components in .95 of the cases, and in .91 where fewer than 20 particles counted.  Arguments as of `smooth`.
 
     Raises
     ------
@@ -148,7 +150,7 @@ def affine_at(structure: Structure, laws: Gaussian) -> Structure:
 
     def at(k: int) -> Structure:
         there, now = Gaussian(laws.mean[k], laws.cov[k]), structure.at(k)
-        tau, A, Q = now.transition(*there)
+        tau, (A, Q) = now.predict(*there).mean, now.transition(*there)
 
         def predict(z: Array, p: Array) -> Gaussian:
             shift = apply(A, difference(z, there.mean, model.angles.x))
@@ -157,7 +159,7 @@ def affine_at(structure: Structure, laws: Gaussian) -> Structure:
         def measure(m: Array, d: Array) -> Measurement:
             return measurement_of(model.angles.y)(*seen_from(now.measure(*there), there, Gaussian(m, d), model.angles.x))
 
-        return Structure(structure.name, model, predict, measure, lambda z, p: Transition(tau, A, Q))
+        return Structure(structure.name, model, predict, measure, lambda z, p: Transition(A, Q))
 
     first = at(0)
     return Structure(structure.name, model, first.predict, first.measure, first.transition, at_step=at)

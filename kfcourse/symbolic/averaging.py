@@ -49,9 +49,10 @@ def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
             return Measurement(h, G, _form(G, d) + R, R)
 
         def transition(z: Array, p: Array) -> Transition:
-            parts = [one.transition(z, p) for one in now]
-            tau, A = _mean(after, [one.tau for one in parts]), _mean(after, [one.A for one in parts])
-            return Transition(tau, A, _mean(after, [one.Q + _form(one.A - A, p) + _square(one.tau - tau) for one in parts]))
+            each, taus = [one.transition(z, p) for one in now], [one.predict(z, p).mean for one in now]
+            tau, A = _mean(after, taus), _mean(after, [one.A for one in each])
+            parts = [Q + _form(slope - A, p) + _square(mean - tau) for (slope, Q), mean in zip(each, taus, strict=True)]
+            return Transition(A, _mean(after, parts))
 
         return Structure("averaged", model.modes[0], predict, measure, transition)
 

@@ -8,7 +8,7 @@ has Gaussian moments in closed form, in any dimension, because an exponential on
 
     M[q(x) exp(a^T x)] = exp(a^T m + a^T P a / 2) M[q(m + P a + delta)],   delta ~ N(0, P)
 
-and the moments of the centred Gaussian delta are finite sums (Isserlis' theorem).  Covariances are
+and the moments of a Gaussian follow one from another (Stein's lemma, `_polynomial_mean`).  Covariances are
 assembled term by term from differences that vanish symbolically, never as M[fg] - M[f] M[g]: a
 large mean or a small variance then loses no digits in floating point.
 """
@@ -16,7 +16,7 @@ large mean or a small variance then loses no digits in floating point.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache, cached_property
+from functools import cache
 from typing import NamedTuple
 
 import sympy as sp
@@ -99,31 +99,17 @@ class GaussianMoments:
         return _cis(sp.expand((a.T * self.mean + a.T * self.cov * a / 2)[0]))
 
     def _polynomial_mean(self, polynomial: sp.Expr, rate: tuple[sp.Expr, ...]) -> sp.Expr:
-        """M[polynomial(m + P a + delta)], delta ~ N(0, P)."""
+        """M[polynomial(x)], x ~ N(s, P), s = m + P a, by Stein's lemma: M[x_i f] = s_i M[f] + sum_j P_ij M[df/dx_j]."""
         shift = self.mean + self.cov * sp.Matrix(rate)
-        deviations = [sp.Dummy(f"delta{i}", real=True) for i in range(len(self.variables))]
-        shifted = polynomial.subs(
-            {x: s + u for x, s, u in zip(self.variables, shift, deviations, strict=True)}, simultaneous=True
-        )
-        total = sp.S.Zero
-        for powers, coefficient in sp.Poly(sp.expand(shifted), *deviations).terms():
-            total += coefficient * self._central_moment(powers)
-        return sp.expand(total)
-
-    @cached_property
-    def _central_moment(self):
-        """M[prod delta_i^powers_i] by Isserlis' recursion: pair one factor with each of the others."""
 
         @cache
         def moment(powers: tuple[int, ...]) -> sp.Expr:
-            if sum(powers) % 2:
-                return sp.S.Zero
             if not any(powers):
                 return sp.S.One
             first = next(i for i, power in enumerate(powers) if power)
             rest = list(powers)
             rest[first] -= 1
-            total = sp.S.Zero
+            total = shift[first] * moment(tuple(rest))
             for j, power in enumerate(rest):
                 if power and self.cov[first, j] != 0:
                     rest[j] -= 1
@@ -131,7 +117,8 @@ class GaussianMoments:
                     rest[j] += 1
             return sp.expand(total)
 
-        return moment
+        terms = sp.Poly(polynomial, *self.variables).terms()
+        return sp.expand(sum((coefficient * moment(powers) for powers, coefficient in terms), sp.S.Zero))
 
 
 def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:

@@ -290,8 +290,8 @@ def _of_step(name: str, model: Model, rules: Sequence[tuple[Array, Array]], equa
         return measurement(h, *_without_rounding(G, d, F, R))
 
     def transition(z: Array, p: Array) -> Transition:
-        tau, A, Q, _ = regressed(equations.state, rules[0], z, np.broadcast_to(p, (*z.shape, n)))
-        return Transition(tau, A, Q)
+        _, A, Q, _ = regressed(equations.state, rules[0], z, np.broadcast_to(p, (*z.shape, n)))
+        return Transition(A, Q)
 
     return Structure(name, model, predict, measure, transition)
 

@@ -51,7 +51,7 @@ class Structure:
     measure : callable
         (m (..., n), d (..., n, n)) -> Measurement(h (..., p), G (..., p, n), F (..., p, p), R).
     transition : callable
-        (z (..., n), p (..., n, n)) -> Transition(tau (..., n), A (..., n, n), Q): what a smoother needs of the object.
+        (z (..., n), p (..., n, n)) -> Transition(A (..., n, n), Q): what a smoother needs of the object.
     formulas : StructuralFormulas or None
         The symbolic functions; None for the numerical structures.
     at_step : callable, optional
@@ -176,8 +176,7 @@ class StructuralFormulas:
 
     @cached_property
     def compiled_transition(self) -> Stepwise:
-        parts = {"tau": self.functions["tau"], "A": self.A, "Q": self.Q}
-        outputs = {name: part.subs(self.model.values) for name, part in parts.items()}
+        outputs = {name: part.subs(self.model.values) for name, part in {"A": self.A, "Q": self.Q}.items()}
         return self._compile("transition", {"z": self.z, "p": self.p}, outputs)
 
     def _compile(

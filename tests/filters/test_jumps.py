@@ -397,7 +397,7 @@ def test_the_average_has_the_moments_of_the_next_state_and_the_measurement():
     cross = (x[:, 0] - 0.7) * (y - y.mean())
     assert abs(cross.mean() - 0.5 * G.item()) < 4 * cross.std() / np.sqrt(size)
     np.testing.assert_allclose(F, G * 0.5 * G + R, rtol=1e-12)
-    _, A, Q = structure.transition(mean, cov)
+    A, Q = structure.transition(mean, cov)
     np.testing.assert_allclose(theta, A * 0.5 * A + Q, rtol=1e-12)
     cross = (x[:, 0] - 0.7) * (x_next - x_next.mean())
     assert abs(cross.mean() - 0.5 * A.item()) < 4 * cross.std() / np.sqrt(size)

@@ -14,7 +14,9 @@ from kfcourse import Model, compare, gaussian, lab_filters, linearised, load_var
 from kfcourse.filters import aof
 from kfcourse.lab import Variant, handin, report
 from kfcourse.lab.admission import admissions
-from kfcourse.lab.handin import CATALOGUE, FIGURES, LANGUAGES, write_handin
+from kfcourse.lab.handin import FIGURES, LANGUAGES, write_handin
+from kfcourse.lab.handin_plain import CATALOGUE
+from kfcourse.lab.handin_sections import StudentReport
 from kfcourse.lab.handin_text import filled, inline_tex
 from kfcourse.lab.refusals import cause
 from kfcourse.lab.report import ranges
@@ -125,7 +127,7 @@ def sentences(leaders, last, language):
     verdicts = [
         Verdict(best, others, "" if last(k) in (best, *others) else last(k)) for k in range(51) for best, *others in [leaders(k)]
     ]
-    return list(handin._Report(Told(), WORDS[language]).sentences(verdicts))
+    return list(StudentReport(Told(), WORDS[language]).sentences(verdicts))
 
 
 @pytest.mark.quick

@@ -53,8 +53,8 @@ def test_they_are_shipped_beside_the_variants_that_the_exercises_ask_about(own):
 def test_each_has_its_filters_and_finite_trajectories(name):
     found = {one.name: one for one in admissions(JUMPS[name].model)}
     scalar = JUMPS[name].model.n == 1
-    assert (found["aof-exact"].one is not None) == scalar
-    assert scalar or "scalar models" in found["aof-exact"].reason
+    assert found["aof-exact"].one is not None
+    assert scalar or ("by " in found["aof-exact"].says and "scalar models" in found["aof-exact"].says)
     assert all(found[one].one for one in ("aof-jump-linearised", "imm", "gpb2"))
     for one in ("aof-averaged", "duof", "fos-averaged", "mfos-averaged", "fos-jump-gaussian"):
         assert found[one].one or "closed" in found[one].reason or "nobody knows the probabilities" in found[one].reason
@@ -112,7 +112,6 @@ def test_where_nothing_knows_modes_it_is_said(tmp_path, own):
     for arguments in (
         ("exercises", "--sets", "a", "--jobs", 1, "--variant", "J1", "--out", tmp_path / "e"),
         ("estimate", tmp_path / "y.csv", "--model", own, "--variant", "mine"),
-        ("lab", "J1", "--report", "en", "--runs", 100, "--exact-runs", 0, "--out", tmp_path / "r"),
     ):
         result = kfcourse(*arguments)
         assert result.exit_code != 0 and "jumps between modes" in result.output, (arguments, result.output)

@@ -173,6 +173,15 @@ def test_statement_is_a_page_without_solutions():
     assert f"```python\ndef gain(Psi, G, F):\n    \"\"\"K, (N, n, p).\"\"\"\n    {STUB}" in page  # fmt: skip
 
 
+@pytest.mark.quick
+def test_what_draws_a_picture_is_folded_under_it():
+    drawn = next(cell.id for cell in tiny().cells if "picture" in cell.metadata.get("tags", []))
+    page = statement(tiny(), {drawn: ("drawn.png", 720)})
+    figure, code = page.index("```{figure} drawn.png\n"), page.index('<details class="kf-code">')
+    assert figure < code < page.index("plt.show()") < page.index("</details>", code) and ":width: 720px" in page
+    assert page.count('<details class="kf-code">') == 1
+
+
 def test_a_variant_that_is_not_shipped_is_written_into_the_notebook(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text('[variants.mine]\nstate = "q*x + v"\nmeter = "x + w"\nparameters = { q = 0.5 }\n', encoding="utf-8")

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from IPython.core.interactiveshell import InteractiveShell
 from matplotlib import font_manager, rcParams
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 
@@ -34,7 +35,7 @@ def test_labels_are_in_the_font_of_the_pages_whatever_their_letters(style, caplo
     ax.set(title="погрешность ω ≤ −1 °", xlabel=r"$\lambda_k^{(i)}$, с")
     ax.legend()
     with caplog.at_level(logging.WARNING):
-        figure.canvas.draw()
+        FigureCanvasAgg(figure).draw()
     assert caplog.messages == []
 
 
@@ -71,7 +72,7 @@ def test_on_a_telephone_panels_stand_one_under_the_other_and_letters_have_ten_pi
     figure, (left, right) = plt.subplots(1, 2, figsize=(7.2, 3), sharey=True)
     left.set(ylabel="error", xlabel="step")
     assert lay_narrow(figure)
-    figure.canvas.draw()
+    FigureCanvasAgg(figure).draw()
     above, below = (ax.get_window_extent() for ax in (left, right))
     assert above.y0 > below.y1
     assert abs(above.x0 - below.x0) < 1
@@ -97,3 +98,26 @@ def test_the_picture_of_a_wide_figure_carries_one_for_telephones(style) -> None:
     figure.subplots()
     _, metadata = formatter(figure)
     assert "narrow" not in metadata
+
+
+def test_the_legend_below_narrow_panels_has_room(style) -> None:
+    """As that of set f, four columns wide."""
+    figure = Figure(figsize=(7.2, 3.2))
+    left, _ = figure.subplots(1, 2)
+    for name in ("prediction (at $k=0$ the prior)", "posterior", "normal, same moments", "state"):
+        left.plot([0, 1], [0, 1], label=name)
+    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    assert lay_narrow(figure)
+    FigureCanvasAgg(figure).draw()
+    (legend,) = figure.legends
+    box, whole = legend.get_window_extent(), figure.bbox
+    assert whole.x0 <= box.x0 < box.x1 <= whole.x1 and whole.y0 <= box.y0
+    assert box.y1 <= min(ax.get_tightbbox().y0 for ax in figure.axes)
+
+
+def test_a_ground_is_painted(style) -> None:
+    with matplotlib.rc_context():
+        book_style(ground="white")
+        assert Figure().get_facecolor() == (1, 1, 1, 1)
+        book_style()
+        assert Figure().get_facecolor()[3] == 0

@@ -1,5 +1,6 @@
 """The likelihood of a record: a dense normal density, the Nile's figure, brute force, and what has none."""
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -7,8 +8,8 @@ import oracles
 import pytest
 import scipy
 
-from kfcourse import Model, gaussian, likelihood, linearised, run, simulate, unscented
-from kfcourse.filters import aof, duof, iterated, kalman_filter, particle, pointmass
+from kfcourse import Model, gaussian, likelihood, linearised, run, simulate, smooth, unscented
+from kfcourse.filters import aof, duof, iterated, kalman_filter, particle, pointmass, robust
 from kfcourse.lab.variants import find_variant
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble
@@ -198,17 +199,25 @@ def test_how_good_normal_laws_are_nobody_knows():
         likelihood_error(kalman_filter(find_variant("1").model), np.zeros(3))
 
 
-def test_nothing_is_computed_where_nobody_asks():
-    """The lab's run pays nothing for likelihood and looking back: both are found from the states afterwards."""
+@pytest.mark.parametrize("build", [aof, iterated, robust])
+def test_nothing_is_computed_where_nobody_asks_and_nothing_twice(build):
+    """The lab's run pays nothing for likelihood and looking back: both are found from the states afterwards.
+
+    A likelihood takes what the filter expected anyway; a smoother A and Q of all steps together, 512 laws at once.
+    """
     calls = []
     structure = linearised(local_level())
     counted = replace(
         structure,
+        predict=lambda z, p: calls.append("predict") or structure.predict(z, p),
         measure=lambda m, d: calls.append("measure") or structure.measure(m, d),
         transition=lambda z, p: calls.append("transition") or structure.transition(z, p),
     )
-    run(aof(counted), nile())
-    assert calls == ["measure"] * 100
+    once = Counter(predict=100, measure=500 if build is iterated else 100)
+    for what, more in ((run, {}), (likelihood, {}), (smooth, {"transition": 1})):
+        calls.clear()
+        what(build(counted), nile())
+        assert Counter(calls) == once + Counter(more)
 
 
 def test_what_has_no_density_is_told():

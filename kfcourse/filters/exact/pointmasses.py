@@ -70,6 +70,14 @@ class PointMass(NamedTuple):
             for some, kernels in predictions([self.fine[i] for i in rows.tolist()], law):
                 yield rows[some], kernels
 
+    def bytes(self) -> int:
+        """That the predictions hold."""
+        return sum(kernels.bytes() for _, kernels in self.groups)
+
+    def without_predictions(self) -> PointMass:
+        """The same, all predictions to be made again."""
+        return self._replace(groups=[], later=np.arange(len(self.fine)))
+
     def evidence_error(self) -> Array:
         """Estimated error of the last ln p(y_k | y_0, ..., y_{k-1}), (runs,): the total's relative error is part of `error`."""
         return self.error
@@ -91,8 +99,8 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
         Largest estimated error of a step, in posterior standard deviations; a step with a larger one is left to the
         adaptive filter.
     memory : float
-        Bytes that predictions may take from one step to the next; those of further trajectories are made twice, a chunk of some
-        50 MB at a time.  A posterior is some kB, 10 MB at most, and not counted.
+        Bytes that predictions may take from one step to the next, and those of all steps for who looks back; further ones are
+        made twice, a chunk of some 50 MB at a time.  A posterior is some kB, 10 MB at most, and not counted.
 
     Raises
     ------
@@ -131,15 +139,15 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
         return log_evidence(before(state, len(y)), y, densities.at(state.step), after.memory.fine)
 
     def look_back(states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
-        memories = [(state.memory.fine, state.memory.error) for state in states]  # without the predictions: these are large
-        posteriors, errors = zip(*memories, strict=True)
-
-        def predicted(k: int) -> Iterable[tuple[Array, Kernels]]:
-            return predictions(posteriors[k - 1], densities.at(k - 1)) if k else before(init(y.shape[1]), y.shape[1])
+        runs, room, visited = y.shape[1], memory, [init(y.shape[1])]
+        for state in states:
+            room -= state.memory.bytes()
+            visited.append(state if room >= 0 else state._replace(memory=state.memory.without_predictions()))
 
         def back(end: int) -> Iterator[State]:
-            known = posteriors[:end], np.array(errors[:end])
-            found = smoothed(*known, y, predicted, densities, accuracy, bool(model.angles.x))
+            memories = [state.memory for state in visited[1 : end + 1]]
+            known = [one.fine for one in memories], np.array([one.error for one in memories])
+            found = smoothed(*known, y, lambda k: before(visited[k], runs), densities, accuracy, bool(model.angles.x))
             for step, one in zip(range(end, 0, -1), found, strict=True):
                 law = Gaussian(one.mean[:, None], one.variance[:, None, None])
                 yield State(step, law, law, one)

@@ -32,6 +32,7 @@ from kfcourse.laws import Array
 LOOKS = 8  # that may be needed until the width of a hump is seen
 SPACING = 0.45  # of the nodes at the highest hump, in its widths
 SMOOTHING_NODES = (49, 65, 97, 129, 193, 257, 385, 513, 769, 1025)  # that a density may have
+ALL, NESTED = (1,), (1, 2, 4)  # which nodes are taken: all; and every second, every fourth, to tell the error
 HERMITE = np.polynomial.hermite_e.hermegauss(16)
 
 
@@ -126,28 +127,29 @@ class Density:
             self.kernels.rows(rows), self.y[rows], self.evidence[rows, 0], self.law, self.ahead and self.ahead.rows(rows)
         )
 
-    def later(self, x: Array) -> Array:
-        """r at x (T, N) by all nodes of the next step, by every second and by every fourth: (T, N, 3)."""
+    def later(self, x: Array, parts: Sequence[int] = NESTED) -> Array:
+        """r at x (T, N) by all nodes of the next step, by every second and by every fourth: (T, N, parts)."""
         if self.ahead is None:
-            return np.ones((*x.shape, 3))
+            return np.ones((*x.shape, len(parts)))
         nodes, weight, _, place, count, point = self.ahead
         mu, sigma = self.law.kernel(x)
-        weights = np.repeat(weight[:, :, None], 3, axis=2)
-        for i, part in ((1, 2), (2, 4)):
+        weights = np.repeat(weight[:, :, None], len(parts), axis=2)
+        for i, part in enumerate(parts[1:], 1):
             weights[:, :, i] *= np.where(point[:, None], 1, part * (np.arange(weight.shape[1]) % part == 0))
         found = _summed(nodes, weights, mu, sigma)
-        nearest = np.clip(mu, place.low, place.high)
-        narrow = ~point[:, None] & (sigma < place.distance(nearest, count[:, None]))
-        if narrow.any():
-            found[narrow] = self._between(mu[narrow], sigma[narrow], np.nonzero(narrow)[0])
+        ends = np.stack([place.low[:, 0], place.high[:, 0]], axis=1)  # where the nodes are farthest apart
+        if (~point & (np.min(sigma, axis=1) < place.distance(ends, count[:, None]).max(axis=1))).any():
+            nearest = np.clip(mu, place.low, place.high)
+            narrow = ~point[:, None] & (sigma < place.distance(nearest, count[:, None]))
+            found[narrow] = self._between(mu[narrow], sigma[narrow], np.nonzero(narrow)[0], parts)
         return found
 
-    def _between(self, mu: Array, sigma: Array, row: Array) -> Array:
-        """The same for kernels narrower than the distance of the nodes: rho between them, (Q, 3)."""
+    def _between(self, mu: Array, sigma: Array, row: Array, parts: Sequence[int]) -> Array:
+        """The same for kernels narrower than the distance of the nodes: rho between them, (Q, parts)."""
         assert self.ahead is not None
         nodes, _, logs, place, count, _ = self.ahead
         (c, s, low, high), last = (part[row, 0] for part in place), count[row] - 1
-        found = np.zeros((len(row), 3))
+        found = np.zeros((len(row), len(parts)))
         first = np.arcsinh((low - c) / s)
         span = np.arcsinh((high - c) / s) - first
         for u, share in zip(HERMITE[0], HERMITE[1] / ROOT, strict=True):
@@ -155,20 +157,20 @@ class Density:
             inside = np.flatnonzero((wanted >= low) & (wanted <= high))
             i = row[inside]
             at = np.clip((np.arcsinh((wanted - c) / s) - first) / span, 0, 1)[inside] * last[inside]
-            for place_of, part in enumerate((1, 2, 4)):
+            for place_of, part in enumerate(parts):
                 values = np.stack([nodes, logs])[:, :, ::part]
                 found[inside, place_of] += share * np.exp(interpolated(values, at / part, i, last[inside] // part + 1)[1])
         return found
 
-    def change(self, x: Array) -> tuple[Array, Array]:
-        """log of p(y_k | x) / p(y_k | ...), (T, N), and r, (T, N, 3)."""
-        return self.law.log_likelihood(self.y, x) - self.evidence, self.later(x)
+    def change(self, x: Array) -> Array:
+        """log of p(y_k | x) / p(y_k | ...), (T, N)."""
+        return self.law.log_likelihood(self.y, x) - self.evidence
 
     def logs(self, x: Array) -> Array:
         """log p(x | Y), (T, N)."""
-        by_measurement, later = self.change(x)
+        known, later = self.kernels.density(x, self.kernels.mass)[:, :, 0], self.later(x, ALL)[:, :, 0]
         with np.errstate(divide="ignore"):
-            found = np.log(self.kernels.density(x, self.kernels.mass)[:, :, 0]) + by_measurement + np.log(later[:, :, 0])
+            found = np.log(known) + self.change(x) + np.log(later)
         return np.where(np.isnan(found), -np.inf, found)
 
     def resolve(self, grids: Sequence[Grid], rows: Array, found: Found, accuracy: float) -> None:
@@ -205,7 +207,7 @@ class Density:
         x = np.array([grid.x[i] for grid, i in zip(grids, chosen, strict=True)])
         with np.errstate(divide="ignore"):
             logs = np.log(np.array([grid.density[i] for grid, i in zip(grids, chosen, strict=True)]))
-            logs = logs + np.log(self.later(x)[:, :, 0])
+            logs = logs + np.log(self.later(x, ALL)[:, :, 0])
         centre, width, low, high = _hump(x, logs)
         left = np.arange(len(grids))
         for _ in range(LOOKS):
@@ -226,7 +228,7 @@ class Density:
     def on_nodes(self, place: Place, count: int) -> Nodes:
         """The densities on so many nodes, an odd number."""
         x, length = place.nodes(count)
-        by_measurement, later = self.change(x)
+        by_measurement, later = self.change(x), self.later(x)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             known = self.kernels.density(x, self.kernels.mass)[:, :, 0]
             seen = known * np.exp(by_measurement)
@@ -241,7 +243,7 @@ class Density:
     def on_points(self, grid: Grid, row: int, found: Found) -> None:
         """Of one trajectory whose meter has no noise: the same points with other masses."""
         x = grid.x[None]
-        later = self.later(x)[:, :, 0]
+        later = self.later(x, ALL)[:, :, 0]
         mass = grid.mass * later
         total = mass.sum(axis=1, keepdims=True)
         if not 0 < total[0, 0] < np.inf:

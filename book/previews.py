@@ -1,0 +1,77 @@
+"""Sphinx extension: what a link to another page leads to, printed into the page itself.
+
+A page read from a file cannot load another one.  So each page carries, for every equation, figure and term of another page that
+it refers to, what preview.js shows: a formula as TeX, a figure as its caption and the address of its picture, a term with its
+sentence.  Only what the page refers to: some hundred bytes each.
+"""
+
+from __future__ import annotations
+
+import json
+import posixpath
+import re
+from functools import cache
+from pathlib import Path
+from urllib.parse import unquote
+
+from bs4 import BeautifulSoup, Tag
+
+REPEATS = "equations.html"  # shows what it refers to
+LINK = re.compile(r'<a [^>]*class="[^"]*\breference internal\b[^"]*"[^>]*>')
+PLACE = re.compile(r'href="([^"#]+\.html)#([^"]+)"')
+FORMULAS = 'class="math'  # a page without any has no MathJax to set one
+
+
+def write(app, exception: Exception | None) -> None:
+    """Add to each page what it refers to."""
+    if exception or app.builder.format != "html":
+        return
+    root = Path(app.outdir)
+    read = cache(lambda name: BeautifulSoup((root / name).read_text(encoding="utf-8"), "html.parser"))
+    for path in sorted(root.rglob("*.html")):
+        name, text = path.relative_to(root).as_posix(), path.read_text(encoding="utf-8")
+        here, found = posixpath.dirname(name) or ".", {}
+        for place in (PLACE.search(link[0]) for link in LINK.finditer(text) if name != REPEATS):
+            target = place and posixpath.normpath(posixpath.join(here, place[1]))
+            if not target or not (root / target).exists():
+                continue
+            shown = preview(read(target), unquote(place[2]), posixpath.relpath(posixpath.dirname(target) or ".", here))
+            if shown and (FORMULAS in text or FORMULAS not in shown):
+                found[f"{place[1]}#{place[2]}"] = shown
+        if found:
+            data = json.dumps(found, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
+            script = f'<script type="application/json" id="kf-previews">{data}</script>\n</body>'
+            path.write_text(text.replace("</body>", script), encoding="utf-8")
+
+
+def preview(page: BeautifulSoup, identity: str, way: str) -> str:
+    """The figure, formula or term that stands at a place of a page, as HTML; nothing for anything else.
+
+    `way` leads from the page that shows it to the folder of its own.
+    """
+    target = page.find(id=identity)
+    if not isinstance(target, Tag):
+        return ""
+    if target.find_parent("dl", class_="kf-terms"):
+        russian, meaning = target.find(class_="kf-ru"), target.find_next_sibling("dd")
+        html = f"<p><b>{target.find(string=True)}</b> {russian}</p>{meaning.decode_contents()}"
+    elif target.name == "figure" or "math" in target.get("class", []):
+        html = str(target)
+    else:
+        return ""
+    shown = BeautifulSoup(html, "html.parser")
+    for one in shown.select("button, details, .headerlink, .kf-where"):
+        one.decompose()
+    for one in shown.select("a"):
+        one.unwrap()
+    for one in shown.find_all(True):
+        for name in ("id", "tabindex", "role", "aria-label"):
+            one.attrs.pop(name, None)
+        for name in {"src", "srcset"} & one.attrs.keys():
+            one[name] = posixpath.normpath(f"{way}/{one[name]}")
+    return str(shown).strip()
+
+
+def setup(app) -> dict[str, bool]:
+    app.connect("build-finished", write, priority=900)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,254 @@
+r"""The exact filter of an object without noise: all that is unknown is where it started, and how the meter fares.
+
+    x_k = phi_k(x_0),      p(x_0 | y_0..k)  ~  p(x_0) prod_i p(y_i | phi_i(x_0), y_0..i-1)
+
+Particles that are moved and resampled die out here: no noise tells copies of one apart, and after some tens of sharp measurements
+all of them are one initial state.  So initial states are drawn anew where too few of them count: from a mixture of Student's laws
+laid over the weighted ones, each weighted by the whole record so far.  Nothing is resampled, and no draw depends on an earlier
+one but through the law that it comes from: the estimates are those of importance sampling (adaptive: Cappe and others, 2004).
+
+If the meter jumps between modes, while the object is the same in all of them, the modes are summed out: given x_0 they are a
+chain with known probabilities, and Bayes' formula for it is a sum over modes (Rao-Blackwell: what is not drawn does not err),
+
+    alpha_j ~ c_j p_j(y_k | x_k),     p(y_k | x_k, y_0..k-1) = sum_j c_j p_j(y_k | x_k),     c'_j = sum_i alpha_i pi_ij
+
+Two clouds that know nothing of each other, as of `particles`: their distance tells the error.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+
+from kfcourse.angles import on_circle
+from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.filters.densities import likelihood
+from kfcourse.filters.particle_smoothing import weighted
+from kfcourse.filters.particles import even, half_apart, normalised, of_both, stream, systematic
+from kfcourse.filters.proposals import FREEDOM, PRIOR, WIDER
+from kfcourse.laws import Array, Gaussian, square_root
+from kfcourse.seeds import Seed, seed_number
+from kfcourse.symbolic.equations import compile_noiseless
+from kfcourse.symbolic.jumping import JumpModel
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import ModelError, exact_matrix
+
+ENOUGH = 0.15  # part of the particles that must count; else they are drawn anew
+ROUNDS = 8  # at a step
+FIT = 0.2  # part that must count for a law to be laid over them: weights are flattened until it does
+CENTRES = 64  # Student's laws in the mixture
+NARROWER = 0.6  # each than the whole, in standard deviations
+
+
+class Undisturbed(NamedTuple):
+    """What the filter remembers.
+
+    Attributes
+    ----------
+    s, x : ndarray (runs, 2, M/2, n), or None before the first measurement
+        Initial states of both clouds, in standard deviations of the prior, and where they have come to by the next measurement.
+    logs : ndarray (runs, 2, M/2)
+        Logarithms of their weights.
+    modes : ndarray (J, runs, 2, M/2)
+        Probabilities of the next mode, given the initial state.
+    record : tuple of ndarray (runs, p)
+        All measurements so far.
+    probability : ndarray (runs, J)
+        Of the modes after the last measurement.
+    evidence : ndarray (2, runs)
+        ln p(y_0, ..., y_k) as each cloud has it.
+    halves, effective, seed
+        As of `kfcourse.filters.particles.Particles`.
+    """
+
+    s: Array | None
+    x: Array | None
+    logs: Array
+    modes: Array
+    record: tuple[Array, ...]
+    probability: Array
+    halves: Array
+    effective: Array
+    evidence: Array
+    seed: np.random.SeedSequence
+
+    def discretisation_error(self) -> Array:
+        """Standard error of the estimates, (runs,): half the distance of both clouds."""
+        return half_apart(self.halves)
+
+
+def is_undisturbed(model: Model | JumpModel) -> bool:
+    """Whether no noise enters the object, which is the same in all modes: `undisturbed` then finds the exact estimate."""
+    modes = model.modes if isinstance(model, JumpModel) else (model,)
+    first = modes[0].state_equation.subs(modes[0].values)
+    return all(_without_noise(one) and one.state_equation.subs(one.values) == first for one in modes)
+
+
+def _without_noise(model: Model) -> bool:
+    B = model.state_equation.jacobian(model.v).subs(model.values)
+    return bool((B * exact_matrix(model.state_noise.cov)).is_zero_matrix)
+
+
+def undisturbed(model: Model | JumpModel, particles: int = 256, seed: Seed = 0, name: str = "particle") -> Filter:
+    """The exact filter of an object without noise, by importance sampling of its initial state.
+
+    Parameters
+    ----------
+    model : Model or JumpModel
+        No noise enters the object, the same in all modes; the meters have densities.
+    particles : int
+        Initial states per trajectory, even, half of them in each cloud.
+    seed : int or numpy.random.Generator
+        The same state and measurement give the same result.
+    name : str
+        Of the filter: "aof-exact" where it stands for the exact one.
+
+    Raises
+    ------
+    ModelError
+        A noise enters the object, or modes differ in it; a meter has no density.
+    """
+    even(particles)
+    if not is_undisturbed(model):
+        raise ModelError(
+            f"{model}: here the initial state must tell all that follows, without a noise in the object, and with one object in "
+            "all modes; take particle(model), or jump_particle(model) of one with modes"
+        )
+    modes = model.modes if isinstance(model, JumpModel) else (model,)
+    likelihoods, (move, _) = [likelihood(one) for one in modes], compile_noiseless(modes[0])
+    chain = model if isinstance(model, JumpModel) else None
+    first_law = np.ones(1) if chain is None else chain.first
+    prior, angles, number = model.prior, modes[0].angles.x, seed_number(seed)
+    root, r, size = square_root(prior.cov), modes[0].n, particles // 2
+    gaussian_init = initial_state(modes[0])
+
+    def init(runs: int) -> State:
+        state = gaussian_init(runs)
+        both, nothing = np.stack([state.posterior.mean] * 2), np.zeros((runs, 2, size))
+        start = np.random.SeedSequence([number, runs])
+        probability = np.tile(first_law, (runs, 1))
+        memory = Undisturbed(
+            None, None, nothing, nothing, (), probability, both, np.full(runs, float(particles)), np.zeros((2, runs)), start
+        )
+        return state._replace(memory=memory)
+
+    def placed(s: Array) -> tuple[Array, Array]:
+        """Initial states, and the probabilities of their first modes (J, ...)."""
+        law = np.broadcast_to(first_law[:, None, None], (len(first_law), *s.shape[:-1]))
+        return on_circle(prior.mean + s @ root.T, angles), law
+
+    def onward(x: Array, c: Array, y: Array, k: int) -> tuple[Array, Array, Array, Array]:
+        """ln p(y_k | x_k, y_0..k-1), alpha, the next states and the probabilities of their modes."""
+        with np.errstate(divide="ignore"):
+            logs = np.stack([np.log(one) + found(y, x, k) for one, found in zip(c, likelihoods, strict=True)])
+        logs = np.where(np.isnan(logs), -np.inf, logs)
+        peak = logs.max(axis=0)
+        alpha = np.exp(logs - np.where(np.isfinite(peak), peak, 0.0))
+        total = alpha.sum(axis=0)
+        alpha = np.divide(alpha, total, out=np.array(c), where=total > 0)
+        with np.errstate(divide="ignore"):
+            told = np.where(total > 0, peak + np.log(total), -np.inf)
+        if chain is None:
+            ahead = alpha
+        elif chain.by_state:
+            ahead = np.einsum("i...,...ij->j...", alpha, chain.transition_of(x, k))
+        else:
+            ahead = np.tensordot(chain.transition_at(k).T, alpha, axes=1)
+        return told, alpha, on_circle(np.broadcast_to(move(x, k), x.shape), angles), ahead
+
+    def whole(s: Array, record: tuple[Array, ...]) -> tuple[Array, Array, Array, Array, Array]:
+        """ln p(y_0..k | x_0), and x_k with alpha, x_{k+1} and the probabilities of its modes."""
+        x, c = placed(s)
+        total = np.zeros(s.shape[:-1])
+        for k, y in enumerate(record):
+            here = x
+            told, alpha, x, c = onward(x, c, y, k)
+            total = total + told
+        return total, here, alpha, x, c
+
+    def step(state: State, y: Array) -> State:
+        memory: Undisturbed = state.memory
+        rng, runs, k = stream(memory.seed, state.step), len(y), state.step
+        record = tuple(np.repeat(one, 2, axis=0)[:, None] for one in (*memory.record, y))  # each cloud is a row from here on
+        if memory.s is None or memory.x is None:
+            s, logs = rng.standard_normal((2 * runs, size, r)), np.zeros((2 * runs, size))
+            here, c = placed(s)
+        else:
+            s, here, logs = (one.reshape(2 * runs, size, *one.shape[3:]) for one in (memory.s, memory.x, memory.logs))
+            c = memory.modes.reshape(-1, 2 * runs, size)
+        with np.errstate(over="ignore", invalid="ignore"):
+            told, alpha, following, ahead = onward(here, c, record[-1], k)
+            logs = logs + told
+            weights, log_mean = normalised(logs)
+            for _ in range(ROUNDS):
+                poor = np.flatnonzero((weights**2).sum(axis=1) * (ENOUGH * size) > 1)
+                if not len(poor):
+                    break
+                # what is written in place is no earlier state's
+                s, logs, here, following = (np.array(one) for one in (s, logs, here, following))
+                alpha, ahead = np.array(alpha), np.array(ahead)
+                s[poor], logs[poor] = _anew(s[poor], logs[poor], rng)
+                found = whole(s[poor], tuple(one[poor] for one in record))
+                logs[poor] += found[0]
+                here[poor], alpha[:, poor], following[poor], ahead[:, poor] = found[1:]
+                weights, log_mean = normalised(logs)
+            # what has left the finite numbers has no weight, and must not make the mean NaN
+            clouds, to_come = (
+                Gaussian(*(one.reshape(runs, 2, *one.shape[1:]) for one in weighted(x, weights, angles)))
+                for x in (np.where(np.isfinite(states), states, 0.0) for states in (here, following))
+            )
+        probability = (alpha * weights).sum(axis=2).reshape(-1, runs, 2).mean(axis=2).T
+        effective = (1 / (weights**2).sum(axis=1)).reshape(runs, 2).sum(axis=1)
+        s, following, logs = (one.reshape(runs, 2, size, *one.shape[2:]) for one in (s, following, logs))
+        modes_ahead, totals = ahead.reshape(-1, runs, 2, size), log_mean.reshape(runs, 2).T
+        so_far, halves = (*memory.record, y), np.moveaxis(clouds.mean, 1, 0)
+        after = Undisturbed(s, following, logs, modes_ahead, so_far, probability, halves, effective, totals, memory.seed)
+        return State(k + 1, of_both(*clouds, angles), of_both(*to_come, angles), after)
+
+    def evidence(before: State, y: Array, after: State) -> Array:
+        return np.logaddexp(*after.memory.evidence) - np.logaddexp(*before.memory.evidence)
+
+    return Filter(name, modes[0], init, step, slow=True, evidence=evidence)
+
+
+def _anew(s: Array, logs: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Initial states (rows, M, r) drawn from a mixture laid over the weighted ones, and ln N(s; 0, I) - ln of its density.
+
+    A part is drawn from the prior, for what the mixture does not see.
+    """
+    rows, size, r = s.shape
+    weights = _flattened(logs)
+    mean, cov = weighted(s, weights, ())
+    scale = np.sqrt(np.diagonal(cov, axis1=1, axis2=2)) + 1e-300
+    correlation = cov / (scale[:, :, None] * scale[:, None, :]) + 1e-9 * np.eye(r)
+    root = WIDER * NARROWER * scale[:, :, None] * np.linalg.cholesky(correlation)
+    fine = systematic(weights, rng)[:, rng.permutation(size)[:CENTRES]]
+    chosen = np.take_along_axis(s, fine[..., None], axis=1)
+    centres = mean[:, None] + np.sqrt(1 - NARROWER**2) * (chosen - mean[:, None])  # so that the whole is as wide as they were
+    normal = rng.standard_normal((rows, size, r))
+    student = normal * np.sqrt(FREEDOM / rng.chisquare(FREEDOM, (rows, size)))[..., None]
+    drawn = centres[:, np.arange(size) % centres.shape[1]] + student @ root.swapaxes(1, 2)
+    s = np.where((rng.random((rows, size)) < PRIOR)[..., None], normal, drawn)
+    inverse = np.linalg.inv(root).swapaxes(1, 2)
+    apart = (s @ inverse)[:, :, None] - (centres @ inverse)[:, None]
+    kernels = -0.5 * (FREEDOM + r) * np.log1p((apart**2).sum(axis=-1) / FREEDOM)
+    constant = scipy.special.gammaln((FREEDOM + r) / 2) - scipy.special.gammaln(FREEDOM / 2) - 0.5 * r * np.log(FREEDOM * np.pi)
+    size_of = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)[:, None]
+    mixture = np.logaddexp.reduce(kernels, axis=2) - np.log(centres.shape[1]) + constant - size_of
+    prior = -0.5 * (s**2).sum(axis=-1) - 0.5 * r * np.log(2 * np.pi)
+    return s, prior - np.logaddexp(np.log(1 - PRIOR) + mixture, np.log(PRIOR) + prior)
+
+
+def _flattened(logs: Array) -> Array:
+    """Weights to a power, at most 1, with which `FIT` of them count."""
+    low, high = np.zeros(len(logs)), np.ones(len(logs))
+    logs = np.where(np.isfinite(logs), logs, -np.inf) - logs.max(axis=1, keepdims=True)
+    logs = np.where(np.isnan(logs), 0.0, logs)
+    for _ in range(20):
+        power = 0.5 * (low + high)
+        weights, _ = normalised(np.where(np.isneginf(logs), -np.inf, power[:, None] * logs))
+        enough = (weights**2).sum(axis=1) * (FIT * logs.shape[1]) <= 1
+        low, high = np.where(enough, power, low), np.where(enough, high, power)
+    return normalised(np.where(np.isneginf(logs), -np.inf, low[:, None] * logs))[0]

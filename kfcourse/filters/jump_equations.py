@@ -1,0 +1,92 @@
+r"""The equations of the logic-dynamic filter (`multiple_models`) for a mode j of so many, in SymPy: to print and to execute.
+
+j may be a letter, as it is printed, or a number; sums over the modes are written out.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from kfcourse.filters import notation as s
+
+
+def of(name: str, j: object, step: str = "k") -> str:
+    """LaTeX of what belongs to mode j at a step."""
+    return rf"{name}_{{{step}}}^{{{j}}}"
+
+
+def vector(name: str, j: object, step: str = "k") -> sp.MatrixSymbol:
+    """Of the state's dimension."""
+    return s.matrix(of(name, j, step), s.n, s.ONE)
+
+
+def square(name: str, j: object, step: str = "k") -> sp.MatrixSymbol:
+    """As the state's covariances are."""
+    return s.matrix(of(name, j, step), s.n, s.n)
+
+
+def number(name: str, j: object, step: str = "k") -> sp.Symbol:
+    """A probability, a weight."""
+    return sp.Symbol(of(name, j, step))
+
+
+def likelihood(j: object) -> sp.Symbol:
+    """N(y_k; h^j, F^j)."""
+    return sp.Symbol(rf"\mathcal{{N}}(y_{{k}};\, {of('h', j)}, {of('F', j)})")
+
+
+def ahead(j: object, i: object) -> tuple[sp.MatrixSymbol, sp.MatrixSymbol]:
+    """tau and Theta of mode j at the law of mode i."""
+    at = rf"({of('z', i)}, {of('p', i)})"
+    return s.matrix(rf"\tau^{{{j}}}{at}", s.n, s.ONE), s.matrix(rf"\Theta^{{{j}}}{at}", s.n, s.n)
+
+
+def correction(j: object, size: int) -> tuple[sp.Eq, ...]:
+    """The law of the state in mode j after y_k, and the probability of the mode."""
+    lam, Psi, z, p = vector(r"\lambda", j), square(r"\Psi", j), vector("z", j), square("p", j)
+    h, K = s.matrix(of("h", j), s.p, s.ONE), s.matrix(of("K", j), s.n, s.p)
+    G, F = s.matrix(of("G", j), s.p, s.n), s.matrix(of("F", j), s.p, s.p)
+    at = rf"({lam.name}, {Psi.name})"
+    values = [s.matrix(rf"{name}^{{{j}}}{at}", *one.shape) for name, one in (("h", h), ("G", G), ("F", F))]
+    total = sp.Add(*(number("c", i) * likelihood(i) for i in range(1, size + 1)), evaluate=False)
+    return (
+        *(sp.Eq(one, value) for one, value in zip((h, G, F), values, strict=True)),
+        sp.Eq(K, Psi * G.T * F.I),
+        sp.Eq(z, lam + K * (s.y - h)),
+        sp.Eq(p, Psi - K * G * Psi),
+        sp.Eq(number(r"\mu", j), number("c", j) * likelihood(j) / total),
+    )
+
+
+def combination(j: object, size: int) -> tuple[sp.Eq, ...]:
+    """The estimate, how far the law of mode j is from it, and the covariance."""
+    modes = range(1, size + 1)
+    mu, z, p, delta = (
+        [make(name, i) for i in modes] for make, name in ((number, r"\mu"), (vector, "z"), (square, "p"), (vector, r"\delta"))
+    )
+    spread = [one + away * away.T for one, away in zip(p, delta, strict=True)]
+    return (
+        sp.Eq(s.z, _sum(mu, z)),
+        sp.Eq(vector(r"\delta", j), vector("z", j) - s.z),
+        sp.Eq(s.P, _sum(mu, spread)),
+    )
+
+
+def prediction(j: object, size: int) -> tuple[sp.Eq, ...]:
+    """The probability of mode j at the next step, what leads to it, and the law of the state there."""
+    modes = range(1, size + 1)
+    mu, c = [number(r"\mu", i) for i in modes], number("c", j, "k+1")
+    pi, w = ([sp.Symbol(rf"{name}^{{{i}{j}}}") for i in modes] for name in (r"\pi", "w"))
+    lam, Psi = vector(r"\lambda", j, "k+1"), square(r"\Psi", j, "k+1")
+    laws, away = [ahead(j, i) for i in modes], [vector(r"\delta", f"{i}{j}", "k+1") for i in modes]
+    return (
+        sp.Eq(c, sp.Add(*(one * weight for one, weight in zip(pi, mu, strict=True)))),
+        *(sp.Eq(share, one * weight / c) for share, one, weight in zip(w, pi, mu, strict=True)),
+        sp.Eq(lam, _sum(w, [tau for tau, _ in laws])),
+        *(sp.Eq(one, tau - lam) for one, (tau, _) in zip(away, laws, strict=True)),
+        sp.Eq(Psi, _sum(w, [Theta + one * one.T for one, (_, Theta) in zip(away, laws, strict=True)])),
+    )
+
+
+def _sum(weights: list[sp.Symbol], parts: list[sp.MatrixExpr]) -> sp.MatrixExpr:
+    return sp.MatAdd(*(sp.MatMul(w, one) for w, one in zip(weights, parts, strict=True)))

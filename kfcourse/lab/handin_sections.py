@@ -1,0 +1,164 @@
+"""What all students' reports have: pieces, the comparison, the conclusion (`handin_plain`, `handin_modes`: what comes before)."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kfcourse.lab.handin_text import filled, in_percent, power_of_ten
+from kfcourse.lab.refusals import cause
+from kfcourse.lab.report import LEVEL, ranges, remarks, table_steps
+from kfcourse.lab.short_names import FILTERS, Entry, JumpEntry
+from kfcourse.montecarlo.comparison import EXACT, Comparison, Verdict
+
+COLUMNS = 4  # filters side by side in a table, so that it fits a page
+FIGURES = ("accuracy", "relative", "ranking", "consistency")
+
+
+@dataclass(frozen=True)
+class Block:
+    """A piece of the report, of a kind: section, subsection, text, items, formulas, table or figure."""
+
+    kind: str
+    text: str = ""
+    lines: list[str] = field(default_factory=list)
+    rows: list[list[str]] = field(default_factory=list)
+
+
+class StudentReport:
+    """The blocks of the report, section by section; a subclass has the task, the functions and the filters."""
+
+    entries: Mapping[str, Entry | JumpEntry] = FILTERS  # where filters have their names from
+
+    def __init__(self, result: Comparison, words: dict[str, str]) -> None:
+        self.result, self.words = result, words
+        self.kinds = [kind for kind in ("linearised", "gaussian") if any(name.endswith(kind) for name in result.available)]
+        compared = result.has_bound or len(result.entrants) > 1
+        self.figures = [name for name in FIGURES if compared or name not in ("relative", "ranking")]
+
+    def blocks(self) -> Iterator[Block]:
+        """The whole report; the words that SymPy puts into formulas in its language, too."""
+        for block in self.sections():
+            lines = [self.translated(line) for line in block.lines]
+            yield dataclasses.replace(block, text=self.translated(block.text), lines=lines)
+
+    def translated(self, text: str) -> str:
+        for english, key in ((r"\text{for}", "if"), (r"\text{otherwise}", "else")):
+            text = text.replace(english, rf"\text{{{self.words[key]}}}")
+        return text
+
+    def sections(self) -> Iterator[Block]:
+        yield from self.task()
+        yield from self.functions()
+        yield from self.filters()
+        yield from self.experiment()
+        yield from self.conclusion()
+
+    def task(self) -> Iterator[Block]:
+        """The equations, the laws, and what is asked for."""
+        raise NotImplementedError
+
+    def functions(self) -> Iterator[Block]:
+        """The structural functions."""
+        raise NotImplementedError
+
+    def filters(self) -> Iterator[Block]:
+        """The equations of the filters."""
+        raise NotImplementedError
+
+    def experiment(self) -> Iterator[Block]:
+        result, words = self.result, self.words
+        yield Block("section", words["experiment"])
+        sentences = [filled(words["experiment_text"], runs=result.runs, steps=result.steps, seed=result.seed)]
+        if result.replicas:
+            designed = ", ".join(map(self.title, result.replicas.names))
+            sentences.append(filled(words["designs"], filters=designed, designs=result.designs))
+        if result.has_bound:
+            sentences.append(filled(words["exact"], runs=result.subset_runs))
+        yield Block("text", " ".join(sentences))
+        if result.left_out:
+            yield Block("text", words["left_out"])
+            yield Block("items", lines=list(self.left_out()))
+        for start in range(0, len(result.available), COLUMNS):
+            names = result.available[start : start + COLUMNS]
+            estimates = [result.error_variance(name) for name in names]
+            rows = [[f"${k}$", *(power_of_ten(one[k]) for one in estimates)] for k in table_steps(result)]
+            yield Block("table", words["table_goes_on" if start else "table"], ["$k$", *map(self.title, names)], rows)
+        for kind, values in remarks(result):
+            whose = ", ".join(map(self.title, values.get("names", ())))
+            told = values | {"names": whose, "at": self.at(np.flatnonzero(values["steps"]).tolist())}
+            yield Block("text", filled(words[f"remark_{kind}"], **told))
+        reference = words["of_exact"] if result.has_bound else self.title(result.control)
+        for name in self.figures:
+            yield Block("figure", filled(words[f"figure_{name}"], reference=reference, level=LEVEL), [f"handin-{name}"])
+
+    def left_out(self) -> Iterator[str]:
+        """The filters that do not take part, and why, those with the same reason together."""
+        names: dict[str, list[str]] = {}
+        for name, reason in self.result.left_out.items():
+            names.setdefault(cause(reason, self.result.model, self.words), []).append(self.title(name))
+        yield from (f"{', '.join(titles)}: {reason}" for reason, titles in names.items())
+
+    def conclusion(self) -> Iterator[Block]:
+        result, words = self.result, self.words
+        if len(result.entrants) == 1:
+            yield Block("section", words["conclusion"])
+            yield Block("text", self.mean_sentence("alone_bound" if result.has_bound else "alone_control"))
+            return
+        verdicts = result.verdicts()
+        yield Block("section", words["conclusion"])
+        yield Block("text", filled(words["verdict_text"], level=LEVEL))
+        heading = [words[key] for key in ("step", "best", "not_worse", "worst")]
+        rows = [
+            [f"${k}$", self.title(best), ", ".join(map(self.title, others)) or "–", self.title(worst) if worst else "–"]
+            for k, (best, others, worst) in ((k, verdicts[k]) for k in table_steps(result))
+        ]
+        yield Block("table", words["verdict_table"], heading, rows)
+        yield Block("items", lines=list(self.sentences(verdicts)))
+
+    def sentences(self, verdicts: list[Verdict]) -> Iterator[str]:
+        """The conclusion: who leads and who is last, on how many steps, and how far from the bound."""
+        result, words = self.result, self.words
+        alone = [best for best, others, _ in verdicts if not others]
+        for name in sorted(set(alone), key=lambda one: -alone.count(one)):
+            steps = [k for k, (best, others, _) in enumerate(verdicts) if best == name and not others]
+            yield filled(words["leads"], name=self.title(name), at=self.at(steps))
+        if not alone:
+            yield words["nobody_leads"]
+        unsure = [k for k, (_, others, _) in enumerate(verdicts) if others]
+        if unsure:
+            yield filled(words["together"], at=self.at(unsure))
+        last = [worst for _, _, worst in verdicts if worst]
+        if last:
+            name = max(set(last), key=lambda one: (last.count(one), one))
+            yield filled(words["last"], name=self.title(name), steps=last.count(name), all=result.steps)
+        else:
+            yield words["nobody_last"]
+        leads = not result.has_bound and result.ranking()[0][0] == result.control
+        yield self.mean_sentence("mean_first" if leads else "mean_bound" if result.has_bound else "mean_control")
+
+    def at(self, steps: list[int]) -> str:
+        """At step 2; at steps 0–1, 3–50."""
+        return filled(self.words["at_step" if len(steps) == 1 else "at_steps"], where=ranges(steps, "${}$"))
+
+    def mean_sentence(self, key: str) -> str:
+        """How far the first filter and the last are from the bound, or from the control."""
+        result = self.result
+        ranked = result.ranking()
+        (first, gap), (final, largest) = ranked[0], ranked[-1]
+        return filled(
+            self.words[key],
+            first=self.title(first),
+            gap=in_percent(gap),
+            last=self.title(final),
+            largest=in_percent(largest),
+            control=self.title(result.control),
+        )
+
+    def title(self, name: str) -> str:
+        entry = self.entries[name]
+        exact = self.words["exact_title"] if name == EXACT else ""
+        return exact or (entry.russian if self.words["language"] == "ru" else entry.title)
