@@ -12,7 +12,9 @@ chain with known probabilities, and Bayes' formula for it is a sum over modes (R
 
     alpha_j ~ c_j p_j(y_k | x_k),     p(y_k | x_k, y_0..k-1) = sum_j c_j p_j(y_k | x_k),     c'_j = sum_i alpha_i pi_ij
 
-Two clouds that know nothing of each other, as of `particles`: their distance tells the error.
+Two clouds that know nothing of each other, as of `particles`: their distance tells the error, but not that of a hump that both
+have missed: on a linear model with two modes and 3,200 trajectories the stated mean square error was .7 of the true one, and the
+difference was made by a few.
 """
 
 from __future__ import annotations
@@ -35,6 +37,7 @@ from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
 
+FIRST = 32  # times as many are drawn of the prior at the first measurement, that a narrow hump far out is not missed
 ENOUGH = 0.15  # part of the particles that must count; else they are drawn anew
 ROUNDS = 8  # at a step
 FIT = 0.2  # part that must count for a law to be laid over them: weights are flattened until it does
@@ -173,7 +176,8 @@ def undisturbed(model: Model | JumpModel, particles: int = 256, seed: Seed = 0, 
         rng, runs, k = stream(memory.seed, state.step), len(y), state.step
         record = tuple(np.repeat(one, 2, axis=0)[:, None] for one in (*memory.record, y))  # each cloud is a row from here on
         if memory.s is None or memory.x is None:
-            s, logs = rng.standard_normal((2 * runs, size, r)), np.zeros((2 * runs, size))
+            many = rng.standard_normal((2 * runs, FIRST * size, r))
+            s, logs = _anew(many, onward(*placed(many), record[-1], k)[0], size, rng)
             here, c = placed(s)
         else:
             s, here, logs = (one.reshape(2 * runs, size, *one.shape[3:]) for one in (memory.s, memory.x, memory.logs))
@@ -189,7 +193,7 @@ def undisturbed(model: Model | JumpModel, particles: int = 256, seed: Seed = 0, 
                 # what is written in place is no earlier state's
                 s, logs, here, following = (np.array(one) for one in (s, logs, here, following))
                 alpha, ahead = np.array(alpha), np.array(ahead)
-                s[poor], logs[poor] = _anew(s[poor], logs[poor], rng)
+                s[poor], logs[poor] = _anew(s[poor], logs[poor], size, rng)
                 found = whole(s[poor], tuple(one[poor] for one in record))
                 logs[poor] += found[0]
                 here[poor], alpha[:, poor], following[poor], ahead[:, poor] = found[1:]
@@ -213,18 +217,18 @@ def undisturbed(model: Model | JumpModel, particles: int = 256, seed: Seed = 0, 
     return Filter(name, modes[0], init, step, slow=True, evidence=evidence)
 
 
-def _anew(s: Array, logs: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Initial states (rows, M, r) drawn from a mixture laid over the weighted ones, and ln N(s; 0, I) - ln of its density.
+def _anew(s: Array, logs: Array, size: int, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Initial states (rows, size, r) drawn from a mixture laid over the weighted ones, and ln N(s; 0, I) - ln of its density.
 
     A part is drawn from the prior, for what the mixture does not see.
     """
-    rows, size, r = s.shape
+    rows, many, r = s.shape
     weights = _flattened(logs)
     mean, cov = weighted(s, weights, ())
     scale = np.sqrt(np.diagonal(cov, axis1=1, axis2=2)) + 1e-300
     correlation = cov / (scale[:, :, None] * scale[:, None, :]) + 1e-9 * np.eye(r)
     root = WIDER * NARROWER * scale[:, :, None] * np.linalg.cholesky(correlation)
-    fine = systematic(weights, rng)[:, rng.permutation(size)[:CENTRES]]
+    fine = systematic(weights, rng)[:, rng.permutation(many)[:CENTRES]]
     chosen = np.take_along_axis(s, fine[..., None], axis=1)
     centres = mean[:, None] + np.sqrt(1 - NARROWER**2) * (chosen - mean[:, None])  # so that the whole is as wide as they were
     normal = rng.standard_normal((rows, size, r))
