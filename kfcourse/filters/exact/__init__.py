@@ -20,6 +20,6 @@ adaptive     for what they do not resolve, one trajectory at a time: panels that
 evidence     and how likely the measurement was, for who asks
 smoothing    what the whole record tells, once it is there
 jumps        the same of state and mode, for models that jump
-usual, loops the way that most trajectories take, compiled (numba)
+usual        the way that most trajectories take, compiled by numba (loops)
 constants    what several of these share
 """
