@@ -1,6 +1,7 @@
-// The search page: the sections that have all words, or else any, best first, each with the place where a word stands.
+// The search page: the sections that have all words, then those with some, best first, each with the place where a word stands.
 const WORD = /[\p{L}\p{N}_]+/gu;
 const SHOWN = 30, AROUND = 110;
+const FEW = 10;  // sections with all the words, below which those with some of them follow
 const english = new Stemmer();  // Sphinx's, of language_data.js
 
 // A word without its ending: "errors" finds "error", "ошибки" finds "ошибка", "фильтрации" finds "фильтрация".
@@ -42,7 +43,8 @@ function excerpt(text, stems) {
 function show(query) {
   const stems = (query.match(WORD) || []).map(stem);
   const all = index.search(query, { combineWith: "AND" });
-  const found = all.length ? all : index.search(query);
+  const some = all.length >= FEW ? [] : index.search(query).filter(({ id }) => !all.some((one) => one.id === id));
+  const found = [...all, ...some];
   const rows = found.slice(0, SHOWN).map(({ id }) => {
     const [address, page, section, text] = SECTIONS[id];
     const [path, anchor] = address.split("#");
@@ -54,7 +56,7 @@ function show(query) {
   });
   document.getElementById("search-results").replaceChildren(...rows);
   const many = `${found.length} section${found.length === 1 ? "" : "s"}${found.length > SHOWN ? `, the best ${SHOWN} of them` : ""}`;
-  const missing = all.length || stems.length < 2 ? "" : ", none with all the words";
+  const missing = some.length && stems.length > 1 ? `, ${all.length || "none"} with all the words` : "";
   document.getElementById("kf-found").textContent = !stems.length ? "" : found.length ? many + missing : "Nothing found: try fewer words, or their beginnings.";
 }
 
