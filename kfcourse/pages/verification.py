@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.symbolic.typesetting import Equation, Side, equation_latex
+from kfcourse.symbolic.typesetting import Equation, Side, equation_latex, side_lines
 
 VERIFIED = "application/vnd.kfcourse.verified+json"  # what the build collects
 DEFINITION = "definition"
+BOTH = r"\text{both sides}"  # of an identity, where nothing else would stand before a bare "0"
 BY_IDENTITY = "identity, by SymPy"
 _SEED = 53
 _GUARD = 15  # further digits with which numbers are computed
@@ -57,7 +58,8 @@ def verified(
     ----------
     *equations : (left, right, ...)
         Sides that are equal: expressions or matrices of SymPy.  A side that is a string of LaTeX is printed and not checked,
-        so at least two others are needed then.  `sympy.Eq` is taken too, unless SymPy has already made it true or false.
+        so at least two others are needed then.  Where all sides print alike a string before them says what they are; without
+        it "both sides" stands there.  `sympy.Eq` is taken too, unless SymPy has already made it true or false.
     where : mapping of symbols to expressions
         What printed symbols stand for (a `MatrixSymbol`: its entries); put in before the difference is taken, as often as it
         takes.
@@ -93,8 +95,9 @@ def verified(
                 _must_agree(left, right, where or {}, digits, at)
     evidence = BY_IDENTITY if digits is None else f"to {digits} digits, at {3 if at is None else len(at)} points"
     mark = f"{evidence}; {how}" if how else evidence
-    body = _display(given, label, names)
-    record = {"label": label, "latex": _block(given, names), "how": mark, "equations": len(given)}
+    told = [(BOTH, *sides) if len({str(side_lines(side, names=names)) for side in sides}) == 1 else sides for sides in given]
+    body = _display(told, label, names)
+    record = {"label": label, "latex": _block(told, names), "how": mark, "equations": len(given)}
     return Shown(f'{body}\n\n<p class="kf-verified">✓ {mark}</p>', record)
 
 

@@ -82,6 +82,13 @@ def test_numbers_to_so_many_digits() -> None:
         verified((fourier, right), digits=5, at=[{x: 1}])
 
 
+def test_no_bare_expression_is_shown() -> None:
+    """Sides that print alike: "0" says nothing to a reader."""
+    alike = sp.expand((x + 1) ** 2 - x**2 - 2 * x), sp.S.One
+    assert r"\text{both sides} &= 1" in verified(alike).markdown
+    assert r"s &= 1" in verified(("s", *alike)).markdown
+
+
 def test_there_must_be_something_to_verify() -> None:
     for nothing in ((), ((r"\tau", x),), ("x = 1",)):
         with pytest.raises(ValueError, match=r"nothing to verify|needs an equation"):
