@@ -19,7 +19,7 @@ difference was made by a few.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -28,7 +28,7 @@ from kfcourse.angles import on_circle
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
 from kfcourse.filters.particle_smoothing import weighted
-from kfcourse.filters.particles import even, half_apart, normalised, of_both, stream, systematic
+from kfcourse.filters.particles import Clouds, at_start, even, normalised, of_both, stream, systematic
 from kfcourse.filters.proposals import FREEDOM, PRIOR, WIDER
 from kfcourse.laws import Array, Gaussian, square_root
 from kfcourse.seeds import Seed, seed_number
@@ -45,8 +45,9 @@ CENTRES = 64  # Student's laws in the mixture
 NARROWER = 0.6  # each than the whole, in standard deviations
 
 
-class Undisturbed(NamedTuple):
-    """What the filter remembers.
+@dataclass(frozen=True, eq=False)
+class Undisturbed(Clouds):
+    """What the filter remembers; the others as of `kfcourse.filters.particles.Clouds`, but ln p(y_0, ..., y_k) as the evidence.
 
     Attributes
     ----------
@@ -60,10 +61,6 @@ class Undisturbed(NamedTuple):
         All measurements so far.
     probability : ndarray (runs, J)
         Of the modes after the last measurement.
-    evidence : ndarray (2, runs)
-        ln p(y_0, ..., y_k) as each cloud has it.
-    halves, effective, seed
-        As of `kfcourse.filters.particles.Particles`.
     """
 
     s: Array | None
@@ -72,14 +69,6 @@ class Undisturbed(NamedTuple):
     modes: Array
     record: tuple[Array, ...]
     probability: Array
-    halves: Array
-    effective: Array
-    evidence: Array
-    seed: np.random.SeedSequence
-
-    def discretisation_error(self) -> Array:
-        """Standard error of the estimates, (runs,): half the distance of both clouds."""
-        return half_apart(self.halves)
 
 
 def is_undisturbed(model: Model | JumpModel) -> bool:
@@ -129,12 +118,9 @@ def undisturbed(model: Model | JumpModel, particles: int = 256, seed: Seed = 0, 
 
     def init(runs: int) -> State:
         state = gaussian_init(runs)
-        both, nothing = np.stack([state.posterior.mean] * 2), np.zeros((runs, 2, size))
-        start = np.random.SeedSequence([number, runs])
+        start, nothing = at_start(state.posterior.mean, particles, number), np.zeros((runs, 2, size))
         probability = np.tile(first_law, (runs, 1))
-        memory = Undisturbed(
-            None, None, nothing, nothing, (), probability, both, np.full(runs, float(particles)), np.zeros((2, runs)), start
-        )
+        memory = Undisturbed(*start, None, None, nothing, nothing, (), probability)
         return state._replace(memory=memory)
 
     def placed(s: Array) -> tuple[Array, Array]:
@@ -208,7 +194,8 @@ def undisturbed(model: Model | JumpModel, particles: int = 256, seed: Seed = 0, 
         s, following, logs = (one.reshape(runs, 2, size, *one.shape[2:]) for one in (s, following, logs))
         modes_ahead, totals = ahead.reshape(-1, runs, 2, size), log_mean.reshape(runs, 2).T
         so_far, halves = (*memory.record, y), np.moveaxis(clouds.mean, 1, 0)
-        after = Undisturbed(s, following, logs, modes_ahead, so_far, probability, halves, effective, totals, memory.seed)
+        clouds_now = halves, effective, totals, memory.seed
+        after = Undisturbed(*clouds_now, s, following, logs, modes_ahead, so_far, probability)
         return State(k + 1, of_both(*clouds, angles), of_both(*to_come, angles), after)
 
     def evidence(before: State, y: Array, after: State) -> Array:

@@ -50,11 +50,11 @@ def correction(j: object, size: int) -> tuple[sp.Eq, ...]:
     values = [s.matrix(rf"{name}^{{{j}}}{at}", *one.shape) for name, one in (("h", h), ("G", G), ("F", F))]
     total = sp.Add(*(number("c", i) * likelihood(i) for i in range(1, size + 1)), evaluate=False)
     return (
-        *(sp.Eq(one, value) for one, value in zip((h, G, F), values, strict=True)),
-        sp.Eq(K, Psi * G.T * F.I),
-        sp.Eq(z, lam + K * (s.y - h)),
-        sp.Eq(p, Psi - K * G * Psi),
-        sp.Eq(number(r"\mu", j), number("c", j) * likelihood(j) / total),
+        *(s.equation(one, value) for one, value in zip((h, G, F), values, strict=True)),
+        s.equation(K, Psi * G.T * F.I),
+        s.equation(z, lam + K * (s.y - h)),
+        s.equation(p, Psi - K * G * Psi),
+        s.equation(number(r"\mu", j), number("c", j) * likelihood(j) / total),
     )
 
 
@@ -66,9 +66,9 @@ def combination(j: object, size: int) -> tuple[sp.Eq, ...]:
     )
     spread = [one + away * away.T for one, away in zip(p, delta, strict=True)]
     return (
-        sp.Eq(s.z, _sum(mu, z)),
-        sp.Eq(vector(r"\delta", j), vector("z", j) - s.z),
-        sp.Eq(s.P, _sum(mu, spread)),
+        s.equation(s.z, _sum(mu, z)),
+        s.equation(vector(r"\delta", j), vector("z", j) - s.z),
+        s.equation(s.P, _sum(mu, spread)),
     )
 
 
@@ -80,11 +80,11 @@ def prediction(j: object, size: int) -> tuple[sp.Eq, ...]:
     lam, Psi = vector(r"\lambda", j, "k+1"), square(r"\Psi", j, "k+1")
     laws, away = [ahead(j, i) for i in modes], [vector(r"\delta", f"{i}{j}", "k+1") for i in modes]
     return (
-        sp.Eq(c, sp.Add(*(one * weight for one, weight in zip(pi, mu, strict=True)))),
-        *(sp.Eq(share, one * weight / c) for share, one, weight in zip(w, pi, mu, strict=True)),
-        sp.Eq(lam, _sum(w, [tau for tau, _ in laws])),
-        *(sp.Eq(one, tau - lam) for one, (tau, _) in zip(away, laws, strict=True)),
-        sp.Eq(Psi, _sum(w, [Theta + one * one.T for one, (_, Theta) in zip(away, laws, strict=True)])),
+        s.equation(c, sp.Add(*(one * weight for one, weight in zip(pi, mu, strict=True)))),
+        *(s.equation(share, one * weight / c) for share, one, weight in zip(w, pi, mu, strict=True)),
+        s.equation(lam, _sum(w, [tau for tau, _ in laws])),
+        *(s.equation(one, tau - lam) for one, (tau, _) in zip(away, laws, strict=True)),
+        s.equation(Psi, _sum(w, [Theta + one * one.T for one, (_, Theta) in zip(away, laws, strict=True)])),
     )
 
 

@@ -12,7 +12,7 @@ noise makes copies of copies: `undisturbed` is for that.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,7 +20,18 @@ from kfcourse.angles import on_circle
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
 from kfcourse.filters.particle_smoothing import weighted
-from kfcourse.filters.particles import LARGEST, even, half_apart, normalised, of_both, plain, stream, systematic, where_measured
+from kfcourse.filters.particles import (
+    LARGEST,
+    Particles,
+    at_start,
+    even,
+    normalised,
+    of_both,
+    plain,
+    stream,
+    systematic,
+    where_measured,
+)
 from kfcourse.filters.proposals import Look, component
 from kfcourse.laws import Array
 from kfcourse.seeds import Seed, seed_number
@@ -30,30 +41,20 @@ from kfcourse.symbolic.jumping import JumpModel
 UNSEEN = 0.1  # share of the modes drawn by their probabilities before y_k all the same, for what a normal law does not see
 
 
-class JumpParticles(NamedTuple):
-    """What the filter remembers.
+@dataclass(frozen=True, eq=False)
+class JumpParticles(Particles):
+    """What the filter remembers; the others as of `kfcourse.filters.particles.Particles`.
 
     Attributes
     ----------
-    x, mode : ndarray (runs, 2, M/2, n), (runs, 2, M/2), or None before the first measurement
-        Both clouds, all particles of equal weight.
+    mode : ndarray (runs, 2, M/2), or None before the first measurement
+        Of each particle.
     probability : ndarray (runs, J)
         Of the modes after the last measurement.
-    halves, effective, evidence, seed
-        As of `kfcourse.filters.particles.Particles`.
     """
 
-    x: Array | None
     mode: Array | None
     probability: Array
-    halves: Array
-    effective: Array
-    evidence: Array
-    seed: np.random.SeedSequence
-
-    def discretisation_error(self) -> Array:
-        """Standard error of the estimates, (runs,): half the distance of both clouds."""
-        return half_apart(self.halves)
 
 
 def jump_particle(model: JumpModel, particles: int = 1000, seed: Seed = 0, name: str = "particle") -> Filter:
@@ -89,10 +90,8 @@ def jump_particle(model: JumpModel, particles: int = 1000, seed: Seed = 0, name:
 
     def init(runs: int) -> State:
         state = gaussian_init(runs)
-        both, root = np.stack([state.posterior.mean] * 2), np.random.SeedSequence([number, runs])
-        probability = np.tile(model.first, (runs, 1))
-        memory = JumpParticles(None, None, probability, both, np.full(runs, float(particles)), np.zeros((2, runs)), root)
-        return state._replace(memory=memory)
+        start, probability = at_start(state.posterior.mean, particles, number), np.tile(model.first, (runs, 1))
+        return state._replace(memory=JumpParticles(*start, x=None, mode=None, probability=probability))
 
     def moved(j: int, x: Array, s: Array, k: int) -> Array:
         """The states after step k in mode j."""
@@ -150,7 +149,8 @@ def jump_particle(model: JumpModel, particles: int = 1000, seed: Seed = 0, name:
             each = [moved(j, x, plain(rng, x.shape[:-1], look)[0], k) for j, look in enumerate(aheads)]
             ahead = _by_mode(next_mode, each).reshape(len(y), particles, model.n)
             predicted = weighted(ahead, np.full(ahead.shape[:-1], 1.0 / particles), angles)
-        memory = JumpParticles(x, mode, probability, np.moveaxis(mean, 1, 0), effective, log_mean.T, root)
+        clouds = np.moveaxis(mean, 1, 0), effective, log_mean.T, root
+        memory = JumpParticles(*clouds, x=x, mode=mode, probability=probability)
         return State(k + 1, of_both(mean, cov, angles), predicted, memory)
 
     def evidence(before: State, y: Array, after: State) -> Array:

@@ -19,7 +19,7 @@ def matrix(latex: str, rows: sp.Expr, columns: sp.Expr) -> sp.MatrixSymbol:
     return sp.MatrixSymbol(latex if "{" in latex else "{" + latex + "}", rows, columns)
 
 
-def equation(left: sp.MatrixExpr, right: sp.MatrixExpr) -> sp.Eq:
+def equation(left: sp.Expr, right: sp.Expr) -> sp.Eq:
     """left = right as it is written: SymPy would first look whether their difference is zero, for a third of a start's time."""
     return sp.Eq(left, right, evaluate=False)
 

@@ -16,7 +16,7 @@ without any contribution of the sampling: that is how particles bound other filt
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,13 +35,12 @@ LARGEST = 1e150  # the squares of larger states are infinite
 PATHS = 200  # that each cloud draws when it looks back
 
 
-class Particles(NamedTuple):
-    """What the filter remembers.
+@dataclass(frozen=True, eq=False)
+class Clouds:
+    """What a filter remembers of two clouds of particles that know nothing of each other.
 
     Attributes
     ----------
-    x : ndarray (runs, 2, M/2, n), or None before the first measurement
-        Both clouds, all particles of equal weight.
     halves : ndarray (2, runs, n)
         The estimate of each cloud.
     effective : ndarray (runs,)
@@ -51,7 +50,6 @@ class Particles(NamedTuple):
     seed : numpy.random.SeedSequence
     """
 
-    x: Array | None
     halves: Array
     effective: Array
     evidence: Array
@@ -59,7 +57,20 @@ class Particles(NamedTuple):
 
     def discretisation_error(self) -> Array:
         """Standard error of the estimates, (runs,): half the distance of both clouds."""
-        return half_apart(self.halves)
+        return np.asarray(0.5 * np.linalg.norm(self.halves[0] - self.halves[1], axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Particles(Clouds):
+    """What the filter remembers; the others as of `Clouds`.
+
+    Attributes
+    ----------
+    x : ndarray (runs, 2, M/2, n), or None before the first measurement
+        Both clouds, all particles of equal weight.
+    """
+
+    x: Array | None
 
     def evidence_error(self) -> Array:
         """Standard error of the last ln p(y_k | y_0, ..., y_{k-1}), (runs,): half the distance of both clouds."""
@@ -98,9 +109,7 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
 
     def init(runs: int) -> State:
         state = gaussian_init(runs)
-        both = np.stack([state.posterior.mean] * 2)
-        root = np.random.SeedSequence([number, runs])
-        return state._replace(memory=Particles(None, both, np.full(runs, float(particles)), np.zeros((2, runs)), root))
+        return state._replace(memory=Particles(*at_start(state.posterior.mean, particles, number), x=None))
 
     def first(rng: np.random.Generator, y: Array) -> tuple[Array, Array]:
         """x_0 (runs, 2, M/2, n), and the logarithms of p / q."""
@@ -142,7 +151,7 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
         with np.errstate(over="ignore", invalid="ignore"):
             following_ones = moved(kept, s, state.step).reshape(len(y), particles, model.n)
             predicted = weighted(following_ones, np.full(following_ones.shape[:-1], 1.0 / particles), angles)
-        memory = Particles(kept, np.moveaxis(mean, 1, 0), effective, log_mean.T, root)
+        memory = Particles(np.moveaxis(mean, 1, 0), effective, log_mean.T, root, x=kept)
         return State(state.step + 1, posterior, predicted, memory)
 
     def evidence(before: State, y: Array, after: State) -> Array:
@@ -156,7 +165,7 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
             found = backwards([memory.x for memory in memories[:end]], transition(model), angles, min(size, PATHS), rng)
             for step, (clouds, effective) in zip(range(end, 0, -1), found, strict=True):
                 law, halves = of_both(*clouds, angles), np.moveaxis(clouds.mean, 1, 0)
-                yield State(step, law, law, memories[step - 1]._replace(x=None, halves=halves, effective=effective))
+                yield State(step, law, law, replace(memories[step - 1], x=None, halves=halves, effective=effective))
 
         return back
 
@@ -169,9 +178,10 @@ def even(particles: int) -> None:
         raise ModelError(f"a particle filter needs an even number of at least 2 particles, got {particles}")
 
 
-def half_apart(halves: Array) -> Array:
-    """Half the distance of the estimates (2, runs, n) of two clouds, (runs,): the standard error of their mean."""
-    return np.asarray(0.5 * np.linalg.norm(halves[0] - halves[1], axis=1))
+def at_start(mean: Array, particles: int, number: int) -> tuple[Array, Array, Array, np.random.SeedSequence]:
+    """The fields of `Clouds` before the first measurement, from the prior's means (runs, n)."""
+    runs = len(mean)
+    return np.stack([mean] * 2), np.full(runs, float(particles)), np.zeros((2, runs)), np.random.SeedSequence([number, runs])
 
 
 def of_both(mean: Array, cov: Array, angles: Components) -> Gaussian:

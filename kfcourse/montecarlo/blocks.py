@@ -13,6 +13,7 @@ from tqdm import tqdm
 from kfcourse.angles import near
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.looking_back import looked_back
+from kfcourse.filters.particles import Clouds
 from kfcourse.laws import Array, NegativeVariance
 from kfcourse.montecarlo.designing import NotFinite, failed
 from kfcourse.montecarlo.ensemble import Instant
@@ -96,7 +97,7 @@ def _back(filters: Sequence[Filter], instants: Iterable[Instant], size: int) -> 
 
 def _twice(state: State) -> tuple[Array, Array]:
     """Two estimates of the reference whose errors, if it has any, are independent: those of both clouds of particles."""
-    first, second = getattr(state.memory, "halves", (state.posterior.mean,) * 2)
+    first, second = state.memory.halves if isinstance(state.memory, Clouds) else (state.posterior.mean,) * 2
     return first, second
 
 
