@@ -60,13 +60,7 @@ def preview(page: BeautifulSoup, identity: str, way: str) -> str:
     else:
         return ""
     shown = BeautifulSoup(html, "html.parser")
-    for one in shown.select("button, details, .headerlink, .kf-where"):
-        one.decompose()
-    for one in shown.select("a"):
-        one.unwrap()
-    for one in shown.find_all(True):
-        for name in ("id", "tabindex", "role", "aria-label"):
-            one.attrs.pop(name, None)
+    for one in shown.select("[src], [srcset]"):
         for name in {"src", "srcset"} & one.attrs.keys():
             one[name] = posixpath.normpath(f"{way}/{one[name]}")
     return str(shown).strip()

@@ -217,6 +217,12 @@ CONTRAST = f"""([theme, colours]) => {{
 }}"""
 
 
+def read(tab, page: str) -> None:
+    """Open a page, its formulas set."""
+    tab.goto((HTML / f"{page}.html").as_uri())
+    tab.wait_for_selector("html[data-formulas=ready]")
+
+
 def show_on(tab, media: str, width: int) -> None:
     """Lay the page out for another medium and width: once, as it is hidden while they change."""
     tab.evaluate("document.body.style.contentVisibility = 'hidden'")
@@ -298,8 +304,7 @@ def test_a_reference_shows_what_it_leads_to(window):
     """Under the mouse and on the keyboard's way, not under a finger; Escape closes it, and the link stays a link."""
     tab, problems = window
     show_on(tab, "screen", 1280)
-    tab.goto((HTML / "comparison.html").as_uri())
-    tab.wait_for_selector("html[data-formulas=ready]")
+    read(tab, "comparison")
     box = tab.locator("#kf-preview")
     formula = tab.locator('article a.reference.internal[href^="#equation-"]').first
     figure = tab.locator('article a.reference.internal[href^="#fig-"]').first
@@ -330,8 +335,7 @@ def test_what_a_link_to_another_page_leads_to_is_shown_too(window):
     """Equations are set, terms say what they mean, in both languages; nothing is loaded but what is there."""
     tab, problems = window
     show_on(tab, "screen", 1280)
-    tab.goto((HTML / "grid.html").as_uri())
-    tab.wait_for_selector("html[data-formulas=ready]")
+    read(tab, "grid")
     box = tab.locator("#kf-preview")
     tab.locator('article a.reference.internal[href^="stratonovich.html#equation-"]').first.hover()
     box.locator("mjx-container").wait_for()
@@ -376,8 +380,7 @@ SHEETS = {"comparison": 9}
 def test_sheets_are_full(window, page):
     tab, _ = window
     show_on(tab, "print", 1280)
-    tab.goto((HTML / f"{page}.html").as_uri())
-    tab.wait_for_selector("html[data-formulas=ready]")
+    read(tab, page)
     printed = tab.pdf(prefer_css_page_size=True)
     assert len(re.findall(rb"/Type\s*/Page\b", printed)) <= SHEETS[page]
     alone = "e => [getComputedStyle(e.querySelector('.admonition-title')).breakAfter, getComputedStyle(e).breakInside]"
@@ -386,8 +389,7 @@ def test_sheets_are_full(window, page):
 
 def test_hints_are_open_on_paper_and_the_code_of_pictures_is_not_there(window):
     tab, _ = window
-    tab.goto((HTML / "manual" / "b-aof.html").as_uri())
-    tab.wait_for_selector("html[data-formulas=ready]")
+    read(tab, "manual/b-aof")
     closed = "() => [...document.querySelectorAll('article details:not(.kf-code)')].map((e) => e.open)"
     assert not any(tab.evaluate(closed))
     tab.evaluate("addEventListener('beforeprint', () => { window.atPrint = (" + closed + ")(); })")

@@ -27,18 +27,18 @@ addEventListener("DOMContentLoaded", () => {
     close();
     const found = target(link);
     if (typeof found === "string") print(found);
-    else copy(found.cloneNode(true));
+    else box.replaceChildren(found.cloneNode(true));
+    bare();
     box.hidden = false;
     link.setAttribute("aria-describedby", box.id);
     shown = link;
     place();
   };
-  const copy = (found) => {
-    for (const one of [found, ...found.querySelectorAll("*")])
+  const bare = () => { // no second element of a name, nothing to press, no links
+    for (const one of box.querySelectorAll("*"))
       for (const name of ["id", "tabindex", "role", "aria-label"]) one.removeAttribute(name);
-    for (const one of found.querySelectorAll("button, details, .headerlink")) one.remove();
-    for (const one of found.querySelectorAll("a")) one.replaceWith(...one.childNodes);
-    box.replaceChildren(found);
+    for (const one of box.querySelectorAll("button, details, .headerlink, .kf-where")) one.remove();
+    for (const one of box.querySelectorAll("a")) one.replaceWith(...one.childNodes);
   };
   const print = async (html) => {
     window.MathJax?.typesetClear?.([box]);

@@ -81,9 +81,7 @@ class JumpReport(StudentReport):
         yield Block("section", words["functions"])
         yield Block("text", words["functions_modes"])
         for kind in self.kinds:
-            yield Block("subsection", words[kind])
-            yield Block("text", words[f"{kind}_text"])
-            yield Block("formulas", lines=words[f"{kind}_formulas"].split("\n"))
+            yield from self.defined(kind)
             blocks = [printed(Structures(mode), kind) for mode in self.model.modes]
             alike = all(block == blocks[0] for block in blocks)
             said = [filled(words["in_mode"], j=f"$j={j}$", name=name) for j, name, _ in self.numbered]

@@ -69,38 +69,34 @@ class PlainReport(StudentReport):
         if self.kinds:
             yield Block("section", self.words["functions"])
         for kind in self.kinds:
-            yield from getattr(self, kind)()
+            yield from self.defined(kind)
+            if self.model.n == self.model.p == 1:
+                yield from getattr(self, kind)()
             yield from self.derived(kind)
 
     def linearised(self) -> Iterator[Block]:
-        model, words = self.model, self.words
-        yield Block("subsection", words["linearised"])
-        yield Block("text", words["linearised_text"])
-        yield Block("formulas", lines=words["linearised_formulas"].split("\n"))
-        if model.n == model.p == 1:
-            sides = ((model.state_equation[0], model.v, "a", "v"), (model.meter_equation[0], model.w, "b", "w"))
-            derivatives = [
-                rf"\frac{{\partial {letter}}}{{\partial {by}}} &= {formula_latex(formula.diff(symbol), model.x, noises)}"
-                for formula, noises, letter, noise in sides
-                for by, symbol in [("x", model.x[0]), *([(noise, noises[0])] if len(noises) == 1 else [])]
-            ]
-            yield Block("text", words["derivatives"])
-            yield Block("formulas", lines=derivatives)
+        """The derivatives of a scalar model."""
+        model = self.model
+        sides = ((model.state_equation[0], model.v, "a", "v"), (model.meter_equation[0], model.w, "b", "w"))
+        derivatives = [
+            rf"\frac{{\partial {letter}}}{{\partial {by}}} &= {formula_latex(formula.diff(symbol), model.x, noises)}"
+            for formula, noises, letter, noise in sides
+            for by, symbol in [("x", model.x[0]), *([(noise, noises[0])] if len(noises) == 1 else [])]
+        ]
+        yield Block("text", self.words["derivatives"])
+        yield Block("formulas", lines=derivatives)
 
     def gaussian(self) -> Iterator[Block]:
-        model, words = self.model, self.words
-        yield Block("subsection", words["gaussian"])
-        yield Block("text", words["gaussian_text"])
-        yield Block("formulas", lines=words["gaussian_formulas"].split("\n"))
-        if model.n == model.p == 1:
-            if conditional := self.conditional():
-                yield Block("text", words["conditional"])
-                yield Block("formulas", lines=conditional)
-            if moments := self.moments():
-                yield Block("text", words["recursion"])
-                yield Block("formulas", lines=[r"q_0 &= 1,\quad q_1 = m,\quad q_{n+1} = m\,q_n + n\,d\,q_{n-1}", *moments])
-            elif not self.structures.quadrature:
-                yield Block("text", words["exponentials"])
+        """The means of a scalar model, step by step."""
+        words = self.words
+        if conditional := self.conditional():
+            yield Block("text", words["conditional"])
+            yield Block("formulas", lines=conditional)
+        if moments := self.moments():
+            yield Block("text", words["recursion"])
+            yield Block("formulas", lines=[r"q_0 &= 1,\quad q_1 = m,\quad q_{n+1} = m\,q_n + n\,d\,q_{n-1}", *moments])
+        elif not self.structures.quadrature:
+            yield Block("text", words["exponentials"])
 
     def conditional(self) -> list[str]:
         """Means of a, a^2, b, b^2 over their noise, at a fixed state."""

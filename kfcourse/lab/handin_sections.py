@@ -65,6 +65,12 @@ class StudentReport:
         """The structural functions."""
         raise NotImplementedError
 
+    def defined(self, kind: str) -> Iterator[Block]:
+        """The heading of a kind of structural functions, and what they are."""
+        yield Block("subsection", self.words[kind])
+        yield Block("text", self.words[f"{kind}_text"])
+        yield Block("formulas", lines=self.words[f"{kind}_formulas"].split("\n"))
+
     def filters(self) -> Iterator[Block]:
         """The equations of the filters."""
         raise NotImplementedError
