@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 import psutil
 import pytest
+from endings import ended
 
 from kfcourse import Model, compare, linearised
 from kfcourse.filters import aof, particle, pointmass
@@ -154,7 +155,7 @@ def test_the_time_decides_on_the_number_of_trajectories_and_on_nothing_else(mode
     found = together([control, sluggish], model, runs=4000)
     begun = time.monotonic()
     result = found(threads=2, subset_seconds=1.0)
-    assert time.monotonic() - begun < 5  # and the fast filters, on a busy machine
+    assert time.monotonic() - begun < 20  # and the fast filters, on a busy machine
     assert 16 <= result.subset_runs <= 666  # two cores at 3 ms a trajectory
     again = compare([control, sluggish], model, 4000, STEPS, 1, subset_runs=result.subset_runs, threads=1, progress=False)
     assert same(result, again) and not result.left_out
@@ -171,7 +172,7 @@ def test_behind_a_chunk_that_is_out_of_time_nothing_counts(model, control, start
     begun = time.monotonic()
     result = together([control, slow(control, "hanging", hangs)], model, threads=2, subset_seconds=2.0)()
     assert result.subset_runs == 32
-    assert time.monotonic() - begun < 10
+    assert time.monotonic() - begun < 30
     assert started == [2]
 
 
@@ -229,7 +230,7 @@ def test_the_end_of_the_program_is_the_end_of_its_processes(number):
     else:
         program.kill()
     errors = program.communicate(timeout=30)[1].decode()  # the pipes are open as long as anybody has them
-    assert not psutil.wait_procs(workers, timeout=10)[1]
-    assert time.monotonic() - begun < 10  # not the minute that is slept
+    assert ended(*workers)
+    assert time.monotonic() - begun < 30  # not the minute that is slept
     assert program.returncode == -number
     assert errors.count("Traceback") == errors.count("KeyboardInterrupt") == (number == signal.SIGINT)

@@ -6,11 +6,11 @@ import signal
 import socket
 import sys
 import threading
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from endings import ended
 from test_grade import FIXTURES, cell, solved
 from tricks import CELLS, FUNCTIONS, PROCESSES
 
@@ -197,16 +197,7 @@ def test_without_a_sandbox_it_is_noted(kernel, outside, tmp_path, port):
     assert os.path.exists(f"/proc/{left}") or sys.platform != "linux"
     kernel.close()  # the daemon, in a session of its own, is gone with it
     if sys.platform == "linux":
-        assert gone(left)
-
-
-def gone(pid):
-    for _ in range(100):  # a killed process stays as a zombie until somebody waits for it
-        status = Path(f"/proc/{pid}/stat")
-        if not status.exists() or status.read_text().split()[2] == "Z":
-            return True
-        time.sleep(0.05)
-    return False
+        assert ended(left)
 
 
 @POSIX
@@ -227,7 +218,7 @@ def test_who_kills_its_process_is_named_and_the_next_is_graded(staged, tmp_path)
     assert all("was killed, twice: by the notebook, or by somebody else" in grade.note for grade in grades[:2])
     assert grades[2].passed == 2
     if sys.platform == "linux":
-        assert all(gone(int((tmp_path / f"flag{name}").read_text())) for name in "12")
+        assert all(ended(int((tmp_path / f"flag{name}").read_text())) for name in "12")
 
 
 # -- processes that somebody kills
