@@ -156,6 +156,10 @@ def gain(cross: Matrices, cov: Matrices, broken: bool = False) -> Matrices:
             first, second, both, determinant = (one[..., None] for one in (first, second, both, determinant))
             left, right = cross[..., 0], cross[..., 1]
             return np.stack([left * second - right * both, right * first - left * both], axis=-1) / determinant[..., None]
+    if cov[..., 0, 0].size >= MANY:
+        solved = _by_components(cross, cov, singular**2)
+        if solved is not None:
+            return solved
     # Scaling to correlations first: components may differ by orders of magnitude in size.
     variance = np.diagonal(cov, axis1=-2, axis2=-1)
     scale = np.sqrt(np.abs(variance))
@@ -176,6 +180,38 @@ def gain(cross: Matrices, cov: Matrices, broken: bool = False) -> Matrices:
 
 # A Cholesky pivot of a correlation matrix below this is rounding, in units of the root of the precision (1.5e-8 in float64).
 SINGULAR = 7.0
+MANY = 512  # matrices, from which on a call for each of their components costs less than LAPACK's for each matrix
+
+
+def _by_components(cross: Matrices, cov: Matrices, least: float) -> Matrices | None:
+    """cross cov^-1 by Cholesky's root, component by component of all matrices at once; in place, as room costs more than sums.
+
+    None if somewhere a pivot is not above this part of its variance: what of a component the others do not tell.
+    """
+    n, lead = cov.shape[-1], np.broadcast_shapes(cross.shape[:-2], cov.shape[:-2])
+    root = np.moveaxis(cov, (-2, -1), (0, 1)).copy()
+    for j in range(n):
+        for k in range(j):
+            _subtract(root[j, k], root[j, :k], root[k, :k])
+            root[j, k] /= root[k, k]
+        _subtract(root[j, j], root[j, :j], root[j, :j])
+        if not np.minimum.reduce(root[j, j] - least * cov[..., j, j], axis=None) > 0:
+            return None
+        np.sqrt(root[j, j], out=root[j, j, ...])
+    x = np.moveaxis(np.broadcast_to(cross, (*lead, *cross.shape[-2:])), (-1, -2), (0, 1)).copy()
+    for j in range(n):  # L (L^T x) = cross^T
+        _subtract(x[j], root[j, :j], x[:j])
+        x[j] /= root[j, j]
+    for j in reversed(range(n)):
+        _subtract(x[j], root[j + 1 :, j], x[j + 1 :])
+        x[j] /= root[j, j]
+    return np.ascontiguousarray(np.moveaxis(x, (0, 1), (-1, -2)))
+
+
+def _subtract(value: Array, left: Array, right: Array) -> None:
+    """value -= sum_i left_i right_i."""
+    for one, other in zip(left, right, strict=True):
+        value -= one * other
 
 
 def _refuse_negative(variance: Array, rounding: float) -> None:

@@ -24,7 +24,7 @@ from kfcourse.laws import Array, Gaussian, apply, gain, product, regression, sta
 from kfcourse.linear.runs import Run
 from kfcourse.linear.system import LinearSystem
 
-AT_ONCE = 512  # laws: so many that a call costs little beside them, so few that stacking them does, too
+AT_ONCE = 2048  # laws: so many that a call costs little beside them, so few that stacking them does, too
 
 
 class Passages(NamedTuple):
@@ -79,7 +79,7 @@ def regressions(passages: Passages) -> list[Regression]:
     if z.shape[-1] == 1:
         return list(map(Regression, z, lam, *regression(p, A, Psi, Q)))
     Ap = product(A, p)
-    S = gain(transpose(Ap), Psi, broken=True)
+    S = gain(Ap.swapaxes(-1, -2), Psi, broken=True)
     left = p - product(S, Ap)
     noise = Q if Q.ndim == p.ndim else np.broadcast_to(Q, (len(z), *Q.shape))
     return list(map(Regression, z, lam, S, left, noise, product(left, transpose(A))))
