@@ -111,8 +111,9 @@ def _noise_of(cov: Array, scale: Array, what: str) -> None:
 def findings(told: Examination, confidence: float = CONFIDENCE, run: int = 0) -> list[Finding]:
     """Size, mean and neighbours of a record's innovations; those that a gate refused are left out.
 
-    The intervals are those of normal laws for sums of many terms: thirty measurements are enough.  Under weights that are
-    neither 0 nor 1 none of this holds; nothing is found of a record that was refused altogether.
+    That of the size is exact without a gate, and behind one that of a gamma law with the same mean and variance; the others are
+    those of normal laws for sums of many terms: thirty measurements are enough.  Under weights that are neither 0 nor 1 none of
+    this holds; nothing is found of a record that was refused altogether.
     """
     used = told.weight[:, run] > 0
     if not used.any():
@@ -122,9 +123,10 @@ def findings(told: Examination, confidence: float = CONFIDENCE, run: int = 0) ->
     degrees = (~np.isnan(value)).sum(axis=-1)
     size = _sizes(value, F).sum() / degrees.sum()
     mean, variance = _below(degrees, told.edge)
-    spread = z * np.sqrt(variance.sum()) / degrees.sum()
-    middle = mean.sum() / degrees.sum()
-    result = [Finding("size", float(size), float(middle - spread), float(middle + spread))]
+    scale = variance.sum() / mean.sum()
+    tails = np.array([(1 - confidence) / 2, (1 + confidence) / 2])
+    low, high = scale * scipy.special.gammaincinv(mean.sum() / scale, tails) / degrees.sum()
+    result = [Finding("size", float(size), float(low), float(high))]
     for i, name in enumerate(_names(value.shape[-1])):
         there = ~np.isnan(value[:, i])
         s = value[there, i] / np.sqrt(F[there, i, i])

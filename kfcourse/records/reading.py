@@ -6,7 +6,8 @@
     0.41,12.9,41.3,0.03
 
 A row is a step, a column is found by its name.  An empty cell of a measurement is missing, so sensors of different rates share
-a file.  An input holds until the next one is given.  The interval to the next row is the input `dt`, if the model has one.
+a file; where it is the only column, so is an empty line.  An input holds until the next one is given.  The interval to the next
+row is the input `dt`, if the model has one.
 """
 
 from __future__ import annotations
@@ -130,7 +131,7 @@ class _Source(NamedTuple):
 
 
 def _lines(source: _Source, path: Path) -> Iterator[tuple[int, str]]:
-    """Number and text of each line that is not blank."""
+    """Number and text of each line, without the blank ones at either end."""
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST + 1)
@@ -150,7 +151,9 @@ def _lines(source: _Source, path: Path) -> Iterator[tuple[int, str]]:
         line = content[: error.start].count(b"\n") + 1
         raise RecordError(f"{source.name}, line {line}: a byte that is not UTF-8; save the file as CSV in UTF-8") from None
     # A quoted cell must not swallow the lines below it: rows are lines.
-    return ((number, line) for number, line in enumerate(re.split("\r\n|\r|\n", text), start=1) if line.strip())
+    lines = list(enumerate(re.split("\r\n|\r|\n", text), start=1))
+    told = [place for place, (_, line) in enumerate(lines) if line.strip()]
+    return iter(lines[told[0] : told[-1] + 1] if told else [])
 
 
 def _header(source: _Source, lines: Iterator[tuple[int, str]]) -> tuple[list[str], str]:
@@ -167,7 +170,7 @@ def _header(source: _Source, lines: Iterator[tuple[int, str]]) -> tuple[list[str
 
 def _cells(source: _Source, number: int, line: str, delimiter: str) -> list[str]:
     try:
-        return next(csv.reader(StringIO(line), delimiter=delimiter, strict=True))
+        return next(csv.reader(StringIO(line), delimiter=delimiter, strict=True), [""])
     except csv.Error as error:
         raise RecordError(f"{source.name}, line {number}: {error}; a quoted cell must end in its line") from None
 
@@ -209,6 +212,8 @@ def _rows(
     """Number of the line, and the numbers in the places wanted."""
     comma = delimiter == ";"
     for number, line in lines:
+        if len(names) > 1 and not line.strip():
+            continue  # of one column it is a row: a measurement that is missing
         cells = _cells(source, number, line, delimiter)
         if len(cells) != len(names):
             raise RecordError(

@@ -68,9 +68,10 @@ def test_on_a_linear_gaussian_model_it_is_the_kalman_filter(state, meter, prior)
     np.testing.assert_allclose(exact.cov, expected.cov, rtol=2 * RESOLVED)
 
 
-def test_its_prediction_is_the_kalman_filters_too():
+@pytest.mark.parametrize("exact_filter", [pointmass, adaptive_pointmass])
+def test_its_prediction_is_the_kalman_filters_too(exact_filter):
     model = Model.define("0.9*x + 1 + 0.3*v", "x + 0.5*w")
-    exact, expected = pointmass(model), kalman_filter(model)
+    exact, expected = exact_filter(model), kalman_filter(model)
     a, b = exact.init(1), expected.init(1)
     for y in (0.3, -1.2, 2.0):
         a, b = exact.step(a, np.array([[y]])), expected.step(b, np.array([[y]]))

@@ -88,6 +88,12 @@ def test_uneven_steps_that_the_model_does_not_know_of(read):
     assert len(read("time,y\n0,1\n1,1\n2.001,1\n", PLAIN).y) == 3  # an hour of a clock's jitter is no warning
 
 
+def test_of_a_single_column_an_empty_line_is_a_missing_measurement(read):
+    """But not those before the names or after the last row, nor of several columns, where a missing row has its commas."""
+    for end in ("", "\n", "\n\n\n"):
+        np.testing.assert_array_equal(read(f"\n\ny\n1\n\n  \n4{end}", PLAIN).y.ravel(), [1, np.nan, np.nan, 4])
+
+
 def test_one_row_is_a_record(read):
     assert read("time,y1,y2,a\n3,1,2,0\n").model.known.inputs["dt"] == (1.0,)
     np.testing.assert_array_equal(intervals(np.array([3.0]), 0.25), [0.25])

@@ -126,20 +126,16 @@ def _nodes(formulas: Sequence[Any]) -> list[Any]:
         waiting: list[tuple[Any, bool]] = [(formula, False)]
         while waiting:
             part, ready = waiting.pop()
-            if _key(part) in places:
+            if part in places:
                 continue
             if part.args and not ready and not isinstance(part, sp.Symbol):
                 waiting += [(part, True), *((argument, False) for argument in part.args)]
                 continue
             nodes.append(_node(part, places))
-            places[_key(part)] = len(nodes) - 1
+            places[part] = len(nodes) - 1
             if len(nodes) > NODES:
                 raise Unsent(f"a formula of more than {NODES} parts")
-    return [nodes, [places[_key(formula)] for formula in formulas]]
-
-
-def _key(part: Any) -> Any:
-    return type(part), part  # 1 and 1.0 are equal
+    return [nodes, [places[formula] for formula in formulas]]
 
 
 def _node(part: Any, places: Mapping[Any, int]) -> list[Any]:
@@ -155,7 +151,7 @@ def _node(part: Any, places: Mapping[Any, int]) -> list[Any]:
     name, arguments = type(part).__name__, getattr(part, "args", ())
     if HEADS.get(name) is not type(part):
         raise Unsent(f"formula with {name}")
-    return [name, *(places[_key(argument)] for argument in arguments)]
+    return [name, *(places[argument] for argument in arguments)]
 
 
 def decode(data: Any, proxies: Proxies | None = None) -> Any:
