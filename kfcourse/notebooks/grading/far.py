@@ -1,32 +1,36 @@
 """Grading on the workers of a Dask scheduler.
 
-There each notebook is graded below a process of its own, by what the command does with notebooks on its machine.  So all that is
-ended with a notebook is its own, on a worker of many threads, too; and with the worker everything ends.
+There each notebook is graded below a process that has no other meanwhile, by what the command does with notebooks on its machine.
+So all that is ended with a notebook is its own, on a worker of many threads, too; and with the worker everything ends.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import secrets
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import as_completed
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from tqdm import tqdm
 
 from kfcourse.files import package_digest
 from kfcourse.montecarlo.parallel import cluster
 from kfcourse.notebooks.grading import keeper
+from kfcourse.notebooks.grading.channel import Channel, Closed, Late, Patient
 from kfcourse.notebooks.grading.pool import Order, grading
 from kfcourse.notebooks.grading.submissions import Returned
 from kfcourse.notebooks.grading.table import FAILED, Grade, RunAll, Started
+from kfcourse.notebooks.grading.values import Strange
 from kfcourse.notebooks.grading.worker import grade_of, packed, returned_of
 
+IDLE = 60.0  # seconds without work after which a process ends: its start costs two, and nobody says that all is done
 LOST = "the process that graded it was killed, again and again: by the notebook, or by somebody else"
 
 
@@ -71,49 +75,99 @@ def graded(work: Returned, order: Order, package: str, topic: str) -> tuple[Grad
     Raises
     ------
     ChildProcessError
-        The process was killed.
+        The process that graded it was killed.
     ValueError
         Notebooks cannot be graded here as they are to be.
     """
     from distributed import get_worker
 
     get_worker().log_event(topic, work.name)
-    asked = {"work": packed(work), "order": packed(order), "package": package}
-    command, life = [sys.executable, "-m", __name__], os.pipe()
+    free = _free.setdefault((order, package), [])
+    process = _living(free) or Kept(order, package, get_worker().local_directory)
     try:
-        if os.name == "posix":  # what keeps the process ends it, and all below it, when this one ends
-            command = [sys.executable, "-I", "-S", str(Path(keeper.__file__)), str(life[0]), *command]
-        kept = {"pass_fds": life[:1], "start_new_session": True} if os.name == "posix" else {}
-        done = subprocess.run(command, input=json.dumps(asked).encode(), capture_output=True, **kept)
-    finally:
-        for end in life:
-            os.close(end)
-    if done.returncode:
-        raise ChildProcessError(f"status {done.returncode}: {done.stderr.decode(errors='replace')[-2000:]}")
-    reply = json.loads(done.stdout)
+        reply = process.grade(work)
+    except (Closed, Strange):
+        process.end()
+        raise ChildProcessError(LOST) from None
     if "problem" in reply:
+        process.end()
         raise ValueError(f"the Dask worker on {socket.gethostname()}: {reply['problem']}")
+    free.append(process)
     return grade_of(reply["grade"]), reply["kind"]
 
 
+class Kept:
+    """A process that grades as ordered, one notebook at a time, until it has nothing to do for a while.
+
+    What keeps it ends it, with all below it, when this process ends.
+    """
+
+    def __init__(self, order: Order, package: str, folder: str):
+        self._life, command, posix = os.pipe(), [sys.executable, "-m", __name__], os.name == "posix"
+        if posix:
+            command = [sys.executable, "-I", "-S", str(Path(keeper.__file__)), str(self._life[0]), *command]
+        self._process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=os.environ | {"TMPDIR": folder},  # the cluster clears it away whatever happens
+            pass_fds=self._life[:1] if posix else (),
+            start_new_session=posix,
+        )
+        assert self._process.stdin and self._process.stdout
+        self._channel = Channel(self._process.stdout, self._process.stdin)
+        self._first = {"order": packed(order), "package": package}
+
+    def grade(self, work: Returned) -> dict[str, Any]:
+        """Grade and kind of the sandbox, or a problem; Closed if the process was killed."""
+        first, self._first = self._first, {}
+        self._channel.send(first | {"work": packed(work)})
+        return self._channel.receive()
+
+    @property
+    def ended(self) -> bool:
+        return self._process.poll() is not None
+
+    def end(self) -> None:
+        """End it with all below it."""
+        for end in self._life:
+            os.close(end)
+        self._process.wait()
+
+
+def _living(free: list[Kept]) -> Kept | None:
+    """One that has not ended for want of work."""
+    with suppress(IndexError):  # any thread takes from the list
+        while (process := free.pop()).ended:
+            process.end()
+        return process
+    return None
+
+
+_free: dict[tuple[Order, str], list[Kept]] = {}
+
+
 def main() -> None:
-    """Grade the notebook of which standard input tells."""
-    asked = json.load(sys.stdin)
-    given = asked["order"]
-    order = Order(**(given | {key: given[key] and Path(given[key]) for key in ("folder", "masters")}))
+    """Grade what comes, until nothing does."""
+    channel = Patient(os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"))
     try:
+        asked = channel.wait(time.monotonic() + IDLE)
+        given = asked["order"]
+        order = Order(**(given | {key: given[key] and Path(given[key]) for key in ("folder", "masters")}))
         if package_digest() != asked["package"]:
             raise ValueError(f"another kfcourse is installed there, in {Path(__file__).parents[2]}: install the same version")
         if not order.folder.is_dir():
             raise ValueError(f"it does not see {order.folder}: --dask needs a file system that the workers share")
         with grading(order, 1) as (run, kinds):
-            (found,) = run([returned_of(asked["work"])], lambda _: None)
-            (kind,) = kinds
+            while True:
+                (grade,), (kind,) = run([returned_of(asked["work"])], lambda _: None), kinds
+                channel.send({"grade": packed(grade), "kind": kind})
+                asked = channel.wait(time.monotonic() + IDLE)
     except (ValueError, OSError) as error:
-        reply = {"problem": str(error)}
-    else:
-        reply = {"grade": packed(found), "kind": kind}
-    json.dump(reply, sys.stdout)
+        channel.send({"problem": str(error)})
+    except (Closed, Late):
+        return
 
 
 if __name__ == "__main__":
