@@ -43,7 +43,6 @@ class Scatter(NamedTuple):
     """
 
     size: int
-    targets: int  # r, the first components
     mean: Array  # (r + s,)
     scatter: Array  # (r + s, r + s)
 
@@ -52,7 +51,7 @@ class Scatter(NamedTuple):
         """Those of target (N, r) and regressor (N, s) stacked into one vector."""
         if not len(target):
             size = target.shape[1] + regressor.shape[1]
-            return cls(0, target.shape[1], np.zeros(size), np.zeros((size, size)))
+            return cls(0, np.zeros(size), np.zeros((size, size)))
         columns = [target[:, i] for i in range(target.shape[1])] + [regressor[:, i] for i in range(regressor.shape[1])]
         count, size = len(target), len(columns)
         mean = [float(np.add.reduce(column)) / count for column in columns]
@@ -61,7 +60,7 @@ class Scatter(NamedTuple):
         for i in range(size):
             for j in range(i, size):
                 scatter[i][j] = scatter[j][i] = _dot(deviations[i], deviations[j])
-        return cls(count, target.shape[1], np.array(mean), np.array(scatter))
+        return cls(count, np.array(mean), np.array(scatter))
 
     @classmethod
     def together(cls, parts: Sequence[Scatter]) -> Scatter:
@@ -71,14 +70,14 @@ class Scatter(NamedTuple):
         mean = counts @ means / counts.sum()
         shift = means - mean
         scatter = np.sum([part.scatter for part in parts], axis=0) + (shift * counts[:, None]).T @ shift
-        return cls(int(counts.sum()), parts[0].targets, mean, scatter)
+        return cls(int(counts.sum()), mean, scatter)
 
-    def regression(self) -> Affine:
-        """Least squares of the target on the regressor.
+    def regression(self, size: int) -> Affine:
+        """Least squares of the first `size` components on the rest.
 
         matrix = Cov(t, r) Cov(r)^+,  offset = M t - matrix M r,  residual = Cov(t) - matrix Cov(t, r)^T
         """
-        cov, size = self.scatter / self.size, self.targets
+        cov = self.scatter / self.size
         cross = cov[:size, size:]
         matrix = gain(cross, cov[size:, size:])
         offset = self.mean[:size] - matrix @ self.mean[size:]

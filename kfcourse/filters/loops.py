@@ -35,7 +35,7 @@ def _moments(target, regressor):
 def scatter(target: Array, regressor: Array) -> Scatter:
     """`Scatter.of` a scalar target and a scalar regressor, (N, 1) both."""
     t, r, tt, tr, rr = _moments(column(target), column(regressor))
-    return Scatter(len(target), 1, np.array([t, r]), np.array([[tt, tr], [tr, rr]]))
+    return Scatter(len(target), np.array([t, r]), np.array([[tt, tr], [tr, rr]]))
 
 
 _ARRAYS = ", ".join(["float64[::1]"] * 5 + ["int64[::1]"] + ["float64[::1]"] * 5)
