@@ -28,6 +28,7 @@ from kfcourse.filters import aof, duof, fbp, fkp, fos, kalman_filter, mfos, poin
 from kfcourse.filters.exact.jumps import jump_pointmass
 from kfcourse.filters.jump_optimal import logic_dynamic_fbp, logic_dynamic_fkp, logic_dynamic_fos
 from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic, moving_alike
+from kfcourse.lab.variants import find_variant
 from kfcourse.linear.system import linear_system
 from kfcourse.montecarlo.ensemble import Instant, JumpInstant
 from kfcourse.symbolic.averaging import averaged, averaged_equations
@@ -314,6 +315,20 @@ def test_a_mode_that_is_observed_is_known(build):
         np.testing.assert_allclose(mean[k, :, 0], z, atol=1e-6)
         np.testing.assert_allclose(cov[k, :, 0, 0], p, atol=1e-6)
         z, p = 0.9 * z, 0.81 * p + 0.49
+
+
+def test_a_mode_that_no_measurement_believes_does_not_take_the_filter_away():
+    """The faulty accelerometers of the landing show a hundredth: corrected as if they did, a sound flight leaves the numbers.
+
+    GPB2 went on from such a law, of probability 0, for ever.  Where all modes lead on, it must not matter: whoever merges sooner
+    forgets it by himself, and as each measurement here leaves no doubt of the mode, both estimate the same.
+    """
+    model = find_variant("J3").model
+    y = simulate(model, 300, 25, seed=1).y
+    both = [run(of(build, model, linearised), y) for build in (gpb2, logic_dynamic)]
+    assert all(np.isfinite(one.mean).all() and np.isfinite(one.cov).all() for one in both)
+    spread = np.sqrt(np.diagonal(both[1].cov, axis1=-2, axis2=-1))
+    assert (np.abs(both[0].mean - both[1].mean) < 1e-6 * spread).all()
 
 
 def test_a_chain_that_changes_with_time():
