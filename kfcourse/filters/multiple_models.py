@@ -165,8 +165,8 @@ def _one_law_a_mode(
 def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Array | None = None, name: str = "gpb2") -> Filter:
     """The generalised pseudo-Bayes filter of order 2: pairs of modes (i_{k-1}, i_k) are corrected each, and merged afterwards.
 
-    Weights mu_ij ~ mu_i pi_ij N(y; h_ij, F_ij) of M^2 laws; then those with the same j become one.  A mode whose probability is too
-    small for a number goes on from the estimate: corrected again and again in a mode that is not, its law would leave the numbers.
+    Weights mu_ij ~ mu_i pi_ij N(y; h_ij, F_ij) of M^2 laws; then those with the same j become one.  A mode whose probability is
+    too small for a number goes on from the estimate: corrected time and again as if it held, its own law would leave the numbers.
 
     Arguments, result and errors as of `imm`; the memory's `predicted` holds the laws of the pairs, i first.
     """
