@@ -124,7 +124,7 @@ def findings(told: Examination, run: int = 0) -> list[Finding]:
     size = _sizes(value, F).sum() / degrees.sum()
     mean, variance = _below(degrees, told.edge)
     scale = variance.sum() / mean.sum()
-    tails = np.array([(1 - confidence) / 2, (1 + confidence) / 2])
+    tails = np.array([(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
     low, high = scale * scipy.special.gammaincinv(mean.sum() / scale, tails) / degrees.sum()
     result = [Finding("size", float(size), float(low), float(high))]
     for i, name in enumerate(_names(value.shape[-1])):
