@@ -1,7 +1,7 @@
 """How many trajectories the lab takes by default: a hundred thousand, or as many as a student waits for.
 
 A pilot on few trajectories and steps measures what one of them costs the fast filters in processor time, at two sizes, so that
-what is done once (deriving, compiling) does not count.  Sizes are coarse: the machine's other work hardly changes the choice.
+what does not grow with them does not count.  Sizes are coarse: the machine's other work hardly changes the choice.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ def usual_runs(filters: Sequence[Filter | Design], model: Model | JumpModel, ste
     fast = [one for one in filters if not one.slow]
     tried, taken = min(steps, STEPS), list[float]()
     try:
-        for runs in PILOT:
+        for runs in (PILOT[0], *PILOT):  # the first time also derives and compiles
             begun = time.process_time()
             compare(fast, model, runs, tried, 1, subset_runs=0, wide=1, threads=1, progress=False, **options)
             taken.append(time.process_time() - begun)
     except (NotFinite, ValueError):
         return Budget(SIZES[0])  # what is wrong is told by the comparison itself
-    each = max(taken[1] - taken[0], 0.0) / (PILOT[1] - PILOT[0]) * steps / tried
+    each = max(taken[2] - taken[1], 0.0) / (PILOT[1] - PILOT[0]) * steps / tried
     return within(each)
 
 
