@@ -92,8 +92,18 @@ def memory_limit(more: float | None) -> Iterator[None]:
 
 
 def _inside(frame: FrameType | None) -> bool:
-    """Whether a thread is in this module: beginning a block or leaving it, where it must not be stopped."""
-    return frame is not None and frame.f_code.co_filename == __file__
+    """Whether a thread is where it must not be stopped: beginning a block or leaving it, or beginning a thread.
+
+    Until a new thread runs it has the number of the one that begins it, and an exception for this one would end the new one
+    before it says that it is there, for which its parent waits.
+    """
+    while frame is not None:
+        if frame.f_code.co_filename == __file__:
+            return True
+        if frame.f_code is threading.Thread.start.__code__ and frame.f_locals["self"].ident is None:
+            return True
+        frame = frame.f_back
+    return False
 
 
 class _Alarm:

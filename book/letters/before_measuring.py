@@ -28,6 +28,20 @@ def small_index(rng):
     return {r"\lim_{\Lambda\to0}": 1.0, r"\Lambda": index, r"\alpha": less * (2 - less)}
 
 
-LETTERS = (kalman_run, scaled, small_index)
+def steady(rng):
+    """One axis under the random acceleration, step by step until nothing changes."""
+    Delta, sigma, sigma_a = rng.uniform(0.5, 2, 3)
+    A, H = np.array([[1, Delta], [0, 1]]), np.array([[1.0, 0.0]])
+    push = sigma_a * np.array([[Delta**2 / 2], [Delta]])
+    Psi = np.eye(2)
+    for _ in range(2000):
+        K = Psi @ H.T / (Psi[0, 0] + sigma**2)
+        p = Psi - K @ H @ Psi
+        Psi = A @ p @ A.T + push @ push.T
+    alpha, beta = K[0, 0], K[1, 0] * Delta
+    return {"p_{22}": p[1, 1], r"\sigma": sigma, r"\Delta": Delta, r"\alpha": alpha, r"\beta": beta}
+
+
+LETTERS = (kalman_run, scaled, small_index, steady)
 SAID = {"Q=0": "a setting", r"\Psi'_c": NOTATION, r"\psi'_{22}": NOTATION, r"\sigma_r": NOTATION}
 EQUALS = {r"c\,\Psi'": r"\Psi'_c", r"\lim_{\Lambda\to0}\alpha\,/\sqrt{2\Lambda}": "1"}

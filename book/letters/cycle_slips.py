@@ -1,7 +1,7 @@
 """The letters of cycle-slips.md: the mean time to a slip by Pontryagin's equation, the loop by iteration."""
 
 import numpy as np
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 from scipy.special import iv
 
 from kfcourse.pages.reader import Of
@@ -33,7 +33,34 @@ def loop(rng):
     return numbers | {"U'": lambda at: slope * np.cos(at)}
 
 
-LETTERS = (slips, loop)
+def saw(rng):
+    """The same double integral for the potential of a saw, with its edge at half a cycle."""
+    variance, q = rng.uniform(0.05, 0.1), rng.uniform(0.01, 0.1)
+
+    def V(x):
+        return ((x + np.pi) % (2 * np.pi) - np.pi) ** 2 / (2 * variance)
+
+    inner = lambda x: quad(lambda s: np.exp(-V(s)), 0, x, points=[min(x, 5 * np.sqrt(variance))], limit=200)[0]  # noqa: E731
+    tau = quad(lambda x: np.exp(V(x)) * inner(x), 0, 2 * np.pi, points=[np.pi], limit=400)[0] / q
+    return {r"\tau": tau, "q": q, r"\sigma_\varphi": np.sqrt(variance)}
+
+
+def pushed(rng):
+    """The probability to slip forwards, by its differential equation, q Pi'' + (b - q V') Pi' = 0."""
+    q, b, height = rng.uniform(0.5, 1), rng.uniform(0.1, 0.3), rng.uniform(0.5, 1)
+
+    def W(x):
+        return height * (1 - np.cos(x)) + 0.1 * (1 - np.cos(2 * x)) - b * x / q
+
+    def rates(x, state):
+        return [state[1], (height * np.sin(x) + 0.2 * np.sin(2 * x) - b / q) * state[1]]
+
+    begin, end = -2 * np.pi, 2 * np.pi
+    way = solve_ivp(rates, (begin, end), [0, 1], method="DOP853", t_eval=[0, end], rtol=1e-12, atol=1e-14)
+    return {r"\Pi": way.y[0, 0] / way.y[0, 1], "W": Of(W, r"\Delta")}
+
+
+LETTERS = (slips, loop, saw, pushed)
 SAID = {
     r"\Delta_{k+1}=\Delta_k-p\,U(\Delta_k)-p\,\tilde n_k+s_\varphi v_k": DEFINITION,
     "2D_n/A^2": NOTATION,

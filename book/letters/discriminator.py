@@ -72,7 +72,22 @@ def carrier(rng):
     return numbers | {"U": U, "u": u, r"\mathsf M": Operator(lambda value: value)}
 
 
-LETTERS = (run, display, western, carrier)
+def drifting(rng):
+    """The loop without noise under a drift of the frequency, until it rests."""
+    T, p_phi, p_nu, a = 0.7, *rng.uniform(0.1, 0.3, 2), rng.uniform(0.02, 0.06)
+
+    def U(at):
+        return 0.8 * np.sin(at)
+
+    error = off = 0.0
+    for _ in range(5000):
+        push = U(error)
+        error, off = error - p_phi * push + T * (off - p_nu * push), off - p_nu * push + a * T
+    gains = {r"p_{\varphi\varphi}": p_phi, r"p_{\nu\varphi}": p_nu}
+    return gains | {"U": U, r"\Delta": error, r"\delta": off, "a": a, "T": T}
+
+
+LETTERS = (run, display, western, carrier, drifting)
 SAID = {
     latex: NOTATION
     for latex in (

@@ -66,7 +66,25 @@ def windowed(rng):
     return every | {r"\tau": lambda u, T: tau(u[0], T), r"\Theta": lambda u, T: Theta(u[0], T), "k": range(1, STEPS - 1)}
 
 
-LETTERS = (windowed,)
+def lengthened(rng):
+    """The variance left by a regression on l measurements at once, and on so many that one more changes nothing."""
+    c, q, R = rng.uniform(0.8, 0.9), *rng.uniform(0.5, 1.5, 2)
+    P = q / (1 - c**2)
+
+    def left(length):
+        lag = np.abs(np.subtract.outer(np.arange(length), np.arange(length)))
+        with_x = P * c ** np.arange(length)
+        return P - with_x @ np.linalg.solve(P * c**lag + R * np.eye(length), with_x)
+
+    end = left(100)
+    kept = c * R / (c**2 * end + q + R)  # c (1 - K)
+    variances = Indexed([P, *(left(length) for length in range(1, 6))])
+    other = -q * R / (c**2 * end)  # the product of the roots
+    numbers = {"p": variances, "p_*": end, "p_-": other, r"\varrho": kept**2, r"\ell": range(1, 5)}
+    return numbers | {"D": lambda p: c**2 * p + q + R}
+
+
+LETTERS = (windowed, lengthened)
 SAID = {
     "H=1": DEFINITION,
     "e=0": DEFINITION,

@@ -90,7 +90,25 @@ def one_component(rng):
     }
 
 
-LETTERS = (iterated, settled, points, posterior, one_component)
+def contraction(rng):
+    """One component: the slope of a round at its end, by a difference in the complex plane."""
+    lam, Psi, y, D_n = rng.normal(), rng.uniform(0.5, 1), rng.normal(), rng.uniform(0.5, 1)
+    S, S1, S2 = lambda x: 2 * x + 0.2 * x**2, lambda x: 2 + 0.4 * x, 0.4
+
+    def gain(x):
+        return Psi * S1(x) / (S1(x) ** 2 * Psi + D_n)
+
+    def one_round(x):
+        return lam + gain(x) * (y - S(x) - S1(x) * (lam - x))
+
+    end = lam
+    for _ in range(500):
+        end = one_round(end)
+    slope_there = one_round(end + 1e-20j).imag / 1e-20
+    return {r"\varrho": slope_there, "K": gain(end), "S'": S1(end), "S''": S2, "x_*": end, r"\lambda": lam}
+
+
+LETTERS = (iterated, settled, points, posterior, one_component, contraction)
 EQUALS = {
     "x_{i+1}": r"\lambda+K\bigl(y-S(x_i)-H(\lambda-x_i)\bigr)",
     r"\mathsf M\,x": r"\lambda",

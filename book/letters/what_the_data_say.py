@@ -39,7 +39,16 @@ def wandering(rng):
     }
 
 
-LETTERS = (wandering,)
+def whittle(rng):
+    """The information of N differences about their spectrum, by its definition."""
+    q, r, count = *rng.uniform(0.5, 2, 2), 7
+    wave = 2 * (1 - np.cos(2 * np.pi * np.arange(4096) / 4096))
+    slopes = np.array([np.ones_like(wave), wave]) / (q + r * wave)  # of ln S, by q and r
+    (qq, qr), (_, rr) = count / 2 * slopes @ slopes.T / len(wave)
+    return {"I_{qq}": qq, "I_{qr}": qr, "I_{rr}": rr, "N": count, "q": q, "r": r, "a": q**2 + 4 * q * r}
+
+
+LETTERS = (wandering, whittle)
 SAID = {
     r"p(y_0,\dots,y_N)=\prod_kp(y_k\mid y_0,\dots,y_{k-1})": STATED,
     r"\ln p(y_0)+\ln p(y_1\mid y_0)": NOTATION,

@@ -117,6 +117,23 @@ def test_blocks_in_blocks_keep_their_own_limits(somewhere):
     assert somewhere(inner_ends) == "went on"
 
 
+def test_a_new_thread_is_not_stopped_in_place_of_the_one_that_begins_it():
+    """For a moment both have one number; a parent waits for ever for a child that ended before it could say that it is there."""
+    stopped = []
+
+    def begins_threads():
+        for _ in range(50):
+            with pytest.raises(OutOfTime), time_limit(0.01):
+                while True:
+                    threading.Thread(target=int, daemon=True).start()
+            stopped.append(True)
+
+    parent = threading.Thread(target=begins_threads, daemon=True)
+    parent.start()
+    parent.join(60)
+    assert len(stopped) == 50
+
+
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no alarms here")
 def test_the_alarm_ends_what_only_looks_for_signals():
     """A wait, and the product of huge integers; without alarms these end by themselves first."""
