@@ -68,8 +68,8 @@ def execute(notebook: NotebookNode, name: str, seconds: float = SECONDS, stop_at
         except DeadKernelError:
             raise NotebookFailed(f"{name}, cell {_running(result)}: the kernel died (out of memory?)") from None
     if stop_at_error and (found := first_error(result)):
-        cell, error = found
-        raise NotebookFailed(f"{name}, cell {cell.id}: {error.ename}: {error.evalue}")
+        cell, shown = found
+        raise NotebookFailed(f"{name}, cell {cell.id}: {shown.ename}: {shown.evalue}")
     return result
 
 

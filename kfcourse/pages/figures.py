@@ -70,7 +70,7 @@ def book_style(ground: str = "none") -> None:
     wide = formatter.lookup_by_type(Figure)
 
     def both(figure: Figure) -> Any:
-        in_brackets(text.get_text() for text in figure.findobj(Text))  # type: ignore[attr-defined]
+        in_brackets(text.get_text() for text in figure.findobj(Text))
         if not (made := wide(figure)):  # of a figure without axes
             return None
         data, metadata = made
