@@ -46,7 +46,7 @@ DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with m
     "--filters",
     "names",
     help=f"Short names, separated by commas. Known: {', '.join(FILTERS)}; for variants with modes: {', '.join(JUMP_FILTERS)}.  "
-    "[default: the lab's seven and the exact AOF; for variants with modes all]",
+    "[default: the lab's seven and the exact AOF; for variants with modes all but those that remember several steps]",
 )
 @click.option(
     "--exact-runs",

@@ -44,7 +44,24 @@ def predicting(rng):
     }  # fmt: skip
 
 
-LETTERS = (correcting, predicting)
+def remembering(rng):
+    """Joint normal laws of x and zeta in each mode: M[x | zeta] by their precision, and the table of mode and zeta."""
+    mean, cov = rng.normal(size=(M, N + 1)), np.array([covariance(rng, N + 1) for _ in range(M)])  # x, and zeta of N
+    q, zeta = rng.dirichlet(np.ones(M)), rng.normal(size=N)
+    precision = np.linalg.inv(cov)
+    u = mean[:, 0] - np.einsum("ia,ia->i", precision[:, 0, 1:], zeta - mean[:, 1:]) / precision[:, 0, 0]
+    Gamma = [one[:1, 1:] @ np.linalg.inv(one[1:, 1:]) for one in cov]
+    L = np.array([multivariate_normal(m[1:], d[1:, 1:]).pdf(zeta) for m, d in zip(mean, cov, strict=True)])
+    joint = np.diag(q) @ L
+    return {
+        "i": range(M), "j": range(M), "q": Indexed(q), "L": Indexed(L), r"\xi": Indexed(joint / np.add.reduce(joint)),
+        r"\zeta": column(zeta),
+        "u^i": Of(lambda i: u[i], "i"), r"\Gamma^i": Of(lambda i: Gamma[i], "i"),
+        r"\chi^i": Of(lambda i: mean[i, :1] - Gamma[i] @ mean[i, 1:], "i"),
+    }  # fmt: skip
+
+
+LETTERS = (correcting, predicting, remembering)
 SAID = {
     r"x_{k+1}=a^{i_{k+1}}(x_k,v_k)": NOTATION,
     r"y_k=b^{i_k}(x_k,w_k)": NOTATION,

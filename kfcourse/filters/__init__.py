@@ -14,8 +14,8 @@ gate, heavy_tails       measurements that are not believed: refused, by any filt
 learnt_noise            a noise of unknown size, learnt on the way
 alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
-                        (jump_equations: as printed;  state_transitions: by the state;  jump_optimal: FOS with modes;
-                        exact.jumps: the exact filter of state and mode;  jump_particles: the same by sampling)
+                        (jump_equations: as printed;  state_transitions: by the state;  jump_optimal: FOS, FKP, FBP with
+                        modes;  exact.jumps: the exact filter of state and mode;  jump_particles: the same by sampling)
 initial_states          the exact filter of an object without noise, with modes of its meter or not
 notation                symbols in which the equations are printed
 programs, fused, loops  the printed equations as rules and regressions; compiled steps made of them (numba)
@@ -37,7 +37,7 @@ from kfcourse.filters.gate import gated
 from kfcourse.filters.heavy_tails import robust
 from kfcourse.filters.initial_states import undisturbed
 from kfcourse.filters.iterated_ekf import iterated
-from kfcourse.filters.jump_optimal import logic_dynamic_fos
+from kfcourse.filters.jump_optimal import logic_dynamic_fbp, logic_dynamic_fkp, logic_dynamic_fos
 from kfcourse.filters.jump_particles import jump_particle
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.learnt_noise import adaptive
@@ -75,6 +75,8 @@ __all__ = [
     "kalman_filter",
     "latex",
     "logic_dynamic",
+    "logic_dynamic_fbp",
+    "logic_dynamic_fkp",
     "logic_dynamic_fos",
     "mdfkp",
     "mdfmp",

@@ -57,14 +57,15 @@ def mdfkp(structure: Structure, memory: int = STEPS) -> Design:
 
 def fbp(structure: Structure, memory: int = STEPS) -> Design:
     """The filter of high order (ФБП): the steps of `fos`, with the last `memory` estimates in the place of z."""
-    return of_structure(f"fbp{_checked(memory)}", structure, FOS, Memory(estimates=memory))
+    return of_structure(f"fbp{checked_memory(memory)}", structure, FOS, Memory(estimates=memory))
 
 
 def _of_measurements(family: str, structure: Structure, recipe: Recipe, memory: int) -> Design:
-    return of_structure(f"{family}{_checked(memory)}", structure, recipe, Memory(estimates=0, measurements=memory))
+    return of_structure(f"{family}{checked_memory(memory)}", structure, recipe, Memory(estimates=0, measurements=memory))
 
 
-def _checked(memory: int) -> int:
+def checked_memory(memory: int) -> int:
+    """The length of a memory; ValueError if it is not a positive whole number."""
     if isinstance(memory, bool) or not isinstance(memory, int | np.integer) or memory < 1:
         raise ValueError(f"a memory holds so many steps, a positive whole number such as 4, got {memory!r}")
     return memory

@@ -1,29 +1,47 @@
-r"""The logic-dynamic filter of optimal structure: what the estimate alone tells of state and mode, found off-line.
+r"""Logic-dynamic filters of optimal structure: what a memory tells of state and mode, found off-line.
 
-The FOS of a model that jumps carries no covariances and no probabilities from step to step, but z_k only.  Before it predicts it
-asks what z_k says of the state in each mode i, and of the mode, over the trajectories that are in mode i:
+Such a filter of a model that jumps carries no covariances and no probabilities from step to step, but zeta_k only (`Memory`).
+Before it predicts it asks what zeta_k says of the state in each mode i, and of the mode, over the trajectories in mode i:
 
-    u_i = Gamma_i z + chi_i  with residual covariance T_i          regression of x_k on z_k, given i_k = i
-    xi_i ~ q_i N(z; M[z | i], Cov(z | i))
+    u_i = Gamma_i zeta + chi_i  with residual covariance T_i          regression of x_k on zeta_k, given i_k = i
+    xi_i ~ q_i N(zeta; M[zeta | i], Cov(zeta | i))
 
 and (xi_i, u_i, T_i) take the place of (mu_i, z_i, p_i) in the prediction of the logic-dynamic AOF (`multiple_models`).
+
+    logic_dynamic_fos   zeta_k = z_k                             (ФОСлд)
+    logic_dynamic_fkp   zeta_k = (y_k, y_{k-1}, ..., y_{k-l+1})  (ФКПлд, finite memory)
+    logic_dynamic_fbp   zeta_k = (z_k, z_{k-1}, ..., z_{k-l+1})  (ФБПлд, high order)
+
+Without jumps they are `fos`, `fkp` and `fbp`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from kfcourse.filters.base import State, initial_state
 from kfcourse.filters.designed import Design, Equations, Regression
-from kfcourse.filters.multiple_models import Modes, each_once, mixture, modes_given, moving_alike, onward
+from kfcourse.filters.finite_memory import STEPS, checked_memory
+from kfcourse.filters.multiple_models import each_once, mixture, modes_given, moving_alike, onward
+from kfcourse.filters.optimal_structure import Memory, Remembered, expected_where_missing
 from kfcourse.laws import Array, Gaussian, Measurement, correct
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure
 
-RIDGE = 1e-12  # of the largest variance, that a law of z without width in a direction has a density
+RIDGE = 1e-12  # of the largest variance, that a law of zeta without width in a direction has a density
+
+
+class Remembering(NamedTuple):
+    """What the filter remembers; the first three as of `multiple_models.Modes`, found anew from the last at each step."""
+
+    probability: Array
+    expected: Array
+    predicted: tuple[Gaussian, ...]
+    kept: Remembered = Remembered()
 
 
 def logic_dynamic_fos(model: JumpModel, structures: Sequence[Structure]) -> Design:
@@ -34,44 +52,77 @@ def logic_dynamic_fos(model: JumpModel, structures: Sequence[Structure]) -> Desi
     ModelError
         A component is an angle; transitions depend on the state.
     """
-    model.without_state("the logic-dynamic FOS")
+    return _remembering("fos", model, structures, Memory())
+
+
+def logic_dynamic_fkp(model: JumpModel, structures: Sequence[Structure], memory: int = STEPS) -> Design:
+    """The logic-dynamic filter with finite memory: what the last `memory` measurements tell of state and mode.
+
+    Raises
+    ------
+    ValueError
+        `memory` is not a positive whole number.
+    ModelError
+        As of `logic_dynamic_fos`.
+    """
+    return _remembering(f"fkp{checked_memory(memory)}", model, structures, Memory(estimates=0, measurements=memory))
+
+
+def logic_dynamic_fbp(model: JumpModel, structures: Sequence[Structure], memory: int = STEPS) -> Design:
+    """The logic-dynamic filter of high order: what the last `memory` estimates tell; errors as of `logic_dynamic_fkp`."""
+    return _remembering(f"fbp{checked_memory(memory)}", model, structures, Memory(estimates=memory))
+
+
+def _remembering(name: str, model: JumpModel, structures: Sequence[Structure], memory: Memory) -> Design:
+    """The construction.  A missing measurement is remembered as its prediction, the mean over the modes."""
+    what = f"the logic-dynamic {name.upper()}"
+    model.without_state(what)
     if model.angles.x or model.angles.y:
-        raise ModelError("the logic-dynamic FOS takes no components that are angles")
+        raise ModelError(f"{what} takes no components that are angles")
 
     alike = moving_alike(structures)
 
     def init(runs: int) -> State:
         start = initial_state(model.modes[0])(runs)
         expected = np.tile(model.first, (runs, 1))
-        return start._replace(memory=Modes(expected, expected, (start.predicted,) * len(structures)))
+        return start._replace(memory=Remembering(expected, expected, (start.predicted,) * len(structures)))
 
     def equations(state: State, y: Array) -> Equations:
-        k, memory = state.step, state.memory
+        k, before = state.step, state.memory
         now = [structure.at(k) for structure in structures]
-        expectations = [one.measure(*prior) for one, prior in zip(now, memory.predicted, strict=True)]
-        corrected = [correct(prior, one, y) for prior, one in zip(memory.predicted, expectations, strict=True)]
-        mu, _ = modes_given(memory.expected, expectations, y)
+        expectations = [one.measure(*prior) for one, prior in zip(now, before.predicted, strict=True)]
+        corrected = [correct(prior, one, y) for prior, one in zip(before.predicted, expectations, strict=True)]
+        mu, _ = modes_given(before.expected, expectations, y)
         posterior = mixture(corrected, mu)
-        z, constant, unit = posterior.mean, np.zeros((len(y), 1)), np.eye(posterior.mean.shape[1])
+        seen = _seen(y, before.expected, expectations) if memory.measurements else y
+        kept = before.kept.and_now(posterior.mean, seen, memory, ())
+        zeta = kept.regressor
+        constant, unit = np.zeros((len(y), 1)), np.eye(zeta.shape[1])
 
         def itself(x: Array, x_next: Array) -> Array:
-            return z
+            return zeta
 
         laws, weights, densities = [], model.law_at(k), []
         for i in range(len(now)):
             if not weights[i] > 0:  # nobody is there
                 laws.append(posterior)
-                densities.append(Measurement(z, unit, unit, unit))
+                densities.append(Measurement(zeta, unit, unit, unit))
                 continue
-            fit = yield Regression(lambda x, x_next: x, z, i)
-            laws.append(Gaussian(fit(z), fit.residual))
-            fit = yield Regression(itself, constant, i)  # mean and covariance of z
+            fit = yield Regression(lambda x, x_next: x, zeta, i)
+            laws.append(Gaussian(fit(zeta), fit.residual))
+            fit = yield Regression(itself, constant, i)  # mean and covariance of zeta
             cov = fit.residual + RIDGE * max(fit.residual.max(), np.finfo(float).tiny) * unit
             densities.append(Measurement(fit.offset, unit, cov, cov))
-        xi, _ = modes_given(np.tile(weights, (len(y), 1)), densities, z)
+        xi, _ = modes_given(np.tile(weights, (len(y), 1)), densities, zeta)
         expected, shares = onward(xi, model.transition_at(k))
         predict = each_once(now, alike)
         following = [mixture([predict(j, law) for law in laws], shares[:, :, j]) for j in range(len(now))]
-        return State(k + 1, posterior, mixture(following, expected), Modes(mu, expected, tuple(following)))
+        return State(k + 1, posterior, mixture(following, expected), Remembering(mu, expected, tuple(following), kept))
 
-    return Design(f"fos-jump-{structures[0].name}", model.modes[0], equations, start=init)
+    return Design(f"{name}-jump-{structures[0].name}", model.modes[0], equations, start=init)
+
+
+def _seen(y: Array, expected: Array, expectations: Sequence[Measurement]) -> Array:
+    """The measurement; where it is missing what all modes together expect of it."""
+    h = sum(expected[:, j, None] * one.h for j, one in enumerate(expectations))
+    return expected_where_missing(y, expectations[0]._replace(h=np.asarray(h)), ())

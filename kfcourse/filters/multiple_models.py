@@ -165,7 +165,8 @@ def _one_law_a_mode(
 def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Array | None = None, name: str = "gpb2") -> Filter:
     """The generalised pseudo-Bayes filter of order 2: pairs of modes (i_{k-1}, i_k) are corrected each, and merged afterwards.
 
-    Weights mu_ij ~ mu_i pi_ij N(y; h_ij, F_ij) of M^2 laws; then those with the same j become one.
+    Weights mu_ij ~ mu_i pi_ij N(y; h_ij, F_ij) of M^2 laws; then those with the same j become one.  A mode whose probability is
+    too small for a number goes on from the estimate: corrected time and again as if it held, its own law would leave the numbers.
 
     Arguments, result and errors as of `imm`; the memory's `predicted` holds the laws of the pairs, i first.
     """
@@ -194,16 +195,25 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
         mu = pairs.sum(axis=1)
         weights = _shares(pairs)
         laws = [mixture(corrected[j::size], weights[:, :, j], angles) for j in range(size)]
+        combined = mixture(laws, mu, angles)
+        laws = [_of_somebody(law, mu[:, j], combined) for j, law in enumerate(laws)]
         now = [structure.at(state.step) for structure in structures]
         pi, leading = links(state.step, laws)
         predict = each_once(now, alike)
         predicted = [predict(j, law) for row in leading for j, law in enumerate(row)]
         expected = (mu[:, :, None] * pi).reshape(len(y), -1)
-        return State(
-            state.step + 1, mixture(laws, mu, angles), mixture(predicted, expected, angles), Modes(mu, expected, tuple(predicted))
-        )
+        return State(state.step + 1, combined, mixture(predicted, expected, angles), Modes(mu, expected, tuple(predicted)))
 
     return Filter(name, models[0], init, step, evidence=evidence)
+
+
+def _of_somebody(law: Gaussian, probability: Array, combined: Gaussian) -> Gaussian:
+    """The law of a mode; where it has no probability the combined one."""
+    nobody = probability == 0
+    if not nobody.any():
+        return law
+    nobody = nobody[:, None]
+    return Gaussian(np.where(nobody, combined.mean, law.mean), np.where(nobody[..., None], combined.cov, law.cov))
 
 
 def moving_alike(structures: Sequence[Structure]) -> list[int]:

@@ -7,7 +7,9 @@ from collections.abc import Iterator
 import sympy as sp
 
 from kfcourse.filters import latex as equations_latex
+from kfcourse.filters.finite_memory import ESTIMATES, MEASUREMENTS
 from kfcourse.filters.jump_equations import combination, correction, prediction
+from kfcourse.lab.families import family
 from kfcourse.lab.handin_sections import Block, StudentReport
 from kfcourse.lab.handin_text import filled, law, lines_of, matrix
 from kfcourse.lab.report import percent, printed, recognised_modes
@@ -17,6 +19,9 @@ from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import FUNCTION_LATEX
 from kfcourse.symbolic.writing import number_latex
+
+# What the filters of optimal structure with modes remember.
+MEMORIES = {"fos": "z_k", "fkp": MEASUREMENTS.name, "fbp": ESTIMATES.name}
 
 
 class JumpReport(StudentReport):
@@ -105,12 +110,16 @@ class JumpReport(StudentReport):
         ):
             yield Block("text", words[key])
             yield Block("formulas", lines=lines_of(equations_latex(equations)))
-        others = {key: [name for name in self.result.entrants if name.startswith(key)] for key in ("imm", "gpb2", "fos-jump")}
-        others["averaged"] = [name for name in self.result.entrants if name.endswith("averaged") or name == "duof"]
+        of_memory = dict.fromkeys(MEMORIES, "about_memory")
+        about = {"imm": "about_imm", "gpb2": "about_gpb2", **of_memory, "averaged": "about_averaged"}
+        told: dict[str, list[str]] = {}
+        for name in self.result.entrants:
+            averaged = name.endswith("averaged") or name == "duof"
+            told.setdefault("averaged" if averaged else name if name in about else family(name), []).append(self.title(name))
         lines = [
-            filled(words[f"about_{key.replace('-', '_')}"], names=", ".join(map(self.title, names)))
-            for key, names in others.items()
-            if names
+            filled(words[text], names=", ".join(told[key]), memory=f"$\\zeta_k = {MEMORIES.get(key)}$")
+            for key, text in about.items()
+            if key in told
         ]
         if lines:
             yield Block("subsection", words["others"])

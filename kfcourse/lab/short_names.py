@@ -23,6 +23,8 @@ from kfcourse.filters import (
     jump_particle,
     jump_pointmass,
     logic_dynamic,
+    logic_dynamic_fbp,
+    logic_dynamic_fkp,
     logic_dynamic_fos,
     mdfkp,
     mdfmp,
@@ -143,6 +145,20 @@ def _entry(short: str, build: Callable[[Structures], Filter | Design]) -> dict[s
     return {short: Entry(FAMILIES[short].title, FAMILIES[short].russian, build)}
 
 
+def _with_modes(
+    short: str, build: Callable[[JumpModel, list[Structure]], Filter | Design], russian: str = ""
+) -> dict[str, JumpEntry]:
+    """The same of a filter with the structural functions of each mode: "fos" is "fos-jump-gaussian", the LD-GFOS."""
+    of = FAMILIES[family(short)]
+    title = of.title + short.removeprefix(family(short))
+    return {
+        f"{short}-jump-gaussian": JumpEntry(f"LD-G{title}", f"Г{of.russian}лд{russian}", lambda s: build(s.model, s.gaussian)),
+        f"{short}-jump-linearised": JumpEntry(
+            f"LD-L{title}", f"Л{of.russian}лд{russian}", lambda s: build(s.model, s.linearised)
+        ),
+    }
+
+
 _MEMORY = f", {STEPS} шага"
 # One line a filter: this is where a new one is added.
 FILTERS: dict[str, Entry] = {
@@ -166,12 +182,12 @@ FILTERS: dict[str, Entry] = {
 }
 # The same for models that jump: filters that know the modes, and plain ones on the average over the modes.
 JUMP_FILTERS: dict[str, JumpEntry] = {
-    "aof-jump-gaussian": JumpEntry("LD-GAOF", "ГАОФлд", lambda s: logic_dynamic(s.gaussian, *s.chain)),
-    "aof-jump-linearised": JumpEntry("LD-LAOF", "ЛАОФлд", lambda s: logic_dynamic(s.linearised, *s.chain)),
+    **_with_modes("aof", lambda model, structures: logic_dynamic(structures, model, model.first)),
     "imm": JumpEntry(*FAMILIES["imm"][:2], lambda s: imm(s.best, *s.chain)),
     "gpb2": JumpEntry(*FAMILIES["gpb2"][:2], lambda s: gpb2(s.best, *s.chain)),
-    "fos-jump-gaussian": JumpEntry("LD-GFOS", "ГФОСлд", lambda s: logic_dynamic_fos(s.model, s.gaussian)),
-    "fos-jump-linearised": JumpEntry("LD-LFOS", "ЛФОСлд", lambda s: logic_dynamic_fos(s.model, s.linearised)),
+    **_with_modes("fos", logic_dynamic_fos),
+    **_with_modes(f"fkp{STEPS}", logic_dynamic_fkp, _MEMORY),
+    **_with_modes(f"fbp{STEPS}", logic_dynamic_fbp, _MEMORY),
     "aof-averaged": JumpEntry("AOF (averaged)", "АОФ (среднее по режимам)", lambda s: aof(s.averaged)),
     "duof": JumpEntry(*FAMILIES["duof"][:2], lambda s: duof(s.model.modes[0], averaged_equations(s.model))),
     "fos-averaged": JumpEntry("FOS (averaged)", "ФОС (среднее по режимам)", lambda s: fos(s.averaged)),
@@ -188,7 +204,8 @@ TITLES = {
 }
 BOUND = 1000  # particles of the exact AOF where there are no point masses
 WITH_MODES = ("aof-jump-gaussian", "aof-jump-linearised", "imm", "gpb2", "aof-exact")  # that carry their probabilities
-JUMP_LAB = tuple(name for name in JUMP_FILTERS if name != "aof-exact")
+# As of models without jumps, those that remember several steps are asked for by name.
+JUMP_LAB = tuple(name for name in JUMP_FILTERS if name != "aof-exact" and not re.search(r"\d-", name))
 LAB = ("aof-gaussian", "aof-linearised", "duof", "fos-gaussian", "fos-linearised", "mfos-gaussian", "mfos-linearised")
 
 
@@ -198,7 +215,9 @@ def title(name: str) -> str:
         return entry.title
     length = re.sub(r"\D", "", name.split("-")[0])
     usual = f"{family(name)}{STEPS}-{name.partition('-')[2]}"
-    return FILTERS[usual].title.replace(str(STEPS), length) if usual in FILTERS else TITLES.get(name, name)
+    if entry := FILTERS.get(usual) or JUMP_FILTERS.get(usual):
+        return entry.title.replace(str(STEPS), length)
+    return TITLES.get(name, name)
 
 
 def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Design]:

@@ -81,6 +81,7 @@ class _BlockStep:
         self.angles = [one.model.angles.x for one in designs]
         self.running = [one.equations(before, block.y) for one, before in zip(designs, states, strict=True)]
         self.results: list[State | None] = [None] * len(designs)
+        self.targets = [0] * len(designs)  # components of what each asked for last
 
     def advance(self, answers: dict[int, Affine | None]) -> list[Scatter | None]:
         """Answer the waiting designs; the moments of the regression each asks for next, None if it is through."""
@@ -99,6 +100,7 @@ class _BlockStep:
         if request.mode is not None and isinstance(self.block, JumpInstant):
             there = self.block.mode == request.mode
             target, regressor = target[there], regressor[there]
+        self.targets[i] = target.shape[1]
         return request.scatter(target, regressor)
 
     def after(self) -> list[State]:
@@ -131,7 +133,7 @@ def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int, poo
                     raise NotFinite(f"step {k}: the model's trajectories become infinite, check its equations and parameters")
                 said = f"{designs[i].name}, step {k}: the design met infinite or NaN values; the model or this filter diverges"
                 raise NotFinite(Reason(said, "infinite", step=k), designs[i].name)
-            fits[i].append(merged.regression(designs[i].model.n))
+            fits[i].append(merged.regression(runs[0].targets[i]))
             asked.append(i)
         active = asked
     return fits

@@ -79,7 +79,7 @@ def test_the_printed_equations_are_the_logic_dynamic_filter():
 @pytest.fixture(scope="module", params=LANGUAGES)
 def written(request, tmp_path_factory):
     """Language, texts, and names of all files."""
-    names = ["aof-jump-gaussian", "imm", "gpb2", "fos-jump-gaussian", "aof-averaged", "aof-exact"]
+    names = ["aof-jump-gaussian", "imm", "gpb2", "fos-jump-gaussian", "fkp4-jump-gaussian", "aof-averaged", "aof-exact"]
     model = find_variant("J1-lasting").model
     filters = [one.one for one in admissions(model, names)]
     result = compare(filters, model, 1000, 3, 1, subset_runs=128, progress=False, threads=1)
@@ -102,7 +102,9 @@ def test_it_tells_the_modes_their_chain_and_the_filters_of_the_variant(written):
         "ru": ["Режимы", "Логико-динамический АОФ", "ГАОФлд", "наиболее вероятный режим без измерений", "точный АОФ"],
     }[language]
     assert all(text in one for text in expected for one in (tex, page))
-    assert not re.search(r"\{(name|names|values|modes|filters)[:}]", tex)
+    assert not re.search(r"\{(name|names|values|modes|filters|memory)[:}]", tex)
+    assert all(rf"$\zeta_k = {one}$" in tex for one in ("z_k", r"(y_{k};\,\dots;\,y_{k-\ell+1})"))
+    assert tex.count(r"\zeta_k + \chi^i") == 2
     assert ("<math" in page) and "<script" not in page
 
 

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from kfcourse import JumpModel, cli, load_variants, simulate
 from kfcourse.filters import jump_pointmass, logic_dynamic
 from kfcourse.lab.admission import admissions
-from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures, title
+from kfcourse.lab.short_names import JUMP_LAB, JumpStructures, title
 from kfcourse.lab.variants import VariantError, chosen_variants, equations, find_variant, read_variants
 from kfcourse.montecarlo.modes import recognised
 
@@ -72,8 +72,8 @@ def test_the_lab_compares_filters_and_tells_the_share_of_right_modes(tmp_path, o
     few = ("--runs", 2000, "--steps", 6, "--exact-runs", 112, "--designs", 1)
     result = kfcourse("lab", "mine", "--variants", own, *few, "--out", tmp_path / "r", "--json", tmp_path / "n.json")
     assert result.exit_code == 0, result.output
-    for name in JUMP_FILTERS:
-        assert name == "aof-exact" or title(name) in result.output
+    for name in JUMP_LAB:
+        assert title(name) in result.output
     assert "D_k above that of exact AOF" in result.output
     for name in ("report.html", "report.tex"):
         text = (tmp_path / "r" / name).read_text()
@@ -103,6 +103,8 @@ def test_listed_and_checked(own):
 def test_filters_are_told_for_modes():
     told = kfcourse("filters", "J1", "--no-trial").output
     assert "LD-GAOF" in told and "GPB2" in told and "particle" not in told
+    assert "LD-GFKP4" in told and "LD-LFBP4" in told
+    assert title("fbp2-jump-linearised") == "LD-LFBP2"
     wrong = kfcourse("lab", "J1", "--filters", "aof-gaussian")
     assert wrong.exit_code == 1 and "unknown filter 'aof-gaussian'; known: aof-jump-gaussian" in wrong.output
 
