@@ -29,7 +29,7 @@ class NotebookFailed(RuntimeError):
     """A notebook stopped; the message names it and the cell."""
 
 
-def execute(notebook: NotebookNode, name: str, seconds: float = SECONDS, stop_at_error: bool = True) -> NotebookNode:
+def execute(notebook: NotebookNode, name: str, stop_at_error: bool = True) -> NotebookNode:
     """Run a notebook in a new kernel and an empty folder.
 
     Parameters
@@ -38,8 +38,6 @@ def execute(notebook: NotebookNode, name: str, seconds: float = SECONDS, stop_at
         Not changed.
     name : str
         For messages.
-    seconds : float
-        Time limit of each cell.
     stop_at_error : bool
         False: an error is kept as the cell's output, and the cells after it run too.
 
@@ -51,7 +49,7 @@ def execute(notebook: NotebookNode, name: str, seconds: float = SECONDS, stop_at
     result = nbformat.from_dict(notebook)
     client = NotebookClient(
         result,
-        timeout=int(seconds),
+        timeout=SECONDS,
         kernel_name="python3",
         allow_errors=not stop_at_error,
         record_timing=False,
@@ -64,7 +62,7 @@ def execute(notebook: NotebookNode, name: str, seconds: float = SECONDS, stop_at
         except CellExecutionError as error:
             raise NotebookFailed(f"{name}, cell {_failed(result)}: {error.ename}: {error.evalue}") from None
         except CellTimeoutError:
-            raise NotebookFailed(f"{name}, cell {_running(result)}: still running after {seconds:g} s") from None
+            raise NotebookFailed(f"{name}, cell {_running(result)}: still running after {SECONDS} s") from None
         except DeadKernelError:
             raise NotebookFailed(f"{name}, cell {_running(result)}: the kernel died (out of memory?)") from None
     return result
