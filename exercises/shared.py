@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 
 import numpy as np
 import sympy as sp
@@ -11,6 +12,7 @@ from kfcourse.checks.exercises import COURSE, Exercise
 from kfcourse.checks.steps import Function, at_wrong_step
 from kfcourse.filters.designed import Scatter
 from kfcourse.laws import Array, transpose
+from kfcourse.scenarios.navigation import Dynamics
 
 Map = Callable[[Array], Array]
 Ranges = Mapping[str, tuple[float, float]]
@@ -28,6 +30,12 @@ def covariance(rng: np.random.Generator, size: int, scale: float = 1.0) -> Array
     """A hidden covariance: correlated, and well away from singular."""
     root = np.eye(size) + 0.4 * rng.normal(size=(size, size))
     return scale * root @ root.T
+
+
+@lru_cache(maxsize=8)
+def vehicle(q: float) -> Dynamics:
+    """Position and velocity, white acceleration of the intensity q."""
+    return Dynamics(np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.0, q]))
 
 
 def substituted(formulas: sp.MatrixBase, names: tuple[sp.Symbol, ...]) -> Callable[..., sp.ImmutableMatrix]:

@@ -20,7 +20,17 @@ def arc(rng):
     }  # fmt: skip
 
 
-LETTERS = (arc,)
+def tunnel(rng):
+    """Variances of the place after a straight tunnel: pushes of speed and heading, each carried to the end."""
+    V, t, p_V, p_psi, q_V, q_psi = rng.uniform(0.5, 2, 6)
+    pushes = scipy.integrate.quad(lambda s: (t - s) ** 2, 0, t)[0]
+    return {
+        "V": V, "t": t, "p_V": p_V, r"p_\psi": p_psi, "q_V": q_V, r"q_\psi": q_psi,
+        r"D_\parallel": t * p_V * t + q_V * pushes, r"D_\perp": V * (t * p_psi * t + q_psi * pushes) * V,
+    }  # fmt: skip
+
+
+LETTERS = (arc, tunnel)
 EQUALS = {
     EAST: r"V\Delta\cos(\psi+u)\frac{\sin u}{u}",
     NORTH: r"V\Delta\sin(\psi+u)\frac{\sin u}{u}",

@@ -95,7 +95,15 @@ def slow_drift(rng):
     return {r"\lim_{\sigma_\xi\to0}": 1.0, r"\sigma_\xi": xi, r"\sigma_n": n, "p": np.roots([1, xi**2, -((xi * n) ** 2)]).max()}
 
 
-LETTERS = (slow_drift, sensors, axis, errors, western, western_before, accelerometer, failure)
+def complementary(rng):
+    """The steady variance of a low-pass filter for the receiver and its complement for the INS: noises added up one by one."""
+    kappa, (xi, n) = rng.uniform(0.3, 0.6), rng.uniform(0.5, 2, 2)
+    weights = (1 - kappa) ** np.arange(200)  # of the receiver's noises in the error, and of the changes of the INS's error
+    spread = ((kappa * weights) ** 2).sum() * n**2 + (weights[1:] ** 2).sum() * xi**2
+    return {r"\kappa": kappa, r"\sigma_\xi": xi, r"\sigma_n": n, r"\mathsf De": spread}
+
+
+LETTERS = (complementary, slow_drift, sensors, axis, errors, western, western_before, accelerometer, failure)
 SAID = {
     r"x_k=f(x_{k-1},\,y_{\mathrm{NR},k-1}-\varepsilon_{k-1})+g\,\xi_{k-1}": DEFINITION,
     r"\varepsilon_k=\varepsilon_{k-1}+\zeta_{k-1}": DEFINITION,

@@ -119,6 +119,7 @@ SAID |= dict.fromkeys(
         r"{\textstyle\sum_i\bigl[2N^{-1}(y-S)\bigr]_i\frac{\partial^2S_i}{\partial x^2}}",
         r"{(y-S)}",
         r"{\textstyle\frac12}",
+        r"{\dot{J}_{\text{Ito}}-\dot{J}}",
         r"{-T(y_k-S)^TN^{-1}(y_k-S)}",
         r"{Ty_k^TN^{-1}y_k}",
     ),

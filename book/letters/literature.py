@@ -2,4 +2,13 @@
 
 from kfcourse.pages.relations import NOTATION
 
-SAID = {r"\rho_1^2": NOTATION, "x_3'": NOTATION, r"\partial x_3'/\partial x_5": NOTATION}
+SAID = dict.fromkeys(
+    (
+        r"\rho_1^2",
+        "x_3'",
+        r"\partial x_3'/\partial x_5",
+        r"\operatorname{tr}I^{-1}/\sigma^2",
+        r"\min_h\,\operatorname{tr}I^{-1}/\sigma^2",
+    ),
+    NOTATION,
+)

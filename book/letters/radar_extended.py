@@ -95,7 +95,25 @@ def transfers(rng):
     return found | {"E": error(0), "E_u": error(1), r"\zeta": 1.7, r"E_{\rm literal}": lambda one: behind[-1] - behind[-2]}
 
 
-LETTERS = (axis, filtered, in_one_step, expanded, transfers)
+def far_apart(rng, j=3):
+    """The same with second differences over j steps, by what the filter makes of a single measurement."""
+    found, zeta = axis(rng), 1.7
+    A, B, H, K, T = (found[name] for name in "ABHKT")
+    errors = []
+    for control in (0, 1):
+        y, state, response = np.zeros(200), np.zeros((2, 1)), []
+        y[2 * j] = 1
+        for k in range(2 * j, 200):
+            u = (y[k - 1] - 2 * y[k - 1 - j] + y[k - 1 - 2 * j]) / (j * T) ** 2 if k > 2 * j else 0
+            ahead = A @ state + B * u * control
+            state = ahead + K * (y[k] - H @ ahead)
+            response.append((H @ state).item())
+        errors.append(1 - np.array(response) @ zeta ** -np.arange(200.0 - 2 * j))
+    mean = (1 - zeta**-j) / (1 - 1 / zeta) / j
+    return {"E": errors[0], "E_j": errors[1], "M_j": mean, "j": j, r"\zeta": zeta}
+
+
+LETTERS = (axis, filtered, in_one_step, expanded, transfers, far_apart)
 SAID = {
     r"z_k=z_{k-1}+K\bigl[y_k-h(\lambda_k)-H(\hat x_{k-1}-z_{k-1})\bigr]": quoted("the radar paper"),
     "u_k=0": "a setting",

@@ -98,7 +98,18 @@ def step(rng):
     }  # fmt: skip
 
 
-LETTERS = (model, flight, limit, growing, start, step)
+def noise_alone(rng):
+    """Steady variances of a filter with fixed gains: what each single error of a measurement leaves, squared and added up."""
+    alpha, beta, sigma = *rng.uniform(0.3, 0.6, 2), rng.uniform(1, 2)
+    r, s, left = alpha, beta, []
+    for _ in range(300):
+        left.append((r, s))
+        r, s = (1 - alpha) * (r + s), s - beta * (r + s)
+    spread = sigma**2 * (np.array(left) ** 2).sum(axis=0)
+    return {r"\alpha": alpha, r"\beta": beta, r"\sigma": sigma, r"\mathsf De^r": spread[0], r"\mathsf De^s": spread[1]}
+
+
+LETTERS = (model, flight, limit, growing, start, step, noise_alone)
 SAID = {
     r"v_k\sim\mathcal N(0,\sigma_a^2)": DEFINITION,
     r"w_k\sim\mathcal N(0,\sigma^2)": DEFINITION,

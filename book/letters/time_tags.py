@@ -35,7 +35,15 @@ def late(rng):
     }  # fmt: skip
 
 
-LETTERS = (clock, prediction, late)
+def one_step_late(rng):
+    """A measurement of the last state: its best gain by least squares over the three errors."""
+    p, Q, R, K = rng.uniform(0.5, 2, 4)
+    unit = np.sqrt(np.array([[p, 0], [Q, 0], [0, R]]))  # of x_{k-1} - z, v, w: what the state holds, what is noise alone
+    state, seen = unit[:, 0], np.array([unit[0, 0], 0, unit[2, 1]])
+    return {"p": p, "Q": Q, "R": R, "K": K, "K_*": np.linalg.lstsq(seen[:, None], state, rcond=None)[0].item()}
+
+
+LETTERS = (clock, prediction, late, one_step_late)
 EQUALS = {
     r"{\hat{s}-s}": r"-V_0\tau+a_0\tau^2/2-j\tau^3/6",
     r"{\hat{V}-V}": r"-a_0\tau+j\tau^2/2",

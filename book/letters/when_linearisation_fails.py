@@ -48,7 +48,17 @@ def western(rng):
     return {names.get(name, name): value for name, value in own.items()}
 
 
-LETTERS = (course, display, western)
+def again(rng):
+    """A constant measured n times, the first time with a larger error than is claimed: the filter's own recursion."""
+    kappa, p, n = rng.uniform(1, 3), rng.uniform(0.5, 2), int(rng.integers(4, 9))
+    claimed, square = p, (1 + 3 * kappa**2 / 4) * p
+    for _ in range(n - 1):
+        K = claimed / (claimed + p)
+        claimed, square = (1 - K) * claimed, (1 - K) ** 2 * square + K**2 * p
+    return {r"\kappa": kappa, "n": n, r"\frac{\mathsf Me_n^2}{p_n}": square / claimed}
+
+
+LETTERS = (course, display, western, again)
 SAID = {r"\nu\ll1": CONDITION, r"\frac34\kappa^2\ll1": CONDITION, r"S'\approx0": CONDITION}
 SAID |= dict.fromkeys(
     (

@@ -27,6 +27,21 @@ def signal(rng):
     }  # fmt: skip
 
 
+def waiting(rng, m=3):
+    """The best linear estimate of a state from a long record that ends m steps later, and from one that ends with it."""
+    found = signal(rng)
+    a, Q, R, K = (found[name] for name in "aQRK")
+
+    def left(last):
+        at = np.arange(-60, last + 1)
+        of_x = Q / (1 - a**2) * a ** np.abs(at)
+        of_y = Q / (1 - a**2) * a ** np.abs(np.subtract.outer(at, at)) + R * np.eye(len(at))
+        return Q / (1 - a**2) - of_x @ np.linalg.solve(of_y, of_x)
+
+    rho = R / (1 - K)
+    return {"p_m": left(m), "p_0": left(0), "b": K * rho, r"\rho": rho, r"\gamma": found[r"\gamma"], "m": m}
+
+
 def amplitude(rng):
     """A pulse of which the package's Kalman filter finds the amplitude, sample by sample."""
     s, y, R, d, b = rng.normal(size=4), rng.normal(size=4), 0.7, 1.9, 0.6
@@ -72,7 +87,7 @@ def weights(rng):
     return {"g": Indexed(g), "s": Indexed(s), "k": range(4), "i": range(4), "j": range(4)}
 
 
-LETTERS = (signal, amplitude, correlator, weights, bucy, shrinking)
+LETTERS = (signal, waiting, amplitude, correlator, weights, bucy, shrinking)
 SAID = {
     r"\zeta=e^{i\theta}": DEFINITION,
     r"W(\zeta)=\frac{1-a\zeta^{-1}}{\rho\,(1-\gamma\zeta^{-1})}\left[\frac{Q}{(1-a\zeta^{-1})(1-\gamma\zeta)}\right]_+": quoted(

@@ -7,11 +7,11 @@ from functools import lru_cache
 import numpy as np
 import sympy as sp
 
-from kfcourse.exercises.shared import substituted
+from kfcourse.exercises.shared import substituted, vehicle
 from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.arithmetic import FORMS
 from kfcourse.linear.system import LinearSystem
-from kfcourse.scenarios.navigation import Clock, Dynamics, Observation, Sensor
+from kfcourse.scenarios.navigation import Clock, Observation, Sensor
 from kfcourse.scenarios.navigation import fuse as fuse_events
 
 # -- l1: two rates in one vector; l2: two time scales
@@ -41,15 +41,9 @@ def correct(m: Array, P: Array, y: Array, H: Array, R: Array) -> tuple[Array, Ar
 # -- l4: over any interval; l5: late measurements
 
 
-@lru_cache(maxsize=8)
-def _vehicle(q: float) -> Dynamics:
-    """Position and velocity, white acceleration of the intensity q."""
-    return Dynamics(np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.0, q]))
-
-
 def move(m: Array, P: Array, dt: float, q: float) -> tuple[Array, Array]:
     """Mean and covariance of position and velocity after dt."""
-    step = _vehicle(q).over(dt)
+    step = vehicle(q).over(dt)
     return step.A @ m, step.A @ P @ step.A.T + step.Q
 
 
@@ -72,7 +66,7 @@ def _fused(
         Observation("receiver", float(tag), float(arrival), np.array([[value]]))
         for tag, arrival, value in zip(tags, arrivals, values, strict=True)
     ]
-    law = fuse_events(_vehicle(q), [_receiver(r)], Gaussian(m, P), messages, np.array([now]), by=by)
+    law = fuse_events(vehicle(q), [_receiver(r)], Gaussian(m, P), messages, np.array([now]), by=by)
     return law.mean[0, 0], law.cov[0, 0]
 
 

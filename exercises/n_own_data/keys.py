@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 import scipy
 
+from kfcourse.exercises.shared import vehicle
 from kfcourse.laws import Array, Gaussian, normalised_square
 from kfcourse.linear.arithmetic import FORMS
 from kfcourse.linear.consistency import Innovations, autocorrelation
 from kfcourse.linear.system import LinearSystem
 from kfcourse.records.reading import intervals as intervals_of
-from kfcourse.scenarios.navigation import Dynamics
 
 H = np.array([[1.0, 0.0]])
 
@@ -22,15 +20,9 @@ def intervals(times: Array) -> Array:
     return intervals_of(times)
 
 
-@lru_cache(maxsize=8)
-def _body(q: float) -> Dynamics:
-    """Position and velocity, white acceleration of the intensity q."""
-    return Dynamics(np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.0, q]))
-
-
 def process_noise(dt: Array, q: float) -> Array:
     """Covariances of what the interval adds."""
-    return np.stack([_body(q).over(float(one)).Q for one in dt])
+    return np.stack([vehicle(q).over(float(one)).Q for one in dt])
 
 
 def follow(times: Array, y: Array, q: float, r: float, m: Array, P: Array) -> tuple[Array, Array]:
@@ -38,7 +30,7 @@ def follow(times: Array, y: Array, q: float, r: float, m: Array, P: Array) -> tu
     laws, law = [], Gaussian(m, P)
     for k, value in enumerate(y):
         if k:
-            step = _body(q).over(float(times[k] - times[k - 1]))
+            step = vehicle(q).over(float(times[k] - times[k - 1]))
             law = Gaussian(step.A @ law.mean, step.A @ law.cov @ step.A.T + step.Q)
         system = LinearSystem(np.eye(2), H, np.zeros((2, 2)), np.array([[r]]))
         law = Gaussian(*FORMS["joseph"].correct(system, law, np.array([value])))

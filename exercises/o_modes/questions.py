@@ -50,9 +50,9 @@ def transitions(rng: np.random.Generator, size: int) -> Array:
     )
 
 
-def laws(rng: np.random.Generator, size: int, n: int = 2) -> tuple[Array, Array]:
+def laws(rng: np.random.Generator, size: int) -> tuple[Array, Array]:
     """Means and covariances of normal laws that differ."""
-    return 2 + 1.5 * rng.normal(size=(size, n)), np.array([covariance(rng, n, rng.uniform(0.5, 2)) for _ in range(size)])
+    return 2 + 1.5 * rng.normal(size=(size, 2)), np.array([covariance(rng, 2, rng.uniform(0.5, 2)) for _ in range(size)])
 
 
 def chains(exercise: Exercise) -> list[tuple]:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 MOST_LINES = 60
 LONGEST = 20_000  # characters
+SHOWN = 70  # of a line that is quoted
 COUNTED = 4  # right steps that earn credit beside a slip: a step can be split up at will, and that earns no more
 HEADINGS = ("letters", "positive")  # that may stand in an answer; the others would change what is asked
 
@@ -213,9 +214,9 @@ def _not_shown(posed: Posed, chain: Derived) -> str:
     return ""
 
 
-def _short(text: str, most: int = 70) -> str:
+def _short(text: str) -> str:
     text = " ".join(text.split())
-    return text if len(text) <= most else f"{text[:most]}..."
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
 
 def _place(slip: Verdict) -> str:

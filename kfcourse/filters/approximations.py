@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.laws import Array, correct
+from kfcourse.laws import Vectors, correct
 from kfcourse.symbolic.structure import Structure
 
 EQUATIONS = (
@@ -37,7 +37,7 @@ def aof(structure: Structure) -> Filter:
     Its own covariance p (runs, n, n) is that of the approximation, not the actual one.
     """
 
-    def step(state: State, y: Array) -> State:
+    def step(state: State, y: Vectors) -> State:
         now = structure.at(state.step)
         expected = now.measure(*state.predicted)
         posterior = correct(state.predicted, expected, y)

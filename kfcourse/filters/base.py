@@ -10,7 +10,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import Components, on_circle
-from kfcourse.laws import Array, Gaussian, Measurement
+from kfcourse.laws import Array, Gaussian, Measurement, Vectors
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import Structure
 
@@ -48,13 +48,13 @@ class Init(Protocol):
 class Advance(Protocol):
     """Correct with y_k, (runs, p), then predict k + 1.  A trajectory whose y is NaN is not corrected."""
 
-    def __call__(self, state: State, y: Array, /) -> State: ...
+    def __call__(self, state: State, y: Vectors, /) -> State: ...
 
 
 class Evidence(Protocol):
     """ln p(y_k | y_0, ..., y_{k-1}), (runs,), from the states before and after the measurement; 0 where it is missing."""
 
-    def __call__(self, before: State, y: Array, after: State, /) -> Array: ...
+    def __call__(self, before: State, y: Vectors, after: State, /) -> Array: ...
 
 
 class LookBack(Protocol):
@@ -64,7 +64,7 @@ class LookBack(Protocol):
     Their memory may tell how good they are, `discretisation_error()`, (runs,), in the units of x.
     """
 
-    def __call__(self, states: Iterable[State], y: Array, /) -> Callable[[int], Iterator[State]]: ...
+    def __call__(self, states: Iterable[State], y: Vectors, /) -> Callable[[int], Iterator[State]]: ...
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ import sympy as sp
 
 from kfcourse.angles import Angles, difference, near
 from kfcourse.filters.base import Advance, Filter, Init, State, initial_state
-from kfcourse.laws import Array, Gaussian, apply, gain, symmetric, where_measured
+from kfcourse.laws import Array, Gaussian, Matrices, Vectors, apply, gain, symmetric, where_measured
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import Structure
 
@@ -28,11 +28,11 @@ class Affine(NamedTuple):
     target ~ matrix @ regressor + offset,  Cov(target - prediction) = residual
     """
 
-    matrix: Array
-    offset: Array
-    residual: Array
+    matrix: Matrices
+    offset: Vectors
+    residual: Matrices
 
-    def __call__(self, regressor: Array) -> Array:
+    def __call__(self, regressor: Vectors) -> Vectors:
         return apply(self.matrix, regressor) + self.offset
 
 
@@ -156,11 +156,11 @@ class Design:
 
     name: str
     model: Model
-    equations: Callable[[State, Array], Equations]
+    equations: Callable[[State, Vectors], Equations]
     slow: bool = False
     start: Init | None = None
     structure: Structure | None = None
-    printed: tuple[Callable[[State, Array], Equations], tuple[sp.Eq, ...]] | None = None
+    printed: tuple[Callable[[State, Vectors], Equations], tuple[sp.Eq, ...]] | None = None
     known: Callable[[Sequence[Affine]], Advance] | None = None
 
     @property
@@ -172,7 +172,7 @@ class Design:
         """The filter with the coefficients of every step, in the order the equations ask for them."""
         steps = [(self.known or self.answered)(tuple(fits)) for fits in coefficients]
 
-        def step(state: State, y: Array) -> State:
+        def step(state: State, y: Vectors) -> State:
             if state.step >= len(steps):
                 raise ValueError(
                     f"{self.name} was designed for {len(steps)} steps; design it with more to run step {state.step + 1}"
@@ -184,7 +184,7 @@ class Design:
     def answered(self, fits: Sequence[Affine]) -> Advance:
         """A step of the equations, each regression answered with its stored coefficients."""
 
-        def step(state: State, y: Array) -> State:
+        def step(state: State, y: Vectors) -> State:
             equations = self.equations(state, y)
             try:
                 next(equations)

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from kfcourse.angles import near
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.laws import Array, Gaussian, any_missing, apply, gain, transpose, without_missing
+from kfcourse.laws import Gaussian, Vectors, any_missing, apply, gain, transpose, without_missing
 from kfcourse.linear.system import LinearSystem, linear_systems
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import linearised
 
 
-def correct(system: LinearSystem, predicted: Gaussian, y: Array) -> Gaussian:
+def correct(system: LinearSystem, predicted: Gaussian, y: Vectors) -> Gaussian:
     """The law of the state after a measurement y, (..., p); its missing components (NaN) tell nothing.
 
     K = P^- H^T (H P^- H^T + R)^-1,   z = x^- + K (y - H x^-),   P = P^- - K H P^-
@@ -50,7 +50,7 @@ def kalman_filter(model: Model) -> Filter:
     """
     system_at = linear_systems(model)
 
-    def step(state: State, y: Array) -> State:
+    def step(state: State, y: Vectors) -> State:
         system, shift, offset = system_at(state.step)  # and the constants of the object and of the meter
         expected = apply(system.H, state.predicted.mean)
         posterior = correct(system, state.predicted, near(y - offset, expected, model.angles.y))

@@ -125,12 +125,12 @@ def _admitted(name: str, structures: Structures | JumpStructures) -> Admission:
     return Admission(name, one, "", tuple(found), tuple(remarks))
 
 
-def on_trial(model: Model | JumpModel, found: Sequence[Admission], seed: int = 1) -> list[Admission]:
+def on_trial(model: Model | JumpModel, found: Sequence[Admission]) -> list[Admission]:
     """The same after a small comparison: a filter that leaves the finite numbers, or a slow one that fails, is warned of."""
     last = int(min(STEPS, model.steps if isinstance(model, JumpModel) else model.known.steps))
     tried = []
     for one in found:
-        failure = _failure(model, one.one, last, seed) if one.one else ""
+        failure = _failure(model, one.one, last) if one.one else ""
         tried.append(_warned(one, failure) if failure else one)
     return tried
 
@@ -139,16 +139,16 @@ def _warned(one: Admission, text: str) -> Admission:
     return dataclasses.replace(one, warnings=(*one.warnings, text))
 
 
-def _failure(model: Model | JumpModel, one: Filter | Design, steps: int, seed: int) -> str:
+def _failure(model: Model | JumpModel, one: Filter | Design, steps: int) -> str:
     """What goes wrong on a few hundred trajectories; empty if nothing."""
     fast = [admission.one for admission in admissions(model, ["duof"]) if admission.one] if one.slow else []
     try:
         found = compare(
-            [*fast, one], model, RUNS, steps, seed, subset_runs=SLOW, subset_seconds=SECONDS, threads=1, progress=False
+            [*fast, one], model, RUNS, steps, seed=1, subset_runs=SLOW, subset_seconds=SECONDS, threads=1, progress=False
         )
     except (NotFinite, np.linalg.LinAlgError) as error:
         with np.errstate(all="ignore"):
-            finite = np.isfinite(simulate(model, RUNS, steps, seed).x).all()
+            finite = np.isfinite(simulate(model, RUNS, steps, seed=1).x).all()
         return f"on a trial of {RUNS} trajectories it left the finite numbers" if finite else str(error)
     return found.left_out.get(one.name, "")
 

@@ -43,28 +43,22 @@ class ParameterMap:
 def parameter_map(
     model: Model,
     values: Mapping[str, Sequence[float]],
-    names: Sequence[str] = LAB,
     *,
     runs: int = 10_000,
     steps: int = 3,
     exact_runs: int = 1000,
-    seed: int = 1,
-    wide: float | None = None,
-    designs: int = 2,
     design_runs: int = 20_000,
 ) -> ParameterMap:
-    """Compare filters with the exact AOF at every pair of values of two parameters.
+    """Compare the lab's filters with the exact AOF at every pair of values of two parameters.
 
     Parameters
     ----------
     model : Model
     values : mapping
         Two parameters, and the values of each.
-    names : sequence of str
-        Short names of the filters.
     exact_runs : int
         Trajectories of the exact AOF in each comparison.
-    runs, steps, seed, wide, designs, design_runs
+    runs, steps, design_runs
         As of `kfcourse.compare`.
 
     Raises
@@ -79,17 +73,16 @@ def parameter_map(
     for a in values[first]:
         for b in values[second]:
             one = model.replace(**{first: a, second: b})
-            filters = lab_filters(one, [*names, EXACT])
+            filters = lab_filters(one, [*LAB, EXACT])
             cells[a, b] = compare(
                 filters,
                 one,
                 runs,
                 steps,
-                seed,
+                seed=1,
                 design_runs=design_runs,
-                designs=designs,
+                designs=2,
                 subset_runs=exact_runs,
-                wide=wide,
                 progress=False,
             )
     return ParameterMap((first, second), cells)

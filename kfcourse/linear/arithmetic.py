@@ -16,7 +16,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kfcourse.laws import Array, Gaussian, any_missing, apply, correct, gain, square_root, symmetric, transpose, without_missing
+from kfcourse.laws import (
+    Array,
+    Gaussian,
+    Matrices,
+    Vectors,
+    any_missing,
+    apply,
+    correct,
+    gain,
+    square_root,
+    symmetric,
+    transpose,
+    without_missing,
+)
 from kfcourse.linear.factored import Factors, correct_factors, factors, predict_factors, product
 from kfcourse.linear.system import LinearSystem
 
@@ -24,8 +37,8 @@ from kfcourse.linear.system import LinearSystem
 class Root(NamedTuple):
     """A normal law by a square root of its covariance: mean (..., n), root (..., n, n), cov = root root^T."""
 
-    mean: Array
-    root: Array
+    mean: Vectors
+    root: Matrices
 
 
 class Form(NamedTuple):
@@ -42,22 +55,22 @@ class Form(NamedTuple):
     """
 
     start: Callable[[Gaussian], Any]
-    predict: Callable[[LinearSystem, Any, Array | float], Any]
-    correct: Callable[[LinearSystem, Any, Array], Any]
+    predict: Callable[[LinearSystem, Any, Vectors | float], Any]
+    correct: Callable[[LinearSystem, Any, Vectors], Any]
     law: Callable[[Any], Gaussian]
 
 
-def predict_law(system: LinearSystem, law: Gaussian, shift: Array | float = 0.0) -> Gaussian:
+def predict_law(system: LinearSystem, law: Gaussian, shift: Vectors | float = 0.0) -> Gaussian:
     """A m + shift,  A P A^T + Q."""
     return Gaussian(apply(system.A, law.mean) + shift, system.A @ law.cov @ system.A.T + system.Q)
 
 
-def _predict_symmetric(system: LinearSystem, law: Gaussian, shift: Array | float) -> Gaussian:
+def _predict_symmetric(system: LinearSystem, law: Gaussian, shift: Vectors | float) -> Gaussian:
     mean, cov = predict_law(system, law, shift)
     return Gaussian(mean, symmetric(cov))
 
 
-def _correct_textbook(system: LinearSystem, law: Gaussian, y: Array) -> Gaussian:
+def _correct_textbook(system: LinearSystem, law: Gaussian, y: Vectors) -> Gaussian:
     """K = P H^T (H P H^T + R)^-1,  m + K (y - H m),  (I - K H) P."""
     innovation, H, R = _measured(system, y - apply(system.H, law.mean))
     cross = law.cov @ transpose(H)
@@ -65,17 +78,17 @@ def _correct_textbook(system: LinearSystem, law: Gaussian, y: Array) -> Gaussian
     return Gaussian(law.mean + apply(K, innovation), (np.eye(len(system.A), dtype=law.cov.dtype) - K @ H) @ law.cov)
 
 
-def _correct_symmetrised(system: LinearSystem, law: Gaussian, y: Array) -> Gaussian:
+def _correct_symmetrised(system: LinearSystem, law: Gaussian, y: Vectors) -> Gaussian:
     mean, cov = _correct_textbook(system, law, y)
     return Gaussian(mean, symmetric(cov))
 
 
-def _correct_joseph(system: LinearSystem, law: Gaussian, y: Array) -> Gaussian:
+def _correct_joseph(system: LinearSystem, law: Gaussian, y: Vectors) -> Gaussian:
     """K as above, (I - K H) P (I - K H)^T + K R K^T."""
     return correct(law, system.measure(*law), y)
 
 
-def _measured(system: LinearSystem, innovation: Array) -> tuple[Array, Array, Array]:
+def _measured(system: LinearSystem, innovation: Vectors) -> tuple[Vectors, Matrices, Matrices]:
     """Innovation, H and R with the missing (NaN) components taken out."""
     if not any_missing(innovation):
         return innovation, system.H, system.R
@@ -83,12 +96,12 @@ def _measured(system: LinearSystem, innovation: Array) -> tuple[Array, Array, Ar
     return innovation, H, R
 
 
-def _predict_root(system: LinearSystem, law: Root, shift: Array | float) -> Root:
+def _predict_root(system: LinearSystem, law: Root, shift: Vectors | float) -> Root:
     """[A S, Q^(1/2)] made triangular: its product with its transpose is A P A^T + Q."""
     return Root(apply(system.A, law.mean) + shift, _triangular(_beside(system.A @ law.root, square_root(system.Q))))
 
 
-def _correct_root(system: LinearSystem, law: Root, y: Array) -> Root:
+def _correct_root(system: LinearSystem, law: Root, y: Vectors) -> Root:
     """Potter's idea with an orthogonal transformation U,
 
         [R^(1/2)  H S]       [F^(1/2)      0 ]
@@ -104,7 +117,7 @@ def _correct_root(system: LinearSystem, law: Root, y: Array) -> Root:
     return Root(law.mean + apply(lower[..., p:, :p], whitened), lower[..., p:, p:])
 
 
-def _beside(left: Array, right: Array) -> Array:
+def _beside(left: Matrices, right: Matrices) -> Matrices:
     return np.concatenate(_broadcast(left, right), axis=-1)
 
 
@@ -114,7 +127,7 @@ def _broadcast(left: Array, right: Array) -> list[Array]:
     return [np.broadcast_to(matrix, lead + matrix.shape[-2:]) for matrix in (left, right)]
 
 
-def _triangular(wide: Array) -> Array:
+def _triangular(wide: Matrices) -> Matrices:
     """Lower triangular L with L L^T = wide wide^T, by Householder's reflections of the columns.
 
     In the precision of `wide`: numpy.linalg.qr computes float32 in double, which would hide what short words do.
@@ -138,7 +151,7 @@ def _forward(lower: Array, right: Array) -> Array:
     return x
 
 
-def _correct_factors(system: LinearSystem, law: Factors, y: Array) -> Factors:
+def _correct_factors(system: LinearSystem, law: Factors, y: Vectors) -> Factors:
     return correct_factors(law, *_measured(system, y - apply(system.H, law.mean)))
 
 

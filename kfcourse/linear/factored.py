@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.laws import Array, apply, symmetric
+from kfcourse.laws import Array, Matrices, Vectors, apply, symmetric
 
 
 class Factors(NamedTuple):
@@ -24,12 +24,12 @@ class Factors(NamedTuple):
     cov = unit diag(diagonal) unit^T
     """
 
-    mean: Array
-    unit: Array
-    diagonal: Array
+    mean: Vectors
+    unit: Matrices
+    diagonal: Vectors
 
 
-def factors(cov: Array) -> tuple[Array, Array]:
+def factors(cov: Matrices) -> tuple[Matrices, Vectors]:
     """U (..., n, n) and D (..., n) of a covariance, U D U^T = cov; a variance that rounding made negative is taken as 0."""
     rest, n = np.array(cov), cov.shape[-1]
     unit, diagonal = np.zeros_like(rest), np.zeros_like(rest[..., 0])
@@ -42,12 +42,12 @@ def factors(cov: Array) -> tuple[Array, Array]:
     return unit, diagonal
 
 
-def product(unit: Array, diagonal: Array) -> Array:
+def product(unit: Matrices, diagonal: Vectors) -> Matrices:
     """U D U^T, (..., n, n)."""
     return symmetric((unit * diagonal[..., None, :]) @ np.swapaxes(unit, -1, -2))
 
 
-def predict_factors(A: Array, law: Factors, shift: Array | float, Q: Array) -> Factors:
+def predict_factors(A: Matrices, law: Factors, shift: Vectors | float, Q: Matrices) -> Factors:
     """A m + shift, and the factors of A P A^T + Q: Gram and Schmidt's orthogonal rows, in the modified order."""
     noise, strength = factors(Q)
     lead = law.unit.shape[:-2]
@@ -64,7 +64,7 @@ def predict_factors(A: Array, law: Factors, shift: Array | float, Q: Array) -> F
     return Factors(apply(A, law.mean) + shift, unit, diagonal)
 
 
-def correct_factors(law: Factors, innovation: Array, H: Array, R: Array) -> Factors:
+def correct_factors(law: Factors, innovation: Vectors, H: Matrices, R: Matrices) -> Factors:
     """Mean and factors after measurements y = H x + w, w ~ N(0, R), with innovation y - H m (..., p)."""
     mixing, noise = factors(R)
     apart = np.linalg.inv(mixing).astype(R.dtype)  # of a triangular matrix with ones on its diagonal
@@ -77,7 +77,7 @@ def correct_factors(law: Factors, innovation: Array, H: Array, R: Array) -> Fact
     return Factors(law.mean + change, unit, diagonal)
 
 
-def bierman(unit: Array, diagonal: Array, h: Array, noise: Array) -> tuple[Array, Array, Array]:
+def bierman(unit: Matrices, diagonal: Vectors, h: Vectors, noise: Array) -> tuple[Matrices, Vectors, Vectors]:
     """Factors after the measurement h^T x + w, w ~ N(0, noise), and the gain (..., n).
 
     f = U^T h,  v = D f;  alpha_j = noise + f_1 v_1 + ... + f_j v_j;  D_j <- D_j alpha_{j-1} / alpha_j,

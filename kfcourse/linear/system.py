@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.laws import Array, Measurement, apply, symmetric
+from kfcourse.laws import Array, Matrices, Measurement, Vectors, apply, symmetric
 from kfcourse.symbolic.choices import decides
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
@@ -41,11 +41,11 @@ class LinearSystem:
         Shapes that do not fit, numbers that are not finite, covariances that are none.
     """
 
-    A: Array
-    H: Array
-    Q: Array
-    R: Array
-    B: Array | None = None
+    A: Matrices
+    H: Matrices
+    Q: Matrices
+    R: Matrices
+    B: Matrices | None = None
 
     def __post_init__(self) -> None:
         for name in "AHQRB":
@@ -81,7 +81,7 @@ class LinearSystem:
         matrices = (self.A, self.H, self.Q, self.R, self.B)
         return LinearSystem(*(None if matrix is None else matrix.astype(dtype) for matrix in matrices))  # type: ignore[arg-type]
 
-    def input(self, u: Array | None) -> Array | float:
+    def input(self, u: Vectors | None) -> Vectors | float:
         """B u, (..., n); 0 without an input."""
         if u is None:
             return 0.0
@@ -89,12 +89,12 @@ class LinearSystem:
             raise ValueError("an input u was given, but the system has no matrix B; pass LinearSystem(A, H, Q, R, B)")
         return apply(self.B, u)
 
-    def measure(self, m: Array, d: Array) -> Measurement:
+    def measure(self, m: Vectors, d: Matrices) -> Measurement:
         """Structural functions of the meter: h = H m, G = H, F = H d H^T + R."""
         return Measurement(apply(self.H, m), self.H, symmetric(self.H @ d @ self.H.T) + self.R, self.R)
 
 
-def linear_system(model: Model) -> tuple[LinearSystem, Array, Array]:
+def linear_system(model: Model) -> tuple[LinearSystem, Vectors, Vectors]:
     """The matrices of a linear model, and the constants of its object (n,) and meter (p,).
 
     Raises
@@ -105,7 +105,7 @@ def linear_system(model: Model) -> tuple[LinearSystem, Array, Array]:
     return linear_systems(model)(None)
 
 
-def linear_systems(model: Model) -> Callable[[int | None], tuple[LinearSystem, Array, Array]]:
+def linear_systems(model: Model) -> Callable[[int | None], tuple[LinearSystem, Vectors, Vectors]]:
     """Step to the matrices and constants, as of `linear_system`, of a linear model that may depend on the step.
 
     Raises
@@ -121,7 +121,7 @@ def linear_systems(model: Model) -> Callable[[int | None], tuple[LinearSystem, A
     return lambda k: _system(model, state.at(k)(), meter.at(k)())
 
 
-def _system(model: Model, state: Sequence[Array], meter: Sequence[Array]) -> tuple[LinearSystem, Array, Array]:
+def _system(model: Model, state: Sequence[Array], meter: Sequence[Array]) -> tuple[LinearSystem, Vectors, Vectors]:
     (A, B, a0), (H, C, b0) = state, meter
     Q, R = (M @ law.cov @ M.T for M, law in ((B, model.state_noise), (C, model.meter_noise)))
     system = LinearSystem(A, H, symmetric(Q), symmetric(R))

@@ -99,6 +99,7 @@ def _make(kind: str, **options: Any) -> None:
     show_default=True,
     help="Share of the points for a step that is right on top of the student's own wrong answer to an earlier question.",
 )
+@click.option("--dask", help="Address of a Dask scheduler whose workers grade instead; they need this package and FOLDER.")
 @click.option("--seed", help="Text that the hidden arguments come from.  [default: another each time]")
 def grade(**options: Any) -> None:
     """Run the returned notebooks in FOLDER and write a table of what passed.

@@ -29,7 +29,7 @@ class NotebookFailed(RuntimeError):
     """A notebook stopped; the message names it and the cell."""
 
 
-def execute(notebook: NotebookNode, name: str, seconds: float = SECONDS, stop_at_error: bool = True) -> NotebookNode:
+def execute(notebook: NotebookNode, name: str, stop_at_error: bool = True) -> NotebookNode:
     """Run a notebook in a new kernel and an empty folder.
 
     Parameters
@@ -38,8 +38,6 @@ def execute(notebook: NotebookNode, name: str, seconds: float = SECONDS, stop_at
         Not changed.
     name : str
         For messages.
-    seconds : float
-        Time limit of each cell.
     stop_at_error : bool
         False: an error is kept as the cell's output, and the cells after it run too.
 
@@ -51,7 +49,7 @@ def execute(notebook: NotebookNode, name: str, seconds: float = SECONDS, stop_at
     result = nbformat.from_dict(notebook)
     client = NotebookClient(
         result,
-        timeout=int(seconds),
+        timeout=SECONDS,
         kernel_name="python3",
         allow_errors=not stop_at_error,
         record_timing=False,
@@ -64,17 +62,32 @@ def execute(notebook: NotebookNode, name: str, seconds: float = SECONDS, stop_at
         except CellExecutionError as error:
             raise NotebookFailed(f"{name}, cell {_failed(result)}: {error.ename}: {error.evalue}") from None
         except CellTimeoutError:
-            raise NotebookFailed(f"{name}, cell {_running(result)}: still running after {seconds:g} s") from None
+            raise NotebookFailed(f"{name}, cell {_running(result)}: still running after {SECONDS} s") from None
         except DeadKernelError:
             raise NotebookFailed(f"{name}, cell {_running(result)}: the kernel died (out of memory?)") from None
+    if stop_at_error and (found := first_error(result)):
+        cell, shown = found
+        raise NotebookFailed(f"{name}, cell {cell.id}: {shown.ename}: {shown.evalue}")
     return result
 
 
-def _failed(notebook: NotebookNode) -> str:
+def first_error(notebook: NotebookNode) -> tuple[NotebookNode, NotebookNode] | None:
+    """The first cell that shows an error it is not tagged to raise, and that output.
+
+    A cell whose picture cannot be drawn shows one, too, though for its kernel it ended well.
+    """
     for cell in notebook.cells:
-        if any(output.output_type == "error" for output in cell.get("outputs", [])):
-            return str(cell.id)
-    return _running(notebook)
+        if "raises-exception" in cell.metadata.get("tags", []):
+            continue
+        for output in cell.get("outputs", []):
+            if output.output_type == "error":
+                return cell, output
+    return None
+
+
+def _failed(notebook: NotebookNode) -> str:
+    found = first_error(notebook)
+    return str(found[0].id) if found else _running(notebook)
 
 
 def _running(notebook: NotebookNode) -> str:

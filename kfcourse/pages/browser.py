@@ -180,7 +180,7 @@ def levels(model: Model) -> list[sp.Symbol]:
     return [symbol for symbol, value in model.values.items() if symbol not in quiet and value > 0]
 
 
-def script(models: Mapping[str, Model], names: Sequence[str] = LAB) -> str:
+def script(models: Mapping[str, Model]) -> str:
     """`kfLab` and `kfModels`, an object of the models by name, as the text of a script that loads nothing."""
-    each = [f"{json.dumps(name)}: {model_source(model, names)}" for name, model in models.items()]
+    each = [f"{json.dumps(name)}: {model_source(model)}" for name, model in models.items()]
     return javascript.RUNTIME + LAB_SCRIPT.read_text(encoding="utf-8") + "const kfModels = {\n" + ",\n".join(each) + "\n};\n"

@@ -88,12 +88,12 @@ def columns(of: Mapping[str, sp.Expr]) -> dict[str, sp.Matrix]:
     return {key: sp.Matrix([one]) for key, one in of.items()}
 
 
-def rounded(rows: Iterable[Iterable[float]], digits: int = 4) -> list[list[float]]:
-    """Numbers as a page holds them: with so many digits."""
-    return [[float(f"{number:.{digits}g}") for number in row] for row in rows]
+def rounded(rows: Iterable[Iterable[float]]) -> list[list[float]]:
+    """Numbers as a page holds them: with four digits."""
+    return [[float(f"{number:.4g}") for number in row] for row in rows]
 
 
-def live_lab(name: str, variants: Mapping[str, Variant], first: str = "53", step: int = 4) -> str:
+def live_lab(name: str, variants: Mapping[str, Variant]) -> str:
     """The lab under the reader's hand: all filters of a scalar variant, designed and compared while its parameters move.
 
     Parameters
@@ -101,11 +101,7 @@ def live_lab(name: str, variants: Mapping[str, Variant], first: str = "53", step
     name : str
         Of the figure.
     variants : dict
-        Scalar variants by name.
-    first : str
-        The one shown first.
-    step : int
-        The step looked at first.
+        Scalar variants by name; 53 is shown first, at step 4.
     """
     source = script({key: variant.plain("live figures") for key, variant in variants.items()}) + (DATA / "live-lab.js").read_text(
         encoding="utf-8"
@@ -114,8 +110,8 @@ def live_lab(name: str, variants: Mapping[str, Variant], first: str = "53", step
         "styles": {one: line_style(one) for one in LAB},
         "titles": {one: title(one) for one in LAB},
         "variants": {key: f"{key}: {variant.title}" for key, variant in variants.items()},
-        "first": first,
-        "step": step,
+        "first": "53",
+        "step": 4,
         "runs": RUNS,
         "steps": STEPS,
     }

@@ -112,9 +112,9 @@ def given(before: Indexed, after: Indexed) -> Indexed:
     return Indexed(lambda at, until: (after if at == until else before)[at,])
 
 
-def normal_nodes(mean: float, variance: float, count: int = 60) -> tuple[np.ndarray, Callable[[Any], float]]:
+def normal_nodes(mean: float, variance: float) -> tuple[np.ndarray, Callable[[Any], float]]:
     r"""Nodes x for a normal law, and the mean of a function of x that is given at the nodes (Gauss and Hermite)."""
-    nodes, weights = np.polynomial.hermite_e.hermegauss(count)
+    nodes, weights = np.polynomial.hermite_e.hermegauss(60)
     weights = weights / weights.sum()
     return mean + np.sqrt(variance) * nodes, lambda values: float(np.sum(weights * values))
 

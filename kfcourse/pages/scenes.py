@@ -9,7 +9,7 @@ who_leads          the front page: the order of the lab's filters over the step 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import sympy as sp
@@ -184,7 +184,7 @@ def grid_step(
     return drawn(name, "Masses on a grid", "grid-step", [value("density", {"x": x}, density)], settings)
 
 
-def leading(found: ParameterMap, names: Iterable[str] = LAB) -> dict[str, Any]:
+def leading(found: ParameterMap) -> dict[str, Any]:
     """What `who_leads` shows of a map whose first parameter has one value: in per cent, with 95 % intervals.
 
     Returns
@@ -198,7 +198,7 @@ def leading(found: ParameterMap, names: Iterable[str] = LAB) -> dict[str, Any]:
     for (first, second), result in found.cells.items():
         ratios.append(float(f"{second / first:.3g}"))
         steps = range(len(result.gap(LAB[0]).value))
-        of = {name: (result.gap(name).value, *result.gap(name).interval()) for name in names}
+        of = {name: (result.gap(name).value, *result.gap(name).interval()) for name in LAB}
         gaps.append([{name: [round(100 * float(one[k]), 4) for one in parts] for name, parts in of.items()} for k in steps])
         order = [result.leaders(k) for k in steps]
         leaders.append([(best, len(others)) for best, *others in order])

@@ -142,22 +142,22 @@ def profile(
     name: str,
     values: Sequence[float],
     positive: Sequence[str] = (),
-    build: Callable[[Model], Filter] = _normal_filter,
 ) -> Array:
     """The largest ln p(y) for given values of one parameter, (values,): over all others that are unknown.
 
-    Where it has fallen by 1.92 from its maximum ends the 95 % interval of a long record.  Arguments and errors as of `estimate`.
+    Where it has fallen by 1.92 from its maximum ends the 95 % interval of a long record.
+    Of the normal filter; arguments and errors as of `estimate`.
     """
     others = [other for other in unknown if other != name]
     found = []
     for value in values:
         model = model.replace(**{name: value})
         if others:
-            best = estimate(model, y, others, [other for other in positive if other != name], build)
+            best = estimate(model, y, others, [other for other in positive if other != name])
             model = best.model  # the next search begins here
             found.append(best.log_likelihood)
         else:
-            found.append(float(likelihood(build(model), y).sum()))
+            found.append(float(likelihood(_normal_filter(model), y).sum()))
     return np.array(found)
 
 

@@ -108,7 +108,7 @@ def _noise_of(cov: Array, scale: Array, what: str) -> None:
         raise ValueError(f"{what} has a negative variance, {variance.min():g}: look at its formula, and at the inputs there")
 
 
-def findings(told: Examination, confidence: float = CONFIDENCE, run: int = 0) -> list[Finding]:
+def findings(told: Examination, run: int = 0) -> list[Finding]:
     """Size, mean and neighbours of a record's innovations; those that a gate refused are left out.
 
     The intervals are those of normal laws for sums of many terms: thirty measurements are enough.  Under weights that are
@@ -118,7 +118,7 @@ def findings(told: Examination, confidence: float = CONFIDENCE, run: int = 0) ->
     if not used.any():
         return []
     value, F = told.found.value[used, run], told.found.cov[used, run]
-    z = float(scipy.special.ndtri((1 + confidence) / 2))
+    z = float(scipy.special.ndtri((1 + CONFIDENCE) / 2))
     degrees = (~np.isnan(value)).sum(axis=-1)
     size = _sizes(value, F).sum() / degrees.sum()
     mean, variance = _below(degrees, told.edge)

@@ -124,15 +124,15 @@ def cubic_sensor() -> Model:
     return Model.define("x/(1 + x**2) + v", "x**3 + x + w", prior={"mean": 0.1, "variance": 1})
 
 
-def logistic(bound: float = 1e4) -> Model:
-    """x' = max(-b, x(1 - x)) + v,  y = x + w;  x_0 ~ N(0.1, 0.01).  x(1 - x) is at most 1/4: above there is nothing to bound."""
-    return Model.define("(-b if x*(1 - x) < -b else x*(1 - x)) + v", "x + w", {"b": bound}, prior={"mean": 0.1, "variance": 0.01})
+def logistic() -> Model:
+    """x' = max(-10^4, x(1 - x)) + v,  y = x + w;  x_0 ~ N(0.1, 0.01).  Above, x(1 - x) <= 1/4."""
+    return Model.define("(-b if x*(1 - x) < -b else x*(1 - x)) + v", "x + w", {"b": 1e4}, prior={"mean": 0.1, "variance": 0.01})
 
 
-def inverse_cube_root(bound: float = 100) -> Model:
-    """x' = min(b, x^(-1/3)) + v with the odd root,  y = x + w;  x_0 ~ N(3.01, 1)."""
+def inverse_cube_root() -> Model:
+    """x' = min(100, x^(-1/3)) + v with the odd root,  y = x + w;  x_0 ~ N(3.01, 1)."""
     return Model.define(
-        "(b if 0 <= x < 1/b**3 else sign(x)/Abs(x)**(1/3)) + v", "x + w", {"b": bound}, prior={"mean": 3.01, "variance": 1}
+        "(b if 0 <= x < 1/b**3 else sign(x)/Abs(x)**(1/3)) + v", "x + w", {"b": 100}, prior={"mean": 3.01, "variance": 1}
     )
 
 

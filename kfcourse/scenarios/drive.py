@@ -13,6 +13,7 @@ import numpy as np
 
 from kfcourse.laws import Array
 
+MOVES = 6.0  # s, when the car has begun to move
 RADIUS = 6_371_000.0  # m, of a sphere as large as the Earth
 
 
@@ -59,10 +60,10 @@ def recorded() -> Drive:
     )
 
 
-def fixes(every: int = 1, start: float = 6.0) -> tuple[Array, Array]:
-    """Times (steps,) and places (steps, 1, 2) of one fix in so many, from `start` on, when the car has begun to move."""
+def fixes(every: int = 1) -> tuple[Array, Array]:
+    """Times (steps,) and places (steps, 1, 2) of one fix in so many, when the car has begun to move."""
     record = recorded()
-    there = np.flatnonzero(~np.isnan(record.place[:, 0]) & (record.times >= start))[::every]
+    there = np.flatnonzero(~np.isnan(record.place[:, 0]) & (record.times >= MOVES))[::every]
     return record.times[there], record.place[there, None]
 
 

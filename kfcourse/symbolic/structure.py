@@ -24,7 +24,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import Components, on_circle
-from kfcourse.laws import Array, Gaussian, Measurement, Transition, measurement_of
+from kfcourse.laws import Array, Gaussian, Matrices, Measurement, Transition, Vectors, measurement_of
 from kfcourse.reasons import Reason
 from kfcourse.symbolic.choices import jumps, masked
 from kfcourse.symbolic.formula import symbol
@@ -62,9 +62,9 @@ class Structure:
 
     name: str
     model: Model
-    predict: Callable[[Array, Array], Gaussian]
-    measure: Callable[[Array, Array], Measurement]
-    transition: Callable[[Array, Array], Transition]
+    predict: Callable[[Vectors, Matrices], Gaussian]
+    measure: Callable[[Vectors, Matrices], Measurement]
+    transition: Callable[[Vectors, Matrices], Transition]
     formulas: StructuralFormulas | None = None
     at_step: Callable[[int], Structure] | None = None
 
@@ -218,7 +218,7 @@ def of_each_step(
 ) -> Structure:
     """The structure that `Structure.at` makes those of each step of."""
 
-    def refused(mean: Array, cov: Array) -> NoReturn:
+    def refused(mean: Vectors, cov: Matrices) -> NoReturn:
         raise ModelError(f"what is found of {model} depends on the step: say which, as in structure.at(k).predict(z, p)")
 
     return Structure(name, model, refused, refused, refused, formulas, at)

@@ -39,21 +39,21 @@ _WITHOUT_WIDTH = {
 }
 
 
-def equation_latex(equation: Equation, width: int = WIDTH, names: Mapping[Any, str] | None = None) -> str:
+def equation_latex(equation: Equation, names: Mapping[Any, str] | None = None) -> str:
     """LaTeX of side = side = ..., with `&` for an aligned environment, in several lines where it is long.
 
     Sides that print alike are printed once.
     """
-    first, *others = (lines for lines, _ in groupby(side_lines(side, width - 6, names) for side in equation))
+    first, *others = (lines for lines, _ in groupby(side_lines(side, WIDTH - 6, names) for side in equation))
     if len(first) > 1:
         raise ValueError(
             "the left side of an equation is too long for one line: give it a name, and the formula as the right side"
         )
     lines: list[str] = []
-    line, room = first[0] + " ", width - symbols(first[0])
+    line, room = first[0] + " ", WIDTH - symbols(first[0])
     for number, side in enumerate(others):
         if number and (len(side) > 1 or symbols(side[0]) + 3 > room):
-            lines, line, room = [*lines, line], "", width - symbols(first[0])
+            lines, line, room = [*lines, line], "", WIDTH - symbols(first[0])
         line += ("&= " if not number or not line else " = ") + side[0]
         room -= symbols(side[0]) + 3
         for continued in side[1:]:

@@ -29,14 +29,13 @@ def formula_latex(expression: sp.Expr, variables: Sequence[sp.Symbol], noises: S
     return str(printer.doprint(_Writer([*variables, *noises], noises).arranged(_readable(sp.sympify(expression)))))
 
 
-def formula_lines(expression: sp.Expr, variables: Sequence[sp.Symbol], noises: Sequence[sp.Symbol] = ()) -> list[str]:
+def formula_lines(expression: sp.Expr, variables: Sequence[sp.Symbol]) -> list[str]:
     """The same in as many lines as a page is wide; only sums are broken."""
     expression = _readable(expression)
-    whole = formula_latex(expression, variables, noises)
-    writer = _Writer([*variables, *noises], noises)
+    whole = formula_latex(expression, variables)
     if symbols(whole) <= WIDTH or not isinstance(expression, sp.Add):
         return [whole]
-    return joined([formula_latex(term, variables, noises) for term in writer.terms(expression)])
+    return joined([formula_latex(term, variables) for term in _Writer(variables, ()).terms(expression)])
 
 
 def _readable(expression: sp.Expr) -> sp.Expr:

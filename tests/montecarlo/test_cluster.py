@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from distributed import LocalCluster
 
-from kfcourse import Model, compare, gaussian, linearised, load_variants
+from kfcourse import compare, gaussian, linearised, load_variants
 from kfcourse.filters import aof, duof, pointmass
 from kfcourse.lab.quality import examine_all
 from kfcourse.lab.short_names import LAB, lab_filters
@@ -23,11 +23,6 @@ def address():
         yield workers.scheduler_address
 
 
-@pytest.fixture
-def model():
-    return Model.define("c*x + e*x*v", "g*x + f*x**2*w", {"c": 0.9, "e": 0.05, "g": 1, "f": 0.02})
-
-
 def same(one, other, within=0.0):
     for sums, others in [(one.sums, other.sums), (one.subset.sums, other.subset.sums)]:
         for name in sums.__dataclass_fields__:
@@ -35,23 +30,23 @@ def same(one, other, within=0.0):
 
 
 @pytest.mark.parametrize("compiled", [False, True])
-def test_the_same_numbers_bit_for_bit(address, model, compiled, capsys):
+def test_the_same_numbers_bit_for_bit(address, variant53, compiled):
     """Compiled, but for rounding: workers that compile for themselves may add up in another order.
 
     The stated error of the exact filter, 1e-10 here, is a difference of sums of rounding 1e-16: it was off by 7e-12 of itself.
     """
-    filters = [*lab_filters(model, LAB), pointmass(model)]
+    filters = [*lab_filters(variant53, LAB), pointmass(variant53)]
     work = {"subset_runs": 160, "compiled": compiled, "designs": 2}
     runs = 2 * ensemble.SMALL_BLOCK  # two blocks
-    here = compare(filters, model, runs, STEPS, 1, **work, threads=1, progress=False)
-    there = compare(filters, model, runs, STEPS, 1, **work, dask=address, progress=True)
+    here = compare(filters, variant53, runs, STEPS, 1, **work, threads=1, progress=False)
+    there = compare(filters, variant53, runs, STEPS, 1, **work, dask=address, progress=True)
     same(here, there, within=1e-9 if compiled else 0.0)
     assert there.subset_runs == 160
 
 
-def test_a_lost_worker(address, model, tmp_path):
+def test_a_lost_worker(address, variant53, tmp_path):
     """The first worker to take a chunk ends; what it had begun is done by another, with the same result."""
-    exact, lost = pointmass(model), tmp_path / "lost"
+    exact, lost = pointmass(variant53), tmp_path / "lost"
 
     def step(state, y):
         try:
@@ -60,17 +55,19 @@ def test_a_lost_worker(address, model, tmp_path):
             return exact.step(state, y)
         os._exit(1)
 
-    filters = [aof(gaussian(model)), exact]
-    here = compare(filters, model, 400, STEPS, 1, subset_runs=160, threads=1, progress=False)
-    there = compare([filters[0], replace(exact, step=step)], model, 400, STEPS, 1, subset_runs=160, dask=address, progress=False)
+    filters = [aof(gaussian(variant53)), exact]
+    here = compare(filters, variant53, 400, STEPS, 1, subset_runs=160, threads=1, progress=False)
+    there = compare(
+        [filters[0], replace(exact, step=step)], variant53, 400, STEPS, 1, subset_runs=160, dask=address, progress=False
+    )
     assert lost.exists()
     same(here, there)
 
 
-def test_time_is_kept(address, model):
+def test_time_is_kept(address, variant53):
     result = compare(
-        [aof(linearised(model)), duof(model), pointmass(model)],
-        model,
+        [aof(linearised(variant53)), duof(variant53), pointmass(variant53)],
+        variant53,
         400,
         STEPS,
         1,

@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import socket
+import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -219,6 +220,32 @@ def test_who_kills_its_process_is_named_and_the_next_is_graded(staged, tmp_path)
     assert grades[2].passed == 2
     if sys.platform == "linux":
         assert all(ended(int((tmp_path / f"flag{name}").read_text())) for name in "12")
+
+
+ENDS_FIRST = """
+import ctypes, subprocess, threading, time
+
+def begin():
+    print(subprocess.Popen(["sleep", "600"]).pid, flush=True)
+    time.sleep(600)
+
+threading.Thread(target=begin).start()
+ctypes.CDLL(None).pthread_exit(None)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a process that has ended is no parent")
+def test_what_a_thread_has_started_is_found_when_the_main_one_has_ended():
+    """Then the process is a zombie, and the parent of what lives: so it is for a moment whenever one with threads is killed."""
+    with subprocess.Popen([sys.executable, "-c", ENDS_FIRST], stdout=subprocess.PIPE) as process:
+        started = int(process.stdout.readline())
+        try:
+            assert ended(process.pid)
+            assert started in keeper.below(os.getpid())
+        finally:
+            os.kill(started, signal.SIGKILL)
+            process.kill()
+    assert ended(started)
 
 
 # -- processes that somebody kills

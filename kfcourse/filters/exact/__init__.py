@@ -22,4 +22,11 @@ smoothing    what the whole record tells, once it is there
 jumps        the same of state and mode, for models that jump
 usual        the way that most trajectories take, compiled by numba (loops)
 constants    what several of these share
+
+Which models of the course need which: over 8 steps and 40 trajectories of each of the 13 shipped scalar variants, `narrow`
+was called for 6 only and `adaptive` for 2 only, the rest is `batch` alone. Of the first 150 models that `kfcourse variants
+--generate` draws with seed 1, well posed or not, 135 are scalar. Over 8 steps and 20 trajectories 69 of them need `narrow`
+and 54 `adaptive`; `noise` takes part in two, of which one, the 105th, would end at its second step without it. A noise that
+grows with the square of the state, as e*x**2*v, lives on it. `roots` is for meters without noise: none of these has one,
+models of one's own may (f = 0).
 """

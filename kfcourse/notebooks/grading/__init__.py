@@ -13,6 +13,7 @@ asking        arguments of the grader's own
 marking       one notebook -> its marks and notes
 worker        the grading process, which compares
 pool          several of them, started anew when one ends
+far           the same on the workers of a Dask cluster
 owners        whose notebook it is, and what to look at
 weights       what an answer is worth
 report        tables and pages for students and lecturers

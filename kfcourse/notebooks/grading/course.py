@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import secrets
 import sys
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from importlib import resources
 from pathlib import Path
 
 import click
 
 from kfcourse.lab.variants import chosen_variants
 from kfcourse.notebooks.course_list import Student, read_assignment
-from kfcourse.notebooks.grading.marking import Setting
+from kfcourse.notebooks.grading.far import far_grading
 from kfcourse.notebooks.grading.owners import Person, owner
-from kfcourse.notebooks.grading.pool import grading
+from kfcourse.notebooks.grading.pool import Order, grading
 from kfcourse.notebooks.grading.report import write_report
-from kfcourse.notebooks.grading.running import Site
-from kfcourse.notebooks.grading.sandbox import HELD, chosen
-from kfcourse.notebooks.grading.staging import answers, stage
+from kfcourse.notebooks.grading.sandbox import HELD
 from kfcourse.notebooks.grading.submissions import Unreadable, read_document, returned
 from kfcourse.notebooks.grading.table import FAILED, PARTLY, SIGNS, Grade, grade_all
 from kfcourse.notebooks.grading.weights import Credit
@@ -41,6 +37,7 @@ def grade_folder(
     seed: str | None,
     parts: float,
     follow_on: float,
+    dask: str | None,
 ) -> bool:
     """Grade the notebooks of a folder as `kfcourse grade` is asked to; whether all could be graded."""
     course = None if students is None else _course(students, variants_file)
@@ -51,20 +48,15 @@ def grade_folder(
     for place in (table, pages):
         if place.is_symlink() and place.parent == folder:
             raise ValueError(f"{place} is a link: has a student returned it? Take it away, or name another place")
-    with tempfile.TemporaryDirectory(prefix="kfcourse-") as made:
-        place = Path(made).resolve()
-        (place / "stage").mkdir()
-        staged = stage(place / "stage")
-        hidden = [Path(str(resources.files("kfcourse"))), *answers(), folder.resolve(), *([masters] if masters else [])]
-        held = chosen(sandbox, hidden, place, staged)
-        salt = seed or secrets.token_hex(8)
-        with grading(Setting(Site(staged, held), salt), workers) as graded:
-            grades, old = grade_all(work, table, again, graded)
+    order = Order(folder.resolve(), masters and masters.resolve(), sandbox, seed or secrets.token_hex(8))
+    with far_grading(order, dask) if dask else grading(order, workers) as (graded, kinds):
+        grades, old = grade_all(work, table, again, graded)
     _show(grades)
+    held = "; ".join(HELD[kind] for kind in sorted(kinds)) or "nothing was run"
     click.echo(f"\n{len(grades) - old} run, {old} unchanged since the last table. Table: {table}")
-    click.echo(f"Sandbox: {HELD[held.kind]}\nHidden arguments: --seed {salt} repeats them")
+    click.echo(f"Sandbox: {held}\nHidden arguments: --seed {order.salt} repeats them")
     if students or report:
-        _show_report(write_report(grades, course, pages, HELD[held.kind], Credit(parts, follow_on)), pages)
+        _show_report(write_report(grades, course, pages, held, Credit(parts, follow_on)), pages)
     return all(one.status not in (FAILED, PARTLY) for one in grades)
 
 

@@ -28,8 +28,11 @@ def adopt() -> bool:
     return False
 
 
-def parents() -> dict[int, int]:
-    """Process to its parent, of all processes that live."""
+def processes() -> dict[int, tuple[int, bool]]:
+    """Every process: its parent, and whether it lives.
+
+    One that has ended may still be the parent of others: of those that a thread started which ends after the first.
+    """
     found = {}
     if os.path.isdir("/proc/self"):
         for name in os.listdir("/proc"):
@@ -37,30 +40,32 @@ def parents() -> dict[int, int]:
                 if name.isdigit():
                     with open(f"/proc/{name}/stat", "rb") as file:
                         state, parent = file.read().rpartition(b")")[2].split()[:2]
-                    if state != b"Z":
-                        found[int(name)] = int(parent)
+                    found[int(name)] = int(parent), state != b"Z"
         return found
     with suppress(OSError, ValueError, subprocess.SubprocessError):
-        listed = subprocess.run(["ps", "-A", "-o", "pid=,ppid="], capture_output=True, text=True, timeout=10).stdout
-        found = {int(pid): int(parent) for pid, parent in (line.split() for line in listed.splitlines())}
+        listed = subprocess.run(["ps", "-A", "-o", "pid=,ppid=,stat="], capture_output=True, text=True, timeout=10).stdout
+        rows = [line.split() for line in listed.splitlines()]
+        found = {int(pid): (int(parent), not state.startswith("Z")) for pid, parent, state in rows}
     return found
 
 
 def below(root: int, spared: frozenset[int] = frozenset()) -> list[int]:
-    """Descendants of a process, without those spared and their descendants."""
-    of = parents()
+    """Descendants of a process that live, without those spared and their descendants."""
+    of = processes()
     found, level = [], [root]
     while level:
-        level = [pid for pid, parent in of.items() if parent in level and pid not in spared]
+        level = [pid for pid, (parent, _) in of.items() if parent in level and pid not in spared]
         found += level
-    return [pid for pid in found if pid != os.getpid()]
+    return [pid for pid in found if of[pid][1] and pid != os.getpid()]
 
 
 def end(root: int, spared: frozenset[int] = frozenset()) -> bool:
     """Kill all descendants of a process; whether there are none any more."""
+    calm = 0
     for _ in range(ROUNDS):
         left = below(root, spared)
-        if not left:
+        calm = 0 if left else calm + 1
+        if calm == 2:  # while processes are listed, one may get another parent, and be overlooked
             return True
         for pid in left:
             with suppress(OSError):

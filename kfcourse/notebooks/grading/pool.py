@@ -5,11 +5,15 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
 from queue import SimpleQueue
 
 from tqdm import tqdm
@@ -17,7 +21,9 @@ from tqdm import tqdm
 from kfcourse.notebooks.grading import keeper
 from kfcourse.notebooks.grading.channel import Closed, Late, Patient
 from kfcourse.notebooks.grading.marking import Setting
-from kfcourse.notebooks.grading.running import START
+from kfcourse.notebooks.grading.running import START, Site
+from kfcourse.notebooks.grading.sandbox import chosen
+from kfcourse.notebooks.grading.staging import answers, stage
 from kfcourse.notebooks.grading.submissions import Returned
 from kfcourse.notebooks.grading.table import FAILED, Grade, RunAll, Started
 from kfcourse.notebooks.grading.values import Strange
@@ -114,9 +120,44 @@ class Worker:
                 pipe.close()  # type: ignore[union-attr]
 
 
+@dataclass(frozen=True)
+class Order:
+    """How a course's notebooks are to be graded, on whatever machine.
+
+    Attributes
+    ----------
+    folder : Path
+        Where they are; absolute, as the masters.
+    masters : Path or None
+    sandbox : {"auto", "bwrap", "none"}
+    salt : str
+        Of the hidden arguments.
+    """
+
+    folder: Path
+    masters: Path | None
+    sandbox: str
+    salt: str
+
+
 @contextmanager
-def grading(setting: Setting, workers: int) -> Iterator[RunAll]:
-    """A function that grades notebooks in so many processes, says when it begins with one, and yields the grades as they come."""
+def grading(order: Order, workers: int) -> Iterator[tuple[RunAll, set[str]]]:
+    """A function that grades notebooks in so many processes, and the kind of sandbox they run in.
+
+    The function says when it begins with a notebook, and yields the grades as they come.
+    """
+    with tempfile.TemporaryDirectory(prefix="kfcourse-") as made:
+        place = Path(made).resolve()
+        (place / "stage").mkdir()
+        staged = stage(place / "stage")
+        hidden = [Path(str(resources.files("kfcourse"))), *answers(), order.folder, *([order.masters] if order.masters else [])]
+        held = chosen(order.sandbox, hidden, place, staged)
+        with _processes(Setting(Site(staged, held), order.salt), workers) as run:
+            yield run, {held.kind}
+
+
+@contextmanager
+def _processes(setting: Setting, workers: int) -> Iterator[RunAll]:
     free: SimpleQueue[Worker] = SimpleQueue()
     family = Family()
     made = [Worker(setting, family) for _ in range(workers)]

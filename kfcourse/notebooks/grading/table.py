@@ -188,7 +188,8 @@ def grade_all(work: Sequence[Returned], path: Path, again: bool, run_all: RunAll
 
     def started(one: Returned) -> None:
         with lock:
-            waiting[one.name] = Grade(one.name, FAILED, note=RUNNING)
+            if one.name in waiting:  # word of it may come late, from far
+                waiting[one.name] = Grade(one.name, FAILED, note=RUNNING)
             write_table([*grades, *waiting.values()], path)
 
     for one in run_all(new, started):

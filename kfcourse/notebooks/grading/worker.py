@@ -21,8 +21,8 @@ from kfcourse.notebooks.grading.submissions import Returned
 from kfcourse.notebooks.grading.table import Grade, Told
 
 
-def packed(value: Returned | marking.Setting | Grade) -> dict[str, Any]:
-    """Fields as JSON takes them."""
+def packed(value: Any) -> dict[str, Any]:
+    """Fields of a dataclass as JSON takes them."""
 
     def plain(one: Any) -> Any:
         if isinstance(one, dict):
