@@ -22,6 +22,7 @@ from myst_nb.core.read import is_myst_markdown_notebook, myst_nb_reader_plugin
 from nbclient.exceptions import DeadKernelError
 from nbformat import NotebookNode
 
+from kfcourse.notebooks.execution import first_error
 from kfcourse.notebooks.jobs import Job, Outcome, make, run_all
 
 BOOK = Path(__file__).resolve().parent
@@ -63,7 +64,11 @@ def execute(chapter: Path) -> Executed:
         )
     except (DeadKernelError, RuntimeError) as error:  # RuntimeError: no kernel starts
         return Executed(chapter, notebook, 0.0, f"{type(error).__name__}: {error}")
-    return Executed(chapter, done.nb, done.time, done.exc_string)
+    traceback = done.exc_string
+    if not traceback and (found := first_error(done.nb)):
+        cell, shown = found
+        traceback = f"{cell.source}\n\n{shown.ename}: {shown.evalue}"
+    return Executed(chapter, done.nb, done.time, traceback)
 
 
 def work(job: Path | Job) -> Executed | Outcome:

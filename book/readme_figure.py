@@ -57,7 +57,7 @@ for name, label in SHOWN.items():
     ax.fill_between(steps, low, high, color=line["color"], alpha=0.16, linewidth=0)
 ax.axhline(0, color="0.35", linewidth=1)
 label_ends(ax, least=0.09, lowest=0, weight="semibold")
-ax.set(xticks=steps, xlabel="step $k$", ylabel="error variance above\nthe exact filter, %")
+ax.set(xticks=steps, xlabel="step $k$", ylabel="error variance above\nthe exact filter (%)")
 written = io.StringIO()
 figure.savefig(written, metadata={"Date": None, "Creator": None})
 text = re.sub(

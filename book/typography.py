@@ -7,7 +7,8 @@ import re
 from docutils import nodes
 from sphinx.transforms.post_transforms import SphinxPostTransform
 
-UNIT = r"(?:%|°|(?:[kMG]?Hz|[kMG]?B|dB|px|deg|m?rad|CPU-s|[km]?m|m?s|min|h)(?:/(?:s|min|h))?[²³]?(?![\w-]))"
+from kfcourse.pages.units import UNIT
+
 AFTER_A_NUMBER = re.compile(rf"(?<=\d) (?={UNIT})|(?<=\d) (?=/ {UNIT})|(?<=\d /) (?={UNIT})|(?<=\d) (?=±)|(?<=±) (?=\d)")
 AFTER_A_FORMULA = re.compile(rf"^ (?={UNIT})")
 UNTOUCHED = (nodes.literal, nodes.literal_block, nodes.math, nodes.math_block)

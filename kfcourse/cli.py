@@ -16,6 +16,7 @@ from kfcourse.derivations.setting import of_model
 from kfcourse.files import is_standard_output, read_only, replacing_together
 from kfcourse.lab.admission import admissions, on_trial
 from kfcourse.lab.admission import table as table_of_filters
+from kfcourse.lab.budget import SECONDS, SIZES, Budget, usual_runs
 from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
 from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
@@ -37,7 +38,11 @@ DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with m
 @click.command()
 @click.argument("variant")
 @VARIANTS
-@click.option("--runs", type=click.IntRange(min=2), default=100_000, show_default=True, help="Trajectories.")
+@click.option(
+    "--runs",
+    type=click.IntRange(min=2),
+    help=f"Trajectories.  [default: {SIZES[0]}, or fewer if they take more than {SECONDS:g} s of processor time by a pilot]",
+)
 @click.option(
     "--steps", type=click.IntRange(min=1), help=f"Measurements of each trajectory.  [default: {STEPS}, or what the variant says]"
 )
@@ -103,7 +108,7 @@ DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with m
 def lab(
     variant: str,
     variants_file: Path | None,
-    runs: int,
+    runs: int | None,
     steps: int | None,
     seed: int,
     names: str | None,
@@ -153,22 +158,26 @@ def lab(
     folder = out or Path("lab-" + re.sub(r"[^\w.-]+", "-", chosen.name))  # no folder but this one
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
+    filters = [one.one for one in found if one.one]
+    designing = {"designs": 1 if same_ensemble else designs or DESIGNS, "compiled": compiled}
+    budget = Budget(runs) if runs else usual_runs(filters, model, steps or chosen.steps, **designing)
+    if budget.says:
+        click.echo(budget.says, err=True)
     result = without_failing(
-        [one.one for one in found if one.one],
+        filters,
         model,
-        runs,
+        budget.runs,
         steps or chosen.steps,
         seed,
         left_out=refused,
         subset_runs=exact_runs,
         subset_seconds=exact_seconds,
         subset_memory=1e6 * exact_memory,
-        designs=1 if same_ensemble else designs or DESIGNS,
         same_ensemble=same_ensemble,
         wide=wide,
         threads=threads,
-        compiled=compiled,
         dask=dask,
+        **designing,
     )
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
@@ -179,7 +188,7 @@ def lab(
     if json_file:
         write_json(chosen, result, json_file)
     with _kept(folder), replacing_together(folder) as place:
-        write_report(chosen, result, place)
+        write_report(chosen, result, place, budget.says)
         if language:
             write_handin(chosen, result, place, language)
     click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""), err=to_error)

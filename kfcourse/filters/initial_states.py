@@ -13,8 +13,10 @@ chain with known probabilities, and Bayes' formula for it is a sum over modes (R
     alpha_j ~ c_j p_j(y_k | x_k),     p(y_k | x_k, y_0..k-1) = sum_j c_j p_j(y_k | x_k),     c'_j = sum_i alpha_i pi_ij
 
 Two clouds that know nothing of each other, as of `particles`: their distance tells the error, but not that of a hump that both
-have missed: on a linear model with two modes and 3,200 trajectories the stated mean square error was .7 of the true one, and the
-difference was made by a few.
+have missed.  On a linear model with two modes and 3,200 trajectories the stated mean square error was .7 of the true one, the
+difference made by a few; of 800 there, drawn `FIRST` times as many at first, four were affected, by up to .016 of the variance.
+So a filter within some per cent of this bound is not told well: intervals of 95 % for gaps of 0 to 5 % covered .70 to .87, and
+all but 1 to 2 % of those are withheld, for rare trajectories.
 """
 
 from __future__ import annotations

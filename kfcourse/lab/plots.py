@@ -22,8 +22,8 @@ class Words(NamedTuple):
     title: Callable[[str], str] = title
     step: str = "step $k$"
     variance: str = "error variance $D_k$ (units of $x^2$)"
-    above: str = "$D_k$ above {name}, %"
-    mean_above: str = "mean of $D_k$ above {name}, %"
+    above: str = "$D_k$ above {name} (%)"
+    mean_above: str = "mean of $D_k$ above {name} (%)"
     normalised: str = r"normalised squared error $\mathsf{M}[e^2/p]$"
     mode: str = "probability of the mode"
 

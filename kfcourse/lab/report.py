@@ -69,15 +69,18 @@ class Section:
         return cls(title, [line.strip() for line in body.split("\\\\\n")])
 
 
-def write_report(variant: Variant, result: Comparison, folder: Path) -> list[Path]:
-    """Write report.html, report.tex and the figures, all of them or none; returns the paths."""
+def write_report(variant: Variant, result: Comparison, folder: Path, budget: str = "") -> list[Path]:
+    """Write report.html, report.tex and the figures, all of them or none; returns the paths.
+
+    `budget` tells why there are so few trajectories, if so.
+    """
     with replacing_together(folder) as place:
         for name, (_, draw) in _FIGURES.items():
             save_figure(partial(draw, result), place, name)
         modes = recognised_modes(result)
         if modes:
             save_figure(partial(plots.mode_probabilities, modes), place, "modes")
-        save_texts(("report.html", "report.tex"), place, _content(variant, result, modes))
+        save_texts(("report.html", "report.tex"), place, _content(variant, result, modes, budget))
         return [folder / path.name for path in place.iterdir()]
 
 
@@ -186,7 +189,7 @@ def recognised_modes(result: Comparison) -> Recognised | None:
     return recognised(known, model, runs, result.steps, result.seed) if known else None
 
 
-def _content(variant: Variant, result: Comparison, modes: Recognised | None) -> dict[str, Any]:
+def _content(variant: Variant, result: Comparison, modes: Recognised | None, budget: str) -> dict[str, Any]:
     # the bound before those that it bounds
     names = tuple(sorted(result.available, key=lambda name: name != EXACT))
     entries = JUMP_FILTERS if isinstance(result.model, JumpModel) else FILTERS
@@ -205,7 +208,7 @@ def _content(variant: Variant, result: Comparison, modes: Recognised | None) -> 
             for name in names
         ],
         "table": _table(result, [_cells(result, name) for name in names]),
-        "remarks": remarks_in_words(result),
+        "remarks": [*([budget] if budget else []), *remarks_in_words(result)],
         "compared": [title(name) for name in compared],
         "gaps": _table(result, [[percent(one) for one in result.gap(name)] for name in compared]) if compared else [],
         "ranking": [

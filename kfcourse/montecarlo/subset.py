@@ -89,7 +89,9 @@ def run_subset(
             reason = f"{done or min(size, CHUNKS[0])} trajectories take {'' if done else 'more than '}{seconds:g} s"
             if not found:
                 return None, left_out | dict.fromkeys(names, reason)
-            left_out[EXACT] = f"{reason}, and of fewer than {FEWEST} the rare ones that matter are missing: give it more time"
+            needed = float(f"{MARGIN * (seconds or 0.0) * FEWEST / done:.1g}")
+            why = f"{reason}, and of fewer than {FEWEST} the rare ones that matter are missing"
+            left_out[EXACT] = f"{why}: give it more time, some {needed:g} s"
             return found.without_exact(), left_out
         return None, left_out
 

@@ -65,14 +65,29 @@ def execute(notebook: NotebookNode, name: str, stop_at_error: bool = True) -> No
             raise NotebookFailed(f"{name}, cell {_running(result)}: still running after {SECONDS} s") from None
         except DeadKernelError:
             raise NotebookFailed(f"{name}, cell {_running(result)}: the kernel died (out of memory?)") from None
+    if stop_at_error and (found := first_error(result)):
+        cell, shown = found
+        raise NotebookFailed(f"{name}, cell {cell.id}: {shown.ename}: {shown.evalue}")
     return result
 
 
-def _failed(notebook: NotebookNode) -> str:
+def first_error(notebook: NotebookNode) -> tuple[NotebookNode, NotebookNode] | None:
+    """The first cell that shows an error it is not tagged to raise, and that output.
+
+    A cell whose picture cannot be drawn shows one, too, though for its kernel it ended well.
+    """
     for cell in notebook.cells:
-        if any(output.output_type == "error" for output in cell.get("outputs", [])):
-            return str(cell.id)
-    return _running(notebook)
+        if "raises-exception" in cell.metadata.get("tags", []):
+            continue
+        for output in cell.get("outputs", []):
+            if output.output_type == "error":
+                return cell, output
+    return None
+
+
+def _failed(notebook: NotebookNode) -> str:
+    found = first_error(notebook)
+    return str(found[0].id) if found else _running(notebook)
 
 
 def _running(notebook: NotebookNode) -> str:

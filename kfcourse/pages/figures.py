@@ -13,7 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from matplotlib_inline.backend_inline import set_matplotlib_formats
+
+from kfcourse.pages.units import in_brackets
 
 # Fixed colours (Okabe and Ito's, distinguishable by the colour-blind); those of the filters are in kfcourse.lab.plots.
 COLOURS = {"truth": "#000000", "measurement": "#999999", "estimate": "#0072B2", "band": "#56B4E9", "warning": "#D55E00"}
@@ -56,6 +59,7 @@ def book_style(ground: str = "none") -> None:
     A `ground`, "white" say, makes them readable wherever a notebook is opened, also where the page is dark.
 
     The picture of each wider than `NARROW` carries a second one, for telephones, in its output's metadata (book/narrow.py).
+    One with the label "time, s" raises ValueError: units stand in brackets.
     """
     for font in FONTS:
         fontManager.addfont(font)
@@ -66,6 +70,7 @@ def book_style(ground: str = "none") -> None:
     wide = formatter.lookup_by_type(Figure)
 
     def both(figure: Figure) -> Any:
+        in_brackets(text.get_text() for text in figure.findobj(Text))
         if not (made := wide(figure)):  # of a figure without axes
             return None
         data, metadata = made

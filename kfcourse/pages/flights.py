@@ -40,11 +40,11 @@ def flight_and_errors(track: Track, estimates: Mapping[str, Array], shown: str) 
         ax.axvline(track.time[inside][0], color=COLOURS["measurement"], linewidth=0.6)
         ax.text(track.time[inside].mean(), 1500, str(part), color=colour, ha="center")
     space.plot(*(estimates[shown][5:, 0] / 1000).T, "--", color="black", linewidth=1)
-    space.set(xlabel="east, km", ylabel="north, km", zlim=(0, 10), title="flight, altitude in km")
+    space.set(xlabel="east (km)", ylabel="north (km)", zlim=(0, 10), title="flight, altitude in km")
     for name, positions in estimates.items():
         squares = ((positions - track.position[:, None]) ** 2).sum(axis=-1)
         ax.semilogy(track.time, np.sqrt(squares.mean(axis=1)), linewidth=1.2, label=name, **LOOKS[name])
-    ax.set(xlabel="time, s", title="RMS error, m", ylim=(25, 2000))
+    ax.set(xlabel="time (s)", title="RMS error (m)", ylim=(25, 2000))
     ax.legend(loc="upper right", bbox_to_anchor=(1, 0.9))
     return fig
 
@@ -61,8 +61,8 @@ def space_and_plan(track: Track, y: Array, estimates: Mapping[str, Array]) -> Fi
         ax.plot(*(track.position[:, :axes] / 1000).T, color=COLOURS["estimate"], linewidth=1.2, label="true path")
         for name, positions in estimates.items():
             ax.plot(*(positions[:, 0, :axes] / 1000).T, linewidth=1.2, label=name, **LOOKS[name])
-    space.set(xlabel="east, km", ylabel="north, km", zlim=(0, 10), title="in space, altitude in km")
-    plan.set(xlabel="east, km", ylabel="north, km", title="in plan")
+    space.set(xlabel="east (km)", ylabel="north (km)", zlim=(0, 10), title="in space, altitude in km")
+    plan.set(xlabel="east (km)", ylabel="north (km)", title="in plan")
     plan.set_aspect("equal", adjustable="datalim")
     for part in range(1, 6):
         middle = np.median(np.flatnonzero(track.part == part)).astype(int)
@@ -88,15 +88,15 @@ def in_plan(track: Track, y: Array, estimates: Mapping[str, Array]) -> Figure:
         ax.plot(*(track.position[inside, :2] / 1000).T, color=COLOURS["estimate"])
         for name, positions in estimates.items():
             ax.plot(*(positions[inside, 0, :2] / 1000).T, linewidth=1.3, label=name, **LOOKS[name])
-        ax.set(title=title, xlabel="east, km")
+        ax.set(title=title, xlabel="east (km)")
         ax.set_aspect("equal", adjustable="datalim")
         ax.locator_params(axis="x", nbins=3)
-    axes[0].set_ylabel("north, km")
+    axes[0].set_ylabel("north (km)")
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(estimates))
     return fig
 
 
-def by_part(parts: Sequence[str], columns: Mapping[str, Estimate], heading: str = "RMS error, m") -> Shown:
+def by_part(parts: Sequence[str], columns: Mapping[str, Estimate], heading: str = "RMS error (m)") -> Shown:
     """A table with a row for each part of the flight; columns of `rms_by_part` or `rms_difference`, value ± standard error."""
     rows: dict[str, list[Any]] = {heading: list(parts)}
     for name, one in columns.items():

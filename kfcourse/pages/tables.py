@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from kfcourse.pages.units import in_brackets
 from kfcourse.pages.verification import Shown
 
 
@@ -15,7 +16,7 @@ def table(columns: Mapping[str, Iterable[Any]], formats: Mapping[str, str] | str
 
     Parameters
     ----------
-    columns : mapping of headings (Markdown, with units) to the entries of a column
+    columns : mapping of headings (Markdown, units in brackets) to the entries of a column
         Numbers, set flush right so that decimals stand below each other; or texts, set flush left.
         A pair (value, error) is printed as value ± error.
     formats : mapping of headings to format specifications, or one for all numbers
@@ -26,8 +27,9 @@ def table(columns: Mapping[str, Iterable[Any]], formats: Mapping[str, str] | str
     Raises
     ------
     ValueError
-        If there is no column, or their lengths differ.
+        If there is no column, or their lengths differ, or a heading's or the caption's unit stands after a comma.
     """
+    in_brackets([*columns, caption])
     listed = {heading: list(entries) for heading, entries in columns.items()}
     lengths = {heading: len(entries) for heading, entries in listed.items()}
     if len(set(lengths.values())) != 1:

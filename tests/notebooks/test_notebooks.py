@@ -326,6 +326,15 @@ def test_a_failing_cell_is_named():
         execution.execute(broken, "here")
 
 
+def test_a_cell_whose_picture_cannot_be_drawn_fails_though_its_kernel_goes_on():
+    shown = "class Broken: ...\nget_ipython().display_formatter.formatters['image/png'].for_type(Broken, int)\nBroken()"
+    broken = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(source) for source in (shown, "2")])
+    with pytest.raises(NotebookFailed, match=rf"here, cell {broken.cells[0].id}"):
+        execution.execute(broken, "here")
+    broken.cells[0].metadata["tags"] = ["raises-exception"]
+    assert execution.execute(broken, "here").cells[1].outputs[0].data["text/plain"] == "2"
+
+
 # -- jobs
 
 

@@ -100,6 +100,18 @@ def test_the_picture_of_a_wide_figure_carries_one_for_telephones(style) -> None:
     assert "narrow" not in metadata
 
 
+@pytest.mark.parametrize("label", ["xlabel", "ylabel", "title"])
+def test_a_picture_whose_unit_follows_a_comma_is_not_drawn(style, label) -> None:
+    formatter = InteractiveShell.instance().display_formatter.formatters["image/png"].lookup_by_type(Figure)
+    figure = Figure(figsize=(4, 3))
+    ax = figure.subplots()
+    ax.set(**{label: "time (s)"})
+    assert formatter(figure)
+    ax.set(**{label: "time, s"})
+    with pytest.raises(ValueError, match=r"time \(s\)"):
+        formatter(figure)
+
+
 def test_the_legend_below_narrow_panels_has_room(style) -> None:
     """As that of set f, four columns wide."""
     figure = Figure(figsize=(7.2, 3.2))

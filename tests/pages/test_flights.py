@@ -56,5 +56,5 @@ def test_table_by_part(track):
     error = np.stack([0 * track.position + [3.0, 4, 0], 0 * track.position + [3.0, 4, 0]], axis=1)
     shown = by_part(["one", "two", "three", "four", "five"], {"ours": rms_by_part(error, track.part)})
     rows = shown.markdown.splitlines()
-    assert rows[0] == "| RMS error, m | ours |"
+    assert rows[0] == "| RMS error (m) | ours |"
     assert rows[-1] == "| five | 5.0 ± 0.0 |"

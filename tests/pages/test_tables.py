@@ -1,5 +1,7 @@
 """Tables and typeset equations."""
 
+import re
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -11,10 +13,10 @@ pytestmark = pytest.mark.quick
 
 
 def test_a_table_aligns_numbers_and_marks_what_is_not_there() -> None:
-    shown = table({"filter": ["a", "b"], "$D$, m²": [1.0, -2.25], "e": [(1.0, 0.125), np.nan]}, ".2f", caption="Errors")
+    shown = table({"filter": ["a", "b"], "$D$ (m²)": [1.0, -2.25], "e": [(1.0, 0.125), np.nan]}, ".2f", caption="Errors")
     assert shown.markdown == (
         '<span class="kf-caption">Errors</span>\n\n'
-        "| filter | $D$, m² | e |\n| :-- | --: | --: |\n| a | 1.00 | 1.00 ± 0.12 |\n| b | −2.25 | – |"
+        "| filter | $D$ (m²) | e |\n| :-- | --: | --: |\n| a | 1.00 | 1.00 ± 0.12 |\n| b | −2.25 | – |"
     )
     assert "| +1.0 |" in table({"D": [1.0]}, {"D": "+.1f"}).markdown
 
@@ -23,6 +25,16 @@ def test_columns_of_a_table_have_one_length() -> None:
     for columns in ({}, {"a": [1], "b": [1, 2]}):
         with pytest.raises(ValueError, match="columns of one length"):
             table(columns)
+
+
+@pytest.mark.parametrize("heading", ["time, s", "$D$, m²", "above the\nbound, %", "push: mean, m/s", r"$\lambda$, s.d."])
+def test_units_stand_in_brackets(heading) -> None:
+    bracketed = "{} ({})".format(*heading.split(", "))
+    with pytest.raises(ValueError, match=re.escape(bracketed)):
+        table({heading: [1.0]})
+    with pytest.raises(ValueError, match="stands after a comma"):
+        table({"a": [1.0]}, caption=heading)
+    table({bracketed: [1.0], "RMS error, most": [2.0], "of mean, s and m": [0.0]})
 
 
 def test_long_equations_are_broken_between_terms() -> None:

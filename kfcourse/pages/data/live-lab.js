@@ -199,7 +199,7 @@ const kfLiveLab = (root, name, given) => {
         const value = result.errors[one][step][0], part = shown ? percent(...bounds.above[one][step]) : "…";
         return `<tr><th scope="row">${titles[one]}</th><td>${isFinite(value) ? ui.short(value) : "diverges"}</td><td>${part}</td></tr>`;
       });
-      table.innerHTML = `<table class="table"><thead><tr><th scope="col">step ${step}</th><th scope="col">error variance</th><th scope="col">above the bound, %</th></tr></thead><tbody>${rows.join("")}</tbody></table>`;
+      table.innerHTML = `<table class="table"><thead><tr><th scope="col">step ${step}</th><th scope="col">error variance</th><th scope="col">above the bound (%)</th></tr></thead><tbody>${rows.join("")}</tbody></table>`;
     };
 
     return (state) => {

@@ -9,7 +9,7 @@ function kfWhoLeads(root, name, { ratios, gaps, leaders, trajectories, looks, ki
   kfFigure(root, name, first, (ui) => {
     const charts = ui.row("kf-charts");
     const bars = ui.chart(charts, {
-      title: "Error variance above the best possible, %", says: "Bars of the filters, the most accurate on top, with 95 % intervals.",
+      title: "Error variance above the best possible (%)", says: "Bars of the filters, the most accurate on top, with 95 % intervals.",
       height: 290, left: 62, x: { label: "" }, y: { label: "", range: [-names.length + 0.4, 0.6], ticks: [] },
     });
     const map = ui.chart(charts, {

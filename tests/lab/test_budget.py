@@ -1,0 +1,48 @@
+"""How many trajectories the lab takes by default: measured by a pilot, told, and left to who asks for a number."""
+
+import pytest
+from click.testing import CliRunner
+
+from kfcourse import cli
+from kfcourse.lab import budget, find_variant, lab_filters
+from kfcourse.lab.budget import PILOT, SECONDS, SIZES, STEPS, Budget, usual_runs, within
+
+pytestmark = pytest.mark.quick
+
+
+@pytest.mark.parametrize(
+    ("each", "runs"), [(0.0, 100_000), (0.99, 100_000), (1.01, 20_000), (4.9, 20_000), (5.1, 5_000), (500, 5_000)]
+)
+def test_as_many_as_there_is_time_for_and_never_none(each, runs):
+    found = within(each * SECONDS / SIZES[0])
+    assert found.runs == runs
+    assert bool(found.says) == (runs < SIZES[0])
+    if found.says:
+        assert found.says.startswith(f"{runs} trajectories: 100000 would take some") and "--runs" in found.says
+
+
+def test_a_pilot_measures_what_more_trajectories_cost(monkeypatch):
+    """The clock is the test's: nine seconds the first time, then three, and two more for more trajectories at 4 steps."""
+    model = find_variant("53").model
+    filters, ticks = lab_filters(model, ["duof", "aof-gaussian"]), iter([0.0, 9.0, 10.0, 13.0, 20.0, 25.0])
+    monkeypatch.setattr(budget.time, "process_time", lambda: next(ticks))
+    each = 2 / (PILOT[1] - PILOT[0]) * 51 / STEPS
+    assert usual_runs(filters, model, 51, designs=1) == within(each)
+    assert within(each).runs == 5000
+
+
+def test_what_is_wrong_is_left_to_the_comparison():
+    model = find_variant("53").model
+    assert usual_runs(lab_filters(model, ["duof"]), model, 5, designs=0) == Budget(SIZES[0])
+
+
+def test_the_lab_tells_why_it_takes_fewer_and_takes_what_it_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(cli, "usual_runs", lambda *given, **options: Budget(300, "300 trajectories: told so"))
+    few = ["lab", "53", "--steps", "3", "--exact-runs", "0", "--filters", "duof,aof-gaussian", "--designs", "1"]
+    for asked, runs in (([], 300), (["--runs", "400"], 400)):
+        place, numbers = tmp_path / f"r{runs}", tmp_path / f"{runs}.json"
+        result = CliRunner().invoke(cli.main, [*few, *asked, "--out", str(place), "--json", str(numbers)])
+        assert result.exit_code == 0, result.output
+        assert f'"runs": {runs},' in numbers.read_text()
+        for text in (result.output, (place / "report.html").read_text(), (place / "report.tex").read_text()):
+            assert ("told so" in text) == (runs == 300)
