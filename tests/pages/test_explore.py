@@ -98,16 +98,25 @@ def test_another_variant_has_its_own_sliders(opened):
         assert "GAOF" in rounds(opened("fig-live-lab", wrong))
 
 
-def test_ten_thousand_trajectories_in_half_a_second(opened):
-    """Of processor time of its worker alone; the least of five, for the machine may be busy."""
+PLAIN = """() => {
+    const begun = performance.now();
+    let sum = 0;
+    for (let i = 0; i < 6e6; i++) sum += Math.sqrt(-2 * Math.log(Math.random())) * Math.cos(2 * Math.PI * Math.random());
+    return sum === 0 ? 0 : performance.now() - begun;
+}"""  # 6 million normal numbers, as a page draws them without thinking
+
+
+def test_ten_thousand_trajectories_while_a_slider_moves(opened):
+    """In a third of a second where so many plain draws take as long: the machine may be slow or busy, so they are compared."""
     tab = opened("fig-live-lab")
-    found = []
+    found, plain = [], []
     for _ in range(5):
         rounds(tab)
         found.append(int(re.search(r"(\d+)\s*ms", tab.get_by_role("status").inner_text())[1]))
+        plain.append(tab.evaluate(PLAIN))
         tab.get_by_role("slider", name="Random numbers").press("ArrowRight")
         tab.wait_for_function("!document.querySelector('[data-done]').dataset.done.match('400')")
-    assert min(found) < 500
+    assert min(found) < 2.5 * min(plain)  # half of them drawn anew, seven filters designed and compared: .6 to 1
 
 
 # ---------------------------------------------------------------- correction and prediction
