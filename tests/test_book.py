@@ -27,7 +27,8 @@ TOC = yaml.safe_load((ROOT / "book" / "_toc.yml").read_text(encoding="utf-8"))
 CHAPTERS = [chapter for part in TOC["parts"] for chapter in part["chapters"]]
 SHELF = [TOC["root"], *(chapter["file"] for chapter in CHAPTERS)]
 PAGES = [*SHELF, *(section["file"] for chapter in CHAPTERS for section in chapter.get("sections", []))]
-NOTEBOOKS = [page for page in SHELF if "{code-cell}" in (ROOT / "book" / f"{page}.md").read_text(encoding="utf-8")]
+SOURCES = {page: ROOT / "book" / f"{page}.md" for page in SHELF}  # some are made with the book
+NOTEBOOKS = [page for page, source in SOURCES.items() if source.exists() and "{code-cell}" in source.read_text(encoding="utf-8")]
 LOCAL = ("file:", "data:", "blob:")
 LOADS = {"script": "src", "link": "href", "img": "src", "iframe": "src", "source": "src", "object": "data", "image": "href"}
 

@@ -485,7 +485,7 @@ def test_what_the_machine_has_not_is_said_in_a_line(call, monkeypatch, error, wo
 
 @pytest.mark.parametrize("error", [RuntimeError("double\nsubscript"), OSError(errno.ENOSPC, "No space left on device", "f")])
 def test_a_report_that_fails_keeps_ranking_and_numbers(call, tmp_path, monkeypatch, error):
-    def failing(variant, result, folder):
+    def failing(variant, result, folder, *chosen):
         (folder / "accuracy.svg").write_text("finished", encoding="utf-8")
         raise error
 
