@@ -128,6 +128,7 @@ def follow(
     times: Array,
     *,
     inputs: Inputs | None = None,
+    by: str = "tag",
     start: float = 0.0,
 ) -> Followed:
     """As `fuse`, with the innovations: each as it was when all measurements captured before it had come.
@@ -141,7 +142,7 @@ def follow(
             innovation, F = past.expected.innovation(past.event.value), past.expected.F
             told.append(Told(past.event.sensor.name, past.event.time, innovation, F.reshape(-1, *F.shape[-2:])))
 
-    return Followed(_run(dynamics, sensors, prior, observations, times, inputs, "tag", None, start, keep), told)
+    return Followed(_run(dynamics, sensors, prior, observations, times, inputs, by, None, start, keep), told)
 
 
 def _run(
