@@ -24,7 +24,7 @@ from kfcourse.lab.variants import Variant, VariantError, find_variant, read_vari
 from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.consistency import Autocorrelation, Innovations, autocorrelation
 from kfcourse.records.estimation import Likeliest, estimate
-from kfcourse.records.examination import Examination, Finding, examine, findings
+from kfcourse.records.examination import Examination, Finding, examine, findings, normal_bound
 from kfcourse.records.reading import Record, RecordError, read_measurements
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.quadrature import gauss_hermite, unscented
@@ -273,7 +273,7 @@ def _whiteness(told: Told, i: int, ax: Axes) -> Axes:
     found = _autocorrelation(told.examined, i)
     if found is not None:
         lags = np.arange(1, len(found.value) + 1)
-        bound = 1.96 * found.standard_deviation
+        bound = normal_bound() * found.standard_deviation
         ax.fill_between(lags, -bound, bound, color=ESTIMATE, alpha=0.2, linewidth=0)
         ax.plot(lags, found.value, "o-", color=MEASURED, markersize=4)
     ax.axhline(0, color="black", linewidth=0.8)

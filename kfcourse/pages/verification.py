@@ -10,6 +10,7 @@ A printed equation carries a mark that says how it was verified.  The build of t
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
@@ -124,7 +125,7 @@ def claim(sentence: str, *conditions: Any) -> Shown:
         if not np.all(condition):
             which = f" (condition {number} of {len(conditions)})" if len(conditions) > 1 else ""
             raise Unverified(f"this does not hold{which}: {sentence}")
-    return Shown(f'{sentence}\u00a0<span class="kf-claim">✓</span>', {"sentence": sentence, "equations": 0})
+    return _holds(sentence)
 
 
 def agree(sentence: str, computed: Any, expected: Any, within: float, relative: bool = True) -> Shown:
@@ -144,6 +145,11 @@ def agree(sentence: str, computed: Any, expected: Any, within: float, relative: 
     bound = within * (np.max(np.abs(expected)) if relative else 1)
     if not difference <= bound:  # a NaN is no agreement
         raise Unverified(f"differs by {difference:.3g}, more than {bound:.3g}: {sentence}")
+    return _holds(sentence)
+
+
+def _holds(sentence: str) -> Shown:
+    sentence = re.sub(r"(?<=\d)%", "\u00a0%", sentence)  # as the book writes it; Python's format leaves no space
     return Shown(f'{sentence}\u00a0<span class="kf-claim">✓</span>', {"sentence": sentence, "equations": 0})
 
 

@@ -24,6 +24,8 @@ from kfcourse.montecarlo.experiment import states
 from kfcourse.records.evidence import likelihood
 from kfcourse.records.smoothing import smooth
 
+TAILS = np.array([(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+
 
 class Examination(NamedTuple):
     """What a filter says of a record.
@@ -108,6 +110,11 @@ def _noise_of(cov: Array, scale: Array, what: str) -> None:
         raise ValueError(f"{what} has a negative variance, {variance.min():g}: look at its formula, and at the inputs there")
 
 
+def normal_bound() -> float:
+    """Within so many standard deviations a normal number is with the confidence of all intervals: 1.96."""
+    return float(scipy.special.ndtri(TAILS[1]))
+
+
 def findings(told: Examination, run: int = 0) -> list[Finding]:
     """Size, mean and neighbours of a record's innovations; those that a gate refused are left out.
 
@@ -115,17 +122,15 @@ def findings(told: Examination, run: int = 0) -> list[Finding]:
     those of normal laws for sums of many terms: thirty measurements are enough.  Under weights that are neither 0 nor 1 none of
     this holds; nothing is found of a record that was refused altogether.
     """
-    used = told.weight[:, run] > 0
+    used, z = told.weight[:, run] > 0, normal_bound()
     if not used.any():
         return []
     value, F = told.found.value[used, run], told.found.cov[used, run]
-    z = float(scipy.special.ndtri((1 + CONFIDENCE) / 2))
     degrees = (~np.isnan(value)).sum(axis=-1)
     size = _sizes(value, F).sum() / degrees.sum()
     mean, variance = _below(degrees, told.edge)
     scale = variance.sum() / mean.sum()
-    tails = np.array([(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
-    low, high = scale * scipy.special.gammaincinv(mean.sum() / scale, tails) / degrees.sum()
+    low, high = scale * scipy.special.gammaincinv(mean.sum() / scale, TAILS) / degrees.sum()
     result = [Finding("size", float(size), float(low), float(high))]
     for i, name in enumerate(_names(value.shape[-1])):
         there = ~np.isnan(value[:, i])

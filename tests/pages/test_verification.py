@@ -107,6 +107,7 @@ def test_claims_hold_or_raise() -> None:
     assert claim("The gain is below **0.7**.", 0.6 < 0.7, np.array([True, True])).markdown.startswith(
         "The gain is below **0.7**.\u00a0<span"
     )
+    assert claim(f"{0.62:.0%} of them, or 3 %.", True).markdown.startswith("62\u00a0% of them, or 3 %.")
     with pytest.raises(Unverified, match=r"condition 2 of 2.*The gain"):
         claim("The gain is below 0.7.", True, np.array([True, False]))
 
