@@ -221,7 +221,7 @@ def test_the_lab_says_so_in_its_reports(tmp_path, monkeypatch, meter, more, name
     monkeypatch.chdir(tmp_path)
     text = f'[variants.c]\nstate = "x/(1 + x**2) + v"\nmeter = "{meter}"\n{more}'
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
-    call = ["lab", "c", "--variants", "mine.toml", "--runs", "300", "--steps", "4", "--exact-runs", "0", "--designs", "1"]
+    call = ["lab", "c", "--variants", "mine.toml", "--runs", "300", "--steps", "4", "--slow-runs", "0", "--designs", "1"]
     result = CliRunner().invoke(main, [*call, "--report", language, "--out", "r", "--json", "r.json"])
     assert result.exit_code == 0, result.output
     told = next(line for line in result.output.splitlines() if "no closed form: means over normal laws by Gauss-Hermite" in line)
