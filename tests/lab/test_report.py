@@ -349,3 +349,15 @@ def test_a_reader_is_told_where_nothing_is_told_and_whose_accuracy_hangs_on_one_
         write_handin(variants["53"], result, tmp_path, language)
         text = (tmp_path / "handin.html").read_text(encoding="utf-8")
         assert told in text and other not in text
+
+
+def test_without_a_bound_nothing_is_said_of_trajectories_with_the_exact_filter(variants, tmp_path):
+    """Errors of so few trajectories are skewed, but no single one makes a tenth of them: no share, no exact AOF in the words."""
+    model = variants["53"].model
+    result = compare(lab_filters(model, ["aof-gaussian", "duof"]), model, 300, 4, 1, slow_runs=0, wide=1, progress=False)
+    (told,) = remarks_in_words(result)
+    assert "rare trajectories decide what is found" in told and "trajectories would do" in told
+    write_handin(variants["53"], result, tmp_path, "ru")
+    both = told + (tmp_path / "handin.html").read_text(encoding="utf-8")
+    assert "результат определяют редкие траектории" in both
+    assert not any(one in both for one in ("exact AOF", "с точным АОФ", "up to 0 %", "до 0 %"))
