@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 
-EQUATION = re.compile(r"^\s{2,}\S|\s=\s|\S {2,}\S|->")
+EQUATION = re.compile(r"^\s{2,}\S|\s=\s|[^\s.:;!?] {2,}\S|->")  # two spaces after a full stop are between sentences
 SPECIAL = re.compile(r"(?!^\s*\* )([*|\\]|(?<=\w)_(?=\W|$))")
 QUOTED = re.compile(r"(`+[^`]+`+)")
 

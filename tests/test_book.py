@@ -332,6 +332,40 @@ def test_a_reference_shows_what_it_leads_to(window):
     assert problems == []
 
 
+def test_a_link_to_what_is_folded_opens_the_fold(window):
+    """From another page, and on the same one; on paper all is open (below)."""
+    tab, problems = window
+    show_on(tab, "screen", 1280)
+    tab.goto((HTML / "integration.html").as_uri())
+    folds = tab.locator("details.kf-more")
+    assert folds.count() > 1 and not any(folds.evaluate_all("all => all.map((e) => e.open)"))
+    for name in ("fig-integration-range", "fig-integration-car"):
+        assert not tab.locator(f"#{name}").is_visible()
+        tab.evaluate("name => { location.hash = name; }", name)
+        tab.locator(f"#{name}").wait_for()
+    tab.goto("about:blank")
+    tab.goto((HTML / "integration.html").as_uri() + "#fig-integration-car")
+    tab.locator("#fig-integration-car").wait_for()
+    assert folds.evaluate_all("all => all.map((e) => e.open)") == [False, True]
+    assert problems == []
+
+
+def test_what_stands_there_before_the_fonts_are_loaded_is_as_wide(window):
+    """So that lines stay where they are: a set page moved by a third of the screen."""
+    tab, _ = window
+    read(tab, "comparison")
+    wide = """async (name) => {
+        await document.fonts.load(`20px "${name}"`);
+        const context = document.createElement("canvas").getContext("2d");
+        context.font = `20px "${name}", monospace`;
+        return context.measureText(document.querySelector("article").textContent.replace(/[^ -~]/g, "")).width;
+    }"""
+    for theirs, ours in (("Before Serif", "Source Serif 4"), ("Before Sans", "Source Sans 3")):
+        if not tab.evaluate("name => document.fonts.load(`20px '${name}'`).then((all) => all.length, () => 0)", theirs):
+            pytest.skip(f"no font of this machine can stand in for {ours}")
+        assert tab.evaluate(wide, theirs) == pytest.approx(tab.evaluate(wide, ours), rel=0.03)
+
+
 def test_what_a_link_to_another_page_leads_to_is_shown_too(window):
     """Equations are set, terms say what they mean, in both languages; nothing is loaded but what is there."""
     tab, problems = window

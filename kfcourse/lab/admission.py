@@ -24,7 +24,7 @@ from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
-from kfcourse.montecarlo.subset import FEWEST
+from kfcourse.montecarlo.slow_filters import FEWEST
 from kfcourse.reasons import Reason
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -143,9 +143,7 @@ def _failure(model: Model | JumpModel, one: Filter | Design, steps: int) -> str:
     """What goes wrong on a few hundred trajectories; empty if nothing."""
     fast = [admission.one for admission in admissions(model, ["duof"]) if admission.one] if one.slow else []
     try:
-        found = compare(
-            [*fast, one], model, RUNS, steps, seed=1, subset_runs=SLOW, subset_seconds=SECONDS, threads=1, progress=False
-        )
+        found = compare([*fast, one], model, RUNS, steps, seed=1, slow_runs=SLOW, slow_seconds=SECONDS, threads=1, progress=False)
     except (NotFinite, np.linalg.LinAlgError) as error:
         with np.errstate(all="ignore"):
             finite = np.isfinite(simulate(model, RUNS, steps, seed=1).x).all()

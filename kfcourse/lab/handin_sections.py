@@ -83,7 +83,7 @@ class StudentReport:
             designed = ", ".join(map(self.title, result.replicas.names))
             sentences.append(filled(words["designs"], filters=designed, designs=result.designs))
         if result.has_bound:
-            sentences.append(filled(words["exact"], runs=result.subset_runs))
+            sentences.append(filled(words["exact"], runs=result.slow_runs))
         yield Block("text", " ".join(sentences))
         if result.left_out:
             yield Block("text", words["left_out"])

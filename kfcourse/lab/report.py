@@ -116,7 +116,7 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
         "runs": result.runs,
         "steps": result.steps,
         "seed": result.seed,
-        "exact_runs": result.subset_runs,
+        "slow_runs": result.slow_runs,
         "left_out": dict(result.left_out),
         "by_particles": dict(result.replaced),
         "error_variance": {name: e.value.tolist() for name, e in estimates.items()},
@@ -183,7 +183,7 @@ def recognised_modes(result: Comparison) -> Recognised | None:
     if not isinstance(model, JumpModel):
         return None
     runs = min(result.runs, RECOGNISED)
-    short = {EXACT} if result.subset_runs < runs // SLOW else set()
+    short = {EXACT} if result.slow_runs < runs // SLOW else set()
     names = [name for name in result.available if name in WITH_MODES and name not in {*result.replaced, *short}]
     known = [one.one for one in admissions(model, names) if isinstance(one.one, Filter)]
     return recognised(known, model, runs, result.steps, result.seed) if known else None
@@ -281,7 +281,7 @@ def remarks(result: Comparison) -> Iterator[tuple[str, dict[str, Any]]]:
     if names := [name for name, steps in bad.items() if steps.any()]:
         part = max(float(result.heavy(name)[bad[name]].max()) for name in names)
         more = max(result.missing(gaps[name], name) for name in names)
-        runs, exact = (f"{float(f'{more * one:.1g}'):.0f}" for one in (result.runs, result.subset_runs))
+        runs, exact = (f"{float(f'{more * one:.1g}'):.0f}" for one in (result.runs, result.slow_runs))
         told = {"part": f"{100 * part:.0f}", "runs": runs, "exact": exact}
         yield "heavy", {"names": names, "steps": np.any([bad[name] for name in names], axis=0), **told}
 

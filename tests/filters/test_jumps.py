@@ -589,7 +589,7 @@ def test_who_wins():
         4000,
         10,
         1,
-        subset_runs=200,
+        slow_runs=200,
         progress=False,
         threads=1,
     )

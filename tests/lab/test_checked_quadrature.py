@@ -127,7 +127,7 @@ def test_who_chooses_a_filter_is_told():
 def test_the_lab_says_so_in_its_reports(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").write_text('[variants.c]\nstate = "x/(1 + x**2) + v"\nmeter = "x**3 + x + w"\n', encoding="utf-8")
-    call = ["lab", "c", "--variants", "mine.toml", "--runs", "300", "--steps", "4", "--exact-runs", "0", "--designs", "1"]
+    call = ["lab", "c", "--variants", "mine.toml", "--runs", "300", "--steps", "4", "--slow-runs", "0", "--designs", "1"]
     result = CliRunner().invoke(main, [*call, "--report", "ru", "--out", "r", "--json", "r.json"])
     assert result.exit_code == 0, result.output
     assert "Gaussian filters: no closed form: means over normal laws by Gauss-Hermite quadrature" in result.output

@@ -34,7 +34,7 @@ WORDS = tomllib.loads((resources.files("kfcourse.lab") / "handin.toml").read_tex
 @pytest.fixture(scope="module")
 def result():
     model = load_variants()["53"].model
-    return compare(lab_filters(model, [*LAB, "aof-exact"]), model, 2000, 4, 1, subset_runs=200, designs=2, progress=False)
+    return compare(lab_filters(model, [*LAB, "aof-exact"]), model, 2000, 4, 1, slow_runs=200, designs=2, progress=False)
 
 
 @pytest.fixture(scope="module")
