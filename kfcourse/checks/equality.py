@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Container, Mapping, Sequence
+from decimal import Decimal, Inexact, localcontext
 from functools import lru_cache
 from typing import Any
 
@@ -18,7 +19,7 @@ from kfcourse.symbolic.formula import symbol
 
 DIGITS = 60  # of the values of formulas
 AGREE = sp.Float(10) ** -30  # relative difference of equal formulas: half of the digits may be lost by cancellation
-FLOAT_DIGITS = 10**12  # numerators and denominators from here on are a float's: 1/3 and 2*np.pi have some 15 digits in Python
+FLOAT_DIGITS = 10, 15  # of a decimal: as many are not typed but computed; 1/3 and 2*np.pi have some 15 in Python
 FLOATS_AGREE = sp.Float(10) ** -12  # of formulas with such numbers: 15 digits, of which terms that cancel may take three
 POINTS = 6
 ROUNDED = 1e-9  # relative size of an imaginary part that rounding explains
@@ -224,7 +225,14 @@ def _entire(formula: sp.Expr) -> bool:
 @lru_cache(maxsize=20_000)
 def _has_floats(formula: sp.Expr) -> bool:
     """Whether a number in it was a float: 0.9 is 9/10, but 0.333333333333333 is what Python makes of 1/3."""
-    return any(max(abs(one.p), one.q) >= FLOAT_DIGITS for one in formula.atoms(sp.Rational))
+    least, most = FLOAT_DIGITS
+    with localcontext(prec=most) as context:
+        for one in formula.atoms(sp.Rational):
+            context.clear_flags()
+            decimal = (Decimal(one.p) / Decimal(one.q)).normalize()
+            if not context.flags[Inexact] and len(decimal.as_tuple().digits) >= least:
+                return True
+    return False
 
 
 def _by_name(formulas: Sequence[sp.Expr]) -> list[sp.Expr]:
