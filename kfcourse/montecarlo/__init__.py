@@ -5,7 +5,7 @@ ensemble     the trajectories that a seed stands for, drawn in blocks
 designing    coefficients of DUOF, FOS, MFOS: regressions over an ensemble
 experiment   `run`, `predictions`, `compare`: splits the seed into designing and comparing, runs all filters together
 blocks       one block of trajectories: all filters advance together
-subset       the slow filters, on as many of the trajectories as a budget allows;  parallel: on all cores
+slow_filters on as many of the trajectories as a budget allows;  parallel: on all cores
 statistics   means over batches of trajectories, standard errors
 two_phase    the same where slow filters ran on a part of them, and where filters were designed several times
 comparison   `Comparison`: error variances, paired differences, ranking, distance from the exact filter
