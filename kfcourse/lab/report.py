@@ -268,13 +268,13 @@ REMARKS = {
     "and means leave these steps out.",
     "doubtful": "At {steps} there is no bound: what ran in the place of the exact AOF errs by more than a tenth of its variance "
     "itself, or another filter is more accurate. Means leave these steps out.",
-    "heavy": "{names}: at {steps} rare trajectories make what the accuracy is found from, one trajectory up to {part} % of it. "
+    "heavy": "{names}: at {steps} the accuracy rests on a few rare trajectories: a single one makes up to {part} % of the sum. "
     "The interval there cannot be trusted; about {runs} trajectories, {exact} of them with the exact AOF, would do.",
-    "skewed": "{names}: at {steps} rare trajectories decide what is found. "
+    "skewed": "{names}: at {steps} the accuracy rests on a few rare trajectories. "
     "The interval there cannot be trusted; about {runs} trajectories, {exact} of them with the exact AOF, would do.",
-    "heavy_alone": "{names}: at {steps} rare trajectories make what the accuracy is found from, one trajectory up to {part} % of "
-    "it. The interval there cannot be trusted; about {runs} trajectories would do.",
-    "skewed_alone": "{names}: at {steps} rare trajectories decide what is found. "
+    "heavy_alone": "{names}: at {steps} the accuracy rests on a few rare trajectories: a single one makes up to {part} % of the sum. "
+    "The interval there cannot be trusted; about {runs} trajectories would do.",
+    "skewed_alone": "{names}: at {steps} the accuracy rests on a few rare trajectories. "
     "The interval there cannot be trusted; about {runs} trajectories would do.",
 }
 
