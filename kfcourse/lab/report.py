@@ -272,8 +272,8 @@ REMARKS = {
     "The interval there cannot be trusted; about {runs} trajectories, {exact} of them with the exact AOF, would do.",
     "skewed": "{names}: at {steps} the accuracy rests on a few rare trajectories. "
     "The interval there cannot be trusted; about {runs} trajectories, {exact} of them with the exact AOF, would do.",
-    "heavy_alone": "{names}: at {steps} the accuracy rests on a few rare trajectories: a single one makes up to {part} % of the sum. "
-    "The interval there cannot be trusted; about {runs} trajectories would do.",
+    "heavy_alone": "{names}: at {steps} the accuracy rests on a few rare trajectories: a single one makes up to {part} % of the "
+    "sum. The interval there cannot be trusted; about {runs} trajectories would do.",
     "skewed_alone": "{names}: at {steps} the accuracy rests on a few rare trajectories. "
     "The interval there cannot be trusted; about {runs} trajectories would do.",
 }
