@@ -2,7 +2,7 @@ r"""A gate before a filter: measurements too far from what it expects are refuse
 
 If the filter is right, the square of its innovation in units of its covariance F is chi-squared with p degrees of freedom,
 
-    nu^T F^-1 nu <= gamma,      P(chi^2_p <= gamma) = probability
+    nu^T F^-1 nu <= gamma,      P(chi^2_p <= gamma) = `probability`
 
 and a measurement beyond gamma is taken for a fault and treated as missing.  That has a danger of its own.  Where the object has
 done what the model does not know of, every measurement lies beyond the gate, the filter refuses them all, and never hears that

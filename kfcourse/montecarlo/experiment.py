@@ -1,5 +1,7 @@
 """The Monte Carlo engine: all filters on common trajectories, statistics on the fly.
 
+::
+
     compare(filters, model, runs, steps, seed) -> Comparison
 
 designs the filters that need it on one ensemble, runs all of them on another, and keeps sums over

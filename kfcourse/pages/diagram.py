@@ -1,5 +1,7 @@
 """Block diagrams (структурные схемы) from a description: boxes, adders, nodes and arrows drawn with matplotlib.
 
+::
+
     block_diagram({"gain": Block("$p_k$", 0, 0), "sum": Block("", 2, 0, kind="adder")}, [Arrow("gain", "sum", "$u_k$")], ax)
 
 Positions and sizes are in units of the axes, which `block_diagram` fits to the drawing; labels may be LaTeX.

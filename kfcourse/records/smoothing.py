@@ -3,7 +3,7 @@ r"""One smoother for every filter with structural functions: the past of a recor
 A filter's estimate z_k uses y_0, ..., y_k.  What the measurements after it tell of x_k comes to it through x_{k+1}, and all that
 takes is Cov(x_k, x_{k+1}).  If x_k ~ N(z, p), it is p A^T with A = dtau/dz, whatever the function a: by Stein's lemma
 
-    M (x - z) a(x, v)^T = p M (da/dx)^T = p (d M a / dz)^T
+    M[(x - z) a(x, v)^T] = p M[da/dx]^T = p (d M[a] / dz)^T
 
 The slope of the structural function stands to the object as G = dh/dm stands to the meter.  So the smoother of Rauch, Tung and
 Striebel (`kfcourse.linear.smoothing`) is at the same time the extended, the unscented, the quadrature and the normal one.
@@ -42,7 +42,7 @@ from kfcourse.symbolic.structure import Structure
 def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     """The states given all measurements of a record: the fixed-interval smoother of a filter.
 
-    S = p A^T Psi'^+,   z^s = z + S (z'^s - lambda'),   p^s = p + S (p'^s - Psi') S^T,      ' : at the next step
+    S = p A^T Psi'^+,   z^s = z + S (z'^s - lambda'),   p^s = p + S (p'^s - Psi') S^T,      primes: at the next step
 
     Parameters
     ----------
