@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import contents
+import formulas
 from docutils import nodes
 from sphinx.transforms.post_transforms import SphinxPostTransform
 from sphinx.util.math import get_node_equation_number
@@ -20,6 +21,7 @@ from sphinx.writers.html5 import HTML5Translator
 
 HERE = Path(__file__).resolve().parent
 NUMBER = re.compile(r"(?:(?<=>)|^)\s*\d+(\.\d+)*\.\s")  # of a section
+SIZE = re.compile(r"width: (\d+)px; height: (\d+)px;")
 STAR = "★"
 
 
@@ -60,6 +62,14 @@ class Translator(HTML5Translator):
         if isinstance(node, nodes.math_block):  # takes the focus and has a name: page.js gives both to the box that MathJax makes
             name = f"Formula {get_node_equation_number(self, node)}" if node["number"] else "Formula"
             attributes |= {"tabindex": "0", "role": "group", "aria-label": name}
+        elif isinstance(node, nodes.math) and tagname == "span":
+            attributes["style"] = f"--wide: {formulas.width(node.astext()):.1f}em"
+        elif tagname == "img":  # the room that it will take, and none is loaded before the reader comes near
+            if size := SIZE.fullmatch(attributes.get("style", "")):
+                del attributes["style"]
+                attributes |= {"width": size[1], "height": size[2]}
+            if node is not self.document.next_node(nodes.image):
+                attributes["loading"] = "lazy"
         return super().starttag(node, tagname, suffix, empty, **attributes)
 
     def visit_title(self, node: nodes.title) -> None:

@@ -20,7 +20,7 @@ from kfcourse.lab.budget import SECONDS, SIZES, Budget, usual_runs
 from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
 from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
-from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, has_bound, title
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, OF_BEST, has_bound, title
 from kfcourse.lab.variants import STEPS, find_variant
 from kfcourse.listing import VARIANTS
 from kfcourse.montecarlo.comparison import EXACT, Comparison
@@ -148,8 +148,10 @@ def lab(
     for one in found:
         for warning in one.warnings:
             click.echo(f"Warning: {title(one.name)}: {warning}", err=True)
-    for remark in dict.fromkeys(remark for one in found if one.name.endswith("-gaussian") for remark in one.remarks):
-        click.echo(f"Gaussian filters: {remark}", err=True)
+    of_functions = [one for one in found if one.name.endswith("-gaussian") or one.name in OF_BEST]
+    for remark in dict.fromkeys(remark for one in of_functions for remark in one.remarks):
+        whose = ", ".join(title(one.name) for one in of_functions if remark in one.remarks)
+        click.echo(f"{whose}: {remark}", err=True)
     if len(refused) == len(found):
         raise click.ClickException(
             "; ".join(f"{name}: {reason}" for name, reason in refused.items())

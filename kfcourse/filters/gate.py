@@ -84,8 +84,9 @@ def gated(one: Filter, probability: float = 0.999, patience: int | None = 5, str
 
     Examples
     --------
+    >>> import numpy as np
     >>> from kfcourse import Model, run
-    >>> from kfcourse.filters import kalman_filter
+    >>> from kfcourse.filters import gated, kalman_filter
     >>> one = kalman_filter(Model.define("x + 0.1*v", "x + w"))
     >>> [round(run(each, np.array([0.1, 0.0, 90.0])).mean[-1].item(), 3) for each in (one, gated(one))]
     [23.247, 0.033]

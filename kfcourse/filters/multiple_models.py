@@ -223,9 +223,9 @@ def moving_alike(structures: Sequence[Structure]) -> list[int]:
 
 
 def _object(one: Structure) -> object:
-    """What tau and Theta hang on; without formulas they are nobody else's."""
+    """What tau and Theta hang on; of structures that do not tell they are nobody else's."""
     if one.formulas is None:
-        return id(one)
+        return one.moving or id(one)
     known = one.model.known
     formulas = [one.formulas.functions[name].subs(one.model.values) for name in ("tau", "Theta")]
     return one.name, *formulas, known.interval, tuple(known.inputs.items())

@@ -135,7 +135,7 @@ class StudentReport:
         if not alone:
             yield words["nobody_leads"]
         unsure = [k for k, (_, others, _) in enumerate(verdicts) if others]
-        if unsure:
+        if alone and unsure:  # without a leader it is every step, as has been said
             yield filled(words["together"], at=self.at(unsure))
         last = [worst for _, _, worst in verdicts if worst]
         if last:

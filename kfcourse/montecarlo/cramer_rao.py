@@ -51,6 +51,8 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: Seed) -> Array:
 
     Examples
     --------
+    >>> from kfcourse import Model
+    >>> from kfcourse.montecarlo.cramer_rao import posterior_bound
     >>> posterior_bound(Model.define("0.9*x + v", "x + 2*w"), runs=10, steps=2, seed=1).ravel().round(4).tolist()
     [0.8, 1.1671]
     """

@@ -91,6 +91,7 @@ def block_diagram(blocks: Mapping[str, Block], arrows: Sequence[Arrow], ax: Axes
     Examples
     --------
     >>> from matplotlib.figure import Figure
+    >>> from kfcourse.pages.diagram import Arrow, Block, block_diagram
     >>> parts = {"x": Block("$x$", 0, 0, 0.5, kind="text"), "gain": Block("$K$", 2, 0)}
     >>> ax = block_diagram(parts, [Arrow("x", "gain")], Figure().add_subplot())
     """

@@ -92,6 +92,7 @@ def estimate(
 
     Examples
     --------
+    >>> from kfcourse.records import estimate
     >>> from kfcourse.scenarios.benchmarks import local_level, nile
     >>> found = estimate(local_level(q=1000, r=10000), nile(), ["q", "r"], positive=["q", "r"])
     >>> [round(value, 1) for value in found.value.tolist()], round(found.log_likelihood, 4)

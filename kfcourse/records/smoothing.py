@@ -66,7 +66,9 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
 
     Examples
     --------
-    >>> from kfcourse import Model, linearised
+    >>> import numpy as np
+    >>> from kfcourse import Model, linearised, smooth
+    >>> from kfcourse.filters import aof
     >>> walk = Model.define("x + v", "x + w")
     >>> [round(z, 3) for z in smooth(aof(linearised(walk)), np.array([1.0, 2.0, np.nan, 4.0])).mean.ravel().tolist()]
     [0.944, 1.833, 2.556, 3.278]
@@ -94,8 +96,10 @@ def smoothing_error(one: Filter, y: Array, lag: int | None = None) -> Array:
 
     Examples
     --------
+    >>> import numpy as np
     >>> from kfcourse import Model
     >>> from kfcourse.filters import pointmass
+    >>> from kfcourse.records import smoothing_error
     >>> y, model = np.array([0.5, 1.0]), Model.define("sin(x) + 0.3*v", "x + 0.1*w")
     >>> bool((smoothing_error(pointmass(model, accuracy=1e-6), y) < 1e-6).all())
     True

@@ -52,6 +52,8 @@ class GaussianMoments:
 
     Examples
     --------
+    >>> import sympy as sp
+    >>> from kfcourse import GaussianMoments
     >>> x, m = sp.symbols("x m", real=True)
     >>> d = sp.Symbol("d", positive=True)
     >>> law = GaussianMoments([x], [m], sp.Matrix([[d]]))

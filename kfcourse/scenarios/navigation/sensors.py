@@ -149,6 +149,7 @@ class Sensor:
 
         Examples
         --------
+        >>> from kfcourse.scenarios.navigation import Sensor
         >>> Sensor.define("range", ["s", "h", "V"], "sqrt(s**2 + h**2) + w", variance=100.0, period=0.25).model.p
         1
         """
