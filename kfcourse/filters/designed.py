@@ -25,7 +25,7 @@ from kfcourse.symbolic.structure import Structure
 class Affine(NamedTuple):
     """The best affine predictor of a target from a regressor, and what it leaves unexplained.
 
-    target ~ matrix @ regressor + offset,  Cov(target - prediction) = residual
+    `target` ≈ `matrix` `regressor` + `offset`,   Cov(`target` - `prediction`) = `residual`
     """
 
     matrix: Matrices
@@ -76,7 +76,7 @@ class Scatter(NamedTuple):
     def regression(self, size: int) -> Affine:
         """Least squares of the first `size` components on the rest.
 
-        matrix = Cov(t, r) Cov(r)^+,  offset = M t - matrix M r,  residual = Cov(t) - matrix Cov(t, r)^T
+        `matrix` = Cov(t, r) Cov(r)^+,  `offset` = M[t] - `matrix` M[r],  `residual` = Cov(t) - `matrix` Cov(t, r)^T
         """
         cov = self.scatter / self.size
         cross = cov[:size, size:]

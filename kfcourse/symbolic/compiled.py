@@ -1,8 +1,12 @@
 """The third printer: the straight-line programs of `codegen.lower` as loops that numba compiles (`pip install kfcourse[fast]`).
 
+::
+
     loop("step", {"y": y, "z": z}, {"next": a*z + g*y}, [a, g])
 
 prints a function of one pass over an ensemble of scalars,
+
+::
 
     step(c, y, z, next):    for each i:  next[i] from y[i], z[i] and the constants c,
 

@@ -86,7 +86,7 @@ def test_a_comparison():
     model = SCALAR["53"]
     filters = [aof(gaussian(model)), aof(unscented(model)), duof(model), fos(gaussian(model))]
     plain, quick = (
-        compare(filters, model, 3000, STEPS, 1, wide=2.0, designs=2, subset_runs=0, progress=False, compiled=which)
+        compare(filters, model, 3000, STEPS, 1, wide=2.0, designs=2, slow_runs=0, progress=False, compiled=which)
         for which in (False, True)
     )
     for name in plain.names:
@@ -172,7 +172,7 @@ def test_without_numba_it_is_said_what_is_missing(monkeypatch):
     model = SCALAR["53"]
     with pytest.raises(ValueError, match=r"compiled=True needs numba: pip install 'kfcourse\[fast\]', or leave it out"):
         compare([aof(gaussian(model))], model, 100, 2, 1, compiled=True)
-    assert compare([aof(gaussian(model))], model, 100, 2, 1, subset_runs=0).runs == 100
+    assert compare([aof(gaussian(model))], model, 100, 2, 1, slow_runs=0).runs == 100
 
 
 def test_a_second_process_finds_what_was_compiled(tmp_path):

@@ -38,7 +38,7 @@ def test_what_is_wrong_is_left_to_the_comparison():
 
 def test_the_lab_tells_why_it_takes_fewer_and_takes_what_it_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(cli, "usual_runs", lambda *given, **options: Budget(300, "300 trajectories: told so"))
-    few = ["lab", "53", "--steps", "3", "--exact-runs", "0", "--filters", "duof,aof-gaussian", "--designs", "1"]
+    few = ["lab", "53", "--steps", "3", "--slow-runs", "0", "--filters", "duof,aof-gaussian", "--designs", "1"]
     for asked, runs in (([], 300), (["--runs", "400"], 400)):
         place, numbers = tmp_path / f"r{runs}", tmp_path / f"{runs}.json"
         result = CliRunner().invoke(cli.main, [*few, *asked, "--out", str(place), "--json", str(numbers)])
