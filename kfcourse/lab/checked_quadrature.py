@@ -37,7 +37,7 @@ ORDERS = (2, 3, 5, 7, 10, 20, 40, 80, 160)
 # error variance other by 2 q of itself at most, 0.02 %.
 CLOSE = 1e-4
 RUNS, STEPS = 100, 20  # of the pilot
-MOST = 400  # points together: beyond it a comparison takes hours
+MOST = 200  # points together: with more, 5,000 trajectories take a quarter of an hour (343 points, D3)
 PIECE = 2**19  # evaluations at once: arrays of some megabytes
 
 Law = TypeVar("Law", Gaussian, Measurement)
