@@ -16,10 +16,10 @@ import numpy as np
 
 from kfcourse import Model, load_variants
 from kfcourse.lab.short_names import lab_filters
-from kfcourse.montecarlo.comparison import Subset
+from kfcourse.montecarlo.comparison import SlowPart
 from kfcourse.montecarlo.ensemble import Ensemble
 from kfcourse.montecarlo.parallel import cores
-from kfcourse.montecarlo.subset import run_subset
+from kfcourse.montecarlo.slow_filters import run_slow_filters
 
 
 def processor_seconds() -> float:
@@ -28,17 +28,17 @@ def processor_seconds() -> float:
     return sum(one.ru_utime + one.ru_stime for one in used)
 
 
-def timed(model: Model, runs: int, steps: int, jobs: int) -> tuple[float, float, Subset]:
+def timed(model: Model, runs: int, steps: int, jobs: int) -> tuple[float, float, SlowPart]:
     """Seconds by the clock and by the processors, and what was found."""
     fast, slow = lab_filters(model, ["aof-linearised", "aof-exact"])
     ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(1), 1.0)
     start, used = time.perf_counter(), processor_seconds()
-    found, _ = run_subset([fast], [slow], ensemble, runs, None, None, jobs, False)
+    found, _ = run_slow_filters([fast], [slow], ensemble, runs, None, None, jobs, False)
     assert found is not None
     return time.perf_counter() - start, processor_seconds() - used, found
 
 
-def same(one: Subset, other: Subset) -> bool:
+def same(one: SlowPart, other: SlowPart) -> bool:
     """Whether all sums are, bit by bit."""
     fields = type(one.sums).__dataclass_fields__
     return all(np.array_equal(getattr(one.sums, name), getattr(other.sums, name), equal_nan=True) for name in fields)
@@ -55,7 +55,7 @@ def main() -> None:
     print(f"{'variant':>8} {'cores':>6} {'s':>8} {'CPU-s':>8} {'ratio':>6}  numbers")
     for name in options.variants:
         model = load_variants()[name].model
-        times: dict[int, list[tuple[float, float, Subset]]] = {jobs: [] for jobs in options.cores}
+        times: dict[int, list[tuple[float, float, SlowPart]]] = {jobs: [] for jobs in options.cores}
         for _ in range(options.repeats):
             for jobs in options.cores:
                 times[jobs].append(timed(model, options.runs, options.steps, jobs))

@@ -1,6 +1,6 @@
 """How often the 95 % intervals of a comparison hold the truth, over many seeds.
 
-    .venv/bin/python benchmarks/intervals.py [--variants 53 2] [--seeds 400] [--runs 100000] [--exact-runs 4000] [--steps 12]
+    .venv/bin/python benchmarks/intervals.py [--variants 53 2] [--seeds 400] [--runs 100000] [--slow-runs 4000] [--steps 12]
 
 For every variant that is shipped: the share of the intervals of `difference` and, with an exact filter, of `gap` and `bound` that
 hold the truth, over seeds, filters and steps, and for the step and filter where it is lowest; with what chance one of so many
@@ -121,7 +121,7 @@ def covered(found: list[tuple[Estimate, np.ndarray]], unit: np.ndarray | float) 
     return 1 - missed.sum() / counted.sum(), (hits / counted[some]).min(), so_bad, high.sum() / max(missed.sum(), 1), told
 
 
-def line(name: str, seeds: int, runs: int, exact_runs: int, steps: int, jobs: int) -> str:
+def line(name: str, seeds: int, runs: int, slow_runs: int, steps: int, jobs: int) -> str:
     model, start = find_variant(name).model, time.monotonic()
     names = JUMP_LAB if isinstance(model, JumpModel) else LAB
     filters = [found.one for found in admissions(model, [*names, EXACT]) if found.one is not None]
@@ -130,7 +130,7 @@ def line(name: str, seeds: int, runs: int, exact_runs: int, steps: int, jobs: in
     filters = [ready.get(one.name, one) for one in filters]
 
     def one(seed: int) -> dict[str, tuple[Estimate, np.ndarray]]:
-        return estimates(compare(filters, model, runs, steps, seed, subset_runs=exact_runs, threads=1, progress=False))
+        return estimates(compare(filters, model, runs, steps, seed, slow_runs=slow_runs, threads=1, progress=False))
 
     found = joblib.Parallel(jobs, prefer="threads" if jobs == 1 else None)(
         joblib.delayed(one)(seed) for seed in range(1, seeds + 1)
@@ -149,14 +149,14 @@ def line(name: str, seeds: int, runs: int, exact_runs: int, steps: int, jobs: in
 def main() -> None:
     parser = argparse.ArgumentParser(description="Coverage of the intervals of a comparison")
     parser.add_argument("--variants", nargs="+", default=[*load_variants(), *WITH_MODES])
-    for option, default in (("--seeds", 400), ("--runs", 100_000), ("--exact-runs", 4000), ("--steps", 12), ("--jobs", 2)):
+    for option, default in (("--seeds", 400), ("--runs", 100_000), ("--slow-runs", 4000), ("--steps", 12), ("--jobs", 2)):
         parser.add_argument(option, type=int, default=default)
     args = parser.parse_args()
-    print(f"{args.seeds} seeds, {args.runs} trajectories, the exact AOF on {args.exact_runs}, {args.steps} steps; nominal 0.95")
+    print(f"{args.seeds} seeds, {args.runs} trajectories, the exact AOF on {args.slow_runs}, {args.steps} steps; nominal 0.95")
     part = f"{'mean':>7} {'worst':>6} {'chance':>6} {'low':>5} {'told':>5}"
     print(f"{'':>8}{'gap':>33} |{'difference':>33} |{'bound':>33} |\n{'variant':>8}{part} |{part} |{part} | {'s':>6}")
     for name in args.variants:
-        print(line(name, args.seeds, args.runs, args.exact_runs, args.steps, args.jobs), flush=True)
+        print(line(name, args.seeds, args.runs, args.slow_runs, args.steps, args.jobs), flush=True)
 
 
 if __name__ == "__main__":

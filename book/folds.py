@@ -1,15 +1,23 @@
 """Sphinx extension: code that is folded away stands after what it shows, and neighbouring cells share one fold.
 
 A reader sees the figure, the equation or the sentence first, and under it a small mark that opens the code.
+
+    ```{more} The derivation, the filter, and a flight past a beacon
+    ```
+
+folds the rest of its section under these words: what a first reader may pass over, where a page is
+long.
 """
 
 from __future__ import annotations
 
+import html
 from itertools import groupby
 
 from docutils import nodes
 from myst_nb.sphinx_ import HideCodeCellNode, HideInputCells
 from sphinx.transforms.post_transforms import SphinxPostTransform
+from sphinx.util.docutils import SphinxDirective
 
 
 class FoldsBelow(SphinxPostTransform):
@@ -23,6 +31,34 @@ class FoldsBelow(SphinxPostTransform):
             for together, cells in groupby(list(parent.children), _folded):
                 if together:
                     _fold(list(cells))
+
+
+class more_below(nodes.General, nodes.Element):
+    """Stands before what is folded until all of the section is there."""
+
+
+class More(SphinxDirective):
+    required_arguments = 1
+    final_argument_whitespace = True
+
+    def run(self) -> list[nodes.Node]:
+        return [more_below("", words=self.arguments[0])]
+
+
+class MoreBelow(SphinxPostTransform):
+    """The rest of a section, up to its subsections, behind a line to click."""
+
+    default_priority = 500
+    formats = ("html",)
+
+    def run(self, **kwargs) -> None:
+        for mark in list(self.document.findall(more_below)):
+            section = mark.parent
+            begin = section.index(mark)
+            end = section.first_child_matching_class(nodes.section, begin) or len(section)
+            section.insert(end, nodes.raw("", "</details>", format="html"))
+            opening = f'<details class="kf-more"><summary>{html.escape(mark["words"])}</summary>'
+            section[begin] = nodes.raw("", opening, format="html")
 
 
 def _folded(node: nodes.Node) -> bool:
@@ -44,5 +80,7 @@ def _fold(cells: list[nodes.container]) -> None:
 
 
 def setup(app) -> dict[str, bool]:
+    app.add_directive("more", More)
     app.add_post_transform(FoldsBelow)
+    app.add_post_transform(MoreBelow)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -8,26 +8,119 @@ from __future__ import annotations
 
 import html
 import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 import contents
+import formulas
 from docutils import nodes
+from sphinx.transforms.post_transforms import SphinxPostTransform
+from sphinx.util.math import get_node_equation_number
+from sphinx.writers.html5 import HTML5Translator
 
 HERE = Path(__file__).resolve().parent
-STAR = re.compile(r"(<h\d[^>]*>(?:<span[^>]*>[^<]*</span>)?|<a[^>]*>(?:<span[^>]*>)?)\s*★\s*")
-FORMULA = re.compile(r'<div class="math notranslate nohighlight"( id="[^"]*")?>\s*(<span class="eqno">\(([^)]*)\))?')
-CAPTION = re.compile(
-    r'<p><span class="kf-caption">(.*?)</span></p>\s*(<div class="pst-scrollable-table-container">)?\s*<table class="([^"]*)">'
-)
 NUMBER = re.compile(r"(?:(?<=>)|^)\s*\d+(\.\d+)*\.\s")  # of a section
-PARAMETERS = re.compile(r"<dl>\s*(<dd><em class=\"sig-param.*?)</dl>", re.DOTALL)  # of a long signature: no list of definitions
-NO_MEANING = re.compile(r"</dt>\s*</dl>")  # of a parameter, say
-ROLES = re.compile(r' role="(?:list|doc-biblioentry)"')  # of a bibliography, not those of today's HTML
-FIGURE = re.compile(r'(<span class="caption-number">[^<]*\d) </span>')
-EMPTY_HEAD = re.compile(r'<th( class="head[^"]*")><p></p></th>')  # the corner of a table is no heading
-TICK = re.compile(r'(<p class="kf-claim">)\s*✓')
-SMALL_TICK = r'\1<span class="kf-tick">✓</span>'
-SMALL_STAR = '\\1<span class="kf-star">★</span>\u00a0'  # never alone at the end of a line
+SIZE = re.compile(r"width: (\d+)px; height: (\d+)px;")
+STAR = "★"
+
+
+class Captions(SphinxPostTransform):
+    """What `kfcourse.pages.table` prints above a table becomes the table's caption."""
+
+    default_priority = 500
+    formats = ("html",)
+
+    def run(self, **kwargs) -> None:
+        for table in list(self.document.findall(nodes.table)):
+            before = table.previous_sibling()
+            if isinstance(before, nodes.paragraph) and before.rawsource.startswith('<span class="kf-caption">'):
+                before.parent.remove(before)
+                table.insert(0, nodes.title("", "", *before.children[1:-1]))
+                table["classes"].append("kf-table")
+
+
+class SmallStars(SphinxPostTransform):
+    """The star before the title of what goes beyond the course, in headings and in links to them."""
+
+    default_priority = 450  # when links are resolved, before typography.py
+    formats = ("html",)
+
+    def run(self, **kwargs) -> None:
+        for above in [*self.document.findall(nodes.title), *self.document.findall(nodes.reference)]:
+            text = above.next_node(nodes.Text)
+            if text is not None and text.startswith(STAR):
+                star = nodes.inline(STAR, STAR, classes=["kf-star"])
+                rest = nodes.Text(f"\N{NO-BREAK SPACE}{text.removeprefix(STAR).lstrip()}")  # never alone at the end of a line
+                text.parent.replace(text, [star, rest])
+
+
+class Translator(HTML5Translator):
+    """Pages as Sphinx writes them, but for what the keyboard, a screen reader, and the rules of HTML need."""
+
+    def starttag(self, node, tagname, suffix="\n", empty=False, **attributes) -> str:
+        if isinstance(node, nodes.math_block):  # takes the focus and has a name: page.js gives both to the box that MathJax makes
+            name = f"Formula {get_node_equation_number(self, node)}" if node["number"] else "Formula"
+            attributes |= {"tabindex": "0", "role": "group", "aria-label": name}
+        elif isinstance(node, nodes.math) and tagname == "span":
+            attributes["style"] = f"--wide: {formulas.width(node.astext()):.1f}em"
+        elif tagname == "img":  # the room that it will take, and none is loaded before the reader comes near
+            if size := SIZE.fullmatch(attributes.get("style", "")):
+                del attributes["style"]
+                attributes |= {"width": size[1], "height": size[2]}
+            if node is not self.document.next_node(nodes.image):
+                attributes["loading"] = "lazy"
+        return super().starttag(node, tagname, suffix, empty, **attributes)
+
+    def visit_title(self, node: nodes.title) -> None:
+        if node is self.document.next_node(nodes.title) and (words := _above(self.builder.env, self.docnames[0])):
+            self.body.append(f'<p class="kf-part">{html.escape(words)}</p>\n')
+        super().visit_title(node)
+
+    def add_fignumber(self, node: nodes.Element) -> None:
+        """With a full stop behind the number; tables have none."""
+        if isinstance(node, nodes.table):
+            return
+        super().add_fignumber(node)
+        if self.body[-3:-2] == ['<span class="caption-number">']:
+            self.body[-2:] = [f"{self.body[-2].rstrip()}.", "</span> "]
+
+    def visit_entry(self, node: nodes.entry) -> None:
+        """The empty corner of a table is no heading."""
+        super().visit_entry(node)
+        if self.body[-1].startswith("<th") and not node.astext():
+            self.body[-1], self.context[-1] = self.body[-1].replace("<th", "<td", 1), "</td>\n"
+            node.clear()
+
+    def visit_citation(self, node: nodes.citation) -> None:
+        """Without the roles of a bibliography, which are not those of today's HTML."""
+        if not isinstance(node.previous_sibling(), nodes.citation):
+            self.body.append('<div class="citation-list">\n')
+        self.body.append(self.starttag(node, "div", classes=[node.tagname]))
+
+    # A signature on several lines is no list of definitions.
+
+    def visit_desc_parameterlist(self, node: nodes.Element) -> None:
+        with self._instead({"<dl>": ""}):
+            super().visit_desc_parameterlist(node)
+
+    def depart_desc_parameterlist(self, node: nodes.Element) -> None:
+        with self._instead({"</dl>": ""}):
+            super().depart_desc_parameterlist(node)
+
+    def visit_desc_parameter(self, node: nodes.Element) -> None:
+        with self._instead({"<dd>": '<span class="sig-line">'}):
+            super().visit_desc_parameter(node)
+
+    def depart_desc_parameter(self, node: nodes.Element) -> None:
+        with self._instead({"</dd>": "</span>\n"}):
+            super().depart_desc_parameter(node)
+
+    @contextmanager
+    def _instead(self, tags: Mapping[str, str]) -> Iterator[None]:
+        begin = len(self.body)
+        yield
+        self.body[begin:] = [tags.get(piece.strip(), piece) for piece in self.body[begin:]]
 
 
 def use_templates(app, config) -> None:
@@ -38,7 +131,7 @@ def complete(app, pagename: str, templatename: str, context: dict, doctree) -> N
     """Everything a page of the book has besides its text."""
     context["kf_parts"] = [_part(part, pagename, context["pathto"]) for part in contents.parts(app.env)]
     context["kf_home"] = {"href": context["pathto"](app.config.root_doc), "current": pagename == app.config.root_doc}
-    context["kf_small_stars"] = lambda toc: NUMBER.sub("", toc).replace("★", '<span class="kf-star">★</span>')
+    context["kf_small_stars"] = lambda toc: NUMBER.sub("", toc).replace(STAR, '<span class="kf-star">★</span>')
     for step in ("prev", "next"):
         if context.get(step):
             first = context[step]["link"] == context["pathto"](app.config.root_doc)
@@ -46,47 +139,20 @@ def complete(app, pagename: str, templatename: str, context: dict, doctree) -> N
             context[step] = {**context[step], "title": title}
     if doctree is None or "body" not in context:
         return
-    body = context["body"]
-    for pattern, replacement in (
-        (FORMULA, _reachable),
-        (FIGURE, r"\1.</span> "),
-        (CAPTION, r'\2<table class="kf-table \3"><caption>\1</caption>'),
-        (TICK, SMALL_TICK),
-        (EMPTY_HEAD, r"<td\1></td>"),
-        (PARAMETERS, _lines),
-        (NO_MEANING, "</dt><dd></dd></dl>"),
-        (ROLES, ""),
-        (STAR, SMALL_STAR),
-    ):
-        body = pattern.sub(replacement, body)
-    if above := _above(app, pagename):
-        body = body.replace("<h1>", f'<p class="kf-part">{html.escape(above)}</p>\n<h1>', 1)
-    context["body"] = body
     context["metatags"] = context.get("metatags", "") + _described(app, pagename, context, doctree)
 
 
-def _above(app, pagename: str) -> str:
+def _above(env, pagename: str) -> str:
     """The words above a title: the part of the book, and the chapter's number."""
-    if pagename == app.config.root_doc:
+    if pagename == env.config.root_doc:
         return "A course companion"
-    part, page = contents.page(app.env, pagename) or (contents.Part("", []), None)
+    part, page = contents.page(env, pagename) or (contents.Part("", []), None)
     return f"{part.caption} · {page.number}" if page and page.number else part.caption
 
 
 def _part(part: contents.Part, pagename: str, pathto) -> dict:
     pages = [{"href": pathto(page.name), "title": page.title, "current": page.name == pagename} for page in part.pages]
     return {"caption": part.caption, "pages": pages, "current": any(page["current"] for page in pages)}
-
-
-def _reachable(match: re.Match) -> str:
-    """A displayed formula takes the focus and has a name (page.js hands both to the box that MathJax makes)."""
-    identity, number = match[1] or "", match[2] or ""
-    name = f"Formula {match[3]}" if match[3] else "Formula"
-    return f'<div class="math notranslate nohighlight"{identity} tabindex="0" role="group" aria-label="{name}">\n{number}'
-
-
-def _lines(match: re.Match) -> str:
-    return match[1].replace("<dd>", '<span class="sig-line">').replace("</dd>", "</span>")
 
 
 def _described(app, pagename: str, context: dict, doctree) -> str:
@@ -143,6 +209,9 @@ def leave_icons_out(app, exception) -> None:
 
 
 def setup(app) -> dict[str, bool]:
+    app.set_translator("html", Translator)
+    app.add_post_transform(Captions)
+    app.add_post_transform(SmallStars)
     app.connect("config-inited", use_templates, priority=900)
     app.connect("html-page-context", only_where_needed, priority=950)
     app.connect("build-finished", write_not_found)

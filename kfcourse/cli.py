@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,18 +21,19 @@ from kfcourse.lab.budget import SECONDS, SIZES, Budget, usual_runs
 from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
 from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
-from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, has_bound, title
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, OF_BEST, has_bound, title
 from kfcourse.lab.variants import STEPS, find_variant
 from kfcourse.listing import VARIANTS
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.experiment import without_failing
-from kfcourse.montecarlo.subset import FEWEST as FEWEST_EXACT
-from kfcourse.montecarlo.subset import LEAST
+from kfcourse.montecarlo.slow_filters import FEWEST as FEWEST_SLOW
+from kfcourse.montecarlo.slow_filters import LEAST
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
 DERIVATION = 60.0  # seconds for the formulas of the filters
 LONGEST = 1_000_000  # bytes of a derivation; /dev/zero never ends
+ENOUGH = 3600  # seconds for slow filters, where their number is given
 DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with more, the lab takes longer
 
 
@@ -54,21 +56,21 @@ DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with m
     "[default: the lab's seven and the exact AOF; for variants with modes all but those that remember several steps]",
 )
 @click.option(
-    "--exact-runs",
+    "--slow-runs",
     type=click.IntRange(min=0),
     default=4000,
     show_default=True,
     help="Trajectories for the slow filters, if the time allows; 0 leaves them out.",
 )
 @click.option(
-    "--exact-seconds",
+    "--slow-seconds",
     type=click.FloatRange(min=0, min_open=True),
     default=30.0,
     show_default=True,
     help="Time for the slow filters: what fits is computed, and the report says on how many trajectories.",
 )
 @click.option(
-    "--exact-memory",
+    "--slow-memory",
     type=click.FloatRange(min=LEAST / 1e6),
     default=1000.0,
     show_default=True,
@@ -112,9 +114,9 @@ def lab(
     steps: int | None,
     seed: int,
     names: str | None,
-    exact_runs: int,
-    exact_seconds: float,
-    exact_memory: float,
+    slow_runs: int,
+    slow_seconds: float,
+    slow_memory: float,
     designs: int | None,
     wide: float | None,
     same_ensemble: bool,
@@ -130,9 +132,9 @@ def lab(
     The same seed gives the same numbers, bit by bit on one machine; another one's linear algebra (BLAS) may round
     otherwise, by 1e-13 or so.
     """
-    if 0 < exact_runs < FEWEST_EXACT:
+    if 0 < slow_runs < FEWEST_SLOW:
         raise click.ClickException(
-            f"on {exact_runs} trajectories the rare ones that matter are missing: give --exact-runs 0, or at least {FEWEST_EXACT}"
+            f"on {slow_runs} trajectories the rare ones that matter are missing: give --slow-runs 0, or at least {FEWEST_SLOW}"
         )
     if same_ensemble and designs not in (None, 1):
         raise click.UsageError("--same-ensemble designs once, on the ensemble of the comparison: leave --designs out")
@@ -140,7 +142,7 @@ def lab(
     model = chosen.model
     if names is None:
         usual = JUMP_LAB if isinstance(model, JumpModel) else LAB
-        wanted = [*usual, "aof-exact"] if exact_runs and has_bound(model) else list(usual)
+        wanted = [*usual, "aof-exact"] if slow_runs and has_bound(model) else list(usual)
     else:
         wanted = [name.strip() for name in names.split(",") if name.strip()]
     found = admissions(model, wanted, DERIVATION)
@@ -148,8 +150,10 @@ def lab(
     for one in found:
         for warning in one.warnings:
             click.echo(f"Warning: {title(one.name)}: {warning}", err=True)
-    for remark in dict.fromkeys(remark for one in found if one.name.endswith("-gaussian") for remark in one.remarks):
-        click.echo(f"Gaussian filters: {remark}", err=True)
+    of_functions = [one for one in found if one.name.endswith("-gaussian") or one.name in OF_BEST]
+    for remark in dict.fromkeys(remark for one in of_functions for remark in one.remarks):
+        whose = ", ".join(title(one.name) for one in of_functions if remark in one.remarks)
+        click.echo(f"{whose}: {remark}", err=True)
     if len(refused) == len(found):
         raise click.ClickException(
             "; ".join(f"{name}: {reason}" for name, reason in refused.items())
@@ -170,9 +174,9 @@ def lab(
         steps or chosen.steps,
         seed,
         left_out=refused,
-        subset_runs=exact_runs,
-        subset_seconds=exact_seconds,
-        subset_memory=1e6 * exact_memory,
+        slow_runs=slow_runs,
+        slow_seconds=slow_seconds,
+        slow_memory=1e6 * slow_memory,
         same_ensemble=same_ensemble,
         wide=wide,
         threads=threads,
@@ -185,10 +189,12 @@ def lab(
         click.echo(f"{title(name)} by particles: {reason}", err=True)
     to_error = json_file is not None and is_standard_output(json_file)
     _tell(result, to_error)
+    again = _again(result, variant, variants_file, seed, names, designs, wide, same_ensemble, compiled)
+    click.echo(again, err=to_error)
     if json_file:
         write_json(chosen, result, json_file)
     with _kept(folder), replacing_together(folder) as place:
-        write_report(chosen, result, place, budget.says)
+        write_report(chosen, result, place, [one for one in (budget.says, again) if one])
         if language:
             write_handin(chosen, result, place, language)
     click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""), err=to_error)
@@ -200,9 +206,39 @@ def _tell(result: Comparison, to_error: bool) -> None:
     lines = [f"D_k above that of {title(reference)}, %, mean over the steps:"]
     for name, gap in result.ranking():
         lines.append(f"{title(name):<10} {100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}")
-    if result.subset_runs:
-        lines.append(f"Slow filters: on {result.subset_runs} of {result.runs} trajectories")
+    if result.slow_runs:
+        lines.append(f"Slow filters: on {result.slow_runs} of {result.runs} trajectories")
     click.echo("\n".join([*lines, *remarks_in_words(result), *conclusions(result)]), err=to_error)
+
+
+def _again(
+    result: Comparison,
+    variant: str,
+    variants_file: Path | None,
+    seed: int,
+    names: str | None,
+    designs: int | None,
+    wide: float | None,
+    same_ensemble: bool,
+    compiled: bool,
+) -> str:
+    """The command that repeats the comparison wherever it runs: what pilots and the time chose is written out."""
+    slow = result.slow_runs if result.slow_runs >= FEWEST_SLOW else 0
+    options: dict[str, object] = {
+        "--variants": variants_file,
+        "--runs": result.runs,
+        "--steps": result.steps,
+        "--seed": seed,
+        "--filters": names,
+        "--slow-runs": slow,
+        "--slow-seconds": ENOUGH if slow else None,
+        "--designs": designs,
+        "--wide": wide,
+    }
+    words = [str(one) for option, value in options.items() if value is not None for one in (option, value)]
+    flags = [flag for flag, given in (("--same-ensemble", same_ensemble), ("--compiled", compiled)) if given]
+    but = ", but for the slow filters, which the time decided" if result.replaced or slow != result.slow_runs else ""
+    return f"The same numbers again{but}: kfcourse lab {shlex.join([variant, *words, *flags])}"
 
 
 @contextmanager

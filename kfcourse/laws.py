@@ -250,7 +250,7 @@ def correct(prior: Gaussian, measurement: Measurement, y: Vectors) -> Gaussian:
 def regression(cov: Matrices, G: Matrices, F: Matrices, R: Matrices) -> tuple[Matrices, Matrices]:
     """The regression of a state with this covariance on y = G x + e, Cov(y) = F, Cov(e) = R: its gain, and what y leaves of cov.
 
-    K = cov G^T F^+,   cov - K G cov
+    K = `cov` G^T F^+,   `cov` - K G `cov`
 
     The last is evaluated as (I - K G) cov (I - K G)^T + K R K^T (Joseph's form, with R = F - G cov G^T), for
     scalars as cov R / F: equal, but never negative.  Where rounding has broken the covariance F may be negative, and is divided

@@ -22,7 +22,7 @@ from kfcourse.lab.short_names import FILTERS, LAB, lab_filters
 from kfcourse.lab.variants import find_variant
 from kfcourse.symbolic.structure import Structure
 
-QUICK = ("--runs", "400", "--steps", "4", "--exact-runs", "0")
+QUICK = ("--runs", "400", "--steps", "4", "--slow-runs", "0")
 EXAMPLE = """
 [variants.53]
 state = "c*x + e*x*v"
@@ -125,7 +125,7 @@ def test_help_and_version(call, option):
 
 def test_the_lab_compiled(call, tmp_path):
     """The same numbers but for rounding."""
-    usual = ["lab", "53", "--runs", 500, "--steps", 3, "--exact-runs", 0, "--filters", "aof-linearised", "--out", "out"]
+    usual = ["lab", "53", "--runs", 500, "--steps", 3, "--slow-runs", 0, "--filters", "aof-linearised", "--out", "out"]
     found = []
     for more in ([], ["--compiled"]):
         result = call(*usual, *more, "--json", tmp_path / "numbers.json")
@@ -135,7 +135,7 @@ def test_the_lab_compiled(call, tmp_path):
 
 
 def test_the_lab_of_variant_53(call, tmp_path):
-    result = call("lab", "53", "--runs", 4000, "--steps", 12, "--exact-runs", 112, "--out", "report", "--json", "n.json")
+    result = call("lab", "53", "--runs", 4000, "--steps", 12, "--slow-runs", 112, "--out", "report", "--json", "n.json")
     assert result.exit_code == 0, result.output
     assert "is more accurate than" in result.output
     data = json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))
@@ -178,24 +178,24 @@ def test_a_real_process_does_it_too(tmp_path):
     assert wrong.stderr.count("\n") == 1
 
 
-def test_without_exact_runs_the_exact_filter_is_left_out(call, no_figures, tmp_path):
+def test_without_slow_runs_the_exact_filter_is_left_out(call, no_figures, tmp_path):
     assert call("lab", "53", *QUICK, "--json", "n.json").exit_code == 0
     data = json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))
     assert set(data["error_variance"]) == set(LAB)
-    assert data["exact_runs"] == 0
+    assert data["slow_runs"] == 0
     assert call("lab", "53", *QUICK, "--filters", "duof,aof-exact,particle", "--json", "n.json").exit_code == 0
     assert set(json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]) == {"duof"}
 
 
 def test_an_exact_filter_without_time_is_left_out_and_the_others_reported(call, no_figures, tmp_path):
-    options = ("--runs", "400", "--steps", "40", "--exact-runs", "400", "--exact-seconds", "0.001")
+    options = ("--runs", "400", "--steps", "40", "--slow-runs", "400", "--slow-seconds", "0.001")
     result = call("lab", "53", *options, "--json", "n.json")
     assert result.exit_code == 0, result.output
     reason = "16 trajectories take more than 0.001 s"
     assert f"exact AOF left out: {reason}" in result.output
     data = json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))
     assert set(data["error_variance"]) == set(LAB)
-    assert data["exact_runs"] == 0
+    assert data["slow_runs"] == 0
     assert data["left_out"] == {"aof-exact": reason}
     assert f"exact AOF left out: {reason}" in (tmp_path / "lab-53" / "report.html").read_text(encoding="utf-8")
 
@@ -210,7 +210,7 @@ def test_filters_can_be_chosen(call, no_report, tmp_path):
 
 def test_every_filter_can_be_chosen(call, no_report, tmp_path):
     result = call(
-        "lab", "53", "--runs", 200, "--steps", 3, "--exact-runs", 112, "--filters", ",".join(FILTERS), "--json", "n.json"
+        "lab", "53", "--runs", 200, "--steps", 3, "--slow-runs", 112, "--filters", ",".join(FILTERS), "--json", "n.json"
     )
     assert result.exit_code == 0, result.output
     assert set(json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]) == set(FILTERS)
@@ -243,7 +243,7 @@ def test_a_variant_s_name_cannot_lead_out_of_the_folder(call, no_figures, tmp_pa
 
 
 def test_the_same_seed_gives_the_same_bytes_whatever_the_threads(call, no_report, tmp_path):
-    common = ("lab", "53", "--runs", 2000, "--steps", 6, "--exact-runs", 112, "--out", "report")
+    common = ("lab", "53", "--runs", 2000, "--steps", 6, "--slow-runs", 112, "--out", "report")
     for name, options in {"a": (), "b": (), "c": ("--threads", 1), "d": ("--seed", 2)}.items():
         assert call(*common, *options, "--json", f"{name}.json").exit_code == 0
     a, b, c, d = ((tmp_path / f"{name}.json").read_bytes() for name in "abcd")
@@ -313,7 +313,7 @@ def test_no_filter_is_an_error(call, names):
 
 
 def test_the_exact_filter_alone_asks_for_a_fast_one(call):
-    refused(call("lab", "53", "--runs", 100, "--steps", 2, "--exact-runs", 100, "--filters", "aof-exact"), "aof-gaussian")
+    refused(call("lab", "53", "--runs", 100, "--steps", 2, "--slow-runs", 100, "--filters", "aof-exact"), "aof-gaussian")
 
 
 def test_a_model_without_closed_form_names_the_term_and_the_way_out(call, no_computation):
@@ -381,8 +381,9 @@ def test_a_bad_json_is_refused_before_the_computation(call, no_computation, path
         ("--steps", "0"),
         ("--seed", "-1"),
         ("--threads", "0"),
-        ("--exact-runs", "-1"),
-        ("--exact-seconds", "0"),
+        ("--slow-runs", "-1"),
+        ("--slow-seconds", "0"),
+        ("--slow-memory", "1"),
     ],
 )
 def test_impossible_numbers_are_refused(call, no_computation, option):
@@ -392,10 +393,18 @@ def test_impossible_numbers_are_refused(call, no_computation, option):
     assert "Traceback" not in result.output
 
 
+@pytest.mark.quick
+@pytest.mark.parametrize("limit", ["runs", "seconds", "memory"])
+def test_an_option_by_its_old_name_is_told_the_new_one(call, no_computation, limit):
+    result = call("lab", "53", f"--exact-{limit}", "500")
+    assert result.exit_code == 2
+    assert f"'--slow-{limit}'" in result.output
+
+
 def test_a_failing_run_leaves_the_report_that_was_there(call, no_figures, tmp_path):
     assert call("lab", "53", *QUICK, "--out", "report", "--json", "n.json").exit_code == 0
     before = snapshot(tmp_path)
-    failing = ("lab", "diverging", "--variants", "mine.toml", "--runs", 200, "--steps", 30, "--exact-runs", 0)
+    failing = ("lab", "diverging", "--variants", "mine.toml", "--runs", 200, "--steps", 30, "--slow-runs", 0)
     line = refused(call(*failing, "--out", "report", "--json", "n.json"), "step")
     assert "infinite" in line
     assert snapshot(tmp_path) == before
@@ -616,13 +625,13 @@ def test_a_noiseless_meter_warns_of_nothing(call, tmp_path):
 
 def test_endless_budgets_are_budgets(call, no_report):
     """No clock can be set to infinity; nothing is limited then."""
-    endless = ("--exact-seconds", "inf", "--exact-memory", "inf", "--exact-runs", 100)
+    endless = ("--slow-seconds", "inf", "--slow-memory", "inf", "--slow-runs", 100)
     result = call("lab", "53", *QUICK[:4], *endless, "--filters", "aof-gaussian,aof-exact")
     assert result.exit_code == 0 and "on 100 of 400 trajectories" in result.output, result.output
 
 
 def test_one_exact_run_has_no_standard_error_and_is_refused(call):
-    refused(call("lab", "53", "--runs", 100, "--steps", 2, "--exact-runs", 7), "at least 100")
+    refused(call("lab", "53", "--runs", 100, "--steps", 2, "--slow-runs", 7), "at least 100")
 
 
 def test_designs_and_a_wider_start_can_be_chosen(call, no_report, tmp_path):

@@ -29,6 +29,16 @@ addEventListener("DOMContentLoaded", () => {
   }
 });
 
+// A link to something that is folded opens the fold.
+function unfold() {
+  const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  const folds = [...document.querySelectorAll("article details:not([open])")].filter((fold) => fold.contains(target));
+  for (const fold of folds) fold.open = true;
+  if (folds.length) target.scrollIntoView();
+}
+addEventListener("DOMContentLoaded", unfold);
+addEventListener("hashchange", unfold);
+
 // On paper hints are open: nobody can click there.  What the reader had closed is closed again.
 let opened = [];
 addEventListener("beforeprint", () => {

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.stats import multivariate_normal
 
 from kfcourse.pages.letters import column, covariance, slope
-from kfcourse.pages.reader import Indexed, Of, Operator
+from kfcourse.pages.reader import Indexed, Of, Operator, Unread
 
 
 def S(x):
@@ -55,6 +55,8 @@ def points(rng):
         return lam + np.sign(i) * roots[:, [abs(i) - 1]] if i else lam
 
     def w(i):
+        if i not in every:
+            raise Unread(f"point {i} of {n} on each side")
         return 1 / (2 * (n + kappa)) if i else kappa / (n + kappa)
 
     every = range(-n, n + 1)

@@ -152,6 +152,7 @@ QUESTIONS = (
         advice="Write down for the last three steps, by hand, which law is used where.",
         on=follow_on.smoother,
         axes=("step",),
+        spare=("ahead", "Psi", "Q"),  # what a filter leaves: ahead = A z, Psi = A p A^T + Q
     ),
     Question(
         "m6",

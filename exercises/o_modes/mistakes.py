@@ -22,6 +22,7 @@ ROOT_FORGOTTEN = (
 DEVIATION = "F is a variance already; the exponent, or the factor before it, takes it for a standard deviation."
 OF_ROWS = "The weights sum to one over the modes that are entered; they say where one of these comes from."
 JOINT = "These weights are joint probabilities: given the mode that is entered, they have to sum to one."
+OTHER_AXIS = "A vector acts along the wrong axis: the mode that is left is the row, and the mode that is entered the column."
 NOT_MIXED = "Each mode goes on with its own law: which modes may it have come from?"
 CHAIN_FORGOTTEN = "The mode may have changed between the steps: the transition is missing."
 
@@ -52,6 +53,8 @@ WRONG_CHAINS: tuple[tuple[str, str, Answer], ...] = (
         lambda mu, pi: (mu @ pi, pi / pi.sum(axis=0)),
     ),
     ("mode-kept", CHAIN_FORGOTTEN, lambda mu, pi: (mu, np.eye(len(mu)))),
+    ("other-axis", OTHER_AXIS, lambda mu, pi: (mu @ pi, mu[:, None] * pi / (mu @ pi)[:, None])),
+    ("other-axis", OTHER_AXIS, lambda mu, pi: (mu @ pi, mu * pi / (mu @ pi))),
 )
 
 # -- o2: Bayes' formula
@@ -102,6 +105,11 @@ WRONG_POSTERIORS: tuple[tuple[str, str, Answer], ...] = (
         "deviation-for-variance",
         DEVIATION,
         bayes(lambda nu, F: normal(nu, F**2) * np.sqrt(F)),
+    ),
+    (
+        "exponent-grows",
+        "The exponent has the wrong sign: what is further off is less likely.",
+        bayes(lambda nu, F: np.exp(nu**2 / (2 * F)) / np.sqrt(F)),
     ),
     (
         "innovation-not-squared",
@@ -163,6 +171,11 @@ def first_forgotten(y: Array, m: float, d: float, a: float, q: float, C: Array, 
     return two_steps_with(weights=lambda mu, pi: (first @ pi, chain(mu, pi)[1]))(y, m, d, a, q, C, pi, first)
 
 
+def first_mixed(y: Array, m: float, d: float, a: float, q: float, C: Array, pi: Array, first: Array) -> tuple[Array, Array]:
+    """The chain moves on from the first law of the modes: shares and probabilities both."""
+    return two_steps_with(weights=lambda mu, pi: chain(first, pi))(y, m, d, a, q, C, pi, first)
+
+
 def chain_before(y: Array, m: float, d: float, a: float, q: float, C: Array, pi: Array, first: Array) -> tuple[Array, Array]:
     """The chain moves before the first measurement."""
     return two_steps_with()(y, m, d, a, q, C, pi, first @ pi)
@@ -192,6 +205,16 @@ WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
         "first-law-again",
         "The second step begins with the first law of the modes again: what has the first measurement told?",
         first_forgotten,
+    ),
+    (
+        "first-law-again",
+        "The second step begins with the first law of the modes again: what has the first measurement told?",
+        first_mixed,
+    ),
+    (
+        "probability-kept",
+        CHAIN_FORGOTTEN,
+        two_steps_with(weights=lambda mu, pi: (mu, chain(mu, pi)[1])),
     ),
     ("not-corrected", "The laws of the state have not seen the first measurement.", two_steps_with(corrected=False)),
     ("not-moved", "The state has moved between the measurements.", two_steps_with(moved=False)),
@@ -305,6 +328,11 @@ WRONG_MIXED: tuple[tuple[str, str, Answer], ...] = (
         JOINT,
         mixed_with(weights=lambda mu, pi: (mu @ pi, mu[:, None] * pi)),
     ),
+    (
+        "other-axis",
+        "The weights of a mode are taken from the wrong axis: they are its column; its row is what becomes of it.",
+        mixed_with(weights=lambda mu, pi: (mu @ pi, chain(mu, pi)[1].T)),
+    ),
     ("not-mixed", NOT_MIXED, lambda mu, pi, z, p: (mu @ pi, z, p)),
     (
         "all-alike",
@@ -338,6 +366,19 @@ WRONG_DECISIONS: tuple[tuple[str, str, Answer], ...] = (
         "other-way",
         "The larger of the two losses is chosen.",
         lambda f, missed, alarm: ((f * missed < (1 - f) * alarm) * 1.0, np.maximum(f * missed, (1 - f) * alarm)),
+    ),
+    (
+        "odds",
+        "That is the limit of the odds, the probability of a fault over that of none, not of the probability.",
+        lambda f, missed, alarm: ((f > alarm / missed) * 1.0, np.where(f > alarm / missed, (1 - f) * alarm, f * missed)),
+    ),
+    (
+        "right-calls-paid",
+        "The loss is that of a right call: who says faulty pays only if the meter is sound.",
+        lambda f, missed, alarm: (
+            decide(f, missed, alarm)[0],
+            np.where(decide(f, missed, alarm)[0] == 1, f * alarm, (1 - f) * missed),
+        ),
     ),
     (
         "probabilities-forgotten",

@@ -237,7 +237,11 @@ def _lasted(error: Array, back: Array | bool = False) -> Array:
 
 WRONG_SLIPS: tuple[tuple[str, str, Answer], ...] = (
     ("rounded-down", ROUNDED_DOWN, slips_with(whole=np.floor)),
-    ("rounded-down", ROUNDED_DOWN, slips_with(whole=np.trunc)),
+    (
+        "rounded-to-zero",
+        "It is rounded towards zero: a loop that is a little short of a whole cycle rests there all the same.",
+        slips_with(whole=np.trunc),
+    ),
     ("not-rounded", "Whole cycles are asked for: the loop rests near one of its stable zeros.", slips_with(whole=lambda c: c)),
     (
         "half-a-cycle",

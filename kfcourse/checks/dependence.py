@@ -29,6 +29,7 @@ class Sensitivity:
     arguments : hidden arguments, a tuple a call
     results : what both give for each call, each as a list of parts
     several : whether answers have several results
+    spare : arguments that follow from the others: a right answer may depend on them or not
     """
 
     names: Sequence[str]
@@ -36,6 +37,7 @@ class Sensitivity:
     arguments: Sequence[tuple]
     results: Sequence[tuple[list[Any], ...]]
     several: bool
+    spare: Sequence[str] = ()
 
     @cached_property
     def _table(self) -> list[tuple[str, list[bool], list[bool]]]:
@@ -86,7 +88,7 @@ class Sensitivity:
     def unused(self, part: int) -> list[str]:
         """Arguments that the part should depend on and does not."""
         found = [name for name, right, mine in self._table if right[part] and not mine[part]]
-        return [name for name in found if not self._jumps(name, part, 1)]
+        return [name for name in found if name not in self.spare and not self._jumps(name, part, 1)]
 
     def superfluous(self, part: int) -> list[str]:
         """Arguments that it depends on and should not, as another part does.
@@ -94,7 +96,7 @@ class Sensitivity:
         An argument that changes no result of the right answer may stand in its formula all the same, and cancel there.
         """
         found = [name for name, right, mine in self._table if mine[part] and any(right) and not right[part]]
-        return [name for name in found if not self._jumps(name, part, 0)]
+        return [name for name in found if name not in self.spare and not self._jumps(name, part, 0)]
 
     def _jumps(self, name: str, part: int, side: int) -> bool:
         """Whether the right answer (0) or the student's (1) changes if an argument is five times as large.

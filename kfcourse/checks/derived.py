@@ -153,7 +153,7 @@ def _read(posed: Posed, text: str) -> tuple[Report, Derived]:
     law = posed.setting.law
     for one in report.chains:
         if one.name in {*law.random, *law.letters, *posed.ends}:
-            raise Unusable(f"a chain begins with `{one.name} =`; what {one.name} means is given, so derive nothing of that name")
+            raise Unusable(f"a chain begins with `{one.name} =`, which has a meaning already; derive `{posed.name}`")
     chains = [one for one in report.chains if one.name == posed.name]
     if len(chains) != 1:
         raise Unusable(f"{len(chains) or 'no'} chain{'s' * (len(chains) != 1)} with `{posed.name}` at the left; {begin}")

@@ -141,7 +141,7 @@ class Wrong:
         results = [
             tuple(list(one) if self.parts else [one] for one in pair) for pair in zip(self.expected, self.found, strict=True)
         ]
-        return Sensitivity(self.names, self.answers, self.arguments, results, bool(self.parts))
+        return Sensitivity(self.names, self.answers, self.arguments, results, bool(self.parts), self.question.spare)
 
     def case(self, values: Mapping[sp.Symbol, Any]) -> str:
         """One input for which the answer is wrong, and what it gives there."""

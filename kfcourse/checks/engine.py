@@ -124,6 +124,10 @@ def told(error: BaseException) -> str:
         text = "no message"
     if isinstance(error, TypeError) and ("to float" in text or "ufunc" in text):
         text += " (functions of symbols are sp.sin, sp.exp, ..., not those of math or NumPy)"
+    elif "NDimArray" in text or "to Python scalars" in text:
+        text += " (functions of arrays are np.sin, np.exp, ..., not those of math or SymPy)"
+    elif isinstance(error, TypeError) and "for ^:" in text:
+        text += " (a power is **)"
     own = [frame for frame in _frames(error) if not _foreign(frame)]
     where = f", in line {own[-1].lineno} of {own[-1].name}()" if own else ""
     return f"{type(error).__name__}{': ' * bool(text)}{text}{where}"

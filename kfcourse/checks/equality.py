@@ -1,13 +1,14 @@
 """Is an answer the right one?  Comparison of formulas by value and of numbers to rounding.
 
 A formula counts as equal if it takes the same values, to 30 digits, at several random points of both signs: any equivalent form
-passes, and no simplification has to succeed.
+passes, and no simplification has to succeed.  Where it has floats, as 2*np.pi or (1/3)*x, to their digits.
 """
 
 from __future__ import annotations
 
 import random
 from collections.abc import Container, Mapping, Sequence
+from decimal import Decimal, Inexact, localcontext
 from functools import lru_cache
 from typing import Any
 
@@ -18,6 +19,8 @@ from kfcourse.symbolic.formula import symbol
 
 DIGITS = 60  # of the values of formulas
 AGREE = sp.Float(10) ** -30  # relative difference of equal formulas: half of the digits may be lost by cancellation
+FLOAT_DIGITS = 10, 15  # of a decimal: as many are not typed but computed; 1/3 and 2*np.pi have some 15 in Python
+FLOATS_AGREE = sp.Float(10) ** -12  # of formulas with such numbers: 15 digits, of which terms that cancel may take three
 POINTS = 6
 ROUNDED = 1e-9  # relative size of an imaginary part that rounding explains
 
@@ -125,7 +128,7 @@ def describe(value: Any) -> str:
     if value is None:
         return "nothing (is `return` missing?)"
     if isinstance(value, np.ndarray):
-        return f"an array of shape {value.shape}"
+        return f"an array{' of text' if value.dtype.kind in 'SU' else ''} of shape {value.shape}"
     if isinstance(value, tuple | list):
         return f"{type(value).__name__} of {len(value)}"
     return f"{type(value).__name__}"
@@ -167,11 +170,12 @@ def equal_formulas(
             sides = [[_with_numbers(f, numbers) for f in side] for side in sides]
         signs = {s: -1 if value < 0 else 1 for s, value in parameters.items()}
         known, both = frozenset(signs.items()), all(map(_entire, sides[1]))
+        close = [FLOATS_AGREE if _has_floats(a) or _has_floats(b) else AGREE for a, b in zip(*sides, strict=True)]
         for number in range(max(POINTS, len(places))):
             place = frozenset(places[number % len(places)].items() if places else ())
-            for a, b in zip(*sides, strict=True):
+            for a, b, near in zip(*sides, close, strict=True):
                 left, right = (_value(f, number, known, both, place) for f in (a, b))
-                if not (left.is_number and right.is_number) or not abs(left - right) <= AGREE * (1 + abs(right)):
+                if not (left.is_number and right.is_number) or not abs(left - right) <= near * (1 + abs(right)):
                     return False
     except Exception:  # SymPy has many ways to stop at a formula that makes no sense
         return False
@@ -216,6 +220,19 @@ def _value(
 def _entire(formula: sp.Expr) -> bool:
     """Whether a formula has no roots and the like: those differ in form where a variance becomes negative."""
     return not formula.has(sp.log, sp.Abs) and all(power.exp.is_integer for power in formula.atoms(sp.Pow))
+
+
+@lru_cache(maxsize=20_000)
+def _has_floats(formula: sp.Expr) -> bool:
+    """Whether a number in it was a float: 0.9 is 9/10, but 0.333333333333333 is what Python makes of 1/3."""
+    least, most = FLOAT_DIGITS
+    with localcontext(prec=most) as context:
+        for one in formula.atoms(sp.Rational):
+            context.clear_flags()
+            decimal = (Decimal(one.p) / Decimal(one.q)).normalize()
+            if not context.flags[Inexact] and len(decimal.as_tuple().digits) >= least:
+                return True
+    return False
 
 
 def _by_name(formulas: Sequence[sp.Expr]) -> list[sp.Expr]:

@@ -87,7 +87,7 @@ def _array(
 
 
 def _yours(part: str, value: np.ndarray) -> str:
-    return f"your {part + ' is' if part else 'function gives'} {_numbers(value)}"
+    return f"your {f'result {part} is' if part else 'function gives'} {_numbers(value)}"
 
 
 def _numbers(array: np.ndarray) -> str:

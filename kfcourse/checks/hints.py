@@ -169,7 +169,11 @@ def sometimes(case: Case) -> Said | None:
         return None
     sizes = [int(np.size(b)) // (len(b) if np.ndim(b) else 1) for _, b in case.pairs] if case.numeric else [1] * len(right)
     if len(set(sizes)) > 1 and all((size == 1) == good for size, good in zip(sizes, right, strict=True)):
-        return "scalars-only", "It is right for scalars only: look at the order of the matrices, and at what is transposed."
+        return (
+            "scalars-only",
+            "It is right for scalars only: look at the order of the matrices, at what is transposed, "
+            "and at what is done entry by entry or over all axes at once.",
+        )
     return (
         "sometimes",
         f"It is right for {sum(right)} of {len(right)} hidden inputs: a case is left out, or it holds for a special one only.",

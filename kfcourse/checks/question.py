@@ -87,6 +87,8 @@ class Question:
         The key on top of earlier answers, `on(gain=...)`: its parameters have the names of functions of earlier questions.
     axes : tuple of str
         What the leading axes of the results are, ("step", "trajectory"); of arguments of such a shape, too.
+    spare : tuple of str
+        Arguments of the key that follow from the others, as Q does from Psi = A p A^T + Q: an answer may do without one.
     """
 
     name: str
@@ -100,6 +102,7 @@ class Question:
     advice: str = ""
     on: Callable[..., Answer | ForVariant] | None = None
     axes: tuple[str, ...] = ()
+    spare: tuple[str, ...] = ()
 
     @property
     def function(self) -> str:

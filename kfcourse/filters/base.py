@@ -82,7 +82,7 @@ class Filter:
     step : Advance
         (State, y (runs, p)) -> State.  The estimate and the filter's own error covariance are its `posterior`.
     slow : bool
-        Thousands of times the cost of the others: comparisons run it on a subset of the trajectories.
+        Thousands of times the cost of the others: comparisons run it on a part of the trajectories.
     instead : Filter, optional
         Of the same name: what comparisons run where a slow filter fails.
     structure : Structure, optional

@@ -19,12 +19,12 @@ from kfcourse.filters import Design, Filter, jump_pointmass, pointmass
 from kfcourse.filters.initial_states import is_undisturbed
 from kfcourse.filters.particles import particle
 from kfcourse.lab.checked_quadrature import Checked
-from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JumpStructures, Structures, check_names, has_exact, title
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, OF_BEST, JumpStructures, Structures, check_names, has_exact, title
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
-from kfcourse.montecarlo.subset import FEWEST
+from kfcourse.montecarlo.slow_filters import FEWEST
 from kfcourse.reasons import Reason
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -114,7 +114,7 @@ def _admitted(name: str, structures: Structures | JumpStructures) -> Admission:
         try:
             if isinstance(structures, JumpStructures):
                 one = JUMP_FILTERS[name].build(structures)
-                return Admission(name, one, remarks=tuple(_not_by_points(structures)) if name == "aof-exact" else ())
+                return Admission(name, one, remarks=tuple(_with_modes(name, structures)))
             one = FILTERS[name].build(structures)
         except (NoClosedForm, ModelError) as error:
             return Admission(name, None, Reason.of(error))
@@ -143,9 +143,7 @@ def _failure(model: Model | JumpModel, one: Filter | Design, steps: int) -> str:
     """What goes wrong on a few hundred trajectories; empty if nothing."""
     fast = [admission.one for admission in admissions(model, ["duof"]) if admission.one] if one.slow else []
     try:
-        found = compare(
-            [*fast, one], model, RUNS, steps, seed=1, subset_runs=SLOW, subset_seconds=SECONDS, threads=1, progress=False
-        )
+        found = compare([*fast, one], model, RUNS, steps, seed=1, slow_runs=SLOW, slow_seconds=SECONDS, threads=1, progress=False)
     except (NotFinite, np.linalg.LinAlgError) as error:
         with np.errstate(all="ignore"):
             finite = np.isfinite(simulate(model, RUNS, steps, seed=1).x).all()
@@ -234,10 +232,21 @@ def _by_particles(structures: Structures) -> Iterator[str]:
         yield from _starved(structures)
 
 
-def _by_quadrature(structures: Structures) -> Iterator[str]:
+def _by_quadrature(structures: Structures | JumpStructures) -> Iterator[str]:
     """Gaussian structural functions that are no formulas."""
     if isinstance(structures.quadrature, Checked):
         yield structures.quadrature.says
+
+
+def _with_modes(name: str, structures: JumpStructures) -> Iterator[str]:
+    """What to know of a filter for models that jump."""
+    of_best = name in OF_BEST
+    if name == "aof-exact":
+        yield from _not_by_points(structures)
+    elif of_best or name.endswith("-gaussian"):
+        yield from _by_quadrature(structures)
+    if of_best and structures.best is structures.linearised:
+        yield "with linearised structural functions, as Gaussian ones cannot be had: see aof-jump-gaussian"
 
 
 def _not_by_points(structures: Structures | JumpStructures) -> Iterator[str]:

@@ -35,7 +35,7 @@ def usual_runs(filters: Sequence[Filter | Design], model: Model | JumpModel, ste
     try:
         for runs in (PILOT[0], *PILOT):  # the first time also derives and compiles
             begun = time.process_time()
-            compare(fast, model, runs, tried, 1, subset_runs=0, wide=1, threads=1, progress=False, **options)
+            compare(fast, model, runs, tried, 1, slow_runs=0, wide=1, threads=1, progress=False, **options)
             taken.append(time.process_time() - begun)
     except (NotFinite, ValueError):
         return Budget(SIZES[0])  # what is wrong is told by the comparison itself

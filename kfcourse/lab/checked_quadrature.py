@@ -2,37 +2,41 @@
 
 A function such as x/(1 + x^2) has a mean over a normal law, but no formula for it.  How many points it takes depends on how wide
 the laws are that occur, and nobody knows these beforehand.  So a pilot runs the lab's filters with some order, and at each law
-that they meet compares the structural functions with those of twice the order; the order is raised until both agree.
+that they meet compares the structural functions with those of twice the order; the order is raised until both agree.  A
+model with modes has one order for all modes without formulas, checked on the laws of filters with modes and of averaged ones.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from kfcourse.angles import difference
-from kfcourse.filters import aof, fos, mfos
+from kfcourse.filters import aof, fos, imm, logic_dynamic, logic_dynamic_fos, mfos
 from kfcourse.laws import Array, Gaussian, Measurement, NegativeVariance
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, simulate
 from kfcourse.montecarlo.experiment import run
 from kfcourse.reasons import Reason
+from kfcourse.symbolic.averaging import averaged
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
-from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite
+from kfcourse.symbolic.quadrature import QuadratureWarning, axes, gauss_hermite
 from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import Structure
+from kfcourse.symbolic.structure import Structure, gaussian
 
-ORDERS = (5, 10, 20, 40, 80, 160)
+ORDERS = (2, 3, 5, 7, 10, 20, 40, 80, 160)
 # Means may change by this part of a standard deviation when the order is doubled, covariances and slopes by this part of
 # themselves: root mean square over the trajectories of a step.  A prediction that is shifted by a part q of its deviation has an
 # error variance other by 2 q of itself at most, 0.02 %.
 CLOSE = 1e-4
-RUNS, STEPS = 200, 20  # of the pilot
+RUNS, STEPS = 100, 20  # of the pilot
 MOST = 400  # points together: beyond it a comparison takes hours
 PIECE = 2**19  # evaluations at once: arrays of some megabytes
 
@@ -40,13 +44,13 @@ Law = TypeVar("Law", Gaussian, Measurement)
 
 
 class Checked(NamedTuple):
-    """A structure by quadrature.
+    """Structures by quadrature, of each mode one; where a mode has formulas they are these.
 
-    `structure` is named "gaussian", as what it computes is; `order` is its number of points an axis, `apart` the largest
+    They are named "gaussian", as what they compute is; `order` is their number of points an axis, `apart` the largest
     difference that the pilot found, in the measure of `CLOSE`.
     """
 
-    structure: Structure
+    structures: list[Structure]
     order: int
     apart: float
 
@@ -58,7 +62,7 @@ class Checked(NamedTuple):
         )
 
 
-def of_checked_order(model: Model, why: NoClosedForm) -> Checked:
+def of_checked_order(model: Model | JumpModel, why: NoClosedForm) -> Checked:
     """The Gaussian structural functions of a model for which there are no formulas, as `why` says.
 
     Raises
@@ -66,44 +70,71 @@ def of_checked_order(model: Model, why: NoClosedForm) -> Checked:
     NoClosedForm
         No order does; the message tells how far the highest one tried is from twice that order.
     """
+    modes = model.modes if isinstance(model, JumpModel) else (model,)
+    known = [_formulas(mode) for mode in modes]
+    size = max(axes(mode) for mode, formulas in zip(modes, known, strict=True) if formulas is None)
     found = ""
     for order in ORDERS:
+        if (points := order**size) > MOST:
+            found += f"; {order} points on each of {size} axes are {points}, more than the {MOST} with which a comparison ends"
+            break
         try:
             with warnings.catch_warnings(), np.errstate(all="ignore"):
                 warnings.simplefilter("ignore", QuadratureWarning)  # the pilot looks at more than the prior law
-                coarse, fine = gauss_hermite(model, order), gauss_hermite(model, 2 * order)
-                if (points := _points(model, order)) > MOST:
-                    break
-                apart = _apart(coarse, fine)
+                coarse, fine = (
+                    [formulas or gauss_hermite(mode, n) for mode, formulas in zip(modes, known, strict=True)]
+                    for n in (order, 2 * order)
+                )
+                apart = _apart(model, coarse, fine)
         except (ModelError, NotFinite, NegativeVariance, np.linalg.LinAlgError):
             continue
         if apart <= CLOSE:
-            return Checked(_in_pieces(replace(coarse, name="gaussian"), max(1, PIECE // points)), order, apart)
-        size = f"by {100 * apart:.2g} %" if apart < 1 else "without bound"
-        found = f"; Gauss-Hermite quadrature with {order} points an axis still errs {size} on the laws that occur"
+            named = [one if one.formulas else replace(one, name="gaussian") for one in coarse]
+            return Checked([_in_pieces(one, max(1, PIECE // points)) for one in named], order, apart)
+        error = f"by {100 * apart:.2g} %" if apart < 1 else "without bound"
+        found = f"; Gauss-Hermite quadrature with {order} points an axis still errs {error} on the laws that occur"
     raise NoClosedForm(Reason.of(why).reworded(f"{why}{found}"))
 
 
-def _points(model: Model, order: int) -> int:
-    """An upper bound of the points of a rule: over the state and the noises of one equation."""
-    return order ** (model.n + max(_multiplied(model)))
+def _formulas(model: Model) -> Structure | None:
+    try:
+        return gaussian(model)
+    except NoClosedForm:
+        return None
 
 
-def _multiplied(model: Model) -> Iterator[int]:
-    """How many noises of each equation are not only added with a constant factor."""
-    for equation, noises in ((model.state_equation, model.v), (model.meter_equation, model.w)):
-        yield sum(equation.diff(noise).has(*model.x, *noises) for noise in noises)
-
-
-def _apart(coarse: Structure, fine: Structure) -> float:
-    """How far two structures are from each other at most, at the laws that filters by the first one meet."""
-    model = coarse.model
-    steps = int(min(STEPS, model.known.steps))
+def _apart(model: Model | JumpModel, coarse: Sequence[Structure], fine: Sequence[Structure]) -> float:
+    """How far structures are from others at most, at the laws that filters by the first ones meet; of no use beyond `CLOSE`."""
     found: list[float] = []
-    watched = _watched(coarse, fine, found)
-    run(aof(watched), simulate(model, RUNS, steps, seed=1).y)
-    design([fos(watched), mfos(watched)], Ensemble(model, RUNS, steps, seed=1).by_step())  # type: ignore[arg-type]
+    for _ in _meeting(model, [_watched(one, other, found) for one, other in zip(coarse, fine, strict=True)]):
+        if not np.max(found) <= CLOSE:
+            break
     return float(np.max(found))  # NaN, if one is
+
+
+def _meeting(model: Model | JumpModel, structures: list[Structure]) -> Iterator[None]:
+    """Shows the structures the laws that they meet in the lab: the prior law, then those of the filters; stops after each."""
+    steps = int(min(STEPS, model.steps if isinstance(model, JumpModel) else model.known.steps))
+    for one in structures:
+        one.at(0).measure(model.prior.mean[None], model.prior.cov)
+    yield
+    y, designing = simulate(model, RUNS, steps, seed=1).y, Ensemble(model, RUNS, steps, seed=1)  # type: ignore[arg-type]
+    if not isinstance(model, JumpModel):
+        run(aof(structures[0]), y)
+        yield
+        design([fos(structures[0]), mfos(structures[0])], designing.by_step())
+        yield
+        return
+    for filter_of in (logic_dynamic, imm):  # the laws of pairs, of GPB2, are narrower
+        run(filter_of(structures, model, model.first), y)
+        yield
+    with suppress(ModelError):  # angles, transitions that depend on the state: there are no such filters
+        one = averaged(model, structures)
+        run(aof(one), y)
+        yield
+        with suppress(NotFinite):  # of modes where hardly anybody is
+            design([logic_dynamic_fos(model, structures), fos(one), mfos(one)], designing.by_step())
+            yield
 
 
 def _watched(coarse: Structure, fine: Structure, found: list[float]) -> Structure:
@@ -130,7 +161,7 @@ def _watched(coarse: Structure, fine: Structure, found: list[float]) -> Structur
 
         return replace(one, predict=predict, measure=measure)
 
-    return Structure(coarse.name, coarse.model, coarse.predict, coarse.measure, coarse.transition, at_step=at)
+    return replace(coarse, at_step=at)
 
 
 def _deviations(cov: Array, mean: Array) -> Array:

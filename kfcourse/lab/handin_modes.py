@@ -9,10 +9,11 @@ import sympy as sp
 from kfcourse.filters import latex as equations_latex
 from kfcourse.filters.finite_memory import ESTIMATES, MEASUREMENTS
 from kfcourse.filters.jump_equations import combination, correction, prediction
+from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.families import family
 from kfcourse.lab.handin_sections import Block, StudentReport
 from kfcourse.lab.handin_text import filled, law, lines_of, matrix
-from kfcourse.lab.report import percent, printed, recognised_modes
+from kfcourse.lab.report import NO_FORMULAS, percent, printed, recognised_modes
 from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures, Structures
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.symbolic.jumping import JumpModel
@@ -34,7 +35,8 @@ class JumpReport(StudentReport):
         assert isinstance(result.model, JumpModel)  # `write_handin` takes the other report for those without
         self.model = result.model
         self.modes = recognised_modes(result)
-        best = JumpStructures(self.model).best[0].name  # of the filters whose names do not tell
+        self.structures = JumpStructures(self.model)
+        best = self.structures.best[0].name  # of the filters whose names do not tell
         self.kinds = [kind for kind in ("linearised", "gaussian") if kind in (*self.kinds, best)]
 
     @property
@@ -92,8 +94,13 @@ class JumpReport(StudentReport):
             said = [filled(words["in_mode"], j=f"$j={j}$", name=name) for j, name, _ in self.numbered]
             for text, block in [(words["in_every_mode"], blocks[0])] if alike else zip(said, blocks, strict=True):
                 yield Block("text", text)
-                long = FUNCTION_LATEX["tau"] not in block
-                yield Block("text", words["not_printed"]) if long else Block("formulas", lines=lines_of(block))
+                found = self.structures.quadrature if NO_FORMULAS in block else None
+                if isinstance(found, Checked):
+                    yield Block("text", filled(words["by_quadrature"], order=found.order))
+                elif FUNCTION_LATEX["tau"] in block:
+                    yield Block("formulas", lines=lines_of(block))
+                else:
+                    yield Block("text", words["not_printed"])
 
     def filters(self) -> Iterator[Block]:
         words, size = self.words, len(self.model.modes)

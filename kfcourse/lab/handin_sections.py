@@ -83,7 +83,7 @@ class StudentReport:
             designed = ", ".join(map(self.title, result.replicas.names))
             sentences.append(filled(words["designs"], filters=designed, designs=result.designs))
         if result.has_bound:
-            sentences.append(filled(words["exact"], runs=result.subset_runs))
+            sentences.append(filled(words["exact"], runs=result.slow_runs))
         yield Block("text", " ".join(sentences))
         if result.left_out:
             yield Block("text", words["left_out"])
@@ -135,7 +135,7 @@ class StudentReport:
         if not alone:
             yield words["nobody_leads"]
         unsure = [k for k, (_, others, _) in enumerate(verdicts) if others]
-        if unsure:
+        if alone and unsure:  # without a leader it is every step, as has been said
             yield filled(words["together"], at=self.at(unsure))
         last = [worst for _, _, worst in verdicts if worst]
         if last:

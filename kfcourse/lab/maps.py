@@ -1,8 +1,10 @@
 """Which filter is the most accurate, and how far from the bound, over two parameters of a model.
 
-found = parameter_map(model, {"e": (0.02, 0.05, 0.2), "f": (0.01, 0.02, 0.05)})
-found[0.05, 0.02].leaders(1)      the most accurate at step 1, and those that are not significantly worse
-draw(found, 1, ax)                all of them as a map
+::
+
+    found = parameter_map(model, {"e": (0.02, 0.05, 0.2), "f": (0.01, 0.02, 0.05)})
+    found[0.05, 0.02].leaders(1)      the most accurate at step 1, and those that are not significantly worse
+    draw(found, 1, ax)                all of them as a map
 """
 
 from __future__ import annotations
@@ -46,7 +48,7 @@ def parameter_map(
     *,
     runs: int = 10_000,
     steps: int = 3,
-    exact_runs: int = 1000,
+    slow_runs: int = 1000,
     design_runs: int = 20_000,
 ) -> ParameterMap:
     """Compare the lab's filters with the exact AOF at every pair of values of two parameters.
@@ -56,7 +58,7 @@ def parameter_map(
     model : Model
     values : mapping
         Two parameters, and the values of each.
-    exact_runs : int
+    slow_runs : int
         Trajectories of the exact AOF in each comparison.
     runs, steps, design_runs
         As of `kfcourse.compare`.
@@ -82,7 +84,7 @@ def parameter_map(
                 seed=1,
                 design_runs=design_runs,
                 designs=2,
-                subset_runs=exact_runs,
+                slow_runs=slow_runs,
                 progress=False,
             )
     return ParameterMap((first, second), cells)

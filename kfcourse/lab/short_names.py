@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -65,21 +66,12 @@ class Structures:
     @cached_property
     def quadrature(self) -> Checked | NoClosedForm | None:
         """What takes the place of the Gaussian functions if they have no closed form, or why nothing does; None if they have."""
-        try:
-            _ = self.gaussian
-        except NoClosedForm as why:
-            try:
-                return of_checked_order(self.model, why)
-            except NoClosedForm as neither:
-                return neither
-        return None
+        return _by_quadrature(self.model, lambda: self.gaussian)
 
     @property
     def normal(self) -> Structure:
         """The Gaussian functions, by quadrature if they have no closed form; NoClosedForm if that does not do either."""
-        if isinstance(self.quadrature, NoClosedForm):
-            raise self.quadrature
-        return self.quadrature.structure if self.quadrature else self.gaussian
+        return self.gaussian if self.quadrature is None else _found(self.quadrature)[0]
 
 
 class JumpStructures:
@@ -96,6 +88,16 @@ class JumpStructures:
     def gaussian(self) -> list[Structure]:
         return [gaussian(mode) for mode in self.model.modes]
 
+    @cached_property
+    def quadrature(self) -> Checked | NoClosedForm | None:
+        """As of `Structures`, for the modes that need it."""
+        return _by_quadrature(self.model, lambda: self.gaussian)
+
+    @property
+    def normal(self) -> list[Structure]:
+        """The Gaussian functions of each mode; as of `Structures`."""
+        return self.gaussian if self.quadrature is None else _found(self.quadrature)
+
     @property
     def chain(self) -> tuple[JumpModel, Array]:
         """The model, for its transitions, and the law of the first mode: what filters with modes take."""
@@ -103,15 +105,41 @@ class JumpStructures:
 
     @property
     def best(self) -> list[Structure]:
-        """Gaussian ones if there is a closed form, else linearised ones."""
+        """Gaussian ones if they can be had, else linearised ones."""
         try:
-            return self.gaussian
+            return self.normal
         except NoClosedForm:
             return self.linearised
 
     @cached_property
     def averaged(self) -> Structure:
         return averaged(self.model, self.best)
+
+
+def _by_quadrature(model: Model | JumpModel, formulas: Callable[[], object]) -> Checked | NoClosedForm | None:
+    """As `Structures.quadrature`; of the models asked for last it is kept, as a pilot takes seconds, and a report asks again."""
+    for known, found in _ASKED:
+        if known is model:
+            return found
+    found = None
+    try:
+        formulas()
+    except NoClosedForm as why:
+        try:
+            found = of_checked_order(model, why)
+        except NoClosedForm as neither:
+            found = neither
+    _ASKED.append((model, found))
+    return found
+
+
+_ASKED: deque[tuple[Model | JumpModel, Checked | NoClosedForm | None]] = deque(maxlen=4)
+
+
+def _found(quadrature: Checked | NoClosedForm) -> list[Structure]:
+    if isinstance(quadrature, NoClosedForm):
+        raise quadrature
+    return quadrature.structures
 
 
 class Entry(NamedTuple):
@@ -152,7 +180,7 @@ def _with_modes(
     of = FAMILIES[family(short)]
     title = of.title + short.removeprefix(family(short))
     return {
-        f"{short}-jump-gaussian": JumpEntry(f"LD-G{title}", f"Г{of.russian}лд{russian}", lambda s: build(s.model, s.gaussian)),
+        f"{short}-jump-gaussian": JumpEntry(f"LD-G{title}", f"Г{of.russian}лд{russian}", lambda s: build(s.model, s.normal)),
         f"{short}-jump-linearised": JumpEntry(
             f"LD-L{title}", f"Л{of.russian}лд{russian}", lambda s: build(s.model, s.linearised)
         ),
@@ -204,6 +232,7 @@ TITLES = {
 }
 BOUND = 1000  # particles of the exact AOF where there are no point masses
 WITH_MODES = ("aof-jump-gaussian", "aof-jump-linearised", "imm", "gpb2", "aof-exact")  # that carry their probabilities
+OF_BEST = ("imm", "gpb2", "aof-averaged", "fos-averaged", "mfos-averaged")  # by `JumpStructures.best`
 # As of models without jumps, those that remember several steps are asked for by name.
 JUMP_LAB = tuple(name for name in JUMP_FILTERS if name != "aof-exact" and not re.search(r"\d-", name))
 LAB = ("aof-gaussian", "aof-linearised", "duof", "fos-gaussian", "fos-linearised", "mfos-gaussian", "mfos-linearised")

@@ -77,12 +77,18 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     VariantWarning
         A variant is not a model; the others can be used.
     """
+    found, faults = usable_variants(path)
+    for fault in faults.values():
+        warnings.warn(str(fault), VariantWarning, stacklevel=2)
+    return found
+
+
+def usable_variants(path: str | Path | None = None) -> tuple[dict[str, Variant], dict[str, VariantError]]:
+    """What `load_variants` reads; and, by name, what is wrong with the others. VariantError as there."""
     found, faults = read_variants(path, [*_shipped(SHIPPED[0])] if path is None else ())
     if not found:
         raise next(iter(faults.values()))
-    for fault in faults.values():
-        warnings.warn(str(fault), VariantWarning, stacklevel=2)
-    return {name: one for name, one in found.items() if isinstance(one.model, Model)}
+    return {name: one for name, one in found.items() if isinstance(one.model, Model)}, faults
 
 
 def read_variants(

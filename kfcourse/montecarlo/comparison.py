@@ -25,7 +25,7 @@ FEW = 250  # batches: of fewer, the skewness is itself so uncertain that only as
 
 
 @dataclass(frozen=True)
-class Subset:
+class SlowPart:
     """Sums of all filters, the slow ones last, over the first of the common trajectories.
 
     `replaced` tells why another filter ran instead of a slow one that failed: name to the reason.
@@ -35,7 +35,7 @@ class Subset:
     sums: Sums
     replaced: Mapping[str, str] = field(default_factory=dict)
 
-    def without_exact(self) -> Subset | None:
+    def without_exact(self) -> SlowPart | None:
         """Without the exact AOF, if any other slow filter is left."""
         kept = [i for i, name in enumerate(self.slow, len(self.sums.square) - len(self.slow)) if name != EXACT]
         fast = list(range(len(self.sums.square) - len(self.slow)))
@@ -71,7 +71,7 @@ class Comparison:
     names : tuple of str
         All filters, in the order given.
     fast : tuple of str
-        Those that ran on every trajectory; the others ran on a subset of them.
+        Those that ran on every trajectory; the slow ones ran on a part of them.
     runs, steps, seed : int
     left_out : dict
         Slow filters without results although they were wanted: name to the reason.
@@ -89,14 +89,14 @@ class Comparison:
     steps: int
     seed: int
     sums: Sums
-    subset: Subset | None
+    slow_part: SlowPart | None
     left_out: Mapping[str, str] = field(default_factory=dict)
     replicas: Replicas | None = None
     smoothing: Comparison | None = None
 
     @cached_property
     def available(self) -> tuple[str, ...]:
-        """Names with results: all, or without the slow ones if their subset was 0 or they were left out."""
+        """Names with results: all, or without the slow ones if `slow_runs` was 0 or they were left out."""
         return tuple(name for name in self.names if name in self.fast or self._is_slow(name))
 
     @property
@@ -124,8 +124,8 @@ class Comparison:
     def doubtful(self) -> Array:
         """Steps, (steps,), at which what should be exact is not: it errs by too much itself, or a filter is more accurate."""
         found = np.zeros(self.steps, dtype=bool)
-        if self.subset is not None and self.has_bound:
-            own = batch_mean(self.subset.sums.doubt, self.subset.sums.weights).value
+        if self.slow_part is not None and self.has_bound:
+            own = batch_mean(self.slow_part.sums.doubt, self.slow_part.sums.weights).value
             found |= ~(own <= UNHEALTHY * self.bound().value)
             for name in self.fast:
                 above = self._estimate(self._above(name))
@@ -139,11 +139,11 @@ class Comparison:
 
     def without_unhealthy(self) -> Comparison:
         """Without the exact AOF, and with the reason, if what ran in its place can be relied on at no step."""
-        if self.subset is None or not self.doubtful.any() or (self.usable | self.without_error).any():
+        if self.slow_part is None or not self.doubtful.any() or (self.usable | self.without_error).any():
             return self
         first = self.replaced.get(EXACT, "it does not resolve this model")
         why = f"{first}; and particles, which ran in its place, err by too much"
-        return replace(self, subset=self.subset.without_exact(), left_out={**self.left_out, EXACT: why})
+        return replace(self, slow_part=self.slow_part.without_exact(), left_out={**self.left_out, EXACT: why})
 
     def heavy(self, name: str) -> Array:
         """Part that the largest single trajectory makes of what is known of the filter, (steps,).
@@ -156,7 +156,7 @@ class Comparison:
         by_errors = ratio(sums.largest_square[i].max(axis=-1), sums.square[i].sum(axis=(1, 2)), 0.0)
         if not self.has_bound:
             return by_errors
-        sums, i = self._in_subset(name)
+        sums, i = self._in_slow_part(name)
         share = self._shares.get(name, np.ones(self.steps))
         by_distances = ratio(sums.largest[i].max(axis=-1), np.abs(sums.distance[i].sum(axis=-1)), 0.0)
         return np.minimum(share * by_distances + (1 - share) * by_errors, 1.0)
@@ -178,7 +178,7 @@ class Comparison:
     @property
     def skewness_limit(self) -> float:
         """The largest skewness of an error whose interval can be trusted."""
-        sums = self.sums if self.subset is None else self.subset.sums
+        sums = self.sums if self.slow_part is None else self.slow_part.sums
         return min(SKEWED, len(sums.counts) / FEW)
 
     def missing(self, found: Estimate, *names: str) -> float:
@@ -198,12 +198,12 @@ class Comparison:
     @property
     def replaced(self) -> Mapping[str, str]:
         """Slow filters that failed, and for which another one ran (`Filter.instead`): name to the reason."""
-        return {} if self.subset is None else self.subset.replaced
+        return {} if self.slow_part is None else self.slow_part.replaced
 
     @property
-    def subset_runs(self) -> int:
+    def slow_runs(self) -> int:
         """Trajectories the slow filters ran on."""
-        return 0 if self.subset is None else int(self.subset.sums.counts.sum())
+        return 0 if self.slow_part is None else int(self.slow_part.sums.counts.sum())
 
     @property
     def control(self) -> str:
@@ -255,14 +255,14 @@ class Comparison:
     def bound(self) -> Estimate:
         """D_k of the exact AOF, (steps,), as the mean of its own variance.
 
-        M p_exact is the carrier's own variance over all trajectories plus M(p_exact - p_carrier) on the subset.
+        M p_exact is the carrier's own variance over all trajectories plus M(p_exact - p_carrier) on the slow part.
         """
         return self._estimate(self._bound())
 
     def above_bound(self, name: str) -> Estimate:
         """D_k(name) / D_k(exact) - 1 per step, (steps,), for a filter that ran on every trajectory, from its errors themselves.
 
-        The numerator is M(e^2 - p_carrier) over all trajectories less M(p_exact - p_carrier) on the subset.
+        The numerator is M(e^2 - p_carrier) over all trajectories less M(p_exact - p_carrier) on the slow part.
         """
         return self._quotient(self._above(name), self._bound())
 
@@ -350,28 +350,28 @@ class Comparison:
         return batch_mean(sums.normalised[i], sums.weights)
 
     def _is_slow(self, name: str) -> bool:
-        return self.subset is not None and name in self.subset.slow
+        return self.slow_part is not None and name in self.slow_part.slow
 
     def _where(self, name: str) -> tuple[Sums, int]:
         """Sums that hold the filter, and its place in them."""
         self._check(name)
-        if name in self.fast or self.subset is None:
+        if name in self.fast or self.slow_part is None:
             return self.sums, self.fast.index(name)
-        return self._in_subset(name)
+        return self._in_slow_part(name)
 
-    def _in_subset(self, name: str) -> tuple[Sums, int]:
-        """Sums over the subset, and the filter's place in them."""
+    def _in_slow_part(self, name: str) -> tuple[Sums, int]:
+        """Sums over the slow part, and the filter's place in them."""
         self._check(name)
-        if self.subset is None:
-            raise KeyError(f"no filter ran on a subset of the trajectories, so nothing is known of {name} there")
-        return self.subset.sums, (*self.fast, *self.subset.slow).index(name)
+        if self.slow_part is None:
+            raise KeyError(f"no filter ran on a part of the trajectories, so nothing is known of {name} there")
+        return self.slow_part.sums, (*self.fast, *self.slow_part.slow).index(name)
 
     def _check(self, *names: str) -> None:
         for name in names:
             if name not in self.available:
                 raise KeyError(f"no results for {name!r}; this comparison has {', '.join(self.available)}")
 
-    # --- estimates as terms: what of which filter, over all trajectories and over the subset
+    # --- estimates as terms: what of which filter, over all trajectories and over the slow part
 
     def _error(self, name: str) -> Terms:
         """D_k: the bound, and what is above it."""
@@ -389,14 +389,14 @@ class Comparison:
     def _distance(self, name: str) -> Terms:
         """M|z - z_exact|^2."""
         if not self.has_bound:
-            raise KeyError(f"the bound needs {EXACT} among the filters, with subset_runs above 0")
+            raise KeyError(f"the bound needs {EXACT} among the filters, with slow_runs above 0")
         self._check(name)
         return Terms({}, {("distance", name): 1.0})
 
     def _bound(self) -> Terms:
         """M p_exact."""
         if not self.has_bound:
-            raise KeyError(f"the bound needs {EXACT} among the filters, with subset_runs above 0")
+            raise KeyError(f"the bound needs {EXACT} among the filters, with slow_runs above 0")
         return Terms({("own", self.carrier): 1.0}, {("own", EXACT): 1.0, ("own", self.carrier): -1.0})
 
     def _above(self, name: str) -> Terms:
@@ -436,7 +436,7 @@ class Comparison:
         """
         shares = {}
         for name in self.fast:
-            sums, i = self._in_subset(name)
+            sums, i = self._in_slow_part(name)
             single = sums.largest[i].max(axis=-1) / sums.weights.sum()
             near, far = (self._estimate(way).standard_error ** 2 for way in self._ways(name))
             shares[name] = np.where(self.doubtful, 0.0, ratio(far, 4 * near + single**2 + far, 1.0))
@@ -474,10 +474,10 @@ class Comparison:
     def _estimate(self, terms: Terms, total: bool = False) -> Estimate:
         """The mean of the terms, (steps,), or summed over the steps, with its standard error."""
         full = batch_sums(self.sums, self.fast, terms.everywhere, total)
-        if self.subset is None or not terms.on_subset:
+        if self.slow_part is None or not terms.on_slow_part:
             found = estimate(full, self.sums.weights)
         else:
-            names = (*self.fast, *self.subset.slow)
-            x, y = (batch_sums(self.subset.sums, names, weights, total) for weights in terms)
-            found = estimate(full, self.sums.weights, x, y, self.subset.sums.weights)
+            names = (*self.fast, *self.slow_part.slow)
+            x, y = (batch_sums(self.slow_part.sums, names, weights, total) for weights in terms)
+            found = estimate(full, self.sums.weights, x, y, self.slow_part.sums.weights)
         return found if self.replicas is None else with_design(found, *self.replicas.variance(terms, total))

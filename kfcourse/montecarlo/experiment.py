@@ -1,5 +1,7 @@
 """The Monte Carlo engine: all filters on common trajectories, statistics on the fly.
 
+::
+
     compare(filters, model, runs, steps, seed) -> Comparison
 
 designs the filters that need it on one ensemble, runs all of them on another, and keeps sums over
@@ -20,13 +22,13 @@ from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
 from kfcourse.filters.fused import fuse
 from kfcourse.laws import Array, Gaussian, stacked
-from kfcourse.montecarlo.blocks import progress_bar, run_block
+from kfcourse.montecarlo.blocks import progress_bar, run_block, run_stretches
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, workers
 from kfcourse.montecarlo.parallel import Cluster, cluster, cores
+from kfcourse.montecarlo.slow_filters import LEAST, run_slow_filters
 from kfcourse.montecarlo.statistics import BATCHES, Sums, batch_sizes
-from kfcourse.montecarlo.subset import LEAST, run_subset
 from kfcourse.montecarlo.two_phase import Replicas
 from kfcourse.montecarlo.widths import best_width
 from kfcourse.reasons import Reason
@@ -114,9 +116,9 @@ def compare(
     smoothers: Sequence[Filter] = (),
     wide: float | None = None,
     compiled: bool = False,
-    subset_runs: int = 2000,
-    subset_seconds: float | None = None,
-    subset_memory: float | None = None,
+    slow_runs: int = 2000,
+    slow_seconds: float | None = None,
+    slow_memory: float | None = None,
     threads: int | None = None,
     dask: str | None = None,
     progress: bool | None = None,
@@ -152,14 +154,14 @@ def compare(
     compiled : bool
         Run compiled code (numba: `pip install kfcourse[fast]`) where a scalar model and its filters have formulas to compile.
         The numbers are the same but for rounding; the first time, compiling takes seconds, and is kept.
-    subset_runs : int
+    slow_runs : int
         Slow filters (exact, particle) run on this many of the common trajectories, at least 100; what they differ by from the
         Gaussian AOF (or else the most accurate fast filter) is found there.  0 leaves them out.
-    subset_seconds : float, optional
-        The slow filters stop after so long, on fewer trajectories; `Comparison.subset_runs` tells on how many.  With
+    slow_seconds : float, optional
+        The slow filters stop after so long, on fewer trajectories; `Comparison.slow_runs` tells on how many.  With
         the same seed, as many trajectories give the same numbers.  A slow filter that fails, or that does not come through
         the first few in this time, is left out, and `Comparison.left_out` tells why.
-    subset_memory : float, optional
+    slow_memory : float, optional
         Bytes that the slow filters may take beyond what the process has (Linux).  They then take fewer trajectories at once,
         which changes nothing but the time; one that has not room for the first few is left out.
     threads : int, optional
@@ -167,7 +169,7 @@ def compare(
         slow filters' chunks, as far as these take more than a moment.
     dask : str, optional
         Address of a Dask scheduler, such as "tcp://scheduler:8786": its workers run the filters, in blocks of trajectories and in
-        chunks of the slow filters'; the numbers are the same.  Designed is here.  `subset_memory` is theirs to keep, not limited.
+        chunks of the slow filters'; the numbers are the same.  Designed is here.  `slow_memory` is theirs to keep, not limited.
     progress : bool, optional
         Show progress bars; by default if standard error is a terminal.
 
@@ -178,15 +180,15 @@ def compare(
     NotFinite
         A trajectory or a filter left the finite numbers.
     """
-    _check_arguments(filters, model, subset_runs, subset_seconds, subset_memory)
+    _check_arguments(filters, model, slow_runs, slow_seconds, slow_memory)
     _check_designs(designs, same_ensemble, wide)
     if smoothers:
-        _check_arguments(smoothers, model, subset_runs, subset_seconds, subset_memory)
+        _check_arguments(smoothers, model, slow_runs, slow_seconds, slow_memory)
     if compiled:
         filters = _compiled(filters)
     seed, threads = seed_number(seed), cores() if threads is None else threads
     names = [one.name for one in filters]
-    slow = [one for one in filters if one.slow and subset_runs]
+    slow = [one for one in filters if one.slow and slow_runs]
     fast = [one for one in filters if not one.slow]
     run_seed, pilot_seed, *design_seeds = np.random.SeedSequence(seed).spawn(2 + designs)
     common = Ensemble(model, runs, steps, run_seed, compiled=compiled)
@@ -209,17 +211,18 @@ def compare(
             common = replace(common, wide=1.0)  # some far start is too far: none but the prior's own
             everything = _run_blocks(everyone, common, far.executor if far else pool, progress)
         sums, replicas = _split(everything, fast, len(others))
-        subset, left_out = None, dict[str, str]()
+        slow_part, left_out = None, dict[str, str]()
         if slow:
             slow_ready = _designed(slow, design_ensemble, pool, progress)
-            subset, left_out = run_subset(
-                ready, slow_ready, common, min(subset_runs, runs), subset_seconds, subset_memory, threads, progress, far=far
+            slow_part, left_out = run_slow_filters(
+                ready, slow_ready, common, min(slow_runs, runs), slow_seconds, slow_memory, threads, progress, far=far
             )
         smoothing = None
         if smoothers:
-            limits = (min(subset_runs, runs), subset_seconds, subset_memory, threads)
+            limits = (min(slow_runs, runs), slow_seconds, slow_memory, threads)
             smoothing = _smoothing(smoothers, common, seed, pool, limits, progress, far)
-    found = Comparison(model, tuple(names), tuple(one.name for one in fast), runs, steps, seed, sums, subset, left_out, replicas)
+    quick = tuple(one.name for one in fast)
+    found = Comparison(model, tuple(names), quick, runs, steps, seed, sums, slow_part, left_out, replicas)
     return replace(found.without_unhealthy(), smoothing=smoothing)
 
 
@@ -260,18 +263,18 @@ def _smoothing(
     """The comparison of smoothers on the same trajectories."""
     slow, fast = ([one for one in smoothers if one.slow == which and (limits[0] or not one.slow)] for which in (True, False))
     sums = _run_blocks(fast, common, far.executor if far else pool, progress, back=True)
-    subset, left_out = run_subset(fast, slow, common, *limits, progress, back=True, far=far) if slow else (None, {})
+    slow_part, left_out = run_slow_filters(fast, slow, common, *limits, progress, back=True, far=far) if slow else (None, {})
     names, quick = (tuple(one.name for one in some) for some in (smoothers, fast))
-    found = Comparison(common.model, names, quick, common.runs, common.steps, seed, sums, subset, left_out)
+    found = Comparison(common.model, names, quick, common.runs, common.steps, seed, sums, slow_part, left_out)
     return found.without_unhealthy()
 
 
 def _check_arguments(
     filters: Sequence[Filter | Design],
     model: Model | JumpModel,
-    subset_runs: int,
-    subset_seconds: float | None,
-    subset_memory: float | None,
+    slow_runs: int,
+    slow_seconds: float | None,
+    slow_memory: float | None,
 ) -> None:
     """ValueError for what `compare` cannot do with these arguments."""
     names = [one.name for one in filters]
@@ -279,14 +282,12 @@ def _check_arguments(
         raise ValueError(f"give at least one filter, and each a name of its own: {', '.join(names) or 'none given'}")
     if all(one.slow for one in filters):
         raise ValueError(f"{names[0]} is found through its difference from a fast filter; add one, such as aof-gaussian")
-    if subset_runs < 0:
-        raise ValueError(f"subset_runs must not be negative, got {subset_runs}")
-    if subset_seconds is not None and not subset_seconds > 0:
-        raise ValueError(f"subset_seconds must be positive, got {subset_seconds}; subset_runs=0 leaves the slow filters out")
-    if subset_memory is not None and not subset_memory >= LEAST:
-        raise ValueError(
-            f"subset_memory must be at least {LEAST:g}, got {subset_memory}; subset_runs=0 leaves the slow filters out"
-        )
+    if slow_runs < 0:
+        raise ValueError(f"slow_runs must not be negative, got {slow_runs}")
+    if slow_seconds is not None and not slow_seconds > 0:
+        raise ValueError(f"slow_seconds must be positive, got {slow_seconds}; slow_runs=0 leaves the slow filters out")
+    if slow_memory is not None and not slow_memory >= LEAST:
+        raise ValueError(f"slow_memory must be at least {LEAST:g}, got {slow_memory}; slow_runs=0 leaves the slow filters out")
     for one in filters:
         if (one.model.n, one.model.p) != (model.n, model.p):
             raise ValueError(
@@ -337,14 +338,16 @@ def _run_blocks(
     filters: Sequence[Filter], ensemble: Ensemble, pool: Executor, progress: bool | None, *, back: bool = False
 ) -> Sums:
     """Sums over all trajectories, its blocks in parallel."""
-
-    record = Sums.record_by_loop if ensemble.compiled and is_scalar(ensemble.model) else Sums.record
+    several = ensemble.compiled and is_scalar(ensemble.model) and not back
 
     def block(index: int) -> Sums:
         size = ensemble.sizes[index]
         counts = batch_sizes(size, max(1, round(BATCHES * size / ensemble.runs)))
         sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, counts)
-        run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight, back=back, record=record)
+        if several:
+            run_stretches(filters, ensemble.stretches(index), sums, ensemble.weight)
+        else:
+            run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight, back=back)
         return sums
 
     indices = range(len(ensemble.sizes))

@@ -1,9 +1,9 @@
-"""Means that are known in part from all trajectories and in part from a subset of them, and what the design adds to their error.
+"""Means that are known in part from all trajectories and in part from a part of them, and what the design adds to their error.
 
 Fast filters ran on all N trajectories, slow ones on the first n.  A quantity is X, of what ran everywhere, plus Y, of what ran
-on the subset:
+on this slow part:
 
-    estimate = M_N X + M_n Y,    Var = Var X / N + Var Y / n + 2 Cov(X, Y) / N
+    Z = M_N[X] + M_n[Y],    Var(Z) = Var(X) / N + Var(Y) / n + 2 Cov(X, Y) / N
 
 Filters with coefficients from an ensemble vary with that ensemble, too.  So they are designed several times, and run on common
 trajectories: the variance of their results, less what it would be for equal coefficients, is the variance of the design.
@@ -27,7 +27,7 @@ class Terms(NamedTuple):
     """X and Y as weighted sums of the statistics of filters."""
 
     everywhere: Weights
-    on_subset: Weights
+    on_slow_part: Weights
 
     def plus(self, other: Terms) -> Terms:
         return Terms(*(_added(mine, theirs) for mine, theirs in zip(self, other, strict=True)))
@@ -64,7 +64,7 @@ class Replicas:
         A distance from the exact filter varies as the square of the error does: their difference is that filter's own.
         """
         weights = dict[str, Array | float]()
-        for (kind, name), weight in (*terms.everywhere.items(), *terms.on_subset.items()):
+        for (kind, name), weight in (*terms.everywhere.items(), *terms.on_slow_part.items()):
             if kind in ("square", "distance") and name in self.names:
                 weights[name] = weights.get(name, 0.0) + weight
         values = np.stack(
@@ -87,19 +87,19 @@ def batch_sums(sums: Sums, names: tuple[str, ...], weights: Weights, total: bool
 
 
 def estimate(
-    full: Array, weights: Array, x: Array | None = None, y: Array | None = None, of_subset: Array | None = None
+    full: Array, weights: Array, x: Array | None = None, y: Array | None = None, of_slow_part: Array | None = None
 ) -> Estimate:
-    """M_N X + M_n Y from batch sums of X over all trajectories, and of X and Y over the subset, if there is a Y.
+    """M_N X + M_n Y from batch sums of X over all trajectories, and of X and Y over the slow part, if there is a Y.
 
-    `weights` and `of_subset` are the weights of the batches.
+    `weights` and `of_slow_part` are the weights of the batches.
     """
     everywhere = batch_mean(full, weights)
-    if x is None or y is None or of_subset is None:
+    if x is None or y is None or of_slow_part is None:
         return everywhere
-    correction = batch_mean(y, of_subset)
-    # Var(x + y) - Var(x - y) = 4 Cov(x, y), each a variance of means over the n of the subset
-    plus, minus = (batch_mean(x + sign * y, of_subset).standard_error ** 2 for sign in (1, -1))
-    covariance = (plus - minus) / 4 * of_subset.sum() / weights.sum()
+    correction = batch_mean(y, of_slow_part)
+    # Var(x + y) - Var(x - y) = 4 Cov(x, y), each a variance of means over the n of the slow part
+    plus, minus = (batch_mean(x + sign * y, of_slow_part).standard_error ** 2 for sign in (1, -1))
+    covariance = (plus - minus) / 4 * of_slow_part.sum() / weights.sum()
     error = np.sqrt(np.maximum(everywhere.standard_error**2 + correction.standard_error**2 + 2 * covariance, 0.0))
     # third cumulants of sums of nearly independent parts add up
     third = everywhere.skewness * everywhere.standard_error**3 + correction.skewness * correction.standard_error**3

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import base64
 import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import jinja2
 import nbformat
@@ -23,6 +26,20 @@ from kfcourse.symbolic.markup import mathml as formula
 
 SECONDS = 120  # a cell may take
 BROWSERS = ("chromium", "google-chrome", "chromium-browser", "msedge", "chrome")
+
+
+class _Client(NotebookClient):
+    """Leaves signals to the command.
+
+    The client's own handlers end the kernel and nothing else: the next notebook would go on after Ctrl-C.
+    """
+
+    @asynccontextmanager
+    async def async_setup_kernel(self, **kwargs: Any) -> AsyncIterator[None]:
+        loop = asyncio.get_running_loop()
+        with mock.patch.object(loop, "add_signal_handler", side_effect=RuntimeError):  # as outside of the main thread
+            async with super().async_setup_kernel(**kwargs):
+                yield
 
 
 class NotebookFailed(RuntimeError):
@@ -47,7 +64,7 @@ def execute(notebook: NotebookNode, name: str, stop_at_error: bool = True) -> No
         A cell raises an error (if `stop_at_error`) or takes too long, or the kernel dies.
     """
     result = nbformat.from_dict(notebook)
-    client = NotebookClient(
+    client = _Client(
         result,
         timeout=SECONDS,
         kernel_name="python3",

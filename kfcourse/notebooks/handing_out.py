@@ -11,7 +11,7 @@ import click
 from tqdm import tqdm
 
 from kfcourse.checks import sets
-from kfcourse.lab.variants import chosen_variants
+from kfcourse.lab.variants import VariantError, chosen_variants, usable_variants
 from kfcourse.notebooks.course_list import assign, save_assignment
 from kfcourse.notebooks.jobs import Job, Outcome, make, plan, run_all
 from kfcourse.notebooks.texts import clean
@@ -34,17 +34,23 @@ def hand_out(
 ) -> bool:
     """Write the notebooks that `kfcourse exercises` or `solutions` is asked for; whether all could be made."""
     wanted = _letters(letters)
-    variants = [v.name for v in chosen_variants(names, everything or bool(students and not names), variants_file)]
-    if students:
-        work = _for_students(kind, students, variants, wanted, out, variants_file, masters, with_pdf)
+    faults: dict[str, VariantError] = {}
+    if everything:
+        variants, faults = usable_variants(variants_file)
     else:
-        work = plan(kind, out, variants, wanted, variants_file, masters, with_pdf)
+        variants = {one.name: one for one in chosen_variants(names, bool(students and not names), variants_file)}
+    if students:
+        work = _for_students(kind, students, [*variants], wanted, out, variants_file, masters, with_pdf)
+    else:
+        work = plan(kind, out, [*variants], wanted, variants_file, masters, with_pdf)
     _separate(work)
     out.mkdir(parents=True, exist_ok=True)
     failed = _show(run_all(work, make, workers, kind, dask), work)
     for outcome in sorted(failed, key=lambda one: one.job.name):
         click.echo(f"FAILED {clean(outcome.job.name)}: {clean(outcome.message, 2000)}", err=True)
-    return not failed
+    for fault in faults.values():
+        click.echo(f"FAILED {clean(str(fault), 2000)}", err=True)
+    return not (failed or faults)
 
 
 def _letters(given: str | None) -> list[str]:

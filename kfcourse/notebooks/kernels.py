@@ -12,7 +12,9 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 from importlib.metadata import entry_points
+from multiprocessing import forkserver
 from multiprocessing.context import ForkServerProcess
 from typing import Any
 
@@ -48,11 +50,24 @@ class ForkedProvisioner(LocalProvisioner):
             return await super().launch_kernel(cmd, **kwargs)
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload(IMPORTED)
+        _start_server()
         arguments = cmd[cmd.index(LAUNCHER) + 1 :]
         process = context.Process(target=serve, args=(arguments, dict(kwargs["env"]), kwargs.get("cwd")))
         process.start()
         self.process, self.pid = Fork(process), process.pid
         return self.connection_info
+
+
+def _start_server() -> None:
+    """The fork server, deaf to Ctrl-C, which is for the command: it would print where its imports were interrupted."""
+    if threading.current_thread() is not threading.main_thread():
+        forkserver.ensure_running()
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # what a process ignores, the one that it starts ignores too
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 class Fork:

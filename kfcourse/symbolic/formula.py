@@ -102,6 +102,7 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
 
     Examples
     --------
+    >>> from kfcourse.symbolic.formula import parse, symbol
     >>> x, v = symbol("x"), symbol("v")
     >>> parse("x - x**2*sin(v)", {"x": x, "v": v})
     -x**2*sin(v) + x
@@ -269,8 +270,10 @@ class Reader:
 
     def call(self, node: ast.Call) -> sp.Expr:
         if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:
-            called = node.func.id if isinstance(node.func, ast.Name) else "this"
-            raise self.fail(node, f"{called!r} is not a known function; known: {', '.join(sorted(FUNCTIONS))}")
+            hint = "" if isinstance(node.func, ast.Name) else "; a product needs *"
+            raise self.fail(
+                node, f"{ast.unparse(node.func)[:40]!r} is not a known function{hint}; known: {', '.join(sorted(FUNCTIONS))}"
+            )
         count = ARGUMENTS.get(node.func.id, 1)
         if node.keywords or len(node.args) != count:
             raise self.fail(node, f"{node.func.id} takes exactly {'one argument' if count == 1 else f'{count} arguments'}")

@@ -1,16 +1,18 @@
 """Structural functions by quadrature over a normal law, for models without a closed form.
 
 A noise that is added with a constant factor, and is correlated with no noise of another kind, needs no points: its mean
-and covariance are added.  The points spread over the state and over the other noises, s variables together.
+and covariance are added.  Nor does the Gauss-Hermite rule need any for noises with factors that depend on the state alone: at
+each point of the state their mean and covariance are known, Cov y = Cov M[y|x] + M Cov[y|x].  The points spread over the state
+and over the other noises, s variables together.
 """
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from functools import partial
+from dataclasses import replace
 from itertools import product as cartesian
-from typing import NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import sympy as sp
@@ -80,13 +82,13 @@ def unscented(model: Model, kappa: float | None = None, root: str = "cholesky", 
         weights[0] = k / (size + k)
         return np.concatenate([np.zeros((1, size)), axes, -axes]), weights
 
-    return _checked("unscented", model, rule, _Equations.of(model, augmented), root, order=5)
+    return _checked("unscented", model, rule, _Equations.of(model, "all" if augmented else "not only added"), root, order=5)
 
 
 def gauss_hermite(model: Model, order: int = 5, root: str = "cholesky", augmented: bool = False) -> Structure:
     """Structural functions by the Gauss-Hermite product rule; exact for polynomials below degree 2*order.
 
-    `order` points an axis, so order**s evaluations.  `root` and `augmented` as of `unscented`.
+    `order` points an axis, so order**s evaluations, s = `axes(model)`.  `root` and `augmented` as of `unscented`.
 
     Raises
     ------
@@ -100,7 +102,14 @@ def gauss_hermite(model: Model, order: int = 5, root: str = "cholesky", augmente
     """
     if order < 2:
         raise ModelError(f"Gauss-Hermite quadrature needs an order of at least 2, got {order}")
-    return _checked("gauss-hermite", model, product_rule(order), _Equations.of(model, augmented), root, order)
+    return _checked(
+        "gauss-hermite", model, product_rule(order), _Equations.of(model, "all" if augmented else _NOT_LINEAR), root, order
+    )
+
+
+def axes(model: Model) -> int:
+    """Over how many variables the Gauss-Hermite rule spreads: the state, and the noises of an equation that need points."""
+    return _Equations.of(model, _NOT_LINEAR).size(model)
 
 
 def product_rule(order: int) -> Rule:
@@ -115,22 +124,34 @@ def product_rule(order: int) -> Rule:
     return rule
 
 
+Pointed: TypeAlias = Literal["all", "not only added", "not linear"]  # the noises over which points spread
+_NOT_LINEAR: Pointed = "not linear"
+
+
 class _Equation(NamedTuple):
-    """One equation of the model as f(x, other noises), and the covariance of what is only added."""
+    """One equation of the model as f(x, noises with points, k), and what the other noises add, at a step k."""
 
     function: Callable[..., Array]
     size: int
-    noise: Gaussian  # all noises; the covariance of those that are only added set to 0
-    root: Array  # of that covariance, columns for the other noises only
-    factors: Stepwise  # of the noises that are only added
+    noise: Gaussian  # all noises; the covariance of those without points
+    root: Array  # of the covariance of those with points, columns for them only
+    factors: Stepwise  # of those without points
+    of_state: bool  # whether factors depend on the state
     angles: Components  # components of the function's value
-    added: Array
+    k: int | None = None
 
-    def at(self, k: int | None) -> _Equation:
-        """That of step k, if the model depends on it."""
-        (matrix,) = self.factors.at(k)()
-        added = symmetric(matrix @ self.noise.cov @ matrix.T)
-        return self._replace(function=partial(self.function, k=k), added=added)
+    def added(self, x: Array, weights: Array) -> Array:
+        """sum_q w_q B(x_q) D B(x_q)^T, the mean over points x (..., q, n) of the covariance given x."""
+        factors = self.factors.at(self.k)
+        if not self.of_state:
+            (matrix,) = factors()
+            return symmetric(matrix @ self.noise.cov @ matrix.T)
+        root = square_root(self.noise.cov)
+        B = np.broadcast_to(factors(x)[0], (*x.shape[:-1], self.size, len(root)))
+        rows = (B.reshape(*x.shape[:-2], -1, len(root)) @ root).reshape(B.shape)  # one product a trajectory, not one a point
+        columns = np.moveaxis(rows * np.sqrt(weights)[:, None, None], -2, -3)  # (..., size, q, noises)
+        columns = columns.reshape(*columns.shape[:-2], -1)
+        return symmetric(columns @ transpose(columns))
 
 
 class _Equations(NamedTuple):
@@ -138,38 +159,42 @@ class _Equations(NamedTuple):
     meter: _Equation
 
     @classmethod
-    def of(cls, model: Model, augmented: bool) -> _Equations:
+    def of(cls, model: Model, pointed: Pointed) -> _Equations:
         state, meter = compile_model(model)
         return cls(
-            _equation(
-                state, model.state_equation, (*model.x, *model.v), model.v, model.state_noise, model, augmented, model.angles.x
-            ),
-            _equation(
-                meter, model.meter_equation, (*model.x, *model.w), model.w, model.meter_noise, model, augmented, model.angles.y
-            ),
+            _equation(state, model.state_equation, model.v, model.state_noise, model, pointed, model.angles.x),
+            _equation(meter, model.meter_equation, model.w, model.meter_noise, model, pointed, model.angles.y),
         )
 
+    def size(self, model: Model) -> int:
+        """Variables with points, of the equation that has more."""
+        return model.n + max(equation.root.shape[1] for equation in self)
 
-def _equation(function, formulas, variables, noises, law: Gaussian, model: Model, augmented: bool, angles: Components):
+
+def _equation(function, formulas, noises, law: Gaussian, model: Model, pointed: Pointed, angles: Components):
     factors = sp.Matrix(formulas).subs(model.values).jacobian(list(noises)) if noises else sp.zeros(len(formulas), 0)
-    constant = [
-        not sp.Matrix(factors[:, j]).applyfunc(sp.simplify).has(*variables) and not decides(formulas, [noise])
+    varying = noises if pointed == _NOT_LINEAR else (*model.x, *noises)
+    plain = [
+        not (factors[:, j].has(*varying) and factors[:, j].applyfunc(sp.simplify).has(*varying))
+        and not decides(formulas, [noise])
         for j, noise in enumerate(noises)
     ]
-    other = np.array([augmented or not c for c in constant], dtype=bool)
+    other = np.array([pointed == "all" or not p for p in plain], dtype=bool)
     while (correlated := ~other & (law.cov[:, other] != 0).any(axis=1)).any():
         other |= correlated
-    added = sp.Matrix(len(formulas), len(noises), lambda i, j: 0 if other[j] else factors[i, j])
-    stepwise = Stepwise.compile(model.known, "factors", {}, {"factors": added}, [])
+    rest = sp.Matrix(len(formulas), len(noises), lambda i, j: 0 if other[j] else factors[i, j])
+    arguments = {"x": sp.Matrix(model.x)} if rest.has(*model.x) else {}
+    stepwise = Stepwise.compile(model.known, "factors", arguments, {"factors": rest}, [*arguments])
     root = np.zeros((len(noises), int(other.sum())))
     root[other] = square_root(law.cov[np.ix_(other, other)]) if other.any() else root[other]
-    return _Equation(function, len(formulas), law, root, stepwise, angles, np.empty(0))
+    without = law._replace(cov=np.where(other[:, None] | other, 0.0, law.cov))
+    return _Equation(function, len(formulas), without, root, stepwise, bool(arguments), angles)
 
 
 def _checked(name: str, model: Model, rule: Rule, equations: _Equations, root: str, order: int) -> Structure:
     """The structure, after a comparison at the prior law of Gauss-Hermite rules of this order and of twice the order."""
     structure = _quadrature(name, model, rule, equations, root)
-    size = model.n + max(equation.root.shape[1] for equation in equations)
+    size = equations.size(model)
     with np.errstate(all="ignore"):
         found = _moments(structure)
         if not all(np.isfinite(moment).all() for _, moment, *_ in found):
@@ -246,51 +271,60 @@ def _quadrature(name: str, model: Model, rule: Rule, equations: _Equations, root
     if root not in ROOTS:
         raise ModelError(f"root must be one of {', '.join(map(repr, ROOTS))}, got {root!r}")
     rules = [rule(model.n + equation.root.shape[1]) for equation in equations]
-    return of_steps(name, model, lambda k: _of_step(name, model, rules, _Equations(*(one.at(k) for one in equations)), root))
+    whole = of_steps(
+        name, model, lambda k: _of_step(name, model, rules, _Equations(*(one._replace(k=k) for one in equations)), root)
+    )
+    state, known = equations.state, model.known
+    numbers = tuple(one.tobytes() for one in (*rules[0], *state.noise, state.root))
+    moving = name, root, numbers, model.state_equation.subs(model.values), known.interval, tuple(known.inputs.items())
+    return replace(whole, moving=moving)
 
 
 def _of_step(name: str, model: Model, rules: Sequence[tuple[Array, Array]], equations: _Equations, root: str) -> Structure:
     n, measurement = model.n, measurement_of(model.angles.y)
 
     def propagate(equation: _Equation, mean: Array, cov: Array, points: Array, weights: Array):
-        """Root of cov, deviations of x, mean of the function, its deviations from that: 0 exactly for what does not vary."""
+        """Root of cov, deviations of x, mean of the function, its deviations from that (0 exactly for what does not vary),
+        and the covariance that noises without points add."""
         scale = ROOTS[root](cov)
         deviation = points[:, :n] @ transpose(scale)
         x = mean[..., None, :] + deviation
         noise = equation.noise.mean + points[:, n:] @ equation.root.T
-        values = equation.function(x, np.broadcast_to(noise, x.shape[:-1] + noise.shape[-1:]))
+        values = equation.function(x, np.broadcast_to(noise, x.shape[:-1] + noise.shape[-1:]), equation.k)
         values = np.broadcast_to(values, (*x.shape[:-1], equation.size))
         middle = values[..., np.argmin((points**2).sum(axis=1)), :]
         values = difference(values, middle[..., None, :], equation.angles)
         shift = weights @ values
-        return scale, deviation, on_circle(middle + shift, equation.angles), values - shift[..., None, :]
+        value = on_circle(middle + shift, equation.angles)
+        return scale, deviation, value, values - shift[..., None, :], equation.added(x, weights)
 
     def predict(z: Array, p: Array) -> Gaussian:
         points, weights = rules[0]
-        _, _, tau, following = propagate(equations.state, z, p, points, weights)
-        return Gaussian(tau, _weighted(weights, following) + equations.state.added)
+        _, _, tau, following, added = propagate(equations.state, z, p, points, weights)
+        return Gaussian(tau, _weighted(weights, following) + added)
 
     def regressed(equation: _Equation, rule: tuple[Array, Array], mean: Array, cov: Array):
-        """Mean of the function, its slopes by x, covariance of what is not linear in x, the function's deviations."""
+        """Mean of the function, its slopes by x, covariance of what is not linear in x, deviations, what is added."""
         points, weights = rule
         # In directions that a singular covariance knows exactly there would be no points, and no slope.
         spread = cov if n == 1 else cov * (1 + UNSEEN * np.finfo(float).eps * np.eye(n))
-        scale, dx, value, deviation = propagate(equation, mean, spread, points, weights)
+        scale, dx, value, deviation, added = propagate(equation, mean, spread, points, weights)
         dx = np.broadcast_to(dx, (*deviation.shape[:-1], n))
         slopes = _slopes(transpose(deviation * weights[:, None]) @ points[:, :n], scale)
         # No difference of nearly equal matrices.
-        return value, slopes, _weighted(weights, deviation - dx @ transpose(slopes)) + equation.added, deviation
+        left = _weighted(weights, deviation - dx @ transpose(slopes)) + added
+        return value, slopes, left, deviation, added
 
     def measure(m: Array, d: Array) -> Measurement:
         d = np.broadcast_to(d, (*m.shape, n))
-        h, G, R, dy = regressed(equations.meter, rules[1], m, d)
+        h, G, R, dy, added = regressed(equations.meter, rules[1], m, d)
         if n == 1:
-            return measurement(h, G, _weighted(rules[1][1], dy) + equations.meter.added, R)
+            return measurement(h, G, _weighted(rules[1][1], dy) + added, R)
         F = symmetric(G @ d @ transpose(G)) + R
         return measurement(h, *_without_rounding(G, d, F, R))
 
     def transition(z: Array, p: Array) -> Transition:
-        _, A, Q, _ = regressed(equations.state, rules[0], z, np.broadcast_to(p, (*z.shape, n)))
+        _, A, Q, *_ = regressed(equations.state, rules[0], z, np.broadcast_to(p, (*z.shape, n)))
         return Transition(A, Q)
 
     return Structure(name, model, predict, measure, transition)

@@ -14,7 +14,7 @@ predict/correct step serves them all.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial, reduce
 from itertools import product as cartesian
@@ -56,6 +56,8 @@ class Structure:
         The symbolic functions; None for the numerical structures.
     at_step : callable, optional
         Step to the structure of that step, if the model depends on it; see `at`.
+    moving : hashable, optional
+        Of numerical structures: the same for those that have the same tau and Theta.
 
     Covariances, G and h that do not depend on the trajectory may come without the leading axes.
     """
@@ -67,6 +69,7 @@ class Structure:
     transition: Callable[[Vectors, Matrices], Transition]
     formulas: StructuralFormulas | None = None
     at_step: Callable[[int], Structure] | None = None
+    moving: Hashable = None
 
     def at(self, k: int) -> Structure:
         """The structural functions of step k: tau and Theta from k to k + 1; h, G, F of y_k.
@@ -299,7 +302,7 @@ def _taylor(equation, x, mean, noise, noise_mean):
 def gaussian(model: Model) -> Structure:
     """Structural functions as exact moments over x ~ N (the normal, or Gaussian, filters').
 
-    tau = M a(x, v),  Theta = Cov a(x, v),  h = M b(x, w),  G = dh/dm,  F = Cov b(x, w)
+    tau = M[a(x, v)],  Theta = Cov(a(x, v)),  h = M[b(x, w)],  G = dh/dm,  F = Cov(b(x, w))
 
     Raises
     ------

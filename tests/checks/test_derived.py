@@ -112,7 +112,7 @@ def test_other_chains_may_stand_before_but_give_no_letter_another_meaning():
     wrong = told(f"h = 0\n{BEGIN}", "M[y^2]", "g^2*(m^2 + d) + f^2*(m^4 + 6*m^2*d + 3*d^2)")
     assert wrong.status == "wrong" and wrong.message.startswith("line 1, `0`: the line differs from what h means")
     for name in ("x", "w", "m", "g"):
-        assert f"what {name} means is given" in told(f"{name} = 1\n{BEGIN}", END).message
+        assert f"`{name} =`, which has a meaning already" in told(f"{name} = 1\n{BEGIN}", END).message
 
 
 HOSTILE = {

@@ -37,5 +37,9 @@ def test_equal_formulas_by_value():
     assert not equal_formulas([sp.Function("u")(z)], [z], {})
     assert equal_formulas([sp.Rational(81, 100) * z], [c**2 * z], {c: sp.Rational(9, 10)})
     assert not equal_formulas([sp.Rational(8, 10) * z], [c**2 * z], {c: sp.Rational(9, 10)})
+    # Python's own 1/3 and pi are as good as their digits, and a number that was typed shorter is not.
+    assert equal_formulas([like((1 / 3) * z + 2 * np.pi * p**0.5, z)], [z / 3 + 2 * sp.pi * sp.sqrt(p)], {})
+    assert not equal_formulas([like(0.33333 * z, z)], [z / 3], {})
+    assert not equal_formulas([like((1 / 3 + 1e-11) * z, z)], [z / 3], {})
     # As a difference of large numbers: 25 of 60 digits are lost.
     assert equal_formulas([(z + 10**25) - 10**25 + sp.sin(z) ** 2 + sp.cos(z) ** 2], [z + 1], {})

@@ -81,13 +81,13 @@ def test_evidence_and_smoothing_take_its_posteriors():
 def test_a_comparison_has_the_same_bound():
     model = SCALAR["53"]
     plain, quick = (
-        compare([aof(gaussian(model)), exact(model)], model, 2000, STEPS, 1, subset_runs=160, progress=False, compiled=which)
+        compare([aof(gaussian(model)), exact(model)], model, 2000, STEPS, 1, slow_runs=160, progress=False, compiled=which)
         for which in (False, True)
     )
     assert quick.has_bound
     assert not quick.replaced
     for name in ("square", "distance", "doubt"):
-        one, other = getattr(plain.subset.sums, name), getattr(quick.subset.sums, name)
+        one, other = getattr(plain.slow_part.sums, name), getattr(quick.slow_part.sums, name)
         np.testing.assert_allclose(other, one, rtol=1e-6, atol=1e-9 * np.abs(one).max(), err_msg=name)
 
 

@@ -645,7 +645,7 @@ def test_a_design_on_trajectories_that_diverge_says_so(variant53):
 
 
 def test_every_filter_has_its_name_counts_its_measurements_and_says_if_it_is_slow(variant53, trajectories):
-    """Results are asked for by name, designs and random streams are looked up by step, and the slow run on a subset."""
+    """Results are asked for by name, designs and random streams are looked up by step, and the slow run on a part."""
     filters = filters_of(variant53, trajectories)
     designed = [f"{family}{a}-{kind}" for family in ("fos", "mfos") for kind in ("linearised", "gaussian") for a in ("", 3)]
     designed += [

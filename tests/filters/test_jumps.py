@@ -17,6 +17,7 @@ from kfcourse import (
     NotFinite,
     compare,
     design,
+    gauss_hermite,
     gaussian,
     likelihood,
     linearised,
@@ -589,7 +590,7 @@ def test_who_wins():
         4000,
         10,
         1,
-        subset_runs=200,
+        slow_runs=200,
         progress=False,
         threads=1,
     )
@@ -651,6 +652,8 @@ def test_objects_are_alike_only_with_the_same_numbers_inputs_and_approximation()
     modes = bent(CHAINED).modes
     assert moving_alike([gaussian(modes[0]), linearised(modes[0])]) == [0, 1]
     assert moving_alike([gaussian(modes[0]), gaussian(modes[0].replace(s=0.5))]) == [0, 1]
-    assert moving_alike([unscented(modes[0]), unscented(modes[1])]) == [0, 1]
+    assert moving_alike([unscented(modes[0]), unscented(modes[1])]) == [0, 0]
+    assert moving_alike([gauss_hermite(modes[0], 3), gauss_hermite(modes[0], 4), gauss_hermite(modes[1], 3)]) == [0, 1, 0]
+    assert moving_alike([gauss_hermite(modes[0]), gauss_hermite(modes[0].replace(s=0.5))]) == [0, 1]
     driven = [Model.define("x + u + v", "x + w", inputs={"u": values}) for values in ([0, 1], [0, 1], [1, 0])]
     assert moving_alike([gaussian(one) for one in driven]) == [0, 0, 2]

@@ -151,7 +151,7 @@ def test_who_knows_of_the_state_gains():
     rows = [(mode[1:] == 1)[mode[:-1] == i].mean() for i in (0, 1)]
     without = logic_dynamic([gaussian(one) for one in model.modes], [[1 - p, p] for p in rows], model.first, name="aof-without")
     result = compare(
-        [of(logic_dynamic, model), of(gpb2, model), without, jump_pointmass(model)], model, 4000, 12, 1, subset_runs=160,
+        [of(logic_dynamic, model), of(gpb2, model), without, jump_pointmass(model)], model, 4000, 12, 1, slow_runs=160,
         progress=False, threads=1,
     )  # fmt: skip
     gain = result.mean_gap_difference("aof-without", "aof-jump-gaussian", slice(3, None))
@@ -179,7 +179,7 @@ def test_jumps_of_the_probabilities_are_refused_by_who_integrates_them():
     model = overloaded([["Heaviside(1 - x)", "1 - Heaviside(1 - x)"], [0.3, 0.7]])
     with pytest.raises(ModelError, match="from mode sound change too abruptly"):
         of(logic_dynamic, model)
-    with pytest.raises(ModelError, match=r"step \d of .* too abruptly .*--exact-runs 0"):
+    with pytest.raises(ModelError, match=r"step \d of .* too abruptly .*--slow-runs 0"):
         run(jump_pointmass(model), simulate(model, 40, 8, seed=1).y)
 
 

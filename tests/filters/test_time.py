@@ -333,7 +333,7 @@ def test_the_growth_model_works_with_every_filter():
     filters = [aof(s), aof(unscented(model)), aof(g), iterated(s, 2), duof(model)]
     filters += [family(g, arguments) for family in (fos, mfos) for arguments in (2, 3)] + [fos(s), mfos(s)]
     filters += [pointmass(model), particle(model, 300)]
-    found = compare(filters, model, 2000, 20, seed=1, subset_runs=112, threads=1, progress=False)
+    found = compare(filters, model, 2000, 20, seed=1, slow_runs=112, threads=1, progress=False)
     assert not found.left_out and set(found.available) == {one.name for one in filters}
     extended, conditional = (found.error_variance(name).value.mean() for name in ("aof-linearised", "duof"))
     assert conditional < extended / 3  # the model's fame: linearising fails here

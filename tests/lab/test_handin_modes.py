@@ -82,7 +82,7 @@ def written(request, tmp_path_factory):
     names = ["aof-jump-gaussian", "imm", "gpb2", "fos-jump-gaussian", "fkp4-jump-gaussian", "aof-averaged", "aof-exact"]
     model = find_variant("J1-lasting").model
     filters = [one.one for one in admissions(model, names)]
-    result = compare(filters, model, 1000, 3, 1, subset_runs=128, progress=False, threads=1)
+    result = compare(filters, model, 1000, 3, 1, slow_runs=128, progress=False, threads=1)
     folder = tmp_path_factory.mktemp(request.param)
     paths = write_handin(find_variant("J1-lasting"), result, folder, request.param)
     texts = [(folder / name).read_text(encoding="utf-8") for name in ("handin.tex", "handin.html")]

@@ -17,9 +17,9 @@ pytestmark = pytest.mark.quick
 DRAW = [plots.accuracy, plots.relative_accuracy, plots.ranking, plots.consistency]
 
 
-def comparison(name, names, subset):
+def comparison(name, names, slow_runs):
     model = load_variants()[name].model
-    return compare(lab_filters(model, names), model, 2000, 7, 1, subset_runs=subset, progress=False)
+    return compare(lab_filters(model, names), model, 2000, 7, 1, slow_runs=slow_runs, progress=False)
 
 
 @pytest.fixture(scope="module")

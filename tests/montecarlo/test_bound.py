@@ -8,7 +8,7 @@ import pytest
 from kfcourse import Ensemble, Model, compare, design, lab_filters
 from kfcourse.filters import duof, kalman_filter
 from kfcourse.lab import LAB
-from kfcourse.montecarlo.comparison import HEAVY, Comparison, Subset
+from kfcourse.montecarlo.comparison import HEAVY, Comparison, SlowPart
 from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean
 from kfcourse.montecarlo.two_phase import Replicas, Terms, with_design
 
@@ -32,14 +32,14 @@ def counted():
     everywhere = sums_of(4, square=[[2, 4, 6, 8], [3, 5, 4, 12]], own=[[4, 5, 5, 6], [1, 1, 1, 1]])
     part = sums_of(2, square=[[2, 4], [3, 5], [9, 9]], own=[[4, 5], [1, 1], [3.5, 4.5]], distance=[[0.25, 0.75], [1, 2], [0, 0]])
     names = ("aof-gaussian", "other", "aof-exact")
-    return Comparison(model, names, names[:2], 4, 1, 0, everywhere, Subset(["aof-exact"], part))
+    return Comparison(model, names, names[:2], 4, 1, 0, everywhere, SlowPart(["aof-exact"], part))
 
 
 def test_its_error_variance_is_the_mean_of_what_it_claims(counted):
-    """M p_control over all, and M(p_exact - p_control) on the subset; its own squares of the error, 9, are never looked at."""
+    """M p_control over all, and M(p_exact - p_control) on the slow part; its own squares of the error, 9, are never looked at."""
     found = counted.error_variance("aof-exact")
     assert found.value.item() == counted.bound().value.item() == 5 - 0.5
-    # x = 4, 5, 5, 6 and y = -0.5, -0.5 on the subset: Var X / 4
+    # x = 4, 5, 5, 6 and y = -0.5, -0.5 on the slow part: Var X / 4
     assert found.standard_error.item() ** 2 == pytest.approx(2 / 3 / 4, rel=1e-12)
     assert counted.difference("other", "aof-exact").value.item() == 6 - 4.5
 
@@ -68,7 +68,7 @@ def test_the_gap_is_what_distances_and_errors_tell_over_the_bound(counted):
 @pytest.mark.parametrize("largest", [0.0, 2.0, 200.0])
 def test_a_distance_that_hangs_on_one_trajectory_hardly_counts(counted, largest):
     far = replace(counted, sums=sums_of(4, square=[[2, 4, 6, 8], [9, 5, 14, 12]], own=[[4, 5, 5, 6], [1, 1, 1, 1]]))
-    far.subset.sums.largest[1, 0, 1] = largest
+    far.slow_part.sums.largest[1, 0, 1] = largest
     s = share(np.array([0.75, 1.25]), np.array([7.0, 1, 8, 4]), largest)
     assert far.gap("other").value.item() == pytest.approx((0.5 + s * 1 + (1 - s) * 5) / 4.5, rel=1e-12)
     assert far.heavy("other").item() == pytest.approx(s * largest / 3, rel=1e-12)
@@ -136,13 +136,13 @@ def test_table_ranking_and_verdict_are_one_estimate(lab53):
 def test_what_is_better_than_the_exact_filter_refutes_it(counted):
     """A substitute that errs as much as it claims, or that a filter beats by far more than chance, bounds nothing."""
     assert not counted.doubtful.any() and counted.usable.all()
-    counted.subset.sums.doubt[:] = 0.11 * 4.5
+    counted.slow_part.sums.doubt[:] = 0.11 * 4.5
     doubtful = replace(counted)
     assert doubtful.doubtful.all() and np.isnan(doubtful.gap("other").value).all()
     left = doubtful.without_unhealthy()
     assert not left.has_bound and "particles" in left.left_out["aof-exact"]
     assert left.gap("other").value.item() == pytest.approx(6 / 5 - 1, rel=1e-14)
-    counted.subset.sums.doubt[:] = 0.0
+    counted.slow_part.sums.doubt[:] = 0.0
     beaten = replace(counted, sums=sums_of(4, square=[[2, 4, 6, 8], [0.1, 0.2, 0.1, 0.2]], own=[[4, 5, 5, 6], [1, 1, 1, 1]]))
     assert beaten.doubtful.all()
 
@@ -161,7 +161,7 @@ def test_the_exact_filter_is_no_entrant(counted):
 
 
 def test_without_it_the_control_is_the_reference(counted):
-    alone = replace(counted, subset=None)
+    alone = replace(counted, slow_part=None)
     assert not alone.has_bound
     assert alone.gap("other").value.item() == pytest.approx(6 / 5 - 1, rel=1e-14)
     assert alone.gap("other").standard_error == pytest.approx(alone.relative("other").standard_error, rel=1e-14)
@@ -185,7 +185,7 @@ def test_intervals_of_the_gap_cover_the_truth_as_often_as_they_say():
     ]
     hits = 0
     for seed in range(200):
-        result = compare(filters, model, 1000, 1, seed, subset_runs=300, threads=1, progress=False)
+        result = compare(filters, model, 1000, 1, seed, slow_runs=300, threads=1, progress=False)
         low, high = result.gap("wrong").interval(0.95)
         hits += bool(low[0] < truth < high[0])
     assert abs(hits - 188) < SIGMA * np.sqrt(200 * 0.95 * 0.05)
@@ -203,7 +203,7 @@ def test_intervals_of_variant_53_cover_the_truth_as_often_as_they_say(variant53)
     filters = [gaussian, linearised, *designed, exact]
     values, limits = [], []
     for seed in range(60):
-        result = compare(filters, variant53, 4000, 3, seed, subset_runs=400, threads=1, progress=False)
+        result = compare(filters, variant53, 4000, 3, seed, slow_runs=400, threads=1, progress=False)
         gaps = [result.gap(name) for name in result.entrants]
         values.append([gap.value for gap in gaps])
         limits.append([gap.interval(0.95) for gap in gaps])
@@ -214,7 +214,7 @@ def test_intervals_of_variant_53_cover_the_truth_as_often_as_they_say(variant53)
 @pytest.fixture(scope="module")
 def lab53(variant53):
     filters = lab_filters(variant53, [*LAB, "aof-exact"])
-    return compare(filters, variant53, 20_000, 8, 7, subset_runs=600, designs=4, progress=False)
+    return compare(filters, variant53, 20_000, 8, 7, slow_runs=600, designs=4, progress=False)
 
 
 def test_no_filter_stands_below_the_bound(lab53):

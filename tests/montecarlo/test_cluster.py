@@ -24,7 +24,7 @@ def address():
 
 
 def same(one, other, within=0.0):
-    for sums, others in [(one.sums, other.sums), (one.subset.sums, other.subset.sums)]:
+    for sums, others in [(one.sums, other.sums), (one.slow_part.sums, other.slow_part.sums)]:
         for name in sums.__dataclass_fields__:
             np.testing.assert_allclose(getattr(others, name), getattr(sums, name), rtol=within, atol=0, err_msg=name)
 
@@ -36,12 +36,12 @@ def test_the_same_numbers_bit_for_bit(address, variant53, compiled):
     The stated error of the exact filter, 1e-10 here, is a difference of sums of rounding 1e-16: it was off by 7e-12 of itself.
     """
     filters = [*lab_filters(variant53, LAB), pointmass(variant53)]
-    work = {"subset_runs": 160, "compiled": compiled, "designs": 2}
+    work = {"slow_runs": 160, "compiled": compiled, "designs": 2}
     runs = 2 * ensemble.SMALL_BLOCK  # two blocks
     here = compare(filters, variant53, runs, STEPS, 1, **work, threads=1, progress=False)
     there = compare(filters, variant53, runs, STEPS, 1, **work, dask=address, progress=True)
     same(here, there, within=1e-9 if compiled else 0.0)
-    assert there.subset_runs == 160
+    assert there.slow_runs == 160
 
 
 def test_a_lost_worker(address, variant53, tmp_path):
@@ -56,9 +56,9 @@ def test_a_lost_worker(address, variant53, tmp_path):
         os._exit(1)
 
     filters = [aof(gaussian(variant53)), exact]
-    here = compare(filters, variant53, 400, STEPS, 1, subset_runs=160, threads=1, progress=False)
+    here = compare(filters, variant53, 400, STEPS, 1, slow_runs=160, threads=1, progress=False)
     there = compare(
-        [filters[0], replace(exact, step=step)], variant53, 400, STEPS, 1, subset_runs=160, dask=address, progress=False
+        [filters[0], replace(exact, step=step)], variant53, 400, STEPS, 1, slow_runs=160, dask=address, progress=False
     )
     assert lost.exists()
     same(here, there)
@@ -71,8 +71,8 @@ def test_time_is_kept(address, variant53):
         400,
         STEPS,
         1,
-        subset_runs=400,
-        subset_seconds=1e-6,
+        slow_runs=400,
+        slow_seconds=1e-6,
         dask=address,
         progress=False,
     )

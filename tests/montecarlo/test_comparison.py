@@ -13,11 +13,11 @@ from kfcourse.filters.exact.pointmasses import pointmass
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.optimal_structure import fos, mfos
 from kfcourse.laws import Gaussian
-from kfcourse.montecarlo.comparison import Comparison, Subset
+from kfcourse.montecarlo.comparison import Comparison, SlowPart
 from kfcourse.montecarlo.ensemble import BLOCK, Ensemble
 from kfcourse.montecarlo.experiment import compare, run
+from kfcourse.montecarlo.slow_filters import BATCH
 from kfcourse.montecarlo.statistics import BATCHES, Sums, batch_mean
-from kfcourse.montecarlo.subset import BATCH
 from kfcourse.scenarios.benchmarks import growth_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import gaussian, linearised
@@ -283,8 +283,8 @@ def test_one_trajectory_has_no_standard_error(linear):
 @pytest.mark.parametrize("runs", [700, BLOCK + 1])
 def test_a_slow_filter_is_found_through_its_difference_from_the_control(variant53, runs):
     control, slow = aof(gaussian(variant53)), replace(aof(linearised(variant53)), name="slow", slow=True)
-    result = compare([control, slow], variant53, runs, 4, seed=3, subset_runs=500, same_ensemble=True, progress=False)
-    assert result.subset_runs == 500
+    result = compare([control, slow], variant53, runs, 4, seed=3, slow_runs=500, same_ensemble=True, progress=False)
+    assert result.slow_runs == 500
     x, y = stored(variant53, runs, 4, 3)
     ours, theirs = ((x - run(one, y).mean)[..., 0] ** 2 for one in (control, slow))
     expected = ours.mean(axis=1) + (theirs - ours)[:, :500].mean(axis=1)
@@ -305,7 +305,7 @@ def test_a_slow_filter_is_found_through_its_difference_from_the_control(variant5
 def test_a_slow_filter_on_all_trajectories_is_as_good_as_a_fast_one(variant53):
     control, fast = aof(gaussian(variant53)), aof(linearised(variant53))
     slow = replace(fast, name="slow", slow=True)
-    result = compare([control, fast, slow], variant53, 640, 3, seed=3, subset_runs=640, progress=False)
+    result = compare([control, fast, slow], variant53, 640, 3, seed=3, slow_runs=640, progress=False)
     np.testing.assert_allclose(result.error_variance("slow").value, result.error_variance("aof-linearised").value, rtol=1e-11)
 
 
@@ -313,7 +313,7 @@ def test_the_excess_over_the_optimal_filter_is_the_distance_from_it(linear):
     """For a linear model the Kalman filter is exact: M|x - z|^2 - M|x - z_exact|^2 = M|z - z_exact|^2."""
     exact, other = replace(kalman_filter(linear), name="aof-exact", slow=True), duof(linear)
     result = compare(
-        [aof(gaussian(linear)), other, exact], linear, 3000, 3, seed=8, design_runs=100, subset_runs=2000, progress=False
+        [aof(gaussian(linear)), other, exact], linear, 3000, 3, seed=8, design_runs=100, slow_runs=2000, progress=False
     )
     excess, gap = result.excess("duof"), result.difference("duof", "aof-exact")
     # A design on 100 trajectories errs by per cents, so the excess is far above its noise.
@@ -330,20 +330,20 @@ def test_the_excess_over_the_optimal_filter_is_the_distance_from_it(linear):
     assert (abs(optimal.value) < SIGMA * optimal.standard_error).all()
 
 
-def test_a_subset_larger_than_the_ensemble_is_all_of_it(variant53):
-    """140 trajectories are all there are for a subset of 500: the slow filter has the fast one's numbers."""
+def test_a_slow_part_larger_than_the_ensemble_is_all_of_it(variant53):
+    """140 trajectories are all there are for a slow part of 500: the slow filter has the fast one's numbers."""
     control, fast = aof(gaussian(variant53)), aof(linearised(variant53))
     slow = replace(fast, name="slow", slow=True)
-    result = compare([control, fast, slow], variant53, 140, 2, seed=3, subset_runs=500, progress=False)
-    assert result.subset_runs == 140
+    result = compare([control, fast, slow], variant53, 140, 2, seed=3, slow_runs=500, progress=False)
+    assert result.slow_runs == 140
     np.testing.assert_allclose(result.error_variance("slow").value, result.error_variance("aof-linearised").value, rtol=1e-11)
 
 
-def by_hand(model, squares, slow, subset, own=None):
+def by_hand(model, squares, slow, slow_runs, own=None):
     """A comparison over one step, every trajectory a batch of its own.
 
     squares, own : dict from name to the squared error and the claimed variance of each trajectory, (runs,); the filters
-    named in `slow` ran on the first `subset` of them.
+    named in `slow` ran on the first `slow_runs` of them.
     """
     fast = tuple(name for name in squares if name not in slow)
 
@@ -356,7 +356,7 @@ def by_hand(model, squares, slow, subset, own=None):
 
     names = (*fast, *slow)
     runs = len(squares[fast[0]])
-    return Comparison(model, names, fast, runs, 1, 0, sums(fast, runs), Subset(list(slow), sums(names, subset)))
+    return Comparison(model, names, fast, runs, 1, 0, sums(fast, runs), SlowPart(list(slow), sums(names, slow_runs)))
 
 
 def test_without_a_gaussian_aof_the_bound_still_has_its_digits():
@@ -364,7 +364,7 @@ def test_without_a_gaussian_aof_the_bound_still_has_its_digits():
     error larger than itself, and come out negative.  Through the DUOF it agrees with the mean of the exact filter's variance."""
     model = growth_model()
     filters = [aof(linearised(model)), duof(model), pointmass(model)]
-    result = compare(filters, model, 1000, 8, 1, subset_runs=150, designs=2, progress=False)
+    result = compare(filters, model, 1000, 8, 1, slow_runs=150, designs=2, progress=False)
     exact, claimed = result.error_variance("aof-exact"), result.own_variance("aof-exact")
     assert result.carrier == "duof" and (exact.standard_error < exact.value).all()
     apart = np.abs(exact.value - claimed.value) / np.hypot(exact.standard_error, claimed.standard_error)
@@ -372,26 +372,26 @@ def test_without_a_gaussian_aof_the_bound_still_has_its_digits():
 
 
 def test_each_filter_is_judged_by_the_trajectories_it_ran_on(variant53):
-    """The fast ones by all, a slow one by its subset; only D goes through the carrier, which is the most accurate
+    """The fast ones by all, a slow one by its slow part; only D goes through the carrier, which is the most accurate
     fast filter where there is no Gaussian AOF."""
     squares = {"first": np.array([1.0, 3, 5]), "second": np.array([2.0, 8, 2]), "slow": np.array([4.0, 2])}
     own = {"first": np.array([1.0, 1, 4]), "second": np.array([2.0, 2, 5]), "slow": np.array([3.0, 1])}
-    result = by_hand(variant53, squares, ["slow"], subset=2, own=own)
+    result = by_hand(variant53, squares, ["slow"], slow_runs=2, own=own)
     assert result.control == result.carrier == "first"
-    assert result.error_variance("slow").value.item() == 3 + (3 - 2)  # M e^2 of the first over all; of both over the subset
+    assert result.error_variance("slow").value.item() == 3 + (3 - 2)  # M e^2 of the first over all; of both over the slow part
     for name, square, claimed in (("first", 3, 2), ("second", 4, 3), ("slow", 3, 2)):
         assert result.component_variance(name).value.item() == square
         assert result.own_variance(name).value.item() == claimed
-    assert result.error_variance("first").freedom == 3 - 1  # a subset beside it does not make it less certain
+    assert result.error_variance("first").freedom == 3 - 1  # a slow part beside it does not make it less certain
     assert result.error_variance("slow").freedom == 2 - 1
-    other_order = by_hand(variant53, {name: squares[name] for name in ("second", "first", "slow")}, ["slow"], subset=2)
+    other_order = by_hand(variant53, {name: squares[name] for name in ("second", "first", "slow")}, ["slow"], slow_runs=2)
     assert other_order.carrier == "first" and other_order.control == "second"
     squares["aof-gaussian"] = squares["second"]
-    assert by_hand(variant53, squares, ["slow"], subset=2).control == "aof-gaussian"
+    assert by_hand(variant53, squares, ["slow"], slow_runs=2).control == "aof-gaussian"
 
 
 @pytest.mark.parametrize("ask", [lambda c: c.error_variance("slow"), lambda c: c.difference("slow", "other")])
-def test_the_variance_of_subset_and_whole_together_is_unbiased(variant53, ask):
+def test_the_variance_of_slow_part_and_whole_together_is_unbiased(variant53, ask):
     """X is a mean over N = 4 trajectories, Y over the first n = 2: Var = Var X / N + Var Y / n + 2 Cov(X, Y) / N.
 
     Drawn with replacement from three possible trajectories there are 81 ensembles, all equally likely.  Over all of them
@@ -402,57 +402,57 @@ def test_the_variance_of_subset_and_whole_together_is_unbiased(variant53, ask):
     values, variances = [], []
     for draw in itertools.product(range(3), repeat=4):
         squares = {name: np.array(possible)[list(draw)] for name, possible in population.items()}
-        found = ask(by_hand(variant53, squares, ["slow"], subset=2))
+        found = ask(by_hand(variant53, squares, ["slow"], slow_runs=2))
         values.append(found.value.item())
         variances.append(found.standard_error.item() ** 2)
     assert np.mean(variances) == pytest.approx(np.var(values), rel=1e-12)
 
 
 def test_a_variance_that_comes_out_negative_is_taken_as_zero(variant53):
-    """The covariance is known from the subset alone; where it says that Y undoes X, the sum may come out below 0.
+    """The covariance is known from the slow part alone; where it says that Y undoes X, the sum may come out below 0.
 
     X = 0, 4 and six times 2, Y = 1, 0:  Var X / 8 = 1/7,  Var Y / 2 = 1/4,  2 Cov / 8 = -1/2.
     """
     squares = {"control": np.array([0.0, 4, 2, 2, 2, 2, 2, 2]), "slow": np.array([1.0, 4])}
-    error = by_hand(variant53, squares, ["slow"], subset=2).error_variance("slow").standard_error
+    error = by_hand(variant53, squares, ["slow"], slow_runs=2).error_variance("slow").standard_error
     assert error.item() == 0
 
 
 def test_the_ranking_does_not_keep_the_order_given(variant53):
     squares = {name: np.array([d, d + 1]) for name, d in (("worst", 9.0), ("best", 1.0), ("middle", 4.0), ("slow", 2.0))}
-    result = by_hand(variant53, squares, ["slow"], subset=2)
+    result = by_hand(variant53, squares, ["slow"], slow_runs=2)
     assert [name for name, _ in result.ranking()] == ["best", "slow", "middle", "worst"]
 
 
 def test_without_the_exact_filter_there_is_no_bound(variant53):
     """Whether no slow filter ran, or only others: not a distance of 0 from nothing."""
     squares = {"aof-gaussian": np.ones(3), "slow": np.ones(2)}
-    with_another = by_hand(variant53, squares, ["slow"], subset=2)
-    for result in (with_another, replace(with_another, subset=None)):
+    with_another = by_hand(variant53, squares, ["slow"], slow_runs=2)
+    for result in (with_another, replace(with_another, slow_part=None)):
         for ask in (result.bound, lambda r=result: r.excess("aof-gaussian"), lambda r=result: r.above_bound("aof-gaussian")):
             with pytest.raises(KeyError, match="the bound needs aof-exact"):
                 ask()
 
 
-def test_above_the_bound_the_control_cancels_when_the_subset_is_everything(variant53):
+def test_above_the_bound_the_control_cancels_when_the_slow_part_is_everything(variant53):
     """M(e^2 - p_control) - M(p_exact - p_control), over the same trajectories, is M e^2 - M p_exact for any p_control."""
     squares = {"aof-gaussian": np.array([1.0, 3, 2]), "other": np.array([4.0, 2, 9]), "aof-exact": np.array([1.0, 2, 2])}
     own = {"aof-gaussian": np.array([7.0, 5, 6]), "other": np.array([1.0, 1, 1]), "aof-exact": np.array([1.0, 2, 3])}
-    result = by_hand(variant53, squares, ["aof-exact"], subset=3, own=own)
+    result = by_hand(variant53, squares, ["aof-exact"], slow_runs=3, own=own)
     assert result.bound().value.item() == pytest.approx(2, rel=1e-14)
     assert result.above_bound("other").value.item() == pytest.approx(5 / 2 - 1, rel=1e-14)
 
 
-def test_the_bound_adds_what_all_trajectories_and_the_subset_tell(variant53):
-    """M p_control over all, and M(p_exact - p_control) over the subset, which is part of all: Var X / N + Var Y / n + 2 Cov / N.
+def test_the_bound_adds_what_all_trajectories_and_the_slow_part_tell(variant53):
+    """M p_control over all, and M(p_exact - p_control) over the slow part, a part of all: Var X / N + Var Y / n + 2 Cov / N.
 
     p_control = 2, 4, 6, 4: mean 4, SE^2 = (8/3)/4;  p_exact - p_control = -1, -3: mean -2, SE^2 = 2/2, Cov = -2.
     The ratio 6/2 of e^2 to the bound varies as (e^2 - 3 bound) / 2: over all as -1/2, -7/2, -9/2, -7/2, SE^2 = 3/4,
-    on the subset as 3/2, 9/2, SE^2 = 4.5/2, Cov = -4.5.
+    on the slow part as 3/2, 9/2, SE^2 = 4.5/2, Cov = -4.5.
     """
     squares = {"aof-gaussian": np.ones(4), "other": np.array([5.0, 5, 9, 5]), "aof-exact": np.ones(2)}
     own = {"aof-gaussian": np.array([2.0, 4, 6, 4]), "other": np.ones(4), "aof-exact": np.array([1.0, 1])}
-    result = by_hand(variant53, squares, ["aof-exact"], subset=2, own=own)
+    result = by_hand(variant53, squares, ["aof-exact"], slow_runs=2, own=own)
     bound, above = result.bound(), result.above_bound("other")
     assert (bound.value.item(), bound.freedom) == (4 - 2, 1)
     assert bound.standard_error.item() == pytest.approx(np.sqrt(2 / 3 + 1 - 1), rel=1e-14)
@@ -460,15 +460,15 @@ def test_the_bound_adds_what_all_trajectories_and_the_subset_tell(variant53):
     assert above.standard_error.item() == pytest.approx(np.sqrt(3 / 4 + 4.5 / 2 - 2 * 4.5 / 4), rel=1e-14)
 
 
-def test_without_a_subset_slow_filters_are_left_out(variant53):
+def test_without_a_slow_part_slow_filters_are_left_out(variant53):
     slow = replace(aof(linearised(variant53)), name="slow", slow=True)
-    result = compare([aof(gaussian(variant53)), slow], variant53, 50, 2, seed=3, subset_runs=0, progress=False)
+    result = compare([aof(gaussian(variant53)), slow], variant53, 50, 2, seed=3, slow_runs=0, progress=False)
     assert result.available == ("aof-gaussian",)
-    assert result.subset_runs == 0
+    assert result.slow_runs == 0
     with pytest.raises(KeyError, match="slow"):
         result.error_variance("slow")
     for filters in ([slow], []):
-        with pytest.raises(ValueError, match=r"fast|at least one|subset"):
+        with pytest.raises(ValueError, match=r"fast|at least one|slow_runs"):
             compare(filters, variant53, 50, 2, seed=3, progress=False)
 
 

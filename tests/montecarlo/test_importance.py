@@ -86,7 +86,7 @@ def test_every_statistic_is_a_mean_over_the_prior(vector):
 def test_on_variant_53_it_tells_the_same_with_less_error(variant53):
     filters = lab_filters(variant53, [*LAB, "aof-exact"])
     plain, wide = (
-        compare(filters, variant53, 30_000, 4, 3, design_runs=50_000, subset_runs=2000, wide=factor, progress=False)
+        compare(filters, variant53, 30_000, 4, 3, design_runs=50_000, slow_runs=2000, wide=factor, progress=False)
         for factor in (1, 2)
     )
     for name in ("aof-linearised", "mfos-gaussian"):  # designed on the same ensemble: the same filters

@@ -17,7 +17,7 @@ from endings import ended
 
 from kfcourse import Model, compare, linearised
 from kfcourse.filters import aof, particle, pointmass
-from kfcourse.montecarlo import parallel, subset
+from kfcourse.montecarlo import parallel, slow_filters
 from kfcourse.symbolic.reading import ModelError
 
 STEPS = 3
@@ -35,8 +35,8 @@ def started(monkeypatch):
         with parallel.processes(count, work) as submit:
             yield submit
 
-    monkeypatch.setattr(subset, "START", 0.0)
-    monkeypatch.setattr(subset, "processes", noted)
+    monkeypatch.setattr(slow_filters, "START", 0.0)
+    monkeypatch.setattr(slow_filters, "processes", noted)
     return counts
 
 
@@ -52,7 +52,7 @@ def slow(one, name, before_step):
 
 def same(one, other):
     """Whether two comparisons have the same sums over the same batches, bit by bit."""
-    found = [(result.subset, result.smoothing and result.smoothing.subset) for result in (one, other)]
+    found = [(result.slow_part, result.smoothing and result.smoothing.slow_part) for result in (one, other)]
     for first, second in zip(*found, strict=True):
         if (first is None) != (second is None):
             return False
@@ -64,7 +64,7 @@ def same(one, other):
 
 
 def together(filters, model, runs=300, **options):
-    return partial(compare, filters, model, runs, STEPS, 1, subset_runs=runs, progress=False, **options)
+    return partial(compare, filters, model, runs, STEPS, 1, slow_runs=runs, progress=False, **options)
 
 
 def test_the_exact_filter_finds_the_same_numbers_on_any_number_of_cores(model, control, started):
@@ -72,7 +72,7 @@ def test_the_exact_filter_finds_the_same_numbers_on_any_number_of_cores(model, c
     found = together([control, exact], model, runs=136, smoothers=[control, exact])
     one, two, three = (found(threads=threads) for threads in (1, 2, 3))
     assert started == [2, 2, 3, 3]  # filtering and smoothing, each time
-    assert one.subset_runs == one.smoothing.subset_runs == 136
+    assert one.slow_runs == one.smoothing.slow_runs == 136
     assert same(one, two) and same(one, three)
 
 
@@ -94,7 +94,7 @@ def test_processes_that_are_no_forks_find_the_same_numbers(model, control, start
 
 
 def test_what_takes_a_moment_only_starts_no_process(model, control, started, monkeypatch):
-    monkeypatch.setattr(subset, "START", 60.0)
+    monkeypatch.setattr(slow_filters, "START", 60.0)
     together([control, pointmass(model)], model, runs=112, threads=2)()
     assert started == []
 
@@ -105,7 +105,7 @@ def test_where_no_process_can_be_had_one_is_enough(model, control, started, monk
     def refused(count, work):
         raise OSError("no more processes")
 
-    monkeypatch.setattr(subset, "processes", refused)
+    monkeypatch.setattr(slow_filters, "processes", refused)
     assert same(found(threads=1), found(threads=2))
 
 
@@ -154,10 +154,10 @@ def test_the_time_decides_on_the_number_of_trajectories_and_on_nothing_else(mode
     sluggish = slow(control, "sluggish", lambda _, y: time.sleep(1e-3 * len(y)))  # 3 ms a trajectory
     found = together([control, sluggish], model, runs=4000)
     begun = time.monotonic()
-    result = found(threads=2, subset_seconds=1.0)
+    result = found(threads=2, slow_seconds=1.0)
     assert time.monotonic() - begun < 20  # and the fast filters, on a busy machine
-    assert 16 <= result.subset_runs <= 666  # two cores at 3 ms a trajectory
-    again = compare([control, sluggish], model, 4000, STEPS, 1, subset_runs=result.subset_runs, threads=1, progress=False)
+    assert 16 <= result.slow_runs <= 666  # two cores at 3 ms a trajectory
+    again = compare([control, sluggish], model, 4000, STEPS, 1, slow_runs=result.slow_runs, threads=1, progress=False)
     assert same(result, again) and not result.left_out
     assert started == [2]
 
@@ -170,8 +170,8 @@ def test_behind_a_chunk_that_is_out_of_time_nothing_counts(model, control, start
             time.sleep(60)
 
     begun = time.monotonic()
-    result = together([control, slow(control, "hanging", hangs)], model, threads=2, subset_seconds=2.0)()
-    assert result.subset_runs == 32
+    result = together([control, slow(control, "hanging", hangs)], model, threads=2, slow_seconds=2.0)()
+    assert result.slow_runs == 32
     assert time.monotonic() - begun < 30
     assert started == [2]
 
@@ -185,7 +185,7 @@ def test_chunks_that_have_no_room_side_by_side_come_one_after_the_other(model, c
         return control.step(state, y)._replace(memory=held)
 
     greedy = replace(control, name="greedy", slow=True, step=step)
-    found = together([control, greedy], model, runs=176, subset_memory=1100e6)  # two of the filter's arrays at a time: 768 MB
+    found = together([control, greedy], model, runs=176, slow_memory=1100e6)  # two of the filter's arrays at a time: 768 MB
     assert same(found(threads=1), found(threads=9))
     assert started == [4, 2]  # the chunks of 16, 32, 64 and 48; then two: and at last one, in no process of its own
 
@@ -198,8 +198,8 @@ from dataclasses import replace
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job has it ignored
 from kfcourse import Model, compare, linearised
 from kfcourse.filters import aof
-from kfcourse.montecarlo import subset
-subset.START = 0.0
+from kfcourse.montecarlo import slow_filters
+slow_filters.START = 0.0
 model = Model.define("0.9*x + 0.1*v", "x + w")
 control = aof(linearised(model))
 def step(state, y):

@@ -2,9 +2,11 @@
 
 import ast
 import hashlib
+import os
 import random
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -512,6 +514,33 @@ def test_jobs_do_not_change_what_is_written_and_failures_do_not_stop_the_rest(ca
     result = call("exercises", "--variant", "53", "--sets", "b", "--masters", masters, "--out", "out2", "--jobs", "1")
     assert result.exit_code == 0
     assert ["out2/53", "0", "1", "0"] in [line.split() for line in result.output.splitlines()]
+
+
+def test_a_variant_that_is_no_model_is_told_at_the_end_and_the_others_are_made(call, masters, no_kernel, tmp_path):
+    (tmp_path / "my.toml").write_text(
+        "".join(
+            f'[variants.{name}]\nstate = "{state}"\nmeter = "x + w"\n' for name, state in (("good", "x + v"), ("bad", "x + z"))
+        ),
+        encoding="utf-8",
+    )
+    options = ("--all", "--variants", "my.toml", "--sets", "b", "--masters", masters, "--out", "out", "--jobs", "1")
+    result = call("exercises", *options)
+    assert result.exit_code == 1
+    (line,) = [line for line in result.output.splitlines() if line.startswith("FAILED")]
+    assert line.startswith("FAILED variant bad in my.toml: unknown symbol 'z'")
+    assert sorted(contents(tmp_path / "out")) == ["good/b-aof.ipynb"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signal to another process")
+def test_ctrl_c_ends_the_command_and_not_a_kernel_alone():
+    """Otherwise the notebook fails, and the next ones are made."""
+    stop = f"import os, signal, time\nos.kill({os.getpid()}, signal.SIGINT)\ntime.sleep(60)"
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            execution.execute(nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(stop)]), "stopped")
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def double(number):

@@ -303,7 +303,7 @@ def test_smoothers_are_compared_with_the_exact_one():
     model = find_variant("53").model
     gaof, exact = aof(gaussian(model)), pointmass(model)
     plain, both = (
-        compare([gaof, exact], model, 4000, 4, seed=1, subset_runs=400, smoothers=some, progress=False)
+        compare([gaof, exact], model, 4000, 4, seed=1, slow_runs=400, smoothers=some, progress=False)
         for some in ((), (gaof, aof(linearised(model)), exact))
     )
     assert plain.smoothing is None

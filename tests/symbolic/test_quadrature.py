@@ -8,7 +8,7 @@ import pytest
 from kfcourse import Model, ModelError, gaussian, linearised, run, simulate
 from kfcourse.filters.approximations import aof
 from kfcourse.scenarios.benchmarks import PENDULUM_ERRORS, pendulum, pendulum_data
-from kfcourse.symbolic.quadrature import ROOTS, QuadratureWarning, gauss_hermite, unscented
+from kfcourse.symbolic.quadrature import ROOTS, QuadratureWarning, axes, gauss_hermite, unscented
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def test_added_noise_apart_is_added_noise_among_the_points(root, factor):
         (*together.predict(mean, cov), *together.measure(mean, cov)),
         strict=True,
     ):
-        np.testing.assert_allclose(left, right, rtol=1e-6)  # the sine by 6 points, over another number of axes
+        np.testing.assert_allclose(left, right, rtol=1e-6, atol=1e-14)  # the sine by 6 points, over another number of axes
 
 
 @pytest.mark.parametrize("root", ROOTS)
@@ -164,6 +164,26 @@ def test_slopes_are_seen_in_directions_without_variance(kind, units):
     np.testing.assert_allclose(np.diagonal(F), [0, 4e8, 1], rtol=1e-6)
     assert not G[0].any()
     assert not R[0].any()
+
+
+@pytest.mark.parametrize(
+    ("state", "meter", "size"),
+    [
+        ("x/(1 + x**2) + v", "x**3 + x + w", 1),
+        ("x/(1 + x**2)*v", "x*w1 + exp(x)*w2", 1),  # given x all is known of them
+        ("x + v", "sin(w1)*w2/(1 + x**2)", 3),
+        ("x + v", "x*w1 + w2**2", 2),
+        ("x + v", "x*w1 + sign(x + w2)", 2),
+    ],
+)
+def test_only_noises_that_do_not_enter_linearly_take_points(state, meter, size):
+    assert axes(Model.define(state, meter)) == size
+
+
+@pytest.mark.filterwarnings("ignore::kfcourse.symbolic.quadrature.QuadratureWarning")
+def test_a_noise_correlated_with_one_that_takes_points_takes_points():
+    both = {"mean": [0, 0], "variance": [[1.0, 0.5], [0.5, 1.0]]}
+    assert axes(Model.define("x + v", "x*w1 + w2**2", meter_noise=both)) == 3
 
 
 # --- warnings

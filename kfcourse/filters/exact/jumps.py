@@ -109,7 +109,7 @@ def jump_pointmass(model: JumpModel, accuracy: float = ACCURACY) -> Filter:
             except TooNarrow:
                 return _step(state, y, now, model, accuracy, FINE[1])
         except Unresolved as error:
-            raise Unresolved(f"step {state.step} of {model}: {error}; leave the exact filter out (--exact-runs 0)") from None
+            raise Unresolved(f"step {state.step} of {model}: {error}; leave the exact filter out (--slow-runs 0)") from None
 
     def evidence(before: State, y: Array, after: State) -> Array:
         now = [law.at(before.step) for law in laws]

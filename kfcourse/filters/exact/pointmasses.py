@@ -128,7 +128,7 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
             except TooNarrow:
                 posterior, predicted, found = way(before(state, len(y)), y, law, accuracy, FINE[1], memory)
         except Unresolved as error:
-            raise Unresolved(f"step {state.step} of {model}: {error}; leave the exact filter out (--exact-runs 0)") from None
+            raise Unresolved(f"step {state.step} of {model}: {error}; leave the exact filter out (--slow-runs 0)") from None
         if model.angles.x:
             posterior, predicted = _on_circle(found, law)
         if state.memory:

@@ -193,8 +193,8 @@ def claimed(claim: Any, cells: Sequence[Cell], variants_file: Path | None, given
     try:
         variant = find_variant(given or name, variants_file)
     except VariantError as error:
-        hint = "" if variants_file else "; if it is of a file of yours, name that with --variants"
-        raise Unreadable(f"{error}{hint}") from None
+        hint = "" if variants_file else f"if variant {given or name} is of a file of yours, name that with --variants; "
+        raise Unreadable(f"{hint}{error}") from None  # the advice first: the list may be long, and is cut in the table
     marked = f"look: marked as variant {variant.name}" + ", which was given" * bool(given)
     notes = [f"{marked}, and says that it is {name}"] if given and name != given else []
     for other, what in (call for cell in cells for call in openings(cell.source)):

@@ -323,7 +323,7 @@ UNUSABLE = [
     ("a7", "has no `=`", lambda: "variant 7\nF = M[(y - h)^2]"),
     ("a7", "no chains with `F`", lambda: "G = g"),
     ("a7", "cannot be read at column", lambda: "F = M[(y-h)^2"),
-    ("a7", "what x means is given", lambda: "x = 5\n" + a7("625*f^2")()),
+    ("a7", "`x =`, which has a meaning already", lambda: "x = 5\n" + a7("625*f^2")()),
 ]
 
 

@@ -41,6 +41,20 @@ def m5(start=None, used="smoothed", predicted=1, reverse=False):
     return answer
 
 
+def m5_by_psi(ahead_by):
+    """With what the filter has predicted, and without Q."""
+
+    def answer(z, p, ahead, Psi, A, Q):
+        means, covs = z.copy(), p.copy()
+        for k in range(len(z) - 2, -1, -1):
+            S = p[k] @ A.T @ np.linalg.inv(Psi[k + ahead_by])
+            means[k] += S @ (means[k + 1] - ahead[k + 1])
+            covs[k] += S @ (covs[k + 1] - Psi[k + 1]) @ S.T
+        return means, covs
+
+    return answer
+
+
 def m5_at_once(z, p, ahead, Psi, A, Q):
     """One dense law of the record: the information of the filter's corrections, and the motion."""
     steps, n = z.shape
@@ -82,6 +96,7 @@ RIGHT = [
     ("m4", m4()),
     ("m5", m5()),
     ("m5", m5_at_once),
+    ("m5", m5_by_psi(1)),
     ("m6", m6_loop),
     ("m7", m7),
 ]
@@ -108,6 +123,7 @@ WRONG = [
     ("m4", "gain-once", m4(cov=lambda p, S, pb, Psi: p - S @ (Psi - pb))),
     ("m5", "one-step-only", m5(used="filtered")),
     ("m5", "prediction-of-same-step", m5(predicted=0)),
+    ("m5", "negative-variance", m5_by_psi(0)),  # Psi has Q in it: that Q itself is not used tells nothing
     ("m5", "reversed", m5(reverse=True)),
     ("m5", "from-the-prediction", m5(start="prediction")),
     ("m6", "variance-forgotten", lambda y, z, p: np.nanmean((y - z) ** 2)),

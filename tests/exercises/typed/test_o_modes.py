@@ -13,7 +13,7 @@ def o2(density=lambda y, h, F: norm.pdf(y, h, F**0.5), joint=lambda c, L: c * L,
     return lambda c, y, h, F: share(joint(c, density(y, h, F)))
 
 
-def o3(spread=1.0, chain=True, correct=True, first=None, noise=1.0, a_squared=True, q_added=True):
+def o3(spread=1.0, chain=True, again=False, correct=True, first=None, noise=1.0, a_squared=True, q_added=True):
     """By sums over the modes i of step 0 and j of step 1."""
 
     def answer(y, m, d, a, q, C, pi, prior):
@@ -23,8 +23,9 @@ def o3(spread=1.0, chain=True, correct=True, first=None, noise=1.0, a_squared=Tr
         z = [m + (d / (d + C[i] ** 2) * (y[0] - m) if correct else 0) for i in J]
         p = [1 / (1 / d + 1 / C[i] ** 2) for i in J]
         later = []
+        before = prior if again else mu
         for j in J:
-            ways = [mu[i] * pi[i][j] if chain else mu[i] * (i == j) for i in J]
+            ways = [before[i] * pi[i][j] if chain else before[i] * (i == j) for i in J]
             c = sum(ways)
             mean = sum(w * a * z[i] for i, w in enumerate(ways)) / c
             var = sum(
@@ -84,15 +85,19 @@ WRONG = [
     ("o1", "transposed unused", o1(c=lambda mu, pi: pi @ mu)),
     ("o1", "row-for-column", o1(w=lambda mu, pi: pi)),
     ("o1", "not-divided", o1(w=lambda mu, pi: mu[:, None] * pi)),
+    ("o1", "other-axis", o1(w=lambda mu, pi: mu[:, None] * pi / (mu @ pi)[:, None])),
+    ("o1", "other-axis", o1(w=lambda mu, pi: mu * pi / (mu @ pi))),
     ("o1", "mode-kept unchanged", o1(c=lambda mu, pi: mu)),
     ("o2", "prior-forgotten unused", o2(joint=lambda c, L: L)),
     ("o2", "root-forgotten", o2(lambda y, h, F: np.exp(-((y - h) ** 2) / F / 2))),
     ("o2", "deviation-for-variance", o2(lambda y, h, F: norm.pdf(y, h, F))),
     ("o2", "half-forgotten", o2(lambda y, h, F: np.exp(-((y - h) ** 2) / F) / F**0.5)),
     ("o2", "not-divided", o2(share=lambda q: q)),
+    ("o2", "exponent-grows", o2(lambda y, h, F: np.exp((y - h) ** 2 / F / 2) / F**0.5)),
     ("o2", "densities-added", o2(joint=lambda c, L: c + L)),
     ("o3", "spread-forgotten", o3(spread=0.0)),
     ("o3", "chain-forgotten", o3(chain=False)),
+    ("o3", "first-law-again", o3(again=True)),
     ("o3", "limit", o3(correct=False)),
     ("o3", "meter-noise-forgotten", o3(noise=0.0)),
     ("o3", "unused", o3(q_added=False)),
@@ -112,16 +117,19 @@ WRONG = [
     ("o6", "spread-forgotten", o6(cov=lambda mu, z, p: np.tensordot(mu, p, 1))),
     ("o6", "row-for-column", o6(weights=lambda mu, pi: mu[:, None] * pi / (mu[:, None] * pi).sum(axis=1, keepdims=True))),
     ("o6", "not-divided", o6(weights=lambda mu, pi: mu[:, None] * pi)),
+    ("o6", "other-axis", o6(weights=lambda mu, pi: (mu[:, None] * pi / (mu @ pi)).T)),
     ("o6", "not-mixed", lambda mu, pi, z, p: (mu @ pi, z, p)),
     ("o7", "losses-ignored", o7(threshold=lambda missed, alarm: 0.5)),
     ("o7", "losses-swapped", o7(threshold=lambda missed, alarm: missed / (alarm + missed))),
+    ("o7", "odds", o7(threshold=lambda missed, alarm: alarm / missed)),
     ("o7", "other-way", o7(loss=np.maximum)),
 ]
 UNUSABLE = [
     ("o1", "expected an array of shape", lambda mu, pi: mu @ pi),
     ("o2", "got the shape", lambda c, y, h, F: o2()(c, y, h, F)[0]),
+    ("o2", "got an array of text of shape", lambda c, y, h, F: o2()(c, y, h, F).astype(str)),
     ("o4", "result 2 of 2", o4(lambda mu, z, p: np.diagonal(deviations(mu, z, p)))),
     ("o5", "has no `=`", lambda: "the spread"),
     ("o5", "known here: W, mu, p1, p2, z, z1, z2. Declare", lambda: "W = mu*d + (1 - mu)*p2"),  # nothing is random: no m, no d
-    ("o5", "what z1 means is given", lambda: "z1 = 0\n" + o5("p2")()),
+    ("o5", "`z1 =`, which has a meaning already; derive `W`", lambda: "z1 = 0\n" + o5("p2")()),
 ]

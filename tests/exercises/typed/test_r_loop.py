@@ -47,6 +47,7 @@ RIGHT = [
     ("r2", r2()),
     ("r3", r3()),
     ("r4", lambda p, A, D, T: p * A**2 / D / T / 4 / sp.pi),
+    ("r4", lambda p, A, D, T: p * A**2 / (2 * D) / (2 * np.pi * T)),  # pi with the digits of a float
     ("r5", lambda variance, q: np.array([one_time(s, q) for s in variance])),
     ("r6", r6()),
 ]
@@ -65,6 +66,7 @@ WRONG = [
     ("r3", "correction-forgotten another-result", r3(after=lambda Psi, q, r: Psi)),
     ("r3", "small-noise", lambda q, r: (sp.sqrt(q * r), sp.sqrt(q * r) - q)),
     ("r4", "radians", lambda p, A, D, T: p * A**2 / (2 * D * T)),
+    ("r4", "factor-of", lambda p, A, D, T: p * A**2 / (4 * 3.14159 * D * T)),
     ("r4", "half-forgotten factor-half", lambda p, A, D, T: p * A**2 / (2 * sp.pi * D * T)),
     ("r4", "gain-forgotten", lambda p, A, D, T: A**2 / (4 * sp.pi * D * T)),
     ("r4", "amplitude-once", lambda p, A, D, T: p * A / (4 * sp.pi * D * T)),
@@ -73,6 +75,7 @@ WRONG = [
     ("r5", "deviation-of-phase power", lambda s, q: np.array([one_time(v, q) for v in s]) * np.sqrt(q)),
     ("r5", "wander-forgotten unused", lambda s, q: np.array([one_time(v, 1) for v in s])),
     ("r6", "rounded-down", r6(cycles=lambda e: e // (2 * np.pi))),
+    ("r6", "rounded-to-zero", r6(cycles=lambda e: (e / (2 * np.pi)).astype(int))),
     ("r6", "not-rounded", r6(cycles=lambda e: e / (2 * np.pi))),
     ("r6", "half-a-cycle", r6(border=np.pi)),
     ("r6", "all-steps", r6(steps=lambda first, last: last)),

@@ -13,7 +13,7 @@ import pytest
 from kfcourse import Model, compare, linearised
 from kfcourse.filters import aof, pointmass
 from kfcourse.lab.short_names import exact
-from kfcourse.montecarlo import subset
+from kfcourse.montecarlo import slow_filters
 from kfcourse.symbolic.reading import ModelError
 
 STEPS = 3
@@ -40,15 +40,15 @@ def same(one, other):
                 np.array_equal(getattr(a, part), getattr(b, part), equal_nan=True) for part in ("value", "standard_error")
             ):
                 return False
-    return one.available == other.available and one.subset_runs == other.subset_runs
+    return one.available == other.available and one.slow_runs == other.slow_runs
 
 
 def test_the_time_decides_on_the_number_of_trajectories_and_on_nothing_else(model, control):
     sluggish = slow(aof(linearised(model)), "sluggish", seconds=1e-3)  # 3 ms a trajectory
-    result = compare([control, sluggish], model, 600, STEPS, 1, subset_runs=600, subset_seconds=0.3, progress=False)
+    result = compare([control, sluggish], model, 600, STEPS, 1, slow_runs=600, slow_seconds=0.3, progress=False)
     # 100 trajectories fit; on a busy machine fewer, but not more.
-    assert 8 <= result.subset_runs <= 100
-    again = compare([control, sluggish], model, 600, STEPS, 1, subset_runs=result.subset_runs, progress=False)
+    assert 8 <= result.slow_runs <= 100
+    again = compare([control, sluggish], model, 600, STEPS, 1, slow_runs=result.slow_runs, progress=False)
     assert same(result, again)
     assert not result.left_out
 
@@ -56,36 +56,36 @@ def test_the_time_decides_on_the_number_of_trajectories_and_on_nothing_else(mode
 def test_the_time_is_used(model, control, monkeypatch):
     """A step of a trajectory takes a second, by a clock that only the filter moves; what would be late is done in part."""
     clock = SimpleNamespace(now=0.0)
-    monkeypatch.setattr(subset, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    monkeypatch.setattr(slow_filters, "time", SimpleNamespace(monotonic=lambda: clock.now))
 
     def step(state, y):
         clock.now += len(y)
         return control.step(state, y)
 
     steady = replace(control, name="steady", slow=True, step=step)
-    options = {"subset_runs": 2000, "subset_seconds": 1000 * STEPS, "threads": 1, "progress": False}
+    options = {"slow_runs": 2000, "slow_seconds": 1000 * STEPS, "threads": 1, "progress": False}
     result = compare([control, steady], model, 2000, STEPS, 1, **options)
     # MARGIN leaves less than ten trajectories unused
-    assert 990 <= result.subset_runs == clock.now / STEPS <= 1000
+    assert 990 <= result.slow_runs == clock.now / STEPS <= 1000
 
 
 def test_a_chunk_that_does_not_end_in_time_is_given_up(model, control):
     stuck = slow(aof(linearised(model)), "stuck", seconds=10.0)  # 160 s for the first chunk
     start = time.monotonic()
-    result = compare([control, stuck], model, 50, STEPS, 1, subset_runs=50, subset_seconds=0.2, progress=False)
+    result = compare([control, stuck], model, 50, STEPS, 1, slow_runs=50, slow_seconds=0.2, progress=False)
     assert time.monotonic() - start < 60
     assert result.left_out == {"stuck": "16 trajectories take more than 0.2 s"}
     assert result.available == ("aof-gaussian",)
-    assert result.subset_runs == 0
+    assert result.slow_runs == 0
 
 
 @pytest.mark.parametrize("error", [ModelError("step 1: too narrow"), MemoryError(), FloatingPointError("overflow")])
 def test_a_slow_filter_that_fails_leaves_the_others_as_they_are(model, control, error):
     other, failing = slow(aof(linearised(model)), "other"), slow(control, "failing", error=error, at=1)
-    result = compare([control, failing, other], model, 60, STEPS, 1, subset_runs=60, progress=False)
+    result = compare([control, failing, other], model, 60, STEPS, 1, slow_runs=60, progress=False)
     assert list(result.left_out) == ["failing"]
     assert (str(error) or "step 1: 16 trajectories need more memory than there is") in result.left_out["failing"]
-    assert same(result, compare([control, other], model, 60, STEPS, 1, subset_runs=60, progress=False))
+    assert same(result, compare([control, other], model, 60, STEPS, 1, slow_runs=60, progress=False))
 
 
 def test_a_slow_filter_that_is_not_finite_is_left_out(model, control):
@@ -123,11 +123,11 @@ def test_what_has_no_room_at_once_is_taken_in_parts(model, control, runs, most):
 
     before, free, tight = resource.getrlimit(resource.RLIMIT_AS), [], []
     filters = ([control, greedy(control, 12, taken)] for taken in (free, tight))
-    options = {"subset_runs": runs, "progress": False, "threads": 1}
+    options = {"slow_runs": runs, "progress": False, "threads": 1}
     found = compare(next(filters), model, runs, STEPS, 1, **options)
     # Two of the filter's arrays at a time: 16 trajectories want 384 MB, 28 of them 672.  What other tests have left to threads
     # may be freed meanwhile: tens of MB.
-    limited = compare(next(filters), model, runs, STEPS, 1, subset_memory=500e6, **options)
+    limited = compare(next(filters), model, runs, STEPS, 1, slow_memory=500e6, **options)
     assert max(free) == most and max(tight) <= 16
     assert same(found, limited)
     assert resource.getrlimit(resource.RLIMIT_AS) == before
@@ -135,7 +135,7 @@ def test_what_has_no_room_at_once_is_taken_in_parts(model, control, runs, most):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux can limit it")
 def test_what_has_no_room_at_all_is_left_out(model, control):
-    result = compare([control, greedy(control, 40, [])], model, 40, STEPS, 1, subset_runs=40, subset_memory=100e6, progress=False)
+    result = compare([control, greedy(control, 40, [])], model, 40, STEPS, 1, slow_runs=40, slow_memory=100e6, progress=False)
     assert result.left_out == {
         "greedy": "step 0: 16 trajectories need more memory than the 100 MB that the slow filters may take"
     }
@@ -152,7 +152,7 @@ def test_what_leaves_no_room_for_a_fast_filter_is_left_out_too(model, control):
         return control.step(state, y)
 
     filters = [replace(control, name="fast", step=step), greedy(control, 1, [])]
-    result = compare(filters, model, 24, STEPS, 1, subset_runs=24, subset_memory=150e6, progress=False, threads=1)
+    result = compare(filters, model, 24, STEPS, 1, slow_runs=24, slow_memory=150e6, progress=False, threads=1)
     assert result.left_out == {"greedy": "16 trajectories need more memory than the 150 MB that the slow filters may take"}
     assert result.available == ("fast",)
 
@@ -163,11 +163,11 @@ def test_the_exact_filter_with_the_least_memory_ends_in_numbers_or_is_left_out()
     lines = (
         "from kfcourse import Model, compare, linearised",
         "from kfcourse.filters import aof, pointmass",
-        "from kfcourse.montecarlo.subset import LEAST",
+        "from kfcourse.montecarlo.slow_filters import LEAST",
         "model = Model.define('0.9*x + 0.05*x*v', 'x + 0.02*x**2*w')",
         "filters = [aof(linearised(model)), pointmass(model)]",
-        "found = compare(filters, model, 112, 3, 1, subset_runs=112, subset_memory=LEAST, progress=False)",
-        "print(found.subset_runs, found.left_out)",
+        "found = compare(filters, model, 112, 3, 1, slow_runs=112, slow_memory=LEAST, progress=False)",
+        "print(found.slow_runs, found.left_out)",
     )
     done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True)
     assert done.returncode == 0 and re.match(r"112 \{\}|0 \{'aof-exact': .*need more memory", done.stdout), done
@@ -175,32 +175,32 @@ def test_the_exact_filter_with_the_least_memory_ends_in_numbers_or_is_left_out()
 
 @pytest.mark.parametrize("memory", [0, -1e9, 1e6, float("nan")])
 def test_hardly_any_memory_is_refused(model, control, memory):
-    with pytest.raises(ValueError, match=r"subset_memory must be at least 1e\+07"):
-        compare([control], model, 20, STEPS, 1, subset_memory=memory)
+    with pytest.raises(ValueError, match=r"slow_memory must be at least 1e\+07"):
+        compare([control], model, 20, STEPS, 1, slow_memory=memory)
 
 
 def test_the_exact_filter_on_a_model_beyond_its_budget_is_left_out_within_seconds():
     model = Model.define("x**3 + 1e-6*v", "x + w")
     start = time.process_time()
     filters = [aof(linearised(model)), pointmass(model)]
-    result = compare(filters, model, 112, 2, 1, subset_runs=112, subset_seconds=300, progress=False)
+    result = compare(filters, model, 112, 2, 1, slow_runs=112, slow_seconds=300, progress=False)
     assert time.process_time() - start < 15  # it takes 3 to 5, and by the clock, on a busy machine, many times that
-    assert re.search(r"^step \d of Model\(x' = .* nodes.*--exact-runs 0", result.left_out["aof-exact"])
+    assert re.search(r"^step \d of Model\(x' = .* nodes.*--slow-runs 0", result.left_out["aof-exact"])
 
 
 @pytest.mark.parametrize("seconds", [0, -1, float("nan")])
 def test_no_time_at_all_is_refused(model, control, seconds):
-    with pytest.raises(ValueError, match="subset_seconds must be positive"):
-        compare([control], model, 20, STEPS, 1, subset_seconds=seconds)
+    with pytest.raises(ValueError, match="slow_seconds must be positive"):
+        compare([control], model, 20, STEPS, 1, slow_seconds=seconds)
 
 
 def test_another_filter_runs_instead_of_one_that_fails(model, control):
     other = slow(control, "failing")
     failing = replace(slow(control, "failing", error=ModelError("no")), instead=other)
-    result = compare([control, failing], model, 40, STEPS, 1, subset_runs=20, progress=False)
+    result = compare([control, failing], model, 40, STEPS, 1, slow_runs=20, progress=False)
     assert dict(result.replaced) == {"failing": "no"}
     assert not result.left_out
-    expected = compare([control, other], model, 40, STEPS, 1, subset_runs=20, progress=False)
+    expected = compare([control, other], model, 40, STEPS, 1, slow_runs=20, progress=False)
     np.testing.assert_array_equal(result.error_variance("failing").value, expected.error_variance("failing").value)
     assert not expected.replaced
 
@@ -208,20 +208,20 @@ def test_another_filter_runs_instead_of_one_that_fails(model, control):
 def test_another_filter_runs_instead_of_one_that_would_not_come_through_in_time(model, control):
     """It is told after the first sixteen, .5 s, while there is time: 84 more take 2.5.  What nothing can replace runs on."""
     crawling, other = slow(control, "aof-exact", seconds=1e-2), slow(control, "aof-exact")
-    settings = {"subset_runs": 112, "subset_seconds": 2, "progress": False, "threads": 1}
+    settings = {"slow_runs": 112, "slow_seconds": 2, "progress": False, "threads": 1}
     result = compare([control, replace(crawling, instead=other)], model, 112, STEPS, 1, **settings)
     assert re.search(r"^16 trajectories take .* s, 100 more than the .* s left$", result.replaced["aof-exact"])
-    assert result.subset_runs == 112
+    assert result.slow_runs == 112
     alone = compare([control, crawling], model, 112, STEPS, 1, **settings)
     assert not alone.replaced and "fewer than 100" in alone.left_out["aof-exact"]
     quick = replace(slow(control, "aof-exact", seconds=1e-4), instead=other)  # there is a minute for .03 s
-    assert not compare([control, quick], model, 112, STEPS, 1, **settings | {"subset_seconds": 60}).replaced
+    assert not compare([control, quick], model, 112, STEPS, 1, **settings | {"slow_seconds": 60}).replaced
 
 
 def test_where_point_masses_fail_the_bound_is_found_by_particles():
     """A meter with thousands of humps is beyond the nodes; as a measurement it tells next to nothing."""
     model = Model.define("0.9*x + 0.1*v", "sin(1000*x) + w")
-    result = compare([aof(linearised(model)), exact(model)], model, 400, 4, 1, subset_runs=112, progress=False)
+    result = compare([aof(linearised(model)), exact(model)], model, 400, 4, 1, slow_runs=112, progress=False)
     assert "nodes" in result.replaced["aof-exact"]
     assert result.has_bound
     bound = result.bound()

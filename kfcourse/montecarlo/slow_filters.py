@@ -23,7 +23,7 @@ from kfcourse.filters.base import Filter
 from kfcourse.laws import Array
 from kfcourse.limits import OutOfTime, memory_limit, time_limit
 from kfcourse.montecarlo.blocks import Failed, TooMuch, progress_bar, run_block
-from kfcourse.montecarlo.comparison import EXACT, Subset
+from kfcourse.montecarlo.comparison import EXACT, SlowPart
 from kfcourse.montecarlo.ensemble import STRATA, Ensemble, Instant, Serial
 from kfcourse.montecarlo.parallel import START, Cluster, Submit, may_start, one_thread, processes
 from kfcourse.montecarlo.statistics import Sums
@@ -44,7 +44,7 @@ class _NoRoom(Exception):
         self.count, self.jobs, self.problem = count, jobs, problem
 
 
-def run_subset(
+def run_slow_filters(
     fast: Sequence[Filter],
     slow: Sequence[Filter],
     ensemble: Ensemble,
@@ -56,7 +56,7 @@ def run_subset(
     *,
     back: bool = False,
     far: Cluster | None = None,
-) -> tuple[Subset | None, dict[str, str]]:
+) -> tuple[SlowPart | None, dict[str, str]]:
     """All filters on at most `size` of the trajectories, in `jobs` processes, as threads would wait for one another.
 
     With `back` they look back from the end; `far` away if there is a cluster.  Also, by name, why slow filters were left out; the
@@ -83,7 +83,7 @@ def run_subset(
                 why = "a process that computed it was killed, perhaps as memory ran out: take fewer jobs at once, or less memory"
                 return None, left_out | dict.fromkeys(names, why)
             done = sum(int(one.counts.sum()) for one in sums)
-            found = Subset(names, Sums.concatenate(sums), replaced) if sums else None
+            found = SlowPart(names, Sums.concatenate(sums), replaced) if sums else None
             if found and (done >= FEWEST or EXACT not in names):
                 return found, left_out
             reason = f"{done or min(size, CHUNKS[0])} trajectories take {'' if done else 'more than '}{seconds:g} s"

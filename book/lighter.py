@@ -1,0 +1,123 @@
+"""Sphinx extension: pages as light as what they show.
+
+The theme's style sheets are made for every page that anyone may write: of 530 kB the book uses 140.  So the rules that ask for
+a class or a name that no page and no script of the built book has are left out.  And the fonts of nearly every page come with a
+script, which is the only way to have them when the first line is laid out: a page is laid out once, not once more for each font
+that arrives, and no line moves.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import tinycss2
+from tinycss2 import ast
+
+SHEETS = ("styles/*.css", "sphinx-design.min.css", "mystnb.*.css", "basic.css", "togglebutton.css", "pygments.css")
+FONTS = (  # first in the lists of book.css; other letters, and readers without scripts, have those of fonts.css
+    ("Ready Serif", "normal", "source-serif-4-latin-wght-normal"),
+    ("Ready Serif", "italic", "source-serif-4-latin-wght-italic"),
+    ("Ready Sans", "normal", "source-sans-3-latin-wght-normal"),
+    ("Ready Mono", "normal", "jetbrains-mono-latin-wght-normal"),
+)
+SCRIPT_OF_FONTS = """for (const [family, style, weight, data] of %s) {
+  const text = atob(data), bytes = new Uint8Array(text.length);
+  for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
+  document.fonts.add(new FontFace(family, bytes, { style, weight }));
+}
+"""
+NAMED = re.compile(r'\b(?:class|id)="([^"]*)"')
+SCRIPT = re.compile(r"<script\b[^>]*>(.*?)</script>", re.DOTALL)
+WORD = re.compile(r"[A-Za-z_][\w-]*")
+BEGUN = re.compile(r"([A-Za-z][\w-]*-)(?=[\"'`]|\$\{)")  # "bs-" of `bs-${name}-auto`: what a script puts together
+
+
+class Used(NamedTuple):
+    """Classes and names of the elements of a book: whole ones, and beginnings of those that scripts put together."""
+
+    words: frozenset[str]
+    beginnings: tuple[str, ...]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.words or str(name).startswith(self.beginnings)
+
+
+def used(pages: Iterable[str], scripts: Iterable[str]) -> Used:
+    """What the elements of these pages are called, or may be once scripts have run."""
+    words: set[str] = set()
+    programs = set(scripts)
+    for page in pages:
+        words.update(*(names.split() for names in set(NAMED.findall(page))))
+        programs.update(SCRIPT.findall(page))
+    for program in programs:
+        words.update(WORD.findall(program))
+    return Used(frozenset(words), tuple({begun for program in programs for begun in BEGUN.findall(program)}))
+
+
+def pruned(sheet: str, here: Used) -> str:
+    """A style sheet without the rules that fit no element; licences stay."""
+    rules = tinycss2.parse_stylesheet(sheet, skip_whitespace=True)
+    return "\n".join(text for rule in rules if (text := _rule(rule, here)))
+
+
+def _rule(rule: ast.Node, here: Used) -> str:
+    if isinstance(rule, ast.Comment):
+        return rule.serialize() if rule.value.startswith("!") else ""
+    if isinstance(rule, ast.AtRule) and rule.lower_at_keyword in ("media", "supports", "layer", "container") and rule.content:
+        inside = tinycss2.parse_rule_list(rule.content, skip_comments=True, skip_whitespace=True)
+        kept = "".join(_rule(one, here) for one in inside)
+        return kept and f"@{rule.at_keyword}{tinycss2.serialize(rule.prelude)}{{{kept}}}"
+    if not isinstance(rule, ast.QualifiedRule):
+        return rule.serialize()
+    selectors = [tinycss2.serialize(one).strip() for one in _selectors(rule.prelude) if all(name in here for name in _asked(one))]
+    return f"{','.join(selectors)}{{{_short(rule.content)}}}" if selectors else ""
+
+
+def _selectors(prelude: list[ast.Node]) -> Iterator[list[ast.Node]]:
+    begin = 0
+    for place, token in enumerate([*prelude, None]):
+        if token is None or token == ",":
+            yield prelude[begin:place]
+            begin = place + 1
+
+
+def _asked(selector: list[ast.Node]) -> Iterator[str]:
+    """The classes and names that an element and those around it must have; what stands in brackets may be one of several."""
+    for before, token in zip([None, *selector], selector, strict=False):
+        if isinstance(token, ast.HashToken) or (isinstance(token, ast.IdentToken) and before == "."):
+            yield token.value
+
+
+def _short(content: list[ast.Node]) -> str:
+    return "".join(" " if isinstance(one, ast.WhitespaceToken) else one.serialize() for one in content if one.type != "comment")
+
+
+def carried(faces: Iterable[tuple[str, str, str, Path]]) -> str:
+    """A script with fonts in it: family, style, weights, and file of each."""
+    return SCRIPT_OF_FONTS % json.dumps([(*face, base64.b64encode(path.read_bytes()).decode()) for *face, path in faces])
+
+
+def write(app, exception: Exception | None) -> None:
+    if exception or app.builder.format != "html":
+        return
+    root = Path(app.outdir)
+    static = root / "_static"
+    here = used(
+        (page.read_text(encoding="utf-8") for page in root.rglob("*.html")),
+        (script.read_text(encoding="utf-8") for script in static.rglob("*.js") if "mathjax" not in script.parts),
+    )
+    for path in (path for pattern in SHEETS for path in static.glob(pattern)):
+        path.write_text(pruned(path.read_text(encoding="utf-8"), here), encoding="utf-8")
+    faces = [(family, style, "100 900", static / "fonts" / f"{name}.woff2") for family, style, name in FONTS]
+    (static / "fonts.js").write_text(carried(faces), encoding="utf-8")
+
+
+def setup(app) -> dict[str, bool]:
+    app.add_js_file("fonts.js", priority=100)  # before all others
+    app.connect("build-finished", write, priority=950)  # when all pages and sheets are there
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
