@@ -1,28 +1,56 @@
 """Sphinx extension: docstrings written to be read with `help()`, shown well in the book.
 
-They are plain text with equations such as `x**2` or `K (y - h)` on lines of their own.  Before numpydoc reads
-them, paragraphs of equations become literal blocks and characters with a meaning in reStructuredText are escaped;
-the sections (Parameters, Returns, ...) are numpydoc's.
+They are plain text.  Before numpydoc reads them, characters with a meaning in reStructuredText are escaped, and
+
+- a paragraph that is indented, or begins with a formula and ends without a full stop, is an equation, which `plain.py` sets;
+- what is indented behind "::" is a program, a picture, or what else stands as it is;
+- lines of two columns, parted by two spaces or more, are a table of names, and stand as they are.
+
+The sections (Parameters, Returns, ...) are numpydoc's.
 """
 
 from __future__ import annotations
 
 import re
 
-EQUATION = re.compile(r"^\s{2,}\S|\s=\s|[^\s.:;!?] {2,}\S|->")  # two spaces after a full stop are between sentences
+import plain
+
+COLUMNS = re.compile(r"[^\s.:;!?] {2,}\S|^ {2,}\S")  # two spaces after a full stop are between sentences
+INDENT = "    "
 SPECIAL = re.compile(r"(?!^\s*\* )([*|\\]|(?<=\w)_(?=\W|$))")
 QUOTED = re.compile(r"(`+[^`]+`+)")
 
 
-def to_restructured(lines: list[str]) -> list[str]:
-    """Paragraphs of the docstring, equations literal and prose escaped."""
-    result: list[str] = []
-    in_sections = False
+def paragraphs(lines: list[str]) -> list[tuple[str, list[str]]]:
+    """Each paragraph with its kind: prose, sections, equations, verbatim, names."""
+    found: list[tuple[str, list[str]]] = []
     for paragraph in "\n".join(lines).split("\n\n"):
         rows = paragraph.strip("\n").split("\n")
-        in_sections = in_sections or (len(rows) > 1 and set(rows[1].strip()) == {"-"})
-        if result and not in_sections and all(EQUATION.search(row) for row in rows):
-            result += ["::", "", *("    " + row for row in rows), ""]
+        before, last = found[-1] if found else ("", [""])
+        indented = all(row.startswith(INDENT) for row in rows)
+        kind = "prose"
+        if before == "sections" or (len(rows) > 1 and set(rows[1].strip()) == {"-"}):
+            kind = "sections"
+        elif rows[0].startswith(">>>") or (indented and (before == "verbatim" or last[-1].endswith("::"))):
+            kind = "verbatim"
+        elif indented or (found and rows[-1][-1] not in ".:?" and plain.begins_with_formula(rows[0])):
+            kind = "equations"
+        elif found and len(rows) > 1 and all(map(COLUMNS.search, rows)):
+            kind = "names"
+        found.append((kind, rows))
+    return found
+
+
+def to_restructured(lines: list[str]) -> list[str]:
+    """The docstring in reStructuredText: equations for `plain.py`, prose escaped."""
+    result: list[str] = []
+    for kind, rows in paragraphs(lines):
+        if kind == "equations":
+            result += [".. equations::", "", *(INDENT + row for row in rows), ""]
+        elif kind == "names":
+            result += ["::", "", *(INDENT + row for row in rows), ""]
+        elif kind == "verbatim":
+            result += [*rows, ""]
         else:
             result += [*map(escape, rows), ""]
     return result

@@ -53,7 +53,7 @@ def near(vector: Array, reference: Array, which: Components) -> Array:
 def moments_on_circle(angle: Array, mass: Array) -> tuple[Array, Array]:
     """Mean and variance of masses at angles: (..., M), (..., M) -> (...), (...), as seen from their circular mean.
 
-    c = arg sum m_i exp(i x_i),   mean = c + sum m_i wrapped(x_i - c)
+    c = arg sum_j m_j exp(i x_j),   `mean` = c + sum_j m_j `wrapped`(x_j - c)
     """
     centre = np.angle((mass * np.exp(1j * angle)).sum(axis=-1))
     deviation = wrapped(angle - centre[..., None])

@@ -1,5 +1,7 @@
 """What a package exports is imported when it is first used: help, and what needs only a part, come at once.
 
+::
+
     if TYPE_CHECKING:
         from kfcourse.symbolic.model import Model
     __getattr__, __dir__ = lazily(__name__, __file__)

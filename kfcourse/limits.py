@@ -40,6 +40,7 @@ class time_limit:
 
     Examples
     --------
+    >>> from kfcourse.limits import OutOfTime, time_limit
     >>> try:
     ...     with time_limit(0.1):
     ...         while True:

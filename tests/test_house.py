@@ -1,6 +1,8 @@
 """The house keeps its order: imports run down its floors, no module hides behind a function, each room says what it is."""
 
 import ast
+import builtins
+import doctest
 import inspect
 import os
 import subprocess
@@ -46,6 +48,24 @@ def test_a_module_does_not_carry_the_name_of_what_it_exports(name):
 def test_a_module_says_what_it_is(name):
     said = sentence(MODULES[name])
     assert said.endswith((".", "?", "!", '"', "`")) and len(said) > 20, said
+
+
+EXAMPLES = [name for name, path in MODULES.items() if ">>> " in path.read_text(encoding="utf-8")]
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_example_imports_what_it_uses(name):
+    """A reader copies it into an empty session; the doctests themselves run with the names of the module."""
+    for one in doctest.DocTestFinder().find(import_module(f"kfcourse.{name}")):
+        code = ast.walk(ast.parse("".join(example.source for example in one.examples)))
+        found = [node for node in code if isinstance(node, ast.Name | ast.alias)]
+        given = {node.asname or node.name if isinstance(node, ast.alias) else node.id for node in found if not _loaded(node)}
+        used = {node.id for node in found if _loaded(node)}
+        assert used - given - set(dir(builtins)) == set(), one.name
+
+
+def _loaded(node):
+    return isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)
 
 
 def test_a_constant_of_the_exact_filter_has_one_value():

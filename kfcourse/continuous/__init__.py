@@ -11,11 +11,11 @@ White noise has no values, only means over intervals: a stored measurement is y_
 noise variance N / (2 T).  A continuous filter is therefore an ordinary `Filter` of this y_k, made for one step T; it tends to
 its differential equations as T -> 0.
 
-    model        `ContinuousModel`, and `to_discrete`: the discrete model with the same limit
-    paths        `simulate`, `coarsen`
-    equations    `log_likelihood_rate`, `filter_equations`: the filter's formulas, derived
-    bucy         `extended_kalman_bucy`: the filter
-    stationary   `steady_state` of a linear model
+model        `ContinuousModel`, and `to_discrete`: the discrete model with the same limit
+paths        `simulate`, `coarsen`
+equations    `log_likelihood_rate`, `filter_equations`: the filter's formulas, derived
+bucy         `extended_kalman_bucy`: the filter
+stationary   `steady_state` of a linear model
 """
 
 from kfcourse.continuous.bucy import extended_kalman_bucy

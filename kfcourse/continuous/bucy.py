@@ -26,7 +26,7 @@ def extended_kalman_bucy(
 
         B  = (D^-1 + T H^T 2 N^-1 H)^-1
         z' = z + T (f + B H^T 2 N^-1 (y - S))
-        D' = (M + T A) B (M + T A)^T + T Q,      M = (I + T B V / 8)^-1 (I + T B W / 2),   V = T Mean[W B W]
+        D' = (M + T A) B (M + T A)^T + T Q,      M = (I + T B V / 8)^-1 (I + T B W / 2),   V = T M[W B W]
 
     D' is never negative.  Without second derivatives M = I; with them W contains white noise of the size 1 / sqrt(T), so
     (T B W)^2 is of the order T, and V makes Mean[M B M^T] = B to that order, as Ito's sense demands.

@@ -23,7 +23,7 @@ def symmetrised_drift(
 ) -> sp.ImmutableMatrix:
     """What is added to ds/dt = rates(s, noise) in Ito's sense to give the same in the symmetrised (Stratonovich) sense, (n, 1).
 
-    With b_l = d rates / d noise_l:   1/2 sum_lm intensity_lm (d b_l / d s) b_m;   for scalar g(x) xi: g g' S_xi / 4.
+    1/2 sum_lm q_lm db_l/ds b_m,   q the intensity, b_l the derivative of the rates by noise l;   of g(x) xi:  g g' S_xi / 4
     """
     b, q = rates.jacobian(sp.Matrix(noise)), range(len(noise))
     terms = [intensity[i, j] / 2 * b.col(i).jacobian(sp.Matrix(state)) * b.col(j) for i in q for j in q]
@@ -33,7 +33,7 @@ def symmetrised_drift(
 class FilterEquations(NamedTuple):
     """The extended Kalman-Bucy filter in formulas, parameters as symbols.
 
-    dz/dt = f + D u,     dD/dt = A D + D A^T + Q + D U D,     u = (dF/dx)^T,  U = d2F/dx2  at x = z
+    dz/dt = f + D u,     dD/dt = A D + D A^T + Q + D U D,     u = (dF/dx)^T,  U = d^2 F / dx^2  at x = z
 
     Attributes
     ----------

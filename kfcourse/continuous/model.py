@@ -93,6 +93,7 @@ class ContinuousModel:
 
         Examples
         --------
+        >>> from kfcourse.continuous import ContinuousModel
         >>> ContinuousModel.define("-a*x", "s", "sin(x)", dict(a=0.5, s=1), noise_density=0.2)
         ContinuousModel(dx/dt = -a*x + s*xi, y = sin(x) + n; a = 1/2, s = 1)
         >>> ContinuousModel.define("-x + cos(t)", "1 + exp(-t)", "x")

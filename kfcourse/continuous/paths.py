@@ -30,7 +30,7 @@ def simulate(
 ) -> Path:
     """Trajectories by the Euler-Maruyama scheme with the step T / substeps.
 
-    x' = x + dt f(x, t) + g(x, t) N(0, S_xi dt / 2),     y_k = mean over the step of S(x, t) + N(0, N / (2 dt))
+    x' = x + dt f(x, t) + g(x, t) N(0, S_xi dt / 2),     y_k = 1/dt Integral S(x, t) dt + N(0, N / (2 dt))
 
     The error of a trajectory is of the order dt if g is constant, and sqrt(dt) if g depends on x; that of its moments is of the
     order dt in both cases.

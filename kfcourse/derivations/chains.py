@@ -6,8 +6,10 @@ x ~ N(m, d)                                 letters of the law that means are ov
 positive c, g                               letters that are positive; variances are without saying
 letters S, q                                more letters that may be used
 
-F = M[(g*x + f*x^2*w - h)^2]                a chain: name = line, and lines that begin with =
-  = g^2*M[(x-m)^2] + f^2*M[x^4]             # what follows this sign is a remark
+::
+
+    F = M[(g*x + f*x^2*w - h)^2]                a chain: name = line, and lines that begin with =
+      = g^2*M[(x-m)^2] + f^2*M[x^4]             # what follows this sign is a remark
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ from the nodes beside it: tau = A - b for the term a of a + b, tau = A / b for t
 a square or a function it follows if the line above has one of the right value.  Beside its own value t this tells the slip:
 
     tau = -t                    a sign            tau = q t, q a number          a number in front
-    tau = t * letters           a power, a factor, a letter for another one
+    tau = t c, c of letters     a power, a factor, a letter for another one
     tau = 0                     doubled, or too much
-    tau - t = q * letters, or a term of the line above                          a term is lost
+    tau - t = q c, or a term of the line above                                  a term is lost
     tau / t = M[x^4] / (3 d^2), and others of the normal law                     a moment
 
 All of it by values at random points.  Where nothing follows, changes are tried: each of the same kinds, one node at a time.

@@ -124,6 +124,7 @@ def check_text(text: str, find: FindModel | None, setting: Setting | None = None
 
     Examples
     --------
+    >>> from kfcourse.derivations import check_text
     >>> print(check_text("S = M[(x - m)^4]\\n  = d^2", find=None))
        1 · M[(x - m)^4]
            nothing to compare it with: the chain is checked from here

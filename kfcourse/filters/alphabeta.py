@@ -5,7 +5,7 @@ r"""Alpha-beta and alpha-beta-gamma filters: Kalman's prediction and correction 
 The coefficients that make it the stationary Kalman filter of `kfcourse.scenarios.radar.kinematic`
 depend on the tracking index alone,
 
-    Lambda = noise_sd T^2 / measurement_sd,
+    Lambda = `noise_sd` T^2 / `measurement_sd`,
     beta = 2 (2 - alpha) - 4 sqrt(1 - alpha) = 2 (1 - sqrt(1 - alpha))^2,   Lambda = beta / sqrt(1 - alpha)     (alpha-beta)
     the same beta,  gamma = beta^2 / alpha,                                 Lambda = gamma / (2 sqrt(1 - alpha))   (with gamma)
 

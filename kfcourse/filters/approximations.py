@@ -2,7 +2,7 @@
 
 The AOF is the Stratonovich recursion itself: its estimate is the posterior mean.  Replacing each
 density by the normal one with the same first two moments gives one predict/correct step, and the
-structural functions decide which filter it is:
+structural functions decide which filter it is::
 
     linearised(model)                     the extended Kalman filter (ЛАОФ)
     gaussian(model)                       the normal filter (ГАОФ)

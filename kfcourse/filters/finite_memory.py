@@ -24,7 +24,7 @@ STEPS = 4  # the school's length of memory
 def fkp(structure: Structure, memory: int = STEPS) -> Design:
     """The filter with finite memory.
 
-    u = Gamma zeta + chi,  T = residual                          regression of x on zeta, the last `memory` measurements
+    u = Gamma zeta + chi,  T = `residual`                        regression of x on zeta, the last `memory` measurements
     lambda' = tau(u, T),  Psi' = Theta(u, T),   z = lambda + K (y - h)
 
     Raises

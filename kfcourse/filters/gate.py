@@ -2,7 +2,7 @@ r"""A gate before a filter: measurements too far from what it expects are refuse
 
 If the filter is right, the square of its innovation in units of its covariance F is chi-squared with p degrees of freedom,
 
-    nu^T F^-1 nu <= gamma,      P(chi^2_p <= gamma) = probability
+    nu^T F^-1 nu <= gamma,      P(chi^2_p <= gamma) = `probability`
 
 and a measurement beyond gamma is taken for a fault and treated as missing.  That has a danger of its own.  Where the object has
 done what the model does not know of, every measurement lies beyond the gate, the filter refuses them all, and never hears that
@@ -84,8 +84,9 @@ def gated(one: Filter, probability: float = 0.999, patience: int | None = 5, str
 
     Examples
     --------
+    >>> import numpy as np
     >>> from kfcourse import Model, run
-    >>> from kfcourse.filters import kalman_filter
+    >>> from kfcourse.filters import gated, kalman_filter
     >>> one = kalman_filter(Model.define("x + 0.1*v", "x + w"))
     >>> [round(run(each, np.array([0.1, 0.0, 90.0])).mean[-1].item(), 3) for each in (one, gated(one))]
     [23.247, 0.033]

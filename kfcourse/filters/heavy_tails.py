@@ -2,18 +2,18 @@ r"""A correction that doubts its measurements: noise with heavy tails, and weigh
 
 The meter's noise is taken for a Student one, normal with a covariance R / u whose u is drawn anew at each step,
 
-    y = h + G (x - lambda) + e,    e | u ~ N(0, R / u),    u ~ Gamma(degrees / 2, degrees / 2)
+    y = h + G (x - lambda) + e,    e | u ~ N(0, R / u),    u ~ Gamma(`degrees` / 2, `degrees` / 2)
 
 The joint law of x and u given y has no closed form.  The nearest product of a law of x and a law of u (variational Bayes) has
 
-    x ~ N(z, p), corrected with R / w,       w = M u = (degrees + p) / (degrees + r^T R^-1 r + tr R^-1 G p G^T)
+    x ~ N(z, p), corrected with R / w,       w = M[u] = (`degrees` + p) / (`degrees` + r^T R^-1 r + tr R^-1 G p G^T)
 
 with the residual r = y - h - G (z - lambda), and is found by going round.  A measurement that fits has w of about 1, one that is
 ten standard deviations off next to none, and none is refused for ever.  Piche, Sarkka, Hartikainen (2012).
 
 Huber's (1964) weights are milder: within an edge c a residual costs its square, beyond it grows only linearly,
 
-    w = min(1, c / sqrt(r^T R^-1 r)):     z minimises (x - lambda)^T Psi^-1 (x - lambda) / 2 + rho(|R^-1/2 r|)
+    w = min(1, c / sqrt(r^T R^-1 r)):     z minimises (x - lambda)^T Psi^-1 (x - lambda) / 2 + rho(|R^(-1/2) r|)
 
 An outlier then still pulls, but with a bounded force.
 """

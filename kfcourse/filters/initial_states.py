@@ -1,6 +1,6 @@
 r"""The exact filter of an object without noise: all that is unknown is where it started, and how the meter fares.
 
-    x_k = phi_k(x_0),      p(x_0 | y_0..k)  ~  p(x_0) prod_i p(y_i | phi_i(x_0), y_0..i-1)
+    x_k = phi_k(x_0),      p(x_0 | y_0..k) ∝ p(x_0) prod_i p(y_i | phi_i(x_0), y_0..i-1)
 
 Particles that are moved and resampled die out here: no noise tells copies of one apart, and after some tens of sharp measurements
 all of them are one initial state.  So initial states are drawn anew where too few of them count: from a mixture of Student's laws
@@ -10,7 +10,7 @@ one but through the law that it comes from: the estimates are those of importanc
 If the meter jumps between modes, while the object is the same in all of them, the modes are summed out: given x_0 they are a
 chain with known probabilities, and Bayes' formula for it is a sum over modes (Rao-Blackwell: what is not drawn does not err),
 
-    alpha_j ~ c_j p_j(y_k | x_k),     p(y_k | x_k, y_0..k-1) = sum_j c_j p_j(y_k | x_k),     c'_j = sum_i alpha_i pi_ij
+    alpha_j ∝ c_j p_j(y_k | x_k),     p(y_k | x_k, y_0..k-1) = sum_j c_j p_j(y_k | x_k),     c'_j = sum_i alpha_i pi_ij
 
 Two clouds that know nothing of each other, as of `particles`: their distance tells the error, but not that of a hump that both
 have missed.  On a linear model with two modes and 3,200 trajectories the stated mean square error was .7 of the true one, the

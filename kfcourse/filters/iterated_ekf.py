@@ -70,7 +70,9 @@ def iterated(structure: Structure, iterations: int = 5) -> Filter:
 
     Examples
     --------
+    >>> import numpy as np
     >>> from kfcourse import Model, linearised, run
+    >>> from kfcourse.filters import iterated
     >>> model = Model.define("x + v", "x**3 + 0.1*w", {}, prior=dict(mean=1, variance=1))
     >>> filters = [iterated(linearised(model), count) for count in (1, 2, 20)]
     >>> [round(run(one, np.array([[[8.0]]])).mean.item(), 3) for one in filters]

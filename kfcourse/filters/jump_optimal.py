@@ -4,13 +4,13 @@ Such a filter of a model that jumps carries no covariances and no probabilities 
 Before it predicts it asks what zeta_k says of the state in each mode i, and of the mode, over the trajectories in mode i:
 
     u_i = Gamma_i zeta + chi_i  with residual covariance T_i          regression of x_k on zeta_k, given i_k = i
-    xi_i ~ q_i N(zeta; M[zeta | i], Cov(zeta | i))
+    xi_i ∝ q_i N(zeta; M[zeta | i], Cov(zeta | i))
 
 and (xi_i, u_i, T_i) take the place of (mu_i, z_i, p_i) in the prediction of the logic-dynamic AOF (`multiple_models`).
 
-    logic_dynamic_fos   zeta_k = z_k                             (ФОСлд)
-    logic_dynamic_fkp   zeta_k = (y_k, y_{k-1}, ..., y_{k-l+1})  (ФКПлд, finite memory)
-    logic_dynamic_fbp   zeta_k = (z_k, z_{k-1}, ..., z_{k-l+1})  (ФБПлд, high order)
+    `logic_dynamic_fos`   zeta_k = z_k                             (ФОСлд)
+    `logic_dynamic_fkp`   zeta_k = (y_k, y_{k-1}, ..., y_{k-l+1})  (ФКПлд, finite memory)
+    `logic_dynamic_fbp`   zeta_k = (z_k, z_{k-1}, ..., z_{k-l+1})  (ФБПлд, high order)
 
 Without jumps they are `fos`, `fkp` and `fbp`.
 """

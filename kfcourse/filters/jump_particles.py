@@ -1,7 +1,7 @@
 r"""Particles of a model that jumps: each is a state and a mode, and looks at the measurement before it chooses its next mode.
 
-    mode j with probability r_j  ~  pi_ij(x) p_j(y_k | x^j) |q_j|       x^j the state that mode j makes likeliest, given y_k
-    then the noise from mode j's own proposal q_j (`proposals`), and the weight
+    mode j with probability r_j ∝ pi_ij(x) p_j(y_k | x^j) |q_j|       x^j the state that mode j makes likeliest, given y_k
+    then the noise from the proposal q_j of mode j, see `proposals`, and the weight
 
     pi_ij(x) p_j(y_k | x_k) p_j(x_k | x) / (r_j q_j(x_k | x, y_k))
 

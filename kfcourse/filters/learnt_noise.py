@@ -3,7 +3,7 @@ r"""A filter that learns how large its meter's noise is, from what is left of ea
 The meter's noise has the covariance s R with an unknown factor s.  After a correction with it the residual and what is still
 unknown of the state make up the noise again,
 
-    M r r^T + G p G^T = s R,        r = y - h - G (z - lambda)
+    M[r r^T] + G p G^T = s R,        r = y - h - G (z - lambda)
 
 so each measurement tells of s, and a mean that forgets follows it (a round of expectation and maximisation at each step;
 Mohamed and Schwarz, 1999).  What is large for another reason, a manoeuvre or a fault, is taken for noise as well.
@@ -30,7 +30,7 @@ class Learnt(NamedTuple):
 def adaptive(structure: Structure, window: float = 50.0) -> Filter:
     """The Gaussian-approximated AOF with a noise of the meter s times the model's.
 
-    K = Psi G^T (G Psi G^T + s R)^+,   s' = s + ((r^T R^-1 r + tr R^-1 G p G^T) / p - s) / window
+    K = Psi G^T (G Psi G^T + s R)^+,   s' = s + ((r^T R^-1 r + tr R^-1 G p G^T) / p - s) / `window`
 
     Parameters
     ----------

@@ -7,15 +7,15 @@ The object is in one of M modes, each with its own model of the same state; the 
 The exact filter would keep one normal law for each history of modes, M^k of them.  These filters merge them once a step, a
 mixture into the normal law with its mean and covariance.  With mu_j the probability of mode j after y_k, c_j before it:
 
-    correct     z_j, p_j and the likelihood L_j = N(y_k; h_j, F_j) in each mode;   mu_j = c_j L_j / sum
+    correct     z_j, p_j and the likelihood L_j = N(y_k; h_j, F_j) in each mode;   mu_j = c_j L_j / sum_i c_i L_i
     combine     z = sum mu_j z_j,   p = sum mu_j (p_j + (z_j - z)(z_j - z)^T)
     chain       c_j = sum_i pi_ij mu_i,   mu_i|j = pi_ij mu_i / c_j
 
 and then they differ by when they merge:
 
-    imm                 the laws of the modes that may lead to j, before a prediction: tau_j, Theta_j of the mixture
-    logic_dynamic       after it: the mixture of tau_j(z_i, p_i), Theta_j(z_i, p_i)     (логико-динамический АОФ)
-    gpb2                after the next correction, J^2 laws in between (generalised pseudo-Bayes of order 2)
+    `imm`               the laws of the modes that may lead to j, before a prediction: tau_j, Theta_j of the mixture
+    `logic_dynamic`     after it: the mixture of tau_j(z_i, p_i), Theta_j(z_i, p_i)     (логико-динамический АОФ)
+    `gpb2`              after the next correction, J^2 laws in between (generalised pseudo-Bayes of order 2)
 
 The first two are the same for affine tau.  Blom and Bar-Shalom (1988); Bar-Shalom, Li, Kirubarajan (2001), section 11.6; for
 the second Rudenko's logic-dynamic filters.

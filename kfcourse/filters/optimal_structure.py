@@ -139,7 +139,7 @@ def fos(structure: Structure, arguments: int = 2) -> Design:
     """The filter of optimal structure.
 
     z = lambda + K (y - h),  K = Psi G^T F^+
-    u = Gamma z + chi,  T = residual                             regression of x on z
+    u = Gamma z + chi,  T = `residual`                           regression of x on z
     lambda' = tau(u, T),  Psi' = Theta(u, T)
 
     Parameters
@@ -155,7 +155,7 @@ def mfos(structure: Structure, arguments: int = 2) -> Design:
     """The modified filter of optimal structure (МФОС): the FOS with Pugachev's coefficients in both steps.
 
     sigma = Psi G^T F^+ (y - h),   z = lambda + H sigma + e      regression of x - lambda on sigma
-    u = Gamma z + chi,  T = residual                             regression of x on z (or on (y, z))
+    u = Gamma z + chi,  T = `residual`                           regression of x on z (or on (y, z))
     s' = tau(u, T),   lambda' = L s' + n                         regression of x' on s'
     Psi' = Theta(u, T)
 

@@ -3,7 +3,7 @@ r"""Looking back with particles: backward sampling.
 The particles of step k are where they were before later measurements came; what these tell is in weights.  Of a state x~ drawn
 from p(x_{k+1} | Y), the particle x^j of step k is the ancestor with probability
 
-    w_j  ~  p(x~ | x^j)          (the particles of step k, resampled, count alike)
+    w_j ∝ p(x~ | x^j)          (the particles of step k, resampled, count alike)
 
 So trajectories are drawn from the end to the start (Godsill, Doucet and West, 2004), not along the few ancestors that the
 filter's own resampling has left.  The mean of step k is taken over all particles by these weights, before one of them is drawn.

@@ -8,7 +8,7 @@ hundreds of times sharper than the prediction, few particles fall where the post
 
 The particles are two clouds that know nothing of each other.  Their estimates z_a and z_b err independently, so that
 
-    M|z - z*|^2 = M (z - z_a)^T (z - z_b),      z* the exact estimate, z that of any filter,
+    M[|z - z*|^2] = M[(z - z_a)^T (z - z_b)],      z* the exact estimate, z that of any filter,
 
 without any contribution of the sampling: that is how particles bound other filters where `exact` does not reach.
 """

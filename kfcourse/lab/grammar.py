@@ -1,5 +1,7 @@
 """New variants, proposed from a grammar of state and meter equations and kept if they are well posed.
 
+::
+
     scalar  ->  x' = DRIFT + OBJECT_NOISE,   y = SIGNAL + METER_NOISE
     vector  ->  x1' = x1 + T*x2,  x2' = x2 + T*(FORCE) + s*v1,   y = VECTOR_METERS
 

@@ -1,8 +1,10 @@
 """Which filter is the most accurate, and how far from the bound, over two parameters of a model.
 
-found = parameter_map(model, {"e": (0.02, 0.05, 0.2), "f": (0.01, 0.02, 0.05)})
-found[0.05, 0.02].leaders(1)      the most accurate at step 1, and those that are not significantly worse
-draw(found, 1, ax)                all of them as a map
+::
+
+    found = parameter_map(model, {"e": (0.02, 0.05, 0.2), "f": (0.01, 0.02, 0.05)})
+    found[0.05, 0.02].leaders(1)      the most accurate at step 1, and those that are not significantly worse
+    draw(found, 1, ax)                all of them as a map
 """
 
 from __future__ import annotations

@@ -119,9 +119,9 @@ def alarms(found: Innovations, confidence: float = CONFIDENCE) -> Array:
 
     With N steps, p components and s_k = F^(-1/2) nu_k, a right filter makes
 
-        sum of |s_k|^2                              chi-squared with p N degrees of freedom
-        |sum of s_k|^2 / N                          chi-squared with p
-        (sum of s_k^T s_{k+1})^2 / (p (N - 1))      chi-squared with 1, for large N
+        sum_k |s_k|^2                               chi-squared with p N degrees of freedom
+        |sum_k s_k|^2 / N                           chi-squared with p
+        (sum_k s_k^T s_{k+1})^2 / (p (N - 1))       chi-squared with 1, for large N
 
     Size is suspect on both sides, the others only above.  For these, s_k is divided by its root mean square in the record: a
     wrong size alone is no alarm of theirs.

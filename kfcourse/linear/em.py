@@ -3,7 +3,7 @@ r"""Noise covariances of a linear system by expectation and maximisation (Dempst
 If the states were seen, Q and R would be the mean squares of their noises.  They are not seen; but the smoother knows these
 squares' means under the present Q and R, which are then replaced by them,
 
-    Q <- mean of M[v v^T | y],    v = x_{k+1} - A x_k,        R <- mean of M[w w^T | y],    w = y_k - H x_k
+    Q <- 1/N sum_k M[v v^T | y],    v = x_{k+1} - A x_k,        R <- 1/N sum_k M[w w^T | y],    w = y_k - H x_k
 
 No round lowers the likelihood.  It takes Cov(x_k, x_{k+1} | y) = S p^s_{k+1}, S as of `kfcourse.linear.smoothing`.
 """

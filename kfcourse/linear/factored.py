@@ -21,7 +21,7 @@ from kfcourse.laws import Array, Matrices, Vectors, apply, symmetric
 class Factors(NamedTuple):
     """A normal law by the factors of its covariance: mean (..., n), unit (..., n, n), diagonal (..., n).
 
-    cov = unit diag(diagonal) unit^T
+    `cov` = `unit` diag(`diagonal`) `unit`^T
     """
 
     mean: Vectors

@@ -1,10 +1,10 @@
 r"""The posterior Cramer-Rao bound: no estimate errs less, by what the densities' slopes tell.
 
-    M (x_k - z_k)(x_k - z_k)^T >= J_k^-1,     J_{k+1} = D22 - D12^T (J_k + D11)^-1 D12 + M I_y(x_{k+1}),   J_0 = d^-1 + M I_y(x_0)
+    M[(x_k - z_k)(x_k - z_k)^T] >= J_k^-1,  J_{k+1} = D22 - D12^T (J_k + D11)^-1 D12 + M[I_y(x_{k+1})],  J_0 = d^-1 + M[I_y(x_0)]
 
 With normal laws x' | x ~ N(m(x), S(x)), and y | x likewise, the means over true trajectories are
 
-    D11 = M I_x(x),     D12 = -M m_x^T S^-1,     D22 = M S^-1,
+    D11 = M[I_x(x)],    D12 = -M[m_x^T S^-1],    D22 = M[S^-1],
     I_ij = m_i^T S^-1 m_j + 1/2 tr(S^-1 S_i S^-1 S_j)         (an index is a derivative by a component of x)
 
 The second term is what the size of the noise tells of x.  For a linear model with normal noises J^-1 is the Kalman filter's
@@ -51,6 +51,8 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: Seed) -> Array:
 
     Examples
     --------
+    >>> from kfcourse import Model
+    >>> from kfcourse.montecarlo.cramer_rao import posterior_bound
     >>> posterior_bound(Model.define("0.9*x + v", "x + 2*w"), runs=10, steps=2, seed=1).ravel().round(4).tolist()
     [0.8, 1.1671]
     """

@@ -3,7 +3,7 @@
 Fast filters ran on all N trajectories, slow ones on the first n.  A quantity is X, of what ran everywhere, plus Y, of what ran
 on this slow part:
 
-    estimate = M_N X + M_n Y,    Var = Var X / N + Var Y / n + 2 Cov(X, Y) / N
+    Z = M_N[X] + M_n[Y],    Var(Z) = Var(X) / N + Var(Y) / n + 2 Cov(X, Y) / N
 
 Filters with coefficients from an ensemble vary with that ensemble, too.  So they are designed several times, and run on common
 trajectories: the variance of their results, less what it would be for equal coefficients, is the variance of the design.

@@ -3,11 +3,15 @@
 A master is a MyST Markdown notebook, exercises/<set>/statement.md.  Text of the variant goes in by Jinja, with the
 delimiters [= ... =] and [% ... %] that neither Python nor LaTeX uses; what is between the lines
 
+::
+
     # BEGIN SOLUTION            <!-- BEGIN SOLUTION -->
     # END SOLUTION              <!-- END SOLUTION -->
 
 of a code or text cell is the solution; a cell of nothing else, such as the answer to a question in words, is left out for
 students.  From a master come, for a variant,
+
+::
 
     render(...)     the complete notebook, with solutions
     student(...)    the same without: stubs that raise NotImplementedError, and the pictures to reach

@@ -42,6 +42,7 @@ def write_csv(columns: Sequence[str], rows: Iterable[Mapping[str, Any]], path: P
 def cautious(text: str) -> str:
     """A text that no spreadsheet takes for a formula: such a one gets an apostrophe; tabs and their like are spaces.
 
+    >>> from kfcourse.notebooks.texts import cautious
     >>> cautious("=1+1"), cautious("\\t=1+1"), cautious("\uff1d1+1"), cautious("a = 1")
     ("'=1+1", "' =1+1", "'\uff1d1+1", 'a = 1')
     """

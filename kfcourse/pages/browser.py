@@ -4,6 +4,8 @@
 those that find coefficients from means and covariances become assignments between the loops.  What comes
 out is, for each filter of a scalar model,
 
+::
+
     step(n, v, c, a)      estimates z and predictions of all trajectories, with the coefficients c
     design(n, v, c, a)    the same, and finds the coefficients c, for which it reads the states x and the next ones
 

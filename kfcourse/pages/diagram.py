@@ -1,5 +1,7 @@
 """Block diagrams (структурные схемы) from a description: boxes, adders, nodes and arrows drawn with matplotlib.
 
+::
+
     block_diagram({"gain": Block("$p_k$", 0, 0), "sum": Block("", 2, 0, kind="adder")}, [Arrow("gain", "sum", "$u_k$")], ax)
 
 Positions and sizes are in units of the axes, which `block_diagram` fits to the drawing; labels may be LaTeX.
@@ -89,6 +91,7 @@ def block_diagram(blocks: Mapping[str, Block], arrows: Sequence[Arrow], ax: Axes
     Examples
     --------
     >>> from matplotlib.figure import Figure
+    >>> from kfcourse.pages.diagram import Arrow, Block, block_diagram
     >>> parts = {"x": Block("$x$", 0, 0, 0.5, kind="text"), "gain": Block("$K$", 2, 0)}
     >>> ax = block_diagram(parts, [Arrow("x", "gain")], Figure().add_subplot())
     """

@@ -1,5 +1,7 @@
 """Figures that answer when they are touched: pieces of HTML that load nothing, beside the still pictures of the same cells.
 
+::
+
     display(HTML(live_lab("fig-live-lab", models)))      the figure; a picture with this name is its first frame, and its paper
 
 The helper, data/figure.js, has axes, curves, handles, sliders and the state in the address.  Formulas come from SymPy through

@@ -26,7 +26,7 @@ def log_normal(value: sp.Expr, mean: sp.Expr, variance: sp.Expr) -> sp.Expr:
 def complete_square(exponent: sp.Expr, variable: sp.Symbol) -> Square:
     """The square completed in an exponent b x^2 + a x + d of the variable x.
 
-    mean = -a / (2b),   variance = -1 / (2b),   rest = d - a^2 / (4b)
+    `mean` = -a / (2b),   `variance` = -1 / (2b),   `rest` = d - a^2 / (4b)
 
     Raises
     ------
@@ -43,7 +43,7 @@ def complete_square(exponent: sp.Expr, variable: sp.Symbol) -> Square:
 def log_integral(exponent: sp.Expr, variable: sp.Symbol) -> sp.Expr:
     """Logarithm of the integral of exp(exponent) over the variable, in which the exponent is quadratic with b < 0.
 
-    ln of the integral = rest + ln(2 pi variance) / 2
+    ln Integral exp(a x + b x^2 + d) dx = `rest` + ln(2 pi `variance`) / 2
     """
     _, variance, rest = complete_square(exponent, variable)
     return rest + sp.log(2 * sp.pi * variance) / 2

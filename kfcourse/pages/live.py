@@ -1,5 +1,7 @@
 """The live page: a reader moves the pointer, and the filter of `kfcourse.scenarios.pointer` cleans the track in the browser.
 
+::
+
     recording = record(hand_track(seed=10), seed=6)      a track and its noise, every 10 ms
     HTML(page(recording))                                the page, one piece of HTML that loads nothing
 

@@ -1,5 +1,7 @@
 r"""Reads a relation as it is printed, in LaTeX, and computes both of its sides.
 
+::
+
     holds(r"p_k=(I-K_kH)\Psi_k", {"p": Indexed(p), "K": Indexed(K), "H": H, "I": I, r"\Psi": Indexed(Psi), "k": range(1, 4)})
 
 The letters are given numbers: floats, matrices (n, m) (a column is (n, 1)), functions of Python, `Indexed` values for letters
@@ -30,7 +32,7 @@ ROUNDING = 1e-8
 def holds(relation: str, letters: Letters, within: float = ROUNDING, approximately: float = 0.1) -> None:
     """Compute the sides of a relation for every value of its indices, and compare.
 
-    |left - right| <= within * scale,   for \\approx within `approximately`
+    |l - r| <= `within` * the scale of their terms; with \\approx `approximately` takes the place of `within`.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 r"""What each displayed relation of a page is: computed from the page's letters, a definition, quoted, or stated without proof.
 
-A page `my-chapter.md` that types relations in `$$` or in a box has a file `letters/my_chapter.py` beside it:
+A page `my-chapter.md` that types relations in `$$` or in a box has a file `letters/my_chapter.py` beside it::
 
     def course(rng): return {"p": Indexed(...), ...}     numbers for the letters, from the package or from a plain program
     LETTERS = (course, western)                          a relation must hold in one of them, with all its letters

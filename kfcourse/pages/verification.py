@@ -1,5 +1,7 @@
 """Statements that are verified where they are printed: the check is the print, and it raises.
 
+::
+
     verified((p, Psi - K*S*Psi), where={p: p_k, K: K_k})     equations: printed, and shown to hold
     claim("The gain tends to 0.62.", abs(K - 0.62) < 0.005)  a sentence, printed if its conditions hold
     agree("Formula and filter agree.", a, b, within=1e-12)   a sentence about numbers that are equal within a tolerance
@@ -131,7 +133,7 @@ def claim(sentence: str, *conditions: Any) -> Shown:
 def agree(sentence: str, computed: Any, expected: Any, within: float, relative: bool = True) -> Shown:
     """A sentence (Markdown), printed if two arrays of numbers agree within a tolerance.
 
-    |computed - expected| <= within * max|expected|,  or <= within if not `relative`
+    |`computed` - `expected`| <= `within` * max|`expected`|,   without the last factor if not `relative`
 
     Raises
     ------

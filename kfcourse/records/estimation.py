@@ -1,6 +1,6 @@
 r"""What a record says of the model itself: parameters and noise variances at which it was likeliest.
 
-    theta = argmax ln p(y; theta),        Cov(theta) ~ I^-1,   I = - d^2 ln p / dtheta^2  at theta
+    theta = argmax ln p(y; theta),        Cov(theta) ≈ I^-1,   I = - d^2 ln p / dtheta^2  at theta
 
 I is the observed information.  A direction in which it vanishes is one that the record does not see: parameters along it may be
 changed together, and nothing measured tells.  Such a direction is named, and its standard errors are infinite.
@@ -92,6 +92,7 @@ def estimate(
 
     Examples
     --------
+    >>> from kfcourse.records import estimate
     >>> from kfcourse.scenarios.benchmarks import local_level, nile
     >>> found = estimate(local_level(q=1000, r=10000), nile(), ["q", "r"], positive=["q", "r"])
     >>> [round(value, 1) for value in found.value.tolist()], round(found.log_likelihood, 4)

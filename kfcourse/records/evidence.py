@@ -46,6 +46,7 @@ def likelihood(one: Filter, y: Array) -> Array:
 
     Examples
     --------
+    >>> from kfcourse import likelihood
     >>> from kfcourse.filters import kalman_filter
     >>> from kfcourse.scenarios.benchmarks import local_level, nile
     >>> round(likelihood(kalman_filter(local_level()), nile()).sum().item(), 4)
@@ -75,8 +76,10 @@ def likelihood_error(one: Filter, y: Array) -> Array:
 
     Examples
     --------
+    >>> import numpy as np
     >>> from kfcourse import Model
     >>> from kfcourse.filters import pointmass
+    >>> from kfcourse.records import likelihood_error
     >>> y, model = np.array([0.5, 1.0]), Model.define("sin(x) + 0.3*v", "x + 0.1*w")
     >>> bool((likelihood_error(pointmass(model, accuracy=1e-6), y) < 2e-6).all())
     True

@@ -1,5 +1,7 @@
 """From a file to a filter: measurements, their times and the inputs of a model, read from CSV.
 
+::
+
     time,y1,y2,turn
     0.00,12.1,,0.02
     0.13,,40.7,

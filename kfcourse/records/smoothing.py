@@ -3,7 +3,7 @@ r"""One smoother for every filter with structural functions: the past of a recor
 A filter's estimate z_k uses y_0, ..., y_k.  What the measurements after it tell of x_k comes to it through x_{k+1}, and all that
 takes is Cov(x_k, x_{k+1}).  If x_k ~ N(z, p), it is p A^T with A = dtau/dz, whatever the function a: by Stein's lemma
 
-    M (x - z) a(x, v)^T = p M (da/dx)^T = p (d M a / dz)^T
+    M[(x - z) a(x, v)^T] = p M[da/dx]^T = p (d M[a] / dz)^T
 
 The slope of the structural function stands to the object as G = dh/dm stands to the meter.  So the smoother of Rauch, Tung and
 Striebel (`kfcourse.linear.smoothing`) is at the same time the extended, the unscented, the quadrature and the normal one.
@@ -42,7 +42,7 @@ from kfcourse.symbolic.structure import Structure
 def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     """The states given all measurements of a record: the fixed-interval smoother of a filter.
 
-    S = p A^T Psi'^+,   z^s = z + S (z'^s - lambda'),   p^s = p + S (p'^s - Psi') S^T,      ' : at the next step
+    S = p A^T Psi'^+,   z^s = z + S (z'^s - lambda'),   p^s = p + S (p'^s - Psi') S^T,      primes: at the next step
 
     Parameters
     ----------
@@ -66,14 +66,32 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
 
     Examples
     --------
-    >>> from kfcourse import Model, linearised
+    >>> import numpy as np
+    >>> from kfcourse import Model, linearised, smooth
+    >>> from kfcourse.filters import aof
     >>> walk = Model.define("x + v", "x + w")
     >>> [round(z, 3) for z in smooth(aof(linearised(walk)), np.array([1.0, 2.0, np.nan, 4.0])).mean.ravel().tolist()]
     [0.944, 1.833, 2.556, 3.278]
     """
-    if one.look_back is None:
-        return normal_laws(one, islice(walk(one, y), 1, None), lag)
-    return stacked([state.posterior for state in _looked_back(one, y, lag)])
+    if one.look_back is not None:
+        return stacked([state.posterior for state in _looked_back(one, y, lag)])
+    if np.ndim(y) != 3 or np.shape(y)[1] <= MANY_RUNS:
+        return _normal_laws(one, y, lag)
+    first = _normal_laws(one, y[:, :MANY_RUNS], lag)
+    if first.cov.strides[1] == 0:  # the same for all: stored once
+        return _normal_laws(one, y, lag)
+    mean, cov = (np.empty((*np.shape(y)[:2], *part.shape[2:])) for part in first)
+    for start in range(0, np.shape(y)[1], MANY_RUNS):
+        some = np.s_[:, start : start + MANY_RUNS]
+        mean[some], cov[some] = _normal_laws(one, y[some], lag) if start else first
+    return Gaussian(mean, cov)
+
+
+MANY_RUNS = 5000  # whose record is looked back to together: what is kept of the steps meanwhile stays near the processor
+
+
+def _normal_laws(one: Filter, y: Array, lag: int | None) -> Gaussian:
+    return normal_laws(one, islice(walk(one, y), 1, None), lag)
 
 
 def smoothing_error(one: Filter, y: Array, lag: int | None = None) -> Array:
@@ -94,8 +112,10 @@ def smoothing_error(one: Filter, y: Array, lag: int | None = None) -> Array:
 
     Examples
     --------
+    >>> import numpy as np
     >>> from kfcourse import Model
     >>> from kfcourse.filters import pointmass
+    >>> from kfcourse.records import smoothing_error
     >>> y, model = np.array([0.5, 1.0]), Model.define("sin(x) + 0.3*v", "x + 0.1*w")
     >>> bool((smoothing_error(pointmass(model, accuracy=1e-6), y) < 1e-6).all())
     True

@@ -1,7 +1,7 @@
 """A track as it is recorded: fixes of a place in the plane at unequal intervals, some missing, some grossly wrong.
 
 x_{k+1} = x_k + dt_k V_k + ...,   V_{k+1} = V_k + ...     on each axis, pushed by white acceleration of intensity q
-y_k = position + w_k,             w_k ~ N(0, sigma^2);    an outlier has `times` that deviation
+y_k = `position` + w_k,           w_k ~ N(0, sigma^2);    an outlier has `times` that deviation
 """
 
 from __future__ import annotations

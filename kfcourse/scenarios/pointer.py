@@ -3,11 +3,13 @@
 The state is (x, y, vx, vy) in pixels and pixels a second.  Between samples the motion is uniformly accelerated, and the
 acceleration is the filter's known input u = (ax, ay):
 
-    x_{k+1} = A x_k + B (u_k + xi_k),   xi ~ N(0, acceleration_sd^2 I)
-    y_k     = H x_k + w_k,              w  ~ N(0, measurement_sd^2 I)
+    x_{k+1} = A x_k + B (u_k + xi_k),   xi ~ N(0, `acceleration_sd`^2 I)
+    y_k     = H x_k + w_k,              w  ~ N(0, `measurement_sd`^2 I)
 
 A hand moves in strokes.  One stroke from rest to rest that changes its acceleration as smoothly as possible (Flash and
 Hogan, 1985) goes along s(tau) = 10 tau^3 - 15 tau^4 + 6 tau^5, and takes the longer the farther it goes (Fitts' law).
+
+::
 
     track = hand_track(seed=1)                                 the true motion, at any moment
     samples = sample(track, interval=0.01, measurement_sd=8, runs=200, seed=2)

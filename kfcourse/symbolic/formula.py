@@ -102,6 +102,7 @@ def parse(formula: str, symbols: dict[str, sp.Symbol]) -> sp.Expr:
 
     Examples
     --------
+    >>> from kfcourse.symbolic.formula import parse, symbol
     >>> x, v = symbol("x"), symbol("v")
     >>> parse("x - x**2*sin(v)", {"x": x, "v": v})
     -x**2*sin(v) + x

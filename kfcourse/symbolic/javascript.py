@@ -1,8 +1,12 @@
 """The second printer: the straight-line programs of `codegen.lower` as JavaScript, for figures that compute in a browser.
 
+::
+
     loop("predict", {"z": z, "p": p}, {"tau": tau, "Theta": Theta}, constants=parameters)
 
 prints a function that runs over an ensemble kept in arrays of numbers,
+
+::
 
     predict(n, v, c, a):    for each i < n:  a.tau[i], a.Theta[i] from a.z[i], a.p[i] and the constants v and c.
 

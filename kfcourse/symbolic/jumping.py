@@ -85,6 +85,7 @@ class JumpModel:
 
         Examples
         --------
+        >>> from kfcourse import JumpModel
         >>> JumpModel.define("0.9*x + v", "x + C*w", modes={"sound": {"parameters": {"C": 1}},
         ...                  "faulty": {"parameters": {"C": 10}}}, transition=[0.8, 0.2])
         JumpModel(sound: x' = v + 9*x/10, y = C*w + x; C = 1 | faulty: x' = v + 9*x/10, y = C*w + x; C = 10)

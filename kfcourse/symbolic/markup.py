@@ -16,6 +16,7 @@ def mathml(latex: str, display: str = "block") -> str:
 
     Examples
     --------
+    >>> from kfcourse.symbolic.markup import mathml
     >>> mathml("h", "inline")
     '<math xmlns="http://www.w3.org/1998/Math/MathML" display="inline"><mrow><mi>h</mi></mrow></math>'
     """

@@ -132,6 +132,7 @@ class Model:
 
         Examples
         --------
+        >>> from kfcourse import Model
         >>> Model.define("c*x + e*x*v", "g*x + f*x**2*w", dict(c=0.9, e=0.05, g=1, f=0.02))
         Model(x' = c*x + e*v*x, y = f*w*x**2 + g*x; c = 9/10, e = 1/20, g = 1, f = 1/50)
         """

@@ -2,7 +2,7 @@ r"""Exact moments of functions of Gaussian variables.
 
 A function that is a sum of terms
 
-    coefficient * monomial(x) * exp(a^T x)        (sines and cosines are complex exponentials)
+    c q(x) exp(a^T x)        c a number, q a monomial (sines and cosines are complex exponentials)
 
 has Gaussian moments in closed form, in any dimension, because an exponential only shifts the mean:
 
@@ -52,6 +52,8 @@ class GaussianMoments:
 
     Examples
     --------
+    >>> import sympy as sp
+    >>> from kfcourse import GaussianMoments
     >>> x, m = sp.symbols("x m", real=True)
     >>> d = sp.Symbol("d", positive=True)
     >>> law = GaussianMoments([x], [m], sp.Matrix([[d]]))

@@ -302,7 +302,7 @@ def _taylor(equation, x, mean, noise, noise_mean):
 def gaussian(model: Model) -> Structure:
     """Structural functions as exact moments over x ~ N (the normal, or Gaussian, filters').
 
-    tau = M a(x, v),  Theta = Cov a(x, v),  h = M b(x, w),  G = dh/dm,  F = Cov b(x, w)
+    tau = M[a(x, v)],  Theta = Cov(a(x, v)),  h = M[b(x, w)],  G = dh/dm,  F = Cov(b(x, w))
 
     Raises
     ------

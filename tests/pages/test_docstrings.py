@@ -24,5 +24,20 @@ pytestmark = pytest.mark.quick
         ("Shapes as of `run`.", False),
     ],
 )
-def test_paragraphs_of_equations_are_blocks_and_sentences_are_not(paragraph, equation):
-    assert ("::" in docstrings.to_restructured(["Summary.", "", paragraph])) == equation
+def test_paragraphs_of_equations_are_set_and_sentences_are_not(paragraph, equation):
+    assert (".. equations::" in docstrings.to_restructured(["Summary.", "", paragraph])) == equation
+
+
+def test_programs_examples_and_tables_of_names_stand_as_they_are():
+    lines = [
+        "Summary, as in::",
+        "",
+        "    a = run(x, y_)",
+        "",
+        ">>> f(2)",
+        "4",
+        "",
+        "one_name    what it is",
+        "other       what *that* is",
+    ]
+    assert docstrings.to_restructured(lines) == [*lines[:7], "::", "", *("    " + row for row in lines[7:]), ""]

@@ -1,6 +1,6 @@
 """From a posterior to the next prediction: a sum of normal kernels, one for each node.
 
-    p(x') = Integral p(x) N(x'; m(x), sigma^2(x)) dx  =  sum_j mass_j N(x'; m(x_j), sigma^2(x_j))
+    p(x') = Integral p(x) N(x'; m(x), sigma^2(x)) dx  =  sum_j m_j N(x'; m(x_j), sigma^2(x_j))
 
 The sum is as good as the integral where the kernels of neighbouring nodes overlap.  Where they do not, `narrow` puts more
 nodes between them.
@@ -119,7 +119,7 @@ class Kernels(NamedTuple):
         return self._replace(mu=mu, sigma=sigma, mass=even, even=even)
 
     def density(self, x: Array, *masses: Array) -> Array:
-        """sum_j mass_j N(x; mu_j, sigma_j^2) at x (T, N) for each of the masses (T, M): (T, N, number of them)."""
+        """sum_j m_j N(x; mu_j, sigma_j^2) at x (T, N) for each of the masses (T, M): (T, N, number of them)."""
         if self.pushed is not None:
             return self.pushed(x)[:, :, np.minimum(range(len(masses)), 1)]
         rate = np.sqrt(0.5) / self.sigma

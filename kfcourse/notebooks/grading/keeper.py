@@ -1,5 +1,7 @@
 """The parent of a notebook's process where there is no sandbox: ends all that it started when it, or the grader, ends.
 
+::
+
     python keeper.py LIFE COMMAND...
 
 runs the command in a session of its own until it ends, or until the pipe LIFE is closed.  Nothing is imported but the standard

@@ -1,11 +1,11 @@
 """Motion in continuous time, and its exact transition over any interval.
 
-    dx = (A x + B u(t)) dt + dW,   M[dW dW^T] = Qc dt
+    dx = (A x + B u(t)) dt + dW,   M[dW dW^T] = Q_c dt
 
 Over an interval dt in which u does not change, with nothing approximated,
 
     x(t + dt) = Phi x(t) + Gamma u + v,   v ~ N(0, Q)
-    Phi = exp(A dt),   Gamma = int_0^dt exp(A s) ds B,   Q = int_0^dt exp(A s) Qc exp(A s)^T ds
+    Phi = exp(A dt),   Gamma = int_0^dt exp(A s) ds B,   Q = int_0^dt exp(A s) Q_c exp(A s)^T ds
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Dynamics:
         All three are power series in s = a h, a the norm of A, here for a short part h of dt with s <= 1/2:
 
             Phi = sum_k s^k (A/a)^k / k!,   Gamma = h sum_k s^k (A/a)^k / (k+1)! B,   Q = h sum_k s^k q_k / (k+1)!
-            q_0 = Qc,   q_{k+1} = (A/a) q_k + q_k (A/a)^T          from dQ/dt = A Q + Q A^T + Qc
+            q_0 = Q_c,   q_{k+1} = (A/a) q_k + q_k (A/a)^T          from dQ/dt = A Q + Q A^T + Q_c
 
         and then doubled until h is dt:
 

@@ -2,7 +2,7 @@
 
 A measurement that arrives late belongs to the past.  The filter keeps its laws of the last seconds and the
 measurements between them; it goes back to the law before the moment of capture and works forward again, with the
-late one in its place:
+late one in its place::
 
     t:       1         2         3         4 = now
     kept:   law ----- law ----- law              used so far

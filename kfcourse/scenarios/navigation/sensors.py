@@ -1,5 +1,7 @@
 """Sensors that measure at their own moments, in their own time scale, and report late.
 
+::
+
     capture at t_j   --interrupt: the time tag-->   ...   --the data, over an interface-->   arrival at a_j >= t_j
 
 Each sensor's clock reads rate * t + shift at the filter's time t; its samples are equally spaced on that clock.
@@ -147,6 +149,7 @@ class Sensor:
 
         Examples
         --------
+        >>> from kfcourse.scenarios.navigation import Sensor
         >>> Sensor.define("range", ["s", "h", "V"], "sqrt(s**2 + h**2) + w", variance=100.0, period=0.25).model.p
         1
         """
