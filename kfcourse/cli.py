@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -32,6 +33,7 @@ from kfcourse.symbolic.model import Model
 
 DERIVATION = 60.0  # seconds for the formulas of the filters
 LONGEST = 1_000_000  # bytes of a derivation; /dev/zero never ends
+ENOUGH = 3600  # seconds for slow filters, where their number is given
 DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with more, the lab takes longer
 
 
@@ -187,10 +189,12 @@ def lab(
         click.echo(f"{title(name)} by particles: {reason}", err=True)
     to_error = json_file is not None and is_standard_output(json_file)
     _tell(result, to_error)
+    again = _again(result, variant, variants_file, seed, names, designs, wide, same_ensemble, compiled)
+    click.echo(again, err=to_error)
     if json_file:
         write_json(chosen, result, json_file)
     with _kept(folder), replacing_together(folder) as place:
-        write_report(chosen, result, place, budget.says)
+        write_report(chosen, result, place, [one for one in (budget.says, again) if one])
         if language:
             write_handin(chosen, result, place, language)
     click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""), err=to_error)
@@ -205,6 +209,36 @@ def _tell(result: Comparison, to_error: bool) -> None:
     if result.slow_runs:
         lines.append(f"Slow filters: on {result.slow_runs} of {result.runs} trajectories")
     click.echo("\n".join([*lines, *remarks_in_words(result), *conclusions(result)]), err=to_error)
+
+
+def _again(
+    result: Comparison,
+    variant: str,
+    variants_file: Path | None,
+    seed: int,
+    names: str | None,
+    designs: int | None,
+    wide: float | None,
+    same_ensemble: bool,
+    compiled: bool,
+) -> str:
+    """The command that repeats the comparison wherever it runs: what pilots and the time chose is written out."""
+    slow = result.slow_runs if result.slow_runs >= FEWEST_SLOW else 0
+    options: dict[str, object] = {
+        "--variants": variants_file,
+        "--runs": result.runs,
+        "--steps": result.steps,
+        "--seed": seed,
+        "--filters": names,
+        "--slow-runs": slow,
+        "--slow-seconds": ENOUGH if slow else None,
+        "--designs": designs,
+        "--wide": wide,
+    }
+    words = [str(one) for option, value in options.items() if value is not None for one in (option, value)]
+    flags = [flag for flag, given in (("--same-ensemble", same_ensemble), ("--compiled", compiled)) if given]
+    but = ", but for the slow filters, which the time decided" if result.replaced or slow != result.slow_runs else ""
+    return f"The same numbers again{but}: kfcourse lab {shlex.join([variant, *words, *flags])}"
 
 
 @contextmanager

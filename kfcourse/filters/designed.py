@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import sympy as sp
@@ -43,6 +43,7 @@ class Scatter(NamedTuple):
     """
 
     size: int
+    targets: int  # r
     mean: Array  # (r + s,)
     scatter: Array  # (r + s, r + s)
 
@@ -51,7 +52,7 @@ class Scatter(NamedTuple):
         """Those of target (N, r) and regressor (N, s) stacked into one vector."""
         if not len(target):
             size = target.shape[1] + regressor.shape[1]
-            return cls(0, np.zeros(size), np.zeros((size, size)))
+            return cls(0, target.shape[1], np.zeros(size), np.zeros((size, size)))
         columns = [target[:, i] for i in range(target.shape[1])] + [regressor[:, i] for i in range(regressor.shape[1])]
         count, size = len(target), len(columns)
         mean = [float(np.add.reduce(column)) / count for column in columns]
@@ -60,7 +61,7 @@ class Scatter(NamedTuple):
         for i in range(size):
             for j in range(i, size):
                 scatter[i][j] = scatter[j][i] = _dot(deviations[i], deviations[j])
-        return cls(count, np.array(mean), np.array(scatter))
+        return cls(count, target.shape[1], np.array(mean), np.array(scatter))
 
     @classmethod
     def together(cls, parts: Sequence[Scatter]) -> Scatter:
@@ -70,7 +71,7 @@ class Scatter(NamedTuple):
         mean = counts @ means / counts.sum()
         shift = means - mean
         scatter = np.sum([part.scatter for part in parts], axis=0) + (shift * counts[:, None]).T @ shift
-        return cls(int(counts.sum()), mean, scatter)
+        return cls(int(counts.sum()), parts[0].targets, mean, scatter)
 
     def regression(self, size: int) -> Affine:
         """Least squares of the first `size` components on the rest.
@@ -108,17 +109,27 @@ class Regression(NamedTuple):
         What the filter itself knows.
     mode : int, optional
         Of a model that jumps: over the trajectories that are in this mode at the step.
-    scatter : callable
-        How the moments of target and regressor are found.
     """
 
     target: Callable[[Array, Array], Array]
     regressor: Array
     mode: int | None = None
-    scatter: Callable[[Array, Array], Scatter] = Scatter.of
+
+    def scatter(self, x: Array, x_next: Array, modes: Array | None = None) -> Scatter:
+        """The moments over a part of the ensemble, which in a model that jumps is in these modes (N,)."""
+        target, regressor = self.target(x, x_next), self.regressor
+        if self.mode is not None and modes is not None:
+            target, regressor = target[modes == self.mode], regressor[modes == self.mode]
+        return Scatter.of(target, regressor)
 
 
-Equations = Generator[Regression, Affine, State]
+class Request(Protocol):
+    """What the equations of a step yield: a `Regression`, or what finds its moments otherwise."""
+
+    def scatter(self, x: Array, x_next: Array, modes: Array | None = None, /) -> Scatter: ...
+
+
+Equations = Generator[Request, Affine, State]
 Part = Generator[Regression, Affine, Gaussian]
 
 
@@ -151,7 +162,7 @@ class Design:
     printed : (equations, tuple of Eq), optional
         Equations, and how they are printed if that is all: of them `fuse` makes compiled ones, while they are this design's.
     known : callable, optional
-        Coefficients of a step -> the step, where that is quicker than `answered`.
+        The step by coefficients that are known, and these, of every step -> a quicker one.
     """
 
     name: str
@@ -161,7 +172,7 @@ class Design:
     start: Init | None = None
     structure: Structure | None = None
     printed: tuple[Callable[[State, Vectors], Equations], tuple[sp.Eq, ...]] | None = None
-    known: Callable[[Sequence[Affine]], Advance] | None = None
+    known: Callable[[Advance, Sequence[Sequence[Affine]]], Advance] | None = None
 
     @property
     def init(self) -> Init:
@@ -170,7 +181,7 @@ class Design:
 
     def with_coefficients(self, coefficients: Sequence[Sequence[Affine]]) -> Filter:
         """The filter with the coefficients of every step, in the order the equations ask for them."""
-        steps = [(self.known or self.answered)(tuple(fits)) for fits in coefficients]
+        steps = [self.answered(tuple(fits)) for fits in coefficients]
 
         def step(state: State, y: Vectors) -> State:
             if state.step >= len(steps):
@@ -179,7 +190,7 @@ class Design:
                 )
             return steps[state.step](state, y)
 
-        return Filter(self.name, self.model, self.init, step)
+        return Filter(self.name, self.model, self.init, self.known(step, coefficients) if self.known else step)
 
     def answered(self, fits: Sequence[Affine]) -> Advance:
         """A step of the equations, each regression answered with its stored coefficients."""

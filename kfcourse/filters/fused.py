@@ -1,4 +1,4 @@
-"""Compiled steps of filters of scalar models: one loop over the ensemble for each stretch of equations between two regressions.
+"""Compiled steps of filters of scalar models: one loop over the ensemble for several steps, and one for each regression.
 
 The loops are printed from `Filter.printed`, the equations that the chapters derive, with the formulas of the structural functions
 put in.  NumPy passes over the ensemble once for each operation; a loop passes once for all of them.  In two places the equations
@@ -9,30 +9,29 @@ cannot vary is 0.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from itertools import chain
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import sympy as sp
 
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import Advance, Filter, State
-from kfcourse.filters.designed import Affine, Design, Equations, Regression
-from kfcourse.filters.programs import Rule, array_name, in_numbers, needed, scalar, stages, value_of
-from kfcourse.laws import Array, Gaussian, column
+from kfcourse.filters.designed import Affine, Design, Equations, Scatter
+from kfcourse.filters.programs import Rule, in_numbers, needed, scalar, stages, value_of
+from kfcourse.laws import Array, Gaussian, any_missing, column
 from kfcourse.symbolic import compiled
 
 T = TypeVar("T")
-Letters = Sequence[sp.Symbol]
+AT_ONCE = 1024  # trajectories whose numbers stay in the nearest cache
 Equalities = tuple[sp.Eq, ...]
 
 _X, _NEXT, _Y, _LAM, _PSI, _Z, _P, _LAM_NEXT, _PSI_NEXT, _F = map(
     scalar, (s.x, s.x_next, s.y, s.lam, s.Psi, s.z, s.P, s.lam_next, s.Psi_next, s.F)
 )
-_KEPT = {_Z, _P, _LAM_NEXT, _PSI_NEXT}
 
 
 def fuse(one: Filter | Design) -> Filter | Design:
@@ -63,12 +62,9 @@ def fuse(one: Filter | Design) -> Filter | Design:
     if program is None:
         return one
     if isinstance(one, Filter):
-        return replace(one, step=program.known(one.step, ()))
-    return replace(
-        one,
-        equations=lambda state, y: program.equations(one.equations, state, y),
-        known=lambda fits: program.known(one.answered(fits), fits),
-    )
+        return replace(one, step=Steps(program, one.step))
+    equations = partial(program.equations, one.equations)
+    return replace(one, equations=equations, known=partial(Steps, program))
 
 
 def _or_warning(one: Filter | Design, compile: Callable[[], T]) -> T | None:
@@ -81,106 +77,110 @@ def _or_warning(one: Filter | Design, compile: Callable[[], T]) -> T | None:
         return None
 
 
-Arrays = dict[str, Array]  # of each trajectory, by the name of the letter
-
-
-class _Loop(NamedTuple):
-    """A compiled function, the names of the arrays that it reads, and of those that it makes."""
-
-    function: Callable[..., int]
-    given: list[str]
-    made: list[str]
-
-    def __call__(self, constants: Array, arrays: Arrays) -> bool:
-        """Make its arrays; whether a measurement is missing, so that they are not what they should be."""
-        given = [arrays[one] for one in self.given]
-        rows = np.empty((len(self.made), len(given[0])))
-        missing = self.function(constants, *given, *rows)
-        arrays.update(zip(self.made, rows, strict=True))
-        return self.given[0] == "y" and missing > 0
-
-
 class _Program(NamedTuple):
-    """The loops of a filter: all of a step with known coefficients; and by parts, with regressions and their targets between."""
+    """The loops of a filter: several steps with their sums; and the moments of target and regressor of each regression."""
 
     parameters: list[float]
-    whole: _Loop
-    parts: list[_Loop]
-    fits: list[tuple[str, str]]  # target and regressor
-    targets: dict[str, _Loop]
-
-    def known(self, otherwise: Advance, fits: Sequence[Affine]) -> Advance:
-        """A step with the coefficients known; with a measurement missing the other one."""
-        constants = self.constants(fits)
-
-        def step(state: State, y: Array) -> State:
-            arrays = _given(state, y)
-            return otherwise(state, y) if self.whole(constants, arrays) else _state(state, arrays, fits)
-
-        return step
+    advance: Callable[..., None]
+    moments: list[Callable[..., tuple[float, ...]]]
+    one_for_all: bool  # p is the residual of the first regression
 
     def equations(self, otherwise: Callable[[State, Array], Equations], state: State, y: Array) -> Equations:
         """A step that asks for its coefficients; with a measurement missing the other one."""
-        from kfcourse.filters.loops import scatter
+        if any_missing(y):
+            return (yield from otherwise(state, y))
+        known, fits = (column(y), *_law(state.predicted)), list[Affine]()
+        for loop in self.moments:
+            fits.append((yield _Pair(loop, self.constants(fits), known)))
+        return self.one(state, y, self.constants(fits)[None], fits, room=min(len(y), AT_ONCE))
 
-        arrays, fits = _given(state, y), list[Affine]()
-        for part, (target, regressor) in zip(self.parts, self.fits, strict=False):
-            if part(self.constants(fits), arrays) and not fits:
-                return (yield from otherwise(state, y))
-            fits.append((yield Regression(partial(self._target, target, arrays), arrays[regressor][:, None], scatter=scatter)))
-        self.parts[-1](self.constants(fits), arrays)
-        return _state(state, arrays, fits)
+    def one(self, state: State, y: Array, constants: Array, fits: Sequence[Affine], room: int) -> State:
+        """The state after a measurement y (N, 1), none missing; constants (1, m)."""
+        row, ends = column(y), np.append(np.arange(0, len(y), AT_ONCE), len(y))
+        sums = np.empty((5, 1, len(ends) - 1))
+        return self.several(state, row[None], constants, fits, row[None], row, ends, sums, np.empty((2, room)))
 
-    def _target(self, name: str, arrays: Arrays, x: Array, x_next: Array) -> Array:
-        if name not in self.targets:
-            return x if name == "x" else x_next
-        known = {**arrays, "x": column(x)}
-        self.targets[name](self.constants(()), known)
-        return known[name][:, None]
+    def several(
+        self,
+        state: State,
+        y: Array,
+        constants: Array,
+        fits: Sequence[Affine],
+        x: Array,
+        weight: Array,
+        starts: Array,
+        sums: Iterable[Array],
+        room: Array,
+    ) -> State:
+        """The state after measurements y (K, N), none missing; constants (K, m), fits of the last step.
+
+        Into the sums (5, K, B) goes what `montecarlo.Sums.record` keeps of the errors of states x (K, N), of batches that begin
+        at starts[:-1] and end at starts[1:].  The posterior is found in the room (2, N); with room for a batch only, it is not.
+        """
+        after = np.empty((2, len(weight)))
+        self.advance(constants, y, x, weight, starts, *_law(state.predicted), *after, *room, *sums)
+        z, p = room[0][:, None], fits[0].residual if self.one_for_all else room[1][:, None, None]
+        return State(state.step + len(y), Gaussian(z, p), Gaussian(after[0][:, None], after[1][:, None, None]))
 
     def constants(self, fits: Sequence[Affine]) -> Array:
         """Parameters and coefficients, in the order in which the loops take them."""
         return np.array([*self.parameters, *(one.item() for fit in fits for one in fit)])
 
 
-def _given(state: State, y: Array) -> Arrays:
-    (lam, Psi), size = state.predicted, len(y)
-    spread = column(Psi) if len(Psi) == size else np.full(size, Psi.item())
-    return {"y": column(y), "lambda": column(lam), "Psi": spread}
+class _Pair(NamedTuple):
+    """A request for a regression whose target and regressor a loop makes of what is known of each trajectory."""
+
+    loop: Callable[..., tuple[float, ...]]
+    constants: Array
+    known: tuple[Array, ...]
+
+    def scatter(self, x: Array, x_next: Array, modes: Array | None = None) -> Scatter:
+        t, r, tt, tr, rr = self.loop(self.constants, *self.known, column(x), column(x_next))
+        return Scatter(len(x), 1, np.array([t, r]), np.array([[tt, tr], [tr, rr]]))
 
 
-def _state(before: State, arrays: Arrays, fits: Sequence[Affine]) -> State:
-    """Covariances that are no arrays are the residuals of the first and of the last regression."""
-    p = arrays["p"][:, None, None] if "p" in arrays else fits[0].residual
-    Psi = arrays["next Psi"][:, None, None] if "next Psi" in arrays else fits[-1].residual
-    posterior, predicted = Gaussian(arrays["z"][:, None], p), Gaussian(arrays["next lambda"][:, None], Psi)
-    return State(before.step + 1, posterior, predicted)
+@dataclass(frozen=True)
+class Steps:
+    """Compiled steps of a filter of a scalar model: one, as `Filter.step` is, or several with the sums of a comparison.
+
+    Attributes
+    ----------
+    program : _Program
+    otherwise : Advance
+        The step where a measurement is missing, or coefficients are.
+    fits : sequence, optional
+        Of a designed filter: the coefficients of every step.
+    """
+
+    program: _Program
+    otherwise: Advance
+    fits: Sequence[Sequence[Affine]] | None = None
+
+    @cached_property
+    def table(self) -> Array:
+        """Constants of every step, (steps, m), or (1, m)."""
+        return np.array([self.program.constants(fits) for fits in ([()] if self.fits is None else self.fits)])
+
+    def __call__(self, state: State, y: Array) -> State:
+        if any_missing(y) or (self.fits is not None and state.step >= len(self.fits)):
+            return self.otherwise(state, y)
+        return self.program.one(state, y, *self._known(state.step, 1), room=len(y))
+
+    def several(self, state: State, y: Array, *record: Any) -> State:
+        """`_Program.several`."""
+        return self.program.several(state, y, *self._known(state.step, len(y)), *record)
+
+    def _known(self, step: int, steps: int) -> tuple[Array, Sequence[Affine]]:
+        """Constants of so many steps, and the coefficients of the last."""
+        if self.fits is None:
+            return np.repeat(self.table, steps, axis=0), ()
+        return self.table[step : step + steps], self.fits[step + steps - 1]
 
 
-class _Texts:
-    """The loops of a filter as they are printed, one after the other."""
-
-    def __init__(self, parameters: Sequence[sp.Symbol]):
-        self.parameters = parameters
-        self.texts = list[str]()
-        self.arrays = list[tuple[list[str], list[str]]]()
-
-    def add(
-        self, group: Sequence[Rule], made: Sequence[sp.Symbol], known: Sequence[sp.Symbol], found: Sequence[sp.Symbol]
-    ) -> None:
-        """Print what makes these letters of known ones and of the coefficients found so far."""
-        definitions = needed(group, made)
-        used = set().union(*(right.free_symbols for right in definitions.values()))
-        given = [letter for letter in known if letter in used] or [_LAM]  # of a constant: as many as there are trajectories
-        arrays = {f"old_{array_name(letter)}": letter for letter in given}
-        new = {f"new_{array_name(letter)}": letter for letter in made}
-        name = f"part{len(self.texts)}"
-        self.texts.append(compiled.loop(name, arrays, new, [*self.parameters, *found], definitions))
-        self.arrays.append(([_name(letter) for letter in given], [_name(letter) for letter in made]))
-
-    def compiled(self) -> list[_Loop]:
-        module = compiled.load(*self.texts)
-        return [_Loop(getattr(module, f"part{i}"), *names) for i, names in enumerate(self.arrays)]
+def _law(predicted: Gaussian) -> tuple[Array, Array]:
+    """lambda and Psi of every trajectory, (N,)."""
+    mean, Psi = column(predicted.mean), column(predicted.cov)
+    return mean, Psi if len(Psi) == len(mean) else np.full(len(mean), Psi.item())
 
 
 _PRINTED: dict[tuple[object, ...], _Program] = {}  # by all that they are printed from
@@ -198,30 +198,26 @@ def _program(one: Filter | Design, printed: Equalities) -> _Program:
 
 def _printed(one: Filter | Design, printed: Equalities) -> _Program:
     """Print, compile and load all loops of a filter."""
+    from kfcourse.filters import loops
+
     groups, fits = stages(printed, _rules(one, printed))
-    coefficients = [[*fit.found, sp.Dummy()][:3] for fit in fits]
-    of_truth = dict(rule for group in groups for rule in group if rule[1].has(_X, _NEXT))  # while designing only
-    groups = [[rule for rule in group if rule[0] not in of_truth] for group in groups]
-    texts, known = _Texts(list(one.model.values)), [_Y, _LAM, _PSI]
-    every = list(chain(*groups))
-    texts.add(every, [left for left, _ in every if left in _KEPT], known, list(chain(*coefficients)))
-    for i, group in enumerate(groups if fits else []):
-        later = {letter for fit in fits[i:] for letter in (fit.target, fit.regressor)} | _KEPT
-        later |= set().union(*(right.free_symbols for _, right in (*chain(*groups[i + 1 :]), *of_truth.items())))
-        made = [left for left, _ in group if left in later]
-        texts.add(group, made, known, list(chain(*coefficients[:i])))
-        known = [*known, *made]
-    for rule in of_truth.items():
-        texts.add([rule], [rule[0]], [_X, *known], [])
-    whole, *loops = texts.compiled()
-    parts, targets = loops[: len(loops) - len(of_truth)], loops[len(loops) - len(of_truth) :]
-    names = [(_name(fit.target), _name(fit.regressor)) for fit in fits]
-    return _Program([], whole, parts, names, dict(zip(map(_name, of_truth), targets, strict=True)))
+    rules, found = list(chain(*groups)), [[*fit.found, sp.Dummy()][:3] for fit in fits]
+    letters, known = {left for left, _ in rules}, {"y": _Y, "lam": _LAM, "Psi": _PSI}
+    made = [_Z, _P if _P in letters else found[0][2], _LAM_NEXT, _PSI_NEXT if _PSI_NEXT in letters else found[-1][2]]
+    constants, texts = [*one.model.values, *chain(*found)], list[str]()
 
+    def add(name: str, given: dict[str, sp.Symbol], wanted: list[sp.Symbol], constants: list[sp.Symbol]) -> None:
+        outputs = {f"made{i}": letter for i, letter in enumerate(wanted)}
+        texts.append(compiled.function(name, given, outputs, constants, needed(rules, wanted)))
 
-def _name(letter: sp.Symbol) -> str:
-    """Of its array."""
-    return f"next {array_name(letter)}" if letter in (_LAM_NEXT, _PSI_NEXT) else array_name(letter)
+    add("step", known, made, constants)
+    texts.append(loops.advance(len(constants)))
+    for i, fit in enumerate(fits):
+        constants = [*one.model.values, *chain(*found[:i])]
+        add(f"pair{i}", {**known, "x": _X, "x_next": _NEXT}, [fit.target, fit.regressor], constants)
+        texts.append(loops.moments(i, len(constants)))
+    module = compiled.load(*texts)
+    return _Program([], module.advance, [getattr(module, f"moments{i}") for i in range(len(fits))], _P not in letters)
 
 
 def _rules(one: Filter | Design, printed: Equalities) -> list[Rule]:

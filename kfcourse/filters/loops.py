@@ -1,64 +1,121 @@
-"""Loops of the compiled engine in which no formula of a model stands: moments and sums.  Only with numba is this imported."""
+"""Loops of the compiled engine in which no formula of a model stands.  Only with numba is this imported.
+
+The texts are put around printed functions of one trajectory (`compiled.function`), into the same module.  Each passes over arrays
+once, and the processor takes eight entries at a time: rows of their own that are counted from 0, and sums in any order, let it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-from numba import njit
+from numba import njit, types
 
-from kfcourse.filters.designed import Scatter
-from kfcourse.laws import Array, column
+from kfcourse.symbolic.compiled import OPTIONS
 
-# Sums may be taken in any order, so that the processor adds several terms at once.
+_ROW, _ROWS = "float64[::1]", "float64[:, ::1]"
+_ANY_ORDER = f'{OPTIONS}, fastmath=set(["reassoc", "nsz"])'
 _OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "nsz"}}
 
+# x (K + 1, N) and y (K, N) from x[0] and the noises (K, N), by `model`.
+_SIMULATE = """
+def simulate(c, x, y, {noises}):
+    constants = {constants}
+    for k in range(len(y)):
+        x_k, y_k, x_next, {rows} = x[k], y[k], x[k + 1], {noises_k}
+        for i in range(len(x_k)):
+            y_k[i], x_next[i] = model(constants, x_k[i], {entries})
+"""
 
-@njit("UniTuple(float64, 5)(float64[::1], float64[::1])", **_OPTIONS)
-def _moments(target, regressor):
-    """Both means, then sums of products of deviations from them."""
-    size, t, r = len(target), 0.0, 0.0
-    for i in range(size):
-        t += target[i]
-        r += regressor[i]
-    t, r = t / size, r / size
-    tt, tr, rr = 0.0, 0.0, 0.0
-    for i in range(size):
-        dt, dr = target[i] - t, regressor[i] - r
-        tt += dt * dt
-        tr += dt * dr
-        rr += dr * dr
-    return t, r, tt, tr, rr
+# Steps of a filter, and of each the sums over batches that `Sums.record` keeps, (K, B).  The constants of each step are a row of
+# the table; z and p of the last are left if there is room for more than a batch.  The largest square is found among whole
+# numbers: their order is that of floats that are not negative.
+_ADVANCE = f"""
+
+@njit("void({_ROWS}, {_ROWS}, {_ROWS}, {_ROW}, int64[::1], {", ".join([_ROW] * 6 + [_ROWS] * 5)})", {_ANY_ORDER})
+def advance(table, y, x, weight, starts, lam, Psi, lam_next, Psi_next, z, p, errors, squares, own, normalised, largest):
+    for b in range(len(starts) - 1):
+        here = slice(starts[b], starts[b + 1])
+        w, lam_0, Psi_0, lam_b, Psi_b = weight[here], lam[here], Psi[here], lam_next[here], Psi_next[here]
+        place = here if len(z) == len(weight) else slice(0, len(w))
+        z_b, p_b = z[place], p[place]
+        for i in range(len(w)):
+            lam_b[i], Psi_b[i] = lam_0[i], Psi_0[i]
+        for k in range(len(y)):
+            c, y_k, x_k = table[k], y[k, here], x[k, here]
+            constants = {{constants}}
+            error, square, variance, quotient, most = 0.0, 0.0, 0.0, 0.0, np.int64(0)
+            for i in range(len(w)):
+                mean, cov, lam_b[i], Psi_b[i] = step(constants, y_k[i], lam_b[i], Psi_b[i])
+                z_b[i], p_b[i] = mean, cov
+                e = x_k[i] - mean
+                term = w[i] * e * e
+                error += w[i] * e
+                square += term
+                variance += w[i] * cov
+                quotient += term / (cov if term > 0 else 1.0)
+                most = max(most, np.float64(term).view(np.int64))
+            errors[k, b], squares[k, b], own[k, b], normalised[k, b] = error, square, variance, quotient
+            largest[k, b] = np.int64(most).view(np.float64)
+"""
+
+# Means of target and regressor, then sums of products of deviations from them: first from the means of a few trajectories,
+# which are near enough to those of all that nothing cancels.
+_MOMENTS = f"""
+
+@njit("UniTuple(float64, 5)({", ".join([_ROW] * 6)})", {_ANY_ORDER})
+def moments{{number}}(c, y, lam, Psi, x, x_next):
+    constants, t, r = {{constants}}, 0.0, 0.0
+    for size in (min(64, len(y)), len(y)):
+        dt, dr, tt, tr, rr = 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(size):
+            target, regressor = pair{{number}}(constants, y[i], lam[i], Psi[i], x[i], x_next[i])
+            target, regressor = target - t, regressor - r
+            dt += target
+            dr += regressor
+            tt += target * target
+            tr += target * regressor
+            rr += regressor * regressor
+        dt, dr = dt / size, dr / size
+        t, r = t + dt, r + dr
+    return t, r, tt - size * dt * dt, tr - size * dt * dr, rr - size * dr * dr
+"""
 
 
-def scatter(target: Array, regressor: Array) -> Scatter:
-    """`Scatter.of` a scalar target and a scalar regressor, (N, 1) both."""
-    t, r, tt, tr, rr = _moments(column(target), column(regressor))
-    return Scatter(len(target), np.array([t, r]), np.array([[tt, tr], [tr, rr]]))
+def advance(constants: int) -> str:
+    """The loop around `step`, of so many constants."""
+    return _ADVANCE.format(constants=_entries(constants))
 
 
-_ARRAYS = ", ".join(["float64[::1]"] * 5 + ["int64[::1]"] + ["float64[::1]"] * 5)
+def moments(number: int, constants: int) -> str:
+    """The loop around `pair<number>`, of so many constants."""
+    return _MOMENTS.format(number=number, constants=_entries(constants))
 
 
-def _record(x, z, p, weight, weights, starts, error, square, own, normalised, largest):
-    """What `Sums.record` keeps of a scalar estimate, of batches that begin at `starts`; p may be one for all."""
-    for b in range(len(weights)):
-        end = starts[b + 1] if b + 1 < len(starts) else len(x)
-        e1, e2, claimed, quotient, most = 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(starts[b], end):
-            e = x[i] - z[i]
-            term = weight[i] * e * e
-            e1 += weight[i] * e
-            e2 += term
-            most = term if term > most else most
-            if len(p) > 1:
-                claimed += weight[i] * p[i]
-                quotient += term / p[i] if p[i] != 0 else (np.inf if term > 0 else 0.0)
-        if len(p) == 1:
-            claimed = p[0] * weights[b]
-            quotient = e2 / p[0] if p[0] != 0 else (np.inf if e2 > 0 else 0.0)
-        error[b], square[b], own[b], normalised[b], largest[b] = e1, e2, claimed, quotient, most
+def simulate(noises: int, constants: int) -> str:
+    """The loop around `model`, of so many constants."""
+    names = [f"noise{i}" for i in range(noises)]
+    text = f'\n\n@njit("void({", ".join([_ROW] + [_ROWS] * (2 + noises))})", {OPTIONS}){_SIMULATE}'
+    rows, of_step, entries = (", ".join(one.format(name) for name in names) for one in ("{}_k", "{}[k]", "{}_k[i]"))
+    return text.format(noises=", ".join(names), rows=rows, noises_k=of_step, entries=entries, constants=_entries(constants))
 
 
-record: Callable[..., None] = njit(f"void({_ARRAYS})", **_OPTIONS)(_record)
+def _entries(constants: int) -> str:
+    return "(" + "".join(f"c[{i}], " for i in range(constants)) + ")"
+
+
+@njit(types.void(types.float64[:, ::1], types.float64[::1], types.int64[::1], types.float64[:, ::1]), **_OPTIONS)
+def squares(x, weight, starts, sums):
+    """Sums of weight x^2 over batches, (K, B), of states x (K, N)."""
+    for k in range(len(x)):
+        for b in range(len(starts) - 1):
+            x_b, w, square = x[k, starts[b] : starts[b + 1]], weight[starts[b] : starts[b + 1]], 0.0
+            for i in range(len(w)):
+                square += w[i] * x_b[i] * x_b[i]
+            sums[k, b] = square
+
+
+@njit(types.void(types.npy_rng, types.float64[::1]), cache=True, nogil=True)
+def normals(rng, out):
+    """`rng.standard_normal(out=out)`, the same bits in less than half the time: no call for each number."""
+    for i in range(len(out)):
+        out[i] = rng.standard_normal()

@@ -31,7 +31,7 @@ from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, WITH_MODES, JumpStru
 from kfcourse.lab.variants import Variant
 from kfcourse.laws import CONFIDENCE, Array
 from kfcourse.limits import OutOfTime, time_limit
-from kfcourse.montecarlo.comparison import EXACT, Comparison
+from kfcourse.montecarlo.comparison import EXACT, HEAVY, Comparison
 from kfcourse.montecarlo.modes import SLOW, Recognised, recognised
 from kfcourse.montecarlo.statistics import Estimate, ratio
 from kfcourse.symbolic.jumping import JumpModel
@@ -69,10 +69,10 @@ class Section:
         return cls(title, [line.strip() for line in body.split("\\\\\n")])
 
 
-def write_report(variant: Variant, result: Comparison, folder: Path, budget: str = "") -> list[Path]:
+def write_report(variant: Variant, result: Comparison, folder: Path, notes: Sequence[str] = ()) -> list[Path]:
     """Write report.html, report.tex and the figures, all of them or none; returns the paths.
 
-    `budget` tells why there are so few trajectories, if so.
+    `notes` stand before the remarks: why there are so few trajectories, how to repeat the comparison.
     """
     with replacing_together(folder) as place:
         for name, (_, draw) in _FIGURES.items():
@@ -80,7 +80,7 @@ def write_report(variant: Variant, result: Comparison, folder: Path, budget: str
         modes = recognised_modes(result)
         if modes:
             save_figure(partial(plots.mode_probabilities, modes), place, "modes")
-        save_texts(("report.html", "report.tex"), place, _content(variant, result, modes, budget))
+        save_texts(("report.html", "report.tex"), place, _content(variant, result, modes, notes))
         return [folder / path.name for path in place.iterdir()]
 
 
@@ -189,7 +189,7 @@ def recognised_modes(result: Comparison) -> Recognised | None:
     return recognised(known, model, runs, result.steps, result.seed) if known else None
 
 
-def _content(variant: Variant, result: Comparison, modes: Recognised | None, budget: str) -> dict[str, Any]:
+def _content(variant: Variant, result: Comparison, modes: Recognised | None, notes: Sequence[str]) -> dict[str, Any]:
     # the bound before those that it bounds
     names = tuple(sorted(result.available, key=lambda name: name != EXACT))
     entries = JUMP_FILTERS if isinstance(result.model, JumpModel) else FILTERS
@@ -208,7 +208,7 @@ def _content(variant: Variant, result: Comparison, modes: Recognised | None, bud
             for name in names
         ],
         "table": _table(result, [_cells(result, name) for name in names]),
-        "remarks": [*([budget] if budget else []), *remarks_in_words(result)],
+        "remarks": [*notes, *remarks_in_words(result)],
         "compared": [title(name) for name in compared],
         "gaps": _table(result, [[percent(one) for one in result.gap(name)] for name in compared]) if compared else [],
         "ranking": [
@@ -270,6 +270,12 @@ REMARKS = {
     "itself, or another filter is more accurate. Means leave these steps out.",
     "heavy": "{names}: at {steps} the accuracy rests on a few rare trajectories: a single one makes up to {part} % of the sum. "
     "The interval there cannot be trusted; about {runs} trajectories, {exact} of them with the exact AOF, would do.",
+    "skewed": "{names}: at {steps} the accuracy rests on a few rare trajectories. "
+    "The interval there cannot be trusted; about {runs} trajectories, {exact} of them with the exact AOF, would do.",
+    "heavy_alone": "{names}: at {steps} the accuracy rests on a few rare trajectories: a single one makes up to {part} % of the "
+    "sum. The interval there cannot be trusted; about {runs} trajectories would do.",
+    "skewed_alone": "{names}: at {steps} the accuracy rests on a few rare trajectories. "
+    "The interval there cannot be trusted; about {runs} trajectories would do.",
 }
 
 
@@ -286,7 +292,8 @@ def remarks(result: Comparison) -> Iterator[tuple[str, dict[str, Any]]]:
         more = max(result.missing(gaps[name], name) for name in names)
         runs, exact = (f"{float(f'{more * one:.1g}'):.0f}" for one in (result.runs, result.slow_runs))
         told = {"part": f"{100 * part:.0f}", "runs": runs, "exact": exact}
-        yield "heavy", {"names": names, "steps": np.any([bad[name] for name in names], axis=0), **told}
+        kind = ("heavy" if part > HEAVY else "skewed") + ("" if result.has_bound else "_alone")
+        yield kind, {"names": names, "steps": np.any([bad[name] for name in names], axis=0), **told}
 
 
 def remarks_in_words(result: Comparison) -> list[str]:

@@ -12,9 +12,10 @@ from tqdm import tqdm
 
 from kfcourse.angles import near
 from kfcourse.filters.base import Filter, State
+from kfcourse.filters.fused import Steps
 from kfcourse.filters.looking_back import looked_back
 from kfcourse.filters.particles import Clouds
-from kfcourse.laws import Array, NegativeVariance
+from kfcourse.laws import Array, NegativeVariance, any_missing
 from kfcourse.montecarlo.designing import NotFinite, failed
 from kfcourse.montecarlo.ensemble import Instant
 from kfcourse.montecarlo.statistics import Sums
@@ -47,12 +48,11 @@ def run_block(
     weight_of: Callable[[Array], Array | None] = lambda x: None,
     *,
     back: bool = False,
-    record: Callable[..., None] = Sums.record,
 ) -> None:
     """Advance all filters together over the steps of one block of trajectories; `back`: let them look back from its end.
 
     With a reference filter, the distance of every other estimate from its own is recorded too.  The initial states tell the
-    weights of the trajectories.  `record` is how the sums take an estimate.
+    weights of the trajectories.
     """
     size, weight = int(sums.counts.sum()), None
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
@@ -62,7 +62,7 @@ def run_block(
             for i, (one, state) in enumerate(zip(filters, states, strict=True)):
                 with _affair_of(one, k):
                     estimate = state.posterior
-                    record(sums, i, k, near(instant.x, estimate.mean, one.model.angles.x), estimate, weight)
+                    sums.record(i, k, near(instant.x, estimate.mean, one.model.angles.x), estimate, weight)
             if reference is not None:
                 twice = _twice(states[reference])
                 sums.record_doubt(k, _doubt(states[reference]), weight)
@@ -71,6 +71,39 @@ def run_block(
                         mean, angles = state.posterior.mean, filters[i].model.angles.x
                         first, second = (near(one, mean, angles) for one in twice)
                         sums.record_distance(i, k, mean, (first, second), weight)
+    _check_finite(filters, sums)
+
+
+def run_stretches(
+    filters: Sequence[Filter],
+    stretches: Iterable[tuple[Array, Array]],
+    sums: Sums,
+    weight_of: Callable[[Array], Array | None],
+) -> None:
+    """`run_block` over several steps of a scalar model at once: x (K + 1, N) and y (K, N) of each stretch.
+
+    A filter that is not compiled, and any whose trajectories have left the numbers, goes step by step.
+    """
+    from kfcourse.filters.loops import squares
+
+    size, k, weight = int(sums.counts.sum()), 0, None
+    states, starts = [one.init(size) for one in filters], np.append(sums.starts, size)
+    room, weights = np.empty((2, int(sums.counts.max()))), np.ones(size)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
+        for x, y in stretches:
+            if k == 0 and (weight := weight_of(x[0][:, None])) is not None:
+                weights = sums.weigh(weight)
+            steps, missing = slice(k, k + len(y)), any_missing(y)
+            squares(x[:-1], weights, starts, sums.size[steps])
+            for i, one in enumerate(filters):
+                if isinstance(one.step, Steps) and not missing:
+                    states[i] = one.step.several(states[i], y, x[:-1], weights, starts, sums.of_scalar(i, steps), room)
+                    continue
+                for j, step in enumerate(range(k, k + len(y))):
+                    with _affair_of(one, step):
+                        states[i] = one.step(states[i], y[j][:, None])
+                        sums.record(i, step, x[j][:, None], states[i].posterior, weight)
+            k += len(y)
     _check_finite(filters, sums)
 
 

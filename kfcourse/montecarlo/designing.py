@@ -15,7 +15,7 @@ import numpy as np
 from kfcourse.filters.base import Filter, State, with_angles_on_circle
 from kfcourse.filters.designed import Affine, Design, Scatter
 from kfcourse.laws import NegativeVariance
-from kfcourse.montecarlo.ensemble import Instant, JumpInstant, Serial
+from kfcourse.montecarlo.ensemble import Instant, Serial
 from kfcourse.reasons import Reason
 
 
@@ -81,7 +81,6 @@ class _BlockStep:
         self.angles = [one.model.angles.x for one in designs]
         self.running = [one.equations(before, block.y) for one, before in zip(designs, states, strict=True)]
         self.results: list[State | None] = [None] * len(designs)
-        self.targets = [0] * len(designs)  # components of what each asked for last
 
     def advance(self, answers: dict[int, Affine | None]) -> list[Scatter | None]:
         """Answer the waiting designs; the moments of the regression each asks for next, None if it is through."""
@@ -96,12 +95,7 @@ class _BlockStep:
             return None
         except (NegativeVariance, np.linalg.LinAlgError) as error:
             raise failed(self.names[i], self.k, error) from None
-        target, regressor = request.target(self.block.x, self.block.x_next), request.regressor
-        if request.mode is not None and isinstance(self.block, JumpInstant):
-            there = self.block.mode == request.mode
-            target, regressor = target[there], regressor[there]
-        self.targets[i] = target.shape[1]
-        return request.scatter(target, regressor)
+        return request.scatter(self.block.x, self.block.x_next, getattr(self.block, "mode", None))
 
     def after(self) -> list[State]:
         """The states of the designs, which are all through: angles between -pi and pi, as when they run."""
@@ -133,7 +127,7 @@ def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int, poo
                     raise NotFinite(f"step {k}: the model's trajectories become infinite, check its equations and parameters")
                 said = f"{designs[i].name}, step {k}: the design met infinite or NaN values; the model or this filter diverges"
                 raise NotFinite(Reason(said, "infinite", step=k), designs[i].name)
-            fits[i].append(merged.regression(runs[0].targets[i]))
+            fits[i].append(merged.regression(merged.targets))
             asked.append(i)
         active = asked
     return fits

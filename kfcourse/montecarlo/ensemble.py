@@ -12,17 +12,17 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, NamedTuple, overload
 
 import numpy as np
 import scipy
 
 from kfcourse.angles import on_circle
-from kfcourse.laws import Array, Gaussian, column, normalised_square, square_root
+from kfcourse.laws import Array, Gaussian, normalised_square, square_root
 from kfcourse.linear.runs import Trajectories
 from kfcourse.seeds import Seed, seed_number
-from kfcourse.symbolic.compiled import is_scalar, load, loop
+from kfcourse.symbolic.compiled import function, is_scalar, load
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -117,11 +117,19 @@ class Ensemble:
     def block(self, index: int) -> Iterator[Instant]:
         """The steps of one block of trajectories."""
         start = self._start(index)
-        for chunk, steps in enumerate(self._chunks):
-            for k, *drawn in zip(steps, *self._draw(index, chunk), strict=True):
-                instant = self._simulator(k, *start, *drawn)
+        for chunk in range(len(self._chunks)):
+            for instant in self._steps(chunk, start, self._draw(index, chunk)):
                 yield instant
                 start = instant.after
+
+    def stretches(self, index: int) -> Iterator[tuple[Array, Array]]:
+        """The same of a compiled scalar model, a few steps at once: x (K + 1, N), its last row begins the next, y (K, N)."""
+        assert isinstance(self._simulator, _CompiledSimulator)
+        x = self._initial(index)
+        for chunk in range(len(self._chunks)):
+            several = self._simulator.several(x, *self._draw(index, chunk))
+            yield several
+            x = several[0][-1][:, None]
 
     def by_step(self, pool: Executor | None = None) -> Iterator[list[Instant]]:
         """All blocks of a step together, step by step: for coefficients that need the whole ensemble."""
@@ -129,16 +137,24 @@ class Ensemble:
         blocks = range(len(self.sizes))
         starts = list(pool.map(self._start, blocks))
         drawn = [pool.submit(self._draw, b, 0) for b in blocks]
-        for chunk, steps in enumerate(self._chunks):
+        for chunk in range(len(self._chunks)):
             noises = [future.result() for future in drawn]  # of each block: of each kind (steps, size, ...)
             if chunk + 1 < len(self._chunks):
                 drawn = [pool.submit(self._draw, b, chunk + 1) for b in blocks]  # ahead of time
-            for i, k in enumerate(steps):
-                simulator = partial(self._simulator, k)
-                given = [(*start, *(kind[i] for kind in kinds)) for start, kinds in zip(starts, noises, strict=True)]
-                instants = list(pool.map(simulator, *zip(*given, strict=True)))
-                yield instants
-                starts = [instant.after for instant in instants]
+            each = list(pool.map(lambda *given, chunk=chunk: list(self._steps(chunk, *given)), starts, noises))
+            yield from map(list, zip(*each, strict=True))
+            starts = [instants[-1].after for instants in each]
+
+    def _steps(self, chunk: int, start: tuple[Array, ...], drawn: tuple[Array, ...]) -> Iterator[Instant]:
+        """A few steps of a block of trajectories."""
+        if isinstance(self._simulator, _CompiledSimulator):
+            x, y = (rows[:, :, None] for rows in self._simulator.several(*start, *drawn))
+            yield from map(Instant, x, y, x[1:])
+            return
+        for k, *noises in zip(self._chunks[chunk], *drawn, strict=True):
+            instant = self._simulator(k, *start, *noises)
+            yield instant
+            start = instant.after
 
     @cached_property
     def _simulator(self) -> _Simulator | _JumpSimulator | _CompiledSimulator:
@@ -160,7 +176,7 @@ class Ensemble:
     def _initial(self, block: int) -> Array:
         rng, size, prior = self._stream(block, 0), self.sizes[block], self.model.prior
         if self.wide is None:
-            return on_circle(_draw(rng, prior, 1, size)[0], self.model.angles.x)
+            return on_circle(_draw(rng, prior, 1, size, self.compiled)[0], self.model.angles.x)
         standard = _by_strata(rng, -(-size // STRATA), len(prior.mean), self.wide)[:size]
         return on_circle(prior.mean + standard @ square_root(prior.cov).T, self.model.angles.x)
 
@@ -190,8 +206,8 @@ class Ensemble:
             first = self.model.modes[0]
             standard = [rng.standard_normal((steps, len(noises), size)).swapaxes(1, 2) for noises in (first.v, first.w)]
             return *standard, rng.random((steps, size))
-        v = _draw(rng, self.model.state_noise, steps, size)
-        return v, _draw(rng, self.model.meter_noise, steps, size)
+        v = _draw(rng, self.model.state_noise, steps, size, self.compiled)
+        return v, _draw(rng, self.model.meter_noise, steps, size, self.compiled)
 
 
 class _Simulator:
@@ -210,19 +226,24 @@ class _Simulator:
 
 
 class _CompiledSimulator:
-    """The same of a scalar model in one pass."""
+    """Several steps of a scalar model in one pass."""
 
     def __init__(self, model: Model):
-        noises = [*model.v, *model.w]
+        from kfcourse.filters import loops
+
+        noises, constants = [*model.v, *model.w], list(model.values)
         given = {"x": model.x[0]} | {f"noise{i}": one for i, one in enumerate(noises)}
         made = {"y": model.meter_equation[0], "next": model.state_equation[0]}
         self.constants = np.array([float(value) for value in model.values.values()])
-        self.step = load(loop("simulate", given, made, list(model.values))).simulate
+        self.loop = load(function("model", given, made, constants), loops.simulate(len(noises), len(constants))).simulate
 
-    def __call__(self, k: int, x: Array, v: Array, w: Array) -> Instant:
-        y, x_next = np.empty((2, len(x), 1))
-        self.step(self.constants, *(column(one) for one in (x, *v.T, *w.T)), y[:, 0], x_next[:, 0])
-        return Instant(x, y, x_next)
+    def several(self, start: Array, v: Array, w: Array) -> tuple[Array, Array]:
+        """x (K + 1, N) and y (K, N) from states (N, 1) and noises (K, N, r)."""
+        steps, size = v.shape[:2]
+        x, y = np.empty((steps + 1, size)), np.empty((steps, size))
+        x[0] = start[:, 0]
+        self.loop(self.constants, x, y, *(np.ascontiguousarray(one[:, :, i]) for one in (v, w) for i in range(one.shape[2])))
+        return x, y
 
 
 class _JumpSimulator:
@@ -257,10 +278,17 @@ def _of_law(standard: Array, law: Gaussian) -> Array:
     return law.mean + standard @ square_root(law.cov).T
 
 
-def _draw(rng: np.random.Generator, law: Gaussian, steps: int, size: int) -> Array:
+def _draw(rng: np.random.Generator, law: Gaussian, steps: int, size: int, compiled: bool) -> Array:
     """Gaussian noise (steps, size, r), every component contiguous in memory."""
     r = len(law.mean)
-    standard = rng.standard_normal((steps, r, size)).swapaxes(1, 2)
+    standard = np.empty((steps, r, size))
+    if compiled:
+        from kfcourse.filters.loops import normals
+
+        normals(rng, standard.reshape(-1))
+    else:
+        rng.standard_normal(out=standard)
+    standard = standard.swapaxes(1, 2)
     if not law.mean.any() and np.array_equal(law.cov, np.eye(r)):
         return standard
     return _of_law(standard, law)

@@ -22,7 +22,7 @@ from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
 from kfcourse.filters.fused import fuse
 from kfcourse.laws import Array, Gaussian, stacked
-from kfcourse.montecarlo.blocks import progress_bar, run_block
+from kfcourse.montecarlo.blocks import progress_bar, run_block, run_stretches
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, workers
@@ -338,14 +338,16 @@ def _run_blocks(
     filters: Sequence[Filter], ensemble: Ensemble, pool: Executor, progress: bool | None, *, back: bool = False
 ) -> Sums:
     """Sums over all trajectories, its blocks in parallel."""
-
-    record = Sums.record_by_loop if ensemble.compiled and is_scalar(ensemble.model) else Sums.record
+    several = ensemble.compiled and is_scalar(ensemble.model) and not back
 
     def block(index: int) -> Sums:
         size = ensemble.sizes[index]
         counts = batch_sizes(size, max(1, round(BATCHES * size / ensemble.runs)))
         sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, counts)
-        run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight, back=back, record=record)
+        if several:
+            run_stretches(filters, ensemble.stretches(index), sums, ensemble.weight)
+        else:
+            run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight, back=back)
         return sums
 
     indices = range(len(ensemble.sizes))

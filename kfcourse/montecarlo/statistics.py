@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from kfcourse.laws import CONFIDENCE, Array, Gaussian, column, normalised_square
+from kfcourse.laws import CONFIDENCE, Array, Gaussian, normalised_square
 from kfcourse.montecarlo.ensemble import STRATA
 
 BATCHES = 128  # standard errors from 128 batches are themselves good to 6 %
@@ -186,8 +186,13 @@ class Sums:
     def record_states(self, step: int, x: Array, weight: Array | None) -> None:
         """Add the true states x (N, n) of a step, and at the first the weights (N,) of the trajectories."""
         if step == 0 and weight is not None:
-            self.weights[:] = self._sums(weight, None)
+            self.weigh(weight)
         self.size[step] = self._sums((x * x).sum(axis=1), weight)
+
+    def weigh(self, weight: Array) -> Array:
+        """The weights (N,) of the trajectories, added up."""
+        self.weights[:] = self._sums(weight, None)
+        return weight
 
     def record(self, filter_index: int, step: int, x: Array, estimate: Gaussian, weight: Array | None = None) -> None:
         """Add one step of one filter: true states x (N, n) and its estimate; with a weight (N,) of each trajectory."""
@@ -200,7 +205,7 @@ class Sums:
             self.square[filter_index, step, i] = self._sums(square, weight)
             self.own[filter_index, step, i] = own[i] * self.weights if own.ndim == 1 else self._sums(own[:, i], weight)
         total = square if error.shape[1] == 1 else (error * error).sum(axis=1)
-        self.largest_square[filter_index, step] = np.maximum.reduceat(total if weight is None else total * weight, self._starts)
+        self.largest_square[filter_index, step] = np.maximum.reduceat(total if weight is None else total * weight, self.starts)
         if error.shape[1] > 1:
             self.normalised[filter_index, step] = self._sums(normalised_square(error, cov), weight) / error.shape[1]
         elif own.ndim == 2:
@@ -212,19 +217,10 @@ class Sums:
         else:  # one variance for the whole ensemble: the sums of squares are there already
             self.normalised[filter_index, step] = _quotient(self.square[filter_index, step, 0], own)
 
-    def record_by_loop(self, filter_index: int, step: int, x: Array, estimate: Gaussian, weight: Array | None = None) -> None:
-        """`record` of a scalar state by a compiled loop."""
-        from kfcourse.filters.loops import record
-
-        arrays = (x, estimate.mean, estimate.cov, np.ones(len(x)) if weight is None else weight)
-        kept = (self.error, self.square, self.own)
-        record(
-            *(column(one) for one in (*arrays, self.weights)),
-            self._starts,
-            *(one[filter_index, step, 0] for one in kept),
-            self.normalised[filter_index, step],
-            self.largest_square[filter_index, step],
-        )
+    def of_scalar(self, filter_index: int, steps: slice) -> tuple[Array, ...]:
+        """Where what `record` keeps of several steps of one filter of a scalar state has its place, each (steps, batches)."""
+        kept = (one[filter_index, steps, 0] for one in (self.error, self.square, self.own))
+        return *kept, self.normalised[filter_index, steps], self.largest_square[filter_index, steps]
 
     def record_distance(
         self, filter_index: int, step: int, mean: Array, reference: tuple[Array, Array], weight: Array | None = None
@@ -237,17 +233,18 @@ class Sums:
         terms = ((mean - first) * (mean - second)).sum(axis=1)
         terms = terms if weight is None else terms * weight
         self.distance[filter_index, step] = self._sums(terms, None)
-        self.largest[filter_index, step] = np.maximum.reduceat(terms, self._starts)
+        self.largest[filter_index, step] = np.maximum.reduceat(terms, self.starts)
 
     def record_doubt(self, step: int, error: Array, weight: Array | None) -> None:
         """Add the estimated errors (N,) of the reference filter's estimates."""
         self.doubt[step] = self._sums(error * error, weight)
 
     def _sums(self, values: Array, weight: Array | None) -> Array:
-        return np.add.reduceat(values if weight is None else values * weight, self._starts)
+        return np.add.reduceat(values if weight is None else values * weight, self.starts)
 
     @cached_property
-    def _starts(self) -> Array:
+    def starts(self) -> Array:
+        """Where the batches begin."""
         return np.concatenate([[0], np.cumsum(self.counts[:-1])]).astype(int)
 
 

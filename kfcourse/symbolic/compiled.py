@@ -35,6 +35,7 @@ from kfcourse.symbolic.model import Model
 
 REMEDY = "compiled=True needs numba: pip install 'kfcourse[fast]', or leave it out"
 NAN = sp.Symbol("nan")  # what a formula gives where it has no value
+OPTIONS = 'cache=True, nogil=True, error_model="numpy"'  # of a function that Python calls
 _HEADER = '''"""Printed by kfcourse.symbolic.compiled; it may be removed at any time."""
 
 import numpy as np
@@ -97,20 +98,49 @@ def loop(
 
 
 def _text(name: str, given: Mapping[str, sp.Symbol], program: Program, constants: Sequence[sp.Symbol]) -> str:
+    used, assignments, values = _assignments(program, constants, {f"{array}_i": one for array, one in given.items()})
+    arrays = [*given, *values]
+    lines = [f"    c{i} = c[{i}]  # {one}" for i, one in enumerate(constants) if one in used]
+    lines += ["    missing = 0", f"    for i in range(len({arrays[0]})):", f"        missing += {arrays[0]}[i] != {arrays[0]}[i]"]
+    lines += [f"        {array}_i = {array}[i]" for array, one in given.items() if one in used]
+    lines += [f"        {line}" for line in assignments]
+    lines += [f"        {output}[i] = {value}" for output, value in values.items()]
+    lines += ["    return missing"]
+    signature = ", ".join(["float64[::1]"] * (1 + len(arrays)))
+    return "\n".join([f'\n\n@njit("int64({signature})", {OPTIONS})', f"def {name}(c, {', '.join(arrays)}):", *lines, ""])
+
+
+def function(
+    name: str,
+    given: Mapping[str, sp.Symbol],
+    made: Mapping[str, sp.Expr],
+    constants: Sequence[sp.Symbol],
+    definitions: Mapping[sp.Symbol, sp.Expr] | None = None,
+) -> str:
+    """A function `name(c, given numbers) -> made numbers` of one trajectory, as text, for a loop to call; see `loop`."""
+    outputs = {key: sp.ImmutableMatrix([value]) for key, value in made.items()}
+    return printed(lambda program: _numbers(name, given, program, constants), outputs, (), definitions or {})
+
+
+def _numbers(name: str, given: Mapping[str, sp.Symbol], program: Program, constants: Sequence[sp.Symbol]) -> str:
+    used, assignments, values = _assignments(program, constants, given)
+    lines = [f"    c{i} = c[{i}]  # {one}" for i, one in enumerate(constants) if one in used]
+    lines += [f"    {line}" for line in assignments]
+    lines += [f"    return {', '.join(values.values())}"]
+    return "\n".join(['\n\n@njit(error_model="numpy")', f"def {name}(c, {', '.join(given)}):", *lines, ""])
+
+
+def _assignments(
+    program: Program, constants: Sequence[sp.Symbol], given: Mapping[str, sp.Symbol]
+) -> tuple[set[sp.Basic], list[str], dict[str, str]]:
+    """The symbols that a program uses, its lines, and the text of each output."""
     entries = {output: matrix[0] for output, matrix in program.outputs.items()}
     used = set().union(*(e.free_symbols for e in (*(value for _, value in program.assignments), *entries.values())))
     names = {target: f"s{i}" for i, (target, _) in enumerate(program.assignments)} | {NAN: "nan"}
-    names |= {one: f"c{i}" for i, one in enumerate(constants)} | {one: f"{array}_i" for array, one in given.items()}
-    printer, arrays = _Printer(names), [*given, *entries]
-    lines = [f"    {names[one]} = c[{i}]  # {one}" for i, one in enumerate(constants) if one in used]
-    lines += ["    missing = 0", f"    for i in range(len({arrays[0]})):", f"        missing += {arrays[0]}[i] != {arrays[0]}[i]"]
-    lines += [f"        {names[one]} = {array}[i]" for array, one in given.items() if one in used]
-    lines += [f"        {names[target]} = {printer.doprint(value)}" for target, value in program.assignments]
-    lines += [f"        {output}[i] = {printer.doprint(entry)}" for output, entry in entries.items()]
-    lines += ["    return missing"]
-    signature = ", ".join(["float64[::1]"] * (1 + len(arrays)))
-    options = 'cache=True, nogil=True, error_model="numpy"'
-    return "\n".join([f'\n\n@njit("int64({signature})", {options})', f"def {name}(c, {', '.join(arrays)}):", *lines, ""])
+    names |= {one: f"c{i}" for i, one in enumerate(constants)} | {one: name for name, one in given.items()}
+    printer = _Printer(names)
+    lines = [f"{names[target]} = {printer.doprint(value)}" for target, value in program.assignments]
+    return used, lines, {output: printer.doprint(entry) for output, entry in entries.items()}
 
 
 @lru_cache(maxsize=256)

@@ -12,11 +12,12 @@ import pytest
 import sympy as sp
 
 from kfcourse import Model, compare, gaussian, linearised, load_variants, run, simulate, unscented
-from kfcourse.filters import aof, dfmp, duof, fos, gated, mdfmp, mfos
+from kfcourse.filters import aof, dfmp, duof, fos, gated, loops, mdfmp, mfos
 from kfcourse.filters.designed import Design
 from kfcourse.filters.fused import fuse
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble
+from kfcourse.montecarlo.statistics import Sums
 from kfcourse.symbolic import compiled
 from kfcourse.symbolic.model import Model as PlainModel
 
@@ -97,6 +98,40 @@ def test_a_comparison():
         np.testing.assert_allclose(other, one, rtol=1e-9, atol=1e-11 * np.abs(one).max(), err_msg=name)
 
 
+def test_normal_numbers_are_numpys_to_the_last_bit():
+    """A million: some 260 of them from the tails; and where the generator goes on."""
+    one, other = (np.random.Generator(np.random.SFC64(3)) for _ in range(2))
+    found = np.empty(1_000_000)
+    loops.normals(one, found)
+    np.testing.assert_array_equal(found, other.standard_normal(1_000_000))
+    assert one.random() == other.random()
+
+
+def test_the_sums_of_several_steps_are_those_of_each(interpreted):
+    """Batches of any size; a variance of 0 counts as nothing without an error and as infinity with one."""
+    model, runs = SCALAR["53"], 50
+    one, (x, y) = fuse(aof(gaussian(model))), simulate(model, runs, STEPS, seed=4)
+    weight = np.random.default_rng(1).random(runs)
+    expected, found = (Sums.empty(1, STEPS, 1, np.array([1, 30, runs - 31])) for _ in range(2))
+    starts, room, state = np.append(found.starts, runs), np.empty((2, 30)), one.init(runs)
+    for k in range(STEPS):
+        state = one.step(state, y[k])
+        expected.record(0, k, x[k], state.posterior, weight)
+    with np.errstate(divide="ignore"):
+        after = one.step.several(
+            one.init(runs), y[:, :, 0].copy(), x[:, :, 0].copy(), weight, starts, found.of_scalar(0, slice(STEPS)), room
+        )
+    for name in ("error", "square", "own", "normalised", "largest_square"):  # sums of 30, in another order
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-13, atol=1e-14, err_msg=name)
+    np.testing.assert_array_equal(after.predicted.mean, state.predicted.mean)
+    sure = Model.define("x", "x + w", prior={"mean": 1.0, "variance": 0.0})
+    quick, sums = fuse(aof(linearised(sure))), np.empty((5, 1, 2))
+    for row, quotients in ((np.ones((1, 2)), [0.0, 0.0]), (np.array([[1.0, 3.0]]), [0.0, np.inf])):
+        with np.errstate(divide="ignore"):
+            quick.step.several(quick.init(2), np.ones((1, 2)), row, np.ones(2), np.arange(3), sums, np.empty((2, 1)))
+        assert sums[3, 0].tolist() == quotients
+
+
 def test_a_meter_that_cannot_vary_and_one_that_never_does():
     """F = 0 at x = 0: no correction there; and the same p = Psi R / F, never negative, where the meter is sharp."""
     model = Model.define("c*x + e*v*x", "g*x**2 + f*x**2*w", {"c": 0.9, "e": 0.05, "g": 1, "f": 1e-9}, prior={"mean": 0.0})
@@ -145,7 +180,7 @@ def test_a_second_process_finds_what_was_compiled(tmp_path):
     code = (
         "import json; from kfcourse import load_variants, linearised; from kfcourse.filters import aof; "
         "from kfcourse.filters.fused import _program; one = aof(linearised(load_variants()['1'].model)); "
-        "f = _program(one, one.printed[1]).whole.function.stats; print(json.dumps([len(f.cache_hits), len(f.cache_misses)]))"
+        "f = _program(one, one.printed[1]).advance.stats; print(json.dumps([len(f.cache_hits), len(f.cache_misses)]))"
     )
     environment = {"XDG_CACHE_HOME": str(tmp_path), "LOCALAPPDATA": str(tmp_path), "HOME": str(tmp_path)}
     found = [

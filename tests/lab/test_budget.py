@@ -1,9 +1,13 @@
 """How many trajectories the lab takes by default: measured by a pilot, told, and left to who asks for a number."""
 
+import html
+import shlex
+
 import pytest
 from click.testing import CliRunner
 
 from kfcourse import cli
+from kfcourse.cli import main
 from kfcourse.lab import budget, find_variant, lab_filters
 from kfcourse.lab.budget import PILOT, SECONDS, SIZES, STEPS, Budget, usual_runs, within
 
@@ -46,3 +50,22 @@ def test_the_lab_tells_why_it_takes_fewer_and_takes_what_it_is_told(tmp_path, mo
         assert f'"runs": {runs},' in numbers.read_text()
         for text in (result.output, (place / "report.html").read_text(), (place / "report.tex").read_text()):
             assert ("told so" in text) == (runs == 300)
+
+
+def test_the_command_that_is_told_repeats_the_numbers(tmp_path, monkeypatch):
+    """What pilots and the clock choose is written out: trajectories, and how many of them the slow filters came through."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my variants.toml").write_text('[variants.a]\nstate = "0.9*x + v"\nmeter = "x + 0.1*x**2*w"\n', encoding="utf-8")
+    call = ["lab", "a", "--variants", "my variants.toml", "--runs", "400", "--steps", "3", "--designs", "2", "--slow-runs", "112"]
+    first = CliRunner().invoke(main, [*call, "--filters", "aof-gaussian,duof,aof-exact", "--out", "a", "--json", "a.json"])
+    assert first.exit_code == 0, first.output
+    (told,) = (line for line in first.output.splitlines() if line.startswith("The same numbers again: "))
+    assert "--runs 400" in told and "--slow-runs 112 --slow-seconds 3600" in told and told in report_text(tmp_path / "a")
+    program, *again = shlex.split(told.partition(": ")[2])
+    second = CliRunner().invoke(main, [*again, "--out", "b", "--json", "b.json"])
+    assert program == "kfcourse" and second.exit_code == 0, second.output
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+
+
+def report_text(folder):
+    return html.unescape((folder / "report.html").read_text(encoding="utf-8"))
