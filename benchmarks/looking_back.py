@@ -1,28 +1,35 @@
 """What looking back and likelihood cost, as ratios to the filter's own run, side by side in one run.
 
-    .venv/bin/python benchmarks/looking_back.py [--repeats 9]
+    OMP_NUM_THREADS=1 python benchmarks/looking_back.py [--repeats 9] [--states 1 2 3 4 6] [--runs 1 200 5000 50000]
 
-Smoother over filter, and likelihood over filter (each runs the filter itself, too), for variant 53, the pendulum of Sarkka and
-Svensson, and models of three and five states, one record and many: ratios of the least processor times of so many turns, in
-which the three follow each other.  A smoother is to cost at most 2.5 times its filter.
+Smoother over filter, and likelihood over filter (each runs the filter itself, too), for a chain of so many states whose last one
+is driven, and the first measured: linear, or with the sine of the first in the last.  And for variant 53, the pendulum of Sarkka
+and Svensson, an aircraft that turns, radar D3, the exact filter and particles.  Ratios of the least processor times of so many
+turns, in which the three follow each other.  A smoother is to cost at most 2.5 times its filter; particles, which draw each
+ancestor anew among all, are the exception.
 
-Found on two cores that were busy with much else (a load of 12 to 16), before in brackets:
+Found on two cores that were busy with much else (a load of 8 to 18), smoother over filter, least of five turns:
 
-                                    smoother     likelihood
-    53, linearised, 2,000 runs     1.9  (2.5)    1.6 (4.7)
-    53, gaussian, 2,000 runs       1.9  (2.4)    1.5 (4.3)
-    53, linearised, 20,000 runs    2.3  (4.9)    1.3 (4.9)
-    53, gaussian, 20,000 runs      2.4  (4.3)    1.1 (4.3)
-    pendulum, linearised, 500      2.3  (2.5)    1.2 (1.4)
-    pendulum, gaussian, 500        2.2  (2.4)    1.2 (1.4)
-    53, exact, 200 runs            2.4  (2.6)    1.1 (1.1)
-    three states, 500              2.1  (3.4)    .9
-    three states, 5,000            2.2 to 3.0 (3.9)  .9
-    turn, 500                      2.2  (3.3)    1.2
-    turn, 5,000                    2.3 to 2.6 (3.9)  1.0
-    radar D3, 500 and 5,000        1.5, 1.6  (2.3)   1.2
+    runs                1     200   5,000   50,000
+    linear, 1 state    1.3    2.4    1.7    1.4
+            2          1.4    2.2    2.0    1.3
+            3          1.7    1.9    1.5    1.9
+            4          1.6    2.1    2.1    1.3
+            6          1.3    2.1    2.2    1.2
+    linearised, 1      1.7    1.3    1.6    1.7
+            2          2.0    2.6    1.6    2.0
+            3          1.1    2.1    1.7    2.1
+            4          1.8    2.1    2.1    1.7
+            6          1.3    2.1    2.3    1.3
+    gaussian, 1        1.5    1.5    2.1    2.2
+            2          1.8    1.8    1.9    2.2
+            3          1.8    1.9    2.1    1.9
+            4          1.4    2.3    2.1    1.8
+            6          1.2    2.0    2.5
 
-Of three states and 5,000 runs a step of the filter takes .3 us; the figure above 2.5 is of minutes when others used the cache.
+The one figure above 2.5 was 1.6 in two other runs; other runs of linearised and gaussian with 6 states and 5,000 runs had 2.0 to
+3.0, where a page of new memory cost as much as a hundred products.  Quadrature filters are dearer: smoothers of unscented filters
+cost 1.1 to 2.4 times as much.  A Kalman filter whose runs share one covariance has 1.6 to 2.3 up to 5,000 runs.
 """
 
 from __future__ import annotations
@@ -30,13 +37,34 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
-from kfcourse import Model, gaussian, likelihood, linearised, run, simulate, smooth, unscented
+from kfcourse import Model, gauss_hermite, gaussian, likelihood, linearised, run, simulate, smooth, unscented
 from kfcourse.filters import Filter, aof, particle, pointmass
 from kfcourse.lab.variants import find_variant
 from kfcourse.scenarios.benchmarks import pendulum, pendulum_data
+
+KINDS = {
+    "linear": linearised,
+    "linearised": linearised,
+    "gaussian": gaussian,
+    "unscented": unscented,
+    "cubature": partial(unscented, kappa=0),
+    "gauss-hermite": partial(gauss_hermite, order=3),
+}
+STEPS = {1: 41, 200: 31, 5000: 11}  # of so many runs
+ROOM = 2e7  # numbers, that the points of all runs may be
+
+
+def chain(n: int, curved: bool) -> Model:
+    """Each state is driven by the next, the last one by noise; the first is measured."""
+    last = f"0.9*x{n} + 0.3*v" + (" - 0.1*sin(x1)" if curved else "")
+    names = [f"x{i}" for i in range(1, n + 1)]
+    motion = [*(f"{one} + 0.2*{other}" for one, other in pairwise(names)), last]
+    return Model.define(motion, "x1 + 0.5*w", symbols={"x": names}, prior={"mean": [0] * n, "variance": np.eye(n)})
 
 
 def turn() -> Model:
@@ -52,33 +80,46 @@ def seconds(work: Callable[[Filter, np.ndarray], object], one: Filter, y: np.nda
     return time.process_time() - start
 
 
-def line(name: str, one: Filter, y: np.ndarray, repeats: int) -> str:
+def ratios(one: Filter, y: np.ndarray, repeats: int) -> str:
+    """Microseconds of the filter for a step of a run; what smoother and likelihood cost beside it."""
     times = np.array([[seconds(work, one, y) for work in (run, smooth, likelihood)] for _ in range(repeats + 1)])[1:]
     own, back, told = times.min(axis=0)
-    return f"{name:32} {1e6 * own / np.prod(y.shape[:2]):12.2f} {back / own:10.2f} {told / own:12.2f}"
+    return f"{1e6 * own / np.prod(y.shape[:2]):8.3f} {back / own:5.2f} {told / own:5.2f}"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--repeats", type=int, default=9)
-    repeats = parser.parse_args().repeats
+    parser.add_argument("--states", type=int, nargs="*", default=[1, 2, 3, 4, 6])
+    parser.add_argument("--runs", type=int, nargs="*", default=[1, 200, 5000, 50_000])
+    given = parser.parse_args()
+    print(f"{'':18}" + "".join(f"{runs:>17} runs" for runs in given.runs) + "   us, smoother, likelihood")
+    for kind, build in KINDS.items():
+        for n in given.states:
+            one = aof(build(chain(n, kind != "linear")))
+            cells = [
+                "" if kind == "gauss-hermite" and runs * 3**n * n > ROOM else ratios(one, y, given.repeats)
+                for runs in given.runs
+                for y in [simulate(one.model, runs, STEPS.get(runs, 6), seed=1).y]
+            ]
+            print(f"{kind:14} {n:2} " + "".join(f"{cell:>22}" for cell in cells), flush=True)
     lab, swing, record = find_variant("53").model, pendulum(), pendulum_data()[1]
-    many, hundreds = simulate(lab, 20_000, 31, seed=1).y, np.repeat(record[:60], 500, axis=1)
-    builds = {"linearised": linearised, "gaussian": gaussian, "unscented": unscented}
-    print(f"{'':32} {'us/step':>12} {'smoother':>10} {'likelihood':>12}")
-    for kind, build in builds.items():
-        print(line(f"53, {kind}, 2,000 runs", aof(build(lab)), many[:, :2000], repeats))
-        print(line(f"53, {kind}, 20,000 runs", aof(build(lab)), many, repeats))
-    for kind, build in builds.items():
-        print(line(f"pendulum, {kind}, 1 run", aof(build(swing)), record, repeats))
-        print(line(f"pendulum, {kind}, 500 runs", aof(build(swing)), hundreds, repeats))
-    three = Model.define(["x1 + 0.2*x2 + 0.02*x3", "x2 + 0.2*x3", "0.9*x3 + 0.3*v"], ["x1 + 0.5*w"])
-    for name, model in {"three states": three, "turn": turn(), "radar D3": find_variant("D3").model}.items():
-        seen = simulate(model, 5000, 21, seed=1).y
-        for runs in (1, 500, 5000):
-            print(line(f"{name}, linearised, {runs}", aof(linearised(model)), seen[:, :runs], repeats))
-    print(line("53, exact, 200 runs", pointmass(lab), many[:, :200], 3))
-    print(line("53, 500 particles, 20 runs", particle(lab, 500), many[:8, :20], 3))
+    many = simulate(lab, 20_000, 31, seed=1).y
+    others = {
+        "53, linearised, 2,000 runs": (aof(linearised(lab)), many[:, :2000]),
+        "53, gaussian, 20,000 runs": (aof(gaussian(lab)), many),
+        "pendulum, unscented, 1 run": (aof(unscented(swing)), record),
+        "pendulum, gaussian, 500 runs": (aof(gaussian(swing)), np.repeat(record[:60], 500, axis=1)),
+        "turn, linearised, 5,000 runs": (aof(linearised(turn())), simulate(turn(), 5000, 21, seed=1).y),
+        "radar D3, linearised, 500 runs": (
+            aof(linearised(radar := find_variant("D3").model)),
+            simulate(radar, 500, 21, seed=1).y,
+        ),
+        "53, exact, 200 runs": (pointmass(lab), many[:, :200]),
+        "53, 500 particles, 20 runs": (particle(lab, 500), many[:8, :20]),
+    }
+    for name, (one, y) in others.items():
+        print(f"{name:32} {ratios(one, y, min(given.repeats, 4) if one.slow else given.repeats)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -112,6 +112,16 @@ def transpose(matrix: Matrices) -> Matrices:
     return matrix if matrix.shape[-2:] == (1, 1) else np.ascontiguousarray(matrix.swapaxes(-1, -2))
 
 
+def runs_last(matrices: Matrices) -> Array:
+    """A copy (r, c, ...) of (..., r, c): of many small matrices each entry is then a row of numbers, which makes sums fast."""
+    return np.moveaxis(matrices, (-2, -1), (0, 1)).copy()
+
+
+def runs_first(matrices: Array) -> Matrices:
+    """(r, c, ...) -> (..., r, c): a view."""
+    return np.moveaxis(matrices, (0, 1), (-2, -1))
+
+
 def symmetric(matrix: Matrices) -> Matrices:
     """(P + P^T) / 2: rounding must not make a covariance asymmetric."""
     return matrix if matrix.shape[-1] == 1 else 0.5 * (matrix + transpose(matrix))
@@ -146,7 +156,7 @@ def gain(cross: Matrices, cov: Matrices, broken: bool = False) -> Matrices:
             _refuse_negative(cov, 0.0)
         zero = np.zeros(np.broadcast_shapes(cross.shape, cov.shape), dtype=np.result_type(cross, cov))
         return np.divide(cross, cov, out=zero, where=cov != 0)
-    singular = SINGULAR * np.sqrt(np.finfo(cov.dtype).eps)
+    singular = rounding(cov.dtype)
     if cov.shape[-1] == 2:  # as below, without the calls that a small matrix is not worth
         first, second, both = cov[..., 0, 0], cov[..., 1, 1], cov[..., 0, 1]
         product_of_both = first * second
@@ -157,9 +167,10 @@ def gain(cross: Matrices, cov: Matrices, broken: bool = False) -> Matrices:
             left, right = cross[..., 0], cross[..., 1]
             return np.stack([left * second - right * both, right * first - left * both], axis=-1) / determinant[..., None]
     if cov[..., 0, 0].size >= MANY:
-        solved = _by_components(cross, cov, singular**2)
-        if solved is not None:
-            return solved
+        every = np.broadcast_to(cross, (*np.broadcast_shapes(cross.shape[:-2], cov.shape[:-2]), *cross.shape[-2:]))
+        solved = runs_last(every.swapaxes(-1, -2))
+        if solve_by_entries(solved, runs_last(cov)):
+            return np.ascontiguousarray(runs_first(solved.swapaxes(0, 1)))
     # Scaling to correlations first: components may differ by orders of magnitude in size.
     variance = np.diagonal(cov, axis1=-2, axis2=-1)
     scale = np.sqrt(np.abs(variance))
@@ -183,35 +194,34 @@ SINGULAR = 7.0
 MANY = 512  # matrices, from which on a call for each of their components costs less than LAPACK's for each matrix
 
 
-def _by_components(cross: Matrices, cov: Matrices, least: float) -> Matrices | None:
-    """cross cov^-1 by Cholesky's root, component by component of all matrices at once; in place, as room costs more than sums.
+def solve_by_entries(right: Array, cov: Array) -> bool:
+    """The solution X of cov X = right takes the place of `right`, (n, m, ...), and Cholesky's root that of cov, (n, n, ...).
 
-    None if somewhere a pivot is not above this part of its variance: what of a component the others do not tell.
+    Entry by entry of all matrices at once, and in place, as room costs more than sums.  False if somewhere a pivot is only
+    rounding: what of a component the others do not tell, as a part of its variance.
     """
-    n, lead = cov.shape[-1], np.broadcast_shapes(cross.shape[:-2], cov.shape[:-2])
-    root = np.moveaxis(cov, (-2, -1), (0, 1)).copy()
+    n, least = len(cov), rounding(cov.dtype) ** 2
     for j in range(n):
-        for k in range(j):
-            _subtract(root[j, k], root[j, :k], root[k, :k])
-            root[j, k] /= root[k, k]
-        _subtract(root[j, j], root[j, :j], root[j, :j])
-        if not np.minimum.reduce(root[j, j] - least * cov[..., j, j], axis=None) > 0:
-            return None
-        np.sqrt(root[j, j], out=root[j, j, ...])
-    x = np.moveaxis(np.broadcast_to(cross, (*lead, *cross.shape[-2:])), (-1, -2), (0, 1)).copy()
-    for j in range(n):  # L (L^T x) = cross^T
-        _subtract(x[j], root[j, :j], x[:j])
-        x[j] /= root[j, j]
+        needed = least * cov[j, j]
+        if j:
+            cov[j:, j] -= np.einsum("ik...,k...->i...", cov[j:, :j], cov[j, :j])
+        if not np.minimum.reduce(cov[j, j] - needed, axis=None) > 0:
+            return False
+        cov[j:, j] /= np.sqrt(cov[j, j])
+    for j in range(n):  # L (L^T X) = right
+        if j:
+            right[j] -= np.einsum("k...,km...->m...", cov[j, :j], right[:j])
+        right[j] /= cov[j, j]
     for j in reversed(range(n)):
-        _subtract(x[j], root[j + 1 :, j], x[j + 1 :])
-        x[j] /= root[j, j]
-    return np.ascontiguousarray(np.moveaxis(x, (0, 1), (-1, -2)))
+        if j < n - 1:
+            right[j] -= np.einsum("k...,km...->m...", cov[j + 1 :, j], right[j + 1 :])
+        right[j] /= cov[j, j]
+    return True
 
 
-def _subtract(value: Array, left: Array, right: Array) -> None:
-    """value -= sum_i left_i right_i."""
-    for one, other in zip(left, right, strict=True):
-        value -= one * other
+def rounding(dtype: np.dtype[Any]) -> float:
+    """A Cholesky pivot of a correlation matrix below this, 1e-7 in float64, is rounding."""
+    return SINGULAR * float(np.sqrt(np.finfo(dtype).eps))
 
 
 def _refuse_negative(variance: Array, rounding: float) -> None:

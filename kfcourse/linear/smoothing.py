@@ -14,13 +14,26 @@ state it is p Q / Psi + S^2 p', of more L (I - S A)^T + S (Q + p') S^T with L = 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from kfcourse.angles import Components, difference, on_circle
-from kfcourse.laws import Array, Gaussian, apply, gain, product, regression, stacked, symmetric, transpose
+from kfcourse.laws import (
+    Array,
+    Gaussian,
+    apply,
+    gain,
+    product,
+    regression,
+    runs_first,
+    runs_last,
+    solve_by_entries,
+    stacked,
+    transpose,
+)
 from kfcourse.linear.runs import Run
 from kfcourse.linear.system import LinearSystem
 
@@ -45,6 +58,54 @@ class Passages(NamedTuple):
     Q: Array
 
 
+class Layout(NamedTuple):
+    """How many small matrices lie in memory, and what is done with them there; the formulas below are the same in each.
+
+    A library's product costs as much for two rows as for eight.  Where each entry of all matrices is a row of numbers it costs as
+    many sums as it has: a sixth for two states, the same for five.
+    """
+
+    put: Callable[[Array], Array]  # (..., n, n) -> there
+    back: Callable[[Array], Array]
+    steps: Callable[[Array], Array]  # the axis of steps, first of (steps, runs, n, n), to the front
+    product: Callable[[Array, Array], Array]
+    transpose: Callable[[Array], Array]
+    apply: Callable[[Array, Array], Array]  # to vectors (..., n)
+    gain: Callable[[Array, Array], Array]  # of cross^T and cov
+
+
+def _gain_by_entries(backwards: Array, cov: Array) -> Array:
+    found = np.broadcast_to(backwards, np.broadcast_shapes(backwards.shape, cov.shape)).copy()
+    if solve_by_entries(found, cov.copy()):
+        return found.swapaxes(0, 1)
+    return runs_last(gain(runs_first(backwards.swapaxes(0, 1)), runs_first(cov), broken=True))
+
+
+BY_MATRIX = Layout(
+    lambda matrices: matrices,
+    lambda matrices: matrices,
+    lambda matrices: matrices,
+    product,
+    transpose,
+    apply,
+    lambda backwards, cov: gain(backwards.swapaxes(-1, -2), cov, broken=True),
+)
+BY_ENTRY = Layout(
+    runs_last,
+    runs_first,
+    lambda matrices: np.moveaxis(matrices, 2, 0),
+    partial(np.einsum, "ij...,jk...->ik..."),
+    lambda matrices: matrices.swapaxes(0, 1),
+    partial(np.einsum, "ij...,...j->...i"),
+    _gain_by_entries,
+)
+
+
+def layout_of(n: int) -> Layout:
+    """The one in which matrices (n, n) cost least."""
+    return BY_ENTRY if 2 <= n <= 4 else BY_MATRIX
+
+
 class Regression(NamedTuple):
     """What a filter knew of x_k, and how it changes with what becomes known of x_{k+1}.
 
@@ -52,9 +113,9 @@ class Regression(NamedTuple):
     ----------
     z, expected : ndarray (runs, n)
         Its estimate, and lambda, the prediction of x_{k+1}.
-    S, left : ndarray (..., n, n)
-        Its gain, and Cov(x_k | x_{k+1}).
-    Q, forth : ndarray (..., n, n), or None of one state
+    S, left : ndarray
+        Its gain, and Cov(x_k | x_{k+1}): matrices (n, n) in their `Layout`, as those below.
+    Q, forth : ndarray, or None of one state
         The noise, and left A^T, which is S Q but for rounding.
     """
 
@@ -66,11 +127,18 @@ class Regression(NamedTuple):
     forth: Array | None = None
 
     def given(self, after: Gaussian, angles: Components = ()) -> Gaussian:
-        """The law of x_k, from that of x_{k+1}."""
-        mean = self.z + apply(self.S, difference(after.mean, self.expected, angles))
-        further = product(self.S, after.cov if self.Q is None else self.Q + after.cov)
-        further = further if self.forth is None else further - self.forth
-        return Gaussian(on_circle(mean, angles), symmetric(self.left + product(further, transpose(self.S))))
+        """The law of x_k, from that of x_{k+1}; its covariance in the same layout."""
+        lies = layout_of(self.z.shape[-1])
+        mean = self.z + lies.apply(self.S, difference(after.mean, self.expected, angles))
+        further = lies.product(self.S, after.cov if self.Q is None else self.Q + after.cov)
+        if self.forth is not None:
+            further -= self.forth
+        further = lies.product(further, lies.transpose(self.S))
+        further += self.left
+        if self.forth is not None:  # rounding must not make it asymmetric
+            further += lies.transpose(further)
+            further *= 0.5
+        return Gaussian(on_circle(mean, angles), further)
 
 
 def regressions(passages: Passages) -> list[Regression]:
@@ -78,11 +146,14 @@ def regressions(passages: Passages) -> list[Regression]:
     (z, p), (lam, Psi), A, Q = passages
     if z.shape[-1] == 1:
         return list(map(Regression, z, lam, *regression(p, A, Psi, Q)))
-    Ap = product(A, p)
-    S = gain(Ap.swapaxes(-1, -2), Psi, broken=True)
-    left = p - product(S, Ap)
-    noise = Q if Q.ndim == p.ndim else np.broadcast_to(Q, (len(z), *Q.shape))
-    return list(map(Regression, z, lam, S, left, noise, product(left, transpose(A))))
+    lies = layout_of(z.shape[-1])
+    p, Psi, A, Q = (lies.put(part if part.ndim == 4 else part[None, None]) for part in (p, Psi, A, Q))
+    Ap = lies.product(A, p)
+    S = lies.gain(Ap, Psi)
+    left = lies.product(S, Ap)
+    np.subtract(p, left, out=left)
+    forth = lies.product(left, lies.transpose(A))
+    return list(map(Regression, z, lam, *(lies.steps(part) for part in (S, left, np.broadcast_to(Q, forth.shape), forth))))
 
 
 def blocks(steps: int, runs: int) -> list[slice]:
@@ -116,14 +187,16 @@ def look_back(back: list[Regression], laws: Sequence[Gaussian], lag: int | None 
         A lag that is no whole number, or below 0.
     """
     check_lag(lag)
+    lies = layout_of(laws[-1].mean.shape[-1])
+    known = laws[-1:] if lag is None else laws
+    laws = [Gaussian(mean, lies.put(cov if cov.ndim == 3 else cov[None])) for mean, cov in known]
     if lag is None:
-        found = [laws[-1]]
         while back:
-            found.append(back.pop().given(found[-1], angles))
-        return stacked(found[::-1])
-    for _ in range(min(lag, len(back))):  # each round tells every state of one measurement more
+            laws.append(back.pop().given(laws[-1], angles))
+        laws.reverse()
+    for _ in range(min(lag or 0, len(back))):  # each round tells every state of one measurement more
         laws = [*(one.given(after, angles) for one, after in zip(back, laws[1:], strict=True)), laws[-1]]
-    return stacked(laws)
+    return stacked([Gaussian(mean, lies.back(cov)) for mean, cov in laws])
 
 
 def check_lag(lag: int | None) -> None:

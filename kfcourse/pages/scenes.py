@@ -22,11 +22,12 @@ from kfcourse.linear.consistency import autocorrelation, chi_squared_bounds, inn
 from kfcourse.montecarlo.experiment import predictions
 from kfcourse.pages.browser import model_source
 from kfcourse.pages.explore import columns, drawn, line_style, rounded, value
+from kfcourse.records.examination import normal_bound
 from kfcourse.symbolic import javascript
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import linearised
 
-Z_95 = 1.96  # of the standard normal law
+Z_95 = normal_bound()
 FAULTS = {  # multiples of Q and R that a wrong filter has
     "Q is too small": (0.1, 1.0),
     "Q is too large": (10.0, 1.0),

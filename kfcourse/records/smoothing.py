@@ -73,9 +73,25 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     >>> [round(z, 3) for z in smooth(aof(linearised(walk)), np.array([1.0, 2.0, np.nan, 4.0])).mean.ravel().tolist()]
     [0.944, 1.833, 2.556, 3.278]
     """
-    if one.look_back is None:
-        return normal_laws(one, islice(walk(one, y), 1, None), lag)
-    return stacked([state.posterior for state in _looked_back(one, y, lag)])
+    if one.look_back is not None:
+        return stacked([state.posterior for state in _looked_back(one, y, lag)])
+    if np.ndim(y) != 3 or np.shape(y)[1] <= MANY_RUNS:
+        return _normal_laws(one, y, lag)
+    first = _normal_laws(one, y[:, :MANY_RUNS], lag)
+    if first.cov.strides[1] == 0:  # the same for all: stored once
+        return _normal_laws(one, y, lag)
+    mean, cov = (np.empty((*np.shape(y)[:2], *part.shape[2:])) for part in first)
+    for start in range(0, np.shape(y)[1], MANY_RUNS):
+        some = np.s_[:, start : start + MANY_RUNS]
+        mean[some], cov[some] = _normal_laws(one, y[some], lag) if start else first
+    return Gaussian(mean, cov)
+
+
+MANY_RUNS = 5000  # whose record is looked back to together: what is kept of the steps meanwhile stays near the processor
+
+
+def _normal_laws(one: Filter, y: Array, lag: int | None) -> Gaussian:
+    return normal_laws(one, islice(walk(one, y), 1, None), lag)
 
 
 def smoothing_error(one: Filter, y: Array, lag: int | None = None) -> Array:

@@ -295,7 +295,16 @@ def _assemble(
     shapes = ", ".join(f"{a}.shape[:{-1 if a in vectors else -2}]" for a in arguments)
     size = f"({rows},)" if is_vector else f"({rows}, {columns})"
     lines = [f"    {output} = np.empty(np.broadcast_shapes({shapes}) + {size})"]
+    numbers = [entry.is_number for entry in entries]
+    if 2 * sum(numbers) > len(numbers):  # one pass for all of them
+        flat = [str(printer.doprint(entry if number else sp.S.Zero)) for entry, number in zip(entries, numbers, strict=True)]
+        rest = ["[" + ", ".join(flat[i : i + columns]) + "]" for i in range(0, len(flat), columns)]
+        lines.append(f"    {output}[...] = [{', '.join(flat if is_vector else rest)}]")
+    else:
+        numbers = [False] * len(numbers)
     for index, entry in enumerate(entries):
+        if numbers[index]:
+            continue
         row, column = divmod(index, columns)
         where = f"{row}" if is_vector else f"{row}, {column}"
         lines.append(f"    {output}[..., {where}] = {printer.doprint(entry)}")

@@ -28,7 +28,7 @@ def kalman(Q, R, **of):
     lam, Psi, y = of["lambda"], of["Psi"], of["y"]
     p = 1 / (1 / Psi + 1 / R)
     z = p * (lam / Psi + y / R)
-    return {"z": z, "half": 1.96 * np.sqrt(p), "lambda": 0.9 * z, "Psi": 0.81 * p + Q}
+    return {"z": z, "half": norm.ppf(0.975) * np.sqrt(p), "lambda": 0.9 * z, "Psi": 0.81 * p + Q}
 
 
 PRINTED = [
@@ -90,7 +90,7 @@ def estimates(y1: float, Q: float, R: float) -> tuple[float, float]:
     y = RECORD[1].copy()
     y[1] = y1
     law = run(kalman_filter(model), y[:, None, None])
-    return law.mean[1, 0, 0], 1.96 * law.cov[1, 0, 0, 0] ** 0.5
+    return law.mean[1, 0, 0], norm.ppf(0.975) * law.cov[1, 0, 0, 0] ** 0.5
 
 
 def test_one_measurement_moves_the_estimate_and_not_the_band(opened):

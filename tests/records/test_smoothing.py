@@ -100,6 +100,50 @@ def test_with_a_lag_it_knows_so_many_measurements_more(changing, record, lag):
     same(found, run(one, y) if lag == 0 else expected if lag >= STEPS - 1 else found)
 
 
+def dense(n, lag=None):
+    """A linear chain of n states with gaps, what its smoother finds, and what one dense regression does."""
+    A = np.eye(n) + np.diag(np.full(n - 1, 0.3), 1) - 0.1 * np.eye(n)[::-1]
+    Q, H, R = 0.2 * np.eye(n) + 0.1, np.eye(min(n, 2), n), np.diag(np.arange(1.0, 1 + min(n, 2)))
+    names = [f"x{i + 1}" for i in range(n)]
+    motion = [" + ".join(f"({float(A[i, j])!r})*{names[j]}" for j in range(n)) + f" + v{i + 1}" for i in range(n)]
+    model = Model.define(
+        motion,
+        [f"x{i + 1} + w{i + 1}" for i in range(min(n, 2))],
+        symbols={"x": names, "v": [f"v{i + 1}" for i in range(n)], "w": [f"w{i + 1}" for i in range(min(n, 2))]},
+        prior={"mean": np.zeros(n), "variance": np.eye(n)},
+        state_noise={"variance": Q},
+        meter_noise={"variance": R},
+    )
+    y = simulate(model, 5, 6, seed=3).y
+    y[2, 1] = y[4, 3] = y[0, 0] = np.nan
+    steps, prior = [(A, np.zeros(n), Q, H, np.zeros(len(H)), R)] * 6, (np.zeros(n), np.eye(n))
+    mean, cov = np.empty((6, 5, n)), np.empty((6, 5, n, n))
+    for k in range(6):
+        known = y.copy()
+        known[k + 1 + (6 if lag is None else lag) :] = np.nan  # an independent way to say the lag
+        for i in range(5):
+            one = oracles.joint_posterior(steps, prior, known[:, i])
+            mean[k, i], cov[k, i] = one[0][k], one[1][k]
+    return model, y, Gaussian(mean, cov)
+
+
+@pytest.mark.parametrize("lag", [None, 0, 2])
+@pytest.mark.parametrize("n", [1, 3, 5])  # small matrices lie in memory in two ways, and a scalar has no products
+def test_of_any_number_of_states_it_is_the_regression_on_what_it_knows(n, lag):
+    model, y, expected = dense(n, lag)
+    same(smooth(aof(linearised(model)), y, lag), expected)
+    many = smooth(aof(linearised(model)), np.tile(y, (1, 400, 1)), lag)  # solved entry by entry
+    same(Gaussian(many.mean[:, -5:], many.cov[:, -5:]), expected)
+
+
+def test_a_great_many_runs_are_looked_back_to_some_after_the_others(monkeypatch):
+    model, y, expected = dense(3)
+    monkeypatch.setattr("kfcourse.records.smoothing.MANY_RUNS", 2)
+    same(smooth(aof(linearised(model)), y), expected)
+    whole = smooth(kalman_filter(model), np.nan_to_num(y))
+    assert whole.cov.strides[1] == 0  # without gaps all have the same, stored once
+
+
 def test_given_matrices_are_smoothed_as_the_model_they_come_from():
     A, _, Q, H, b, R = matrices(2)
     system, rng = LinearSystem(A, H, Q, R, np.eye(2)), np.random.default_rng(5)
