@@ -348,7 +348,15 @@ def estimate(
     """Estimate the states from your own measurements, FILE (CSV): forward, looking back, and judged.
 
     A row is a step; its cells are found by the names in the first line: y (or y1, y2, ...), time, and the inputs.  An empty cell
-    is a missing measurement.  The model may use dt, the interval to the next row, with inputs = { dt = [1] }.
+    is a missing measurement.  The model may use dt, the interval to the next row, with inputs = { dt = [1] }, as in this file:
+
+    \b
+    [variants.walk]
+    state = "x + sqrt(q*dt)*v"
+    meter = "x + sqrt(r)*w"
+    parameters = { q = 0.1, r = 3.0 }
+    inputs = { dt = [1] }
+    prior = { mean = 0, variance = 100 }
     """
     variant = model_of(model_file, name)
     folder = out or Path("estimate-" + re.sub(r"[^\w.-]+", "-", file.stem))

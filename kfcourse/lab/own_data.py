@@ -24,6 +24,7 @@ from kfcourse.lab.variants import Variant, VariantError, find_variant, read_vari
 from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.consistency import Autocorrelation, Innovations, autocorrelation
 from kfcourse.records.estimation import Likeliest, estimate
+from kfcourse.records.evidence import NoDensity
 from kfcourse.records.examination import Examination, Finding, examine, findings, normal_bound
 from kfcourse.records.reading import Record, RecordError, read_measurements
 from kfcourse.symbolic.model import Model
@@ -149,10 +150,17 @@ def estimate_record(
         return one if gate is None else gated(one, gate)
 
     build(record.model)  # what cannot be had is said before the long part
-    likeliest = estimate(record.model, record.y, unknown, positive, build) if unknown else None
-    if likeliest:
-        record = record._replace(model=likeliest.model)
-    examined = examine(build(record.model), record.y, 1.0 if gate is None else gate)
+    try:
+        likeliest = estimate(record.model, record.y, unknown, positive, build) if unknown else None
+        if likeliest:
+            record = record._replace(model=likeliest.model)
+        examined = examine(build(record.model), record.y, 1.0 if gate is None else gate)
+    except NoDensity as error:
+        raise RecordError(
+            f"{path}: row {error.step + 1}, time {record.times[error.step]:g}, cannot be judged: what the filter expects there "
+            "has a covariance that is singular or not finite; look at the measurements up to it (--gate refuses those out of all "
+            "bounds) and at the formulas, and give every component of the meter a noise"
+        ) from None
     for law in (examined.estimate, examined.smoothed):
         bad = ~(np.isfinite(law.mean).all(axis=(1, 2)) & np.isfinite(law.cov).all(axis=(1, 2, 3)))
         if bad.any():

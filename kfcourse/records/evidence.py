@@ -21,6 +21,17 @@ from kfcourse.laws import Array, log_density
 from kfcourse.montecarlo.experiment import walk
 
 
+class NoDensity(ValueError):
+    """A filter has no density for the measurement of a `step`: its covariance is singular, or no finite number."""
+
+    def __init__(self, name: str, step: int, run: int) -> None:
+        super().__init__(
+            f"{name} has no density for the measurement of step {step}, run {run}: the covariance expected of it is singular, "
+            "or the filter left the finite numbers; give every component of the meter a noise, and look at run(one, y) before it"
+        )
+        self.step = step
+
+
 def likelihood(one: Filter, y: Array) -> Array:
     """The logarithm of each measurement's density, given all before it: ln p(y_k | y_0, ..., y_{k-1}).
 
@@ -42,7 +53,8 @@ def likelihood(one: Filter, y: Array) -> Array:
     Raises
     ------
     ValueError
-        A filter that has no density of measurements, a measurement claimed to be known before it comes, or another shape of y.
+        A filter that has no density of measurements (`NoDensity`: of one of them), a measurement claimed to be known before it
+        comes, or another shape of y.
 
     Examples
     --------
@@ -55,11 +67,7 @@ def likelihood(one: Filter, y: Array) -> Array:
     evidence = one.evidence or _normal(one)
     found = np.stack([evidence(before, now, after) for before, now, after in _passages(one, y)])
     if not np.isfinite(found).all():
-        k, run = np.argwhere(~np.isfinite(found))[0]
-        raise ValueError(
-            f"{one.name} has no density for the measurement of step {k}, run {run}: the covariance expected of it is singular, "
-            "or the filter left the finite numbers; give every component of the meter a noise, and look at run(one, y) before it"
-        )
+        raise NoDensity(one.name, *np.argwhere(~np.isfinite(found))[0])
     return found
 
 

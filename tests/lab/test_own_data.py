@@ -134,6 +134,13 @@ def test_the_command_writes_numbers_and_a_report(call, place):
         assert sentence.split(":")[0] in html
 
 
+def test_the_model_in_the_help_can_be_copied(call, place):
+    model = re.search(r"(\[variants.*?)\n\nOptions:", call("--help").output, re.DOTALL)[1]
+    (place / "copied.toml").write_text(model)
+    result = call("line.csv", "--model", "copied.toml", "--unknown", "q,r", "--positive", "q,r")
+    assert result.exit_code == 0 and "Report: estimate-line/report.html" in result.output
+
+
 def test_unknown_parameters_are_found_first(call, place):
     times, _, y = practitioner_s_track(4)
     written(place / "line.csv", times, y[:, :1])
@@ -173,6 +180,7 @@ def test_every_filter_of_the_option(place, structure):
         (["line.csv", "--model", "my.toml", "--variant", "line", "--column", "y"], 2, ["--column"]),
         (["line.csv", "--model", "my.toml", "--variant", "line", "--track", "x,q"], 2, ["there are x"]),
         (["bad.csv", "--model", "my.toml", "--variant", "line"], 1, ["bad.csv, line 3, column y"]),
+        (["wild.csv", "--model", "my.toml", "--variant", "line"], 1, ["wild.csv: row 2, time 1, cannot be judged", "--gate"]),
         (
             ["negative.csv", "--model", "my.toml", "--variant", "root"],
             1,
@@ -184,6 +192,7 @@ def test_every_filter_of_the_option(place, structure):
 )
 def test_what_cannot_be_done_is_said_and_nothing_is_written(call, place, arguments, code, words):
     (place / "bad.csv").write_text("time,y\n0,1\n1,one\n")
+    (place / "wild.csv").write_text("time,y\n0,1\n1,1e300\n2,1\n")
     (place / "negative.csv").write_text("time,y,u\n0,1,1\n1,1,-1\n2,1,1\n")
     before = sorted(place.iterdir())
     result = call(*arguments)
