@@ -264,7 +264,7 @@ def test_one_trajectory_gives_the_same_numbers_as_many(variants):
 
 
 def test_a_vector_model_is_refused_with_advice(variants):
-    with pytest.raises(ModelError, match=r"scalar.*2 states.*particle"):
+    with pytest.raises(ModelError, match=r"scalar.*dimension 2.*particle"):
         pointmass(variants["20"])
     assert not has_exact(variants["20"])
     two = Model.define(["x"], ["x + w1", "x + w2"])
