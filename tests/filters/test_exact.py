@@ -268,7 +268,7 @@ def test_a_vector_model_is_refused_with_advice(variants):
         pointmass(variants["20"])
     assert not has_exact(variants["20"])
     two = Model.define(["x"], ["x + w1", "x + w2"])
-    with pytest.raises(ModelError, match="2 measurements"):
+    with pytest.raises(ModelError, match="state has dimension 1, the measurement 2: use particle"):
         pointmass(two)
 
 

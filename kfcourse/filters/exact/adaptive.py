@@ -61,7 +61,7 @@ def check_scalar(model: Model) -> None:
     """ModelError unless the model has one state and one measurement."""
     if model.n != 1 or model.p != 1:
         raise ModelError(
-            f"the point-mass filter is for scalar models; here the state has the dimension {model.n}, the measurement {model.p}: "
+            f"the point-mass filter is for scalar models; here the state has dimension {model.n}, the measurement {model.p}: "
             "use particle(model)"
         )
 
