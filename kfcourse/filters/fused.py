@@ -77,7 +77,7 @@ def _or_warning(one: Filter | Design, compile: Callable[[], T]) -> T | None:
         return None
 
 
-class _Program(NamedTuple):
+class Loops(NamedTuple):
     """The loops of a filter: several steps with their sums; and the moments of target and regressor of each regression."""
 
     parameters: list[float]
@@ -145,14 +145,15 @@ class Steps:
 
     Attributes
     ----------
-    program : _Program
+    program : Loops
+        Printed from the equations of the filter.
     otherwise : Advance
         The step where a measurement is missing, or coefficients are.
     fits : sequence, optional
         Of a designed filter: the coefficients of every step.
     """
 
-    program: _Program
+    program: Loops
     otherwise: Advance
     fits: Sequence[Sequence[Affine]] | None = None
 
@@ -167,7 +168,7 @@ class Steps:
         return self.program.one(state, y, *self._known(state.step, 1), room=len(y))
 
     def several(self, state: State, y: Array, *record: Any) -> State:
-        """`_Program.several`."""
+        """`Loops.several`, with the constants and coefficients of these steps."""
         return self.program.several(state, y, *self._known(state.step, len(y)), *record)
 
     def _known(self, step: int, steps: int) -> tuple[Array, Sequence[Affine]]:
@@ -183,10 +184,10 @@ def _law(predicted: Gaussian) -> tuple[Array, Array]:
     return mean, Psi if len(Psi) == len(mean) else np.full(len(mean), Psi.item())
 
 
-_PRINTED: dict[tuple[object, ...], _Program] = {}  # by all that they are printed from
+_PRINTED: dict[tuple[object, ...], Loops] = {}  # by all that they are printed from
 
 
-def _program(one: Filter | Design, printed: Equalities) -> _Program:
+def _program(one: Filter | Design, printed: Equalities) -> Loops:
     """The loops of a filter, with its parameters."""
     model, formulas = one.model, one.structure.formulas.functions.values() if one.structure and one.structure.formulas else ()
     means = (tuple(law.mean) for law in (model.state_noise, model.meter_noise))
@@ -196,7 +197,7 @@ def _program(one: Filter | Design, printed: Equalities) -> _Program:
     return _PRINTED[key]._replace(parameters=[float(value) for value in model.values.values()])
 
 
-def _printed(one: Filter | Design, printed: Equalities) -> _Program:
+def _printed(one: Filter | Design, printed: Equalities) -> Loops:
     """Print, compile and load all loops of a filter."""
     from kfcourse.filters import loops
 
@@ -217,7 +218,7 @@ def _printed(one: Filter | Design, printed: Equalities) -> _Program:
         add(f"pair{i}", {**known, "x": _X, "x_next": _NEXT}, [fit.target, fit.regressor], constants)
         texts.append(loops.moments(i, len(constants)))
     module = compiled.load(*texts)
-    return _Program([], module.advance, [getattr(module, f"moments{i}") for i in range(len(fits))], _P not in letters)
+    return Loops([], module.advance, [getattr(module, f"moments{i}") for i in range(len(fits))], _P not in letters)
 
 
 def _rules(one: Filter | Design, printed: Equalities) -> list[Rule]:
