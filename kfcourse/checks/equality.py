@@ -20,6 +20,7 @@ from kfcourse.symbolic.formula import symbol
 DIGITS = 60  # of the values of formulas
 AGREE = sp.Float(10) ** -30  # relative difference of equal formulas: half of the digits may be lost by cancellation
 FLOAT_DIGITS = 10, 15  # of a decimal: as many are not typed but computed; 1/3 and 2*np.pi have some 15 in Python
+DOUBLE_BITS = 1100  # of numerator and denominator at most: 2**1024 and 10**324 are the ends of double precision
 FLOATS_AGREE = sp.Float(10) ** -12  # of formulas with such numbers: 15 digits, of which terms that cancel may take three
 POINTS = 6
 ROUNDED = 1e-9  # relative size of an imaginary part that rounding explains
@@ -228,6 +229,8 @@ def _has_floats(formula: sp.Expr) -> bool:
     least, most = FLOAT_DIGITS
     with localcontext(prec=most) as context:
         for one in formula.atoms(sp.Rational):
+            if max(abs(one.p), one.q).bit_length() > DOUBLE_BITS:  # a power of powers: as a decimal it takes minutes
+                continue
             context.clear_flags()
             decimal = (Decimal(one.p) / Decimal(one.q)).normalize()
             if not context.flags[Inexact] and len(decimal.as_tuple().digits) >= least:
