@@ -24,6 +24,7 @@ OF_ROWS = "The weights sum to one over the modes that are entered; they say wher
 JOINT = "These weights are joint probabilities: given the mode that is entered, they have to sum to one."
 OTHER_AXIS = "A vector acts along the wrong axis: the mode that is left is the row, and the mode that is entered the column."
 NOT_MIXED = "Each mode goes on with its own law: which modes may it have come from?"
+FIRST_AGAIN = "The second step begins with the first law of the modes again: what has the first measurement told?"
 CHAIN_FORGOTTEN = "The mode may have changed between the steps: the transition is missing."
 
 # -- o1: the chain
@@ -203,12 +204,12 @@ WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "first-law-again",
-        "The second step begins with the first law of the modes again: what has the first measurement told?",
+        FIRST_AGAIN,
         first_forgotten,
     ),
     (
         "first-law-again",
-        "The second step begins with the first law of the modes again: what has the first measurement told?",
+        FIRST_AGAIN,
         first_mixed,
     ),
     (

@@ -46,7 +46,7 @@ def test_the_first_result_without_a_hint_is_where_to_start():
     """A hint of a later result may tell what follows from the first; a mistake that is known by name may explain both."""
     question = asks(lambda a, b: (a + b, a * b), [(2.5, 1.5), (0.5, 3.0)], (), ("sum", "product"))
     message = outcome(question, lambda a, b: (np.cos(a) * b + 1, 3 * a * b)).message
-    assert "sum is wrong too: start there. product: It is right but for a factor" in message and "your sum is" in message
+    assert "sum is wrong too: start there. product: It is right but for a factor" in message and "your result sum is" in message
     known = asks(
         lambda a, b: (a + b, a * b),
         [(2.5, 1.5), (0.5, 3.0)],
