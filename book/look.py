@@ -62,6 +62,8 @@ class Translator(HTML5Translator):
         if isinstance(node, nodes.math_block):  # takes the focus and has a name: page.js gives both to the box that MathJax makes
             name = f"Formula {get_node_equation_number(self, node)}" if node["number"] else "Formula"
             attributes |= {"tabindex": "0", "role": "group", "aria-label": name}
+        elif tagname == "table" and "kf-formulas" in node["classes"]:  # so does one of formulas, which may be wider, too
+            attributes |= {"tabindex": "0", "aria-label": "Equations"}
         elif isinstance(node, nodes.math) and tagname == "span":
             attributes["style"] = f"--wide: {formulas.width(node.astext()):.1f}em"
         elif tagname == "img":  # the room that it will take, and none is loaded before the reader comes near

@@ -10,10 +10,6 @@ addEventListener("load", async () => {
       formula.removeAttribute(name);
     }
   }
-  // The theme has looked which tables scroll before their formulas were set.
-  for (const table of document.querySelectorAll(".pst-scrollable-table-container")) {
-    if (table.scrollWidth > table.clientWidth) table.tabIndex = 0;
-  }
   document.documentElement.dataset.formulas = "ready";
 });
 
