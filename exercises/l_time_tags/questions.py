@@ -46,7 +46,8 @@ def timing_numbers(exercise: Exercise) -> dict[str, float]:
 def dimension_arguments(exercise: Exercise) -> list[tuple]:
     """Two series; in the second a whole period passes before the first measurement of the receiver."""
     rng = exercise.rng("l1")
-    ratio, first = int(rng.choice((5, 7))), int(rng.integers(2, 4))  # odd: first and -first are other steps of a period
+    # steps of a period: first, its neighbours and -first are different ones
+    ratio, first = int(rng.choice((8, 9))), int(rng.integers(2, 4))
     return [(4 * ratio + 1, ratio, first), (3 * ratio, ratio, first + ratio)]
 
 
