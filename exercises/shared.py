@@ -23,7 +23,7 @@ def personal(exercise: Exercise, name: str, **numbers: tuple[float, float, float
     It is always the same for a variant and `name`.
     """
     rng, course = exercise.rng(name), exercise.variant.name == COURSE
-    return {key: own if course else float(f"{rng.uniform(*limits):.2g}") for key, (own, *limits) in numbers.items()}
+    return {key: own if course else float(f"{rng.uniform(low, high):.2g}") for key, (own, low, high) in numbers.items()}
 
 
 def covariance(rng: np.random.Generator, size: int, scale: float = 1.0) -> Array:
