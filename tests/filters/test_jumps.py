@@ -30,11 +30,12 @@ from kfcourse import (
 from kfcourse.filters import aof, duof, fbp, fkp, fos, kalman_filter, mfos, pointmass
 from kfcourse.filters.exact.jumps import jump_pointmass
 from kfcourse.filters.jump_optimal import logic_dynamic_fbp, logic_dynamic_fkp, logic_dynamic_fos
-from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic, moving_alike
+from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
 from kfcourse.lab.variants import find_variant
 from kfcourse.montecarlo.ensemble import Instant, JumpInstant
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 from kfcourse.symbolic.jumping import JumpModel
+from kfcourse.symbolic.structure import moving_alike
 
 pytestmark = pytest.mark.quick
 
