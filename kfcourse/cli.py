@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryFile
 
 import click
 
@@ -391,6 +392,7 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        TemporaryFile(dir=folder).close()
     except OSError as error:
         raise click.ClickException(
             f"the report cannot go to {folder}: {error.strerror}; choose another folder with --out"
@@ -405,3 +407,11 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
         raise click.ClickException(f"the numbers cannot go to {json_file}: name a file in an existing folder with --json")
     if read_only(json_file):
         raise click.ClickException(f"{json_file} is read-only, and is not replaced: name another file with --json")
+    if json_file.exists() and not json_file.is_file():  # a pipe or a device is written to, not replaced
+        return
+    try:
+        TemporaryFile(dir=json_file.parent).close()
+    except OSError as error:
+        raise click.ClickException(
+            f"the numbers cannot go to {json_file}: {error.strerror}; name a file in another folder with --json"
+        ) from None
