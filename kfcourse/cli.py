@@ -204,7 +204,7 @@ def lab(
 def _tell(result: Comparison, to_error: bool) -> None:
     """The ranking; to standard error if standard output takes the numbers."""
     reference = EXACT if result.has_bound else result.control
-    lines = [f"D_k above that of {title(reference)}, %, mean over the steps:"]
+    lines = [f"D_k above that of {title(reference)}, %, mean over the steps ± standard error:"]
     for name, gap in result.ranking():
         lines.append(f"{title(name):<10} {100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}")
     if result.slow_runs:
