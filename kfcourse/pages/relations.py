@@ -171,6 +171,10 @@ def letters_of(page: Path) -> Letters:
 def formulas(text: str) -> Iterator[Formula]:
     """The formulas of a page that no expression of SymPy prints: displays, boxes, strings in `verified` and `typeset`."""
     prose = _CELL.sub("", text)
+    before, dollars, after = _DISPLAY.sub("", prose).partition("$$")
+    if dollars:
+        there = f"{before[-20:]}$${after[:20]}".strip()
+        raise Unverified(f"a display stands on lines of its own, with $$ at the beginning of the lines around it: {there!r}")
     for latex, label in _DISPLAY.findall(prose):
         yield Formula("display", latex, label)
     for *_, body in _BOX.findall(prose):

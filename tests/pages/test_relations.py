@@ -61,6 +61,12 @@ def test_what_is_displayed_is_computed_or_listed():
             page.judge(Formula(kind, one))
 
 
+@pytest.mark.parametrize("page", ["So $$p = q$$ holds.", "- so\n\n  $$\n  p = q\n  $$\n"])
+def test_a_display_that_would_not_be_read_stops_the_build(page):
+    with pytest.raises(Unverified, match="a display stands on lines of its own"):
+        list(formulas(page))
+
+
 def test_displays_boxes_and_strings_are_found():
     page = """
 Text with $a=b$.
