@@ -357,6 +357,17 @@ def test_no_line_moves_while_a_page_is_loaded(browser, page):
         assert tab.evaluate("window.shifted ?? 0") < 0.1
 
 
+def test_formulas_are_there_without_scripts(browser):
+    """All of them, set and with fonts of the book, displayed ones on the keyboard's way."""
+    with browser.new_context(offline=True, java_script_enabled=False) as context:
+        tab = context.new_page()
+        tab.goto((HTML / f"{WHOLE}.html").as_uri())
+        assert tab.locator(".math").count() == tab.locator(".math > mjx-container > mjx-math").count() > 100
+        assert tab.locator("div.math").count() == tab.locator("div.math > mjx-container[tabindex='0'][aria-label]").count()
+        box = tab.locator("div.math mjx-math").first.bounding_box()
+        assert box["width"] > 100 and box["height"] > 10
+
+
 def weight(page: str) -> int:
     """Bytes that a page loads when it is opened, but fonts of its style sheets; what is lazy comes later."""
     path = HTML / f"{page}.html"
