@@ -1,7 +1,7 @@
 // node formulas.js FOLDER: sets formulas with MathJax of that folder.  A line in, a line out, both JSON: [TeX, display] becomes
 // {html} or {error}; null becomes {css}, the rules of all that was set.
 const [, , folder] = process.argv;
-const SPARE = / (?:data-mjx-texclass|xmlns|unselectable|style)="(?:ORD|[A-Z]+|http[^"]*|on|position: relative;)"/g; // said by book.css, or to MathJax
+const SPARE = / (?:data-mjx-texclass|xmlns|unselectable|style|class)="(?:[A-Z]+|http[^"]*|on|position: relative;|mjx-[in])"/g; // no rule asks for it
 
 function answer(MathJax, asked) {
   const tree = MathJax.startup.adaptor;
