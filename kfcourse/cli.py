@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import click
 
@@ -391,6 +392,8 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(dir=folder):  # a folder that is there may be another's
+            pass
     except OSError as error:
         raise click.ClickException(
             f"the report cannot go to {folder}: {error.strerror}; choose another folder with --out"
