@@ -12,6 +12,8 @@ and (xi_i, u_i, T_i) take the place of (mu_i, z_i, p_i) in the prediction of the
     `logic_dynamic_fkp`   zeta_k = (y_k, y_{k-1}, ..., y_{k-l+1})  (ФКПлд, finite memory)
     `logic_dynamic_fbp`   zeta_k = (z_k, z_{k-1}, ..., z_{k-l+1})  (ФБПлд, high order)
 
+The memories are Rudenko's (2010), a mode beside the state as in his logic-dynamic filters.
+
 Without jumps they are `fos`, `fkp` and `fbp`.
 """
 
@@ -25,12 +27,12 @@ import numpy as np
 from kfcourse.filters.base import State, initial_state
 from kfcourse.filters.designed import Design, Equations, Regression
 from kfcourse.filters.finite_memory import STEPS, checked_memory
-from kfcourse.filters.multiple_models import each_once, mixture, modes_given, moving_alike, onward
+from kfcourse.filters.multiple_models import mixture, modes_given, onward
 from kfcourse.filters.optimal_structure import Memory, Remembered, expected_where_missing
 from kfcourse.laws import Array, Gaussian, Measurement, correct
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import Structure
+from kfcourse.symbolic.structure import Structure, each_once, moving_alike
 
 RIDGE = 1e-12  # of the largest variance, that a law of zeta without width in a direction has a density
 
