@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import sympy as sp
@@ -82,7 +82,7 @@ class Loops(NamedTuple):
     parameters: list[float]
     regressions: int
     advance: Callable[..., None]
-    design: Callable[..., None]  # None without regressions
+    design: Any  # the loop; None without regressions
     one_for_all: bool  # p is the residual of the first regression
 
     def table(self, coefficients: Array) -> Array:
