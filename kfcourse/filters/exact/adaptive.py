@@ -96,7 +96,7 @@ def on_panels(
         borders[narrow, -1] = np.nextafter(borders[narrow, -1], np.inf)
         with np.errstate(all="ignore"):  # far states, where formulas leave the finite numbers, have no density
             grids = resolve(borders, log_density, _wider_than_kernels(law), rule)
-        cut = np.array([_cut_off(grid, np.unique(line)) for (grid, _), line in zip(grids, borders, strict=True)])
+        cut = np.array([_cut_off(grid, line) for (grid, _), line in zip(grids, borders, strict=True)])
         for place, (grid, error), bad, known in zip(left.tolist(), grids, cut, narrow, strict=True):
             if known:
                 found[place] = Grid(grid.x[:1], np.ones(1), np.full(1, 1e300)), 0.0
@@ -262,7 +262,8 @@ class _Bayes:
 
 def _cut_off(grid: Grid, borders: Array) -> bool:
     """Whether the posterior goes on beyond the support."""
-    at_border = np.array([grid.x[0] < borders[1], grid.x[-1] > borders[-2]])
+    second, last = np.searchsorted(borders, borders[0], "right"), np.searchsorted(borders, borders[-1]) - 1  # some may be equal
+    at_border = np.array([grid.x[0] < borders[second], grid.x[-1] > borders[last]])
     return bool((at_border & (grid.density[[0, -1]] * (grid.x[-1] - grid.x[0]) > BORDER)).any())
 
 
