@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryFile
 
 import click
 
@@ -17,7 +18,7 @@ from kfcourse.derivations.setting import of_model
 from kfcourse.files import is_standard_output, read_only, replacing_together
 from kfcourse.lab.admission import admissions, on_trial
 from kfcourse.lab.admission import table as table_of_filters
-from kfcourse.lab.budget import SECONDS, SIZES, Budget, usual_runs
+from kfcourse.lab.budget import SIZES, Budget, usual_runs
 from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
 from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
@@ -31,7 +32,7 @@ from kfcourse.montecarlo.slow_filters import LEAST
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
-DERIVATION = 60.0  # seconds for the formulas of the filters
+DERIVATION = 180.0  # seconds for the formulas of the filters: a busy machine must not leave out what a quiet one has
 LONGEST = 1_000_000  # bytes of a derivation; /dev/zero never ends
 ENOUGH = 3600  # seconds for slow filters, where their number is given
 DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with more, the lab takes longer
@@ -43,7 +44,7 @@ DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with m
 @click.option(
     "--runs",
     type=click.IntRange(min=2),
-    help=f"Trajectories.  [default: {SIZES[0]}, or fewer if they take more than {SECONDS:g} s of processor time by a pilot]",
+    help=f"Trajectories.  [default: {SIZES[0]}, or {' or '.join(map(str, SIZES[1:]))} where the filters have more to compute]",
 )
 @click.option(
     "--steps", type=click.IntRange(min=1), help=f"Measurements of each trajectory.  [default: {STEPS}, or what the variant says]"
@@ -163,8 +164,8 @@ def lab(
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
     filters = [one.one for one in found if one.one]
-    designing = {"designs": 1 if same_ensemble else designs or DESIGNS, "compiled": compiled}
-    budget = Budget(runs) if runs else usual_runs(filters, model, steps or chosen.steps, **designing)
+    many = 1 if same_ensemble else designs or DESIGNS
+    budget = Budget(runs) if runs else usual_runs(filters, model, steps or chosen.steps, many)
     if budget.says:
         click.echo(budget.says, err=True)
     result = without_failing(
@@ -181,7 +182,8 @@ def lab(
         wide=wide,
         threads=threads,
         dask=dask,
-        **designing,
+        designs=many,
+        compiled=compiled,
     )
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
@@ -203,7 +205,7 @@ def lab(
 def _tell(result: Comparison, to_error: bool) -> None:
     """The ranking; to standard error if standard output takes the numbers."""
     reference = EXACT if result.has_bound else result.control
-    lines = [f"D_k above that of {title(reference)}, %, mean over the steps:"]
+    lines = [f"D_k above that of {title(reference)}, %, mean over the steps ± standard error:"]
     for name, gap in result.ranking():
         lines.append(f"{title(name):<10} {100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}")
     if result.slow_runs:
@@ -222,7 +224,7 @@ def _again(
     same_ensemble: bool,
     compiled: bool,
 ) -> str:
-    """The command that repeats the comparison wherever it runs: what pilots and the time chose is written out."""
+    """The command that repeats the comparison wherever it runs: what was chosen by count or by time is written out."""
     slow = result.slow_runs if result.slow_runs >= FEWEST_SLOW else 0
     options: dict[str, object] = {
         "--variants": variants_file,
@@ -391,6 +393,7 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        TemporaryFile(dir=folder).close()
     except OSError as error:
         raise click.ClickException(
             f"the report cannot go to {folder}: {error.strerror}; choose another folder with --out"
@@ -405,3 +408,11 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
         raise click.ClickException(f"the numbers cannot go to {json_file}: name a file in an existing folder with --json")
     if read_only(json_file):
         raise click.ClickException(f"{json_file} is read-only, and is not replaced: name another file with --json")
+    if json_file.exists() and not json_file.is_file():  # a pipe or a device is written to, not replaced
+        return
+    try:
+        TemporaryFile(dir=json_file.parent).close()
+    except OSError as error:
+        raise click.ClickException(
+            f"the numbers cannot go to {json_file}: {error.strerror}; name a file in another folder with --json"
+        ) from None

@@ -34,7 +34,7 @@ from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.state_transitions import by_state
 from kfcourse.laws import Array, Gaussian, Measurement, correct, log_density
 from kfcourse.symbolic.jumping import JumpModel
-from kfcourse.symbolic.structure import Structure
+from kfcourse.symbolic.structure import Structure, each_once, moving_alike
 
 Chain: TypeAlias = Array | Callable[[int], Array] | JumpModel
 Predict: TypeAlias = Callable[[Gaussian], Gaussian]
@@ -214,34 +214,6 @@ def _of_somebody(law: Gaussian, probability: Array, combined: Gaussian) -> Gauss
         return law
     nobody = nobody[:, None]
     return Gaussian(np.where(nobody, combined.mean, law.mean), np.where(nobody[..., None], combined.cov, law.cov))
-
-
-def moving_alike(structures: Sequence[Structure]) -> list[int]:
-    """For each mode the first one with the same tau and Theta: of meters that fail, say, there is one object."""
-    keys = [_object(one) for one in structures]
-    return [next(i for i, other in enumerate(keys) if other == key) for key in keys]
-
-
-def _object(one: Structure) -> object:
-    """What tau and Theta hang on; of structures that do not tell they are nobody else's."""
-    if one.formulas is None:
-        return one.moving or id(one)
-    known = one.model.known
-    formulas = [one.formulas.functions[name].subs(one.model.values) for name in ("tau", "Theta")]
-    return one.name, *formulas, known.interval, tuple(known.inputs.items())
-
-
-def each_once(now: Sequence[Structure], alike: Sequence[int]) -> Callable[[int, Gaussian], Gaussian]:
-    """(mode, law) -> N(tau, Theta) of the next state, found once for modes that move alike."""
-    found: dict[tuple[int, int], tuple[Gaussian, Gaussian]] = {}
-
-    def predict(j: int, law: Gaussian) -> Gaussian:
-        key = alike[j], id(law)
-        if key not in found:
-            found[key] = law, now[j].predict(*law)  # while it is kept, no other law has its id
-        return found[key][1]
-
-    return predict
 
 
 def onward(mu: Array, pi: Array) -> tuple[Array, Array]:

@@ -40,7 +40,7 @@ def by_state(model: JumpModel) -> Leading:
     ModelError
         Formulas of more than three components, or so abrupt that the points do not see them.
     """
-    used = [i for i, one in enumerate(model.x) if model.chain.has(one)]
+    used = _used(model)
     if len(used) > max(ORDER):
         raise ModelError(
             f"transitions that depend on {len(used)} components are not integrated: that takes too many points; let them depend "
@@ -54,6 +54,16 @@ def by_state(model: JumpModel) -> Leading:
         return np.stack([nu for nu, _ in each], axis=1), [found for _, found in each]
 
     return leading
+
+
+def points_of(model: JumpModel) -> int:
+    """How many points a mean over the state takes here; 0 if transitions do not depend on it."""
+    return ORDER[size] ** size if (size := len(_used(model))) in ORDER else 0
+
+
+def _used(model: JumpModel) -> list[int]:
+    """The components of the state on which transitions depend."""
+    return [i for i, one in enumerate(model.x) if model.chain.has(one)]
 
 
 def _weighted(

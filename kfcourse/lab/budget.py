@@ -1,24 +1,29 @@
 """How many trajectories the lab takes by default: a hundred thousand, or as many as a student waits for.
 
-A pilot on few trajectories and steps measures what one of them costs the fast filters in processor time, at two sizes, so that
-what does not grow with them does not count.  Sizes are coarse: the machine's other work hardly changes the choice.
+The work is counted, not timed, so that the same command takes the same trajectories on every machine:
+
+    work = trajectories * steps * sum over the filters of passes * laws * (n^2 + n * points)
+
+A designed filter passes over its ensemble and over the common one, with each of its designs.  In a pass it predicts and corrects
+so many normal laws a step: one, or one for each mode, or (GPB2) for each pair of modes.  A law is matrices of n^2 numbers, and
+where means are sums over points, n numbers at each.  On one core of 2026 a unit takes some tenth of a microsecond, half or twice
+as much: sizes are coarse, so that this does not matter.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from kfcourse.filters import Design, Filter
-from kfcourse.montecarlo.designing import NotFinite
-from kfcourse.montecarlo.experiment import compare
+from kfcourse.filters.state_transitions import points_of
+from kfcourse.lab.checked_quadrature import Checked
+from kfcourse.lab.short_names import OF_BEST, JumpStructures, Structures
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
 SIZES = (100_000, 20_000, 5_000)  # trajectories
-SECONDS = 240.0  # of processor time, for the fast filters
-PILOT, STEPS = (256, 2304), 4  # trajectories, which are measured by what the larger number takes more, and steps
+USUAL = 2e9  # units of work for the fast filters, some three minutes
 
 
 class Budget(NamedTuple):
@@ -28,30 +33,29 @@ class Budget(NamedTuple):
     says: str = ""
 
 
-def usual_runs(filters: Sequence[Filter | Design], model: Model | JumpModel, steps: int, **options: Any) -> Budget:
-    """The most of `SIZES` that the fast filters are through in `SECONDS`, or the least; options as of `compare`."""
-    fast = [one for one in filters if not one.slow]
-    tried, taken = min(steps, STEPS), list[float]()
-    try:
-        for runs in (PILOT[0], *PILOT):  # the first time also derives and compiles
-            begun = time.process_time()
-            compare(fast, model, runs, tried, 1, slow_runs=0, wide=1, threads=1, progress=False, **options)
-            taken.append(time.process_time() - begun)
-    except (NotFinite, ValueError):
-        return Budget(SIZES[0])  # what is wrong is told by the comparison itself
-    each = max(taken[2] - taken[1], 0.0) / (PILOT[1] - PILOT[0]) * steps / tried
-    return within(each)
-
-
-def within(each: float) -> Budget:
-    """The same from the processor seconds of a trajectory."""
+def usual_runs(filters: Sequence[Filter | Design], model: Model | JumpModel, steps: int, designs: int) -> Budget:
+    """The most of `SIZES` with which the fast filters' work is the `USUAL` one, or the least."""
+    each = steps * sum(_work(one, model, designs) for one in filters if isinstance(one, Design) or not one.slow)
     most, *fewer = SIZES
-    if most * each <= SECONDS:
+    if most * each <= USUAL:
         return Budget(most)
-    runs = next((size for size in fewer if size * each <= SECONDS), fewer[-1])
-    needed = float(f"{most * each:.1g}")
+    runs = next((size for size in fewer if size * each <= USUAL), fewer[-1])
     return Budget(
         runs,
-        f"{runs} trajectories: {most} would take some {needed:.0f} s of processor time, more than the usual {SECONDS:g} s. "
-        "More of them, by --runs, make the intervals narrower, as the root of their number.",
+        f"{runs} trajectories: with {most} these filters have {most * each / USUAL:.2g} times the work to do that is usual.  The "
+        "work is counted, so that this number is the same on every machine.  More trajectories, by --runs, make the intervals "
+        "narrower, as the root of their number.",
     )
+
+
+def _work(one: Filter | Design, model: Model | JumpModel, designs: int) -> int:
+    """Units of one trajectory and step."""
+    passes, n, modes, points = 2 * designs if isinstance(one, Design) else 1, model.n, 1, 0
+    if isinstance(model, JumpModel) and one.name != "duof":
+        modes, points = len(model.modes) ** (2 if one.name == "gpb2" else 1), points_of(model)
+    if one.name == "aof-gauss-hermite":
+        points = 5**n
+    elif one.name.endswith("-gaussian") or one.name in OF_BEST:
+        found = (JumpStructures(model) if isinstance(model, JumpModel) else Structures(model)).quadrature
+        points += found.points if isinstance(found, Checked) else 0
+    return passes * modes * (n**2 + n * points)

@@ -38,7 +38,7 @@ ORDERS = (2, 3, 5, 7, 10, 20, 40, 80, 160)
 CLOSE = 1e-4
 RUNS, STEPS = 100, 20  # of the pilot
 MOST = 200  # points together: with more, 5,000 trajectories take a quarter of an hour (343 points, D3)
-PIECE = 2**19  # evaluations at once: arrays of some megabytes
+PIECE = 2**15  # evaluations at once: arrays that a processor's cache holds
 
 Law = TypeVar("Law", Gaussian, Measurement)
 
@@ -46,12 +46,13 @@ Law = TypeVar("Law", Gaussian, Measurement)
 class Checked(NamedTuple):
     """Structures by quadrature, of each mode one; where a mode has formulas they are these.
 
-    They are named "gaussian", as what they compute is; `order` is their number of points an axis, `apart` the largest
-    difference that the pilot found, in the measure of `CLOSE`.
+    They are named "gaussian", as what they compute is; `order` is their number of points an axis, `points` that of all, `apart`
+    the largest difference that the pilot found, in the measure of `CLOSE`.
     """
 
     structures: list[Structure]
     order: int
+    points: int
     apart: float
 
     @property
@@ -90,7 +91,7 @@ def of_checked_order(model: Model | JumpModel, why: NoClosedForm) -> Checked:
             continue
         if apart <= CLOSE:
             named = [one if one.formulas else replace(one, name="gaussian") for one in coarse]
-            return Checked([_in_pieces(one, max(1, PIECE // points)) for one in named], order, apart)
+            return Checked([_in_pieces(one, max(1, PIECE // points)) for one in named], order, points, apart)
         error = f"by {100 * apart:.2g} %" if apart < 1 else "without bound"
         found = f"; Gauss-Hermite quadrature with {order} points an axis still errs {error} on the laws that occur"
     raise NoClosedForm(Reason.of(why).reworded(f"{why}{found}"))

@@ -18,7 +18,7 @@ from kfcourse.laws import Array, Gaussian, Measurement, Transition, product, tra
 from kfcourse.symbolic.equations import Noiseless, compile_noiseless
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import Structure, of_each_step
+from kfcourse.symbolic.structure import Structure, each_once, moving_alike, of_each_step
 
 
 def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
@@ -33,12 +33,15 @@ def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
     if model.angles.x or model.angles.y:
         raise ModelError("components that are angles have no average over modes; take filters that know the modes")
 
+    alike = moving_alike(structures)
+
     def at(k: int) -> Structure:
         before, after = model.law_at(k), model.law_at(k + 1)
         now = [one.at(k) for one in structures]
 
         def predict(z: Array, p: Array) -> Gaussian:
-            laws = [one.predict(z, p) for one in now]
+            each, law = each_once(now, alike), Gaussian(z, p)
+            laws = [each(j, law) for j in range(len(now))]
             tau = _mean(after, [law.mean for law in laws])
             return Gaussian(tau, _mean(after, [law.cov + _square(law.mean - tau) for law in laws]))
 

@@ -34,7 +34,7 @@ from kfcourse.symbolic.choices import decides
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.reading import ModelError
+from kfcourse.symbolic.reading import ModelError, exact_matrix
 from kfcourse.symbolic.structure import Structure, of_steps
 
 Rule: TypeAlias = Callable[[int], tuple[Array, Array]]
@@ -135,8 +135,8 @@ class _Equation(NamedTuple):
     size: int
     noise: Gaussian  # all noises; the covariance of those without points
     root: Array  # of the covariance of those with points, columns for them only
-    factors: Stepwise  # of those without points
-    of_state: bool  # whether factors depend on the state
+    factors: Stepwise  # B D B^T of those without points
+    of_state: bool  # whether it depends on the state
     angles: Components  # components of the function's value
     k: int | None = None
 
@@ -144,14 +144,10 @@ class _Equation(NamedTuple):
         """sum_q w_q B(x_q) D B(x_q)^T, the mean over points x (..., q, n) of the covariance given x."""
         factors = self.factors.at(self.k)
         if not self.of_state:
-            (matrix,) = factors()
-            return symmetric(matrix @ self.noise.cov @ matrix.T)
-        root = square_root(self.noise.cov)
-        B = np.broadcast_to(factors(x)[0], (*x.shape[:-1], self.size, len(root)))
-        rows = (B.reshape(*x.shape[:-2], -1, len(root)) @ root).reshape(B.shape)  # one product a trajectory, not one a point
-        columns = np.moveaxis(rows * np.sqrt(weights)[:, None, None], -2, -3)  # (..., size, q, noises)
-        columns = columns.reshape(*columns.shape[:-2], -1)
-        return symmetric(columns @ transpose(columns))
+            return symmetric(factors()[0])
+        each = np.broadcast_to(factors(x)[0], (*x.shape[:-1], self.size, self.size))
+        mean = weights @ each.reshape(*x.shape[:-1], self.size**2)
+        return symmetric(mean.reshape(*x.shape[:-2], self.size, self.size))
 
 
 class _Equations(NamedTuple):
@@ -183,12 +179,13 @@ def _equation(function, formulas, noises, law: Gaussian, model: Model, pointed: 
     while (correlated := ~other & (law.cov[:, other] != 0).any(axis=1)).any():
         other |= correlated
     rest = sp.Matrix(len(formulas), len(noises), lambda i, j: 0 if other[j] else factors[i, j])
-    arguments = {"x": sp.Matrix(model.x)} if rest.has(*model.x) else {}
-    stepwise = Stepwise.compile(model.known, "factors", arguments, {"factors": rest}, [*arguments])
+    cov = np.where(other[:, None] | other, 0.0, law.cov)
+    added = rest * exact_matrix(cov) * rest.T
+    arguments = {"x": sp.Matrix(model.x)} if added.has(*model.x) else {}
+    stepwise = Stepwise.compile(model.known, "added", arguments, {"added": added}, [*arguments])
     root = np.zeros((len(noises), int(other.sum())))
     root[other] = square_root(law.cov[np.ix_(other, other)]) if other.any() else root[other]
-    without = law._replace(cov=np.where(other[:, None] | other, 0.0, law.cov))
-    return _Equation(function, len(formulas), without, root, stepwise, bool(arguments), angles)
+    return _Equation(function, len(formulas), law._replace(cov=cov), root, stepwise, bool(arguments), angles)
 
 
 def _checked(name: str, model: Model, rule: Rule, equations: _Equations, root: str, order: int) -> Structure:

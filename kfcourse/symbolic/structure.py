@@ -14,7 +14,7 @@ predict/correct step serves them all.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial, reduce
 from itertools import product as cartesian
@@ -342,3 +342,31 @@ def _moments(equation, x, mean, cov, noise, noise_mean, noise_cov, known: tuple[
 
 def _expanded(functions, **hints: bool) -> dict[str, sp.ImmutableMatrix]:
     return {name: sp.ImmutableMatrix(matrix).applyfunc(partial(sp.expand, **hints)) for name, matrix in functions.items()}
+
+
+def moving_alike(structures: Sequence[Structure]) -> list[int]:
+    """For each mode the first one with the same tau and Theta: of meters that fail, say, there is one object."""
+    keys = [_object(one) for one in structures]
+    return [next(i for i, other in enumerate(keys) if other == key) for key in keys]
+
+
+def _object(one: Structure) -> object:
+    """What tau and Theta hang on; of structures that do not tell they are nobody else's."""
+    if one.formulas is None:
+        return one.moving or id(one)
+    model, known = one.model, one.model.known
+    noise = [part.tobytes() for part in model.state_noise]
+    return one.name, model.state_equation.subs(model.values), *noise, known.interval, tuple(known.inputs.items())
+
+
+def each_once(now: Sequence[Structure], alike: Sequence[int]) -> Callable[[int, Gaussian], Gaussian]:
+    """(mode, law) -> N(tau, Theta) of the next state, found once for modes that move alike."""
+    found: dict[tuple[int, int], tuple[Gaussian, Gaussian]] = {}
+
+    def predict(j: int, law: Gaussian) -> Gaussian:
+        key = alike[j], id(law)
+        if key not in found:
+            found[key] = law, now[j].predict(*law)  # while it is kept, no other law has its id
+        return found[key][1]
+
+    return predict

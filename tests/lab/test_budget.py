@@ -1,4 +1,4 @@
-"""How many trajectories the lab takes by default: measured by a pilot, told, and left to who asks for a number."""
+"""How many trajectories the lab takes by default: counted, told, and left to who asks for a number."""
 
 import html
 import shlex
@@ -6,38 +6,71 @@ import shlex
 import pytest
 from click.testing import CliRunner
 
-from kfcourse import cli
+from kfcourse import Model, cli
 from kfcourse.cli import main
-from kfcourse.lab import budget, find_variant, lab_filters
-from kfcourse.lab.budget import PILOT, SECONDS, SIZES, STEPS, Budget, usual_runs, within
+from kfcourse.lab import find_variant, lab_filters
+from kfcourse.lab.admission import admissions
+from kfcourse.lab.budget import SIZES, USUAL, Budget, usual_runs
+from kfcourse.lab.short_names import LAB, Structures
 
 pytestmark = pytest.mark.quick
 
 
+def work(model, steps, names, designs=4):
+    return [one.one for one in admissions(model, names) if one.one], model, steps, designs
+
+
 @pytest.mark.parametrize(
-    ("each", "runs"), [(0.0, 100_000), (0.99, 100_000), (1.01, 20_000), (4.9, 20_000), (5.1, 5_000), (500, 5_000)]
+    ("steps", "runs"), [(1, 100_000), (476, 100_000), (477, 20_000), (2380, 20_000), (2381, 5_000), (99_999, 5_000)]
 )
-def test_as_many_as_there_is_time_for_and_never_none(each, runs):
-    found = within(each * SECONDS / SIZES[0])
+def test_as_many_as_the_usual_work_allows_and_never_none(steps, runs):
+    """The lab's seven on a scalar model: two of one pass, five of two times four: 42 units a trajectory and step."""
+    assert int(2e9 / 42 / 100_000) == 476
+    found = usual_runs(*work(find_variant("53").model, steps, LAB))
     assert found.runs == runs
     assert bool(found.says) == (runs < SIZES[0])
     if found.says:
-        assert found.says.startswith(f"{runs} trajectories: 100000 would take some") and "--runs" in found.says
+        times = f"{steps * 42 * 1e5 / USUAL:.2g}"
+        assert (
+            found.says.startswith(f"{runs} trajectories: with 100000 these filters have {times} times") and "--runs" in found.says
+        )
 
 
-def test_a_pilot_measures_what_more_trajectories_cost(monkeypatch):
-    """The clock is the test's: nine seconds the first time, then three, and two more for more trajectories at 4 steps."""
-    model = find_variant("53").model
-    filters, ticks = lab_filters(model, ["duof", "aof-gaussian"]), iter([0.0, 9.0, 10.0, 13.0, 20.0, 25.0])
-    monkeypatch.setattr(budget.time, "process_time", lambda: next(ticks))
-    each = 2 / (PILOT[1] - PILOT[0]) * 51 / STEPS
-    assert usual_runs(filters, model, 51, designs=1) == within(each)
-    assert within(each).runs == 5000
+MODES = ("aof-jump-linearised", "imm", "gpb2", "fos-jump-linearised", "duof")
 
 
-def test_what_is_wrong_is_left_to_the_comparison():
-    model = find_variant("53").model
-    assert usual_runs(lab_filters(model, ["duof"]), model, 5, designs=0) == Budget(SIZES[0])
+@pytest.mark.parametrize(
+    ("name", "names", "units"),
+    [
+        ("D2", LAB, 42 * 4),  # n = 2
+        ("D3", ("aof-linearised", "duof", "fos-linearised"), (1 + 8 + 8) * 9),
+        ("J1", MODES, 2 + 2 + 4 + 2 * 8 + 8),  # two modes, four pairs; DUOF knows of none
+        ("J1-overload", ("imm",), 2 * (1 + 32)),  # transitions of the state by 32 points
+    ],
+)
+def test_the_work_is_that_of_passes_laws_and_points(name, names, units):
+    filters, model, _, designs = work(find_variant(name).model, 1, names)
+    steps = int(USUAL / SIZES[0] / units)
+    assert usual_runs(filters, model, steps, designs).runs == SIZES[0] > usual_runs(filters, model, steps + 1, designs).runs
+
+
+def test_where_means_are_sums_over_points_the_points_count():
+    model = Model.define("x/(1 + x**2) + 0.1*v", "x + w")
+    filters, points = lab_filters(model, ["aof-gaussian", "aof-linearised"]), Structures(model).quadrature.points
+    steps = int(USUAL / SIZES[0] / (1 + points + 1))
+    assert points >= 3 and usual_runs(filters, model, steps, 1).runs == SIZES[0] > usual_runs(filters, model, steps + 1, 1).runs
+
+
+def test_no_clock_takes_part(monkeypatch):
+    """On a machine without any the same numbers come; the slow filters do not count, whose trajectories time decides."""
+
+    def stopped():
+        raise AssertionError("the clock was asked")
+
+    filters, model, steps, designs = work(find_variant("53").model, 51, [*LAB, "aof-exact"])
+    for clock in ("time", "process_time", "perf_counter", "monotonic"):
+        monkeypatch.setattr(f"time.{clock}", stopped)
+    assert usual_runs(filters, model, steps, designs) == usual_runs(filters[:-1], model, steps, designs) == Budget(SIZES[0])
 
 
 def test_the_lab_tells_why_it_takes_fewer_and_takes_what_it_is_told(tmp_path, monkeypatch):
@@ -53,7 +86,7 @@ def test_the_lab_tells_why_it_takes_fewer_and_takes_what_it_is_told(tmp_path, mo
 
 
 def test_the_command_that_is_told_repeats_the_numbers(tmp_path, monkeypatch):
-    """What pilots and the clock choose is written out: trajectories, and how many of them the slow filters came through."""
+    """What is chosen is written out: trajectories, and how many of them the slow filters came through in time."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my variants.toml").write_text('[variants.a]\nstate = "0.9*x + v"\nmeter = "x + 0.1*x**2*w"\n', encoding="utf-8")
     call = ["lab", "a", "--variants", "my variants.toml", "--runs", "400", "--steps", "3", "--designs", "2", "--slow-runs", "112"]
