@@ -90,8 +90,8 @@ class Kernels(NamedTuple):
         masses it knows no more than of `even`.
     pushed_bytes : int
         That `pushed` holds.
-    crowded : bool
-        Whether they were `merged`: the posterior before needed panels, and the next one is likely to.
+    panels : bool
+        Whether the posterior before needed panels.
     bells : callable
         Adds them up: `add_bells`, or the same compiled.
     """
@@ -105,7 +105,7 @@ class Kernels(NamedTuple):
     spectral: Array
     pushed: Callable[[Array], Array] | None = None
     pushed_bytes: int = 0
-    crowded: bool = False
+    panels: bool = False
     bells: Callable[..., None] = add_bells
 
     def bytes(self) -> int:
@@ -191,4 +191,4 @@ def overlapping(x: Array, mass: Array, density: Array, uniform: bool, law: Scala
     with np.errstate(divide="ignore", invalid="ignore"):
         slope = (at_top(mu, 1) - at_top(mu, -1)) / (at_top(x, 1) - at_top(x, -1))
         width = np.hypot(np.where(np.isfinite(slope), slope, 0.0) / (ROOT * at_top(density)), at_top(sigma))
-    return Kernels(mu, sigma, mass, even, at_top(mu), width, np.full(len(x), uniform))
+    return Kernels(mu, sigma, mass, even, at_top(mu), width, np.full(len(x), uniform), panels=not uniform)

@@ -12,12 +12,12 @@ import numpy as np
 from kfcourse.angles import moments_on_circle
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, is_nonlinear, scalar_densities
-from kfcourse.filters.exact.adaptive import check_scalar, on_panels
+from kfcourse.filters.exact.adaptive import TENTH, check_scalar, on_panels
 from kfcourse.filters.exact.batch import Place, Posteriors, posteriors
 from kfcourse.filters.exact.constants import ELEMENTS, MORE, NODES, SPACINGS, TOLERABLE
 from kfcourse.filters.exact.evidence import log_evidence
 from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, of_prior
-from kfcourse.filters.exact.places import Candidates, hidden, likeliest, looked, spaced
+from kfcourse.filters.exact.places import Candidates, hidden, likeliest, looked, of_kernels, spaced
 from kfcourse.filters.exact.prediction import predictions
 from kfcourse.filters.exact.roots import at_roots
 from kfcourse.filters.exact.smoothing import smoothed
@@ -191,11 +191,11 @@ def corrected(
     mean, variance, error = np.full((3, len(y)), np.nan)
     adaptive = np.zeros(len(y), dtype=bool)
 
-    def correct(rows: Array, kernels: Kernels) -> None:
+    def correct(rows: Array, kernels: Kernels, hasty: bool) -> None:
         values, resolved = y[rows], np.zeros(len(rows), dtype=bool)
         error[rows] = np.inf
         place, candidates = likeliest(kernels, values, law)
-        for some, found, good in _in_batch(kernels, values, law, place, candidates, accuracy, fine_nodes):
+        for some, found, good in _in_batch(kernels, values, law, place, candidates, accuracy, fine_nodes, hasty):
             done = rows[some]
             mean[done], variance[done], error[done] = found.mean, found.variance, found.error + found.inherited
             for i, x, mass, density in zip(done.tolist(), found.x, found.mass, found.density, strict=True):
@@ -209,7 +209,7 @@ def corrected(
             i = int(rows[left[row]])
             grids[i], error[i], adaptive[i] = grid, error_there, True
             mean[i], variance[i] = grid.mean(), grid.variance()
-        if kernels.crowded and np.isinf(error[rows]).any():
+        if hasty and np.isinf(error[rows]).any():
             raise Unresolved("panels do not resolve a posterior")
 
     for rows, kernels in groups:
@@ -219,13 +219,13 @@ def corrected(
                 mean[place], variance[place] = grid.mean(), grid.variance()
             continue
         for chunk in chunks(len(rows), NODES[0] * kernels.mu.shape[1], ELEMENTS):
-            some, here = rows[chunk], kernels.rows(chunk)
+            some, here, hasty = rows[chunk], kernels.rows(chunk), kernels.panels and accuracy >= TENTH
             try:
-                correct(some, here)
+                correct(some, here, hasty)
             except Unresolved:
-                if not here.crowded:
+                if not hasty:
                     raise
-                correct(some, here._replace(crowded=False))  # with as many nodes as there may be
+                correct(some, here, hasty=False)
     return Corrected(grids, mean, variance, error, adaptive)
 
 
@@ -299,15 +299,22 @@ def _quick_step(
 
 
 def _in_batch(
-    kernels: Kernels, y: Array, law: ScalarDensities, place: Place, candidates: Candidates, accuracy: float, fine_nodes: int
+    kernels: Kernels,
+    y: Array,
+    law: ScalarDensities,
+    place: Place,
+    candidates: Candidates,
+    accuracy: float,
+    fine_nodes: int,
+    hasty: bool,
 ) -> Iterator[tuple[Array, Posteriors, Array]]:
     """Rows of kernels, their posteriors, and whether these are resolved; on the finest grid also those that are not.
 
-    A posterior after one that needed panels is likely to need them, too: only few nodes are tried, and once.
+    In haste only few nodes are tried, and once: a posterior after one that needed panels is likely to need them, too.
     """
     look = looked(kernels, y, law, place)
     left, least = np.arange(len(y)), np.zeros(len(y))  # trajectories to do, and the nodes that kernels need
-    spacings, most = (SPACINGS[:1], TRIED) if kernels.crowded else (SPACINGS, NODES[-1])
+    spacings, most = (SPACINGS[:1], TRIED) if hasty else (SPACINGS, NODES[-1])
     for spacing in spacings:
         place, wanted = spaced(look.rows(left), candidates.rows(left), law, spacing)
         sizes = np.searchsorted(NODES[:-1], np.maximum(wanted, least[left]))
@@ -319,7 +326,10 @@ def _in_batch(
                 i, there = left[some], place.rows(some)
                 found = posteriors(kernels.rows(i), y[i], law, there, count)
                 least[i] = nodes_for_kernels(law, found, count, fine_nodes)
-                found = found._replace(error=np.where(hidden(candidates.rows(i), there, count), np.inf, found.error))
+                unseen = hidden(candidates.rows(i), there, count)
+                if kernels.panels:  # the prediction may have humps of its own
+                    unseen |= hidden(of_kernels(kernels.rows(i), y[i], law), there, count)
+                found = found._replace(error=np.where(unseen, np.inf, found.error))
                 good = (found.error <= accuracy) & (least[i] <= count)
                 told = good | (spacing == spacings[-1]) | (count == NODES[-1])
                 yield i[told], Posteriors(*(array[told] for array in found)), good[told]

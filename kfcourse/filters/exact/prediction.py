@@ -66,7 +66,7 @@ def predictions(grids: Sequence[Grid], law: ScalarDensities) -> Iterator[tuple[A
     if finer:
         yield from _packed(finer, *middle)
     if crowded:
-        yield from ((places, kernels._replace(crowded=True)) for places, kernels in _packed(crowded, *middle))
+        yield from ((places, kernels._replace(panels=True)) for places, kernels in _packed(crowded, *middle))
 
 
 def _far_narrower(grid: Grid, law: ScalarDensities, rough: Kernels) -> Kernels | Finer:
