@@ -18,11 +18,12 @@ mode of the last measurement: a spike on which no draw lies yet is found.  Draws
 sharp that hardly any would lie within its error.
 
 What is stated of the error is `WITHIN` times the root of V + d^2: on eleven models with spikes, a kink and several humps, of 200
-trajectories each, it held at 99.4 to 100 % of the corrections (exact: plain grids, or all histories of modes).  V is the variance of weighted means by their weights (the delta
-method), d half the distance of the two clouds, which know nothing of each other.  For a normal error 2.6 times would do; the rest
-is for V and d, which are themselves uncertain where few draws count, and for small humps that both clouds have lost.  These are
-few trajectories in a thousand; no statistic of the draws tells of them, and a bound is too high by what they err.  How often the
-intervals hold of filters within some per cent of this bound has not been counted with these laws.
+trajectories each, it held at 99.4 to 100 % of the corrections (exact: plain grids, or all histories of modes).  V is the variance
+of weighted means by their weights (the delta method), d half the distance of the two clouds, which know nothing of each other.
+For a normal error 2.6 times would do; the rest is for V and d, which are themselves uncertain where few draws count, and for
+small humps that both clouds have lost.  These are few trajectories in a thousand; no statistic of the draws tells of them, and a
+bound is too high by what they err.  How often the intervals hold of filters within some per cent of this bound has not been
+counted with these laws.
 """
 
 from __future__ import annotations
