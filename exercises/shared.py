@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -15,15 +15,15 @@ from kfcourse.laws import Array, transpose
 from kfcourse.scenarios.navigation import Dynamics
 
 Map = Callable[[Array], Array]
-Ranges = Mapping[str, tuple[float, float]]
 
 
-def personal(exercise: Exercise, name: str, course: Mapping[str, float], ranges: Ranges) -> dict[str, float]:
-    """Numbers of two digits from the ranges, the same for a variant and name; the course's own for its variant."""
-    if exercise.variant.name == COURSE:
-        return dict(course)
-    rng = exercise.rng(name)
-    return {key: float(f"{rng.uniform(*limits):.2g}") for key, limits in ranges.items()}
+def personal(exercise: Exercise, name: str, **numbers: tuple[float, float, float]) -> dict[str, float]:
+    """Of each number the course's own, for the course's variant, or one of two digits from the range that stands after it.
+
+    It is always the same for a variant and `name`.
+    """
+    rng, course = exercise.rng(name), exercise.variant.name == COURSE
+    return {key: own if course else float(f"{rng.uniform(low, high):.2g}") for key, (own, low, high) in numbers.items()}
 
 
 def covariance(rng: np.random.Generator, size: int, scale: float = 1.0) -> Array:
@@ -110,7 +110,7 @@ Fit = Callable[[Array, Array], tuple[Array, Array, Array]]
 
 def regression(target: Array, regressor: Array) -> tuple[Array, Array, Array]:
     """matrix (r, s), offset (r,), residual covariance (r, r)."""
-    matrix, offset, residual = Scatter.of(target, regressor).regression(target.shape[1])
+    matrix, offset, residual = Scatter.of(target, regressor).regression()
     return matrix, offset, residual
 
 

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryFile
 
 import click
 
@@ -204,7 +205,7 @@ def lab(
 def _tell(result: Comparison, to_error: bool) -> None:
     """The ranking; to standard error if standard output takes the numbers."""
     reference = EXACT if result.has_bound else result.control
-    lines = [f"D_k above that of {title(reference)}, %, mean over the steps:"]
+    lines = [f"D_k above that of {title(reference)}, %, mean over the steps ± standard error:"]
     for name, gap in result.ranking():
         lines.append(f"{title(name):<10} {100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}")
     if result.slow_runs:
@@ -392,6 +393,7 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        TemporaryFile(dir=folder).close()
     except OSError as error:
         raise click.ClickException(
             f"the report cannot go to {folder}: {error.strerror}; choose another folder with --out"
@@ -406,3 +408,11 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
         raise click.ClickException(f"the numbers cannot go to {json_file}: name a file in an existing folder with --json")
     if read_only(json_file):
         raise click.ClickException(f"{json_file} is read-only, and is not replaced: name another file with --json")
+    if json_file.exists() and not json_file.is_file():  # a pipe or a device is written to, not replaced
+        return
+    try:
+        TemporaryFile(dir=json_file.parent).close()
+    except OSError as error:
+        raise click.ClickException(
+            f"the numbers cannot go to {json_file}: {error.strerror}; name a file in another folder with --json"
+        ) from None

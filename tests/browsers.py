@@ -20,3 +20,29 @@ def chromium():
         browser = playwright.chromium.launch(executable_path=path)
         yield browser
         browser.close()
+
+
+@contextmanager
+def offline(browser):
+    """new_tab(path, text, **options) -> a tab for the page of that text, in the file `path`, from which alone it may load.
+
+    What the page complains of, or loads from elsewhere, fails the test at its end.
+    """
+    contexts, problems = [], []
+
+    def new_tab(path, text, **options):
+        path.write_text(text, encoding="utf-8")
+        context = browser.new_context(offline=True, **({"viewport": {"width": 900, "height": 1000}} | options))
+        contexts.append(context)
+        tab = context.new_page()
+        tab.set_default_timeout(20_000)
+        tab.on("console", lambda message: problems.append(message.text))
+        tab.on("pageerror", lambda error: problems.append(str(error)))
+        own = (path.as_uri(), "blob:", "data:")
+        tab.on("request", lambda one: one.url.startswith(own) or problems.append(f"loads {one.url}"))
+        return tab
+
+    yield new_tab
+    for context in contexts:
+        context.close()
+    assert problems == []

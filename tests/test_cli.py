@@ -583,6 +583,12 @@ def test_a_read_only_file_of_numbers_is_not_replaced(call, no_computation, tmp_p
     assert (tmp_path / "n.json").read_text(encoding="utf-8") == "mine"
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="a folder in which nobody may make a file: /proc")
+def test_a_place_where_no_file_can_be_made_is_refused_before_the_computation(call, no_computation):
+    refused(call("lab", "53", *QUICK, "--out", "/proc"), "the report cannot go to /proc", "--out")
+    refused(call("lab", "53", *QUICK, "--json", "/proc/n.json"), "the numbers cannot go to /proc/n.json", "--json")
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no modes")
 def test_a_replaced_file_keeps_its_mode(tmp_path):
     (tmp_path / "n.json").write_text("old", encoding="utf-8")

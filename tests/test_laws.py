@@ -320,7 +320,7 @@ def test_symmetric_is_symmetric(rng):
 def test_a_regression_is_least_squares(rng, r, s):
     regressor = rng.normal(size=(60, s)) @ rng.normal(size=(s, s)) + 3
     target = regressor @ rng.normal(size=(s, r)) + rng.normal(size=(60, r)) - 2
-    fit = Scatter.of(target, regressor).regression(r)
+    fit = Scatter.of(target, regressor).regression()
     design = np.column_stack([regressor, np.ones(60)])
     solution, *_ = np.linalg.lstsq(design, target, rcond=None)
     np.testing.assert_allclose(fit.matrix, solution[:s].T, rtol=1e-9, atol=1e-9)
@@ -345,13 +345,13 @@ def test_moments_of_parts_taken_together_are_moments_of_the_whole(rng, cuts):
 
 def test_a_constant_regressor_predicts_the_mean(rng):
     target = rng.normal(size=(20, 1))
-    fit = Scatter.of(target, np.full((20, 1), 0.5)).regression(1)
+    fit = Scatter.of(target, np.full((20, 1), 0.5)).regression()
     np.testing.assert_allclose(fit(np.array([[0.5], [7.0]])), np.full((2, 1), target.mean()), rtol=1e-14)
     np.testing.assert_allclose(fit.residual, [[target.var()]], rtol=1e-14)
 
 
 def test_one_trajectory_is_a_regression_on_a_constant():
-    fit = Scatter.of(np.array([[2.0]]), np.array([[3.0]])).regression(1)
+    fit = Scatter.of(np.array([[2.0]]), np.array([[3.0]])).regression()
     assert (fit.matrix.item(), fit.offset.item(), fit.residual.item()) == (0.0, 2.0, 0.0)
 
 
@@ -366,11 +366,11 @@ def test_a_perfect_regression_leaves_no_negative_variance(rng):
     for _ in range(50):
         regressor = rng.normal(size=(30, 2))
         target = regressor @ rng.normal(size=(2, 2))
-        fit = Scatter.of(target, regressor).regression(2)
+        fit = Scatter.of(target, regressor).regression()
         assert (np.diagonal(fit.residual) >= 0).all()
         # Rounding of sums of 30 products and of a solution whose condition is below 1e2.
         assert abs(fit.residual).max() < 1e-13 * target.var(axis=0).sum()
-        assert Scatter.of(0.7 * regressor[:, :1], regressor[:, :1]).regression(1).residual.item() >= 0
+        assert Scatter.of(0.7 * regressor[:, :1], regressor[:, :1]).regression().residual.item() >= 0
 
 
 def test_the_log_density_is_the_normal_law_s_of_what_was_measured():

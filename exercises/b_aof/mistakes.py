@@ -247,17 +247,21 @@ def _zeros_for_missing(y: Array, mean: Array, cov: Array, measure: Callable, pre
     return run_filter(np.nan_to_num(y), mean, cov, measure, predict)
 
 
-def _handed_on(after: bool, y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
-    """The predictions of the next step; or a filter that goes on from its prediction, not from its estimate."""
+def _run_by(beat: Callable, y: Array, mean: Array, cov: Array, measure: Callable, predict: Callable) -> Array:
+    """A run with another end of each step: beat(lam, Psi, z, p, missing, predict) -> what is returned, and the next lam, Psi."""
     lam, Psi = np.tile(mean, (y.shape[1], 1)), full(cov, y.shape[1])
     found = []
     for k, one in enumerate(y):
-        missing = np.isnan(one).any(axis=-1)
-        z, p, *_ = step(lam, Psi, np.where(missing[:, None], 0.0, one), at_step(measure, k), at_step(predict, k))
-        z, p = np.where(missing[:, None], lam, z), np.where(missing[:, None, None], Psi, p)
-        lam, Psi = at_step(predict, k)(z, p) if after else at_step(predict, k)(lam, Psi)
-        found.append(lam if after else z)
+        missing = np.isnan(one).any(axis=-1)[:, None]
+        z, p, *_ = step(lam, Psi, np.where(missing, 0.0, one), at_step(measure, k), at_step(predict, k))
+        returned, lam, Psi = beat(lam, Psi, np.where(missing, lam, z), p, missing[:, None], at_step(predict, k))
+        found.append(returned)
     return np.array(found)
+
+
+def _next_returned(lam: Array, Psi: Array, z: Array, p: Array, missing: Array, predict: Callable) -> tuple[Array, ...]:
+    following = predict(z, np.where(missing, Psi, p))
+    return following[0], *following
 
 
 WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
@@ -265,6 +269,11 @@ WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
     ("predictions-returned", messages.PREDICTIONS_RETURNED, _predictions),
     ("covariance-frozen", "The covariance never changes from step to step: hand Psi on, not only lam.", _frozen),
     ("missing-as-zero", messages.MISSING_AS_ZERO, _zeros_for_missing),
+    (
+        "surer-of-missing",
+        "Where a measurement is missing the estimate stays, but the covariance shrinks all the same: nothing was learnt there.",
+        lambda *a: _run_by(lambda lam, Psi, z, p, missing, predict: (z, *predict(z, p)), *a),
+    ),
     *(
         (name, says, lambda *a, wrong=wrong: run_with(step_with(wrong), *a))
         for name, says, wrong in WRONG_CORRECTIONS
@@ -283,12 +292,12 @@ WRONG_RUNS: tuple[tuple[str, str, Answer], ...] = (
     (
         "next-returned",
         "These are the predictions of the next step; return the estimates of this one.",
-        lambda *a: _handed_on(True, *a),
+        lambda *a: _run_by(_next_returned, *a),
     ),
     (
         "estimate-not-handed-on",
         "The filter goes on from its prediction: what a measurement tells is lost at the next step.",
-        lambda *a: _handed_on(False, *a),
+        lambda *a: _run_by(lambda lam, Psi, z, p, missing, predict: (z, *predict(lam, Psi)), *a),
     ),
 )
 

@@ -25,12 +25,7 @@ from kfcourse.exercises.shared import covariance, personal
 
 def track_numbers(exercise: Exercise) -> dict[str, float]:
     """dt (s), sigma (px), sigma_a (px/s^2), and the number of the hand's track."""
-    found = personal(
-        exercise,
-        "i",
-        {"dt": 0.01, "sigma": 8.0, "sigma_a": 7100.0, "track": 7},
-        {"dt": (0.008, 0.02), "sigma": (5, 12), "sigma_a": (4000, 9000), "track": (10, 99)},
-    )
+    found = personal(exercise, "i", dt=(0.01, 0.008, 0.02), sigma=(8.0, 5, 12), sigma_a=(7100.0, 4000, 9000), track=(7, 10, 99))
     return found | {"track": int(found["track"])}
 
 

@@ -27,10 +27,7 @@ from kfcourse.filters.alphabeta import steady_beta
 def radar_numbers(exercise: Exercise) -> dict[str, float]:
     """T (s), sigma (m), alpha, and the radius of the first circle (m)."""
     return personal(
-        exercise,
-        "j",
-        {"T": 0.8, "sigma": 100.0, "alpha": 0.095, "radius": 6000.0},
-        {"T": (0.5, 1.5), "sigma": (50, 150), "alpha": (0.07, 0.25), "radius": (4500, 7500)},
+        exercise, "j", T=(0.8, 0.5, 1.5), sigma=(100.0, 50, 150), alpha=(0.095, 0.07, 0.25), radius=(6000.0, 4500, 7500)
     )
 
 

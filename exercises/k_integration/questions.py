@@ -23,12 +23,7 @@ from kfcourse.exercises.shared import personal
 
 def integration_numbers(exercise: Exercise) -> dict[str, float]:
     """T (s), sigma_n and sigma_xi (m/s), gap: how long the receiver is lost (s)."""
-    return personal(
-        exercise,
-        "k",
-        {"T": 0.1, "sigma_n": 0.2, "sigma_xi": 0.01, "gap": 60.0},
-        {"T": (0.05, 0.4), "sigma_n": (0.1, 0.5), "sigma_xi": (0.005, 0.025), "gap": (30, 90)},
-    )
+    return personal(exercise, "k", T=(0.1, 0.05, 0.4), sigma_n=(0.2, 0.1, 0.5), sigma_xi=(0.01, 0.005, 0.025), gap=(60.0, 30, 90))
 
 
 # -- k1: the error of the slow sensor as the state

@@ -38,6 +38,13 @@ WRONG_DIMENSIONS: tuple[tuple[str, str, Answer], ...] = (
         "It is one step off: steps are counted from 0.",
         dimension_where(lambda k, ratio, first: (k >= first - 1) & ((k - first + 1) % ratio == 0)),
     ),
+    *(
+        ("one-step-late", "It is one step late: step `first` itself is that of the first measurement.", dimension_where(there))
+        for there in (
+            lambda k, ratio, first: (k > first) & ((k - first - 1) % ratio == 0),
+            lambda k, ratio, first: (k - first - 1) % ratio == 0,
+        )
+    ),
     (
         "held",
         "Once the receiver has measured, its value is counted at every step: one measurement taken for many.",

@@ -26,16 +26,13 @@ def timing_numbers(exercise: Exercise) -> dict[str, float]:
     found = personal(
         exercise,
         "l",
-        {"speed": 250.0, "acceleration": 3.0, "period": 0.1, "latency": 0.12, "jitter": 0.04, "sigma": 3.0, "ratio": 40},
-        {
-            "speed": (120, 300),
-            "acceleration": (1.5, 4),
-            "period": (0.1, 0.3),
-            "latency": (0.08, 0.3),
-            "jitter": (0.02, 0.1),
-            "sigma": (2, 6),
-            "ratio": (10, 60),
-        },
+        speed=(250.0, 120, 300),
+        acceleration=(3.0, 1.5, 4),
+        period=(0.1, 0.1, 0.3),
+        latency=(0.12, 0.08, 0.3),
+        jitter=(0.04, 0.02, 0.1),
+        sigma=(3.0, 2, 6),
+        ratio=(40, 10, 60),
     )
     return found | {"ratio": int(found["ratio"])}
 
@@ -46,7 +43,8 @@ def timing_numbers(exercise: Exercise) -> dict[str, float]:
 def dimension_arguments(exercise: Exercise) -> list[tuple]:
     """Two series; in the second a whole period passes before the first measurement of the receiver."""
     rng = exercise.rng("l1")
-    ratio, first = int(rng.choice((5, 7))), int(rng.integers(2, 4))  # odd: first and -first are other steps of a period
+    # steps of a period: first, its neighbours and -first are different ones
+    ratio, first = int(rng.choice((8, 9))), int(rng.integers(2, 4))
     return [(4 * ratio + 1, ratio, first), (3 * ratio, ratio, first + ratio)]
 
 

@@ -268,13 +268,8 @@ def _gain_of_last_step(z: Array, p: Array, ahead: Array, Psi: Array, A: Array, Q
 
 
 def _gain_of_next(z: Array, p: Array, ahead: Array, Psi: Array, A: Array, Q: Array) -> tuple[Array, Array]:
-    means, covs = [z[-1]], [p[-1]]
-    for k in range(len(z) - 2, -1, -1):
-        S = neighbours(p[k + 1], A, Q)[1]
-        mean, cov = step_back(z[k], p[k], ahead[k + 1], Psi[k + 1], means[-1], covs[-1], S)
-        means.append(mean)
-        covs.append(cov)
-    return np.stack(means[::-1]), np.stack(covs[::-1])
+    later = iter(p[:0:-1])
+    return smooth_with(lambda _, *rest: neighbours(next(later), *rest), step_back)(z, p, ahead, Psi, A, Q)
 
 
 WRONG_RECORDS: Rows = (

@@ -33,7 +33,7 @@ from kfcourse.linear.system import LinearSystem
 
 def record_numbers(exercise: Exercise) -> dict[str, float]:
     """Variances q of the level's steps and r of the meter, and the share of measurements that are missing."""
-    return personal(exercise, "m", {"q": 1.0, "r": 9.0, "missing": 0.2}, {"q": (0.5, 2), "r": (4, 16), "missing": (0.1, 0.3)})
+    return personal(exercise, "m", q=(1.0, 0.5, 2), r=(9.0, 4, 16), missing=(0.2, 0.1, 0.3))
 
 
 def gate_arguments(exercise: Exercise) -> list[tuple]:

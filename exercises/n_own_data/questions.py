@@ -30,16 +30,13 @@ def record_numbers(exercise: Exercise) -> dict[str, float]:
     return personal(
         exercise,
         "n",
-        {"q": 0.5, "sigma": 2.0, "shortest": 0.1, "longest": 1.5, "outliers": 0.05, "size": 60.0, "missing": 0.15},
-        {
-            "q": (0.2, 1.0),
-            "sigma": (1.5, 4),
-            "shortest": (0.1, 0.3),
-            "longest": (1.2, 2.0),
-            "outliers": (0.03, 0.07),
-            "size": (40, 90),
-            "missing": (0.1, 0.25),
-        },
+        q=(0.5, 0.2, 1.0),
+        sigma=(2.0, 1.5, 4),
+        shortest=(0.1, 0.1, 0.3),
+        longest=(1.5, 1.2, 2.0),
+        outliers=(0.05, 0.03, 0.07),
+        size=(60.0, 40, 90),
+        missing=(0.15, 0.1, 0.25),
     )
 
 

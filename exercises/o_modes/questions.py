@@ -32,8 +32,12 @@ def modes_numbers(exercise: Exercise) -> dict[str, float]:
     return personal(
         exercise,
         "o",
-        {"a": 0.9, "q": 0.5, "C": 10.0, "fail": 0.025, "repair": 0.1, "missed": 5.0},
-        {"a": (0.7, 0.95), "q": (0.3, 0.8), "C": (6, 14), "fail": (0.02, 0.06), "repair": (0.08, 0.3), "missed": (3, 8)},
+        a=(0.9, 0.7, 0.95),
+        q=(0.5, 0.3, 0.8),
+        C=(10.0, 6, 14),
+        fail=(0.025, 0.02, 0.06),
+        repair=(0.1, 0.08, 0.3),
+        missed=(5.0, 3, 8),
     )
 
 

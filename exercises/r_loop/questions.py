@@ -26,12 +26,7 @@ from kfcourse.exercises.shared import personal
 
 def loop_numbers(exercise: Exercise) -> dict[str, float]:
     """sigma of the meter (V, the amplitude is 1 V), s_phi by which the phase wanders (rad a step), rate of the samples (kHz)."""
-    return personal(
-        exercise,
-        "r",
-        {"sigma": 2.0, "s_phi": 0.2, "rate": 8.0},
-        {"sigma": (1.6, 2.4), "s_phi": (0.17, 0.24), "rate": (4, 12)},
-    )
+    return personal(exercise, "r", sigma=(2.0, 1.6, 2.4), s_phi=(0.2, 0.17, 0.24), rate=(8.0, 4, 12))
 
 
 def samples(exercise: Exercise) -> list[tuple]:

@@ -73,16 +73,16 @@ class Scatter(NamedTuple):
         scatter = np.sum([part.scatter for part in parts], axis=0) + (shift * counts[:, None]).T @ shift
         return cls(int(counts.sum()), parts[0].targets, mean, scatter)
 
-    def regression(self, size: int) -> Affine:
-        """Least squares of the first `size` components on the rest.
+    def regression(self) -> Affine:
+        """Least squares of the targets on the rest.
 
         `matrix` = Cov(t, r) Cov(r)^+,  `offset` = M[t] - `matrix` M[r],  `residual` = Cov(t) - `matrix` Cov(t, r)^T
         """
-        cov = self.scatter / self.size
-        cross = cov[:size, size:]
-        matrix = gain(cross, cov[size:, size:])
-        offset = self.mean[:size] - matrix @ self.mean[size:]
-        return Affine(matrix, offset, _nonnegative(cov[:size, :size] - matrix @ cross.T))
+        cov, r = self.scatter / self.size, self.targets
+        cross = cov[:r, r:]
+        matrix = gain(cross, cov[r:, r:])
+        offset = self.mean[:r] - matrix @ self.mean[r:]
+        return Affine(matrix, offset, _nonnegative(cov[:r, :r] - matrix @ cross.T))
 
 
 def _dot(left: Array, right: Array) -> float:

@@ -127,7 +127,7 @@ def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int, poo
                     raise NotFinite(f"step {k}: the model's trajectories become infinite, check its equations and parameters")
                 said = f"{designs[i].name}, step {k}: the design met infinite or NaN values; the model or this filter diverges"
                 raise NotFinite(Reason(said, "infinite", step=k), designs[i].name)
-            fits[i].append(merged.regression(merged.targets))
+            fits[i].append(merged.regression())
             asked.append(i)
         active = asked
     return fits

@@ -71,7 +71,7 @@ def _make(kind: str, **options: Any) -> None:
     type=click.FloatRange(min=1),
     default=SECONDS,
     show_default=True,
-    help="Time limit of a cell; a notebook may take five times as long.",
+    help="Time limit of a cell, and of an answer's call (18 s at most); a notebook may take five times as long.",
 )
 @click.option("--again", is_flag=True, help="Grade those too that have not changed since the last table.")
 @click.option("--sandbox", type=click.Choice(KINDS), default="auto", show_default=True, help="Where the notebooks run.")

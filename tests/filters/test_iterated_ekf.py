@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from scipy.optimize import least_squares
+from test_filters import STRUCTURES
 
 from kfcourse.filters import notation as s
 from kfcourse.filters.approximations import aof
@@ -14,15 +15,8 @@ from kfcourse.filters.kalman import kalman_filter
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import run
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.quadrature import gauss_hermite, unscented
-from kfcourse.symbolic.structure import gaussian, linearised
-
-STRUCTURES = {
-    "linearised": linearised,
-    "gaussian": gaussian,
-    "unscented": unscented,
-    "gauss-hermite": lambda m: gauss_hermite(m, 3),
-}
+from kfcourse.symbolic.quadrature import unscented
+from kfcourse.symbolic.structure import linearised
 
 PRIOR_MEAN, PRIOR_COV = np.array([3.0, 1.0]), np.array([[0.9, 0.3], [0.3, 0.6]])
 NOISE = np.array([[0.04, 0.01], [0.01, 0.05]])

@@ -3,12 +3,14 @@
 import math
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 from test_filters import LINEAR, exact_ensemble
+from test_jump_particles import histories
+from test_multiple_models import follow
 
 from kfcourse import (
     Ensemble,
@@ -30,7 +32,6 @@ from kfcourse.filters.exact.jumps import jump_pointmass
 from kfcourse.filters.jump_optimal import logic_dynamic_fbp, logic_dynamic_fkp, logic_dynamic_fos
 from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
 from kfcourse.lab.variants import find_variant
-from kfcourse.linear.system import linear_system
 from kfcourse.montecarlo.ensemble import Instant, JumpInstant
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 from kfcourse.symbolic.jumping import JumpModel
@@ -73,43 +74,6 @@ def of(build, model, kind=gaussian):
     return build([kind(mode) for mode in model.modes], model.transition_at, model.first)
 
 
-def follow(one, y):
-    state, found = one.init(y.shape[1]), []
-    for measured in y:
-        state = one.step(state, measured)
-        found.append((*state.posterior, state.memory.probability, state.memory.expected, *state.predicted))
-    return [np.stack(column) for column in zip(*found, strict=True)]
-
-
-def histories(model, y):
-    """Mean, variance and probabilities of the last mode, by a Kalman filter for each history of modes, for one trajectory."""
-    systems = [linear_system(mode) for mode in model.modes]
-    steps, size = len(y), len(model.modes)
-    logs, laws, last = [], [], []
-    for modes in product(range(size), repeat=steps):
-        log = math.log(model.first[modes[0]])
-        mean, variance = float(model.prior.mean[0]), float(model.prior.cov[0, 0])
-        for k, (mode, value) in enumerate(zip(modes, y, strict=True)):
-            system, *constants = systems[mode]
-            A, H, Q, R, a0, b0 = (float(np.squeeze(one)) for one in (system.A, system.H, system.Q, system.R, *constants))
-            if k:
-                log += math.log(model.transition_at(k - 1)[modes[k - 1], mode])
-                mean, variance = A * mean + a0, A * A * variance + Q
-            S = H * H * variance + R
-            log += -0.5 * ((value - H * mean - b0) ** 2 / S + math.log(2 * math.pi * S))
-            gain = variance * H / S
-            mean, variance = mean + gain * (value - H * mean - b0), variance * R / S
-        logs.append(log)
-        laws.append((mean, variance))
-        last.append(modes[-1])
-    weights = np.exp(np.array(logs) - max(logs))
-    evidence = max(logs) + math.log(weights.sum())
-    weights /= weights.sum()
-    mean, variance = np.array(laws).T
-    z = weights @ mean
-    return z, weights @ (variance + (mean - z) ** 2), np.bincount(last, weights, size), evidence
-
-
 # --- the exact filter
 
 
@@ -120,10 +84,10 @@ def test_the_exact_filter_is_the_sum_over_all_histories(model):
     total = likelihood(jump_pointmass(model), y).sum(axis=0)
     for trajectory in range(4):
         for k in (0, 1, 3, 5):
-            z, variance, expected, evidence = histories(model, y[: k + 1, trajectory, 0])
+            z, variance, expected, evidence = histories(model, y[: k + 1, trajectory])
             # the accuracy of a step is 1e-3 standard deviations, and estimated with caution
-            assert abs(mean[k, trajectory, 0] - z) < 1e-3 * math.sqrt(variance)
-            assert abs(cov[k, trajectory, 0, 0] / variance - 1) < 2e-3
+            assert abs(mean[k, trajectory] - z) < 1e-3 * np.sqrt(variance)
+            assert abs(cov[k, trajectory] / variance - 1) < 2e-3
             np.testing.assert_allclose(probability[k, trajectory], expected, atol=1e-3)
         assert abs(total[trajectory] - evidence) < 6e-3
 
@@ -286,11 +250,11 @@ def test_what_is_merged_when():
         mean, cov, probability, *_ = follow(of(build, AFFINE), y)
         for trajectory in range(5):
             for k in range(3):
-                z, variance, expected, _ = histories(AFFINE, y[: k + 1, trajectory, 0])
-                same = abs(mean[k, trajectory, 0] - z) < 1e-9 * math.sqrt(variance)
+                z, variance, expected, _ = histories(AFFINE, y[: k + 1, trajectory])
+                same = abs(mean[k, trajectory] - z) < 1e-9 * np.sqrt(variance)
                 assert same == (k < exact)
                 if k < exact:
-                    assert abs(cov[k, trajectory, 0, 0] / variance - 1) < 1e-9
+                    assert abs(cov[k, trajectory] / variance - 1) < 1e-9
                     np.testing.assert_allclose(probability[k, trajectory], expected, atol=1e-9)
 
 

@@ -204,6 +204,7 @@ def test_a_vector_variant_has_no_scalar_derivation(tmp_path):
     write_handin(load_variants()["20"], found, tmp_path, "ru")
     tex = (tmp_path / "handin.tex").read_text(encoding="utf-8")
     assert "В среднем по шагам точнее всех ГАОФ; дисперсия ошибки наименее точного, ДУОФ, больше на $" in tex
+    assert r"После знака $\pm$ указана стандартная ошибка." in tex
     assert r"\Psi_0 = D_0 = \begin{pmatrix}0.1 & 0 \\ 0 & 0.1\end{pmatrix}" in tex
     assert "pmatrix" in tex and "q_2" not in tex and r"&\quad" in tex
 

@@ -32,7 +32,7 @@ class InsideKernel:
     """A kernel for notebooks that do nothing to their process; values are sent as between two."""
 
     def __init__(self, place, opening, seconds):
-        self.notes, self._namespace, self._answers = [], {}, {}
+        self.notes, self.seconds, self._namespace, self._answers = [], seconds, {}, {}
 
     def __enter__(self):
         return self

@@ -603,8 +603,41 @@ def test_an_interrupted_run_goes_on_where_it_was(three):
     def rest(new, started):
         return [Grade(one.name, "graded", "b", "53", MARKS, "", one.digest) for one in new]
 
-    grades, old = grade_all(work, table, False, rest)
-    assert ([one.name for one in grades], old) == (["a.ipynb", "b.ipynb", "c.ipynb"], 1)
+    grades, old, kept = grade_all(work, table, False, rest)
+    assert ([one.name for one in grades], old, kept) == (["a.ipynb", "b.ipynb", "c.ipynb"], 1, {})
+
+
+def test_a_row_is_not_lost_to_a_run_that_cannot_grade_its_notebook(three):
+    """Two runs over one folder, with the lab's variants and with others, leave all that either graded; a new file counts anew."""
+    table = three / "table.csv"
+
+    def run(known, **options):
+        def graded(new, started):
+            for one in new:
+                yield (
+                    Grade(one.name, "graded", "b", "53", MARKS, "", one.digest)
+                    if one.name in known
+                    else Grade(one.name, "not graded", note="no such variant")
+                )
+
+        grades, _, kept = grade_all(submissions.returned(three, masters=FIXTURES, **options), table, False, graded)
+        return [one.status for one in grades], kept
+
+    assert run(["a.ipynb"]) == (["graded", "not graded", "not graded"], {})
+    (three / "a.ipynb").rename(three / "d.ipynb")
+    (three / "my.toml").write_text(MY_TOML, encoding="utf-8")
+    of_lab = {"d.ipynb": "no such variant"}
+    assert run(["b.ipynb"], variants_file=three / "my.toml") == (["graded", "not graded", "graded"], of_lab)
+
+    def interrupted(new, started):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        grade_all(submissions.returned(three, masters=FIXTURES, seconds=7.0), table, False, interrupted)
+    assert sorted(one.name for one in read_table(table).values()) == ["b.ipynb", "d.ipynb"]
+
+    change_file(three / "d.ipynb")
+    assert run([]) == (["graded", "not graded", "not graded"], {"b.ipynb": "no such variant"})
 
 
 def test_the_digest_knows_all_that_a_grade_depends_on(three, tmp_path):

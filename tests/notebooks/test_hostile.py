@@ -105,6 +105,12 @@ def test_no_function_gets_more_than_it_deserves(kernel, name, monkeypatch):
     assert result and result.passed, (result, stopped)
 
 
+def test_an_endless_answer_is_ended_as_early_as_a_cell_and_the_time_said_is_its_own(kernel, monkeypatch):
+    monkeypatch.setattr(kernel, "seconds", 1.0)
+    result, _ = marked(kernel, Step("def gain(Psi, G, F):\n    while True:\n        pass", "answer"), CHECK)
+    assert (result.status, result.message) == ("unusable", "still running after 1 s: is there a loop that never ends?")
+
+
 @pytest.mark.parametrize("name", CELLS)
 def test_no_cell_lets_a_wrong_answer_pass(kernel, name):
     """One after the other in the same process: what the earlier ones have changed stays changed."""

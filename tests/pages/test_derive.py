@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from browsers import offline
 
 from kfcourse.derivations.values import hermite
 from kfcourse.lab import load_variants
@@ -39,20 +40,15 @@ def texts() -> list[str]:
 @pytest.fixture
 def tab(browser, tmp_path):
     """The field and its script in a page from a file, without a network."""
-    path, problems = tmp_path / "derive.html", []
+    path = tmp_path / "derive.html"
     example = "F = M[(g*x + f*x^2*w - h)^2]\n = g^2*d + 3*f^2*d^2"
     body = field(load_variants(), example)
     head = '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>x</title>'
-    path.write_text(f"{head}<style>{STYLE}</style></head><body>{body}</body></html>", encoding="utf-8")
-    context = browser.new_context(offline=True, viewport={"width": 390, "height": 800})
-    page = context.new_page()
-    page.on("console", lambda message: problems.append(message.text))
-    page.on("pageerror", lambda error: problems.append(str(error)))
-    page.on("request", lambda request: request.url == path.as_uri() or problems.append(f"loads {request.url}"))
-    page.goto(path.as_uri())
-    yield page
-    context.close()
-    assert problems == []
+    with offline(browser) as new_tab:
+        text = f"{head}<style>{STYLE}</style></head><body>{body}</body></html>"
+        page = new_tab(path, text, viewport={"width": 390, "height": 800})
+        page.goto(path.as_uri())
+        yield page
 
 
 def test_verdicts_are_those_of_the_checker(tab):

@@ -50,9 +50,11 @@ def grade_folder(
             raise ValueError(f"{place} is a link: has a student returned it? Take it away, or name another place")
     order = Order(folder.resolve(), masters and masters.resolve(), sandbox, seed or secrets.token_hex(8))
     with far_grading(order, dask) if dask else grading(order, workers) as (graded, kinds):
-        grades, old = grade_all(work, table, again, graded)
+        grades, old, kept = grade_all(work, table, again, graded)
     _show(grades)
     held = "; ".join(HELD[kind] for kind in sorted(kinds)) or "nothing was run"
+    for name, reason in sorted(kept.items()):
+        click.echo(f"kept as an earlier run graded it: {clean(name)}; this one could not: {clean(reason, 200)}")
     click.echo(f"\n{len(grades) - old} run, {old} unchanged since the last table. Table: {table}")
     click.echo(f"Sandbox: {held}\nHidden arguments: --seed {order.salt} repeats them")
     if students or report:

@@ -30,7 +30,7 @@ WHOLE = 5  # times as long may a notebook take
 MEMORY = 4 * 2**30  # bytes of a notebook's process
 START = 60.0  # seconds until a process answers
 GRACE = 3.0  # seconds after which a process that stops nothing is stopped
-ANSWER = 18.0  # seconds that one call of an answer may take
+ANSWER = 18.0  # seconds that one call of an answer may take, where a cell may not take less
 ANSWERS = 45.0  # all calls of it, those of the search for the kind of mistake included
 
 
@@ -93,7 +93,7 @@ class Kernel:
 
     def __init__(self, place: Site, opening: Opening, seconds: float = SECONDS):
         self.notes: list[str] = []
-        self._place, self._opening, self._seconds = place, opening, seconds
+        self._place, self._opening, self.seconds = place, opening, seconds
         self._deadline = float("inf")
         self._done: list[tuple[str, tuple[str, ...]]] = []  # cells, to be run again
         self._process: Process | None = None
@@ -101,7 +101,7 @@ class Kernel:
 
     def __enter__(self) -> Kernel:
         self._start()
-        self._deadline = time.monotonic() + WHOLE * self._seconds
+        self._deadline = time.monotonic() + WHOLE * self.seconds
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -148,11 +148,11 @@ class Kernel:
         """
         message = {"do": "cell", "source": source, "names": list(names)}
         try:
-            reply = self._once_more(lambda: self._request(message, min(time.monotonic() + self._seconds, self._deadline), []))
+            reply = self._once_more(lambda: self._request(message, min(time.monotonic() + self.seconds, self._deadline), []))
         except OutOfTime:
             late = time.monotonic() >= self._deadline
-            long = f"the notebook takes longer than {WHOLE * self._seconds:g} s" if late else ""
-            raise Stopped(long or f"still running after {self._seconds:g} s") from None
+            long = f"the notebook takes longer than {WHOLE * self.seconds:g} s" if late else ""
+            raise Stopped(long or f"still running after {self.seconds:g} s") from None
         self._done.append((source, tuple(names)))
         error, answers = reply.get("error"), reply.get("answers")
         told = (clean(str(error[0]), 60), clean(str(error[1]))) if isinstance(error, list) and len(error) == 2 else None
@@ -165,7 +165,7 @@ class Kernel:
         Raises
         ------
         Missing, Unusable, OutOfTime
-            As an answer that is called here would make `kfcourse.checks.engine.call` say.
+            As an answer that is called here would make `kfcourse.checks.engine.call` say; the last with the seconds.
         """
         functions: list[Callable] = []
 
@@ -177,6 +177,8 @@ class Kernel:
         message = {"do": "ask", "question": question, "arguments": sent, "seconds": seconds}
         try:
             reply = self._once_more(lambda: self._request(message, time.monotonic() + seconds + GRACE, functions))
+        except OutOfTime:
+            raise OutOfTime(seconds) from None
         except Ended as reason:
             raise Lost(str(reason)) from None
         except Stopped as reason:
@@ -189,7 +191,7 @@ class Kernel:
         if reply.get("fails") == "missing":
             raise Missing
         if reply.get("fails") == "late":
-            raise OutOfTime
+            raise OutOfTime(seconds)
         raise Unusable(clean(str(reply.get("says")), 300))
 
     def _once_more(self, request: Callable[[], dict[str, Any]]) -> dict[str, Any]:
@@ -208,7 +210,7 @@ class Kernel:
         self.close()
         self._start()
         for source, names in self._done:
-            until = min(time.monotonic() + self._seconds, self._deadline)
+            until = min(time.monotonic() + self.seconds, self._deadline)
             try:
                 self._request({"do": "cell", "source": source, "names": list(names)}, until, [])
             except OutOfTime:
@@ -264,6 +266,7 @@ class Answer:
 
     def __init__(self, kernel: Kernel, question: str):
         self._kernel, self._question, self._left = kernel, question, ANSWERS
+        self._most = min(ANSWER, kernel.seconds)
         self.lost = ""  # why no answer could be had
 
     def __call__(self, *arguments: Any) -> Any:
@@ -271,7 +274,7 @@ class Answer:
             raise OutOfTime
         start = time.monotonic()
         try:
-            return self._kernel.ask(self._question, arguments, min(ANSWER, self._left))
+            return self._kernel.ask(self._question, arguments, min(self._most, self._left))
         except Lost as reason:
             self.lost = str(reason)
             raise

@@ -40,7 +40,7 @@ class Returned:
     name : str
         The path in the folder, with slashes.
     digest : str
-        Of the file and of all that its grade depends on; the same digest gives the same grade.
+        Of all that its grade depends on, and of the file and the variant given; the same digest gives the same grade.
     seconds : float
         Time limit of a cell.
     variants_file : Path or None
@@ -79,15 +79,14 @@ def returned(
         setting.update(path.read_bytes())
     found = []
     for path, problem in sorted(_handed_in(folder)):
-        name, digest, variant = path.relative_to(folder).as_posix(), setting.copy(), ""
+        name, content, variant = path.relative_to(folder).as_posix(), hashlib.sha256(), ""
         if not problem:
             variant = given(name, path)
-            digest.update(f"{variant}\n".encode())
+            content.update(f"{variant}\n".encode())
             with suppress(OSError):  # told when it is graded
-                digest.update(_content(path))
-        found.append(
-            Returned(path, name, "" if problem else digest.hexdigest(), seconds, variants_file, masters, variant, problem)
-        )
+                content.update(_content(path))
+        digest = "" if problem else f"{setting.hexdigest()[:32]}-{content.hexdigest()}"
+        found.append(Returned(path, name, digest, seconds, variants_file, masters, variant, problem))
     return found
 
 

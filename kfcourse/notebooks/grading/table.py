@@ -170,20 +170,23 @@ Started = Callable[[Returned], None]
 RunAll = Callable[[Sequence[Returned], Started], Iterable[Grade]]
 
 
-def grade_all(work: Sequence[Returned], path: Path, again: bool, run_all: RunAll) -> tuple[list[Grade], int]:
+def grade_all(work: Sequence[Returned], path: Path, again: bool, run_all: RunAll) -> tuple[list[Grade], int, dict[str, str]]:
     """Grade what is new, and write the table after each notebook, so that an interrupted run goes on where it was.
 
-    What is still to be graded stands in the table too: if the run is ended, it says which notebooks were in it.
+    What is still to be graded stands in the table too: if the run is ended, it says which notebooks were in it.  A notebook
+    that was graded, and that this run cannot grade (of a variant that another `--variants` has, say), keeps its row.
 
     Returns
     -------
-    grades, old : list of Grade, int
-        By name; how many were taken from the earlier table.
+    grades, old, kept : list of Grade, int, dict
+        By name; how many were taken from the earlier table; name of a notebook that keeps its row to why it was not graded.
     """
     table = read_table(path)
     grades, new = unchanged(work, {} if again else table)
-    old = len(grades)
-    waiting = {one.name: Grade(one.name, FAILED, note=WAITING) for one in new}
+    old, kept = len(grades), dict[str, str]()
+    by_file = {_file(one): one for one in table.values()}
+    before = {one.name: replace(by_file[_file(one)], name=one.name) for one in new if _file(one) in by_file}
+    waiting = {one.name: before.get(one.name) or Grade(one.name, FAILED, note=WAITING) for one in new}
     lock = threading.Lock()
 
     def started(one: Returned) -> None:
@@ -194,8 +197,15 @@ def grade_all(work: Sequence[Returned], path: Path, again: bool, run_all: RunAll
 
     for one in run_all(new, started):
         with lock:
+            if one.status == FAILED and one.name in before:
+                kept[one.name], one = one.note, before[one.name]
             grades.append(one)
             waiting.pop(one.name, None)
             write_table([*grades, *waiting.values()], path)
     write_table(grades, path)
-    return sorted(grades, key=lambda one: one.name), old
+    return sorted(grades, key=lambda one: one.name), old, kept
+
+
+def _file(one: Grade | Returned) -> str:
+    """What its digest says of the file and the variant given alone."""
+    return one.digest.rpartition("-")[2]

@@ -231,7 +231,7 @@ WRONG = [
     ("b4", "innovation-sign", b4(correct=b2(innovation=lambda y, h, lam, G: h - y))),
     ("b4", "unused", lambda *arguments: b4(own=OWN())(*arguments)),
     ("b4", "unused", lambda y, mean, cov, measure, predict: b4()(y, mean, cov, OWN()[0], predict)),
-    ("b4", "sometimes", b4(covariance=lambda Psi, p: p)),
+    ("b4", "surer-of-missing", b4(covariance=lambda Psi, p: p)),
     ("b4", "sometimes", b4(estimate=lambda lam: 0 * lam)),
     ("b4", "sometimes", b4(gone=lambda missing: missing | missing.any())),
     ("b4", "unused", b4(start=lambda mean, cov: (0 * mean, cov))),

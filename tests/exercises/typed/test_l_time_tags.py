@@ -185,6 +185,8 @@ WRONG = [
     ("l1", "receiver-only", l1(lambda k, ratio, first: k >= first and (k - first) % ratio == 0, base=0)),
     ("l1", "held", l1(lambda k, ratio, first: k >= first)),
     ("l1", "one-step-off", l1(lambda k, ratio, first: k + 1 >= first and (k + 1 - first) % ratio == 0)),
+    ("l1", "one-step-late", l1(lambda k, ratio, first: k > first and (k - first) % ratio == 1)),
+    ("l1", "one-step-late", l1(lambda k, ratio, first: k % ratio == (first + 1) % ratio)),
     ("l1", "reversed", l1(lambda k, ratio, first: not (k >= first and (k - first) % ratio == 0))),
     ("l1", "receiver-only", lambda steps, ratio, first: (np.arange(steps) - first) % ratio == 0),
     ("l2", "other-way", lambda reading, rate, shift: rate * reading + shift),
