@@ -52,7 +52,7 @@ figure, ax = plt.subplots(figsize=(7.2, 3.1))
 steps = np.arange(STEPS.stop)
 for name, label in SHOWN.items():
     gap, line = result.gap(name)[STEPS], style(name) | {"label": label}
-    middle, (low, high) = 100 * gap.value, (100 * limit for limit in gap.interval(0.95))
+    middle, (low, high) = 100 * gap.value, (100 * limit for limit in gap.interval())
     ax.plot(steps, middle, markersize=4, **line)
     ax.fill_between(steps, low, high, color=line["color"], alpha=0.16, linewidth=0)
 ax.axhline(0, color="0.35", linewidth=1)

@@ -5,6 +5,7 @@ import builtins
 import doctest
 import inspect
 import os
+import re
 import subprocess
 import sys
 from graphlib import TopologicalSorter
@@ -82,6 +83,19 @@ def test_a_constant_of_the_exact_filter_has_one_value():
     names = [name for name, _ in found]
     assert len(names) > 30
     assert [pair for pair in found if names.count(pair[0]) > 1] == []
+
+
+def test_a_filter_cites_its_source():
+    """Name and year, in the docstring of its file or in its own; the exact filter's stands in the map of its folder."""
+    from kfcourse import filters
+
+    exported = [one for one in map(vars(filters).get, filters.__all__) if inspect.isfunction(one)]
+    homes = {one.__module__ for one in exported} - {"kfcourse.filters.notation"}
+    assert len(homes) > 15
+    for home in homes:
+        module = import_module("kfcourse.filters.exact" if home.startswith("kfcourse.filters.exact") else home)
+        said = [module.__doc__, *(one.__doc__ for one in exported if one.__module__ == home)]
+        assert re.search(r"(?:[A-Z][a-z]+|others)(?:'s)?,?\s\(?(?:19|20)\d\d\b", " ".join(map(str, said))), home
 
 
 def test_every_folder_has_its_page():

@@ -12,6 +12,8 @@ and (xi_i, u_i, T_i) take the place of (mu_i, z_i, p_i) in the prediction of the
     `logic_dynamic_fkp`   zeta_k = (y_k, y_{k-1}, ..., y_{k-l+1})  (ФКПлд, finite memory)
     `logic_dynamic_fbp`   zeta_k = (z_k, z_{k-1}, ..., z_{k-l+1})  (ФБПлд, high order)
 
+The memories are Rudenko's (2010), a mode beside the state as in his logic-dynamic filters.
+
 Without jumps they are `fos`, `fkp` and `fbp`.
 """
 

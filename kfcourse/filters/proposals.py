@@ -7,6 +7,7 @@ A particle x and the noise u ~ N(m, D) make the next state x' = a(x, u), and y =
 so u has a posterior of its own.  A step of Gauss and Newton takes g and R at the last u_i for affine and constant, which gives
 a normal law for u; a few of them find the posterior's mode and width.  They are taken in s, u = m + L s with L L^T = D, so that
 singular D (a noise that enters some components only) needs no care.  The initial state is a noise, too: x_0 = u ~ prior.
+Doucet, Godsill and Andrieu (2000) say why to look there.
 """
 
 from __future__ import annotations

@@ -22,6 +22,7 @@ from kfcourse.lab.plots import style
 from kfcourse.lab.short_names import LAB, title
 from kfcourse.lab.variants import Variant
 from kfcourse.pages.browser import script
+from kfcourse.records.examination import normal_bound
 from kfcourse.symbolic import javascript
 
 DATA = Path(__file__).parent / "data"
@@ -116,6 +117,7 @@ def live_lab(name: str, variants: Mapping[str, Variant]) -> str:
         "step": 4,
         "runs": RUNS,
         "steps": STEPS,
+        "reach": normal_bound(),
     }
     return figure(name, "The lab, live", source, f"(root, name) => kfLiveLab(root, name, {json.dumps(given)})")
 

@@ -56,8 +56,8 @@ const kfServe = () => {
 if (typeof document === "undefined") kfServe();
 
 const kfLiveLab = (root, name, given) => {
-  const { styles, titles, runs, steps } = given, names = Object.keys(styles);
-  const MINUS = "\u2212", SPACE = "\u00a0", CONFIDENCE = 1.96;
+  const { styles, titles, runs, steps, reach } = given, names = Object.keys(styles);
+  const MINUS = "\u2212", SPACE = "\u00a0";
   const key = (variant, parameter) => `${variant}.${parameter}`;
   const defaults = { variant: given.first, step: given.step, seed: 1, shown: 2, function: "F" };
   for (const [variant, model] of Object.entries(kfModels)) {
@@ -65,7 +65,7 @@ const kfLiveLab = (root, name, given) => {
     defaults[key(variant, "prior-mean")] = model.prior.mean;
     defaults[key(variant, "prior-variance")] = model.prior.variance;
   }
-  const percent = (value, error) => (isFinite(value) ? `${(100 * value).toFixed(2)} ± ${(100 * CONFIDENCE * error).toFixed(2)}`.replace("-", MINUS) : "diverges");
+  const percent = (value, error) => (isFinite(value) ? `${(100 * value).toFixed(2)} ± ${(100 * reach * error).toFixed(2)}`.replace("-", MINUS) : "diverges");
 
   kfFigure(root, name, defaults, (ui) => {
     const chosen = ui.row(), sliders = ui.row(), keys = ui.row("kf-lines"), main = ui.row("kf-charts"), status = ui.says(), table = ui.row("kf-numbers");
@@ -128,7 +128,7 @@ const kfLiveLab = (root, name, given) => {
       const tops = [];
       for (const one of names) {
         const part = shown ? bounds.above[one] : ks.map(() => [NaN, NaN]), value = part.map(([ratio]) => 100 * ratio);
-        const half = part.map(([, error]) => 100 * CONFIDENCE * error);
+        const half = part.map(([, error]) => 100 * reach * error);
         lines.gap[one](ks, value);
         bands[one](ks, value.map((v, k) => v - half[k]), value.map((v, k) => v + half[k]));
         tops.push(...value.map((v, k) => v + half[k]).filter(isFinite));
