@@ -15,10 +15,13 @@ from pathlib import Path
 from urllib.parse import quote, unquote, urlsplit
 
 import nbformat
+import numpy as np
 import pytest
 import yaml
 from browsers import chromium
 from bs4 import BeautifulSoup
+from matplotlib.colors import rgb_to_hsv, to_rgb
+from matplotlib.image import imread
 
 ROOT = Path(__file__).resolve().parent.parent
 HTML = ROOT / "_build" / "html"
@@ -381,6 +384,41 @@ def weight(page: str) -> int:
     if any(file.name == "startup.js" for file in files):
         files |= set((HTML / "_static" / "mathjax").rglob("*.js"))
     return sum(file.stat().st_size for file in files if file.is_file())
+
+
+HUES = {
+    "red": (335, 12),
+    "orange": (8, 48),
+    "yellow": (40, 70),
+    "green": (70, 170),
+    "blue": (170, 255),
+    "purple": (250, 345),
+}  # degrees
+
+
+def hues(picture: Path) -> set[str]:
+    """The names of the hues that a picture has: of its strokes and areas, or of more than a few dots."""
+    if picture.suffix == ".svg":
+        colours = [to_rgb(one) for one in set(re.findall(r"#[0-9a-fA-F]{6}\b", picture.read_text(encoding="utf-8")))]
+    else:
+        dots = imread(picture)
+        drawn, count = np.unique(dots[dots[..., 3] > 0.6][:, :3], axis=0, return_counts=True)
+        colours = [tuple(one) for one in drawn[count > 30]]
+    angles = [360 * hsv[0] for hsv in map(rgb_to_hsv, colours) if hsv[1] > 0.15 and hsv[2] > 0.15]
+    return {name for name, (low, high) in HUES.items() for one in angles if (one - low) % 360 <= (high - low) % 360}
+
+
+@pytest.mark.parametrize("page", SHELF)
+def test_hues_that_a_figure_speaks_of_are_in_its_picture(page: str) -> None:
+    path = HTML / f"{page}.html"
+    for one in re.findall(r"<figure.*?</figure>", path.read_text(encoding="utf-8"), re.DOTALL):
+        figure = BeautifulSoup(one, "html.parser").figure
+        pictures = [image for image in figure.find_all("img") if not image["src"].startswith("data:")]
+        words = " ".join([figure.get_text(), *(image.get("alt", "") for image in pictures)]).lower()
+        named = {name for name in HUES if re.search(rf"\b{name}\b", words)}
+        if named and pictures:
+            there = set.union(*(hues(path.parent / image["src"]) for image in pictures))
+            assert named <= there, f"{figure.get('id')} speaks of {', '.join(named - there)}; its picture has {', '.join(there)}"
 
 
 def test_pages_are_light():
