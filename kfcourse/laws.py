@@ -195,7 +195,7 @@ MANY = 512  # matrices, from which on a call for each of their components costs 
 
 
 def solve_by_entries(right: Array, cov: Array) -> bool:
-    """The solution X of cov X = right takes the place of `right`, (n, m, ...), and Cholesky's root that of cov, (n, n, ...).
+    """The solution X of cov X = right takes the place of `right`, (n, m, ...), and cov, (n, n, ...), is used up.
 
     Entry by entry of all matrices at once, and in place, as room costs more than sums.  False if somewhere a pivot is only
     rounding: what of a component the others do not tell, as a part of its variance.
@@ -207,15 +207,16 @@ def solve_by_entries(right: Array, cov: Array) -> bool:
             cov[j:, j] -= np.einsum("ik...,k...->i...", cov[j:, :j], cov[j, :j])
         if not np.minimum.reduce(cov[j, j] - needed, axis=None) > 0:
             return False
-        cov[j:, j] /= np.sqrt(cov[j, j])
+        cov[j, j] = 1 / np.sqrt(cov[j, j])  # a product costs a fifth of a quotient
+        cov[j + 1 :, j] *= cov[j, j]
     for j in range(n):  # L (L^T X) = right
         if j:
             right[j] -= np.einsum("k...,km...->m...", cov[j, :j], right[:j])
-        right[j] /= cov[j, j]
+        right[j] *= cov[j, j]
     for j in reversed(range(n)):
         if j < n - 1:
             right[j] -= np.einsum("k...,km...->m...", cov[j + 1 :, j], right[j + 1 :])
-        right[j] /= cov[j, j]
+        right[j] *= cov[j, j]
     return True
 
 

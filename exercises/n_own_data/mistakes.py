@@ -94,6 +94,7 @@ def filter_with(
     returned: str = "estimates",
     carried: bool = True,
     meter_noise: Callable[[float], float] = lambda r: r,
+    sign: float = 1.0,
 ) -> Answer:
     """The filter with something done otherwise."""
 
@@ -108,7 +109,7 @@ def filter_with(
             before = m, P
             seen = not np.isnan(value)
             if seen or missing in ("zero", "expected"):
-                innovation = value - m[0] if seen else (-m[0] if missing == "zero" else 0.0)
+                innovation = sign * (value - m[0]) if seen else (-m[0] if missing == "zero" else 0.0)
                 K = P[:, 0] / (P[0, 0] + meter_noise(r))
                 m, P = m + K * innovation, P - np.outer(K, P[0])
             found.append((m, P) if returned == "estimates" else before)
@@ -144,6 +145,7 @@ WRONG_FILTERS: tuple[tuple[str, str, Answer], ...] = (
         filter_with(noise=lambda dt, q: np.zeros((2, 2))),
     ),
     ("covariance-not-carried", "The motion carries the covariance, too: A P A^T.", filter_with(carried=False)),
+    ("innovation-sign", messages.INNOVATION_SIGN, filter_with(sign=-1.0)),
     ("noise-squared", messages.NOISE_SQUARED, filter_with(meter_noise=lambda r: r**2)),
     ("noise-by-deviation", messages.NOISE_BY_DEVIATION, filter_with(meter_noise=np.sqrt)),
 )

@@ -80,7 +80,11 @@ def _array(
         if place and len(sizes) > 1 and array.shape[: len(sizes)] == sizes:
             array = array[: place[0] + 1, place[1]]  # of this trajectory, up to this step
         elif place and array.ndim and array.shape[:1] == sizes[:1]:
-            array = array[place[0]]
+            if axes[0] == "step":  # what is found of a row may need its neighbours, as an interval does
+                first, end = max(0, place[0] - 1), min(place[0] + 2, len(array))
+                name, array = f"{name}[{first}:{end}]", array[first:end]
+            else:
+                array = array[place[0]]
         inputs.append(f"{name} = {_numbers(array)}")
     where = "".join(f", {axis} {i}" for axis, i in zip(axes, place, strict=False))
     return f"An example{where}{' (counted from 0)' if where else ''}: for {', '.join(inputs)} {_yours(part, found)}."

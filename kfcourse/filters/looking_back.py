@@ -36,19 +36,35 @@ def looked_back(one: Filter, states: Iterable[State], y: Array, lag: int | None 
     return [*early, *reversed([*islice(back(len(y)), reach)])]
 
 
-def normal_laws(one: Filter, states: Iterable[State], lag: int | None = None) -> Gaussian:
-    """The normal laws of the states (steps, runs, ...) given all measurements, or so many later ones."""
+def normal_laws(
+    one: Filter, states: Iterable[State], lag: int | None = None, into: Gaussian | None = None, room: Array | None = None
+) -> Gaussian:
+    """The normal laws of the states (steps, runs, ...) given all measurements, or so many later ones.
+
+    They are put into `into`, and matrices stay in the room of all steps but the last until they are used, if these are given.
+    """
     structure = structure_of(one, "looking back")
     back, waiting, laws = list[Regression](), list[State](), list[Gaussian]()
+
+    def look(visited: Sequence[State]) -> None:
+        if visited:
+            here = None if room is None else room[:, len(back) : len(back) + len(visited)]
+            back.extend(regressions(_passages(structure, visited), here))
+
     for state in states:
-        if waiting and len(waiting) * len(state.posterior.mean) >= AT_ONCE:
-            back += regressions(_passages(structure, waiting))
+        if waiting and len(waiting) * _weight(waiting[-1]) >= AT_ONCE:
+            look(waiting)
             waiting = []
         waiting.append(state)
         laws = [*(laws if lag is not None else ()), state.posterior]  # all are kept only if needed
-    if waiting[:-1]:
-        back += regressions(_passages(structure, waiting[:-1]))
-    return look_back(back, laws, lag, one.model.angles.x)
+    look(waiting[:-1])
+    return look_back(back, laws, lag, one.model.angles.x, into)
+
+
+def _weight(state: State) -> int:
+    """For how many laws a step counts: where all runs have one covariance, it is means alone that are put together."""
+    mean, cov = state.predicted
+    return len(mean) if cov.ndim == 3 else 1 + len(mean) // 16
 
 
 def _passages(structure: Structure, visited: Sequence[State]) -> Passages:

@@ -8,14 +8,19 @@ and since x_{k+1} itself is known only as N(z', p'), from all measurements, what
 
     z_k^s = z + S (z' - lambda),      p_k^s = p + S (p' - Psi) S^T = (I - S A) p (I - S A)^T + S (Q + p') S^T
 
-with Q = Psi - A p A^T.  The last form is a sum of non-negative terms: a wide prior cannot make it negative by rounding.  Of one
-state it is p Q / Psi + S^2 p', of more L (I - S A)^T + S (Q + p') S^T with L = (I - S A) p = Cov(x_k | x_{k+1}).
+with Q = Psi - A p A^T.  The last form is a sum of non-negative terms: a wide prior cannot make it negative by rounding.  All of
+it that waits for no later measurement is the covariance that is left when x_{k+1} is known,
+
+    C = Cov(x_k | x_{k+1}) = (I - S A) p (I - S A)^T + S Q S^T,      p_k^s = C + S p' S^T
+
+Of one state C = p Q / Psi, of more L - S (A L - Q S^T) with L = (I - S A) p, where only rounding is in the brackets.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +36,6 @@ from kfcourse.laws import (
     runs_first,
     runs_last,
     solve_by_entries,
-    stacked,
     transpose,
 )
 from kfcourse.linear.runs import Run
@@ -114,35 +118,33 @@ class Regression(NamedTuple):
     z, expected : ndarray (runs, n)
         Its estimate, and lambda, the prediction of x_{k+1}.
     S, left : ndarray
-        Its gain, and Cov(x_k | x_{k+1}): matrices (n, n) in their `Layout`, as those below.
-    Q, forth : ndarray, or None of one state
-        The noise, and left A^T, which is S Q but for rounding.
+        Its gain, and C = Cov(x_k | x_{k+1}): matrices (n, n) in their `Layout`.
     """
 
     z: Array
     expected: Array
     S: Array
     left: Array
-    Q: Array | None = None
-    forth: Array | None = None
 
     def given(self, after: Gaussian, angles: Components = ()) -> Gaussian:
         """The law of x_k, from that of x_{k+1}; its covariance in the same layout."""
-        lies = layout_of(self.z.shape[-1])
-        mean = self.z + lies.apply(self.S, difference(after.mean, self.expected, angles))
-        further = lies.product(self.S, after.cov if self.Q is None else self.Q + after.cov)
-        if self.forth is not None:
-            further -= self.forth
-        further = lies.product(further, lies.transpose(self.S))
-        further += self.left
-        if self.forth is not None:  # rounding must not make it asymmetric
-            further += lies.transpose(further)
-            further *= 0.5
-        return Gaussian(on_circle(mean, angles), further)
+        n = self.z.shape[-1]
+        lies = layout_of(n)
+        mean = lies.apply(self.S, difference(after.mean, self.expected, angles))
+        mean += self.z
+        cov = lies.product(lies.product(self.S, after.cov), lies.transpose(self.S))
+        cov = np.add(cov, self.left, out=cov if cov.size >= self.left.size else None)
+        if n > 1:  # rounding must not make it asymmetric
+            cov += lies.transpose(cov)
+            cov *= 0.5
+        return Gaussian(on_circle(mean, angles), cov)
 
 
-def regressions(passages: Passages) -> list[Regression]:
-    """Of each step on the next.  They do not depend on what comes later: found for all steps together."""
+def regressions(passages: Passages, room: Array | None = None) -> list[Regression]:
+    """Of each step on the next.  They do not depend on what comes later: found for all steps together.
+
+    Where all runs have matrices of their own they are put into the room, of as many steps, if it is given; see `room_for`.
+    """
     (z, p), (lam, Psi), A, Q = passages
     if z.shape[-1] == 1:
         return list(map(Regression, z, lam, *regression(p, A, Psi, Q)))
@@ -152,8 +154,22 @@ def regressions(passages: Passages) -> list[Regression]:
     S = lies.gain(Ap, Psi)
     left = lies.product(S, Ap)
     np.subtract(p, left, out=left)
-    forth = lies.product(left, lies.transpose(A))
-    return list(map(Regression, z, lam, *(lies.steps(part) for part in (S, left, np.broadcast_to(Q, forth.shape), forth))))
+    rounded = lies.product(A, left)
+    rounded -= lies.product(Q, lies.transpose(S))
+    left -= lies.product(S, rounded)
+    S, left = lies.steps(S), lies.steps(left)
+    if room is not None and S.shape == room.shape[1:]:
+        room[:] = S, left
+        S, left = room
+    return list(map(Regression, z, lam, S, left))
+
+
+def room_for(steps: int, runs: int, n: int) -> Array:
+    """Where matrices of so many steps and runs stay until they are used, both of a `Regression`.
+
+    It may be used again: memory that is asked for anew costs as much as the products that it is to hold.
+    """
+    return np.empty((2, steps, runs, n, n) if layout_of(n) is BY_MATRIX else (2, steps, n, n, runs))
 
 
 def blocks(steps: int, runs: int) -> list[slice]:
@@ -162,19 +178,27 @@ def blocks(steps: int, runs: int) -> list[slice]:
     return [slice(start, start + size) for start in range(0, steps, size)]
 
 
-def look_back(back: list[Regression], laws: Sequence[Gaussian], lag: int | None = None, angles: Components = ()) -> Gaussian:
+def look_back(
+    back: Sequence[Regression],
+    laws: Sequence[Gaussian],
+    lag: int | None = None,
+    angles: Components = (),
+    into: Gaussian | None = None,
+) -> Gaussian:
     """The laws of the states, given all measurements of the record.
 
     Parameters
     ----------
     back : list of Regression
-        Of all steps but the last.  Without a lag it is used up, so that what is found needs no memory beside it.
+        Of all steps but the last.
     laws : sequence of Gaussian
         The filter's, of each step; without a lag that of the last one is enough.
     lag : int, optional
         Only so many later measurements: the law of x_k given y_0, ..., y_{k + lag}.
     angles : tuple
         Numbers of the components of x that are.
+    into : Gaussian, optional
+        Where the result is put.
 
     Returns
     -------
@@ -190,13 +214,31 @@ def look_back(back: list[Regression], laws: Sequence[Gaussian], lag: int | None 
     lies = layout_of(laws[-1].mean.shape[-1])
     known = laws[-1:] if lag is None else laws
     laws = [Gaussian(mean, lies.put(cov if cov.ndim == 3 else cov[None])) for mean, cov in known]
+    found: Iterable[Gaussian]  # the last step first
     if lag is None:
-        while back:
-            laws.append(back.pop().given(laws[-1], angles))
-        laws.reverse()
-    for _ in range(min(lag or 0, len(back))):  # each round tells every state of one measurement more
-        laws = [*(one.given(after, angles) for one, after in zip(back, laws[1:], strict=True)), laws[-1]]
-    return stacked([Gaussian(mean, lies.back(cov)) for mean, cov in laws])
+        found = accumulate(reversed(back), lambda after, one: one.given(after, angles), initial=laws[-1])
+    else:
+        for _ in range(min(lag, len(back))):  # each round tells every state of one measurement more
+            laws = [*(one.given(after, angles) for one, after in zip(back, laws[1:], strict=True)), laws[-1]]
+        found = reversed(laws)
+    return _put_together((Gaussian(mean, lies.back(cov)) for mean, cov in found), len(back) + 1, into)
+
+
+def _put_together(found: Iterable[Gaussian], steps: int, into: Gaussian | None) -> Gaussian:
+    """Laws of successive steps, of the last one first, as one; covariances that are the same for all runs are stored once."""
+    if into is not None:
+        for k, law in zip(reversed(range(steps)), found, strict=True):
+            into.mean[k], into.cov[k] = law
+        return into
+    mean: Array
+    cov: Array
+    for k, law in zip(reversed(range(steps)), found, strict=True):
+        if k == steps - 1:
+            mean, cov = (np.empty((steps, *part.shape)) for part in law)
+        if len(law.cov) > cov.shape[1]:
+            cov = np.repeat(cov, len(law.cov), axis=1)
+        mean[k], cov[k] = law
+    return Gaussian(mean, np.broadcast_to(cov, (*mean.shape, mean.shape[-1])))
 
 
 def check_lag(lag: int | None) -> None:

@@ -35,7 +35,8 @@ from kfcourse.laws import (
     symmetric,
     transpose,
 )
-from kfcourse.montecarlo.experiment import walk
+from kfcourse.linear.smoothing import room_for
+from kfcourse.montecarlo.experiment import run, walk
 from kfcourse.symbolic.structure import Structure
 
 
@@ -75,23 +76,26 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     """
     if one.look_back is not None:
         return stacked([state.posterior for state in _looked_back(one, y, lag)])
-    if np.ndim(y) != 3 or np.shape(y)[1] <= MANY_RUNS:
-        return _normal_laws(one, y, lag)
-    first = _normal_laws(one, y[:, :MANY_RUNS], lag)
-    if first.cov.strides[1] == 0:  # the same for all: stored once
-        return _normal_laws(one, y, lag)
-    mean, cov = (np.empty((*np.shape(y)[:2], *part.shape[2:])) for part in first)
-    for start in range(0, np.shape(y)[1], MANY_RUNS):
-        some = np.s_[:, start : start + MANY_RUNS]
-        mean[some], cov[some] = _normal_laws(one, y[some], lag) if start else first
-    return Gaussian(mean, cov)
-
-
-MANY_RUNS = 5000  # whose record is looked back to together: what is kept of the steps meanwhile stays near the processor
-
-
-def _normal_laws(one: Filter, y: Array, lag: int | None) -> Gaussian:
+    if np.ndim(y) == 3 and np.shape(y)[1] > (many := max(1, min(MANY_RUNS, NEAR // one.model.n**2))):
+        few = run(one, y[:3, :2]).cov
+        if few.strides[1]:  # else it is the same for all, and stored once
+            return _in_parts(one, np.asarray(y, dtype=float), lag, many)
     return normal_laws(one, islice(walk(one, y), 1, None), lag)
+
+
+MANY_RUNS = 5000  # at most, whose record is looked back to together
+NEAR = 60_000  # numbers of their covariances at a step, that what is kept of the steps meanwhile stays near the processor
+
+
+def _in_parts(one: Filter, y: Array, lag: int | None, many: int) -> Gaussian:
+    """The normal laws given the record, of so many runs at a time."""
+    steps, runs, n = *y.shape[:2], one.model.n
+    found, room = Gaussian(np.empty((steps, runs, n)), np.empty((steps, runs, n, n))), room_for(steps - 1, many, n)
+    for start in range(0, runs, many):
+        some = np.s_[:, start : start + many]
+        into = Gaussian(found.mean[some], found.cov[some])
+        normal_laws(one, islice(walk(one, y[some]), 1, None), lag, into, room if start + many <= runs else None)
+    return found
 
 
 def smoothing_error(one: Filter, y: Array, lag: int | None = None) -> Array:

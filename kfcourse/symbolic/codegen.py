@@ -76,8 +76,8 @@ def compile_function(
     Returns
     -------
     Compiled
-        `function(*arrays)`: leading axes broadcast.  An output that no argument enters comes back
-        without leading axes, the same for every trajectory.
+        `function(*arrays)`: leading axes broadcast.  A matrix has those of the arguments that enter it, so what is the same for
+        every trajectory is found once; and so has an output of one entry, or one that no argument enters.
     """
     matrices = (tuple((key, sp.ImmutableMatrix(one)) for key, one in given.items()) for given in (arguments, outputs))
     return _compiled(name, *matrices, tuple(vectors), doc, tuple((definitions or {}).items()))
@@ -269,20 +269,25 @@ def numpy_source(name: str, arguments: Mapping[str, sp.MatrixBase], program: Pro
     printer = NumbersPrinter(rename)
     lines += [f"    {rename[target]} = {printer.doprint(value)}" for target, value in program.assignments]
     for output, entries in program.outputs.items():
-        lines += _assemble(output, entries, output in program.vectors, arguments, program.vectors, printer)
+        is_vector = output in program.vectors
+        enter = arguments if is_vector else _entering(entries, arguments, program)
+        leads = ", ".join(f"{a}.shape[:{-1 if a in program.vectors else -2}]" for a in enter)
+        lines += _assemble(output, entries, is_vector, leads, printer)
     lines.append(f"    return {', '.join(program.outputs)}{',' if len(program.outputs) == 1 else ''}")
     return "\n".join(lines) + "\n"
 
 
-def _assemble(
-    output: str,
-    entries: sp.MatrixBase,
-    is_vector: bool,
-    arguments: Mapping[str, sp.MatrixBase],
-    vectors: frozenset[str],
-    printer: NumbersPrinter,
-) -> list[str]:
-    """Lines that put the entries of one output together."""
+def _entering(entries: sp.MatrixBase, arguments: Mapping[str, sp.MatrixBase], program: Program) -> list[str]:
+    """Names of the arguments that these entries are made of, also by way of assignments."""
+    symbols = set(entries.free_symbols)
+    for target, value in reversed(program.assignments):  # each uses earlier ones only
+        if target in symbols:
+            symbols |= value.free_symbols
+    return [name for name, matrix in arguments.items() if symbols & matrix.free_symbols]
+
+
+def _assemble(output: str, entries: sp.MatrixBase, is_vector: bool, leads: str, printer: NumbersPrinter) -> list[str]:
+    """Lines that put the entries of one output together; `leads`: shapes of the leading axes that it has."""
     rows, columns = entries.shape
     if not entries.free_symbols:
         texts = [[printer.doprint(entries[i, j]) for j in range(columns)] for i in range(rows)]
@@ -292,9 +297,8 @@ def _assemble(
         axes = "None" if is_vector else "None, None"
         text = printer.doprint(entries[0])
         return [f"    {output} = {text if text.isidentifier() else f'({text})'}[..., {axes}]"]
-    shapes = ", ".join(f"{a}.shape[:{-1 if a in vectors else -2}]" for a in arguments)
     size = f"({rows},)" if is_vector else f"({rows}, {columns})"
-    lines = [f"    {output} = np.empty(np.broadcast_shapes({shapes}) + {size})"]
+    lines = [f"    {output} = np.empty(np.broadcast_shapes({leads}) + {size})"]
     numbers = [entry.is_number for entry in entries]
     if 2 * sum(numbers) > len(numbers):  # one pass for all of them
         flat = [str(printer.doprint(entry if number else sp.S.Zero)) for entry, number in zip(entries, numbers, strict=True)]

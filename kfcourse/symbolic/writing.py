@@ -39,8 +39,20 @@ def formula_lines(expression: sp.Expr, variables: Sequence[sp.Symbol]) -> list[s
 
 
 def _readable(expression: sp.Expr) -> sp.Expr:
-    """Without expm1, which keeps the digits of e^u - 1 in the code: people write the latter."""
-    return sp.expand(expression.replace(expm1, lambda u: sp.exp(u) - 1)) if expression.has(expm1) else expression
+    """Without expm1, which keeps the digits of e^u - 1 in the code: people write the latter; and sin^2 u + cos^2 u is 1."""
+    if expression.has(expm1):
+        expression = sp.expand(expression.replace(expm1, lambda u: sp.exp(u) - 1))
+    if not (expression.has(sp.sin) and expression.has(sp.cos)):
+        return expression
+    ways = (expression, _by_other(expression, sp.sin, sp.cos), _by_other(expression, sp.cos, sp.sin))
+    return min(ways, key=lambda way: len(sp.Add.make_args(way)))
+
+
+def _by_other(expression: sp.Expr, one: type[sp.Function], other: type[sp.Function]) -> sp.Expr:
+    """With 1 - other^2 for the square of one of both functions."""
+    return sp.expand(
+        expression.replace(lambda e: e.is_Pow and e.exp == 2 and e.base.func is one, lambda e: 1 - other(*e.base.args) ** 2)
+    )
 
 
 def number_latex(value: float) -> str:

@@ -9,6 +9,7 @@ from tiny import NOTHING, asks, c, d, outcome, p, x, y, z
 
 from kfcourse.checks.diagnosis import GENERAL
 from kfcourse.checks.engine import check
+from kfcourse.checks.failing import shown
 from kfcourse.checks.question import MIME, Attempts, Question, catalogue
 
 pytestmark = pytest.mark.quick
@@ -160,3 +161,11 @@ def test_an_argument_that_cancels_in_the_right_answer_may_stand_in_a_wrong_one()
 def test_an_integer_is_used_if_any_change_of_it_tells():
     question = asks(lambda a, k: a ** (1 + k % 3), [(1.7, 1)])
     assert "depend" not in outcome(question, lambda a, k: a * (1 + k % 2) + 0.3 * (k > 2)).message
+
+
+def test_an_example_of_a_step_shows_the_rows_beside_it() -> None:
+    """An interval is the difference of two rows: from one alone nobody sees what is wrong."""
+    times, wrong = np.array([5.0, 7.0, 8.0]), np.array([2.0, 1.0, 7.0])
+    said = shown(["times"], [times], wrong, np.array([2.0, 1.0, 1.0]), axes=("step",))
+    assert said == "An example, step 2 (counted from 0): for times[1:3] = [7, 8] your function gives 7."
+    assert "times[0:2] = [5, 7]" in shown(["times"], [times], wrong + 1, wrong, axes=("step",))

@@ -11,6 +11,7 @@ from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem
 from kfcourse.linear import run as run_linear
 from kfcourse.linear import smooth as smooth_linear
+from kfcourse.linear.smoothing import Passages, regressions
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble
 from kfcourse.montecarlo.experiment import states
@@ -136,12 +137,37 @@ def test_of_any_number_of_states_it_is_the_regression_on_what_it_knows(n, lag):
     same(Gaussian(many.mean[:, -5:], many.cov[:, -5:]), expected)
 
 
-def test_a_great_many_runs_are_looked_back_to_some_after_the_others(monkeypatch):
-    model, y, expected = dense(3)
-    monkeypatch.setattr("kfcourse.records.smoothing.MANY_RUNS", 2)
-    same(smooth(aof(linearised(model)), y), expected)
+@pytest.mark.parametrize("lag", [None, 1])
+@pytest.mark.parametrize("n", [1, 3, 5])
+def test_a_great_many_runs_are_looked_back_to_some_after_the_others(monkeypatch, n, lag):
+    model, y, expected = dense(n, lag)
+    monkeypatch.setattr("kfcourse.records.smoothing.MANY_RUNS", 2)  # of five
+    same(smooth(aof(linearised(model)), y, lag), expected)
     whole = smooth(kalman_filter(model), np.nan_to_num(y))
     assert whole.cov.strides[1] == 0  # without gaps all have the same, stored once
+
+
+def test_what_all_runs_share_is_found_once():
+    """Gains and covariances of a linear model know nothing of the record, unless something is missing in one of the runs."""
+    model, y, _ = dense(3)
+    one, full = aof(linearised(model)), np.nan_to_num(y)
+    assert all(law.cov.shape == (3, 3) for state in states(one, full) for law in (state.posterior, state.predicted))
+    gaps = states(one, y)
+    assert gaps[-1].predicted.cov.shape == (5, 3, 3)
+    assert smooth(one, full).cov.strides[1] == 0 != smooth(one, y).cov.strides[1]
+    found = regressions(
+        Passages(*(law_of(states(one, full)[1:-1], name) for name in ("posterior", "predicted")), *transition(one))
+    )
+    assert {(part.S.shape[-1], part.left.shape[-1]) for part in found} == {(1, 1)}  # the axis of runs, entry by entry
+
+
+def law_of(visited, name):
+    laws = [getattr(state, name) for state in visited]
+    return Gaussian(np.stack([law.mean for law in laws]), np.stack([law.cov for law in laws])[:, None])
+
+
+def transition(one):
+    return one.structure.transition(one.model.prior.mean, one.model.prior.cov)
 
 
 def test_given_matrices_are_smoothed_as_the_model_they_come_from():
@@ -183,9 +209,9 @@ def test_a_wide_prior_spoils_no_variance():
     assert np.linalg.eigvalsh(found.cov).min() > 0
 
     A, *visited = np.array([[1, T], [0, 1]]), *states(one, y[:, None, None])[1:]
-    p_s = visited[-1].posterior.cov[0]
+    p_s = visited[-1].posterior.cov
     for state in visited[-2::-1]:
-        p, Psi = state.posterior.cov[0], state.predicted.cov[0]
+        p, Psi = state.posterior.cov, state.predicted.cov  # one of both for all runs
         S = p @ A.T @ np.linalg.inv(Psi)
         p_s = p + S @ (p_s - Psi) @ S.T
     assert np.abs(p_s / expected - 1).max() > 1  # what rounding makes of it differs between machines

@@ -111,6 +111,21 @@ def test_a_constant_output_is_one_value_for_all(constant, ensemble):
     assert other.shape == (50, 1)
 
 
+def test_a_matrix_is_one_for_all_whom_its_arguments_are_one_for(ensemble):
+    """A vector is one for each trajectory; what a matrix is made of may come by way of what is found once for several entries."""
+    x, p = ensemble
+    both = sp.sin(p11) * sp.exp(p12)
+    outputs = {
+        "x_next": sp.Matrix([x1, x2]),
+        "of_p": sp.Matrix([[both, both + 1], [both**2, p11]]),
+        "of_all": sp.Matrix([[both, x1]]),
+    }
+    code = compile_function("f", ARGUMENTS, outputs, ["x", "x_next"]).function
+    assert [part.shape for part in code(x, p[0])] == [(50, 2), (2, 2), (50, 1, 2)]
+    assert [part.shape for part in code(x[0], p)] == [(50, 2), (50, 2, 2), (50, 1, 2)]
+    np.testing.assert_allclose(code(x, p[0])[1], code(x, p)[1][0], rtol=1e-14)
+
+
 @pytest.mark.parametrize("name", ["np", "x", "s0", "return_", "Dummy", "x_1", "value", "E", "I"])
 def test_no_symbol_can_hide_another(name, ensemble):
     # Names in the formula never reach the code as they are.

@@ -63,6 +63,8 @@ def test_the_code_s_expm1_is_written_as_people_do():
     printed = formula_latex(F, (m, d))
     assert "expm" not in printed
     assert printed == formula_latex(sp.expand(F.replace(expm1, lambda u: sp.exp(u) - 1)), (m, d))
+    by_hand = sp.Rational(1, 2) - sp.exp(-2 * d) / 2 + (sp.exp(-2 * d) - sp.exp(-d)) * sp.sin(m) ** 2 + 1
+    assert printed == formula_latex(sp.expand(by_hand), (m, d))  # sin^2 m + cos^2 m is 1
     assert "expm" not in " ".join(formula_lines(F, (m, d)))
 
 
