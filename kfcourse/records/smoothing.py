@@ -90,11 +90,12 @@ NEAR = 60_000  # numbers of their covariances at a step, that what is kept of th
 def _in_parts(one: Filter, y: Array, lag: int | None, many: int) -> Gaussian:
     """The normal laws given the record, of so many runs at a time."""
     steps, runs, n = *y.shape[:2], one.model.n
+    many = -(-runs // -(-runs // many))  # all parts alike
     found, room = Gaussian(np.empty((steps, runs, n)), np.empty((steps, runs, n, n))), room_for(steps - 1, many, n)
     for start in range(0, runs, many):
         some = np.s_[:, start : start + many]
         into = Gaussian(found.mean[some], found.cov[some])
-        normal_laws(one, islice(walk(one, y[some]), 1, None), lag, into, room if start + many <= runs else None)
+        normal_laws(one, islice(walk(one, y[some]), 1, None), lag, into, room)
     return found
 
 
