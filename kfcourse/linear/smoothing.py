@@ -43,6 +43,8 @@ from kfcourse.linear.system import LinearSystem
 
 AT_ONCE = 2048  # laws: so many that a call costs little beside them, so few that stacking them does, too
 
+ON_ONE_CORE = 200_000  # products in one of matrices; with more a library sets all cores to it, which wait longer than they work
+
 
 class Passages(NamedTuple):
     """A filter's ways from each step to the next.
@@ -130,8 +132,9 @@ class Regression(NamedTuple):
         """The law of x_k, from that of x_{k+1}; its covariance in the same layout."""
         n = self.z.shape[-1]
         lies = layout_of(n)
-        news, all_runs = difference(after.mean, self.expected, angles), self.S.size == n * n
-        mean = news @ self.S.reshape(n, n).T if all_runs else lies.apply(self.S, news)  # the former is three times as fast
+        news = difference(after.mean, self.expected, angles)
+        at_once = self.S.size == n * n and news.size * n <= ON_ONE_CORE  # three times as fast
+        mean = news @ self.S.reshape(n, n).T if at_once else lies.apply(self.S, news)
         mean += self.z
         cov = lies.product(lies.product(self.S, after.cov), lies.transpose(self.S))
         cov = np.add(cov, self.left, out=cov if cov.size >= self.left.size else None)

@@ -28,6 +28,7 @@ from kfcourse.laws import (
     Gaussian,
     Measurement,
     Transition,
+    any_missing,
     apply,
     measurement_of,
     product,
@@ -77,9 +78,9 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     if one.look_back is not None:
         return stacked([state.posterior for state in _looked_back(one, y, lag)])
     if np.ndim(y) == 3 and np.shape(y)[1] > (many := max(1, min(MANY_RUNS, NEAR // one.model.n**2))):
-        few = run(one, y[:3, :2]).cov
-        if few.strides[1]:  # else it is the same for all, and stored once
-            return _in_parts(one, np.asarray(y, dtype=float), lag, many)
+        y = np.asarray(y, dtype=float)
+        if any_missing(y) or run(one, y[:3, :2]).cov.strides[1]:  # else covariances are the same for all, and stored once
+            return _in_parts(one, y, lag, many)
     return normal_laws(one, islice(walk(one, y), 1, None), lag)
 
 
