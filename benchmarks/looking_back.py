@@ -2,12 +2,12 @@
 
     OMP_NUM_THREADS=1 python benchmarks/looking_back.py [--repeats 9] [--states 1 2 3 4 6] [--runs 1 300 5000 50000]
 
-Smoother over filter, and likelihood over filter (each runs the filter itself, too), for a chain of so many states whose last
-one is driven, and the first measured: linear, whole and with a tenth of the measurements missing, by `kalman_filter`, or with the
-sine of the first in the last.  And for variant 53, the pendulum of Sarkka and Svensson, an aircraft that turns, radar D3, the exact
-filter and particles.  Ratios of processor times, the three one after the other in each of so many turns: their medians, and the
-smoother's worst.  A smoother is to cost at most 2.5 times its filter; particles, which draw each ancestor anew among all, are the
-exception.
+Smoother over filter, and likelihood over filter (each runs the filter itself, too), for a chain of so many states whose last one
+is driven, and the first measured: linear, whole and with a tenth of the measurements missing, by `kalman_filter`, or with the
+sine of the first in the last. And for variant 53, the pendulum of Sarkka and Svensson, an aircraft that turns, radar D3, the
+exact filter and particles. Ratios of processor times, the three one after the other in each of so many turns: their medians, and
+the smoother's worst. A smoother is to cost at most 2.5 times its filter; particles, which draw each ancestor anew among all, are
+the exception.
 
 Found on two cores that were busy with much else (a load of 15 to 22), smoother over filter, median of five to seven turns:
 
@@ -38,10 +38,11 @@ Found on two cores that were busy with much else (a load of 15 to 22), smoother 
             4          1.9    1.7    1.9    1.6
             6          1.5    1.7    1.8    1.6
 
-Six states with gaps, whose filter is the cheapest of those that have a covariance for each run, are above it.  Worst turns had up to
-3.4, single ones more: the machine's, where a page of new memory cost as much as a hundred products.  Quadrature filters are dearer:
-smoothers of unscented filters cost 1.1 to 2.4 times as much.  Where the motion is linear and nothing is missing all runs have one
-covariance: a step of a filter of six states costs .08 us a run on 5,000 runs, where it took 1.1 us as long as each had its own.
+Six states with gaps, whose filter is the cheapest of those that have a covariance for each run, are above it. Worst turns had up
+to 3.4, single ones more: the machine's, where a page of new memory cost as much as a hundred products. Quadrature filters are
+dearer: smoothers of unscented filters cost 1.1 to 2.4 times as much. Where the motion is linear and nothing is missing all runs
+have one covariance: a step of a filter of six states costs .08 us a run on 5,000 runs, where it took 1.1 us as long as each had
+its own.
 """
 
 from __future__ import annotations
