@@ -55,9 +55,13 @@ class Clouds:
     evidence: Array
     seed: np.random.SeedSequence
 
-    def discretisation_error(self) -> Array:
+    def apart(self) -> Array:
         """Standard error of the estimates, (runs,): half the distance of both clouds."""
         return np.asarray(0.5 * np.linalg.norm(self.halves[0] - self.halves[1], axis=1))
+
+    def discretisation_error(self) -> Array:
+        """What is stated of the error, (runs,): the standard error."""
+        return self.apart()
 
 
 @dataclass(frozen=True, eq=False)

@@ -136,6 +136,8 @@ def _twice(state: State) -> tuple[Array, Array]:
 
 def _doubt(state: State) -> Array:
     """The reference's own error, (runs,): half the distance of two clouds; what discretisation leaves of the nodes' mean."""
+    if isinstance(state.memory, Clouds):
+        return state.memory.apart()
     found = getattr(state.memory, "discretisation_error", None)
     return np.zeros(len(state.posterior.mean)) if found is None else found()
 

@@ -3,6 +3,9 @@ r"""Numbers and words in the sentences that `claim` and `agree` print, read from
 A number that is typed must also stand in the code of its cell outside of the sentence, as it is or as a tolerance (12 digits and
 1e-12, 95 % and 0.95, 10^{-6} and 1e-6); others come from values, `f"{x:.2f}"`.  What is left (years, names, units) the page's
 file in letters/ lists in LITERALS.  A sentence that compares needs a condition that compares.
+
+A decimal number in the prose around the cells, or in the words of a figure, stands in the code of the page as well: where it is
+computed, or in a condition that holds it.
 """
 
 from __future__ import annotations
@@ -19,6 +22,10 @@ COMPARING = re.compile(
     r"narrower|wider|only|falls?|grows?|rises?|faster|slower|sooner|later|leads|first|last|same|agree|equal)\b"
 )
 _NUMBER = re.compile(r"(?<![\w.^_{\\])(\d+(?:[ \u00a0]\d{3})*(?:\.\d+)?)")
+_DECIMAL = re.compile(r"(?<![\w.^_\\])\d+\.\d+(?![\w.])")
+_NO_PROSE = re.compile(
+    r"\A---\n.*?\n---\n|^```(?:text|toml|console|python)\n.*?^```|``?[^`\n]+``?|<[^>]+>|\]\([^)]*\)", re.MULTILINE | re.DOTALL
+)
 _POWER = re.compile(r"10\^(?:\{(-?\d+)\}|(\d))")
 _FORMULA = re.compile(r"\$([^$]*)\$")
 _VALUE = re.compile(r"(?:=|<|>|\\l?eq?|\\ge?|\\approx|^)\s*(-?[\d.]+)\s*$")
@@ -42,6 +49,16 @@ def spoken(page: str) -> Iterator[Sentence]:
             yield Sentence(
                 "…".join(typed), unknown, getattr(call.func, "id", "") == "agree" or any(map(_compares, call.args[1:]))
             )
+
+
+def decimals(page: str) -> list[str]:
+    """The decimal numbers of a page's prose and of the words of its figures that its code does not know."""
+    known, prose = set[float](), page
+    for code in cells(page):
+        known |= _constants(ast.parse(code), set())
+        prose = prose.replace(code, "")
+    found = _DECIMAL.findall(_NO_PROSE.sub("", prose))
+    return [number for number in found if not {float(number), round(float(number) / 100, 12)} & known]  # or a percentage
 
 
 def _typed(sentence: ast.expr) -> Iterator[str]:
