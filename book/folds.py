@@ -1,6 +1,7 @@
 """Sphinx extension: code that is folded away stands after what it shows, and neighbouring cells share one fold.
 
-A reader sees the figure, the equation or the sentence first, and under it a small mark that opens the code.
+A reader sees the figure, the equation or the sentence first, and under it a small mark that opens the code.  What computes
+the answer to a question is folded with the answer.
 
     ```{more} The derivation, the filter, and a flight past a beacon
     ```
@@ -12,7 +13,7 @@ long.
 from __future__ import annotations
 
 import html
-from itertools import groupby
+from itertools import groupby, takewhile
 
 from docutils import nodes
 from myst_nb.sphinx_ import HideCodeCellNode, HideInputCells
@@ -31,6 +32,19 @@ class FoldsBelow(SphinxPostTransform):
             for together, cells in groupby(list(parent.children), _folded):
                 if together:
                     _fold(list(cells))
+
+
+class AnswersWhole(SphinxPostTransform):
+    """The cells that compute an answer stand in its box, not as folds of their own under each question."""
+
+    default_priority = HideInputCells.default_priority - 1
+    formats = ("html",)
+
+    def run(self, **kwargs) -> None:
+        for answer in [box for box in self.document.findall(nodes.Admonition) if "answer" in box["classes"]]:
+            for cell in list(takewhile(_hidden, answer.parent[answer.parent.index(answer) + 1 :])):
+                cell.parent.remove(cell)
+                answer += cell
 
 
 class more_below(nodes.General, nodes.Element):
@@ -65,6 +79,10 @@ def _folded(node: nodes.Node) -> bool:
     return isinstance(node, nodes.container) and node.get("nb_element") == "cell_code" and node.get("hide_mode") == "input"
 
 
+def _hidden(node: nodes.Node) -> bool:
+    return isinstance(node, nodes.container) and node.get("hide_mode") == "all"
+
+
 def _fold(cells: list[nodes.container]) -> None:
     last = cells[-1]
     fold = HideCodeCellNode(prompt_show=last["prompt_show"], prompt_hide=last["prompt_hide"], classes=["below-output"])
@@ -82,5 +100,6 @@ def _fold(cells: list[nodes.container]) -> None:
 def setup(app) -> dict[str, bool]:
     app.add_directive("more", More)
     app.add_post_transform(FoldsBelow)
+    app.add_post_transform(AnswersWhole)
     app.add_post_transform(MoreBelow)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,88 +1,129 @@
-"""Sphinx extension: MathJax sets the formulas, from the book's own files.
+"""Sphinx extension: formulas are set when the book is built.
 
-A page loads the parts that it needs, two thirds of MathJax's usual bundle, and the book carries these and no others.  The fonts
-that most formulas need come with a script (lighter.py says why).
+MathJax, run by the Node that playwright brings, writes each formula as the elements and the MathML that it would write in a
+browser; all pages share one style sheet and its fonts.  So a page needs no script to show a formula, no line of it moves, and
+TeX that cannot be read stops the build.
 """
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
+import subprocess
+from functools import cache
 from importlib import resources
 from pathlib import Path
 
-from lighter import carried
+from docutils import nodes
+from playwright._impl._driver import compute_driver_executable
+from sphinx.util import logging
+from sphinx.util.math import get_node_equation_number
+from sphinx.writers.html5 import HTML5Translator
 
-PARTS = {  # MathJax's name of a part -> its file, and the part that must be there before
-    "core": ("core.js", None),
-    "input/tex-base": ("input/tex-base.js", "core"),
-    "[tex]/ams": ("input/tex/extensions/ams.js", "input/tex-base"),
-    "output/chtml": ("output/chtml.js", "core"),
-    "a11y/assistive-mml": ("a11y/assistive-mml.js", "core"),
-}
-ASKED_FOR = "output/chtml/fonts/tex.js"  # by the output, of itself
-FONTS = "output/chtml/fonts/woff-v2"
-CARRIED = {
-    "MJXZERO": "Zero",
-    "MJXTEX": "Main-Regular",
-    "MJXTEX-I": "Math-Italic",
-    "MJXTEX-S1": "Size1-Regular",
-    "MJXTEX-C": "Calligraphic-Regular",
-    "MJXTEX-SS": "SansSerif-Regular",
-}
-LEAVE_OUT = """MathJax.startup = { ready() {  // the style sheet that MathJax writes would load them once more
-  MathJax.startup.defaultReady();
-  const faces = MathJax.startup.output.font.constructor.defaultFonts, here = %s;
-  for (const [key, face] of Object.entries(faces)) if (here.includes(face["font-family"])) delete faces[key];
-  MathJax.startup.promise.then(() => { document.documentElement.dataset.set = ""; });  // book.css keeps room for them till then
-} };
-"""
+MATHJAX = Path(str(resources.files("sphinx-mathjax-offline"))) / "static" / "mathjax"
+FONTS = MATHJAX / "output" / "chtml" / "fonts" / "woff-v2"
+SHEET = "formulas.css"
+LISTS = re.compile(r"(?<=font-family: )MJX[\w-]+(?:, MJX[\w-]+)+")  # of fonts, for each kind of letters
+log = logging.getLogger(__name__)
 
 
-# What takes no room of its own in a line; what stands between two others, with room around it; indices; brackets and points.
-NONE = re.compile(
-    r"\\(?:[()!{},;: ]|"
-    r"(?:math\w+|operatorname|text|left|right|hat|tilde|bar|dot|ddot|over\w+|wide\w+|displaystyle|[td]?frac|sqrt)\b)"
-)
-BETWEEN = re.compile(r"\\(?:le|ge|in|sim|to|approx|mid|equiv|ne|gg|ll|mapsto|propto|cdot|times)\b|[=<>+-]")
-INDEX = re.compile(r"[_^](?:\{((?:[^{}]|\{[^{}]*\})*)\}|(\\[A-Za-z]+|.))")
-THIN = re.compile(r"[(),.|'ijl]")
+class Unreadable(ValueError):
+    """TeX that MathJax cannot read; the message says why."""
 
 
-def width(tex: str) -> float:
-    """About how wide a formula in a line will be, in em: half of 874 are nearer than 11 %, and lines hold several."""
-    tex = NONE.sub("", tex.replace("\\ ", "."))  # a space that is asked for is as wide as a point
-    small = sum(_letters(one or other) for one, other in INDEX.findall(tex))
-    tex = INDEX.sub("", tex)
-    between, thin = len(BETWEEN.findall(tex)), len(THIN.findall(BETWEEN.sub("", tex)))
-    return 0.1 + 0.57 * (_letters(BETWEEN.sub("", tex)) - thin) + 0.5 * small + 1.34 * between + 0.46 * thin
+class Setter:
+    """MathJax in a process of its own, begun with the first formula."""
+
+    def __init__(self) -> None:
+        self.process: subprocess.Popen[str] | None = None
+        self.html = cache(self._html)
+
+    def _html(self, tex: str, display: bool) -> str:
+        """A formula as HTML, in a line or displayed."""
+        answer = self._ask([tex, display])
+        if "error" in answer:
+            raise Unreadable(f"MathJax cannot read {tex!r}: {answer['error']}")
+        return answer["html"]
+
+    def sheet(self) -> str:
+        """The style sheet of all formulas set so far."""
+        return self._ask(None)["css"]
+
+    def _ask(self, what) -> dict[str, str]:
+        if self.process is None:
+            command = [compute_driver_executable()[0], Path(__file__).with_suffix(".js"), MATHJAX]
+            self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8")
+        self.process.stdin.write(f"{json.dumps(what)}\n")
+        self.process.stdin.flush()
+        if line := self.process.stdout.readline():
+            return json.loads(line)
+        raise RuntimeError(f"Node ended while it set {what!r}, and said why above; `make install` installs what it needs")
+
+    def close(self) -> None:
+        if self.process is not None:
+            self.process.communicate()
+            self.process = None
 
 
-def _letters(tex: str) -> int:
-    return len(re.sub(r"[{}\s^_&\\]", "", re.sub(r"\\[A-Za-z]+", "x", tex)))
+SETTER = Setter()
 
 
-def configure(app, config) -> None:
-    config.mathjax_path = "mathjax/startup.js"
-    before = {part: [other] for part, (_, other) in PARTS.items() if other}
-    config.mathjax3_config = {"loader": {"load": list(PARTS), "dependencies": before}, "tex": {"packages": ["base", "ams"]}}
+def _set(node: nodes.Element, tex: str, display: bool) -> str:
+    try:
+        return SETTER.html(tex, display)
+    except Unreadable as reason:
+        log.warning("%s", reason, location=node)
+        return ""
 
 
-def copy(app, error) -> None:
-    if error is not None or app.builder.format != "html":
-        return
-    whole = Path(str(resources.files("sphinx-mathjax-offline"))) / "static" / "mathjax"
-    mine = Path(app.outdir, "_static", "mathjax")
-    for name in ("startup.js", ASKED_FOR, *(file for file, _ in PARTS.values())):
-        (mine / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(whole / name, mine / name)
-    shutil.copytree(whole / FONTS, mine / FONTS, dirs_exist_ok=True)
-    faces = [(family, "normal", "normal", mine / FONTS / f"MathJax_{name}.woff") for family, name in CARRIED.items()]
-    (mine / "fonts.js").write_text(carried(faces) + LEAVE_OUT % list(CARRIED), encoding="utf-8")
+def in_a_line(writer: HTML5Translator, node: nodes.math) -> None:
+    writer.body += [writer.starttag(node, "span", "", CLASS="math"), _set(node, node.astext(), False), "</span>"]
+    raise nodes.SkipNode
+
+
+def displayed(writer: HTML5Translator, node: nodes.math_block) -> None:
+    """With its number; the keyboard reaches it and can scroll it where it is wider than the screen."""
+    number = get_node_equation_number(writer, node) if node["number"] else ""
+    writer.body.append(writer.starttag(node, "div", CLASS="math"))
+    if number:
+        writer.body.append(f'<span class="eqno">({number})')
+        writer.add_permalink_ref(node, "Link to this equation")
+        writer.body.append("</span>")
+    tex = node.astext() if node["nowrap"] else _lines(node.astext())
+    name = f"Formula {number}".strip()
+    reached = f'<mjx-container tabindex="0" role="group" aria-label="{name}"'
+    writer.body += [_set(node, tex, True).replace("<mjx-container", reached, 1), "</div>\n"]
+    raise nodes.SkipNode
+
+
+def _lines(tex: str) -> str:
+    """Lines that end with a double backslash, and equations with an empty line between them, stand one below the other."""
+    parts = [rf"\begin{{split}}{part}\end{{split}}" if r"\\" in part else part for part in tex.split("\n\n") if part.strip()]
+    together = r" \\ ".join(parts)
+    return together if len(parts) == 1 else rf"\begin{{align}}\begin{{aligned}}{together}\end{{aligned}}\end{{align}}"
+
+
+def _ready_first(fonts: re.Match[str]) -> str:
+    """Those that the page has before its first line is laid out (lighter.py) stand before those of the style sheet."""
+    return ", ".join(f'"Ready {name}"' for name in fonts[0].split(", ")) + f", {fonts[0]}"
+
+
+def write(app, exception: Exception | None) -> None:
+    """The style sheet, and the fonts that it names."""
+    try:
+        if exception is None and app.builder.format == "html":
+            static = Path(app.outdir, "_static")
+            sheet = LISTS.sub(_ready_first, SETTER.sheet())
+            (static / SHEET).write_text(sheet, encoding="utf-8")
+            for name in re.findall(r"MathJax_[\w-]+\.woff", sheet):
+                shutil.copyfile(FONTS / name, static / "fonts" / name)
+    finally:
+        SETTER.close()
 
 
 def setup(app) -> dict[str, bool]:
-    app.add_js_file("mathjax/fonts.js", priority=600)  # behind MathJax's settings
-    app.connect("config-inited", configure)
-    app.connect("build-finished", copy)
-    return {"parallel_read_safe": True, "parallel_write_safe": True}
+    app.add_html_math_renderer("set", (in_a_line, None), (displayed, None))
+    app.add_css_file(SHEET, priority=400)  # below the book's own
+    app.connect("build-finished", write)
+    return {"parallel_read_safe": True, "parallel_write_safe": False}

@@ -19,11 +19,18 @@ import tinycss2
 from tinycss2 import ast
 
 SHEETS = ("styles/*.css", "sphinx-design.min.css", "mystnb.*.css", "basic.css", "togglebutton.css", "pygments.css")
-FONTS = (  # first in the lists of book.css; other letters, and readers without scripts, have those of fonts.css
-    ("Ready Serif", "normal", "source-serif-4-latin-wght-normal"),
-    ("Ready Serif", "italic", "source-serif-4-latin-wght-italic"),
-    ("Ready Sans", "normal", "source-sans-3-latin-wght-normal"),
-    ("Ready Mono", "normal", "jetbrains-mono-latin-wght-normal"),
+FONTS = (  # first in the lists of book.css and formulas.css; other letters, and readers without scripts, have those of the sheets
+    ("Ready Serif", "normal", "100 900", "source-serif-4-latin-wght-normal.woff2"),
+    ("Ready Serif", "italic", "100 900", "source-serif-4-latin-wght-italic.woff2"),
+    ("Ready Sans", "normal", "100 900", "source-sans-3-latin-wght-normal.woff2"),
+    ("Ready Mono", "normal", "100 900", "jetbrains-mono-latin-wght-normal.woff2"),
+    ("Ready MJXZERO", "normal", "normal", "MathJax_Zero.woff"),
+    ("Ready MJXTEX", "normal", "normal", "MathJax_Main-Regular.woff"),
+    ("Ready MJXTEX-I", "normal", "normal", "MathJax_Math-Italic.woff"),
+    ("Ready MJXTEX-S1", "normal", "normal", "MathJax_Size1-Regular.woff"),
+    ("Ready MJXTEX-S4", "normal", "normal", "MathJax_Size4-Regular.woff"),
+    ("Ready MJXTEX-C", "normal", "normal", "MathJax_Calligraphic-Regular.woff"),
+    ("Ready MJXTEX-SS", "normal", "normal", "MathJax_SansSerif-Regular.woff"),
 )
 SCRIPT_OF_FONTS = """for (const [family, style, weight, data] of %s) {
   const text = atob(data), bytes = new Uint8Array(text.length);
@@ -97,9 +104,11 @@ def _short(content: list[ast.Node]) -> str:
     return "".join(" " if isinstance(one, ast.WhitespaceToken) else one.serialize() for one in content if one.type != "comment")
 
 
-def carried(faces: Iterable[tuple[str, str, str, Path]]) -> str:
-    """A script with fonts in it: family, style, weights, and file of each."""
-    return SCRIPT_OF_FONTS % json.dumps([(*face, base64.b64encode(path.read_bytes()).decode()) for *face, path in faces])
+def carried(folder: Path) -> str:
+    """A script with the fonts in it."""
+    return SCRIPT_OF_FONTS % json.dumps(
+        [(*face, base64.b64encode((folder / file).read_bytes()).decode()) for *face, file in FONTS]
+    )
 
 
 def write(app, exception: Exception | None) -> None:
@@ -109,12 +118,11 @@ def write(app, exception: Exception | None) -> None:
     static = root / "_static"
     here = used(
         (page.read_text(encoding="utf-8") for page in root.rglob("*.html")),
-        (script.read_text(encoding="utf-8") for script in static.rglob("*.js") if "mathjax" not in script.parts),
+        (script.read_text(encoding="utf-8") for script in static.rglob("*.js")),
     )
     for path in (path for pattern in SHEETS for path in static.glob(pattern)):
         path.write_text(pruned(path.read_text(encoding="utf-8"), here), encoding="utf-8")
-    faces = [(family, style, "100 900", static / "fonts" / f"{name}.woff2") for family, style, name in FONTS]
-    (static / "fonts.js").write_text(carried(faces), encoding="utf-8")
+    (static / "fonts.js").write_text(carried(static / "fonts"), encoding="utf-8")
 
 
 def setup(app) -> dict[str, bool]:

@@ -13,10 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import contents
-import formulas
 from docutils import nodes
 from sphinx.transforms.post_transforms import SphinxPostTransform
-from sphinx.util.math import get_node_equation_number
 from sphinx.writers.html5 import HTML5Translator
 
 HERE = Path(__file__).resolve().parent
@@ -59,13 +57,8 @@ class Translator(HTML5Translator):
     """Pages as Sphinx writes them, but for what the keyboard, a screen reader, and the rules of HTML need."""
 
     def starttag(self, node, tagname, suffix="\n", empty=False, **attributes) -> str:
-        if isinstance(node, nodes.math_block):  # takes the focus and has a name: page.js gives both to the box that MathJax makes
-            name = f"Formula {get_node_equation_number(self, node)}" if node["number"] else "Formula"
-            attributes |= {"tabindex": "0", "role": "group", "aria-label": name}
-        elif tagname == "table" and "kf-formulas" in node["classes"]:  # so does one of formulas, which may be wider, too
+        if tagname == "table" and "kf-formulas" in node["classes"]:  # the keyboard can scroll one of formulas, which may be wide
             attributes |= {"tabindex": "0", "aria-label": "Equations"}
-        elif isinstance(node, nodes.math) and tagname == "span":
-            attributes["style"] = f"--wide: {formulas.width(node.astext()):.1f}em"
         elif tagname == "img":  # the room that it will take, and none is loaded before the reader comes near
             if size := SIZE.fullmatch(attributes.get("style", "")):
                 del attributes["style"]
@@ -183,13 +176,6 @@ def _boxed(node: nodes.Node) -> bool:
     return False
 
 
-def only_where_needed(app, pagename: str, templatename: str, context: dict, doctree) -> None:
-    """Sphinx takes the front page for one with formulas because its contents lead to such pages."""
-    if 'class="math' not in context.get("body", ""):
-        scripts = context.get("script_files", [])
-        context["script_files"] = [one for one in scripts if "mathjax" not in f"{one.filename} {one.attributes}".lower()]
-
-
 def write_not_found(app, exception) -> None:
     """The page that a server shows for an address that does not exist; it needs no other file."""
     if exception or app.builder.format != "html":
@@ -215,7 +201,6 @@ def setup(app) -> dict[str, bool]:
     app.add_post_transform(Captions)
     app.add_post_transform(SmallStars)
     app.connect("config-inited", use_templates, priority=900)
-    app.connect("html-page-context", only_where_needed, priority=950)
     app.connect("build-finished", write_not_found)
     app.connect("build-finished", leave_icons_out)
     app.connect("html-page-context", complete, priority=300)  # before the theme, which tries the templates

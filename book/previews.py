@@ -1,7 +1,7 @@
 """Sphinx extension: what a link to another page leads to, printed into the page itself.
 
 A page read from a file cannot load another one.  So each page carries, for every equation, figure and term of another page that
-it refers to, what preview.js shows: a formula as TeX, a figure as its caption and the address of its picture, a term with its
+it refers to, what preview.js shows: a formula, a figure as its caption and the address of its picture, a term with its
 sentence.  Only what the page refers to: some hundred bytes each.
 """
 
@@ -19,7 +19,6 @@ from bs4 import BeautifulSoup, Tag
 REPEATS = "equations.html"  # shows what it refers to
 LINK = re.compile(r'<a [^>]*class="[^"]*\breference internal\b[^"]*"[^>]*>')
 PLACE = re.compile(r'href="([^"#]+\.html)#([^"]+)"')
-FORMULAS = 'class="math'  # a page without any has no MathJax to set one
 
 
 def write(app, exception: Exception | None) -> None:
@@ -36,7 +35,7 @@ def write(app, exception: Exception | None) -> None:
             if not target or not (root / target).exists():
                 continue
             shown = preview(read(target), unquote(place[2]), posixpath.relpath(posixpath.dirname(target) or ".", here))
-            if shown and (FORMULAS in text or FORMULAS not in shown):
+            if shown:
                 found[f"{place[1]}#{place[2]}"] = shown
         if found:
             data = json.dumps(found, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")

@@ -221,12 +221,6 @@ CONTRAST = f"""([theme, colours]) => {{
 }}"""
 
 
-def read(tab, page: str) -> None:
-    """Open a page, its formulas set."""
-    tab.goto((HTML / f"{page}.html").as_uri())
-    tab.wait_for_selector("html[data-formulas=ready]")
-
-
 def show_on(tab, media: str, width: int) -> None:
     """Lay the page out for another medium and width: once, as it is hidden while they change."""
     tab.evaluate("document.body.style.contentVisibility = 'hidden'")
@@ -238,18 +232,11 @@ def show_on(tab, media: str, width: int) -> None:
 
 @pytest.mark.parametrize("page", [*PAGES, "search", "genindex", "py-modindex", "404"])
 def test_page_in_a_browser_without_network(window, page: str) -> None:
-    """Loads without a complaint; fits screens and paper; axe-core finds nothing, light and dark; formulas are formulas."""
+    """Loads without a complaint; fits screens and paper; axe-core finds nothing, light and dark; code is folded."""
     tab, problems = window
     path = HTML / f"{page}.html"
     tab.set_viewport_size({"width": 390, "height": 1000})
     tab.goto(path.as_uri(), wait_until="load")
-    if 'class="math' in path.read_text(encoding="utf-8"):
-        tab.wait_for_function("window.MathJax?.startup?.promise")
-        tab.wait_for_selector("html[data-formulas=ready]")
-        assert tab.locator("mjx-container").count() > 0
-        assert tab.locator("mjx-merror, [data-mjx-error]").count() == 0, "a formula that MathJax cannot read"
-    else:
-        assert not tab.evaluate("Boolean(window.MathJax)"), "a page without formulas loads MathJax"
     tab.evaluate("for (const picture of document.images) picture.loading = 'eager'")
     tab.wait_for_function("[...document.images].every((picture) => picture.complete)")
     tab.wait_for_load_state("networkidle")
@@ -301,7 +288,6 @@ def test_the_keyboard_reaches_the_text_first(window):
     assert tab.evaluate("document.activeElement.getAttribute('href')") == "#main-content"
     assert tab.evaluate("document.activeElement.checkVisibility()")
     assert tab.locator("main#main-content").count() == 1
-    tab.wait_for_selector("html[data-formulas=ready]")
     formulas = tab.locator("div.math")
     assert formulas.count() == tab.locator("div.math mjx-container[tabindex='0'][aria-label]").count() > 0
 
@@ -310,7 +296,7 @@ def test_a_reference_shows_what_it_leads_to(window):
     """Under the mouse and on the keyboard's way, not under a finger; Escape closes it, and the link stays a link."""
     tab, problems = window
     show_on(tab, "screen", 1280)
-    read(tab, "comparison")
+    tab.goto((HTML / "comparison.html").as_uri())
     box = tab.locator("#kf-preview")
     formula = tab.locator('article a.reference.internal[href^="#equation-"]').first
     figure = tab.locator('article a.reference.internal[href^="#fig-"]').first
@@ -368,21 +354,30 @@ def test_no_line_moves_while_a_page_is_loaded(browser, page):
     with browser.new_context(offline=True, viewport={"width": 1280, "height": 900}) as context:
         tab = context.new_page()
         tab.add_init_script(SHIFTS)
-        read(tab, page)
+        tab.goto((HTML / f"{page}.html").as_uri())
         tab.evaluate("() => new Promise((seen) => requestAnimationFrame(() => requestAnimationFrame(seen)))")
         assert tab.evaluate("[...document.fonts].some((one) => one.family.includes('Ready Serif') && one.status === 'loaded')")
         assert tab.evaluate("window.shifted ?? 0") < 0.1
 
 
+def test_formulas_are_there_without_scripts(browser):
+    """All of them, set and with fonts of the book, displayed ones on the keyboard's way."""
+    with browser.new_context(offline=True, java_script_enabled=False) as context:
+        tab = context.new_page()
+        tab.goto((HTML / f"{WHOLE}.html").as_uri())
+        assert tab.locator(".math").count() == tab.locator(".math > mjx-container > mjx-math").count() > 100
+        assert tab.locator("div.math").count() == tab.locator("div.math > mjx-container[tabindex='0'][aria-label]").count()
+        box = tab.locator("div.math mjx-math").first.bounding_box()
+        assert box["width"] > 100 and box["height"] > 10
+
+
 def weight(page: str) -> int:
-    """Bytes that a page loads when it is opened, with all parts of MathJax where it has formulas; what is lazy comes later."""
+    """Bytes that a page loads when it is opened, but fonts of its style sheets; what is lazy comes later."""
     path = HTML / f"{page}.html"
     html = BeautifulSoup(path.read_text(encoding="utf-8"), "html.parser")
     parts = html.select("script, link[rel~=stylesheet], link[rel~=icon], img:not([loading=lazy])")
     named = [name for one in parts if (name := one.get(LOADS[one.name])) and not name.startswith("data:")]
     files = {path, *((path.parent / re.split("[?#]", name)[0]).resolve() for name in named)}
-    if any(file.name == "startup.js" for file in files):
-        files |= set((HTML / "_static" / "mathjax").rglob("*.js"))
     return sum(file.stat().st_size for file in files if file.is_file())
 
 
@@ -431,7 +426,7 @@ def test_what_a_link_to_another_page_leads_to_is_shown_too(window):
     """Equations are set, terms say what they mean, in both languages; nothing is loaded but what is there."""
     tab, problems = window
     show_on(tab, "screen", 1280)
-    read(tab, "grid")
+    tab.goto((HTML / "grid.html").as_uri())
     box = tab.locator("#kf-preview")
     tab.locator('article a.reference.internal[href^="stratonovich.html#equation-"]').first.hover()
     box.locator("mjx-container").wait_for()
@@ -478,7 +473,7 @@ SHEETS = {"comparison": 9}
 def test_sheets_are_full(window, page):
     tab, _ = window
     show_on(tab, "print", 1280)
-    read(tab, page)
+    tab.goto((HTML / f"{page}.html").as_uri())
     printed = tab.pdf(prefer_css_page_size=True)
     assert len(re.findall(rb"/Type\s*/Page\b", printed)) <= SHEETS[page]
     alone = "e => [getComputedStyle(e.querySelector('.admonition-title')).breakAfter, getComputedStyle(e).breakInside]"
@@ -487,7 +482,7 @@ def test_sheets_are_full(window, page):
 
 def test_hints_are_open_on_paper_and_the_code_of_pictures_is_not_there(window):
     tab, _ = window
-    read(tab, "manual/b-aof")
+    tab.goto((HTML / "manual/b-aof.html").as_uri())
     closed = "() => [...document.querySelectorAll('article details:not(.kf-code)')].map((e) => e.open)"
     assert not any(tab.evaluate(closed))
     tab.evaluate("addEventListener('beforeprint', () => { window.atPrint = (" + closed + ")(); })")

@@ -40,14 +40,9 @@ addEventListener("DOMContentLoaded", () => {
     for (const one of box.querySelectorAll("button, details, .headerlink, .kf-where")) one.remove();
     for (const one of box.querySelectorAll("a")) one.replaceWith(...one.childNodes);
   };
-  const print = async (html) => {
-    window.MathJax?.typesetClear?.([box]);
+  const print = (html) => {
     box.innerHTML = html;
     for (const picture of box.querySelectorAll("img")) picture.onload = () => shown && place(); // only now it has its height
-    if (!box.querySelector(".math")) return;
-    await window.MathJax?.startup?.promise;
-    await window.MathJax?.typesetPromise?.([box]);
-    if (shown) place();
   };
   const place = () => {
     const at = shown.getBoundingClientRect(), { width, height } = box.getBoundingClientRect(), page = document.documentElement;
@@ -60,15 +55,16 @@ addEventListener("DOMContentLoaded", () => {
     waiting = setTimeout(what, delay);
   };
 
+  const left = () => later(() => shown !== document.activeElement && close(), 250); // time to go over to the box, to read or to copy
   for (const link of document.querySelectorAll('article a.reference.internal[href*="#"]')) {
     if (!target(link)) continue;
     link.addEventListener("pointerenter", (event) => event.pointerType === "mouse" && later(() => open(link), 150));
-    link.addEventListener("pointerleave", () => later(close, 250)); // time to go over to the box, to read or to copy
+    link.addEventListener("pointerleave", left);
     link.addEventListener("focus", () => link.matches(":focus-visible") && open(link));
     link.addEventListener("blur", close);
   }
   box.addEventListener("pointerenter", () => clearTimeout(waiting));
-  box.addEventListener("pointerleave", () => later(close, 250));
+  box.addEventListener("pointerleave", left);
   addEventListener("keydown", (event) => event.key === "Escape" && close());
   addEventListener("scroll", () => shown && place(), { passive: true }); // the focus itself may have moved the page
 });

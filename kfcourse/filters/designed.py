@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 import sympy as sp
@@ -123,13 +123,7 @@ class Regression(NamedTuple):
         return Scatter.of(target, regressor)
 
 
-class Request(Protocol):
-    """What the equations of a step yield: a `Regression`, or what finds its moments otherwise."""
-
-    def scatter(self, x: Array, x_next: Array, modes: Array | None = None, /) -> Scatter: ...
-
-
-Equations = Generator[Request, Affine, State]
+Equations = Generator[Regression, Affine, State]
 Part = Generator[Regression, Affine, Gaussian]
 
 
@@ -161,8 +155,6 @@ class Design:
         The structural functions that the equations use.
     printed : (equations, tuple of Eq), optional
         Equations, and how they are printed if that is all: of them `fuse` makes compiled ones, while they are this design's.
-    known : callable, optional
-        The step by coefficients that are known, and these, of every step -> a quicker one.
     """
 
     name: str
@@ -172,7 +164,6 @@ class Design:
     start: Init | None = None
     structure: Structure | None = None
     printed: tuple[Callable[[State, Vectors], Equations], tuple[sp.Eq, ...]] | None = None
-    known: Callable[[Advance, Sequence[Sequence[Affine]]], Advance] | None = None
 
     @property
     def init(self) -> Init:
@@ -190,7 +181,7 @@ class Design:
                 )
             return steps[state.step](state, y)
 
-        return Filter(self.name, self.model, self.init, self.known(step, coefficients) if self.known else step)
+        return Filter(self.name, self.model, self.init, step)
 
     def answered(self, fits: Sequence[Affine]) -> Advance:
         """A step of the equations, each regression answered with its stored coefficients."""

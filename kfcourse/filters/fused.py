@@ -1,4 +1,4 @@
-"""Compiled steps of filters of scalar models: one loop over the ensemble for several steps, and one for each regression.
+"""Compiled steps of filters of scalar models: one loop over trajectories for several steps, and one that finds coefficients.
 
 The loops are printed from `Filter.printed`, the equations that the chapters derive, with the formulas of the structural functions
 put in.  NumPy passes over the ensemble once for each operation; a loop passes once for all of them.  In two places the equations
@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import chain
 from typing import Any, NamedTuple, TypeVar
 
@@ -20,7 +20,7 @@ import sympy as sp
 
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import Advance, Filter, State
-from kfcourse.filters.designed import Affine, Design, Equations, Scatter
+from kfcourse.filters.designed import Affine, Design
 from kfcourse.filters.programs import Rule, in_numbers, needed, scalar, stages, value_of
 from kfcourse.laws import Array, Gaussian, any_missing, column
 from kfcourse.symbolic import compiled
@@ -62,9 +62,8 @@ def fuse(one: Filter | Design) -> Filter | Design:
     if program is None:
         return one
     if isinstance(one, Filter):
-        return replace(one, step=Steps(program, one.step))
-    equations = partial(program.equations, one.equations)
-    return replace(one, equations=equations, known=partial(Steps, program))
+        return replace(one, step=Steps(program, one.step, program.table(np.empty((1, 0)))))
+    return Fused(**vars(one), program=program)
 
 
 def _or_warning(one: Filter | Design, compile: Callable[[], T]) -> T | None:
@@ -78,65 +77,41 @@ def _or_warning(one: Filter | Design, compile: Callable[[], T]) -> T | None:
 
 
 class Loops(NamedTuple):
-    """The loops of a filter: several steps with their sums; and the moments of target and regressor of each regression."""
+    """The loops of a filter: several steps with their sums, and of a design several steps that find their coefficients."""
 
     parameters: list[float]
+    regressions: int
     advance: Callable[..., None]
-    moments: list[Callable[..., tuple[float, ...]]]
+    design: Any  # the loop; None without regressions
     one_for_all: bool  # p is the residual of the first regression
 
-    def equations(self, otherwise: Callable[[State, Array], Equations], state: State, y: Array) -> Equations:
-        """A step that asks for its coefficients; with a measurement missing the other one."""
-        if any_missing(y):
-            return (yield from otherwise(state, y))
-        known, fits = (column(y), *_law(state.predicted)), list[Affine]()
-        for loop in self.moments:
-            fits.append((yield _Pair(loop, self.constants(fits), known)))
-        return self.one(state, y, self.constants(fits)[None], fits, room=min(len(y), AT_ONCE))
-
-    def one(self, state: State, y: Array, constants: Array, fits: Sequence[Affine], room: int) -> State:
-        """The state after a measurement y (N, 1), none missing; constants (1, m)."""
-        row, ends = column(y), np.append(np.arange(0, len(y), AT_ONCE), len(y))
-        sums = np.empty((5, 1, len(ends) - 1))
-        return self.several(state, row[None], constants, fits, row[None], row, ends, sums, np.empty((2, room)))
-
-    def several(
-        self,
-        state: State,
-        y: Array,
-        constants: Array,
-        fits: Sequence[Affine],
-        x: Array,
-        weight: Array,
-        starts: Array,
-        sums: Iterable[Array],
-        room: Array,
-    ) -> State:
-        """The state after measurements y (K, N), none missing; constants (K, m), fits of the last step.
-
-        Into the sums (5, K, B) goes what `montecarlo.Sums.record` keeps of the errors of states x (K, N), of batches that begin
-        at starts[:-1] and end at starts[1:].  The posterior is found in the room (2, N); with room for a batch only, it is not.
-        """
-        after = np.empty((2, len(weight)))
-        self.advance(constants, y, x, weight, starts, *_law(state.predicted), *after, *room, *sums)
-        z, p = room[0][:, None], fits[0].residual if self.one_for_all else room[1][:, None, None]
-        return State(state.step + len(y), Gaussian(z, p), Gaussian(after[0][:, None], after[1][:, None, None]))
-
-    def constants(self, fits: Sequence[Affine]) -> Array:
-        """Parameters and coefficients, in the order in which the loops take them."""
-        return np.array([*self.parameters, *(one.item() for fit in fits for one in fit)])
+    def table(self, coefficients: Array) -> Array:
+        """What the loops take as constants of each step, (steps, m): parameters, and coefficients (steps, regressions, 3)."""
+        steps = len(coefficients)
+        return np.hstack([np.tile(self.parameters, (steps, 1)), coefficients.reshape(steps, -1)])
 
 
-class _Pair(NamedTuple):
-    """A request for a regression whose target and regressor a loop makes of what is known of each trajectory."""
+@dataclass(frozen=True)
+class Fused(Design):
+    """A design whose coefficients a compiled loop finds: `montecarlo.designing.design_together`."""
 
-    loop: Callable[..., tuple[float, ...]]
-    constants: Array
-    known: tuple[Array, ...]
+    program: Loops = field(kw_only=True)
 
-    def scatter(self, x: Array, x_next: Array, modes: Array | None = None) -> Scatter:
-        t, r, tt, tr, rr = self.loop(self.constants, *self.known, column(x), column(x_next))
-        return Scatter(len(x), 1, np.array([t, r]), np.array([[tt, tr], [tr, rr]]))
+    def begin(self, runs: int, steps: int) -> tuple[Array, Array]:
+        """What the loop works on: a table with room for the coefficients, and lambda and Psi before the first step, (2, runs)."""
+        law = np.array(_law(self.init(1).predicted))
+        return self.program.table(np.zeros((steps, self.program.regressions, 3))), np.tile(law, runs)
+
+    def fitted(self, table: Array) -> Filter:
+        """The filter with the coefficients of a table."""
+        found = table[:, len(self.program.parameters) :].reshape(len(table), -1, 3, 1)
+        return self.with_coefficients([[Affine(H[None], e, T[None]) for H, e, T in row] for row in found])
+
+    def with_coefficients(self, coefficients: Sequence[Sequence[Affine]]) -> Filter:
+        """`Design.with_coefficients`, with compiled steps."""
+        one = super().with_coefficients(coefficients)
+        found = np.array([[part.item() for fit in row for part in fit] for row in coefficients])
+        return replace(one, step=Steps(self.program, one.step, self.program.table(found)))
 
 
 @dataclass(frozen=True)
@@ -149,33 +124,36 @@ class Steps:
         Printed from the equations of the filter.
     otherwise : Advance
         The step where a measurement is missing, or coefficients are.
-    fits : sequence, optional
-        Of a designed filter: the coefficients of every step.
+    table : ndarray (steps, m)
+        Constants of every step; of one for all, if the filter has no coefficients.
     """
 
     program: Loops
     otherwise: Advance
-    fits: Sequence[Sequence[Affine]] | None = None
-
-    @cached_property
-    def table(self) -> Array:
-        """Constants of every step, (steps, m), or (1, m)."""
-        return np.array([self.program.constants(fits) for fits in ([()] if self.fits is None else self.fits)])
+    table: Array
 
     def __call__(self, state: State, y: Array) -> State:
-        if any_missing(y) or (self.fits is not None and state.step >= len(self.fits)):
+        if any_missing(y) or (self.program.regressions and state.step >= len(self.table)):
             return self.otherwise(state, y)
-        return self.program.one(state, y, *self._known(state.step, 1), room=len(y))
+        row, ends = column(y), np.minimum(np.arange(0, len(y) + AT_ONCE, AT_ONCE), len(y))
+        sums = np.empty((5, 1, len(ends) - 1))
+        return self.several(state, row[None], row[None], row, ends, sums, np.empty((2, len(y))))
 
-    def several(self, state: State, y: Array, *record: Any) -> State:
-        """`Loops.several`, with the constants and coefficients of these steps."""
-        return self.program.several(state, y, *self._known(state.step, len(y)), *record)
+    def several(
+        self, state: State, y: Array, x: Array, weight: Array, starts: Array, sums: Iterable[Array], room: Array
+    ) -> State:
+        """The state after measurements y (K, N), none missing.
 
-    def _known(self, step: int, steps: int) -> tuple[Array, Sequence[Affine]]:
-        """Constants of so many steps, and the coefficients of the last."""
-        if self.fits is None:
-            return np.repeat(self.table, steps, axis=0), ()
-        return self.table[step : step + steps], self.fits[step + steps - 1]
+        Into the sums (5, K, B) goes what `montecarlo.Sums.record` keeps of the errors of states x (K, N), of batches that begin
+        at starts[:-1] and end at starts[1:].  The posterior is found in the room (2, N); with room for a batch only, it is not.
+        """
+        program, k, after = self.program, state.step, np.empty((2, len(weight)))
+        constants = self.table[k : k + len(y)] if program.regressions else self.table.repeat(len(y), axis=0)
+        program.advance(constants, y, x, weight, starts, *_law(state.predicted), *after, *room, *sums)
+        residual = len(program.parameters) + 2
+        p = constants[-1:, residual : residual + 1] if program.one_for_all else room[1][:, None, None]
+        posterior, predicted = Gaussian(room[0][:, None], p), Gaussian(after[0][:, None], after[1][:, None, None])
+        return State(k + len(y), posterior, predicted)
 
 
 def _law(predicted: Gaussian) -> tuple[Array, Array]:
@@ -213,12 +191,12 @@ def _printed(one: Filter | Design, printed: Equalities) -> Loops:
 
     add("step", known, made, constants)
     texts.append(loops.advance(len(constants)))
+    parameters = len(one.model.values)
     for i, fit in enumerate(fits):
-        constants = [*one.model.values, *chain(*found[:i])]
-        add(f"pair{i}", {**known, "x": _X, "x_next": _NEXT}, [fit.target, fit.regressor], constants)
-        texts.append(loops.moments(i, len(constants)))
+        add(f"pair{i}", {**known, "x": _X, "x_next": _NEXT}, [fit.target, fit.regressor], constants[: parameters + 3 * i])
+    texts += [loops.design(parameters, len(fits))] if fits else []
     module = compiled.load(*texts)
-    return Loops([], module.advance, [getattr(module, f"moments{i}") for i in range(len(fits))], _P not in letters)
+    return Loops([], len(fits), module.advance, getattr(module, "design", None), _P not in letters)
 
 
 def _rules(one: Filter | Design, printed: Equalities) -> list[Rule]:

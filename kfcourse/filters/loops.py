@@ -13,15 +13,16 @@ from numba import njit, types
 from kfcourse.symbolic.compiled import OPTIONS
 
 _ROW, _ROWS = "float64[::1]", "float64[:, ::1]"
-_ANY_ORDER = f'{OPTIONS}, fastmath=set(["reassoc", "nsz"])'
+_SUMS = '["reassoc", "nsz"]'
+_ANY_ORDER = f"{OPTIONS}, fastmath=set({_SUMS})"
 _OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "nsz"}}
 
-# x (K + 1, N) and y (K, N) from x[0] and the noises (K, N), by `model`.
+# x (K + 1, N) and y (K, N) from x[0] and the noises (K, n), by `model`, of the trajectories from `first` to `last`.
 _SIMULATE = """
-def simulate(c, x, y, {noises}):
-    constants = {constants}
+def simulate(c, first, last, x, y, {noises}):
+    constants, here = {constants}, slice(first, last)
     for k in range(len(y)):
-        x_k, y_k, x_next, {rows} = x[k], y[k], x[k + 1], {noises_k}
+        x_k, y_k, x_next, {rows} = x[k, here], y[k, here], x[k + 1, here], {noises_k}
         for i in range(len(x_k)):
             y_k[i], x_next[i] = model(constants, x_k[i], {entries})
 """
@@ -58,12 +59,13 @@ def advance(table, y, x, weight, starts, lam, Psi, lam_next, Psi_next, z, p, err
             largest[k, b] = np.int64(most).view(np.float64)
 """
 
-# Means of target and regressor, then sums of products of deviations from them: first from the means of a few trajectories,
-# which are near enough to those of all that nothing cancels.
-_MOMENTS = f"""
+# A regression over all trajectories, of target and regressor that `pair` makes: matrix, offset and residual, as in
+# `designed.Scatter.regression`.  First deviations from the means of a few trajectories, which are near enough to those of all
+# that nothing cancels.  What rounding has made negative is no variance: NaN says that the plain loop is to look at it.
+_FIT = f"""
 
-@njit("UniTuple(float64, 5)({", ".join([_ROW] * 6)})", {_ANY_ORDER})
-def moments{{number}}(c, y, lam, Psi, x, x_next):
+@njit(error_model="numpy", fastmath=set({_SUMS}))
+def fit{{number}}(c, y, lam, Psi, x, x_next):
     constants, t, r = {{constants}}, 0.0, 0.0
     for size in (min(64, len(y)), len(y)):
         dt, dr, tt, tr, rr = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -77,7 +79,22 @@ def moments{{number}}(c, y, lam, Psi, x, x_next):
             rr += regressor * regressor
         dt, dr = dt / size, dr / size
         t, r = t + dt, r + dr
-    return t, r, tt - size * dt * dt, tr - size * dt * dr, rr - size * dr * dr
+    tt, tr, rr = tt - size * dt * dt, tr - size * dt * dr, rr - size * dr * dr
+    matrix = tr / rr if rr > 0 else 0.0 if rr == 0 else nan
+    return matrix, t - matrix * r, max((tt - matrix * tr) / size, 0.0)
+"""
+
+# Steps of a design on y (K, N) and x (K + 1, N): coefficients go into the table (K, m), lambda and Psi are those after them.
+_DESIGN = f"""
+
+@njit("void({_ROWS}, {_ROWS}, {_ROWS}, {_ROW}, {_ROW})", {_ANY_ORDER})
+def design(table, y, x, lam, Psi):
+    for k in range(len(y)):
+        c, y_k, x_k, x_next = table[k], y[k], x[k], x[k + 1]
+        {{fits}}
+        constants = {{constants}}
+        for i in range(len(lam)):
+            _, _, lam[i], Psi[i] = step(constants, y_k[i], lam[i], Psi[i])
 """
 
 
@@ -86,15 +103,18 @@ def advance(constants: int) -> str:
     return _ADVANCE.format(constants=_entries(constants))
 
 
-def moments(number: int, constants: int) -> str:
-    """The loop around `pair<number>`, of so many constants."""
-    return _MOMENTS.format(number=number, constants=_entries(constants))
+def design(parameters: int, regressions: int) -> str:
+    """The loops around `pair0`, `pair1`, ..., and that which takes them and `step` in turn."""
+    firsts = [parameters + 3 * i for i in range(regressions + 1)]
+    texts = [_FIT.format(number=i, constants=_entries(one)) for i, one in enumerate(firsts[:-1])]
+    fits = [f"c[{one}], c[{one + 1}], c[{one + 2}] = fit{i}(c, y_k, lam, Psi, x_k, x_next)" for i, one in enumerate(firsts[:-1])]
+    return "".join([*texts, _DESIGN.format(fits="\n        ".join(fits), constants=_entries(firsts[-1]))])
 
 
 def simulate(noises: int, constants: int) -> str:
     """The loop around `model`, of so many constants."""
     names = [f"noise{i}" for i in range(noises)]
-    text = f'\n\n@njit("void({", ".join([_ROW] + [_ROWS] * (2 + noises))})", {OPTIONS}){_SIMULATE}'
+    text = f'\n\n@njit("void({", ".join([_ROW, "int64", "int64"] + [_ROWS] * (2 + noises))})", {OPTIONS}){_SIMULATE}'
     rows, of_step, entries = (", ".join(one.format(name) for name in names) for one in ("{}_k", "{}[k]", "{}_k[i]"))
     return text.format(noises=", ".join(names), rows=rows, noises_k=of_step, entries=entries, constants=_entries(constants))
 

@@ -8,13 +8,14 @@ sent back into the equations.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 
 import numpy as np
 
 from kfcourse.filters.base import Filter, State, with_angles_on_circle
 from kfcourse.filters.designed import Affine, Design, Scatter
-from kfcourse.laws import NegativeVariance
+from kfcourse.filters.fused import Fused
+from kfcourse.laws import Array, NegativeVariance
 from kfcourse.montecarlo.ensemble import Instant, Serial
 from kfcourse.reasons import Reason
 
@@ -71,6 +72,26 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: E
         for table, row in zip(coefficients, fits, strict=True):
             table.append(row)
     return [one.with_coefficients(table) for one, table in zip(designs, coefficients, strict=True)]
+
+
+def design_together(
+    designs: Sequence[Fused], ensemble: Iterable[tuple[Array, Array]], size: tuple[int, int], pool: Executor
+) -> list[Filter]:
+    """`design` by compiled loops, of `size` runs and steps: each design passes over `Ensemble.together` in a thread of its own.
+
+    A design that meets infinite or NaN values is missing: `design` tells why, or gets along with them.
+    """
+    begun = [pool.submit(one.begin, *size) for one in designs]
+    running, end = list[Future[None]](), 0
+    for x, y in ensemble:  # the next is drawn while the designs work on this one
+        work = [(one, *future.result()) for one, future in zip(designs, begun, strict=True)]
+        for future in running:
+            future.result()
+        first, end = end, end + len(y)
+        running = [pool.submit(one.program.design, table[first:end], y, x, *law) for one, table, law in work]
+    for future in running:
+        future.result()
+    return [one.fitted(table) for one, table, _ in work if np.isfinite(table).all()]
 
 
 class _BlockStep:

@@ -12,11 +12,13 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from itertools import accumulate
 from typing import Any, NamedTuple, overload
 
 import numpy as np
 import scipy
+import sympy as sp
 
 from kfcourse.angles import on_circle
 from kfcourse.laws import Array, Gaussian, normalised_square, square_root
@@ -131,6 +133,23 @@ class Ensemble:
             yield several
             x = several[0][-1][:, None]
 
+    def together(self, pool: Executor) -> Iterator[tuple[Array, Array]]:
+        """The same of all blocks, side by side; each stretch holds until the next but one is asked for."""
+        simulator, ends = self._simulator, [0, *accumulate(self.sizes)]
+        assert isinstance(simulator, _CompiledSimulator)
+        rooms = [simulator.room(STEPS_AT_ONCE, self.runs) for _ in range(2)]
+
+        def fill(index: int, chunk: int, x: Array, y: Array) -> None:
+            here, before = slice(*ends[index : index + 2]), rooms[chunk % 2 - 1][0]
+            x[0, here] = before[-1, here] if chunk else self._initial(index)[:, 0]
+            simulator.fill(x, y, here, *self._draw(index, chunk))
+
+        for chunk, steps in enumerate(map(len, self._chunks)):
+            x, y = rooms[chunk % 2]
+            several = x[: steps + 1], y[:steps]
+            list(pool.map(lambda index, chunk=chunk, several=several: fill(index, chunk, *several), range(len(self.sizes))))
+            yield several
+
     def by_step(self, pool: Executor | None = None) -> Iterator[list[Instant]]:
         """All blocks of a step together, step by step: for coefficients that need the whole ensemble."""
         pool = pool or Serial()
@@ -229,21 +248,36 @@ class _CompiledSimulator:
     """Several steps of a scalar model in one pass."""
 
     def __init__(self, model: Model):
-        from kfcourse.filters import loops
-
-        noises, constants = [*model.v, *model.w], list(model.values)
-        given = {"x": model.x[0]} | {f"noise{i}": one for i, one in enumerate(noises)}
-        made = {"y": model.meter_equation[0], "next": model.state_equation[0]}
         self.constants = np.array([float(value) for value in model.values.values()])
-        self.loop = load(function("model", given, made, constants), loops.simulate(len(noises), len(constants))).simulate
+        equations = model.meter_equation[0], model.state_equation[0]
+        self.loop = _simulation(model.x[0], (*model.v, *model.w), tuple(model.values), *equations)
 
     def several(self, start: Array, v: Array, w: Array) -> tuple[Array, Array]:
         """x (K + 1, N) and y (K, N) from states (N, 1) and noises (K, N, r)."""
-        steps, size = v.shape[:2]
-        x, y = np.empty((steps + 1, size)), np.empty((steps, size))
+        x, y = self.room(*v.shape[:2])
         x[0] = start[:, 0]
-        self.loop(self.constants, x, y, *(np.ascontiguousarray(one[:, :, i]) for one in (v, w) for i in range(one.shape[2])))
+        self.fill(x, y, slice(0, len(start)), v, w)
         return x, y
+
+    def room(self, steps: int, size: int) -> tuple[Array, Array]:
+        return np.empty((steps + 1, size)), np.empty((steps, size))
+
+    def fill(self, x: Array, y: Array, here: slice, v: Array, w: Array) -> None:
+        """x[1:] and y of some trajectories from their x[0] and noises (K, n, r)."""
+        noises = (np.ascontiguousarray(one[:, :, i]) for one in (v, w) for i in range(one.shape[2]))
+        self.loop(self.constants, here.start, here.stop, x, y, *noises)
+
+
+@lru_cache(maxsize=256)
+def _simulation(
+    x: sp.Symbol, noises: tuple[sp.Symbol, ...], constants: tuple[sp.Symbol, ...], y: sp.Expr, x_next: sp.Expr
+) -> Any:
+    """The loop of the two equations."""
+    from kfcourse.filters import loops
+
+    given = {"x": x} | {f"noise{i}": one for i, one in enumerate(noises)}
+    text = function("model", given, {"y": y, "next": x_next}, constants)
+    return load(text, loops.simulate(len(noises), len(constants))).simulate
 
 
 class _JumpSimulator:

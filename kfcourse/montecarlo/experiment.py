@@ -20,12 +20,12 @@ import numpy as np
 
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
-from kfcourse.filters.fused import fuse
+from kfcourse.filters.fused import Fused, fuse
 from kfcourse.laws import Array, Gaussian, stacked
 from kfcourse.montecarlo.blocks import progress_bar, run_block, run_stretches
 from kfcourse.montecarlo.comparison import Comparison
-from kfcourse.montecarlo.designing import NotFinite, design
-from kfcourse.montecarlo.ensemble import Ensemble, workers
+from kfcourse.montecarlo.designing import NotFinite, design, design_together
+from kfcourse.montecarlo.ensemble import STEPS_AT_ONCE, Ensemble, workers
 from kfcourse.montecarlo.parallel import Cluster, cluster, cores
 from kfcourse.montecarlo.slow_filters import LEAST, run_slow_filters
 from kfcourse.montecarlo.statistics import BATCHES, Sums, batch_sizes
@@ -201,7 +201,7 @@ def compare(
         ready = _designed(fast, design_ensemble, pool, progress)
         again = [_designed(to_design, one, pool, progress) for one in others]
         if not same_ensemble:
-            common = replace(common, wide=best_width(ready, model, runs, steps, pilot_seed) if wide is None else wide)
+            common = replace(common, wide=best_width(ready, replace(common, seed=pilot_seed)) if wide is None else wide)
         everyone = [*ready, *chain(*again)]
         try:
             everything = _run_blocks(everyone, common, far.executor if far else pool, progress)
@@ -326,12 +326,14 @@ def _split(sums: Sums, fast: Sequence[Filter | Design], again: int) -> tuple[Sum
 
 def _designed(filters: Sequence[Filter | Design], ensemble: Ensemble, pool: Executor, progress: bool | None) -> list[Filter]:
     """The filters in their order, those that need it designed on the ensemble."""
-    designs = [one for one in filters if isinstance(one, Design)]
-    fitted: dict[str, Filter] = {}
-    if designs:
+    found = {one.name: one for one in filters if isinstance(one, Filter)}
+    if quick := [one for one in filters if isinstance(one, Fused)]:
+        few = progress_bar("designing", -(-ensemble.steps // STEPS_AT_ONCE), "stretch", progress, ensemble.together(pool))
+        found |= {one.name: one for one in design_together(quick, few, (ensemble.runs, ensemble.steps), pool)}
+    if rest := [one for one in filters if isinstance(one, Design) and one.name not in found]:
         steps = progress_bar("designing", ensemble.steps, "step", progress, ensemble.by_step(pool))
-        fitted = {one.name: one for one in design(designs, steps, pool)}
-    return [fitted[one.name] if isinstance(one, Design) else one for one in filters]
+        found |= {one.name: one for one in design(rest, steps, pool)}
+    return [found[one.name] for one in filters]
 
 
 def _run_blocks(

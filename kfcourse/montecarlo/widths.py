@@ -7,13 +7,12 @@ leave less to chance.  How often is best depends on the model; where the start i
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from kfcourse.filters.base import Filter
 from kfcourse.montecarlo.ensemble import Ensemble
-from kfcourse.symbolic.jumping import JumpModel
-from kfcourse.symbolic.model import Model
 
 WIDTHS = (1.0, 1.5, 2.0, 3.0)  # that are tried
 RUNS = 2048  # trajectories of the pilot
@@ -22,19 +21,19 @@ RARE = 1e-6  # weight of a state that the prior hardly ever has: six deviations 
 LOST = 0.5  # part of the mean square of the states that such may make
 
 
-def best_width(filters: Sequence[Filter], model: Model | JumpModel, runs: int, steps: int, seed: np.random.SeedSequence) -> float:
-    """The width of `Ensemble` with which the filters' errors, and their distances from the first filter, vary least.
+def best_width(filters: Sequence[Filter], ensemble: Ensemble) -> float:
+    """The width with which the filters' errors on such an ensemble, and their distances from the first filter, vary least.
 
     A mean of w f over states drawn from q, with w = p / q, varies as M_q[(w f)^2] = M_p[w f^2] does.  So one sample, drawn with
     the largest width, tells it for all of them.  What is least is the mean of its logarithm over filters and steps.  A model
     whose far states lead out of the finite numbers, or to where they count for more than all others though the prior
     hardly ever has them, has them drawn from the prior.
     """
-    if model.angles.x or not np.any(model.prior.cov):
+    if ensemble.model.angles.x or not np.any(ensemble.model.prior.cov):
         return 1.0
-    if _astray(Ensemble(model, RUNS, steps, seed, REACH)):
+    if _astray(replace(ensemble, runs=RUNS, wide=REACH)):
         return 1.0
-    *laws, widest = (Ensemble(model, min(runs, RUNS), steps, seed, wide) for wide in WIDTHS)
+    *laws, widest = (replace(ensemble, runs=min(ensemble.runs, RUNS), wide=wide) for wide in WIDTHS)
     loss, weights = np.zeros(len(WIDTHS)), np.empty((len(WIDTHS), widest.sizes[0]))
     states = [one.init(widest.sizes[0]) for one in filters]
     with np.errstate(all="ignore"):  # what is not finite is seen below
@@ -47,14 +46,12 @@ def best_width(filters: Sequence[Filter], model: Model | JumpModel, runs: int, s
                 states = [one.step(state, y) for one, state in zip(filters, states, strict=True)]
             except (ValueError, ArithmeticError, np.linalg.LinAlgError):
                 return 1.0  # which filter it is is said where all of them run
-            first = states[0].posterior.mean
-            for other in (x, *(state.posterior.mean for state in states[1:])):
-                square = ((first - other) ** 2).sum(axis=1)
-                second = (weights * (weights[-1] * square**2)).mean(axis=1)
-                if not np.isfinite(second).all():
-                    return 1.0
-                if second.all():  # not so for a filter that is the same as the first
-                    loss += np.log(second)
+            first, *others = (one.T for one in (*(state.posterior.mean for state in states), x))
+            squares = ((first - np.stack(others)) ** 2).sum(axis=1)
+            second = np.einsum("wi,fi->wf", weights, weights[-1] * squares**2) / len(x)
+            if not np.isfinite(second).all():
+                return 1.0
+            loss += np.log(second[:, second.all(axis=0)]).sum(axis=1)  # without a filter that is the same as the first
     return WIDTHS[int(np.argmin(loss))]
 
 

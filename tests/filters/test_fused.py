@@ -14,9 +14,9 @@ import sympy as sp
 from kfcourse import Model, compare, gaussian, linearised, load_variants, run, simulate, unscented
 from kfcourse.filters import aof, dfmp, duof, fos, gated, loops, mdfmp, mfos
 from kfcourse.filters.designed import Design
-from kfcourse.filters.fused import fuse
-from kfcourse.montecarlo.designing import design
-from kfcourse.montecarlo.ensemble import Ensemble
+from kfcourse.filters.fused import Fused, fuse
+from kfcourse.montecarlo.designing import NotFinite, design, design_together
+from kfcourse.montecarlo.ensemble import SMALL_BLOCK, Ensemble, Serial, workers
 from kfcourse.montecarlo.statistics import Sums
 from kfcourse.symbolic import compiled
 from kfcourse.symbolic.model import Model as PlainModel
@@ -35,7 +35,14 @@ def family(model):
 
 
 def ready(filters, model, runs):
-    found = iter(design([one for one in filters if isinstance(one, Design)], Ensemble(model, runs, STEPS, 1).by_step()))
+    """All designed on the same trajectories, of one block; the compiled ones by two stretches of them, of some steps each."""
+    record = list(Ensemble(model, runs, STEPS, 1).block(0))
+    plain = [one for one in filters if isinstance(one, Design) and not isinstance(one, Fused)]
+    quick = [one for one in filters if isinstance(one, Fused)]
+    x = np.stack([record[0].x[:, 0], *(one.x_next[:, 0] for one in record)])
+    y = np.stack([one.y[:, 0] for one in record])
+    stretches = [(x[:5], y[:4]), (x[4:], y[4:])]
+    found = iter([*design(plain, [[one] for one in record]), *design_together(quick, stretches, (runs, STEPS), Serial())])
     return [next(found) if isinstance(one, Design) else one for one in filters]
 
 
@@ -96,6 +103,38 @@ def test_a_comparison():
     for name in ("error", "square", "own", "normalised", "largest_square", "size", "weights"):
         one, other = getattr(plain.sums, name), getattr(quick.sums, name)
         np.testing.assert_allclose(other, one, rtol=1e-9, atol=1e-11 * np.abs(one).max(), err_msg=name)
+
+
+def test_the_number_of_threads_changes_no_bit():
+    """Of two blocks, in a design too; its trajectories, side by side, are those of the blocks."""
+    model, runs = SCALAR["53"], 2 * SMALL_BLOCK + 1
+    ensemble = Ensemble(model, runs, STEPS, 1, compiled=True)
+    blocks = [list(ensemble.stretches(index)) for index in range(2)]
+    sums = []
+    for threads in (1, 3):
+        with workers(threads) as pool:
+            for k, found in enumerate(ensemble.together(pool)):
+                for array, parts in zip(found, zip(*(block[k] for block in blocks), strict=True), strict=True):
+                    np.testing.assert_array_equal(array, np.hstack(parts))
+        assert k == len(blocks[0]) - 1
+        filters = [aof(gaussian(model)), duof(model), fos(gaussian(model))]
+        sums.append(compare(filters, model, runs, STEPS, 1, slow_runs=0, threads=threads, progress=False, compiled=True).sums)
+    np.testing.assert_array_equal(sums[0].square, sums[1].square)
+
+
+def test_a_design_that_meets_no_numbers_is_refused_as_without_numba():
+    explodes = SCALAR["53"].replace(c=1e40)
+    said = []
+    for which in (False, True):
+        with pytest.raises(NotFinite, match="infinite or NaN") as refused:
+            compare([aof(linearised(explodes)), duof(explodes)], explodes, 500, 12, 1, progress=False, compiled=which)
+        said.append(str(refused.value))
+    assert said[0] == said[1]
+
+
+def test_a_regressor_that_is_the_same_for_all(interpreted):
+    sure = Model.define("0.9*x + 0.1*v", "x + 0.1*w", prior={"mean": 0.1, "variance": 0.0})
+    check(sure, 60, family(sure))
 
 
 def test_normal_numbers_are_numpys_to_the_last_bit():

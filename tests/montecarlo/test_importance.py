@@ -109,5 +109,5 @@ def test_states_that_the_prior_hardly_ever_has_are_not_drawn_where_they_lead_ast
     for name, steps, wide in (("8", 5, False), ("8", 6, False), ("53", 6, True)):
         model = load_variants()[name].model
         filters = lab_filters(model, ["aof-gaussian", "aof-linearised"])
-        found = best_width(filters, model, 20_000, steps, np.random.SeedSequence(1))
+        found = best_width(filters, Ensemble(model, 20_000, steps, 1))
         assert (found > 1) == wide

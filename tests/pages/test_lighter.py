@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "book"))
-import formulas
 import lighter
 
 pytestmark = pytest.mark.quick
@@ -45,12 +44,3 @@ HERE = lighter.used(
 )
 def test_rules_that_fit_no_element_are_left_out(rule, kept):
     assert lighter.pruned(rule, HERE) == kept
-
-
-@pytest.mark.parametrize(
-    ("tex", "em"),  # as MathJax sets them, measured
-    [(r"x_{k+1}=a(x_k,v_k)", 8.05), (r"\lambda_k,\ \Psi_k", 3.37), (r"\hat x_{k\mid k},\ P_{k\mid k}", 4.82), ("n", 0.63)],
-)
-def test_the_room_for_a_formula_is_about_what_it_takes(tex, em):
-    """As far off as three quarters of all are, and a fifth of a letter."""
-    assert formulas.width(tex) == pytest.approx(em, rel=0.2, abs=0.12)

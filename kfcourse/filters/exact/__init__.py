@@ -12,7 +12,7 @@ fixed grid would see.  So each trajectory gets its own nodes at every step.  A s
 
 pointmasses  the filter: a step, its ways, and the budget of its error
 prediction   from a posterior to the next prediction: a sum of normal kernels (kernels), also between the nodes (narrow), or
-             an integral over the noise (noise)
+             an integral over the noise (noise); where panels make kernels crowd, of fewer (merging)
 places       where the new posterior lies: the states that explain the measurement
 batch        nodes x = c + s sinh t there, Bayes' rule, and an estimate of the error: for many trajectories at once
 roots        or, for a meter without noise, the few states that explain it

@@ -20,6 +20,7 @@ from kfcourse.filters.densities import ScalarDensities, scalar_densities
 from kfcourse.filters.exact.batch import ROUNDING, Place
 from kfcourse.filters.exact.constants import ELEMENTS, NEGLIGIBLE, ROOT, WIDTH
 from kfcourse.filters.exact.kernels import Grid, Kernels, Unresolved
+from kfcourse.filters.exact.merging import MERGED
 from kfcourse.filters.exact.panels import PANEL_NODES, SPLITS, Rule, resolve
 from kfcourse.filters.exact.places import Candidates, explanations
 from kfcourse.laws import Array, Gaussian
@@ -74,7 +75,8 @@ def on_panels(
     Each with an estimate of its error in posterior standard deviations, see `resolve`; infinite if y contradicts the prediction
     so much that the posterior lies beyond its support.
     """
-    rule = ROUGH_RULE if accuracy >= TENTH else FINE_RULE
+    rough = accuracy >= TENTH
+    rule = ROUGH_RULE if rough else FINE_RULE
     found: list[tuple[Grid, float]] = [(Grid(*np.empty((3, 0))), np.inf)] * len(y)
     left = np.arange(len(y))
     for sigmas in (WIDTH, FAR):
@@ -94,12 +96,13 @@ def on_panels(
         borders[narrow, -1] = np.nextafter(borders[narrow, -1], np.inf)
         with np.errstate(all="ignore"):  # far states, where formulas leave the finite numbers, have no density
             grids = resolve(borders, log_density, _wider_than_kernels(law), rule)
-        cut = np.array([_cut_off(grid, np.unique(line)) for (grid, _), line in zip(grids, borders, strict=True)])
+        cut = np.array([_cut_off(grid, line) for (grid, _), line in zip(grids, borders, strict=True)])
         for place, (grid, error), bad, known in zip(left.tolist(), grids, cut, narrow, strict=True):
             if known:
                 found[place] = Grid(grid.x[:1], np.ones(1), np.full(1, 1e300)), 0.0
             elif not bad and (variance := grid.variance()) > 0:
-                found[place] = grid, error + ROUNDING * abs(grid.mean()) / np.sqrt(variance)
+                rounding = ROUNDING * abs(grid.mean()) / np.sqrt(variance)
+                found[place] = grid._replace(rough=rough), error + rounding + rough * MERGED
         left = left[cut & ~narrow]
         if not len(left):
             break
@@ -110,7 +113,8 @@ def _first_borders(kernels: Kernels, y: Array, law: ScalarDensities, candidates:
     """Borders (T, B) of panels: ever closer towards where humps may be, and at some of the prediction's kernels."""
     low, high = kernels.support(sigmas)
     roots = explanations(kernels, y, law, low, high, HUMPS, HUMPS_SEARCHED)
-    if np.isfinite(roots).all(axis=1).any():
+    roots = roots[:, : max(1, np.isfinite(roots).sum(axis=1).max())]
+    if roots.shape[1] == HUMPS:
         raise Unresolved(f"more than {HUMPS - 1} states explain a measurement: too many humps for any number of nodes")
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         centres = np.concatenate([candidates.centre, roots], axis=1)
@@ -258,7 +262,8 @@ class _Bayes:
 
 def _cut_off(grid: Grid, borders: Array) -> bool:
     """Whether the posterior goes on beyond the support."""
-    at_border = np.array([grid.x[0] < borders[1], grid.x[-1] > borders[-2]])
+    second, last = np.searchsorted(borders, borders[0], "right"), np.searchsorted(borders, borders[-1]) - 1  # some may be equal
+    at_border = np.array([grid.x[0] < borders[second], grid.x[-1] > borders[last]])
     return bool((at_border & (grid.density[[0, -1]] * (grid.x[-1] - grid.x[0]) > BORDER)).any())
 
 

@@ -28,7 +28,8 @@ def log_evidence(groups: Iterable[tuple[Array, Kernels]], y: Array, law: ScalarD
             if law.noiseless:
                 found[rows] = [_of_roots(kernels.rows(slice(i, i + 1)), grid, law) for i, grid in enumerate(grids)]
                 continue
-            x, density = np.array([[values[grid.density.argmax()] for values in grid[::2]] for grid in grids]).T[:, :, None]
+            tops = [(grid, grid.density.argmax()) for grid in grids]
+            x, density = np.array([(grid.x[top], grid.density[top]) for grid, top in tops]).T[:, :, None]
             known = density >= SHARP  # a prior without variance
             before = np.where(known, 1.0, kernels.density(x, kernels.mass)[:, :, 0])
             found[rows] = (np.log(before) + law.log_likelihood(y[rows], x) - np.log(np.where(known, 1.0, density)))[:, 0]

@@ -29,12 +29,20 @@ def chunks(rows: int, elements: int, most: int) -> Iterator[slice]:
     return (slice(start, start + size) for start in range(0, rows, size))
 
 
-def bells(u: Array) -> Array:
-    """exp(-u^2), in place of u; nothing below exp(-LOWEST)."""
+def bells(u: Array, lowest: float = LOWEST) -> Array:
+    """exp(-u^2), in place of u; nothing below exp(-lowest)."""
     u *= u
-    np.minimum(u, LOWEST, out=u)
+    np.minimum(u, lowest, out=u)
     np.negative(u, out=u)
     return np.exp(u, out=u)
+
+
+def add_bells(x: Array, rate: Array, centre: Array, weights: Array, lowest: float, result: Array) -> None:
+    """Adds sum_j w_j exp(-(r_j x - c_j)^2), of x (T, N), r and c (T, M), and w (T, M, P), to result (T, P, N)."""
+    for i in chunks(len(x), x.shape[1] * rate.shape[1], CACHED):
+        u = x[i, :, None] * rate[i, None, :]
+        u -= centre[i, None, :]
+        result[i] += np.matmul(bells(u, lowest), weights[i]).transpose(0, 2, 1)
 
 
 class Unresolved(ModelError):
@@ -48,13 +56,15 @@ class TooNarrow(Unresolved):
 class Grid(NamedTuple):
     """A posterior as point masses: nodes x (M,), ascending, their masses (M,), and the density there (M,).
 
-    `uniform` is true if the nodes are equidistant in a smooth variable, and every second one is a rule of its own.
+    `uniform` is true if the nodes are equidistant in a smooth variable, and every second one is a rule of its own;
+    `rough` if they are those of panels, and only so accurate that their kernels may be `merged`.
     """
 
     x: Array
     mass: Array
     density: Array
     uniform: bool = False
+    rough: bool = False
 
     def mean(self) -> float:
         return float(self.mass @ self.x)
@@ -80,6 +90,10 @@ class Kernels(NamedTuple):
         masses it knows no more than of `even`.
     pushed_bytes : int
         That `pushed` holds.
+    panels : bool
+        Whether the posterior before needed panels.
+    bells : callable
+        Adds them up: `add_bells`, or the same compiled.
     """
 
     mu: Array
@@ -91,6 +105,8 @@ class Kernels(NamedTuple):
     spectral: Array
     pushed: Callable[[Array], Array] | None = None
     pushed_bytes: int = 0
+    panels: bool = False
+    bells: Callable[..., None] = add_bells
 
     def bytes(self) -> int:
         """That it holds."""
@@ -124,13 +140,10 @@ class Kernels(NamedTuple):
             return self.pushed(x)[:, :, np.minimum(range(len(masses)), 1)]
         rate = np.sqrt(0.5) / self.sigma
         centre, weights = self.mu * rate, np.stack([mass * rate for mass in masses], axis=2)
-        result = np.empty((*x.shape, len(masses)))
-        for i in chunks(len(x), x.shape[1] * self.mu.shape[1], CACHED):
-            kernel = x[i, :, None] * rate[i, None, :]
-            kernel -= centre[i, None, :]
-            np.matmul(bells(kernel), weights[i], out=result[i])
-        result[result <= 2 * np.exp(-LOWEST) * weights.sum(axis=1, keepdims=True)] = 0.0
-        return result / np.sqrt(np.pi)
+        result = np.zeros((len(x), len(masses), x.shape[1]))
+        self.bells(x, rate, centre, weights, LOWEST, result)
+        result[result <= 2 * np.exp(-LOWEST) * weights.sum(axis=1)[:, :, None]] = 0.0
+        return result.transpose(0, 2, 1) / np.sqrt(np.pi)
 
     def moments(self) -> tuple[Array, Array]:
         """Mean and variance (T,) of the predictions: those of mixtures."""
@@ -140,7 +153,7 @@ class Kernels(NamedTuple):
 
     def rows(self, chosen: Array | slice) -> Kernels:
         mu, sigma, mass, even, centre, width, spectral = (array[chosen] for array in self[:7])
-        return Kernels(mu, sigma, mass, even, centre, width, spectral, self.pushed, self.pushed_bytes)
+        return Kernels(mu, sigma, mass, even, centre, width, spectral, *self[7:])
 
 
 def of_prior(prior: Gaussian) -> Kernels:
@@ -178,4 +191,4 @@ def overlapping(x: Array, mass: Array, density: Array, uniform: bool, law: Scala
     with np.errstate(divide="ignore", invalid="ignore"):
         slope = (at_top(mu, 1) - at_top(mu, -1)) / (at_top(x, 1) - at_top(x, -1))
         width = np.hypot(np.where(np.isfinite(slope), slope, 0.0) / (ROOT * at_top(density)), at_top(sigma))
-    return Kernels(mu, sigma, mass, even, at_top(mu), width, np.full(len(x), uniform))
+    return Kernels(mu, sigma, mass, even, at_top(mu), width, np.full(len(x), uniform), panels=not uniform)

@@ -26,6 +26,8 @@ LEFT, DONE, NARROW = 0, 1, 2  # to NumPy; done; done, and the next kernels do no
 _ANY_ORDER: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract"}}
 
 
+_VALUES, _MANY, _MANY_PARTS, _NUMBERS = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
+
 _LOG2, _HIGH, _LOW = 1 / np.log(2), 0.693145751953125, 1.42860682030941723212e-6  # ln 2 = high + low, few digits in the first
 
 
@@ -115,6 +117,20 @@ def _density(x, kernel, parts, found):
         for i in range(count):
             value = found[part, i]
             found[part, i] = value / (np.sqrt(np.pi) * parts[1, part]) if value > parts[2, part] else 0.0
+
+
+@njit(types.void(_MANY, _MANY, _MANY, _MANY_PARTS, types.float64, _MANY_PARTS), cache=True, nogil=True, **_ANY_ORDER)
+def add_bells(x, rate, centre, weights, lowest, result):
+    """`kernels.add_bells`."""
+    bells = np.empty(x.shape[1])
+    for t in range(len(x)):
+        for j in range(rate.shape[1]):
+            for i in range(x.shape[1]):
+                u = x[t, i] * rate[t, j] - centre[t, j]
+                bells[i] = _exp(-min(u * u, lowest))
+            for part in range(weights.shape[2]):
+                for i in range(x.shape[1]):
+                    result[t, part, i] += weights[t, j, part] * bells[i]
 
 
 @njit(**_ANY_ORDER)
@@ -386,9 +402,6 @@ def _predicted(mass, moved):
     return mean, variance
 
 
-_VALUES = types.float64[::1]
-_MANY = types.float64[:, ::1]
-_NUMBERS = types.int64[::1]
 _MOVES = types.FunctionType(types.int64(*[_VALUES] * 5))  # the printed loops: constants, x, and what is made of each
 _METER = types.FunctionType(types.int64(*[_VALUES] * 6))
 

@@ -87,6 +87,7 @@ class _Panels:
 
     def __init__(self, rows: int, log_density: Callable[[Array, Array], Array], rule: Rule):
         self.rows, self.log_density, self.rule = rows, log_density, rule
+        self.peak = np.full(rows, -np.inf)  # the highest log-density of each trajectory
         self.row: Array = np.empty(0, dtype=int)
         self.left: Array = np.empty(0)
         self.right: Array = np.empty(0)
@@ -104,6 +105,7 @@ class _Panels:
         asked = np.repeat(x[order[np.cumsum(count) - 1]][:, None], count.max(), axis=1)  # filled up with the last panel
         asked[place, slot] = x
         logs = self.log_density(asked.reshape(len(some), -1), some).reshape(asked.shape)[place, slot]
+        np.maximum.at(self.peak, row, logs.max(axis=1))
         for name, new in (("row", row), ("left", left), ("right", right), ("x", x), ("logs", logs)):
             setattr(self, name, np.concatenate([getattr(self, name), new]))
 
@@ -111,20 +113,14 @@ class _Panels:
         for name in ("row", "left", "right", "x", "logs"):
             setattr(self, name, getattr(self, name)[chosen])
 
-    def peak(self) -> Array:
-        """The highest log-density of each panel's trajectory (P,)."""
-        peak = np.full(self.rows, -np.inf)
-        np.maximum.at(peak, self.row, self.logs.max(axis=1))
-        return peak[self.row]
-
     def seen(self) -> Array:
         """Panels of trajectories whose density is a number anywhere."""
-        return np.isfinite(self.peak())
+        return np.isfinite(self.peak)[self.row]
 
     def values(self) -> Array:
         """Densities (P, q) relative to the highest of each trajectory; flat where nothing is seen."""
         with np.errstate(invalid="ignore"):
-            return np.where(self.seen()[:, None], np.exp(self.logs - self.peak()[:, None]), 1.0)
+            return np.where(self.seen()[:, None], np.exp(self.logs - self.peak[self.row, None]), 1.0)
 
     def masses(self) -> tuple[Array, Array]:
         """The mass of each panel (P,), and that in its last two Legendre coefficients."""

@@ -58,6 +58,13 @@ def likeliest(kernels: Kernels, y: Array, law: ScalarDensities) -> tuple[Place, 
     return chosen, Candidates(known, scales, logs)
 
 
+def of_kernels(kernels: Kernels, y: Array, law: ScalarDensities) -> Candidates:
+    """Each kernel of a prediction as a hump: where they are narrow, all roots of a measurement may lie far out in the tails."""
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        logs = np.log(kernels.mass) + law.log_likelihood(y, kernels.mu)
+    return Candidates(kernels.mu, kernels.sigma, np.where(np.isnan(logs), -np.inf, logs))
+
+
 class Look(NamedTuple):
     """A rough view of posteriors: masses on a few nodes (T, LOOKED), the highest point, the width of the hump there, the ends."""
 

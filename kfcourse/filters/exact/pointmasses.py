@@ -12,12 +12,12 @@ import numpy as np
 from kfcourse.angles import moments_on_circle
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, is_nonlinear, scalar_densities
-from kfcourse.filters.exact.adaptive import check_scalar, on_panels
+from kfcourse.filters.exact.adaptive import TENTH, check_scalar, on_panels
 from kfcourse.filters.exact.batch import Place, Posteriors, posteriors
 from kfcourse.filters.exact.constants import ELEMENTS, MORE, NODES, SPACINGS, TOLERABLE
 from kfcourse.filters.exact.evidence import log_evidence
 from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, of_prior
-from kfcourse.filters.exact.places import Candidates, hidden, likeliest, looked, spaced
+from kfcourse.filters.exact.places import Candidates, hidden, likeliest, looked, of_kernels, spaced
 from kfcourse.filters.exact.prediction import predictions
 from kfcourse.filters.exact.roots import at_roots
 from kfcourse.filters.exact.smoothing import smoothed
@@ -31,6 +31,7 @@ from kfcourse.symbolic.reading import ModelError
 # any number of trajectories tells.
 ACCURACY = 1e-3
 FINE = (129, 257)  # nodes of a posterior that must be interpolated: the second if the first are too few to share its mass
+TRIED = 65  # nodes of a posterior after one that needed panels
 MEMORY = 2**28  # bytes of predictions
 REMADE = 128  # trajectories whose predictions are made again at once
 
@@ -189,6 +190,28 @@ def corrected(
     grids: dict[int, Grid] = {}
     mean, variance, error = np.full((3, len(y)), np.nan)
     adaptive = np.zeros(len(y), dtype=bool)
+
+    def correct(rows: Array, kernels: Kernels, hasty: bool) -> None:
+        values, resolved = y[rows], np.zeros(len(rows), dtype=bool)
+        error[rows] = np.inf
+        place, candidates = likeliest(kernels, values, law)
+        for some, found, good in _in_batch(kernels, values, law, place, candidates, accuracy, fine_nodes, hasty):
+            done = rows[some]
+            mean[done], variance[done], error[done] = found.mean, found.variance, found.error + found.inherited
+            for i, x, mass, density in zip(done.tolist(), found.x, found.mass, found.density, strict=True):
+                grids[i] = Grid(x, mass, density, uniform=True)
+            resolved[some] = good
+        left = np.flatnonzero(~resolved)
+        if not len(left):
+            return
+        better = _on_panels(kernels.rows(left), values[left], law, candidates.rows(left), accuracy, error[rows[left]])
+        for row, grid, error_there in better:
+            i = int(rows[left[row]])
+            grids[i], error[i], adaptive[i] = grid, error_there, True
+            mean[i], variance[i] = grid.mean(), grid.variance()
+        if hasty and np.isinf(error[rows]).any():
+            raise Unresolved("panels do not resolve a posterior")
+
     for rows, kernels in groups:
         if law.noiseless and not np.isnan(y[rows]).any():
             for place, grid in zip(rows.tolist(), at_roots(kernels, y[rows], law), strict=True):
@@ -196,23 +219,13 @@ def corrected(
                 mean[place], variance[place] = grid.mean(), grid.variance()
             continue
         for chunk in chunks(len(rows), NODES[0] * kernels.mu.shape[1], ELEMENTS):
-            unresolved = []
-            here, values = kernels.rows(chunk), y[rows[chunk]]
-            place, candidates = likeliest(here, values, law)
-            for some, found, good in _in_batch(here, values, law, place, candidates, accuracy, fine_nodes):
-                done = rows[chunk][some]
-                mean[done], variance[done], error[done] = found.mean, found.variance, found.error + found.inherited
-                for i, x, mass, density in zip(done.tolist(), found.x, found.mass, found.density, strict=True):
-                    grids[i] = Grid(x, mass, density, uniform=True)
-                unresolved.append(some[~good])
-            left = np.concatenate(unresolved)
-            if not len(left):
-                continue
-            better = _on_panels(here.rows(left), values[left], law, candidates.rows(left), accuracy, error[rows[chunk][left]])
-            for row, grid, error_there in better:
-                i = int(rows[chunk][left[row]])
-                grids[i], error[i], adaptive[i] = grid, error_there, True
-                mean[i], variance[i] = grid.mean(), grid.variance()
+            some, here, hasty = rows[chunk], kernels.rows(chunk), kernels.panels and accuracy >= TENTH
+            try:
+                correct(some, here, hasty)
+            except Unresolved:
+                if not hasty:
+                    raise
+                correct(some, here, hasty=False)
     return Corrected(grids, mean, variance, error, adaptive)
 
 
@@ -261,7 +274,9 @@ def _quick_step(
     fine_nodes: int,
     room: float,
 ) -> tuple[Gaussian, Gaussian, PointMass]:
-    """`_step` with the usual way compiled: what it leaves goes here as there, and so do its predictions that are not usual."""
+    """`_step` with the usual way and sums of kernels compiled: what the first leaves, and its predictions, go here as there."""
+    from kfcourse.filters.exact.loops import add_bells
+
     numbers, size, usual = np.empty((5, len(y))), np.zeros(len(y), dtype=int), np.zeros(len(y), dtype=bool)
     values = np.empty((3, 0))
     if memory and isinstance(memory.fine, Packed):
@@ -269,6 +284,7 @@ def _quick_step(
         done = usual_way(memory.fine, rows, y[rows, 0], accuracy, fine_nodes)
         values, numbers[:, rows], size[rows], usual[rows] = done.values, done.numbers, done.size, done.usual
         groups = memory._replace(later=memory.later[size[memory.later] == 0]).predictions(law)
+    groups = ((some, kernels._replace(bells=add_bells)) for some, kernels in groups)
     found = corrected(groups, y, law, accuracy, fine_nodes)
     others = size == 0
     numbers[:3, others] = np.array(found[1:4])[:, others]
@@ -283,25 +299,39 @@ def _quick_step(
 
 
 def _in_batch(
-    kernels: Kernels, y: Array, law: ScalarDensities, place: Place, candidates: Candidates, accuracy: float, fine_nodes: int
+    kernels: Kernels,
+    y: Array,
+    law: ScalarDensities,
+    place: Place,
+    candidates: Candidates,
+    accuracy: float,
+    fine_nodes: int,
+    hasty: bool,
 ) -> Iterator[tuple[Array, Posteriors, Array]]:
-    """Rows of kernels, their posteriors, and whether these are resolved; on the finest grid also those that are not."""
+    """Rows of kernels, their posteriors, and whether these are resolved; on the finest grid also those that are not.
+
+    In haste only few nodes are tried, and once: a posterior after one that needed panels is likely to need them, too.
+    """
     look = looked(kernels, y, law, place)
     left, least = np.arange(len(y)), np.zeros(len(y))  # trajectories to do, and the nodes that kernels need
-    for spacing in SPACINGS:
+    spacings, most = (SPACINGS[:1], TRIED) if hasty else (SPACINGS, NODES[-1])
+    for spacing in spacings:
         place, wanted = spaced(look.rows(left), candidates.rows(left), law, spacing)
         sizes = np.searchsorted(NODES[:-1], np.maximum(wanted, least[left]))
         again = np.zeros(len(left), dtype=bool)
-        for size in np.unique(sizes).tolist():
+        for size in np.unique(sizes[np.array(NODES)[sizes] <= most]).tolist():
             count, todo = NODES[size], np.flatnonzero(sizes == size)
             for chunk in chunks(len(todo), count * kernels.mu.shape[1], ELEMENTS):
                 some = todo[chunk]
                 i, there = left[some], place.rows(some)
                 found = posteriors(kernels.rows(i), y[i], law, there, count)
                 least[i] = nodes_for_kernels(law, found, count, fine_nodes)
-                found = found._replace(error=np.where(hidden(candidates.rows(i), there, count), np.inf, found.error))
+                unseen = hidden(candidates.rows(i), there, count)
+                if kernels.panels:  # the prediction may have humps of its own
+                    unseen |= hidden(of_kernels(kernels.rows(i), y[i], law), there, count)
+                found = found._replace(error=np.where(unseen, np.inf, found.error))
                 good = (found.error <= accuracy) & (least[i] <= count)
-                told = good | (spacing == SPACINGS[-1]) | (count == NODES[-1])
+                told = good | (spacing == spacings[-1]) | (count == NODES[-1])
                 yield i[told], Posteriors(*(array[told] for array in found)), good[told]
                 least[i] = np.maximum(least[i], np.where(good, 0, MORE * count))
                 again[some] = ~told

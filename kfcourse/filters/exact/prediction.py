@@ -3,6 +3,7 @@
 kernels  a kernel for each node, where neighbouring kernels overlap
 narrow   more nodes between these, where they do not
 noise    the integral over the noise, where too many more would be needed
+merging  fewer kernels, where panels have made them crowd
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from kfcourse.filters.densities import ScalarDensities
 from kfcourse.filters.exact.constants import ELEMENTS, FEW
 from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, overlapping
+from kfcourse.filters.exact.merging import MANY, merged
 from kfcourse.filters.exact.narrow import Finer, refined
 from kfcourse.filters.exact.noise import by_noise
 from kfcourse.laws import Array
@@ -24,18 +26,23 @@ PACKED = (256, 512, 768, 1024, 1536, 2048, 4096, 8192, 16_384, KERNELS)  # kerne
 
 def predictions(grids: Sequence[Grid], law: ScalarDensities) -> Iterator[tuple[Array, Kernels]]:
     """The predictions of all posteriors, those of about as many kernels together: (places of the posteriors, kernels)."""
-    groups: dict[tuple[int, bool], list[int]] = {}
+    groups: dict[tuple[int, bool, bool], list[int]] = {}
     for place, grid in enumerate(grids):
         size = len(grid.x) if grid.uniform else 64 * -(-len(grid.x) // 64)
-        groups.setdefault((size, grid.uniform), []).append(place)
+        groups.setdefault((size, grid.uniform, grid.rough and size > MANY), []).append(place)
     finer: list[Finer] = []
+    crowded: list[Finer] = []
     middle = np.empty((2, len(grids), 1))  # centre and width of each prediction
-    for (size, uniform), members in groups.items():
+    for (size, uniform, crowd), members in groups.items():
         for some in chunks(len(members), size, ELEMENTS // 2):
             rows = np.array(members[some])
             x, mass, density = _stacked([grids[i] for i in rows.tolist()], size)
             kernels = overlapping(x, mass, density, uniform, law)
             middle[:, rows] = kernels.centre, kernels.width
+            if crowd:
+                found = merged(x, mass, law)
+                crowded.append(found._replace(row=rows[found.row]))
+                continue
             too_narrow = uniform & (apart(kernels.mu, kernels.sigma, mass) > 1)
             narrow = np.flatnonzero(too_narrow)
             if not len(narrow):
@@ -58,6 +65,8 @@ def predictions(grids: Sequence[Grid], law: ScalarDensities) -> Iterator[tuple[A
                     finer = []
     if finer:
         yield from _packed(finer, *middle)
+    if crowded:
+        yield from ((places, kernels._replace(panels=True)) for places, kernels in _packed(crowded, *middle))
 
 
 def _far_narrower(grid: Grid, law: ScalarDensities, rough: Kernels) -> Kernels | Finer:

@@ -25,11 +25,11 @@ AT_ONCE = 512  # trajectories: 3 MB of nodes
 class Packed(Sequence[Grid]):
     """Posteriors one after the other in one array (3, M): nodes, masses, densities; where each begins, how many nodes it has.
 
-    `usual` tells those whose nodes are a rule and whose kernels overlap.
+    `usual` tells those whose nodes are a rule and whose kernels overlap; `uniform` and `rough` are those of `Grid`.
     """
 
-    def __init__(self, values: Array, start: Array, size: Array, usual: Array, uniform: Array):
-        self.values, self.start, self.size, self.usual, self.uniform = values, start, size, usual, uniform
+    def __init__(self, values: Array, start: Array, size: Array, usual: Array, uniform: Array, rough: Array):
+        self.values, self.start, self.size, self.usual, self.uniform, self.rough = values, start, size, usual, uniform, rough
 
     def __len__(self) -> int:
         return len(self.start)
@@ -41,20 +41,19 @@ class Packed(Sequence[Grid]):
             raise IndexError(place)
         begin = self.start[place]
         x, mass, density = self.values[:, begin : begin + self.size[place]]
-        return Grid(x, mass, density, bool(self.uniform[place]))
+        return Grid(x, mass, density, bool(self.uniform[place]), bool(self.rough[place]))
 
     @classmethod
     def together(cls, values: Array, size: Array, usual: Array, grids: Mapping[int, Grid]) -> Packed:
         """Those in the order of the sizes (T,), where these are not 0, and the grids of the others."""
         count, start = size.copy(), np.cumsum(size) - size
-        uniform = usual | (size > 0)
+        uniform, rough = size > 0, np.zeros(len(size), dtype=bool)
         end = values.shape[1]
         for place, grid in grids.items():
-            count[place], start[place], uniform[place] = len(grid.x), end, grid.uniform
+            count[place], start[place], uniform[place], rough[place] = len(grid.x), end, grid.uniform, grid.rough
             end += len(grid.x)
-        return cls(
-            np.concatenate([values, *(np.array(grid[:3]) for grid in grids.values())], axis=1), start, count, usual, uniform
-        )
+        every = np.concatenate([values, *(np.array(grid[:3]) for grid in grids.values())], axis=1)
+        return cls(every, start, count, usual, uniform, rough)
 
 
 class Done(NamedTuple):
