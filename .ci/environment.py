@@ -22,7 +22,7 @@ FINISHED = VENV / "installed"
 PIP = [str(PYTHON), "-m", "pip", "--disable-pip-version-check", "--no-input", "install"]
 
 TEMPORARY = tempfile.gettempdir()
-FULL = f"The disk is full: .venv takes about 1 GB, and pip 200 MB in {TEMPORARY} (another folder: TMPDIR=...). Make room"
+FULL = f"The disk is full: .venv takes about 1.2 GB, and pip 200 MB in {TEMPORARY} (another folder: TMPDIR=...). Make room"
 READ_ONLY = "This folder cannot be written to. Take a copy of the project in a folder of your own"
 NO_NETWORK = "The packages cannot be fetched. Connect to the network (a proxy: HTTPS_PROXY=...; another index: PIP_INDEX_URL=...)"
 # What venv and pip say of a failure, and what to do. The first that fits counts.
@@ -82,7 +82,7 @@ def main(goals: str) -> None:
         except ImportError:
             package = f"python{major}.{minor}-venv"
             sys.exit(f"This Python cannot make environments. On Debian and Ubuntu: sudo apt install {package}; {again}")
-        print(f"Making .venv with Python {major}.{minor}.{micro}: about 1 GB, a minute or two", flush=True)
+        print(f"Making .venv with Python {major}.{minor}.{micro}: about 1.2 GB, a minute or two", flush=True)
     try:
         if not keep:
             run(sys.executable, "-m", "venv", "--clear", str(VENV))

@@ -2,14 +2,33 @@
 
     python benchmarks/records_others.py [--tracks 20]
 
-The others are no dependencies of the project.  Make a throw-away environment for the measurement, and install there this package
-and those of filterpy, pykalman and stonesoup that are wanted; who is missing is named and left out.
+The others are no dependencies of the project.  In a throw-away environment, from the root of the project:
+
+    python -m venv /tmp/others
+    /tmp/others/bin/pip install -e . filterpy pykalman stonesoup
+    /tmp/others/bin/python benchmarks/records_others.py
+
+(With uv's venv and pip the second line takes half a minute; pip itself had not ended after five.)  Who is missing is named and
+left out.
 
 Tracks are those of `kfcourse.scenarios.irregular`: 300 fixes, 0.1 to 1.5 s apart, 15 % missing, 5 % of the others wrong by twenty
 times the noise.  Each program gets the times, the fixes (NaN where missing), and the numbers of the model; the lines that are
 counted are those of its function below, from which everything else follows.  Where a library has no gate it is written by hand;
 pykalman filters all steps in one call, and has no place for one.  Nobody else ends the refusing of a track that is lost.  Stone
-Soup's smoother takes a step without a measurement for one that is smoothed already, and carries nothing across it (its 1.9).
+Soup's smoother takes a step without a measurement for one that is smoothed already, and carries nothing across it.
+
+Found with filterpy 2.0.0, pykalman 0.11.2 and Stone Soup 1.9.1 on 20 tracks, medians, and the worst in brackets; the
+first track pays for loading the library, and for deriving the formulas:
+
+              lines    filtered, m     smoothed, m    first s  later s
+    ours         12   2.20  (5.23)    1.17  (3.37)       0.63     0.17
+    filterpy     17   2.20 (10.85)    1.17  (2.13)       1.89     0.02
+    pykalman      7   8.53 (13.48)    4.62  (7.18)       0.40     0.09
+    stonesoup    27   2.20 (10.85)    1.47 (10.00)       0.32     0.27
+
+On 18 of the tracks a plain loop in NumPy gives our numbers to 1e-12.  On the two others the gate loses the track and begins anew:
+there our filter has 3.9 m instead of 10.8, and 5.2 as before, and the smoother, which must join two tracks, 3.3 and 3.4 m instead
+of 2.0 and 2.1.
 """
 
 from __future__ import annotations

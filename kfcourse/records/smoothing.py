@@ -28,6 +28,7 @@ from kfcourse.laws import (
     Gaussian,
     Measurement,
     Transition,
+    any_missing,
     apply,
     measurement_of,
     product,
@@ -77,9 +78,9 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     if one.look_back is not None:
         return stacked([state.posterior for state in _looked_back(one, y, lag)])
     if np.ndim(y) == 3 and np.shape(y)[1] > (many := max(1, min(MANY_RUNS, NEAR // one.model.n**2))):
-        few = run(one, y[:3, :2]).cov
-        if few.strides[1]:  # else it is the same for all, and stored once
-            return _in_parts(one, np.asarray(y, dtype=float), lag, many)
+        y = np.asarray(y, dtype=float)
+        if any_missing(y) or run(one, y[:3, :2]).cov.strides[1]:  # else covariances are the same for all, and stored once
+            return _in_parts(one, y, lag, many)
     return normal_laws(one, islice(walk(one, y), 1, None), lag)
 
 
@@ -90,11 +91,12 @@ NEAR = 60_000  # numbers of their covariances at a step, that what is kept of th
 def _in_parts(one: Filter, y: Array, lag: int | None, many: int) -> Gaussian:
     """The normal laws given the record, of so many runs at a time."""
     steps, runs, n = *y.shape[:2], one.model.n
+    many = -(-runs // -(-runs // many))  # all parts alike
     found, room = Gaussian(np.empty((steps, runs, n)), np.empty((steps, runs, n, n))), room_for(steps - 1, many, n)
     for start in range(0, runs, many):
         some = np.s_[:, start : start + many]
         into = Gaussian(found.mean[some], found.cov[some])
-        normal_laws(one, islice(walk(one, y[some]), 1, None), lag, into, room if start + many <= runs else None)
+        normal_laws(one, islice(walk(one, y[some]), 1, None), lag, into, room)
     return found
 
 

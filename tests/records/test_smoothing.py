@@ -161,6 +161,15 @@ def test_what_all_runs_share_is_found_once():
     assert {(part.S.shape[-1], part.left.shape[-1]) for part in found} == {(1, 1)}  # the axis of runs, entry by entry
 
 
+def test_a_page_of_products_is_no_reason_for_all_cores(monkeypatch):
+    """Shared gains are applied by one product of matrices only while a library keeps it on one core; both ways agree."""
+    model, y, _ = dense(5)
+    one, full = aof(linearised(model)), np.nan_to_num(y)
+    small = smooth(one, full)
+    monkeypatch.setattr("kfcourse.linear.smoothing.ON_ONE_CORE", 0)
+    same(smooth(one, full), small)
+
+
 def law_of(visited, name):
     laws = [getattr(state, name) for state in visited]
     return Gaussian(np.stack([law.mean for law in laws]), np.stack([law.cov for law in laws])[:, None])
