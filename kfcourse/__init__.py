@@ -6,8 +6,8 @@ compare(lab_filters(model), model, 100_000, 51, seed=1).ranking()
 
 A folder is a floor; each one's docstring says what lives there.  Below them all: `laws` (normal laws, gain with its
 pseudo-inverse, correction, missing measurements), `angles` (the short way round), `limits` (a time limit for a block of
-code), `reasons` (messages that a report says in its own words), `files` (whole or not at all), `seeds` (a number, or a
-generator that draws one), `exports` (names that are imported when they are used).
+code), `kinds` (a model where a filter is expected, told), `reasons` (messages that a report says in its own words), `files`
+(whole or not at all), `seeds` (a number, or a generator that draws one), `exports` (names that are imported when they are used).
 """
 
 from typing import TYPE_CHECKING

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.kinds import expect
 from kfcourse.laws import Vectors, correct
 from kfcourse.symbolic.structure import Structure
 
@@ -36,6 +37,7 @@ def aof(structure: Structure) -> Filter:
 
     Its own covariance p (runs, n, n) is that of the approximation, not the actual one.
     """
+    expect(structure, Structure, "aof")
 
     def step(state: State, y: Vectors) -> State:
         now = structure.at(state.step)

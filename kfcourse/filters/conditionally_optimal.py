@@ -12,6 +12,7 @@ from kfcourse.angles import difference
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import State
 from kfcourse.filters.designed import Design, Equations, fitted_correction, fitted_prediction
+from kfcourse.kinds import expect
 from kfcourse.laws import Array
 from kfcourse.symbolic.equations import Noiseless, compile_noiseless
 from kfcourse.symbolic.model import Model
@@ -40,6 +41,7 @@ def duof(model: Model, equations: tuple[Noiseless, Noiseless] | None = None) -> 
     Its own covariance is the residual of each regression, (n, n): one for the whole ensemble.  Given `equations` take the place
     of a(z, m_v) and b(lambda, m_w).
     """
+    expect(model, Model, "duof")
     (a, b), angles = equations or compile_noiseless(model), model.angles
 
     def step(state: State, y: Array) -> Equations:

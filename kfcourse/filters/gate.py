@@ -23,6 +23,7 @@ import numpy as np
 import scipy
 
 from kfcourse.filters.base import Filter, State, structure_of
+from kfcourse.kinds import expect
 from kfcourse.laws import (
     Array,
     Gaussian,
@@ -78,7 +79,7 @@ def gated(one: Filter, probability: float = 0.999, patience: int | None = 5, str
     Raises
     ------
     TypeError
-        A `Design`, whose coefficients are still to be found.
+        No filter: a `Design`, whose coefficients are still to be found, a model, or structural functions.
     ValueError
         A probability or a patience that is none; a filter without structural functions of its own, and no `structure`.
 
@@ -91,10 +92,9 @@ def gated(one: Filter, probability: float = 0.999, patience: int | None = 5, str
     >>> [round(run(each, np.array([0.1, 0.0, 90.0])).mean[-1].item(), 3) for each in (one, gated(one))]
     [23.247, 0.033]
     """
-    if not isinstance(one, Filter):
-        raise TypeError(
-            f"{getattr(one, 'name', one)} is no filter yet: find its coefficients with design(...), then put the gate before"
-        )
+    expect(one, Filter, "gated")
+    if structure is not None:
+        expect(structure, Structure, "structure=")
     if not 0 < probability < 1:
         raise ValueError(f"probability must lie between 0 and 1, got {probability!r}")
     if patience is not None and (isinstance(patience, bool) or not isinstance(patience, int | np.integer) or patience < 1):

@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, gain, product, transpose, without_missing
 from kfcourse.symbolic.structure import Structure
 
@@ -59,9 +60,12 @@ def robust(structure: Structure, degrees: float = 4.0, rounds: int = 10, edge: f
 
     Raises
     ------
+    TypeError
+        A model or a filter in the place of the structure.
     ValueError
         Degrees or an edge that are not positive, rounds that are none.
     """
+    expect(structure, Structure, "robust")
     if not degrees > 0:
         raise ValueError(f"degrees must be positive, got {degrees!r}")
     if edge is not None and not edge > 0:

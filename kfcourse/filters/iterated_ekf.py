@@ -21,6 +21,7 @@ import numpy as np
 from kfcourse.angles import Components, difference
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, product, symmetric, transpose
 from kfcourse.symbolic.structure import Structure
 
@@ -78,6 +79,7 @@ def iterated(structure: Structure, iterations: int = 5) -> Filter:
     >>> [round(run(one, np.array([[[8.0]]])).mean.item(), 3) for one in filters]
     [3.331, 2.461, 2.0]
     """
+    expect(structure, Structure, "iterated")
     if isinstance(iterations, bool) or not isinstance(iterations, int | np.integer) or iterations < 1:
         raise ValueError(f"iterations must be a whole number, at least 1 (which is aof(structure)); got {iterations!r}")
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from kfcourse.angles import near
 from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.kinds import expect
 from kfcourse.laws import Gaussian, Vectors, any_missing, apply, gain, transpose, without_missing
 from kfcourse.linear.system import LinearSystem, linear_systems
 from kfcourse.symbolic.model import Model
@@ -48,6 +49,7 @@ def kalman_filter(model: Model) -> Filter:
     ModelError
         The model is not linear.
     """
+    expect(model, Model, "kalman_filter")
     system_at = linear_systems(model)
 
     def step(state: State, y: Vectors) -> State:

@@ -17,6 +17,7 @@ import numpy as np
 
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.heavy_tails import residual_square, trusted
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, correct, log_density
 from kfcourse.symbolic.structure import Structure
 
@@ -49,6 +50,7 @@ def adaptive(structure: Structure, window: float = 50.0) -> Filter:
     ValueError
         A window of one measurement or less.
     """
+    expect(structure, Structure, "adaptive")
     if not window > 1:
         raise ValueError(f"window must be more than one measurement, got {window!r}")
 

@@ -39,6 +39,7 @@ from kfcourse.angles import Components, near
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import State
 from kfcourse.filters.designed import Design, Equations, Regression, fitted_correction, fitted_prediction
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, gain, product, transpose
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure
@@ -92,6 +93,7 @@ def of_structure(name: str, structure: Structure, recipe: Recipe, memory: Memory
     ModelError
         Measurements alone are to be remembered, but the model has angles, which jump by a turn: no regression fits them.
     """
+    expect(structure, Structure, name)
     angles = structure.model.angles
     if not memory.estimates and (angles.x or angles.y):
         raise ModelError(

@@ -25,6 +25,7 @@ from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood, transition
 from kfcourse.filters.particle_smoothing import backwards, weighted
 from kfcourse.filters.proposals import Look
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
@@ -104,6 +105,7 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
     Filter
         Its covariance is an unbiased estimate of the posterior's.
     """
+    expect(model, Model, "particle")
     even(particles)
     number, log_likelihood, angles = seed_number(seed), likelihood(model), model.angles.x
     state_equation, _ = compile_model(model)

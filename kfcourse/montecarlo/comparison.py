@@ -94,6 +94,16 @@ class Comparison:
     replicas: Replicas | None = None
     smoothing: Comparison | None = None
 
+    def __repr__(self) -> str:
+        slow = f" ({self.slow_runs:,} for {', '.join(self.slow_part.slow)})" if self.slow_part else ""
+        lines = [
+            f"Comparison of {', '.join(self.names)}: {self.steps} steps, {self.runs:,} trajectories{slow}, seed {self.seed}",
+            *(f"left out: {name}, {why}" for name, why in self.left_out.items()),
+            "ask ranking(), verdicts(), error_variance(name), gap(name), difference(first, second)"
+            + (", and the same of .smoothing" if self.smoothing else ""),
+        ]
+        return "\n".join(lines)
+
     @cached_property
     def available(self) -> tuple[str, ...]:
         """Names with results: all, or without the slow ones if `slow_runs` was 0 or they were left out."""

@@ -21,6 +21,7 @@ import numpy as np
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
 from kfcourse.filters.fused import Fused, fuse
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, stacked
 from kfcourse.montecarlo.blocks import progress_bar, run_block, run_stretches
 from kfcourse.montecarlo.comparison import Comparison
@@ -59,7 +60,7 @@ def run(one: Filter, y: Array) -> Gaussian:
     ValueError
         Measurements of another shape.
     TypeError
-        A `Design`, whose coefficients are still to be found.
+        No filter: a `Design`, whose coefficients are still to be found, a model, or structural functions.
     """
     return stacked([state.posterior for state in islice(walk(one, y), 1, None)])
 
@@ -79,11 +80,7 @@ def states(one: Filter, y: Array) -> list[State]:
 
 def walk(one: Filter, y: Array) -> Iterator[State]:
     """The same one after the other: what the exact filter or particles remember of all steps may be gigabytes."""
-    if isinstance(one, Design):
-        raise TypeError(
-            f"{one.name} is a Design, whose coefficients are still to be found over an ensemble: "
-            f"run(design([it], Ensemble(model, 100_000, {len(y)}, seed=1).by_step())[0], y), or compare([it], model, ...)"
-        )
+    expect(one, Filter, "a run")
     y, p = np.asarray(y, dtype=float), one.model.p
     if y.ndim == 1 and p == 1:
         y = y[:, None, None]
@@ -183,6 +180,8 @@ def compare(
     _check_arguments(filters, model, slow_runs, slow_seconds, slow_memory)
     _check_designs(designs, same_ensemble, wide)
     if smoothers:
+        for one in smoothers:
+            expect(one, Filter, "smoothers=")
         _check_arguments(smoothers, model, slow_runs, slow_seconds, slow_memory)
     if compiled:
         filters = _compiled(filters)
@@ -277,6 +276,11 @@ def _check_arguments(
     slow_memory: float | None,
 ) -> None:
     """ValueError for what `compare` cannot do with these arguments."""
+    if isinstance(filters, Filter | Design):
+        raise TypeError(f"compare expects a list of filters, and one came: compare([{filters.name}], model, ...)")
+    for one in filters:
+        expect(one, Filter, "compare", Design)
+    expect(model, Model, "compare", JumpModel)
     names = [one.name for one in filters]
     if len(set(names)) < len(names) or not names:
         raise ValueError(f"give at least one filter, and each a name of its own: {', '.join(names) or 'none given'}")

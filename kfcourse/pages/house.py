@@ -35,6 +35,7 @@ LAYERS = (
     "laws",
     "angles",
     "limits",
+    "kinds",
     "reasons",
     "files",
     "seeds",

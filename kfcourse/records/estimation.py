@@ -19,6 +19,7 @@ import scipy
 
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.base import Filter
+from kfcourse.kinds import expect
 from kfcourse.laws import Array
 from kfcourse.records.evidence import likelihood
 from kfcourse.symbolic.model import Model
@@ -98,6 +99,7 @@ def estimate(
     >>> [round(value, 1) for value in found.value.tolist()], round(found.log_likelihood, 4)
     ([1468.5, 15099.7], -641.5856)
     """
+    expect(model, Model, "estimate", Mapping)
     model = model if isinstance(model, Model) else Model.of_table(model)
     names, logs, start = _checked(model, unknown, positive)
     # Coordinates: the logarithm of what is positive; what may have any sign in units of its start.
@@ -149,6 +151,7 @@ def profile(
     Where it has fallen by 1.92 from its maximum ends the 95 % interval of a long record.
     Of the normal filter; arguments and errors as of `estimate`.
     """
+    expect(model, Model, "profile")
     others = [other for other in unknown if other != name]
     found = []
     for value in values:

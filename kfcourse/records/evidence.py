@@ -17,6 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from kfcourse.filters.base import Evidence, Filter, State, structure_of, unknown_error
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, log_density
 from kfcourse.montecarlo.experiment import walk
 
@@ -64,6 +65,7 @@ def likelihood(one: Filter, y: Array) -> Array:
     >>> round(likelihood(kalman_filter(local_level()), nile()).sum().item(), 4)
     -641.5856
     """
+    expect(one, Filter, "likelihood")
     evidence = one.evidence or _normal(one)
     found = np.stack([evidence(before, now, after) for before, now, after in _passages(one, y)])
     if not np.isfinite(found).all():
@@ -92,6 +94,7 @@ def likelihood_error(one: Filter, y: Array) -> Array:
     >>> bool((likelihood_error(pointmass(model, accuracy=1e-6), y) < 2e-6).all())
     True
     """
+    expect(one, Filter, "likelihood_error")
     found = []
     for _, _, after in _passages(one, y):
         if not hasattr(after.memory, "evidence_error"):

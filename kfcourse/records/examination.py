@@ -18,6 +18,7 @@ import numpy as np
 import scipy
 
 from kfcourse.filters.base import Filter, structure_of
+from kfcourse.kinds import expect
 from kfcourse.laws import CONFIDENCE, Array, Gaussian, normalised_square, stacked, without_missing
 from kfcourse.linear.consistency import Innovations
 from kfcourse.montecarlo.experiment import states
@@ -80,6 +81,7 @@ def examine(one: Filter, y: Array, edge: float = 1.0) -> Examination:
         A filter without structural functions, measurements of another shape, no likelihood (`kfcourse.likelihood`), a noise with
         a negative variance, as sqrt(u) has where an input u is negative.
     """
+    expect(one, Filter, "examine")
     structure = structure_of(one, "an examination of a record")
     visited = states(one, y)
     seen = np.reshape(y, (len(visited) - 1, -1, one.model.p))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kfcourse.filters.base import Filter
+from kfcourse.kinds import expect
 from kfcourse.laws import Array
 from kfcourse.montecarlo.experiment import states
 
@@ -24,6 +25,7 @@ def weights(one: Filter, y: Array) -> Array:
     ValueError
         A filter that weighs nothing, measurements of another shape.
     """
+    expect(one, Filter, "weights")
     memories = [state.memory for state in states(one, y)[1:]]
     if not all(hasattr(memory, "weight") for memory in memories):
         raise ValueError(f"{one.name} takes every measurement as it is: ask gated(one) or robust(structure) for weights")

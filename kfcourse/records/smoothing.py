@@ -23,6 +23,7 @@ from kfcourse.filters.approximations import aof
 from kfcourse.filters.base import Filter, State, unknown_error
 from kfcourse.filters.iterated_ekf import seen_from
 from kfcourse.filters.looking_back import looked_back, normal_laws
+from kfcourse.kinds import expect
 from kfcourse.laws import (
     Array,
     Gaussian,
@@ -75,6 +76,7 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     >>> [round(z, 3) for z in smooth(aof(linearised(walk)), np.array([1.0, 2.0, np.nan, 4.0])).mean.ravel().tolist()]
     [0.944, 1.833, 2.556, 3.278]
     """
+    expect(one, Filter, "smooth")
     if one.look_back is not None:
         return stacked([state.posterior for state in _looked_back(one, y, lag)])
     if np.ndim(y) == 3 and np.shape(y)[1] > (many := max(1, min(MANY_RUNS, NEAR // one.model.n**2))):
@@ -126,6 +128,7 @@ def smoothing_error(one: Filter, y: Array, lag: int | None = None) -> Array:
     >>> bool((smoothing_error(pointmass(model, accuracy=1e-6), y) < 1e-6).all())
     True
     """
+    expect(one, Filter, "smoothing_error")
     if one.look_back is None:
         raise unknown_error(one)
     return np.stack([state.memory.discretisation_error() for state in _looked_back(one, y, lag)])
@@ -160,6 +163,7 @@ def smooth_iterated(structure: Structure, y: Array, rounds: int = 5) -> Gaussian
     ValueError
         `rounds` is not a whole number above 0; measurements of another shape.
     """
+    expect(structure, Structure, "smooth_iterated")
     if isinstance(rounds, bool) or not isinstance(rounds, int | np.integer) or rounds < 1:
         raise ValueError(f"rounds must be a whole number, at least 1 (which is smooth(aof(structure), y)); got {rounds!r}")
     law = smooth(aof(structure), y)

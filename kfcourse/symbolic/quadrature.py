@@ -18,6 +18,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import Components, difference, near, on_circle
+from kfcourse.kinds import expect
 from kfcourse.laws import (
     SINGULAR,
     Array,
@@ -73,6 +74,8 @@ def unscented(model: Model, kappa: float | None = None, root: str = "cholesky", 
         A function is not finite at a point of the prior law, or too rough for its moments there to be found by points.
     """
 
+    expect(model, Model, "unscented")
+
     def rule(size: int) -> tuple[Array, Array]:
         k = max(3.0 - size, 0.0) if kappa is None else float(kappa)
         if not size + k > 0:
@@ -100,6 +103,7 @@ def gauss_hermite(model: Model, order: int = 5, root: str = "cholesky", augmente
     QuadratureWarning
         A function is not finite at a point of the prior law, or twice as many points an axis give other moments there.
     """
+    expect(model, Model, "gauss_hermite")
     if order < 2:
         raise ModelError(f"Gauss-Hermite quadrature needs an order of at least 2, got {order}")
     return _checked(

@@ -24,6 +24,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import Components, on_circle
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, Matrices, Measurement, Transition, Vectors, measurement_of
 from kfcourse.reasons import Reason
 from kfcourse.symbolic.choices import jumps, masked
@@ -268,6 +269,7 @@ def linearised(model: Model) -> Structure:
     NoClosedForm
         If an equation is not differentiable.
     """
+    expect(model, Model, "linearised")
     (z, p), (m, d) = gaussian_symbols(model, "z", "p"), gaussian_symbols(model, "m", "d")
     tau, A, B = _taylor(model.state_equation, model.x, z, model.v, exact_matrix(model.state_noise.mean))
     h, H, C = _taylor(model.meter_equation, model.x, m, model.w, exact_matrix(model.meter_noise.mean))
@@ -309,6 +311,7 @@ def gaussian(model: Model) -> Structure:
     NoClosedForm
         If a term has no closed-form Gaussian mean: use `unscented` or `gauss_hermite`.
     """
+    expect(model, Model, "gaussian")
     (z, p), (m, d) = gaussian_symbols(model, "z", "p"), gaussian_symbols(model, "m", "d")
     known = model.known.symbols
     tau, Theta = _moments(model.state_equation, model.x, z, p, model.v, *_exact(model.state_noise), known)

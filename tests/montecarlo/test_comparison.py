@@ -1,6 +1,7 @@
 """What a comparison reports: against direct per-trajectory formulas, theory, and the page's table."""
 
 import itertools
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -558,3 +559,17 @@ def test_from_the_second_step_on_the_duof_is_the_least_accurate(lab, name):
     # Averaged over k = 2 ... 10, where the page's table has the DUOF last in every row.
     low, _ = lab.score_difference("duof", name, slice(2, None)).interval(0.95)
     assert low > 0
+
+
+def test_a_printed_comparison_is_short_and_says_what_to_ask(variant53):
+    found = compare(
+        [aof(gaussian(variant53)), pointmass(variant53)], variant53, 1000, 2, 7, slow_runs=100,
+        smoothers=[aof(gaussian(variant53))], progress=False,
+    )  # fmt: skip
+    heading, asked = str(found).splitlines()
+    assert heading == "Comparison of aof-gaussian, aof-exact: 2 steps, 1,000 trajectories (100 for aof-exact), seed 7"
+    for name in re.findall(r"(\w+)\(", asked):
+        assert callable(getattr(found, name))
+    assert asked.endswith(".smoothing") and not repr(found.smoothing).endswith(".smoothing")
+    without = replace(found, slow_part=None, left_out={"aof-exact": "too slow"})
+    assert str(without).splitlines()[1] == "left out: aof-exact, too slow"

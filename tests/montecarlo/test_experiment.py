@@ -305,7 +305,7 @@ def test_one_trajectory_of_a_scalar_meter_may_be_a_vector(variant53, vector):
 
 def test_a_design_that_is_run_says_what_to_do(variant53):
     y = simulate(variant53, 2, 3, seed=1).y
-    with pytest.raises(TypeError, match=r"duof is a Design.*design\(\[it\], Ensemble\(model, 100_000, 3, seed=1\)\.by_step"):
+    with pytest.raises(TypeError, match=r"the Design duof came.*design\(\[it\], Ensemble\(model, 100_000, steps, seed=1"):
         run(duof(variant53), y)
     one = design([duof(variant53)], Ensemble(variant53, 1000, 3, seed=1).by_step())[0]  # what the message says
     assert np.isfinite(run(one, y).mean).all()

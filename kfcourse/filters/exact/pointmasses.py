@@ -22,6 +22,7 @@ from kfcourse.filters.exact.prediction import predictions
 from kfcourse.filters.exact.roots import at_roots
 from kfcourse.filters.exact.smoothing import smoothed
 from kfcourse.filters.exact.usual import Packed, UsualWay, compiled_usual_way
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.compiled import is_scalar
 from kfcourse.symbolic.model import Model
@@ -110,6 +111,7 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
     Unresolved
         When it runs: a step would need more nodes than the budget has.
     """
+    expect(model, Model, "pointmass")
     check_scalar(model)
     if not 0 < accuracy < 1:
         raise ModelError(f"the point-mass filter needs 0 < accuracy < 1, got {accuracy}")

@@ -1,0 +1,64 @@
+"""A model, structural functions, a filter: one where another is expected is told, before anything is computed."""
+
+import numpy as np
+import pytest
+
+from kfcourse import Model, compare, gauss_hermite, gaussian, likelihood, linearised, predictions, run, smooth, unscented
+from kfcourse.filters import adaptive, aof, duof, fkp, fos, gated, iterated, kalman_filter, mdfmp, particle, pointmass, robust
+from kfcourse.records import estimate, examine, likelihood_error, profile, smooth_iterated, smoothing_error, weights
+
+MODEL = Model.define("0.9*x + a*v", "x + w", {"a": 1.0})
+STRUCTURE = linearised(MODEL)
+FILTER = aof(STRUCTURE)
+Y = np.zeros(3)
+
+OF_STRUCTURES = {
+    "aof": aof, "robust": robust, "adaptive": adaptive, "iterated": iterated, "fos": fos, "mdfmp": mdfmp, "fkp4": fkp,
+    "smooth_iterated": lambda one: smooth_iterated(one, Y), "structure=": lambda one: gated(FILTER, structure=one),
+}  # fmt: skip
+OF_FILTERS = {
+    "gated": gated, "a run": lambda one: run(one, Y), "smooth": lambda one: smooth(one, Y),
+    "likelihood": lambda one: likelihood(one, Y), "examine": lambda one: examine(one, Y), "weights": lambda one: weights(one, Y),
+    "smoothing_error": lambda one: smoothing_error(one, Y), "likelihood_error": lambda one: likelihood_error(one, Y),
+    "smoothers=": lambda one: compare([FILTER], MODEL, 10, 2, 1, smoothers=[one]),
+}  # fmt: skip
+OF_MODELS = {
+    "linearised": linearised, "gaussian": gaussian, "unscented": unscented, "gauss_hermite": gauss_hermite, "duof": duof,
+    "kalman_filter": kalman_filter, "pointmass": pointmass, "particle": particle, "estimate": lambda one: estimate(one, Y, ["a"]),
+    "profile": lambda one: profile(one, Y, ["a"], "a", [1.0]), "compare": lambda one: compare([FILTER], one, 10, 2, 1),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", OF_STRUCTURES)
+def test_a_model_or_a_filter_in_the_place_of_structural_functions(what):
+    with pytest.raises(TypeError, match=rf"^{what} expects a Structure, and a Model came: give linearised\(model\)"):
+        OF_STRUCTURES[what](MODEL)
+    with pytest.raises(TypeError, match=rf"^{what} expects a Structure, and the Filter aof-linearised came: give linearised"):
+        OF_STRUCTURES[what](FILTER)
+
+
+@pytest.mark.parametrize("what", OF_FILTERS)
+def test_a_model_structural_functions_or_a_design_in_the_place_of_a_filter(what):
+    with pytest.raises(TypeError, match=rf"^{what} expects a Filter, and a Model came: make a filter .*aof\(linearised\(model"):
+        OF_FILTERS[what](MODEL)
+    with pytest.raises(TypeError, match=rf"^{what} expects a Filter, and the Structure linearised came: make .*aof\(structure"):
+        OF_FILTERS[what](STRUCTURE)
+    with pytest.raises(TypeError, match=rf"^{what} expects a Filter, and the Design duof came: find its coefficients"):
+        OF_FILTERS[what](duof(MODEL))
+
+
+@pytest.mark.parametrize("what", OF_MODELS)
+def test_a_filter_or_structural_functions_in_the_place_of_a_model(what):
+    for one in (FILTER, STRUCTURE):
+        with pytest.raises(TypeError, match=rf"^{what} expects a Model, and the .*{one.name} came: give the model .*, it.model$"):
+            OF_MODELS[what](one)
+
+
+def test_other_things_in_the_place_of_a_filter():
+    for one, message in ((aof, "the function aof came: call it first"), (Y, "a ndarray came: see its documentation")):
+        with pytest.raises(TypeError, match=rf"^a run expects a Filter, and {message}"):
+            predictions(one, Y)
+    with pytest.raises(TypeError, match=r"a list of filters, and one came: compare\(\[aof-linearised\], model"):
+        compare(FILTER, MODEL, 10, 2, 1)
+    with pytest.raises(TypeError, match=r"^compare expects a Filter, and a Model came"):
+        compare([FILTER, MODEL], MODEL, 10, 2, 1)
