@@ -99,7 +99,8 @@ class ContinuousModel:
         >>> ContinuousModel.define("-x + cos(t)", "1 + exp(-t)", "x")
         ContinuousModel(dx/dt = -x + xi*(1 + exp(-t)) + cos(t), y = x + n)
         """
-        values = {checked_name(name): exact_number(name, value) for name, value in table("parameters", parameters).items()}
+        given = table("parameters", parameters)
+        values = {checked_name(name): exact_number(f"parameter {name}", value) for name, value in given.items()}
         f, S = (formula_list(what, _plain(formulas)) for what, formulas in (("drift", drift), ("signal", signal)))
         g = _rows(diffusion)
         n, noises = len(f), len(g[0])

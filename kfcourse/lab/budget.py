@@ -1,6 +1,6 @@
 """How many trajectories the lab takes by default: a hundred thousand, or as many as a student waits for.
 
-The work is counted, not timed, so that the same command takes the same trajectories on every machine:
+The work is counted, not timed, so that the same command takes the same trajectories on every machine::
 
     work = trajectories * steps * sum over the filters of passes * laws * (n^2 + n * points)
 

@@ -95,9 +95,9 @@ FAMILIES: dict[str, Family] = {
         "8",
     ),
     "fbp": Family("FBP", "ФБП", "FBP, the filter of high order", "Фильтр большого порядка (ФБП)", "#661100", "X"),
-    "particle": Family("particle", "АОФ, частицы", colour="#F0E442", marker="*"),
-    "imm": Family("IMM", "АОФлд, смешивание до прогноза", colour="#D55E00"),
-    "gpb2": Family("GPB2", "АОФлд, пары режимов", colour="#009E73"),
+    "particle": Family("particle", "АОФ (частицы)", colour="#F0E442", marker="*"),
+    "imm": Family("IMM", "АОФлд (смешивание до прогноза)", colour="#D55E00"),
+    "gpb2": Family("GPB2", "АОФлд (пары режимов)", colour="#009E73"),
     "iterated": Family("iterated EKF", "итерационный РФК", colour="#E69F00"),
     "alpha": Family("alpha-beta", "альфа-бета", colour="#E69F00"),
 }

@@ -33,7 +33,7 @@ ENGLISH = Words()
 
 def style(name: str) -> dict[str, Any]:
     """Line style of a filter: colour by family, dashes for the linearised approximation, black for the exact."""
-    approximation = name.partition("-")[2]
+    approximation = name.partition("-")[2].removeprefix("jump-")
     if approximation == "exact":
         return {"color": "black", "linestyle": "-", "marker": "*", "label": title(name)}
     colour, marker = look(name)

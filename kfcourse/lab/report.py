@@ -262,12 +262,17 @@ def _equation_sections(names: tuple[str, ...]) -> list[Section]:
     return [Section.of(FAMILIES[one].heading, equations_latex(EQUATIONS[one])) for one in families if one in EQUATIONS]
 
 
+ALIGNMENT = re.compile(r"(?P<inner>\\begin\{(?P<kind>\w+)\}.*?\\end\{(?P=kind)\})|&", re.DOTALL)  # the line's own &
+LOST = 100.0  # times the most accurate filter's D_k: ten times its error; a few trajectories that make so much are lost ones
+
 # What a reader must know before he relies on distances from the bound, by kind.
 REMARKS = {
     "rounding": "At {steps} the errors are zero but for the rounding of numbers as large as the states: nothing is told of them, "
     "and means leave these steps out.",
     "doubtful": "At {steps} there is no bound: what ran in the place of the exact AOF errs by more than a tenth of its variance "
     "itself, or another filter is more accurate. Means leave these steps out.",
+    "diverged": "{names}: at {steps} D_k is more than a hundred times that of the most accurate filter, and a few trajectories "
+    "make it: on these the filtering diverges. How much worse it is no number here tells; rank the other filters.",
     "heavy": "{names}: at {steps} the accuracy rests on a few rare trajectories: a single one makes up to {part} % of the sum. "
     "The interval there cannot be trusted; about {runs} trajectories, {exact} of them with the exact AOF, would do.",
     "skewed": "{names}: at {steps} the accuracy rests on a few rare trajectories. "
@@ -287,6 +292,12 @@ def remarks(result: Comparison) -> Iterator[tuple[str, dict[str, Any]]]:
         yield "doubtful", {"steps": result.doubtful}
     gaps = {name: result.gap(name) for name in result.entrants}
     bad = {name: result.usable & ~result.trusted(gap, name) for name, gap in gaps.items()}
+    variances = {name: result.error_variance(name).value for name in gaps}
+    best = np.min([*variances.values()], axis=0)
+    lost = {name: steps & (result.heavy(name) > HEAVY) & (variances[name] > LOST * best) for name, steps in bad.items()}
+    if names := [name for name, steps in lost.items() if steps.any()]:
+        yield "diverged", {"names": names, "steps": np.any([lost[name] for name in names], axis=0)}
+        bad = {name: steps for name, steps in bad.items() if name not in names}
     if names := [name for name, steps in bad.items() if steps.any()]:
         part = max(float(result.heavy(name)[bad[name]].max()) for name in names)
         more = max(result.missing(gaps[name], name) for name in names)
@@ -375,8 +386,8 @@ def on_one_power(estimate: Estimate) -> tuple[float, float, int | None]:
 
 
 def _mathml(line: str) -> str:
-    """One line of an aligned block as MathML, which browsers show without any script."""
-    return mathml(line.replace("&", ""))
+    """One line of an aligned block as MathML, which browsers show without any script; columns of its matrices stay apart."""
+    return mathml(ALIGNMENT.sub(lambda found: found["inner"] or "", line))
 
 
 def escape_tex(text: str) -> str:

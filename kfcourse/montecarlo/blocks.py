@@ -168,7 +168,7 @@ def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
     said = f"step {step}: {one.name} became infinite or NaN although the trajectories are finite"
     if one.slow:
         raise Failed(one.name, Reason(said, "infinite", step=step))
-    raise NotFinite(Reason(f"{said}; leave it out or check the model", "infinite", step=step), one.name)
+    raise NotFinite(Reason(f"{said}: it diverges; leave it out, or check the model", "infinite", step=step), one.name)
 
 
 def progress_bar(what: str, total: int, unit: str, progress: bool | None, items: Iterable[T] | None = None) -> tqdm[T]:

@@ -178,10 +178,15 @@ class JumpModel:
     def transition_at(self, k: int) -> Array:
         """pi at step k, (J, J): from the mode of y_k to that of y_{k+1}; ModelError if it depends on the state."""
         self.without_state("a matrix of transitions for all states")
-        found = np.asarray(self.chain_of_step.at(k)()[0], dtype=float)
+        found = self._entries(k)
         if problem := _not_probabilities(found):
             raise ModelError(f"`transition` at step {k}: {problem}; change its formulas, or run at most {k} steps")
         return found / found.sum(axis=1, keepdims=True)
+
+    def _entries(self, k: int) -> Array:
+        """What the formulas of pi give at step k; what is no probability is told in words, not warned of."""
+        with np.errstate(all="ignore"):
+            return np.asarray(self.chain_of_step.at(k)()[0], dtype=float)
 
     def law_at(self, k: int) -> Array:
         """q_k, (J,): the probabilities of the modes of y_k before anything is measured; ModelError if they are not known."""
@@ -220,7 +225,7 @@ class JumpModel:
             self._check_states(steps, reached)
             return
         for k in range(steps):
-            matrix = np.asarray(self.chain_of_step.at(k)()[0], dtype=float)
+            matrix = self._entries(k)
             if problem := _not_probabilities(matrix):
                 where = f" at step {k}" if known.symbols else ""
                 if k >= SURE:
@@ -327,14 +332,14 @@ def _compiled(
         raise ModelError(f"`transition`: {error}{differs}") from None
     known = model.known.used(matrix, of_step)
     arguments = {"x": sp.Matrix(model.x)} if matrix.has(*model.x) else {}
-    numeric = matrix.subs({symbol(name): exact_number(name, value) for name, value in common.items()})
+    numeric = matrix.subs({symbol(name): exact_number(f"parameter {name}", value) for name, value in common.items()})
     return matrix, Stepwise.compile(known, "transition", arguments, {"transition": numeric}, [*arguments])
 
 
 def _entry(one: Any, names: dict[str, sp.Symbol]) -> sp.Expr:
     if isinstance(one, str | sp.Expr):
         return read(one, names, "transition")
-    return exact_number("transition", one)
+    return exact_number("an entry", one)
 
 
 def _law(first: Any, size: int) -> Array:

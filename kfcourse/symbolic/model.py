@@ -136,7 +136,8 @@ class Model:
         >>> Model.define("c*x + e*x*v", "g*x + f*x**2*w", dict(c=0.9, e=0.05, g=1, f=0.02))
         Model(x' = c*x + e*v*x, y = f*w*x**2 + g*x; c = 9/10, e = 1/20, g = 1, f = 1/50)
         """
-        values = {checked_name(name): exact_number(name, value) for name, value in table("parameters", parameters).items()}
+        given = table("parameters", parameters)
+        values = {checked_name(name): exact_number(f"parameter {name}", value) for name, value in given.items()}
         a, b, known = formula_list("state", state), formula_list("meter", meter), Known.read(interval, inputs)
         used = {name for formula in (*a, *b) for name in names_in(formula)}
         named = _symbols(symbols, [*values, *known.inputs], used, len(a))
@@ -207,7 +208,7 @@ class Model:
         unknown = sorted(set(parameters) - set(self.parameters))
         if unknown:
             raise ModelError(f"the model has no parameter {', '.join(unknown)}; it has {', '.join(self.parameters) or 'none'}")
-        values = dict(self.parameters) | {name: exact_number(name, value) for name, value in parameters.items()}
+        values = dict(self.parameters) | {name: exact_number(f"parameter {name}", value) for name, value in parameters.items()}
         return dataclasses.replace(self, parameters=values)
 
     @classmethod

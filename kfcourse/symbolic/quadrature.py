@@ -36,7 +36,7 @@ from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
-from kfcourse.symbolic.structure import Structure, of_steps
+from kfcourse.symbolic.structure import Structure, object_equation, of_steps
 
 Rule: TypeAlias = Callable[[int], tuple[Array, Array]]
 
@@ -275,10 +275,9 @@ def _quadrature(name: str, model: Model, rule: Rule, equations: _Equations, root
     whole = of_steps(
         name, model, lambda k: _of_step(name, model, rules, _Equations(*(one._replace(k=k) for one in equations)), root)
     )
-    state, known = equations.state, model.known
+    state = equations.state
     numbers = tuple(one.tobytes() for one in (*rules[0], *state.noise, state.root))
-    moving = name, root, numbers, model.state_equation.subs(model.values), known.interval, tuple(known.inputs.items())
-    return replace(whole, moving=moving)
+    return replace(whole, moving=(name, root, numbers, *object_equation(model)))
 
 
 def _of_step(name: str, model: Model, rules: Sequence[tuple[Array, Array]], equations: _Equations, root: str) -> Structure:

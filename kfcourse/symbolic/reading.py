@@ -56,16 +56,16 @@ def checked_name(name: str) -> str:
         raise ModelError(str(error)) from None
 
 
-def exact_number(name: str, value: Any) -> sp.Rational:
+def exact_number(what: str, value: Any) -> sp.Rational:
     """The decimal number a person typed, exactly: 0.9 is 9/10."""
     try:
         number = float(value) if isinstance(value, int | float | np.integer | np.floating | sp.Rational) else float("nan")
     except OverflowError:
         number = float("inf")
     if isinstance(value, bool) or not np.isfinite(number):
-        raise ModelError(f"parameter {name} = {shown(value)}: expected a finite number")
+        raise ModelError(f"{what} = {shown(value)}: expected a finite number")
     if number and not 1e-100 < abs(number) < 1e100:
-        raise ModelError(f"parameter {name} = {shown(value)} is too large or too small; change the units")
+        raise ModelError(f"{what} = {shown(value)} is too large or too small; change the units")
     return value if isinstance(value, sp.Rational) else sp.Rational(str(value))
 
 

@@ -357,9 +357,13 @@ def _object(one: Structure) -> object:
     """What tau and Theta hang on; of structures that do not tell they are nobody else's."""
     if one.formulas is None:
         return one.moving or id(one)
-    model, known = one.model, one.model.known
-    noise = [part.tobytes() for part in model.state_noise]
-    return one.name, model.state_equation.subs(model.values), *noise, known.interval, tuple(known.inputs.items())
+    return one.name, *(part.tobytes() for part in one.model.state_noise), *object_equation(one.model)
+
+
+def object_equation(model: Model) -> tuple[Hashable, ...]:
+    """Equal for models with the same state equation: its numbers, its symbols in their order, its interval and inputs."""
+    known = model.known
+    return model.x, model.v, model.state_equation.subs(model.values), known.interval, tuple(known.inputs.items())
 
 
 def each_once(now: Sequence[Structure], alike: Sequence[int]) -> Callable[[int, Gaussian], Gaussian]:

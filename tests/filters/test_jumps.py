@@ -620,5 +620,16 @@ def test_objects_are_alike_only_with_the_same_numbers_inputs_and_approximation()
     assert moving_alike([unscented(modes[0]), unscented(modes[1])]) == [0, 0]
     assert moving_alike([gauss_hermite(modes[0], 3), gauss_hermite(modes[0], 4), gauss_hermite(modes[1], 3)]) == [0, 1, 0]
     assert moving_alike([gauss_hermite(modes[0]), gauss_hermite(modes[0].replace(s=0.5))]) == [0, 1]
+    turned = [
+        Model.define(
+            ["p + v1", "q + v2"],
+            "p + w",
+            symbols={"x": ["p", "q"], "v": list(noises), "w": ["w"]},
+            state_noise={"variance": [1.0, 4.0]},
+        )
+        for noises in (("v1", "v2"), ("v1", "v2"), ("v2", "v1"))
+    ]
+    for build in (gaussian, linearised, unscented):
+        assert moving_alike([build(one) for one in turned]) == [0, 0, 2]  # the same formulas, the variances are each other's
     driven = [Model.define("x + u + v", "x + w", inputs={"u": values}) for values in ([0, 1], [0, 1], [1, 0])]
     assert moving_alike([gaussian(one) for one in driven]) == [0, 0, 2]

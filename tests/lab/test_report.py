@@ -351,6 +351,29 @@ def test_a_reader_is_told_where_nothing_is_told_and_whose_accuracy_hangs_on_one_
         assert told in text and other not in text
 
 
+def test_a_filter_that_a_few_trajectories_take_far_beyond_the_others_is_said_to_diverge(variants, tmp_path):
+    """One filter's variance is a thousand times the other's by one trajectory; if all make it, that is no divergence."""
+    model = variants["53"].model
+    for everywhere in (False, True):
+        result = compare(lab_filters(model, ["aof-gaussian", "duof"]), model, 400, 3, 1, slow_runs=0, wide=1, progress=False)
+        result.sums.square[1, 2] *= 1000
+        result.sums.largest_square[:] = 0
+        if not everywhere:
+            result.sums.largest_square[1, 2] = 0.5 * result.sums.square[1, 2].sum()
+        found = " ".join(remarks_in_words(result))
+        assert ("DUOF: at step 2 D_k is more than a hundred times" in found) == (not everywhere), found
+        write_handin(variants["53"], result, tmp_path, "ru")
+        assert ("на них фильтрация расходится" in (tmp_path / "handin.html").read_text(encoding="utf-8")) == (not everywhere)
+
+
+def test_columns_of_a_matrix_stay_apart_in_a_page(variants, tmp_path):
+    model = Model.define(["x1 + 0.1*x2", "x2 + v"], "x1 + w", prior={"mean": [1, 2], "variance": [3, 5]})
+    result = compare(lab_filters(model, ["aof-linearised", "duof"]), model, 300, 2, 1, slow_runs=0, wide=1, progress=False)
+    write_handin(dataclasses.replace(variants["53"], model=model), result, tmp_path, "en")
+    cells = re.findall(r"<mtr>(.*?)</mtr>", (tmp_path / "handin.html").read_text(encoding="utf-8"))
+    assert "<mtd><mn>3</mn></mtd><mtd><mn>0</mn></mtd>" in cells
+
+
 def test_without_a_bound_nothing_is_said_of_trajectories_with_the_exact_filter(variants, tmp_path):
     """Errors of so few trajectories are skewed; as if no single one counted for much: no share, no exact AOF in the words."""
     model = variants["53"].model

@@ -1,9 +1,11 @@
 """Kernels that crowd: where a posterior is sharp, panels put hundreds of nodes within a sigma of the next prediction's kernels.
 
 The kernels of all nodes in a cell, some tenths of a sigma long, have about the same sum as two: those at the Gauss rule of the
-nodes' masses.  With the mean m, variance v and third moment s of the nodes of a cell,
+nodes' masses.  With the mean m, variance v and third moment s of the nodes of a cell, they lie at x_1 and x_2 and have the shares
+w_1 and w_2 of its mass:
 
-    x  =  m + sqrt(v) (g -+ sqrt(1 + g^2)),    masses  1/2 (1 +- g / sqrt(1 + g^2)),    g = s / (2 v^(3/2))
+    x_1 = m + sqrt(v) (g - r),    x_2 = m + sqrt(v) (g + r),    r = sqrt(1 + g^2),    g = s / (2 v^(3/2)),
+    w_1 = (1 + g / r) / 2,    w_2 = (1 - g / r) / 2
 
 Moments up to the third are kept, so what is lost is the fourth derivative of a kernel by its node over a cell.
 """
