@@ -157,8 +157,8 @@ def scalar_densities(model: Model) -> ScalarDensities:
     rough = pieces is None or any(part.has(sp.Derivative, sp.DiracDelta) for part in outputs.values())
     if rough or any(jumps(one, model.x) for one in model.meter_equation.atoms(sp.Piecewise)):
         raise ModelError(
-            f"{model} jumps at a state, where the point-mass filter needs a smooth meter, and an object whose jumps lie at single "
-            "thresholds; use particle(model), or a Gaussian filter, unscented(model)"
+            f"{model} jumps at a state, where the point-mass filter needs a smooth meter, and an object whose jumps lie at "
+            "single thresholds; use particle(model), or a Gaussian filter, unscented(model)"
         )
     lacks_x = not b.has(x)
     if lacks_x and meter_variance.is_zero:
@@ -172,7 +172,8 @@ def scalar_densities(model: Model) -> ScalarDensities:
         if solved is not None:
             found = found._replace(log_likelihood=lambda y, x: solved(y[..., None], x[..., None]))
         if pieces:
-            found = found._replace(piece=lambda x, one=number.at(k): one(x[..., None])[0][..., 0])
+            numbered = number.at(k)
+            found = found._replace(piece=lambda x: numbered(x[..., None])[0][..., 0])
         return found._replace(noiseless=meter_variance.is_zero is True)
 
     return at(0)
