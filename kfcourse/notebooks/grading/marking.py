@@ -234,7 +234,9 @@ class Marking:
         return [clean(f"{', '.join(questions)}: {reason}") for reason, questions in self._reasons.items()]
 
 
-STRANGE = re.compile(r"✓|kfcourse|\.questions\b|\.structures\b|_getframe|currentframe|__code__|__traceback__|\.hidden|__setattr__")
+STRANGE = re.compile(
+    r"✓|kfcourse|\.questions\b|\.structures\b|_getframe|currentframe|__code__|__traceback__|\.hidden|__setattr__"
+)
 
 
 def strange_lines(own: Iterable[Cell], master: NotebookNode) -> list[str]:
