@@ -37,7 +37,7 @@ def drawn(figure: Figure) -> list[dict[str, Any]]:
             (str(one.get_label()), {hue for colour in one.get_facecolor() for hue in _hues(colour)}) for one in ax.collections
         ]
         looks += [("_", {hue for colour in one.get_edgecolor() for hue in _hues(colour)}) for one in ax.collections]
-        patches = [*ax.patches, *(text.arrow_patch for text in ax.texts if getattr(text, "arrow_patch", None))]
+        patches = [*ax.patches, *(arrow for text in ax.texts if (arrow := getattr(text, "arrow_patch", None)))]
         looks += [("_", {DASHES.get(str(one.get_linestyle()), ""), *_hues(one.get_facecolor())} - {""}) for one in patches]
         names = [(name, sorted(look)) for name, look in looks if name and not name.startswith("_") and name != "None"]
         said = [ax.get_title(), ax.get_title("left"), ax.get_xlabel(), ax.get_ylabel(), *(text.get_text() for text in ax.texts)]
