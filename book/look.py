@@ -199,7 +199,7 @@ def leave_icons_out(app, exception) -> None:
 
 
 def measure_nothing(app, exception) -> None:
-    """The theme lays out all code of a page when it is loaded, to see what can be scrolled; page.js asks what is laid out anyway."""
+    """The theme lays out all code of a page once it is loaded, to see what scrolls; page.js asks what is laid out anyway."""
     if not exception and app.builder.format == "html":
         script = Path(app.outdir) / "_static" / "scripts" / "pydata-sphinx-theme.js"
         before, measuring, after = script.read_text(encoding="utf-8").partition(MEASURING)
