@@ -16,6 +16,8 @@ from kfcourse.laws import Array
 
 Rows = tuple[tuple[str, str, Answer], ...]
 
+ABOUT_THE_MEAN = "The mean error is subtracted first; the meter's errors have the mean zero by the model."
+
 # -- m1: the gate
 
 WRONG_GATES: Rows = (
@@ -330,14 +332,24 @@ WRONG_ROUNDS: Rows = (
         "The smoother's uncertainty makes the mean square larger, not smaller.",
         _round(lambda y, z, p: np.mean((y - z) ** 2 - p)),
     ),
+    (
+        "variance-everywhere",
+        "The smoother's variance is averaged over all steps; only those with a measurement count.",
+        lambda y, z, p: float(np.nanmean((y - z) ** 2) + np.mean(p)),
+    ),
     ("variance-alone", "Only the smoother's variance is there.", _round(lambda y, z, p: np.mean(p))),
     ("sum-for-mean", "It is a sum over the measurements, not a mean.", _round(lambda y, z, p: np.sum((y - z) ** 2 + p))),
     ("missing-counted", "It is divided by the number of all steps; what is missing tells nothing of the meter.", _divided_by_all),
     ("missing-as-zero", messages.MISSING_AS_ZERO, _zero_for_missing),
     (
         "about-the-mean",
-        "The mean error is subtracted first; the meter's errors have the mean zero by the model.",
+        ABOUT_THE_MEAN,
         _round(lambda y, z, p: np.var(y - z) + np.mean(p)),
+    ),
+    (
+        "about-the-mean",
+        ABOUT_THE_MEAN,
+        lambda y, z, p: float(np.nanvar(y - z) + np.mean(p)),
     ),
     ("deviation-for-variance", messages.DEVIATION_FOR_VARIANCE, _round(lambda y, z, p: np.sqrt(np.mean((y - z) ** 2 + p)))),
     ("deviation-added", "A standard deviation is added to a square.", _round(lambda y, z, p: np.mean((y - z) ** 2 + np.sqrt(p)))),
@@ -380,6 +392,11 @@ WRONG_WEIGHTS: Rows = (
     ("R-multiplied", "The square of the residual is multiplied by R; it is divided by it.", _weight(size=lambda r, R: r @ R @ r)),
     ("R-forgotten", "The residual is not compared with the noise: R is missing.", _weight(size=lambda r, R: r @ r)),
     ("correlation-forgotten", messages.CORRELATIONS_IGNORED, _weight(size=lambda r, R: r @ (r / np.diag(R)))),
+    (
+        "components-of-state",
+        "The state's components are counted; the measurement's are asked for.",
+        lambda r, R, G, p, s: weight(r, R, G, p, s) * (s + len(p)) / (s + len(r)),
+    ),
     ("one-component", "The number of components is more than one.", _weight(above=lambda s, m: s + 1)),
     (
         "components-forgotten",

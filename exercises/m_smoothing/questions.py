@@ -90,14 +90,14 @@ def round_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def weight_arguments(exercise: Exercise) -> list[tuple]:
-    """Two measurements of two components: one that fits, one far off."""
+    """Two measurements of two components, of a state of three: one that fits, one far off."""
     rng = exercise.rng("m7")
     found = []
     for far in (1.0, 5.0):
-        G = np.array([[1.0, 0.4], [-0.3, 1.2]]) + 0.1 * rng.normal(size=(2, 2))
+        G = np.array([[1.0, 0.4, -0.6], [-0.3, 1.2, 0.5]]) + 0.1 * rng.normal(size=(2, 3))
         R = np.array([[1.0, 0.5], [0.5, 0.8]]) * rng.uniform(0.5, 0.8)
         found.append(
-            (far * (np.array([0.9, -0.7]) + 0.2 * rng.random(2)), R, G, covariance(rng, 2, 0.5), float(rng.uniform(3, 6)))
+            (far * (np.array([0.9, -0.7]) + 0.2 * rng.random(2)), R, G, covariance(rng, 3, 0.5), float(rng.uniform(3, 6)))
         )
     return found
 

@@ -23,9 +23,12 @@ DEVIATION = "F is a variance already; the exponent, or the factor before it, tak
 OF_ROWS = "The weights sum to one over the modes that are entered; they say where one of these comes from."
 JOINT = "These weights are joint probabilities: given the mode that is entered, they have to sum to one."
 OTHER_AXIS = "A vector acts along the wrong axis: the mode that is left is the row, and the mode that is entered the column."
+ROW_TAKEN = "The weights of a mode are taken from the wrong axis: they are its column; its row is what becomes of it."
 NOT_MIXED = "Each mode goes on with its own law: which modes may it have come from?"
 FIRST_AGAIN = "The second step begins with the first law of the modes again: what has the first measurement told?"
 CHAIN_FORGOTTEN = "The mode may have changed between the steps: the transition is missing."
+
+SWAPPED = "The two losses have changed places: which one is paid if a fault is overlooked?"
 
 # -- o1: the chain
 
@@ -167,6 +170,18 @@ def covariances_alone(mu: Array, z: Array, p: Array) -> tuple[Array, Array]:
     return mu @ z, np.tensordot(mu, p, 1)
 
 
+def by_squares(mu: Array, z: Array, p: Array) -> tuple[Array, Array]:
+    """Mean of the square less square of the mean: another covariance if the weights do not sum to one."""
+    mean, square = about_zero(mu, z, p)
+    return mean, square - np.outer(mean, mean)
+
+
+def rows(mu: Array, pi: Array) -> tuple[Array, Array]:
+    """Shares whose rows are taken for columns."""
+    c, w = chain(mu, pi)
+    return c, w.T
+
+
 def first_forgotten(y: Array, m: float, d: float, a: float, q: float, C: Array, pi: Array, first: Array) -> tuple[Array, Array]:
     """The second step begins with the first law of the modes again."""
     return two_steps_with(weights=lambda mu, pi: (first @ pi, chain(mu, pi)[1]))(y, m, d, a, q, C, pi, first)
@@ -195,6 +210,8 @@ WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
     ("chain-forgotten", CHAIN_FORGOTTEN, two_steps_with(weights=lambda mu, pi: (mu, np.eye(len(mu))))),
     ("transposed", TRANSPOSED, two_steps_with(weights=lambda mu, pi: chain(mu, pi.T / pi.T.sum(axis=1, keepdims=True)))),
     ("transposed", TRANSPOSED, two_steps_with(weights=lambda mu, pi: (pi @ mu, (pi.T * mu[:, None]) / (pi @ mu)))),
+    ("other-axis", ROW_TAKEN, two_steps_with(weights=rows)),
+    ("other-axis", ROW_TAKEN, two_steps_with(weights=rows, merge=by_squares)),
     ("spread-forgotten", SPREAD_FORGOTTEN, two_steps_with(merge=covariances_alone)),
     ("not-mixed", NOT_MIXED, two_steps_with(own=True)),
     (
@@ -331,8 +348,8 @@ WRONG_MIXED: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "other-axis",
-        "The weights of a mode are taken from the wrong axis: they are its column; its row is what becomes of it.",
-        mixed_with(weights=lambda mu, pi: (mu @ pi, chain(mu, pi)[1].T)),
+        ROW_TAKEN,
+        mixed_with(weights=rows),
     ),
     ("not-mixed", NOT_MIXED, lambda mu, pi, z, p: (mu @ pi, z, p)),
     (
@@ -360,8 +377,16 @@ WRONG_DECISIONS: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "losses-swapped",
-        "The two losses have changed places: which one is paid if a fault is overlooked?",
+        SWAPPED,
         lambda f, missed, alarm: decide(f, alarm, missed),
+    ),
+    (
+        "losses-swapped",
+        SWAPPED,
+        lambda f, missed, alarm: (
+            decide(f, alarm, missed)[0],
+            np.where(decide(f, alarm, missed)[0] == 1, (1 - f) * alarm, f * missed),
+        ),
     ),
     (
         "other-way",

@@ -11,6 +11,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 import sympy as sp
+from sympy.core.relational import Relational
 
 from kfcourse.angles import TURN, Components, difference, wrapped
 from kfcourse.filters.inverted import by_change_of_variable
@@ -23,6 +24,7 @@ from kfcourse.symbolic.reading import ModelError, exact_matrix
 
 TINY = 1e-300  # in place of a variance of exactly 0
 TRIALS, ROUNDING = 50, 1e-12  # states on which a covariance is tried; eigenvalue of correlations that is none
+FORMULAS = 64  # more than one choice has
 MOST_TURNS = 50  # of an angle whose noise is so large that it tells nothing
 
 
@@ -96,6 +98,7 @@ class ScalarDensities(NamedTuple):
     meter_width : x -> standard deviation of the meter's noise over |slope|: how well y tells x
     noiseless : whether the meter has no noise: there is no density of y, and log_likelihood must not be asked
     jump : pi for an angle, whose residual changes its sign on the far side of the circle too, by a jump; otherwise infinite
+    piece : x -> a number for each of the formulas that an object which jumps has, by the one that holds at x
     """
 
     kernel: Callable[[Array], tuple[Array, Array]]
@@ -107,6 +110,7 @@ class ScalarDensities(NamedTuple):
     meter_width: Callable[[Array], Array]
     jump: float = np.inf
     noiseless: bool = False
+    piece: Callable[[Array], Array] | None = None
     at_step: Callable[[int], ScalarDensities] | None = None
 
     def at(self, k: int) -> ScalarDensities:
@@ -147,26 +151,42 @@ def scalar_densities(model: Model) -> ScalarDensities:
     x, (mean, variance, b, meter_variance) = model.x[0], (part.subs(model.values) for part in formulas(model))
     parts = {"state": mean, "variance": variance, "meter": b, "meter_variance": meter_variance}
     outputs = {name: sp.Matrix([part.diff(x)]) for name, part in parts.items()}
-    choices = {*model.state_equation.atoms(sp.Piecewise), *model.meter_equation.atoms(sp.Piecewise)}
-    rough = any(part.has(sp.Derivative, sp.DiracDelta) for part in outputs.values())
-    if rough or any(jumps(one, model.x) for one in choices):
+    pieces = _pieces(sp.Matrix([mean, variance]), x)
+    if pieces is not None:
+        outputs |= {name: outputs[name].replace(sp.DiracDelta, lambda *place: sp.S.Zero) for name in ("state", "variance")}
+    rough = pieces is None or any(part.has(sp.Derivative, sp.DiracDelta) for part in outputs.values())
+    if rough or any(jumps(one, model.x) for one in model.meter_equation.atoms(sp.Piecewise)):
         raise ModelError(
-            f"{model} jumps at a state, and the point-mass filter needs smooth equations; use particle(model), or a Gaussian "
-            "filter, unscented(model)"
+            f"{model} jumps at a state, where the point-mass filter needs a smooth meter, and an object whose jumps lie at "
+            "single thresholds; use particle(model), or a Gaussian filter, unscented(model)"
         )
     lacks_x = not b.has(x)
     if lacks_x and meter_variance.is_zero:
         raise ModelError(f"{list(model.meter_equation)}: the meter shows neither the state nor any noise")
     slopes = Stepwise.compile(model.known, "slopes", {"x": sp.Matrix(model.x)}, outputs, ["x", "state", "meter"])
+    number = Stepwise.compile(model.known, "piece", {"x": sp.Matrix(model.x)}, {"piece": sp.Matrix([pieces])}, ["x", "piece"])
 
     def at(k: int) -> ScalarDensities:
         functions = (one.at(k) for one in (next_state, meter, slopes))
         found = _elementwise(model, *functions, lacks_x=lacks_x, at_step=at if model.timed else None)
         if solved is not None:
             found = found._replace(log_likelihood=lambda y, x: solved(y[..., None], x[..., None]))
+        if pieces:
+            numbered = number.at(k)
+            found = found._replace(piece=lambda x: numbered(x[..., None])[0][..., 0])
         return found._replace(noiseless=meter_variance.is_zero is True)
 
     return at(0)
+
+
+def _pieces(moments: sp.Matrix, x: sp.Symbol) -> sp.Expr | None:
+    """A number for each of the formulas between jumps, 0 if there is none; None if their thresholds are not looked into."""
+    choices = [one for one in sorted(moments.atoms(sp.Piecewise), key=str) if jumps(one, (x,))]
+    if any(not isinstance(condition, Relational) for one in choices for _, condition in one.args[:-1]):
+        return None
+    numbers = [sp.Piecewise(*((i, condition) for i, (_, condition) in enumerate(one.args))) for one in choices]
+    numbers += [one for one in sorted(moments.atoms(sp.sign, sp.Heaviside), key=str) if one.has(x)]
+    return sp.Add(*(one / sp.Integer(FORMULAS) ** i for i, one in enumerate(numbers)))
 
 
 def _elementwise(

@@ -91,7 +91,7 @@ class Undisturbed(Clouds):
     variance: Array
 
     def discretisation_error(self) -> Array:
-        """What the error of the estimates stays below at 99 of 100 trajectories, (runs,)."""
+        """What the error of the estimates stays below at 99 of 100 corrections, (runs,)."""
         return np.asarray(WITHIN * np.sqrt(self.variance + self.apart() ** 2))
 
 

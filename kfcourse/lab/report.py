@@ -155,6 +155,9 @@ def _model_in_numbers(model: Model | JumpModel) -> dict[str, Any]:
     }
 
 
+ROUNDING = 1e-10  # per cent
+
+
 def conclusions(result: Comparison, confidence: float = CONFIDENCE) -> list[str]:
     """The ranking in sentences: each filter against the next, significant or not at the confidence.
 
@@ -165,8 +168,10 @@ def conclusions(result: Comparison, confidence: float = CONFIDENCE) -> list[str]
     for better, worse in pairwise(ranked):
         difference = result.mean_gap_difference(worse, better)
         low, high = (100 * float(limit) for limit in difference.interval(confidence))
-        # Filters that coincide, as on a linear model, differ by rounding: 1e-14 %.
-        verdict = "is more accurate than" if low > 1e-10 else "is not significantly different from"
+        if max(-low, high) < ROUNDING:  # filters that coincide, as on a linear model, differ by 1e-14 %
+            sentences.append(f"{title(better)} and {title(worse)} are the same but for rounding.")
+            continue
+        verdict = "is more accurate than" if low > ROUNDING else "is not significantly different from"
         sentences.append(
             f"{title(better)} {verdict} {title(worse)}: {100 * float(difference.value):.3g} % "
             f"({100 * confidence:g} % confidence: {low:.3g} to {high:.3g} %)."

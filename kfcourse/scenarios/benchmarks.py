@@ -132,7 +132,10 @@ def logistic() -> Model:
 def inverse_cube_root() -> Model:
     """x' = min(100, x^(-1/3)) + v with the odd root,  y = x + w;  x_0 ~ N(3.01, 1)."""
     return Model.define(
-        "(b if 0 <= x < 1/b**3 else sign(x)/Abs(x)**(1/3)) + v", "x + w", {"b": 100}, prior={"mean": 3.01, "variance": 1}
+        "((b if x < 1/b**3 else Abs(x)**(-1/3)) if x >= 0 else -Abs(x)**(-1/3)) + v",
+        "x + w",
+        {"b": 100},
+        prior={"mean": 3.01, "variance": 1},
     )
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from kfcourse import Model, ModelError, filters, load_variants, run, simulate
 from kfcourse.filters import adaptive_pointmass, kalman_filter
+from kfcourse.scenarios.benchmarks import inverse_cube_root
 
 # What these tests compare with is known to far more digits than a comparison needs.
 ACCURACY = 1e-6
@@ -139,3 +140,64 @@ def test_a_kernel_that_is_narrow_here_and_folds_there():
     assert abs(state.posterior.mean[0, 0] - mean) < 10 * INTERPOLATED * np.sqrt(variance)
     assert abs(state.posterior.cov[0, 0, 0] / variance - 1) < 10 * INTERPOLATED
     assert state.memory.error[0] < 10 * INTERPOLATED
+
+
+BEYOND = 40.0  # the states of the oracles below lie within
+
+
+def by_midpoints(y, prior, mean, deviation):
+    """Means and deviations of p(x_k | y_0..k), y = x + w, with the midpoint rule on cells none of which holds the jump at 0."""
+    x = np.arange(-BEYOND, BEYOND, 0.02) + 0.01
+    kernel = np.exp(-0.5 * ((x[:, None] - mean(x)) / deviation(x)) ** 2) / deviation(x)
+    ahead = np.exp(-0.5 * (x - prior.mean) ** 2 / prior.cov[0, 0])[:, None]
+    for measured in y[:, :, 0]:
+        p = ahead * np.exp(-0.5 * (measured - x[:, None]) ** 2)
+        p /= p.sum(axis=0)
+        found = x @ p
+        yield found, np.sqrt(x**2 @ p - found**2)
+        ahead = kernel @ p
+
+
+@pytest.mark.parametrize(
+    ("state", "mean", "deviation"),
+    [
+        ("x - 0.5*sign(x) + v", lambda x: x - 0.5 * np.sign(x), np.ones_like),  # dry friction
+        ("0.8*x + 3*sign(x) + v", lambda x: 0.8 * x + 3 * np.sign(x), np.ones_like),
+        ("Heaviside(x) + v", lambda x: np.heaviside(x, 0.5), np.ones_like),
+        ("0.9*x + (1 if x < 0 else 2)*v", lambda x: 0.9 * x, lambda x: np.where(x < 0, 1.0, 2.0)),
+    ],
+)
+def test_nodes_are_split_where_the_object_jumps(state, mean, deviation):
+    """A midpoint rule of cells 1/50 of the meter's deviation wide errs by some 1e-5; across a jump it would by 1e-2."""
+    model = Model.define(state, "x + w", prior={"mean": 0.5, "variance": 2.0})
+    _, y = simulate(model, 12, 5, seed=1)
+    exact = filters.pointmass(model)
+    ours = exact.init(12)
+    for measured, (middle, sd) in zip(y, by_midpoints(y, model.prior, mean, deviation), strict=True):
+        ours = exact.step(ours, measured)
+        assert (ours.memory.error < 1e-3).all()
+        assert (np.abs(ours.posterior.mean[:, 0] - middle) / sd <= 1e-4).all()
+        assert (np.abs(np.sqrt(ours.posterior.cov[:, 0, 0]) / sd - 1) <= 1e-4).all()
+
+
+def test_a_state_that_comes_from_beside_a_pole_is_followed_far_out():
+    """x' = x^(-1/3) + v with the odd root: few of x come to 20, from 1/8000.  Particles have none there.
+
+    The oracle takes cells 1/500 of their distance from the pole: so many that their midpoints, at 20, are 1/75 apart.
+    """
+    model = inverse_cube_root()
+    first, then = 0.5, np.array([20.0, -30.0, 1.0, 7.0])
+    exact = filters.pointmass(model)
+    ours = exact.step(exact.step(exact.init(4), np.full((4, 1), first)), then[:, None])
+    edge = np.geomspace(1e-6, 12.0, 8000)
+    x, length = 0.5 * (edge[1:] + edge[:-1]), np.diff(edge)
+    x, length = np.concatenate([-x, x]), np.concatenate([length, length])
+    mass = length * np.exp(-0.5 * (x - 3.01) ** 2 - 0.5 * (x - first) ** 2)
+    for row, measured in enumerate(then):
+        there = measured + np.linspace(-8, 8, 161)
+        p = np.exp(-0.5 * (there[:, None] - 1 / np.cbrt(x)) ** 2) @ mass * np.exp(-0.5 * (measured - there) ** 2)
+        p /= p.sum()
+        middle = p @ there
+        sd = np.sqrt(p @ (there - middle) ** 2)
+        assert abs(ours.posterior.mean[row, 0] - middle) <= 1e-3 * sd
+        assert abs(np.sqrt(ours.posterior.cov[row, 0, 0]) / sd - 1) <= 1e-3

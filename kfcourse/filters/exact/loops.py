@@ -23,15 +23,15 @@ from kfcourse.filters.exact.places import COARSELY, EXPLANATIONS, FRACTIONS, HID
 LEFT, DONE, NARROW = 0, 1, 2  # to NumPy; done; done, and the next kernels do not overlap
 
 # Sums may be taken in any order, so that the processor adds several terms at once.
-_ANY_ORDER: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract"}}
-
+_CALLED: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract"}}
+_ANY_ORDER = _CALLED | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # of what only compiled functions call
 
 _VALUES, _MANY, _MANY_PARTS, _NUMBERS = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
 
 _LOG2, _HIGH, _LOW = 1 / np.log(2), 0.693145751953125, 1.42860682030941723212e-6  # ln 2 = high + low, few digits in the first
 
 
-@njit(error_model="numpy", fastmath={"contract"})
+@njit(**_ANY_ORDER | {"fastmath": {"contract"}})
 def _exp(u):
     """exp(u), |u| < 708, to the last bit but one: 2^k exp(r), |r| < .35, by Taylor's polynomial, that loops do many at once."""
     k = np.floor(u * _LOG2 + 0.5)
@@ -119,7 +119,7 @@ def _density(x, kernel, parts, found):
             found[part, i] = value / (np.sqrt(np.pi) * parts[1, part]) if value > parts[2, part] else 0.0
 
 
-@njit(types.void(_MANY, _MANY, _MANY, _MANY_PARTS, types.float64, _MANY_PARTS), cache=True, nogil=True, **_ANY_ORDER)
+@njit(types.void(_MANY, _MANY, _MANY, _MANY_PARTS, types.float64, _MANY_PARTS), cache=True, nogil=True, **_CALLED)
 def add_bells(x, rate, centre, weights, lowest, result):
     """`kernels.add_bells`."""
     bells = np.empty(x.shape[1])
@@ -418,7 +418,7 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
         ),
         cache=True,
         nogil=True,
-        **_ANY_ORDER,
+        **_CALLED,
     )  # fmt: skip
     def steps(moves, meter, c, of_noise, before, start, count, y, accuracy, fine_nodes, after, numbers, size, status):
         """One step of many trajectories: the length of `after` that is filled.

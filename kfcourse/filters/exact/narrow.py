@@ -97,6 +97,11 @@ def _piece(flat: Array, count: Array | int, at: Array, begin: Array | int) -> Ar
     return result
 
 
+def piece(x: Array, law: ScalarDensities) -> Array:
+    """The numbers of the formulas that hold at x: 0 everywhere if the object does not jump."""
+    return np.zeros(x.shape) if law.piece is None else law.piece(x)
+
+
 def panels(x: Array, mass: Array, law: ScalarDensities, most: int) -> tuple[Array, Array, Array, Array]:
     """Gauss nodes and weights over the numbers of the nodes (T, N), on panels halved until kernels overlap.
 
@@ -105,18 +110,20 @@ def panels(x: Array, mass: Array, law: ScalarDensities, most: int) -> tuple[Arra
     """
     rows, count = x.shape
     borders = np.append(np.arange(0, count - 1, COARSE), count - 1)
-    at_border = np.stack([*law.kernel(x[:, borders]), mass[:, borders]])
+    at_border = np.stack([*law.kernel(x[:, borders]), piece(x[:, borders], law), mass[:, borders]])
     row = np.repeat(np.arange(rows), len(borders) - 1)
     left, right = (np.tile(side.astype(float), rows) for side in (borders[:-1], borders[1:]))
-    known = [at_border[:, :, :-1].reshape(3, -1), at_border[:, :, 1:].reshape(3, -1)]  # mean, sigma, mass at both ends
+    known = [at_border[:, :, :-1].reshape(4, -1), at_border[:, :, 1:].reshape(4, -1)]  # mean, sigma, piece, mass at both ends
     done: list[tuple[Array, ...]] = []
     fits = np.ones(rows, dtype=bool)
     while len(left):
         middle = 0.5 * (left + right)
-        there = np.stack([*law.kernel(interpolated(x[None], middle, row)[0]), mass[row, np.round(middle).astype(int)]])
-        (a, s, m), (b, t, n), (c, u, o) = known[0], there, known[1]
-        covered = np.abs(b - a) + np.abs(c - b)
-        narrow = covered > PANEL_STEP * np.minimum(np.minimum(s, t), u)
+        at = interpolated(x[None], middle, row)[0]
+        there = np.stack([*law.kernel(at), piece(at, law), mass[row, np.round(middle).astype(int)]])
+        (a, s, i, m), (b, t, j, n), (c, u, k, o) = known[0], there, known[1]
+        covered, room = np.abs(b - a) + np.abs(c - b), PANEL_STEP * np.minimum(np.minimum(s, t), u)
+        covered = np.where((i != j) | (j != k), np.maximum(covered, 2 * room), covered)  # a jump, however small
+        narrow = covered > room
         split = narrow & ((right - left) * np.maximum(np.maximum(m, n), o) > UNSEEN) & (middle > left) & (middle < right)
         kept = ~(split | narrow & (right - left < 1))
         done.append((row[kept], left[kept], right[kept], covered[kept] / PANEL_STEP))

@@ -96,7 +96,7 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
     ----------
     model : Model
         One state, one measurement, noises entering linearly (with any functions of x as factors); the meter's may be solved
-        for (`inverted`), or be nothing.
+        for (`inverted`), or be nothing.  The object may jump, at thresholds farther apart than a posterior's nodes.
     accuracy : float
         Largest estimated error of a step, in posterior standard deviations; a step with a larger one is left to the
         adaptive filter.
@@ -107,7 +107,7 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
     Raises
     ------
     ModelError
-        The model is not scalar, or a noise enters nonlinearly and cannot be solved for.
+        The model is not scalar, the meter jumps, or a noise enters nonlinearly and cannot be solved for.
     Unresolved
         When it runs: a step would need more nodes than the budget has.
     """
@@ -158,7 +158,7 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
         return back
 
     found = Filter("aof-exact", model, init, step, slow=True, evidence=evidence, look_back=look_back)
-    if not is_scalar(model) or densities.noiseless or is_nonlinear(model):
+    if not is_scalar(model) or densities.noiseless or densities.piece or is_nonlinear(model):
         return found
     return replace(found, quick=(step, lambda: partial(step, usual_way=compiled_usual_way(model))))
 

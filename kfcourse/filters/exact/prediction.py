@@ -1,7 +1,7 @@
 """From posteriors to predictions: which of the three ways a trajectory takes.
 
 kernels  a kernel for each node, where neighbouring kernels overlap
-narrow   more nodes between these, where they do not
+narrow   more nodes between these, where they do not, or where the object jumps
 noise    the integral over the noise, where too many more would be needed
 merging  fewer kernels, where panels have made them crowd
 """
@@ -16,7 +16,7 @@ from kfcourse.filters.densities import ScalarDensities
 from kfcourse.filters.exact.constants import ELEMENTS, FEW
 from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, overlapping
 from kfcourse.filters.exact.merging import MANY, merged
-from kfcourse.filters.exact.narrow import Finer, refined
+from kfcourse.filters.exact.narrow import Finer, piece, refined
 from kfcourse.filters.exact.noise import by_noise
 from kfcourse.laws import Array
 
@@ -39,11 +39,15 @@ def predictions(grids: Sequence[Grid], law: ScalarDensities) -> Iterator[tuple[A
             x, mass, density = _stacked([grids[i] for i in rows.tolist()], size)
             kernels = overlapping(x, mass, density, uniform, law)
             middle[:, rows] = kernels.centre, kernels.width
-            if crowd:
+            if crowd and law.piece is None:
                 found = merged(x, mass, law)
                 crowded.append(found._replace(row=rows[found.row]))
                 continue
-            too_narrow = uniform & (apart(kernels.mu, kernels.sigma, mass) > 1)
+            numbers = piece(x, law)
+            across = (numbers[:, 1:] != numbers[:, :-1]).any(axis=1)
+            if across.any() and not uniform:
+                raise Unresolved("a posterior that needed panels lies across a jump of the object")
+            too_narrow = across | (uniform & (apart(kernels.mu, kernels.sigma, mass) > 1))
             narrow = np.flatnonzero(too_narrow)
             if not len(narrow):
                 yield rows, kernels
@@ -72,6 +76,8 @@ def predictions(grids: Sequence[Grid], law: ScalarDensities) -> Iterator[tuple[A
 def _far_narrower(grid: Grid, law: ScalarDensities, rough: Kernels) -> Kernels | Finer:
     """The prediction of one trajectory whose kernels are too narrow for a sum of FEW."""
     try:
+        if law.piece is not None:
+            raise Unresolved("its inverse, which the integral over the noise takes, has gaps where the object jumps")
         return by_noise(grid, law, rough)
     except Unresolved:
         found = refined(grid.x[None], grid.mass[None], law, KERNELS)

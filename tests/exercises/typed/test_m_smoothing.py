@@ -130,9 +130,11 @@ WRONG = [
     ("m6", "missing-counted", lambda y, z, p: np.nansum((y - z) ** 2 + p) / len(y)),
     ("m6", "missing-as-zero", lambda y, z, p: np.mean((np.where(np.isnan(y), 0, y) - z) ** 2 + p)),
     ("m6", "about-the-mean", lambda y, z, p: np.nanvar(y - z) + np.mean(p[~np.isnan(y)])),
-    ("m6", "", lambda y, z, p: np.nanmean((y - z) ** 2) + np.mean(p)),
+    ("m6", "about-the-mean", lambda y, z, p: np.nanvar(y - z) + np.mean(p)),
+    ("m6", "variance-everywhere", lambda y, z, p: np.nanmean((y - z) ** 2) + np.mean(p)),
     ("m7", "trace-forgotten", lambda *a: m7(*a, trace=False)),
     ("m7", "one-component", lambda *a: m7(*a, m=1)),
+    ("m7", "components-of-state", lambda r, R, G, p, s: m7(r, R, G, p, s, m=G.shape[1])),
 ]
 UNUSABLE = [
     ("m6", "a missing measurement used", lambda y, z, p: np.mean((y - z) ** 2 + p)),

@@ -38,6 +38,16 @@ def o3(spread=1.0, chain=True, again=False, correct=True, first=None, noise=1.0,
     return answer
 
 
+def o3_by_rows(y, m, d, a, q, C, pi, first):
+    """The weights' rows in the place of their columns; the variance by squares."""
+    mu = first * norm.pdf(y[0], m, np.sqrt(d + C**2)) / (first @ norm.pdf(y[0], m, np.sqrt(d + C**2)))
+    z, p = a * (m + d / (d + C**2) * (y[0] - m)), a**2 / (1 / d + 1 / C**2) + q
+    c = mu @ pi
+    w = mu[:, None] * pi / c
+    later = c * norm.pdf(y[1], w @ z, np.sqrt(w @ (p + z**2) - (w @ z) ** 2 + C**2))
+    return mu, later / later.sum()
+
+
 def o4(cov):
     return lambda mu, z, p: (sum(w * m for w, m in zip(mu, z, strict=True)), cov(mu, z, p))
 
@@ -60,6 +70,14 @@ def o6(weights=lambda mu, pi: mu[:, None] * pi / (mu @ pi), cov=deviations):
 
 def o7(threshold=lambda missed, alarm: alarm / (alarm + missed), loss=np.minimum):
     return lambda f, missed, alarm: ((f > threshold(missed, alarm)) * 1, loss(f * missed, (1 - f) * alarm))
+
+
+def o7_with_own_loss(threshold):
+    """The loss is that of the call, whichever it is."""
+    return lambda f, missed, alarm: (
+        (f > threshold(missed, alarm)) * 1,
+        np.where(f > threshold(missed, alarm), (1 - f) * alarm, f * missed),
+    )
 
 
 RIGHT = [
@@ -102,6 +120,7 @@ WRONG = [
     ("o3", "meter-noise-forgotten", o3(noise=0.0)),
     ("o3", "unused", o3(q_added=False)),
     ("o3", "", o3(a_squared=False)),
+    ("o3", "other-axis", o3_by_rows),
     ("o4", "spread-forgotten", o4(lambda mu, z, p: np.tensordot(mu, p, 1))),
     ("o4", "about-zero", o4(lambda mu, z, p: deviations(mu, z, p, lambda mu, z: 0 * z[0]))),
     ("o4", "sum-of-variables", o4(lambda mu, z, p: np.tensordot(mu**2, p, 1))),
@@ -121,6 +140,7 @@ WRONG = [
     ("o6", "not-mixed", lambda mu, pi, z, p: (mu @ pi, z, p)),
     ("o7", "losses-ignored", o7(threshold=lambda missed, alarm: 0.5)),
     ("o7", "losses-swapped", o7(threshold=lambda missed, alarm: missed / (alarm + missed))),
+    ("o7", "losses-swapped", o7_with_own_loss(lambda missed, alarm: missed / (alarm + missed))),
     ("o7", "odds", o7(threshold=lambda missed, alarm: alarm / missed)),
     ("o7", "other-way", o7(loss=np.maximum)),
 ]
