@@ -26,7 +26,7 @@ import numpy as np
 from matplotlib import pyplot as plt
 
 from kfcourse.pages.reader import is_relation, normal, pieces
-from kfcourse.pages.relations import Formula, Letters, calls, cells, formulas, letters_of
+from kfcourse.pages.relations import Formula, Letters, calls, cells, formulas, letters_of, outside_points
 from kfcourse.pages.verification import Unverified
 
 BOOK = Path(__file__).resolve().parents[1] / "book"
@@ -48,27 +48,30 @@ class Planted(NamedTuple):
 
 def planted(page: Path, chance: random.Random, most: int = 10**9) -> Iterator[Planted]:
     """One change of each kind in each typed relation of a page, in `most` relations of it."""
-    letters = letters_of(page)
+    letters, text = letters_of(page), page.read_text(encoding="utf-8")
+    elsewhere = outside_points(text)
     places = [
         (formula, piece)
-        for formula in formulas(page.read_text(encoding="utf-8"))
-        for piece in (pieces(formula.latex) if formula.kind in ("display", "box") else [normal(formula.latex)])
+        for formula in formulas(text)
+        for piece in (pieces(formula.latex) if formula.kind in ("display", "box", "point") else [normal(formula.latex)])
         if formula.kind in ("side", "name") or letters.says(piece)
     ]
     for formula, piece in chance.sample(places, min(most, len(places))):
-        letters.judge(formula)  # what does not hold before notices everything
+        letters.judge(formula, elsewhere)  # what does not hold before notices everything
         for kind in KINDS:
             changed = change(piece, kind, chance)
             if changed:
                 after = formula._replace(latex=changed)
-                found = piece in letters.said or noticed(letters, after)  # what is listed and not there fails test_relations.py
+                found = piece in letters.said or noticed(
+                    letters, after, elsewhere
+                )  # what is listed and not there fails test_relations.py
                 yield Planted(page.stem, formula.kind, kind, piece, changed, found)
 
 
-def noticed(letters: Letters, formula: Formula) -> bool:
+def noticed(letters: Letters, formula: Formula, elsewhere: str = "") -> bool:
     """Does the page's gate stop at this formula?"""
     try:
-        letters.judge(formula)
+        letters.judge(formula, elsewhere)
     except Unverified:
         return True
     return False
@@ -177,7 +180,7 @@ def _scripts(text: list[str]) -> Iterator[bool]:
 
 def report(found: list[Planted]) -> str:
     """Planted and unnoticed changes, by chapter and kind of display: a table."""
-    columns = [(where, kind) for where in ("display", "box", "side", "name", "checked") for kind in KINDS]
+    columns = [(where, kind) for where in ("display", "box", "point", "side", "name", "checked") for kind in KINDS]
     columns = [one for one in columns if any((row.where, row.kind) == one for row in found)]
     wheres = list(dict.fromkeys(where for where, _ in columns))
     lines = [f"{'unnoticed of planted':24}" + "".join(f"{where:>12}" for where in wheres) + f"{'all':>12}"]

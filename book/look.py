@@ -14,6 +14,7 @@ from pathlib import Path
 
 import contents
 from docutils import nodes
+from sphinx.errors import ExtensionError
 from sphinx.transforms.post_transforms import SphinxPostTransform
 from sphinx.writers.html5 import HTML5Translator
 
@@ -21,6 +22,7 @@ HERE = Path(__file__).resolve().parent
 NUMBER = re.compile(r"(?:(?<=>)|^)\s*\d+(\.\d+)*\.\s")  # of a section
 SIZE = re.compile(r"width: (\d+)px; height: (\d+)px;")
 STAR = "★"
+MEASURING = ',"complete"===document.readyState?O():window.addEventListener("load",O)'
 
 
 class Captions(SphinxPostTransform):
@@ -196,6 +198,16 @@ def leave_icons_out(app, exception) -> None:
         (Path(app.outdir) / "_static" / "scripts" / "fontawesome.js").write_text("", encoding="utf-8")
 
 
+def measure_nothing(app, exception) -> None:
+    """The theme lays out all code of a page once it is loaded, to see what scrolls; page.js asks what is laid out anyway."""
+    if not exception and app.builder.format == "html":
+        script = Path(app.outdir) / "_static" / "scripts" / "pydata-sphinx-theme.js"
+        before, measuring, after = script.read_text(encoding="utf-8").partition(MEASURING)
+        if not measuring:
+            raise ExtensionError(f"the theme's script does not have {MEASURING!r} any more: see look.measure_nothing")
+        script.write_text(before + after, encoding="utf-8")
+
+
 def setup(app) -> dict[str, bool]:
     app.set_translator("html", Translator)
     app.add_post_transform(Captions)
@@ -203,5 +215,6 @@ def setup(app) -> dict[str, bool]:
     app.connect("config-inited", use_templates, priority=900)
     app.connect("build-finished", write_not_found)
     app.connect("build-finished", leave_icons_out)
+    app.connect("build-finished", measure_nothing)
     app.connect("html-page-context", complete, priority=300)  # before the theme, which tries the templates
     return {"parallel_read_safe": True, "parallel_write_safe": True}

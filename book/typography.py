@@ -1,4 +1,4 @@
-"""Sphinx extension: a number stays on one line with its unit, whether typed or printed by a cell."""
+"""Sphinx extension: what no line may part: a number and its unit, whether typed or printed by a cell, a formula and its comma."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ AFTER_A_NUMBER = re.compile(rf"(?<=\d) (?={UNIT})|(?<=\d) (?=/ {UNIT})|(?<=\d /)
 AFTER_A_FORMULA = re.compile(rf"^ (?={UNIT})")
 UNTOUCHED = (nodes.literal, nodes.literal_block, nodes.math, nodes.math_block)
 BETWEEN_TAGS = re.compile(r"(?:^|(?<=>))[^<]+")  # of HTML that cells write themselves
+OPENING = re.compile(r"[(\[“‘]+$")
+CLOSING = re.compile(r"^[,.;:!?)\]”’]+")
 NO_TEXT = re.compile(r"<(script|style|svg|pre)\b")
 
 
@@ -37,10 +39,34 @@ class TogetherWithUnits(SphinxPostTransform):
                 text.parent.children[place] = nodes.Text(found)
 
 
+class TogetherWithMarks(SphinxPostTransform):
+    """A formula and the punctuation beside it stay on one line; browsers break lines around the boxes of formulas."""
+
+    default_priority = TogetherWithUnits.default_priority + 1  # which asks what stands before a text
+    formats = ("html",)
+
+    def run(self, **kwargs) -> None:
+        for formula in list(self.document.findall(nodes.math)):
+            parent, place = formula.parent, formula.parent.index(formula)
+            opening, closing = _taken(parent, place - 1, OPENING), _taken(parent, place + 1, CLOSING)
+            if opening or closing:
+                parent[place] = nodes.inline("", "", *opening, formula, *closing, classes=["kf-together"])
+
+
+def _taken(parent: nodes.Element, place: int, marks: re.Pattern[str]) -> list[nodes.Text]:
+    """The marks at this end of a text, which loses them."""
+    text = parent[place] if 0 <= place < len(parent) else None
+    if not isinstance(text, nodes.Text) or not (found := marks.search(text)):
+        return []
+    parent[place] = nodes.Text(marks.sub("", text))
+    return [nodes.Text(found[0])]
+
+
 def together(text: str) -> str:
     return AFTER_A_NUMBER.sub("\N{NO-BREAK SPACE}", text)
 
 
 def setup(app) -> dict[str, bool]:
     app.add_post_transform(TogetherWithUnits)
+    app.add_post_transform(TogetherWithMarks)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

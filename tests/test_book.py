@@ -129,6 +129,8 @@ def window(only_tab):
     return tab, problems
 
 
+# What is out of sight, too (page.js).
+LAY_OUT = "document.documentElement.classList.add('kf-whole'); document.body.offsetHeight"
 # Pictures that are shown wider or higher than they are, by more than the rounding of small ones.
 SQUEEZED = """() => [...document.querySelectorAll("article img")]
   .filter(e => Math.abs(e.clientWidth / e.clientHeight / (e.naturalWidth / e.naturalHeight) - 1) > 0.05).map(e => e.src)"""
@@ -237,6 +239,7 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
     path = HTML / f"{page}.html"
     tab.set_viewport_size({"width": 390, "height": 1000})
     tab.goto(path.as_uri(), wait_until="load")
+    tab.evaluate(LAY_OUT)
     tab.evaluate("for (const picture of document.images) picture.loading = 'eager'")
     tab.wait_for_function("[...document.images].every((picture) => picture.complete)")
     tab.wait_for_load_state("networkidle")
@@ -358,6 +361,125 @@ def test_no_line_moves_while_a_page_is_loaded(browser, page):
         tab.evaluate("() => new Promise((seen) => requestAnimationFrame(() => requestAnimationFrame(seen)))")
         assert tab.evaluate("[...document.fonts].some((one) => one.family.includes('Ready Serif') && one.status === 'loaded')")
         assert tab.evaluate("window.shifted ?? 0") < 0.1
+
+
+def boxes(tab) -> float:
+    """How many boxes the page has laid out."""
+    metrics = tab.context.new_cdp_session(tab)
+    metrics.send("Performance.enable")
+    return {one["name"]: one["value"] for one in metrics.send("Performance.getMetrics")["metrics"]}["LayoutObjects"]
+
+
+@pytest.mark.parametrize("page", ["comparison", "stratonovich", "track-2d"])
+def test_what_is_out_of_sight_is_not_laid_out(browser, page):
+    """When a page is opened; a script that asks for the size of anything there would lay it out.  On paper all is."""
+    with browser.new_context(offline=True, viewport={"width": 1280, "height": 900}) as context:
+        tab = context.new_page()
+        tab.goto((HTML / f"{page}.html").as_uri())
+        tab.wait_for_timeout(500)  # scripts that begin when all is loaded
+        opened = boxes(tab)
+        tab.evaluate(LAY_OUT)
+        assert opened < boxes(tab) / 3
+        tab.evaluate("document.documentElement.classList.remove('kf-whole')")
+        tab.emulate_media(media="print")
+        ways = "[...document.querySelectorAll('article > section > section')].map((e) => getComputedStyle(e).contentVisibility)"
+        assert set(tab.evaluate(ways)) == {"visible"}
+
+
+# How far an element is from the upper edge of what may be read: asked until it stays there, or for ten seconds.
+COME_TO_REST = """(name) => new Promise((rest) => {
+    let there = 0, asked = 0;
+    const ask = () => {
+        const padding = parseFloat(getComputedStyle(document.documentElement).scrollPaddingTop);
+        const off = document.getElementById(name).getBoundingClientRect().top - padding;
+        there = Math.abs(off) < 3 ? there + 1 : 0;
+        if (there === 3 || ++asked === 50) rest(off); else setTimeout(ask, 200);
+    };
+    ask();
+})"""
+
+
+@pytest.mark.parametrize("page", ["comparison", "stratonovich"])
+def test_a_link_leads_to_its_place(browser, page):
+    """Also past sections that were not laid out: from another page, by a click, by an address; and back, and loaded again."""
+    with browser.new_context(offline=True, viewport={"width": 1280, "height": 900}) as context:
+        tab = context.new_page()
+        address = (HTML / f"{page}.html").as_uri()
+        tab.goto(address)
+        named = "[...document.querySelectorAll('article :is(figure, div.math)[id]')].map((e) => e.id)"
+        *_, before, last = tab.evaluate(named)
+        tab.evaluate("name => { location.hash = name; }", last)
+        assert abs(tab.evaluate(COME_TO_REST, last)) < 3
+        tab.goto("about:blank")
+        tab.goto(f"{address}#{before}")
+        assert abs(tab.evaluate(COME_TO_REST, before)) < 3
+        tab.reload()
+        assert abs(tab.evaluate(COME_TO_REST, before)) < 3
+        tab.goto("about:blank")
+        tab.goto(address)
+        link = tab.locator("#pst-page-toc-nav a").nth(-2)
+        link.click()
+        assert abs(tab.evaluate(COME_TO_REST, urlsplit(link.get_attribute("href")).fragment)) < 3
+
+
+def test_the_contents_show_where_the_reader_is(browser):
+    """The section that fills the screen, and the one it is part of; at the top of a page none."""
+    with browser.new_context(offline=True, viewport={"width": 1280, "height": 900}) as context:
+        tab = context.new_page()
+        tab.goto((HTML / "track-2d.html").as_uri())
+        marked = "[...document.querySelectorAll('.bd-sidebar-secondary .active')].map((e) => e.hash)"
+        assert tab.evaluate(marked) == []
+        for section, above in (("ready-after-three-samples", "model-and-filter"), ("questions", None)):
+            tab.evaluate("name => document.getElementById(name).scrollIntoView({ behavior: 'instant' })", section)
+            both = [f"#{name}" for name in (above, section) if name]
+            tab.wait_for_function(f"wanted => String({marked}) === String(wanted)", arg=both)
+
+
+def test_the_keyboard_scrolls_what_is_wider_than_its_box(browser):
+    """Code on a telephone; where nothing can be scrolled the keyboard does not stop."""
+    wide = "e => [e.scrollWidth > e.clientWidth, e.tabIndex]"
+    found = set()
+    for width in (390, 1280):
+        with browser.new_context(offline=True, viewport={"width": width, "height": 900}) as context:
+            tab = context.new_page()
+            tab.goto((HTML / "track-2d.html").as_uri())
+            tab.evaluate(LAY_OUT)
+            tab.evaluate("for (const e of document.querySelectorAll('details')) e.open = true")
+            tab.wait_for_timeout(300)
+            found |= {tuple(one) for one in tab.locator("article pre").evaluate_all(f"all => all.map({wide})")}
+    assert found == {(True, 0), (False, -1)}
+
+
+def test_the_columns_of_a_folder_s_files_stay_columns_on_a_telephone(browser):
+    """Its lines do not wrap; the box scrolls, and the page does not."""
+    with browser.new_context(offline=True, viewport={"width": 390, "height": 900}) as context:
+        tab = context.new_page()
+        tab.goto((HTML / "package" / "kfcourse.filters.html").as_uri())
+        files = tab.locator("article > section > .highlight-text pre").first
+        lines = files.evaluate("e => e.clientHeight / parseFloat(getComputedStyle(e).lineHeight)")
+        assert lines < files.inner_text().count("\n") + 3
+        assert tab.evaluate(FIT)["page"] <= 0
+
+
+def test_words_out_of_sight_are_found(browser):
+    """By the browser's own search in the page."""
+    with browser.new_context(offline=True, viewport={"width": 1280, "height": 900}) as context:
+        tab = context.new_page()
+        tab.goto((HTML / "comparison.html").as_uri())
+        assert tab.evaluate("scrollY") == 0 and tab.evaluate("window.find('Key points')")
+        tab.wait_for_function("scrollY > 2000")
+
+
+@pytest.mark.parametrize("page", [WHOLE, "comparison"])
+def test_a_formula_stays_with_its_comma(page):
+    """And with its bracket: no text that begins behind a formula begins with a mark."""
+    html = BeautifulSoup((HTML / f"{page}.html").read_text(encoding="utf-8"), "html.parser")
+    alone = [formula for formula in html.select("article span.math") if "kf-together" not in formula.parent.get("class", [])]
+    assert alone and html.select("article .kf-together > span.math")
+    for formula in alone:
+        before, after = formula.previous_sibling, formula.next_sibling
+        assert not (isinstance(after, str) and re.match(r"[,.;:!?)\]]", after)), after
+        assert not (isinstance(before, str) and re.search(r"[(\[]$", before)), before
 
 
 def test_formulas_are_there_without_scripts(browser):
@@ -494,6 +616,14 @@ def test_hints_are_open_on_paper_and_the_code_of_pictures_is_not_there(window):
     assert tab.locator("details.kf-code").count() == 1 and not tab.locator("details.kf-code").is_visible()
 
 
+def test_the_live_track_is_its_still_picture_on_paper(window):
+    tab, _ = window
+    tab.goto((HTML / "live-track.html").as_uri())
+    show_on(tab, "print", PAPER)
+    assert tab.locator(".kf-live").count() == 1 and not tab.locator(".kf-live").is_visible()
+    assert tab.locator("#fig-live-track img").is_visible()
+
+
 @pytest.mark.parametrize("page", NOTEBOOKS)
 def test_the_number_of_verified_equations_leads_to_them(page):
     found = re.search(r'class="kf-count" href="equations.html#([^"]+)"', (HTML / f"{page}.html").read_text(encoding="utf-8"))
@@ -537,6 +667,8 @@ def test_a_chapter_is_downloaded_as_a_notebook(window):
         ("stratonovich equation", "stratonovich.html", ""),
         ("variant 53 Russian report", "sample-report.html", ""),
         ("ошибки фильтрации", "notation.html", "estimates-and-gains"),  # which says "ошибка", "фильтр"
+        ("alpha-beta", "radar-tracking.html", "experiment-1-kalman-against-alpha-beta"),
+        ("likelihood", "what-the-data-say.html", "likelihood-from-innovations"),
         ("likelihood_error", "package/kfcourse.records.html", "module-kfcourse.records.evidence"),
     ],
 )

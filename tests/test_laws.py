@@ -321,6 +321,7 @@ def test_a_regression_is_least_squares(rng, r, s):
     regressor = rng.normal(size=(60, s)) @ rng.normal(size=(s, s)) + 3
     target = regressor @ rng.normal(size=(s, r)) + rng.normal(size=(60, r)) - 2
     fit = Scatter.of(target, regressor).regression()
+    assert np.array_equal(Scatter.of(target, regressor).regression(r).matrix, fit.matrix)  # of notebooks handed out earlier
     design = np.column_stack([regressor, np.ones(60)])
     solution, *_ = np.linalg.lstsq(design, target, rcond=None)
     np.testing.assert_allclose(fit.matrix, solution[:s].T, rtol=1e-9, atol=1e-9)

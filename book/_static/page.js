@@ -1,17 +1,34 @@
-// A formula and the punctuation beside it stay on one line; browsers break lines around the boxes of formulas.
+// Sections out of sight are not laid out (book.css), so nobody knows yet how high they are.  Who comes to a place, or comes back
+// to one, needs the heights of all above it: then the whole page is laid out.
+const whole = () => document.documentElement.classList.add("kf-whole");
+if (location.hash || performance.getEntriesByType("navigation")[0]?.type !== "navigate") whole();
+addEventListener("click", (event) => event.target.closest?.('a[href*="#"]') && whole(), { capture: true });
+addEventListener("hashchange", () => { // without a click
+  if (document.documentElement.matches(".kf-whole")) return;
+  whole();
+  document.getElementById(decodeURIComponent(location.hash.slice(1)))?.scrollIntoView();
+});
+
+// The contents at the right show where the reader is: the last section that has come to the upper part of the screen.
 addEventListener("DOMContentLoaded", () => {
-  for (const formula of document.querySelectorAll("span.math")) {
-    const after = formula.nextSibling, before = formula.previousSibling;
-    const mark = after?.nodeType === Node.TEXT_NODE && after.data.match(/^[,.;:!?)\]”’]+/)?.[0];
-    const bracket = before?.nodeType === Node.TEXT_NODE && before.data.match(/[(\[“‘]+$/)?.[0];
-    if (!mark && !bracket) continue;
-    const together = document.createElement("span");
-    together.className = "kf-together";
-    formula.replaceWith(together);
-    together.append(bracket || "", formula, mark || "");
-    if (mark) after.data = after.data.slice(mark.length);
-    if (bracket) before.data = before.data.slice(0, -bracket.length);
-  }
+  const links = document.querySelectorAll("#pst-page-toc-nav a"), here = new Set();
+  const mark = (changes) => {
+    for (const { target, isIntersecting } of changes) isIntersecting ? here.add(target.id) : here.delete(target.id);
+    const last = [...links].filter((link) => here.has(decodeURIComponent(link.hash.slice(1)))).pop();
+    const above = last?.closest("ul ul")?.previousElementSibling; // the section that it is part of
+    for (const link of links) link.classList.toggle("active", link === last || link === above);
+  };
+  const seen = new IntersectionObserver(mark, { rootMargin: "-20% 0px -79%" });
+  for (const link of links) seen.observe(document.getElementById(decodeURIComponent(link.hash.slice(1))));
+});
+
+// What is wider than its box, the keyboard reaches and scrolls: asked once it is laid out, as sections out of sight are not.
+addEventListener("DOMContentLoaded", () => {
+  const measured = new ResizeObserver((changes) => {
+    for (const { target: e } of changes) e.tabIndex = e.scrollWidth > e.clientWidth || e.scrollHeight > e.clientHeight ? 0 : -1;
+  });
+  const boxes = "pre, .cell_output > .output, .pst-scrollable-table-container";
+  for (const box of document.querySelectorAll(boxes)) measured.observe(box);
 });
 
 // A link to something that is folded opens the fold.

@@ -39,7 +39,8 @@ def steady(rng):
         p = Psi - K @ H @ Psi
         Psi = A @ p @ A.T + push @ push.T
     alpha, beta = K[0, 0], K[1, 0] * Delta
-    return {"p_{22}": p[1, 1], r"\sigma": sigma, r"\Delta": Delta, r"\alpha": alpha, r"\beta": beta}
+    same = {r"\sigma_r": np.sqrt(p[0, 0]), r"\alpha(\Lambda)": alpha, r"\Lambda": sigma_a * Delta**2 / sigma}
+    return {"p_{22}": p[1, 1], r"\sigma": sigma, r"\sigma_a": sigma_a, r"\Delta": Delta, r"\alpha": alpha, r"\beta": beta} | same
 
 
 LETTERS = (kalman_run, scaled, small_index, steady)

@@ -63,6 +63,8 @@ def carrier(rng):
     highest = max(map(U, errors))
     u = Of(lambda theta: -A * np.sin(theta + lam) * A * (np.cos(theta + lam + delta) - np.cos(theta + lam)) / D_n, r"\theta")
     numbers = {
+        "A": A,
+        "D_n": D_n,
         r"\Delta": delta,
         r"p_{\varphi\varphi}": p,
         r"U_{\max}": highest,

@@ -111,6 +111,7 @@ SAID = {
     r"S(\lambda)-S(\lambda+\delta)": NOTATION,
 }
 EQUALS = {
+    r"\sqrt{\sigma_n/\sigma_\xi}": r"\sigma_n/\sqrt p",
     r"{\lim_{\sigma_\xi\to0}p/\sigma_\xi}": r"\sigma_n",
     r"\frac{d}{d\varepsilon}S(y_{\mathrm{NR}}-\varepsilon)": r"-S'(\lambda)",
     r"y_{\mathrm{SR}}-(y_{\mathrm{INS}}-\hat\varepsilon)": r"n-\varepsilon+\hat\varepsilon",

@@ -1,8 +1,31 @@
-"""The letters of live-lab.md: the arguments of a gain."""
+"""The letters of live-lab.md: the arguments of a gain, which is that of the best line through its law."""
+
+import numpy as np
+from numpy.polynomial.hermite_e import hermegauss
 
 from kfcourse.pages.relations import NOTATION
 
+NODES, WEIGHTS = hermegauss(5)  # exact for polynomials up to degree 9
+
+
+def best_line(rng):
+    """Of y = x + f x^2 w over x ~ N(lambda, Psi), by quadrature."""
+    f, lam, Psi = rng.uniform(0.1, 0.5), rng.uniform(1, 3), rng.uniform(0.1, 5)
+    x, w = (one.ravel() for one in np.meshgrid(lam + np.sqrt(Psi) * NODES, NODES))
+    weight = np.outer(WEIGHTS, WEIGHTS).ravel() / WEIGHTS.sum() ** 2
+    y = x + f * x**2 * w
+    K = weight @ ((x - lam) * (y - weight @ y)) / (weight @ (y - weight @ y) ** 2)
+    return {"K": K, "f": f, r"\lambda": lam}
+
+
+LETTERS = (best_line,)
 SAID = {
     r"\lambda": NOTATION,
     r"\Psi": NOTATION,
+    r"\varrho": NOTATION,
+    "1/K": NOTATION,
+    r"1/K\,\big|_{\Psi=\lambda^2/\sqrt3}": NOTATION,
+    r"\frac{\partial}{\partial\Psi}\frac1K\Big|_{\Psi=\lambda^2/\sqrt3}": NOTATION,
+    r"\mathsf D(e+d)^2": NOTATION,
+    r"\mathsf Dd^2": NOTATION,
 }

@@ -59,7 +59,7 @@ def limit(rng):
         return (1 - alpha) * (zeta - 1) ** 2 / np.linalg.det(zeta * np.eye(2) - closed @ found["A"])
 
     return found | {
-        r"\Psi": Indexed(lambda i, j: Psi[i - 1, j - 1]), "F": F, r"\alpha": alpha, r"\beta": beta,
+        r"\Psi": Indexed(lambda i, j: Psi[i - 1, j - 1]), "F": F, r"\alpha": alpha, r"\beta": beta, "a_0": 1.7,
         r"\Lambda": found[r"\sigma_a"] * found["T"] ** 2 / SIGMA, r"\chi": chi, "E": E, r"\zeta": near, r"\lim_{\zeta\to1}": 1.0,
         r"\chi(-1)\big|_{\beta=\beta_-}": chi(-1, roots.min()), r"\chi(-1)\big|_{\beta=\beta_+}": chi(-1, roots.max()),
     }  # fmt: skip

@@ -92,6 +92,7 @@ SAID = {
     r"\mathsf M(x_{k+1}-\tau)^3": NOTATION,
 }
 EQUALS = {
+    r"3f^2d(2m^2+d)": r"F_\text{Gaussian}-F_\text{linearised}",
     r"\Theta_\text{Gaussian}-\Theta_\text{linearised}": "e^2p",
     r"F_\text{Gaussian}-F_\text{linearised}": "3df^2(2m^2+d)",
 }

@@ -73,12 +73,12 @@ class Scatter(NamedTuple):
         scatter = np.sum([part.scatter for part in parts], axis=0) + (shift * counts[:, None]).T @ shift
         return cls(int(counts.sum()), parts[0].targets, mean, scatter)
 
-    def regression(self) -> Affine:
-        """Least squares of the targets on the rest.
+    def regression(self, targets: int | None = None) -> Affine:
+        """Least squares of the targets on the rest; notebooks handed out with earlier versions also say how many there are.
 
         `matrix` = Cov(t, r) Cov(r)^+,  `offset` = M[t] - `matrix` M[r],  `residual` = Cov(t) - `matrix` Cov(t, r)^T
         """
-        cov, r = self.scatter / self.size, self.targets
+        cov, r = self.scatter / self.size, self.targets if targets is None else targets
         cross = cov[:r, r:]
         matrix = gain(cross, cov[r:, r:])
         offset = self.mean[:r] - matrix @ self.mean[r:]

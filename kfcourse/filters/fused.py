@@ -68,7 +68,8 @@ def fuse(one: Filter | Design) -> Filter | Design:
 
 def _or_warning(one: Filter | Design, compile: Callable[[], T]) -> T | None:
     try:
-        return compile()
+        with compiled.no_collection():
+            return compile()
     except ImportError:
         raise
     except Exception as error:  # whatever a compiler may say of a formula: it runs without, too
@@ -180,7 +181,9 @@ def _printed(one: Filter | Design, printed: Equalities) -> Loops:
     from kfcourse.filters import loops
 
     groups, fits = stages(printed, _rules(one, printed))
-    rules, found = list(chain(*groups)), [[*fit.found, sp.Dummy()][:3] for fit in fits]
+    # A residual without a letter has a name: the number of a nameless Dummy would make another text, compiled anew, each time.
+    residuals = [sp.Dummy(f"T{i}") for i in range(len(fits))]
+    rules, found = list(chain(*groups)), [[*fit.found, own][:3] for fit, own in zip(fits, residuals, strict=True)]
     letters, known = {left for left, _ in rules}, {"y": _Y, "lam": _LAM, "Psi": _PSI}
     made = [_Z, _P if _P in letters else found[0][2], _LAM_NEXT, _PSI_NEXT if _PSI_NEXT in letters else found[-1][2]]
     constants, texts = [*one.model.values, *chain(*found)], list[str]()

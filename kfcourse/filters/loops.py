@@ -10,7 +10,7 @@ from typing import Any
 
 from numba import njit, types
 
-from kfcourse.symbolic.compiled import OPTIONS
+from kfcourse.symbolic.compiled import INNER, OPTIONS
 
 _ROW, _ROWS = "float64[::1]", "float64[:, ::1]"
 _SUMS = '["reassoc", "nsz"]'
@@ -64,7 +64,7 @@ def advance(table, y, x, weight, starts, lam, Psi, lam_next, Psi_next, z, p, err
 # that nothing cancels.  What rounding has made negative is no variance: NaN says that the plain loop is to look at it.
 _FIT = f"""
 
-@njit(error_model="numpy", fastmath=set({_SUMS}))
+@njit({INNER}, fastmath=set({_SUMS}))
 def fit{{number}}(c, y, lam, Psi, x, x_next):
     constants, t, r = {{constants}}, 0.0, 0.0
     for size in (min(64, len(y)), len(y)):

@@ -23,9 +23,10 @@ from kfcourse.lab.report import Section, ranges, save_figure, save_texts
 from kfcourse.lab.variants import Variant, VariantError, find_variant, read_variants
 from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.consistency import Autocorrelation, Innovations, autocorrelation
-from kfcourse.records.estimation import Likeliest, estimate
+from kfcourse.records.estimation import Likeliest, NoMaximum, estimate
 from kfcourse.records.evidence import NoDensity
 from kfcourse.records.examination import Examination, Finding, examine, findings, normal_bound
+from kfcourse.records.outliers import weights
 from kfcourse.records.reading import Record, RecordError, read_measurements
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.quadrature import gauss_hermite, unscented
@@ -60,6 +61,7 @@ class Told(NamedTuple):
     gate: float | None
     likeliest: Likeliest | None
     examined: Examination
+    without_refused: bool = False  # what the gate refuses near the maximum did not enter the search for it
 
     @property
     def refused(self) -> Array:
@@ -87,6 +89,11 @@ class Told(NamedTuple):
                 )
             ]
             sentences += [f"Warning: {one}." for one in self.likeliest.flat]
+        if self.without_refused:
+            sentences.append(
+                "Near its maximum the likelihood jumps, because a measurement begins to pass the gate: the values are those of "
+                "the largest likelihood of the measurements that passed there."
+            )
         return sentences + [judged(one) for one in self.findings]
 
     @property
@@ -145,13 +152,24 @@ def estimate_record(
     """
     record = read_measurements(path, variant.plain("estimates from a record"), columns)
 
+    def plain(model: Model) -> Filter:
+        return aof(STRUCTURES[structure](model))
+
     def build(model: Model) -> Filter:
-        one = aof(STRUCTURES[structure](model))
-        return one if gate is None else gated(one, gate)
+        return plain(model) if gate is None else gated(plain(model), gate)
 
     build(record.model)  # what cannot be had is said before the long part
+    without_refused = False
     try:
-        likeliest = estimate(record.model, record.y, unknown, positive, build) if unknown else None
+        try:
+            likeliest = estimate(record.model, record.y, unknown, positive, build) if unknown else None
+        except NoMaximum as stopped:
+            if gate is None:
+                raise
+            without_refused = True
+            refused = weights(build(stopped.model), record.y) == 0
+            passed = np.where(refused[:, :, None], np.nan, record.y)
+            likeliest = estimate(stopped.model, passed, unknown, positive, plain)
         if likeliest:
             record = record._replace(model=likeliest.model)
         examined = examine(build(record.model), record.y, 1.0 if gate is None else gate)
@@ -169,7 +187,7 @@ def estimate_record(
                 f"{path}: the estimate is not finite from row {k + 1}, time {record.times[k]:g}: look at the formulas there (an "
                 "interval of 0, a root of what is negative), or begin with a smaller prior variance"
             )
-    return Told(variant, record, structure, gate, likeliest, examined)
+    return Told(variant, record, structure, gate, likeliest, examined, without_refused)
 
 
 def write_record(told: Told, folder: Path, track: tuple[str, str] | None = None) -> None:

@@ -84,10 +84,12 @@ def cluster(address: str | None) -> Iterator[Cluster | None]:
         return
     try:
         from dask.distributed import Client
+        from distributed.comm import normalize_address, resolve_address
         from distributed.scheduler import KilledWorker
     except ImportError:
         raise ValueError("--dask needs the package `distributed`: pip install 'kfcourse[dask]'") from None
     try:
+        resolve_address(normalize_address(address))  # a client that cannot read it waits 20 s, and ends in a traceback
         client = Client(address, timeout=10, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise ValueError(f"no Dask scheduler answers at {address}: {error}") from None

@@ -22,9 +22,10 @@ from nbconvert import HTMLExporter
 from nbformat import NotebookNode
 
 from kfcourse.checks.question import MIME
+from kfcourse.notebooks.grading.submissions import SECONDS  # a worked solution has no more time than a student
 from kfcourse.symbolic.markup import mathml as formula
 
-SECONDS = 120  # a cell may take
+PRINTING = 120  # seconds until a page is printed
 BROWSERS = ("chromium", "google-chrome", "chromium-browser", "msedge", "chrome")
 
 
@@ -79,7 +80,7 @@ def execute(notebook: NotebookNode, name: str, stop_at_error: bool = True) -> No
         except CellExecutionError as error:
             raise NotebookFailed(f"{name}, cell {_failed(result)}: {error.ename}: {error.evalue}") from None
         except CellTimeoutError:
-            raise NotebookFailed(f"{name}, cell {_running(result)}: still running after {SECONDS} s") from None
+            raise NotebookFailed(f"{name}, cell {_running(result)}: still running after {SECONDS:g} s") from None
         except DeadKernelError:
             raise NotebookFailed(f"{name}, cell {_running(result)}: the kernel died (out of memory?)") from None
     if stop_at_error and (found := first_error(result)):
@@ -179,9 +180,9 @@ def pdf(page: Path, target: Path) -> None:
         command = [browser, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}", "--no-pdf-header-footer"]
         try:
             done = subprocess.run(
-                [*command, f"--print-to-pdf={target}", page.resolve().as_uri()], capture_output=True, text=True, timeout=SECONDS
+                [*command, f"--print-to-pdf={target}", page.resolve().as_uri()], capture_output=True, text=True, timeout=PRINTING
             )
         except subprocess.TimeoutExpired:
-            raise NotebookFailed(f"{browser} did not print {page} in {SECONDS} s") from None
+            raise NotebookFailed(f"{browser} did not print {page} in {PRINTING} s") from None
     if done.returncode or not target.exists() or not target.stat().st_size:
         raise NotebookFailed(f"{browser} could not print {page}: {done.stderr.strip()[-200:]}")

@@ -16,6 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib_inline.backend_inline import set_matplotlib_formats
 
+from kfcourse.pages.captions import drawn
 from kfcourse.pages.units import in_brackets
 
 # Fixed colours (Okabe and Ito's, distinguishable by the colour-blind); those of the filters are in kfcourse.lab.plots.
@@ -58,7 +59,8 @@ def book_style(ground: str = "none") -> None:
 
     A `ground`, "white" say, makes them readable wherever a notebook is opened, also where the page is dark.
 
-    The picture of each wider than `NARROW` carries a second one, for telephones, in its output's metadata (book/narrow.py).
+    The picture of each wider than `NARROW` carries a second one, for telephones, in its output's metadata (book/narrow.py), and
+    each carries there what it shows, with which its caption is compared (book/figures.py).
     One with the label "time, s" raises ValueError: units stand in brackets.
     """
     for font in FONTS:
@@ -73,7 +75,7 @@ def book_style(ground: str = "none") -> None:
         in_brackets(text.get_text() for text in figure.findobj(Text))
         if not (made := wide(figure)):  # of a figure without axes
             return None
-        data, metadata = made
+        data, metadata = made[0], made[1] | {"drawn": drawn(figure)}
         if lay_narrow(figure):
             metadata = metadata | {"narrow": wide(figure)[0]}
         return data, metadata

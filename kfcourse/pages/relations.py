@@ -10,6 +10,9 @@ A page `my-chapter.md` that types relations in `$$` or in a box has a file `lett
     LITERALS = ("1960",)                                 numbers in `claim` texts behind which no expression stands, and need not
 
 So a changed letter stops the build: what is computed no longer holds, or what was said is no longer there.
+
+The key points of a page say again what it has shown: a formula in them is computed, or stands elsewhere on the page, letter by
+letter.
 """
 
 from __future__ import annotations
@@ -38,13 +41,15 @@ _CELL = re.compile(r"^(`{3,})\{code-cell\}[^\n]*\n(.*?)^\1\s*$", re.DOTALL | re.
 _BOX = re.compile(
     r"^(`{3,})\{admonition\} ([^\n]*)\n:class:[^\n]*\b(?:algorithm|definition)\b(.*?)^\1\s*$", re.DOTALL | re.MULTILINE
 )
+_POINTS = re.compile(r"^(`{3,})\{admonition\} Key points\n(.*?)^\1\s*$", re.DOTALL | re.MULTILINE)
 _DISPLAY = re.compile(r"^(?:\$\$|```\{math\})\n(.*?)\n(?:\$\$|```)(?: \(([\w-]+)\))?\s*$", re.DOTALL | re.MULTILINE)
 _INLINE = re.compile(r"(?<![\\$])\$([^$]+)\$(?!\$)")
 _OPERATOR = re.compile(r"(?:^|\s)([+/]|-|\\frac|\\sqrt|\^ (?:T|\d|\{ - 1 \}))(?=\s|$)")
 
 
 class Formula(NamedTuple):
-    """A formula as a page types it: a "display", in a "box", or in a cell a "side" or "name" that is printed, not checked."""
+    """A formula as a page types it: a "display", in a "box", in a key "point", or in a cell a "side" or "name" that is printed,
+    not checked."""
 
     kind: str
     latex: str
@@ -86,8 +91,8 @@ class Letters:
         """What a page must have, as its file speaks of it."""
         return [*(text for text in self.said if text not in map(normal, self.labels)), *self.labels, *self.equals.values()]
 
-    def judge(self, formula: Formula) -> list[Said]:
-        """What each relation of a formula is.
+    def judge(self, formula: Formula, elsewhere: str = "") -> list[Said]:
+        """What each relation of a formula is; a key point may say what stands elsewhere on the page.
 
         Raises
         ------
@@ -103,6 +108,9 @@ class Letters:
             raise Unverified(
                 _unsaid(formula.latex, "it is printed beside a checked equation, and nothing holds it; EQUALS or SAID may")
             )
+        if formula.kind == "point":
+            new = [piece for piece in pieces(formula.latex) if not re.search(rf" {re.escape(piece)} (?![\^_'])", elsewhere)]
+            return [self._judged(self.equals.get(piece, piece), formula) for piece in new]
         return [self._judged(piece, formula) for piece in pieces(formula.latex) if self.says(piece)]
 
     def says(self, piece: str) -> bool:
@@ -179,6 +187,8 @@ def formulas(text: str) -> Iterator[Formula]:
         yield Formula("display", latex, label)
     for *_, body in _BOX.findall(prose):
         yield from (Formula("box", latex) for latex in _INLINE.findall(_DISPLAY.sub("", body)))
+    for _, body in _POINTS.findall(prose):
+        yield from (Formula("point", latex) for latex in _INLINE.findall(body))
     for code in cells(text):
         yield from _printed(code)
 
@@ -216,8 +226,17 @@ def _texts(nodes: Iterable[ast.expr]) -> list[str]:
 def judged(page: Path, text: str | None = None) -> Iterator[tuple[Formula, list[Said]]]:
     """The formulas of a page, each with what its relations are; another text may take the place of the page's."""
     letters = letters_of(page)
-    for formula in formulas(page.read_text(encoding="utf-8") if text is None else text):
-        yield formula, letters.judge(formula)
+    text = page.read_text(encoding="utf-8") if text is None else text
+    elsewhere = outside_points(text)
+    for formula in formulas(text):
+        yield formula, letters.judge(formula, elsewhere)
+
+
+def outside_points(text: str) -> str:
+    """All formulas of a page but those of its key points, one after the other, as `normal` writes them."""
+    text = _POINTS.sub("", text)
+    typed = [latex for latex, _ in _DISPLAY.findall(text)] + _INLINE.findall(_DISPLAY.sub("", text))
+    return "|".join(f" {normal(latex)} " for latex in typed)
 
 
 def mark(said: Sequence[Said]) -> str:

@@ -30,6 +30,21 @@ STEP = 1e-3  # of the differences that stand for derivatives, in the coordinates
 FLAT = 0.01  # information that is none: the likelihood of an e times larger variance differs by half of this
 
 
+class NoMaximum(ValueError):
+    """The search found none; `model` is where it ended.
+
+    The likelihood of a gated filter jumps where a measurement begins to pass, and a maximum beside a jump has no derivatives.
+    """
+
+    def __init__(self, reason: str, model: Model, names: Sequence[str]) -> None:
+        at = ", ".join(f"{name} = {float(model.parameters[name]):.6g}" for name in names)
+        super().__init__(
+            f"no maximum of the likelihood was found ({reason}; last at {at}): begin nearer to it, fix a parameter, or leave out "
+            "the measurements that a gate refuses, in the place of the gate"
+        )
+        self.model = model
+
+
 class Likeliest(NamedTuple):
     """Parameters of the largest likelihood.
 
@@ -89,7 +104,7 @@ def estimate(
     ModelError
         Names that are no parameters, or a start that is not positive.
     ValueError
-        No likelihood at the start, as of `likelihood`, or no maximum found.
+        No likelihood at the start, as of `likelihood`, or no maximum found (`NoMaximum`).
 
     Examples
     --------
@@ -124,14 +139,11 @@ def estimate(
     log_likelihood(first)  # says what is wrong with the start
     found = scipy.optimize.minimize(
         cost, first, method="trust-exact", jac=lambda c: derivatives(tuple(c))[0], hess=lambda c: derivatives(tuple(c))[1],
-        options={"gtol": 1e-6 * max(1.0, abs(cost(first))), "maxiter": 200},
+        options={"gtol": 1e-6 * max(1.0, abs(cost(first))), "maxiter": 60},
     )  # fmt: skip
     value, information = parameters(found.x), derivatives(tuple(found.x))[1]
     if not (found.success and np.isfinite(information).all() and np.linalg.eigvalsh(information).min() > -FLAT):
-        at = ", ".join(f"{name} = {one:.6g}" for name, one in zip(names, value.tolist(), strict=True))
-        raise ValueError(
-            f"no maximum of the likelihood was found ({found.message}; last at {at}): begin nearer to it, or fix a parameter"
-        )
+        raise NoMaximum(found.message, model.replace(**dict(zip(names, value.tolist(), strict=True))), names)
     covariance, flat = _inverse(information, names)
     error = np.sqrt(covariance) * np.where(logs, value, unit)
     best = model.replace(**dict(zip(names, value.tolist(), strict=True)))

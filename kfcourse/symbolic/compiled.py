@@ -17,8 +17,10 @@ by every process.
 
 from __future__ import annotations
 
+import gc
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import lru_cache
 from hashlib import sha256
 from importlib.util import module_from_spec, spec_from_file_location
@@ -36,6 +38,7 @@ from kfcourse.symbolic.model import Model
 REMEDY = "compiled=True needs numba: pip install 'kfcourse[fast]', or leave it out"
 NAN = sp.Symbol("nan")  # what a formula gives where it has no value
 OPTIONS = 'cache=True, nogil=True, error_model="numpy"'  # of a function that Python calls
+INNER = 'error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True'  # of one that only compiled functions call
 _HEADER = '''"""Printed by kfcourse.symbolic.compiled; it may be removed at any time."""
 
 import numpy as np
@@ -127,7 +130,7 @@ def _numbers(name: str, given: Mapping[str, sp.Symbol], program: Program, consta
     lines = [f"    c{i} = c[{i}]  # {one}" for i, one in enumerate(constants) if one in used]
     lines += [f"    {line}" for line in assignments]
     lines += [f"    return {', '.join(values.values())}"]
-    return "\n".join(['\n\n@njit(error_model="numpy")', f"def {name}(c, {', '.join(given)}):", *lines, ""])
+    return "\n".join([f"\n\n@njit({INNER})", f"def {name}(c, {', '.join(given)}):", *lines, ""])
 
 
 def _assignments(
@@ -167,3 +170,15 @@ def load(*functions: str) -> ModuleType:
     sys.modules[name] = module  # numba finds what it has kept by the module's name
     spec.loader.exec_module(module)
     return module
+
+
+@contextmanager
+def no_collection() -> Iterator[None]:
+    """While compiling: few of the many new objects are garbage, and the collector would look through all of SymPy's, too."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()

@@ -233,6 +233,18 @@ def test_a_second_process_finds_what_was_compiled(tmp_path):
     assert found == [[0, 1], [1, 0]]
 
 
+def test_what_is_printed_does_not_depend_on_what_was_done_before(monkeypatch):
+    """Or the machine code of another session would not be found: the number of a Dummy that has no name stood in the text."""
+    texts, filters = [], family(SCALAR["53"])
+    for _ in range(2):
+        monkeypatch.setattr("kfcourse.filters.fused._PRINTED", {})
+        monkeypatch.setattr(compiled, "load", lambda *text: texts.append(text) or SimpleNamespace(advance=None))
+        assert all(fuse(one) is not one for one in filters)
+        sp.Dummy()
+    assert len(filters) > 10
+    assert texts[: len(filters)] == texts[len(filters) :]
+
+
 def test_a_loop_in_full():
     x, c = sp.symbols("x c", real=True)
     assert compiled.loop("f", {"x": x}, {"value": c * x**2 + sp.Piecewise((sp.exp(-x), x > 0), (1, True))}, [c]) == (

@@ -61,6 +61,16 @@ def written(path, times, y):
     path.write_text("\n".join(["time,y1,y2" if y.shape[1] == 2 else "time,y", *cells]), encoding="utf-8")
 
 
+LEVEL = """
+[variants.level]
+state = "x + sqrt(q*dt)*v"
+meter = "x + sqrt(r)*w"
+parameters = { q = 0.3, r = 3.0 }
+inputs = { dt = [1] }
+prior = { mean = 0, variance = 4 }
+"""
+
+
 @pytest.fixture
 def place(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -244,3 +254,25 @@ def test_a_finding_in_words():
     fits, not_so = (judged(Finding("neighbours of y2", value, -0.1, 0.1)) for value in (0.05, 0.3))
     assert "not so here" not in fits and "0.050 (a filter that is right has -0.100 to 0.100" in fits
     assert "y2: 0.300" in not_so and "claims more than it knows" in not_so
+
+
+def test_a_maximum_beside_a_jump_of_the_gate_is_found(place, call):
+    """A doubtful measurement of such a size that the largest likelihood has it just within the gate.
+
+    Where it passes, the estimate is that of the record without a gate; where it does not, of the record without it.
+    """
+    rng = np.random.default_rng(3)
+    y = np.cumsum(np.sqrt(0.3) * rng.normal(size=40)) + rng.normal(size=40)
+    y[20] += 5.15
+    (place / "level.toml").write_text(LEVEL, encoding="utf-8")
+    written(place / "level.csv", np.arange(40.0), y[:, None])
+    options = ("--unknown", "r", "--positive", "r")
+    result = call("level.csv", "--model", "level.toml", "--gate", 0.99, *options)
+    assert result.exit_code == 0 and "Near its maximum the likelihood jumps" in result.output
+    told = call("level.csv", "--model", "level.toml", *options)
+    assert "the likelihood jumps" not in told.output
+
+    def r(output):
+        return re.search(r"^r = .*$", output, re.M)[0]
+
+    assert r(result.output) == r(told.output)

@@ -84,6 +84,13 @@ def test_checks_of_variants(address):
     assert list(examine_all(chosen, 2000, dask=address)) == list(examine_all(chosen, 2000, jobs=1))
 
 
+@pytest.mark.parametrize("wrong", ["nonsense", "tcp://scheduler", "nobody.invalid:8786"])
+def test_what_is_no_address_is_said_before_there_is_a_client(monkeypatch, wrong):
+    monkeypatch.setattr("dask.distributed.Client", None)
+    with pytest.raises(ValueError, match=f"no Dask scheduler answers at {wrong}: "), cluster(wrong):
+        pass
+
+
 def test_nobody_answers():
     with pytest.raises(ValueError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1:"), cluster("tcp://127.0.0.1:1"):
         pass

@@ -328,6 +328,13 @@ def test_a_failing_cell_is_named():
         execution.execute(broken, "here")
 
 
+def test_a_cell_that_takes_too_long_is_named(monkeypatch):
+    monkeypatch.setattr(execution, "SECONDS", 1)
+    slow = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("import time\ntime.sleep(60)")])
+    with pytest.raises(NotebookFailed, match=f"here, cell {slow.cells[0].id}: still running after 1 s"):
+        execution.execute(slow, "here")
+
+
 def test_a_cell_whose_picture_cannot_be_drawn_fails_though_its_kernel_goes_on():
     shown = "class Broken: ...\nget_ipython().display_formatter.formatters['image/png'].for_type(Broken, int)\nBroken()"
     broken = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(source) for source in (shown, "2")])

@@ -35,6 +35,14 @@ def test_a_formula_is_set_for_the_eye_and_said_to_a_screen_reader(setter):
     assert not tree.select("[xmlns], [data-mjx-texclass]")
 
 
+def test_letters_have_no_boxes_that_change_nothing(setter):
+    """A box stays that is small, or stands apart."""
+    tree = BeautifulSoup(setter.html(r"x_{k} = 12\,y", display=False), "html.parser")
+    boxes = tree.select("mjx-mi, mjx-mo, mjx-mn, mjx-mstyle")
+    assert boxes and all(one.has_attr("size") or one.has_attr("space") for one in boxes)
+    assert len(tree.select("mjx-c")) == 6 and len(tree.select("mjx-mspace")) == 1
+
+
 def test_what_is_displayed_is_larger_and_has_a_line_of_its_own(setter):
     shown, small = (BeautifulSoup(setter.html(r"\frac{a}{b}", display), "html.parser") for display in (True, False))
     assert shown.select_one("mjx-container[display=true]") and not small.select_one("mjx-container[display=true]")

@@ -19,7 +19,7 @@ PAGES = sorted(set(BOOK.glob("*.md")) - {BOOK / "equations.md"})  # which the bu
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_each_typed_relation_says_what_it_is(page: Path):
     for formula, said in judged(page):
-        assert said or formula.kind in ("box", "display")
+        assert said or formula.kind in ("box", "display", "point")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
@@ -134,3 +134,11 @@ def test_a_number_without_an_expression_is_found():
     assert sentence.unknown == ["7"] and sentence.compares
     (empty,) = spoken('```{code-cell} python\nclaim("It is larger.", True)\n```\n')
     assert not empty.compares
+
+
+def test_a_formula_of_the_key_points_is_computed_or_stands_elsewhere(tmp_path):
+    page = "The sum $q=r+s$ and $uv^2$.\n\n```{admonition} Key points\n:class: keypoints\n\n- So $q=r+s$, $uv^2$.\n```\n"
+    assert [said for _, said in judged(tmp_path / "page.md", page)] == [[], []]
+    for wrong in ("$q=r-s$", "$uv$", "$uv^3$"):
+        with pytest.raises(Unverified, match="nothing says what this is"):
+            list(judged(tmp_path / "page.md", page.replace("- So $q=r+s$", f"- So {wrong}")))

@@ -23,15 +23,15 @@ from kfcourse.filters.exact.places import COARSELY, EXPLANATIONS, FRACTIONS, HID
 LEFT, DONE, NARROW = 0, 1, 2  # to NumPy; done; done, and the next kernels do not overlap
 
 # Sums may be taken in any order, so that the processor adds several terms at once.
-_ANY_ORDER: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract"}}
-
+_CALLED: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract"}}
+_ANY_ORDER = _CALLED | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # of what only compiled functions call
 
 _VALUES, _MANY, _MANY_PARTS, _NUMBERS = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
 
 _LOG2, _HIGH, _LOW = 1 / np.log(2), 0.693145751953125, 1.42860682030941723212e-6  # ln 2 = high + low, few digits in the first
 
 
-@njit(error_model="numpy", fastmath={"contract"})
+@njit(**_ANY_ORDER | {"fastmath": {"contract"}})
 def _exp(u):
     """exp(u), |u| < 708, to the last bit but one: 2^k exp(r), |r| < .35, by Taylor's polynomial, that loops do many at once."""
     k = np.floor(u * _LOG2 + 0.5)
@@ -119,7 +119,7 @@ def _density(x, kernel, parts, found):
             found[part, i] = value / (np.sqrt(np.pi) * parts[1, part]) if value > parts[2, part] else 0.0
 
 
-@njit(types.void(_MANY, _MANY, _MANY, _MANY_PARTS, types.float64, _MANY_PARTS), cache=True, nogil=True, **_ANY_ORDER)
+@njit(types.void(_MANY, _MANY, _MANY, _MANY_PARTS, types.float64, _MANY_PARTS), cache=True, nogil=True, **_CALLED)
 def add_bells(x, rate, centre, weights, lowest, result):
     """`kernels.add_bells`."""
     bells = np.empty(x.shape[1])
@@ -314,19 +314,21 @@ def _distance(x, masses, step, whole):
 
 
 @njit(**_ANY_ORDER)
-def _roughness(x, mass, step, mean, variance, every, sums):
-    """`roughness` of every so many of the masses, taken so many times."""
-    count = (len(x) - 1) // step + 1
+def _roughness(x, mass, step, mean, variance, every, differences):
+    """`roughness` of every so many of the masses, taken so many times; with room for zeros before and after them."""
+    count, before = (len(x) - 1) // step + 1, ORDER // 2
+    every[: count + ORDER] = 0.0
     for i in range(count):
-        every[i], sums[i] = step * mass[step * i], 0.0
-    for m in range(ORDER + 1):
-        coefficient, shift = COEFFICIENTS[m], m - ORDER // 2
-        for i in range(max(0, -shift), min(count, count - shift)):
-            sums[i] += coefficient * every[i + shift]
+        every[before + i] = step * mass[step * i]
     most = 0.0
     for i in range(count):
+        difference = 0.0
+        for m in range(ORDER + 1):  # of so few terms that it is unrolled, and many differences are taken at once
+            difference += COEFFICIENTS[m] * every[i + m]
+        differences[i] = difference
+    for i in range(count):
         away = (x[step * i] - mean) / np.sqrt(variance)
-        most = max(most, np.abs(sums[i]) * (1 + np.abs(away) + np.abs(away * away - 1)))
+        most = max(most, np.abs(differences[i]) * (1 + np.abs(away) + np.abs(away * away - 1)))
     return most
 
 
@@ -342,7 +344,7 @@ def _cautious(change, before):
 
 
 @njit(**_ANY_ORDER)
-def _posterior(meter, c, y, x, length, shown, away, kernel, parts, found, mass, density):
+def _posterior(meter, c, y, x, length, shown, away, kernel, parts, found, padded, mass, density):
     """`posteriors` on nodes: mean, variance, and estimated error, of these nodes and inherited."""
     count = len(x)
     mean, variance, signal, slope = _first(shown, count)
@@ -370,7 +372,7 @@ def _posterior(meter, c, y, x, length, shown, away, kernel, parts, found, mass, 
     for i, (part, step) in enumerate(((2, 2), (2, 4), (1, 1), (0, 1))):
         away[i] = _distance(x, found[part], step, whole)
     for step in (1, 2):
-        away[3 + step] = _roughness(x, mass, step, m, v, variance, signal)
+        away[3 + step] = _roughness(x, mass, step, m, v, padded, signal)
     for i in (0, 2, 4):
         away[i] = max(away[i] - rounding, 0.0)
     error = max(_extrapolated(away[0], away[1]), _cautious(away[4], away[5]))
@@ -416,7 +418,7 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
         ),
         cache=True,
         nogil=True,
-        **_ANY_ORDER,
+        **_CALLED,
     )  # fmt: skip
     def steps(moves, meter, c, of_noise, before, start, count, y, accuracy, fine_nodes, after, numbers, size, status):
         """One step of many trajectories: the length of `after` that is filled.
@@ -430,7 +432,7 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
         most, filled = constants[0][-1], 0
         kernel, moved, found, parts = np.empty((3, most)), np.empty((3, most)), np.empty((3, most)), np.empty((3, 3))
         shown, few, nodes, candidates = np.empty((4, most)), np.empty((6, most)), np.empty((4, most)), np.empty((3, 4))
-        dense, changes = np.empty(LOOKED), np.empty(6)
+        dense, changes, padded = np.empty(LOOKED), np.empty(6), np.empty(most + ORDER)
         for t in range(len(y)):
             status[t], n = LEFT, count[t]
             end = start[t] + n
@@ -454,7 +456,7 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
                 mass, density = nodes[2, :n], nodes[3, :n]
                 _nodes(place, x, length)
                 m, v, error, inherited = _posterior(
-                    meter, c, y[t], x, length, shown, changes, kernel, parts, found, mass, density
+                    meter, c, y[t], x, length, shown, changes, kernel, parts, found, padded, mass, density
                 )
                 moves(c, x, moved[0, :n], moved[1, :n], moved[2, :n])
                 apart = _apart(mass, moved)

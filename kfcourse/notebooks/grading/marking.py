@@ -234,11 +234,13 @@ class Marking:
         return [clean(f"{', '.join(questions)}: {reason}") for reason, questions in self._reasons.items()]
 
 
-STRANGE = re.compile(r"kfcourse|\.questions\b|\.structures\b|_getframe|currentframe|__code__|__traceback__|\.hidden|__setattr__")
+STRANGE = re.compile(
+    r"✓|kfcourse|\.questions\b|\.structures\b|_getframe|currentframe|__code__|__traceback__|\.hidden|__setattr__"
+)
 
 
 def strange_lines(own: Iterable[Cell], master: NotebookNode) -> list[str]:
-    """Lines of the student's that reach for more than an exercise needs, such as what the package computes."""
+    """Lines of the student's that reach for more than an exercise needs, such as what the package computes, or print a tick."""
     usual = {line.strip() for cell in master.cells for line in cell.source.splitlines()}
     found = [
         clean(f"look at {cell.name}: {line.strip()}")

@@ -20,7 +20,7 @@ LEFT_OUT = (
     "listing.py",
     "__main__.py",
 )  # what a student's notebook has no use for
-NEEDED = ("__init__.py", "grading/__init__.py", "grading/channel.py", "grading/session.py", "grading/values.py")  # of notebooks
+NEEDED = ("__init__.py", *(f"grading/{name}.py" for name in ("__init__", "channel", "keeper", "sandbox", "session", "values")))
 ANSWERS = "derivations/worked.py"  # writes right derivations
 COMPANIONS = "companion.py"  # what the notebooks of a set import; never a key
 
