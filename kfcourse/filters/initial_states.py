@@ -129,6 +129,11 @@ def undisturbed(model: Model | JumpModel, particles: int = 256, seed: Seed = 0, 
     name : str
         Of the filter: "aof-exact" where it stands for the exact one.
 
+    Returns
+    -------
+    Filter
+        Its covariance has no bias of the order 1 / particles: the mean of it is the bound.
+
     Raises
     ------
     ModelError
@@ -276,7 +281,12 @@ def undisturbed(model: Model | JumpModel, particles: int = 256, seed: Seed = 0, 
         halves = np.moveaxis(clouds.mean, 1, 0)
         clouds_now = halves, effective, totals, memory.seed
         after = Undisturbed(*clouds_now, s, following, logs, modes_ahead, (*memory.record, y), probability, variance)
-        return State(k + 1, of_both(*clouds, angles), of_both(*to_come, angles), after)
+        # E cov = p - sum w^2 off off^T - (sum w^2 off off^T - p sum w^2); the clouds' distance tells the first of these sums
+        squares, covs = weights**2, clouds.cov.reshape(2 * runs, *clouds.cov.shape[2:])
+        bias = np.einsum("rm,rmi,rmj->rij", squares, off, off) - squares.sum(axis=1)[:, None, None] * covs
+        posterior = of_both(*clouds, angles)
+        posterior = posterior._replace(cov=posterior.cov + bias.reshape(clouds.cov.shape).mean(axis=1))
+        return State(k + 1, posterior, of_both(*to_come, angles), after)
 
     def evidence(before: State, y: Array, after: State) -> Array:
         return np.logaddexp(*after.memory.evidence) - np.logaddexp(*before.memory.evidence)

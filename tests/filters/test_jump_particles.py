@@ -379,3 +379,19 @@ def test_what_they_cannot_do_is_refused():
     assert not is_undisturbed(parted)
     with pytest.raises(ModelError, match="noise enters nonlinearly"):
         jump_particle(JumpModel.define(["x1 + v1", "x2 + v2"], ["x1 + w1**2", "x2 + w2"], modes={"a": {}}, transition=[1.0]))
+
+
+def test_its_covariance_is_on_average_the_posteriors():
+    """A bound is the mean of these: with uncorrected weights it was up to 2 % too high here, eight standard errors."""
+    model = Model.define(
+        ["x1 + 0.2*x2", "0.95*x2 - 0.1*x1"],
+        ["x1 + 0.5*w1"],
+        symbols={"x": ["x1", "x2"], "w": ["w1"]},
+        prior={"mean": [0, 0], "variance": [1, 1]},
+    )
+    _, y = simulate(model, 3000, 7, seed=5)
+    ours, kalman = run(undisturbed(model, 256, seed=3), y), run(kalman_filter(model), y)
+    own, exact = (np.trace(one.cov, axis1=-2, axis2=-1) for one in (ours, kalman))
+    for k in range(7):
+        found, known = own[k], exact[k].mean()
+        assert abs(found.mean() - known) < 4 * found.std() / np.sqrt(len(found)), k
