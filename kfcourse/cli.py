@@ -207,7 +207,8 @@ def _tell(result: Comparison, to_error: bool) -> None:
     reference = EXACT if result.has_bound else result.control
     lines = [f"D_k above that of {title(reference)}, %, mean over the steps ± standard error:"]
     for name, gap in result.ranking():
-        lines.append(f"{title(name):<10} {100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}")
+        found = f"{100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}"
+        lines.append(f"{title(name):<18} {'diverges' if name in result.lost else found}")
     if result.slow_runs:
         lines.append(f"Slow filters: on {result.slow_runs} of {result.runs} trajectories")
     click.echo("\n".join([*lines, *remarks_in_words(result), *conclusions(result)]), err=to_error)

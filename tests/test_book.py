@@ -616,6 +616,14 @@ def test_hints_are_open_on_paper_and_the_code_of_pictures_is_not_there(window):
     assert tab.locator("details.kf-code").count() == 1 and not tab.locator("details.kf-code").is_visible()
 
 
+def test_the_live_track_is_its_still_picture_on_paper(window):
+    tab, _ = window
+    tab.goto((HTML / "live-track.html").as_uri())
+    show_on(tab, "print", PAPER)
+    assert tab.locator(".kf-live").count() == 1 and not tab.locator(".kf-live").is_visible()
+    assert tab.locator("#fig-live-track img").is_visible()
+
+
 @pytest.mark.parametrize("page", NOTEBOOKS)
 def test_the_number_of_verified_equations_leads_to_them(page):
     found = re.search(r'class="kf-count" href="equations.html#([^"]+)"', (HTML / f"{page}.html").read_text(encoding="utf-8"))
@@ -659,6 +667,8 @@ def test_a_chapter_is_downloaded_as_a_notebook(window):
         ("stratonovich equation", "stratonovich.html", ""),
         ("variant 53 Russian report", "sample-report.html", ""),
         ("ошибки фильтрации", "notation.html", "estimates-and-gains"),  # which says "ошибка", "фильтр"
+        ("alpha-beta", "radar-tracking.html", "experiment-1-kalman-against-alpha-beta"),
+        ("likelihood", "what-the-data-say.html", "likelihood-from-innovations"),
         ("likelihood_error", "package/kfcourse.records.html", "module-kfcourse.records.evidence"),
     ],
 )

@@ -153,6 +153,16 @@ WRONG_FILTERS: tuple[tuple[str, str, Answer], ...] = (
         "Standard deviations stand where variances belong: sigma_n and sigma_xi have to be squared.",
         filter_with(gain=lambda Psi, n: -Psi / (Psi + n), drift=lambda p, xi: p + xi),
     ),
+    (
+        "noise-as-deviation",
+        "In the gain the receiver's noise is a standard deviation beside a variance: square sigma_n.",
+        filter_with(gain=lambda Psi, n: -Psi / (Psi + n)),
+    ),
+    (
+        "drift-as-deviation",
+        "A standard deviation is added to the variance from step to step: square sigma_xi.",
+        filter_with(drift=lambda p, xi: p + xi),
+    ),
     ("gain-frozen", "The gain never changes: hand the variance on from step to step.", filter_with(frozen=True)),
     (
         "predicted-first",

@@ -10,7 +10,7 @@ import numpy as np
 
 from kfcourse.lab.handin_text import filled, in_percent, power_of_ten
 from kfcourse.lab.refusals import cause
-from kfcourse.lab.report import LEVEL, ranges, remarks, table_steps
+from kfcourse.lab.report import LEVEL, ROUNDING, ranges, remarks, table_steps
 from kfcourse.lab.short_names import FILTERS, Entry, JumpEntry
 from kfcourse.montecarlo.comparison import EXACT, Comparison, Verdict
 
@@ -143,7 +143,7 @@ class StudentReport:
             yield filled(words["last"], name=self.title(name), steps=last.count(name), all=result.steps)
         else:
             yield words["nobody_last"]
-        leads = not result.has_bound and result.ranking()[0][0] == result.control
+        leads = not result.has_bound and abs(100 * float(result.ranking()[0][1].value)) < ROUNDING  # the control, or its equal
         yield self.mean_sentence("mean_first" if leads else "mean_bound" if result.has_bound else "mean_control")
 
     def at(self, steps: list[int]) -> str:
@@ -153,11 +153,13 @@ class StudentReport:
     def mean_sentence(self, key: str) -> str:
         """How far the first filter and the last are from the bound, or from the control."""
         result = self.result
-        ranked = result.ranking()
+        ranked = [one for one in result.ranking() if one[0] not in result.lost] or result.ranking()
         (first, gap), (final, largest) = ranked[0], ranked[-1]
+        if len(ranked) == 1 and len(result.entrants) > 1:
+            return filled(self.words["mean_alone"], first=self.title(first))
         return filled(
             self.words[key],
-            first=self.title(first),
+            first=self.title(result.control if key == "mean_first" else first),
             gap=in_percent(gap),
             last=self.title(final),
             largest=in_percent(largest),

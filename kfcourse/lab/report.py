@@ -155,20 +155,20 @@ def _model_in_numbers(model: Model | JumpModel) -> dict[str, Any]:
     }
 
 
-ROUNDING = 1e-10  # per cent
+ROUNDING = 1e-6  # per cent: equal filters may have lost half of their digits on the way
 
 
 def conclusions(result: Comparison, confidence: float = CONFIDENCE) -> list[str]:
     """The ranking in sentences: each filter against the next, significant or not at the confidence.
 
-    In per cent of the bound, the exact AOF's error variance; without it, of the control's.
+    In per cent of the bound, the exact AOF's error variance; without it, of the control's.  Filters that diverge are left out.
     """
-    ranked = [name for name, _ in result.ranking()]
+    ranked = [name for name, _ in result.ranking() if name not in result.lost]
     sentences = []
     for better, worse in pairwise(ranked):
         difference = result.mean_gap_difference(worse, better)
         low, high = (100 * float(limit) for limit in difference.interval(confidence))
-        if max(-low, high) < ROUNDING:  # filters that coincide, as on a linear model, differ by 1e-14 %
+        if max(-low, high) < ROUNDING:  # filters that coincide, as on a linear model
             sentences.append(f"{title(better)} and {title(worse)} are the same but for rounding.")
             continue
         verdict = "is more accurate than" if low > ROUNDING else "is not significantly different from"
@@ -219,7 +219,7 @@ def _content(variant: Variant, result: Comparison, modes: Recognised | None, not
         "ranking": [
             (
                 title(name),
-                percent(mean),
+                percent(mean) if name not in result.lost else "diverges",
                 _between_designs(result, name),
             )
             for name, mean in result.ranking()
@@ -268,7 +268,6 @@ def _equation_sections(names: tuple[str, ...]) -> list[Section]:
 
 
 ALIGNMENT = re.compile(r"(?P<inner>\\begin\{(?P<kind>\w+)\}.*?\\end\{(?P=kind)\})|&", re.DOTALL)  # the line's own &
-LOST = 100.0  # times the most accurate filter's D_k: ten times its error; a few trajectories that make so much are lost ones
 
 # What a reader must know before he relies on distances from the bound, by kind.
 REMARKS = {
@@ -297,12 +296,9 @@ def remarks(result: Comparison) -> Iterator[tuple[str, dict[str, Any]]]:
         yield "doubtful", {"steps": result.doubtful}
     gaps = {name: result.gap(name) for name in result.entrants}
     bad = {name: result.usable & ~result.trusted(gap, name) for name, gap in gaps.items()}
-    variances = {name: result.error_variance(name).value for name in gaps}
-    best = np.min([*variances.values()], axis=0)
-    lost = {name: steps & (result.heavy(name) > HEAVY) & (variances[name] > LOST * best) for name, steps in bad.items()}
-    if names := [name for name, steps in lost.items() if steps.any()]:
-        yield "diverged", {"names": names, "steps": np.any([lost[name] for name in names], axis=0)}
-        bad = {name: steps for name, steps in bad.items() if name not in names}
+    if result.lost:
+        yield "diverged", {"names": [*result.lost], "steps": np.any([*result.lost.values()], axis=0)}
+        bad = {name: steps for name, steps in bad.items() if name not in result.lost}
     if names := [name for name, steps in bad.items() if steps.any()]:
         part = max(float(result.heavy(name)[bad[name]].max()) for name in names)
         more = max(result.missing(gaps[name], name) for name in names)

@@ -19,6 +19,7 @@ EXACT = "aof-exact"
 ROUNDING = (64 * np.finfo(float).eps) ** 2  # an error variance less than this part of M|x|^2 is one of rounding
 UNHEALTHY = 0.1  # squared error of the exact filter's substitute, in its variance, from which on it bounds nothing
 BEATEN = 5.0  # standard errors by which a filter must be better than the "exact" one to refute it, at any step
+LOST = 100.0  # times the most accurate filter's D_k: ten times its error
 HEAVY = 0.1  # part of a sum over trajectories that a single one makes where its interval cannot be trusted
 SKEWED = 0.5  # skewness of an error with which the transformation of `Estimate.interval` does not do any more
 FEW = 250  # batches: of fewer, the skewness is itself so uncertain that only as many 250ths are admitted
@@ -171,6 +172,14 @@ class Comparison:
         by_distances = ratio(sums.largest[i].max(axis=-1), np.abs(sums.distance[i].sum(axis=-1)), 0.0)
         return np.minimum(share * by_distances + (1 - share) * by_errors, 1.0)
 
+    @cached_property
+    def lost(self) -> dict[str, Array]:
+        """Entrants that diverge on a few trajectories, and the steps, (steps,), at which these make `LOST` times the best D_k."""
+        variances = {name: self.error_variance(name).value for name in self.entrants}
+        most = LOST * np.min([*variances.values()], axis=0)
+        bad = {name: self.usable & (self.heavy(name) > HEAVY) & (variances[name] > most) for name in variances}
+        return {name: steps for name, steps in bad.items() if steps.any()}
+
     def trusted(self, found: Estimate, *names: str) -> Array:
         """Whether the interval of what was found of these filters (`gap`, `difference`, `bound`) can be trusted, (steps,).
 
@@ -215,10 +224,16 @@ class Comparison:
         """Trajectories the slow filters ran on."""
         return 0 if self.slow_part is None else int(self.slow_part.sums.counts.sum())
 
-    @property
+    @cached_property
     def control(self) -> str:
-        """The fast filter that others are related to where there is no bound: the Gaussian AOF if there, else the first."""
-        return "aof-gaussian" if "aof-gaussian" in self.fast else self.fast[0]
+        """The fast filter that others are related to where there is no bound: the Gaussian AOF if there, else the first.
+
+        One that diverges, by the rule of `lost`, is passed over.
+        """
+        found = {name: self._estimate(self._mean_square(name)).value for name in self.fast}
+        most = LOST * np.min([*found.values()], axis=0) + self.rounding
+        steady = [name for name in self.fast if not ((found[name] > most) & (self.heavy(name) > HEAVY)).any()] or [*self.fast]
+        return "aof-gaussian" if "aof-gaussian" in steady else steady[0]
 
     @cached_property
     def carrier(self) -> str:
@@ -269,12 +284,13 @@ class Comparison:
         """
         return self._estimate(self._bound())
 
-    def above_bound(self, name: str) -> Estimate:
+    def above_bound(self, name: str, steps: slice | None = None) -> Estimate:
         """D_k(name) / D_k(exact) - 1 per step, (steps,), for a filter that ran on every trajectory, from its errors themselves.
 
-        The numerator is M(e^2 - p_carrier) over all trajectories less M(p_exact - p_carrier) on the slow part.
+        The numerator is M(e^2 - p_carrier) over all trajectories less M(p_exact - p_carrier) on the slow part.  With steps, the
+        mean over these.  `gap` is known better, but is too low where it is made by states so rare that the slow part has none.
         """
-        return self._quotient(self._above(name), self._bound())
+        return self._quotient(self._above(name), self._bound(), steps)
 
     def gap(self, name: str) -> Estimate:
         """How far above the bound a filter is, D_k(name) / D_k(exact AOF) - 1 per step, (steps,).

@@ -99,8 +99,9 @@ class Structure:
                 if name in ("Theta", "F") and i > j:
                     continue  # symmetric
                 index = "" if len(matrix) == 1 else f"_{{{i + 1}}}" if matrix.cols == 1 else f"_{{{i + 1}{j + 1}}}"
-                first, *further = formula_lines(matrix[i, j], arguments)
-                lines += [rf"{FUNCTION_LATEX[name]}{index}({names}) &= {first}", *(rf"&\quad {line}" for line in further)]
+                value = f"{FUNCTION_LATEX[name]}{index}({names})"
+                first, *further = formula_lines(matrix[i, j], arguments, value)
+                lines += [f"{value} &= {first}", *(rf"&\quad {line}" for line in further)]
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
     def source(self) -> str:

@@ -29,13 +29,14 @@ def formula_latex(expression: sp.Expr, variables: Sequence[sp.Symbol], noises: S
     return str(printer.doprint(_Writer([*variables, *noises], noises).arranged(_readable(sp.sympify(expression)))))
 
 
-def formula_lines(expression: sp.Expr, variables: Sequence[sp.Symbol]) -> list[str]:
-    """The same in as many lines as a page is wide; only sums are broken."""
+def formula_lines(expression: sp.Expr, variables: Sequence[sp.Symbol], before: str = "") -> list[str]:
+    """The same in as many lines as a page is wide beside what stands before them; only sums are broken."""
     expression = _readable(expression)
     whole = formula_latex(expression, variables)
-    if symbols(whole) <= WIDTH or not isinstance(expression, sp.Add):
+    width = WIDTH - symbols(before)
+    if symbols(whole) <= width or not isinstance(expression, sp.Add):
         return [whole]
-    return joined([formula_latex(term, variables) for term in _Writer(variables, ()).terms(expression)])
+    return joined([formula_latex(term, variables) for term in _Writer(variables, ()).terms(expression)], width)
 
 
 def _readable(expression: sp.Expr) -> sp.Expr:

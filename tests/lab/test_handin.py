@@ -112,7 +112,7 @@ def test_numbers_and_verdicts_are_those_of_the_comparison(written, result):
 class Told:
     """A comparison of which only the order of the filters is told: at each step those that lead, and the last."""
 
-    has_bound, control, steps, seed = True, "aof-gaussian", 51, 1
+    has_bound, control, steps, seed, lost = True, "aof-gaussian", 51, 1, {}
     entrants = ("aof-gaussian", "duof", "fos-gaussian")
 
     def __init__(self):
@@ -150,6 +150,36 @@ def test_the_conclusion_counts_in_good_language():
     assert nobody == "Ни на одном шаге нет фильтра, который был бы значимо точнее каждого из остальных."  # and that is all of it
     assert once == "ГАОФ — наименее точный фильтр на 51 шаге из 51."
     assert never == "Ни на одном шаге наименее точный фильтр не хуже самого точного значимо."
+
+
+@pytest.mark.parametrize("language", ["en", "ru"])
+def test_a_filter_that_equals_the_control_but_for_rounding_is_not_told_a_difference(language):
+    """IMM beside the logic-dynamic AOF of an object that is affine in every mode: they differ by 1e-16."""
+    told = Told()
+    told.has_bound, found = False, {"fos-gaussian": -3e-16, "aof-gaussian": 0.0, "duof": 0.3}
+    told.ranking = lambda: [(name, Estimate(np.array(value), np.array(0.01), 9)) for name, value in found.items()]
+    report = StudentReport(told, WORDS[language])
+    *_, last = report.sentences([Verdict("aof-gaussian", [], "duof")] * 51)
+    assert last == report.mean_sentence("mean_first")
+    assert report.title("aof-gaussian") in last and "e-" not in last
+    found["fos-gaussian"] = -3e-3
+    *_, last = report.sentences([Verdict("aof-gaussian", [], "duof")] * 51)
+    assert last == report.mean_sentence("mean_control") and report.title("fos-gaussian") in last
+
+
+@pytest.mark.parametrize("language", ["en", "ru"])
+def test_a_filter_that_diverges_is_no_last_with_a_number(language):
+    told = Told()
+    told.lost = {"fos-gaussian": np.ones(51, dtype=bool)}
+    sentence = StudentReport(told, WORDS[language]).mean_sentence("mean_bound")
+    assert told.entrants[1] == "duof" and StudentReport(told, WORDS[language]).title("duof") in sentence
+    assert StudentReport(told, WORDS[language]).title("fos-gaussian") not in sentence
+    told.lost |= {"duof": np.ones(51, dtype=bool)}
+    assert (
+        StudentReport(told, WORDS[language])
+        .mean_sentence("mean_bound")
+        .endswith(StudentReport(told, WORDS[language]).title("aof-gaussian") + ".")
+    )
 
 
 @pytest.mark.quick

@@ -16,7 +16,7 @@ from kfcourse.filters import aof
 from kfcourse.lab.handin import write_handin
 from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
 from kfcourse.lab.short_names import LAB, title
-from kfcourse.lab.variants import Variant
+from kfcourse.lab.variants import Variant, find_variant
 
 FIGURES = ("accuracy", "relative", "ranking", "consistency")
 
@@ -75,6 +75,15 @@ def test_a_difference_is_significant_if_its_interval_excludes_zero(result53, con
         printed = [float(number) for number in re.findall(r"confidence: (\S+) to (\S+) %", sentence)[0]]
         np.testing.assert_allclose(printed, [100 * low, 100 * high], rtol=0.005)  # three digits
         assert f"{100 * confidence:g} % confidence" in sentence
+
+
+def test_a_filter_that_diverges_is_no_measure_for_others_and_has_no_place_among_them():
+    """D3: the linearised AOF loses some trajectories, and errs ten thousand times as much there as the FOS does."""
+    model = find_variant("D3").model
+    result = compare(lab_filters(model, ["aof-linearised", "fos-linearised"]), model, 1000, 6, 1, progress=False)
+    assert set(result.lost) == {"aof-linearised"} and result.control == "fos-linearised"
+    assert conclusions(result) == []
+    assert any("LAOF" in said and "diverges" in said for said in remarks_in_words(result))
 
 
 def test_both_verdicts_occur(result53):

@@ -171,7 +171,8 @@ STARTS = ("subprocess.Popen", "os.system", "os.fork", "os.forkpty", "os.exec", "
 NETWORK = ("socket.connect", "socket.bind", "socket.getaddrinfo", "socket.sendto", "socket.gethostbyname")
 SIGNALS = ("os.kill", "os.killpg", "signal.pthread_kill")
 WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
-MACHINE = (*SYSTEM, *ETC, "/System", "/Library", "/dev", "/proc/self", os.environ.get("WINDIR", "/usr"))  # which libraries read
+_PROC = tuple(f"/proc/{name}" for name in ("self", "stat", "meminfo", "cpuinfo"))
+MACHINE = (*SYSTEM, *ETC, "/System", "/Library", "/dev", "/sys", *_PROC, os.environ.get("WINDIR", "/usr"))  # which libraries read
 
 
 def watch(channel: Channel, folder: Path, protected: Sequence[str]) -> None:

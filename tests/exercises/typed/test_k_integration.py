@@ -146,6 +146,8 @@ WRONG = [
             k2()(sigma_xi, sigma_n)[2],
         ),
     ),
+    ("k3", "noise-as-deviation", k3(gain=lambda Psi, r: -Psi / (Psi + np.sqrt(r)))),
+    ("k3", "drift-as-deviation", lambda ins, sr, xi, n, p0: k3()(ins, sr, np.sqrt(xi), n, p0)),
     ("k3", "predicted-first", k3(first=True)),
     ("k3", "error-added", k3(velocity=lambda ins, e: ins + e)),
     ("k3", "error-returned", k3(velocity=lambda ins, e: e)),

@@ -201,6 +201,7 @@ WRONG = [
     ("l3", "whole-vector-dropped", l3_all_or_nothing),
     ("l3", "wrong-part-of-R", l3(rows_of_R="first")),
     ("l3", "correlation-forgotten", l3_one_by_one_would_be_wrong),
+    ("l3", "noise-forgotten", l3(F=lambda H, P, R: H @ P @ H.T)),
     ("l4", "constant-in-interval", l4(Q=lambda t: [[t**4 / 4, t**3 / 2], [t**3 / 2, t**2]])),
     ("l4", "diagonal", l4(Q=lambda t: [[t**3 / 3, 0], [0, t]])),
     ("l4", "velocity-only", l4(Q=lambda t: [[0, 0], [0, t]])),
