@@ -302,7 +302,7 @@ def remarks(result: Comparison) -> Iterator[tuple[str, dict[str, Any]]]:
     if names := [name for name, steps in bad.items() if steps.any()]:
         part = max(float(result.heavy(name)[bad[name]].max()) for name in names)
         more = max(result.missing(gaps[name], name) for name in names)
-        runs, exact = (f"{float(f'{more * one:.1g}'):.0f}" for one in (result.runs, result.slow_runs))
+        runs, exact = (int(float(f"{more * one:.1g}")) for one in (result.runs, result.slow_runs))
         told = {"part": f"{100 * part:.0f}", "runs": runs, "exact": exact}
         kind = ("heavy" if part > HEAVY else "skewed") + ("" if result.has_bound else "_alone")
         yield kind, {"names": names, "steps": np.any([bad[name] for name in names], axis=0), **told}
