@@ -154,9 +154,18 @@ def processes(count: int, work: Callable[..., Any]) -> Iterator[Submit]:
         yield partial(forks.submit, _do)
     finally:
         end.send_bytes(b"over")
+        _close_results(forks)
         forks.shutdown(cancel_futures=True)
         over.close()
         end.close()
+
+
+def _close_results(forks: ProcessPoolExecutor) -> None:
+    """Of a result that a fork had half sent when it ended the rest never comes: forks alone can send it, if this process cannot.
+
+    The thread that reads results would wait for it, and whoever ends the pool for that thread; there is no public way to it.
+    """
+    forks._result_queue._writer.close()  # type: ignore[attr-defined]
 
 
 def _begin(work: Callable[..., Any]) -> None:

@@ -234,3 +234,27 @@ def test_the_end_of_the_program_is_the_end_of_its_processes(number):
     assert time.monotonic() - begun < 30  # not the minute that is slept
     assert program.returncode == -number
     assert errors.count("Traceback") == errors.count("KeyboardInterrupt") == (number == signal.SIGINT)
+
+
+HALF_SENT = """
+import os, time
+from kfcourse.montecarlo.parallel import processes
+
+for wait in range(20):
+    hear, tell = os.pipe()
+
+    def work():
+        os.write(tell, b"!")
+        return bytes(10**8)
+
+    with processes(1, work) as submit:
+        submit()
+        os.read(hear, 1)
+        time.sleep(wait / 100)
+"""
+
+
+@linux
+def test_a_result_that_is_half_sent_is_waited_for_by_nobody():
+    """Forks that were ended while they sent a large result left the pool waiting for the rest: once in 60 times Ctrl-C hung."""
+    assert subprocess.run([sys.executable, "-c", HALF_SENT], timeout=120).returncode == 0
