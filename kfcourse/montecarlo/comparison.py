@@ -22,6 +22,7 @@ BEATEN = 5.0  # standard errors by which a filter must be better than the "exact
 LOST = 100.0  # times the most accurate filter's D_k: ten times its error
 HEAVY = 0.1  # part of a sum over trajectories that a single one makes where its interval cannot be trusted
 SKEWED = 0.5  # skewness of an error with which the transformation of `Estimate.interval` does not do any more
+ALIKE = 10  # decimals of D_k over the least and of `mean_gap`: filters that agree in them coincide but for rounding
 FEW = 250  # batches: of fewer, the skewness is itself so uncertain that only as many 250ths are admitted
 
 
@@ -312,14 +313,21 @@ class Comparison:
         return self._quotient(self._over(first, second), self._reference(), steps)
 
     def ranking(self, steps: slice = slice(None)) -> list[tuple[str, Estimate]]:
-        """The entrants from the most accurate on, each with its `mean_gap`."""
+        """The entrants from the most accurate on, each with its `mean_gap`; those that coincide in their own order."""
         found = [(name, self.mean_gap(name, steps)) for name in self.entrants]
-        return sorted(found, key=lambda item: float(item[1].value))
+        return sorted(found, key=lambda item: round(float(item[1].value), ALIKE))
+
+    @cached_property
+    def _ranked(self) -> list[list[str]]:
+        """The entrants at each step from the most accurate on; those that coincide in their own order."""
+        found = np.array([self.error_variance(name).value for name in self.entrants])
+        least = np.fmin.reduce(found)
+        order = np.argsort(np.round(found / np.where(least > 0, least, 1.0), ALIKE), axis=0, kind="stable")
+        return [[self.entrants[i] for i in column] for column in order.T]
 
     def leaders(self, step: int, confidence: float = CONFIDENCE) -> list[str]:
         """The most accurate entrant at a step, then those that are not significantly worse, each by its own paired interval."""
-        found = {name: float(self.error_variance(name).value[step]) for name in self.entrants}
-        best, *others = sorted(found, key=lambda name: found[name])
+        best, *others = self._ranked[step]
         return [best, *(name for name in others if self.difference(name, best)[step].interval(confidence)[0] <= 0)]
 
     def verdicts(self, confidence: float = CONFIDENCE) -> list[Verdict]:
@@ -328,8 +336,7 @@ class Comparison:
         With the confidence all of them are right: Holm's test of everybody's difference from the most accurate, over all steps
         and filters.  Where all errors are rounding, nobody is better.
         """
-        found = {name: self.error_variance(name).value for name in self.entrants}
-        ranked = [sorted(self.entrants, key=lambda name: found[name][k]) for k in range(self.steps)]
+        ranked = self._ranked
         pairs = {(name, best) for best, *others in ranked for name in others}
         by_pair = {pair: self.difference(*pair).p_value() for pair in pairs}
         p = np.array([[by_pair[name, best][k] for name in others] for k, (best, *others) in enumerate(ranked)])

@@ -425,6 +425,17 @@ def test_the_ranking_does_not_keep_the_order_given(variant53):
     assert [name for name, _ in result.ranking()] == ["best", "slow", "middle", "worst"]
 
 
+def test_filters_that_coincide_keep_their_order(variant53):
+    """Rounding made now one of two equal filters the least accurate, now the other, in table, ranking and conclusion."""
+    base = np.linspace(1, 2, 200)
+    for first, second in ((1, 1 + 1e-15), (1 + 1e-15, 1)):
+        squares = {"best": base, "also": first * (base[::-1] + 9), "same": second * (base[::-1] + 9)}
+        result = replace(by_hand(variant53, squares, [], slow_runs=0), slow_part=None)
+        assert [name for name, _ in result.ranking()] == ["best", "also", "same"]
+        assert [(one.best, one.worst) for one in result.verdicts()] == [("best", "same")] * result.steps
+        assert result.leaders(0)[0] == "best"
+
+
 def test_without_the_exact_filter_there_is_no_bound(variant53):
     """Whether no slow filter ran, or only others: not a distance of 0 from nothing."""
     squares = {"aof-gaussian": np.ones(3), "slow": np.ones(2)}
