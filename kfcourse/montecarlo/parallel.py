@@ -60,9 +60,16 @@ class Cluster:
 
     @contextmanager
     def processes(self, count: int, work: Callable[..., Any]) -> Iterator[Submit]:
-        """As `processes`: what the work needs is sent to each worker once."""
-        sent = self.client.scatter(work, broadcast=True, hash=False)
+        """As `processes`: what the work needs is sent to each worker once.
+
+        As the result of a task, which is found again if the workers that hold it are lost; scattered data would be gone.
+        """
+        sent = self.client.submit(_itself, work, pure=False)
         yield partial(self.executor.submit, _do_far, sent)
+
+
+def _itself(work: Callable[..., Any]) -> Callable[..., Any]:
+    return work
 
 
 def _do_far(work: Callable[..., Any], *arguments: Any) -> Any:

@@ -198,10 +198,6 @@ def test_without_a_sandbox_it_is_noted(kernel, outside, tmp_path, port):
     names = ("leaves a daemon", "reads another notebook", "writes outside", "uses the network")
     marked(kernel, *(Step(filled(PROCESSES[name], **values), name) for name in names))
     assert f"reads {outside / 'other.ipynb'}" in kernel.notes
-    passwords = os.path.realpath("/etc/passwd")
-    assert f"reads {passwords}" not in kernel.notes
-    kernel.cell("import numpy, matplotlib.font_manager\nwith open('/etc/passwd') as file:\n    file.read()")
-    assert [note for note in kernel.notes if note.startswith("reads")][1:] == [f"reads {passwords}"]  # and nothing of a library's
     assert f"writes {tmp_path / 'x'}" in kernel.notes
     assert {"starts processes", "uses the network"} <= set(kernel.notes)
     left = int((tmp_path / "flag").read_text())

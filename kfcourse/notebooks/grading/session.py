@@ -24,7 +24,6 @@ from kfcourse.checks import Exercise, Result, exercise
 from kfcourse.checks.engine import in_library, told
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.notebooks.grading.channel import Channel, Closed
-from kfcourse.notebooks.grading.sandbox import ETC, SYSTEM
 from kfcourse.notebooks.grading.values import decode, encode
 
 FILE = 100 * 2**20  # bytes a notebook may write to one file
@@ -171,8 +170,6 @@ STARTS = ("subprocess.Popen", "os.system", "os.fork", "os.forkpty", "os.exec", "
 NETWORK = ("socket.connect", "socket.bind", "socket.getaddrinfo", "socket.sendto", "socket.gethostbyname")
 SIGNALS = ("os.kill", "os.killpg", "signal.pthread_kill")
 WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
-_PROC = tuple(f"/proc/{name}" for name in ("self", "stat", "meminfo", "cpuinfo"))
-MACHINE = (*SYSTEM, *ETC, "/System", "/Library", "/dev", "/sys", *_PROC, os.environ.get("WINDIR", "/usr"))  # which libraries read
 
 
 def watch(channel: Channel, folder: Path, protected: Sequence[str]) -> None:
@@ -183,7 +180,6 @@ def watch(channel: Channel, folder: Path, protected: Sequence[str]) -> None:
     home = os.path.realpath(folder.parent)
     said: set[str] = set()
     needed = [_folder(path) for path in (sys.prefix, sys.base_prefix, home, *sys.path)]  # perhaps inside of a closed one
-    usual = (*needed, *map(_folder, MACHINE))
     closed = {path: tuple(place for place in needed if place.startswith(path)) for path in map(_folder, protected)}
     tell = channel.send
 
@@ -203,8 +199,6 @@ def watch(channel: Channel, folder: Path, protected: Sequence[str]) -> None:
                 raise PermissionError(f"{place} is closed while notebooks are graded")
             if isinstance(flags, int) and flags & WRITES and not place.startswith((home + os.sep, "/dev/")):
                 note(f"writes {place}")
-            elif isinstance(flags, int) and not _folder(place).startswith(usual):
-                note(f"reads {place}")
         elif event in ("os.remove", "os.rename", "os.rmdir", "shutil.rmtree") and isinstance(arguments[0], str | os.PathLike):
             place = os.path.realpath(arguments[0])
             if not place.startswith(home + os.sep):
