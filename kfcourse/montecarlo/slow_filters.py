@@ -69,7 +69,8 @@ def run_slow_filters(
     if size < FEWEST and EXACT in chosen:
         left_out[EXACT] = f"on {size} trajectories the rare ones that matter are missing: take at least {FEWEST}, or 0"
     with one_thread():
-        end = None if seconds is None else time.monotonic() + seconds
+        begun = time.monotonic()
+        end = None if seconds is None else begun + seconds
         while running := [one for name, one in chosen.items() if name not in left_out]:
             names = [one.name for one in running]
             try:
@@ -86,11 +87,12 @@ def run_slow_filters(
             found = SlowPart(names, Sums.concatenate(sums), replaced) if sums else None
             if found and (done >= FEWEST or EXACT not in names):
                 return found, left_out
-            reason = f"{done or min(size, CHUNKS[0])} trajectories take {'' if done else 'more than '}{seconds:g} s"
             if not found:
+                reason = f"{min(size, CHUNKS[0])} trajectories take more than {seconds:g} s"
                 return None, left_out | dict.fromkeys(names, reason)
-            needed = float(f"{MARGIN * (seconds or 0.0) * FEWEST / done:.1g}")
-            why = f"{reason}, and of fewer than {FEWEST} the rare ones that matter are missing"
+            spent = time.monotonic() - begun  # more than the limit where it came late
+            needed = float(f"{MARGIN * spent * FEWEST / done:.1g}")
+            why = f"{done} trajectories take {spent:.2g} s, and of fewer than {FEWEST} the rare ones that matter are missing"
             left_out[EXACT] = f"{why}: give it more time, some {needed:g} s"
             return found.without_exact(), left_out
         return None, left_out

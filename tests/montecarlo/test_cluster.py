@@ -1,6 +1,7 @@
 """Beyond one machine: the work on the workers of a Dask cluster, here two processes of this one."""
 
 import os
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -76,7 +77,8 @@ def test_time_is_kept(address, variant53):
         dask=address,
         progress=False,
     )
-    assert "take more than" in result.left_out["aof-exact"]
+    # Of so short a time a chunk may see nothing until it is done.
+    assert re.match(r"16 trajectories take (more than 1e-06|[.\d]+) s", result.left_out["aof-exact"])
 
 
 def test_checks_of_variants(address):
