@@ -77,8 +77,8 @@ def test_time_is_kept(address, variant53):
         dask=address,
         progress=False,
     )
-    # Of so short a time a chunk may see nothing until it is done.
-    assert re.match(r"16 trajectories take (more than 1e-06|[.\d]+) s", result.left_out["aof-exact"])
+    # A worker's thread may see so short a limit when its first chunk is done: 16 trajectories count, or those of both workers.
+    assert re.match(r"(16 trajectories take more than 1e-06|\d\d trajectories take .+) s", result.left_out["aof-exact"])
 
 
 def test_checks_of_variants(address):
