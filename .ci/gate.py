@@ -62,9 +62,8 @@ def planted(page: Path, chance: random.Random, most: int = 10**9) -> Iterator[Pl
             changed = change(piece, kind, chance)
             if changed:
                 after = formula._replace(latex=changed)
-                found = piece in letters.said or noticed(
-                    letters, after, elsewhere
-                )  # what is listed and not there fails test_relations.py
+                # What is listed as said and not there fails test_relations.py.
+                found = piece in letters.said or noticed(letters, after, elsewhere)
                 yield Planted(page.stem, formula.kind, kind, piece, changed, found)
 
 
