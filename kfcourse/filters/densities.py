@@ -96,7 +96,7 @@ class ScalarDensities(NamedTuple):
     residual : (y, x) -> the signal that explains y, minus the signal at x, for an angle the short way round.  What explains y
         is y itself; |y - b| if the signal is the noise's deviation
     meter_width : x -> standard deviation of the meter's noise over |slope|: how well y tells x
-    noiseless : whether the meter has no noise: there is no density of y, and log_likelihood must not be asked
+    noiseless : whether the meter has no noise at this step: there is no density of y, and log_likelihood must not be asked
     jump : pi for an angle, whose residual changes its sign on the far side of the circle too, by a jump; otherwise infinite
     piece : x -> a number for each of the formulas that an object which jumps has, by the one that holds at x
     """
@@ -174,7 +174,8 @@ def scalar_densities(model: Model) -> ScalarDensities:
         if pieces:
             numbered = number.at(k)
             found = found._replace(piece=lambda x: numbered(x[..., None])[0][..., 0])
-        return found._replace(noiseless=meter_variance.is_zero is True)
+        here = dict(zip(model.known.symbols, model.known.at(k), strict=True)) if model.timed else {}
+        return found._replace(noiseless=meter_variance.subs(here).is_zero is True)
 
     return at(0)
 

@@ -22,6 +22,7 @@ BEATEN = 5.0  # standard errors by which a filter must be better than the "exact
 LOST = 100.0  # times the most accurate filter's D_k: ten times its error
 HEAVY = 0.1  # part of a sum over trajectories that a single one makes where its interval cannot be trusted
 SKEWED = 0.5  # skewness of an error with which the transformation of `Estimate.interval` does not do any more
+SAME = 1e-6  # of the bound: what the exact filter's own error of a thousandth of a deviation can make of a distance
 ALIKE = 10  # decimals of D_k over the least and of `mean_gap`: filters that agree in them coincide but for rounding
 FEW = 250  # batches: of fewer, the skewness is itself so uncertain that only as many 250ths are admitted
 
@@ -193,6 +194,7 @@ class Comparison:
             gaps = np.array([np.nan_to_num(self.gap(name).value, nan=-np.inf) for name in names])
             heavy = np.array([self.heavy(name) for name in names])
             good = good & (np.take_along_axis(heavy, gaps.argmax(axis=0)[None], axis=0)[0] <= HEAVY)
+            good = good | (self.usable & (np.abs(found.value) + 2 * found.standard_error < SAME))
         return np.asarray(good)
 
     @property

@@ -25,6 +25,17 @@ def test_a_linear_meter_shows_the_state():
     assert (found.cov == 0).all()
 
 
+def test_a_meter_may_lose_its_noise_on_the_way():
+    """Noise until step 3, none at 3 and 4, some again: the Kalman filter's estimates, and the state itself in between."""
+    noise = {"variance": "0 if 3 <= k < 5 else 1"}
+    model = Model.define("0.9*x + 0.1*v", "x + w", meter_noise=noise)
+    x, y = simulate(model, 500, 7, seed=1)
+    found, kalman = run(pointmass(model), y), run(kalman_filter(model), y)
+    np.testing.assert_allclose(found.mean, kalman.mean, rtol=0, atol=ACCURACY)  # deviations are below 1
+    np.testing.assert_allclose(found.mean[3:5], x[3:5], rtol=0, atol=LAST_BIT)
+    assert (found.cov[3:5] == 0).all()
+
+
 def test_its_prediction_is_a_sum_of_kernels_one_for_each_root():
     """y = x^2 leaves +-sqrt(y), with the weights of the prior N(0.5, 1) there; then x' = 0.9 x + 0.3 v."""
     model = Model.define("0.9*x + 0.3*v", "x**2", prior={"mean": 0.5})

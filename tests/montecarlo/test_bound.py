@@ -122,6 +122,15 @@ def test_how_many_more_trajectories_would_do():
     assert one.missing(found, "other") == pytest.approx(5, rel=1e-12)  # half of it where a tenth may be
 
 
+@pytest.mark.parametrize(("value", "error", "good"), [(1e-9, 1e-8, True), (1e-9, 1e-6, False), (1e-4, 1e-8, False)])
+def test_what_is_nothing_may_be_made_by_one_trajectory(value, error, good):
+    """The GAOF on a linear model: its distance is the exact filter's own rounding."""
+    one = skewed(20, rare=0, factor=1.0, seed=1)
+    one.sums.largest_square[1, 0, 3] = one.sums.square[1].sum() / 2
+    found = Estimate(np.array([value]), np.array([error]), 19, np.array([2.0]))
+    assert one.trusted(found, "other").tolist() == [good]
+
+
 def test_table_ranking_and_verdict_are_one_estimate(lab53):
     """D_k, gaps, their differences and means are the same numbers: differences of the table's, over the bound."""
     bound = lab53.error_variance("aof-exact").value
