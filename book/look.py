@@ -22,6 +22,7 @@ HERE = Path(__file__).resolve().parent
 NUMBER = re.compile(r"(?:(?<=>)|^)\s*\d+(\.\d+)*\.\s")  # of a section
 SIZE = re.compile(r"width: (\d+)px; height: (\d+)px;")
 STAR = "★"
+LIVE = re.compile(r'<div class="kf-(?:live|explore)" data-name="([^"]+)"')  # a figure that answers, and whose place it takes
 MEASURING = ',"complete"===document.readyState?O():window.addEventListener("load",O)'
 
 
@@ -53,6 +54,23 @@ class SmallStars(SphinxPostTransform):
                 star = nodes.inline(STAR, STAR, classes=["kf-star"])
                 rest = nodes.Text(f"\N{NO-BREAK SPACE}{text.removeprefix(STAR).lstrip()}")  # never alone at the end of a line
                 text.parent.replace(text, [star, rest])
+
+
+class InPlace(SphinxPostTransform):
+    """A figure that answers is read right after its still picture: its script runs before what stands below is seen, and moves."""
+
+    default_priority = 500
+    formats = ("html",)
+
+    def run(self, **kwargs) -> None:
+        figures = {name: figure for figure in self.document.findall(nodes.figure) for name in figure["ids"]}
+        for live in list(self.document.findall(nodes.raw)):
+            if (found := LIVE.search(live.astext())) and found[1] in figures:
+                output = live.parent
+                output.remove(live)
+                figures[found[1]].insert(1, live)
+                if not output.children:
+                    output.parent.parent.remove(output.parent)
 
 
 class Translator(HTML5Translator):
@@ -212,6 +230,7 @@ def setup(app) -> dict[str, bool]:
     app.set_translator("html", Translator)
     app.add_post_transform(Captions)
     app.add_post_transform(SmallStars)
+    app.add_post_transform(InPlace)
     app.connect("config-inited", use_templates, priority=900)
     app.connect("build-finished", write_not_found)
     app.connect("build-finished", leave_icons_out)

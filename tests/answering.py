@@ -18,8 +18,8 @@ from kfcourse.pages.exponents import log_normal
 SCALAR = {name: variant for name, variant in load_variants().items() if variant.model.n == 1 == variant.model.p}
 STILL = "data:image/svg+xml," + "%3Csvg xmlns='http://www.w3.org/2000/svg' width='300' height='100'/%3E"
 ALONE = """<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-<title>Figure</title></head><body>{html}
-<figure id="{name}"><img src="{still}" alt="still"><figcaption>Caption</figcaption></figure></body></html>"""
+<title>Figure</title></head><body>
+<figure id="{name}"><img src="{still}" alt="still">{html}<figcaption>Caption</figcaption></figure></body></html>"""
 
 
 x, y, following = sp.symbols("x y x_next", real=True)

@@ -46,14 +46,13 @@ def figure(name: str, says: str, code: str, call: str) -> str:
     helper = HELPER.read_text(encoding="utf-8")
     mount = f"""(() => {{
 const root = document.currentScript.parentElement.querySelector(".kf-explore");
-const start = () => ({call})(root, {json.dumps(name)});
-document.readyState === "loading" ? addEventListener("DOMContentLoaded", start) : start();
+({call})(root, {json.dumps(name)});
 }})();"""
     for text in (helper, code, mount):
         if "</script" in text.lower():
             raise ValueError(f"{name}: a script within a page cannot hold </script")
     return (
-        f'<div class="kf-explored"><div class="kf-explore" role="group" aria-label="{says}"></div>'
+        f'<div class="kf-explored"><div class="kf-explore" data-name="{name}" role="group" aria-label="{says}"></div>'
         f'<script>{helper}</script><script class="kf-code">{code}</script><script>{mount}</script></div>'
     )
 

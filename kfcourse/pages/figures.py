@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from matplotlib.font_manager import fontManager
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
+from matplotlib.ticker import AutoLocator
 from matplotlib_inline.backend_inline import set_matplotlib_formats
 
 from kfcourse.pages.captions import drawn
@@ -26,6 +28,9 @@ COLOURS = {"truth": "#000000", "measurement": "#999999", "estimate": "#0072B2", 
 WIDTH = 7.2
 # A column of 338 px, on a screen of 390, shows a figure of this width with letters of 10 pt as 10.2 px, one of 7.2 as 6.3.
 NARROW = 4.4
+
+# Labels of axes that count steps; "step $T$ (s)" measures one.
+COUNTED = re.compile(r"steps?( apart)?( \$[kl]\$)?( \(.* each\))?")
 
 FONTS = sorted((Path(__file__).parent / "data").glob("*.ttf"))  # the pages' own, Source Sans 3 (OFL.txt)
 
@@ -73,6 +78,7 @@ def book_style(ground: str = "none") -> None:
 
     def both(figure: Figure) -> Any:
         in_brackets(text.get_text() for text in figure.findobj(Text))
+        whole_steps(figure)
         if not (made := wide(figure)):  # of a figure without axes
             return None
         data, metadata = made[0], made[1] | {"drawn": drawn(figure)}
@@ -81,6 +87,15 @@ def book_style(ground: str = "none") -> None:
         return data, metadata
 
     formatter.for_type(Figure, both)
+
+
+def whole_steps(figure: Figure) -> None:
+    """No marks between the steps on axes that count them: "step", "step $k$", "steps apart", "step $k$ (5 ms each)"."""
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            locator = axis.get_major_locator()
+            if isinstance(locator, AutoLocator) and COUNTED.fullmatch(axis.get_label_text()):
+                locator.set_params(integer=True)
 
 
 def lay_narrow(figure: Figure) -> bool:

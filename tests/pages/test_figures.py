@@ -39,6 +39,23 @@ def test_labels_are_in_the_font_of_the_pages_whatever_their_letters(style, caplo
     assert caplog.messages == []
 
 
+@pytest.mark.parametrize("label", ["step", "step $k$", "steps apart $l$", "step $k$ (5 ms each)"])
+def test_marks_of_an_axis_that_counts_steps_are_whole_numbers(style, label):
+    """Also above a shared axis, and in the picture for telephones; an axis of time keeps its halves, and chosen marks stay."""
+    figure, axes = plt.subplots(2, sharex=True)
+    other, (time, chosen) = plt.subplots(1, 2)
+    for ax in (*axes, time, chosen):
+        ax.plot(range(4), range(4))
+    axes[1].set_xlabel(label)
+    time.set_xlabel("step $T$ (s)")
+    chosen.set(xlabel=label, xticks=[0.5, 2.5])
+    for one in (figure, other):
+        InteractiveShell.instance().display_formatter.format(one)
+    marks = [ax.get_xticks() for ax in (*axes, time, chosen)]
+    assert [bool((one == one.round()).all()) for one in marks] == [True, True, False, False]
+    plt.close("all")
+
+
 def test_labels_at_the_ends_are_apart_and_in_order() -> None:
     _, ax = plt.subplots()
     for end, name in ((1.0, "low"), (1.01, "middle"), (1.02, "high"), (5.0, "far")):

@@ -1116,8 +1116,5 @@
     });
   }
 
-  if (typeof document !== "undefined") {
-    if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start);
-    else start();
-  }
+  if (typeof document !== "undefined") start();  // at once: what stands below has its place when it is first seen
 })();

@@ -305,14 +305,18 @@ button.kf-try { font: inherit; color: var(--accent, LinkText); background: none;
       const given = read(name, defaults);
       if (given) ui.set({ ...defaults, ...given });
     });
-    // What a sentence of the page tells to try.
-    for (const one of document.querySelectorAll(`button[data-figure="${name}"]`))
-      one.addEventListener("click", () => {
-        ui.set({ ...defaults, ...parse(one.dataset.state, defaults) });
-        root.scrollIntoView();
-      });
-    if (read(name, defaults) && location.hash.includes("?")) root.scrollIntoView();
-    root.dataset.ready = "";
+    // What a sentence of the page tells to try, and what a link leads to: below, where the page may not be read yet.  The figure
+    // itself does not wait for that, or what stands under it would move when it comes.
+    const rest = () => {
+      for (const one of document.querySelectorAll(`button[data-figure="${name}"]`))
+        one.addEventListener("click", () => {
+          ui.set({ ...defaults, ...parse(one.dataset.state, defaults) });
+          root.scrollIntoView();
+        });
+      if (read(name, defaults) && location.hash.includes("?")) root.scrollIntoView();
+      root.dataset.ready = "";
+    };
+    document.readyState === "loading" ? addEventListener("DOMContentLoaded", rest) : rest();
     return ui;
   }, { values, INK, BLUE, BAND, ORANGE });
 })();

@@ -194,10 +194,10 @@ const kfLiveLab = (root, name, given) => {
       functions.y(spanned(found));
     };
     const drawTable = ({ step }) => {
-      const shown = bounds && bounds.number === result.number;
+      const shown = result && bounds && bounds.number === result.number;
       const rows = names.map((one) => {
-        const value = result.errors[one][step][0], part = shown ? percent(...bounds.above[one][step]) : "…";
-        return `<tr><th scope="row">${titles[one]}</th><td>${isFinite(value) ? ui.short(value) : "diverges"}</td><td>${part}</td></tr>`;
+        const value = result?.errors[one][step][0], part = shown ? percent(...bounds.above[one][step]) : "…";
+        return `<tr><th scope="row">${titles[one]}</th><td>${!result ? "…" : isFinite(value) ? ui.short(value) : "diverges"}</td><td>${part}</td></tr>`;
       });
       table.innerHTML = `<table class="table"><thead><tr><th scope="col">step ${step}</th><th scope="col">error variance</th><th scope="col">above the bound (%)</th></tr></thead><tbody>${rows.join("")}</tbody></table>`;
     };
@@ -215,7 +215,11 @@ const kfLiveLab = (root, name, given) => {
         asked = JSON.stringify(question);
         ask(question);
       }
-      if (!result) return;
+      if (!result) {  // both take the room that they need later
+        status.textContent = `${runs} trajectories of ${steps} steps, seven filters: they are being designed and compared. The bound is being computed.`;
+        drawTable(state);
+        return;
+      }
       if (!result.finite) status.textContent = "With these numbers the trajectories themselves become infinite.";
       else
         status.textContent = `${runs} trajectories of ${steps} steps, seven filters designed and compared: ${Math.round(result.milliseconds)}${SPACE}ms. `
