@@ -57,7 +57,7 @@ class SmallStars(SphinxPostTransform):
 
 
 class InPlace(SphinxPostTransform):
-    """A figure that answers is read right after its still picture: its script runs before what stands below is seen, and moves."""
+    """A figure that answers is read right after its still picture: its script runs before what stands below is seen."""
 
     default_priority = 500
     formats = ("html",)

@@ -344,8 +344,9 @@ def test_a_link_to_what_is_folded_opens_the_fold(window):
     assert problems == []
 
 
-# Pages that moved by a fifth to a half of the screen while they were loaded: fonts came, formulas were typed wider than set.
-MOVED = ["notation", "architecture", "equations", "manual/d-fos"]
+# Pages that moved by a tenth to a half of the screen while they were loaded: fonts came, formulas were typed wider than set,
+# scripts filled what had no size.
+MOVED = ["notation", "architecture", "equations", "manual/d-fos", "live-lab", "live-track", "derive-it"]
 SHIFTS = """new PerformanceObserver((list) => {
     window.shifted = list.getEntries().reduce((sum, one) => sum + (one.hadRecentInput ? 0 : one.value), window.shifted ?? 0);
 }).observe({ type: "layout-shift", buffered: true })"""
@@ -353,14 +354,14 @@ SHIFTS = """new PerformanceObserver((list) => {
 
 @pytest.mark.parametrize("page", MOVED)
 def test_no_line_moves_while_a_page_is_loaded(browser, page):
-    """The limit is that of the web's own measure for a page that stands still."""
+    """A third of what the web's own measure allows a page that stands still; these moved by 0.0001 at most."""
     with browser.new_context(offline=True, viewport={"width": 1280, "height": 900}) as context:
         tab = context.new_page()
         tab.add_init_script(SHIFTS)
         tab.goto((HTML / f"{page}.html").as_uri())
         tab.evaluate("() => new Promise((seen) => requestAnimationFrame(() => requestAnimationFrame(seen)))")
         assert tab.evaluate("[...document.fonts].some((one) => one.family.includes('Ready Serif') && one.status === 'loaded')")
-        assert tab.evaluate("window.shifted ?? 0") < 0.1
+        assert tab.evaluate("window.shifted ?? 0") < 0.03
 
 
 def boxes(tab) -> float:
