@@ -11,10 +11,11 @@ import click
 from tqdm import tqdm
 
 from kfcourse.checks import sets
-from kfcourse.lab.variants import VariantError, chosen_variants, usable_variants
+from kfcourse.lab.variants import VariantError, chosen_variants, read_variants, usable_variants
 from kfcourse.notebooks.course_list import assign, save_assignment
 from kfcourse.notebooks.jobs import Job, Outcome, make, plan, run_all
 from kfcourse.notebooks.texts import clean
+from kfcourse.symbolic.jumping import JumpModel
 
 ASSIGNMENT = "assignment.csv"
 
@@ -39,6 +40,10 @@ def hand_out(
         variants, faults = usable_variants(variants_file)
     else:
         variants = {one.name: one for one in chosen_variants(names, bool(students and not names), variants_file)}
+    for one in variants.values():
+        one.plain("the exercises")  # said once, not for each set
+    if variants_file and (everything or not names):
+        _say_left_out(variants_file, bool(variants))
     if students:
         work = _for_students(kind, students, [*variants], wanted, out, variants_file, masters, with_pdf)
     else:
@@ -51,6 +56,16 @@ def hand_out(
     for fault in faults.values():
         click.echo(f"FAILED {clean(str(fault), 2000)}", err=True)
     return not (failed or faults)
+
+
+def _say_left_out(variants_file: Path, others: bool) -> None:
+    """Name the file's variants with modes, which nobody gets; ValueError if there are no others."""
+    jumping = [name for name, one in read_variants(variants_file)[0].items() if isinstance(one.model, JumpModel)]
+    said = f"jump between modes, for which the exercises are not made: {clean(', '.join(jumping), 500)}"
+    if not others:
+        raise ValueError(f"{variants_file} has no other variants than those that {said}")
+    if jumping:
+        click.echo(f"Left out, since they {said}\n")
 
 
 def _letters(given: str | None) -> list[str]:

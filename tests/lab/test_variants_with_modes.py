@@ -15,6 +15,8 @@ from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import JUMP_LAB, JumpStructures, title
 from kfcourse.lab.variants import VariantError, chosen_variants, equations, find_variant, read_variants
 from kfcourse.montecarlo.modes import recognised
+from kfcourse.notebooks import handing_out
+from kfcourse.notebooks.jobs import Outcome
 
 JUMPS = {name: one for name, one in read_variants()[0].items() if isinstance(one.model, JumpModel)}
 OWN = """
@@ -120,6 +122,25 @@ def test_where_nothing_knows_modes_it_is_said(tmp_path, own):
         assert "Traceback" not in result.output
     with pytest.raises(VariantError, match="jumps between modes"):
         find_variant("J1").plain("the exercises")
+
+
+def test_nobody_gets_a_variant_with_modes_and_it_is_said(tmp_path, own, monkeypatch):
+    monkeypatch.setattr(handing_out, "run_all", lambda work, *_: [Outcome(job, "written") for job in work])
+    (tmp_path / "list.csv").write_text("name,group\nA,1\nB,1\n")
+    command = ("exercises", "--variants", own, "--sets", "a", "--out", tmp_path / "e")
+    for whom in (["--all"], ["--students", tmp_path / "list.csv"]):
+        result = kfcourse(*command, *whom)
+        assert result.exit_code == 0 and re.search("Left out, since they jump between modes.*: mine\n", result.output)
+    assert "mine" not in (tmp_path / "e" / "assignment.csv").read_text()
+    named = kfcourse(*command, "--variant", "plain")
+    assert named.exit_code == 0 and "Left out" not in named.output
+    several = kfcourse("exercises", "--variants", own, "--sets", "a,b", "--out", tmp_path / "e", "--variant", "mine")
+    assert several.exit_code == 1 and several.output.count("jumps between modes") == 1
+
+    own.write_text(OWN.partition("[variants.plain]")[0])
+    for whom in (["--all"], ["--students", tmp_path / "list.csv"]):
+        result = kfcourse(*command, *whom)
+        assert result.exit_code == 1 and "no other variants than those that jump between modes" in result.output
 
 
 @pytest.mark.parametrize(
