@@ -92,7 +92,7 @@ def test_variants_are_listed_with_titles_and_equations(call):
     result = call("variants")
     assert result.exit_code == 0
     assert re.search(r"^ +53  multiplicative noises", result.output, re.MULTILINE)
-    assert "x' = c*x + e*v*x;  y = f*w*x**2 + g*x" in result.output
+    assert "x' = c*x + e*x*v;  y = g*x + f*x**2*w" in result.output  # as the file has them
     assert len(re.findall(r"x' = ", result.output)) >= 12
 
 

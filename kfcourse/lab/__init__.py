@@ -1,6 +1,6 @@
 """The lab: its variants, its filters by short name, whether a variant is well posed, figures and report.
 
-variants     `Variant`, read from variants.toml or a file like it
+variants     `Variant`, read from variants.toml or a file like it;  variant_tables: as it is written there
 admission    which filters a model admits, and why not
 families     what each family of filters is called, in both languages, and how it is drawn
 short_names  the lab's filters: "duof" -> how to build it, "DUOF" in tables;  checked_quadrature: where there are no formulas

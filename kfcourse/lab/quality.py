@@ -39,10 +39,12 @@ from kfcourse.lab.criteria import (
 )
 from kfcourse.lab.difficulty import Hardness, hardness
 from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_exact, title
-from kfcourse.lab.variants import FEWEST, RUNS, Variant
+from kfcourse.lab.variant_tables import RUNS
+from kfcourse.lab.variants import Variant
 from kfcourse.laws import Array, Gaussian
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.linear.system import is_linear
+from kfcourse.montecarlo.batches import FEWEST
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate

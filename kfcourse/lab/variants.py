@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from kfcourse.montecarlo.statistics import BATCHES
+from kfcourse.lab.variant_tables import SHIPPED, VariantError, on_a_line, read_tables, shipped
 from kfcourse.symbolic.jumping import JumpModel, model_of_table
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import shown
@@ -19,17 +17,7 @@ from kfcourse.symbolic.sense import nothing_random
 MODEL_KEYS = {"parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs", "interval", "angles"}
 JUMP_KEYS = {"modes", "transition", "first"}
 VARIANT_KEYS = {"title", "steps", "state", "meter"} | MODEL_KEYS | JUMP_KEYS
-SHIPPED = ("variants.toml", "tasks.toml", "jumps.toml")
 STEPS = 51  # of the lab, where a variant does not say another number
-
-RUNS = 40_000  # trajectories by which a variant is checked
-FEWEST = 2 * BATCHES  # that have standard errors
-MANY = 40  # names that a message lists
-LARGEST_FILE = 1_000_000  # bytes; thousands of variants.  /dev/zero never ends
-
-
-class VariantError(ValueError):
-    """A file of variants, or a variant in it, cannot be used; the message names the file and variant."""
 
 
 class VariantWarning(UserWarning):
@@ -85,7 +73,7 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
 
 def usable_variants(path: str | Path | None = None) -> tuple[dict[str, Variant], dict[str, VariantError]]:
     """What `load_variants` reads; and, by name, what is wrong with the others. VariantError as there."""
-    found, faults = read_variants(path, [*_shipped(SHIPPED[0])] if path is None else ())
+    found, faults = read_variants(path, [*shipped(SHIPPED[0])] if path is None else ())
     if not found:
         raise next(iter(faults.values()))
     return {name: one for name, one in found.items() if isinstance(one.model, Model)}, faults
@@ -103,53 +91,15 @@ def read_variants(
     VariantError
         The file is missing or not TOML, or has no variant of such a name.
     """
-    where, tables = _tables(path)
-    if unknown := [name for name in names if name not in tables]:
-        raise VariantError(f"no variant {', '.join(map(repr, unknown))}; there are {_listed(list(tables))}")
+    where, tables = read_tables(path, names)
     found: dict[str, Variant] = {}
     faults: dict[str, VariantError] = {}
-    for name in dict.fromkeys(names) or tables:
+    for name, table in tables.items():
         try:
-            found[name] = read_variant(name, tables[name], where)
+            found[name] = read_variant(name, table, where)
         except VariantError as error:
             faults[name] = error
     return found, faults
-
-
-def _listed(names: list[str]) -> str:
-    return ", ".join(names if len(names) <= MANY else [*names[:MANY], f"... ({len(names)} in all)"])
-
-
-def _shipped(file: str) -> dict[str, Any]:
-    text = (resources.files("kfcourse.lab") / file).read_text(encoding="utf-8")
-    return dict(tomllib.loads(text)["variants"])
-
-
-def _tables(path: str | Path | None) -> tuple[str, dict[str, Any]]:
-    """What a file is called in messages, and its tables."""
-    if path is None:
-        return "the shipped variants", {name: table for file in SHIPPED for name, table in _shipped(file).items()}
-    where = str(path)
-    try:
-        with Path(path).open("rb") as file:
-            content = file.read(LARGEST_FILE + 1)
-        if len(content) > LARGEST_FILE:
-            raise VariantError(f"{where} has more than {LARGEST_FILE:,} bytes: it is no file of variants; check the path")
-        text = content.decode("utf-8-sig").replace("\r\n", "\n")
-    except FileNotFoundError:
-        raise VariantError(f"no file of variants at {where}; check the path") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise VariantError(f"{where} cannot be read: {error}") from None
-    try:
-        tables = tomllib.loads(text).get("variants")
-    except tomllib.TOMLDecodeError as error:
-        raise VariantError(f"{where} is not valid TOML: {error}") from None
-    except (ValueError, RecursionError) as error:
-        what = "lists in too many lists" if isinstance(error, RecursionError) else "a number of thousands of digits"
-        raise VariantError(f"{where} holds {what}, and is not read; no variant needs that") from None
-    if not isinstance(tables, dict) or not tables:
-        raise VariantError(f'{where} has no variants; it needs tables such as [variants.53] with state = "..." and meter = "..."')
-    return where, tables
 
 
 def read_variant(name: str, table: Any, where: str) -> Variant:
@@ -176,8 +126,7 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
     for mode in model.modes if isinstance(model, JumpModel) else (model,):
         if problem := nothing_random(mode):
             raise VariantError(f"{prefix}{problem}")
-    title = "".join(c if c.isprintable() else " " for c in str(table.get("title", "")))
-    return Variant(name, " ".join(title.split()), model, steps, dict(table))
+    return Variant(name, on_a_line(str(table.get("title", ""))), model, steps, dict(table))
 
 
 def find_variant(name: str, path: str | Path | None = None) -> Variant:
@@ -196,18 +145,3 @@ def chosen_variants(names: Sequence[str], everything: bool, path: str | Path | N
     for fault in faults.values():
         raise fault
     return list(found.values())
-
-
-def equations(model: Model | JumpModel) -> str:
-    """The equations on a line; of a model with modes what differs on one for each, too."""
-    if isinstance(model, JumpModel):
-        own = [key for key in model.modes[0].parameters if len({mode.parameters[key] for mode in model.modes}) > 1]
-        formulas = [equations(mode) for mode in model.modes]
-        common = [formulas[0]] if len(set(formulas)) == 1 else []
-        values = [[f"{key} = {float(mode.parameters[key]):g}" for key in own] for mode in model.modes]
-        each = [[*([] if common else [formula]), *said] for formula, said in zip(formulas, values, strict=True)]
-        return "\n        ".join(
-            [*common, *(f"{name}: {';  '.join(said)}" for name, said in zip(model.names, each, strict=True))]
-        )
-    state, meter = (", ".join(map(str, one)) for one in (model.state_equation, model.meter_equation))
-    return f"x' = {state};  y = {meter}"

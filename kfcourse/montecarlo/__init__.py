@@ -2,6 +2,7 @@
 
 widths        how wide to draw their initial states
 ensemble      the trajectories that a seed stands for, drawn in blocks
+batches       how an ensemble is cut
 designing     coefficients of DUOF, FOS, MFOS: regressions over an ensemble
 experiment    `run`, `predictions`, `compare`: splits the seed into designing and comparing, runs all filters together
 blocks        one block of trajectories: all filters advance together

@@ -23,6 +23,7 @@ import sympy as sp
 from kfcourse.angles import on_circle
 from kfcourse.laws import Array, Gaussian, normalised_square, square_root
 from kfcourse.linear.runs import Trajectories
+from kfcourse.montecarlo.batches import STRATA
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.compiled import function, is_scalar, load
 from kfcourse.symbolic.equations import compile_model
@@ -33,7 +34,6 @@ from kfcourse.symbolic.model import Model
 # arrays short enough for the processor's caches.
 BLOCK, SMALL_BLOCK = 100_000, 16_384
 STEPS_AT_ONCE = 4  # steps drawn by one call: few calls, and little memory over the whole ensemble
-STRATA = 16  # initial states of a set that share the law out among them: a batch of the slow filters
 
 
 class Instant(NamedTuple):

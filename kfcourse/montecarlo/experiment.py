@@ -23,13 +23,14 @@ from kfcourse.filters.designed import Design
 from kfcourse.filters.fused import Fused, fuse
 from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, stacked
+from kfcourse.montecarlo.batches import BATCHES, batch_sizes
 from kfcourse.montecarlo.blocks import progress_bar, run_block, run_stretches
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite, design, design_together
 from kfcourse.montecarlo.ensemble import STEPS_AT_ONCE, Ensemble, workers
 from kfcourse.montecarlo.parallel import Cluster, cluster, cores
 from kfcourse.montecarlo.slow_filters import LEAST, run_slow_filters
-from kfcourse.montecarlo.statistics import BATCHES, Sums, batch_sizes
+from kfcourse.montecarlo.statistics import Sums
 from kfcourse.montecarlo.two_phase import Replicas
 from kfcourse.montecarlo.widths import best_width
 from kfcourse.reasons import Reason

@@ -22,9 +22,10 @@ from tqdm import tqdm
 from kfcourse.filters.base import Filter
 from kfcourse.laws import Array
 from kfcourse.limits import OutOfTime, memory_limit, time_limit
+from kfcourse.montecarlo.batches import STRATA
 from kfcourse.montecarlo.blocks import Failed, TooMuch, progress_bar, run_block
 from kfcourse.montecarlo.comparison import EXACT, SlowPart
-from kfcourse.montecarlo.ensemble import STRATA, Ensemble, Instant, Serial
+from kfcourse.montecarlo.ensemble import Ensemble, Instant, Serial
 from kfcourse.montecarlo.parallel import START, Cluster, Submit, may_start, one_thread, processes
 from kfcourse.montecarlo.statistics import Sums
 

@@ -15,9 +15,6 @@ import numpy as np
 import scipy
 
 from kfcourse.laws import CONFIDENCE, Array, Gaussian, normalised_square
-from kfcourse.montecarlo.ensemble import STRATA
-
-BATCHES = 128  # standard errors from 128 batches are themselves good to 6 %
 
 
 @dataclass(frozen=True)
@@ -121,13 +118,6 @@ def ratio(numerator: Array, denominator: Array, of_zero: Array | float) -> Array
     """numerator / denominator, and `of_zero` where the denominator is not positive."""
     shape = np.broadcast_shapes(np.shape(numerator), np.shape(denominator))
     return np.divide(numerator, denominator, out=np.broadcast_to(of_zero, shape).astype(float), where=denominator > 0)
-
-
-def batch_sizes(runs: int, batches: int) -> Array:
-    """Sizes of about so many batches, nearly equal; of whole sets of `STRATA` trajectories if there are many."""
-    whole = STRATA if runs >= 8 * STRATA else 1
-    inner = np.linspace(0, runs, min(batches, max(runs // whole, 1)) + 1)[1:-1].astype(int) // whole * whole
-    return np.diff(np.concatenate([[0], np.unique(inner[inner > 0]), [runs]]))
 
 
 @dataclass(frozen=True)

@@ -31,11 +31,12 @@ from kfcourse.lab.criteria import (
 )
 from kfcourse.lab.difficulty import Hardness, hardness, nonlinearity
 from kfcourse.lab.grammar import DRIFT, FORCE, METER_NOISE, OBJECT_NOISE, SIGNAL, VECTOR_METERS, generate, propose
-from kfcourse.lab.quality import FEWEST, Quality, examine, examine_all, table
+from kfcourse.lab.quality import Quality, examine, examine_all, table
 from kfcourse.lab.short_names import LAB, Structures
 from kfcourse.lab.variants import STEPS, VariantError, read_variant
 from kfcourse.laws import Gaussian
 from kfcourse.linear.system import is_linear
+from kfcourse.montecarlo.batches import FEWEST
 from kfcourse.montecarlo.ensemble import simulate
 
 SHIPPED = load_variants()

@@ -13,7 +13,8 @@ from kfcourse import JumpModel, cli, load_variants, simulate
 from kfcourse.filters import jump_pointmass, logic_dynamic
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import JUMP_LAB, JumpStructures, title
-from kfcourse.lab.variants import VariantError, chosen_variants, equations, find_variant, read_variants
+from kfcourse.lab.variant_tables import summary
+from kfcourse.lab.variants import VariantError, chosen_variants, find_variant, read_variants
 from kfcourse.montecarlo.modes import recognised
 from kfcourse.notebooks import handing_out
 from kfcourse.notebooks.jobs import Outcome
@@ -94,10 +95,13 @@ def test_the_lab_compares_filters_and_tells_the_share_of_right_modes(tmp_path, o
 def test_listed_and_checked(own):
     listed = kfcourse("variants", "--variant", "J1").output
     assert listed.count("x' = ") == 1 and "        sound: C = 1\n        faulty: C = 10\n" in listed
-    two = JumpModel.define(
-        "x + v", "x + w", modes={"sound": {}, "cubic": {"meter": "x**3 + w"}}, transition=[[0.9, 0.1], [0, 1]], first=[1, 0]
-    )
-    assert equations(two) == "sound: x' = v + x;  y = w + x\n        cubic: x' = v + x;  y = w + x**3"
+    modes = {"sound": {}, "cubic": {"meter": "x**3 +\n C*w", "parameters": {"C": 2}}}
+    table = {"state": "x + v", "meter": ["x + C*w"], "parameters": {"C": 1, "T": 1}, "modes": modes}
+    assert summary("two", table).split("\n") == [
+        "   two  no title",
+        "        sound: x' = x + v;  y = x + C*w;  C = 1",
+        "        cubic: x' = x + v;  y = x**3 + C*w;  C = 2",
+    ]
     checked = kfcourse("variants", "--variants", own, "--variant", "mine", "--check", "--runs", 256)
     assert checked.exit_code == 0 and "has 2 modes: only whether it is bounded is checked" in checked.output
 

@@ -14,11 +14,12 @@ from kfcourse.filters.exact.pointmasses import pointmass
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.optimal_structure import fos, mfos
 from kfcourse.laws import Gaussian
+from kfcourse.montecarlo.batches import BATCHES
 from kfcourse.montecarlo.comparison import Comparison, SlowPart
 from kfcourse.montecarlo.ensemble import BLOCK, Ensemble
 from kfcourse.montecarlo.experiment import compare, run
 from kfcourse.montecarlo.slow_filters import BATCH
-from kfcourse.montecarlo.statistics import BATCHES, Sums, batch_mean
+from kfcourse.montecarlo.statistics import Sums, batch_mean
 from kfcourse.scenarios.benchmarks import growth_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import gaussian, linearised
