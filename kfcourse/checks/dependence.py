@@ -77,7 +77,8 @@ class Sensitivity:
             try:
                 other = change(arguments[place])
                 values = [*arguments[:place], other, *arguments[place + 1 :]]
-                right, mine = ([np.asarray(part, float) for part in self._parts(answer, values)] for answer in self.answers)
+                with np.errstate(divide="raise", invalid="raise"):  # not into LAPACK, which complains on the terminal
+                    right, mine = ([np.asarray(part, float) for part in self._parts(one, values)] for one in self.answers)
             except (OutOfTime, KeyboardInterrupt):
                 raise
             except BaseException:  # as above

@@ -127,6 +127,8 @@ def told(error: BaseException) -> str:
         text += " (functions of symbols are sp.sin, sp.exp, ..., not those of math or NumPy)"
     elif "NDimArray" in text or "to Python scalars" in text:
         text += " (functions of arrays are np.sin, np.exp, ..., not those of math or SymPy)"
+    elif isinstance(error, np.linalg.LinAlgError) and "did not converge" in text:
+        text += " (is there NaN or infinity in what it was given?)"
     elif isinstance(error, TypeError) and "for ^:" in text:
         text += " (a power is **)"
     own = [frame for frame in _frames(error) if not _foreign(frame)]

@@ -113,3 +113,11 @@ def test_negative_variances_are_no_news_where_the_right_answer_has_them():
     for answer in (lambda P: -3 * P, lambda P: -P - np.eye(3)):
         assert "negative-variance" not in outcome(DIFFERENCE, answer).diagnosis
     assert "negative-variance" in outcome(CARRIED, lambda A, P: A @ P @ A.T - 50 * P).diagnosis
+
+
+def test_what_is_not_finite_does_not_reach_lapack(capfd):
+    """It complains on the terminal, past Python."""
+    fitted = asks(lambda a: np.linalg.lstsq(np.log([[3 - a, 2], [2, 1]]), [1, 2])[0], [(np.float64(0.5),), (np.float64(2.0),)])
+    wrong = outcome(fitted, lambda a: np.array([1.0, 2.0]))
+    assert wrong.diagnosis == ("unused",)
+    assert capfd.readouterr() == ("", "")

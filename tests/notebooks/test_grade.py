@@ -372,13 +372,20 @@ def test_another_variant_is_noticed_and_does_not_count(graded_here):
     assert found.variant == "53"
 
 
+@pytest.mark.parametrize("line", ["task = Own()", "task.check = print", "task = exercise2"])
+def test_a_task_of_the_students_own_is_noticed(graded_here, line):
+    stands_in = "class Own: ...\nOwn.check = print\nexercise2 = task\nif 0: "
+    assert graded_here(add(solved(), stands_in + line, "def gain"))[2] == f"look at cell 4: if 0: {line}"
+
+
 def test_taking_the_answer_is_noticed(graded_here):
     assert "(gain): return task.questions['b1'].answer(task)(Psi, G, F)" in graded_here(takes_the_answer())[2]
 
 
 def test_an_error_is_reported_by_cell(graded_here):
-    _, marks, note = graded_here(syntax())
+    found, marks, note = graded_here(syntax())
     assert marks == ("not run", "unusable")
+    assert found.told["b1"].says == "not run. NameError: name 'gain' is not defined"
     number = place(syntax(), "def gain")
     assert f"cell {number} (gain): SyntaxError" in note
     assert "b1: NameError: name 'gain' is not defined" in note
@@ -389,6 +396,7 @@ def test_an_endless_loop_is_ended(graded):
     assert marks == ("passed", "not run")
     number = place(loops(), "import time")
     assert note == f"cell {number}: still running after {SECONDS} s"
+    assert f"not run. {note}" in graded.table["loops"]["details"]
 
 
 def test_a_dead_kernel_is_reported_and_its_children_are_ended(graded):

@@ -184,11 +184,15 @@ class Marking:
             except Stopped as reason:
                 if isinstance(reason, Ended):  # what would have come is not known
                     self.marks |= {name: NOT_GRADED for name, mark in self.marks.items() if mark == NOT_RUN}
+                for name, mark in self.marks.items():
+                    if mark == NOT_RUN:
+                        self._not_run(name, f"{step.where}: {reason}")
                 return [f"{'look: ' * isinstance(reason, Ended)}{step.where}: {reason}"]
             if ran.error and (step.own or "import " in step.source) and ran.error[0] != "NotImplementedError":
                 self.errors.append(clean(f"{step.where}: {': '.join(ran.error)}"))
             for name in step.questions:
                 if ran.error:
+                    self._not_run(name, ": ".join(ran.error))
                     self._reason(": ".join(ran.error), name)
                 elif name in ran.answers and name in self.marks:
                     self._check(name, kernel, ran.answers[name])
@@ -217,6 +221,11 @@ class Marking:
         elif result.status == WRONG and result.diagnosis:
             self._reason(", ".join(result.diagnosis), name)
 
+    def _not_run(self, name: str, reason: str) -> None:
+        """Say in the student's feedback where the notebook stopped."""
+        if name in self.marks:
+            self.results[name] = Result(name, self._exercise.questions[name].title, NOT_RUN, clean(f"not run. {reason}", 300))
+
     def _not_graded(self, name: str, reason: str) -> None:
         title = self._exercise.questions[name].title
         self.results[name], self.marks[name] = Result(name, title, NOT_GRADED, LOOKED_AT), NOT_GRADED
@@ -235,7 +244,8 @@ class Marking:
 
 
 STRANGE = re.compile(
-    r"✓|kfcourse|\.questions\b|\.structures\b|_getframe|currentframe|__code__|__traceback__|\.hidden|__setattr__"
+    r"✓|\btask(\.\w+)?\s*=(?!=|\s*exercise\()"  # checks of one's own: here others count
+    r"|kfcourse|\.questions\b|\.structures\b|_getframe|currentframe|__code__|__traceback__|\.hidden|__setattr__"
 )
 
 
