@@ -1,9 +1,9 @@
-"""Compiled steps of filters of scalar models: one loop over trajectories for several steps, and one that finds coefficients.
+"""Compiled steps of filters of scalar models.
 
-The loops are printed from `Filter.printed`, the equations that the chapters derive, with the formulas of the structural functions
-put in.  NumPy passes over the ensemble once for each operation; a loop passes once for all of them.  In two places the equations
-are computed as `laws.correct` does, not as they are printed: p = Psi R / F, which is never negative, and the gain of a meter that
-cannot vary is 0.
+A step is a loop over trajectories, printed from `Filter.printed`, the equations that the chapters derive, with the formulas of
+the structural functions put in; `loops` calls it, step by step.  NumPy passes over the ensemble once for each operation; a loop
+passes once for all of them.  In two places the equations are computed as `laws.correct` does, not as they are printed:
+p = Psi R / F, which is never negative, and the gain of a meter that cannot vary is 0.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from importlib import import_module
 from itertools import chain
 from typing import Any, NamedTuple, TypeVar
 
@@ -78,13 +79,17 @@ def _or_warning(one: Filter | Design, compile: Callable[[], T]) -> T | None:
 
 
 class Loops(NamedTuple):
-    """The loops of a filter: several steps with their sums, and of a design several steps that find their coefficients."""
+    """The printed loops of a filter: its step; of a design also the sums for its regressions, and what comes after them."""
 
     parameters: list[float]
     regressions: int
-    advance: Callable[..., None]
-    design: Any  # the loop; None without regressions
+    text: str
     one_for_all: bool  # p is the residual of the first regression
+
+    @property
+    def compiled(self) -> Any:
+        """Their module: `step`, and of a design `sums` and `after`."""
+        return compiled.load(self.text)
 
     def table(self, coefficients: Array) -> Array:
         """What the loops take as constants of each step, (steps, m): parameters, and coefficients (steps, regressions, 3)."""
@@ -102,6 +107,13 @@ class Fused(Design):
         """What the loop works on: a table with room for the coefficients, and lambda and Psi before the first step, (2, runs)."""
         law = np.array(_law(self.init(1).predicted))
         return self.program.table(np.zeros((steps, self.program.regressions, 3))), np.tile(law, runs)
+
+    def find(self, table: Array, y: Array, x: Array, lam: Array, Psi: Array) -> None:
+        """Coefficients of steps with y (K, N) and x (K + 1, N): into the table; lambda and Psi (N,) are those after them."""
+        from kfcourse.filters import loops
+
+        own, program = self.program.compiled, self.program
+        loops.design(own.sums, own.after, len(program.parameters), program.regressions, table, y, x, lam, Psi)
 
     def fitted(self, table: Array) -> Filter:
         """The filter with the coefficients of a table."""
@@ -148,9 +160,11 @@ class Steps:
         Into the sums (5, K, B) goes what `montecarlo.Sums.record` keeps of the errors of states x (K, N), of batches that begin
         at starts[:-1] and end at starts[1:].  The posterior is found in the room (2, N); with room for a batch only, it is not.
         """
+        from kfcourse.filters import loops
+
         program, k, after = self.program, state.step, np.empty((2, len(weight)))
         constants = self.table[k : k + len(y)] if program.regressions else self.table.repeat(len(y), axis=0)
-        program.advance(constants, y, x, weight, starts, *_law(state.predicted), *after, *room, *sums)
+        loops.advance(program.compiled.step, constants, y, x, weight, starts, *_law(state.predicted), *after, *room, *sums)
         residual = len(program.parameters) + 2
         p = constants[-1:, residual : residual + 1] if program.one_for_all else room[1][:, None, None]
         posterior, predicted = Gaussian(room[0][:, None], p), Gaussian(after[0][:, None], after[1][:, None, None])
@@ -163,6 +177,29 @@ def _law(predicted: Gaussian) -> tuple[Array, Array]:
     return mean, Psi if len(Psi) == len(mean) else np.full(len(mean), Psi.item())
 
 
+# The sums of a comparison, those that `Sums.record` keeps; weight and x of each trajectory.  The largest square is found among
+# whole numbers: their order is that of floats that are not negative.
+_OF_ERRORS = compiled.Totals(
+    ["x", "weight", "totals"],
+    "error, square, variance, quotient, most = 0.0, 0.0, 0.0, 0.0, np.int64(0)",
+    [
+        "e = x[i] - mean",
+        "term = weight[i] * e * e",
+        "error += weight[i] * e",
+        "square += term",
+        "variance += weight[i] * cov",
+        "quotient += term / (cov if term > 0 else 1.0)",
+        "most = max(most, np.float64(term).view(np.int64))",
+    ],
+    "totals[0], totals[1], totals[2], totals[3], totals[4] = error, square, variance, quotient, np.int64(most).view(np.float64)",
+)
+# The sums of a regression: of deviations from two numbers, and of their products.
+_OF_PAIRS = compiled.Totals(
+    ["near", "totals"],
+    "t, r, dt, dr, tt, tr, rr = near[0], near[1], 0.0, 0.0, 0.0, 0.0, 0.0",
+    ["d, e = target - t, regressor - r", "dt += d", "dr += e", "tt += d * d", "tr += d * e", "rr += e * e"],
+    "totals[0], totals[1], totals[2], totals[3], totals[4] = dt, dr, tt, tr, rr",
+)
 _PRINTED: dict[tuple[object, ...], Loops] = {}  # by all that they are printed from
 
 
@@ -177,29 +214,32 @@ def _program(one: Filter | Design, printed: Equalities) -> Loops:
 
 
 def _printed(one: Filter | Design, printed: Equalities) -> Loops:
-    """Print, compile and load all loops of a filter."""
-    from kfcourse.filters import loops
-
+    """Print, compile and load the loops of a filter."""
+    import_module("kfcourse.filters.loops")  # now, with the warning of what cannot be compiled
     groups, fits = stages(printed, _rules(one, printed))
     # A residual without a letter has a name: the number of a nameless Dummy would make another text, compiled anew, each time.
     residuals = [sp.Dummy(f"T{i}") for i in range(len(fits))]
     rules, found = list(chain(*groups)), [[*fit.found, own][:3] for fit, own in zip(fits, residuals, strict=True)]
     letters, known = {left for left, _ in rules}, {"y": _Y, "lam": _LAM, "Psi": _PSI}
-    made = [_Z, _P if _P in letters else found[0][2], _LAM_NEXT, _PSI_NEXT if _PSI_NEXT in letters else found[-1][2]]
-    constants, texts = [*one.model.values, *chain(*found)], list[str]()
+    after = {"lam": _LAM_NEXT, "Psi": _PSI_NEXT if _PSI_NEXT in letters else found[-1][2]}
+    posterior = {"z": _Z, "p": _P if _P in letters else found[0][2]}
+    constants, parameters = [*one.model.values, *chain(*found)], len(one.model.values)
 
-    def add(name: str, given: dict[str, sp.Symbol], wanted: list[sp.Symbol], constants: list[sp.Symbol]) -> None:
-        outputs = {f"made{i}": letter for i, letter in enumerate(wanted)}
-        texts.append(compiled.function(name, given, outputs, constants, needed(rules, wanted)))
+    def made(arrays: dict[str, sp.Symbol], count: int) -> compiled.Pass:
+        return compiled.Pass(arrays, constants[:count], needed(rules, arrays.values()))
 
-    add("step", known, made, constants)
-    texts.append(loops.advance(len(constants)))
-    parameters = len(one.model.values)
-    for i, fit in enumerate(fits):
-        add(f"pair{i}", {**known, "x": _X, "x_next": _NEXT}, [fit.target, fit.regressor], constants[: parameters + 3 * i])
-    texts += [loops.design(parameters, len(fits))] if fits else []
-    module = compiled.load(*texts)
-    return Loops([], len(fits), module.advance, getattr(module, "design", None), _P not in letters)
+    step = made({**after, **posterior}, len(constants))._replace(summed={"mean": posterior["z"], "cov": posterior["p"]})
+    text = compiled.loop("step", known, step._replace(totals=_OF_ERRORS), passed=True)
+    if fits:
+        text += compiled.loop("after", known, made(after, len(constants)), passed=True)
+        passes = list[compiled.Pass]()
+        for i, fit in enumerate(fits):
+            pair = {"target": fit.target, "regressor": fit.regressor}
+            passes.append(made(pair, parameters + 3 * i)._replace(made={}, summed=pair, totals=_OF_PAIRS))
+        text += compiled.choice("sums", {**known, "x": _X, "x_next": _NEXT}, passes)
+    program = Loops([], len(fits), text, _P not in letters)
+    assert program.compiled
+    return program
 
 
 def _rules(one: Filter | Design, printed: Equalities) -> list[Rule]:

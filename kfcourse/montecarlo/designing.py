@@ -88,7 +88,7 @@ def design_together(
         for future in running:
             future.result()
         first, end = end, end + len(y)
-        running = [pool.submit(one.program.design, table[first:end], y, x, *law) for one, table, law in work]
+        running = [pool.submit(one.find, table[first:end], y, x, *law) for one, table, law in work]
     for future in running:
         future.result()
     return [one.fitted(table) for one, table, _ in work if np.isfinite(table).all()]

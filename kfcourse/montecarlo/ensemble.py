@@ -25,7 +25,7 @@ from kfcourse.laws import Array, Gaussian, normalised_square, square_root
 from kfcourse.linear.runs import Trajectories
 from kfcourse.montecarlo.batches import STRATA
 from kfcourse.seeds import Seed, seed_number
-from kfcourse.symbolic.compiled import function, is_scalar, load
+from kfcourse.symbolic.compiled import Pass, is_scalar, load, loop
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -264,8 +264,9 @@ class _CompiledSimulator:
 
     def fill(self, x: Array, y: Array, here: slice, v: Array, w: Array) -> None:
         """x[1:] and y of some trajectories from their x[0] and noises (K, n, r)."""
-        noises = (np.ascontiguousarray(one[:, :, i]) for one in (v, w) for i in range(one.shape[2]))
-        self.loop(self.constants, here.start, here.stop, x, y, *noises)
+        noises = [np.ascontiguousarray(one[:, :, i]) for one in (v, w) for i in range(one.shape[2])]
+        for k, row in enumerate(y):
+            self.loop(self.constants, x[k, here], *(one[k] for one in noises), row[here], x[k + 1, here])
 
 
 @lru_cache(maxsize=256)
@@ -273,11 +274,8 @@ def _simulation(
     x: sp.Symbol, noises: tuple[sp.Symbol, ...], constants: tuple[sp.Symbol, ...], y: sp.Expr, x_next: sp.Expr
 ) -> Any:
     """The loop of the two equations."""
-    from kfcourse.filters import loops
-
     given = {"x": x} | {f"noise{i}": one for i, one in enumerate(noises)}
-    text = function("model", given, {"y": y, "next": x_next}, constants)
-    return load(text, loops.simulate(len(noises), len(constants))).simulate
+    return load(loop("model", given, Pass({"y": y, "x_next": x_next}, constants))).model
 
 
 class _JumpSimulator:

@@ -2,7 +2,7 @@
 
 ::
 
-    loop("step", {"y": y, "z": z}, {"next": a*z + g*y}, [a, g])
+    loop("step", {"y": y, "z": z}, Pass({"next": a*z + g*y}, [a, g]))
 
 prints a function of one pass over an ensemble of scalars,
 
@@ -10,9 +10,8 @@ prints a function of one pass over an ensemble of scalars,
 
     step(c, y, z, next):    for each i:  next[i] from y[i], z[i] and the constants c,
 
-where NumPy needs a pass for each operation; it returns how many entries of the first array are missing (NaN).  The text is kept
-as a module in the user's cache, where numba keeps the machine code beside it: a function made in memory would be compiled anew
-by every process.
+where NumPy needs a pass for each operation.  The text is kept as a module in the user's cache, where numba keeps the machine
+code beside it: a function made in memory would be compiled anew by every process.
 """
 
 from __future__ import annotations
@@ -25,7 +24,9 @@ from functools import lru_cache
 from hashlib import sha256
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from textwrap import indent
 from types import ModuleType
+from typing import NamedTuple
 
 import sympy as sp
 from sympy.core.relational import Relational
@@ -37,12 +38,13 @@ from kfcourse.symbolic.model import Model
 
 REMEDY = "compiled=True needs numba: pip install 'kfcourse[fast]', or leave it out"
 NAN = sp.Symbol("nan")  # what a formula gives where it has no value
-OPTIONS = 'cache=True, nogil=True, error_model="numpy"'  # of a function that Python calls
-INNER = 'error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True'  # of one that only compiled functions call
+_CALLED = '@njit("void({})", cache=True, nogil=True, error_model="numpy")'  # by Python
+# By compiled functions, which get its address; sums may be taken in any order, so that the processor adds eight terms at once.
+_PASSED = '@cfunc("void({})", cache=True, error_model="numpy", fastmath={{"reassoc", "nsz"}})'
 _HEADER = '''"""Printed by kfcourse.symbolic.compiled; it may be removed at any time."""
 
 import numpy as np
-from numba import njit
+from numba import cfunc, njit
 
 nan = np.nan
 '''
@@ -77,60 +79,81 @@ class _Printer(NumbersPrinter):
         return f"min({', '.join(map(self._print, expr.args))})"
 
 
-def loop(
-    name: str,
-    given: Mapping[str, sp.Symbol],
-    made: Mapping[str, sp.Expr],
-    constants: Sequence[sp.Symbol],
-    definitions: Mapping[sp.Symbol, sp.Expr] | None = None,
-) -> str:
-    """A function `name(c, given arrays, made arrays)` of one loop over their entries, as text; it counts the first array's NaN.
+class Totals(NamedTuple):
+    """Sums that a loop takes on its way, as text: names of arrays for it, and what is done before, at each entry i, and after."""
+
+    arrays: Sequence[str]
+    before: str
+    each: Sequence[str]
+    after: str
+
+
+class Pass(NamedTuple):
+    """What one pass over arrays makes.
+
+    Attributes
+    ----------
+    made : dict
+        Name of an array, (N,), to the expression that is written into it, which may be an array that is given.
+    constants : sequence of Symbol
+        Numbers that are the same for all entries: the first of the array c, in this order.
+    definitions : dict
+        Auxiliary symbols that the expressions may use.
+    summed : dict
+        Name to expression, of numbers that go into the totals only.
+    totals : Totals, optional
+    """
+
+    made: Mapping[str, sp.Expr]
+    constants: Sequence[sp.Symbol]
+    definitions: Mapping[sp.Symbol, sp.Expr] = {}
+    summed: Mapping[str, sp.Expr] = {}
+    totals: Totals = Totals([], "", [], "")
+
+
+def loop(name: str, given: Mapping[str, sp.Symbol], one: Pass, *, passed: bool = False) -> str:
+    """A function `name(c, given arrays, made arrays, arrays of the totals)` of one loop over their entries, as text.
 
     Parameters
     ----------
     name : str
-    given, made : dict
-        Name of an array, (N,), to the symbol of its entries, and to the expression that is written into it.
-    constants : sequence of Symbol
-        Numbers that are the same for all entries: those of the array c, in this order.
-    definitions : dict, optional
-        Auxiliary symbols that the expressions may use.
+    given : dict
+        Name of an array, (N,), to the symbol of its entries.
+    one : Pass
+    passed : bool
+        Whether it is for other compiled functions to call, and not for Python.
     """
-    outputs = {key: sp.ImmutableMatrix([value]) for key, value in made.items()}
-    return printed(lambda program: _text(name, given, program, constants), outputs, (), definitions or {})
+    return _function(name, ["c"], given, one, _PASSED if passed else _CALLED) + _body(given, one)
 
 
-def _text(name: str, given: Mapping[str, sp.Symbol], program: Program, constants: Sequence[sp.Symbol]) -> str:
-    used, assignments, values = _assignments(program, constants, {f"{array}_i": one for array, one in given.items()})
-    arrays = [*given, *values]
-    lines = [f"    c{i} = c[{i}]  # {one}" for i, one in enumerate(constants) if one in used]
-    lines += ["    missing = 0", f"    for i in range(len({arrays[0]})):", f"        missing += {arrays[0]}[i] != {arrays[0]}[i]"]
-    lines += [f"        {array}_i = {array}[i]" for array, one in given.items() if one in used]
+def choice(name: str, given: Mapping[str, sp.Symbol], passes: Sequence[Pass]) -> str:
+    """A function `name(number, c, ...)` of several loops on arrays of the same names, for others to call; the number says which."""
+    cases = "".join(f"    if number == {i}:\n{indent(_body(given, one), '    ')}" for i, one in enumerate(passes))
+    return _function(name, ["number", "c"], given, passes[0], _PASSED) + cases
+
+
+def _function(name: str, first: list[str], given: Mapping[str, sp.Symbol], one: Pass, decorator: str) -> str:
+    names = [*first, *{**given, **one.made}, *one.totals.arrays]
+    signature = ", ".join("int64" if one == "number" else "float64[::1]" for one in names)
+    return f"\n\n{decorator.format(signature)}\ndef {name}({', '.join(names)}):\n"
+
+
+def _body(given: Mapping[str, sp.Symbol], one: Pass) -> str:
+    outputs = {made: sp.ImmutableMatrix([value]) for made, value in {**one.made, **one.summed}.items()}
+    return printed(lambda program: _text(given, program, one), outputs, (), one.definitions)
+
+
+def _text(given: Mapping[str, sp.Symbol], program: Program, one: Pass) -> str:
+    used, assignments, values = _assignments(program, one.constants, {f"{array}_i": entry for array, entry in given.items()})
+    lines = [f"    c{i} = c[{i}]  # {letter}" for i, letter in enumerate(one.constants) if letter in used]
+    lines += [f"    {one.totals.before}"] if one.totals.before else []
+    lines += [f"    for i in range(len({next(iter(given))})):"]
+    lines += [f"        {array}_i = {array}[i]" for array, entry in given.items() if entry in used]
     lines += [f"        {line}" for line in assignments]
-    lines += [f"        {output}[i] = {value}" for output, value in values.items()]
-    lines += ["    return missing"]
-    signature = ", ".join(["float64[::1]"] * (1 + len(arrays)))
-    return "\n".join([f'\n\n@njit("int64({signature})", {OPTIONS})', f"def {name}(c, {', '.join(arrays)}):", *lines, ""])
-
-
-def function(
-    name: str,
-    given: Mapping[str, sp.Symbol],
-    made: Mapping[str, sp.Expr],
-    constants: Sequence[sp.Symbol],
-    definitions: Mapping[sp.Symbol, sp.Expr] | None = None,
-) -> str:
-    """A function `name(c, given numbers) -> made numbers` of one trajectory, as text, for a loop to call; see `loop`."""
-    outputs = {key: sp.ImmutableMatrix([value]) for key, value in made.items()}
-    return printed(lambda program: _numbers(name, given, program, constants), outputs, (), definitions or {})
-
-
-def _numbers(name: str, given: Mapping[str, sp.Symbol], program: Program, constants: Sequence[sp.Symbol]) -> str:
-    used, assignments, values = _assignments(program, constants, given)
-    lines = [f"    c{i} = c[{i}]  # {one}" for i, one in enumerate(constants) if one in used]
-    lines += [f"    {line}" for line in assignments]
-    lines += [f"    return {', '.join(values.values())}"]
-    return "\n".join([f"\n\n@njit({INNER})", f"def {name}(c, {', '.join(given)}):", *lines, ""])
+    lines += [f"        {output}{'[i]' if output in one.made else ''} = {value}" for output, value in values.items()]
+    lines += [f"        {line}" for line in one.totals.each]
+    lines += [f"    {one.totals.after}"] if one.totals.after else []
+    return "\n".join([*lines, ""])
 
 
 def _assignments(

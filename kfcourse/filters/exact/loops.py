@@ -404,8 +404,8 @@ def _predicted(mass, moved):
     return mean, variance
 
 
-_MOVES = types.FunctionType(types.int64(*[_VALUES] * 5))  # the printed loops: constants, x, and what is made of each
-_METER = types.FunctionType(types.int64(*[_VALUES] * 6))
+_MOVES = types.FunctionType(types.void(*[_VALUES] * 5))  # the printed loops: constants, x, and what is made of each
+_METER = types.FunctionType(types.void(*[_VALUES] * 6))
 
 
 def _with(constants: tuple[Any, ...]) -> Callable[..., int]:

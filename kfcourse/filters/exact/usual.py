@@ -86,7 +86,8 @@ def compiled_usual_way(model: Model) -> UsualWay:
     signal = sp.sqrt(of_model.meter_variance) if of_noise else of_model.meter
     moves = {"mean": of_model.state, "variance": of_model.variance, "slope": of_model.state.diff(x)}
     meter = {"mean": of_model.meter, "variance": of_model.meter_variance, "signal": signal, "slope": signal.diff(x)}
-    printed = (compiled.loop(name, {"x": x}, made, list(model.values)) for name, made in (("moves", moves), ("meter", meter)))
+    made = {name: compiled.Pass(formula, list(model.values)) for name, formula in (("moves", moves), ("meter", meter))}
+    printed = (compiled.loop(name, {"x": x}, one) for name, one in made.items())
     laws = compiled.load(*printed)
     moves_of, meter_of = laws.moves, laws.meter
     constants = np.array([float(value) for value in model.values.values()])
