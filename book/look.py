@@ -14,6 +14,7 @@ from pathlib import Path
 
 import contents
 from docutils import nodes
+from folds import FoldsBelow
 from sphinx.errors import ExtensionError
 from sphinx.transforms.post_transforms import SphinxPostTransform
 from sphinx.writers.html5 import HTML5Translator
@@ -59,7 +60,7 @@ class SmallStars(SphinxPostTransform):
 class InPlace(SphinxPostTransform):
     """A figure that answers is read right after its still picture: its script runs before what stands below is seen."""
 
-    default_priority = 500
+    default_priority = FoldsBelow.default_priority - 1  # cells that are then neighbours have one fold
     formats = ("html",)
 
     def run(self, **kwargs) -> None:

@@ -560,7 +560,7 @@ def test_what_a_link_to_another_page_leads_to_is_shown_too(window):
     assert "функция правдоподобия" in box.inner_text() and "as a function of what is sought" in box.inner_text()
     assert tab.locator("a.kf-term").count() > 2
     tab.locator('article a.kf-term[href="glossary.html#term-likelihood"]').click()
-    assert tab.locator("dt#term-likelihood").is_visible()
+    tab.locator("dt#term-likelihood").wait_for()
     where = tab.locator("dt#term-likelihood + dd a")
     place = urlsplit(where.get_attribute("href")).fragment
     where.click()

@@ -116,7 +116,7 @@ def test_no_cell_lets_a_wrong_answer_pass(kernel, name):
     """One after the other in the same process: what the earlier ones have changed stays changed."""
     wrong_gain = Step("def gain(Psi, G, F):\n    return G @ Psi", "answer")
     result, _ = marked(kernel, wrong_gain, Step(CELLS[name], "trick"), CHECK)
-    assert result is None or result.status in ("wrong", "unusable")
+    assert result is None or result.status in ("wrong", "unusable", "not run")
 
 
 def test_arguments_learned_by_heart_would_pass_without_a_salt():
