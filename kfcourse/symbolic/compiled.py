@@ -127,7 +127,7 @@ def loop(name: str, given: Mapping[str, sp.Symbol], one: Pass, *, passed: bool =
 
 
 def choice(name: str, given: Mapping[str, sp.Symbol], passes: Sequence[Pass]) -> str:
-    """A function `name(number, c, ...)` of several loops on arrays of the same names, for others to call; the number says which."""
+    """A function `name(number, c, ...)` of several loops on arrays of equal names, for others to call; the number says which."""
     cases = "".join(f"    if number == {i}:\n{indent(_body(given, one), '    ')}" for i, one in enumerate(passes))
     return _function(name, ["number", "c"], given, passes[0], _PASSED) + cases
 
