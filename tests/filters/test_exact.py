@@ -8,6 +8,7 @@ import pytest
 
 from kfcourse import Model, ModelError, compare, filters, lab_filters, load_variants, run, simulate
 from kfcourse.filters import adaptive_pointmass, aof, kalman_filter
+from kfcourse.filters.exact.kernels import Unresolved
 from kfcourse.filters.exact.panels import Rule
 from kfcourse.lab.short_names import LAB, has_exact
 from kfcourse.symbolic.structure import gaussian
@@ -285,6 +286,15 @@ def test_a_meter_without_noise_has_no_density_but_an_exact_filter():
     assert has_exact(model)
     with pytest.raises(ModelError, match=r"without noise.*pointmass"):
         adaptive_pointmass(model)
+
+
+def test_a_posterior_between_two_doubles_is_not_resolved():
+    """Where the spacing of doubles is above the meter's noise no node is left: an error that names the cure, no IndexError."""
+    model = Model.define("1e18*v", "x + w")
+    exact, y = pointmass(model), simulate(model, 20, 2, 1)[1]
+    first = exact.step(exact.init(20), y[0])
+    with pytest.raises(Unresolved, match="step 1 of .*--slow-runs 0"):
+        exact.step(first, y[1])
 
 
 @pytest.mark.parametrize("options", [{"order": 5}, {"tolerance": 0}, {"tolerance": 1}, {"tolerance": float("nan")}])

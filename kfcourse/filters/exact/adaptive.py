@@ -261,7 +261,9 @@ class _Bayes:
 
 
 def _cut_off(grid: Grid, borders: Array) -> bool:
-    """Whether the posterior goes on beyond the support."""
+    """Whether the posterior goes on beyond the support, or no number of it is within."""
+    if not len(grid.x):
+        return True
     second, last = np.searchsorted(borders, borders[0], "right"), np.searchsorted(borders, borders[-1]) - 1  # some may be equal
     at_border = np.array([grid.x[0] < borders[second], grid.x[-1] > borders[last]])
     return bool((at_border & (grid.density[[0, -1]] * (grid.x[-1] - grid.x[0]) > BORDER)).any())
