@@ -156,6 +156,17 @@ def test_what_is_better_than_the_exact_filter_refutes_it(counted):
     assert beaten.doubtful.all()
 
 
+@pytest.mark.parametrize(("errors", "refuted"), [(3.8, []), (4.5, ["a substitute"]), (5.2, ["a substitute", "the exact one"])])
+def test_a_substitute_is_refuted_sooner(counted, errors, refuted):
+    """A filter that is better by so many standard errors: enough against particles before it is against the exact filter."""
+    mean = 4.5 - errors * np.std([1, 1, -1, -1], ddof=1) / 2  # the bound is 5 - 0.5, without an error
+    square = [[9.0] * 4, [mean + 1, mean + 1, mean - 1, mean - 1]]
+    one = replace(counted, sums=sums_of(4, square=square, own=[[5.0] * 4, [1.0] * 4]))
+    in_place = replace(one, slow_part=replace(one.slow_part, replaced={"aof-exact": "it does not resolve the model"}))
+    found = {"the exact one": one.doubtful.all(), "a substitute": in_place.doubtful.all()}
+    assert [name for name in ("a substitute", "the exact one") if found[name]] == refuted
+
+
 def test_freedom_of_an_error_of_trajectories_and_designs():
     """Welch and Satterthwaite's formula, by hand: (a + b)^2 / (a^2 / f + b^2 / g) of two variances a and b."""
     one = with_design(Estimate(np.array([1.0, 2.0]), np.array([0.3, 0.3]), 20), np.array([0.04, 0.0]), 3)
