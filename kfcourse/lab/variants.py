@@ -39,7 +39,7 @@ class Variant:
         if isinstance(self.model, JumpModel):
             raise VariantError(
                 f"variant {self.name} jumps between modes ({', '.join(self.model.names)}), for which {what} are not made; "
-                f"`kfcourse lab {self.name}` compares filters on it"
+                f"`kfcourse lab {self.name}` compares filters on it (with --variants FILE if it is one of your own)"
             )
         return self.model
 
