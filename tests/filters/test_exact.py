@@ -293,7 +293,7 @@ def test_a_posterior_between_two_doubles_is_not_resolved():
     model = Model.define("1e18*v", "x + w")
     exact, y = pointmass(model), simulate(model, 20, 2, 1)[1]
     first = exact.step(exact.init(20), y[0])
-    with pytest.raises(Unresolved, match="step 1 of .*--slow-runs 0"):
+    with pytest.raises(Unresolved, match=r"step 1 of .*--slow-runs 0"):
         exact.step(first, y[1])
 
 

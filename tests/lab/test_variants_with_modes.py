@@ -124,7 +124,7 @@ def test_where_nothing_knows_modes_it_is_said(tmp_path, own):
         result = kfcourse(*arguments)
         assert result.exit_code != 0 and "jumps between modes" in result.output, (arguments, result.output)
         assert "Traceback" not in result.output
-    with pytest.raises(VariantError, match="jumps between modes.*`kfcourse lab J1`.*--variants FILE"):
+    with pytest.raises(VariantError, match=r"jumps between modes.*`kfcourse lab J1`.*--variants FILE"):
         find_variant("J1").plain("the exercises")
 
 
