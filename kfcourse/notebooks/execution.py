@@ -66,12 +66,14 @@ def execute(notebook: NotebookNode, name: str, stop_at_error: bool = True) -> No
         A cell raises an error (if `stop_at_error`) or takes too long, or the kernel dies.
     """
     result = nbformat.from_dict(notebook)
+    started: list[str] = []  # ids of cells: a running one has a number of execution already
     client = _Client(
         result,
         timeout=SECONDS,
         kernel_name="python3",
         allow_errors=not stop_at_error,
         record_timing=False,
+        on_cell_execute=lambda cell, cell_index: started.append(cell.id),
         extra_arguments=["--log-level=ERROR"],
     )
     with tempfile.TemporaryDirectory() as folder:
@@ -79,11 +81,11 @@ def execute(notebook: NotebookNode, name: str, stop_at_error: bool = True) -> No
         try:
             client.execute()
         except CellExecutionError as error:
-            raise NotebookFailed(f"{name}, cell {_failed(result)}: {error.ename}: {error.evalue}") from None
+            raise NotebookFailed(f"{name}, cell {started[-1]}: {error.ename}: {error.evalue}") from None
         except CellTimeoutError:
-            raise NotebookFailed(f"{name}, cell {_running(result)}: still running after {SECONDS:g} s") from None
+            raise NotebookFailed(f"{name}, cell {started[-1]}: still running after {SECONDS:g} s") from None
         except DeadKernelError:
-            raise NotebookFailed(f"{name}, cell {_running(result)}: the kernel died (out of memory?)") from None
+            raise NotebookFailed(f"{name}, cell {started[-1]}: the kernel died (out of memory?)") from None
     if stop_at_error and (found := first_error(result)):
         cell, shown = found
         raise NotebookFailed(f"{name}, cell {cell.id}: {shown.ename}: {shown.evalue}")
@@ -102,19 +104,6 @@ def first_error(notebook: NotebookNode) -> tuple[NotebookNode, NotebookNode] | N
             if output.output_type == "error":
                 return cell, output
     return None
-
-
-def _failed(notebook: NotebookNode) -> str:
-    found = first_error(notebook)
-    return str(found[0].id) if found else _running(notebook)
-
-
-def _running(notebook: NotebookNode) -> str:
-    """The first code cell that has not finished."""
-    for cell in notebook.cells:
-        if cell.cell_type == "code" and cell.source.strip() and not cell.execution_count:
-            return str(cell.id)
-    return str(notebook.cells[-1].id)
 
 
 def pictures(executed: NotebookNode, narrow: bool = False) -> dict[str, bytes]:

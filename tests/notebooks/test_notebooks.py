@@ -329,9 +329,10 @@ def test_a_failing_cell_is_named():
 
 
 def test_a_cell_that_takes_too_long_is_named(monkeypatch):
-    monkeypatch.setattr(execution, "SECONDS", 1)
-    slow = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("import time\ntime.sleep(60)")])
-    with pytest.raises(NotebookFailed, match=f"here, cell {slow.cells[0].id}: still running after 1 s"):
+    monkeypatch.setattr(execution, "SECONDS", 5)
+    sources = ("1", "import time\ntime.sleep(60)", "2")
+    slow = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(source) for source in sources])
+    with pytest.raises(NotebookFailed, match=f"here, cell {slow.cells[1].id}: still running after 5 s"):
         execution.execute(slow, "here")
 
 
