@@ -124,6 +124,7 @@ def test_what_notebooks_import_is_there():
             "from kfcourse.commands import main; main(['variants'])",
             ["joblib", "kfcourse.checks", "kfcourse.filters", "matplotlib", "numba", "scipy", "sympy"],
         ),
+        ("import sympy; del sympy.MatrixBase.jacobian; from kfcourse.checks import sets; sets()", ["scipy.special"]),
     ],
 )
 def test_what_is_slow_to_import_waits_until_it_is_used(code, slow):
