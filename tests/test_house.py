@@ -77,8 +77,8 @@ def test_a_constant_of_the_exact_filter_has_one_value():
         if name.startswith("filters.exact.")
         for node in ast.parse(path.read_text(encoding="utf-8")).body
         if isinstance(node, ast.Assign)
-        for target in node.targets
-        if isinstance(target, ast.Name) and target.id.isupper()
+        for target in ast.walk(node)  # two in one line, too
+        if isinstance(target, ast.Name) and isinstance(target.ctx, ast.Store) and target.id.isupper()
     ]
     names = [name for name, _ in found]
     assert len(names) > 30
