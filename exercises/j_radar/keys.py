@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import lru_cache
+from collections.abc import Callable, Sequence
+from functools import cache, lru_cache
 
 import numpy as np
 import scipy
@@ -32,7 +32,13 @@ def cartesian(r: sp.Expr, phi: sp.Expr, eps: sp.Expr) -> tuple[sp.Expr, ...]:
 
 def jacobian_of(formulas: sp.Matrix | Sequence[sp.Expr]) -> Answer:
     """Derivatives of the formulas by the position, as a function of it."""
-    return substituted(sp.Matrix(formulas).jacobian(POSITION), POSITION)
+    return derived(lambda: sp.Matrix(formulas).jacobian(POSITION))
+
+
+def derived(derive: Callable[[], sp.MatrixBase]) -> Answer:
+    """What is derived of the position, as a function of it; derived when it is first asked for, not by all who open a set."""
+    found = cache(derive)
+    return lambda *position: substituted(found(), POSITION)(*position)
 
 
 def meter_jacobian(x: sp.Expr, y: sp.Expr, z: sp.Expr) -> sp.ImmutableMatrix:

@@ -6,8 +6,7 @@ import sympy as sp
 
 from kfcourse.checks.question import Answer
 from kfcourse.exercises import messages
-from kfcourse.exercises.j_radar.keys import MEASURED, POSITION, cartesian, jacobian_of, meter_jacobian
-from kfcourse.exercises.shared import substituted
+from kfcourse.exercises.j_radar.keys import MEASURED, POSITION, cartesian, derived, jacobian_of, meter_jacobian
 from kfcourse.scenarios.radar import CARTESIAN, SPHERICAL, X, Y, Z
 
 # -- j1, j2: what the radar measures
@@ -58,7 +57,7 @@ WRONG_JACOBIANS: tuple[tuple[str, str, Answer], ...] = (
     (
         "inverse",
         "These are the derivatives of the position by range and angles; the meter goes the other way.",
-        substituted(CARTESIAN.jacobian(MEASURED).subs(dict(zip(MEASURED, SPHERICAL, strict=True)), simultaneous=True), POSITION),
+        derived(lambda: CARTESIAN.jacobian(MEASURED).subs(dict(zip(MEASURED, SPHERICAL, strict=True)), simultaneous=True)),
     ),
     (
         "azimuth-reversed",
@@ -85,17 +84,17 @@ WRONG_JACOBIANS: tuple[tuple[str, str, Answer], ...] = (
     (
         "root-forgotten",
         "A power of a distance is wrong in the row of the azimuth: an angle's derivative is one over a length.",
-        substituted(_with_row(1, [-Y / GROUND, X / GROUND, 0]), POSITION),
+        derived(lambda: _with_row(1, [-Y / GROUND, X / GROUND, 0])),
     ),
     (
         "root-forgotten",
         "A power of a distance is wrong in the row of the elevation: an angle's derivative is one over a length.",
-        substituted(_with_row(2, [-X * Z / SLANT**2, -Y * Z / SLANT**2, GROUND / SLANT**2]), POSITION),
+        derived(lambda: _with_row(2, [-X * Z / SLANT**2, -Y * Z / SLANT**2, GROUND / SLANT**2])),
     ),
     (
         "sine-and-cosine-swapped",
         "x and y are swapped in the row of the azimuth: the derivative by x has y above.",
-        substituted(_with_row(1, [X / GROUND**2, -Y / GROUND**2, 0]), POSITION),
+        derived(lambda: _with_row(1, [X / GROUND**2, -Y / GROUND**2, 0])),
     ),
     *(
         (
@@ -114,19 +113,21 @@ WRONG_JACOBIANS: tuple[tuple[str, str, Answer], ...] = (
     (
         "ground-fixed",
         "In the elevation the distance along the ground depends on x and y too.",
-        substituted(
-            sp.Matrix([SPHERICAL[0], SPHERICAL[1], 0]).jacobian(POSITION)
-            + sp.Matrix([[0] * 3, [0] * 3, [0, 0, GROUND / SLANT**2]]),
-            POSITION,
+        derived(
+            lambda: (
+                sp.Matrix([SPHERICAL[0], SPHERICAL[1], 0]).jacobian(POSITION)
+                + sp.Matrix([[0] * 3, [0] * 3, [0, 0, GROUND / SLANT**2]])
+            )
         ),
     ),
     (
         "range-for-ground",
         "In the azimuth the distance is that along the ground: the height does not turn it.",
-        substituted(
-            sp.Matrix([SPHERICAL[0], 0, SPHERICAL[2]]).jacobian(POSITION)
-            + sp.Matrix([[0] * 3, [-Y / SLANT**2, X / SLANT**2, 0], [0] * 3]),
-            POSITION,
+        derived(
+            lambda: (
+                sp.Matrix([SPHERICAL[0], 0, SPHERICAL[2]]).jacobian(POSITION)
+                + sp.Matrix([[0] * 3, [-Y / SLANT**2, X / SLANT**2, 0], [0] * 3])
+            )
         ),
     ),
     (

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import scipy
 import sympy as sp
-from scipy.special import iv
 
 from kfcourse.checks.question import Answer
 from kfcourse.exercises import messages
@@ -172,12 +172,12 @@ WRONG_TIMES: tuple[tuple[str, str, Answer], ...] = (
     (
         "bessel-once",
         "There are two integrals, over exp(V) and over exp(-V), and each gives a Bessel function.",
-        lambda s, q: 2 * np.pi**2 / q * iv(0, 1 / s),
+        lambda s, q: 2 * np.pi**2 / q * scipy.special.iv(0, 1 / s),
     ),
     (
         "deviation-for-variance",
         "The argument has a standard deviation where the variance belongs.",
-        lambda s, q: 2 * np.pi**2 / q * iv(0, 1 / np.sqrt(s)) ** 2,
+        lambda s, q: 2 * np.pi**2 / q * scipy.special.iv(0, 1 / np.sqrt(s)) ** 2,
     ),
     (
         "limit",
@@ -187,24 +187,24 @@ WRONG_TIMES: tuple[tuple[str, str, Answer], ...] = (
     (
         "variance-in-place",
         "The argument of the Bessel function is upside down: the surer the loop, the longer it lasts.",
-        lambda s, q: 2 * np.pi**2 / q * iv(0, s) ** 2,
+        lambda s, q: 2 * np.pi**2 / q * scipy.special.iv(0, s) ** 2,
     ),
     (
         "deviation-of-phase",
         "q is the variance by which the phase wanders in a step; it is not squared or rooted.",
-        lambda s, q: 2 * np.pi**2 / np.sqrt(q) * iv(0, 1 / s) ** 2,
+        lambda s, q: 2 * np.pi**2 / np.sqrt(q) * scipy.special.iv(0, 1 / s) ** 2,
     ),
     (
         "wander-forgotten",
         "How fast the phase wanders is missing: in steps of which length is time counted?",
-        lambda s, q: 2 * np.pi**2 * iv(0, 1 / s) ** 2,
+        lambda s, q: 2 * np.pi**2 * scipy.special.iv(0, 1 / s) ** 2,
     ),
     (
         "half-a-cycle",
         "It is half of what it should be: half a cycle away is no slip yet, every second loop falls back from there.",
         lambda s, q: mean_time(s, q) / 2,
     ),
-    ("wrong-bessel", "It is the Bessel function of order zero.", lambda s, q: 2 * np.pi**2 / q * iv(1, 1 / s) ** 2),
+    ("wrong-bessel", "It is the Bessel function of order zero.", lambda s, q: 2 * np.pi**2 / q * scipy.special.iv(1, 1 / s) ** 2),
     ("limit-of-unsure", "That is a phase that wanders freely, without a loop.", lambda s, q: 2 * np.pi**2 / q + 0 * s),
 )
 

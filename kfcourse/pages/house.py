@@ -7,6 +7,7 @@ import html
 import re
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from importlib import resources
 from pathlib import Path
 
@@ -55,8 +56,11 @@ def modules() -> Iterator[tuple[str, Path]]:
 
 
 def imported(path: Path) -> set[str]:
-    """Modules of this package that a file imports, below `kfcourse`; not those that only a type checker reads."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    """Modules of this package that a file imports, below `kfcourse`; not those that only a type checker reads.
+
+    From a folder it imports the folder, unless what it takes is a module: `from kfcourse.filters import notation`.
+    """
+    tree, known = ast.parse(path.read_text(encoding="utf-8")), _names()
     typing = {id(node) for block in ast.walk(tree) if _for_types(block) for node in ast.walk(block)}
     found: set[str] = set()
     for node in ast.walk(tree):
@@ -65,10 +69,16 @@ def imported(path: Path) -> set[str]:
         if isinstance(node, ast.ImportFrom) and node.module == "kfcourse":
             found |= {f"kfcourse.{alias.name}" for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            found |= {node.module or ""}
+            taken = {f"{node.module}.{alias.name}": node.module or "" for alias in node.names}
+            found |= {name if name in known else folder for name, folder in taken.items()}
         elif isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
     return {name.removeprefix("kfcourse.") for name in found if name.startswith("kfcourse.")}
+
+
+@cache
+def _names() -> set[str]:
+    return {f"kfcourse.{name}" for name, _ in modules()}
 
 
 def _for_types(node: ast.AST) -> bool:

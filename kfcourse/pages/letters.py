@@ -32,11 +32,12 @@ def column(values: Any) -> np.ndarray:
     return np.asarray(values, float).reshape(-1, 1)
 
 
-def kalman_run(rng: np.random.Generator, states: int = 3, seen: int = 2) -> dict[str, Any]:
+def kalman_run(rng: np.random.Generator, seen: int = 2) -> dict[str, Any]:
     r"""The letters A, H, Q, R, I and \\lambda, \\Psi, K, z, p, \\nu, F, y with the index k, from `kfcourse.filters.kalman`.
 
     K is p H^T R^{-1}, the form of the gain that the package does not compute with.
     """
+    states = 3
     A, H = rng.normal(size=(states, states)), rng.normal(size=(seen, states))
     Q, R = covariance(rng, states), covariance(rng, seen)
     system = LinearSystem(A, H, Q, R)

@@ -36,10 +36,8 @@ BORDER = 1e-10  # of the density at the ends of the support, relative: beyond th
 ROUGH_RULE, FINE_RULE = Rule.of_order(8, 1e-4), Rule.of_order(12, 1e-7)  # of `on_panels`
 TENTH = 1e-4  # accuracy from which on the rough one does
 AROUND = 9  # borders of first panels towards a hump
-HUMPS, HUMPS_SEARCHED = (
-    40,
-    129,
-)  # states that explain the measurement, to which first panels lead, and points among which they are sought
+HUMPS = 40  # states that explain the measurement, to which first panels lead
+HUMPS_SEARCHED = 129  # points among which they are sought
 SOME = 12  # kernels at which there are borders
 WORK = 1e8  # nodes times kernels of a trajectory at a time: a second
 
