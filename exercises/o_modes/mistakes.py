@@ -59,6 +59,7 @@ WRONG_CHAINS: tuple[tuple[str, str, Answer], ...] = (
     ("mode-kept", CHAIN_FORGOTTEN, lambda mu, pi: (mu, np.eye(len(mu)))),
     ("other-axis", OTHER_AXIS, lambda mu, pi: (mu @ pi, mu[:, None] * pi / (mu @ pi)[:, None])),
     ("other-axis", OTHER_AXIS, lambda mu, pi: (mu @ pi, mu * pi / (mu @ pi))),
+    ("other-axis", OTHER_AXIS, lambda mu, pi: ((mu * pi).sum(axis=0), mu * pi / (mu * pi).sum(axis=0))),
 )
 
 # -- o2: Bayes' formula
@@ -206,6 +207,13 @@ def mixture_kept(y: Array, m: float, d: float, a: float, q: float, C: Array, pi:
     return before, joint.sum(axis=0) / joint.sum()
 
 
+def by_density_alone(y: Array, m: float, d: float, a: float, q: float, C: Array, pi: Array, first: Array) -> tuple[Array, Array]:
+    """The second measurement weighs the modes without what the chain says of them."""
+    before, after = two_steps_with()(y, m, d, a, q, C, pi, first)
+    likelihood = after / chain(before, pi)[0]
+    return before, likelihood / likelihood.sum()
+
+
 WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
     ("chain-forgotten", CHAIN_FORGOTTEN, two_steps_with(weights=lambda mu, pi: (mu, np.eye(len(mu))))),
     ("transposed", TRANSPOSED, two_steps_with(weights=lambda mu, pi: chain(mu, pi.T / pi.T.sum(axis=1, keepdims=True)))),
@@ -233,6 +241,11 @@ WRONG_STEPS: tuple[tuple[str, str, Answer], ...] = (
         "probability-kept",
         CHAIN_FORGOTTEN,
         two_steps_with(weights=lambda mu, pi: (mu, chain(mu, pi)[1])),
+    ),
+    (
+        "chance-forgotten",
+        "At the second step only the densities are compared: how probable was each mode before the measurement?",
+        by_density_alone,
     ),
     ("not-corrected", "The laws of the state have not seen the first measurement.", two_steps_with(corrected=False)),
     ("not-moved", "The state has moved between the measurements.", two_steps_with(moved=False)),

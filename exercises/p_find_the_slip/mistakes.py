@@ -18,6 +18,7 @@ CENTRAL = "That is about the mean; here the mean of the square is asked for, abo
 NOISE_FORGOTTEN = "The noise of the meter is missing."
 ONE_OF_TWO = "Only one of the two terms of the mean square has the right factor."
 FOURTH = "A moment of order four is wrong: of a normal law the fourth central one is 3 d^2."
+DIVIDED_BY_LESS = "It is divided by N - 1; moments of an ensemble are divided by N here."
 MOMENTS_OF_START = "Moments of the first step stand there; x has changed since."
 
 # -- p1: the square of a factor
@@ -194,6 +195,11 @@ WRONG_MATRICES: tuple[tuple[str, str, Answer], ...] = (
         matrix_with(raw_moment, lambda e, s: raw_moment(s, s)),
     ),
     (
+        "about-zero",
+        "The cross moments are taken about zero, those of sigma about its mean.",
+        matrix_with(raw_moment, lambda e, s: covariance_of(s, s)),
+    ),
+    (
         "components-apart",
         "Each component has a regression of its own; sigma's components are correlated.",
         lambda e, s: covariance_of(e, s) / np.diagonal(covariance_of(s, s)),
@@ -236,6 +242,16 @@ WRONG_FITS: tuple[tuple[str, str, Answer], ...] = (
         "whole-variance",
         "T is the whole covariance; what the regression explains is subtracted.",
         lambda x_0, x, z: (*regression(x, z)[:2], covariance_of(x, x)),
+    ),
+    (
+        "square-about-zero",
+        "T begins with the mean square of x about zero; what is left of x is about its mean.",
+        lambda x_0, x, z: (*regression(x, z)[:2], raw_moment(x, x) - covariance_of(x, x) + regression(x, z)[2]),
+    ),
+    (
+        "divided-by-N-1",
+        DIVIDED_BY_LESS,
+        lambda x_0, x, z: (*regression(x, z)[:2], regression(x, z)[2] * len(x) / (len(x) - 1)),
     ),
     ("error-for-residual", messages.ERROR_FOR_RESIDUAL, lambda x_0, x, z: (*regression(x, z)[:2], covariance_of(x - z, x - z))),
     ("offset-forgotten", messages.OFFSET_FORGOTTEN, lambda x_0, x, z: (regression(x, z)[0], x.mean(axis=0), regression(x, z)[2])),
@@ -287,7 +303,7 @@ WRONG_MOMENTS: tuple[tuple[str, str, Answer], ...] = (
     ("deviation", messages.DEVIATION_FOR_VARIANCE, lambda x, mode: (x.mean(), x.std())),
     (
         "divided-by-N-1",
-        "The variance is divided by N - 1; moments of an ensemble are divided by N here.",
+        DIVIDED_BY_LESS,
         lambda x, mode: (x.mean(), x.var(ddof=1)),
     ),
 )

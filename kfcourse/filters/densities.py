@@ -15,7 +15,7 @@ from sympy.core.relational import Relational
 
 from kfcourse.angles import TURN, Components, difference, wrapped
 from kfcourse.filters.inverted import by_change_of_variable
-from kfcourse.laws import Array, Gaussian
+from kfcourse.laws import MANY, Array, Gaussian, runs_last, solve_by_entries
 from kfcourse.reasons import Reason
 from kfcourse.symbolic.choices import decides, jumps
 from kfcourse.symbolic.known import Stepwise
@@ -63,9 +63,15 @@ def likelihood(model: Model) -> LogLikelihood:
     def log_normal(innovation: Array, cov: Array) -> Array:
         if model.p == 1:
             return _log_normal(innovation[..., 0], cov[..., 0, 0])
+        if cov.shape[:-1] == innovation.shape and cov.size >= MANY * model.p**2:
+            weighted, factor = runs_last(innovation[..., None]), runs_last(cov)
+            if solve_by_entries(weighted, factor):
+                square = np.einsum("...i,i...->...", innovation, weighted[:, 0])
+                logdet = -2 * np.log(np.einsum("ii...->i...", factor)).sum(axis=0)  # the inverses of Cholesky's pivots
+                return -0.5 * (square + logdet + model.p * np.log(2 * np.pi))
         _, logdet = np.linalg.slogdet(cov)
-        weighted = np.linalg.solve(cov, innovation[..., None])[..., 0]
-        return -0.5 * ((innovation * weighted).sum(axis=-1) + logdet + model.p * np.log(2 * np.pi))
+        square = (innovation * np.linalg.solve(cov, innovation[..., None])[..., 0]).sum(axis=-1)
+        return -0.5 * (square + logdet + model.p * np.log(2 * np.pi))
 
     return log_likelihood
 

@@ -310,7 +310,9 @@ def _of_step(name: str, model: Model, rules: Sequence[tuple[Array, Array]], equa
         spread = cov if n == 1 else cov * (1 + UNSEEN * np.finfo(float).eps * np.eye(n))
         scale, dx, value, deviation, added = propagate(equation, mean, spread, points, weights)
         dx = np.broadcast_to(dx, (*deviation.shape[:-1], n))
-        slopes = _slopes(transpose(deviation * weights[:, None]) @ points[:, :n], scale)
+        weighed = deviation * weights[:, None]
+        cross = transpose(weighed) @ points[:, :n]
+        slopes = _slopes(np.where(np.abs(cross) > _rounding_of(weighed, deviation), cross, 0.0), scale)
         # No difference of nearly equal matrices.
         left = _weighted(weights, deviation - dx @ transpose(slopes)) + added
         return value, slopes, left, deviation, added
@@ -345,6 +347,15 @@ def _slopes(cross: Array, root: Array) -> Array:
     except np.linalg.LinAlgError:
         slopes = cross @ np.linalg.pinv(regular, rcond=root.shape[-1] * np.finfo(float).eps)
     return slopes / size[..., None, :]
+
+
+def _rounding_of(weighed: Array, deviation: Array) -> Array:
+    """What of a covariance with a standard normal variable is only rounding, (..., p, 1): a tiny part of the deviation of y.
+
+    A sum over points that ought to cancel, where a meter does not tell the sign of a state, leaves some units of precision.  As a
+    gain they would do no harm, but the estimate made with it is a measurement in disguise, and a regression would find it.
+    """
+    return LOST * np.finfo(float).eps * np.sqrt(np.maximum((weighed * deviation).sum(axis=-2), 0.0))[..., None]
 
 
 # d is known to some units of precision, so G d G^T to as many times (sum_j |G_ij| sd_j)^2, the variance if all components were

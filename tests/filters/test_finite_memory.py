@@ -1,5 +1,7 @@
 """Filters that remember: the note's loops, the best estimate from a window, identities, and what is refused."""
 
+import warnings
+
 import numpy as np
 import oracles
 import pytest
@@ -10,7 +12,9 @@ from kfcourse.filters.optimal_structure import Memory, Recipe, Remembered, of_st
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble, Instant, simulate
 from kfcourse.montecarlo.experiment import run
+from kfcourse.scenarios.benchmarks import growth_model
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import gaussian, linearised
 
@@ -205,3 +209,16 @@ def test_estimates_do_not_depend_on_what_other_trajectories_do(variant53):
     y = simulate(variant53, 6, 5, seed=3).y
     for one in [*filters, aof(structure)]:
         np.testing.assert_allclose(run(one, y[:, 2:3]).mean[:, 0], run(one, y).mean[:, 2], rtol=1e-13)
+
+
+def test_an_estimate_that_tells_nothing_is_no_measurement_in_disguise():
+    """The growth model's meter is even: z_0 is 0 for all, and one that it is remembered beside adds nothing to z_1."""
+    model = growth_model()
+    with warnings.catch_warnings(action="ignore", category=QuadratureWarning):
+        structure = gauss_hermite(model, 20)
+    filters = design([fbp(structure, 1), fbp(structure, 2)], Ensemble(model, 400, 3, seed=1).by_step())
+    y = simulate(model, 50, 3, seed=2).y
+    one, two = (run(each, y).mean for each in filters)
+    np.testing.assert_array_equal(one[0], 0.0)
+    # the same regression, of two numbers instead of one: rounding, which the steep object takes ten times further
+    np.testing.assert_allclose(one, two, rtol=1e-10, atol=1e-10)

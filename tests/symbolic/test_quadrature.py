@@ -221,3 +221,14 @@ def test_on_variant_53_the_unscented_filter_is_the_extended_one(variant53):
     np.testing.assert_allclose(by_points.cov, by_tangent.cov, rtol=1e-12, atol=1e-14)
     exact = run(aof(gaussian(variant53)), y)
     assert np.abs(exact.cov - by_points.cov).max() > 1e-4  # not for want of anything to see
+
+
+@pytest.mark.parametrize("kind", [gauss_hermite, unscented])
+@pytest.mark.parametrize("units", [1.0, 1e-9])
+def test_what_a_meter_does_not_tell_is_exactly_nothing(kind, units):
+    """Points sum odd functions to 1e-17: a gain of that size makes the estimate the measurement, in units of its own."""
+    model = Model.define("x + v", "u*(x**2/20 + cos(x)) + u*w", {"u": units}, prior={"mean": 0, "variance": 5})
+    with warnings.catch_warnings(action="ignore", category=QuadratureWarning):
+        measured = kind(model).measure(np.zeros((3, 1)), np.array([[5.0], [0.1], [7.3]])[:, None])
+    np.testing.assert_array_equal(measured.G, 0.0)
+    np.testing.assert_array_equal(measured.F, measured.R)

@@ -13,7 +13,7 @@ def o2(density=lambda y, h, F: norm.pdf(y, h, F**0.5), joint=lambda c, L: c * L,
     return lambda c, y, h, F: share(joint(c, density(y, h, F)))
 
 
-def o3(spread=1.0, chain=True, again=False, correct=True, first=None, noise=1.0, a_squared=True, q_added=True):
+def o3(spread=1.0, chain=True, again=False, correct=True, known=True, noise=1.0, a_squared=True, q_added=True):
     """By sums over the modes i of step 0 and j of step 1."""
 
     def answer(y, m, d, a, q, C, pi, prior):
@@ -32,7 +32,7 @@ def o3(spread=1.0, chain=True, again=False, correct=True, first=None, noise=1.0,
                 w * ((a * a if a_squared else a) * p[i] + q * q_added + spread * (a * z[i] - mean) ** 2)
                 for i, w in enumerate(ways)
             )
-            later.append(c * norm.pdf(y[1], mean, np.sqrt(var / c + noise * C[j] ** 2)))
+            later.append((c if known else 1) * norm.pdf(y[1], mean, np.sqrt(var / c + noise * C[j] ** 2)))
         return mu, np.array(later) / sum(later)
 
     return answer
@@ -105,6 +105,7 @@ WRONG = [
     ("o1", "not-divided", o1(w=lambda mu, pi: mu[:, None] * pi)),
     ("o1", "other-axis", o1(w=lambda mu, pi: mu[:, None] * pi / (mu @ pi)[:, None])),
     ("o1", "other-axis", o1(w=lambda mu, pi: mu * pi / (mu @ pi))),
+    ("o1", "other-axis", lambda mu, pi: (mu * pi.sum(axis=0), mu * pi / (mu * pi.sum(axis=0)))),
     ("o1", "mode-kept unchanged", o1(c=lambda mu, pi: mu)),
     ("o2", "prior-forgotten unused", o2(joint=lambda c, L: L)),
     ("o2", "root-forgotten", o2(lambda y, h, F: np.exp(-((y - h) ** 2) / F / 2))),
@@ -118,6 +119,7 @@ WRONG = [
     ("o3", "first-law-again", o3(again=True)),
     ("o3", "limit", o3(correct=False)),
     ("o3", "meter-noise-forgotten", o3(noise=0.0)),
+    ("o3", "chance-forgotten", o3(known=False)),
     ("o3", "unused", o3(q_added=False)),
     ("o3", "", o3(a_squared=False)),
     ("o3", "other-axis", o3_by_rows),
