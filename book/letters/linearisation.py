@@ -1,4 +1,4 @@
-"""The letters of linearisation.md: runs of the package's extended filter: of a scalar model, in Western notation of several states."""
+"""The letters of linearisation.md: runs of the package's extended filter of a scalar model, and of several states."""
 
 from functools import partial
 
@@ -26,7 +26,7 @@ def course(rng):
 
 
 def scalar(rng):
-    """Slopes at the estimate and at the prediction, of functions that stay the same; the noise of the object in both notations."""
+    """Functions that stay the same, their slopes anywhere, and the noise of the object in both notations."""
     run = extended_run(rng, BENT_SCALAR)
     at_k = {letter: Of(lambda k, one=run[name].values: one[k], "k") for letter, name in (("S'", "H"), ("f'", r"\Phi"))}
     g = run["g"].values
