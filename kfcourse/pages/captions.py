@@ -4,9 +4,10 @@
 `contradicted` reads a caption with it.  Five rules, none of which needs to know what the figure is about:
 
 * a colour or dashes beside a name, "the DUOF (orange)", "the dashed tangent", are those of the curve with this name;
-* what is said of a panel, "Left, ...", speaks of colours and dashes that this panel has, and there are as many panels as it says;
+* what is said of a panel, "Left, ...", speaks of colours and dashes that this panel has, of each of two once, and there are as
+  many panels as it says;
 * sentences about two panels have no fewer words (of titles, axes, names) in common with them than with the panels exchanged;
-* what is said to rise or fall, a name, a colour or dashes, or a curve without a name, does so somewhere, and more than a little;
+* what is said to rise or fall, a name, a colour or dashes, or a curve without a name, does so somewhere, by a third of its height;
 * of two that are named, one above or below the other, some pair of curves is so on the average.
 """
 
@@ -53,6 +54,7 @@ def drawn(figure: Figure) -> list[dict[str, Any]]:
                 "words": sorted(_words(" ".join(said))),
                 "looks": sorted(set().union(*(look for _, look in looks))),
                 "names": names,
+                "together": sorted({tuple(sorted(look)) for _, look in looks if len(look) > 1}),
                 "curves": curves,
             }
         )
@@ -93,8 +95,14 @@ def _of_panels(words: str, panels: list[dict[str, Any]]) -> Iterator[str]:
             yield f"{number} {what}: there are {len(places)}"
     if absent := sorted((LOOKS & _words(words)).difference(*(panel["looks"] for panel in panels))):
         yield f"{', '.join(absent)}: no panel has it"
+    drawn_so = [set(look) for panel in panels for look in panel.get("together", [])]
+    for one, other in re.findall(rf"\b({'|'.join(LOOKS)})(?:, | )({'|'.join(LOOKS)})\b", words, re.IGNORECASE):
+        if drawn_so and not any({one.lower(), other.lower()} <= look for look in drawn_so):
+            yield f"{one}, {other}: nothing is both"
     if len(places) != 2:
         return
+    spoken = [side for side, _ in _sided(words)]
+    yield from (f"{side} is said twice" for side in sorted(set(spoken)) if spoken.count(side) > 1)
     shared = set.intersection(*(set(panel["words"]) for panel in panels))
     first, last = (places[place] for place in sorted(places))
     across = first["place"][0] == last["place"][0]
@@ -151,9 +159,9 @@ def _meant(what: str, curves: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _moves(places: list[list[float]], up: bool) -> bool:
-    """Does a curve rise, or fall, as it is drawn or to the right, by a hundredth of the height of its panel?"""
+    """Does a curve rise, or fall, as it is drawn or to the right, by a third of what it does at all?"""
     ways = (np.array([y for _, y in way]) * (1 if up else -1) for way in (places, sorted(places)))
-    return any(np.max(heights - np.minimum.accumulate(heights)) > 0.01 for heights in ways)
+    return any(np.max(heights - np.minimum.accumulate(heights)) > max(np.ptp(heights) / 3, 0.01) for heights in ways)
 
 
 def _higher(one: list[list[float]], other: list[list[float]]) -> float | None:

@@ -32,6 +32,7 @@ WRONG = [
     "Left: gain at each frequency. Right: error.",
     "The gain (left) and the error (right).",
     "The DUOF falls.",
+    "Left, the error. Left, the gain (dotted).",
     "The orange curve falls.",
     "The DUOF lies far above the bound.",
     "The dashed line stays below the orange one.",
