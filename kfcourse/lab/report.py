@@ -173,10 +173,15 @@ def conclusions(result: Comparison, confidence: float = CONFIDENCE) -> list[str]
             continue
         verdict = "is more accurate than" if low > ROUNDING else "is not significantly different from"
         sentences.append(
-            f"{title(better)} {verdict} {title(worse)}: {100 * float(difference.value):.3g} % "
-            f"({100 * confidence:g} % confidence: {low:.3g} to {high:.3g} %)."
+            f"{title(better)} {verdict} {title(worse)}: {_three_digits(100 * float(difference.value))} % "
+            f"({100 * confidence:g} % confidence: {_three_digits(low)} to {_three_digits(high)} %)."
         )
     return sentences
+
+
+def _three_digits(value: float) -> str:
+    """Three digits, or all before the point; no power of ten for what is large."""
+    return f"{value:.0f}" if 1000 <= abs(value) < 1e12 else f"{value:.3g}"
 
 
 def recognised_modes(result: Comparison) -> Recognised | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from importlib import resources
@@ -59,13 +60,27 @@ def _all_tables(path: str | Path | None) -> tuple[str, dict[str, Any]]:
     try:
         tables = tomllib.loads(text).get("variants")
     except tomllib.TOMLDecodeError as error:
-        raise VariantError(f"{where} is not valid TOML: {error}") from None
+        raise VariantError(f"{where} is not valid TOML: {error}{_line_of(text, error)}") from None
     except (ValueError, RecursionError) as error:
         what = "lists in too many lists" if isinstance(error, RecursionError) else "a number of thousands of digits"
         raise VariantError(f"{where} holds {what}, and is not read; no variant needs that") from None
     if not isinstance(tables, dict) or not tables:
         raise VariantError(f'{where} has no variants; it needs tables such as [variants.53] with state = "..." and meter = "..."')
     return where, tables
+
+
+def _line_of(text: str, error: tomllib.TOMLDecodeError) -> str:
+    """The line that is no TOML and, of the two ways in which a value is most often written wrongly, how it is written right."""
+    place = re.search(r"at line (\d+), column (\d+)", str(error))
+    if not place:
+        return ""
+    line, column = text.split("\n")[int(place[1]) - 1], int(place[2]) - 1
+    cure = ""
+    if re.match(r"[+-]?\.\d", line[column:]):
+        cure = "; a number has a digit before its point, as in 0.9"
+    elif "Invalid value" in str(error):
+        cure = "; formulas and other texts stand in quotes"
+    return f": {on_a_line(line):.80}{cure}"
 
 
 def on_a_line(text: str) -> str:

@@ -77,6 +77,15 @@ def test_a_difference_is_significant_if_its_interval_excludes_zero(result53, con
         assert f"{100 * confidence:g} % confidence" in sentence
 
 
+def test_a_large_difference_has_no_power_of_ten():
+    """The tangent of x^2 at 0 tells the linearised FOS nothing at first: it stays hundreds of times less accurate."""
+    model = Model.define("0.9*x + 1e-4*v", "x**2 + 0.001*w")
+    result = compare(lab_filters(model, ["duof", "fos-linearised"]), model, 2000, 12, 1, progress=False)
+    (sentence,) = conclusions(result)
+    (low, high) = re.findall(r"confidence: (\d{4,}) to (\d{4,}) %", sentence)[0]
+    assert float(low) < 100 * float(result.mean_gap_difference("fos-linearised", "duof").value) < float(high)
+
+
 def test_a_filter_that_diverges_is_no_measure_for_others_and_has_no_place_among_them():
     """D3: the linearised AOF loses some trajectories, and errs ten thousand times as much there as the FOS does."""
     model = find_variant("D3").model

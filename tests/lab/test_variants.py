@@ -251,6 +251,8 @@ def test_a_formula_cannot_execute_code(tmp_path, formula):
         ("[variants]", "no variants"),
         ("[variant.53]\n" + GOOD, "no variants"),
         ("[variants.53\n" + GOOD, "not valid TOML"),
+        ("[variants.a]\nstate = c*x + v", "column 9): state = c*x + v; formulas and other texts stand in quotes"),
+        ("[variants.a]\n" + GOOD + "parameters = { c = .9 }", "parameters = { c = .9 }; a number has a digit before its point"),
         ("[variants.a]\n" + GOOD + "[variants.a]\n" + GOOD, "not valid TOML"),
         ("[variants.a]\n" + GOOD + f"prior = {{ mean = {'9' * 10_000} }}", "a number of thousands of digits"),
         ("[variants.a]\n" + GOOD + f"prior = {{ mean = {'[' * 5000}{']' * 5000} }}", "lists in too many lists"),
