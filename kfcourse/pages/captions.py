@@ -7,8 +7,8 @@
 * what is said of a panel, "Left, ...", speaks of colours and dashes that this panel has, of each of two once, and there are as
   many panels as it says;
 * sentences about two panels have no fewer words (of titles, axes, names) in common with them than with the panels exchanged;
-* what is said to rise or fall, a name, a colour or dashes, or a curve without a name, does so somewhere, by a third of its height;
-* of two that are named, one above or below the other, some pair of curves is so on the average.
+* what is said to rise or fall, by its name, colour or dashes, does so somewhere, by a third of its height;
+* of two that are said to lie one above or below the other, some pair of curves does so on the average.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import rgb_to_hsv, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -46,7 +47,7 @@ def drawn(figure: Figure) -> list[dict[str, Any]]:
         patches = [*ax.patches, *(arrow for text in ax.texts if (arrow := getattr(text, "arrow_patch", None)))]
         looks += [("_", {DASHES.get(str(one.get_linestyle()), ""), *_hues(one.get_facecolor())} - {""}) for one in patches]
         names = [(name, sorted(look)) for name, look in looks if name and not name.startswith("_") and name != "None"]
-        curves = [curve for line in ax.get_lines() if (curve := _curve(line))] if ax.name == "rectilinear" else []
+        curves = [curve for line in ax.get_lines() if (curve := _curve(ax, line))] if ax.name == "rectilinear" else []
         said = [ax.get_title(), ax.get_title("left"), ax.get_xlabel(), ax.get_ylabel(), *(text.get_text() for text in ax.texts)]
         found.append(
             {
@@ -184,15 +185,15 @@ def _words(text: str) -> set[str]:
     return formulas | {word.lower() for word in re.findall(r"[A-Za-z]{3,}", re.sub(r"\$[^$]*\$", " ", text))}
 
 
-def _curve(line: Line2D) -> dict[str, Any] | None:
+def _curve(ax: Axes, line: Line2D) -> dict[str, Any] | None:
     """A line's name and looks, where it runs, in parts of the panel's width and height, and its values at both ends, the least
     and the largest; none if it is no curve."""
     points = np.asarray(line.get_xydata(), float)
     points = points[np.isfinite(points).all(axis=1)]
-    if len(points) < 2 or line.get_transform() != line.axes.transData:
+    if len(points) < 2 or line.get_transform() != ax.transData:
         return None
     order = points[np.linspace(0, len(points) - 1, min(len(points), _SAMPLES)).round().astype(int)]
-    places = line.axes.transAxes.inverted().transform(line.axes.transData.transform(order))
+    places = ax.transAxes.inverted().transform(ax.transData.transform(order))
     first, *_, last = values = points[:, 1]
     return {
         "name": str(line.get_label()),

@@ -91,7 +91,11 @@ def extended_run(rng: np.random.Generator, model: Model = BENT) -> dict[str, Any
     def functions(matrix: sp.Matrix) -> list[Callable[[Any], np.ndarray]]:
         """Of x, at each step."""
         computed = sp.lambdify([*model.x, symbol("k")], matrix.subs(model.values))
-        return [lambda x, k=k: np.array(computed(*np.ravel(x), k)).reshape(matrix.shape) for k in range(_STEPS)]
+
+        def at(k: int) -> Callable[[Any], np.ndarray]:
+            return lambda x: np.array(computed(*np.ravel(x), k)).reshape(matrix.shape)
+
+        return [at(k) for k in range(_STEPS)]
 
     f, S = functions(move.subs(quiet)), functions(see.subs(quiet))
     D_xi = covariance(rng, len(model.v))
