@@ -45,6 +45,14 @@ def compare(app, env) -> None:
             log.warning("what is said of a figure contradicts its picture: %s", problem, location=page)
 
 
+def renumber(app, env) -> None:
+    """Figures of pages without a number of their own are counted from one on each page, not through all of these pages."""
+    for kinds in env.toc_fignumbers.values():
+        for numbers in kinds.values():
+            if all(len(number) == 1 for number in numbers.values()):
+                numbers.update((name, (place,)) for place, name in enumerate(numbers, 1))
+
+
 def pictures(cell) -> Iterator[tuple[str, list[dict[str, Any]]]]:
     """The name of a cell's figure, and the panels of its picture."""
     name = cell.metadata.get("mystnb", {}).get("figure", {}).get("name")
@@ -71,5 +79,6 @@ def _ancestors(node: nodes.Node):
 
 def setup(app) -> dict[str, bool]:
     app.connect("doctree-resolved", check)
+    app.connect("env-updated", renumber)
     app.connect("env-updated", compare, priority=900)  # after executed.py has put the outputs there
     return {"parallel_read_safe": True, "parallel_write_safe": True}

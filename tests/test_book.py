@@ -344,6 +344,15 @@ def test_a_link_to_what_is_folded_opens_the_fold(window):
     assert problems == []
 
 
+@pytest.mark.parametrize("page", PAGES)
+def test_figures_are_counted_on_their_page(page):
+    """By the chapter's number and theirs, or from one where a page has no number."""
+    text = (HTML / f"{page}.html").read_text(encoding="utf-8")
+    chapter = re.search(r"<title>(\d+)\. ", text)
+    counted = re.findall(r'caption-number">Figure ([\d.]+?)\.? ?<', text)
+    assert counted == [f"{chapter[1]}.{place}" if chapter else f"{place}" for place in range(1, len(counted) + 1)]
+
+
 @pytest.mark.parametrize("page", NOTEBOOKS)
 def test_the_boxes_that_close_a_chapter_are_not_folded(page):
     html = BeautifulSoup((HTML / f"{page}.html").read_text(encoding="utf-8"), "html.parser")
