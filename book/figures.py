@@ -79,6 +79,6 @@ def _ancestors(node: nodes.Node):
 
 def setup(app) -> dict[str, bool]:
     app.connect("doctree-resolved", check)
-    app.connect("env-updated", renumber)
+    app.connect("env-check-consistency", renumber)  # when Sphinx has numbered them
     app.connect("env-updated", compare, priority=900)  # after executed.py has put the outputs there
     return {"parallel_read_safe": True, "parallel_write_safe": True}
