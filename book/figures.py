@@ -1,12 +1,15 @@
-"""Sphinx extension: no figure without a number, a caption, and a text that says what is seen; neither contradicts the picture.
+"""Sphinx extension: no figure without a number, a caption, and a text that says what is seen; nothing contradicts the picture.
 
 A warning, and warnings are errors, names every picture that lacks one of them, and each word that `kfcourse.pages.captions` finds
-to be wrong.
+to be wrong, in them and in a paragraph that refers to one figure.
 """
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import nbformat
 from docutils import nodes
@@ -33,19 +36,40 @@ def check(app, doctree, name: str) -> None:
 
 
 def compare(app, env) -> None:
-    """Warn of what the words of a cell's figure say, and its picture does not show."""
-    for path in sorted((Path(app.outdir).parent / "jupyter_execute").rglob("*.ipynb")):
-        for cell in nbformat.read(path, as_version=4).cells:
-            for problem in wrong(cell):
-                log.warning("a caption or its alternative text contradicts the picture: %s", problem, location=path.stem)
+    """Warn of what is said of the figure of a cell, and its picture does not show."""
+    paths = sorted((Path(app.outdir).parent / "jupyter_execute").rglob("*.ipynb"))
+    pages = {path.stem: nbformat.read(path, as_version=4).cells for path in paths}
+    figures = {name: panels for cells in pages.values() for cell in cells for name, panels in pictures(cell)}
+    for page, cells in pages.items():
+        for problem in (problem for cell in cells for problem in wrong(cell, figures)):
+            log.warning("what is said of a figure contradicts its picture: %s", problem, location=page)
 
 
-def wrong(cell) -> list[str]:
-    """What is wrong in the words of a cell's figure."""
+def renumber(app, env) -> None:
+    """Figures of pages without a number of their own are counted from one on each page, not through all of these pages."""
+    for kinds in env.toc_fignumbers.values():
+        for numbers in kinds.values():
+            if all(len(number) == 1 for number in numbers.values()):
+                numbers.update((name, (place,)) for place, name in enumerate(numbers, 1))
+
+
+def pictures(cell) -> Iterator[tuple[str, list[dict[str, Any]]]]:
+    """The name of a cell's figure, and the panels of its picture."""
+    name = cell.metadata.get("mystnb", {}).get("figure", {}).get("name")
+    for output in cell.get("outputs", []):
+        if name and (panels := output.get("metadata", {}).get("image/png", {}).get("drawn")):
+            yield name, panels
+
+
+def wrong(cell, figures: dict[str, list[dict[str, Any]]]) -> Iterator[str]:
+    """What is wrong in the words of a cell's figure, or in the paragraphs of a text that speak of one of these figures."""
     about = cell.metadata.get("mystnb", {})
-    words = (about.get("figure", {}).get("caption", ""), about.get("image", {}).get("alt", ""))
-    pictures = [output.metadata.get("image/png", {}).get("drawn") for output in cell.get("outputs", []) if "metadata" in output]
-    return [problem for panels in pictures if panels for text in words for problem in contradicted(text, panels)]
+    for text in (about.get("figure", {}).get("caption", ""), about.get("image", {}).get("alt", "")):
+        yield from (problem for _, panels in pictures(cell) for problem in contradicted(text, panels))
+    for paragraph in cell.source.split("\n\n") if cell.cell_type == "markdown" else ():
+        names = set(re.findall(r"\{numref\}`(fig-[\w-]+)`", paragraph))
+        if len(names) == 1 and (panels := figures.get(names.pop())):
+            yield from contradicted(paragraph, panels)
 
 
 def _ancestors(node: nodes.Node):
@@ -55,5 +79,6 @@ def _ancestors(node: nodes.Node):
 
 def setup(app) -> dict[str, bool]:
     app.connect("doctree-resolved", check)
+    app.connect("env-check-consistency", renumber)  # when Sphinx has numbered them
     app.connect("env-updated", compare, priority=900)  # after executed.py has put the outputs there
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -7,7 +7,7 @@ the answer to a question is folded with the answer.
     ```
 
 folds the rest of its section under these words: what a first reader may pass over, where a page is
-long.
+long.  The boxes that close a chapter stay open.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class More(SphinxDirective):
 
 
 class MoreBelow(SphinxPostTransform):
-    """The rest of a section, up to its subsections, behind a line to click."""
+    """The rest of a section, up to its subsections or the box of its algorithm or key points, behind a line to click."""
 
     default_priority = 500
     formats = ("html",)
@@ -69,10 +69,16 @@ class MoreBelow(SphinxPostTransform):
         for mark in list(self.document.findall(more_below)):
             section = mark.parent
             begin = section.index(mark)
-            end = section.first_child_matching_class(nodes.section, begin) or len(section)
+            end = next((place for place in range(begin, len(section)) if _closing(section[place])), len(section))
             section.insert(end, nodes.raw("", "</details>", format="html"))
             opening = f'<details class="kf-more"><summary>{html.escape(mark["words"])}</summary>'
             section[begin] = nodes.raw("", opening, format="html")
+
+
+def _closing(node: nodes.Node) -> bool:
+    return isinstance(node, nodes.section) or (
+        isinstance(node, nodes.Element) and not {"algorithm", "keypoints"}.isdisjoint(node.get("classes", []))
+    )
 
 
 def _folded(node: nodes.Node) -> bool:

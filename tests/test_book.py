@@ -344,6 +344,21 @@ def test_a_link_to_what_is_folded_opens_the_fold(window):
     assert problems == []
 
 
+@pytest.mark.parametrize("page", PAGES)
+def test_figures_are_counted_on_their_page(page):
+    """By the chapter's number and theirs, or from one where a page has no number."""
+    text = (HTML / f"{page}.html").read_text(encoding="utf-8")
+    chapter = re.search(r"<title>(\d+)\. ", text)
+    counted = re.findall(r'caption-number">Figure ([\d.]+?)\.? ?<', text)
+    assert counted == [f"{chapter[1]}.{place}" if chapter else f"{place}" for place in range(1, len(counted) + 1)]
+
+
+@pytest.mark.parametrize("page", NOTEBOOKS)
+def test_the_boxes_that_close_a_chapter_are_not_folded(page):
+    html = BeautifulSoup((HTML / f"{page}.html").read_text(encoding="utf-8"), "html.parser")
+    assert html.select("details.kf-more :is(.algorithm, .keypoints)") == []
+
+
 # Pages that moved by a tenth to a half of the screen while they were loaded: fonts came, formulas were typed wider than set,
 # scripts filled what had no size.
 MOVED = ["notation", "architecture", "equations", "manual/d-fos", "live-lab", "live-track", "derive-it"]
@@ -588,8 +603,8 @@ def test_a_figure_of_another_page_is_shown_with_its_picture(window):
     assert problems == []
 
 
-# Sheets of A4 of a chapter that had one more, and two half empty: code went overleaf as a whole, figures were as on a screen.
-SHEETS = {"comparison": 9}
+# Sheets of A4 of chapters that had one more: code went overleaf as a whole and figures were as on a screen; the last was blank.
+SHEETS = {"comparison": 9, "linearisation": 10}
 
 
 @pytest.mark.parametrize("page", SHEETS)

@@ -3,13 +3,13 @@
 import numpy as np
 from scipy.stats import multivariate_normal
 
-from kfcourse.pages.letters import extended_run, given
+from kfcourse.pages.letters import BENT_LATER, extended_run, given
 from kfcourse.pages.reader import Indexed, Of
 from kfcourse.pages.relations import DEFINITION, NOTATION
 
 
 def course(rng):
-    found = extended_run(rng)
+    found = extended_run(rng, BENT_LATER)
     x, lam, Psi = rng.normal(size=(3, 1)), found[r"\lambda"].plain, found[r"\Psi"].plain
     y, S, D_n = found["y"].plain, found["S"].plain, found["D_n"]
 

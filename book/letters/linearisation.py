@@ -1,8 +1,10 @@
-"""The letters of linearisation.md: a run of the package's extended filter of a scalar model, in both notations."""
+"""The letters of linearisation.md: runs of the package's extended filter of a scalar model, and of several states."""
+
+from functools import partial
 
 import numpy as np
 
-from kfcourse.pages.letters import BENT_SCALAR, column, extended_run, slope
+from kfcourse.pages.letters import BENT_SCALAR, BENT_SCALAR_LATER, column, extended_run, slope
 from kfcourse.pages.reader import Indexed, Of
 from kfcourse.pages.relations import DEFINITION, NOTATION
 
@@ -15,24 +17,33 @@ class AtEstimate(np.ndarray):
 
 
 def course(rng):
-    run = extended_run(rng, BENT_SCALAR)
+    run = extended_run(rng, BENT_SCALAR_LATER)
     H, Phi, g = (run[name].values for name in ("H", r"\Phi", "g"))
     functions = Indexed([now.view(AtEstimate) for now in g])
-    slopes = {"S'": Of(lambda k: H[k], "k"), "f'": Of(lambda k: Phi[k], "k")}
-    slopes |= {"S_k'": lambda at: slope(run["S"].plain, at), "f_k'": lambda at: slope(run["f"].plain, at)}
-    slopes |= {"m_0": column(BENT_SCALAR.prior.mean), "D_0": BENT_SCALAR.prior.cov}
-    return run | slopes | {"g": functions}
+    others = {"S'": Of(lambda k: H[k], "k"), "f'": Of(lambda k: Phi[k], "k")}
+    others |= {"m_0": column(BENT_SCALAR_LATER.prior.mean), "D_0": BENT_SCALAR_LATER.prior.cov}
+    return run | others | {"g": functions}
+
+
+def scalar(rng):
+    """Functions that stay the same, their slopes anywhere, and the noise of the object in both notations."""
+    run = extended_run(rng, BENT_SCALAR)
+    at_k = {letter: Of(lambda k, one=run[name].values: one[k], "k") for letter, name in (("S'", "H"), ("f'", r"\Phi"))}
+    g = run["g"].values
+    at_k |= {"g": Of(lambda k: g[k], "k"), "Q": Of(lambda k: g[k] ** 2 * run[r"D_\xi"], "k")}
+    same = {f"{name}_k'": partial(slope, run[name].plain) for name in "Sf"}
+    return at_k | same | {name: run[name] for name in (r"\lambda", "z", r"D_\xi", "k")}
 
 
 def western(rng):
-    run = extended_run(rng, BENT_SCALAR)
+    run = extended_run(rng)
     H, Phi, g = (run[name].values for name in ("H", r"\Phi", "g"))
     at_k = {
         "H": Of(lambda k: H[k], "k"),
         r"\partial h/\partial x": Of(lambda k: H[k], "k"),
         "F": Of(lambda k: Phi[k], "k"),
         r"\partial f/\partial x": Of(lambda k: Phi[k], "k"),
-        "Q": Of(lambda k: g[k] ** 2 * run[r"D_\xi"], "k"),
+        "Q": Of(lambda k: g[k] @ run[r"D_\xi"] @ g[k].T, "k"),
         "g": Of(lambda k: g[k], "k"),
     }
     same = {
@@ -52,7 +63,7 @@ def western(rng):
     )
 
 
-LETTERS = (course, western)
+LETTERS = (course, scalar, western)
 SAID = {
     r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k": DEFINITION,
     r"y_k=S_k(x_k)+n_k": DEFINITION,

@@ -2,20 +2,26 @@
 
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss
+from scipy.optimize import minimize_scalar
 
 from kfcourse.pages.relations import NOTATION
 
 NODES, WEIGHTS = hermegauss(5)  # exact for polynomials up to degree 9
 
 
-def best_line(rng):
-    """Of y = x + f x^2 w over x ~ N(lambda, Psi), by quadrature."""
-    f, lam, Psi = rng.uniform(0.1, 0.5), rng.uniform(1, 3), rng.uniform(0.1, 5)
+def gain(f, lam, Psi):
+    """Of the best line for y = x + f x^2 w over x ~ N(lambda, Psi), by quadrature."""
     x, w = (one.ravel() for one in np.meshgrid(lam + np.sqrt(Psi) * NODES, NODES))
     weight = np.outer(WEIGHTS, WEIGHTS).ravel() / WEIGHTS.sum() ** 2
     y = x + f * x**2 * w
-    K = weight @ ((x - lam) * (y - weight @ y)) / (weight @ (y - weight @ y) ** 2)
-    return {"K": K, "f": f, r"\lambda": lam}
+    return weight @ ((x - lam) * (y - weight @ y)) / (weight @ (y - weight @ y) ** 2)
+
+
+def best_line(rng):
+    """A gain, and the largest one, looked for over all variances."""
+    f, lam = rng.uniform(0.1, 0.5), rng.uniform(1, 3)
+    largest = -minimize_scalar(lambda Psi: -gain(f, lam, Psi), bounds=(0.01, lam**2), method="bounded").fun
+    return {"K": gain(f, lam, rng.uniform(0.1, 5)), r"\max_{\Psi}K": largest, "f": f, r"\lambda": lam}
 
 
 LETTERS = (best_line,)

@@ -35,9 +35,9 @@ def course(rng):
 def display(rng):
     """Near the prediction the parabola in t."""
     own = course(rng)
-    t = 3.0
+    t = 10.0
     first, second, Psi = abs(own["S'"]), own["S''"], own[r"\Psi"]
-    bend = 0.01 * np.sqrt(Psi) ** 3 * t**3  # what the series leaves out
+    bend = 0.001 * np.sqrt(Psi) ** 3 * t**3  # what the series leaves out
     ahead = first * np.sqrt(Psi) * t + second * Psi * t**2 / 2 + bend
     return own | {"S(x)": own["S"] + ahead, r"S(\lambda)": own["S"], "t": t}
 

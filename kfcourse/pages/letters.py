@@ -14,6 +14,7 @@ from kfcourse.laws import Gaussian
 from kfcourse.linear.system import LinearSystem
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.pages.reader import Indexed
+from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import linearised
 
@@ -54,15 +55,29 @@ def kalman_run(rng: np.random.Generator, seen: int = 2) -> dict[str, Any]:
     return {"A": A, "H": H, "Q": Q, "R": R, "I": np.eye(states), "k": K_RANGE} | letters
 
 
-BENT = Model.define(
-    ["x1 + 0.3*sin(x2) + 0.2*x3 + 0.4*v1", "0.8*x2 - 0.2*x1*x3 + (0.3 + 0.1*x1)*v2", "0.9*x3 + 0.1*x1**2 + 0.2*v1 + 0.1*x2*v2"],
-    ["x1 + 0.2*x2*x3 + 0.5*w1", "exp(0.2*x3) + 0.3*x2 + 0.1*w1 + 0.4*w2"],
-    symbols={"x": ["x1", "x2", "x3"], "v": ["v1", "v2"], "w": ["w1", "w2"]},
-    prior={"mean": [0.5, -0.3, 0.2], "variance": [0.5, 0.4, 0.3]},
-)
-BENT_SCALAR = Model.define(
-    "0.8*x + 0.3*sin(x) + (0.4 + 0.1*x)*v", "x + 0.2*x**2 + 0.5*w", {}, prior={"mean": 0.5, "variance": 0.4}
-)
+def _bent(turn: str, mixed: str) -> Model:
+    """Three states, two measurements, with these two coefficients."""
+    return Model.define(
+        [
+            f"x1 + {turn}*sin(x2) + 0.2*x3 + 0.4*v1",
+            "0.8*x2 - 0.2*x1*x3 + (0.3 + 0.1*x1)*v2",
+            "0.9*x3 + 0.1*x1**2 + 0.2*v1 + 0.1*x2*v2",
+        ],
+        [f"x1 + {mixed}*x2*x3 + 0.5*w1", "exp(0.2*x3) + 0.3*x2 + 0.1*w1 + 0.4*w2"],
+        symbols={"x": ["x1", "x2", "x3"], "v": ["v1", "v2"], "w": ["w1", "w2"]},
+        prior={"mean": [0.5, -0.3, 0.2], "variance": [0.5, 0.4, 0.3]},
+    )
+
+
+def _bent_scalar(turn: str, mixed: str) -> Model:
+    return Model.define(
+        f"0.8*x + {turn}*sin(x) + (0.4 + 0.1*x)*v", f"x + {mixed}*x**2 + 0.5*w", {}, prior={"mean": 0.5, "variance": 0.4}
+    )
+
+
+BENT, BENT_SCALAR = _bent("0.3", "0.2"), _bent_scalar("0.3", "0.2")
+# Other ones at each step: f_k is not f_{k+1}.
+BENT_LATER, BENT_SCALAR_LATER = _bent("0.1*k", "0.1*k"), _bent_scalar("0.1*k", "0.1*k")
 
 
 def extended_run(rng: np.random.Generator, model: Model = BENT) -> dict[str, Any]:
@@ -74,26 +89,32 @@ def extended_run(rng: np.random.Generator, model: Model = BENT) -> dict[str, Any
     quiet = dict.fromkeys([*model.v, *model.w], 0)
     move, see = sp.Matrix(model.state_equation), sp.Matrix(model.meter_equation)
 
-    def function(matrix: sp.Matrix) -> Callable[[Any], np.ndarray]:
-        computed = sp.lambdify(list(model.x), matrix.subs(model.values))
-        return lambda x: np.array(computed(*np.ravel(x))).reshape(matrix.shape)
+    def functions(matrix: sp.Matrix) -> list[Callable[[Any], np.ndarray]]:
+        """Of x, at each step."""
+        computed = sp.lambdify([*model.x, symbol("k")], matrix.subs(model.values))
 
-    f, S = function(move.subs(quiet)), function(see.subs(quiet))
+        def at(k: int) -> Callable[[Any], np.ndarray]:
+            return lambda x: np.array(computed(*np.ravel(x), k)).reshape(matrix.shape)
+
+        return [at(k) for k in range(_STEPS)]
+
+    f, S = functions(move.subs(quiet)), functions(see.subs(quiet))
     D_xi = covariance(rng, len(model.v))
     unmixed = np.linalg.inv(np.linalg.cholesky(D_xi))
-    noise = function(move.jacobian(model.v))
+    noise = functions(move.jacobian(model.v))
     D_n = np.array(see.jacobian(model.w) * see.jacobian(model.w).T, dtype=float)
     ekf = aof(linearised(model))
     state = ekf.init(1)
     found: dict[str, list[Any]] = {name: [] for name in (r"\lambda", r"\Psi", "y", "z", "p", "H", "K", r"\nu", r"\Phi", "g")}
-    for y in simulate(model, runs=1, steps=_STEPS, seed=int(rng.integers(1 << 30))).y:
+    for k, y in enumerate(simulate(model, runs=1, steps=_STEPS, seed=int(rng.integers(1 << 30))).y):
         law, state = state.predicted, ekf.step(state, y)
         (lam, Psi), (z, p) = (_only(law), _only(state.posterior))
-        H = slope(S, lam)
-        row = (lam, Psi, column(y), z, p, H, p @ H.T @ np.linalg.inv(D_n), column(y) - S(lam), slope(f, z), noise(z) @ unmixed)
+        H = slope(S[k], lam)
+        K, nu = p @ H.T @ np.linalg.inv(D_n), column(y) - S[k](lam)
+        row = (lam, Psi, column(y), z, p, H, K, nu, slope(f[k], z), noise[k](z) @ unmixed)
         for name, value in zip(found, row, strict=True):
             found[name].append(value)
-    found |= {"f": [f] * _STEPS, "S": [S] * _STEPS}
+    found |= {"f": f, "S": S}
     letters = {name: Indexed(values, values[2]) for name, values in found.items()}
     return {r"D_\xi": D_xi, "D_n": D_n, "I": np.eye(len(model.x)), "k": K_RANGE} | letters
 

@@ -4,8 +4,8 @@ A number that is typed must also stand in the code of its cell outside of the se
 1e-12, 95 % and 0.95, 10^{-6} and 1e-6); others come from values, `f"{x:.2f}"`.  What is left (years, names, units) the page's
 file in letters/ lists in LITERALS.  A sentence that compares needs a condition that compares.
 
-A decimal number in the prose around the cells, or in the words of a figure, stands in the code of the page as well: where it is
-computed, or in a condition that holds it.
+A number of two digits or more in the prose around the cells, or in the words of a figure, stands in the code of the page as well:
+where it is computed, or in a condition that holds it.  Numbers that are names (variant 53, lecture 10) need not.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from kfcourse.laws import CONFIDENCE
 from kfcourse.pages.relations import calls, cells
 
 COMPARING = re.compile(
@@ -22,9 +23,11 @@ COMPARING = re.compile(
     r"narrower|wider|only|falls?|grows?|rises?|faster|slower|sooner|later|leads|first|last|same|agree|equal)\b"
 )
 _NUMBER = re.compile(r"(?<![\w.^_{\\])(\d+(?:[ \u00a0]\d{3})*(?:\.\d+)?)")
-_DECIMAL = re.compile(r"(?<![\w.^_\\])\d+\.\d+(?![\w.])")
+_TOLD = re.compile(r"(?<![\w.^_\\{])(?:\d+\.\d+|\d{1,3}(?:[,\u00a0 ]\d{3})+|\d{2,})(?!\w|[.-]\w|\})")
 _NO_PROSE = re.compile(
-    r"\A---\n.*?\n---\n|^```(?:text|toml|console|python)\n.*?^```|``?[^`\n]+``?|<[^>]+>|\]\([^)]*\)", re.MULTILINE | re.DOTALL
+    r"\A---\n.*?\n---\n|^```(?:text|toml|console|python|\{chapter\})\n.*?^```|``?[^`\n]+``?|<[^>]+>|\]\([^)]*\)"
+    r"|\b(?:[Vv]ariants?|[Ll]ectures?|Python) \d[\d.]*(?: and \d+)?",
+    re.MULTILINE | re.DOTALL,
 )
 _POWER = re.compile(r"10\^(?:\{(-?\d+)\}|(\d))")
 _FORMULA = re.compile(r"\$([^$]*)\$")
@@ -51,14 +54,16 @@ def spoken(page: str) -> Iterator[Sentence]:
             )
 
 
-def decimals(page: str) -> list[str]:
-    """The decimal numbers of a page's prose and of the words of its figures that its code does not know."""
-    known, prose = set[float](), page
+def told(page: str) -> list[str]:
+    """The numbers of a page's prose and of the words of its figures that its code does not know."""
+    known, prose = {CONFIDENCE}, page
     for code in cells(page):
         known |= _constants(ast.parse(code), set())
         prose = prose.replace(code, "")
-    found = _DECIMAL.findall(_NO_PROSE.sub("", prose))
-    return [number for number in found if not {float(number), round(float(number) / 100, 12)} & known]  # or a percentage
+    found = _TOLD.findall(_NO_PROSE.sub("", prose))
+    values = [float(re.sub(r"[,\u00a0 ]", "", number)) for number in found]
+    known |= {round(100 * one, 9) for one in known}  # a percentage
+    return [number for number, value in zip(found, values, strict=True) if value not in known]
 
 
 def _typed(sentence: ast.expr) -> Iterator[str]:
