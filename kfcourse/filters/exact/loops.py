@@ -197,12 +197,13 @@ def _candidates(meter, c, y, known, place, x, shown, kernel, parts, found, candi
     mean, variance, signal, slope = _first(shown, known + 1)
     meter(c, at, mean, variance, signal, slope)
     _density(at, kernel, parts, found[:2])
-    best, highest = known, -np.inf
+    best, highest, of_middle = known, -np.inf, width
     for j in range(known + 1):
-        scale = width
+        scale = of_middle
         if j < known:
             by_meter = np.sqrt(variance[j]) / np.abs(slope[j])
             scale = by_meter if by_meter < width else width
+            of_middle = min(of_middle, np.hypot(at[j] - at[known], scale))
         log_mass = np.log(found[1, j] * scale * ROOT) + _log_likelihood(y, mean[j], variance[j])
         log_mass = log_mass if scale > 0 and not np.isnan(log_mass) else -np.inf
         candidates[0, j], candidates[1, j], candidates[2, j] = at[j], scale, log_mass
