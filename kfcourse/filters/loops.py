@@ -1,6 +1,6 @@
 """Loops of the compiled engine in which no formula of a model stands.  Only with numba is this imported.
 
-The formulas are in printed loops over trajectories (`compiled.choice`), which these call: all filters use the same, compiled once.
+The formulas are in printed loops over trajectories (`compiled.choice`), which these call: the same for all filters, made once.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def advance(step, table, y, x, weight, starts, lam, Psi, lam_next, Psi_next, z, 
         for i in range(len(w)):
             lam_b[i], Psi_b[i] = lam_0[i], Psi_0[i]
         for k in range(len(y)):
-            x_b, error, square, variance, quotient, most = x[k, here], 0.0, 0.0, 0.0, 0.0, 0
+            x_b, error, square, variance, quotient, most = x[k, here], 0.0, 0.0, 0.0, 0.0, np.int64(0)
             step(POSTERIOR, table[k], y[k, here], lam_b, Psi_b, x_b, x_b, z_b, p_b)
             for i in range(len(w)):
                 e = x_b[i] - z_b[i]
