@@ -112,8 +112,8 @@ def loop(name: str, given: Mapping[str, sp.Symbol], one: Pass) -> str:
 def choice(name: str, given: Mapping[str, sp.Symbol], made: Sequence[str], passes: Sequence[Pass]) -> str:
     """A function `name(number, c, given arrays, made arrays)` of several loops, for others to call; the number says which.
 
-    A pass need not make all arrays that are made, and may make given ones anew.  One function for all: what takes the time to
-    compile is not the formulas but all that is around them.
+    A pass need not make all arrays that are made, and may make given ones anew.  One function for all compiles faster than
+    one for each.
     """
     cases = "".join(f"    if number == {i}:\n{indent(_body(given, one), '    ')}" for i, one in enumerate(passes))
     return _function(name, ["number", "c", *given, *made], _PASSED) + cases
