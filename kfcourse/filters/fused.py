@@ -27,7 +27,6 @@ from kfcourse.laws import Array, Gaussian, any_missing, column
 from kfcourse.symbolic import compiled
 
 T = TypeVar("T")
-AT_ONCE = 1024  # trajectories whose numbers stay in the nearest cache
 Equalities = tuple[sp.Eq, ...]
 
 _X, _NEXT, _Y, _LAM, _PSI, _Z, _P, _LAM_NEXT, _PSI_NEXT, _F = map(
@@ -79,7 +78,7 @@ def _or_warning(one: Filter | Design, compile: Callable[[], T]) -> T | None:
 
 
 class Loops(NamedTuple):
-    """The printed loops of a filter: its step; of a design also the sums for its regressions, and what comes after them."""
+    """The printed loops of a filter: its step; of a design also what its regressions are on, and what comes after them."""
 
     parameters: list[float]
     regressions: int
@@ -88,7 +87,7 @@ class Loops(NamedTuple):
 
     @property
     def compiled(self) -> Any:
-        """Their module: `step`, and of a design `sums` and `after`."""
+        """Their module, with the function `step`."""
         return compiled.load(self.text)
 
     def table(self, coefficients: Array) -> Array:
@@ -112,8 +111,8 @@ class Fused(Design):
         """Coefficients of steps with y (K, N) and x (K + 1, N): into the table; lambda and Psi (N,) are those after them."""
         from kfcourse.filters import loops
 
-        own, program = self.program.compiled, self.program
-        loops.design(own.sums, own.after, len(program.parameters), program.regressions, table, y, x, lam, Psi)
+        program = self.program
+        loops.design(program.compiled.step, len(program.parameters), program.regressions, table, y, x, lam, Psi)
 
     def fitted(self, table: Array) -> Filter:
         """The filter with the coefficients of a table."""
@@ -148,6 +147,8 @@ class Steps:
     def __call__(self, state: State, y: Array) -> State:
         if any_missing(y) or (self.program.regressions and state.step >= len(self.table)):
             return self.otherwise(state, y)
+        from kfcourse.filters.loops import AT_ONCE
+
         row, ends = column(y), np.minimum(np.arange(0, len(y) + AT_ONCE, AT_ONCE), len(y))
         sums = np.empty((5, 1, len(ends) - 1))
         return self.several(state, row[None], row[None], row, ends, sums, np.empty((2, len(y))))
@@ -177,29 +178,6 @@ def _law(predicted: Gaussian) -> tuple[Array, Array]:
     return mean, Psi if len(Psi) == len(mean) else np.full(len(mean), Psi.item())
 
 
-# The sums of a comparison, those that `Sums.record` keeps; weight and x of each trajectory.  The largest square is found among
-# whole numbers: their order is that of floats that are not negative.
-_OF_ERRORS = compiled.Totals(
-    ["x", "weight", "totals"],
-    "error, square, variance, quotient, most = 0.0, 0.0, 0.0, 0.0, np.int64(0)",
-    [
-        "e = x[i] - mean",
-        "term = weight[i] * e * e",
-        "error += weight[i] * e",
-        "square += term",
-        "variance += weight[i] * cov",
-        "quotient += term / (cov if term > 0 else 1.0)",
-        "most = max(most, np.float64(term).view(np.int64))",
-    ],
-    "totals[0], totals[1], totals[2], totals[3], totals[4] = error, square, variance, quotient, np.int64(most).view(np.float64)",
-)
-# The sums of a regression: of deviations from two numbers, and of their products.
-_OF_PAIRS = compiled.Totals(
-    ["near", "totals"],
-    "t, r, dt, dr, tt, tr, rr = near[0], near[1], 0.0, 0.0, 0.0, 0.0, 0.0",
-    ["d, e = target - t, regressor - r", "dt += d", "dr += e", "tt += d * d", "tr += d * e", "rr += e * e"],
-    "totals[0], totals[1], totals[2], totals[3], totals[4] = dt, dr, tt, tr, rr",
-)
 _PRINTED: dict[tuple[object, ...], Loops] = {}  # by all that they are printed from
 
 
@@ -222,21 +200,17 @@ def _printed(one: Filter | Design, printed: Equalities) -> Loops:
     rules, found = list(chain(*groups)), [[*fit.found, own][:3] for fit, own in zip(fits, residuals, strict=True)]
     letters, known = {left for left, _ in rules}, {"y": _Y, "lam": _LAM, "Psi": _PSI}
     after = {"lam": _LAM_NEXT, "Psi": _PSI_NEXT if _PSI_NEXT in letters else found[-1][2]}
-    posterior = {"z": _Z, "p": _P if _P in letters else found[0][2]}
+    p = _P if _P in letters else found[0][2]
     constants, parameters = [*one.model.values, *chain(*found)], len(one.model.values)
 
     def made(arrays: dict[str, sp.Symbol], count: int) -> compiled.Pass:
         return compiled.Pass(arrays, constants[:count], needed(rules, arrays.values()))
 
-    step = made({**after, **posterior}, len(constants))._replace(summed={"mean": posterior["z"], "cov": posterior["p"]})
-    text = compiled.loop("step", known, step._replace(totals=_OF_ERRORS), passed=True)
+    passes = [made({**after, "first": _Z, "second": p}, len(constants))]
     if fits:
-        text += compiled.loop("after", known, made(after, len(constants)), passed=True)
-        passes = list[compiled.Pass]()
-        for i, fit in enumerate(fits):
-            pair = {"target": fit.target, "regressor": fit.regressor}
-            passes.append(made(pair, parameters + 3 * i)._replace(made={}, summed=pair, totals=_OF_PAIRS))
-        text += compiled.choice("sums", {**known, "x": _X, "x_next": _NEXT}, passes)
+        passes.append(made(after, len(constants)))
+    passes += [made({"first": fit.target, "second": fit.regressor}, parameters + 3 * i) for i, fit in enumerate(fits)]
+    text = compiled.choice("step", {**known, "x": _X, "x_next": _NEXT}, ["first", "second"], passes)
     program = Loops([], len(fits), text, _P not in letters)
     assert program.compiled
     return program

@@ -39,8 +39,7 @@ from kfcourse.symbolic.model import Model
 REMEDY = "compiled=True needs numba: pip install 'kfcourse[fast]', or leave it out"
 NAN = sp.Symbol("nan")  # what a formula gives where it has no value
 _CALLED = '@njit("void({})", cache=True, nogil=True, error_model="numpy")'  # by Python
-# By compiled functions, which get its address; sums may be taken in any order, so that the processor adds eight terms at once.
-_PASSED = '@cfunc("void({})", cache=True, error_model="numpy", fastmath={{"reassoc", "nsz"}})'
+_PASSED = '@cfunc("void({})", cache=True, error_model="numpy")'  # by compiled functions, which get its address
 _HEADER = '''"""Printed by kfcourse.symbolic.compiled; it may be removed at any time."""
 
 import numpy as np
@@ -79,15 +78,6 @@ class _Printer(NumbersPrinter):
         return f"min({', '.join(map(self._print, expr.args))})"
 
 
-class Totals(NamedTuple):
-    """Sums that a loop takes on its way, as text: names of arrays for it, and what is done before, at each entry i, and after."""
-
-    arrays: Sequence[str]
-    before: str
-    each: Sequence[str]
-    after: str
-
-
 class Pass(NamedTuple):
     """What one pass over arrays makes.
 
@@ -99,20 +89,15 @@ class Pass(NamedTuple):
         Numbers that are the same for all entries: the first of the array c, in this order.
     definitions : dict
         Auxiliary symbols that the expressions may use.
-    summed : dict
-        Name to expression, of numbers that go into the totals only.
-    totals : Totals, optional
     """
 
     made: Mapping[str, sp.Expr]
     constants: Sequence[sp.Symbol]
     definitions: Mapping[sp.Symbol, sp.Expr] = {}
-    summed: Mapping[str, sp.Expr] = {}
-    totals: Totals = Totals([], "", [], "")
 
 
-def loop(name: str, given: Mapping[str, sp.Symbol], one: Pass, *, passed: bool = False) -> str:
-    """A function `name(c, given arrays, made arrays, arrays of the totals)` of one loop over their entries, as text.
+def loop(name: str, given: Mapping[str, sp.Symbol], one: Pass) -> str:
+    """A function `name(c, given arrays, made arrays)` of one loop over their entries, as text.
 
     Parameters
     ----------
@@ -120,39 +105,37 @@ def loop(name: str, given: Mapping[str, sp.Symbol], one: Pass, *, passed: bool =
     given : dict
         Name of an array, (N,), to the symbol of its entries.
     one : Pass
-    passed : bool
-        Whether it is for other compiled functions to call, and not for Python.
     """
-    return _function(name, ["c"], given, one, _PASSED if passed else _CALLED) + _body(given, one)
+    return _function(name, ["c", *{**given, **one.made}], _CALLED) + _body(given, one)
 
 
-def choice(name: str, given: Mapping[str, sp.Symbol], passes: Sequence[Pass]) -> str:
-    """A function `name(number, c, ...)` of several loops on arrays of equal names, for others to call; the number says which."""
+def choice(name: str, given: Mapping[str, sp.Symbol], made: Sequence[str], passes: Sequence[Pass]) -> str:
+    """A function `name(number, c, given arrays, made arrays)` of several loops, for others to call; the number says which.
+
+    A pass need not make all arrays that are made, and may make given ones anew.  One function for all compiles faster than
+    one for each.
+    """
     cases = "".join(f"    if number == {i}:\n{indent(_body(given, one), '    ')}" for i, one in enumerate(passes))
-    return _function(name, ["number", "c"], given, passes[0], _PASSED) + cases
+    return _function(name, ["number", "c", *given, *made], _PASSED) + cases
 
 
-def _function(name: str, first: list[str], given: Mapping[str, sp.Symbol], one: Pass, decorator: str) -> str:
-    names = [*first, *{**given, **one.made}, *one.totals.arrays]
-    signature = ", ".join("int64" if one == "number" else "float64[::1]" for one in names)
-    return f"\n\n{decorator.format(signature)}\ndef {name}({', '.join(names)}):\n"
+def _function(name: str, arguments: Sequence[str], decorator: str) -> str:
+    signature = ", ".join("int64" if one == "number" else "float64[::1]" for one in arguments)
+    return f"\n\n{decorator.format(signature)}\ndef {name}({', '.join(arguments)}):\n"
 
 
 def _body(given: Mapping[str, sp.Symbol], one: Pass) -> str:
-    outputs = {made: sp.ImmutableMatrix([value]) for made, value in {**one.made, **one.summed}.items()}
-    return printed(lambda program: _text(given, program, one), outputs, (), one.definitions)
+    outputs = {made: sp.ImmutableMatrix([value]) for made, value in one.made.items()}
+    return printed(lambda program: _text(given, program, one.constants), outputs, (), one.definitions)
 
 
-def _text(given: Mapping[str, sp.Symbol], program: Program, one: Pass) -> str:
-    used, assignments, values = _assignments(program, one.constants, {f"{array}_i": entry for array, entry in given.items()})
-    lines = [f"    c{i} = c[{i}]  # {letter}" for i, letter in enumerate(one.constants) if letter in used]
-    lines += [f"    {one.totals.before}"] if one.totals.before else []
+def _text(given: Mapping[str, sp.Symbol], program: Program, constants: Sequence[sp.Symbol]) -> str:
+    used, assignments, values = _assignments(program, constants, {f"{array}_i": entry for array, entry in given.items()})
+    lines = [f"    c{i} = c[{i}]  # {letter}" for i, letter in enumerate(constants) if letter in used]
     lines += [f"    for i in range(len({next(iter(given))})):"]
     lines += [f"        {array}_i = {array}[i]" for array, entry in given.items() if entry in used]
     lines += [f"        {line}" for line in assignments]
-    lines += [f"        {output}{'[i]' if output in one.made else ''} = {value}" for output, value in values.items()]
-    lines += [f"        {line}" for line in one.totals.each]
-    lines += [f"    {one.totals.after}"] if one.totals.after else []
+    lines += [f"        {output}[i] = {value}" for output, value in values.items()]
     return "\n".join([*lines, ""])
 
 

@@ -66,6 +66,23 @@ def test_variant_53_rarely_needs_the_adaptive_filter():
     assert np.mean([len(grid.x) for state in states for grid in state.memory.fine]) < 50
 
 
+def test_a_narrow_hump_at_the_middle_of_its_prediction_is_seen():
+    """A thousandth as wide, between two nodes of a first look: what is as wide as the prediction hid it."""
+    _, y = simulate(MODELS["53"], 512, 51, seed=1)
+    for state in followed(filters.pointmass(MODELS["53"]), y[:20, [396]]):
+        assert not state.memory.adaptive.any()
+
+
+def test_after_panels_nodes_do_again():
+    """Kernels far from the measurement are no humps beside the root that explains it, though the likeliest among kernels."""
+    one, (_, y) = filters.pointmass(MODELS["53"]), simulate(MODELS["53"], 20, 9, seed=1)
+    *_, state = followed(one, y[:8])
+    memory = state.memory._replace(fine=[grid._replace(uniform=False) for grid in state.memory.fine])
+    expected, found = (one.step(each, y[8]) for each in (state, state._replace(memory=memory.without_predictions())))
+    assert not found.memory.adaptive.any()
+    np.testing.assert_allclose(found.memory.variance, expected.memory.variance, rtol=1e-3)
+
+
 @pytest.mark.parametrize(
     ("state", "meter"),
     [

@@ -3,7 +3,8 @@
 A trajectory goes the usual way if the kernels of its nodes overlap before and after the step, and nodes x = c + s sinh t resolve
 its posterior.  Of any other it is said that it is LEFT.  Only with numba is this imported.
 
-The numbers are those of NumPy but for rounding: sums are taken in another order, and exp(u) is computed here, for many u at once.
+The numbers are those of NumPy but for rounding: sums are taken in another order, and exp(u), to 2e-13 of it, and ln(x) are
+computed here, for many at once.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from kfcourse.filters.exact.kernels import OVERLAP, SEEN
 from kfcourse.filters.exact.places import COARSELY, EXPLANATIONS, FRACTIONS, HIDDEN, HUMP, SEARCHED
 
 LEFT, DONE, NARROW = 0, 1, 2  # to NumPy; done; done, and the next kernels do not overlap
+MOVES, METER = 0, 1  # which of the printed laws
 
 # Sums may be taken in any order, so that the processor adds several terms at once.
 _CALLED: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract"}}
@@ -28,17 +30,22 @@ _ANY_ORDER = _CALLED | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  #
 
 _VALUES, _MANY, _MANY_PARTS, _NUMBERS = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
 
-_LOG2, _HIGH, _LOW = 1 / np.log(2), 0.693145751953125, 1.42860682030941723212e-6  # ln 2 = high + low, few digits in the first
+_LN2 = np.log(2)
+_WHOLE = 1.5 * 2.0**52  # what is added to it is rounded to a whole number, and this stands in the last bits
+_BITS_OF_WHOLE, _BITS_OF_ROOT = np.array([_WHOLE, np.sqrt(0.5)]).view(np.int64).tolist()
+_AS_WRITTEN = _ANY_ORDER | {"fastmath": {"contract"}}  # no sum in another order
 
 
-@njit(**_ANY_ORDER | {"fastmath": {"contract"}})
+@njit(**_AS_WRITTEN)
 def _exp(u):
-    """exp(u), |u| < 708, to the last bit but one: 2^k exp(r), |r| < .35, by Taylor's polynomial, that loops do many at once."""
-    k = np.floor(u * _LOG2 + 0.5)
-    r = (u - k * _HIGH) - k * _LOW
-    p = 1 / 6227020800
-    p = p * r + 1 / 479001600
-    p = p * r + 1 / 39916800
+    """exp(u), |u| < 708, to 2e-13 of it: 2^k exp(r), |r| < .35, by Taylor's polynomial.
+
+    Here, and for the logarithm, no change from int to float and back, so that loops do many at once.
+    """
+    shifted = u * (1 / _LN2) + _WHOLE
+    k = shifted - _WHOLE
+    r = u - k * _LN2
+    p = 1 / 39916800
     p = p * r + 1 / 3628800
     p = p * r + 1 / 362880
     p = p * r + 1 / 40320
@@ -50,7 +57,34 @@ def _exp(u):
     p = p * r + 1 / 2
     p = p * r + 1
     p = p * r + 1
-    return p * np.int64((np.int64(k) + 1023) << 52).view(np.float64)
+    return p * np.int64((np.float64(shifted).view(np.int64) + 1023) << 52).view(np.float64)
+
+
+@njit(**_AS_WRITTEN)
+def _log(x):
+    """ln x to 1e-15, x >= 0 no smaller than numbers are in full: k ln 2 + ln m, 1/2 < m^2 < 2, ln m = 2 artanh s."""
+    bits = np.float64(x).view(np.int64)
+    k = (bits - _BITS_OF_ROOT) >> 52
+    m = np.int64(bits - (k << 52)).view(np.float64)
+    s = (m - 1) / (m + 1)
+    z = s * s
+    p = 1 / 19
+    p = p * z + 1 / 17
+    p = p * z + 1 / 15
+    p = p * z + 1 / 13
+    p = p * z + 1 / 11
+    p = p * z + 1 / 9
+    p = p * z + 1 / 7
+    p = p * z + 1 / 5
+    p = p * z + 1 / 3
+    p = p * z + 1
+    value = (np.int64(k + _BITS_OF_WHOLE).view(np.float64) - _WHOLE) * _LN2 + 2 * s * p
+    return -np.inf if x == 0 else value if x < np.inf else x
+
+
+@njit(**_ANY_ORDER)
+def _arrays(size):
+    return np.empty(size), np.empty(size), np.empty(size), np.empty(size)
 
 
 @njit(**_ANY_ORDER)
@@ -78,10 +112,10 @@ def _kernels(x, mass, density, moved, kernel, parts):
     others of every second, then the rest: the sums over `quarter` and `even` are parts of the sum over all.  Of each part: where
     it ends, the mass up to there, and up to which sum there is nothing.
     """
-    count, place, top, low, high, weight, total = len(x), 0, 0, np.inf, -np.inf, 0.0, 0.0
+    (to, spread, _, _), count, place, top, low, high, weight, total = moved, len(x), 0, 0, np.inf, -np.inf, 0.0, 0.0
     for part, first, step in ((0, 0, 4), (1, 2, 4), (2, 1, 2)):
         for j in range(first, count, step):
-            mean, sigma = moved[0, j], max(np.sqrt(moved[1, j]), 1e-150)
+            mean, sigma = to[j], max(np.sqrt(spread[j]), 1e-150)
             rate = np.sqrt(0.5) / sigma
             kernel[0, place], kernel[1, place], kernel[2, place] = rate, mean * rate, mass[j] * rate
             weight += mass[j] * rate
@@ -94,9 +128,9 @@ def _kernels(x, mass, density, moved, kernel, parts):
     for j in range(count):
         top = j if density[j] > density[top] else top
     top = min(max(top, 1), count - 2)
-    slope = (moved[0, top + 1] - moved[0, top - 1]) / (x[top + 1] - x[top - 1])
-    width = np.hypot(slope / (ROOT * density[top]) if np.isfinite(slope) else 0.0, max(np.sqrt(moved[1, top]), 1e-150))
-    return moved[0, top], width, low, high
+    slope = (to[top + 1] - to[top - 1]) / (x[top + 1] - x[top - 1])
+    width = np.hypot(slope / (ROOT * density[top]) if np.isfinite(slope) else 0.0, max(np.sqrt(spread[top]), 1e-150))
+    return to[top], width, low, high
 
 
 @njit(**_ANY_ORDER)
@@ -134,12 +168,6 @@ def add_bells(x, rate, centre, weights, lowest, result):
 
 
 @njit(**_ANY_ORDER)
-def _first(rows, count):
-    """The beginnings of four rows, contiguous as the printed loops take them."""
-    return rows[0, :count], rows[1, :count], rows[2, :count], rows[3, :count]
-
-
-@njit(**_ANY_ORDER)
 def _residual(y, mean, signal, of_noise):
     return np.abs(y - mean) - signal if of_noise else y - signal
 
@@ -149,16 +177,16 @@ def _log_likelihood(y, mean, variance):
     if np.isnan(y):
         return 0.0
     variance = max(variance, TINY)
-    return -0.5 * ((y - mean) * (y - mean) / variance + np.log(2 * np.pi * variance))
+    return -0.5 * ((y - mean) * (y - mean) / variance + _log(2 * np.pi * variance))
 
 
 @njit(**_ANY_ORDER)
-def _explanations(meter, c, of_noise, y, place, x, shown):
+def _explanations(law, c, of_noise, y, place, x, shown):
     """`explanations`: the roots of b(x, m_w) = y in the support, those nearest to the middle, in x[2]; how many."""
-    at, root, left, right, far, known = x[0, :SEARCHED], x[2], x[3], x[4], x[5], 0
-    _nodes(place, at, x[1])
-    mean, variance, signal, slope = _first(shown, len(at))
-    meter(c, at, mean, variance, signal, slope)
+    (at, length, root, left, right, far), (mean, variance, signal, slope), known = x, shown, 0
+    at = at[:SEARCHED]
+    _nodes(place, at, length)
+    law(METER, c, at, mean, variance, signal, slope)
     for i in range(1, SEARCHED):
         before, after = _residual(y, mean[i - 1], signal[i - 1], of_noise), _residual(y, mean[i], signal[i], of_noise)
         if (before > 0) == (after > 0) or not np.abs(after - before) < np.inf:
@@ -169,19 +197,19 @@ def _explanations(meter, c, of_noise, y, place, x, shown):
             far[j + 1], left[j + 1], right[j + 1] = far[j], left[j], right[j]
         far[j], left[j], right[j] = distance, at[i - 1], at[i]
         known = min(known + 1, EXPLANATIONS)
-    meter(c, left[:known], mean[:known], variance[:known], signal[:known], slope[:known])
+    law(METER, c, left[:known], mean, variance, signal, slope)
     for j in range(known):
         far[j] = _residual(y, mean[j], signal[j], of_noise) > 0
     for halving in range(COARSELY + 1):
         for j in range(known):
             root[j] = 0.5 * (left[j] + right[j])
         if halving < COARSELY:
-            meter(c, root[:known], mean[:known], variance[:known], signal[:known], slope[:known])
+            law(METER, c, root[:known], mean, variance, signal, slope)
             for j in range(known):
                 same = (_residual(y, mean[j], signal[j], of_noise) > 0) == (far[j] > 0)
                 left[j], right[j] = (root[j], right[j]) if same else (left[j], root[j])
     for _ in range(2):
-        meter(c, root[:known], mean[:known], variance[:known], signal[:known], slope[:known])
+        law(METER, c, root[:known], mean, variance, signal, slope)
         for j in range(known):
             newton = root[j] + _residual(y, mean[j], signal[j], of_noise) / slope[j]
             root[j] = newton if left[j] < newton < right[j] else root[j]
@@ -189,21 +217,21 @@ def _explanations(meter, c, of_noise, y, place, x, shown):
 
 
 @njit(**_ANY_ORDER)
-def _candidates(meter, c, y, known, place, x, shown, kernel, parts, found, candidates):
+def _candidates(law, c, y, known, place, x, shown, kernel, parts, found, candidates):
     """`likeliest`: centres, widths and masses of humps, of the roots in x[2] and of the middle; the place of the likeliest."""
-    middle, width, low, high = place
-    at = x[2, : known + 1]
+    (middle, width, low, high), (mean, variance, signal, slope) = place, shown
+    at = x[2][: known + 1]
     at[known] = min(max(middle, low), high)
-    mean, variance, signal, slope = _first(shown, known + 1)
-    meter(c, at, mean, variance, signal, slope)
+    law(METER, c, at, mean, variance, signal, slope)
     _density(at, kernel, parts, found[:2])
-    best, highest = known, -np.inf
+    best, highest, of_middle = known, -np.inf, width
     for j in range(known + 1):
-        scale = width
+        scale = of_middle
         if j < known:
             by_meter = np.sqrt(variance[j]) / np.abs(slope[j])
             scale = by_meter if by_meter < width else width
-        log_mass = np.log(found[1, j] * scale * ROOT) + _log_likelihood(y, mean[j], variance[j])
+            of_middle = min(of_middle, np.hypot(at[j] - at[known], scale))
+        log_mass = _log(found[1, j] * scale * ROOT) + _log_likelihood(y, mean[j], variance[j])
         log_mass = log_mass if scale > 0 and not np.isnan(log_mass) else -np.inf
         candidates[0, j], candidates[1, j], candidates[2, j] = at[j], scale, log_mass
         if log_mass > highest:
@@ -218,21 +246,20 @@ def _overlap(mass):
 
 
 @njit(**_ANY_ORDER)
-def _looked(moves, meter, c, y, place, x, shown, moved, kernel, parts, found, dense):
+def _looked(law, c, y, place, x, shown, moved, kernel, parts, found, dense):
     """`looked`: centre, width and ends of the highest hump; and in `dense` how densely its kernels want their nodes.
 
     The width is NaN where nothing is seen.
     """
-    at, length, logs = x[0, :LOOKED], x[1], x[2]
-    count = len(at)
+    at, length, logs, (mean, variance, signal, slope), count = x[0][:LOOKED], x[1], x[2], shown, LOOKED
     _nodes(place, at, length)
-    mean, variance, signal, slope = _first(shown, count)
-    meter(c, at, mean, variance, signal, slope)
+    law(METER, c, at, mean, variance, signal, slope)
     _density(at, kernel, parts, found[:2])
     top = 0
     for i in range(count):
-        logs[i] = np.log(found[1, i]) + _log_likelihood(y, mean[i], variance[i])
-        logs[i] = -np.inf if np.isnan(logs[i]) else logs[i]
+        log = _log(found[1, i]) + _log_likelihood(y, mean[i], variance[i])
+        logs[i] = -np.inf if np.isnan(log) else log
+    for i in range(count):
         top = i if logs[i] > logs[top] else top
     highest, area, fallen = logs[top], 0.0, np.inf
     for i in range(count):
@@ -246,9 +273,10 @@ def _looked(moves, meter, c, y, place, x, shown, moved, kernel, parts, found, de
     for i in range(count):
         if logs[i] > TAIL * area:
             first, last = min(first, i), i
-    moves(c, at, moved[0, :count], moved[1, :count], moved[2, :count])
+    mean, variance, signal, slope = moved
+    law(MOVES, c, at, mean, variance, signal, slope)
     for i in range(count):
-        wanted = np.abs(moved[2, i]) / max(np.sqrt(moved[1, i]), 1e-150)
+        wanted = np.abs(slope[i]) / max(np.sqrt(variance[i]), 1e-150)
         dense[i] = _overlap(logs[i] / area) * wanted
     return at[top], min(area / ROOT, 2 * fallen), at[max(first - 1, 0)], at[min(last + 1, count - 1)]
 
@@ -344,16 +372,17 @@ def _cautious(change, before):
 
 
 @njit(**_ANY_ORDER)
-def _posterior(meter, c, y, x, length, shown, away, kernel, parts, found, padded, mass, density):
+def _posterior(law, c, y, x, length, shown, away, kernel, parts, found, padded, mass, density):
     """`posteriors` on nodes: mean, variance, and estimated error, of these nodes and inherited."""
-    count = len(x)
-    mean, variance, signal, slope = _first(shown, count)
-    meter(c, x, mean, variance, signal, slope)
+    (mean, variance, signal, slope), count = shown, len(x)
+    law(METER, c, x, mean, variance, signal, slope)
     _density(x, kernel, parts, found)
     highest, total = -np.inf, 0.0
     for i in range(count):
         mean[i] = _log_likelihood(y, mean[i], variance[i])
-        highest = max(highest, mean[i] + np.log(found[2, i]))
+        variance[i] = mean[i] + _log(found[2, i])
+    for i in range(count):
+        highest = max(highest, variance[i])
     for i in range(count):
         log = mean[i] - highest
         likelihood = (np.inf if log > 708 else _exp(max(log, -708.0))) * length[i]
@@ -383,10 +412,10 @@ def _posterior(meter, c, y, x, length, shown, away, kernel, parts, found, padded
 @njit(**_ANY_ORDER)
 def _apart(mass, moved):
     """`apart`: how far the kernels of neighbouring nodes are, up to 1 their sum is as good as the integral."""
-    most = 0.0
+    (to, spread, _, _), most = moved, 0.0
     for i in range(1, len(mass) - 1):
-        here = moved[0, i]
-        gap = max(np.abs(moved[0, i + 1] - here), np.abs(here - moved[0, i - 1])) / max(np.sqrt(moved[1, i]), 1e-150)
+        here = to[i]
+        gap = max(np.abs(to[i + 1] - here), np.abs(here - to[i - 1])) / max(np.sqrt(spread[i]), 1e-150)
         if not gap * OVERLAP <= most:
             most = max(most, gap * _overlap(mass[i]))
     return most
@@ -395,17 +424,17 @@ def _apart(mass, moved):
 @njit(**_ANY_ORDER)
 def _predicted(mass, moved):
     """`Kernels.moments`."""
-    mean = variance = 0.0
+    (to, spread, _, _), mean, variance = moved, 0.0, 0.0
     for i in range(len(mass)):
-        mean += mass[i] * moved[0, i]
+        mean += mass[i] * to[i]
     for i in range(len(mass)):
-        sigma = max(np.sqrt(moved[1, i]), 1e-150)
-        variance += mass[i] * (sigma * sigma + (moved[0, i] - mean) * (moved[0, i] - mean))
+        sigma = max(np.sqrt(spread[i]), 1e-150)
+        variance += mass[i] * (sigma * sigma + (to[i] - mean) * (to[i] - mean))
     return mean, variance
 
 
-_MOVES = types.FunctionType(types.void(*[_VALUES] * 5))  # the printed loops: constants, x, and what is made of each
-_METER = types.FunctionType(types.void(*[_VALUES] * 6))
+# Printed, with the constants of the model: law(number, c, x, mean, variance, signal, slope); MOVES makes no signal.
+_LAW = types.FunctionType(types.void(types.int64, *[_VALUES] * 6))
 
 
 def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
@@ -413,52 +442,52 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
 
     @njit(
         types.int64(
-            _MOVES, _METER, _VALUES, types.boolean, _MANY, _NUMBERS, _NUMBERS, _VALUES, types.float64, types.float64,
+            _LAW, _VALUES, types.boolean, _MANY, _NUMBERS, _NUMBERS, _VALUES, types.float64, types.float64,
             _MANY, _MANY, _NUMBERS, _NUMBERS,
         ),
         cache=True,
         nogil=True,
         **_CALLED,
     )  # fmt: skip
-    def steps(moves, meter, c, of_noise, before, start, count, y, accuracy, fine_nodes, after, numbers, size, status):
+    def steps(law, c, of_noise, before, start, count, y, accuracy, fine_nodes, after, numbers, size, status):
         """One step of many trajectories: the length of `after` that is filled.
 
-        moves, meter : the state's and the meter's loops, with their constants c; whether the signal is the noise's deviation
+        law : of state and meter, with their constants c; whether the signal is the noise's deviation
         before (3, M), start, count (T,) : nodes, masses and densities; where those of each trajectory begin, and how many
         y (T,), accuracy, fine_nodes : as of `pointmasses`
         after (3, T * most) : as `before`, one after the other
         numbers (5, T), size, status (T,) : mean, variance, error, mean and variance predicted; nodes; LEFT, DONE or NARROW
         """
         most, filled = constants[0][-1], 0
-        kernel, moved, found, parts = np.empty((3, most)), np.empty((3, most)), np.empty((3, most)), np.empty((3, 3))
-        shown, few, nodes, candidates = np.empty((4, most)), np.empty((6, most)), np.empty((4, most)), np.empty((3, 4))
-        dense, changes, padded = np.empty(LOOKED), np.empty(6), np.empty(most + ORDER)
+        kernel, found, parts, candidates = np.empty((3, most)), np.empty((3, most)), np.empty((3, 3)), np.empty((3, 4))
+        nodes, dense, changes, padded = np.empty((4, most)), np.empty(LOOKED), np.empty(6), np.empty(most + ORDER)
+        moved, shown, few = _arrays(most), _arrays(most), _arrays(most) + _arrays(most)[:2]
         for t in range(len(y)):
             status[t], n = LEFT, count[t]
             end = start[t] + n
             x, mass, density = before[0, start[t] : end], before[1, start[t] : end], before[2, start[t] : end]
-            moves(c, x, moved[0, :n], moved[1, :n], moved[2, :n])
+            law(MOVES, c, x, moved[0], moved[1], moved[2], moved[3])
             place = _kernels(x, mass, density, moved, kernel, parts)
             if not -np.inf < place[2] < place[3] < np.inf or np.isnan(place[1]):
                 continue
-            known = _explanations(meter, c, of_noise, y[t], place, few, shown)
-            place = _candidates(meter, c, y[t], known, place, few, shown, kernel, parts, found, candidates)
-            hump = _looked(moves, meter, c, y[t], place, few, shown, moved, kernel, parts, found, dense)
+            known = _explanations(law, c, of_noise, y[t], place, few, shown)
+            place = _candidates(law, c, y[t], known, place, few, shown, kernel, parts, found, candidates)
+            hump = _looked(law, c, y[t], place, few, shown, moved, kernel, parts, found, dense)
             if np.isnan(hump[1]):
                 continue
             least = 0.0
             for spacing in SPACINGS:
                 place, wanted = _spaced(hump, few[0], dense, candidates, known, spacing)
-                n = 0
+                n = NODES[0]
                 for number in NODES:
                     n = number if n < max(wanted, least) else n
                 x, length = nodes[0, :n], nodes[1, :n]
                 mass, density = nodes[2, :n], nodes[3, :n]
                 _nodes(place, x, length)
                 m, v, error, inherited = _posterior(
-                    meter, c, y[t], x, length, shown, changes, kernel, parts, found, padded, mass, density
+                    law, c, y[t], x, length, shown, changes, kernel, parts, found, padded, mass, density
                 )
-                moves(c, x, moved[0, :n], moved[1, :n], moved[2, :n])
+                law(MOVES, c, x, moved[0], moved[1], moved[2], moved[3])
                 apart = _apart(mass, moved)
                 least_now = (n - 1) * apart + 1
                 least_now = least_now if least_now <= most else fine_nodes

@@ -39,6 +39,10 @@ class Candidates(NamedTuple):
     def rows(self, chosen: Array | slice) -> Candidates:
         return Candidates(*(array[chosen] for array in self))
 
+    def beside(self, others: Candidates) -> Candidates:
+        """These and others."""
+        return Candidates(*(np.concatenate(arrays, axis=1) for arrays in zip(self, others, strict=True)))
+
 
 def likeliest(kernels: Kernels, y: Array, law: ScalarDensities) -> tuple[Place, Candidates]:
     """The place of the likeliest hump, and all candidates."""
@@ -46,8 +50,10 @@ def likeliest(kernels: Kernels, y: Array, law: ScalarDensities) -> tuple[Place, 
     x = explanations(kernels, y, law, low, high)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         scale = np.fmin(law.meter_width(x), kernels.width)
-    centres = np.concatenate([x, np.clip(kernels.centre, low, high)], axis=1)
-    scales = np.concatenate([scale, kernels.width], axis=1)
+    middle = np.clip(kernels.centre, low, high)
+    of_middle = np.fmin(kernels.width, np.fmin.reduce(np.hypot(x - middle, scale), axis=1, keepdims=True))  # a root is beside it
+    centres = np.concatenate([x, middle], axis=1)
+    scales = np.concatenate([scale, of_middle], axis=1)
     known = np.where(np.isnan(centres), kernels.centre, centres)
     coarse = kernels.thinned()
     with np.errstate(divide="ignore", invalid="ignore"):

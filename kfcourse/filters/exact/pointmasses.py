@@ -328,9 +328,10 @@ def _in_batch(
                 i, there = left[some], place.rows(some)
                 found = posteriors(kernels.rows(i), y[i], law, there, count)
                 least[i] = nodes_for_kernels(law, found, count, fine_nodes)
-                unseen = hidden(candidates.rows(i), there, count)
+                humps = candidates.rows(i)
                 if kernels.panels:  # the prediction may have humps of its own
-                    unseen |= hidden(of_kernels(kernels.rows(i), y[i], law), there, count)
+                    humps = humps.beside(of_kernels(kernels.rows(i), y[i], law))
+                unseen = hidden(humps, there, count)
                 found = found._replace(error=np.where(unseen, np.inf, found.error))
                 good = (found.error <= accuracy) & (least[i] <= count)
                 told = good | (spacing == spacings[-1]) | (count == NODES[-1])

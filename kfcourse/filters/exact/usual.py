@@ -86,10 +86,8 @@ def compiled_usual_way(model: Model) -> UsualWay:
     signal = sp.sqrt(of_model.meter_variance) if of_noise else of_model.meter
     moves = {"mean": of_model.state, "variance": of_model.variance, "slope": of_model.state.diff(x)}
     meter = {"mean": of_model.meter, "variance": of_model.meter_variance, "signal": signal, "slope": signal.diff(x)}
-    made = {name: compiled.Pass(formula, list(model.values)) for name, formula in (("moves", moves), ("meter", meter))}
-    printed = (compiled.loop(name, {"x": x}, one) for name, one in made.items())
-    laws = compiled.load(*printed)
-    moves_of, meter_of = laws.moves, laws.meter
+    passes = [compiled.Pass(one, list(model.values)) for one in (moves, meter)]
+    law = compiled.load(compiled.choice("law", {"x": x}, list(meter), passes)).law
     constants = np.array([float(value) for value in model.values.values()])
 
     def step(before: Packed, rows: Array, y: Array, accuracy: float, fine_nodes: int) -> Done:
@@ -101,7 +99,7 @@ def compiled_usual_way(model: Model) -> UsualWay:
             after = np.empty((3, len(rows[some]) * NODES[-1]))
             given = before.values, start[some], count[some], y[some], accuracy, fine_nodes
             here = np.empty((5, len(rows[some])))
-            filled = steps(moves_of, meter_of, constants, of_noise, *given, after, here, size[some], status[some])
+            filled = steps(law, constants, of_noise, *given, after, here, size[some], status[some])
             numbers[:, some] = here
             values.append(after[:, :filled])
         return Done(np.concatenate(values, axis=1), numbers, size, status == DONE)
