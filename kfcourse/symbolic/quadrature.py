@@ -312,7 +312,7 @@ def _of_step(name: str, model: Model, rules: Sequence[tuple[Array, Array]], equa
         dx = np.broadcast_to(dx, (*deviation.shape[:-1], n))
         weighed = deviation * weights[:, None]
         cross = transpose(weighed) @ points[:, :n]
-        slopes = _slopes(np.where(np.abs(cross) > _rounding_of(weighed, deviation), cross, 0.0), scale)
+        slopes = _slopes(np.where(np.abs(cross) <= _rounding_of(weighed, deviation), 0.0, cross), scale)
         # No difference of nearly equal matrices.
         left = _weighted(weights, deviation - dx @ transpose(slopes)) + added
         return value, slopes, left, deviation, added
