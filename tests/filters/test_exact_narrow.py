@@ -96,7 +96,7 @@ def test_beyond_the_budget_there_is_a_message_within_seconds(state, meter):
     with pytest.raises(ModelError, match=r"step \d of Model.*narrow|step \d of Model.*nodes"):
         for measurement in y:
             state = exact.step(state, measurement)
-    assert time.process_time() - start < 5
+    assert time.process_time() - start < 20  # it takes up to 6 on a slow processor; minutes would be what the budget is against
 
 
 @pytest.mark.parametrize("state", ["x**2 - 1 + 0.01*v", "x**2 + 0.01*v", "31*x + 0.1*v", "sin(3*x) + 0.01*v"])

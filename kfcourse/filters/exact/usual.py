@@ -87,7 +87,8 @@ def compiled_usual_way(model: Model) -> UsualWay:
     moves = {"mean": of_model.state, "variance": of_model.variance, "slope": of_model.state.diff(x)}
     meter = {"mean": of_model.meter, "variance": of_model.meter_variance, "signal": signal, "slope": signal.diff(x)}
     passes = [compiled.Pass(one, list(model.values)) for one in (moves, meter)]
-    law = compiled.load(compiled.choice("law", {"x": x}, list(meter), passes)).law
+    printed = compiled.choice("law", {"x": x}, list(meter), passes)
+    compiled.load(printed)  # now; a step takes it by its text, which another machine can be sent
     constants = np.array([float(value) for value in model.values.values()])
 
     def step(before: Packed, rows: Array, y: Array, accuracy: float, fine_nodes: int) -> Done:
@@ -99,7 +100,7 @@ def compiled_usual_way(model: Model) -> UsualWay:
             after = np.empty((3, len(rows[some]) * NODES[-1]))
             given = before.values, start[some], count[some], y[some], accuracy, fine_nodes
             here = np.empty((5, len(rows[some])))
-            filled = steps(law, constants, of_noise, *given, after, here, size[some], status[some])
+            filled = steps(compiled.load(printed).law, constants, of_noise, *given, after, here, size[some], status[some])
             numbers[:, some] = here
             values.append(after[:, :filled])
         return Done(np.concatenate(values, axis=1), numbers, size, status == DONE)
