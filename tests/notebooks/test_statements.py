@@ -50,7 +50,7 @@ def test_every_question_has_a_task_and_a_hint(name, body):
 
 @pytest.mark.parametrize(("letter", "variant"), [(letter, "5") for letter in sets()] + [("a", "53"), ("a", "1"), ("g", "20")])
 def test_answers_in_words_are_the_solutions_only(letter, variant):
-    """They run to the end; no student gets one of them, nor a stub in its place."""
+    """They run to the end, and no student gets one of them, nor a stub in its place."""
     whole = render(read(letter), exercise(letter, variant))
     done = execute_inside(solution(whole))
     assert [one for one in results(done) if one["status"] != "passed"] == []
