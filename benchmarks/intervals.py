@@ -190,16 +190,16 @@ class Asked:
 
         return ask if callable(known) else known
 
-    def again(self, seed: int) -> tuple[Estimate, np.ndarray]:
-        """The answers to all questions with another seed, designs included, side by side, and that all count."""
-        result = compare(*self.made, seed, **self.options)
-        answers = [getattr(result, name)(*given) for name, given in self.questions.values()]
-        fields = (
-            np.concatenate([np.broadcast_to(getattr(one, field), np.shape(one.value)).ravel() for one in answers])
-            for field in FIELDS
-        )
-        together = Estimate(*fields)
-        return together, np.ones(together.value.shape, dtype=bool)
+
+def again(made: tuple[Any, ...], options: dict[str, Any], questions: list[Any], seed: int) -> tuple[Estimate, np.ndarray]:
+    """The answers to all questions with another seed, designs included, side by side, and that all count."""
+    result = compare(*made, seed, **options)
+    answers = [getattr(result, name)(*given) for name, given in questions]
+    fields = (
+        np.concatenate([np.broadcast_to(getattr(one, field), np.shape(one.value)).ravel() for one in answers]) for field in FIELDS
+    )
+    together = Estimate(*fields)
+    return together, np.ones(together.value.shape, dtype=bool)
 
 
 def comparisons_of(page: str) -> list[Asked]:
@@ -227,7 +227,7 @@ def page_lines(page: str, seeds: int, jobs: int) -> list[str]:
     for i, asked in enumerate(comparisons_of(page)):
         start = time.monotonic()
         found = joblib.Parallel(jobs, prefer="threads" if jobs == 1 else None)(
-            joblib.delayed(asked.again)(seed) for seed in range(1, seeds + 1)
+            joblib.delayed(again)(asked.made, asked.options, [*asked.questions.values()], seed) for seed in range(1, seeds + 1)
         )
         size = np.mean([np.abs(one.value) for one, _ in found], axis=0)
         share, worst, so_bad, low, _ = covered(found, size)
