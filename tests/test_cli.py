@@ -191,12 +191,13 @@ def test_an_exact_filter_without_time_is_left_out_and_the_others_reported(call, 
     options = ("--runs", "400", "--steps", "40", "--slow-runs", "400", "--slow-seconds", "0.001")
     result = call("lab", "53", *options, "--json", "n.json")
     assert result.exit_code == 0, result.output
-    reason = "16 trajectories take more than 0.001 s"
-    assert f"exact AOF left out: {reason}" in result.output
     data = json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))
+    reason = data["left_out"]["aof-exact"]
+    assert re.fullmatch(r"16 trajectories take more than 0.001 s: give it more time, over 0.00\d s", reason)  # by the cores
+    assert f"exact AOF left out: {reason}" in result.output
     assert set(data["error_variance"]) == set(LAB)
     assert data["slow_runs"] == 0
-    assert data["left_out"] == {"aof-exact": reason}
+    assert set(data["left_out"]) == {"aof-exact"}
     assert f"exact AOF left out: {reason}" in (tmp_path / "lab-53" / "report.html").read_text(encoding="utf-8")
 
 

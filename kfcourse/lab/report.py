@@ -180,8 +180,10 @@ def conclusions(result: Comparison, confidence: float = CONFIDENCE) -> list[str]
 
 
 def _three_digits(value: float) -> str:
-    """Three digits, or all before the point; no power of ten for what is large."""
-    return f"{value:.0f}" if 1000 <= abs(value) < 1e12 else f"{value:.3g}"
+    """Three digits, or all before the point; a power of ten only for what is beyond all measure."""
+    if abs(value) >= 1e12:
+        return f"{value:.3g}"
+    return f"{value:.0f}" if abs(value) >= 1000 else np.format_float_positional(value, 3, fractional=False, trim="-")
 
 
 def recognised_modes(result: Comparison) -> Recognised | None:

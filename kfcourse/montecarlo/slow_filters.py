@@ -89,7 +89,9 @@ def run_slow_filters(
             if found and (done >= FEWEST or EXACT not in names):
                 return found, left_out
             if not found:
-                reason = f"{min(size, CHUNKS[0])} trajectories take more than {seconds:g} s"
+                first = min(size, CHUNKS[0])
+                least = seconds * max(1.0, (FEWEST if EXACT in names else first) / (first * jobs)) if seconds else 0.0
+                reason = f"{first} trajectories take more than {seconds:g} s: give it more time, over {float(f'{least:.1g}'):g} s"
                 return None, left_out | dict.fromkeys(names, reason)
             spent = time.monotonic() - begun  # more than the limit where it came late
             needed = float(f"{MARGIN * spent * FEWEST / done:.1g}")

@@ -86,6 +86,14 @@ def test_a_large_difference_has_no_power_of_ten():
     assert float(low) < 100 * float(result.mean_gap_difference("fos-linearised", "duof").value) < float(high)
 
 
+def test_nor_has_a_tiny_one():
+    model = Model.define("0.9*x + 0.1*v", "x + 3e-6*x**2 + 0.1*w")
+    result = compare(lab_filters(model, ["aof-gaussian", "aof-linearised"]), model, 2000, 4, 1, progress=False)
+    (sentence,) = conclusions(result)
+    (low, high) = re.findall(r"confidence: (-?0\.0000\d{3,}) to (0\.0000\d{3,}) %", sentence)[0]
+    assert float(low) < 0 < float(high)
+
+
 def test_a_filter_that_diverges_is_no_measure_for_others_and_has_no_place_among_them():
     """D3: the linearised AOF loses some trajectories, and errs ten thousand times as much there as the FOS does."""
     model = find_variant("D3").model
