@@ -159,6 +159,16 @@ FIT = """() => {
             .map((e) => e.outerHTML.slice(0, 80)),
     };
 }"""
+# Words and formulas under the mark that opens the code, which stands on the last line of what the code shows.
+UNDER_A_MARK = """() => [...document.querySelectorAll("article details.below-output:not([open]) > summary")]
+  .filter((mark) => mark.checkVisibility()).flatMap((mark) => {
+    const { left, top, bottom } = mark.getBoundingClientRect(), shown = mark.parentElement.previousElementSibling;
+    const all = document.createRange();
+    return (shown ? [...shown.querySelectorAll(":scope > p, mjx-container")] : []).filter((e) => {
+      all.selectNodeContents(e);
+      return [...all.getClientRects()].some((one) => one.right > left && one.top < bottom - 2 && one.bottom > top + 2);
+    }).map((e) => e.textContent.slice(-60));
+  })"""
 # Figures in sight whose letters of 10 pt are smaller than 10 px, of those with a picture for telephones; all wide ones have one.
 TOO_SMALL = """() => [...document.querySelectorAll("article .cell_output figure img")].filter((e) => e.checkVisibility())
     .map((e) => [e.currentSrc.slice(-30), e.clientWidth / (e.naturalWidth / 2) * 10 * 96 / 72])
@@ -262,6 +272,7 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
     show_on(tab, "screen", 1280)
     wide = tab.evaluate(FIT)
     assert wide["page"] <= 0 and wide["code"] == [], "at 1280 px a page scrolls, or a code cell"
+    assert tab.evaluate(UNDER_A_MARK) == [], "the mark of the code lies on text"
     tab.evaluate(AXE)
     whole = tab.evaluate(AUDIT, COLOURS) if page == WHOLE else []
     tab.evaluate(THIN, THEMES)
