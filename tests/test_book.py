@@ -173,6 +173,8 @@ UNDER_A_MARK = """() => [...document.querySelectorAll("article details.below-out
 TOO_SMALL = """() => [...document.querySelectorAll("article .cell_output figure img")].filter((e) => e.checkVisibility())
     .map((e) => [e.currentSrc.slice(-30), e.clientWidth / (e.naturalWidth / 2) * 10 * 96 / 72])
     .filter(([, size]) => size < 10)"""
+# Ten screens of a chapter, as it is opened, in px, and a fiftieth more.
+LONGEST = 10_200
 # A sheet of A4 less its margins, in px of CSS.
 PAPER = 673
 AXE = resources.files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
@@ -272,6 +274,8 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
     show_on(tab, "screen", 1280)
     wide = tab.evaluate(FIT)
     assert wide["page"] <= 0 and wide["code"] == [], "at 1280 px a page scrolls, or a code cell"
+    if page in NOTEBOOKS:
+        assert tab.evaluate("document.querySelector('article').scrollHeight") <= LONGEST, "fold what a first reader may pass over"
     assert tab.evaluate(UNDER_A_MARK) == [], "the mark of the code lies on text"
     tab.evaluate(AXE)
     whole = tab.evaluate(AUDIT, COLOURS) if page == WHOLE else []
@@ -615,7 +619,7 @@ def test_a_figure_of_another_page_is_shown_with_its_picture(window):
 
 
 # Sheets of A4 of chapters that had one more: code went overleaf as a whole and figures were as on a screen; the last was blank.
-SHEETS = {"comparison": 9, "linearisation": 10}
+SHEETS = {"comparison": 9, "linearisation": 10, "live-track": 8}
 
 
 @pytest.mark.parametrize("page", SHEETS)
