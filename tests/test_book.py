@@ -159,10 +159,22 @@ FIT = """() => {
             .map((e) => e.outerHTML.slice(0, 80)),
     };
 }"""
+# Words and formulas under the mark that opens the code, which stands on the last line of what the code shows.
+UNDER_A_MARK = """() => [...document.querySelectorAll("article details.below-output:not([open]) > summary")]
+  .filter((mark) => mark.checkVisibility()).flatMap((mark) => {
+    const { left, top, bottom } = mark.getBoundingClientRect(), shown = mark.parentElement.previousElementSibling;
+    const all = document.createRange();
+    return (shown ? [...shown.querySelectorAll(":scope > p, mjx-container")] : []).filter((e) => {
+      all.selectNodeContents(e);
+      return [...all.getClientRects()].some((one) => one.right > left && one.top < bottom - 2 && one.bottom > top + 2);
+    }).map((e) => e.textContent.slice(-60));
+  })"""
 # Figures in sight whose letters of 10 pt are smaller than 10 px, of those with a picture for telephones; all wide ones have one.
 TOO_SMALL = """() => [...document.querySelectorAll("article .cell_output figure img")].filter((e) => e.checkVisibility())
     .map((e) => [e.currentSrc.slice(-30), e.clientWidth / (e.naturalWidth / 2) * 10 * 96 / 72])
     .filter(([, size]) => size < 10)"""
+# Ten screens of a chapter, as it is opened, in px, and a fiftieth more.
+LONGEST = 10_200
 # A sheet of A4 less its margins, in px of CSS.
 PAPER = 673
 AXE = resources.files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
@@ -262,6 +274,9 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
     show_on(tab, "screen", 1280)
     wide = tab.evaluate(FIT)
     assert wide["page"] <= 0 and wide["code"] == [], "at 1280 px a page scrolls, or a code cell"
+    if page in NOTEBOOKS:
+        assert tab.evaluate("document.querySelector('article').scrollHeight") <= LONGEST, "fold what a first reader may pass over"
+    assert tab.evaluate(UNDER_A_MARK) == [], "the mark of the code lies on text"
     tab.evaluate(AXE)
     whole = tab.evaluate(AUDIT, COLOURS) if page == WHOLE else []
     tab.evaluate(THIN, THEMES)
@@ -604,7 +619,7 @@ def test_a_figure_of_another_page_is_shown_with_its_picture(window):
 
 
 # Sheets of A4 of chapters that had one more: code went overleaf as a whole and figures were as on a screen; the last was blank.
-SHEETS = {"comparison": 9, "linearisation": 10}
+SHEETS = {"comparison": 9, "linearisation": 10, "live-track": 8}
 
 
 @pytest.mark.parametrize("page", SHEETS)
