@@ -173,8 +173,8 @@ UNDER_A_MARK = """() => [...document.querySelectorAll("article details.below-out
 TOO_SMALL = """() => [...document.querySelectorAll("article .cell_output figure img")].filter((e) => e.checkVisibility())
     .map((e) => [e.currentSrc.slice(-30), e.clientWidth / (e.naturalWidth / 2) * 10 * 96 / 72])
     .filter(([, size]) => size < 10)"""
-# Ten screens of a chapter, as it is opened, in px, and a fiftieth more.
-LONGEST = 10_200
+# Ten screens of a chapter, as it is opened, in px, and half a screen for other fonts.
+LONGEST = 10_500
 # A sheet of A4 less its margins, in px of CSS.
 PAPER = 673
 AXE = resources.files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")

@@ -189,7 +189,8 @@ class Comparison:
 
         Not where rare trajectories make it: where a single one makes more than `HEAVY` of what the least accurate of the filters
         is known from, or where the error is `SKEWED`, of `FEW` batches less: there the standard error hangs on whether a
-        rare trajectory has come.  `benchmarks/intervals.py` counts how often the others hold the truth.
+        rare trajectory has come.  `benchmarks/intervals.py` counts how often the others hold the truth.  What no trajectory
+        of the slow part shows cannot be told: where one in ten thousand is lost (variant 5 after step 4), take more `slow_runs`.
         """
         good = self.usable & (np.abs(found.skewness) <= self.skewness_limit)
         if names:
