@@ -164,7 +164,7 @@ UNDER_A_MARK = """() => [...document.querySelectorAll("article details.below-out
   .filter((mark) => mark.checkVisibility()).flatMap((mark) => {
     const { left, top, bottom } = mark.getBoundingClientRect(), shown = mark.parentElement.previousElementSibling;
     const all = document.createRange();
-    return (shown ? [...shown.querySelectorAll(":scope > p, mjx-container")] : []).filter((e) => {
+    return (shown ? [...shown.querySelectorAll(":scope > p, mjx-container > :first-child")] : []).filter((e) => {
       all.selectNodeContents(e);
       return [...all.getClientRects()].some((one) => one.right > left && one.top < bottom - 2 && one.bottom > top + 2);
     }).map((e) => e.textContent.slice(-60));
