@@ -64,9 +64,9 @@ exact filter compiled): up to step 4 .90 to .98 of the gaps hold the truth, from
 .83 down to .58 of the FOS's, and `trusted` says nothing.  The exact filter is right: its M[e^2 / p] is 1 within .01.
 But the sine meter loses the other filters now and then: of 40,000 trajectories a single one makes 5 to 10 % of the distance from
 it, and 4,000 often have none like it.  Then the mean of the distances is too small, its standard error as well, and this gives it
-its weight in `Comparison._shares`.  Tried there, and not enough: errors of the fast filters that are larger than they claim
-count as distances that are missing (repairs the GAOF, not the FOS); distances that are less than the errors tell by 1.5
-to 2.5 standard errors have no weight (.6 to .8, and bands ten times as wide at some steps of 53).
+its weight in `Comparison._shares`.  Tried there, and not enough: the fast filters' largest errors count as distances that may be
+missing (repairs the GAOF alone, and makes its bands on 53 ten times as wide; less what filters claim, it does neither); distances
+that are less than the errors tell by 1.5 to 2.5 standard errors have no weight (.5 to .8, and such bands at some steps of 53).
 
 With `--pages` the comparisons of a page of the book are made again, at its sizes, and asked what the page asks: all is drawn anew
 with each seed, design ensembles too:
@@ -77,7 +77,7 @@ with each seed, design ensembles too:
     filters-that-remember, variant 53              60         .959 | .933
     filters-that-remember, cubic sensor            60         .941 | .883
     filters-that-remember, growth model            60         .942 | .817   (chance .32)
-    filters-that-remember, question 4              60         .946 | .933
+    filters-that-remember, question 4              60         .954 | .933
 
 Question 4 was asked of variant 5, with 400 exact trajectories and eight steps: .75 | .68.  The page `literature` is not measured.
 """

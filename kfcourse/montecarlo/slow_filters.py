@@ -90,15 +90,18 @@ def run_slow_filters(
                 return found, left_out
             if not found:
                 first = min(size, CHUNKS[0])
-                least = seconds * max(1.0, (FEWEST if EXACT in names else first) / (first * jobs)) if seconds else 0.0
-                reason = f"{first} trajectories take more than {seconds:g} s: give it more time, over {float(f'{least:.1g}'):g} s"
+                least = (seconds or 0.0) * max(1.0, (FEWEST if EXACT in names else first) / (first * jobs))
+                reason = f"{first} trajectories take more than {seconds:g} s: {_more_time(least)}"
                 return None, left_out | dict.fromkeys(names, reason)
             spent = time.monotonic() - begun  # more than the limit where it came late
-            needed = float(f"{MARGIN * spent * FEWEST / done:.1g}")
             why = f"{done} trajectories take {spent:.2g} s, and of fewer than {FEWEST} the rare ones that matter are missing"
-            left_out[EXACT] = f"{why}: give it more time, some {needed:g} s"
+            left_out[EXACT] = f"{why}: {_more_time(MARGIN * spent * FEWEST / done)}"
             return found.without_exact(), left_out
         return None, left_out
+
+
+def _more_time(seconds: float) -> str:
+    return f"give it more time, some {float(f'{seconds:.1g}'):g} s"
 
 
 def _chunks_in_time(
