@@ -90,6 +90,7 @@ import io
 import time
 import warnings
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -123,6 +124,8 @@ def estimates(result: Comparison) -> dict[str, tuple[Estimate, np.ndarray]]:
         gaps, bound = {name: result.gap(name) for name in entrants}, result.bound()
         asked["gap"] = [(gaps[name], result.trusted(gaps[name], name)) for name in entrants]
         asked["bound"] = [(bound, result.trusted(bound))]
+    of_mean = [result.mean_gap(name) for name in others], [result.mean_gap_difference(name, control) for name in others]
+    asked["mean"] = [(found, np.ones(result.steps, dtype=bool)) for found in chain(*of_mean)]
     return {
         what: (
             Estimate(*(np.array([np.broadcast_to(getattr(one, field), result.steps) for one, _ in found]) for field in FIELDS)),
@@ -159,7 +162,7 @@ def covered(found: list[tuple[Estimate, np.ndarray]], unit: np.ndarray | float) 
     return 1 - missed.sum() / counted.sum(), (hits / counted[some]).min(), so_bad, high.sum() / max(missed.sum(), 1), told
 
 
-def line(name: str, seeds: int, runs: int, slow_runs: int, steps: int, jobs: int) -> str:
+def line(name: str, seeds: int, runs: int, slow_runs: int, steps: int, jobs: int, compiled: bool) -> str:
     model, start = find_variant(name).model, time.monotonic()
     names = JUMP_LAB if isinstance(model, JumpModel) else LAB
     filters = [found.one for found in admissions(model, [*names, EXACT]) if found.one is not None]
@@ -168,14 +171,15 @@ def line(name: str, seeds: int, runs: int, slow_runs: int, steps: int, jobs: int
     filters = [ready.get(one.name, one) for one in filters]
 
     def one(seed: int) -> dict[str, tuple[Estimate, np.ndarray]]:
-        return estimates(compare(filters, model, runs, steps, seed, slow_runs=slow_runs, threads=1, progress=False))
+        options = {"slow_runs": slow_runs, "threads": 1, "progress": False, "compiled": compiled}
+        return estimates(compare(filters, model, runs, steps, seed, **options))
 
     found = joblib.Parallel(jobs, prefer="threads" if jobs == 1 else None)(
         joblib.delayed(one)(seed) for seed in range(1, seeds + 1)
     )
     of_size = "bound" if "bound" in found[0] else "difference"
     cells, size = [], np.mean([np.abs(result[of_size][0].value).max(axis=0) for result in found], axis=0)
-    for what, unit in (("gap", 1.0), ("difference", size), ("bound", size)):
+    for what, unit in (("gap", 1.0), ("difference", size), ("bound", size), ("mean", 1.0)):
         if what not in found[0]:
             cells.append(" " * 36)
             continue
@@ -256,6 +260,7 @@ def main() -> None:
     parser.add_argument("--pages", nargs="+", default=[], help="pages of the book in place of variants")
     for option, default in (("--seeds", 400), ("--runs", 100_000), ("--slow-runs", 4000), ("--steps", 12), ("--jobs", 2)):
         parser.add_argument(option, type=int, default=default)
+    parser.add_argument("--compiled", action="store_true", help="by compiled code: the same numbers but for rounding")
     args = parser.parse_args()
     if args.pages:
         part = f"{'mean':>7} {'worst':>6} {'chance':>6} {'low':>5}"
@@ -265,9 +270,10 @@ def main() -> None:
         return
     print(f"{args.seeds} seeds, {args.runs} trajectories, the exact AOF on {args.slow_runs}, {args.steps} steps; nominal 0.95")
     part = f"{'mean':>7} {'worst':>6} {'chance':>6} {'low':>5} {'told':>5}"
-    print(f"{'':>8}{'gap':>33} |{'difference':>33} |{'bound':>33} |\n{'variant':>8}{part} |{part} |{part} | {'s':>6}")
+    kinds = "|".join(f"{kind:>33} " for kind in ("gap", "difference", "bound", "mean over steps"))
+    print(f"{'':>8}{kinds}|\n{'variant':>8}{part} |{part} |{part} |{part} | {'s':>6}")
     for name in args.variants:
-        print(line(name, args.seeds, args.runs, args.slow_runs, args.steps, args.jobs), flush=True)
+        print(line(name, args.seeds, args.runs, args.slow_runs, args.steps, args.jobs, args.compiled), flush=True)
 
 
 if __name__ == "__main__":

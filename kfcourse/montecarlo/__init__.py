@@ -6,6 +6,7 @@ batches       how an ensemble is cut
 designing     coefficients of DUOF, FOS, MFOS: regressions over an ensemble
 experiment    `run`, `predictions`, `compare`: splits the seed into designing and comparing, runs all filters together
 blocks        one block of trajectories: all filters advance together
+exceptional   trajectories on which the fast filters disagree: the slow ones are to see them
 slow_filters  on as many of the trajectories as a budget allows;  parallel: on all cores
 statistics    means over batches of trajectories, standard errors
 two_phase     the same where slow filters ran on a part of them, and where filters were designed several times

@@ -18,6 +18,7 @@ from kfcourse.filters.particles import Clouds
 from kfcourse.laws import Array, NegativeVariance, any_missing
 from kfcourse.montecarlo.designing import NotFinite, failed
 from kfcourse.montecarlo.ensemble import Instant
+from kfcourse.montecarlo.exceptional import Scores
 from kfcourse.montecarlo.statistics import Sums
 from kfcourse.reasons import Reason
 
@@ -48,11 +49,12 @@ def run_block(
     weight_of: Callable[[Array], Array | None] = lambda x: None,
     *,
     back: bool = False,
+    scores: Scores | None = None,
 ) -> None:
     """Advance all filters together over the steps of one block of trajectories; `back`: let them look back from its end.
 
-    With a reference filter, the distance of every other estimate from its own is recorded too.  The initial states tell the
-    weights of the trajectories.
+    With a reference filter, the distance of every other estimate from its own is recorded too, and in `scores`, if there are any,
+    how exceptional the trajectories are.  The initial states tell the weights of the trajectories.
     """
     size, weight = int(sums.counts.sum()), None
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
@@ -63,6 +65,8 @@ def run_block(
                 with _affair_of(one, k):
                     estimate = state.posterior
                     sums.record(i, k, near(instant.x, estimate.mean, one.model.angles.x), estimate, weight)
+            if scores is not None:
+                scores.add(instant.x, [state.posterior.mean for state in states], filters[0].model.angles.x, weight)
             if reference is not None:
                 twice = _twice(states[reference])
                 sums.record_doubt(k, _doubt(states[reference]), weight)

@@ -30,21 +30,49 @@ FEW = 250  # batches: of fewer, the skewness is itself so uncertain that only as
 
 @dataclass(frozen=True)
 class SlowPart:
-    """Sums of all filters, the slow ones last, over the first of the common trajectories.
+    """Sums of all filters, the slow ones last, over a part of the common trajectories.
 
-    `replaced` tells why another filter ran instead of a slow one that failed: name to the reason.
+    Attributes
+    ----------
+    slow : list of str
+    first : Sums
+        Over the first trajectories, without those that are exceptional.
+    exceptional : Sums, optional
+        Over these of all trajectories, in the batches of the fast filters' sums.
+    replaced : dict
+        Why another filter ran instead of a slow one that failed: name to the reason.
     """
 
     slow: list[str]
-    sums: Sums
+    first: Sums
+    exceptional: Sums | None = None
     replaced: Mapping[str, str] = field(default_factory=dict)
 
     def without_exact(self) -> SlowPart | None:
         """Without the exact AOF, if any other slow filter is left."""
-        kept = [i for i, name in enumerate(self.slow, len(self.sums.square) - len(self.slow)) if name != EXACT]
-        fast = list(range(len(self.sums.square) - len(self.slow)))
-        slow = [name for name in self.slow if name != EXACT]
-        return replace(self, slow=slow, sums=self.sums.of_filters([*fast, *kept])) if slow else None
+        if not (slow := [name for name in self.slow if name != EXACT]):
+            return None
+        start = len(self.first.square) - len(self.slow)
+        kept = [*range(start), *(i for i, name in enumerate(self.slow, start) if name != EXACT)]
+        return replace(
+            self, slow=slow, first=self.first.of_filters(kept), exceptional=self.exceptional and self.exceptional.of_filters(kept)
+        )
+
+    @property
+    def runs(self) -> int:
+        """Trajectories that the slow filters ran on."""
+        return int(self.first.counts.sum() + (0 if self.exceptional is None else self.exceptional.counts.sum()))
+
+    def part(self, weight: float) -> float:
+        """The part of all trajectories, by their weight, that the first ones stand for."""
+        return 1.0 if self.exceptional is None else 1 - self.exceptional.weights.sum() / weight
+
+    def together(self, weight: float) -> Sums:
+        """The sums as if over all trajectories, of that weight."""
+        if self.exceptional is None:
+            return self.first
+        factor = self.part(weight) * weight / self.first.weights.sum()
+        return Sums.concatenate([self.first.times(factor), self.exceptional])
 
 
 class Verdict(NamedTuple):
@@ -139,7 +167,7 @@ class Comparison:
         """Steps, (steps,), at which what should be exact is not: it errs by too much itself, or a filter is more accurate."""
         found = np.zeros(self.steps, dtype=bool)
         if self.slow_part is not None and self.has_bound:
-            own = batch_mean(self.slow_part.sums.doubt, self.slow_part.sums.weights).value
+            own = batch_mean(self._on_slow_part.doubt, self._on_slow_part.weights).value
             found |= ~(own <= UNHEALTHY * self.bound().value)
             limit = BEATEN_IN_PLACE if EXACT in self.replaced else BEATEN
             for name in self.fast:
@@ -189,8 +217,7 @@ class Comparison:
 
         Not where rare trajectories make it: where a single one makes more than `HEAVY` of what the least accurate of the filters
         is known from, or where the error is `SKEWED`, of `FEW` batches less: there the standard error hangs on whether a
-        rare trajectory has come.  `benchmarks/intervals.py` counts how often the others hold the truth.  What no trajectory
-        of the slow part shows cannot be told: where one in ten thousand is lost (variant 5 after step 4), take more `slow_runs`.
+        rare trajectory has come.  `benchmarks/intervals.py` counts how often the others hold the truth.
         """
         good = self.usable & (np.abs(found.skewness) <= self.skewness_limit)
         if names:
@@ -203,7 +230,7 @@ class Comparison:
     @property
     def skewness_limit(self) -> float:
         """The largest skewness of an error whose interval can be trusted."""
-        sums = self.sums if self.slow_part is None else self.slow_part.sums
+        sums = self.sums if self.slow_part is None else self.slow_part.first
         return min(SKEWED, len(sums.counts) / FEW)
 
     def missing(self, found: Estimate, *names: str) -> float:
@@ -228,7 +255,7 @@ class Comparison:
     @property
     def slow_runs(self) -> int:
         """Trajectories the slow filters ran on."""
-        return 0 if self.slow_part is None else int(self.slow_part.sums.counts.sum())
+        return 0 if self.slow_part is None else self.slow_part.runs
 
     @cached_property
     def control(self) -> str:
@@ -402,7 +429,12 @@ class Comparison:
         self._check(name)
         if self.slow_part is None:
             raise KeyError(f"no filter ran on a part of the trajectories, so nothing is known of {name} there")
-        return self.slow_part.sums, (*self.fast, *self.slow_part.slow).index(name)
+        return self._on_slow_part, (*self.fast, *self.slow_part.slow).index(name)
+
+    @cached_property
+    def _on_slow_part(self) -> Sums:
+        assert self.slow_part is not None
+        return self.slow_part.together(self.sums.weights.sum())
 
     def _check(self, *names: str) -> None:
         for name in names:
@@ -511,11 +543,14 @@ class Comparison:
 
     def _estimate(self, terms: Terms, total: bool = False) -> Estimate:
         """The mean of the terms, (steps,), or summed over the steps, with its standard error."""
-        full = batch_sums(self.sums, self.fast, terms.everywhere, total)
-        if self.slow_part is None or not terms.on_slow_part:
-            found = estimate(full, self.sums.weights)
+        full, weights = batch_sums(self.sums, self.fast, terms.everywhere, total), self.sums.weights
+        part = self.slow_part
+        if part is None or not terms.on_slow_part:
+            found = estimate(full, weights)
         else:
-            names = (*self.fast, *self.slow_part.slow)
-            x, y = (batch_sums(self.slow_part.sums, names, weights, total) for weights in terms)
-            found = estimate(full, self.sums.weights, x, y, self.slow_part.sums.weights)
+            names = (*self.fast, *part.slow)
+            if part.exceptional is not None:
+                full = full + batch_sums(part.exceptional, names, terms.on_slow_part, total)
+            x, y = (batch_sums(part.first, names, some, total) for some in terms)
+            found = estimate(full, weights, x, y, part.first.weights, part.part(weights.sum()))
         return found if self.replicas is None else with_design(found, *self.replicas.variance(terms, total))

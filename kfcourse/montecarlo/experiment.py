@@ -28,6 +28,7 @@ from kfcourse.montecarlo.blocks import progress_bar, run_block, run_stretches
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite, design, design_together
 from kfcourse.montecarlo.ensemble import STEPS_AT_ONCE, Ensemble, workers
+from kfcourse.montecarlo.exceptional import Chosen, Scores, how_many
 from kfcourse.montecarlo.parallel import Cluster, cluster, cores
 from kfcourse.montecarlo.slow_filters import LEAST, run_slow_filters
 from kfcourse.montecarlo.statistics import Sums
@@ -153,8 +154,9 @@ def compare(
         Run compiled code (numba: `pip install kfcourse[fast]`) where a scalar model and its filters have formulas to compile.
         The numbers are the same but for rounding; the first time, compiling takes seconds, and is kept.
     slow_runs : int
-        Slow filters (exact, particle) run on this many of the common trajectories, at least 100; what they differ by from the
-        Gaussian AOF (or else the most accurate fast filter) is found there.  0 leaves them out.
+        Slow filters (exact, particle) run on this many of the common trajectories, at least 100: the first ones, and those on
+        which the fast filters disagree or err the most (`exceptional`).  What they differ by from the Gaussian AOF (or else the
+        most accurate fast filter) is found there.  0 leaves them out.
     slow_seconds : float, optional
         The slow filters stop after so long, on fewer trajectories; `Comparison.slow_runs` tells on how many.  With
         the same seed, as many trajectories give the same numbers.  A slow filter that fails, or that does not come through
@@ -203,24 +205,24 @@ def compare(
         if not same_ensemble:
             common = replace(common, wide=best_width(ready, replace(common, seed=pilot_seed)) if wide is None else wide)
         everyone = [*ready, *chain(*again)]
+        few, limits = min(slow_runs, runs), (slow_seconds, slow_memory, threads)
+        executor, judged = far.executor if far else pool, (len(ready), how_many(runs) if slow else 0)
         try:
-            everything = _run_blocks(everyone, common, far.executor if far else pool, progress)
+            everything, exceptional = _run_blocks(everyone, common, executor, progress, judged)
         except NotFinite:
             if wide is not None or not common.wide or common.wide == 1:
                 raise
             common = replace(common, wide=1.0)  # some far start is too far: none but the prior's own
-            everything = _run_blocks(everyone, common, far.executor if far else pool, progress)
+            everything, exceptional = _run_blocks(everyone, common, executor, progress, judged)
         sums, replicas = _split(everything, fast, len(others))
         slow_part, left_out = None, dict[str, str]()
         if slow:
             slow_ready = _designed(slow, design_ensemble, pool, progress)
-            slow_part, left_out = run_slow_filters(
-                ready, slow_ready, common, min(slow_runs, runs), slow_seconds, slow_memory, threads, progress, far=far
-            )
+            chosen = Chosen.of(few, exceptional)
+            slow_part, left_out = run_slow_filters(ready, slow_ready, common, chosen, sums.counts, *limits, progress, far=far)
         smoothing = None
         if smoothers:
-            limits = (min(slow_runs, runs), slow_seconds, slow_memory, threads)
-            smoothing = _smoothing(smoothers, common, seed, pool, limits, progress, far)
+            smoothing = _smoothing(smoothers, common, seed, pool, few, limits, progress, far)
     quick = tuple(one.name for one in fast)
     found = Comparison(model, tuple(names), quick, runs, steps, seed, sums, slow_part, left_out, replicas)
     return replace(found.without_unhealthy(), smoothing=smoothing)
@@ -256,14 +258,19 @@ def _smoothing(
     common: Ensemble,
     seed: int,
     pool: Executor,
-    limits: tuple[int, float | None, float | None, int],
+    few: int,
+    limits: tuple[float | None, float | None, int],
     progress: bool | None,
     far: Cluster | None,
 ) -> Comparison:
     """The comparison of smoothers on the same trajectories."""
-    slow, fast = ([one for one in smoothers if one.slow == which and (limits[0] or not one.slow)] for which in (True, False))
-    sums = _run_blocks(fast, common, far.executor if far else pool, progress, back=True)
-    slow_part, left_out = run_slow_filters(fast, slow, common, *limits, progress, back=True, far=far) if slow else (None, {})
+    slow, fast = ([one for one in smoothers if one.slow == which and (few or not one.slow)] for which in (True, False))
+    judged = len(fast), how_many(common.runs) if slow else 0
+    sums, exceptional = _run_blocks(fast, common, far.executor if far else pool, progress, judged, back=True)
+    slow_part, left_out = None, dict[str, str]()
+    if slow:
+        given = fast, slow, common, Chosen.of(few, exceptional), sums.counts
+        slow_part, left_out = run_slow_filters(*given, *limits, progress, back=True, far=far)
     names, quick = (tuple(one.name for one in some) for some in (smoothers, fast))
     found = Comparison(common.model, names, quick, common.runs, common.steps, seed, sums, slow_part, left_out)
     return found.without_unhealthy()
@@ -342,20 +349,37 @@ def _designed(filters: Sequence[Filter | Design], ensemble: Ensemble, pool: Exec
 
 
 def _run_blocks(
-    filters: Sequence[Filter], ensemble: Ensemble, pool: Executor, progress: bool | None, *, back: bool = False
-) -> Sums:
-    """Sums over all trajectories, its blocks in parallel."""
-    several = ensemble.compiled and is_scalar(ensemble.model) and not back
+    filters: Sequence[Filter],
+    ensemble: Ensemble,
+    pool: Executor,
+    progress: bool | None,
+    judged: tuple[int, int],
+    *,
+    back: bool = False,
+) -> tuple[Sums, Array]:
+    """Sums over all trajectories, its blocks in parallel.
 
-    def block(index: int) -> Sums:
+    Judged by the first so many filters, also the numbers of so many of the most exceptional trajectories.
+    """
+    judges, count = judged
+    several = ensemble.compiled and is_scalar(ensemble.model) and not back and not count
+
+    def block(index: int) -> tuple[Sums, tuple[Array, Array]]:
         size = ensemble.sizes[index]
         counts = batch_sizes(size, max(1, round(BATCHES * size / ensemble.runs)))
         sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, counts)
+        scores = Scores(size, judges)
         if several:
             run_stretches(filters, ensemble.stretches(index), sums, ensemble.weight)
         else:
-            run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight, back=back)
-        return sums
+            run_block(
+                filters, ensemble.block(index), sums, weight_of=ensemble.weight, back=back, scores=scores if count else None
+            )
+        return sums, scores.highest(count)
 
     indices = range(len(ensemble.sizes))
-    return Sums.concatenate(list(progress_bar("comparing", len(indices), "block", progress, pool.map(block, indices))))
+    found, highest = zip(*progress_bar("comparing", len(indices), "block", progress, pool.map(block, indices)), strict=True)
+    starts = accumulate(ensemble.sizes, initial=0)
+    places = np.concatenate([start + here for start, (here, _) in zip(starts, highest, strict=False)])
+    best = np.argsort(-np.concatenate([scores for _, scores in highest]), kind="stable")[:count]
+    return Sums.concatenate(found), np.sort(places[best])

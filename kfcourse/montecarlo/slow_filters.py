@@ -1,4 +1,4 @@
-"""The slow filters of a comparison: on the first of the common trajectories, as many as budgets of time and memory allow.
+"""The slow filters of a comparison: on a part of the common trajectories, as many as budgets of time and memory allow.
 
 Chunks of trajectories grow from a few to hundreds, as far as the memory allows; results are kept by batches of a few
 trajectories, always the same ones.  So the time decides after which chunk the work stops, and nothing else: chunks are the same
@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -26,6 +27,7 @@ from kfcourse.montecarlo.batches import STRATA
 from kfcourse.montecarlo.blocks import Failed, TooMuch, progress_bar, run_block
 from kfcourse.montecarlo.comparison import EXACT, SlowPart
 from kfcourse.montecarlo.ensemble import Ensemble, Instant, Serial
+from kfcourse.montecarlo.exceptional import Chosen
 from kfcourse.montecarlo.parallel import START, Cluster, Submit, may_start, one_thread, processes
 from kfcourse.montecarlo.statistics import Sums
 
@@ -35,6 +37,16 @@ FEWEST = 100  # trajectories that are a result: with fewer, the rare ones that m
 LEAST = 10e6  # bytes that can be a limit: interpreter and libraries take some at any time
 WAIT = 0.5  # seconds, so that what waits can be interrupted: on Windows, and by a time limit in another thread
 MARGIN = 1.3  # how much longer than the chunks before the next one may take, for each trajectory
+
+
+class _Data(NamedTuple):
+    """x, y and the following x, (steps, size, ...), of the chosen trajectories; their weights (size,) if they are not equal."""
+
+    x: Array
+    y: Array
+    x_next: Array
+    weight: Array | None
+    chosen: Chosen
 
 
 class _NoRoom(Exception):
@@ -49,7 +61,8 @@ def run_slow_filters(
     fast: Sequence[Filter],
     slow: Sequence[Filter],
     ensemble: Ensemble,
-    size: int,
+    chosen: Chosen,
+    batches: Array,
     seconds: float | None,
     memory: float | None,
     jobs: int,
@@ -58,34 +71,36 @@ def run_slow_filters(
     back: bool = False,
     far: Cluster | None = None,
 ) -> tuple[SlowPart | None, dict[str, str]]:
-    """All filters on at most `size` of the trajectories, in `jobs` processes, as threads would wait for one another.
+    """All filters on the chosen trajectories, in `jobs` processes, as threads would wait for one another.
 
-    With `back` they look back from the end; `far` away if there is a cluster.  Also, by name, why slow filters were left out; the
-    others then start again without them, or with what runs instead.
+    Batches of such sizes have the fast filters' sums over all trajectories.  With `back` they look back from the end; `far` away
+    if there is a cluster.  Also, by name, why slow filters were left out; the others then start again without them, or with what
+    runs instead.
     """
-    data = _first(ensemble, size)
+    data, size = _data(ensemble, chosen), len(chosen.places)
     left_out: dict[str, str] = {}
     replaced: dict[str, str] = {}
-    chosen = {one.name: one for one in slow}
-    if size < FEWEST and EXACT in chosen:
+    wanted = {one.name: one for one in slow}
+    if size < FEWEST and EXACT in wanted:
         left_out[EXACT] = f"on {size} trajectories the rare ones that matter are missing: take at least {FEWEST}, or 0"
     with one_thread():
         begun = time.monotonic()
         end = None if seconds is None else begun + seconds
-        while running := [one for name, one in chosen.items() if name not in left_out]:
+        while running := [one for name, one in wanted.items() if name not in left_out]:
             names = [one.name for one in running]
             try:
-                sums = _chunks_in_time([*fast, *running], ensemble, data, end, memory, jobs, progress, back, far)
+                sums = _chunks_in_time([*fast, *running], data, end, memory, jobs, progress, back, far)
             except Failed as failed:
-                other = chosen[failed.name].instead
+                other = wanted[failed.name].instead
                 (left_out if other is None else replaced)[failed.name] = failed.reason
-                chosen[failed.name] = other or chosen[failed.name]
+                wanted[failed.name] = other or wanted[failed.name]
                 continue
             except BrokenProcessPool:
                 why = "a process that computed it was killed, perhaps as memory ran out: take fewer jobs at once, or less memory"
                 return None, left_out | dict.fromkeys(names, why)
             done = sum(int(one.counts.sum()) for one in sums)
-            found = SlowPart(names, Sums.concatenate(sums), replaced) if sums else None
+            few = STRATA if chosen.wanted else 0  # the first ones alone stand for those only that are not exceptional
+            found = _slow_part(names, Sums.concatenate(sums), chosen, batches, replaced) if done > few else None
             if found and (done >= FEWEST or EXACT not in names):
                 return found, left_out
             if not found:
@@ -106,8 +121,7 @@ def _more_time(seconds: float) -> str:
 
 def _chunks_in_time(
     filters: Sequence[Filter],
-    ensemble: Ensemble,
-    data: tuple[Array, Array, Array],
+    data: _Data,
     end: float | None,
     memory: float | None,
     jobs: int,
@@ -117,8 +131,8 @@ def _chunks_in_time(
 ) -> list[Sums]:
     """Sums over the chunks that are done in time; one that would take too much time or memory is done in smaller ones."""
     names = [one.name for one in filters]
-    size, jobs = data[0].shape[1], far.cores if far else jobs if may_start() else 1
-    chunk = partial(_chunk, filters, data, names.index(EXACT) if EXACT in names else None, ensemble.weight, back)
+    size, jobs = len(data.chosen.places), far.cores if far else jobs if may_start() else 1
+    chunk = partial(_chunk, filters, data, names.index(EXACT) if EXACT in names else None, back)
     with progress_bar("slow filters", size, "trajectory", progress) as bar:
         replaceable = any(one.name == EXACT and one.instead is not None for one in filters)
         work = _Work(size, end, bar, jobs if replaceable else 0)
@@ -154,9 +168,8 @@ def _chunks_in_time(
 
 def _chunk(
     filters: Sequence[Filter],
-    data: tuple[Array, Array, Array],
+    data: _Data,
     reference: int | None,
-    weight_of: Callable[[Array], Array | None],
     back: bool,
     memory: float | None,
     seconds: float | None,
@@ -165,12 +178,13 @@ def _chunk(
 ) -> tuple[Sums, float] | MemoryError | None:
     """Sums over one chunk and the seconds it took; None if it has not as many, or what is too large for the memory."""
     begun = time.monotonic()
-    steps, _, n = data[0].shape
+    here, (steps, _, n) = slice(start, start + count), data.x.shape
+    weight = None if data.weight is None else data.weight[here]
     try:
         with memory_limit(memory), _within(seconds):
-            instants = [Instant(*(array[k, start : start + count] for array in data)) for k in range(steps)]
-            sums = Sums.empty(len(filters), steps, n, np.diff([*range(0, count, BATCH), count]))
-            run_block(filters, instants, sums, reference, weight_of, back=back)
+            instants = [Instant(*(array[k, here] for array in (data.x, data.y, data.x_next))) for k in range(steps)]
+            sums = Sums.empty(len(filters), steps, n, data.chosen.batches(start, count))
+            run_block(filters, instants, sums, reference, lambda x: weight, back=back)
     except OutOfTime:
         return None
     except MemoryError as problem:
@@ -259,13 +273,36 @@ def _within(seconds: float | None) -> AbstractContextManager[None]:
     return nullcontext() if seconds is None else time_limit(max(seconds, 1e-3))
 
 
-def _first(ensemble: Ensemble, size: int) -> tuple[Array, Array, Array]:
-    """The first `size` of the ensemble's trajectories: x, y and the following x, (steps, size, ...)."""
+def _data(ensemble: Ensemble, chosen: Chosen) -> _Data:
+    """The chosen ones of the ensemble's trajectories."""
     parts: list[list[Instant]] = []
-    left = size
-    for index, block in enumerate(ensemble.sizes):
-        if left > 0:
-            parts.append([Instant(*(a[:left].copy() for a in instant)) for instant in ensemble.block(index)])
-            left -= block
-    x, y, x_next = (np.stack([np.concatenate([part[k][i] for part in parts]) for k in range(ensemble.steps)]) for i in range(3))
-    return x, y, x_next
+    order, start = np.argsort(chosen.places, kind="stable"), 0
+    wanted = chosen.places[order]
+    for index, size in enumerate(ensemble.sizes):
+        if len(here := wanted[(wanted >= start) & (wanted < start + size)] - start):
+            parts.append([Instant(*(a[here] for a in instant)) for instant in ensemble.block(index)])
+        start += size
+    back = np.argsort(order)
+    x, y, x_next = (
+        np.stack([np.concatenate([part[k][i] for part in parts])[back] for k in range(ensemble.steps)]) for i in range(3)
+    )
+    weight = ensemble.weight(x[0])
+    if not chosen.counted.all():
+        weight = chosen.counted * (1.0 if weight is None else weight)
+    return _Data(x, y, x_next, weight, chosen)
+
+
+def _slow_part(names: list[str], sums: Sums, chosen: Chosen, batches: Array, replaced: Mapping[str, str]) -> SlowPart:
+    """What was found on the first so many of the chosen trajectories.
+
+    Exceptional ones for which there was no time are like those for which there was: these stand for them.
+    """
+    done = int(sums.counts.sum())
+    exceptional = chosen.exceptional[:done]
+    if not exceptional.any():
+        return SlowPart(names, sums, replaced=replaced)
+    single = exceptional[np.cumsum(sums.counts).astype(int) - 1]
+    places = np.searchsorted(np.cumsum(batches), chosen.places[:done][exceptional], side="right")
+    gathered = sums.of_batches(single).gathered(places, len(batches))
+    each = chosen.wanted / np.count_nonzero(exceptional)
+    return SlowPart(names, sums.of_batches(~single), gathered.times(each), replaced)

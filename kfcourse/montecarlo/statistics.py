@@ -173,6 +173,26 @@ class Sums:
         common = (self.counts, self.weights, self.size, self.doubt)
         return Sums(*common, *(getattr(self, name)[chosen] for name in list(self.__dataclass_fields__)[len(common) :]))
 
+    def of_batches(self, chosen: Array) -> Sums:
+        """Those of some of the batches."""
+        return Sums(*(getattr(self, name)[..., chosen] for name in self.__dataclass_fields__))
+
+    def times(self, factor: float) -> Sums:
+        """The same where every trajectory weighs so many times as much."""
+        names = list(self.__dataclass_fields__)[1:]
+        return Sums(self.counts, *(factor * getattr(self, name) for name in names))
+
+    def gathered(self, places: Array, batches: int) -> Sums:
+        """Sums over other batches, of which each of these goes into the one with the number in `places`."""
+
+        def gather(name: str) -> Array:
+            values = np.moveaxis(getattr(self, name), -1, 0)
+            result = np.zeros((batches, *values.shape[1:]))
+            (np.maximum if name.startswith("largest") else np.add).at(result, places, values)
+            return np.moveaxis(result, 0, -1)
+
+        return Sums(*map(gather, self.__dataclass_fields__))
+
     def record_states(self, step: int, x: Array, weight: Array | None) -> None:
         """Add the true states x (N, n) of a step, and at the first the weights (N,) of the trajectories."""
         if step == 0 and weight is not None:

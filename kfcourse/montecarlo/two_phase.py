@@ -1,9 +1,10 @@
 """Means that are known in part from all trajectories and in part from a part of them, and what the design adds to their error.
 
-Fast filters ran on all N trajectories, slow ones on the first n.  A quantity is X, of what ran everywhere, plus Y, of what ran
-on this slow part:
+Fast filters ran on all N trajectories, slow ones on the first n and on the exceptional ones (`exceptional`).  A quantity is X, of
+what ran everywhere, plus Y, of what ran on this slow part.  Of the exceptional ones, a set E, Y is known everywhere, so that with
+X' = X + Y on E and X' = X elsewhere, and the part q of trajectories that are not exceptional, n of which are the first ones,
 
-    Z = M_N[X] + M_n[Y],    Var(Z) = Var(X) / N + Var(Y) / n + 2 Cov(X, Y) / N
+    Z = M_N[X'] + q M_n[Y],    Var(Z) = Var(X') / N + q^2 Var(Y) / n + 2 q Cov(X', Y) / N
 
 Filters with coefficients from an ensemble vary with that ensemble, too.  So they are designed several times, and run on common
 trajectories: the variance of their results, less what it would be for equal coefficients, is the variance of the design.
@@ -87,15 +88,21 @@ def batch_sums(sums: Sums, names: tuple[str, ...], weights: Weights, total: bool
 
 
 def estimate(
-    full: Array, weights: Array, x: Array | None = None, y: Array | None = None, of_slow_part: Array | None = None
+    full: Array,
+    weights: Array,
+    x: Array | None = None,
+    y: Array | None = None,
+    of_slow_part: Array | None = None,
+    part: float = 1.0,
 ) -> Estimate:
-    """M_N X + M_n Y from batch sums of X over all trajectories, and of X and Y over the slow part, if there is a Y.
+    """M_N X + q M_n Y from batch sums of X over all trajectories, and of X and Y over the first ones, if there is a Y.
 
-    `weights` and `of_slow_part` are the weights of the batches.
+    `weights` and `of_slow_part` are the weights of the batches, and q is the `part`.
     """
     everywhere = batch_mean(full, weights)
     if x is None or y is None or of_slow_part is None:
         return everywhere
+    y = part * y
     correction = batch_mean(y, of_slow_part)
     # Var(x + y) - Var(x - y) = 4 Cov(x, y), each a variance of means over the n of the slow part
     plus, minus = (batch_mean(x + sign * y, of_slow_part).standard_error ** 2 for sign in (1, -1))

@@ -87,7 +87,7 @@ def test_a_comparison_has_the_same_bound():
     assert quick.has_bound
     assert not quick.replaced
     for name in ("square", "distance", "doubt"):
-        one, other = getattr(plain.slow_part.sums, name), getattr(quick.slow_part.sums, name)
+        one, other = getattr(plain.slow_part.first, name), getattr(quick.slow_part.first, name)
         np.testing.assert_allclose(other, one, rtol=1e-6, atol=1e-9 * np.abs(one).max(), err_msg=name)
 
 

@@ -68,7 +68,7 @@ def test_the_gap_is_what_distances_and_errors_tell_over_the_bound(counted):
 @pytest.mark.parametrize("largest", [0.0, 2.0, 200.0])
 def test_a_distance_that_hangs_on_one_trajectory_hardly_counts(counted, largest):
     far = replace(counted, sums=sums_of(4, square=[[2, 4, 6, 8], [9, 5, 14, 12]], own=[[4, 5, 5, 6], [1, 1, 1, 1]]))
-    far.slow_part.sums.largest[1, 0, 1] = largest
+    far.slow_part.first.largest[1, 0, 1] = largest
     s = share(np.array([0.75, 1.25]), np.array([7.0, 1, 8, 4]), largest)
     assert far.gap("other").value.item() == pytest.approx((0.5 + s * 1 + (1 - s) * 5) / 4.5, rel=1e-12)
     assert far.heavy("other").item() == pytest.approx(s * largest / 3, rel=1e-12)
@@ -145,13 +145,13 @@ def test_table_ranking_and_verdict_are_one_estimate(lab53):
 def test_what_is_better_than_the_exact_filter_refutes_it(counted):
     """A substitute that errs as much as it claims, or that a filter beats by far more than chance, bounds nothing."""
     assert not counted.doubtful.any() and counted.usable.all()
-    counted.slow_part.sums.doubt[:] = 0.11 * 4.5
+    counted.slow_part.first.doubt[:] = 0.11 * 4.5
     doubtful = replace(counted)
     assert doubtful.doubtful.all() and np.isnan(doubtful.gap("other").value).all()
     left = doubtful.without_unhealthy()
     assert not left.has_bound and "particles" in left.left_out["aof-exact"]
     assert left.gap("other").value.item() == pytest.approx(6 / 5 - 1, rel=1e-14)
-    counted.slow_part.sums.doubt[:] = 0.0
+    counted.slow_part.first.doubt[:] = 0.0
     beaten = replace(counted, sums=sums_of(4, square=[[2, 4, 6, 8], [0.1, 0.2, 0.1, 0.2]], own=[[4, 5, 5, 6], [1, 1, 1, 1]]))
     assert beaten.doubtful.all()
 

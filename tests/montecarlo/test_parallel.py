@@ -56,10 +56,15 @@ def same(one, other):
     for first, second in zip(*found, strict=True):
         if (first is None) != (second is None):
             return False
-        if first is not None and not all(
-            np.array_equal(getattr(first.sums, part), getattr(second.sums, part)) for part in first.sums.__dataclass_fields__
-        ):
-            return False
+        if first is not None:
+            for part in ("first", "exceptional"):
+                sums, others = getattr(first, part), getattr(second, part)
+                if (sums is None) != (others is None):
+                    return False
+                if sums is not None and not all(
+                    np.array_equal(getattr(sums, name), getattr(others, name)) for name in sums.__dataclass_fields__
+                ):
+                    return False
     return one.available == other.available and dict(one.left_out) == dict(other.left_out)
 
 
