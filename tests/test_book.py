@@ -83,6 +83,31 @@ def test_style_sheets_load_only_local_files() -> None:
         assert not re.search(r"(@import\s+|url\()\s*[\"']?(https?:)?//", sheet.read_text(encoding="utf-8")), sheet
 
 
+def test_no_rule_makes_the_style_of_a_whole_page_hang_on_each_element_that_comes():
+    """`.bd-article:has(.a) p` is asked again of all in the article whenever some of it arrives: half the time of a page."""
+    whole = re.compile(
+        r"(?:html|body|\.bd-(?:main|content|article)[\w-]*)(?:\.[\w-]+)*(?::not\()?:has\((?:[^()]|\([^()]*\))*\)+\s*[\s>+~]\s*[\w.#*:\[]"
+    )
+    assert whole.search(".bd-article:has(.kf-live) section") and not whole.search(".bd-content:not(:has(.bd-sidebar))::after")
+    sheets = [*(HTML / "_static").rglob("*.css")]
+    assert len(sheets) > 8
+    for sheet in sheets:
+        assert not (found := whole.search(sheet.read_text(encoding="utf-8"))), f"{sheet.name}: {found.group()}"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_page_is_light_or_dark_before_its_first_line(scheme):
+    """The theme decides when the page is there: until then a page for the night was white."""
+    with chromium() as browser:
+        tab = browser.new_context(offline=True, color_scheme=scheme).new_page()
+        tab.add_init_script(
+            "new MutationObserver((_, self) => { if (document.body) { window.first = document.documentElement.dataset.theme;"
+            " self.disconnect(); } }).observe(document, { childList: true, subtree: true });"
+        )
+        tab.goto((HTML / "comparison.html").as_uri())
+        assert tab.evaluate("[first, document.documentElement.dataset.theme]") == [scheme, scheme]
+
+
 @pytest.mark.parametrize("page", NOTEBOOKS)
 def test_notebook_is_executed_without_errors(page: str) -> None:
     notebook = nbformat.read(EXECUTED / f"{page}.ipynb", as_version=4)

@@ -1,10 +1,14 @@
+// Light or dark from the first line on: the theme decides once the page is there, and then all of it would get its style anew.
+const documentRoot = document.documentElement;
+if (documentRoot.dataset.theme === "auto") documentRoot.dataset.theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
+
 // Sections out of sight are not laid out (book.css), so nobody knows yet how high they are.  Who comes to a place, or comes back
 // to one, needs the heights of all above it: then the whole page is laid out.
-const whole = () => document.documentElement.classList.add("kf-whole");
+const whole = () => documentRoot.classList.add("kf-whole");
 if (location.hash || performance.getEntriesByType("navigation")[0]?.type !== "navigate") whole();
 addEventListener("click", (event) => event.target.closest?.('a[href*="#"]') && whole(), { capture: true });
 addEventListener("hashchange", () => { // without a click
-  if (document.documentElement.matches(".kf-whole")) return;
+  if (documentRoot.matches(".kf-whole")) return;
   whole();
   document.getElementById(decodeURIComponent(location.hash.slice(1)))?.scrollIntoView();
 });

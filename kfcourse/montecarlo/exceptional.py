@@ -20,7 +20,7 @@ from kfcourse.angles import near
 from kfcourse.laws import Array
 from kfcourse.montecarlo.batches import STRATA
 
-SHARE = 200  # one trajectory in so many is exceptional: on the variants that makes the variance of a gap the least, or nearly
+SHARE = 200  # one trajectory in so many is exceptional; with half as many the others vary 1.5 to 2 times as much (5, 7, 53)
 MOST = 512  # but no more: of 4000, the usual size of a slow part, an eighth
 EIGHTH = 8  # one set of so many is of exceptional trajectories, until all have come
 

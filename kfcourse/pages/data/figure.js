@@ -264,10 +264,14 @@ button.kf-try { font: inherit; color: var(--accent, LinkText); background: none;
     const code = root.parentElement.querySelector("script.kf-code")?.textContent;
     const ui = { root, name, state, code, charts: [], shown: [], worker, make: (tag, attributes, text) => make(tag, attributes, root, text) };
     let pending = 0, draw = null;
-    const redraw = () => {
+    const compute = () => {
       for (const show of ui.shown) show(state);
       draw(state);
-      for (const one of ui.charts) one.draw();
+    };
+    const paint = () => { for (const one of ui.charts) one.draw(); };
+    const redraw = () => {
+      compute();
+      paint();
     };
     const keep = () => {
       const changed = Object.entries(state).filter(([key, value]) => key in defaults && value !== defaults[key]);
@@ -292,15 +296,15 @@ button.kf-try { font: inherit; color: var(--accent, LinkText); background: none;
       ui.shown = ui.shown.filter((show) => show.within !== parent);
     };
     draw = build(ui);
-    redraw();
+    compute();
     // The still picture of the same cell makes room on the screen, and stays for paper.
     const still = document.getElementById(name)?.querySelector("img, [role=img]");
     if (still) {
       still.classList.add("kf-still");
       still.after(root);
-      redraw();
     }
-    new ResizeObserver(() => { for (const one of ui.charts) one.draw(); }).observe(root);
+    paint();
+    new ResizeObserver(paint).observe(root);
     addEventListener("hashchange", () => {
       const given = read(name, defaults);
       if (given) ui.set({ ...defaults, ...given });

@@ -12,7 +12,8 @@ function kfTwoBeats(root, name, first) {
   const distance = (at) => values(place, { x: Float64Array.of(at) })[0];
   const REACH = [0, 5.5];
   // The handle is where the measurement would be exact: the place to the right at which the distance is y.
-  const start = Number([...Array(551).keys()].map((i) => i / 100).reduce((a, b) => (Math.abs(distance(b) - first) < Math.abs(distance(a) - first) ? b : a)));
+  const places = Float64Array.from({ length: 551 }, (_, i) => i / 100), off = values(place, { x: places }).map((one) => Math.abs(one - first));
+  const start = places[off.indexOf(Math.min(...off))];
   kfFigure(root, name, { place: start }, (ui) => {
     const charts = ui.row("kf-charts"), says = ui.says();
     const axis = { label: "position x (km)", range: [LOW, HIGH] };
@@ -31,8 +32,12 @@ function kfTwoBeats(root, name, first) {
     });
     return (state) => {
       const y = distance(state.place), fits = values(likelihood, { x }, { y });
-      const product = before.map((one, i) => one * fits[i]), posterior = product.map((one) => one / (sum(product) * step));
-      const predicted = x.map((_, i) => step * sum(posterior.map((one, j) => one * kernel[N * i + j])));
+      const product = before.map((one, i) => one * fits[i]), whole = sum(product) * step, posterior = product.map((one) => one / whole);
+      const predicted = x.map((_, i) => {
+        let total = 0;
+        for (let j = 0; j < N; j++) total += posterior[j] * kernel[N * i + j];
+        return step * total;
+      });
       const most = fits.reduce((a, b) => Math.max(a, b)), none = x.map(() => 0), high = 1.05 * Math.max(1, ...posterior, ...predicted);
       const mean = (density) => step * sum(density.map((one, i) => one * x[i]));
       lines.prior(x, none, before);
