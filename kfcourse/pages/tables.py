@@ -51,4 +51,4 @@ def _cell(entry: Any, style: str) -> str:
         return " ± ".join(_cell(part, style if number == 0 else style.replace("+", "")) for number, part in enumerate(entry))
     if isinstance(entry, float | np.floating) and np.isnan(entry):
         return "–"
-    return format(entry, style).replace("-", "−")
+    return format(entry, style).replace("-", "−").replace("%", "\u00a0%")  # as `claim` writes it

@@ -19,6 +19,7 @@ def test_a_table_aligns_numbers_and_marks_what_is_not_there() -> None:
         "| filter | $D$ (m²) | e |\n| :-- | --: | --: |\n| a | 1.00 | 1.00 ± 0.12 |\n| b | −2.25 | – |"
     )
     assert "| +1.0 |" in table({"D": [1.0]}, {"D": "+.1f"}).markdown
+    assert "| 12.5\u00a0% |" in table({"D": [0.125]}, ".1%").markdown
 
 
 def test_columns_of_a_table_have_one_length() -> None:
@@ -35,6 +36,12 @@ def test_units_stand_in_brackets(heading) -> None:
     with pytest.raises(ValueError, match="stands after a comma"):
         table({"a": [1.0]}, caption=heading)
     table({bracketed: [1.0], "RMS error, most": [2.0], "of mean, s and m": [0.0]})
+
+
+def test_a_unit_before_more_words_stands_in_brackets_too() -> None:
+    for caption, better in [("bound, % ± error", "bound (%) ± error"), ("error, m, of fixes", "error (m), of fixes")]:
+        with pytest.raises(ValueError, match=re.escape(better)):
+            table({"a": [1.0]}, caption=caption)
 
 
 def test_long_equations_are_broken_between_terms() -> None:
