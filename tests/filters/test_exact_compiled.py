@@ -9,7 +9,7 @@ import pytest
 
 from kfcourse import Model, compare, gaussian, load_variants, simulate
 from kfcourse.filters import aof, pointmass
-from kfcourse.filters.exact import loops
+from kfcourse.filters.exact import loops, pointmasses
 from kfcourse.filters.fused import fuse
 from kfcourse.lab.short_names import exact
 from kfcourse.records.evidence import likelihood
@@ -101,11 +101,25 @@ def test_what_the_loop_cannot_take_stays_as_it_is():
         assert fuse(one) is one
 
 
-def test_exp_and_ln():
+def test_the_first_step_is_taken_by_the_loop_too(monkeypatch):
+    """From the prior, a single normal law; that its numbers are those of the plain step, `test_every_scalar_variant` says."""
+
+    def refused(*_):
+        raise AssertionError("left to NumPy")
+
+    quick, y = fuse(pointmass(SCALAR["53"])), simulate(SCALAR["53"], 64, 1, 1).y
+    monkeypatch.setattr(pointmasses, "likeliest", refused)
+    assert quick.step(quick.init(64), y[0]).memory.fine.usual.all()
+
+
+def test_exp_and_ln(monkeypatch):
     """To 2e-13 and 1e-15, over all that densities are made of."""
-    x = np.concatenate([np.linspace(-707, 707, 100_001), np.random.default_rng(1).normal(0, 3, 10_000)])
+    monkeypatch.setattr(loops, "_half", loops._half.py_func)
+    x = np.concatenate([np.linspace(-708, 708, 100_001), np.random.default_rng(1).normal(0, 3, 10_000)])
     exponentials = np.array([loops._exp.py_func(one) for one in x])
     np.testing.assert_allclose(exponentials, np.exp(x), rtol=2e-13)
+    powers = np.array([loops._half(one, loops._POLYNOMIAL) for one in x])
+    np.testing.assert_allclose(powers, np.exp2(-x), rtol=3e-14)
     logarithms = np.array([loops._log.py_func(one) for one in np.exp(x)])
     np.testing.assert_allclose(logarithms, np.log(np.exp(x)), rtol=1e-15, atol=1e-15)
     assert [loops._log.py_func(one) for one in (0.0, np.inf)] == [-np.inf, np.inf]
