@@ -10,6 +10,7 @@ computed here, for many at once.
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import hypot, isfinite, isnan, sqrt
 from typing import Any
 
 import numpy as np
@@ -21,15 +22,18 @@ from kfcourse.filters.exact.batch import COEFFICIENTS, KINK, ORDER, ROUNDING
 from kfcourse.filters.exact.constants import LOOKED, LOWEST, MORE, NEGLIGIBLE, NODES, ROOT, SPACINGS, TAIL, WIDTH
 from kfcourse.filters.exact.kernels import OVERLAP, SEEN
 from kfcourse.filters.exact.places import COARSELY, EXPLANATIONS, FRACTIONS, HIDDEN, HUMP, SEARCHED
+from kfcourse.laws import Array
 
 LEFT, DONE, NARROW = 0, 1, 2  # to NumPy; done; done, and the next kernels do not overlap
 MOVES, METER = 0, 1  # which of the printed laws
 
 # Sums may be taken in any order, so that the processor adds several terms at once.
 _CALLED: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract"}}
-_ANY_ORDER = _CALLED | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # of what only compiled functions call
+_ANY_ORDER = _CALLED | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}  # of what only compiled functions call
 
 _VALUES, _MANY, _MANY_PARTS, _NUMBERS = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
+# Printed, with the constants of the model: law(number, c, x, mean, variance, signal, slope); MOVES makes no signal.
+_LAW = types.FunctionType(types.void(types.int64, *[_VALUES] * 6))
 
 _LN2 = np.log(2)
 _LOWEST2 = LOWEST / _LN2
@@ -84,12 +88,7 @@ def _log(x):
     return -np.inf if x == 0 else value if x < np.inf else x
 
 
-@njit(**_ANY_ORDER)
-def _arrays(size):
-    return np.empty(size), np.empty(size), np.empty(size), np.empty(size)
-
-
-@njit(**_ANY_ORDER)
+@njit(types.int64(types.int64), **_ANY_ORDER)
 def _whole(count):
     """So many entries, to whole fours: what the processor does at once."""
     return 4 * ((count + 3) // 4)
@@ -114,7 +113,7 @@ def _place_of(value, values):
 @njit(**_AS_WRITTEN)
 def _asinh(a):
     """arsinh a, a >= 0, to 1e-15 of 1 + arsinh a."""
-    return _log(a + np.sqrt(a * a + 1))
+    return _log(a + sqrt(a * a + 1))
 
 
 @njit(**_ANY_ORDER)
@@ -124,11 +123,9 @@ def _nodes(place, count, x, length):
     first, last = -_asinh((centre - low) / scale), _asinh((high - centre) / scale)
     step, half = (last - first) / (count - 1), 0.5 * scale
     for i in range(_whole(count)):
-        grown = _exp(first + step * np.int32(i))
+        grown = _exp(first + step * np.int32(min(i, count - 1)))
         x[i] = centre + half * (grown - 1 / grown)
-        length[i] = half * (grown + 1 / grown) * step
-    for i in range(count, _whole(count)):
-        x[i], length[i] = x[count - 1], 0.0
+        length[i] = half * (grown + 1 / grown) * step if i < count else 0.0
 
 
 @njit(**_ANY_ORDER)
@@ -144,10 +141,10 @@ def _kernels(x, mass, density, moved, chosen, kernel, parts, ends):
     Of each kernel the rate, the rate times the centre, and the rate times the mass.  Of those of every fourth node, of every
     second, and of all: the mass, and up to which sum there is nothing.
     """
-    (to, spread, _, _), count, slope = moved, len(x), 0.0
+    to, spread, count, slope = moved[0], moved[1], len(x), 0.0
     for j in range(count):
-        mean, sigma = to[j], max(np.sqrt(spread[j]), 1e-150)
-        rate = np.sqrt(0.5 / _LN2) / sigma
+        mean, sigma = to[j], max(sqrt(spread[j]), 1e-150)
+        rate = sqrt(0.5 / _LN2) / sigma
         kernel[0, j], kernel[1, j], kernel[2, j] = rate, mean * rate, mass[j] * rate
         low, high = WIDTH * sigma - mean, WIDTH * sigma + mean
         counts = mass[j] > NEGLIGIBLE
@@ -166,7 +163,7 @@ def _kernels(x, mass, density, moved, chosen, kernel, parts, ends):
     if count > 1:
         top = min(max(top, 1), count - 2)
         slope = (to[top + 1] - to[top - 1]) / (x[top + 1] - x[top - 1])
-    width = np.hypot(slope / (ROOT * density[top]) if np.isfinite(slope) else 0.0, max(np.sqrt(spread[top]), 1e-150))
+    width = hypot(slope / (ROOT * density[top]) if isfinite(slope) else 0.0, max(sqrt(spread[top]), 1e-150))
     return to[top], width, -_highest(ends[0], count), _highest(ends[1], count)
 
 
@@ -193,7 +190,7 @@ def _density(x, count, kernels, kernel, parts, found, powers):
                 u, u_2 = u * u, u_2 * u_2
                 sums[i] += weight * _half(u if u < most else most, P) + weight_2 * _half(u_2 if u_2 < most else most, P)
     for part in range(len(found)):
-        sums, least, over = found[part], parts[1, part], np.sqrt(_LN2 / np.pi) / parts[0, part]
+        sums, least, over = found[part], parts[1, part], sqrt(_LN2 / np.pi) / parts[0, part]
         for i in range(whole):
             sums[i] = sums[i] * over if sums[i] > least else 0.0
 
@@ -212,79 +209,78 @@ def add_bells(x, rate, centre, weights, lowest, result):
                     result[t, part, i] += weights[t, j, part] * bells[i]
 
 
+@njit(types.void(_LAW, types.int64, _VALUES, _VALUES, types.int64, _MANY), **_ANY_ORDER)
+def _made(law, number, c, x, count, made):
+    law(number, c, x[:count], made[0], made[1], made[2], made[3])
+
+
 @njit(**_ANY_ORDER)
 def _residual(y, mean, signal, of_noise):
-    return np.abs(y - mean) - signal if of_noise else y - signal
+    return abs(y - mean) - signal if of_noise else y - signal
 
 
 @njit(**_ANY_ORDER)
 def _log_likelihood(y, mean, variance):
-    if np.isnan(y):
+    if isnan(y):
         return 0.0
     variance = max(variance, TINY)
     return -0.5 * ((y - mean) * (y - mean) / variance + _log(2 * np.pi * variance))
 
 
 @njit(**_ANY_ORDER)
-def _explanations(law, c, of_noise, y, place, x, shown):
-    """`explanations`: the roots of b(x, m_w) = y in the support, those nearest to the middle, in x[2]; how many."""
-    (at, length, root, left, right, far), (mean, variance, signal, slope), known = x, shown, 0
-    _nodes(place, np.int64(SEARCHED), at, length)
-    law(METER, c, at[: _whole(SEARCHED)], mean, variance, signal, slope)
-    for i in range(_whole(SEARCHED)):
-        length[i] = _residual(y, mean[i], signal[i], of_noise)
+def _explanations(law, c, of_noise, y, place, few, shown):
+    """`explanations`: the roots of b(x, m_w) = y in the support, those nearest to the middle, in few[2]; how many."""
+    at, residual, root, left, right, far = few[0], few[1], few[2], few[3], few[4], few[5]
+    mean, signal, slope, known = shown[0], shown[2], shown[3], 0
+    _nodes(place, np.int64(SEARCHED), at, residual)
+    _made(law, METER, c, at, SEARCHED, shown)
+    for i in range(SEARCHED):
+        residual[i] = _residual(y, mean[i], signal[i], of_noise)
     for i in range(1, SEARCHED):
-        before, after = length[i - 1], length[i]
-        if (before > 0) == (after > 0) or not np.abs(after - before) < np.inf:
+        before, after = residual[i - 1], residual[i]
+        if (before > 0) == (after > 0) or not abs(after - before) < np.inf:
             continue
-        distance, j = np.abs(0.5 * (at[i] + at[i - 1]) - place[0]), min(known, EXPLANATIONS)
+        distance, j = abs(0.5 * (at[i] + at[i - 1]) - place[0]), min(known, EXPLANATIONS)
         while j and distance < far[j - 1]:
             j -= 1
             far[j + 1], left[j + 1], right[j + 1] = far[j], left[j], right[j]
         far[j], left[j], right[j] = distance, at[i - 1], at[i]
         known = min(known + 1, EXPLANATIONS)
-    for _ in range(COARSELY // 4):  # four halvings at once: all points at which they may look
-        for j in range(known):
-            some = at[20 * j : 20 * j + 20]
-            some[0], some[16:] = left[j], right[j]
-            for gap in (8, 4, 2, 1):
-                for i in range(gap, 16, 2 * gap):
-                    some[i] = 0.5 * (some[i - gap] + some[i + gap])
-        law(METER, c, at[: 20 * known], mean, variance, signal, slope)
-        for i in range(20 * known):
-            length[i] = _residual(y, mean[i], signal[i], of_noise)
-        for j in range(known):
-            first = i = 20 * j
-            for gap in (8, 4, 2, 1):
-                i += gap if (length[i + gap] > 0) == (length[first] > 0) else 0
-            left[j], right[j] = at[i], at[i + 1]
     for j in range(known):
-        root[j] = 0.5 * (left[j] + right[j])
-    for _ in range(2):
-        law(METER, c, root[:known], mean, variance, signal, slope)
-        for j in range(known):
-            newton = root[j] + _residual(y, mean[j], signal[j], of_noise) / slope[j]
-            root[j] = newton if left[j] < newton < right[j] else root[j]
+        begin, end = left[j], right[j]
+        for _ in range(COARSELY // 4):  # four halvings at once: all points at which they may look
+            step, i = (end - begin) / 16, 0
+            for point in range(17):
+                at[point] = begin + step * np.int32(point)
+            _made(law, METER, c, at, 17, shown)
+            negative = _residual(y, mean[0], signal[0], of_noise) > 0
+            for gap in (8, 4, 2, 1):
+                i += gap if (_residual(y, mean[i + gap], signal[i + gap], of_noise) > 0) == negative else 0
+            begin, end = at[i], at[i + 1]
+        root[j] = 0.5 * (begin + end)
+        for _ in range(2):
+            _made(law, METER, c, root[j:], 1, shown)
+            newton = root[j] + _residual(y, mean[0], signal[0], of_noise) / slope[0]
+            root[j] = newton if begin < newton < end else root[j]
     return known
 
 
 @njit(**_ANY_ORDER)
-def _candidates(law, c, y, known, place, x, shown, kernels, kernel, parts, found, powers, candidates):
-    """`likeliest`: centres, widths and masses of humps, of the roots in x[2] and of the middle; the place of the likeliest."""
-    (middle, width, low, high), (mean, variance, signal, slope) = place, shown
-    at = x[2][: known + 1]
+def _candidates(law, c, y, known, place, few, shown, kernels, kernel, parts, found, powers, candidates):
+    """`likeliest`: centres, widths and masses of humps, of the roots in few[2] and of the middle; the place of the likeliest."""
+    (middle, width, low, high), at, mean, variance, slope = place, few[2], shown[0], shown[1], shown[3]
     at[known] = min(max(middle, low), high)
-    law(METER, c, at, mean, variance, signal, slope)
-    _density(x[2], known + 1, kernels, kernel, parts, found[:2], powers)
+    _made(law, METER, c, at, known + 1, shown)
+    _density(at, known + 1, kernels, kernel, parts, found[:2], powers)
     best, highest, of_middle = known, -np.inf, width
     for j in range(known + 1):
         scale = of_middle
         if j < known:
-            by_meter = np.sqrt(variance[j]) / np.abs(slope[j])
+            by_meter = sqrt(variance[j]) / abs(slope[j])
             scale = by_meter if by_meter < width else width
-            of_middle = min(of_middle, np.hypot(at[j] - at[known], scale))
+            of_middle = min(of_middle, hypot(at[j] - at[known], scale))
         log_mass = _log(found[1, j] * scale * ROOT) + _log_likelihood(y, mean[j], variance[j])
-        log_mass = log_mass if scale > 0 and not np.isnan(log_mass) else -np.inf
+        log_mass = log_mass if scale > 0 and not isnan(log_mass) else -np.inf
         candidates[0, j], candidates[1, j], candidates[2, j] = at[j], scale, log_mass
         if log_mass > highest:
             best, highest = j, log_mass
@@ -294,27 +290,27 @@ def _candidates(law, c, y, known, place, x, shown, kernels, kernel, parts, found
 @njit(**_ANY_ORDER)
 def _overlap(mass):
     share = 1 - _log(max(mass, SEEN)) / np.log(SEEN)
-    return OVERLAP * np.sqrt(min(max(share, 0.0), 1.0))
+    return OVERLAP * sqrt(min(max(share, 0.0), 1.0))
 
 
 @njit(**_ANY_ORDER)
-def _looked(law, c, y, place, x, shown, moved, kernels, kernel, parts, found, powers, dense):
+def _looked(law, c, y, place, few, shown, moved, kernels, kernel, parts, found, powers, dense):
     """`looked`: centre, width and ends of the highest hump; and in `dense` how densely its kernels want their nodes.
 
     The width is NaN where nothing is seen.
     """
-    (at, length, logs, away, _, _), (mean, variance, signal, slope), count = x, shown, np.int64(LOOKED)
+    at, length, logs, away, mean, variance, count = few[0], few[1], few[2], few[3], shown[0], shown[1], np.int64(LOOKED)
     whole = _whole(count)
     _nodes(place, count, at, length)
-    law(METER, c, at[:whole], mean, variance, signal, slope)
+    _made(law, METER, c, at, whole, shown)
     _density(at, count, kernels, kernel, parts, found[:2], powers)
     for i in range(whole):
         log = _log(found[1, i]) + _log_likelihood(y, mean[i], variance[i])
-        logs[i] = -np.inf if np.isnan(log) else log
+        logs[i] = -np.inf if isnan(log) else log
     highest, area = _highest(logs, count), 0.0
     top = _place_of(highest, logs)
     for i in range(whole):
-        away[i] = -np.abs(at[i] - at[top]) if logs[i] < highest - 0.5 else -np.inf
+        away[i] = -abs(at[i] - at[top]) if logs[i] < highest - 0.5 else -np.inf
         logs[i] = _exp(max(logs[i] - highest, -708.0)) * length[i]
         area += logs[i]
     if not area < np.inf:
@@ -324,10 +320,10 @@ def _looked(law, c, y, place, x, shown, moved, kernels, kernel, parts, found, po
         first += 1
     while last > 0 and not logs[last] > TAIL * area:
         last -= 1
-    mean, variance, signal, slope = moved
-    law(MOVES, c, at[:whole], mean, variance, signal, slope)
+    _made(law, MOVES, c, at, whole, moved)
+    variance, slope = moved[1], moved[3]
     for i in range(whole):
-        wanted = np.abs(slope[i]) / max(np.sqrt(variance[i]), 1e-150) * _overlap(logs[i] / area)
+        wanted = abs(slope[i]) / max(sqrt(variance[i]), 1e-150) * _overlap(logs[i] / area)
         dense[i] = wanted * wanted
     return at[top], min(area / ROOT, 2 * fallen), at[max(first - 1, 0)], at[min(last + 1, count - 1)]
 
@@ -352,9 +348,9 @@ def _spaced(hump, at, dense, candidates, known, spacing, wanted):
             if candidates[2, j] > likeliest + HIDDEN:
                 away, narrow = candidates[0, j] - centre, candidates[1, j]
                 by_humps = max(by_humps, (scale * scale + away * away) / (narrow * narrow))
-        by_humps = max(np.sqrt(by_humps), np.sqrt(scale * scale + (HUMP * width) ** 2) / (spacing * width))
+        by_humps = max(sqrt(by_humps), sqrt(scale * scale + (HUMP * width) ** 2) / (spacing * width))
         span = _span((centre, scale, low, high))
-        number = span * max(by_humps, np.sqrt(_highest(wanted, np.int64(LOOKED))))
+        number = span * max(by_humps, sqrt(_highest(wanted, np.int64(LOOKED))))
         if number < fewest:
             best, fewest = scale, number
         if span * by_humps < fewest_by_humps:
@@ -374,7 +370,7 @@ def _hidden(candidates, known, place, count):
     for j in range(known + 1):
         at, width, log_mass = candidates[0, j], candidates[1, j], candidates[2, j]
         inside = low <= at <= high
-        if log_mass > likeliest + HIDDEN and not (inside and np.hypot(scale, at - centre) * step <= 2 * width):
+        if log_mass > likeliest + HIDDEN and not (inside and hypot(scale, at - centre) * step <= 2 * width):
             return True
     return False
 
@@ -389,15 +385,16 @@ def _distance(x, masses, chosen, times, count, whole):
         first += mass * away
         second += mass * away * away
     mean = first / total
-    change = np.abs((second / total - mean * mean) / of_variance - 1) + np.abs(times * total / of_total - 1)
-    return np.abs(mean) / np.sqrt(of_variance) + change
+    change = abs((second / total - mean * mean) / of_variance - 1) + abs(times * total / of_total - 1)
+    return abs(mean) / sqrt(of_variance) + change
 
 
 @njit(**_ANY_ORDER)
 def _roughness(x, mass, step, mean, variance, every, differences):
     """`roughness` of every so many of the masses, taken so many times; with room for zeros before and after them."""
-    count, before, rate = (len(x) - 1) // step + 1, ORDER // 2, 1 / np.sqrt(variance)
-    every[: count + ORDER] = 0.0
+    count, before, rate = (len(x) - 1) // step + 1, ORDER // 2, 1 / sqrt(variance)
+    for i in range(count + ORDER):
+        every[i] = 0.0
     for i in range(count):
         every[before + i] = step * mass[step * i]
     for i in range(count):
@@ -407,7 +404,7 @@ def _roughness(x, mass, step, mean, variance, every, differences):
         differences[i] = difference
     for i in range(count):
         away = (x[step * i] - mean) * rate
-        rough = np.abs(differences[i]) * (1 + np.abs(away) + np.abs(away * away - 1))
+        rough = abs(differences[i]) * (1 + abs(away) + abs(away * away - 1))
         differences[i] = rough if rough < np.inf else np.inf
     return _highest(differences, count)
 
@@ -429,8 +426,8 @@ def _posterior(law, c, y, rows, count, shown, away, kernels, kernel, parts, foun
 
     rows : nodes, lengths; to be filled with masses and densities
     """
-    (mean, variance, signal, slope), (x, length, mass, density), whole = shown, rows, _whole(count)
-    law(METER, c, x[:whole], mean, variance, signal, slope)
+    mean, variance, (x, length, mass, density), whole = shown[0], shown[1], rows, _whole(count)
+    _made(law, METER, c, x, whole, shown)
     _density(x, count, kernels, kernel, parts, found, powers)
     total = 0.0
     for i in range(whole):
@@ -452,26 +449,26 @@ def _posterior(law, c, y, rows, count, shown, away, kernels, kernel, parts, foun
     for i in range(whole):
         density[i] = mass[i] / length[i]
         v += mass[i] * (x[i] - m) * (x[i] - m)
-    moments, rounding = (m, v, total), ROUNDING * np.abs(m) / np.sqrt(v)
+    moments, rounding = (m, v, total), ROUNDING * abs(m) / sqrt(v)
     # By every second and fourth node, by every second and fourth kernel; roughness of all and of every second.
     for i, (part, nodes, times) in enumerate(((2, 1, 2), (2, 2, 4), (1, 0, 1), (0, 0, 1))):
         away[i] = _distance(x, found[part], chosen[nodes], times, count, moments)
     for step in (1, 2):
-        away[3 + step] = _roughness(x[:count], mass, step, m, v, padded, signal)
+        away[3 + step] = _roughness(x[:count], mass, step, m, v, padded, shown[2])
     for i in (0, 2, 4):
         away[i] = max(away[i] - rounding, 0.0)
     error = max(_extrapolated(away[0], away[1]), _cautious(away[4], away[5]))
-    error += (mass[0] + mass[count - 1]) * max(m - x[0], x[count - 1] - m) / np.sqrt(v)
+    error += (mass[0] + mass[count - 1]) * max(m - x[0], x[count - 1] - m) / sqrt(v)
     return m, v, error, rounding + _cautious(away[2], away[3])
 
 
 @njit(**_ANY_ORDER)
 def _apart(mass, moved, gaps):
     """`apart`: how far the kernels of neighbouring nodes are, up to 1 their sum is as good as the integral."""
-    (to, spread, _, _), count = moved, len(mass) - 2
+    to, spread, count = moved[0], moved[1], len(mass) - 2
     for i in range(count):
         before, here, after = to[i], to[i + 1], to[i + 2]
-        gap = max(np.abs(after - here), np.abs(here - before)) / max(np.sqrt(spread[i + 1]), 1e-150) * _overlap(mass[i + 1])
+        gap = max(abs(after - here), abs(here - before)) / max(sqrt(spread[i + 1]), 1e-150) * _overlap(mass[i + 1])
         gaps[i] = gap if gap < np.inf else np.inf
     return _highest(gaps, count)
 
@@ -479,17 +476,22 @@ def _apart(mass, moved, gaps):
 @njit(**_ANY_ORDER)
 def _predicted(mass, moved):
     """`Kernels.moments`."""
-    (to, spread, _, _), mean, variance = moved, 0.0, 0.0
+    to, spread, mean, variance = moved[0], moved[1], 0.0, 0.0
     for i in range(len(mass)):
         mean += mass[i] * to[i]
     for i in range(len(mass)):
-        sigma = max(np.sqrt(spread[i]), 1e-150)
+        sigma = max(sqrt(spread[i]), 1e-150)
         variance += mass[i] * (sigma * sigma + (to[i] - mean) * (to[i] - mean))
     return mean, variance
 
 
-# Printed, with the constants of the model: law(number, c, x, mean, variance, signal, slope); MOVES makes no signal.
-_LAW = types.FunctionType(types.void(types.int64, *[_VALUES] * 6))
+def room() -> Array:
+    """The arrays that `steps` works with, as rows of one: what is allocated by compiled code takes long to compile."""
+    rows = np.zeros((33, NODES[-1] + BEYOND + ORDER))
+    for part in range(3):  # all, every second, every fourth
+        rows[20 + part, :: 1 << part] = 1.0
+    rows[32, :11] = *_POLYNOMIAL, _LOWEST2
+    return rows
 
 
 def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
@@ -498,13 +500,13 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
     @njit(
         types.int64(
             _LAW, _VALUES, types.boolean, _MANY, _NUMBERS, _NUMBERS, _VALUES, types.float64, types.float64,
-            _MANY, _MANY, _NUMBERS, _NUMBERS,
+            _MANY, _MANY, _NUMBERS, _NUMBERS, _MANY,
         ),
         cache=True,
         nogil=True,
         **_CALLED,
     )  # fmt: skip
-    def steps(law, c, of_noise, before, start, count, y, accuracy, fine_nodes, after, numbers, size, status):
+    def steps(law, c, of_noise, before, start, count, y, accuracy, fine_nodes, after, numbers, size, status, rows):
         """One step of many trajectories: the length of `after` that is filled.
 
         law : of state and meter, with their constants c; whether the signal is the noise's deviation
@@ -512,31 +514,27 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
         y (T,), accuracy, fine_nodes : as of `pointmasses`
         after (3, T * most) : as `before`, one after the other
         numbers (5, T), size, status (T,) : mean, variance, error, mean and variance predicted; nodes; LEFT, DONE or NARROW
+        rows : `room()`
         """
         most, filled = constants[0][-1], 0
-        room = most + BEYOND
-        kernel, found, parts, candidates = np.empty((3, room)), np.empty((3, room)), np.empty((2, 3)), np.empty((3, 4))
-        length, dense, changes, padded = np.empty(room), np.empty(_whole(LOOKED)), np.empty(6), np.empty(room + ORDER)
-        moved, shown, few = _arrays(room), _arrays(room), _arrays(room) + _arrays(room)[:2]
-        powers, chosen = np.empty(11), np.zeros((3, room))
-        powers[:10], powers[10] = _POLYNOMIAL, _LOWEST2
-        for part in range(3):  # all, every second, every fourth
-            chosen[part, :: 1 << part] = 1.0
+        kernel, found, moved, shown, few, chosen = rows[:3], rows[3:6], rows[6:10], rows[10:14], rows[14:20], rows[20:23]
+        candidates, parts, length, dense = rows[23:26], rows[26:28], rows[28], rows[29]
+        padded, changes, powers = rows[30], rows[31], rows[32]
         for t in range(len(y)):
             status[t], kernels = LEFT, count[t]
             end = start[t] + kernels
             x, mass, density = before[0, start[t] : end], before[1, start[t] : end], before[2, start[t] : end]
             if kernels > 1:
-                law(MOVES, c, x, moved[0], moved[1], moved[2], moved[3])
+                _made(law, MOVES, c, x, kernels, moved)
             else:
-                moved[0][0], moved[1][0] = x[0], density[0] * density[0]
+                moved[0, 0], moved[1, 0] = x[0], density[0] * density[0]
             place = _kernels(x, mass, density, moved, chosen, kernel, parts, found)
-            if not -np.inf < place[2] < place[3] < np.inf or np.isnan(place[1]):
+            if not -np.inf < place[2] < place[3] < np.inf or isnan(place[1]):
                 continue
             known = _explanations(law, c, of_noise, y[t], place, few, shown)
             place = _candidates(law, c, y[t], known, place, few, shown, kernels, kernel, parts, found, powers, candidates)
             hump = _looked(law, c, y[t], place, few, shown, moved, kernels, kernel, parts, found, powers, dense)
-            if np.isnan(hump[1]):
+            if isnan(hump[1]):
                 continue
             least = 0.0
             x, mass, density = after[0, filled:], after[1, filled:], after[2, filled:]
@@ -546,11 +544,11 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
                 for number in NODES:
                     n = number if n < max(wanted, least) else n
                 _nodes(place, n, x, length)
-                rows = x, length, mass, density
+                nodes = x, length, mass, density
                 m, v, error, inherited = _posterior(
-                    law, c, y[t], rows, n, shown, changes, kernels, kernel, parts, found, powers, chosen, padded
+                    law, c, y[t], nodes, n, shown, changes, kernels, kernel, parts, found, powers, chosen, padded
                 )
-                law(MOVES, c, x[: _whole(n)], moved[0], moved[1], moved[2], moved[3])
+                _made(law, MOVES, c, x, _whole(n), moved)
                 apart = _apart(mass[:n], moved, shown[0])
                 least_now = (n - 1) * apart + 1
                 least_now = least_now if least_now <= most else fine_nodes

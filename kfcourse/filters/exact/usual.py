@@ -99,15 +99,15 @@ def compiled_usual_way(model: Model) -> UsualWay:
     constants = np.array([float(value) for value in model.values.values()])
 
     def step(before: Packed, rows: Array, y: Array, accuracy: float, fine_nodes: int) -> Done:
-        from kfcourse.filters.exact.loops import BEYOND, DONE, steps
+        from kfcourse.filters.exact.loops import BEYOND, DONE, room, steps
 
         numbers, (size, status) = np.empty((5, len(rows))), np.zeros((2, len(rows)), dtype=int)
-        values, start, count = [np.empty((3, 0))], before.start[rows], before.size[rows]
+        values, start, count, rooms = [np.empty((3, 0))], before.start[rows], before.size[rows], room()
         for some in chunks(len(rows), 1, AT_ONCE):
             after = np.empty((3, len(rows[some]) * NODES[-1] + BEYOND))
             given = before.values, start[some], count[some], y[some], accuracy, fine_nodes
             here = np.empty((5, len(rows[some])))
-            filled = steps(compiled.load(printed).law, constants, of_noise, *given, after, here, size[some], status[some])
+            filled = steps(compiled.load(printed).law, constants, of_noise, *given, after, here, size[some], status[some], rooms)
             numbers[:, some] = here
             values.append(after[:, :filled])
         return Done(np.concatenate(values, axis=1), numbers, size, status == DONE)
