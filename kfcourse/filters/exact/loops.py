@@ -10,7 +10,7 @@ computed here, for many at once.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import hypot, isfinite, isnan, sqrt
+from math import exp, hypot, isfinite, isnan, sqrt
 from typing import Any
 
 import numpy as np
@@ -150,16 +150,20 @@ def _kernels(x, mass, density, moved, chosen, kernel, parts, ends):
         counts = mass[j] > NEGLIGIBLE
         ends[0, j] = (low if low < np.inf else np.inf) if counts else -np.inf
         ends[1, j] = (high if high < np.inf else np.inf) if counts else -np.inf
-        ends[2, j] = density[j]
     for j in range(count, count + 4):
         kernel[0, j] = kernel[1, j] = kernel[2, j] = 0.0
-    for part in range(3):
-        of, total, weight = chosen[2 - part], 0.0, 0.0
-        for j in range(count):
-            total += of[j] * mass[j]
-            weight += of[j] * kernel[2, j]
-        parts[0, part], parts[1, part] = total, 2 * np.exp(-LOWEST) * weight
-    top = _place_of(_highest(ends[2], count), density)
+    half, quarter, mass_2, mass_4, mass_all, weight_2, weight_4, weight_all = chosen[0], chosen[1], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(count):
+        mass_all += mass[j]
+        mass_2 += half[j] * mass[j]
+        mass_4 += quarter[j] * mass[j]
+        weight_all += kernel[2, j]
+        weight_2 += half[j] * kernel[2, j]
+        weight_4 += quarter[j] * kernel[2, j]
+    nothing = 2 * exp(-LOWEST)
+    parts[0, 0], parts[0, 1], parts[0, 2] = mass_4, mass_2, mass_all
+    parts[1, 0], parts[1, 1], parts[1, 2] = nothing * weight_4, nothing * weight_2, nothing * weight_all
+    top = _place_of(_highest(density, count), density)
     if count > 1:
         top = min(max(top, 1), count - 2)
         slope = (to[top + 1] - to[top - 1]) / (x[top + 1] - x[top - 1])
@@ -215,27 +219,36 @@ def _made(law, number, c, x, count, made):
 
 
 @njit(**_ANY_ORDER)
-def _residual(y, mean, signal, of_noise):
-    return abs(y - mean) - signal if of_noise else y - signal
+def _residuals(law, c, of_noise, y, x, count, shown):
+    """Of y at points x, in shown[0]."""
+    _made(law, METER, c, x, count, shown)
+    mean, signal = shown[0], shown[2]
+    for i in range(count):
+        mean[i] = (abs(y - mean[i]) if of_noise else y) - signal[i]
 
 
 @njit(**_ANY_ORDER)
-def _log_likelihood(y, mean, variance):
+def _weighed(y, density, count, shown):
+    """Logarithms of likelihoods, in shown[0], and of these times the densities, in shown[1]; -inf for what is no number."""
+    mean, variance = shown[0], shown[1]
+    for i in range(_whole(count)):
+        spread = max(variance[i], TINY)
+        mean[i] = -0.5 * ((y - mean[i]) * (y - mean[i]) / spread + _log(2 * np.pi * spread))
     if isnan(y):
-        return 0.0
-    variance = max(variance, TINY)
-    return -0.5 * ((y - mean) * (y - mean) / variance + _log(2 * np.pi * variance))
+        for i in range(_whole(count)):
+            mean[i] = 0.0
+    for i in range(_whole(count)):
+        log = mean[i] + _log(density[i])
+        variance[i] = log if log < np.inf else np.inf if log > 0 else -np.inf
 
 
 @njit(**_ANY_ORDER)
 def _explanations(law, c, of_noise, y, place, few, shown):
     """`explanations`: the roots of b(x, m_w) = y in the support, those nearest to the middle, in few[2]; how many."""
-    at, residual, root, left, right, far = few[0], few[1], few[2], few[3], few[4], few[5]
-    mean, signal, slope, known = shown[0], shown[2], shown[3], 0
-    _nodes(place, np.int64(SEARCHED), at, residual)
-    _made(law, METER, c, at, SEARCHED, shown)
-    for i in range(SEARCHED):
-        residual[i] = _residual(y, mean[i], signal[i], of_noise)
+    at, root, left, right, far, residual, slope = few[0], few[2], few[3], few[4], few[5], shown[0], shown[3]
+    known, many = 0, np.int64(SEARCHED)
+    _nodes(place, many, at, few[1])
+    _residuals(law, c, of_noise, y, at, many, shown)
     for i in range(1, SEARCHED):
         before, after = residual[i - 1], residual[i]
         if (before > 0) == (after > 0) or not abs(after - before) < np.inf:
@@ -246,21 +259,21 @@ def _explanations(law, c, of_noise, y, place, few, shown):
             far[j + 1], left[j + 1], right[j + 1] = far[j], left[j], right[j]
         far[j], left[j], right[j] = distance, at[i - 1], at[i]
         known = min(known + 1, EXPLANATIONS)
+    many = np.int64(17)
     for j in range(known):
         begin, end = left[j], right[j]
         for _ in range(COARSELY // 4):  # four halvings at once: all points at which they may look
             step, i = (end - begin) / 16, 0
-            for point in range(17):
+            for point in range(many):
                 at[point] = begin + step * np.int32(point)
-            _made(law, METER, c, at, 17, shown)
-            negative = _residual(y, mean[0], signal[0], of_noise) > 0
+            _residuals(law, c, of_noise, y, at, many, shown)
             for gap in (8, 4, 2, 1):
-                i += gap if (_residual(y, mean[i + gap], signal[i + gap], of_noise) > 0) == negative else 0
+                i += gap if (residual[i + gap] > 0) == (residual[0] > 0) else 0
             begin, end = at[i], at[i + 1]
         root[j] = 0.5 * (begin + end)
         for _ in range(2):
-            _made(law, METER, c, root[j:], 1, shown)
-            newton = root[j] + _residual(y, mean[0], signal[0], of_noise) / slope[0]
+            _residuals(law, c, of_noise, y, root[j:], np.int64(1), shown)
+            newton = root[j] + residual[0] / slope[0]
             root[j] = newton if begin < newton < end else root[j]
     return known
 
@@ -268,20 +281,23 @@ def _explanations(law, c, of_noise, y, place, few, shown):
 @njit(**_ANY_ORDER)
 def _candidates(law, c, y, known, place, few, shown, kernels, kernel, parts, found, powers, candidates):
     """`likeliest`: centres, widths and masses of humps, of the roots in few[2] and of the middle; the place of the likeliest."""
-    (middle, width, low, high), at, mean, variance, slope = place, few[2], shown[0], shown[1], shown[3]
+    (middle, width, low, high), at, variance, slope, of_middle = place, few[2], shown[1], shown[3], place[1]
     at[known] = min(max(middle, low), high)
     _made(law, METER, c, at, known + 1, shown)
     _density(at, known + 1, kernels, kernel, parts, found[:2], powers)
-    best, highest, of_middle = known, -np.inf, width
     for j in range(known + 1):
         scale = of_middle
         if j < known:
             by_meter = sqrt(variance[j]) / abs(slope[j])
             scale = by_meter if by_meter < width else width
             of_middle = min(of_middle, hypot(at[j] - at[known], scale))
-        log_mass = _log(found[1, j] * scale * ROOT) + _log_likelihood(y, mean[j], variance[j])
-        log_mass = log_mass if scale > 0 and not isnan(log_mass) else -np.inf
-        candidates[0, j], candidates[1, j], candidates[2, j] = at[j], scale, log_mass
+        candidates[0, j], candidates[1, j] = at[j], scale
+    _weighed(y, found[1], known + 1, shown)
+    best, highest = known, -np.inf
+    for j in range(known + 1):
+        scale = candidates[1, j]
+        log_mass = shown[1, j] + _log(scale * ROOT) if scale > 0 else -np.inf
+        candidates[2, j] = log_mass
         if log_mass > highest:
             best, highest = j, log_mass
     return candidates[0, best], candidates[1, best], low, high
@@ -299,14 +315,12 @@ def _looked(law, c, y, place, few, shown, moved, kernels, kernel, parts, found, 
 
     The width is NaN where nothing is seen.
     """
-    at, length, logs, away, mean, variance, count = few[0], few[1], few[2], few[3], shown[0], shown[1], np.int64(LOOKED)
+    at, length, away, logs, variance, slope, count = few[0], few[1], few[3], shown[1], moved[1], moved[3], np.int64(LOOKED)
     whole = _whole(count)
     _nodes(place, count, at, length)
     _made(law, METER, c, at, whole, shown)
     _density(at, count, kernels, kernel, parts, found[:2], powers)
-    for i in range(whole):
-        log = _log(found[1, i]) + _log_likelihood(y, mean[i], variance[i])
-        logs[i] = -np.inf if isnan(log) else log
+    _weighed(y, found[1], count, shown)
     highest, area = _highest(logs, count), 0.0
     top = _place_of(highest, logs)
     for i in range(whole):
@@ -321,7 +335,6 @@ def _looked(law, c, y, place, few, shown, moved, kernels, kernel, parts, found, 
     while last > 0 and not logs[last] > TAIL * area:
         last -= 1
     _made(law, MOVES, c, at, whole, moved)
-    variance, slope = moved[1], moved[3]
     for i in range(whole):
         wanted = abs(slope[i]) / max(sqrt(variance[i]), 1e-150) * _overlap(logs[i] / area)
         dense[i] = wanted * wanted
@@ -376,20 +389,20 @@ def _hidden(candidates, known, place, count):
 
 
 @njit(**_ANY_ORDER)
-def _distance(x, masses, chosen, times, count, whole):
-    """`Summary.distance` of the chosen masses, taken so many times, from mean, variance and total."""
+def _distance(x, masses, count, whole):
+    """`Summary.distance` of masses from mean, variance and total."""
     (of_mean, of_variance, of_total), total, first, second = whole, 0.0, 0.0, 0.0
     for i in range(_whole(count)):
-        mass, away = chosen[i] * masses[i], x[i] - of_mean
-        total += mass
-        first += mass * away
-        second += mass * away * away
+        away = x[i] - of_mean
+        total += masses[i]
+        first += masses[i] * away
+        second += masses[i] * away * away
     mean = first / total
-    change = abs((second / total - mean * mean) / of_variance - 1) + abs(times * total / of_total - 1)
+    change = abs((second / total - mean * mean) / of_variance - 1) + abs(total / of_total - 1)
     return abs(mean) / sqrt(of_variance) + change
 
 
-@njit(**_ANY_ORDER)
+@njit(types.float64(_VALUES, _VALUES, types.int64, types.float64, types.float64, _VALUES, _VALUES), **_ANY_ORDER)
 def _roughness(x, mass, step, mean, variance, every, differences):
     """`roughness` of every so many of the masses, taken so many times; with room for zeros before and after them."""
     count, before, rate = (len(x) - 1) // step + 1, ORDER // 2, 1 / sqrt(variance)
@@ -421,26 +434,23 @@ def _cautious(change, before):
 
 
 @njit(**_ANY_ORDER)
-def _posterior(law, c, y, rows, count, shown, away, kernels, kernel, parts, found, powers, chosen, padded):
+def _posterior(law, c, y, nodes, count, shown, away, kernels, kernel, parts, found, powers, chosen, padded):
     """`posteriors` on nodes: mean, variance, and estimated error, of these nodes and inherited.
 
-    rows : nodes, lengths; to be filled with masses and densities
+    nodes : these, lengths; to be filled with masses and densities
     """
-    mean, variance, (x, length, mass, density), whole = shown[0], shown[1], rows, _whole(count)
+    (x, length, mass, density), whole = nodes, _whole(count)
     _made(law, METER, c, x, whole, shown)
-    _density(x, count, kernels, kernel, parts, found, powers)
-    total = 0.0
+    _density(x, count, kernels, kernel, parts, found[:3], powers)
+    _weighed(y, found[2], count, shown)
+    highest, half, quarter, total = _highest(shown[1], count), chosen[0], chosen[1], 0.0
     for i in range(whole):
-        mean[i] = _log_likelihood(y, mean[i], variance[i])
-        log = mean[i] + _log(found[2, i])
-        variance[i] = log if log < np.inf else np.inf if log > 0 else -np.inf
-    highest = _highest(variance, count)
-    for i in range(whole):
-        log = mean[i] - highest
+        log = shown[0, i] - highest
         likelihood = (np.inf if log > 708 else _exp(max(log, -708.0))) * length[i]
         found[0, i] *= likelihood
         found[1, i] *= likelihood
         found[2, i] *= likelihood
+        found[3, i], found[4, i] = 2 * half[i] * found[2, i], 4 * quarter[i] * found[2, i]
         total += found[2, i]
     m = v = 0.0
     for i in range(whole):
@@ -450,16 +460,14 @@ def _posterior(law, c, y, rows, count, shown, away, kernels, kernel, parts, foun
         density[i] = mass[i] / length[i]
         v += mass[i] * (x[i] - m) * (x[i] - m)
     moments, rounding = (m, v, total), ROUNDING * abs(m) / sqrt(v)
-    # By every second and fourth node, by every second and fourth kernel; roughness of all and of every second.
-    for i, (part, nodes, times) in enumerate(((2, 1, 2), (2, 2, 4), (1, 0, 1), (0, 0, 1))):
-        away[i] = _distance(x, found[part], chosen[nodes], times, count, moments)
-    for step in (1, 2):
-        away[3 + step] = _roughness(x[:count], mass, step, m, v, padded, shown[2])
-    for i in (0, 2, 4):
-        away[i] = max(away[i] - rounding, 0.0)
-    error = max(_extrapolated(away[0], away[1]), _cautious(away[4], away[5]))
+    # By every fourth and second kernel, all, by every second and fourth node.
+    for i in range(len(found)):
+        away[i] = _distance(x, found[i], count, moments)
+    rough = _roughness(x[:count], mass, 1, m, v, padded, shown[2])
+    rough_2 = _roughness(x[:count], mass, 2, m, v, padded, shown[2])
+    error = max(_extrapolated(max(away[3] - rounding, 0.0), away[4]), _cautious(max(rough - rounding, 0.0), rough_2))
     error += (mass[0] + mass[count - 1]) * max(m - x[0], x[count - 1] - m) / sqrt(v)
-    return m, v, error, rounding + _cautious(away[2], away[3])
+    return m, v, error, rounding + _cautious(max(away[1] - rounding, 0.0), away[0])
 
 
 @njit(**_ANY_ORDER)
@@ -487,10 +495,9 @@ def _predicted(mass, moved):
 
 def room() -> Array:
     """The arrays that `steps` works with, as rows of one: what is allocated by compiled code takes long to compile."""
-    rows = np.zeros((33, NODES[-1] + BEYOND + ORDER))
-    for part in range(3):  # all, every second, every fourth
-        rows[20 + part, :: 1 << part] = 1.0
-    rows[32, :11] = *_POLYNOMIAL, _LOWEST2
+    rows = np.zeros((34, NODES[-1] + BEYOND + ORDER))
+    rows[22, ::2] = rows[23, ::4] = 1.0  # every second, every fourth
+    rows[33, :11] = *_POLYNOMIAL, _LOWEST2
     return rows
 
 
@@ -517,9 +524,9 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
         rows : `room()`
         """
         most, filled = constants[0][-1], 0
-        kernel, found, moved, shown, few, chosen = rows[:3], rows[3:6], rows[6:10], rows[10:14], rows[14:20], rows[20:23]
-        candidates, parts, length, dense = rows[23:26], rows[26:28], rows[28], rows[29]
-        padded, changes, powers = rows[30], rows[31], rows[32]
+        kernel, found, moved, shown, few, chosen = rows[:3], rows[3:8], rows[8:12], rows[12:16], rows[16:22], rows[22:24]
+        candidates, parts, length, dense = rows[24:27], rows[27:29], rows[29], rows[30]
+        padded, changes, powers = rows[31], rows[32], rows[33]
         for t in range(len(y)):
             status[t], kernels = LEFT, count[t]
             end = start[t] + kernels
