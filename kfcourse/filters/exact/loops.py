@@ -41,7 +41,7 @@ _POLYNOMIAL = tuple(Chebyshev.interpolate(np.exp2, 9, [-0.5, 0.5]).convert(kind=
 _WHOLE = 1.5 * 2.0**52  # what is added to it is rounded to a whole number, and this stands in the last bits
 _BITS_OF_WHOLE, _BITS_OF_ROOT = np.array([_WHOLE, np.sqrt(0.5)]).view(np.int64).tolist()
 _AS_WRITTEN = _ANY_ORDER | {"fastmath": {"contract"}}  # no sum in another order
-_OF_NUMBERS = _ANY_ORDER | {"fastmath": {"reassoc", "nsz", "nnan"}}  # where nothing is NaN
+_ALL_BUT_SIGN = np.int64(2**63 - 1)
 BEYOND = 7  # entries of an array after those of the most nodes
 
 
@@ -94,12 +94,20 @@ def _whole(count):
     return 4 * ((count + 3) // 4)
 
 
-@njit(**_OF_NUMBERS)
+@njit(types.int64(types.float64), **_ANY_ORDER)
+def _rank(value):
+    """A whole number in the order of floats: the processor finds the largest of many of these at once."""
+    bits = np.float64(value).view(np.int64)
+    return bits ^ ((bits >> 63) & _ALL_BUT_SIGN)
+
+
+@njit(types.float64(_VALUES, types.int64), **_ANY_ORDER)
 def _highest(values, count):
-    most = -np.inf
+    most = _rank(-np.inf)
     for i in range(count):
-        most = values[i] if values[i] > most else most
-    return most
+        rank = _rank(values[i])
+        most = rank if rank > most else most
+    return np.int64(most ^ ((most >> 63) & _ALL_BUT_SIGN)).view(np.float64)
 
 
 @njit(**_ANY_ORDER)
@@ -152,7 +160,7 @@ def _kernels(x, mass, density, moved, chosen, kernel, parts, ends):
         ends[1, j] = (high if high < np.inf else np.inf) if counts else -np.inf
     for j in range(count, count + 4):
         kernel[0, j] = kernel[1, j] = kernel[2, j] = 0.0
-    half, quarter, mass_2, mass_4, mass_all, weight_2, weight_4, weight_all = chosen[0], chosen[1], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    half, quarter, mass_2, mass_4, mass_all, weight_2, weight_4, weight_all = chosen[3], chosen[4], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(count):
         mass_all += mass[j]
         mass_2 += half[j] * mass[j]
@@ -161,8 +169,8 @@ def _kernels(x, mass, density, moved, chosen, kernel, parts, ends):
         weight_2 += half[j] * kernel[2, j]
         weight_4 += quarter[j] * kernel[2, j]
     nothing = 2 * exp(-LOWEST)
-    parts[0, 0], parts[0, 1], parts[0, 2] = mass_4, mass_2, mass_all
-    parts[1, 0], parts[1, 1], parts[1, 2] = nothing * weight_4, nothing * weight_2, nothing * weight_all
+    parts[0, 0], parts[0, 1], parts[0, 2] = mass_4 / 4, mass_2 / 2, mass_all
+    parts[1, 0], parts[1, 1], parts[1, 2] = nothing * weight_4 / 4, nothing * weight_2 / 2, nothing * weight_all
     top = _place_of(_highest(density, count), density)
     if count > 1:
         top = min(max(top, 1), count - 2)
@@ -443,24 +451,23 @@ def _posterior(law, c, y, nodes, count, shown, away, kernels, kernel, parts, fou
     _made(law, METER, c, x, whole, shown)
     _density(x, count, kernels, kernel, parts, found[:3], powers)
     _weighed(y, found[2], count, shown)
-    highest, half, quarter, total = _highest(shown[1], count), chosen[0], chosen[1], 0.0
+    likelihood, highest, total, m, v = shown[0], _highest(shown[1], count), 0.0, 0.0, 0.0
     for i in range(whole):
-        log = shown[0, i] - highest
-        likelihood = (np.inf if log > 708 else _exp(max(log, -708.0))) * length[i]
-        found[0, i] *= likelihood
-        found[1, i] *= likelihood
-        found[2, i] *= likelihood
-        found[3, i], found[4, i] = 2 * half[i] * found[2, i], 4 * quarter[i] * found[2, i]
+        log = likelihood[i] - highest
+        likelihood[i] = (np.inf if log > 708 else _exp(max(log, -708.0))) * length[i]
+    # By every fourth and second kernel, by all, and of these by every second and fourth node.
+    for part in range(len(found) - 1, -1, -1):
+        for i in range(whole):
+            found[part, i] = chosen[part, i] * found[min(part, 2), i] * likelihood[i]
+    for i in range(whole):
         total += found[2, i]
-    m = v = 0.0
+        m += found[2, i] * x[i]
+    m /= total
     for i in range(whole):
         mass[i] = found[2, i] / total
-        m += mass[i] * x[i]
-    for i in range(whole):
         density[i] = mass[i] / length[i]
         v += mass[i] * (x[i] - m) * (x[i] - m)
     moments, rounding = (m, v, total), ROUNDING * abs(m) / sqrt(v)
-    # By every fourth and second kernel, all, by every second and fourth node.
     for i in range(len(found)):
         away[i] = _distance(x, found[i], count, moments)
     rough = _roughness(x[:count], mass, 1, m, v, padded, shown[2])
@@ -495,9 +502,9 @@ def _predicted(mass, moved):
 
 def room() -> Array:
     """The arrays that `steps` works with, as rows of one: what is allocated by compiled code takes long to compile."""
-    rows = np.zeros((34, NODES[-1] + BEYOND + ORDER))
-    rows[22, ::2] = rows[23, ::4] = 1.0  # every second, every fourth
-    rows[33, :11] = *_POLYNOMIAL, _LOWEST2
+    rows = np.zeros((37, NODES[-1] + BEYOND + ORDER))
+    rows[8:11], rows[11, ::2], rows[12, ::4] = 1, 2, 4  # all, every second, every fourth, so many times
+    rows[36, :11] = *_POLYNOMIAL, _LOWEST2
     return rows
 
 
@@ -524,9 +531,9 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
         rows : `room()`
         """
         most, filled = constants[0][-1], 0
-        kernel, found, moved, shown, few, chosen = rows[:3], rows[3:8], rows[8:12], rows[12:16], rows[16:22], rows[22:24]
-        candidates, parts, length, dense = rows[24:27], rows[27:29], rows[29], rows[30]
-        padded, changes, powers = rows[31], rows[32], rows[33]
+        kernel, found, chosen, moved, shown, few = rows[:3], rows[3:8], rows[8:13], rows[13:17], rows[17:21], rows[21:27]
+        candidates, parts, length, dense = rows[27:30], rows[30:32], rows[32], rows[33]
+        padded, changes, powers = rows[34], rows[35], rows[36]
         for t in range(len(y)):
             status[t], kernels = LEFT, count[t]
             end = start[t] + kernels
