@@ -26,6 +26,7 @@ from kfcourse.laws import Array
 
 LEFT, DONE, NARROW = 0, 1, 2  # to NumPy; done; done, and the next kernels do not overlap
 MOVES, METER = 0, 1  # which of the printed laws
+BY_HALF, BY_ALL = np.int64(2), np.int64(3)  # a density: by every fourth kernel, then by every second, then by all
 
 # Sums may be taken in any order, so that the processor adds several terms at once.
 _CALLED: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract"}}
@@ -180,8 +181,8 @@ def _kernels(x, mass, density, moved, chosen, kernel, parts, ends):
 
 
 @njit(**_ANY_ORDER)
-def _density(x, count, kernels, kernel, parts, found, powers):
-    """`Kernels.density` by every fourth kernel, by every second, and by all, as far as there is room.
+def _density(x, count, kernels, kernel, parts, powers, many, found):
+    """`Kernels.density` by every fourth kernel, by every second, and by all: the first so many of these.
 
     Two kernels at a time.  The numbers of `powers` are no constants here: the processor takes what it finds in memory as a part
     of an operation.
@@ -190,7 +191,7 @@ def _density(x, count, kernels, kernel, parts, found, powers):
     P = (
         powers[0], powers[1], powers[2], powers[3], powers[4], powers[5], powers[6], powers[7], powers[8], powers[9],
     )  # fmt: skip
-    for part in range(len(found)):
+    for part in range(many):
         sums, first, step = found[part], (0, 2, 1)[part], (4, 4, 2)[part]
         for i in range(whole):
             sums[i] = found[part - 1, i] if part else 0.0
@@ -201,7 +202,7 @@ def _density(x, count, kernels, kernel, parts, found, powers):
                 u, u_2 = x[i] * rate - centre, x[i] * rate_2 - centre_2
                 u, u_2 = u * u, u_2 * u_2
                 sums[i] += weight * _half(u if u < most else most, P) + weight_2 * _half(u_2 if u_2 < most else most, P)
-    for part in range(len(found)):
+    for part in range(many):
         sums, least, over = found[part], parts[1, part], sqrt(_LN2 / np.pi) / parts[0, part]
         for i in range(whole):
             sums[i] = sums[i] * over if sums[i] > least else 0.0
@@ -236,9 +237,14 @@ def _residuals(law, c, of_noise, y, x, count, shown):
 
 
 @njit(**_ANY_ORDER)
-def _weighed(y, density, count, shown):
-    """Logarithms of likelihoods, in shown[0], and of these times the densities, in shown[1]; -inf for what is no number."""
-    mean, variance = shown[0], shown[1]
+def _seen(law, c, y, x, count, kernels, kernel, parts, powers, many, found, shown):
+    """Densities of a prediction, and logarithms of the likelihood, in shown[0], and of the posterior, in shown[4].
+
+    These are -inf for what is no number.
+    """
+    _made(law, METER, c, x, _whole(count), shown)
+    _density(x, count, kernels, kernel, parts, powers, many, found)
+    mean, variance, density, logs = shown[0], shown[1], found[many - 1], shown[4]
     for i in range(_whole(count)):
         spread = max(variance[i], TINY)
         mean[i] = -0.5 * ((y - mean[i]) * (y - mean[i]) / spread + _log(2 * np.pi * spread))
@@ -247,16 +253,14 @@ def _weighed(y, density, count, shown):
             mean[i] = 0.0
     for i in range(_whole(count)):
         log = mean[i] + _log(density[i])
-        variance[i] = log if log < np.inf else np.inf if log > 0 else -np.inf
+        logs[i] = log if log < np.inf else np.inf if log > 0 else -np.inf
 
 
 @njit(**_ANY_ORDER)
 def _explanations(law, c, of_noise, y, place, few, shown):
     """`explanations`: the roots of b(x, m_w) = y in the support, those nearest to the middle, in few[2]; how many."""
     at, root, left, right, far, residual, slope = few[0], few[2], few[3], few[4], few[5], shown[0], shown[3]
-    known, many = 0, np.int64(SEARCHED)
-    _nodes(place, many, at, few[1])
-    _residuals(law, c, of_noise, y, at, many, shown)
+    known = 0
     for i in range(1, SEARCHED):
         before, after = residual[i - 1], residual[i]
         if (before > 0) == (after > 0) or not abs(after - before) < np.inf:
@@ -287,25 +291,18 @@ def _explanations(law, c, of_noise, y, place, few, shown):
 
 
 @njit(**_ANY_ORDER)
-def _candidates(law, c, y, known, place, few, shown, kernels, kernel, parts, found, powers, candidates):
-    """`likeliest`: centres, widths and masses of humps, of the roots in few[2] and of the middle; the place of the likeliest."""
-    (middle, width, low, high), at, variance, slope, of_middle = place, few[2], shown[1], shown[3], place[1]
-    at[known] = min(max(middle, low), high)
-    _made(law, METER, c, at, known + 1, shown)
-    _density(at, known + 1, kernels, kernel, parts, found[:2], powers)
+def _candidates(known, place, at, shown, candidates):
+    """`likeliest`: centres, widths and masses of humps, of the roots and of the middle; the place of the likeliest."""
+    (_, width, low, high), variance, slope, logs, of_middle = place, shown[1], shown[3], shown[4], place[1]
+    best, highest = known, -np.inf
     for j in range(known + 1):
         scale = of_middle
         if j < known:
             by_meter = sqrt(variance[j]) / abs(slope[j])
             scale = by_meter if by_meter < width else width
             of_middle = min(of_middle, hypot(at[j] - at[known], scale))
-        candidates[0, j], candidates[1, j] = at[j], scale
-    _weighed(y, found[1], known + 1, shown)
-    best, highest = known, -np.inf
-    for j in range(known + 1):
-        scale = candidates[1, j]
-        log_mass = shown[1, j] + _log(scale * ROOT) if scale > 0 else -np.inf
-        candidates[2, j] = log_mass
+        log_mass = logs[j] + _log(scale * ROOT) if scale > 0 else -np.inf
+        candidates[0, j], candidates[1, j], candidates[2, j] = at[j], scale, log_mass
         if log_mass > highest:
             best, highest = j, log_mass
     return candidates[0, best], candidates[1, best], low, high
@@ -318,17 +315,13 @@ def _overlap(mass):
 
 
 @njit(**_ANY_ORDER)
-def _looked(law, c, y, place, few, shown, moved, kernels, kernel, parts, found, powers, dense):
+def _looked(few, logs, moved, dense):
     """`looked`: centre, width and ends of the highest hump; and in `dense` how densely its kernels want their nodes.
 
     The width is NaN where nothing is seen.
     """
-    at, length, away, logs, variance, slope, count = few[0], few[1], few[3], shown[1], moved[1], moved[3], np.int64(LOOKED)
+    at, length, away, variance, slope, count = few[0], few[1], few[3], moved[1], moved[3], np.int64(LOOKED)
     whole = _whole(count)
-    _nodes(place, count, at, length)
-    _made(law, METER, c, at, whole, shown)
-    _density(at, count, kernels, kernel, parts, found[:2], powers)
-    _weighed(y, found[1], count, shown)
     highest, area = _highest(logs, count), 0.0
     top = _place_of(highest, logs)
     for i in range(whole):
@@ -342,7 +335,6 @@ def _looked(law, c, y, place, few, shown, moved, kernels, kernel, parts, found, 
         first += 1
     while last > 0 and not logs[last] > TAIL * area:
         last -= 1
-    _made(law, MOVES, c, at, whole, moved)
     for i in range(whole):
         wanted = abs(slope[i]) / max(sqrt(variance[i]), 1e-150) * _overlap(logs[i] / area)
         dense[i] = wanted * wanted
@@ -442,16 +434,10 @@ def _cautious(change, before):
 
 
 @njit(**_ANY_ORDER)
-def _posterior(law, c, y, nodes, count, shown, away, kernels, kernel, parts, found, powers, chosen, padded):
-    """`posteriors` on nodes: mean, variance, and estimated error, of these nodes and inherited.
-
-    nodes : these, lengths; to be filled with masses and densities
-    """
-    (x, length, mass, density), whole = nodes, _whole(count)
-    _made(law, METER, c, x, whole, shown)
-    _density(x, count, kernels, kernel, parts, found[:3], powers)
-    _weighed(y, found[2], count, shown)
-    likelihood, highest, total, m, v = shown[0], _highest(shown[1], count), 0.0, 0.0, 0.0
+def _posterior(x, length, mass, density, count, shown, found, chosen):
+    """`posteriors` on nodes, which fills masses and densities: mean, variance, total."""
+    whole = _whole(count)
+    likelihood, highest, total, m, v = shown[0], _highest(shown[4], count), 0.0, 0.0, 0.0
     for i in range(whole):
         log = likelihood[i] - highest
         likelihood[i] = (np.inf if log > 708 else _exp(max(log, -708.0))) * length[i]
@@ -467,14 +453,19 @@ def _posterior(law, c, y, nodes, count, shown, away, kernels, kernel, parts, fou
         mass[i] = found[2, i] / total
         density[i] = mass[i] / length[i]
         v += mass[i] * (x[i] - m) * (x[i] - m)
-    moments, rounding = (m, v, total), ROUNDING * abs(m) / sqrt(v)
-    for i in range(len(found)):
-        away[i] = _distance(x, found[i], count, moments)
-    rough = _roughness(x[:count], mass, 1, m, v, padded, shown[2])
-    rough_2 = _roughness(x[:count], mass, 2, m, v, padded, shown[2])
+    return m, v, total
+
+
+@njit(**_ANY_ORDER)
+def _errors(x, mass, count, moments, found, rough, rough_2, away):
+    """Estimated errors of a posterior, of its own nodes and inherited; roughness of all masses and of every second."""
+    m, v, _ = moments
+    rounding = ROUNDING * abs(m) / sqrt(v)
+    for part in range(len(found)):
+        away[part] = _distance(x, found[part], count, moments)
     error = max(_extrapolated(max(away[3] - rounding, 0.0), away[4]), _cautious(max(rough - rounding, 0.0), rough_2))
     error += (mass[0] + mass[count - 1]) * max(m - x[0], x[count - 1] - m) / sqrt(v)
-    return m, v, error, rounding + _cautious(max(away[1] - rounding, 0.0), away[0])
+    return error, rounding + _cautious(max(away[1] - rounding, 0.0), away[0])
 
 
 @njit(**_ANY_ORDER)
@@ -502,9 +493,9 @@ def _predicted(mass, moved):
 
 def room() -> Array:
     """The arrays that `steps` works with, as rows of one: what is allocated by compiled code takes long to compile."""
-    rows = np.zeros((37, NODES[-1] + BEYOND + ORDER))
+    rows = np.zeros((38, NODES[-1] + BEYOND + ORDER))
     rows[8:11], rows[11, ::2], rows[12, ::4] = 1, 2, 4  # all, every second, every fourth, so many times
-    rows[36, :11] = *_POLYNOMIAL, _LOWEST2
+    rows[37, :11] = *_POLYNOMIAL, _LOWEST2
     return rows
 
 
@@ -531,9 +522,9 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
         rows : `room()`
         """
         most, filled = constants[0][-1], 0
-        kernel, found, chosen, moved, shown, few = rows[:3], rows[3:8], rows[8:13], rows[13:17], rows[17:21], rows[21:27]
-        candidates, parts, length, dense = rows[27:30], rows[30:32], rows[32], rows[33]
-        padded, changes, powers = rows[34], rows[35], rows[36]
+        kernel, found, chosen, moved, shown, few = rows[:3], rows[3:8], rows[8:13], rows[13:17], rows[17:22], rows[22:28]
+        candidates, parts, length, dense = rows[28:31], rows[31:33], rows[33], rows[34]
+        padded, changes, powers, searched, looked = rows[35], rows[36], rows[37], np.int64(SEARCHED), np.int64(LOOKED)
         for t in range(len(y)):
             status[t], kernels = LEFT, count[t]
             end = start[t] + kernels
@@ -545,9 +536,16 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
             place = _kernels(x, mass, density, moved, chosen, kernel, parts, found)
             if not -np.inf < place[2] < place[3] < np.inf or isnan(place[1]):
                 continue
+            _nodes(place, searched, few[0], few[1])
+            _residuals(law, c, of_noise, y[t], few[0], searched, shown)
             known = _explanations(law, c, of_noise, y[t], place, few, shown)
-            place = _candidates(law, c, y[t], known, place, few, shown, kernels, kernel, parts, found, powers, candidates)
-            hump = _looked(law, c, y[t], place, few, shown, moved, kernels, kernel, parts, found, powers, dense)
+            few[2, known] = min(max(place[0], place[2]), place[3])
+            _seen(law, c, y[t], few[2], known + 1, kernels, kernel, parts, powers, BY_HALF, found, shown)
+            place = _candidates(known, place, few[2], shown, candidates)
+            _nodes(place, looked, few[0], few[1])
+            _seen(law, c, y[t], few[0], looked, kernels, kernel, parts, powers, BY_HALF, found, shown)
+            _made(law, MOVES, c, few[0], _whole(looked), moved)
+            hump = _looked(few, shown[4], moved, dense)
             if isnan(hump[1]):
                 continue
             least = 0.0
@@ -558,10 +556,11 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
                 for number in NODES:
                     n = number if n < max(wanted, least) else n
                 _nodes(place, n, x, length)
-                nodes = x, length, mass, density
-                m, v, error, inherited = _posterior(
-                    law, c, y[t], nodes, n, shown, changes, kernels, kernel, parts, found, powers, chosen, padded
-                )
+                _seen(law, c, y[t], x, n, kernels, kernel, parts, powers, BY_ALL, found, shown)
+                m, v, total = _posterior(x, length, mass, density, n, shown, found, chosen)
+                rough = _roughness(x[:n], mass, 1, m, v, padded, shown[0])
+                rough_2 = _roughness(x[:n], mass, 2, m, v, padded, shown[0])
+                error, inherited = _errors(x, mass, n, (m, v, total), found, rough, rough_2, changes)
                 _made(law, MOVES, c, x, _whole(n), moved)
                 apart = _apart(mass[:n], moved, shown[0])
                 least_now = (n - 1) * apart + 1
