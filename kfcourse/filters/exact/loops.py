@@ -5,6 +5,11 @@ its posterior.  Of any other it is said that it is LEFT.  Only with numba is thi
 
 The numbers are those of NumPy but for rounding: sums are taken in another order, and exp(u), to 2e-13 of it, and ln(x) are
 computed here, for many at once.
+
+Compiling takes as long as there is code after all is put into its caller, and again into that one's: so `steps` itself calls what
+several parts need.  What makes much code of little text is left out: arrays allocated here (they are rows of one that is given,
+and no references are counted), whole slices that are assigned, `np.sqrt` of a number (`math.sqrt` is the same), a literal number
+for an argument (compiled again for each; `np.int64` is not).
 """
 
 from __future__ import annotations
@@ -30,7 +35,8 @@ BY_HALF, BY_ALL = np.int64(2), np.int64(3)  # a density: by every fourth kernel,
 
 # Sums may be taken in any order, so that the processor adds several terms at once.
 _CALLED: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract"}}
-_ANY_ORDER = _CALLED | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}  # of what only compiled functions call
+_LOOP: dict[str, Any] = _CALLED | {"cache": True, "nogil": True, "no_cfunc_wrapper": True}
+_ANY_ORDER = _CALLED | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}  # only compiled functions call it
 
 _VALUES, _MANY, _MANY_PARTS, _NUMBERS = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
 # Printed, with the constants of the model: law(number, c, x, mean, variance, signal, slope); MOVES makes no signal.
@@ -40,7 +46,7 @@ _LN2 = np.log(2)
 _LOWEST2 = LOWEST / _LN2
 _POLYNOMIAL = tuple(Chebyshev.interpolate(np.exp2, 9, [-0.5, 0.5]).convert(kind=Polynomial).coef.tolist())
 _WHOLE = 1.5 * 2.0**52  # what is added to it is rounded to a whole number, and this stands in the last bits
-_BITS_OF_WHOLE, _BITS_OF_ROOT = np.array([_WHOLE, np.sqrt(0.5)]).view(np.int64).tolist()
+_BITS_OF_WHOLE, _BITS_OF_ROOT, _BITS_OF_LOWEST = np.array([_WHOLE, np.sqrt(0.5), -np.inf]).view(np.int64).tolist()
 _AS_WRITTEN = _ANY_ORDER | {"fastmath": {"contract"}}  # no sum in another order
 _ALL_BUT_SIGN = np.int64(2**63 - 1)
 BEYOND = 7  # entries of an array after those of the most nodes
@@ -95,20 +101,19 @@ def _whole(count):
     return 4 * ((count + 3) // 4)
 
 
-@njit(types.int64(types.float64), **_ANY_ORDER)
-def _rank(value):
-    """A whole number in the order of floats: the processor finds the largest of many of these at once."""
-    bits = np.float64(value).view(np.int64)
+@njit(types.int64(types.int64), **_ANY_ORDER)
+def _in_order(bits):
+    """Of a float's bits a whole number in the order of floats, and back: of these the largest of many is found at once."""
     return bits ^ ((bits >> 63) & _ALL_BUT_SIGN)
 
 
 @njit(types.float64(_VALUES, types.int64), **_ANY_ORDER)
 def _highest(values, count):
-    most = _rank(-np.inf)
+    most = _in_order(_BITS_OF_LOWEST)
     for i in range(count):
-        rank = _rank(values[i])
-        most = rank if rank > most else most
-    return np.int64(most ^ ((most >> 63) & _ALL_BUT_SIGN)).view(np.float64)
+        value = _in_order(np.float64(values[i]).view(np.int64))
+        most = value if value > most else most
+    return np.int64(_in_order(most)).view(np.float64)
 
 
 @njit(**_ANY_ORDER)
@@ -161,7 +166,8 @@ def _kernels(x, mass, density, moved, chosen, kernel, parts, ends):
         ends[1, j] = (high if high < np.inf else np.inf) if counts else -np.inf
     for j in range(count, count + 4):
         kernel[0, j] = kernel[1, j] = kernel[2, j] = 0.0
-    half, quarter, mass_2, mass_4, mass_all, weight_2, weight_4, weight_all = chosen[3], chosen[4], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    mass_2 = mass_4 = mass_all = weight_2 = weight_4 = weight_all = 0.0
+    half, quarter = chosen[3], chosen[4]
     for j in range(count):
         mass_all += mass[j]
         mass_2 += half[j] * mass[j]
@@ -208,7 +214,7 @@ def _density(x, count, kernels, kernel, parts, powers, many, found):
             sums[i] = sums[i] * over if sums[i] > least else 0.0
 
 
-@njit(types.void(_MANY, _MANY, _MANY, _MANY_PARTS, types.float64, _MANY_PARTS), cache=True, nogil=True, **_CALLED)
+@njit(types.void(_MANY, _MANY, _MANY, _MANY_PARTS, types.float64, _MANY_PARTS), **_LOOP)
 def add_bells(x, rate, centre, weights, lowest, result):
     """`kernels.add_bells`."""
     bells = np.empty(x.shape[1])
@@ -224,6 +230,7 @@ def add_bells(x, rate, centre, weights, lowest, result):
 
 @njit(types.void(_LAW, types.int64, _VALUES, _VALUES, types.int64, _MANY), **_ANY_ORDER)
 def _made(law, number, c, x, count, made):
+    """Mean, variance, signal and slope by a printed law, in the first rows."""
     law(number, c, x[:count], made[0], made[1], made[2], made[3])
 
 
@@ -240,7 +247,7 @@ def _residuals(law, c, of_noise, y, x, count, shown):
 def _seen(law, c, y, x, count, kernels, kernel, parts, powers, many, found, shown):
     """Densities of a prediction, and logarithms of the likelihood, in shown[0], and of the posterior, in shown[4].
 
-    These are -inf for what is no number.
+    The latter are -inf where they are no numbers.
     """
     _made(law, METER, c, x, _whole(count), shown)
     _density(x, count, kernels, kernel, parts, powers, many, found)
@@ -301,7 +308,7 @@ def _candidates(known, place, at, shown, candidates):
             by_meter = sqrt(variance[j]) / abs(slope[j])
             scale = by_meter if by_meter < width else width
             of_middle = min(of_middle, hypot(at[j] - at[known], scale))
-        log_mass = logs[j] + _log(scale * ROOT) if scale > 0 else -np.inf
+        log_mass = logs[j] + _log(scale * ROOT) if 0 < scale < np.inf else -np.inf
         candidates[0, j], candidates[1, j], candidates[2, j] = at[j], scale, log_mass
         if log_mass > highest:
             best, highest = j, log_mass
@@ -507,9 +514,7 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
             _LAW, _VALUES, types.boolean, _MANY, _NUMBERS, _NUMBERS, _VALUES, types.float64, types.float64,
             _MANY, _MANY, _NUMBERS, _NUMBERS, _MANY,
         ),
-        cache=True,
-        nogil=True,
-        **_CALLED,
+        **_LOOP | {"_nrt": False},
     )  # fmt: skip
     def steps(law, c, of_noise, before, start, count, y, accuracy, fine_nodes, after, numbers, size, status, rows):
         """One step of many trajectories: the length of `after` that is filled.
@@ -521,7 +526,7 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
         numbers (5, T), size, status (T,) : mean, variance, error, mean and variance predicted; nodes; LEFT, DONE or NARROW
         rows : `room()`
         """
-        most, filled = constants[0][-1], 0
+        most, filled = constants[0][-1], np.int64(0)
         kernel, found, chosen, moved, shown, few = rows[:3], rows[3:8], rows[8:13], rows[13:17], rows[17:22], rows[22:28]
         candidates, parts, length, dense = rows[28:31], rows[31:33], rows[33], rows[34]
         padded, changes, powers, searched, looked = rows[35], rows[36], rows[37], np.int64(SEARCHED), np.int64(LOOKED)
@@ -554,7 +559,7 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
                 place, wanted = _spaced(hump, few[0], dense, candidates, known, spacing, few[3])
                 n = np.int64(NODES[0])
                 for number in NODES:
-                    n = number if n < max(wanted, least) else n
+                    n = np.int64(number) if n < max(wanted, least) else n
                 _nodes(place, n, x, length)
                 _seen(law, c, y[t], x, n, kernels, kernel, parts, powers, BY_ALL, found, shown)
                 m, v, total = _posterior(x, length, mass, density, n, shown, found, chosen)
