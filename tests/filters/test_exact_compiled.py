@@ -9,7 +9,7 @@ import pytest
 
 from kfcourse import Model, compare, gaussian, load_variants, simulate
 from kfcourse.filters import aof, pointmass
-from kfcourse.filters.exact import loops
+from kfcourse.filters.exact import loops, pointmasses
 from kfcourse.filters.fused import fuse
 from kfcourse.lab.short_names import exact
 from kfcourse.records.evidence import likelihood
@@ -101,15 +101,45 @@ def test_what_the_loop_cannot_take_stays_as_it_is():
         assert fuse(one) is one
 
 
-def test_exp_and_ln():
-    """To 2e-13 and 1e-15, over all that densities are made of."""
-    x = np.concatenate([np.linspace(-707, 707, 100_001), np.random.default_rng(1).normal(0, 3, 10_000)])
+def test_the_first_step_is_taken_by_the_loop_too(monkeypatch):
+    """From the prior, a single normal law; that its numbers are those of the plain step, `test_every_scalar_variant` says."""
+
+    def refused(*_):
+        raise AssertionError("left to NumPy")
+
+    quick, y = fuse(pointmass(SCALAR["53"])), simulate(SCALAR["53"], 64, 1, 1).y
+    monkeypatch.setattr(pointmasses, "likeliest", refused)
+    assert quick.step(quick.init(64), y[0]).memory.fine.usual.all()
+
+
+def test_exp_and_ln(monkeypatch):
+    """To 2e-13, 3e-14 and 1e-15, over all that densities are made of."""
+    for name in ("_half", "_log"):
+        monkeypatch.setattr(loops, name, getattr(loops, name).py_func)
+    x = np.concatenate([np.linspace(-708, 708, 100_001), np.random.default_rng(1).normal(0, 3, 10_000)])
     exponentials = np.array([loops._exp.py_func(one) for one in x])
     np.testing.assert_allclose(exponentials, np.exp(x), rtol=2e-13)
-    logarithms = np.array([loops._log.py_func(one) for one in np.exp(x)])
+    u = np.append(np.linspace(-1021, 1021, 100_001), loops._LOWEST2)
+    powers = np.array([loops._half(one, loops._POLYNOMIAL) for one in u])
+    np.testing.assert_allclose(powers, np.exp2(-u), rtol=3e-14)
+    far = np.append(np.geomspace(1e-9, 1e150, 10_000), 0)
+    areas = np.array([loops._asinh.py_func(one) for one in far])
+    np.testing.assert_allclose(areas, np.arcsinh(far), rtol=1e-15, atol=1e-15)
+    logarithms = np.array([loops._log(one) for one in np.exp(x)])
     np.testing.assert_allclose(logarithms, np.log(np.exp(x)), rtol=1e-15, atol=1e-15)
-    assert [loops._log.py_func(one) for one in (0.0, np.inf)] == [-np.inf, np.inf]
-    assert np.isnan(loops._log.py_func(np.nan))
+    assert [loops._log(one) for one in (0.0, np.inf)] == [-np.inf, np.inf]
+    assert np.isnan(loops._log(np.nan))
+
+
+def test_the_largest_of_many(monkeypatch):
+    """By bits: of both signs and zeros, and where one is infinite."""
+    monkeypatch.setattr(loops, "_in_order", loops._in_order.py_func)
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        values = rng.normal(0, 10.0 ** rng.integers(-300, 300), 7) - rng.integers(0, 2) * 10.0 ** rng.integers(-300, 300)
+        values[rng.integers(0, 7)] = rng.choice([0.0, -np.inf, np.inf, values[0]], p=[0.3, 0.3, 0.1, 0.3])
+        for count in (1, 4, 7):
+            assert loops._highest.py_func(values, count) == values[:count].max()
 
 
 def test_machine_code_is_kept_beside_every_constant():

@@ -5,59 +5,72 @@ its posterior.  Of any other it is said that it is LEFT.  Only with numba is thi
 
 The numbers are those of NumPy but for rounding: sums are taken in another order, and exp(u), to 2e-13 of it, and ln(x) are
 computed here, for many at once.
+
+Compiling takes as long as there is code after all is put into its caller, and again into that one's: so `steps` itself calls what
+several parts need.  What makes much code of little text is left out: arrays allocated here (they are rows of one that is given,
+and no references are counted), whole slices that are assigned, `np.sqrt` of a number (`math.sqrt` is the same), a literal number
+for an argument (compiled again for each; `np.int64` is not).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import exp, hypot, isfinite, isnan, sqrt
 from typing import Any
 
 import numpy as np
 from numba import njit, types
+from numpy.polynomial import Chebyshev, Polynomial
 
 from kfcourse.filters.densities import TINY
 from kfcourse.filters.exact.batch import COEFFICIENTS, KINK, ORDER, ROUNDING
 from kfcourse.filters.exact.constants import LOOKED, LOWEST, MORE, NEGLIGIBLE, NODES, ROOT, SPACINGS, TAIL, WIDTH
 from kfcourse.filters.exact.kernels import OVERLAP, SEEN
 from kfcourse.filters.exact.places import COARSELY, EXPLANATIONS, FRACTIONS, HIDDEN, HUMP, SEARCHED
+from kfcourse.laws import Array
 
 LEFT, DONE, NARROW = 0, 1, 2  # to NumPy; done; done, and the next kernels do not overlap
 MOVES, METER = 0, 1  # which of the printed laws
+BY_HALF, BY_ALL = np.int64(2), np.int64(3)  # a density: by every fourth kernel, then by every second, then by all
 
 # Sums may be taken in any order, so that the processor adds several terms at once.
 _CALLED: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract"}}
-_ANY_ORDER = _CALLED | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # of what only compiled functions call
+_LOOP: dict[str, Any] = _CALLED | {"cache": True, "nogil": True, "no_cfunc_wrapper": True}
+_ANY_ORDER = _CALLED | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}  # only compiled functions call it
 
 _VALUES, _MANY, _MANY_PARTS, _NUMBERS = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1], types.int64[::1]
+# Printed, with the constants of the model: law(number, c, x, mean, variance, signal, slope); MOVES makes no signal.
+_LAW = types.FunctionType(types.void(types.int64, *[_VALUES] * 6))
 
 _LN2 = np.log(2)
+_LOWEST2 = LOWEST / _LN2
+_POLYNOMIAL = tuple(Chebyshev.interpolate(np.exp2, 9, [-0.5, 0.5]).convert(kind=Polynomial).coef.tolist())
 _WHOLE = 1.5 * 2.0**52  # what is added to it is rounded to a whole number, and this stands in the last bits
-_BITS_OF_WHOLE, _BITS_OF_ROOT = np.array([_WHOLE, np.sqrt(0.5)]).view(np.int64).tolist()
+_BITS_OF_WHOLE, _BITS_OF_ROOT, _BITS_OF_LOWEST = np.array([_WHOLE, np.sqrt(0.5), -np.inf]).view(np.int64).tolist()
 _AS_WRITTEN = _ANY_ORDER | {"fastmath": {"contract"}}  # no sum in another order
+_ALL_BUT_SIGN = np.int64(2**63 - 1)
+BEYOND = 7  # entries of an array after those of the most nodes
+
+
+@njit(**_AS_WRITTEN)
+def _half(u, P):
+    """2^-u, |u| < 1021.5, to 3e-14 of it: 2^k 2^r, |r| <= 1/2, by a polynomial.
+
+    Here, and for the logarithm, no change from int to float and back, so that loops do many at once.
+    """
+    shifted = _WHOLE - u
+    r = (_WHOLE - shifted) - u
+    z = r * r
+    even = (((P[8] * z + P[6]) * z + P[4]) * z + P[2]) * z + P[0]
+    odd = (((P[9] * z + P[7]) * z + P[5]) * z + P[3]) * z + P[1]
+    bits = np.float64(even + r * odd).view(np.int64) + (np.float64(shifted).view(np.int64) << 52)
+    return np.int64(bits).view(np.float64)
 
 
 @njit(**_AS_WRITTEN)
 def _exp(u):
-    """exp(u), |u| < 708, to 2e-13 of it: 2^k exp(r), |r| < .35, by Taylor's polynomial.
-
-    Here, and for the logarithm, no change from int to float and back, so that loops do many at once.
-    """
-    shifted = u * (1 / _LN2) + _WHOLE
-    k = shifted - _WHOLE
-    r = u - k * _LN2
-    p = 1 / 39916800
-    p = p * r + 1 / 3628800
-    p = p * r + 1 / 362880
-    p = p * r + 1 / 40320
-    p = p * r + 1 / 5040
-    p = p * r + 1 / 720
-    p = p * r + 1 / 120
-    p = p * r + 1 / 24
-    p = p * r + 1 / 6
-    p = p * r + 1 / 2
-    p = p * r + 1
-    p = p * r + 1
-    return p * np.int64((np.float64(shifted).view(np.int64) + 1023) << 52).view(np.float64)
+    """exp(u), |u| <= 708, to 2e-13 of it, as the power of 2 that it is has been rounded."""
+    return _half(u * (-1 / _LN2), _POLYNOMIAL)
 
 
 @njit(**_AS_WRITTEN)
@@ -82,78 +95,126 @@ def _log(x):
     return -np.inf if x == 0 else value if x < np.inf else x
 
 
-@njit(**_ANY_ORDER)
-def _arrays(size):
-    return np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+@njit(types.int64(types.int64), **_ANY_ORDER)
+def _whole(count):
+    """So many entries, to whole fours: what the processor does at once."""
+    return 4 * ((count + 3) // 4)
 
 
-@njit(**_ANY_ORDER)
-def _nodes(place, x, length):
-    """`Place.nodes`: the nodes, and the lengths they stand for."""
-    count, (centre, scale, low, high) = len(x), place
-    first, last = np.arcsinh((low - centre) / scale), np.arcsinh((high - centre) / scale)
+@njit(types.int64(types.int64), **_ANY_ORDER)
+def _in_order(bits):
+    """Of a float's bits a whole number in the order of floats, and back: of these the largest of many is found at once."""
+    return bits ^ ((bits >> 63) & _ALL_BUT_SIGN)
+
+
+@njit(types.float64(_VALUES, types.int64), **_ANY_ORDER)
+def _highest(values, count):
+    most = _in_order(_BITS_OF_LOWEST)
     for i in range(count):
-        grown = _exp(first + (last - first) * (i / (count - 1)))
-        x[i] = centre + 0.5 * scale * (grown - 1 / grown)
-        length[i] = 0.5 * scale * (grown + 1 / grown) * ((last - first) / (count - 1))
+        value = _in_order(np.float64(values[i]).view(np.int64))
+        most = value if value > most else most
+    return np.int64(_in_order(most)).view(np.float64)
+
+
+@njit(**_ANY_ORDER)
+def _place_of(value, values):
+    for i in range(len(values)):
+        if values[i] == value:
+            return i
+    return 0
+
+
+@njit(**_AS_WRITTEN)
+def _asinh(a):
+    """arsinh a, a >= 0, to 1e-15 of 1 + arsinh a."""
+    return _log(a + sqrt(a * a + 1))
+
+
+@njit(**_ANY_ORDER)
+def _nodes(place, count, x, length):
+    """`Place.nodes`: the nodes, and the lengths they stand for; to whole fours the last node again, of no length."""
+    centre, scale, low, high = place
+    first, last = -_asinh((centre - low) / scale), _asinh((high - centre) / scale)
+    step, half = (last - first) / (count - 1), 0.5 * scale
+    for i in range(_whole(count)):
+        grown = _exp(first + step * np.int32(min(i, count - 1)))
+        x[i] = centre + half * (grown - 1 / grown)
+        length[i] = half * (grown + 1 / grown) * step if i < count else 0.0
 
 
 @njit(**_ANY_ORDER)
 def _span(place):
     centre, scale, low, high = place
-    return np.arcsinh((high - centre) / scale) + np.arcsinh((centre - low) / scale)
+    return _asinh((high - centre) / scale) + _asinh((centre - low) / scale)
 
 
 @njit(**_ANY_ORDER)
-def _kernels(x, mass, density, moved, kernel, parts):
+def _kernels(x, mass, density, moved, chosen, kernel, parts, ends):
     """`overlapping` and `support`: the kernels of nodes, and the prediction's centre, width, and ends.
 
-    Of each kernel the rate, the rate times the centre, and the rate times the mass; first those of every fourth node, then the
-    others of every second, then the rest: the sums over `quarter` and `even` are parts of the sum over all.  Of each part: where
-    it ends, the mass up to there, and up to which sum there is nothing.
+    Of each kernel the rate, the rate times the centre, and the rate times the mass.  Of those of every fourth node, of every
+    second, and of all: the mass, and up to which sum there is nothing.
     """
-    (to, spread, _, _), count, place, top, low, high, weight, total = moved, len(x), 0, 0, np.inf, -np.inf, 0.0, 0.0
-    for part, first, step in ((0, 0, 4), (1, 2, 4), (2, 1, 2)):
-        for j in range(first, count, step):
-            mean, sigma = to[j], max(np.sqrt(spread[j]), 1e-150)
-            rate = np.sqrt(0.5) / sigma
-            kernel[0, place], kernel[1, place], kernel[2, place] = rate, mean * rate, mass[j] * rate
-            weight += mass[j] * rate
-            total += mass[j]
-            if mass[j] > NEGLIGIBLE:
-                low, high = min(low, mean - WIDTH * sigma), max(high, mean + WIDTH * sigma)
-            place += 1
-        parts[0, part], parts[1, part], parts[2, part] = place, total, 2 * np.exp(-LOWEST) * weight
-    parts[1, 2] = 1.0
+    to, spread, count, slope = moved[0], moved[1], len(x), 0.0
     for j in range(count):
-        top = j if density[j] > density[top] else top
-    top = min(max(top, 1), count - 2)
-    slope = (to[top + 1] - to[top - 1]) / (x[top + 1] - x[top - 1])
-    width = np.hypot(slope / (ROOT * density[top]) if np.isfinite(slope) else 0.0, max(np.sqrt(spread[top]), 1e-150))
-    return to[top], width, low, high
+        mean, sigma = to[j], max(sqrt(spread[j]), 1e-150)
+        rate = sqrt(0.5 / _LN2) / sigma
+        kernel[0, j], kernel[1, j], kernel[2, j] = rate, mean * rate, mass[j] * rate
+        low, high = WIDTH * sigma - mean, WIDTH * sigma + mean
+        counts = mass[j] > NEGLIGIBLE
+        ends[0, j] = (low if low < np.inf else np.inf) if counts else -np.inf
+        ends[1, j] = (high if high < np.inf else np.inf) if counts else -np.inf
+    for j in range(count, count + 4):
+        kernel[0, j] = kernel[1, j] = kernel[2, j] = 0.0
+    mass_2 = mass_4 = mass_all = weight_2 = weight_4 = weight_all = 0.0
+    half, quarter = chosen[3], chosen[4]
+    for j in range(count):
+        mass_all += mass[j]
+        mass_2 += half[j] * mass[j]
+        mass_4 += quarter[j] * mass[j]
+        weight_all += kernel[2, j]
+        weight_2 += half[j] * kernel[2, j]
+        weight_4 += quarter[j] * kernel[2, j]
+    nothing = 2 * exp(-LOWEST)
+    parts[0, 0], parts[0, 1], parts[0, 2] = mass_4 / 4, mass_2 / 2, mass_all
+    parts[1, 0], parts[1, 1], parts[1, 2] = nothing * weight_4 / 4, nothing * weight_2 / 2, nothing * weight_all
+    top = _place_of(_highest(density, count), density)
+    if count > 1:
+        top = min(max(top, 1), count - 2)
+        slope = (to[top + 1] - to[top - 1]) / (x[top + 1] - x[top - 1])
+    width = hypot(slope / (ROOT * density[top]) if isfinite(slope) else 0.0, max(sqrt(spread[top]), 1e-150))
+    return to[top], width, -_highest(ends[0], count), _highest(ends[1], count)
 
 
 @njit(**_ANY_ORDER)
-def _density(x, kernel, parts, found):
-    """`Kernels.density` by every fourth kernel, by every second, and by all, as far as there is room."""
-    first, count = 0, len(x)
-    for part in range(len(found)):
-        sums = found[part]
-        for i in range(count):
+def _density(x, count, kernels, kernel, parts, powers, many, found):
+    """`Kernels.density` by every fourth kernel, by every second, and by all: the first so many of these.
+
+    Two kernels at a time.  The numbers of `powers` are no constants here: the processor takes what it finds in memory as a part
+    of an operation.
+    """
+    whole, most = _whole(count), powers[10]
+    P = (
+        powers[0], powers[1], powers[2], powers[3], powers[4], powers[5], powers[6], powers[7], powers[8], powers[9],
+    )  # fmt: skip
+    for part in range(many):
+        sums, first, step = found[part], (0, 2, 1)[part], (4, 4, 2)[part]
+        for i in range(whole):
             sums[i] = found[part - 1, i] if part else 0.0
-        for j in range(first, int(parts[0, part])):
+        for j in range(first, kernels, 2 * step):
             rate, centre, weight = kernel[0, j], kernel[1, j], kernel[2, j]
-            for i in range(count):
-                u = x[i] * rate - centre
-                sums[i] += weight * _exp(-min(u * u, LOWEST))
-        first = int(parts[0, part])
-    for part in range(len(found)):
-        for i in range(count):
-            value = found[part, i]
-            found[part, i] = value / (np.sqrt(np.pi) * parts[1, part]) if value > parts[2, part] else 0.0
+            rate_2, centre_2, weight_2 = kernel[0, j + step], kernel[1, j + step], kernel[2, j + step]
+            for i in range(whole):
+                u, u_2 = x[i] * rate - centre, x[i] * rate_2 - centre_2
+                u, u_2 = u * u, u_2 * u_2
+                sums[i] += weight * _half(u if u < most else most, P) + weight_2 * _half(u_2 if u_2 < most else most, P)
+    for part in range(many):
+        sums, least, over = found[part], parts[1, part], sqrt(_LN2 / np.pi) / parts[0, part]
+        for i in range(whole):
+            sums[i] = sums[i] * over if sums[i] > least else 0.0
 
 
-@njit(types.void(_MANY, _MANY, _MANY, _MANY_PARTS, types.float64, _MANY_PARTS), cache=True, nogil=True, **_CALLED)
+@njit(types.void(_MANY, _MANY, _MANY, _MANY_PARTS, types.float64, _MANY_PARTS), **_LOOP)
 def add_bells(x, rate, centre, weights, lowest, result):
     """`kernels.add_bells`."""
     bells = np.empty(x.shape[1])
@@ -161,78 +222,93 @@ def add_bells(x, rate, centre, weights, lowest, result):
         for j in range(rate.shape[1]):
             for i in range(x.shape[1]):
                 u = x[t, i] * rate[t, j] - centre[t, j]
-                bells[i] = _exp(-min(u * u, lowest))
+                bells[i] = _exp(max(-(u * u), -lowest))
             for part in range(weights.shape[2]):
                 for i in range(x.shape[1]):
                     result[t, part, i] += weights[t, j, part] * bells[i]
 
 
-@njit(**_ANY_ORDER)
-def _residual(y, mean, signal, of_noise):
-    return np.abs(y - mean) - signal if of_noise else y - signal
+@njit(types.void(_LAW, types.int64, _VALUES, _VALUES, types.int64, _MANY), **_ANY_ORDER)
+def _made(law, number, c, x, count, made):
+    """Mean, variance, signal and slope by a printed law, in the first rows."""
+    law(number, c, x[:count], made[0], made[1], made[2], made[3])
 
 
 @njit(**_ANY_ORDER)
-def _log_likelihood(y, mean, variance):
-    if np.isnan(y):
-        return 0.0
-    variance = max(variance, TINY)
-    return -0.5 * ((y - mean) * (y - mean) / variance + _log(2 * np.pi * variance))
+def _residuals(law, c, of_noise, y, x, count, shown):
+    """Of y at points x, in shown[0]."""
+    _made(law, METER, c, x, count, shown)
+    mean, signal = shown[0], shown[2]
+    for i in range(count):
+        mean[i] = (abs(y - mean[i]) if of_noise else y) - signal[i]
 
 
 @njit(**_ANY_ORDER)
-def _explanations(law, c, of_noise, y, place, x, shown):
-    """`explanations`: the roots of b(x, m_w) = y in the support, those nearest to the middle, in x[2]; how many."""
-    (at, length, root, left, right, far), (mean, variance, signal, slope), known = x, shown, 0
-    at = at[:SEARCHED]
-    _nodes(place, at, length)
-    law(METER, c, at, mean, variance, signal, slope)
+def _seen(law, c, y, x, count, kernels, kernel, parts, powers, many, found, shown):
+    """Densities of a prediction, and logarithms of the likelihood, in shown[0], and of the posterior, in shown[4].
+
+    The latter are -inf where they are no numbers.
+    """
+    _made(law, METER, c, x, _whole(count), shown)
+    _density(x, count, kernels, kernel, parts, powers, many, found)
+    mean, variance, density, logs = shown[0], shown[1], found[many - 1], shown[4]
+    for i in range(_whole(count)):
+        spread = max(variance[i], TINY)
+        mean[i] = -0.5 * ((y - mean[i]) * (y - mean[i]) / spread + _log(2 * np.pi * spread))
+    if isnan(y):
+        for i in range(_whole(count)):
+            mean[i] = 0.0
+    for i in range(_whole(count)):
+        log = mean[i] + _log(density[i])
+        logs[i] = log if log < np.inf else np.inf if log > 0 else -np.inf
+
+
+@njit(**_ANY_ORDER)
+def _explanations(law, c, of_noise, y, place, few, shown):
+    """`explanations`: the roots of b(x, m_w) = y in the support, those nearest to the middle, in few[2]; how many."""
+    at, root, left, right, far, residual, slope = few[0], few[2], few[3], few[4], few[5], shown[0], shown[3]
+    known = 0
     for i in range(1, SEARCHED):
-        before, after = _residual(y, mean[i - 1], signal[i - 1], of_noise), _residual(y, mean[i], signal[i], of_noise)
-        if (before > 0) == (after > 0) or not np.abs(after - before) < np.inf:
+        before, after = residual[i - 1], residual[i]
+        if (before > 0) == (after > 0) or not abs(after - before) < np.inf:
             continue
-        distance, j = np.abs(0.5 * (at[i] + at[i - 1]) - place[0]), min(known, EXPLANATIONS)
+        distance, j = abs(0.5 * (at[i] + at[i - 1]) - place[0]), min(known, EXPLANATIONS)
         while j and distance < far[j - 1]:
             j -= 1
             far[j + 1], left[j + 1], right[j + 1] = far[j], left[j], right[j]
         far[j], left[j], right[j] = distance, at[i - 1], at[i]
         known = min(known + 1, EXPLANATIONS)
-    law(METER, c, left[:known], mean, variance, signal, slope)
+    many = np.int64(17)
     for j in range(known):
-        far[j] = _residual(y, mean[j], signal[j], of_noise) > 0
-    for halving in range(COARSELY + 1):
-        for j in range(known):
-            root[j] = 0.5 * (left[j] + right[j])
-        if halving < COARSELY:
-            law(METER, c, root[:known], mean, variance, signal, slope)
-            for j in range(known):
-                same = (_residual(y, mean[j], signal[j], of_noise) > 0) == (far[j] > 0)
-                left[j], right[j] = (root[j], right[j]) if same else (left[j], root[j])
-    for _ in range(2):
-        law(METER, c, root[:known], mean, variance, signal, slope)
-        for j in range(known):
-            newton = root[j] + _residual(y, mean[j], signal[j], of_noise) / slope[j]
-            root[j] = newton if left[j] < newton < right[j] else root[j]
+        begin, end = left[j], right[j]
+        for _ in range(COARSELY // 4):  # four halvings at once: all points at which they may look
+            step, i = (end - begin) / 16, 0
+            for point in range(many):
+                at[point] = begin + step * np.int32(point)
+            _residuals(law, c, of_noise, y, at, many, shown)
+            for gap in (8, 4, 2, 1):
+                i += gap if (residual[i + gap] > 0) == (residual[0] > 0) else 0
+            begin, end = at[i], at[i + 1]
+        root[j] = 0.5 * (begin + end)
+        for _ in range(2):
+            _residuals(law, c, of_noise, y, root[j:], np.int64(1), shown)
+            newton = root[j] + residual[0] / slope[0]
+            root[j] = newton if begin < newton < end else root[j]
     return known
 
 
 @njit(**_ANY_ORDER)
-def _candidates(law, c, y, known, place, x, shown, kernel, parts, found, candidates):
-    """`likeliest`: centres, widths and masses of humps, of the roots in x[2] and of the middle; the place of the likeliest."""
-    (middle, width, low, high), (mean, variance, signal, slope) = place, shown
-    at = x[2][: known + 1]
-    at[known] = min(max(middle, low), high)
-    law(METER, c, at, mean, variance, signal, slope)
-    _density(at, kernel, parts, found[:2])
-    best, highest, of_middle = known, -np.inf, width
+def _candidates(known, place, at, shown, candidates):
+    """`likeliest`: centres, widths and masses of humps, of the roots and of the middle; the place of the likeliest."""
+    (_, width, low, high), variance, slope, logs, of_middle = place, shown[1], shown[3], shown[4], place[1]
+    best, highest = known, -np.inf
     for j in range(known + 1):
         scale = of_middle
         if j < known:
-            by_meter = np.sqrt(variance[j]) / np.abs(slope[j])
+            by_meter = sqrt(variance[j]) / abs(slope[j])
             scale = by_meter if by_meter < width else width
-            of_middle = min(of_middle, np.hypot(at[j] - at[known], scale))
-        log_mass = _log(found[1, j] * scale * ROOT) + _log_likelihood(y, mean[j], variance[j])
-        log_mass = log_mass if scale > 0 and not np.isnan(log_mass) else -np.inf
+            of_middle = min(of_middle, hypot(at[j] - at[known], scale))
+        log_mass = logs[j] + _log(scale * ROOT) if 0 < scale < np.inf else -np.inf
         candidates[0, j], candidates[1, j], candidates[2, j] = at[j], scale, log_mass
         if log_mass > highest:
             best, highest = j, log_mass
@@ -241,69 +317,62 @@ def _candidates(law, c, y, known, place, x, shown, kernel, parts, found, candida
 
 @njit(**_ANY_ORDER)
 def _overlap(mass):
-    share = 1 - np.log(max(mass, SEEN)) / np.log(SEEN)
-    return OVERLAP * np.sqrt(min(max(share, 0.0), 1.0))
+    share = 1 - _log(max(mass, SEEN)) / np.log(SEEN)
+    return OVERLAP * sqrt(min(max(share, 0.0), 1.0))
 
 
 @njit(**_ANY_ORDER)
-def _looked(law, c, y, place, x, shown, moved, kernel, parts, found, dense):
+def _looked(few, logs, moved, dense):
     """`looked`: centre, width and ends of the highest hump; and in `dense` how densely its kernels want their nodes.
 
     The width is NaN where nothing is seen.
     """
-    at, length, logs, (mean, variance, signal, slope), count = x[0][:LOOKED], x[1], x[2], shown, LOOKED
-    _nodes(place, at, length)
-    law(METER, c, at, mean, variance, signal, slope)
-    _density(at, kernel, parts, found[:2])
-    top = 0
-    for i in range(count):
-        log = _log(found[1, i]) + _log_likelihood(y, mean[i], variance[i])
-        logs[i] = -np.inf if np.isnan(log) else log
-    for i in range(count):
-        top = i if logs[i] > logs[top] else top
-    highest, area, fallen = logs[top], 0.0, np.inf
-    for i in range(count):
-        if logs[i] < highest - 0.5:
-            fallen = min(fallen, np.abs(at[i] - at[top]))
+    at, length, away, variance, slope, count = few[0], few[1], few[3], moved[1], moved[3], np.int64(LOOKED)
+    whole = _whole(count)
+    highest, area = _highest(logs, count), 0.0
+    top = _place_of(highest, logs)
+    for i in range(whole):
+        away[i] = -abs(at[i] - at[top]) if logs[i] < highest - 0.5 else -np.inf
         logs[i] = _exp(max(logs[i] - highest, -708.0)) * length[i]
         area += logs[i]
     if not area < np.inf:
         return 0.0, np.nan, 0.0, 0.0
-    first, last = count, 0
-    for i in range(count):
-        if logs[i] > TAIL * area:
-            first, last = min(first, i), i
-    mean, variance, signal, slope = moved
-    law(MOVES, c, at, mean, variance, signal, slope)
-    for i in range(count):
-        wanted = np.abs(slope[i]) / max(np.sqrt(variance[i]), 1e-150)
-        dense[i] = _overlap(logs[i] / area) * wanted
+    fallen, first, last = -_highest(away, count), 0, count - 1
+    while first < count and not logs[first] > TAIL * area:
+        first += 1
+    while last > 0 and not logs[last] > TAIL * area:
+        last -= 1
+    for i in range(whole):
+        wanted = abs(slope[i]) / max(sqrt(variance[i]), 1e-150) * _overlap(logs[i] / area)
+        dense[i] = wanted * wanted
     return at[top], min(area / ROOT, 2 * fallen), at[max(first - 1, 0)], at[min(last + 1, count - 1)]
 
 
 @njit(**_ANY_ORDER)
-def _spaced(hump, at, dense, candidates, known, spacing):
+def _spaced(hump, at, dense, candidates, known, spacing, wanted):
     """`spaced`: the place with which the fewest nodes do, and how many."""
     centre, width, low, high = hump
     likeliest, nodes, fewest, fewest_by_humps = -np.inf, NODES[-1], np.inf, np.inf
     best = best_by_humps = np.nan
     for j in range(known + 1):
         likeliest = max(likeliest, candidates[2, j])
+    wide = _log((high - low) / width)
     for fraction in FRACTIONS:
-        scale = width * ((high - low) / width) ** fraction
-        by_kernels = by_humps = 0.0
-        for i in range(LOOKED):
+        scale = width * _exp(fraction * wide)
+        by_humps = 0.0
+        for i in range(_whole(LOOKED)):
             away = at[i] - centre
-            by_kernels = max(by_kernels, dense[i] * dense[i] * (scale * scale + away * away))
+            by_kernel = dense[i] * (scale * scale + away * away)
+            wanted[i] = by_kernel if by_kernel < np.inf else np.inf
         for j in range(known + 1):
             if candidates[2, j] > likeliest + HIDDEN:
                 away, narrow = candidates[0, j] - centre, candidates[1, j]
                 by_humps = max(by_humps, (scale * scale + away * away) / (narrow * narrow))
-        by_humps = max(np.sqrt(by_humps), np.hypot(scale, HUMP * width) / (spacing * width))
+        by_humps = max(sqrt(by_humps), sqrt(scale * scale + (HUMP * width) ** 2) / (spacing * width))
         span = _span((centre, scale, low, high))
-        wanted = span * max(by_humps, np.sqrt(by_kernels))
-        if wanted < fewest:
-            best, fewest = scale, wanted
+        number = span * max(by_humps, sqrt(_highest(wanted, np.int64(LOOKED))))
+        if number < fewest:
+            best, fewest = scale, number
         if span * by_humps < fewest_by_humps:
             best_by_humps, fewest_by_humps = scale, span * by_humps
     if not fewest < nodes:
@@ -321,43 +390,43 @@ def _hidden(candidates, known, place, count):
     for j in range(known + 1):
         at, width, log_mass = candidates[0, j], candidates[1, j], candidates[2, j]
         inside = low <= at <= high
-        if log_mass > likeliest + HIDDEN and not (inside and np.hypot(scale, at - centre) * step <= 2 * width):
+        if log_mass > likeliest + HIDDEN and not (inside and hypot(scale, at - centre) * step <= 2 * width):
             return True
     return False
 
 
 @njit(**_ANY_ORDER)
-def _distance(x, masses, step, whole):
-    """`Summary.distance` of every so many of the masses, taken so many times, from mean, variance and total."""
-    total = mean = variance = 0.0
-    for i in range(0, len(x), step):
+def _distance(x, masses, count, whole):
+    """`Summary.distance` of masses from mean, variance and total."""
+    (of_mean, of_variance, of_total), total, first, second = whole, 0.0, 0.0, 0.0
+    for i in range(_whole(count)):
+        away = x[i] - of_mean
         total += masses[i]
-        mean += masses[i] * x[i]
-    mean /= total
-    for i in range(0, len(x), step):
-        variance += masses[i] * (x[i] - mean) * (x[i] - mean)
-    of_mean, of_variance, of_total = whole
-    change = np.abs(variance / total / of_variance - 1) + np.abs(step * total / of_total - 1)
-    return np.abs(mean - of_mean) / np.sqrt(of_variance) + change
+        first += masses[i] * away
+        second += masses[i] * away * away
+    mean = first / total
+    change = abs((second / total - mean * mean) / of_variance - 1) + abs(total / of_total - 1)
+    return abs(mean) / sqrt(of_variance) + change
 
 
-@njit(**_ANY_ORDER)
+@njit(types.float64(_VALUES, _VALUES, types.int64, types.float64, types.float64, _VALUES, _VALUES), **_ANY_ORDER)
 def _roughness(x, mass, step, mean, variance, every, differences):
     """`roughness` of every so many of the masses, taken so many times; with room for zeros before and after them."""
-    count, before = (len(x) - 1) // step + 1, ORDER // 2
-    every[: count + ORDER] = 0.0
+    count, before, rate = (len(x) - 1) // step + 1, ORDER // 2, 1 / sqrt(variance)
+    for i in range(count + ORDER):
+        every[i] = 0.0
     for i in range(count):
         every[before + i] = step * mass[step * i]
-    most = 0.0
     for i in range(count):
         difference = 0.0
         for m in range(ORDER + 1):  # of so few terms that it is unrolled, and many differences are taken at once
             difference += COEFFICIENTS[m] * every[i + m]
         differences[i] = difference
     for i in range(count):
-        away = (x[step * i] - mean) / np.sqrt(variance)
-        most = max(most, np.abs(differences[i]) * (1 + np.abs(away) + np.abs(away * away - 1)))
-    return most
+        away = (x[step * i] - mean) * rate
+        rough = abs(differences[i]) * (1 + abs(away) + abs(away * away - 1))
+        differences[i] = rough if rough < np.inf else np.inf
+    return _highest(differences, count)
 
 
 @njit(**_ANY_ORDER)
@@ -372,69 +441,69 @@ def _cautious(change, before):
 
 
 @njit(**_ANY_ORDER)
-def _posterior(law, c, y, x, length, shown, away, kernel, parts, found, padded, mass, density):
-    """`posteriors` on nodes: mean, variance, and estimated error, of these nodes and inherited."""
-    (mean, variance, signal, slope), count = shown, len(x)
-    law(METER, c, x, mean, variance, signal, slope)
-    _density(x, kernel, parts, found)
-    highest, total = -np.inf, 0.0
-    for i in range(count):
-        mean[i] = _log_likelihood(y, mean[i], variance[i])
-        variance[i] = mean[i] + _log(found[2, i])
-    for i in range(count):
-        highest = max(highest, variance[i])
-    for i in range(count):
-        log = mean[i] - highest
-        likelihood = (np.inf if log > 708 else _exp(max(log, -708.0))) * length[i]
-        for part in range(3):
-            found[part, i] *= likelihood
+def _posterior(x, length, mass, density, count, shown, found, chosen):
+    """`posteriors` on nodes, which fills masses and densities: mean, variance, total."""
+    whole = _whole(count)
+    likelihood, highest, total, m, v = shown[0], _highest(shown[4], count), 0.0, 0.0, 0.0
+    for i in range(whole):
+        log = likelihood[i] - highest
+        likelihood[i] = (np.inf if log > 708 else _exp(max(log, -708.0))) * length[i]
+    # By every fourth and second kernel, by all, and of these by every second and fourth node.
+    for part in range(len(found) - 1, -1, -1):
+        for i in range(whole):
+            found[part, i] = chosen[part, i] * found[min(part, 2), i] * likelihood[i]
+    for i in range(whole):
         total += found[2, i]
-    m = v = 0.0
-    for i in range(count):
+        m += found[2, i] * x[i]
+    m /= total
+    for i in range(whole):
         mass[i] = found[2, i] / total
         density[i] = mass[i] / length[i]
-        m += mass[i] * x[i]
-    for i in range(count):
         v += mass[i] * (x[i] - m) * (x[i] - m)
-    whole, rounding = (m, v, total), ROUNDING * np.abs(m) / np.sqrt(v)
-    # By every second and fourth node, by every second and fourth kernel; roughness of all and of every second.
-    for i, (part, step) in enumerate(((2, 2), (2, 4), (1, 1), (0, 1))):
-        away[i] = _distance(x, found[part], step, whole)
-    for step in (1, 2):
-        away[3 + step] = _roughness(x, mass, step, m, v, padded, signal)
-    for i in (0, 2, 4):
-        away[i] = max(away[i] - rounding, 0.0)
-    error = max(_extrapolated(away[0], away[1]), _cautious(away[4], away[5]))
-    error += (mass[0] + mass[-1]) * max(m - x[0], x[-1] - m) / np.sqrt(v)
-    return m, v, error, rounding + _cautious(away[2], away[3])
+    return m, v, total
 
 
 @njit(**_ANY_ORDER)
-def _apart(mass, moved):
+def _errors(x, mass, count, moments, found, rough, rough_2, away):
+    """Estimated errors of a posterior, of its own nodes and inherited; roughness of all masses and of every second."""
+    m, v, _ = moments
+    rounding = ROUNDING * abs(m) / sqrt(v)
+    for part in range(len(found)):
+        away[part] = _distance(x, found[part], count, moments)
+    error = max(_extrapolated(max(away[3] - rounding, 0.0), away[4]), _cautious(max(rough - rounding, 0.0), rough_2))
+    error += (mass[0] + mass[count - 1]) * max(m - x[0], x[count - 1] - m) / sqrt(v)
+    return error, rounding + _cautious(max(away[1] - rounding, 0.0), away[0])
+
+
+@njit(**_ANY_ORDER)
+def _apart(mass, moved, gaps):
     """`apart`: how far the kernels of neighbouring nodes are, up to 1 their sum is as good as the integral."""
-    (to, spread, _, _), most = moved, 0.0
-    for i in range(1, len(mass) - 1):
-        here = to[i]
-        gap = max(np.abs(to[i + 1] - here), np.abs(here - to[i - 1])) / max(np.sqrt(spread[i]), 1e-150)
-        if not gap * OVERLAP <= most:
-            most = max(most, gap * _overlap(mass[i]))
-    return most
+    to, spread, count = moved[0], moved[1], len(mass) - 2
+    for i in range(count):
+        before, here, after = to[i], to[i + 1], to[i + 2]
+        gap = max(abs(after - here), abs(here - before)) / max(sqrt(spread[i + 1]), 1e-150) * _overlap(mass[i + 1])
+        gaps[i] = gap if gap < np.inf else np.inf
+    return _highest(gaps, count)
 
 
 @njit(**_ANY_ORDER)
 def _predicted(mass, moved):
     """`Kernels.moments`."""
-    (to, spread, _, _), mean, variance = moved, 0.0, 0.0
+    to, spread, mean, variance = moved[0], moved[1], 0.0, 0.0
     for i in range(len(mass)):
         mean += mass[i] * to[i]
     for i in range(len(mass)):
-        sigma = max(np.sqrt(spread[i]), 1e-150)
+        sigma = max(sqrt(spread[i]), 1e-150)
         variance += mass[i] * (sigma * sigma + (to[i] - mean) * (to[i] - mean))
     return mean, variance
 
 
-# Printed, with the constants of the model: law(number, c, x, mean, variance, signal, slope); MOVES makes no signal.
-_LAW = types.FunctionType(types.void(types.int64, *[_VALUES] * 6))
+def room() -> Array:
+    """The arrays that `steps` works with, as rows of one: what is allocated by compiled code takes long to compile."""
+    rows = np.zeros((38, NODES[-1] + BEYOND + ORDER))
+    rows[8:11], rows[11, ::2], rows[12, ::4] = 1, 2, 4  # all, every second, every fourth, so many times
+    rows[37, :11] = *_POLYNOMIAL, _LOWEST2
+    return rows
 
 
 def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
@@ -443,13 +512,11 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
     @njit(
         types.int64(
             _LAW, _VALUES, types.boolean, _MANY, _NUMBERS, _NUMBERS, _VALUES, types.float64, types.float64,
-            _MANY, _MANY, _NUMBERS, _NUMBERS,
+            _MANY, _MANY, _NUMBERS, _NUMBERS, _MANY,
         ),
-        cache=True,
-        nogil=True,
-        **_CALLED,
+        **_LOOP | {"_nrt": False},
     )  # fmt: skip
-    def steps(law, c, of_noise, before, start, count, y, accuracy, fine_nodes, after, numbers, size, status):
+    def steps(law, c, of_noise, before, start, count, y, accuracy, fine_nodes, after, numbers, size, status, rows):
         """One step of many trajectories: the length of `after` that is filled.
 
         law : of state and meter, with their constants c; whether the signal is the noise's deviation
@@ -457,48 +524,58 @@ def _with(constants: tuple[Any, ...]) -> Callable[..., int]:
         y (T,), accuracy, fine_nodes : as of `pointmasses`
         after (3, T * most) : as `before`, one after the other
         numbers (5, T), size, status (T,) : mean, variance, error, mean and variance predicted; nodes; LEFT, DONE or NARROW
+        rows : `room()`
         """
-        most, filled = constants[0][-1], 0
-        kernel, found, parts, candidates = np.empty((3, most)), np.empty((3, most)), np.empty((3, 3)), np.empty((3, 4))
-        nodes, dense, changes, padded = np.empty((4, most)), np.empty(LOOKED), np.empty(6), np.empty(most + ORDER)
-        moved, shown, few = _arrays(most), _arrays(most), _arrays(most) + _arrays(most)[:2]
+        most, filled = constants[0][-1], np.int64(0)
+        kernel, found, chosen, moved, shown, few = rows[:3], rows[3:8], rows[8:13], rows[13:17], rows[17:22], rows[22:28]
+        candidates, parts, length, dense = rows[28:31], rows[31:33], rows[33], rows[34]
+        padded, changes, powers, searched, looked = rows[35], rows[36], rows[37], np.int64(SEARCHED), np.int64(LOOKED)
         for t in range(len(y)):
-            status[t], n = LEFT, count[t]
-            end = start[t] + n
+            status[t], kernels = LEFT, count[t]
+            end = start[t] + kernels
             x, mass, density = before[0, start[t] : end], before[1, start[t] : end], before[2, start[t] : end]
-            law(MOVES, c, x, moved[0], moved[1], moved[2], moved[3])
-            place = _kernels(x, mass, density, moved, kernel, parts)
-            if not -np.inf < place[2] < place[3] < np.inf or np.isnan(place[1]):
+            if kernels > 1:
+                _made(law, MOVES, c, x, kernels, moved)
+            else:
+                moved[0, 0], moved[1, 0] = x[0], density[0] * density[0]
+            place = _kernels(x, mass, density, moved, chosen, kernel, parts, found)
+            if not -np.inf < place[2] < place[3] < np.inf or isnan(place[1]):
                 continue
+            _nodes(place, searched, few[0], few[1])
+            _residuals(law, c, of_noise, y[t], few[0], searched, shown)
             known = _explanations(law, c, of_noise, y[t], place, few, shown)
-            place = _candidates(law, c, y[t], known, place, few, shown, kernel, parts, found, candidates)
-            hump = _looked(law, c, y[t], place, few, shown, moved, kernel, parts, found, dense)
-            if np.isnan(hump[1]):
+            few[2, known] = min(max(place[0], place[2]), place[3])
+            _seen(law, c, y[t], few[2], known + 1, kernels, kernel, parts, powers, BY_HALF, found, shown)
+            place = _candidates(known, place, few[2], shown, candidates)
+            _nodes(place, looked, few[0], few[1])
+            _seen(law, c, y[t], few[0], looked, kernels, kernel, parts, powers, BY_HALF, found, shown)
+            _made(law, MOVES, c, few[0], _whole(looked), moved)
+            hump = _looked(few, shown[4], moved, dense)
+            if isnan(hump[1]):
                 continue
             least = 0.0
+            x, mass, density = after[0, filled:], after[1, filled:], after[2, filled:]
             for spacing in SPACINGS:
-                place, wanted = _spaced(hump, few[0], dense, candidates, known, spacing)
-                n = NODES[0]
+                place, wanted = _spaced(hump, few[0], dense, candidates, known, spacing, few[3])
+                n = np.int64(NODES[0])
                 for number in NODES:
-                    n = number if n < max(wanted, least) else n
-                x, length = nodes[0, :n], nodes[1, :n]
-                mass, density = nodes[2, :n], nodes[3, :n]
-                _nodes(place, x, length)
-                m, v, error, inherited = _posterior(
-                    law, c, y[t], x, length, shown, changes, kernel, parts, found, padded, mass, density
-                )
-                law(MOVES, c, x, moved[0], moved[1], moved[2], moved[3])
-                apart = _apart(mass, moved)
+                    n = np.int64(number) if n < max(wanted, least) else n
+                _nodes(place, n, x, length)
+                _seen(law, c, y[t], x, n, kernels, kernel, parts, powers, BY_ALL, found, shown)
+                m, v, total = _posterior(x, length, mass, density, n, shown, found, chosen)
+                rough = _roughness(x[:n], mass, 1, m, v, padded, shown[0])
+                rough_2 = _roughness(x[:n], mass, 2, m, v, padded, shown[0])
+                error, inherited = _errors(x, mass, n, (m, v, total), found, rough, rough_2, changes)
+                _made(law, MOVES, c, x, _whole(n), moved)
+                apart = _apart(mass[:n], moved, shown[0])
                 least_now = (n - 1) * apart + 1
                 least_now = least_now if least_now <= most else fine_nodes
                 seen = error <= accuracy and inherited < np.inf and not _hidden(candidates, known, place, n)
                 if seen and least_now <= n:
                     status[t], size[t] = NARROW if apart > 1 else DONE, n
                     numbers[0, t], numbers[1, t], numbers[2, t] = m, v, error + inherited
-                    numbers[3, t], numbers[4, t] = _predicted(mass, moved)
-                    for i in range(n):
-                        after[0, filled], after[1, filled], after[2, filled] = x[i], mass[i], density[i]
-                        filled += 1
+                    numbers[3, t], numbers[4, t] = _predicted(mass[:n], moved)
+                    filled += n
                     break
                 if n == most:
                     break

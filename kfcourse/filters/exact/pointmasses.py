@@ -124,7 +124,7 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
 
     def step(state: State, y: Array, usual_way: UsualWay | None = None) -> State:
         law = densities.at(state.step)
-        way = partial(_quick_step, usual_way, state.memory) if usual_way else _step
+        way = partial(_quick_step, usual_way, state.memory, model.prior) if usual_way else _step
         try:
             try:
                 posterior, predicted, found = way(before(state, len(y)), y, law, accuracy, FINE[0], memory)
@@ -269,6 +269,7 @@ def _following(
 def _quick_step(
     usual_way: UsualWay,
     memory: PointMass | None,
+    prior: Gaussian,
     groups: Iterable[tuple[Array, Kernels]],
     y: Array,
     law: ScalarDensities,
@@ -281,11 +282,15 @@ def _quick_step(
 
     numbers, size, usual = np.empty((5, len(y))), np.zeros(len(y), dtype=int), np.zeros(len(y), dtype=bool)
     values = np.empty((3, 0))
-    if memory and isinstance(memory.fine, Packed):
-        rows = np.flatnonzero(memory.fine.usual)
-        done = usual_way(memory.fine, rows, y[rows, 0], accuracy, fine_nodes)
+    known = memory.fine if memory else Packed.of_normal(prior, len(y))
+    if isinstance(known, Packed):
+        rows = np.flatnonzero(known.usual)
+        done = usual_way(known, rows, y[rows, 0], accuracy, fine_nodes)
         values, numbers[:, rows], size[rows], usual[rows] = done.values, done.numbers, done.size, done.usual
+    if memory:
         groups = memory._replace(later=memory.later[size[memory.later] == 0]).predictions(law)
+    else:
+        groups = ((some[size[some] == 0], kernels.rows(size[some] == 0)) for some, kernels in groups if (size[some] == 0).any())
     groups = ((some, kernels._replace(bells=add_bells)) for some, kernels in groups)
     found = corrected(groups, y, law, accuracy, fine_nodes)
     others = size == 0

@@ -15,7 +15,7 @@ import sympy as sp
 from kfcourse.filters.densities import formulas
 from kfcourse.filters.exact.constants import NODES
 from kfcourse.filters.exact.kernels import Grid, chunks
-from kfcourse.laws import Array
+from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic import compiled
 from kfcourse.symbolic.model import Model
 
@@ -42,6 +42,13 @@ class Packed(Sequence[Grid]):
         begin = self.start[place]
         x, mass, density = self.values[:, begin : begin + self.size[place]]
         return Grid(x, mass, density, bool(self.uniform[place]), bool(self.rough[place]))
+
+    @classmethod
+    def of_normal(cls, law: Gaussian, runs: int) -> Packed:
+        """The same normal law for all, a single node: its mean, the mass 1, and, in place of a density, its deviation."""
+        values = np.array([[law.mean[0]], [1.0], [max(np.sqrt(law.cov[0, 0]), 1e-150)]])
+        yes = np.ones(runs, dtype=bool)
+        return cls(values, np.zeros(runs, dtype=int), np.ones(runs, dtype=int), yes, yes, ~yes)
 
     @classmethod
     def together(cls, values: Array, size: Array, usual: Array, grids: Mapping[int, Grid]) -> Packed:
@@ -92,15 +99,15 @@ def compiled_usual_way(model: Model) -> UsualWay:
     constants = np.array([float(value) for value in model.values.values()])
 
     def step(before: Packed, rows: Array, y: Array, accuracy: float, fine_nodes: int) -> Done:
-        from kfcourse.filters.exact.loops import DONE, steps
+        from kfcourse.filters.exact.loops import BEYOND, DONE, room, steps
 
         numbers, (size, status) = np.empty((5, len(rows))), np.zeros((2, len(rows)), dtype=int)
-        values, start, count = [np.empty((3, 0))], before.start[rows], before.size[rows]
+        values, start, count, rooms = [np.empty((3, 0))], before.start[rows], before.size[rows], room()
         for some in chunks(len(rows), 1, AT_ONCE):
-            after = np.empty((3, len(rows[some]) * NODES[-1]))
+            after = np.empty((3, len(rows[some]) * NODES[-1] + BEYOND))
             given = before.values, start[some], count[some], y[some], accuracy, fine_nodes
             here = np.empty((5, len(rows[some])))
-            filled = steps(compiled.load(printed).law, constants, of_noise, *given, after, here, size[some], status[some])
+            filled = steps(compiled.load(printed).law, constants, of_noise, *given, after, here, size[some], status[some], rooms)
             numbers[:, some] = here
             values.append(after[:, :filled])
         return Done(np.concatenate(values, axis=1), numbers, size, status == DONE)
