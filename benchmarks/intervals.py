@@ -59,11 +59,11 @@ With 100,000 trajectories and the exact AOF on 4,000, the sizes of `kfcourse lab
 
 Each worst place here is such as chance alone would bring among so many.
 
-These are the first five steps, and slow parts of the first trajectories alone.  Then, on variant 5 at the same sizes, .90 down to .75
-of the GAOF's gaps and .83 down to .58 of the FOS's held the truth from step 5 to 11, and `trusted` said nothing: the sine meter
-loses these filters now and then, a single one of 40,000 trajectories makes 5 to 10 % of the distance, and 4,000 often had none like
-it.  Since the slow part has the exceptional trajectories (`montecarlo.exceptional`), with 12 steps, all filters of the lab,
-compiled; the last kind are means over the steps, of each filter and of its difference from the control:
+These are the first five steps, and slow parts of the first trajectories alone.  Then, on variant 5 at the same sizes, .90 down to
+.75 of the GAOF's gaps and .83 down to .58 of the FOS's held the truth from step 5 to 11, and `trusted` said nothing: the sine
+meter loses these filters now and then, a single one of 40,000 trajectories makes 5 to 10 % of the distance, and 4,000 often had
+none like it.  Since the slow part has the exceptional trajectories (`montecarlo.exceptional`), with 12 steps, all filters of the
+lab, compiled; the last kind are means over the steps, of each filter and of its difference from the control:
 
     variant      seeds       gap         difference        bound          mean      told
     53             160   .938 | .899   .947 | .906   .955 | .931   .958 | .925   .01
