@@ -206,7 +206,8 @@ def compare(
             common = replace(common, wide=best_width(ready, replace(common, seed=pilot_seed)) if wide is None else wide)
         everyone = [*ready, *chain(*again)]
         few, limits = min(slow_runs, runs), (slow_seconds, slow_memory, threads)
-        executor, judged = far.executor if far else pool, (len(ready), how_many(runs) if slow else 0)
+        count = how_many(runs) if few and any(one.slow for one in (*filters, *smoothers)) else 0
+        executor, judged = far.executor if far else pool, (len(ready), count)
         try:
             everything, exceptional = _run_blocks(everyone, common, executor, progress, judged)
         except NotFinite:
@@ -215,14 +216,14 @@ def compare(
             common = replace(common, wide=1.0)  # some far start is too far: none but the prior's own
             everything, exceptional = _run_blocks(everyone, common, executor, progress, judged)
         sums, replicas = _split(everything, fast, len(others))
+        chosen = Chosen.of(few, exceptional)
         slow_part, left_out = None, dict[str, str]()
         if slow:
             slow_ready = _designed(slow, design_ensemble, pool, progress)
-            chosen = Chosen.of(few, exceptional)
             slow_part, left_out = run_slow_filters(ready, slow_ready, common, chosen, sums.counts, *limits, progress, far=far)
         smoothing = None
         if smoothers:
-            smoothing = _smoothing(smoothers, common, seed, pool, few, limits, progress, far)
+            smoothing = _smoothing(smoothers, common, seed, pool, chosen, limits, progress, far)
     quick = tuple(one.name for one in fast)
     found = Comparison(model, tuple(names), quick, runs, steps, seed, sums, slow_part, left_out, replicas)
     return replace(found.without_unhealthy(), smoothing=smoothing)
@@ -258,18 +259,18 @@ def _smoothing(
     common: Ensemble,
     seed: int,
     pool: Executor,
-    few: int,
+    chosen: Chosen,
     limits: tuple[float | None, float | None, int],
     progress: bool | None,
     far: Cluster | None,
 ) -> Comparison:
-    """The comparison of smoothers on the same trajectories."""
+    """The comparison of smoothers on the same trajectories, the slow ones on those that the slow filters saw."""
+    few = len(chosen.places)
     slow, fast = ([one for one in smoothers if one.slow == which and (few or not one.slow)] for which in (True, False))
-    judged = len(fast), how_many(common.runs) if slow else 0
-    sums, exceptional = _run_blocks(fast, common, far.executor if far else pool, progress, judged, back=True)
+    sums, _ = _run_blocks(fast, common, far.executor if far else pool, progress, (0, 0), back=True)
     slow_part, left_out = None, dict[str, str]()
     if slow:
-        given = fast, slow, common, Chosen.of(few, exceptional), sums.counts
+        given = fast, slow, common, chosen, sums.counts
         slow_part, left_out = run_slow_filters(*given, *limits, progress, back=True, far=far)
     names, quick = (tuple(one.name for one in some) for some in (smoothers, fast))
     found = Comparison(common.model, names, quick, common.runs, common.steps, seed, sums, slow_part, left_out)
