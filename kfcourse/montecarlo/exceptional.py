@@ -20,7 +20,7 @@ from kfcourse.angles import near
 from kfcourse.laws import Array
 from kfcourse.montecarlo.batches import STRATA
 
-SHARE = 200  # one trajectory in so many is exceptional; with half as many the others vary 1.5 to 2 times as much (5, 7, 53)
+SHARE = 200  # one trajectory in so many; with half of them the distances of the rest vary 1.3 to 3.5 times as much (7, 53, 5)
 MOST = 512  # but no more: of 4000, the usual size of a slow part, an eighth
 EIGHTH = 8  # one set of so many is of exceptional trajectories, until all have come
 

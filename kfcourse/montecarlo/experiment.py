@@ -369,14 +369,12 @@ def _run_blocks(
         size = ensemble.sizes[index]
         counts = batch_sizes(size, max(1, round(BATCHES * size / ensemble.runs)))
         sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, counts)
-        scores = Scores(size, judges)
+        scores = Scores(size, judges) if count else None
         if several:
             run_stretches(filters, ensemble.stretches(index), sums, ensemble.weight)
         else:
-            run_block(
-                filters, ensemble.block(index), sums, weight_of=ensemble.weight, back=back, scores=scores if count else None
-            )
-        return sums, scores.highest(count)
+            run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight, back=back, scores=scores)
+        return sums, scores.highest(count) if scores else (np.empty(0, dtype=int), np.empty(0))
 
     indices = range(len(ensemble.sizes))
     found, highest = zip(*progress_bar("comparing", len(indices), "block", progress, pool.map(block, indices)), strict=True)

@@ -99,7 +99,7 @@ def run_slow_filters(
                 why = "a process that computed it was killed, perhaps as memory ran out: take fewer jobs at once, or less memory"
                 return None, left_out | dict.fromkeys(names, why)
             done = sum(int(one.counts.sum()) for one in sums)
-            few = STRATA if chosen.wanted else 0  # the first ones alone stand for those only that are not exceptional
+            few = BATCH if chosen.wanted else 0  # the first ones alone stand for those only that are not exceptional
             found = _slow_part(names, Sums.concatenate(sums), chosen, batches, replaced) if done > few else None
             if found and (done >= FEWEST or EXACT not in names):
                 return found, left_out

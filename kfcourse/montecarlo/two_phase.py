@@ -92,21 +92,21 @@ def estimate(
     weights: Array,
     x: Array | None = None,
     y: Array | None = None,
-    of_slow_part: Array | None = None,
+    of_first: Array | None = None,
     part: float = 1.0,
 ) -> Estimate:
     """M_N X + q M_n Y from batch sums of X over all trajectories, and of X and Y over the first ones, if there is a Y.
 
-    `weights` and `of_slow_part` are the weights of the batches, and q is the `part`.
+    `weights` and `of_first` are the weights of the batches, and q is the `part`.
     """
     everywhere = batch_mean(full, weights)
-    if x is None or y is None or of_slow_part is None:
+    if x is None or y is None or of_first is None:
         return everywhere
     y = part * y
-    correction = batch_mean(y, of_slow_part)
-    # Var(x + y) - Var(x - y) = 4 Cov(x, y), each a variance of means over the n of the slow part
-    plus, minus = (batch_mean(x + sign * y, of_slow_part).standard_error ** 2 for sign in (1, -1))
-    covariance = (plus - minus) / 4 * of_slow_part.sum() / weights.sum()
+    correction = batch_mean(y, of_first)
+    # Var(x + y) - Var(x - y) = 4 Cov(x, y), each a variance of means over the first n
+    plus, minus = (batch_mean(x + sign * y, of_first).standard_error ** 2 for sign in (1, -1))
+    covariance = (plus - minus) / 4 * of_first.sum() / weights.sum()
     error = np.sqrt(np.maximum(everywhere.standard_error**2 + correction.standard_error**2 + 2 * covariance, 0.0))
     # third cumulants of sums of nearly independent parts add up
     third = everywhere.skewness * everywhere.standard_error**3 + correction.skewness * correction.standard_error**3

@@ -21,6 +21,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.symbolic.typesetting import Equation, Side, equation_latex, side_lines
+from kfcourse.symbolic.writing import number_latex
 
 VERIFIED = "application/vnd.kfcourse.verified+json"  # what the build collects
 DEFINITION = "definition"
@@ -150,19 +151,17 @@ def agree(sentence: str, computed: Any, expected: Any, within: float, relative: 
     return _holds(sentence)
 
 
-_POWER_OF_TEN = re.compile(r"(?<![\w.])(\d(?:\.\d+)?)e([-+]\d+)(?!\w)")
+_POWER_OF_TEN = re.compile(r"(?<![\w.])\d(?:\.\d+)?e[-+]\d+(?!\w)")
 
 
-def _power_of_ten(number: re.Match[str]) -> str:
-    """7e-07 as people write it."""
-    factor = "" if number[1] == "1" else rf"{number[1]}\cdot "
-    return f"${factor}10^{{{int(number[2])}}}$"
+def _typeset(number: re.Match[str]) -> str:
+    return f"${number_latex(float(number[0]))}$"
 
 
 def _holds(sentence: str) -> Shown:
     sentence = re.sub(r"(?<=\d)%", "\u00a0%", sentence)  # as the book writes it; Python's format leaves no space
     parts = sentence.split("$")
-    parts[::2] = (_POWER_OF_TEN.sub(_power_of_ten, text) for text in parts[::2])  # no formulas, these
+    parts[::2] = (_POWER_OF_TEN.sub(_typeset, text) for text in parts[::2])  # those that are no formulas
     sentence = "$".join(parts)
     return Shown(f'{sentence}\u00a0<span class="kf-claim">✓</span>', {"sentence": sentence, "equations": 0})
 

@@ -57,9 +57,12 @@ def _by_other(expression: sp.Expr, one: type[sp.Function], other: type[sp.Functi
 
 
 def number_latex(value: float) -> str:
-    r"""LaTeX of a parameter's value: 0.5, or 5 \cdot 10^{-5}."""
+    r"""LaTeX of a value: 0.5, 5 \cdot 10^{-5}, or 10^{-6}."""
     digits, _, power = f"{value:g}".partition("e")
-    return digits + (rf" \cdot 10^{{{int(power)}}}" if power else "")
+    if not power:
+        return digits
+    factor = digits.removesuffix("1") if digits in ("1", "-1") else rf"{digits} \cdot "
+    return f"{factor}10^{{{int(power)}}}"
 
 
 class _Writer:

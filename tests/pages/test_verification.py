@@ -109,7 +109,7 @@ def test_claims_hold_or_raise() -> None:
     )
     assert claim(f"{0.62:.0%} of them, or 3 %.", True).markdown.startswith("62\u00a0% of them, or 3 %.")
     shown = claim(f"From {1e-9:.0e} to {7.25e12:.1e}, $1e-9$ and the variant a1e3.", True).markdown
-    assert shown.startswith(r"From $10^{-9}$ to $7.2\cdot 10^{12}$, $1e-9$ and the variant a1e3.")
+    assert shown.startswith(r"From $10^{-9}$ to $7.2 \cdot 10^{12}$, $1e-9$ and the variant a1e3.")
     with pytest.raises(Unverified, match=r"condition 2 of 2.*The gain"):
         claim("The gain is below 0.7.", True, np.array([True, False]))
 

@@ -50,7 +50,8 @@ def test_what_is_written_is_what_was_given(name) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "expected"), [(1, "1"), (0.5, "0.5"), (5e-5, r"5 \cdot 10^{-5}"), (-3.986e14, r"-3.986 \cdot 10^{14}")]
+    ("value", "expected"),
+    [(1, "1"), (0.5, "0.5"), (5e-5, r"5 \cdot 10^{-5}"), (-3.986e14, r"-3.986 \cdot 10^{14}"), (-1e-6, "-10^{-6}")],
 )
 def test_powers_of_ten_of_a_value_are_written_as_people_do(value, expected):
     assert number_latex(value) == expected

@@ -50,6 +50,7 @@ _BITS_OF_WHOLE, _BITS_OF_ROOT, _BITS_OF_LOWEST = np.array([_WHOLE, np.sqrt(0.5),
 _AS_WRITTEN = _ANY_ORDER | {"fastmath": {"contract"}}  # no sum in another order
 _ALL_BUT_SIGN = np.int64(2**63 - 1)
 BEYOND = 7  # entries of an array after those of the most nodes
+assert COARSELY % 4 == 0
 
 
 @njit(**_AS_WRITTEN)

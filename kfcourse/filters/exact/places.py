@@ -21,7 +21,7 @@ HIDDEN = np.log(1e-12)  # mass of a hump that does not count
 HUMP = 2.0  # widths of the highest hump, to both sides of its top, on which it is resolved
 FRACTIONS = np.linspace(0.1, 1, 5)  # scales that are tried: powers of the support's width in the hump's
 SEARCHED = 33  # points of the support that are looked at for a change of sign
-COARSELY = 8  # times a bracket is halved before Newton takes over
+COARSELY = 8  # times a bracket is halved before Newton takes over; compiled, four at a time
 EXPLANATIONS = 3  # roots that are followed: those nearest to the middle of the prediction
 
 

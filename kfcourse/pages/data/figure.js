@@ -1,6 +1,6 @@
 // Figures that answer: axes, curves, bands, handles that a mouse, a finger or the arrow keys move, sliders, a worker, and the state
 // in the address, so that a link keeps it.  A figure begins as the still picture that its cell draws; this takes its place when the
-// first frame stands, and gives it back to paper.  Nothing moves unless the reader moves it.  Sizes are CSS pixels: text stays as
+// first frame is computed, and gives it back to paper.  Nothing moves unless the reader moves it.  Sizes are CSS pixels: text stays as
 // large as it is when the screen is small.
 //
 //   kfFigure(root, name, defaults, (ui) => { ...; return (state) => { draw } });
