@@ -104,7 +104,7 @@ def run_slow_filters(
             if found and (done >= FEWEST or EXACT not in names):
                 return found, left_out
             if not found:
-                first = min(size, CHUNKS[0])
+                first = min(size, done + CHUNKS[0])
                 least = (seconds or 0.0) * max(1.0, (FEWEST if EXACT in names else first) / (first * jobs))
                 reason = f"{first} trajectories take more than {seconds:g} s: {_more_time(least)}"
                 return None, left_out | dict.fromkeys(names, reason)

@@ -40,6 +40,8 @@ def test_wherever_time_ends_there_are_about_as_many_of_both_kinds():
     assert again.tolist() == list(range(500, 2000 - 240, 20))  # exceptional ones among the first: they count once
     assert chosen.batches(0, 48).tolist() == [16] + 16 * [1] + [16]
     assert chosen.batches(16, 32).tolist() == 16 * [1] + [16]
+    of_one_set = Chosen.of(16, np.arange(0, 3200, 200))
+    assert of_one_set.counted.all() and of_one_set.wanted == 0  # nothing would stand for those that it leaves out
 
 
 def test_scores_are_the_largest_share_that_a_trajectory_has_of_any_mean():
@@ -87,9 +89,12 @@ def test_exceptional_ones_for_which_there_is_no_time_are_stood_for_by_the_others
     chosen = Chosen.of(2000, np.arange(0, 4800, 20))
     sums = Sums.empty(1, 1, 1, chosen.batches(0, 32))
     sums.square[0, 0, 0] = sum(range(1, 17)), *range(17, 33)
-    found = _slow_part(["slow"], sums, chosen, np.full(10, 480), {})
+    sums.largest_square[0, 0, 1:] = range(17, 33)
+    found = _slow_part(["slow"], sums, chosen, np.full(30, 160), {})
     assert found.first.square.ravel().tolist() == [sum(range(1, 17))]
-    assert found.exceptional.square.ravel().tolist() == [15 * sum(range(17, 33)), *9 * [0]]  # all are in the first batch
+    in_batches = range(17, 25), range(25, 33)  # the numbers 0 to 140, and 160, with which the second begins, to 300
+    assert found.exceptional.square.ravel().tolist() == [*(15 * sum(some) for some in in_batches), *28 * [0]]
+    assert found.exceptional.largest_square.ravel().tolist() == [*(15 * max(some) for some in in_batches), *28 * [0]]
     assert found.exceptional.weights.sum() == 240 and found.runs == 32
     assert found.part(4800) == 1 - 240 / 4800
     assert found.together(4800).weights.sum() == pytest.approx(4800, rel=1e-14)

@@ -79,6 +79,22 @@ def test_a_chunk_that_does_not_end_in_time_is_given_up(model, control):
     assert result.slow_runs == 0
 
 
+def test_the_first_set_alone_is_no_result(model, control):
+    """Where there are exceptional trajectories it stands for the others only, and these come with the second set."""
+    one, steps = aof(linearised(model)), []
+
+    def step(state, y):
+        steps.append(len(y))
+        time.sleep(0.0 if len(steps) <= STEPS else 60.0)
+        return one.step(state, y)
+
+    stuck = replace(one, name="stuck", slow=True, step=step)
+    result = compare([control, stuck], model, 3200, STEPS, 1, slow_runs=64, slow_seconds=1.0, threads=1, progress=False)
+    assert steps == [16] * (STEPS + 1)
+    assert result.slow_runs == 0
+    assert result.left_out == {"stuck": "32 trajectories take more than 1 s: give it more time, some 1 s"}
+
+
 @pytest.mark.parametrize("error", [ModelError("step 1: too narrow"), MemoryError(), FloatingPointError("overflow")])
 def test_a_slow_filter_that_fails_leaves_the_others_as_they_are(model, control, error):
     other, failing = slow(aof(linearised(model)), "other"), slow(control, "failing", error=error, at=1)
