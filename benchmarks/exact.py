@@ -3,8 +3,8 @@
     .venv/bin/python benchmarks/exact.py [--runs 512] [--steps 51] [--checked 8] [--variants 53 2]
 
 For every variant that is shipped, and variant 53 with a meter ten times worse (53/f=.2): microseconds a trajectory-step of one
-thread, plain and compiled (numba), and how many times faster the latter is (two runs: 11.5 and 12.8 for variant 53, 10.1 and 9.6
-for 1, 16.4 and 18.7 for 5); how many times faster than the adaptive filter, which was the exact filter once, the plain one is;
+thread, plain and compiled (numba), and how many times faster the latter is (four runs: 8.9 to 11.3 for variant 53, 7.4 to
+8.3 for 1, 13 to 16 for 5); how many times faster than the adaptive filter, which was the exact filter once, the plain one is;
 nodes of a posterior, the share of steps left to the adaptive filter, and the estimated errors, in posterior standard deviations:
 50 %, 99 % and the worst of all steps.
 Vector variants are done by particles; the error is half the distance of the two clouds' estimates.
