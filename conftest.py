@@ -1,4 +1,4 @@
-"""Python examples of the README are executed, in order, as one test session."""
+"""What pytest collects: Python examples of the README too, executed in order as one test session."""
 
 import gc
 
@@ -6,5 +6,8 @@ from sybil import Sybil
 from sybil.parsers.markdown import PythonCodeBlockParser
 
 gc.set_threshold(50_000, 20, 50)  # SymPy makes much and leaves little: looking for garbage so often takes a twentieth of the time
+
+# Loops that numba compiles when they are imported: by the process whose tests want them, not by each to look for examples.
+collect_ignore = ["kfcourse/filters/loops.py", "kfcourse/filters/exact/loops.py"]
 
 pytest_collect_file = Sybil(parsers=[PythonCodeBlockParser()], patterns=["README.md"]).pytest()

@@ -56,6 +56,7 @@ ROUNDS = 8  # at a step
 FIT = 0.5  # part that must count for laws to be laid over them: weights are flattened until it does
 CENTRES = 32  # Student's laws in the mixture, of each kind
 NARROWER = 0.6  # those as wide as the whole are narrower than it, in standard deviations
+ROWS = 8  # whose distances from all laws are found at a time: the numbers stay in the processor's cache
 SEEN = 20  # particles that a mode's meter must find within its own error; else they are drawn anew
 RIDGE = 1e-12  # of the curvature in all directions together, in each, so that it has a root
 WITHIN = 5.0  # times the standard error is stated
@@ -322,13 +323,20 @@ def _anew(
     student = normal * np.sqrt(FREEDOM / rng.chisquare(FREEDOM, (rows, size)))[..., None]
     drawn = centres[:, parts] + (roots[:, parts] @ student[..., None])[..., 0]
     s = np.where((rng.random((rows, size)) < PRIOR)[..., None], normal, drawn)
+    blocks = (slice(first, first + ROWS) for first in range(0, rows, ROWS))
+    mixture = np.concatenate([_log_mixture(s[here], centres[here], roots[here]) for here in blocks])
+    prior = -0.5 * (s**2).sum(axis=-1) - 0.5 * r * np.log(2 * np.pi)
+    return s, prior - np.logaddexp(np.log(1 - PRIOR) + mixture, np.log(PRIOR) + prior)
+
+
+def _log_mixture(s: Array, centres: Array, roots: Array) -> Array:
+    """ln of the density at s (rows, size, r) of Student's laws, equally probable, with roots (rows, laws, r, r) of their widths."""
+    r = s.shape[-1]
     apart = np.linalg.inv(roots)[:, None] @ (s[:, :, None] - centres[:, None])[..., None]
     kernels = -0.5 * (FREEDOM + r) * np.log1p((apart[..., 0] ** 2).sum(axis=-1) / FREEDOM)
     kernels -= np.log(np.abs(np.linalg.det(roots)))[:, None]
     constant = scipy.special.gammaln((FREEDOM + r) / 2) - scipy.special.gammaln(FREEDOM / 2) - 0.5 * r * np.log(FREEDOM * np.pi)
-    mixture = np.logaddexp.reduce(kernels, axis=2) - np.log(centres.shape[1]) + constant
-    prior = -0.5 * (s**2).sum(axis=-1) - 0.5 * r * np.log(2 * np.pi)
-    return s, prior - np.logaddexp(np.log(1 - PRIOR) + mixture, np.log(PRIOR) + prior)
+    return np.logaddexp.reduce(kernels, axis=2) - np.log(centres.shape[1]) + constant
 
 
 def _flattened(logs: Array) -> Array:
@@ -338,7 +346,7 @@ def _flattened(logs: Array) -> Array:
     logs = np.where(np.isnan(logs), 0.0, logs)
     for _ in range(20):
         power = 0.5 * (low + high)
-        weights, _ = normalised(np.where(np.isneginf(logs), -np.inf, power[:, None] * logs))
-        enough = (weights**2).sum(axis=1) * (FIT * logs.shape[1]) <= 1
+        weights = np.exp(power[:, None] * logs)
+        enough = np.einsum("rm,rm->r", weights, weights) * (FIT * logs.shape[1]) <= weights.sum(axis=1) ** 2
         low, high = np.where(enough, power, low), np.where(enough, high, power)
     return normalised(np.where(np.isneginf(logs), -np.inf, low[:, None] * logs))[0]

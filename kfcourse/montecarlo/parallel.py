@@ -17,7 +17,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
 from importlib import import_module
 from multiprocessing.connection import Connection, Pipe
 from typing import Any
@@ -124,9 +124,15 @@ def one_thread() -> threadpool_limits:
     for part in ("linalg", "ndimage", "special"):
         import_module(f"scipy.{part}")
     limits = threadpool_limits(1, "blas")
+    _make_buffers(os.getpid())
+    return limits
+
+
+@cache
+def _make_buffers(_process: int) -> None:
+    """Once in each process, as it takes longer than a small comparison."""
     square = np.eye(512)
     np.linalg.cholesky(np.linalg.solve(square, square) @ square)
-    return limits
 
 
 @contextmanager

@@ -217,7 +217,7 @@ def _end_of(
         raise ModelError(f"`{what}`: the variance of {noise}, {problem}")
     numeric = sp.Matrix([variance.subs(parameters)])
     used = replace(known, end=Known.end).used(numeric, {name: s for name, s in symbols.items() if s not in parameters})
-    steps = int(min(CHECKED, used.steps))
+    steps = int(min(CHECKED, used.steps)) if used.symbols else 1  # the same at all steps
     variance_at = Stepwise.compile(used, "variance", {}, {"variance": numeric}, [])
     with np.errstate(all="ignore"):
         for k in range(steps):

@@ -2,6 +2,7 @@
 
 import ast
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from kfcourse import Model, compare, gaussian, load_variants, simulate
 from kfcourse.filters import aof, pointmass
-from kfcourse.filters.exact import loops, pointmasses
+from kfcourse.filters.exact import pointmasses
 from kfcourse.filters.fused import fuse
 from kfcourse.lab.short_names import exact
 from kfcourse.records.evidence import likelihood
@@ -23,6 +24,11 @@ SCALAR = {
 }
 EPSILON = np.finfo(float).eps
 STEPS = 6
+
+
+@pytest.fixture(scope="module")
+def loops():
+    return import_module("kfcourse.filters.exact.loops")  # which compiles: not by each process that looks for tests here
 
 
 def both(model, runs, seed=2):
@@ -112,7 +118,7 @@ def test_the_first_step_is_taken_by_the_loop_too(monkeypatch):
     assert quick.step(quick.init(64), y[0]).memory.fine.usual.all()
 
 
-def test_exp_and_ln(monkeypatch):
+def test_exp_and_ln(monkeypatch, loops):
     """To 2e-13, 3e-14 and 1e-15, over all that densities are made of."""
     for name in ("_half", "_log"):
         monkeypatch.setattr(loops, name, getattr(loops, name).py_func)
@@ -131,7 +137,7 @@ def test_exp_and_ln(monkeypatch):
     assert np.isnan(loops._log(np.nan))
 
 
-def test_the_largest_of_many(monkeypatch):
+def test_the_largest_of_many(monkeypatch, loops):
     """By bits: of both signs and zeros, and where one is infinite."""
     monkeypatch.setattr(loops, "_in_order", loops._in_order.py_func)
     rng = np.random.default_rng(1)
@@ -142,7 +148,7 @@ def test_the_largest_of_many(monkeypatch):
             assert loops._highest.py_func(values, count) == values[:count].max()
 
 
-def test_machine_code_is_kept_beside_every_constant():
+def test_machine_code_is_kept_beside_every_constant(loops):
     """What a loop takes from elsewhere is in its closure, or a changed one would be read from the cache with its old value."""
     kept = set()
     for one in loops.steps.py_func.__closure__[0].cell_contents:

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from importlib import import_module
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 import sympy as sp
 
 from kfcourse import Model, compare, gaussian, linearised, load_variants, run, simulate, unscented
-from kfcourse.filters import aof, dfmp, duof, fos, gated, loops, mdfmp, mfos
+from kfcourse.filters import aof, dfmp, duof, fos, gated, mdfmp, mfos
 from kfcourse.filters.designed import Design
 from kfcourse.filters.fused import Fused, fuse
 from kfcourse.montecarlo.designing import NotFinite, design, design_together
@@ -45,8 +46,13 @@ def ready(filters, model, runs):
     return [next(found) if isinstance(one, Design) else one for one in filters]
 
 
+@pytest.fixture(scope="module")
+def loops():
+    return import_module("kfcourse.filters.loops")  # which compiles: not by each process that looks for tests here
+
+
 @pytest.fixture
-def interpreted(monkeypatch):
+def interpreted(monkeypatch, loops):
     """The printed loops run by Python, which takes no seconds to compile, on NumPy's numbers."""
 
     def unchanged(*signature, **options):
@@ -141,7 +147,7 @@ def test_a_regressor_that_is_the_same_for_all(interpreted):
     check(sure, 60, family(sure))
 
 
-def test_normal_numbers_are_numpys_to_the_last_bit():
+def test_normal_numbers_are_numpys_to_the_last_bit(loops):
     """A million: some 260 of them from the tails; and where the generator goes on."""
     one, other = (np.random.Generator(np.random.SFC64(3)) for _ in range(2))
     found = np.empty(1_000_000)
