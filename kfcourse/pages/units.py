@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 
 # What numbers are followed by, on pages and in labels.
-UNIT = r"(?:%|°|(?:s\.d\.|[kMG]?Hz|[kMG]?B|dB|px|deg|m?rad|CPU-s|[km]?m|m?s|min|h)(?:/(?:s|min|h))?[²³]?(?![\w-]))"
+UNIT = r"(?:%|°|(?:s\.d\.|[kMG]?Hz|[kMG]?B|dB|px|deg|m?rad|CPU-s|[km]?m|[mµ]?s|V|min|h)(?:/(?:s|min|h))?[²³]?(?![\w-]))"
 _AFTER_A_COMMA = re.compile(rf"^(.*?\S),\s({UNIT})(?:[,;]|\s±|$)", re.DOTALL)
 
 

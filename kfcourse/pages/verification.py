@@ -151,6 +151,7 @@ def agree(sentence: str, computed: Any, expected: Any, within: float, relative: 
     return _holds(sentence)
 
 
+_MINUS = re.compile(r"(?<![^\s(])-(?=\d)")
 _POWER_OF_TEN = re.compile(r"(?<![\w.])\d(?:\.\d+)?e[-+]\d+(?!\w)")
 
 
@@ -161,7 +162,7 @@ def _typeset(number: re.Match[str]) -> str:
 def _holds(sentence: str) -> Shown:
     sentence = re.sub(r"(?<=\d)%", "\u00a0%", sentence)  # as the book writes it; Python's format leaves no space
     parts = sentence.split("$")
-    parts[::2] = (_POWER_OF_TEN.sub(_typeset, text) for text in parts[::2])  # those that are no formulas
+    parts[::2] = (_POWER_OF_TEN.sub(_typeset, _MINUS.sub("−", text)) for text in parts[::2])  # those that are no formulas
     sentence = "$".join(parts)
     return Shown(f'{sentence}\u00a0<span class="kf-claim">✓</span>', {"sentence": sentence, "equations": 0})
 
