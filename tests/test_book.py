@@ -508,9 +508,10 @@ def test_the_keyboard_scrolls_what_is_wider_than_its_box(browser):
     assert found == {(True, 0), (False, -1)}
 
 
-def test_the_columns_of_a_folder_s_files_stay_columns_on_a_telephone(browser):
+@pytest.mark.parametrize("width", [390, 1280])
+def test_the_columns_of_a_folder_s_files_stay_columns(browser, width):
     """Its lines do not wrap; the box scrolls, and the page does not."""
-    with browser.new_context(offline=True, viewport={"width": 390, "height": 900}) as context:
+    with browser.new_context(offline=True, viewport={"width": width, "height": 900}) as context:
         tab = context.new_page()
         tab.goto((HTML / "package" / "kfcourse.filters.html").as_uri())
         files = tab.locator("article > section > .highlight-text pre").first
@@ -742,6 +743,12 @@ def test_search_finds_sections_and_quotes_them(window, words, page, section):
     assert all(row.locator("p").inner_text() for row in rows.all()[:5])
     assert tab.locator("#search-results mark").count() > 1  # of five: not where only a title has the words
     assert problems == []
+
+
+def test_words_that_stand_apart_are_apart_in_what_is_searched():
+    """A term and its Russian name, for instance."""
+    glued = re.findall(r"[a-z)][а-яё]\w*", (HTML / "_static" / "search" / "sections.js").read_text(encoding="utf-8"))
+    assert glued == []
 
 
 def test_search_says_that_it_finds_nothing(window):
