@@ -100,6 +100,8 @@ def verified(
     evidence = BY_IDENTITY if digits is None else f"to {digits} digits, at {3 if at is None else len(at)} points"
     mark = f"{evidence}; {how}" if how else evidence
     told = [(BOTH, *sides) if len({str(side_lines(side, names=names)) for side in sides}) == 1 else sides for sides in given]
+    if any(sides[0] == BOTH and not any(sp.flatten([sides[1]])) for sides in told):
+        raise ValueError("0 = 0 says nothing: give the sides whose difference it is, or a string that says what vanishes")
     body = _display(told, label, names)
     record = {"label": label, "latex": _block(told, names), "how": mark, "equations": len(given)}
     return Shown(f'{body}\n\n<p class="kf-verified">✓ {mark}</p>', record)

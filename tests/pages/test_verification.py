@@ -87,6 +87,12 @@ def test_no_bare_expression_is_shown() -> None:
     alike = sp.expand((x + 1) ** 2 - x**2 - 2 * x), sp.S.One
     assert r"\text{both sides} &= 1" in verified(alike).markdown
     assert r"s &= 1" in verified(("s", *alike)).markdown
+    nothing = sp.expand((x + 1) ** 2) - (x**2 + 2 * x + 1), sp.S.Zero
+    with pytest.raises(ValueError, match="0 = 0 says nothing"):
+        verified(nothing)
+    with pytest.raises(ValueError, match="0 = 0 says nothing"):
+        verified((sp.diag(*nothing), sp.zeros(2)))
+    assert r"s &= 0" in verified(("s", *nothing)).markdown
 
 
 def test_there_must_be_something_to_verify() -> None:
