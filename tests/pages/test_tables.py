@@ -40,7 +40,7 @@ def test_units_stand_in_brackets(heading) -> None:
 
 def test_a_unit_before_more_words_stands_in_brackets_too() -> None:
     captions = {"bound, % ± error": "bound (%) ±", "error, m, of fixes": "error (m), of", "angle, rad: six": "angle (rad): six"}
-    captions |= {"of the phase, rad².": "of the phase (rad²).", "error, % of the state": "error (%) of", "f, rad a step": "f (rad) a"}
+    captions |= {"of it, rad².": "of it (rad²).", "error, % of the state": "error (%) of", "f, rad a step": "f (rad) a"}
     for caption, better in captions.items():
         with pytest.raises(ValueError, match=re.escape(better)):
             table({"a": [1.0]}, caption=caption)
