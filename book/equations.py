@@ -75,12 +75,12 @@ def _title(document: str) -> str:
 
 def _count(here: Counter) -> str:
     words = {
-        "total": "equations verified",
-        "computed": "typed relations computed",
-        "others": "definitions and the like",
-        "claims": "claims",
+        "total": ("equation verified", "equations verified"),
+        "computed": ("typed relation computed", "typed relations computed"),
+        "others": ("definition or the like", "definitions and the like"),
+        "claims": ("claim", "claims"),
     }
-    return ", ".join(f"{here[name]} {text}" for name, text in words.items() if here[name])
+    return ", ".join(f"{here[name]} {words[name][here[name] > 1]}" for name in words if here[name])
 
 
 def _entry(latex: str, label: str | None, what: str) -> str:

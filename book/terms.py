@@ -191,7 +191,7 @@ def _list(app, name: str) -> nodes.definition_list:
         head = nodes.term("", term.name.replace("'", "’"), ids=[term.identity])
         if term.short and term.short != term.name:
             head += nodes.Text(f" ({term.short})")
-        head += nodes.inline("", ", ".join(term.ru), classes=["kf-ru", "language-ru"])
+        head += [nodes.Text(" "), nodes.inline("", ", ".join(term.ru), classes=["kf-ru", "language-ru"])]
         page = app.env.kf_introduced[term.name]
         number = contents.page(app.env, page)[1].number
         title = contents.page(app.env, page)[1].title.replace(" ★", "")

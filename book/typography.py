@@ -14,7 +14,7 @@ AFTER_A_FORMULA = re.compile(rf"^ (?={UNIT})")
 UNTOUCHED = (nodes.literal, nodes.literal_block, nodes.math, nodes.math_block)
 BETWEEN_TAGS = re.compile(r"(?:^|(?<=>))[^<]+")  # of HTML that cells write themselves
 OPENING = re.compile(r"[(\[“‘]+$")
-CLOSING = re.compile(r"^[,.;:!?)\]”’]+")
+CLOSING = re.compile(rf"^(?:\N{{NO-BREAK SPACE}}{UNIT})?[,.;:!?)\]”’]*")
 NO_TEXT = re.compile(r"<(script|style|svg|pre)\b")
 
 
@@ -40,7 +40,7 @@ class TogetherWithUnits(SphinxPostTransform):
 
 
 class TogetherWithMarks(SphinxPostTransform):
-    """A formula and the punctuation beside it stay on one line; browsers break lines around the boxes of formulas."""
+    """A formula, its unit and its punctuation stay on one line; browsers break lines around the boxes of formulas."""
 
     default_priority = TogetherWithUnits.default_priority + 1  # which asks what stands before a text
     formats = ("html",)
@@ -56,7 +56,7 @@ class TogetherWithMarks(SphinxPostTransform):
 def _taken(parent: nodes.Element, place: int, marks: re.Pattern[str]) -> list[nodes.Text]:
     """The marks at this end of a text, which loses them."""
     text = parent[place] if 0 <= place < len(parent) else None
-    if not isinstance(text, nodes.Text) or not (found := marks.search(text)):
+    if not isinstance(text, nodes.Text) or not (found := marks.search(text)) or not found[0]:
         return []
     parent[place] = nodes.Text(marks.sub("", text))
     return [nodes.Text(found[0])]

@@ -23,6 +23,8 @@ from bs4 import BeautifulSoup
 from matplotlib.colors import rgb_to_hsv, to_rgb
 from matplotlib.image import imread
 
+from kfcourse.pages.units import UNIT
+
 ROOT = Path(__file__).resolve().parent.parent
 HTML = ROOT / "_build" / "html"
 EXECUTED = ROOT / "_build" / "jupyter_execute"
@@ -526,15 +528,15 @@ def test_words_out_of_sight_are_found(browser):
         tab.wait_for_function("scrollY > 2000")
 
 
-@pytest.mark.parametrize("page", [WHOLE, "comparison"])
+@pytest.mark.parametrize("page", [WHOLE, "comparison", "manual/r-loop"])
 def test_a_formula_stays_with_its_comma(page):
-    """And with its bracket: no text that begins behind a formula begins with a mark."""
+    """And with its bracket and its unit: no text that begins behind a formula begins with a mark or a unit."""
     html = BeautifulSoup((HTML / f"{page}.html").read_text(encoding="utf-8"), "html.parser")
     alone = [formula for formula in html.select("article span.math") if "kf-together" not in formula.parent.get("class", [])]
     assert alone and html.select("article .kf-together > span.math")
     for formula in alone:
         before, after = formula.previous_sibling, formula.next_sibling
-        assert not (isinstance(after, str) and re.match(r"[,.;:!?)\]]", after)), after
+        assert not (isinstance(after, str) and re.match(rf"[,.;:!?)\]]|\u00a0{UNIT}", after)), after
         assert not (isinstance(before, str) and re.search(r"[(\[]$", before)), before
 
 
@@ -740,6 +742,12 @@ def test_search_finds_sections_and_quotes_them(window, words, page, section):
     assert all(row.locator("p").inner_text() for row in rows.all()[:5])
     assert tab.locator("#search-results mark").count() > 1  # of five: not where only a title has the words
     assert problems == []
+
+
+def test_words_that_stand_apart_are_apart_in_what_is_searched():
+    """A term and its Russian name, for instance."""
+    glued = re.findall(r"[a-z)][а-яё]\w*", (HTML / "_static" / "search" / "sections.js").read_text(encoding="utf-8"))
+    assert glued == []
 
 
 def test_search_says_that_it_finds_nothing(window):

@@ -73,9 +73,9 @@ SAID = {
 }
 SAID |= dict.fromkeys(
     (
-        r"f_{k-1}(x_{k-1})-O(x_{k-1}-z_{k-1})^2",
+        r"f_{k-1}(x_{k-1})-O\bigl((x_{k-1}-z_{k-1})^2\bigr)",
         r"g_{k-1}^2(x_{k-1})-O(x_{k-1}-z_{k-1})",
-        r"S_{k}(x_k)-O(x_k-\lambda_k)^2",
+        r"S_{k}(x_k)-O\bigl((x_k-\lambda_k)^2\bigr)",
         r"\mathsf{M}\,g^2(z+u)-g^2(z)-O(p^2)",
     ),
     NOTATION,

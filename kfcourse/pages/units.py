@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterable
 
 # What numbers are followed by, on pages and in labels.
-UNIT = r"(?:%|°|(?:s\.d\.|[kMG]?Hz|[kMG]?B|dB|px|deg|m?rad|CPU-s|[km]?m|m?s|min|h)(?:/(?:s|min|h))?[²³]?(?![\w-]))"
-_AFTER_A_COMMA = re.compile(rf"^(.*?\S),\s({UNIT})(?:[,;]|\s±|$)", re.DOTALL)
+UNIT = r"(?:%|°|(?:s\.d\.|[kMG]?Hz|[kMG]?B|dB|px|deg|m?rad|CPU-s|[km]?m|[mµ]?s|V|min|h)(?:/(?:s|min|h))?[²³]?(?![\w-]))"
+_AFTER_A_COMMA = re.compile(rf"^(.*?\S),\s({UNIT})(?:[,;:.]|\s(?:±|a\b|of\b)|$)", re.DOTALL)
 
 
 def in_brackets(labels: Iterable[str]) -> None:

@@ -100,6 +100,8 @@ def verified(
     evidence = BY_IDENTITY if digits is None else f"to {digits} digits, at {3 if at is None else len(at)} points"
     mark = f"{evidence}; {how}" if how else evidence
     told = [(BOTH, *sides) if len({str(side_lines(side, names=names)) for side in sides}) == 1 else sides for sides in given]
+    if any(sides[0] == BOTH and not any(sp.flatten([sides[1]])) for sides in told):
+        raise ValueError("0 = 0 says nothing: give the sides whose difference it is, or a string that says what vanishes")
     body = _display(told, label, names)
     record = {"label": label, "latex": _block(told, names), "how": mark, "equations": len(given)}
     return Shown(f'{body}\n\n<p class="kf-verified">✓ {mark}</p>', record)
@@ -151,6 +153,7 @@ def agree(sentence: str, computed: Any, expected: Any, within: float, relative: 
     return _holds(sentence)
 
 
+_MINUS = re.compile(r"(?<![^\s(])-(?=\d)")
 _POWER_OF_TEN = re.compile(r"(?<![\w.])\d(?:\.\d+)?e[-+]\d+(?!\w)")
 
 
@@ -161,7 +164,7 @@ def _typeset(number: re.Match[str]) -> str:
 def _holds(sentence: str) -> Shown:
     sentence = re.sub(r"(?<=\d)%", "\u00a0%", sentence)  # as the book writes it; Python's format leaves no space
     parts = sentence.split("$")
-    parts[::2] = (_POWER_OF_TEN.sub(_typeset, text) for text in parts[::2])  # those that are no formulas
+    parts[::2] = (_POWER_OF_TEN.sub(_typeset, _MINUS.sub("−", text)) for text in parts[::2])  # those that are no formulas
     sentence = "$".join(parts)
     return Shown(f'{sentence}\u00a0<span class="kf-claim">✓</span>', {"sentence": sentence, "equations": 0})
 

@@ -28,7 +28,7 @@ def test_columns_of_a_table_have_one_length() -> None:
             table(columns)
 
 
-@pytest.mark.parametrize("heading", ["time, s", "$D$, m²", "above the\nbound, %", "push: mean, m/s", r"$\lambda$, s.d."])
+@pytest.mark.parametrize("heading", ["time, s", "$D$, m²", "above the\nbound, %", "late: mean, µs", r"$\lambda$, s.d."])
 def test_units_stand_in_brackets(heading) -> None:
     bracketed = "{} ({})".format(*heading.split(", "))
     with pytest.raises(ValueError, match=re.escape(bracketed)):
@@ -39,7 +39,9 @@ def test_units_stand_in_brackets(heading) -> None:
 
 
 def test_a_unit_before_more_words_stands_in_brackets_too() -> None:
-    for caption, better in [("bound, % ± error", "bound (%) ± error"), ("error, m, of fixes", "error (m), of fixes")]:
+    captions = {"bound, % ± error": "bound (%) ±", "error, m, of fixes": "error (m), of", "angle, rad: six": "angle (rad): six"}
+    captions |= {"of it, rad².": "of it (rad²).", "error, % of the state": "error (%) of", "f, rad a step": "f (rad) a"}
+    for caption, better in captions.items():
         with pytest.raises(ValueError, match=re.escape(better)):
             table({"a": [1.0]}, caption=caption)
 

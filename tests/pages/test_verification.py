@@ -87,6 +87,12 @@ def test_no_bare_expression_is_shown() -> None:
     alike = sp.expand((x + 1) ** 2 - x**2 - 2 * x), sp.S.One
     assert r"\text{both sides} &= 1" in verified(alike).markdown
     assert r"s &= 1" in verified(("s", *alike)).markdown
+    nothing = sp.expand((x + 1) ** 2) - (x**2 + 2 * x + 1), sp.S.Zero
+    with pytest.raises(ValueError, match="0 = 0 says nothing"):
+        verified(nothing)
+    with pytest.raises(ValueError, match="0 = 0 says nothing"):
+        verified((sp.diag(*nothing), sp.zeros(2)))
+    assert r"s &= 0" in verified(("s", *nothing)).markdown
 
 
 def test_there_must_be_something_to_verify() -> None:
@@ -110,6 +116,8 @@ def test_claims_hold_or_raise() -> None:
     assert claim(f"{0.62:.0%} of them, or 3 %.", True).markdown.startswith("62\u00a0% of them, or 3 %.")
     shown = claim(f"From {1e-9:.0e} to {7.25e12:.1e}, $1e-9$ and the variant a1e3.", True).markdown
     assert shown.startswith(r"From $10^{-9}$ to $7.2 \cdot 10^{12}$, $1e-9$ and the variant a1e3.")
+    shown = claim(f"It is {-0.26:+.2f} (-3 before), {-2e-5:.0e} in the years 1960-61, $x_k-1$ and `a[-1]`.", True).markdown
+    assert shown.startswith(r"It is −0.26 (−3 before), −$2 \cdot 10^{-5}$ in the years 1960-61, $x_k-1$ and `a[-1]`.")
     with pytest.raises(Unverified, match=r"condition 2 of 2.*The gain"):
         claim("The gain is below 0.7.", True, np.array([True, False]))
 
