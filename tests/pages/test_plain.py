@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +23,10 @@ import plain
 pytestmark = pytest.mark.quick
 
 
+@cache
 def documented():
     """The docstrings that the pages of the package show, by name."""
+    shown = {}
     for folder, files in package.folders().items():
         for name in files:
             module = importlib.import_module(name)
@@ -36,15 +39,13 @@ def documented():
             for key, value in found.items():
                 own = getattr(value, "__doc__", None)
                 if isinstance(own, str) and own != type(value).__doc__:  # else that of `tuple`, say
-                    yield key, inspect.cleandoc(own).split("\n")
-
-
-DOCUMENTED = dict(documented())
+                    shown[key] = inspect.cleandoc(own).split("\n")
+    return shown
 
 
 def test_every_equation_of_the_package_is_read():
     equations, unread = 0, []
-    for name, lines in DOCUMENTED.items():
+    for name, lines in documented().items():
         for kind, rows in docstrings.paragraphs(lines):
             if kind == "equations":
                 equations += 1
@@ -58,7 +59,7 @@ def test_every_equation_of_the_package_is_read():
 
 def test_no_equation_is_taken_for_prose_or_for_a_table():
     """Each line has columns, begins with a formula and its =, and is read to the end: an equation that a full stop hides, say."""
-    for name, lines in DOCUMENTED.items():
+    for name, lines in documented().items():
         for kind, rows in docstrings.paragraphs(lines)[1:]:
             if kind in ("prose", "names") and all(" = " in row.split("  ")[0] and "   " in row for row in rows):
                 with pytest.raises(plain.NotPlain):
@@ -161,7 +162,7 @@ def test_what_is_set_is_what_the_filter_computes():
     K = Psi * G / F
     course = {"K": K, r"\Psi": Psi, "G": G, "F": F, r"\lambda": lam, "y": y, "h": G * lam, "I": 1.0}
     course |= {"z": lam + K * (y - G * lam), "p": Psi - K * G * Psi}
-    lines = DOCUMENTED["kfcourse.filters.approximations.aof"]
+    lines = documented()["kfcourse.filters.approximations.aof"]
     (rows,) = [rows for kind, rows in docstrings.paragraphs(lines) if kind == "equations"]
     first = rows[0].replace("F^+", "F^-1")  # of a number
     assert len(latex(first)) == 3
