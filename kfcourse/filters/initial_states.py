@@ -330,7 +330,7 @@ def _anew(
 
 
 def _log_mixture(s: Array, centres: Array, roots: Array) -> Array:
-    """ln of the density at s (rows, size, r) of Student's laws, equally probable, with roots (rows, laws, r, r) of their widths."""
+    """ln of the density at s (rows, size, r) of Student's laws, all as probable, of widths with roots (rows, laws, r, r)."""
     r = s.shape[-1]
     apart = np.linalg.inv(roots)[:, None] @ (s[:, :, None] - centres[:, None])[..., None]
     kernels = -0.5 * (FREEDOM + r) * np.log1p((apart[..., 0] ** 2).sum(axis=-1) / FREEDOM)

@@ -21,8 +21,6 @@ from kfcourse.symbolic.structure import Structure
 
 Rule = tuple[sp.Symbol, sp.Expr]
 
-_ARRAYS = {s.x_next: "next", s.lam_next: "lambda", s.Psi_next: "Psi"}  # predictions take the place of their letter
-
 # The functions' values in the equations, and where each is taken.
 _VALUES = {
     s.h_value: ("h", s.lam, s.Psi),
@@ -49,11 +47,12 @@ def scalar(expression: sp.Basic, inverse: Callable[[sp.Expr], sp.Expr] = lambda 
     return expression
 
 
+_ARRAYS = {scalar(one): name for one, name in ((s.x_next, "next"), (s.lam_next, "lambda"), (s.Psi_next, "Psi"))}
+
+
 def array_name(symbol: sp.Symbol) -> str:
     """The array that holds a letter of the equations: "lambda" for \\lambda_{k}; predictions take the place of their letter."""
-    if named := next((name for one, name in _ARRAYS.items() if scalar(one) == symbol), None):
-        return named
-    return "".join(re.findall(r"[A-Za-z]+", re.sub(r"_\{k(\+1)?\}", "", symbol.name)))
+    return _ARRAYS.get(symbol) or "".join(re.findall(r"[A-Za-z]+", re.sub(r"_\{k(\+1)?\}", "", symbol.name)))
 
 
 def function_values(structure: Structure) -> dict[sp.Symbol, sp.Expr]:

@@ -17,7 +17,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import cache
 from itertools import product
 from pathlib import Path
 
@@ -36,10 +37,11 @@ _GIVEN = (s.x, s.x_next, s.y, s.lam, s.Psi)  # what a step is given; of a runnin
 _KEPT = (s.z, s.P, s.lam_next, s.Psi_next)  # what it leaves
 
 
-def statistics(letters: Iterable[sp.MatrixSymbol]) -> dict[sp.Symbol, str]:
+@cache
+def statistics(letters: frozenset[sp.MatrixSymbol]) -> Mapping[sp.Symbol, str]:
     """How the means, covariances and inverted variances of letters, which the equations hold as symbols, are computed."""
     found = {}
-    for left, right in product(list(letters), repeat=2):
+    for left, right in product(sorted(letters, key=str), repeat=2):
         one, other = array_name(scalar(left)), array_name(scalar(right))
         found[scalar(s.cov(left, right))] = f"kfCov(n, a.{one}, a.{other})"
     for left in letters:
@@ -56,9 +58,9 @@ def filter_source(name: str, structures: Structures) -> str:
     structure = structures.gaussian if approximation == "gaussian" else structures.linearised
     rules = in_numbers(EQUATIONS[family], structures.model, structure, javascript.inverse)
     letters = {*_GIVEN, *(one.lhs for one in EQUATIONS[family])}
-    known = statistics(sorted(letters, key=str))
+    known = statistics(frozenset(letters))
     kept = [scalar(one) for one in _KEPT if one in letters and any(scalar(one) == left for left, _ in rules)]
-    coefficients = {left: array_name(left) for left, right in rules if right.free_symbols & set(known)}
+    coefficients = {left: array_name(left) for left, right in rules if right.free_symbols & known.keys()}
     constants = list(structures.model.values)
     running = [(left, right) for left, right in rules if left not in coefficients]
     given = [scalar(one) for one in (s.y, s.lam, s.Psi)]
@@ -95,7 +97,7 @@ def _design(
             group.append((left, right))
             continue
         close()
-        names = {one: text for one, text in known.items() if right.has(one)}
+        names = {one: known[one] for one in right.free_symbols & known.keys()}
         names |= {one: f"c.{key}" for one, key in coefficients.items()}
         lines.append(f"c.{coefficients[left]} = {javascript.expression(right, names)};")
     close()
@@ -108,7 +110,7 @@ def _used_later(
     """Of a group's letters those that the later rules need, also through means and covariances, and those that are kept."""
     used = set(kept)
     for _, right in later:
-        texts = " ".join(known[one] for one in right.free_symbols & set(known))
+        texts = " ".join(known[one] for one in right.free_symbols & known.keys())
         names = set(re.findall(r"a\.(\w+)", texts))
         used |= right.free_symbols | {left for left, _ in group if array_name(left) in names}
     return [left for left, _ in group if left in used]
