@@ -95,7 +95,7 @@ def test_another_variant_has_its_own_sliders(opened):
     assert rounds(tab)
     assert tab.get_by_role("slider", name="h", exact=True).count() == 1
     for wrong in ("#fig-live-lab?variant=77&53.c=x&53.e=1e9&nonsense=1", "#another"):  # an address that somebody mistyped
-        assert "GAOF" in rounds(opened("fig-live-lab", wrong))
+        opened("fig-live-lab", wrong).locator(".kf-numbers", has_text="GAOF").wait_for()
 
 
 PLAIN = """() => {
@@ -110,7 +110,7 @@ def test_ten_thousand_trajectories_while_a_slider_moves(opened):
     """In a third of a second where so many plain draws take as long: the machine may be slow or busy, so they are compared."""
     tab = opened("fig-live-lab")
     found, plain = [], []
-    for _ in range(5):
+    for _ in range(3):
         rounds(tab)
         found.append(int(re.search(r"(\d+)\s*ms", tab.get_by_role("status").inner_text())[1]))
         plain.append(tab.evaluate(PLAIN))
