@@ -70,9 +70,12 @@ lab, compiled; the last kind are means over the steps, of each filter and of its
     1               80   .950 | .900   .950 | .900                 .943 | .912   0
     2               60   .941 | .867   .950 | .883   .953 | .917   .943 | .917   0
     3               60   .945 | .879   .944 | .721   .953 | .867   .947 | .883   .01
+    4              120   .932 | .850   .949 | .883   .948 | .917   .933 | .908   .07
     5              120   .940 | .900   .946 | .892   .953 | .925   .938 | .908   0
     7               80   .930 | .875   .941 | .875   .941 | .911   .929 | .875   0
+    9               40   .948 | .850   .961 | .900   .931 | .875   .954 | .875   0
     11              80   .952 | .887   .957 | .887   .952 | .925   .970 | .950   0
+    12             100   .946 | .908   .944 | .910   .957 | .930   .927 | .900   0
 
 But for one, each worst place is such as chance would bring, were the coverage .92.  That one is the DUOF of variant 3 at step 1,
 which misses by trajectories of which 100,000 have one or none (chance .01): no choice among those that came tells of others.
