@@ -7,6 +7,9 @@ import pytest
 
 from kfcourse.notebooks.execution import BROWSERS
 
+# The suggestions of the address bar, which nobody sees here, are two pages of their own in each window: a second of processor time.
+WITHOUT = "--disable-features=WebUIOmniboxPopup,WebUIOmniboxAimPopup"
+
 
 @contextmanager
 def chromium():
@@ -17,7 +20,7 @@ def chromium():
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path)
+        browser = playwright.chromium.launch(executable_path=path, args=[WITHOUT])
         yield browser
         browser.close()
 
