@@ -144,12 +144,8 @@ def on_trial(model: Model | JumpModel, found: Sequence[Admission]) -> list[Admis
     tried = []
     for one in found:
         failure = _failure(model, one.one, last) if one.one else ""
-        tried.append(_warned(one, failure) if failure else one)
+        tried.append(dataclasses.replace(one, warnings=(*one.warnings, failure)) if failure else one)
     return tried
-
-
-def _warned(one: Admission, text: str) -> Admission:
-    return dataclasses.replace(one, warnings=(*one.warnings, text))
 
 
 def _failure(model: Model | JumpModel, one: Filter | Design, steps: int) -> str:
