@@ -21,7 +21,7 @@ from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.budget import SIZES, Budget, usual_runs
 from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
-from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
+from kfcourse.lab.report import conclusions, recognised_modes, remarks_in_words, write_json, write_report
 from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, OF_BEST, has_bound, title
 from kfcourse.lab.variants import STEPS, find_variant
 from kfcourse.listing import VARIANTS
@@ -196,9 +196,10 @@ def lab(
     if json_file:
         write_json(chosen, result, json_file)
     with _kept(folder), replacing_together(folder) as place:
-        write_report(chosen, result, place, [one for one in (budget.says, again) if one])
+        modes = recognised_modes(result, filters)
+        write_report(chosen, result, place, [one for one in (budget.says, again) if one], found, modes)
         if language:
-            write_handin(chosen, result, place, language)
+            write_handin(chosen, result, place, language, modes)
     click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""), err=to_error)
 
 

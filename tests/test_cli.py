@@ -217,7 +217,7 @@ def test_every_filter_can_be_chosen(call, no_report, tmp_path):
     assert set(json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))["error_variance"]) == set(FILTERS)
 
 
-def test_the_issue_s_file_of_variants_works(call, no_report, tmp_path):
+def test_a_file_of_ones_own_with_a_shipped_variant_gives_the_same_numbers(call, no_report, tmp_path):
     assert call("lab", "53", *QUICK, "--variants", "mine.toml", "--json", "a.json", "--out", "a").exit_code == 0
     assert call("lab", "53", *QUICK, "--json", "b.json", "--out", "b").exit_code == 0
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()

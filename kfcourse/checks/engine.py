@@ -254,7 +254,7 @@ class _Check:
         return bool(_flat(self.expected)) and self.agree(*sides)
 
     def _wrong(self, found: list[Any]) -> Result:
-        pairs = [_both(found, self.expected, place) for place in range(len(self.question.parts))]
+        pairs = [(part_of(found, place), part_of(self.expected, place)) for place in range(len(self.question.parts))]
         right = [1 for mine, theirs in pairs if self.agree(mine, theirs) and not self._in_numbers(mine, theirs)]
         share = len(right) / len(self.question.parts) if right else 0.0
         times = self._times(found)
@@ -314,10 +314,6 @@ def _flat(result: Any) -> list[sp.Expr]:
     if isinstance(result, list | tuple | sp.MatrixBase):
         return [formula for part in result for formula in _flat(part)]
     return [result] if isinstance(result, sp.Basic) else []
-
-
-def _both(found: Sequence[Any], expected: Sequence[Any], place: int) -> tuple[list[Any], list[Any]]:
-    return part_of(found, place), part_of(expected, place)
 
 
 def _reference(answer: Answer, arguments: Sequence[tuple]) -> list[Any]:

@@ -22,7 +22,7 @@ from typing import NamedTuple
 from kfcourse.derivations.setting import KINDS, Setting, of_model
 from kfcourse.derivations.terms import Node
 from kfcourse.derivations.typed import read_line
-from kfcourse.symbolic.formula import FormulaError, check_name
+from kfcourse.symbolic.formula import check_name
 from kfcourse.symbolic.model import Model
 
 MOST_LINES = 400
@@ -137,6 +137,3 @@ def _name(text: str, number: int) -> str:
         return text if text == "lambda" else check_name(text)
     except ValueError as error:
         raise DerivationError(f"line {number}: {error}") from None
-
-
-__all__ = ["Chain", "DerivationError", "FindModel", "FormulaError", "Typed", "read_chains"]

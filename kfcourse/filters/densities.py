@@ -218,7 +218,7 @@ def _elementwise(
     def log_likelihood(y: Array, x: Array) -> Array:
         mean, variance = moments(meter, x)
         if model.angles.y:
-            innovation, sd = wrapped(y - mean), np.sqrt(variance.max(keepdims=True)).reshape(1)
+            innovation, sd = wrapped(y - mean), np.sqrt(variance.max(initial=0.0)).reshape(1)
             value = wound(lambda turns: _log_normal(innovation + turns[0], variance), sd, model.angles.y)
         else:
             value = _log_normal(y - mean, variance)

@@ -24,6 +24,7 @@ from kfcourse.filters.particles import (
     LARGEST,
     Particles,
     at_start,
+    by_clouds,
     even,
     normalised,
     of_both,
@@ -153,10 +154,7 @@ def jump_particle(model: JumpModel, particles: int = 1000, seed: Seed = 0, name:
         memory = JumpParticles(*clouds, x=x, mode=mode, probability=probability)
         return State(k + 1, of_both(mean, cov, angles), predicted, memory)
 
-    def evidence(before: State, y: Array, after: State) -> Array:
-        return np.where(np.isnan(y).any(axis=-1), 0.0, np.logaddexp(*after.memory.evidence) - np.log(2))
-
-    return Filter(name, model.modes[0], init, step, slow=True, evidence=evidence)
+    return Filter(name, model.modes[0], init, step, slow=True, evidence=by_clouds)
 
 
 def _size(mean: Array, root: Array) -> Array:

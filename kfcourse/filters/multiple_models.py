@@ -30,7 +30,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from kfcourse.angles import Components, near, on_circle
-from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.filters.base import Evidence, Filter, State, initial_state
 from kfcourse.filters.state_transitions import by_state
 from kfcourse.laws import Array, Gaussian, Measurement, correct, log_density
 from kfcourse.symbolic.jumping import JumpModel
@@ -129,18 +129,10 @@ def _one_law_a_mode(
         expected = np.tile(first, (runs, 1))
         return start._replace(memory=Modes(expected, expected, (start.predicted,) * len(models)))
 
-    def measurements(state: State) -> list[Measurement]:
-        """What each mode expects to be measured."""
-        each = zip(structures, state.memory.predicted, strict=True)
-        return [structure.at(state.step).measure(*prior) for structure, prior in each]
-
-    def evidence(before: State, y: Array, after: State) -> Array:
-        return modes_given(before.memory.expected, measurements(before), y)[1]
-
     def step(state: State, y: Array) -> State:
         memory: Modes = state.memory
         now = [structure.at(state.step) for structure in structures]
-        expectations = measurements(state)
+        expectations = _expectations(now, memory)
         corrected = [correct(prior, one, y) for prior, one in zip(memory.predicted, expectations, strict=True)]
         mu, _ = modes_given(memory.expected, expectations, y)
         pi, leading = links(state.step, corrected)
@@ -159,7 +151,20 @@ def _one_law_a_mode(
             Modes(mu, expected, tuple(predicted)),
         )
 
-    return Filter(name, models[0], init, step, evidence=evidence)
+    return Filter(name, models[0], init, step, evidence=_evidence(structures))
+
+
+def _expectations(now: Sequence[Structure], memory: Modes) -> list[Measurement]:
+    """What is expected to be measured in each mode, or for each pair of modes in the second of them."""
+    return [now[i % len(now)].measure(*law) for i, law in enumerate(memory.predicted)]
+
+
+def _evidence(structures: Sequence[Structure]) -> Evidence:
+    def evidence(before: State, y: Array, after: State) -> Array:
+        now = [structure.at(before.step) for structure in structures]
+        return modes_given(before.memory.expected, _expectations(now, before.memory), y)[1]
+
+    return evidence
 
 
 def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Array | None = None, name: str = "gpb2") -> Filter:
@@ -180,16 +185,10 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
         weights = np.tile(first / size, (runs, size))  # as if any mode had come before, the same law of each
         return start._replace(memory=Modes(np.tile(first, (runs, 1)), weights, (start.predicted,) * size**2))
 
-    def measurements(state: State) -> list[Measurement]:
-        now = [structure.at(state.step) for structure in structures]
-        return [now[pair % size].measure(*prior) for pair, prior in enumerate(state.memory.predicted)]
-
-    def evidence(before: State, y: Array, after: State) -> Array:
-        return modes_given(before.memory.expected, measurements(before), y)[1]
-
     def step(state: State, y: Array) -> State:
         memory: Modes = state.memory
-        expectations = measurements(state)
+        now = [structure.at(state.step) for structure in structures]
+        expectations = _expectations(now, memory)
         corrected = [correct(prior, one, y) for prior, one in zip(memory.predicted, expectations, strict=True)]
         pairs = modes_given(memory.expected, expectations, y)[0].reshape(len(y), size, size)
         mu = pairs.sum(axis=1)
@@ -197,14 +196,13 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
         laws = [mixture(corrected[j::size], weights[:, :, j], angles) for j in range(size)]
         combined = mixture(laws, mu, angles)
         laws = [_of_somebody(law, mu[:, j], combined) for j, law in enumerate(laws)]
-        now = [structure.at(state.step) for structure in structures]
         pi, leading = links(state.step, laws)
         predict = each_once(now, alike)
         predicted = [predict(j, law) for row in leading for j, law in enumerate(row)]
         expected = (mu[:, :, None] * pi).reshape(len(y), -1)
         return State(state.step + 1, combined, mixture(predicted, expected, angles), Modes(mu, expected, tuple(predicted)))
 
-    return Filter(name, models[0], init, step, evidence=evidence)
+    return Filter(name, models[0], init, step, evidence=_evidence(structures))
 
 
 def _of_somebody(law: Gaussian, probability: Array, combined: Gaussian) -> Gaussian:

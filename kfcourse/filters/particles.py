@@ -160,9 +160,6 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
         memory = Particles(np.moveaxis(mean, 1, 0), effective, log_mean.T, root, x=kept)
         return State(state.step + 1, posterior, predicted, memory)
 
-    def evidence(before: State, y: Array, after: State) -> Array:
-        return np.where(np.isnan(y).any(axis=-1), 0.0, np.logaddexp(*after.memory.evidence) - np.log(2))
-
     def look_back(states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
         memories = [state.memory for state in states]
 
@@ -175,7 +172,12 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
 
         return back
 
-    return Filter(name, model, init, step, slow=True, evidence=evidence, look_back=look_back)
+    return Filter(name, model, init, step, slow=True, evidence=by_clouds, look_back=look_back)
+
+
+def by_clouds(before: State, y: Array, after: State) -> Array:
+    """ln of the mean of both clouds' weights, (runs,); 0 where nothing, or not all, was measured."""
+    return np.where(np.isnan(y).any(axis=-1), 0.0, np.logaddexp(*after.memory.evidence) - np.log(2))
 
 
 def even(particles: int) -> None:

@@ -74,32 +74,45 @@ class Admission:
         return "; ".join([self.reason] if self.reason else [*self.warnings, *self.remarks])
 
 
-def admissions(model: Model | JumpModel, names: Sequence[str] | None = None, seconds: float | None = None) -> list[Admission]:
+def admissions(
+    model: Model | JumpModel,
+    names: Sequence[str] | None = None,
+    seconds: float | None = None,
+    known: Sequence[Admission] = (),
+) -> list[Admission]:
     """Which of the filters, all by default, can be built for the model, and what to know of them; each as the lab builds it.
 
-    With `seconds`, the formulas of each must be derived in that time.
+    With `seconds`, the formulas of each must be derived in that time.  What is `known` of a filter is not found out again.
 
     Raises
     ------
     ValueError
         An unknown name; the message lists the known ones.
     """
-    known = JUMP_FILTERS if isinstance(model, JumpModel) else FILTERS
-    names = list(known if names is None else names)
-    check_names(names, known)
+    there = JUMP_FILTERS if isinstance(model, JumpModel) else FILTERS
+    names = list(there if names is None else names)
+    check_names(names, there)
     structures = JumpStructures(model) if isinstance(model, JumpModel) else Structures(model)
-    found, too_long = [], set[str]()
-    for name in dict.fromkeys(names):
-        kind = name.split("-")[-1]  # filters with the same structural functions share the time
-        try:
-            if kind in too_long:
-                raise OutOfTime
-            with nullcontext() if seconds is None else time_limit(seconds):
-                found.append(_admitted(name, structures))
-        except OutOfTime:
-            too_long.add(kind)
-            found.append(Admission(name, None, Reason(_TOO_LONG.format(seconds), "too_long", seconds=f"{seconds:g}")))
-    return found
+    found = {one.name: one for one in known}
+    # filters with the same structural functions share the time
+    too_long = {_kind(one.name): one.reason for one in known if getattr(one.reason, "kind", "") == "too_long"}
+    for name in names:
+        if name in found:
+            continue
+        if (reason := too_long.get(_kind(name))) is None:
+            try:
+                with nullcontext() if seconds is None else time_limit(seconds):
+                    found[name] = _admitted(name, structures)
+                continue
+            except OutOfTime:
+                reason = too_long[_kind(name)] = Reason(_TOO_LONG.format(seconds), "too_long", seconds=f"{seconds:g}")
+        found[name] = Admission(name, None, reason)
+    return [found[name] for name in dict.fromkeys(names)]
+
+
+def _kind(name: str) -> str:
+    """Which structural functions a filter takes, by its name."""
+    return name.split("-")[-1]
 
 
 _TOO_LONG = (
@@ -131,12 +144,8 @@ def on_trial(model: Model | JumpModel, found: Sequence[Admission]) -> list[Admis
     tried = []
     for one in found:
         failure = _failure(model, one.one, last) if one.one else ""
-        tried.append(_warned(one, failure) if failure else one)
+        tried.append(dataclasses.replace(one, warnings=(*one.warnings, failure)) if failure else one)
     return tried
-
-
-def _warned(one: Admission, text: str) -> Admission:
-    return dataclasses.replace(one, warnings=(*one.warnings, text))
 
 
 def _failure(model: Model | JumpModel, one: Filter | Design, steps: int) -> str:

@@ -22,6 +22,7 @@ from kfcourse.lab.handin_text import inline_html, inline_tex
 from kfcourse.lab.report import save_figure, save_texts
 from kfcourse.lab.variants import Variant
 from kfcourse.montecarlo.comparison import Comparison
+from kfcourse.montecarlo.modes import Recognised
 from kfcourse.symbolic.jumping import JumpModel
 
 LANGUAGES = ("en", "ru")
@@ -43,8 +44,12 @@ FIGURES: dict[str, Callable[..., Axes]] = {
 }
 
 
-def write_handin(variant: Variant, result: Comparison, folder: Path, language: str) -> list[Path]:
+def write_handin(
+    variant: Variant, result: Comparison, folder: Path, language: str, modes: Recognised | None = None
+) -> list[Path]:
     """Write handin.tex, handin.html and their figures, all of them or none; returns the paths.
+
+    `modes` are the `recognised_modes`.
 
     Raises
     ------
@@ -55,13 +60,13 @@ def write_handin(variant: Variant, result: Comparison, folder: Path, language: s
         raise ValueError(f"the report is written in {' or '.join(LANGUAGES)}, not {language!r}")
     words = tomllib.loads((resources.files("kfcourse.lab") / "handin.toml").read_text(encoding="utf-8"))[language]
     with_modes = isinstance(result.model, JumpModel)
-    report = JumpReport(result, words) if with_modes else PlainReport(result, words)
+    report = JumpReport(result, words, modes) if with_modes else PlainReport(result, words)
     content = {"blocks": list(report.blocks()), "words": words, "variant": variant, "language": language}
     labels = plots.Words(report.title, **{part: words[f"axis_{part}"] for part in plots.Words._fields[1:]})
     with replacing_together(folder) as place:
         for name in report.figures:
             save_figure(partial(FIGURES[name], result, words=labels), place, f"handin-{name}")
-        if isinstance(report, JumpReport) and report.modes:
-            save_figure(partial(plots.mode_probabilities, report.modes, words=labels), place, "handin-modes")
+        if modes:
+            save_figure(partial(plots.mode_probabilities, modes, words=labels), place, "handin-modes")
         save_texts(("handin.html", "handin.tex"), place, content, inline=inline_html, inline_tex=inline_tex)
         return [folder / path.name for path in place.iterdir()]

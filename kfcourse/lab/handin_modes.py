@@ -13,9 +13,10 @@ from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.families import family
 from kfcourse.lab.handin_sections import Block, StudentReport
 from kfcourse.lab.handin_text import filled, law, lines_of, matrix
-from kfcourse.lab.report import NO_FORMULAS, percent, printed, recognised_modes
+from kfcourse.lab.report import NO_FORMULAS, percent, printed
 from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures, Structures
 from kfcourse.montecarlo.comparison import Comparison
+from kfcourse.montecarlo.modes import Recognised
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import FUNCTION_LATEX
@@ -30,11 +31,11 @@ class JumpReport(StudentReport):
 
     entries = JUMP_FILTERS
 
-    def __init__(self, result: Comparison, words: dict[str, str]) -> None:
+    def __init__(self, result: Comparison, words: dict[str, str], modes: Recognised | None) -> None:
         super().__init__(result, words)
         assert isinstance(result.model, JumpModel)  # `write_handin` takes the other report for those without
         self.model = result.model
-        self.modes = recognised_modes(result)
+        self.modes = modes
         self.structures = JumpStructures(self.model)
         best = self.structures.best[0].name  # of the filters whose names do not tell
         self.kinds = [kind for kind in ("linearised", "gaussian") if kind in (*self.kinds, best)]

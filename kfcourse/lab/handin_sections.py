@@ -11,7 +11,7 @@ import numpy as np
 from kfcourse.lab.handin_text import filled, in_percent, power_of_ten
 from kfcourse.lab.refusals import cause
 from kfcourse.lab.report import LEVEL, ROUNDING, ranges, remarks, table_steps
-from kfcourse.lab.short_names import FILTERS, Entry, JumpEntry
+from kfcourse.lab.short_names import FILTERS, Entry
 from kfcourse.montecarlo.comparison import EXACT, Comparison, Verdict
 
 COLUMNS = 4  # filters side by side in a table, so that it fits a page
@@ -31,7 +31,7 @@ class Block:
 class StudentReport:
     """The blocks of the report, section by section; a subclass has the task, the functions and the filters."""
 
-    entries: Mapping[str, Entry | JumpEntry] = FILTERS  # where filters have their names from
+    entries: Mapping[str, Entry] = FILTERS  # where filters have their names from
 
     def __init__(self, result: Comparison, words: dict[str, str]) -> None:
         self.result, self.words = result, words

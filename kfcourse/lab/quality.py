@@ -24,6 +24,7 @@ import numpy as np
 from tqdm import tqdm
 
 from kfcourse.filters import Design, Filter
+from kfcourse.lab.admission import admissions
 from kfcourse.lab.criteria import (
     UNMEASURED,
     Finding,
@@ -38,7 +39,7 @@ from kfcourse.lab.criteria import (
     unmeasured,
 )
 from kfcourse.lab.difficulty import Hardness, hardness
-from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_exact, title
+from kfcourse.lab.short_names import LAB, Structures, has_exact, title
 from kfcourse.lab.variant_tables import RUNS
 from kfcourse.lab.variants import Variant
 from kfcourse.laws import Array, Gaussian
@@ -53,8 +54,6 @@ from kfcourse.montecarlo.parallel import cluster
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.moments import NoClosedForm
-from kfcourse.symbolic.reading import ModelError
 
 VECTOR = 8  # a vector model takes that much longer, and gets that many times fewer
 STRESS = 1.5  # factor of all deviations
@@ -153,7 +152,8 @@ def _of_modes(variant: Variant, model: JumpModel, runs: int, seed: int) -> Quali
 
 def _simulated(found: Quality, structures: Structures, runs: int, steps: int, seed: int) -> Quality:
     """The criteria that need trajectories, and what is remarked about them."""
-    model, harsh, filters = structures.model, _harsh(structures.model), _buildable(structures)
+    model, harsh = structures.model, _harsh(structures.model)
+    filters = [one.one for one in admissions(model, LAB) if one.one]
     x = simulate(model, runs, steps, seed).x
     moments = bounded(x)
     if moments.ok and not np.isfinite(simulate(harsh, runs, steps, seed).x).all():
@@ -174,17 +174,6 @@ def _simulated(found: Quality, structures: Structures, runs: int, steps: int, se
         remarks=tuple(_remarks(model, x, found.linear)),
         fragile=tuple(_fragile(result, x, filters, harsh, seed)),
     )
-
-
-def _buildable(structures: Structures) -> list[Filter | Design]:
-    """The lab's filters that the model admits."""
-    built = []
-    for name in LAB:
-        try:
-            built.append(FILTERS[name].build(structures))
-        except (NoClosedForm, ModelError):
-            continue
-    return built
 
 
 def _harsh(model: Model) -> Model:

@@ -22,10 +22,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kfcourse.files import replacing_together, save
-from kfcourse.filters import EQUATIONS, Filter
+from kfcourse.filters import EQUATIONS, Design, Filter
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab import plots
-from kfcourse.lab.admission import admissions
+from kfcourse.lab.admission import Admission, admissions
 from kfcourse.lab.families import FAMILIES, family
 from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, WITH_MODES, JumpStructures, Structures, title
 from kfcourse.lab.variants import Variant
@@ -69,18 +69,25 @@ class Section:
         return cls(title, [line.strip() for line in body.split("\\\\\n")])
 
 
-def write_report(variant: Variant, result: Comparison, folder: Path, notes: Sequence[str] = ()) -> list[Path]:
+def write_report(
+    variant: Variant,
+    result: Comparison,
+    folder: Path,
+    notes: Sequence[str] = (),
+    known: Sequence[Admission] = (),
+    modes: Recognised | None = None,
+) -> list[Path]:
     """Write report.html, report.tex and the figures, all of them or none; returns the paths.
 
-    `notes` stand before the remarks: why there are so few trajectories, how to repeat the comparison.
+    `notes` stand before the remarks: why there are so few trajectories, how to repeat the comparison.  Filters of which it is
+    `known` whether the model admits them are not looked at again; `modes` are the `recognised_modes`.
     """
     with replacing_together(folder) as place:
         for name, (_, draw) in _FIGURES.items():
             save_figure(partial(draw, result), place, name)
-        modes = recognised_modes(result)
         if modes:
             save_figure(partial(plots.mode_probabilities, modes), place, "modes")
-        save_texts(("report.html", "report.tex"), place, _content(variant, result, modes, notes))
+        save_texts(("report.html", "report.tex"), place, _content(variant, result, notes, known, modes))
         return [folder / path.name for path in place.iterdir()]
 
 
@@ -186,8 +193,8 @@ def _three_digits(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 1000 else np.format_float_positional(value, 3, fractional=False, trim="-")
 
 
-def recognised_modes(result: Comparison) -> Recognised | None:
-    """What the filters that carry probabilities of modes know of them; None of a model without modes.
+def recognised_modes(result: Comparison, filters: Sequence[Filter | Design]) -> Recognised | None:
+    """What those of the filters compared that carry probabilities of modes know of them; None of a model without modes.
 
     The exact filter tells only if it came through as many trajectories in its time.
     """
@@ -196,12 +203,14 @@ def recognised_modes(result: Comparison) -> Recognised | None:
         return None
     runs = min(result.runs, RECOGNISED)
     short = {EXACT} if result.slow_runs < runs // SLOW else set()
-    names = [name for name in result.available if name in WITH_MODES and name not in {*result.replaced, *short}]
-    known = [one.one for one in admissions(model, names) if isinstance(one.one, Filter)]
-    return recognised(known, model, runs, result.steps, result.seed) if known else None
+    names = {name for name in result.available if name in WITH_MODES and name not in {*result.replaced, *short}}
+    of_modes = [one for one in filters if isinstance(one, Filter) and one.name in names]
+    return recognised(of_modes, model, runs, result.steps, result.seed) if of_modes else None
 
 
-def _content(variant: Variant, result: Comparison, modes: Recognised | None, notes: Sequence[str]) -> dict[str, Any]:
+def _content(
+    variant: Variant, result: Comparison, notes: Sequence[str], known: Sequence[Admission], modes: Recognised | None
+) -> dict[str, Any]:
     # the bound before those that it bounds
     names = tuple(sorted(result.available, key=lambda name: name != EXACT))
     entries = JUMP_FILTERS if isinstance(result.model, JumpModel) else FILTERS
@@ -211,7 +220,7 @@ def _content(variant: Variant, result: Comparison, modes: Recognised | None, not
         "result": result,
         "left_out": [(title(name), reason) for name, reason in result.left_out.items()],
         "replaced": [(title(name), reason) for name, reason in result.replaced.items()],
-        "admissions": [(title(one.name), one.verdict, one.says) for one in admissions(result.model, seconds=60.0)],
+        "admissions": [(title(one.name), one.verdict, one.says) for one in admissions(result.model, None, FORMULAS, known)],
         "model": Section.of("Model", result.model.latex()),
         "structures": _structure_sections(result.model, names),
         "equations": _equation_sections(names),

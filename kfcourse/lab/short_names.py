@@ -7,7 +7,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 from kfcourse.filters import (
     Design,
@@ -142,23 +142,18 @@ def _found(quadrature: Checked | NoClosedForm) -> list[Structure]:
     return quadrature.structures
 
 
-class Entry(NamedTuple):
-    """A filter of the lab: printed names and how to build it."""
+Of = TypeVar("Of", Structures, JumpStructures)
+
+
+class Entry(NamedTuple, Generic[Of]):
+    """A filter of the lab, or of those for models that jump: printed names and how to build it."""
 
     title: str
     russian: str
-    build: Callable[[Structures], Filter | Design]
+    build: Callable[[Of], Filter | Design]
 
 
-class JumpEntry(NamedTuple):
-    """A filter of the lab for models that jump."""
-
-    title: str
-    russian: str
-    build: Callable[[JumpStructures], Filter | Design]
-
-
-def _twice(short: str, build: Callable[[Structure], Filter | Design], russian: str = "") -> dict[str, Entry]:
+def _twice(short: str, build: Callable[[Structure], Filter | Design], russian: str = "") -> dict[str, Entry[Structures]]:
     """The entries of "fos", "fos3": with Gaussian structural functions, and with linearised ones; `russian` ends the name."""
     of = FAMILIES[family(short)]
     title, russian = of.title + short.removeprefix(family(short)), of.russian + russian
@@ -168,28 +163,26 @@ def _twice(short: str, build: Callable[[Structure], Filter | Design], russian: s
     }
 
 
-def _entry(short: str, build: Callable[[Structures], Filter | Design]) -> dict[str, Entry]:
+def _entry(short: str, build: Callable[[Structures], Filter | Design]) -> dict[str, Entry[Structures]]:
     """The entry of a family that is one filter."""
     return {short: Entry(FAMILIES[short].title, FAMILIES[short].russian, build)}
 
 
 def _with_modes(
     short: str, build: Callable[[JumpModel, list[Structure]], Filter | Design], russian: str = ""
-) -> dict[str, JumpEntry]:
+) -> dict[str, Entry[JumpStructures]]:
     """The same of a filter with the structural functions of each mode: "fos" is "fos-jump-gaussian", the LD-GFOS."""
     of = FAMILIES[family(short)]
     title = of.title + short.removeprefix(family(short))
     return {
-        f"{short}-jump-gaussian": JumpEntry(f"LD-G{title}", f"Г{of.russian}лд{russian}", lambda s: build(s.model, s.normal)),
-        f"{short}-jump-linearised": JumpEntry(
-            f"LD-L{title}", f"Л{of.russian}лд{russian}", lambda s: build(s.model, s.linearised)
-        ),
+        f"{short}-jump-gaussian": Entry(f"LD-G{title}", f"Г{of.russian}лд{russian}", lambda s: build(s.model, s.normal)),
+        f"{short}-jump-linearised": Entry(f"LD-L{title}", f"Л{of.russian}лд{russian}", lambda s: build(s.model, s.linearised)),
     }
 
 
 _MEMORY = f", {STEPS} шага"
 # One line a filter: this is where a new one is added.
-FILTERS: dict[str, Entry] = {
+FILTERS: dict[str, Entry[Structures]] = {
     **_twice("aof", aof),
     **_entry("duof", lambda s: duof(s.model)),
     **_twice("fos", fos),
@@ -209,18 +202,18 @@ FILTERS: dict[str, Entry] = {
     **_entry("particle", lambda s: particle(s.model)),
 }
 # The same for models that jump: filters that know the modes, and plain ones on the average over the modes.
-JUMP_FILTERS: dict[str, JumpEntry] = {
+JUMP_FILTERS: dict[str, Entry[JumpStructures]] = {
     **_with_modes("aof", lambda model, structures: logic_dynamic(structures, model, model.first)),
-    "imm": JumpEntry(*FAMILIES["imm"][:2], lambda s: imm(s.best, *s.chain)),
-    "gpb2": JumpEntry(*FAMILIES["gpb2"][:2], lambda s: gpb2(s.best, *s.chain)),
+    "imm": Entry(*FAMILIES["imm"][:2], lambda s: imm(s.best, *s.chain)),
+    "gpb2": Entry(*FAMILIES["gpb2"][:2], lambda s: gpb2(s.best, *s.chain)),
     **_with_modes("fos", logic_dynamic_fos),
     **_with_modes(f"fkp{STEPS}", logic_dynamic_fkp, _MEMORY),
     **_with_modes(f"fbp{STEPS}", logic_dynamic_fbp, _MEMORY),
-    "aof-averaged": JumpEntry("AOF (averaged)", "АОФ (среднее по режимам)", lambda s: aof(s.averaged)),
-    "duof": JumpEntry(*FAMILIES["duof"][:2], lambda s: duof(s.model.modes[0], averaged_equations(s.model))),
-    "fos-averaged": JumpEntry("FOS (averaged)", "ФОС (среднее по режимам)", lambda s: fos(s.averaged)),
-    "mfos-averaged": JumpEntry("MFOS (averaged)", "МФОС (среднее по режимам)", lambda s: mfos(s.averaged)),
-    "aof-exact": JumpEntry("exact AOF", "АОФ", lambda s: exact(s.model)),
+    "aof-averaged": Entry("AOF (averaged)", "АОФ (среднее по режимам)", lambda s: aof(s.averaged)),
+    "duof": Entry(*FAMILIES["duof"][:2], lambda s: duof(s.model.modes[0], averaged_equations(s.model))),
+    "fos-averaged": Entry("FOS (averaged)", "ФОС (среднее по режимам)", lambda s: fos(s.averaged)),
+    "mfos-averaged": Entry("MFOS (averaged)", "МФОС (среднее по режимам)", lambda s: mfos(s.averaged)),
+    "aof-exact": Entry("exact AOF", "АОФ", lambda s: exact(s.model)),
 }
 # Printed names of filters that are not among the lab's.
 TITLES = {

@@ -6,10 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from kfcourse import cli
 from kfcourse.filters import aof, duof
+from kfcourse.lab import admission
 from kfcourse.lab.admission import admissions, on_trial, table
-from kfcourse.lab.short_names import FILTERS, LAB, has_bound, lab_filters
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, LAB, has_bound, lab_filters
 from kfcourse.laws import gain
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare, without_failing
@@ -96,6 +99,29 @@ def test_a_trial_tells_a_filter_from_the_model():
     broken = replace(good, one=replace(good.one, step=step))
     (one,) = on_trial(model, [broken])
     assert one.verdict == "poor" and one.says == "on a trial of 512 trajectories it left the finite numbers"
+
+
+@pytest.mark.parametrize(
+    ("variant", "filters", "all_of_them"),
+    [("53", "aof-gaussian,duof", FILTERS), ("J1", "imm,aof-jump-gaussian,duof", JUMP_FILTERS)],
+)
+def test_the_lab_looks_at_each_filter_once(variant, filters, all_of_them, tmp_path, monkeypatch):
+    """Those compared, then the others for the report's table; the student's report and its modes take what is there."""
+    looked, look = [], admission._admitted
+    monkeypatch.setattr(admission, "_admitted", lambda name, structures: looked.append(name) or look(name, structures))
+    few = ["--runs", "40", "--steps", "2", "--slow-runs", "0", "--designs", "1", "--report", "en", "--out", str(tmp_path)]
+    result = CliRunner().invoke(cli.main, ["lab", variant, "--filters", filters, *few])
+    assert result.exit_code == 0, result.output
+    assert looked[: filters.count(",") + 1] == filters.split(",") and sorted(looked) == sorted(all_of_them)
+    assert (tmp_path / "handin-modes.svg").exists() == (variant == "J1")
+
+
+def test_formulas_that_were_not_derived_in_time_are_not_derived_again():
+    model = Model.define("0.9*x + v", "(1 + x)**14 + w")
+    known = admissions(model, ["aof-gaussian"], seconds=0.01)
+    found = admissions(model, ["fos-gaussian", "aof-gaussian", "duof"], seconds=60, known=known)
+    assert [one.name for one in found] == ["fos-gaussian", "aof-gaussian", "duof"]
+    assert [one.reason for one in found] == [known[0].reason] * 2 + [""] and "within 0.01 s" in known[0].reason
 
 
 def test_an_unknown_filter_is_refused():

@@ -13,6 +13,7 @@ from kfcourse.filters.jump_equations import number, square, vector
 from kfcourse.lab import Variant, find_variant
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.handin import LANGUAGES, write_handin
+from kfcourse.lab.report import recognised_modes
 from kfcourse.laws import Measurement, log_density
 
 MODEL = JumpModel.define(
@@ -84,7 +85,7 @@ def written(request, tmp_path_factory):
     filters = [one.one for one in admissions(model, names)]
     result = compare(filters, model, 1000, 3, 1, slow_runs=128, progress=False, threads=1)
     folder = tmp_path_factory.mktemp(request.param)
-    paths = write_handin(find_variant("J1-lasting"), result, folder, request.param)
+    paths = write_handin(find_variant("J1-lasting"), result, folder, request.param, recognised_modes(result, filters))
     texts = [(folder / name).read_text(encoding="utf-8") for name in ("handin.tex", "handin.html")]
     return request.param, *texts, {path.name for path in paths}
 

@@ -23,13 +23,13 @@ from kfcourse.filters.exact.kernels import Grid, Kernels, Unresolved
 from kfcourse.filters.exact.merging import MERGED
 from kfcourse.filters.exact.panels import PANEL_NODES, SPLITS, Rule, resolve
 from kfcourse.filters.exact.places import Candidates, explanations
+from kfcourse.filters.exact.roots import halved
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
 FAR = 37.0  # sigmas covered where a measurement contradicts the prediction: exp(-37^2 / 2) is the smallest number
 KERNEL = 3.0  # a panel is at most so many sigmas of the transition kernel wide, that the integral be smooth on it
-LAST_BIT = {"xtol": np.finfo(float).tiny, "rtol": 4 * np.finfo(float).eps, "maxiter": 2000}  # of a zero
 SCALES = (0.5, 2.0, WIDTH)  # distances, in kernel sigmas, of panel borders from the prediction's own centres
 QUANTILES = np.array([0.02, 0.25, 0.5, 0.75, 0.98])  # of the posterior, where those centres are
 BORDER = 1e-10  # of the density at the ends of the support, relative: beyond them there must be nothing
@@ -159,15 +159,11 @@ def adaptive_pointmass(model: Model, order: int = 8, tolerance: float = 1e-5) ->
 
     def step(state: State, y: Array) -> State:
         law = densities.at(state.step)
-        bayes = _Bayes(law, _wider_than_kernels(law))
         before = state.memory or ([None] * len(y), [None] * len(y))
         try:
             after = Panels(
                 *(
-                    [
-                        bayes.corrected(*kernels(grid, state.step), float(value), rule)[0]
-                        for grid, value in zip(grids, y[:, 0], strict=True)
-                    ]
+                    [_corrected(kernels(grid, state.step), one, law, rule) for grid, one in zip(grids, y, strict=True)]
                     for grids, rule in zip(before, rules, strict=True)
                 )
             )
@@ -198,64 +194,46 @@ def _wider_than_kernels(law: ScalarDensities) -> Callable[[Array, Array], Array]
     return too_wide
 
 
-class _Bayes:
-    """One step of the Stratonovich equation for one trajectory."""
+def _corrected(prediction: tuple[Array, Array, Array], y: Array, law: ScalarDensities, rule: Rule) -> Grid:
+    """The posterior of one trajectory: a prediction that is a sum of normal kernels (M,), corrected with y (1,).
 
-    def __init__(self, law: ScalarDensities, too_wide: Callable[[Array, Array], Array]):
-        self.too_wide = too_wide
-        self.residual: Callable[[float, Array], Array] = lambda y, x: law.residual(np.array(y), x)
-        self.log_likelihood: Callable[[float, Array], Array] = lambda y, x: law.log_likelihood(np.array([y]), x)
+    Where the measurement contradicts the prediction by more than `FAR` sigmas, what is within `WIDTH` of them.
+    """
+    mu, sigma, mass = prediction
 
-    def corrected(
-        self,
-        mu: Array,
-        sigma: Array,
-        mass: Array,
-        y: float,
-        rule: Rule,
-    ) -> tuple[Grid, bool]:
-        """The posterior: a prediction that is a sum of normal kernels (M,), corrected with y; and whether it is complete.
+    def log_density(x: Array) -> Array:
+        if x.size > PANEL_NODES or x.size * mu.size > WORK:
+            raise Unresolved(f"the posterior needs more than {x.size:,} nodes, the prediction is a sum of {mu.size:,} kernels")
+        return _log_mixture(x, mu, sigma, mass) + law.log_likelihood(y, x)
 
-        It is not where the measurement contradicts the prediction by more than `FAR` sigmas.
-        """
+    def within(width: float) -> tuple[Grid, bool]:
+        """And whether it is complete."""
+        borders = _prediction_borders(mu, sigma, mass, width)
+        if not np.isnan(y):
+            borders = np.union1d(borders, _towards_explanations(borders, y, law))
+        if len(borders) < 2:  # a prior without variance, or a support narrower than rounding: the state is known
+            return Grid(borders, np.ones(1), np.full(1, 1e300)), True
+        grid, _ = resolve(borders[None], lambda x, _: log_density(x[0])[None], _wider_than_kernels(law), rule)[0]
+        return grid, not _cut_off(grid, borders)
 
-        def log_density(x: Array) -> Array:
-            if x.size > PANEL_NODES or x.size * mu.size > WORK:
-                raise Unresolved(
-                    f"the posterior needs more than {x.size:,} nodes, the prediction is a sum of {mu.size:,} kernels"
-                )
-            return _log_mixture(x, mu, sigma, mass) + self.log_likelihood(y, x)
+    near, complete = within(WIDTH)
+    if complete:
+        return near
+    far, complete = within(FAR)
+    return far if complete else near
 
-        def between(borders: Array) -> tuple[Grid, bool]:
-            if not np.isnan(y):
-                borders = np.union1d(borders, self._explanations(borders, y))
-            if len(borders) < 2:  # a prior without variance, or a support narrower than rounding: the state is known
-                return Grid(borders, np.ones(1), np.full(1, 1e300)), True
-            grid, _ = resolve(borders[None], lambda x, _: log_density(x[0])[None], self.too_wide, rule)[0]
-            return grid, not _cut_off(grid, borders)
 
-        near, complete = between(_prediction_borders(mu, sigma, mass, WIDTH))
-        if complete:
-            return near, True
-        far, complete = between(_prediction_borders(mu, sigma, mass, FAR))
-        return (far, True) if complete else (near, False)
-
-    def _explanations(self, borders: Array, y: float) -> Array:
-        """Panel borders that approach, by halves, every state that explains y without noise."""
-        x = np.unique(np.concatenate([borders, 0.5 * (borders[1:] + borders[:-1])]))
-        residual = self.residual(y, x)
-        result = []
-        for i in np.flatnonzero(np.signbit(residual[1:]) != np.signbit(residual[:-1])):
-            root = scipy.optimize.brentq(lambda at: self.residual(y, np.array([at]))[0], x[i], x[i + 1], **LAST_BIT)
-            offsets = (borders[-1] - borders[0]) * 0.5 ** np.arange(SPLITS)
-            near = np.concatenate([root - offsets, root + offsets])
-            # Stop approaching where the log-likelihood has become flat.
-            drop = self.log_likelihood(y, np.array([root])) - self.log_likelihood(y, near)
-            flat = (drop < 0.5).reshape(2, -1).all(axis=0)
-            last = int(np.argmax(flat)) + 1 if flat.any() else SPLITS
-            result += [root - offsets[:last], root + offsets[:last]]
-        found = np.concatenate([*result, np.empty(0)])
-        return found[(found > borders[0]) & (found < borders[-1])]
+def _towards_explanations(borders: Array, y: Array, law: ScalarDensities) -> Array:
+    """Panel borders that approach, by halves, every state that explains y without noise."""
+    x = np.unique(np.concatenate([borders, 0.5 * (borders[1:] + borders[:-1])]))
+    negative = np.signbit(law.residual(y, x))
+    left = np.flatnonzero(negative[1:] != negative[:-1])
+    root = np.mean(halved(lambda at: np.signbit(law.residual(y, at)), x[left], x[left + 1], SPLITS), axis=0)[:, None, None]
+    near = root + (borders[-1] - borders[0]) * np.array([[-1], [1]]) * 0.5 ** np.arange(SPLITS)
+    # Stop approaching where the log-likelihood has become flat.
+    flat = (law.log_likelihood(y, root) - law.log_likelihood(y, near) < 0.5).all(axis=1, keepdims=True)
+    found = near[np.broadcast_to(np.cumsum(flat, axis=2) - flat == 0, near.shape)]
+    return found[(found > borders[0]) & (found < borders[-1])]
 
 
 def _cut_off(grid: Grid, borders: Array) -> bool:

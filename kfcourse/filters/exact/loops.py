@@ -266,7 +266,10 @@ def _seen(law, c, y, x, count, kernels, kernel, parts, powers, many, found, show
 
 @njit(**_ANY_ORDER)
 def _explanations(law, c, of_noise, y, place, few, shown):
-    """`explanations`: the roots of b(x, m_w) = y in the support, those nearest to the middle, in few[2]; how many."""
+    """`explanations`: the roots of b(x, m_w) = y in the support, those nearest to the middle, in few[2]; how many.
+
+    Its halving is that of `roots.halved`, which takes arrays and a function, written for one bracket, as numba compiles it.
+    """
     at, root, left, right, far, residual, slope = few[0], few[2], few[3], few[4], few[5], shown[0], shown[3]
     known = 0
     for i in range(1, SEARCHED):
