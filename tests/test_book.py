@@ -508,14 +508,19 @@ def test_the_keyboard_scrolls_what_is_wider_than_its_box(browser):
     assert found == {(True, 0), (False, -1)}
 
 
-def test_the_columns_of_a_folder_s_files_stay_columns_on_a_telephone(browser):
-    """Its lines do not wrap; the box scrolls, and the page does not."""
-    with browser.new_context(offline=True, viewport={"width": 390, "height": 900}) as context:
+@pytest.mark.parametrize("width", [390, 1280])
+def test_the_names_of_a_folder_s_files_stand_whole_in_a_column(browser, width):
+    """And so do those of a class's fields; the page does not scroll sideways."""
+    with browser.new_context(offline=True, viewport={"width": width, "height": 900}) as context:
         tab = context.new_page()
         tab.goto((HTML / "package" / "kfcourse.filters.html").as_uri())
-        files = tab.locator("article > section > .highlight-text pre").first
-        lines = files.evaluate("e => e.clientHeight / parseFloat(getComputedStyle(e).lineHeight)")
-        assert lines < files.inner_text().count("\n") + 3
+        tab.evaluate(LAY_OUT)
+        lines = "all => all.map(e => e.getClientRects().length)"
+        columns = tab.locator("article > section > .pst-scrollable-table-container table.kf-names td:first-child code")
+        fields = tab.locator("article dl.field-list dt > strong:not(:text-matches(','))")
+        assert columns.count() > 15 and set(columns.evaluate_all(lines)) == {1}
+        line = "all => all.map(e => e.clientHeight / parseFloat(getComputedStyle(e).lineHeight))"
+        assert fields.count() > 15 and max(fields.evaluate_all(line)) < 1.5
         assert tab.evaluate(FIT)["page"] <= 0
 
 
