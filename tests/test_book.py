@@ -533,6 +533,31 @@ def test_words_out_of_sight_are_found(browser):
         tab.wait_for_function("scrollY > 2000")
 
 
+# What has no thousands to part: code, formulas, years and volumes.
+NO_NUMBERS = "pre, code, script, style, svg, .math, .kf-live, .citation, iframe"
+# Spaces between thousands, nothing where there are five digits, a comma where there are four.
+THOUSANDS = re.compile(
+    r"(?<![\w.,])(?:\d{1,3}(?:[ \u00a0\u2009\u202f]\d{3})+|\d{5,}|\d,\d{3}(?!,\d))(?!\w)(?=(.{0,30}))", re.DOTALL
+)
+
+
+def test_what_is_no_way_to_write_thousands_is_seen():
+    wrong = ("50 000 runs", "50\u202f000 runs", "195959 px/s²", "12908.4 m", "of 3,000 runs", "1 000 000 in all")
+    right = ("50,000 runs", "1,000,000 in all", "9999 runs", "0.00001", "steps 0, 10, 200", "1871-1970", "9,10,200")
+    assert [bool(THOUSANDS.search(text)) for text in (*wrong, *right)] == [True] * len(wrong) + [False] * len(right)
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if not page.startswith("package/")])  # docstrings are code
+def test_thousands_are_parted_by_commas(page: str) -> None:
+    """Of five digits and more, in words, tables and what is said of pictures: 9999, 10,000."""
+    article = BeautifulSoup((HTML / f"{page}.html").read_text(encoding="utf-8"), "html.parser").article
+    said = [image.get("alt", "") for image in article.find_all("img")]
+    for one in article.select(NO_NUMBERS):
+        one.decompose()
+    text = "\n".join([article.get_text("\n"), *said])
+    assert [found[0] + found[1] for found in THOUSANDS.finditer(text)] == []
+
+
 @pytest.mark.parametrize("page", [WHOLE, "comparison", "manual/r-loop"])
 def test_a_formula_stays_with_its_comma(page):
     """And with its bracket and its unit: no text that begins behind a formula begins with a mark or a unit."""
