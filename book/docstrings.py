@@ -4,7 +4,7 @@ They are plain text.  Before numpydoc reads them, characters with a meaning in r
 
 - a paragraph that is indented, or begins with a formula and ends without a full stop, is an equation, which `plain.py` sets;
 - what is indented behind "::" is a program, a picture, or what else stands as it is;
-- lines of two columns, parted by two spaces or more, are a table of names, and stand as they are.
+- lines of two columns, parted by two spaces or more, are a table of names, which may go on in lines that are indented.
 
 The sections (Parameters, Returns, ...) are numpydoc's.
 """
@@ -16,6 +16,7 @@ import re
 import plain
 
 COLUMNS = re.compile(r"[^\s.:;!?] {2,}\S|^ {2,}\S")  # two spaces after a full stop are between sentences
+PARTED = re.compile(r"(?<=[^\s.:;!?]) {2,}(?=\S)")
 INDENT = "    "
 SPECIAL = re.compile(r"(?!^\s*\* )([*|\\]|(?<=\w)_(?=\W|$))")
 QUOTED = re.compile(r"(`+[^`]+`+)")
@@ -48,12 +49,21 @@ def to_restructured(lines: list[str]) -> list[str]:
         if kind == "equations":
             result += [".. equations::", "", *(INDENT + row for row in rows), ""]
         elif kind == "names":
-            result += ["::", "", *(INDENT + row for row in rows), ""]
+            result += table(rows)
         elif kind == "verbatim":
             result += [*rows, ""]
         else:
             result += [*map(escape, rows), ""]
     return result
+
+
+def table(rows: list[str]) -> list[str]:
+    """The table of names: each, and what is said of it."""
+    entries = re.sub(r"\n +", " ", "\n".join(rows)).split("\n")
+    result = [".. list-table::", "   :class: kf-names", ""]
+    for name, said in (PARTED.split(entry, maxsplit=1) for entry in entries):
+        result += [f"   * - ``{name.replace('`', '')}``", f"     - {escape(said)}"]
+    return [*result, ""]
 
 
 def escape(row: str) -> str:

@@ -524,14 +524,22 @@ def test_the_keyboard_scrolls_what_is_wider_than_its_box(browser):
     assert found == {(True, 0), (False, -1)}
 
 
-def test_the_columns_of_a_folder_s_files_stay_columns_on_a_telephone(browser):
-    """Its lines do not wrap; the box scrolls, and the page does not."""
-    with browser.new_context(offline=True, viewport={"width": 390, "height": 900}) as context:
+@pytest.mark.parametrize("width", [390, 1280])
+def test_the_names_of_a_folder_s_files_stand_whole_in_a_column(browser, width):
+    """And so do those of a class's fields; the page does not scroll sideways."""
+    with browser.new_context(offline=True, viewport={"width": width, "height": 900}) as context:
         tab = context.new_page()
         tab.goto((HTML / "package" / "kfcourse.filters.html").as_uri())
-        files = tab.locator("article > section > .highlight-text pre").first
-        lines = files.evaluate("e => e.clientHeight / parseFloat(getComputedStyle(e).lineHeight)")
-        assert lines < files.inner_text().count("\n") + 3
+        tab.evaluate(LAY_OUT)
+        lines = """all => all.map(e => {
+            const text = document.createRange();
+            text.selectNodeContents(e);
+            return new Set([...text.getClientRects()].map(one => Math.round(one.bottom))).size;
+        })"""
+        columns = tab.locator("article > section > .pst-scrollable-table-container table.kf-names td:first-child code")
+        fields = tab.locator("article dl.field-list dt > strong:not(:text-matches(','))")
+        assert columns.count() > 15 and set(columns.evaluate_all(lines)) == {1}
+        assert fields.count() > 15 and set(fields.evaluate_all(lines)) == {1}
         assert tab.evaluate(FIT)["page"] <= 0
 
 
@@ -542,6 +550,31 @@ def test_words_out_of_sight_are_found(browser):
         tab.goto((HTML / "comparison.html").as_uri())
         assert tab.evaluate("scrollY") == 0 and tab.evaluate("window.find('Key points')")
         tab.wait_for_function("scrollY > 2000")
+
+
+# What has no thousands to part: code, formulas, years and volumes.
+NO_NUMBERS = "pre, code, script, style, svg, .math, .kf-live, .citation, iframe"
+# Spaces between thousands, nothing where there are five digits, a comma where there are four.
+THOUSANDS = re.compile(
+    r"(?<![\w.,])(?:\d{1,3}(?:[ \u00a0\u2009\u202f]\d{3})+|\d{5,}|\d,\d{3}(?!,\d))(?!\w)(?=(.{0,30}))", re.DOTALL
+)
+
+
+def test_what_is_no_way_to_write_thousands_is_seen():
+    wrong = ("50 000 runs", "50\u202f000 runs", "195959 px/s²", "12908.4 m", "of 3,000 runs", "1 000 000 in all")
+    right = ("50,000 runs", "1,000,000 in all", "9999 runs", "0.00001", "steps 0, 10, 200", "1871-1970", "9,10,200")
+    assert [bool(THOUSANDS.search(text)) for text in (*wrong, *right)] == [True] * len(wrong) + [False] * len(right)
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if not page.startswith("package/")])  # docstrings are code
+def test_thousands_are_parted_by_commas(page: str) -> None:
+    """Of five digits and more, in words, tables and what is said of pictures: 9999, 10,000."""
+    article = BeautifulSoup((HTML / f"{page}.html").read_text(encoding="utf-8"), "html.parser").article
+    said = [image.get("alt", "") for image in article.find_all("img")]
+    for one in article.select(NO_NUMBERS):
+        one.decompose()
+    text = "\n".join([article.get_text("\n"), *said])
+    assert [found[0] + found[1] for found in THOUSANDS.finditer(text)] == []
 
 
 @pytest.mark.parametrize("page", [WHOLE, "comparison", "manual/r-loop"])

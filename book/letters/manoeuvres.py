@@ -54,6 +54,7 @@ SAID = {
     "r_x": NOTATION,
     "r_y": NOTATION,
     "r_z": NOTATION,
+    r"\mu_{1\mid1}-\mu_{1\mid2}": NOTATION,
     r"\frac{\sin\eta}{\eta}-\frac{\eta^4}{120}+\dots": "a series",
 }
 EQUALS = {

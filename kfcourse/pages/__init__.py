@@ -10,7 +10,7 @@ letters       numbers for the letters that many pages share
 sentences     numbers and words in the sentences of a page
 exponents     squares completed in the exponents of normal laws
 tables        tables of numbers
-units         the unit of a label in brackets
+units         the unit of a label in brackets, long numbers
 figures       the style of the figures, labels at the ends of curves
 diagram       block diagrams from a description
 flights       pictures and tables of a flight and its estimates

@@ -15,7 +15,7 @@ from matplotlib.font_manager import fontManager
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
-from matplotlib.ticker import AutoLocator
+from matplotlib.ticker import MaxNLocator
 from matplotlib_inline.backend_inline import set_matplotlib_formats
 
 from kfcourse.pages.captions import drawn
@@ -90,12 +90,12 @@ def book_style(ground: str = "none") -> None:
 
 
 def whole_steps(figure: Figure) -> None:
-    """No marks between the steps on axes that count them: "step", "step $k$", "steps apart", "step $k$ (5 ms each)"."""
+    """Marks at steps, by 1, 2, 5, 10, on axes that count them: "step", "step $k$", "steps apart", "step $k$ (5 ms each)"."""
     for ax in figure.axes:
         for axis in (ax.xaxis, ax.yaxis):
             locator = axis.get_major_locator()
-            if isinstance(locator, AutoLocator) and COUNTED.fullmatch(axis.get_label_text()):
-                locator.set_params(integer=True)
+            if isinstance(locator, MaxNLocator) and COUNTED.fullmatch(axis.get_label_text()):
+                locator.set_params(integer=True, steps=[1, 2, 5, 10])
 
 
 def lay_narrow(figure: Figure) -> bool:

@@ -22,8 +22,8 @@ COMPARING = re.compile(
     r"\b(larger|smaller|more|less|most|least|none|never|always|all|every|each|no|worse|better|best|worst|above|below|lower|higher|"
     r"narrower|wider|only|falls?|grows?|rises?|faster|slower|sooner|later|leads|first|last|same|agree|equal)\b"
 )
-_NUMBER = re.compile(r"(?<![\w.^_{\\])(\d+(?:[ \u00a0]\d{3})*(?:\.\d+)?)")
-_TOLD = re.compile(r"(?<![\w.^_\\{])(?:\d+\.\d+|\d{1,3}(?:[,\u00a0 ]\d{3})+|\d{2,})(?!\w|[.-]\w|\})")
+_NUMBER = re.compile(r"(?<![\w.^_{\\])(\d{1,3}(?:,\d{3})+(?:\.\d+)?|\d+(?:\.\d+)?)")
+_TOLD = re.compile(r"(?<![\w.^_\\{])(?:\d+\.\d+|\d{1,3}(?:,\d{3})+|\d{2,})(?!\w|[.-]\w|\})")
 _NO_PROSE = re.compile(
     r"\A---\n.*?\n---\n|^```(?:text|toml|console|python|\{chapter\})\n.*?^```|``?[^`\n]+``?|<[^>]+>|\]\([^)]*\)"
     r"|\b(?:[Vv]ariants?|[Ll]ectures?|Python) \d[\d.]*(?: and \d+)?",
@@ -61,7 +61,7 @@ def told(page: str) -> list[str]:
         known |= _constants(ast.parse(code), set())
         prose = prose.replace(code, "")
     found = _TOLD.findall(_NO_PROSE.sub("", prose))
-    values = [float(re.sub(r"[,\u00a0 ]", "", number)) for number in found]
+    values = [float(number.replace(",", "")) for number in found]
     known |= {round(100 * one, 9) for one in known}  # a percentage
     return [number for number, value in zip(found, values, strict=True) if value not in known]
 
@@ -80,7 +80,7 @@ def _numbers(text: str) -> Iterator[str]:
             yield f"1e{''.join(power)}"
         yield from (value[1] for part in re.split(r"[,;]|\\ ", formula) if (value := _VALUE.search(part)))
     for number in _NUMBER.findall(_FORMULA.sub(" ", text)):
-        yield re.sub(r"[ \u00a0]", "", number)
+        yield number.replace(",", "")
 
 
 def _constants(tree: ast.AST, without: set[int]) -> set[float]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kfcourse.pages.units import in_brackets
+from kfcourse.pages.units import by_thousands, in_brackets
 from kfcourse.pages.verification import Shown
 
 
@@ -51,4 +51,4 @@ def _cell(entry: Any, style: str) -> str:
         return " ± ".join(_cell(part, style if number == 0 else style.replace("+", "")) for number, part in enumerate(entry))
     if isinstance(entry, float | np.floating) and np.isnan(entry):
         return "–"
-    return format(entry, style).replace("-", "−").replace("%", "\u00a0%")  # as `claim` writes it
+    return by_thousands(format(entry, style)).replace("-", "−").replace("%", "\u00a0%")  # as `claim` writes it

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from kfcourse.pages.units import by_thousands
 from kfcourse.symbolic.typesetting import Equation, Side, equation_latex, side_lines
 from kfcourse.symbolic.writing import number_latex
 
@@ -154,6 +155,7 @@ def agree(sentence: str, computed: Any, expected: Any, within: float, relative: 
 
 
 _MINUS = re.compile(r"(?<![^\s(])-(?=\d)")
+_NO_WORDS = re.compile(r"(\$[^$]*\$|`[^`]*`)")  # formulas and code in a sentence
 _POWER_OF_TEN = re.compile(r"(?<![\w.])\d(?:\.\d+)?e[-+]\d+(?!\w)")
 
 
@@ -163,9 +165,9 @@ def _typeset(number: re.Match[str]) -> str:
 
 def _holds(sentence: str) -> Shown:
     sentence = re.sub(r"(?<=\d)%", "\u00a0%", sentence)  # as the book writes it; Python's format leaves no space
-    parts = sentence.split("$")
-    parts[::2] = (_POWER_OF_TEN.sub(_typeset, _MINUS.sub("−", text)) for text in parts[::2])  # those that are no formulas
-    sentence = "$".join(parts)
+    parts = _NO_WORDS.split(sentence)
+    parts[::2] = (by_thousands(_POWER_OF_TEN.sub(_typeset, _MINUS.sub("−", text))) for text in parts[::2])
+    sentence = "".join(parts)
     return Shown(f'{sentence}\u00a0<span class="kf-claim">✓</span>', {"sentence": sentence, "equations": 0})
 
 

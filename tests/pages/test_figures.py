@@ -13,6 +13,7 @@ from matplotlib import font_manager, rcParams
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.ticker import MaxNLocator
 
 from kfcourse.pages import book_style, label_ends
 from kfcourse.pages.figures import FONTS, NARROW, lay_narrow
@@ -53,6 +54,18 @@ def test_marks_of_an_axis_that_counts_steps_are_whole_numbers(style, label):
         InteractiveShell.instance().display_formatter.format(one)
     marks = [ax.get_xticks() for ax in (*axes, time, chosen)]
     assert [bool((one == one.round()).all()) for one in marks] == [True, True, False, False]
+    plt.close("all")
+
+
+def test_marks_of_21_steps_do_not_end_behind_the_last(style):
+    """The lab's axis went by threes, to 21, where the steps end at 20."""
+    figure, ax = plt.subplots()
+    ax.plot(range(21))
+    ax.set_xlabel("step $k$")
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    InteractiveShell.instance().display_formatter.format(figure)
+    low, high = ax.get_xlim()
+    assert [mark for mark in ax.get_xticks() if low <= mark <= high] == [0, 5, 10, 15, 20]
     plt.close("all")
 
 

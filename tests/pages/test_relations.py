@@ -61,7 +61,7 @@ def test_a_changed_digit_of_prose_or_of_a_figure_is_noticed():
     page = """---
 version: 3.11
 ---
-Falls to $0.27$, from 2.5 on; 95.5 % of `0.9` and [1](a0.5.md). Variant 53 has 95 % of 20 000 at the 40 steps.
+Falls to $0.27$, from 2.5 on; 95.5 % of `0.9` and [1](a0.5.md). Variant 53 has 95 % of 20,000 at the 40 steps.
 
 ```{code-cell} python
 ---
@@ -78,8 +78,9 @@ c = 0.125
 """
     assert told(page) == []
     decimals = ("0.27$", "0.28$"), ("2.5 on", "2.6 on"), ("95.5 %", "94.5 %"), ("4.7 px", "3.7 px")
-    for right, wrong in (*decimals, ("95 %", "90 %"), ("20 000", "30 000"), ("the 40", "the 41")):
+    for right, wrong in (*decimals, ("95 %", "90 %"), ("20,000", "30,000"), ("the 40", "the 41")):
         assert len(told(page.replace(right, wrong))) == 1
+    assert told(page.replace("20,000", "20 000")), "thousands are parted by commas, and by nothing else"
 
 
 def letters(rng: np.random.Generator) -> dict[str, float]:
@@ -141,6 +142,8 @@ def test_a_number_without_an_expression_is_found():
     cell = '```{code-cell} python\nclaim(f"To 12 digits 7 of {n:.3f} are larger at $k=2$.", abs(x[2] - y) < 1e-12)\n```\n'
     (sentence,) = spoken(cell)
     assert sentence.unknown == ["7"] and sentence.compares
+    (typed,) = spoken(cell.replace("7 of", "20,000 of 30 000, 7 of").replace("x[2]", "x[2] + 20_000"))
+    assert typed.unknown == ["30", "000", "7"]
     (empty,) = spoken('```{code-cell} python\nclaim("It is larger.", True)\n```\n')
     assert not empty.compares
 

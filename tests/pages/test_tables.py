@@ -20,6 +20,7 @@ def test_a_table_aligns_numbers_and_marks_what_is_not_there() -> None:
     )
     assert "| +1.0 |" in table({"D": [1.0]}, {"D": "+.1f"}).markdown
     assert "| 12.5\u00a0% |" in table({"D": [0.125]}, ".1%").markdown
+    assert "| 9999 |\n| −12,908.4 |" in table({"D": [9999, -12908.4]}).markdown
 
 
 def test_columns_of_a_table_have_one_length() -> None:

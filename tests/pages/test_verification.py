@@ -118,6 +118,8 @@ def test_claims_hold_or_raise() -> None:
     assert shown.startswith(r"From $10^{-9}$ to $7.2 \cdot 10^{12}$, $1e-9$ and the variant a1e3.")
     shown = claim(f"It is {-0.26:+.2f} (-3 before), {-2e-5:.0e} in the years 1960-61, $x_k-1$ and `a[-1]`.", True).markdown
     assert shown.startswith(r"It is −0.26 (−3 before), −$2 \cdot 10^{-5}$ in the years 1960-61, $x_k-1$ and `a[-1]`.")
+    shown = claim(f"{195959} of {9999} or {12908.44:.1f}, 0.123456, $x=10000$ and `runs=20000`.", True).markdown
+    assert shown.startswith("195,959 of 9999 or 12,908.4, 0.123456, $x=10000$ and `runs=20000`.")
     with pytest.raises(Unverified, match=r"condition 2 of 2.*The gain"):
         claim("The gain is below 0.7.", True, np.array([True, False]))
 
