@@ -21,6 +21,8 @@ from sympy.printing.precedence import PRECEDENCE
 from kfcourse.symbolic.formula import NO_NUMBERS
 from kfcourse.symbolic.reading import ModelError
 
+SHORT = 50  # operations of formulas whose common factors are taken out
+
 
 @dataclass(frozen=True)
 class Program:
@@ -134,9 +136,13 @@ def lower(
     definitions: Mapping[sp.Symbol, sp.Expr],
     factor: bool = True,
 ) -> Program:
-    """Common subexpressions, with common factors taken out, and small integer powers as elementary assignments."""
+    """Common subexpressions, with common factors taken out of short formulas, and small integer powers as elementary assignments.
+
+    Of long ones factors would hide common subexpressions, and take most of the time: variant 20 needs 65 operations, not 71.
+    """
     names = sp.numbered_symbols("s", cls=sp.Dummy)
     everything = [*definitions.values(), *(sp.Matrix(m) for m in outputs.values())]
+    factor = factor and sum(int(sp.count_ops(entry)) for entry in sp.flatten(everything)) <= SHORT
     found, reduced = sp.cse(everything, symbols=names, optimizations="basic" if factor else None)
     shared = _in_order([*found, *zip(definitions, reduced[: len(definitions)], strict=True)])
     assignments: list[tuple[sp.Symbol, sp.Expr]] = []

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from kfcourse.symbolic.codegen import compile_function
+from kfcourse.lab.variants import find_variant
+from kfcourse.symbolic import codegen
+from kfcourse.symbolic.codegen import compile_function, lower
+from kfcourse.symbolic.structure import gaussian, linearised
 
 pytestmark = pytest.mark.quick
 
@@ -77,6 +80,25 @@ def test_each_power_is_computed_once():
         "f", ARGUMENTS, {"a": sp.Matrix([x1**6 + x1**3]), "b": sp.Matrix([x1**2 * x2])}, ["x", "a", "b"]
     ).source
     assert body.count("*") - body.count('"*') <= 5  # x^2, x^3, x^6, x^2 x2, and nothing twice
+
+
+@pytest.mark.parametrize("name", ["20", "21", "J2"])
+def test_common_factors_of_long_formulas_would_be_no_help(name, monkeypatch):
+    """Not taken out, the functions need fewer operations."""
+    model = find_variant(name).model
+    model = getattr(model, "modes", (model,))[0]
+
+    def operations(structure):
+        formulas = {name: one.subs(model.values) for name, one in structure.formulas.functions.items()}
+        program = lower(formulas, ["tau", "h"], {})
+        entries = [value for _, value in program.assignments] + sp.flatten(program.outputs.values())
+        return sum(int(sp.count_ops(one)) for one in entries)
+
+    for structure in (linearised(model), gaussian(model)):
+        ours = operations(structure)
+        with monkeypatch.context() as patch:
+            patch.setattr(codegen, "SHORT", np.inf)
+            assert ours < operations(structure)
 
 
 def test_leading_axes_broadcast(ensemble):
