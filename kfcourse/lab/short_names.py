@@ -142,15 +142,15 @@ def _found(quadrature: Checked | NoClosedForm) -> list[Structure]:
     return quadrature.structures
 
 
-Of = TypeVar("Of", Structures, JumpStructures)
+AnyStructures = TypeVar("AnyStructures", Structures, JumpStructures)
 
 
-class Entry(NamedTuple, Generic[Of]):
+class Entry(NamedTuple, Generic[AnyStructures]):
     """A filter of the lab, or of those for models that jump: printed names and how to build it."""
 
     title: str
     russian: str
-    build: Callable[[Of], Filter | Design]
+    build: Callable[[AnyStructures], Filter | Design]
 
 
 def _twice(short: str, build: Callable[[Structure], Filter | Design], russian: str = "") -> dict[str, Entry[Structures]]:
