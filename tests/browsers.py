@@ -7,7 +7,7 @@ import pytest
 
 from kfcourse.notebooks.execution import BROWSERS
 
-# The suggestions of the address bar, which nobody sees here, are two pages of their own in each window: a second of processor time.
+# The suggestions of the address bar, which nobody sees here, are two pages of their own in each window: a CPU-second.
 WITHOUT = "--disable-features=WebUIOmniboxPopup,WebUIOmniboxAimPopup"
 
 
