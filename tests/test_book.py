@@ -158,6 +158,28 @@ def window(only_tab):
 
 # What is out of sight, too (page.js).
 LAY_OUT = "document.documentElement.classList.add('kf-whole'); document.body.offsetHeight"
+
+
+def laid_out(tab, page) -> None:
+    """Open the page, laid out to its end: what the mouse is sent to stays where it was found."""
+    tab.goto((HTML / f"{page}.html").as_uri())
+    tab.evaluate(LAY_OUT)
+
+
+def hover(tab, link) -> None:
+    """The mouse goes to the link until what it leads to is shown: on a busy machine the page may move under it the first time."""
+    from playwright.sync_api import TimeoutError as Late
+
+    for attempt in range(4):
+        link.hover()
+        try:
+            return tab.locator("#kf-preview").wait_for(timeout=5_000)
+        except Late:
+            if attempt == 3:
+                raise
+            tab.mouse.move(0, 0)
+
+
 # Pictures that are shown wider or higher than they are, by more than the rounding of small ones.
 SQUEEZED = """() => [...document.querySelectorAll("article img")]
   .filter(e => Math.abs(e.clientWidth / e.clientHeight / (e.naturalWidth / e.naturalHeight) - 1) > 0.05).map(e => e.src)"""
@@ -341,15 +363,16 @@ def test_a_reference_shows_what_it_leads_to(window):
     """Under the mouse and on the keyboard's way, not under a finger; Escape closes it, and the link stays a link."""
     tab, problems = window
     show_on(tab, "screen", 1280)
-    tab.goto((HTML / "comparison.html").as_uri())
+    laid_out(tab, "comparison")
     box = tab.locator("#kf-preview")
     formula = tab.locator('article a.reference.internal[href^="#equation-"]').first
     figure = tab.locator('article a.reference.internal[href^="#fig-"]').first
-    formula.hover()
+    hover(tab, formula)
     box.locator("mjx-container").wait_for()
     assert "#" not in box.inner_text()  # the mark beside a number, which is a link
     tab.keyboard.press("Escape")
     assert not box.is_visible()
+    tab.mouse.move(0, 0)  # or it enters what the focus, as it moves the page, brings under it
     figure.focus()
     tab.keyboard.press("Shift+Tab")
     tab.keyboard.press("Tab")
@@ -655,13 +678,13 @@ def test_what_a_link_to_another_page_leads_to_is_shown_too(window):
     """Equations are set, terms say what they mean, in both languages; nothing is loaded but what is there."""
     tab, problems = window
     show_on(tab, "screen", 1280)
-    tab.goto((HTML / "grid.html").as_uri())
+    laid_out(tab, "grid")
     box = tab.locator("#kf-preview")
-    tab.locator('article a.reference.internal[href^="stratonovich.html#equation-"]').first.hover()
+    hover(tab, tab.locator('article a.reference.internal[href^="stratonovich.html#equation-"]').first)
     box.locator("mjx-container").wait_for()
     assert "(1." in box.inner_text() and box.locator("[id], a").count() == 0
     tab.keyboard.press("Escape")
-    tab.locator('article a.kf-term[href="glossary.html#term-likelihood"]').hover()
+    hover(tab, tab.locator('article a.kf-term[href="glossary.html#term-likelihood"]'))
     box.get_by_text("likelihood", exact=True).wait_for()
     assert "функция правдоподобия" in box.inner_text() and "as a function of what is sought" in box.inner_text()
     assert tab.locator("a.kf-term").count() > 2
@@ -683,8 +706,8 @@ def test_a_figure_of_another_page_is_shown_with_its_picture(window):
         found = re.search(r'href="(?!#)([^"#]+\.html#fig-[^"]+)"', (HTML / f"{page}.html").read_text(encoding="utf-8"))
         if not found:
             continue
-        tab.goto((HTML / f"{page}.html").as_uri())
-        tab.locator(f'article a.reference.internal[href="{found[1]}"]').first.hover()
+        laid_out(tab, page)
+        hover(tab, tab.locator(f'article a.reference.internal[href="{found[1]}"]').first)
         picture = tab.locator("#kf-preview img")
         picture.wait_for()
         tab.wait_for_function("e => e.complete && e.naturalWidth > 0", arg=picture.element_handle())
