@@ -138,7 +138,7 @@ def lower(
 ) -> Program:
     """Common subexpressions, with common factors taken out of short formulas, and small integer powers as elementary assignments.
 
-    Of long ones factors would hide common subexpressions, and take most of the time: variant 20 needs 65 operations, not 71.
+    Of long ones factors would hide more common subexpressions than they save products, and take most of the time.
     """
     names = sp.numbered_symbols("s", cls=sp.Dummy)
     everything = [*definitions.values(), *(sp.Matrix(m) for m in outputs.values())]
