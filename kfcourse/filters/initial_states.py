@@ -41,7 +41,7 @@ from kfcourse.filters.densities import likelihood
 from kfcourse.filters.particle_smoothing import weighted
 from kfcourse.filters.particles import Clouds, at_start, even, normalised, of_both, stream, systematic
 from kfcourse.filters.proposals import FREEDOM, PRIOR, WIDER
-from kfcourse.laws import Array, Gaussian, square_root
+from kfcourse.laws import Array, Gaussian, gain, square_root
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_noiseless
 from kfcourse.symbolic.jumping import JumpModel
@@ -216,8 +216,7 @@ def undisturbed(model: Model | JumpModel, particles: int = 256, seed: Seed = 0, 
                 off, missing = difference(y, h, modes[0].angles.y), np.isnan(y)[..., None]
                 J = np.where(missing, 0.0, G @ slope)
                 R = np.broadcast_to(R, (*h.shape, h.shape[-1]))
-                precision = np.linalg.pinv(np.where(np.isfinite(R), R, 0.0))
-                weighed = share[..., None, None] * np.swapaxes(J, -1, -2) @ precision
+                weighed = share[..., None, None] * gain(np.swapaxes(J, -1, -2), np.where(np.isfinite(R), R, 0.0), broken=True)
                 curvature = curvature + weighed @ J
                 gradient = gradient + weighed @ np.where(missing, 0.0, off[..., None])
             slope = tangents[0].at(k).transition(here, np.zeros((modes[0].n,) * 2)).A @ slope
@@ -332,11 +331,11 @@ def _anew(
 def _log_mixture(s: Array, centres: Array, roots: Array) -> Array:
     """ln of the density at s (rows, size, r) of Student's laws, all as probable, of widths with roots (rows, laws, r, r)."""
     r = s.shape[-1]
-    apart = np.linalg.inv(roots)[:, None] @ (s[:, :, None] - centres[:, None])[..., None]
-    kernels = -0.5 * (FREEDOM + r) * np.log1p((apart[..., 0] ** 2).sum(axis=-1) / FREEDOM)
-    kernels -= np.log(np.abs(np.linalg.det(roots)))[:, None]
+    apart = np.linalg.inv(roots) @ (s.swapaxes(-1, -2)[:, None] - centres[..., None])  # (rows, laws, r, size)
+    kernels = -0.5 * (FREEDOM + r) * np.log1p((apart**2).sum(axis=2) / FREEDOM)
+    kernels -= np.log(np.abs(np.linalg.det(roots)))[..., None]
     constant = scipy.special.gammaln((FREEDOM + r) / 2) - scipy.special.gammaln(FREEDOM / 2) - 0.5 * r * np.log(FREEDOM * np.pi)
-    return np.logaddexp.reduce(kernels, axis=2) - np.log(centres.shape[1]) + constant
+    return normalised(kernels.swapaxes(1, 2))[1] + constant
 
 
 def _flattened(logs: Array) -> Array:
