@@ -34,7 +34,8 @@ def on_circle(vector: Array, which: Components) -> Array:
     if not which:
         return vector
     result = np.array(vector)
-    result[..., which] = wrapped(result[..., which])
+    for i in which:  # views: of few trajectories in half the time of picking columns
+        result[..., i] = wrapped(result[..., i])
     return result
 
 

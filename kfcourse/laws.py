@@ -161,11 +161,15 @@ def gain(cross: Matrices, cov: Matrices, broken: bool = False) -> Matrices:
         first, second, both = cov[..., 0, 0], cov[..., 1, 1], cov[..., 0, 1]
         product_of_both = first * second
         determinant = product_of_both - both * both
-        certain = determinant - singular**2 * product_of_both
-        if min(np.minimum.reduce(one, axis=None) for one in (first, second, certain)) > 0:
+        certain = determinant - singular**2 * product_of_both  # and if the first variance is positive, so is the second
+        if min(np.minimum.reduce(one, axis=None) for one in (first, certain)) > 0:
             first, second, both, determinant = (one[..., None] for one in (first, second, both, determinant))
             left, right = cross[..., 0], cross[..., 1]
-            return np.stack([left * second - right * both, right * first - left * both], axis=-1) / determinant[..., None]
+            by_first = left * second - right * both
+            solved = np.empty((*by_first.shape, 2), dtype=by_first.dtype)
+            solved[..., 0], solved[..., 1] = by_first, right * first - left * both
+            solved /= determinant[..., None]
+            return solved
     if cov[..., 0, 0].size >= MANY:
         every = np.broadcast_to(cross, (*np.broadcast_shapes(cross.shape[:-2], cov.shape[:-2]), *cross.shape[-2:]))
         solved = runs_last(every.swapaxes(-1, -2))
@@ -220,6 +224,7 @@ def solve_by_entries(right: Array, cov: Array) -> bool:
     return True
 
 
+@cache
 def rounding(dtype: np.dtype[Any]) -> float:
     """A Cholesky pivot of a correlation matrix below this, 1e-7 in float64, is rounding."""
     return SINGULAR * float(np.sqrt(np.finfo(dtype).eps))
@@ -270,12 +275,12 @@ def without_missing(innovation: Vectors, G: Matrices, F: Matrices, R: Matrices) 
     """Take missing components out: no innovation, no sensitivity, a variance of their own."""
     missing = np.isnan(innovation)
     either = missing[..., :, None] | missing[..., None, :]
-    identity = np.eye(innovation.shape[-1], dtype=F.dtype)
+    own = identity(innovation.shape[-1], F.dtype)
     return (
         np.where(missing, 0.0, innovation),
         np.where(missing[..., :, None], 0.0, G),
-        np.where(either, identity, F),
-        np.where(either, identity, R),
+        np.where(either, own, F),
+        np.where(either, own, R),
     )
 
 
