@@ -140,9 +140,22 @@ def lower(
 
     Of long ones factors would hide more common subexpressions than they save products, and take most of the time.
     """
+    everything = [*definitions.values(), *(entry for matrix in outputs.values() for entry in matrix)]
+    short = sum(int(sp.count_ops(entry)) for entry in everything) <= SHORT
+    matrices = tuple((key, sp.ImmutableMatrix(one)) for key, one in outputs.items())
+    return _lowered(matrices, tuple(vectors), tuple(definitions.items()), factor and short)
+
+
+@lru_cache(maxsize=256)  # modes often have the same object, or the same meter; so have models that differ in one noise
+def _lowered(
+    output_items: tuple[tuple[str, sp.ImmutableMatrix], ...],
+    vectors: tuple[str, ...],
+    definition_items: tuple[tuple[sp.Symbol, sp.Expr], ...],
+    factor: bool,
+) -> Program:
+    outputs, definitions = dict(output_items), dict(definition_items)
     names = sp.numbered_symbols("s", cls=sp.Dummy)
     everything = [*definitions.values(), *(sp.Matrix(m) for m in outputs.values())]
-    factor = factor and sum(int(sp.count_ops(entry)) for entry in sp.flatten(everything)) <= SHORT
     found, reduced = sp.cse(everything, symbols=names, optimizations="basic" if factor else None)
     shared = _in_order([*found, *zip(definitions, reduced[: len(definitions)], strict=True)])
     assignments: list[tuple[sp.Symbol, sp.Expr]] = []

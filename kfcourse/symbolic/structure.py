@@ -150,7 +150,7 @@ class StructuralFormulas:
     def R(self) -> sp.ImmutableMatrix:
         """F - G d G^T, the part of the measurement's covariance that the state does not explain."""
         G, F = self.functions["G"], self.functions["F"]
-        return sp.ImmutableMatrix(F - G * self.d * G.T).applyfunc(sp.expand)
+        return _expanded(sp.ImmutableMatrix(F - G * self.d * G.T))
 
     @cached_property
     def A(self) -> sp.ImmutableMatrix:
@@ -160,7 +160,7 @@ class StructuralFormulas:
     @cached_property
     def Q(self) -> sp.ImmutableMatrix:
         """Theta - A p A^T, the part of the next state's covariance that this state does not explain."""
-        return sp.ImmutableMatrix(self.functions["Theta"] - self.A * self.p * self.A.T).applyfunc(sp.expand)
+        return _expanded(sp.ImmutableMatrix(self.functions["Theta"] - self.A * self.p * self.A.T))
 
     @cached_property
     def compiled_predict(self) -> Stepwise:
@@ -282,7 +282,7 @@ def linearised(model: Model) -> Structure:
         "F": H * d * H.T + C * exact_matrix(model.meter_noise.cov) * C.T,
     }
     # e^(a+b) stays one: a height of 6500 km over a scale of 13 km has an e^a beyond all numbers.
-    return StructuralFormulas(model, "linearised", z, p, m, d, _expanded(functions, power_exp=False)).structure()
+    return StructuralFormulas(model, "linearised", z, p, m, d, _all_expanded(functions, power_exp=False)).structure()
 
 
 @lru_cache(maxsize=64)
@@ -318,7 +318,7 @@ def gaussian(model: Model) -> Structure:
     tau, Theta = _moments(model.state_equation, model.x, z, p, model.v, *_exact(model.state_noise), known)
     h, F = _moments(model.meter_equation, model.x, m, d, model.w, *_exact(model.meter_noise), known)
     functions = {"tau": tau, "Theta": Theta, "h": h, "G": h.jacobian(m), "F": F}
-    return StructuralFormulas(model, "gaussian", z, p, m, d, _expanded(functions)).structure()
+    return StructuralFormulas(model, "gaussian", z, p, m, d, _all_expanded(functions)).structure()
 
 
 def _exact(law: Gaussian) -> tuple[sp.ImmutableMatrix, sp.ImmutableMatrix]:
@@ -344,8 +344,13 @@ def _moments(equation, x, mean, cov, noise, noise_mean, noise_cov, known: tuple[
     return tuple(sp.ImmutableMatrix(matrix.xreplace(masks)) for matrix in (means, covs))
 
 
-def _expanded(functions, **hints: bool) -> dict[str, sp.ImmutableMatrix]:
-    return {name: sp.ImmutableMatrix(matrix).applyfunc(partial(sp.expand, **hints)) for name, matrix in functions.items()}
+def _all_expanded(functions, **hints: bool) -> dict[str, sp.ImmutableMatrix]:
+    return {name: _expanded(sp.ImmutableMatrix(matrix), **hints) for name, matrix in functions.items()}
+
+
+@lru_cache(maxsize=256)  # modes often have the same object, or the same meter, with other numbers
+def _expanded(matrix: sp.ImmutableMatrix, **hints: bool) -> sp.ImmutableMatrix:
+    return matrix.applyfunc(partial(sp.expand, **hints))
 
 
 def moving_alike(structures: Sequence[Structure]) -> list[int]:
