@@ -25,7 +25,7 @@ FORKED = "kfcourse-forked"  # the name in pyproject.toml
 LAUNCHER = "ipykernel_launcher"
 # The last: a fork is told how its parent starts processes, and a worker of joblib does it in joblib's way.
 IMPORTED = [
-    *("ipykernel.kernelapp", "matplotlib.backends.backend_svg", "scipy.special", "scipy.linalg"),
+    *("ipykernel.kernelapp", "matplotlib.backends.backend_svg", "scipy.special", "scipy.linalg", "scipy.stats"),
     *("sympy.physics.units", "kfcourse.pages", "kfcourse.exercises", "joblib"),
 ]
 
