@@ -9,6 +9,7 @@ import sympy as sp
 from kfcourse.lab.variants import find_variant
 from kfcourse.symbolic import codegen
 from kfcourse.symbolic.codegen import compile_function, lower
+from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import gaussian, linearised
 
 pytestmark = pytest.mark.quick
@@ -99,6 +100,19 @@ def test_common_factors_of_long_formulas_would_be_no_help(name, monkeypatch):
         with monkeypatch.context() as patch:
             patch.setattr(codegen, "SHORT", np.inf)
             assert ours < operations(structure)
+
+
+def test_what_models_share_is_lowered_once():
+    """Models that differ in a number of the object, as modes do and the steps of a search, have one meter."""
+    meter = "x*exp(-x**2) + 0.017*w"
+
+    def lowered():
+        return codegen._lowered.cache_info().misses
+
+    linearised(Model.define("c*x + v", meter, {"c": 0.71}))
+    before = lowered()
+    linearised(Model.define("c*x + v", meter, {"c": 0.72}))
+    assert lowered() - before == 1  # tau and Theta
 
 
 def test_leading_axes_broadcast(ensemble):
