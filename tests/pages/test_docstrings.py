@@ -53,7 +53,7 @@ def test_lines_of_two_columns_are_a_table_that_has_no_lines_to_break():
         "",
         "   * - ``one_name``",
         "     - what it is;  other: and what this is, which takes more than a line (as a line that goes on tells)",
-        "   * - ``pair(a, b), three``",
+        "   * - ``pair(a, b)``, ``three``",
         r"     - what \*that\* is",
         "",
     ]
