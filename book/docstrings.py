@@ -17,6 +17,7 @@ import plain
 
 COLUMNS = re.compile(r"[^\s.:;!?] {2,}\S|^ {2,}\S")  # two spaces after a full stop are between sentences
 PARTED = re.compile(r"(?<=[^\s.:;!?]) {2,}(?=\S)")
+APART = re.compile(r",\s*(?![^()]*\))")
 INDENT = "    "
 SPECIAL = re.compile(r"(?!^\s*\* )([*|\\]|(?<=\w)_(?=\W|$))")
 QUOTED = re.compile(r"(`+[^`]+`+)")
@@ -62,7 +63,8 @@ def table(rows: list[str]) -> list[str]:
     entries = re.sub(r"\n +", " ", "\n".join(rows)).split("\n")
     result = [".. list-table::", "   :class: kf-names", ""]
     for name, said in (PARTED.split(entry, maxsplit=1) for entry in entries):
-        result += [f"   * - ``{name.replace('`', '')}``", f"     - {escape(said)}"]
+        names = (f"``{one}``" for one in APART.split(name.replace("`", "")))  # a line may break between them
+        result += [f"   * - {', '.join(names)}", f"     - {escape(said)}"]
     return [*result, ""]
 
 

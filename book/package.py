@@ -39,12 +39,12 @@ def page(folder: str, files: dict[str, Path]) -> str:
     """A folder's page in MyST Markdown."""
     inside = {name: path for name, path in files.items() if name != folder}
     said = [documented(folder, members=False)] if folder in files else [ALONE, ""]
-    rows = [f"| {{py:mod}}`{name}` | {plain(sentence(path))} |" for name, path in inside.items()]
+    rows = [f"| {{py:mod}}`~{name}` | {without_formulas(sentence(path))} |" for name, path in inside.items()]
     parts = [line for name in inside for line in (f"## {name.removeprefix(folder + '.')}", "", documented(name))]
     return "\n".join([f"# {folder}", "", *said, "| file | what it is for |", "| --- | --- |", *rows, "", *parts])
 
 
-def plain(text: str) -> str:
+def without_formulas(text: str) -> str:
     """A sentence of a docstring, whose dollars are no formulas."""
     return text.replace("$", r"\$")
 

@@ -31,6 +31,7 @@ from kfcourse.montecarlo.slow_filters import FEWEST as FEWEST_SLOW
 from kfcourse.montecarlo.slow_filters import LEAST
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.writing import by_thousands
 
 DERIVATION = 180.0  # seconds for the formulas of the filters: a busy machine must not leave out what a quiet one has
 LONGEST = 1_000_000  # bytes of a derivation; /dev/zero never ends
@@ -211,7 +212,7 @@ def _tell(result: Comparison, to_error: bool) -> None:
         found = f"{100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}"
         lines.append(f"{title(name):<18} {'diverges' if name in result.lost else found}")
     if result.slow_runs:
-        lines.append(f"Slow filters: on {result.slow_runs} of {result.runs} trajectories")
+        lines.append(by_thousands(f"Slow filters: on {result.slow_runs} of {result.runs} trajectories"))
     click.echo("\n".join([*lines, *remarks_in_words(result), *conclusions(result)]), err=to_error)
 
 

@@ -40,9 +40,13 @@ def steady(rng):
         Psi = A @ p @ A.T + push @ push.T
     alpha, beta = K[0, 0], K[1, 0] * Delta
     same = {r"\sigma_r": np.sqrt(p[0, 0]), r"\alpha(\Lambda)": alpha, r"\Lambda": sigma_a * Delta**2 / sigma}
-    return {"p_{22}": p[1, 1], r"\sigma": sigma, r"\sigma_a": sigma_a, r"\Delta": Delta, r"\alpha": alpha, r"\beta": beta} | same
+    of_p = {"p_{11}": p[0, 0], "p_{12}": p[0, 1], "p_{22}": p[1, 1], r"\psi_{12}": Psi[0, 1]}
+    return of_p | same | {r"\sigma": sigma, r"\sigma_a": sigma_a, r"\Delta": Delta, r"\alpha": alpha, r"\beta": beta}
 
 
 LETTERS = (kalman_run, scaled, small_index, steady)
-SAID = {"Q=0": "a setting", r"\Psi'_c": NOTATION, r"\psi'_{22}": NOTATION, r"\sigma_r": NOTATION}
+SAID = {
+    "Q=0": "a setting",
+    **dict.fromkeys((r"\Psi'_c", r"\psi'_{22}", r"\sigma_r", "p_{22}", r"p_{22}\big|_{\Lambda\to0}"), NOTATION),
+}
 EQUALS = {r"c\,\Psi'": r"\Psi'_c", r"\lim_{\Lambda\to0}\alpha\,/\sqrt{2\Lambda}": "1"}

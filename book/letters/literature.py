@@ -7,6 +7,7 @@ SAID = dict.fromkeys(
         r"\rho_1^2",
         "x_3'",
         r"\partial x_3'/\partial x_5",
+        r"\sin^2\gamma",
         r"\operatorname{tr}I^{-1}/\sigma^2",
         r"\min_h\,\operatorname{tr}I^{-1}/\sigma^2",
     ),

@@ -95,16 +95,27 @@ class ScalarDensities(NamedTuple):
 
     Attributes
     ----------
-    kernel : x -> mean and standard deviation of the next state, given x
-    kernel_slope : x -> the derivatives of both
-    log_likelihood : (y, x) -> log p(y | x); 0 where y is missing (NaN)
-    signal, slope : x -> b(x, m_w) and its derivative; the noise's standard deviation and its, if b(x, m_w) lacks x
-    residual : (y, x) -> the signal that explains y, minus the signal at x, for an angle the short way round.  What explains y
-        is y itself; |y - b| if the signal is the noise's deviation
-    meter_width : x -> standard deviation of the meter's noise over |slope|: how well y tells x
-    noiseless : whether the meter has no noise at this step: there is no density of y, and log_likelihood must not be asked
-    jump : pi for an angle, whose residual changes its sign on the far side of the circle too, by a jump; otherwise infinite
-    piece : x -> a number for each of the formulas that an object which jumps has, by the one that holds at x
+    kernel : function of x
+        Mean and standard deviation of the next state, given x.
+    kernel_slope : function of x
+        The derivatives of both.
+    log_likelihood : function of y and x
+        log p(y | x); 0 where y is missing (NaN).
+    signal, slope : functions of x
+        b(x, m_w) and its derivative; the noise's standard deviation and its, if b(x, m_w) lacks x.
+    residual : function of y and x
+        The signal that explains y, minus the signal at x, for an angle the short way round.  What explains y is y itself; |y - b|
+        if the signal is the noise's deviation.
+    meter_width : function of x
+        Standard deviation of the meter's noise over |slope|: how well y tells x.
+    jump : float
+        pi for an angle, whose residual changes its sign on the far side of the circle too, by a jump; otherwise infinite.
+    noiseless : bool
+        Whether the meter has no noise at this step: there is no density of y, and log_likelihood must not be asked.
+    piece : function of x, optional
+        A number for each of the formulas that an object which jumps has, by the one that holds at x.
+    at_step : function of k, optional
+        All this at step k, where the model depends on it.
     """
 
     kernel: Callable[[Array], tuple[Array, Array]]

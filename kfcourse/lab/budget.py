@@ -21,6 +21,7 @@ from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.short_names import OF_BEST, JumpStructures, Structures
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.writing import by_thousands
 
 SIZES = (100_000, 20_000, 5_000)  # trajectories
 USUAL = 2e9  # units of work for the fast filters, some three minutes
@@ -42,9 +43,9 @@ def usual_runs(filters: Sequence[Filter | Design], model: Model | JumpModel, ste
     runs = next((size for size in fewer if size * each <= USUAL), fewer[-1])
     return Budget(
         runs,
-        f"{runs} trajectories: with {most} these filters have {most * each / USUAL:.2g} times the work to do that is usual.  The "
-        "work is counted, so that this number is the same on every machine.  More trajectories, by --runs, make the intervals "
-        "narrower, as the root of their number.",
+        f"{by_thousands(f'{runs} trajectories: with {most}')} these filters have {most * each / USUAL:.2g} times the work to do "
+        "that is usual.  The work is counted, so that this number is the same on every machine.  More trajectories, by --runs, "
+        "make the intervals narrower, as the root of their number.",
     )
 
 

@@ -25,7 +25,7 @@ class Family(NamedTuple):
     marker: str = "."
 
 
-# In the order of the course.  Okabe and Ito's colours and Tol's muted ones, which the colour-blind tell apart.
+# In the order of the course.  Okabe and Ito's colours and Tol's muted ones, and darker ones for those that are faint on paper.
 FAMILIES: dict[str, Family] = {
     "kalman": Family("Kalman", "ФК", colour="#000000", marker="x"),
     "aof": Family(
@@ -83,7 +83,7 @@ FAMILIES: dict[str, Family] = {
         "ДФКП",
         "DFKP, the two-step filter with finite memory",
         "Двухшаговый фильтр с конечной памятью (ДФКП)",
-        "#44AA99",
+        "#0091F2",
         "H",
     ),
     "mdfkp": Family(
@@ -95,14 +95,14 @@ FAMILIES: dict[str, Family] = {
         "8",
     ),
     "fbp": Family("FBP", "ФБП", "FBP, the filter of high order", "Фильтр большого порядка (ФБП)", "#661100", "X"),
-    "particle": Family("particle", "АОФ (частицы)", colour="#F0E442", marker="*"),
+    "particle": Family("particle", "АОФ (частицы)", colour="#4C3900", marker="*"),
     "imm": Family("IMM", "АОФлд (смешивание до прогноза)", colour="#D55E00"),
     "gpb2": Family("GPB2", "АОФлд (пары режимов)", colour="#009E73"),
-    "iterated": Family("iterated EKF", "итерационный РФК", colour="#E69F00"),
-    "alpha": Family("alpha-beta", "альфа-бета", colour="#E69F00"),
+    "iterated": Family("iterated EKF", "итерационный РФК", colour="#B87500"),
+    "alpha": Family("alpha-beta", "альфа-бета", colour="#B87500"),
 }
 # Where three arguments of the FOS's gain stand beside two, they have a look of their own.
-LOOKS = {"fos3": ("#56B4E9", "v"), "mfos3": ("#E69F00", "P")}
+LOOKS = {"fos3": ("#8F33FF", "v"), "mfos3": ("#664400", "P")}
 
 
 def family(name: str) -> str:

@@ -12,7 +12,7 @@ from kfcourse.filters.jump_equations import combination, correction, prediction
 from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.families import family
 from kfcourse.lab.handin_sections import Block, StudentReport
-from kfcourse.lab.handin_text import filled, law, lines_of, matrix
+from kfcourse.lab.handin_text import law, lines_of, matrix
 from kfcourse.lab.report import NO_FORMULAS, percent, printed
 from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures, Structures
 from kfcourse.montecarlo.comparison import Comparison
@@ -48,20 +48,20 @@ class JumpReport(StudentReport):
     def task(self) -> Iterator[Block]:
         model, words = self.model, self.words
         yield Block("section", words["task"])
-        yield Block("text", filled(words["task_modes_text"], modes=len(model.modes)))
+        yield Block("text", self.said("task_modes_text", modes=len(model.modes)))
         equations = [lines_of(mode.latex(values=False, indexed=True)) for mode in model.modes]
         if all(lines == equations[0] for lines in equations):
             yield Block("formulas", lines=equations[0])
         else:
             for (j, name, _), lines in zip(self.numbered, equations, strict=True):
-                yield Block("text", filled(words["in_mode"], j=f"$j={j}$", name=name))
+                yield Block("text", self.said("in_mode", j=f"$j={j}$", name=name))
                 yield Block("formulas", lines=lines)
         names = dict.fromkeys(name for mode in model.modes for name in mode.values)
         values = {name: [mode.values.get(name) for mode in model.modes] for name in names}
         common = [name for name, each in values.items() if len(set(each)) == 1]
         if common:
             said = ", ".join(f"${sp.latex(name)} = {number_latex(float(model.modes[0].values[name]))}$" for name in common)
-            yield Block("text", filled(words["common_parameters"], values=said))
+            yield Block("text", self.said("common_parameters", values=said))
         own = [name for name in names if name not in common]
         heading = ["$j$", words["mode"], *(f"${sp.latex(name)}$" for name in own)]
         rows = [[f"${j}$", name, *(_number(mode, one) for one in own)] for j, name, mode in self.numbered]
@@ -82,7 +82,7 @@ class JumpReport(StudentReport):
         chain = rf"\pi &= \left(\mathsf{{P}}(i_{{k+1}} = j \mid i_k = i)\right)_{{ij}} = {sp.latex(model.chain)}"
         yield Block("formulas", lines=[chain, rf"q &= {matrix(model.first[None])}"])
         yield Block("text", words["independent"])
-        yield Block("text", filled(words["find_modes"], filters=", ".join(map(self.title, self.result.entrants))))
+        yield Block("text", self.said("find_modes", filters=", ".join(map(self.title, self.result.entrants))))
 
     def functions(self) -> Iterator[Block]:
         words = self.words
@@ -92,12 +92,12 @@ class JumpReport(StudentReport):
             yield from self.defined(kind)
             blocks = [printed(Structures(mode), kind) for mode in self.model.modes]
             alike = all(block == blocks[0] for block in blocks)
-            said = [filled(words["in_mode"], j=f"$j={j}$", name=name) for j, name, _ in self.numbered]
+            said = [self.said("in_mode", j=f"$j={j}$", name=name) for j, name, _ in self.numbered]
             for text, block in [(words["in_every_mode"], blocks[0])] if alike else zip(said, blocks, strict=True):
                 yield Block("text", text)
                 found = self.structures.quadrature if NO_FORMULAS in block else None
                 if isinstance(found, Checked):
-                    yield Block("text", filled(words["by_quadrature"], order=found.order))
+                    yield Block("text", self.said("by_quadrature", order=found.order))
                 elif FUNCTION_LATEX["tau"] in block:
                     yield Block("formulas", lines=lines_of(block))
                 else:
@@ -125,7 +125,7 @@ class JumpReport(StudentReport):
             averaged = name.endswith("averaged") or name == "duof"
             told.setdefault("averaged" if averaged else name if name in about else family(name), []).append(self.title(name))
         lines = [
-            filled(words[text], names=", ".join(told[key]), memory=f"$\\zeta_k = {MEMORIES.get(key)}$")
+            self.said(text, names=", ".join(told[key]), memory=f"$\\zeta_k = {MEMORIES.get(key)}$")
             for key, text in about.items()
             if key in told
         ]

@@ -11,7 +11,7 @@ from kfcourse.filters import latex as equations_latex
 from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.families import FAMILIES, family
 from kfcourse.lab.handin_sections import Block, StudentReport
-from kfcourse.lab.handin_text import filled, law, lines_of, matrix
+from kfcourse.lab.handin_text import law, lines_of, matrix
 from kfcourse.lab.report import printed
 from kfcourse.lab.short_names import Structures
 from kfcourse.lab.written_out import written_lines
@@ -59,11 +59,11 @@ class PlainReport(StudentReport):
         yield Block("formulas", lines=[state, *others])
         values = ", ".join(f"${sp.latex(name)} = {number_latex(float(value))}$" for name, value in model.values.items())
         if values:
-            yield Block("text", filled(words["parameters"], values=values))
+            yield Block("text", self.said("parameters", values=values))
         laws = (("x_0", model.prior), ("v_k", model.state_noise), ("w_k", model.meter_noise))
         yield Block("formulas", lines=[rf"{name} &\sim {law(one)}" for name, one in laws])
         yield Block("text", words["independent"])
-        yield Block("text", filled(words["find"], filters=", ".join(self.title(name) for name in self.result.entrants)))
+        yield Block("text", self.said("find", filters=", ".join(self.title(name) for name in self.result.entrants)))
 
     def functions(self) -> Iterator[Block]:
         if self.kinds:
@@ -128,7 +128,7 @@ class PlainReport(StudentReport):
     def derived(self, kind: str) -> Iterator[Block]:
         """The five functions, with their numbers in the catalogue where it has them."""
         if kind == "gaussian" and isinstance(found := self.structures.quadrature, Checked):
-            yield Block("text", filled(self.words["by_quadrature"], order=found.order))
+            yield Block("text", self.said("by_quadrature", order=found.order))
             return
         block = printed(self.structures, kind)
         yield Block("text", self.words["result"])
@@ -142,7 +142,7 @@ class PlainReport(StudentReport):
             forms = {name: (name, str(sp.expand(structure[name]))) for name in FUNCTION_LATEX}
             numbers = [f"${FUNCTION_LATEX[name]}$ — {CATALOGUE[form]}" for name, form in forms.items() if form in CATALOGUE]
             if numbers:
-                yield Block("text", filled(self.words["catalogue"], numbers=", ".join(numbers)))
+                yield Block("text", self.said("catalogue", numbers=", ".join(numbers)))
 
     def filters(self) -> Iterator[Block]:
         words = self.words
@@ -161,7 +161,7 @@ class PlainReport(StudentReport):
             yield Block("formulas", lines=lines_of(equations_latex(EQUATIONS[one])))
             if one == "aof" and self.model.n == self.model.p == 1:
                 for name in (f"aof-{kind}" for kind in self.derivable if f"aof-{kind}" in self.result.entrants):
-                    yield Block("text", filled(words["written_out"], name=self.title(name)))
+                    yield Block("text", self.said("written_out", name=self.title(name)))
                     yield Block("formulas", lines=written_lines(getattr(self.structures, name.removeprefix("aof-"))))
             if one == designed:
                 yield Block("text", words["over_ensemble"])

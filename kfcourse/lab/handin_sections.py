@@ -45,6 +45,10 @@ class StudentReport:
             lines = [self.translated(line) for line in block.lines]
             yield dataclasses.replace(block, text=self.translated(block.text), lines=lines)
 
+    def said(self, key: str, **values: object) -> str:
+        """The words of that name, filled with what they speak of."""
+        return filled(self.words[key], self.words["thousands"], **values)
+
     def translated(self, text: str) -> str:
         for english, key in ((r"\text{for}", "if"), (r"\text{otherwise}", "else")):
             text = text.replace(english, rf"\text{{{self.words[key]}}}")
@@ -78,12 +82,12 @@ class StudentReport:
     def experiment(self) -> Iterator[Block]:
         result, words = self.result, self.words
         yield Block("section", words["experiment"])
-        sentences = [filled(words["experiment_text"], runs=result.runs, steps=result.steps, seed=result.seed)]
+        sentences = [self.said("experiment_text", runs=result.runs, steps=result.steps, seed=str(result.seed))]
         if result.replicas:
             designed = ", ".join(map(self.title, result.replicas.names))
-            sentences.append(filled(words["designs"], filters=designed, designs=result.designs))
+            sentences.append(self.said("designs", filters=designed, designs=result.designs))
         if result.has_bound:
-            sentences.append(filled(words["exact"], runs=result.slow_runs))
+            sentences.append(self.said("exact", runs=result.slow_runs))
         yield Block("text", " ".join(sentences))
         if result.left_out:
             yield Block("text", words["left_out"])
@@ -96,10 +100,10 @@ class StudentReport:
         for kind, values in remarks(result):
             whose = ", ".join(map(self.title, values.get("names", ())))
             told = values | {"names": whose, "at": self.at(np.flatnonzero(values["steps"]).tolist())}
-            yield Block("text", filled(words[f"remark_{kind}"], **told))
+            yield Block("text", self.said(f"remark_{kind}", **told))
         reference = words["of_exact"] if result.has_bound else self.title(result.control)
         for name in self.figures:
-            yield Block("figure", filled(words[f"figure_{name}"], reference=reference, level=LEVEL), [f"handin-{name}"])
+            yield Block("figure", self.said(f"figure_{name}", reference=reference, level=LEVEL), [f"handin-{name}"])
 
     def left_out(self) -> Iterator[str]:
         """The filters that do not take part, and why, those with the same reason together."""
@@ -116,7 +120,7 @@ class StudentReport:
             return
         verdicts = result.verdicts()
         yield Block("section", words["conclusion"])
-        yield Block("text", filled(words["verdict_text"], level=LEVEL))
+        yield Block("text", self.said("verdict_text", level=LEVEL))
         heading = [words[key] for key in ("step", "best", "not_worse", "worst")]
         rows = [
             [f"${k}$", self.title(best), ", ".join(map(self.title, others)) or "–", self.title(worst) if worst else "–"]
@@ -131,16 +135,16 @@ class StudentReport:
         alone = [best for best, others, _ in verdicts if not others]
         for name in sorted(set(alone), key=lambda one: -alone.count(one)):
             steps = [k for k, (best, others, _) in enumerate(verdicts) if best == name and not others]
-            yield filled(words["leads"], name=self.title(name), at=self.at(steps))
+            yield self.said("leads", name=self.title(name), at=self.at(steps))
         if not alone:
             yield words["nobody_leads"]
         unsure = [k for k, (_, others, _) in enumerate(verdicts) if others]
         if alone and unsure:  # without a leader it is every step, as has been said
-            yield filled(words["together"], at=self.at(unsure))
+            yield self.said("together", at=self.at(unsure))
         last = [worst for _, _, worst in verdicts if worst]
         if last:
             name = max(set(last), key=lambda one: (last.count(one), one))
-            yield filled(words["last"], name=self.title(name), steps=last.count(name), all=result.steps)
+            yield self.said("last", name=self.title(name), steps=last.count(name), all=result.steps)
         else:
             yield words["nobody_last"]
         leads = not result.has_bound and abs(100 * float(result.ranking()[0][1].value)) < ROUNDING  # the control, or its equal
@@ -148,7 +152,7 @@ class StudentReport:
 
     def at(self, steps: list[int]) -> str:
         """At step 2; at steps 0–1, 3–50."""
-        return filled(self.words["at_step" if len(steps) == 1 else "at_steps"], where=ranges(steps, "${}$"))
+        return self.said("at_step" if len(steps) == 1 else "at_steps", where=ranges(steps, "${}$"))
 
     def mean_sentence(self, key: str) -> str:
         """How far the first filter and the last are from the bound, or from the control."""
@@ -156,9 +160,9 @@ class StudentReport:
         ranked = [one for one in result.ranking() if one[0] not in result.lost] or result.ranking()
         (first, gap), (final, largest) = ranked[0], ranked[-1]
         if len(ranked) == 1 and len(result.entrants) > 1:
-            return filled(self.words["mean_alone"], first=self.title(first))
-        return filled(
-            self.words[key],
+            return self.said("mean_alone", first=self.title(first))
+        return self.said(
+            key,
             first=self.title(result.control if key == "mean_first" else first),
             gap=in_percent(gap),
             last=self.title(final),

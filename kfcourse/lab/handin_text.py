@@ -11,11 +11,11 @@ from kfcourse.lab.report import Section, escape_tex, on_one_power, percent
 from kfcourse.laws import Array, Gaussian
 from kfcourse.montecarlo.statistics import Estimate
 from kfcourse.symbolic.markup import mathml
-from kfcourse.symbolic.writing import number_latex
+from kfcourse.symbolic.writing import by_thousands, number_latex
 
 
-def filled(text: str, **values: object) -> str:
-    """The text with {name} replaced by what the name stands for; braces of LaTeX stay.
+def filled(text: str, thousands: str, **values: object) -> str:
+    """The text with {name} replaced by what the name stands for; braces of LaTeX stay, `thousands` parts long numbers.
 
     {name:step/steps} puts a number and the word that goes with it, in Russian one of three: {name:шаг/шага/шагов}.
     """
@@ -24,14 +24,9 @@ def filled(text: str, **values: object) -> str:
         one = values[found["name"]]
         if not isinstance(one, int):
             return str(one)
-        return spaced(one) + (f" {with_number(one, found['words'].split('/'))}" if found["words"] else "")
+        return by_thousands(str(one), thousands) + (f" {with_number(one, found['words'].split('/'))}" if found["words"] else "")
 
     return re.sub(rf"\{{(?P<name>{'|'.join(values)})(:(?P<words>[^{{}}]*))?\}}", value, text)
-
-
-def spaced(number: int) -> str:
-    """A whole number with its thousands apart, from five digits on: 100 000."""
-    return f"{number:,}".replace(",", "\u202f") if number >= 10_000 else str(number)
 
 
 def with_number(number: int, words: list[str]) -> str:

@@ -38,6 +38,7 @@ from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
+from kfcourse.symbolic.writing import by_thousands
 
 LEVEL = f"{100 * CONFIDENCE:g} %"
 _FIGURES: dict[str, tuple[str, Callable[[Comparison, Axes], Axes]]] = {
@@ -106,7 +107,8 @@ def save_texts(names: Sequence[str], folder: Path, content: Mapping[str, Any], *
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("kfcourse.lab"), trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    environment.filters |= {"mathml": _mathml, "tex": escape_tex, "html": jinja2.filters.do_forceescape, **filters}
+    own = {"mathml": _mathml, "tex": escape_tex, "html": jinja2.filters.do_forceescape, "thousands": by_thousands}
+    environment.filters |= own | filters
     for name in names:
         (folder / name).write_text(environment.get_template(name + ".j2").render(content), encoding="utf-8")
 
@@ -327,8 +329,9 @@ def remarks(result: Comparison) -> Iterator[tuple[str, dict[str, Any]]]:
 def remarks_in_words(result: Comparison) -> list[str]:
     """The remarks as sentences."""
     return [
-        REMARKS[kind].format(**values | {"names": ", ".join(map(title, values.get("names", ()))), "steps": _at(values["steps"])})
+        by_thousands(REMARKS[kind].format(**values | {"names": names, "steps": _at(values["steps"])}))
         for kind, values in remarks(result)
+        for names in [", ".join(map(title, values.get("names", ())))]
     ]
 
 

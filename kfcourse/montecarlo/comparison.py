@@ -14,6 +14,7 @@ from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean, ratio, re
 from kfcourse.montecarlo.two_phase import Replicas, Terms, batch_sums, estimate, with_design
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.writing import by_thousands
 
 EXACT = "aof-exact"
 ROUNDING = (64 * np.finfo(float).eps) ** 2  # an error variance less than this part of M|x|^2 is one of rounding
@@ -127,9 +128,10 @@ class Comparison:
     smoothing: Comparison | None = None
 
     def __repr__(self) -> str:
-        slow = f" ({self.slow_runs:,} for {', '.join(self.slow_part.slow)})" if self.slow_part else ""
+        slow = f" ({self.slow_runs} for {', '.join(self.slow_part.slow)})" if self.slow_part else ""
+        compared = f"Comparison of {', '.join(self.names)}: {self.steps} steps, {self.runs} trajectories{slow}"
         lines = [
-            f"Comparison of {', '.join(self.names)}: {self.steps} steps, {self.runs:,} trajectories{slow}, seed {self.seed}",
+            f"{by_thousands(compared)}, seed {self.seed}",
             *(f"left out: {name}, {why}" for name, why in self.left_out.items()),
             "ask ranking(), verdicts(), error_variance(name), gap(name), difference(first, second)"
             + (", and the same of .smoothing" if self.smoothing else ""),

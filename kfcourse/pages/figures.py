@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ import numpy as np
 from IPython.core.interactiveshell import InteractiveShell
 from matplotlib import rcParams
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
 from matplotlib.legend import Legend
@@ -20,6 +23,7 @@ from matplotlib_inline.backend_inline import set_matplotlib_formats
 
 from kfcourse.pages.captions import drawn
 from kfcourse.pages.units import in_brackets
+from kfcourse.symbolic.writing import by_thousands
 
 # Fixed colours (Okabe and Ito's, distinguishable by the colour-blind); those of the filters are in kfcourse.lab.plots.
 COLOURS = {"truth": "#000000", "measurement": "#999999", "estimate": "#0072B2", "band": "#56B4E9", "warning": "#D55E00"}
@@ -79,6 +83,7 @@ def book_style(ground: str = "none") -> None:
     def both(figure: Figure) -> Any:
         in_brackets(text.get_text() for text in figure.findobj(Text))
         whole_steps(figure)
+        part_thousands(figure)
         if not (made := wide(figure)):  # of a figure without axes
             return None
         data, metadata = made[0], made[1] | {"drawn": drawn(figure)}
@@ -96,6 +101,20 @@ def whole_steps(figure: Figure) -> None:
             locator = axis.get_major_locator()
             if isinstance(locator, MaxNLocator) and COUNTED.fullmatch(axis.get_label_text()):
                 locator.set_params(integer=True, steps=[1, 2, 5, 10])
+
+
+def part_thousands(figure: Figure) -> None:
+    """10,000 in whatever a figure says, at its marks and elsewhere."""
+    for text in figure.findobj(Text):
+        text.set_text(by_thousands(text.get_text()))
+    for axis in figure.findobj(Axis):
+        formatter: Any
+        for formatter in (axis.get_major_formatter(), axis.get_minor_formatter()):
+            formatter.format_ticks = partial(_parted, formatter.format_ticks)
+
+
+def _parted(said: Callable[..., list[str]], marks: Sequence[float]) -> list[str]:
+    return [by_thousands(one) for one in said(marks)]
 
 
 def lay_narrow(figure: Figure) -> bool:

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from kfcourse.pages.units import by_thousands, in_brackets
+from kfcourse.pages.units import in_brackets
 from kfcourse.pages.verification import Shown
+from kfcourse.symbolic.writing import by_thousands
 
 
 def table(columns: Mapping[str, Iterable[Any]], formats: Mapping[str, str] | str = "", caption: str = "") -> Shown:

@@ -1,4 +1,4 @@
-"""Units in labels of figures and headings of tables, and long numbers: one form over the whole book."""
+"""Units in labels of figures and headings of tables: one form over the whole book."""
 
 from __future__ import annotations
 
@@ -8,12 +8,6 @@ from collections.abc import Iterable
 # What numbers are followed by, on pages and in labels.
 UNIT = r"(?:%|°|(?:s\.d\.|[kMG]?Hz|[kMG]?B|dB|px|deg|m?rad|CPU-s|[km]?m|[mµ]?s|V|min|h)(?:/(?:s|min|h))?[²³]?(?![\w-]))"
 _AFTER_A_COMMA = re.compile(rf"^(.*?\S),\s({UNIT})(?:[,;:.]|\s(?:±|a\b|of\b)|$)", re.DOTALL)
-_LONG = re.compile(r"(?<![\w.,])\d{5,}(?!\w)")
-
-
-def by_thousands(text: str) -> str:
-    """The text with commas in whole numbers, and before the point of others, of five digits and more: 9999, 10,000."""
-    return _LONG.sub(lambda number: f"{int(number[0]):,}", text)
 
 
 def in_brackets(labels: Iterable[str]) -> None:

@@ -20,9 +20,8 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.pages.units import by_thousands
 from kfcourse.symbolic.typesetting import Equation, Side, equation_latex, side_lines
-from kfcourse.symbolic.writing import number_latex
+from kfcourse.symbolic.writing import by_thousands, number_latex
 
 VERIFIED = "application/vnd.kfcourse.verified+json"  # what the build collects
 DEFINITION = "definition"

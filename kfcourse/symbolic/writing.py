@@ -1,10 +1,11 @@
-"""Formulas as people write them: parameters before variables before noises, short terms before long ones.
+"""Formulas and numbers as people write them: parameters before variables before noises, short terms before long ones.
 
 SymPy orders by the alphabet and prints f w x^2 + g x; the course writes g x + f x^2 w.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from itertools import groupby
 
@@ -54,6 +55,14 @@ def _by_other(expression: sp.Expr, one: type[sp.Function], other: type[sp.Functi
     return sp.expand(
         expression.replace(lambda e: e.is_Pow and e.exp == 2 and e.base.func is one, lambda e: 1 - other(*e.base.args) ** 2)
     )
+
+
+_LONG = re.compile(r"(?<![\w.,])\d{5,}(?!\w)")
+
+
+def by_thousands(text: str, comma: str = ",") -> str:
+    """The text with commas in whole numbers, and before the point of others, of five digits and more: 9999, 10,000."""
+    return _LONG.sub(lambda number: f"{int(number[0]):,}".replace(",", comma), text)
 
 
 def number_latex(value: float) -> str:

@@ -30,9 +30,10 @@ def test_as_many_as_the_usual_work_allows_and_never_none(steps, runs):
     assert found.runs == runs
     assert bool(found.says) == (runs < SIZES[0])
     if found.says:
-        times = f"{steps * 42 * 1e5 / USUAL:.2g}"
+        told, times = {20_000: "20,000", 5_000: "5000"}[runs], f"{steps * 42 * 1e5 / USUAL:.2g}"
         assert (
-            found.says.startswith(f"{runs} trajectories: with 100000 these filters have {times} times") and "--runs" in found.says
+            found.says.startswith(f"{told} trajectories: with 100,000 these filters have {times} times")
+            and "--runs" in found.says
         )
 
 

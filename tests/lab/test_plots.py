@@ -1,7 +1,10 @@
 """Figures: labelled axes, one colour a family, bands that are confidence intervals."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
+from colours import apart, contrast, shown
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
@@ -9,11 +12,17 @@ from matplotlib.figure import Figure
 from kfcourse import compare, lab_filters, load_variants, run, simulate
 from kfcourse.filters import aof
 from kfcourse.lab import plots
+from kfcourse.lab.families import FAMILIES, LOOKS, look
 from kfcourse.lab.short_names import FILTERS, LAB, title
 from kfcourse.symbolic.structure import gaussian
 
 pytestmark = pytest.mark.quick
 
+SIDE_BY_SIDE = [  # the bound, the AOF, the DUOF, and what stands beside them
+    ("kalman", "aof", "duof", "fos", "mfos", "fos3", "mfos3"),
+    ("kalman", "aof", "duof", "fos", "mfos", "particle"),
+    ("kalman", "aof", "iterated", "particle"),
+]
 DRAW = [plots.accuracy, plots.relative_accuracy, plots.ranking, plots.consistency]
 
 
@@ -148,3 +157,17 @@ def test_one_trajectory_with_estimates(ax):
     assert ax.get_ylabel()
     assert "GAOF" in [text.get_text() for text in ax.get_legend().get_texts()]
     np.testing.assert_array_equal(ax.lines[-1].get_ydata(), z)
+
+
+@pytest.mark.parametrize("name", [*FAMILIES, *LOOKS])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_a_filter_s_line_is_seen_on_the_page(name, theme):
+    """WCAG 2 wants 3 of what is no text."""
+    assert contrast(*shown(look(name)[0], theme)) >= 3
+
+
+@pytest.mark.parametrize("names", SIDE_BY_SIDE)
+def test_the_colour_blind_tell_filters_of_a_figure_apart(names):
+    """By their colours alone, at seven times what is just noticed; each has a marker of its own besides."""
+    assert min(apart(look(one)[0], look(other)[0]) for one, other in combinations(names, 2)) > 7 * 2.3
+    assert len({look(name)[1] for name in names if name != "iterated"}) == len({*names} - {"iterated"})

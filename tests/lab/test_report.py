@@ -351,9 +351,10 @@ def test_the_variance_between_designs_is_reported(variants, no_figures, tmp_path
     data = json.loads(write_json(variants["53"], result, tmp_path / "n.json").read_text(encoding="utf-8"))
     assert data["designs"] == 3
     assert data["design_deviation"] == {"duof": result.design_error("duof").value.tolist()}
-    write_report(variants["53"], result, tmp_path)
+    write_report(variants["53"], dataclasses.replace(result, runs=20_000, seed=20_000), tmp_path)
     for name in ("report.html", "report.tex"):
         text = (tmp_path / name).read_text(encoding="utf-8")
+        assert "20,000 common trajectories, 4 steps, seed 20000" in text
         assert "designed on 3 ensembles" in text
         assert "between designs" in text
 

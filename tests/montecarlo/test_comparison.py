@@ -589,9 +589,10 @@ def test_a_printed_comparison_is_short_and_says_what_to_ask(variant53):
         smoothers=[aof(gaussian(variant53))], progress=False,
     )  # fmt: skip
     heading, asked = str(found).splitlines()
-    assert heading == "Comparison of aof-gaussian, aof-exact: 2 steps, 1,000 trajectories (100 for aof-exact), seed 7"
+    assert heading == "Comparison of aof-gaussian, aof-exact: 2 steps, 1000 trajectories (100 for aof-exact), seed 7"
     for name in re.findall(r"(\w+)\(", asked):
         assert callable(getattr(found, name))
     assert asked.endswith(".smoothing") and not repr(found.smoothing).endswith(".smoothing")
     without = replace(found, slow_part=None, left_out={"aof-exact": "too slow"})
     assert str(without).splitlines()[1] == "left out: aof-exact, too slow"
+    assert str(replace(without, runs=10_000, seed=10_000)).splitlines()[0].endswith("10,000 trajectories, seed 10000")

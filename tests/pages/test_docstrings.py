@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
+import inspect
+import re
 import sys
 from pathlib import Path
 
@@ -9,6 +12,8 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "book"))
 import docstrings
+
+from kfcourse.pages.house import layer, modules
 
 pytestmark = pytest.mark.quick
 
@@ -48,7 +53,36 @@ def test_lines_of_two_columns_are_a_table_that_has_no_lines_to_break():
         "",
         "   * - ``one_name``",
         "     - what it is;  other: and what this is, which takes more than a line (as a line that goes on tells)",
-        "   * - ``pair(a, b), three``",
+        "   * - ``pair(a, b)``, ``three``",
         r"     - what \*that\* is",
         "",
     ]
+
+
+def entries(section, doc):
+    """(names, what stands behind the colon) of each entry of a section of a docstring."""
+    found = re.search(rf"^{section}\n-+\n(.*?)(?=^\w[^\n]*\n---|\Z)", inspect.cleandoc(doc or ""), re.DOTALL | re.MULTILINE)
+    rows = [row.split(" : ", 1) for row in (found[1] if found else "").split("\n") if re.match(r"[\w*`][^:]* : ", row)]
+    return [(re.split(r",\s*", names), kind) for names, kind in rows]
+
+
+def documented():
+    """Name and value of each class and function of the package."""
+    for module in (importlib.import_module(f"kfcourse.{name}") for name, _ in modules() if layer(name) != "exercises"):
+        for name, one in vars(module).items():
+            if (inspect.isclass(one) or inspect.isfunction(one)) and one.__module__ == module.__name__:
+                yield f"{module.__name__}.{name}", one
+
+
+def test_behind_the_colon_of_an_entry_stands_its_type_and_no_field_is_left_out():
+    """`signal : x -> b(x, m_w)` was printed as if b(x, m_w) were a class."""
+    wrong, seen = [], 0
+    for name, one in documented():
+        fields = set(getattr(one, "_fields", ()))
+        for section in ("Parameters", "Attributes", "Returns"):
+            rows = entries(section, one.__doc__)
+            seen += len(rows)
+            wrong += [(name, kind) for _, kind in rows if re.search(r"->|;|\.$", kind)]
+            if rows and section == "Attributes" and (missing := fields - {field for names, _ in rows for field in names}):
+                wrong.append((name, f"without {missing}"))
+    assert wrong == [] and seen > 200

@@ -59,7 +59,7 @@ def test_the_lab_is_compared_and_a_link_keeps_it(opened):
     assert set(rows) == {"GAOF", "LAOF", "DUOF", "GFOS", "LFOS", "GMFOS", "LMFOS"}
     above = {name: float(cells[1].split(" ± ")[0]) for name, cells in rows.items()}
     assert min(above, key=above.get) == "DUOF" and above["DUOF"] > 0  # what the page tells to look for
-    assert "10000 trajectories of 30 steps" in tab.get_by_role("status").inner_text()
+    assert "10,000 trajectories of 30 steps" in tab.get_by_role("status").inner_text()
 
     slider = tab.get_by_role("slider", name="f", exact=True)
     slider.press("Home")

@@ -69,6 +69,21 @@ def test_marks_of_21_steps_do_not_end_behind_the_last(style):
     plt.close("all")
 
 
+def test_thousands_at_marks_are_parted_by_commas(style):
+    """Also of a third axis, of marks that were chosen, and in what else a figure says."""
+    figure = plt.figure()
+    plane, space = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2, projection="3d")
+    plane.plot([-20_000, 20_000], [0, 5000])
+    space.plot([0, 1], [0, 1], [0, 30_000])
+    space.set(title="20000 runs", xticks=[0, 1], xticklabels=["9999", "10000 at most"])
+    InteractiveShell.instance().display_formatter.format(figure)
+    assert space.get_title() == "20,000 runs"
+    assert [mark.get_text() for mark in space.xaxis.get_majorticklabels()] == ["9999", "10,000 at most"]
+    marks = [[mark.get_text() for mark in axis.get_majorticklabels()] for axis in (plane.xaxis, plane.yaxis, space.zaxis)]
+    assert ["−20,000" in marks[0], "5000" in marks[1], "30,000" in marks[2]] == [True, True, True]
+    plt.close()
+
+
 def test_labels_at_the_ends_are_apart_and_in_order() -> None:
     _, ax = plt.subplots()
     for end, name in ((1.0, "low"), (1.01, "middle"), (1.02, "high"), (5.0, "far")):

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from browsers import offline
 from click.testing import CliRunner
+from colours import contrast
 
 from kfcourse import cli
 from kfcourse.laws import Gaussian, normalised_square
@@ -831,15 +832,6 @@ def test_every_control_has_a_name(opened):
     assert tab.locator("input, button, canvas").count() == 19
     assert tab.get_by_role("columnheader").all_inner_texts() == ["last 3 s", "whole track"]
     assert tab.get_by_role("rowheader").count() == 5
-
-
-def contrast(one: str, other: str) -> float:
-    """Contrast ratio of two colours #rrggbb (WCAG 2)."""
-    luminance = []
-    for colour in (one, other):
-        c = np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)])
-        luminance.append(np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4) @ [0.2126, 0.7152, 0.0722])
-    return (max(luminance) + 0.05) / (min(luminance) + 0.05)
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

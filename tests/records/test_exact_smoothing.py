@@ -87,6 +87,39 @@ def test_it_is_the_posterior_of_the_whole_trajectory(name, missing):
     assert error.max() < 1e-3 * np.sqrt(found.cov.max())
 
 
+CURVED_METERS = {
+    "2": (lambda x: 0.9 * x, lambda x: x + 0.3 * x**2),
+    "5": (lambda x: 0.95 * x, np.sin),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "some"), [("2", slice(148, 160)), ("5", slice(0, 12))])
+def test_far_humps_of_little_mass_have_nodes_too(name, some):
+    """The meter's other roots keep a mass of 1e-5 or so, a few per cent of a variance: recursions on 1,501 equidistant nodes."""
+    model, (move, see) = find_variant(name).model, CURVED_METERS[name]
+    y = simulate(model, 1000, 12, seed=0).y[:, some]
+    x = np.linspace(-9, 9, 1501)  # a thirteenth of the kernel's deviation, a tenth of the narrowest hump's
+    kernel = np.exp(-0.5 * ((x - move(x)[:, None]) / 0.2) ** 2)
+    filtered, ahead = [np.exp(-0.5 * x**2)], np.ones((y.shape[1], len(x)))
+    likelihood = np.exp(-0.5 * ((y - see(x)) / 0.3) ** 2)
+    for k in range(12):
+        density = filtered[-1] @ kernel if k else filtered.pop()
+        density = density * likelihood[k]
+        filtered.append(density / density.sum(axis=1, keepdims=True))
+    mean, variance = np.empty((2, 12, y.shape[1]))
+    for k in reversed(range(12)):
+        mass = filtered[k] * ahead
+        mass /= mass.sum(axis=1, keepdims=True)
+        mean[k] = mass @ x
+        variance[k] = mass @ x**2 - mean[k] ** 2
+        ahead = (ahead * likelihood[k]) @ kernel.T
+        ahead /= ahead.max(axis=1, keepdims=True)
+    one = pointmass(model)
+    found, error, sd = smooth(one, y), smoothing_error(one, y), np.sqrt(variance)
+    assert (np.abs(found.mean[..., 0] - mean) <= error + 1e-5 * sd).all()  # a hump with less of the variance is not looked for
+    np.testing.assert_allclose(found.cov[..., 0, 0], variance, rtol=1e-4)  # ten of these; the accuracy asked for is 1e-3
+
+
 def test_where_kernels_are_narrow_rho_is_taken_between_the_nodes():
     """An object all but without noise: later states are functions of the first, and one integral tells everything."""
     model = Model.define("x + sin(x)/2 + 1e-5*v", "x + x**2/4 + 0.5*w", prior={"mean": 0.5, "variance": 0.3})

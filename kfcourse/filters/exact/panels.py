@@ -51,8 +51,8 @@ def resolve(
     ----------
     borders : ndarray (T, B)
         Of the first panels of each trajectory, ascending; equal ones have no panel between them.
-    log_density : x (R, N), trajectories (R,) -> (R, N)
-    too_wide : left, right (P,) -> (P,)
+    log_density : function of x (R, N) and trajectories (R,), to (R, N)
+    too_wide : function of left and right (P,), to (P,)
         Panels to be split whatever the density.
 
     Returns

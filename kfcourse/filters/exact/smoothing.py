@@ -31,6 +31,8 @@ from kfcourse.laws import Array
 
 LOOKS = 8  # that may be needed until the width of a hump is seen
 SPACING = 0.45  # of the nodes at the highest hump, in its widths
+FAR_SPACING = 0.8  # at the farthest place that counts, in the same widths: a curved meter's humps are about as wide
+COUNTS = 1e-5  # share of a place in the variance from which on it does
 SMOOTHING_NODES = (49, 65, 97, 129, 193, 257, 385, 513, 769, 1025)  # that a density may have
 ALL, NESTED = (1,), (1, 2, 4)  # which nodes are taken: all; and every second, every fourth, to tell the error
 HERMITE = np.polynomial.hermite_e.hermegauss(16)
@@ -208,21 +210,22 @@ class Density:
         with np.errstate(divide="ignore"):
             logs = np.log(np.array([grid.density[i] for grid, i in zip(grids, chosen, strict=True)]))
             logs = logs + np.log(self.later(x, ALL)[:, :, 0])
-        centre, width, low, high = _hump(x, logs)
+        centre, width, far, low, high = _hump(x, logs)
         left = np.arange(len(grids))
         for _ in range(LOOKS):
             one = self.rows(left)
             x, _ = Place(centre[left], width[left], low[left], high[left]).nodes(LOOKED)
             seen = _hump(x, one.logs(x))
             narrower = seen[1] < 0.5 * width[left]
-            for known, new in zip((centre, width, low, high), seen, strict=True):
+            seen = (*seen[:2], np.maximum(seen[2], far[left]), *seen[3:])  # between closer nodes far humps may be hidden
+            for known, new in zip((centre, width, far, low, high), seen, strict=True):
                 known[left] = new
             left = left[narrower[:, 0]]
             if not len(left):
                 break
         scale = 2 * width
         span = np.arcsinh((high - centre) / scale) + np.arcsinh((centre - low) / scale)
-        wanted = span * np.hypot(scale, 2 * width) / (SPACING * width) + 1
+        wanted = span * np.maximum(np.hypot(scale, 2 * width) / SPACING, np.hypot(scale, far) / FAR_SPACING) / width + 1
         return Place(centre, scale, low, high), wanted[:, 0]
 
     def on_nodes(self, place: Place, count: int) -> Nodes:
@@ -306,8 +309,10 @@ class Found:
         return found[0], found[1]
 
 
-def _hump(x: Array, logs: Array) -> tuple[Array, Array, Array, Array]:
-    """Centre and width of the highest hump of densities known on a few nodes (T, N), and where they end; (T, 1) each."""
+def _hump(x: Array, logs: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Centre and width of the highest hump of densities known on a few nodes (T, N), how far from it something counts, and where
+    they end; (T, 1) each.
+    """
     top = logs.argmax(axis=1, keepdims=True)
     highest = np.take_along_axis(logs, top, axis=1)
     if not np.isfinite(highest).all():
@@ -323,7 +328,9 @@ def _hump(x: Array, logs: Array) -> tuple[Array, Array, Array, Array]:
     centre = np.take_along_axis(x, top, axis=1)
     fallen = np.where(logs < highest - 0.5, np.abs(x - centre), np.inf).min(axis=1, keepdims=True)
     width = np.minimum(area / ROOT, 2 * fallen)
-    return centre, width, np.take_along_axis(x, first, axis=1), np.take_along_axis(x, last, axis=1)
+    away = np.abs(x - centre)
+    far = np.where(mass * away**2 > COUNTS * area * width**2, away, 0.0).max(axis=1, keepdims=True)
+    return centre, width, far, np.take_along_axis(x, first, axis=1), np.take_along_axis(x, last, axis=1)
 
 
 def _summed(nodes: Array, weights: Array, mu: Array, sigma: Array) -> Array:

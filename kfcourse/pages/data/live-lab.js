@@ -58,6 +58,7 @@ if (typeof document === "undefined") kfServe();
 const kfLiveLab = (root, name, given) => {
   const { styles, titles, runs, steps, reach } = given, names = Object.keys(styles);
   const MINUS = "\u2212", SPACE = "\u00a0";
+  const thousands = (number) => (number < 10000 ? `${number}` : number.toLocaleString("en"));
   const key = (variant, parameter) => `${variant}.${parameter}`;
   const defaults = { variant: given.first, step: given.step, seed: 1, shown: 2, function: "F" };
   for (const [variant, model] of Object.entries(kfModels)) {
@@ -216,13 +217,13 @@ const kfLiveLab = (root, name, given) => {
         ask(question);
       }
       if (!result) {  // both take the room that they need later
-        status.textContent = `${runs} trajectories of ${steps} steps, seven filters: they are being designed and compared. The bound is being computed.`;
+        status.textContent = `${thousands(runs)} trajectories of ${steps} steps, seven filters: they are being designed and compared. The bound is being computed.`;
         drawTable(state);
         return;
       }
       if (!result.finite) status.textContent = "With these numbers the trajectories themselves become infinite.";
       else
-        status.textContent = `${runs} trajectories of ${steps} steps, seven filters designed and compared: ${Math.round(result.milliseconds)}${SPACE}ms. `
+        status.textContent = `${thousands(runs)} trajectories of ${steps} steps, seven filters designed and compared: ${Math.round(result.milliseconds)}${SPACE}ms. `
           + (bounds ? `Bound by the exact filter on ${bounds.m} more.` : "The bound is being computed.");
       drawErrors();
       drawTrack(state);
