@@ -32,7 +32,7 @@ from kfcourse.laws import Array
 LOOKS = 8  # that may be needed until the width of a hump is seen
 SPACING = 0.45  # of the nodes at the highest hump, in its widths
 FAR_SPACING = 0.8  # at the farthest place that counts, in the same widths: a curved meter's humps are about as wide
-COUNTS = 1e-5  # share of a place in the variance from which on it does
+MATTERS = 1e-5  # share of a place in the variance from which on it counts
 SMOOTHING_NODES = (49, 65, 97, 129, 193, 257, 385, 513, 769, 1025)  # that a density may have
 ALL, NESTED = (1,), (1, 2, 4)  # which nodes are taken: all; and every second, every fourth, to tell the error
 HERMITE = np.polynomial.hermite_e.hermegauss(16)
@@ -329,7 +329,7 @@ def _hump(x: Array, logs: Array) -> tuple[Array, Array, Array, Array, Array]:
     fallen = np.where(logs < highest - 0.5, np.abs(x - centre), np.inf).min(axis=1, keepdims=True)
     width = np.minimum(area / ROOT, 2 * fallen)
     away = np.abs(x - centre)
-    far = np.where(mass * away**2 > COUNTS * area * width**2, away, 0.0).max(axis=1, keepdims=True)
+    far = np.where(mass * away**2 > MATTERS * area * width**2, away, 0.0).max(axis=1, keepdims=True)
     return centre, width, far, np.take_along_axis(x, first, axis=1), np.take_along_axis(x, last, axis=1)
 
 
