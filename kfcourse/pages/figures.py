@@ -114,7 +114,7 @@ def part_thousands(figure: Figure) -> None:
 
 
 def _parted(said: Callable[..., list[str]], marks: Sequence[float]) -> list[str]:
-    return [by_thousands(one) for one in said(marks)]
+    return [by_thousands(str(one)) for one in said(marks)]  # marks set by hand may be numbers
 
 
 def lay_narrow(figure: Figure) -> bool:

@@ -75,7 +75,7 @@ def test_thousands_at_marks_are_parted_by_commas(style):
     plane, space = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2, projection="3d")
     plane.plot([-20_000, 20_000], [0, 5000])
     space.plot([0, 1], [0, 1], [0, 30_000])
-    space.set(title="20000 runs", xticks=[0, 1], xticklabels=["9999", "10000 at most"])
+    space.set(title="20000 runs", xticks=[0, 1], xticklabels=[9999, "10000 at most"])
     InteractiveShell.instance().display_formatter.format(figure)
     assert space.get_title() == "20,000 runs"
     assert [mark.get_text() for mark in space.xaxis.get_majorticklabels()] == ["9999", "10,000 at most"]
