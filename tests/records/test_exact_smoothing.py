@@ -98,7 +98,7 @@ def test_far_humps_of_little_mass_have_nodes_too(name, some):
     """The meter's other roots keep a mass of 1e-5 or so, a few per cent of a variance: recursions on 1,501 equidistant nodes."""
     model, (move, see) = find_variant(name).model, CURVED_METERS[name]
     y = simulate(model, 1000, 12, seed=0).y[:, some]
-    x = np.linspace(-9, 9, 1501)  # a thirteenth of the kernel's deviation, a tenth of the narrowest hump's
+    x = np.linspace(-9, 9, 1501)  # a seventeenth of the kernel's deviation, a tenth of the narrowest hump's
     kernel = np.exp(-0.5 * ((x - move(x)[:, None]) / 0.2) ** 2)
     filtered, ahead = [np.exp(-0.5 * x**2)], np.ones((y.shape[1], len(x)))
     likelihood = np.exp(-0.5 * ((y - see(x)) / 0.3) ** 2)
