@@ -1,5 +1,7 @@
 """Looking back exactly, and with particles: linear models, brute force over whole trajectories, and the errors that both tell."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -188,6 +190,24 @@ def test_what_cannot_be_resolved_is_refused_in_words(monkeypatch):
     model = find_variant("53").model
     with pytest.raises(Unresolved, match=r"looking back to step \d: 17 nodes do not resolve.*smooth\(particle\(model\), y\)"):
         smooth(pointmass(model), simulate(model, 3, 3, seed=1).y)
+
+
+def test_it_finds_what_a_record_that_contradicts_the_model_has_lost_in_the_filter():
+    """A prior 4 to 11 deviations away from the measurements, at once or by and by; the Kalman filter has the truth."""
+    found = []
+    for first, level in itertools.product((np.nan, 0.0), np.arange(4.0, 12.0)):
+        y = np.array([first, *4 * [level]])[:, None, None]
+        model = Model.define("x + 0.1*v", "x + 0.5*w")
+        mean, _ = off(run(pointmass(model), y), run(kalman_filter(model), y))
+        try:
+            told = smoothing_error(pointmass(model), y) / np.sqrt(smooth(kalman_filter(model), y).cov[..., 0, 0])
+        except Unresolved:
+            told = np.array(np.inf)
+        found.append((mean.max(), told.max()))
+    wrong, told = np.array(found).T
+    assert (told > wrong / 3).all()
+    assert (wrong[np.isinf(told)] > 0.01).all() and (told[wrong < 1e-6] < 1e-4).all()  # and without false alarm
+    assert 3 < np.isinf(told).sum() < 10
 
 
 @pytest.mark.parametrize("lag", [0, 1])

@@ -110,6 +110,12 @@ def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) 
         The model is not scalar, the meter jumps, or a noise enters nonlinearly and cannot be solved for.
     Unresolved
         When it runs: a step would need more nodes than the budget has.
+
+    Notes
+    -----
+    Nodes overlap where a density has 1e-10 of its height and end where it has 1e-14, which no trajectory of the model notices.
+    A record that contradicts the model, so that later measurements put a state more than some six deviations from where it was
+    thought to be, needs what has been cut off: the filter is wrong then and does not tell.  `smoothing_error` does, or refuses.
     """
     expect(model, Model, "pointmass")
     check_scalar(model)

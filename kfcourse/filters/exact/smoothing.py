@@ -195,8 +195,9 @@ class Density:
                 if last and not good.all():
                     raise Unresolved(
                         f"{SMOOTHING_NODES[-1]:,} nodes do not resolve the density of trajectory {rows[left[some[~good]]][0]} "
-                        f"given the whole record, estimated error {one.error.max():.1g} standard deviations; take more noise, "
-                        "a shorter record, or particles: smooth(particle(model), y)"
+                        f"given the whole record, estimated error {one.error.max():.1g} standard deviations; it may contradict "
+                        "the model, as with an outlier or too narrow a prior: allow for more noise, a wider prior, or a shorter "
+                        "record; or take particles, smooth(particle(model), y)"
                     )
                 found.keep(rows[left[some[good]]], one, good)
                 again[some] = ~good
