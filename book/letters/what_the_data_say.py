@@ -45,10 +45,37 @@ def whittle(rng):
     wave = 2 * (1 - np.cos(2 * np.pi * np.arange(4096) / 4096))
     slopes = np.array([np.ones_like(wave), wave]) / (q + r * wave)  # of ln S, by q and r
     (qq, qr), (_, rr) = count / 2 * slopes @ slopes.T / len(wave)
-    return {"I_{qq}": qq, "I_{qr}": qr, "I_{rr}": rr, "N": count, "q": q, "r": r, "a": q**2 + 4 * q * r}
+    at, lags = rng.uniform(1, 2), np.array([-1, 0, 1])  # of the differences, whose covariances are -r, q + 2r, -r
+    S = {"S": lambda omega: np.sum([-r, q + 2 * r, -r] * np.cos(lags * omega)), r"\omega": at}
+    of_S = {rf"\partial\ln S/\partial {one}": slope / S["S"](at) for one, slope in (("q", 1), ("r", 2 - 2 * np.cos(at)))}
+    return S | of_S | {"I_{qq}": qq, "I_{qr}": qr, "I_{rr}": rr, "N": count, "q": q, "r": r, "a": q**2 + 4 * q * r}
 
 
-LETTERS = (wandering, whittle)
+def rounds(rng, r_of_m=0.5):
+    """Rounds of EM for independent states, each the mean of their squares over a record whose mean square is m."""
+    y = rng.normal(size=5)
+    m = float(np.mean(y**2))
+    r = r_of_m * m
+
+    def after(q):
+        gain = q / (q + r)
+        return float(np.mean((gain * y) ** 2 + (1 - gain) * q))
+
+    q = [m]
+    for _ in range(20_001):
+        q.append(after(q[-1]))
+    return {"m": m, "r": r, "K": q[-1] / (q[-1] + r), "q": Indexed(q, q[-1]), "q'": after(q[-1]), "j": range(20_000, 20_001)}
+
+
+def quiet_rounds(rng):
+    return rounds(rng, 2)
+
+
+def edge_rounds(rng):
+    return rounds(rng, 1)
+
+
+LETTERS = (wandering, whittle, rounds, quiet_rounds, edge_rounds)
 SAID = {
     r"p(y_0,\dots,y_N)=\prod_kp(y_k\mid y_0,\dots,y_{k-1})": STATED,
     r"\ln p(y_0)+\ln p(y_1\mid y_0)": NOTATION,
