@@ -106,3 +106,4 @@ SAID = {
     r"\Psi_{k+1}": NOTATION,
     r"\mathsf M\,\Theta(u_k,T_k)": NOTATION,
 }
+LITERALS = ("third", "two", "five")  # of names

@@ -84,3 +84,4 @@ SAID = {
     r"\Psi^{\text{before}}": NOTATION,
     r"\Psi^{\text{after}}": NOTATION,
 }
+LITERALS = ("third", "thousand")  # of names

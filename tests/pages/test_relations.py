@@ -175,6 +175,10 @@ def test_a_number_without_an_expression_is_found():
     assert sentence.unknown == ["7"] and sentence.compares
     (typed,) = spoken(cell.replace("7 of", "20,000 of 30 000, 7 of").replace("x[2]", "x[2] + 20_000"))
     assert typed.unknown == ["30", "000", "7"]
+    for word, known in (("three", "3"), ("a third", "1 / 3"), ("four digits", "1e-4"), ("two thousand", "2_000"), ("ten", "10")):
+        told_so = f'```{{code-cell}} python\nclaim("So it is with {word}.", x < {known})\n```\n'
+        assert [one.unknown for one in spoken(told_so)] == [[]]
+        assert [one.unknown for one in spoken(told_so.replace(known, "7"))] != [[]], word
     (empty,) = spoken('```{code-cell} python\nclaim("It is larger.", True)\n```\n')
     assert not empty.compares
 
