@@ -43,9 +43,10 @@ def other_law(rng):
     """The deviation of the law to draw from at which the mean square has no slope, by integrals."""
 
     def moment(s, power):
-        return quad(lambda x: np.exp(-(x**2) * (1 - 1 / (2 * s**2))) * x**power, 0, 12, epsabs=0, epsrel=1e-12)[0]
+        return quad(lambda x: np.exp(-(x**2) * (1 - 1 / (2 * s**2))) * x**power, 0, 15, epsabs=0, epsrel=1e-12)[0]
 
-    return {"s": brentq(lambda s: moment(s, 10) / moment(s, 8) - s**2, 1.5, 3, xtol=1e-14)}
+    s = brentq(lambda s: moment(s, 10) / moment(s, 8) - s**2, 1.5, 3, xtol=1e-14)
+    return {"s": s, r"\int\varphi^2x^8/\psi\,dx": 2 * s * moment(s, 8) / np.sqrt(2 * np.pi)}
 
 
 def linearised_start(rng):

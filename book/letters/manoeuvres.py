@@ -47,6 +47,16 @@ def place(rng):
     return dict(zip((r"r_x", r"r_y", r"r_z", "r", r"\varphi", r"\epsilon"), (*x, r, phi, epsilon), strict=True))
 
 
+def two_modes(rng):
+    """The joint table of two modes, counted from one."""
+    pi, mu = rng.dirichlet(np.ones(2), size=2), rng.dirichlet(np.ones(2))
+    table = np.diag(mu) @ pi
+    c = np.ones(2) @ table
+    one = {f"{name}_{i}": values[i - 1] for name, values in ((r"\mu", mu), ("c", c)) for i in (1, 2)}
+    backwards = {rf"\mu_{{1\mid{j}}}": table[0, j - 1] / c[j - 1] for j in (1, 2)}
+    return one | backwards | {rf"\pi_{{{i}{i}}}": pi[i - 1, i - 1] for i in (1, 2)}
+
+
 def turned(rng, middle=False):
     """A velocity turned by an acceleration across it: that of the step's beginning, or of its middle."""
     v, J = column(rng.normal(size=2)), np.array([[0.0, -1], [1, 0]])
@@ -62,7 +72,7 @@ def turned_in_the_middle(rng):
     return turned(rng, middle=True)
 
 
-LETTERS = (modes, mixing, place, turned, turned_in_the_middle)
+LETTERS = (modes, mixing, two_modes, place, turned, turned_in_the_middle)
 SAID = {
     "L_j=1": "a setting",
     r"\mu_{i|j}(k-1|k-1)": NOTATION,

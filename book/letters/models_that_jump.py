@@ -64,8 +64,15 @@ def remembering(rng):
 def nearest(rng):
     """The mean square about m of a law with the mean mu and the variance s."""
     mass, x, m = rng.dirichlet(np.ones(4)), rng.normal(size=4), rng.normal()
-    mu = mass @ x
-    return {r"\mathsf M_f": Operator(lambda values: float(mass @ values)), "x": x, "m": m, r"\mu": mu, "s": mass @ (x - mu) ** 2}
+    mu, d = mass @ x, rng.uniform(0.5, 2)
+    entropy = {"d": d, r"\mathsf M_f\ln\mathcal N": mass @ multivariate_normal(m, d).logpdf(x)}
+    return entropy | {
+        r"\mathsf M_f": Operator(lambda values: float(mass @ values)),
+        "x": x,
+        "m": m,
+        r"\mu": mu,
+        "s": mass @ (x - mu) ** 2,
+    }
 
 
 def failed(rng):
