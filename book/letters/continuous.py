@@ -203,6 +203,12 @@ def unknown_start_now(rng):
     return letters | {"u": letters["D"] / scale, "u'": letters[r"\dot D"] / scale / (letters["q"] * letters["r"]) ** 0.5}
 
 
+def from_infinity(rng):
+    (a, q, r), t = rng.uniform(0.5, 2, size=3), rng.uniform(0.2, 0.5)
+    letters, D = riccati(a, q, r, [1, 0])
+    return letters | {"t": t, r"\rho": np.sqrt(a**2 + q * r), r"\delta_\infty": D(t) - D(40)}
+
+
 LETTERS = (
     display,
     in_short,
@@ -216,6 +222,7 @@ LETTERS = (
     forgotten,
     unknown_start,
     unknown_start_now,
+    from_infinity,
 )
 SAID = {
     r"\frac{dx}{dt}=f(x,t)+g(x,t)\,\xi(t)": DEFINITION,
@@ -231,3 +238,4 @@ SAID |= dict.fromkeys(
     NOTATION,
 )
 SAID |= dict.fromkeys((r"q=s^2S_\xi/2", r"r=2h^2/N"), DEFINITION)
+EQUALS |= {r"2\rho/\bigl(r(e^{2\rho t}-1)\bigr)": r"\delta_\infty"}

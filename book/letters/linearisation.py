@@ -89,7 +89,16 @@ def multiplied(rng):
     }  # fmt: skip
 
 
-LETTERS = (course, scalar, western, even, multiplied)
+def exponent(rng):
+    """Mean and variance of the density exp(a x + b x^2), up to a constant, by a sum."""
+    a, b = rng.normal(), -rng.uniform(0.5, 2)
+    x = np.linspace(-12, 12, 4001)
+    mass = np.exp(a * x + b * x**2)
+    mean = np.average(x, weights=mass)
+    return {"a": a, "b": b, r"m_\text{e}": mean, r"v_\text{e}": np.average((x - mean) ** 2, weights=mass)}
+
+
+LETTERS = (course, scalar, western, even, multiplied, exponent)
 SAID = {
     r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k": DEFINITION,
     r"y_k=S_k(x_k)+n_k": DEFINITION,
@@ -107,3 +116,4 @@ SAID |= dict.fromkeys(
     ),
     NOTATION,
 )
+EQUALS = {"-1/(2b)": r"v_\text{e}", "-a/(2b)": r"m_\text{e}"}

@@ -5,7 +5,7 @@ from scipy.stats import multivariate_normal
 
 from kfcourse.pages.letters import column, covariance
 from kfcourse.pages.reader import Indexed, Of
-from kfcourse.pages.relations import CONDITION, NOTATION
+from kfcourse.pages.relations import CONDITION, DEFINITION, NOTATION
 from kfcourse.scenarios.radar import spherical
 
 M, N = 3, 2
@@ -89,3 +89,4 @@ EQUALS = {
     r"r\sin(\epsilon)": "r_z",
 }
 SAID |= {r"\pi_{11}+\pi_{22}=1": CONDITION}
+SAID |= {r"\Theta=JpJ^T+Q": DEFINITION}

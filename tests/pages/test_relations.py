@@ -39,7 +39,7 @@ UNREAD = {
     "continuous": 16, "cycle-slips": 11, "derive-it": 10, "discriminator": 21, "drive": 3, "extended-kalman": 8,
     "filters-that-remember": 16, "four-sensors": 3, "grid": 10, "integration-limits": 13, "integration": 12, "lab-filters": 16,
     "lab-manual": 2, "lecture-continuous": 7, "linearisation": 15, "literature": 14, "live-lab": 12, "live-track": 3,
-    "looking-back": 8, "manoeuvres": 3, "models-that-jump": 3, "notation": 12, "numerics": 15, "outliers": 9, "particles": 7,
+    "looking-back": 8, "manoeuvres": 2, "models-that-jump": 3, "notation": 12, "numerics": 15, "outliers": 9, "particles": 7,
     "radar-extended": 11, "radar-tracking": 11, "sigma-points": 14, "stratonovich": 16, "structural-functions": 19,
     "time-tags": 7, "track-2d": 14, "what-the-data-say": 11, "when-linearisation-fails": 13, "wiener": 28,
 }  # fmt: skip
