@@ -222,7 +222,7 @@ UNDER_A_MARK = """() => [...document.querySelectorAll("article details.below-out
 TOO_WIDE = """() => {
     const folds = [...document.querySelectorAll("article details:not([open])")];
     for (const fold of folds) fold.open = true;
-    const found = [...document.querySelectorAll("article div.math mjx-container")]
+    const found = [...document.querySelectorAll("article div.math mjx-container, article div:has(> .kf-formulas)")]
         .filter((e) => e.scrollWidth > e.clientWidth + 1)
         .map((e) => `${e.textContent.slice(0, 60)} (+${e.scrollWidth - e.clientWidth})`);
     for (const fold of folds) fold.open = false;

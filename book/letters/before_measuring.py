@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from kfcourse.filters.alphabeta import steady_beta
 from kfcourse.filters.kalman import correct, predict
 from kfcourse.laws import Gaussian
 from kfcourse.linear.system import LinearSystem
@@ -44,7 +45,12 @@ def steady(rng):
     return of_p | same | {r"\sigma": sigma, r"\sigma_a": sigma_a, r"\Delta": Delta, r"\alpha": alpha, r"\beta": beta}
 
 
-LETTERS = (kalman_run, scaled, small_index, steady)
+def small_gains(rng):
+    alpha = rng.uniform(0.05, 0.1)
+    return {r"\alpha": alpha, r"\beta": steady_beta(alpha)}
+
+
+LETTERS = (kalman_run, scaled, small_index, steady, small_gains)
 SAID = {
     "Q=0": "a setting",
     **dict.fromkeys((r"\Psi'_c", r"\psi'_{22}", r"\sigma_r", "p_{22}", r"p_{22}\big|_{\Lambda\to0}"), NOTATION),

@@ -3,7 +3,7 @@
 import numpy as np
 
 from kfcourse.pages.reader import Of, bell
-from kfcourse.pages.relations import DEFINITION, NOTATION
+from kfcourse.pages.relations import CONDITION, DEFINITION, NOTATION
 
 
 def masses(rng):
@@ -50,9 +50,15 @@ def bent(rng):
     return {"y_0": y, r"\lim_{f\to0}\frac{z_0-y_0}{f^2}": (4 * moved(5e-4) - moved(1e-3)) / 3}
 
 
-LETTERS = (masses, bent)
+def crossing(rng):
+    """Where the average line meets the curve, off zero: the greatest root of y^4 - 4 y^2 - 3."""
+    return {"|y_0|": np.roots([1, 0, -4, 0, -3]).real.max()}
+
+
+LETTERS = (masses, bent, crossing)
 SAID = {r"a_v=\frac{\partial a}{\partial v}": DEFINITION}
 SAID |= dict.fromkeys(
     (r"\frac{dx}{dt}", "I_y(x)"),
     NOTATION,
 )
+SAID |= {"|y_0|=2": CONDITION}

@@ -1,8 +1,13 @@
 """The letters of comparison.md: a state, its posterior mean and another estimate, with finitely many measurements."""
 
 import numpy as np
+from scipy.integrate import quad
+from scipy.optimize import brentq
 
+from kfcourse.filters import aof
 from kfcourse.pages.reader import Indexed, Operator
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.structure import linearised
 
 
 def exact(rng):
@@ -15,11 +20,45 @@ def exact(rng):
         "x": Indexed([x]),
         "z": Indexed([other]),
         r"z_k^{\text{exact}}": best,
+        "D": Indexed([mass @ (x - other) ** 2]),
         "k": range(1),
         r"\mathsf M": Operator(lambda values: float(mass @ values)),
     }
 
 
-LETTERS = (exact,)
+def against_the_bound(rng):
+    """A filter off the exact one by what its measurement says; the exact one's error has two values for each."""
+    mass = np.repeat(rng.dirichlet(np.ones(3)), 2) / 2
+    p, delta = np.repeat(rng.uniform(0.5, 2, size=3), 2), np.repeat(rng.normal(size=3), 2)
+    epsilon = np.sqrt(p) * np.tile([1, -1], 3)
+
+    def mean(values):
+        return float(mass @ values)
+
+    means = {r"\mathsf M": Operator(mean), r"\mathsf D": Operator(lambda values: mean((values - mean(values)) ** 2))}
+    return means | {"p": p, r"\delta": delta, r"\epsilon": epsilon, "e": epsilon + delta}
+
+
+def other_law(rng):
+    """The deviation of the law to draw from at which the mean square has no slope, by integrals."""
+
+    def moment(s, power):
+        return quad(lambda x: np.exp(-(x**2) * (1 - 1 / (2 * s**2))) * x**power, 0, 15, epsabs=0, epsrel=1e-12)[0]
+
+    s = brentq(lambda s: moment(s, 10) / moment(s, 8) - s**2, 1.5, 3, xtol=1e-14)
+    return {"s": s, r"\int\varphi^2x^8/\psi\,dx": 2 * s * moment(s, 8) / np.sqrt(2 * np.pi)}
+
+
+def linearised_start(rng):
+    """The linearised AOF of the lab's model at its first measurement."""
+    g, e = rng.uniform(0.5, 2, size=2)
+    one = aof(linearised(Model.define("0.9*x + e*x*v", "g*x + 0.3*x**2*w", {"g": g, "e": e})))
+    y = rng.normal()
+    state = one.step(one.init(1), np.array([[y]]))
+    z, Psi = state.posterior.mean.item(), state.predicted.cov.item()
+    return {"g": g, "e": e, "y": Indexed([y]), "z": Indexed([z]), r"\Psi": Indexed([1.0, Psi])}
+
+
+LETTERS = (exact, against_the_bound, other_law, linearised_start)
 SAID = {}
 LITERALS = ("20",)

@@ -2,12 +2,15 @@
 
 import numpy as np
 import sympy as sp
+from scipy.linalg import expm
+from scipy.optimize import brentq
 
 from kfcourse.continuous import ContinuousModel, extended_kalman_bucy, steady_state, to_discrete
 from kfcourse.continuous.equations import filter_equations
 from kfcourse.pages.letters import column, covariance, slope
 from kfcourse.pages.reader import Indexed
 from kfcourse.pages.relations import DEFINITION, NOTATION
+from kfcourse.symbolic.structure import linearised
 
 SIGNAL = ["x1 + 0.2*x2**2", "x2 - 0.3*x1*x2"]
 C = np.array([[0.0, 1.0], [1.0, 0.0]])  # picks the components in the other order
@@ -141,7 +144,86 @@ def walk(rng):
     return {"q": q, "r": r, "D": np.sqrt(q * r) / r, "D_{4N}": np.sqrt(4 * q / r), "T": q, "N": r}
 
 
-LETTERS = (display, in_short, box, western, discretised, stationary, walk)
+def short_step(rng):
+    """The prediction of the package's discrete filter, and its next covariance by a solver."""
+    own, T = model(rng), 0.07
+    letters, f, _ = rates(own)
+    steps = to_discrete(own, T)
+    law = linearised(steps).predict(letters["z"].T, letters["D"][None])
+    Psi, D_n = np.reshape(law.cov, (2, 2)), steps.meter_noise.cov
+    B = np.eye(2) + Psi @ letters["H"].T @ np.linalg.solve(D_n, letters["H"])
+    names = {"z": letters["z"], "D": letters["D"], "A": letters["A"], "H": letters["H"], "g": letters["g"], "I": np.eye(2)}
+    after = {r"\lambda": column(law.mean), r"\Psi": Psi, "f": f(letters["z"]), "T": T, "B": B}
+    return names | after | {r"D_\xi": steps.state_noise.cov, "D_n": D_n}
+
+
+def riccati(a, q, r, start):
+    """D(t) of the scalar equation, as the quotient of two solutions of a linear one; `start` is a quotient too."""
+    rates = np.array([[-a, q], [r, a]])
+
+    def D(t):
+        above, below = expm(rates * t) @ start
+        return above / below
+
+    return {"a": a, "q": q, "r": r}, D
+
+
+def forgetting(rng):
+    """A start that is forgotten, and Euler's first step from it."""
+    (a, q, r, D_0), t = rng.uniform(0.5, 2, size=4), rng.uniform(0.2, 0.5)
+    letters, D = riccati(a, q, r, [D_0 + 200, 1])
+    limit = D(40)
+    dot = D(t + 1e-20j).imag / 1e-20
+    negative = brentq(lambda T: D_0 + 200 + T * (q - 2 * a * (D_0 + 200) - r * (D_0 + 200) ** 2), 0, 9, xtol=1e-15)
+    apart = {"D": D(t), r"\dot D": dot, r"D_\infty": limit, r"\rho": np.sqrt(a**2 + q * r), "t": t, "T": 1.01 * negative}
+    errors = {r"\delta": lambda t: D(t) - limit, r"\delta_0": D_0 + 200 - limit, "D_0": D_0 + 200}
+    return letters | apart | errors
+
+
+def forgotten(rng):
+    letters = forgetting(rng)
+    delta, dot = letters["D"] - letters[r"D_\infty"], letters[r"\dot D"]
+    return letters | {r"\delta": delta, r"\dot\delta": dot, "w": 1 / delta, r"\dot w": -dot / delta**2}
+
+
+def unknown_start(rng):
+    """A random walk of which nothing was known, when its variance is within one per cent of the limit."""
+    q, r = rng.uniform(0.5, 2, size=2)
+    letters, D = riccati(0, q, r, [1, 0])
+    scale, rate = D(40), np.sqrt(q * r)
+    t = brentq(lambda t: D(t) / scale - 1.01, 0.1, 40, xtol=1e-15)
+    dot = D(t + 1e-20j).imag / 1e-20
+    del letters["a"]
+    return letters | {"D": D(t), r"\dot D": dot, "t": t, r"\theta": rate * t, "u": lambda theta: D(theta / rate) / scale}
+
+
+def unknown_start_now(rng):
+    letters = unknown_start(rng)
+    scale = np.sqrt(letters["q"] / letters["r"])
+    return letters | {"u": letters["D"] / scale, "u'": letters[r"\dot D"] / scale / (letters["q"] * letters["r"]) ** 0.5}
+
+
+def from_infinity(rng):
+    (a, q, r), t = rng.uniform(0.5, 2, size=3), rng.uniform(0.2, 0.5)
+    letters, D = riccati(a, q, r, [1, 0])
+    return letters | {"t": t, r"\rho": np.sqrt(a**2 + q * r), r"\delta_\infty": D(t) - D(40)}
+
+
+LETTERS = (
+    display,
+    in_short,
+    box,
+    western,
+    discretised,
+    stationary,
+    walk,
+    short_step,
+    forgetting,
+    forgotten,
+    unknown_start,
+    unknown_start_now,
+    from_infinity,
+)
 SAID = {
     r"\frac{dx}{dt}=f(x,t)+g(x,t)\,\xi(t)": DEFINITION,
     r"y(t)=S(cx,t)+n(t)": DEFINITION,
@@ -155,3 +237,5 @@ SAID |= dict.fromkeys(
     (r"{\textstyle\frac12}",),
     NOTATION,
 )
+SAID |= dict.fromkeys((r"q=s^2S_\xi/2", r"r=2h^2/N"), DEFINITION)
+EQUALS |= {r"2\rho/\bigl(r(e^{2\rho t}-1)\bigr)": r"\delta_\infty"}

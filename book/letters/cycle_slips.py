@@ -2,10 +2,11 @@
 
 import numpy as np
 from scipy.integrate import quad, solve_ivp
+from scipy.linalg import solve_continuous_are
 from scipy.special import iv
 
 from kfcourse.pages.reader import Of
-from kfcourse.pages.relations import DEFINITION, NOTATION
+from kfcourse.pages.relations import CONDITION, DEFINITION, NOTATION
 
 
 def slips(rng):
@@ -60,9 +61,17 @@ def pushed(rng):
     return {r"\Pi": way.y[0, 0] / way.y[0, 1], "W": Of(W, r"\Delta")}
 
 
-LETTERS = (slips, loop, saw, pushed)
+def carrier(rng):
+    """The sine's potential by an integral, and the steady state of the loop."""
+    q, r = rng.uniform(0.5, 2, size=2)
+    p = solve_continuous_are(np.zeros((1, 1)), np.eye(1), [[q]], [[r]]).item()
+    return {"q": q, "r": r, "p": p, "V": lambda x: quad(np.sin, 0, x)[0] / p, r"\sigma_\varphi": np.sqrt(p)}
+
+
+LETTERS = (slips, loop, saw, pushed, carrier)
 SAID = {
     r"\Delta_{k+1}=\Delta_k-p\,U(\Delta_k)-p\,\tilde n_k+s_\varphi v_k": DEFINITION,
     "2D_n/A^2": NOTATION,
     r"1/\sigma_\varphi^2": NOTATION,
 }
+SAID |= {r"\tau(2\pi)=0": CONDITION}

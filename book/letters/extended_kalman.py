@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.stats import multivariate_normal
 
-from kfcourse.pages.letters import BENT_LATER, extended_run, given
+from kfcourse.pages.letters import BENT_LATER, covariance, extended_run, given
 from kfcourse.pages.reader import Indexed, Of
-from kfcourse.pages.relations import DEFINITION, NOTATION
+from kfcourse.pages.relations import CONDITION, DEFINITION, NOTATION
 
 
 def course(rng):
@@ -54,7 +54,36 @@ def beams(rng):
     return {r"\theta": Indexed(angles), "H": Indexed(H), "D": Indexed(D), "i": range(1, 3)}
 
 
-LETTERS = (course, western, beams)
+def perfect(rng):
+    """Without noise of the meter; the best linear estimate by a solver, not by an inverse."""
+    H, Psi = rng.normal(size=(2, 3)), covariance(rng, 3)
+    F = H @ Psi @ H.T
+    return {"H": H, r"\Psi": Psi, "F": F, "p": Psi - Psi @ H.T @ np.linalg.solve(F, H @ Psi)}
+
+
+def no_prior(rng):
+    """Weighted least squares, and what a meter says that has no part in it."""
+    H, D, nu, lam = rng.normal(size=(4, 3)), covariance(rng, 4), rng.normal(size=(4, 1)), rng.normal(size=(3, 1))
+    white = np.linalg.inv(np.linalg.cholesky(D))
+    z = lam + np.linalg.lstsq(white @ H, white @ nu, rcond=None)[0]
+    a = rng.normal(size=(4, 1))
+    return {"H": H, "D_n": D, r"\nu": nu, r"\lambda": lam, "z": z, r"\Psi": covariance(rng, 3), "a": a, "F": H @ H.T + D}
+
+
+def tangents(rng):
+    """One component: a sine for f and S, near the place of its tangent."""
+    at, off, p = rng.uniform(0.2, 0.4), rng.uniform(0.2, 0.3), rng.uniform(0.1, 0.2)
+    kept = {r"\Phi": np.cos(at), "e": off, "g": lambda z: p, r"\xi": 1.0, "f": np.sin, "x_{k+1}": np.sin(at + off) + p}
+    return kept | {"S": np.sin, "H": np.cos(at), r"\lambda": at, "z": at, "x": at + off}
+
+
+def across(rng):
+    """A body beside the line of sight; the deviation at which the bend is as large as the error of the range."""
+    r, t, sigma_t = rng.uniform(4, 5), rng.uniform(3, 4), rng.uniform(1, 2)
+    return {"r": r, "t": t, r"\sigma_t": sigma_t, r"\sigma_r": sigma_t**2 / (2 * r)}
+
+
+LETTERS = (course, western, beams, perfect, no_prior, tangents, across)
 SAID = {
     r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k": DEFINITION,
     r"y_k=S_k(x_k)+n_k": DEFINITION,
@@ -77,3 +106,5 @@ SAID |= dict.fromkeys(
     ),
     NOTATION,
 )
+SAID |= dict.fromkeys((r"\Psi^{-1}=0", r"D_n^{-1}=0"), CONDITION)
+SAID |= {r"g_{k-1}=g_{k-1}(z_{k-1})": NOTATION, "x=z+e": DEFINITION}

@@ -84,7 +84,18 @@ def lengthened(rng):
     return numbers | {"D": lambda p: c**2 * p + q + R}
 
 
-LETTERS = (windowed, lengthened)
+def slow(rng):
+    """A state that hardly forgets, by the recursion over the length of its window."""
+    c, q, R = 1 - 1e-6, rng.uniform(1, 2) * 1e-4, rng.uniform(1, 2)
+    p = [0.0, R / (1 + R * (1 - c**2) / q)]
+    for _ in range(5_000):
+        Psi = c**2 * p[-1] + q
+        p.append(Psi * R / (Psi + R))
+    gone = c * R / (c**2 * p[-1] + q + R)
+    return {"p": Indexed(p), "p_*": p[-1], r"\varrho": gone**2, r"\ell": range(200, 202)}
+
+
+LETTERS = (windowed, lengthened, slow)
 SAID = {
     "H=1": DEFINITION,
     "e=0": DEFINITION,
@@ -95,3 +106,4 @@ SAID = {
     r"\Psi_{k+1}": NOTATION,
     r"\mathsf M\,\Theta(u_k,T_k)": NOTATION,
 }
+LITERALS = ("third", "two", "five")  # of names

@@ -45,3 +45,4 @@ SAID = {r"h\le\sigma": CONDITION}
 EQUALS = {
     r"\frac2h\int_0^hh\sum_j\mathcal N(s+jh)\cos\frac{2\pi ms}h\,ds": r"2e^{-2\pi^2m^2\sigma^2/h^2}",
 }
+SAID |= {r"2e^{-2\pi^2\sigma^2/h^2}=10^{-6}": CONDITION}

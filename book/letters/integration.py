@@ -1,6 +1,7 @@
 """The letters of integration.md: runs of the package's filter of an axis, its Western form with matrices, the accelerometer."""
 
 import numpy as np
+from control import dare
 from scipy.integrate import quad
 
 from kfcourse.filters.kalman import correct, predict
@@ -8,7 +9,7 @@ from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem, run
 from kfcourse.pages.letters import K_RANGE, column, covariance
 from kfcourse.pages.reader import Indexed, Of
-from kfcourse.pages.relations import DEFINITION, NOTATION
+from kfcourse.pages.relations import CONDITION, DEFINITION, NOTATION
 from kfcourse.scenarios.navigation import Dynamics
 
 SENSOR, RADIO = r"y_{\mathrm{NR},k}", r"y_{\mathrm R,k}"
@@ -40,7 +41,8 @@ def axis(rng):
     )
     eps, p, Psi = law.posterior.mean[:, 0, 0], law.posterior.cov[:, 0, 0, 0], law.predicted.cov[:, 0, 0, 0]
     innovation = receiver - ins + law.predicted.mean[:, 0, 0]
-    return {
+    changes = {"V": Indexed(V), "n": Indexed(receiver - V), r"\varepsilon": Indexed(drift)}
+    return changes | {
         r"\Psi": Indexed(Psi), "p": Indexed(p), "K": Indexed(-p / n**2), r"\hat\varepsilon": Indexed(eps),
         r"\nu": Indexed(innovation),
         r"\hat V": Indexed(ins - eps), r"\sigma_\xi": xi, r"\sigma_n": n, "k": K_RANGE,
@@ -95,15 +97,70 @@ def slow_drift(rng):
     return {r"\lim_{\sigma_\xi\to0}": 1.0, r"\sigma_\xi": xi, r"\sigma_n": n, "p": np.roots([1, xi**2, -((xi * n) ** 2)]).max()}
 
 
-def complementary(rng):
+def complementary(rng, kappa=0.4, xi=0.7, n=1.3):
     """The steady variance of a low-pass filter for the receiver and its complement for the INS: noises added up one by one."""
-    kappa, (xi, n) = rng.uniform(0.3, 0.6), rng.uniform(0.5, 2, 2)
-    weights = (1 - kappa) ** np.arange(200)  # of the receiver's noises in the error, and of the changes of the INS's error
+    weights = (1 - kappa) ** np.arange(600)  # of the receiver's noises in the error, and of the changes of the INS's error
     spread = ((kappa * weights) ** 2).sum() * n**2 + (weights[1:] ** 2).sum() * xi**2
     return {r"\kappa": kappa, r"\sigma_\xi": xi, r"\sigma_n": n, r"\mathsf De": spread}
 
 
-LETTERS = (complementary, slow_drift, sensors, axis, errors, western, western_before, accelerometer, failure)
+def best_border(rng):
+    """The low-pass filter with the gain of the steady Kalman filter, for a drift that is slow."""
+    n = rng.uniform(1, 2)
+    xi = n * rng.uniform(0.05, 0.1)
+    p = np.roots([1, xi**2, -((xi * n) ** 2)]).max()
+    return complementary(rng, p / n**2, xi, n)
+
+
+def low_pass(rng):
+    """Step by step: the receiver's velocity less the INS's, smoothed, is added to the INS's."""
+    kappa, V, drift, n = rng.uniform(0.3, 0.6), *rng.normal(size=(3, 5))
+    epsilon, smooth = np.cumsum(drift), np.zeros(5)
+    for k in range(1, 5):
+        smooth[k] = (1 - kappa) * smooth[k - 1] + kappa * ((V + n) - (V + epsilon))[k]
+    made = {"V": Indexed(V), "n": Indexed(n), r"\varepsilon": Indexed(epsilon), r"\xi": Indexed(drift[1:])}
+    return made | {r"\kappa": kappa, "e": Indexed(V + epsilon + smooth - V), "k": range(1, 4)}
+
+
+def two_filters(rng):
+    """At one frequency filters are factors."""
+    V, n, e, F, G = rng.normal(size=5)
+    made = {r"\mathcal F": F, r"\mathcal G": G, r"\hat V": F * (V + e) + G * (V + n), "V": V, "n": n, r"\varepsilon": e}
+    return made | {r"y_{\mathrm{INS}}": V + e, r"y_{\mathrm{SR}}": V + n}
+
+
+def rare(rng):
+    """The steady variances of a receiver that averages over m steps."""
+    m, xi, n = 3, *rng.uniform(0.5, 2, size=2)
+    q, R = m * xi**2, n**2 / m
+    Psi = dare(np.eye(1), np.eye(1), [[q]], [[R]])[0].item()
+    return {"m": m, r"\sigma_\xi": xi, r"\sigma_n": n, "q": q, "R": R, r"\Psi": Psi, "p": Psi - q}
+
+
+def lecture(rng):
+    """The general gain, and the lecture's."""
+    own = western(rng)
+    law = {"G": own["H"], r"\Psi": own["P^-"], "p": own["P"], "F": own["P^-"] + own["R"], "K": own["P^-"] @ own["H"].T}
+    K = np.linalg.solve(law["F"], law["K"].T).T
+    return law | {"K": K, r"\tilde D": own["P^-"], "D": own["P"], "D_n": own["R"], "I": np.eye(3)}
+
+
+LETTERS = (
+    complementary,
+    slow_drift,
+    sensors,
+    axis,
+    errors,
+    western,
+    western_before,
+    accelerometer,
+    failure,
+    best_border,
+    low_pass,
+    two_filters,
+    rare,
+    lecture,
+)
 SAID = {
     r"x_k=f(x_{k-1},\,y_{\mathrm{NR},k-1}-\varepsilon_{k-1})+g\,\xi_{k-1}": DEFINITION,
     r"\varepsilon_k=\varepsilon_{k-1}+\zeta_{k-1}": DEFINITION,
@@ -120,3 +177,4 @@ EQUALS = {
     r"\det\begin{pmatrix}H\\HA\\HA^2\end{pmatrix}": "-T_a^3",
     r"\textstyle\int_0^t\bigl(\frac12(t-s)^2\bigr)^2q_b\,ds": "q_bt^5/20",
 }
+SAID |= dict.fromkeys((r"m=2\sigma_n/\sigma_\xi", r"\mathcal F+\mathcal G=1", r"\mathcal F=1-\mathcal G"), CONDITION)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from kfcourse.pages.letters import BENT, K_RANGE, extended_run
-from kfcourse.pages.reader import Indexed, Of
+from kfcourse.pages.letters import BENT, K_RANGE, extended_run, normal_nodes
+from kfcourse.pages.reader import Indexed, Of, Operator
 from kfcourse.pages.relations import DEFINITION, NOTATION
 from kfcourse.symbolic.structure import linearised
 
@@ -134,7 +134,29 @@ def western(rng):
     return names | {"y": own["y"].plain, r"\mu": own["S"].plain(lam)}
 
 
-LETTERS = (two_step, second_fit, optimal_structure, plain_prediction, optimal, western)
+def regression(rng):
+    """One component, moments by quadrature: the gain is the slope of the best line through all x and y."""
+    lam, Psi, y = rng.normal(), rng.uniform(0.5, 1), rng.normal()
+    x, mean = normal_nodes(lam, Psi)
+    h, G = mean(b(x, 0)), mean(1 + 0.2 * x)
+    C, F = mean((x - lam) * b(x, 0)), mean((b(x, 0) - h) ** 2) + 0.16
+    law = {"C": C, "F": F, "G": G, "h": h, "K": C / F, r"\lambda": lam, r"\Psi": Psi}
+    return law | {"y": y, "z": lam + C / F * (y - h), r"\varepsilon": x - lam, "x": x}
+
+
+def linear_meter(rng):
+    """The first line of Pugachev's filter, fitted to all signs that the error of the state and the noise can have."""
+    g, f, Psi = rng.uniform(0.5, 2, size=3)
+    off, w = np.sqrt(Psi) * np.array([1, 1, -1, -1]), f * np.array([1, -1, 1, -1])
+    lam = rng.normal()
+    x, y = lam + off, g * (lam + off) + w
+    H = np.polyfit(y - g * lam, off, 1)[0]
+    errors = {"x": x, "y": y, r"\lambda": lam, r"\omega": y - g * lam, "b": lambda x, w: g * x + f * w, "k": range(1)}
+    spread = {r"\mathsf D": Operator(np.var), r"\mathsf{Cov}": covariance}
+    return errors | spread | {"g": g, "f": f, "d": Psi, r"\Psi": Indexed([Psi]), "R": f**2, "H": Indexed([H])}
+
+
+LETTERS = (two_step, second_fit, optimal_structure, plain_prediction, optimal, western, regression, linear_meter)
 SAID = {
     r"\lambda_0=m": DEFINITION,
     r"\Psi_0=d": DEFINITION,

@@ -4,11 +4,13 @@ import importlib.util
 from pathlib import Path
 
 import numpy as np
+from scipy.linalg import expm
+from scipy.optimize import brentq
 
 from kfcourse import linearised
 from kfcourse.continuous import to_discrete
-from kfcourse.pages.letters import column, covariance, slope
-from kfcourse.pages.relations import NOTATION
+from kfcourse.pages.letters import column, covariance, normal_nodes, slope
+from kfcourse.pages.relations import CONDITION, NOTATION
 
 _spec = importlib.util.spec_from_file_location("letters.continuous", Path(__file__).with_name("continuous.py"))
 shared = importlib.util.module_from_spec(_spec)
@@ -99,7 +101,76 @@ def start(rng):
     return {"z(0)": m, "m": m, "D(0)": d, "d": d, "x": z, "z": z}
 
 
-LETTERS = (derivatives, likelihood, in_short, sizes, step, western, start)
+def linear_signal(rng):
+    """The second derivative of the log-likelihood's rate where the signal is linear, by the slopes of its gradient."""
+    own = shared.model(rng, ["x1 + 0.2*x2", "x2 - 0.3*x1"])
+    letters, _, S = shared.rates(own)
+    y, N = letters["y"], letters["N"]
+    U = slope(lambda x: slope(S, letters["z"]).T @ np.linalg.solve(N, 2 * (y - S(x))), letters["z"])
+    return {"U": U, "H": letters["H"], "N": N}
+
+
+def ahead_of_data(rng):
+    """The covariance with the data and without them, both at one moment."""
+    letters, _, _ = shared.rates(shared.model(rng), second_derivatives=True)
+    letters |= derivatives(rng)
+    A, D, g = letters["A"], letters["D"], letters["g"]
+    above = D + covariance(rng, 2)
+    dot = A @ above + above @ A.T + g @ letters[r"S_\xi"] @ g.T / 2
+    return letters | {r"\bar D": above, r"\dot{\bar D}": dot, "E": above - D, r"\dot E": dot - letters[r"\dot D"]}
+
+
+def even_signal(rng):
+    """A cosine at its top: U by the slope of the log-likelihood's gradient, the mean signal of the process."""
+    y, N, x = rng.uniform(-1, 1), rng.uniform(1, 2), rng.normal()
+    U = (2 / N * (y - np.cos(1e-20j)) * -np.sin(1e-20j) / 1e-20).imag
+    nodes, mean = normal_nodes(0, 0.5)
+    return {"y": y, "N": N, "U": U, "S": np.cos(x), "x": x, r"\mathsf My": mean(np.cos(nodes))}
+
+
+def blow_up(rng):
+    """The scalar equation with U > 0 as the quotient of two solutions of a linear one; infinite where the lower one vanishes."""
+    a, q, D_0, N = rng.uniform(0.5, 1, size=4)
+    U, t = 2 * a**2 / q, rng.uniform(0.1, 0.2)
+
+    def pair(t):
+        return expm(np.array([[-a, q], [-U, a]]) * t) @ [D_0, 1]
+
+    D, end = pair(t)[0] / pair(t)[1], brentq(lambda t: pair(t)[1], 0, np.pi / np.sqrt(q * U - a**2), xtol=1e-15)
+    above, below = pair(t + 1e-20j)
+    dot, omega = (above / below).imag / 1e-20, np.sqrt(q * U - a**2)
+    names = {"a": a, "q": q, "U": U, "t": t, "D": D, r"\dot D": dot, "J": 1 / D, r"\dot J": -dot / D**2, r"\omega": omega}
+    return names | {r"\varphi": np.arctan2(U * D_0 - a, omega), "D_0": D_0, "t_*": end, "N": N, r"\sigma": np.sqrt(2 / N)}
+
+
+def amplitude(rng):
+    x = rng.normal()
+    return {"x": x, "S": np.exp(x)}
+
+
+def near_estimate(rng):
+    """A parabola around the estimate, and a measurement of one short step."""
+    (z, e, kappa), tau = rng.normal(size=3), rng.uniform(0.1, 0.2)
+    S = np.polynomial.Polynomial([0, 1, kappa / 2])
+    around = {"S_0": S(z), "S_1": S.deriv()(z), "S_2": S.deriv(2)(z)}
+    return around | {"x": z + e, "z": z, "e": e, "S": S(z + e), "T": tau**2, r"\tau": tau}
+
+
+LETTERS = (
+    derivatives,
+    likelihood,
+    in_short,
+    sizes,
+    step,
+    western,
+    start,
+    linear_signal,
+    ahead_of_data,
+    even_signal,
+    blow_up,
+    amplitude,
+    near_estimate,
+)
 SAID = {
     latex: NOTATION
     for latex in (
@@ -125,3 +196,4 @@ SAID |= dict.fromkeys(
     ),
     NOTATION,
 )
+SAID |= {r"U<a^2/q": CONDITION}

@@ -1,12 +1,15 @@
 """The letters of linearisation.md: runs of the package's extended filter of a scalar model, and of several states."""
 
 from functools import partial
+from itertools import product
 
 import numpy as np
 
 from kfcourse.pages.letters import BENT_SCALAR, BENT_SCALAR_LATER, column, extended_run, slope
-from kfcourse.pages.reader import Indexed, Of
+from kfcourse.pages.reader import Indexed, Of, Operator
 from kfcourse.pages.relations import DEFINITION, NOTATION
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.structure import linearised
 
 
 class AtEstimate(np.ndarray):
@@ -63,10 +66,43 @@ def western(rng):
     )
 
 
-LETTERS = (course, scalar, western)
+def even(rng):
+    """The variance without measurements, each noise carried to its step by itself."""
+    c, g, D_xi, D_0 = rng.uniform(0.5, 2, size=4)
+    Psi = [c ** (2 * k) * D_0 + sum(c ** (2 * j) for j in range(k)) * g**2 * D_xi for k in range(4)]
+    return {"c": c, "g": g, r"D_\xi": D_xi, r"\Psi": Indexed(Psi), "k": range(3), "S": np.cos, "x": rng.normal()}
+
+
+def multiplied(rng):
+    """The package's filter without measurements, and the truth by all signs that the state and the noises can have."""
+    c, e, m, p_0 = rng.uniform(0.85, 0.95), *rng.uniform(0.6, 0.8, size=3)
+    ahead = linearised(Model.define("c*x + e*x*v", "x + w", {"c": c, "e": e}))
+    signs = np.array(list(product((-1, 1), repeat=5)))
+    x, laws = [m + np.sqrt(p_0) * signs[:, 0]], [(np.array([[m]]), np.array([[[p_0]]]))]
+    for sign in signs.T[1:]:
+        x.append((c + e * sign) * x[-1])
+        laws.append(ahead.predict(*laws[-1]))
+    u = np.sqrt(p_0) * signs[:, 0]
+    return {
+        "c": c, "e": e, "m": m, "p": Indexed([law[1].item() for law in laws], p_0), "z": Indexed([law[0].item() for law in laws]),
+        "x": Indexed(x), "u": u, "V": Indexed([np.var(one) for one in x]), r"\mathsf M": Operator(np.mean), "k": range(4),
+    }  # fmt: skip
+
+
+def exponent(rng):
+    """Mean and variance of the density exp(a x + b x^2), up to a constant, by a sum."""
+    a, b = rng.normal(), -rng.uniform(0.5, 2)
+    x = np.linspace(-12, 12, 4001)
+    mass = np.exp(a * x + b * x**2)
+    mean = np.average(x, weights=mass)
+    return {"a": a, "b": b, r"m_\text{e}": mean, r"v_\text{e}": np.average((x - mean) ** 2, weights=mass)}
+
+
+LETTERS = (course, scalar, western, even, multiplied, exponent)
 SAID = {
     r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k": DEFINITION,
     r"y_k=S_k(x_k)+n_k": DEFINITION,
+    "g=ex": DEFINITION,
     r"\ln p(x_{k-1}\mid y_{0:k-1})": DEFINITION,
     r"\ln p(x_k\mid x_{k-1})": DEFINITION,
     r"\ln p(y_k\mid x_k)": DEFINITION,
@@ -80,3 +116,4 @@ SAID |= dict.fromkeys(
     ),
     NOTATION,
 )
+EQUALS = {"-1/(2b)": r"v_\text{e}", "-a/(2b)": r"m_\text{e}"}

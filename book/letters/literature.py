@@ -13,3 +13,4 @@ SAID = dict.fromkeys(
     ),
     NOTATION,
 )
+LITERALS = ("ten", "five", "thousand", "four thousand")  # of names

@@ -1,11 +1,12 @@
 """The letters of looking-back.md: a run of the package's linear filter, and its smoother by one regression on all of it."""
 
 import numpy as np
+from control import dare
 
 from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem, run, smooth
 from kfcourse.pages.letters import K_RANGE, column, covariance
-from kfcourse.pages.reader import Indexed
+from kfcourse.pages.reader import Indexed, Of
 from kfcourse.pages.relations import NOTATION
 
 STEPS, STATES, SEEN = 6, 3, 2
@@ -39,7 +40,8 @@ def course(rng):
         r"\lambda": _columns(found.predicted.mean),
         r"\Psi": Indexed(Psi),
         "S": Indexed([np.linalg.solve(Psi[k + 1], system.A @ p[k]).T for k in range(STEPS - 1)]),
-        "A": Indexed([system.A] * STEPS),
+        "A": Indexed([system.A] * STEPS, system.A),
+        r"\mathrm{Cov}(x_k,x_{k+1})": Of(lambda k: (system.A @ p[k]).T, "k"),
         "Q": Indexed([system.Q] * STEPS),
     }
 
@@ -70,7 +72,34 @@ def meeting(rng):
     return letters | information | {"A": A, "H": H, "Q": Q, "R": R, "y": _columns(y)}
 
 
-LETTERS = (course, meeting)
+def walk(rng):
+    """A random walk far from both ends: the filter's limit by its Riccati equation, the smoother's by going back long enough."""
+    Q, R = rng.uniform(0.5, 2, size=2)
+    Psi = dare(np.eye(1), np.eye(1), [[Q]], [[R]])[0].item()
+    p = back = Psi * R / (Psi + R)
+    for _ in range(200):
+        back = p + (p / Psi) ** 2 * (back - Psi)
+    return {"Q": Q, "R": R, "p": p, r"\Psi": Psi, r"\bar p": back, "S": p / Psi}
+
+
+def slow_walk(rng):
+    Q, R = rng.uniform(0.5, 2) * 1e-3, rng.uniform(1, 2)
+    Psi = dare(np.eye(1), np.eye(1), [[Q]], [[R]])[0].item()
+    return {"Q": Q, "R": R, "p": Psi - Q, r"\Psi": Psi}
+
+
+def one_component(rng):
+    A, Q, p = rng.uniform(0.5, 2, size=3)
+    return {
+        "A": A,
+        "Q": Q,
+        "p": Indexed([p]),
+        r"\Psi": Indexed([p, np.var(A * np.sqrt(p) * np.array([1, -1])) + Q]),
+        "k": range(1),
+    }
+
+
+LETTERS = (course, meeting, walk, slow_walk, one_component)
 SAID = {
     r"\bar z=z": NOTATION,
     r"\bar p=p": NOTATION,

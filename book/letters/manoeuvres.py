@@ -5,7 +5,7 @@ from scipy.stats import multivariate_normal
 
 from kfcourse.pages.letters import column, covariance
 from kfcourse.pages.reader import Indexed, Of
-from kfcourse.pages.relations import NOTATION
+from kfcourse.pages.relations import CONDITION, DEFINITION, NOTATION
 from kfcourse.scenarios.radar import spherical
 
 M, N = 3, 2
@@ -47,7 +47,32 @@ def place(rng):
     return dict(zip((r"r_x", r"r_y", r"r_z", "r", r"\varphi", r"\epsilon"), (*x, r, phi, epsilon), strict=True))
 
 
-LETTERS = (modes, mixing, place)
+def two_modes(rng):
+    """The joint table of two modes, counted from one."""
+    pi, mu = rng.dirichlet(np.ones(2), size=2), rng.dirichlet(np.ones(2))
+    table = np.diag(mu) @ pi
+    c = np.ones(2) @ table
+    one = {f"{name}_{i}": values[i - 1] for name, values in ((r"\mu", mu), ("c", c)) for i in (1, 2)}
+    backwards = {rf"\mu_{{1\mid{j}}}": table[0, j - 1] / c[j - 1] for j in (1, 2)}
+    return one | backwards | {rf"\pi_{{{i}{i}}}": pi[i - 1, i - 1] for i in (1, 2)}
+
+
+def turned(rng, middle=False):
+    """A velocity turned by an acceleration across it: that of the step's beginning, or of its middle."""
+    v, J = column(rng.normal(size=2)), np.array([[0.0, -1], [1, 0]])
+    omega, T = rng.uniform(0.5, 1), rng.uniform(0.2, 0.3)
+    half = np.eye(2) - omega * T / 2 * J
+    after = np.linalg.solve(half, half.T @ v) if middle else v + omega * T * J @ v
+    sizes = {"|v|": np.hypot(*v.ravel()), "|v'|": np.hypot(*after.ravel())}
+    product = {r"(v'-v)\cdot(v'+v)": ((after - v).T @ (after + v)).item()}
+    return sizes | product | {"v": v, "v'": after, "J": J, r"\omega": omega, "T": T}
+
+
+def turned_in_the_middle(rng):
+    return turned(rng, middle=True)
+
+
+LETTERS = (modes, mixing, two_modes, place, turned, turned_in_the_middle)
 SAID = {
     "L_j=1": "a setting",
     r"\mu_{i|j}(k-1|k-1)": NOTATION,
@@ -63,3 +88,5 @@ EQUALS = {
     r"r\cos(\epsilon)\sin(\varphi)": "r_y",
     r"r\sin(\epsilon)": "r_z",
 }
+SAID |= {r"\pi_{11}+\pi_{22}=1": CONDITION}
+SAID |= {r"\Theta=JpJ^T+Q": DEFINITION}

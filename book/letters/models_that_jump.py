@@ -4,7 +4,7 @@ import numpy as np
 from scipy.stats import multivariate_normal
 
 from kfcourse.pages.letters import column, covariance
-from kfcourse.pages.reader import Indexed, Of
+from kfcourse.pages.reader import Indexed, Of, Operator
 from kfcourse.pages.relations import NOTATION
 
 M, N = 3, 2
@@ -19,7 +19,7 @@ def correcting(rng):
     joint = np.diag(c) @ L
     mu = joint / np.add.reduce(joint)
     return {
-        "i": range(M), "j": range(M), "L": Indexed(L), "c": Indexed(c), r"\mu": Indexed(mu), "y_k": column(y),
+        "i": range(M), "j": range(M), "L": Indexed(L), "c": Indexed(c), r"\mu": Indexed(mu), "y_k": column(y), "y": column(y),
         "h": Indexed([column(one) for one in h]), "F": Indexed(F),
         "h^j": Of(lambda j: column(h[j]), "j"), "F^j": Of(lambda j: F[j], "j"),
         "z^j": Of(lambda j: column(z[j]), "j"), "z": column(np.average(z, axis=0, weights=mu)),
@@ -61,7 +61,28 @@ def remembering(rng):
     }  # fmt: skip
 
 
-LETTERS = (correcting, predicting, remembering)
+def nearest(rng):
+    """The mean square about m of a law with the mean mu and the variance s."""
+    mass, x, m = rng.dirichlet(np.ones(4)), rng.normal(size=4), rng.normal()
+    mu, d = mass @ x, rng.uniform(0.5, 2)
+    entropy = {"d": d, r"\mathsf M_f\ln\mathcal N": mass @ multivariate_normal(m, d).logpdf(x)}
+    return entropy | {
+        r"\mathsf M_f": Operator(lambda values: float(mass @ values)),
+        "x": x,
+        "m": m,
+        r"\mu": mu,
+        "s": mass @ (x - mu) ** 2,
+    }
+
+
+def failed(rng):
+    """What one innovation adds to the odds of a failed sensor."""
+    F, nu = rng.uniform(0.5, 2, size=2), rng.normal()
+    sound, failed = (multivariate_normal(0, one).logpdf(nu) for one in F)
+    return {"F": Indexed(F), r"\nu": nu, r"\ell": failed - sound, r"\varrho": F[1] / F[0]}
+
+
+LETTERS = (correcting, predicting, remembering, nearest, failed)
 SAID = {
     r"x_{k+1}=a^{i_{k+1}}(x_k,v_k)": NOTATION,
     r"y_k=b^{i_k}(x_k,w_k)": NOTATION,
@@ -70,3 +91,4 @@ SAID = {
     r"\Psi^{\text{before}}": NOTATION,
     r"\Psi^{\text{after}}": NOTATION,
 }
+LITERALS = ("third", "thousand")  # of names

@@ -100,7 +100,17 @@ def two_measurements(rng):
     return {"x": Indexed([None, *x]), "w": Indexed(w), "y": Indexed(y), r"\delta": delta}
 
 
-LETTERS = (any_gain, wrong_gain, array, bierman, at_the_end, at_the_beginning, two_measurements)
+def one_measurement(rng):
+    """A scalar measurement, and the prediction's root in the words of the text."""
+    own, scalar = array(rng), _corrected(rng, 1)
+    F = scalar["H"] @ scalar[r"\Psi"] @ scalar["H"].T + scalar["R"]
+    wide = np.hstack([own["A"] @ own["S"], np.linalg.cholesky(own["Q"])])
+    T, _ = np.linalg.qr(wide.T, mode="complete")
+    turned = {r"(AS\;\;Q^{1/2})": wide, "T": T, r"(S'\;\;0)": np.hstack([own["S'"], np.zeros((3, 3))])}
+    return turned | {"p": scalar["p"], r"\Psi": scalar[r"\Psi"], "R": scalar["R"].item(), "F": F.item()}
+
+
+LETTERS = (any_gain, wrong_gain, array, bierman, at_the_end, at_the_beginning, two_measurements, one_measurement)
 _BEFORE = r"\begin{pmatrix}R^{1/2}&HS\\0&S\end{pmatrix}"
 _BLOCKS = r"\begin{pmatrix}F&H\Psi\\\Psi H^T&\Psi\end{pmatrix}"
 _WRONG = r"(K+\epsilon\gamma)"

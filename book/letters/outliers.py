@@ -21,7 +21,19 @@ def doubting(rng, states=3, m=2):
     return letters | {r"\lambda": lam, "s": s, "m": m, r"\operatorname{tr}": np.trace}
 
 
-LETTERS = (doubting,)
+def scalar(rng, w=1.0):
+    """A fix of one component."""
+    Psi, R, nu = rng.uniform(0.5, 2, size=3)
+    F = Psi + R / w
+    left = np.linalg.inv([[1 / Psi + w / R]]).item()
+    return {r"\Psi": Psi, "R": R, "w": w, "F": F, "K": left * w / R, "p": left, r"\nu": nu, "s": nu / F**0.5}
+
+
+def doubtful(rng):
+    return scalar(rng, 0.3)
+
+
+LETTERS = (doubting, scalar, doubtful)
 SAID = {
     "w=1": NOTATION,
     r"\nu^TF^{-1}\nu>\gamma": CONDITION,

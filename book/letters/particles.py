@@ -19,3 +19,4 @@ SAID = {
     r"\mathsf M_q\left[x^2\,\tfrac{p}{q}\right]": NOTATION,
     r"\frac{N_e}{N}\to\frac{(\mathsf M w)^2}{\mathsf M w^2}": NOTATION,
 }
+LITERALS = ("thousand",)

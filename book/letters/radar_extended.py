@@ -8,7 +8,7 @@ from kfcourse.linear import LinearSystem, run
 from kfcourse.linear.system import linear_system
 from kfcourse.pages.letters import column, covariance
 from kfcourse.pages.reader import Indexed
-from kfcourse.pages.relations import NOTATION, quoted
+from kfcourse.pages.relations import CONDITION, NOTATION, quoted
 from kfcourse.scenarios.pointer import acceleration_from
 from kfcourse.scenarios.radar import kinematic
 
@@ -125,3 +125,4 @@ EQUALS = {
     r"E_{\rm literal}(1)": r"\frac{2\beta}{\alpha+2\beta}",
     r"\frac{E_u(\zeta)}{E(\zeta)}": r"\frac{(\zeta-1)(2\zeta+1)}{2\zeta^2}",
 }
+SAID |= {r"|\zeta|=1": CONDITION}

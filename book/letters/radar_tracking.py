@@ -8,7 +8,7 @@ from kfcourse.filters.alphabeta import alpha_beta, steady_beta, tracking_index
 from kfcourse.linear.system import linear_system
 from kfcourse.pages.letters import column
 from kfcourse.pages.reader import Indexed
-from kfcourse.pages.relations import DEFINITION, NOTATION, quoted
+from kfcourse.pages.relations import CONDITION, DEFINITION, NOTATION, quoted
 from kfcourse.scenarios.flight import aircraft
 from kfcourse.scenarios.radar import kinematic
 
@@ -109,7 +109,36 @@ def noise_alone(rng):
     return {r"\alpha": alpha, r"\beta": beta, r"\sigma": sigma, r"\mathsf De^r": spread[0], r"\mathsf De^s": spread[1]}
 
 
-LETTERS = (model, flight, limit, growing, start, step, noise_alone)
+def small_gains(rng):
+    alpha = rng.uniform(0.05, 0.1)
+    return {r"\alpha": alpha, r"\beta": steady_beta(alpha)}
+
+
+def limit_at_once(rng):
+    """The same limit as matrices, and the filter's answer to a measurement that grows by a factor at each step."""
+    own, zeta, y = limit(rng), 1.7, rng.normal()
+    Psi = np.array([[own[r"\Psi"][i, j] for j in (1, 2)] for i in (1, 2)])
+    K, A, H = column([own[r"\alpha"], own[r"\beta"] / own["T"]]), own["A"], own["H"]
+    x = np.linalg.solve(np.eye(2) - (np.eye(2) - K @ H) @ A / zeta, K * y)
+    answer = {r"\zeta": zeta, "y": y, r"\hat x": x, r"\hat r": x[0].item(), r"\rho": np.sqrt(1 - own[r"\alpha"])}
+    return own | answer | {r"\Psi": Psi, "K": K, "q": own[r"\sigma_a"] ** 2}
+
+
+def errors(rng):
+    """Errors of a filter with fixed gains that follows a straight line, in place and in T times speed."""
+    alpha, beta, n = *rng.uniform(0.3, 0.6, 2), rng.normal(size=5)
+    r, s, true = 0.0, 0.0, (rng.normal(), rng.normal())
+    rows = [(-true[0], -true[1])]
+    for k in range(1, 5):
+        place = true[0] + k * true[1]
+        ahead = r + s
+        r, s = ahead + alpha * (place + n[k] - ahead), s + beta * (place + n[k] - ahead)
+        rows.append((r - place, s - true[1]))
+    at_k = {f"e^{name}": Indexed([row[i] for row in rows]) for i, name in enumerate("rs")}
+    return at_k | {r"\alpha": alpha, r"\beta": beta, "n": Indexed(n), "k": range(1, 5)}
+
+
+LETTERS = (model, flight, limit, growing, start, step, noise_alone, small_gains, limit_at_once, errors)
 SAID = {
     r"v_k\sim\mathcal N(0,\sigma_a^2)": DEFINITION,
     r"w_k\sim\mathcal N(0,\sigma^2)": DEFINITION,
@@ -127,3 +156,5 @@ EQUALS = {
     r"\chi(-1)\big|_{\beta=\beta_+}": r"-4\sqrt{1-\alpha}",
     r"\lim_{\zeta\to1}\frac{E(\zeta)}{(\zeta-1)^2}\,T^2": r"T^2(1-\alpha)/\beta",
 }
+SAID |= {r"\beta=\alpha^2/(2-\alpha)": quoted("Benedict and Bordner")}
+SAID |= dict.fromkeys((r"\chi(-1)<0", r"\beta=4-2\alpha"), CONDITION)

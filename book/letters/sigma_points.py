@@ -1,6 +1,7 @@
 """The letters of sigma-points.md: a correction that is iterated, and one by points, as plain programs."""
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.stats import multivariate_normal
 
 from kfcourse.pages.letters import column, covariance, slope
@@ -110,7 +111,14 @@ def contraction(rng):
     return {r"\varrho": slope_there, "K": gain(end), "S'": S1(end), "S''": S2, "x_*": end, r"\lambda": lam}
 
 
-LETTERS = (iterated, settled, points, posterior, one_component, contraction)
+def fourth_moment(rng):
+    """The weight of the centre for which the square of a component has the variance 2, and how long the points are then."""
+    n = 3
+    kappa = brentq(lambda kappa: (n + kappa) ** 2 * 2 / (2 * (n + kappa)) - 1 - 2, -1, 2, xtol=1e-15)
+    return {"n": n, r"\kappa": kappa, "|x|": np.sqrt(n + kappa)}
+
+
+LETTERS = (iterated, settled, points, posterior, one_component, contraction, fourth_moment)
 EQUALS = {
     "x_{i+1}": r"\lambda+K\bigl(y-S(x_i)-H(\lambda-x_i)\bigr)",
     r"\mathsf M\,x": r"\lambda",

@@ -1,9 +1,10 @@
 """The letters of stratonovich.md: a linear model whose densities are all known, and a chain as a plain program."""
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from kfcourse.pages.letters import chain_run
-from kfcourse.pages.reader import Of, bell
+from kfcourse.pages.reader import Indexed, Of, Operator, bell
 from kfcourse.pages.relations import DEFINITION, NOTATION
 
 
@@ -73,7 +74,45 @@ def chain(rng):
     }
 
 
-LETTERS = (densities, joint, chain)
+def odds(rng):
+    """The odds of the shadow after a step of the chain of two states, and the steepest slope of their logarithm."""
+    alpha, beta = rng.uniform(0.05, 0.3, size=2)
+    P = np.array([[1 - alpha, alpha], [beta, 1 - beta]])  # from and to: present, shadowed
+
+    def after(o):
+        present, shadowed = np.array([1, o]) / (1 + o) @ P
+        return shadowed / present
+
+    def slope(log_o):
+        return (np.log(after(np.exp(log_o + 1e-20j))) / 1e-20).imag
+
+    steepest = -minimize_scalar(lambda log_o: -slope(log_o), bounds=(-9, 9), method="bounded", options={"xatol": 1e-9}).fun
+    o = rng.uniform(0.5, 2)
+    return {r"\alpha": alpha, r"\beta": beta, "o": o, "o'": after(o), r"\varkappa": steepest}
+
+
+def splitting(rng):
+    """What a meter with three readings tells of a state with four values."""
+    joint, x = rng.dirichlet(np.ones(12)).reshape(3, 4), rng.normal(size=4)
+    given = joint / joint.sum(axis=1, keepdims=True)
+    z, square = given @ x, given @ x**2
+    mass, lam = joint.sum(axis=1), joint.sum(axis=0) @ x
+
+    def mean(values):
+        return float(mass @ values)
+
+    before = joint.sum(axis=0) @ (x - lam) ** 2
+    means = {r"\mathsf M": Operator(mean), r"\mathsf D": Operator(lambda values: mean((values - mean(values)) ** 2))}
+    return means | {"p": Indexed([square - z**2]), "z": Indexed([z], z), r"\Psi": Indexed([before]), "k": range(1)}
+
+
+def shadow(rng):
+    """The variance of a state that is 1 with the probability q."""
+    q = rng.uniform(0.2, 0.8)
+    return {"q": q, r"\Psi": np.average((np.array([0, 1]) - q) ** 2, weights=[1 - q, q])}
+
+
+LETTERS = (densities, joint, chain, odds, splitting, shadow)
 SAID = {
     r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k": DEFINITION,
     r"y_k=S_k(x_k)+n_k": DEFINITION,

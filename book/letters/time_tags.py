@@ -43,7 +43,13 @@ def one_step_late(rng):
     return {"p": p, "Q": Q, "R": R, "K": K, "K_*": np.linalg.lstsq(seen[:, None], state, rcond=None)[0].item()}
 
 
-LETTERS = (clock, prediction, late, one_step_late)
+def late_gain(rng):
+    """The gain of one who takes the measurement for one of this moment."""
+    p, Q, R = rng.uniform(0.5, 2, size=3)
+    return {"p": p, "Q": Q, "R": R, "K": 1 - R * np.linalg.inv([[p + Q + R]]).item()}
+
+
+LETTERS = (clock, prediction, late, one_step_late, late_gain)
 EQUALS = {
     r"{\hat{s}-s}": r"-V_0\tau+a_0\tau^2/2-j\tau^3/6",
     r"{\hat{V}-V}": r"-a_0\tau+j\tau^2/2",
@@ -54,3 +60,4 @@ SAID = {
     r"\hat V(t)=\dot s(t-\tau)": DEFINITION,
     r"\hat b(t)=u(t)-\ddot s(t-\tau)": DEFINITION,
 }
+SAID |= {"c(t)=rt+c_0": DEFINITION}

@@ -58,7 +58,25 @@ def again(rng):
     return {r"\kappa": kappa, "n": n, r"\frac{\mathsf Me_n^2}{p_n}": square / claimed}
 
 
-LETTERS = (course, display, western, again)
+def perfect(rng, nu=1.3):
+    """A parabola without noise: moments by quadrature, and the measurement in the scale of the tangent."""
+    lam, Psi, slope = rng.normal(), rng.uniform(0.5, 2), rng.uniform(1, 2)
+    bend = nu * slope / np.sqrt(Psi)
+    x, mean = normal_nodes(lam, Psi)
+
+    def S(x):
+        return slope * (x - lam) + bend * (x - lam) ** 2 / 2
+
+    h, t = mean(S(x)), rng.uniform(0.5, 1)
+    law = {r"\Psi": Psi, "S'": slope, "S''": bend, r"\nu": nu, "F": mean((S(x) - h) ** 2), "G": mean((x - lam) * S(x)) / Psi}
+    return law | {"t": t, "s": (S(lam + t * np.sqrt(Psi)) - h) / slope / np.sqrt(Psi)}
+
+
+def nearly_straight(rng):
+    return perfect(rng, 0.1)
+
+
+LETTERS = (course, display, western, again, perfect, nearly_straight)
 SAID = {r"\nu\ll1": CONDITION, r"\frac34\kappa^2\ll1": CONDITION, r"S'\approx0": CONDITION}
 SAID |= dict.fromkeys(
     (

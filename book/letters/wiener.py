@@ -87,7 +87,13 @@ def weights(rng):
     return {"g": Indexed(g), "s": Indexed(s), "k": range(4), "i": range(4), "j": range(4)}
 
 
-LETTERS = (signal, waiting, amplitude, correlator, weights, bucy, shrinking)
+def found(rng):
+    """The greatest ratio for one pulse: the mean of the correlator over its deviation, squared."""
+    own = amplitude(rng)
+    return {name: own[name] for name in ("R", "E", "b")} | {"d": own["b"] * own["E"] / np.sqrt(own["R"] * own["E"])}
+
+
+LETTERS = (signal, waiting, amplitude, correlator, weights, bucy, shrinking, found)
 SAID = {
     r"\zeta=e^{i\theta}": DEFINITION,
     r"W(\zeta)=\frac{1-a\zeta^{-1}}{\rho\,(1-\gamma\zeta^{-1})}\left[\frac{Q}{(1-a\zeta^{-1})(1-\gamma\zeta)}\right]_+": quoted(
@@ -112,3 +118,4 @@ EQUALS = {
     r"\textstyle\sum g_k^2\sum s_k^2-(\sum g_ks_k)^2": r"\frac12\sum_i\sum_j(g_is_j-g_js_i)^2",
     r"\ln\frac{\mathcal L(b)}{\mathcal L(0)}": r"(bC-b^2E/2)/R",
 }
+SAID |= {"d^2=13": "a setting"}

@@ -20,7 +20,8 @@ def extended_kalman_bucy(
 ) -> Filter:
     """The extended Kalman filter in continuous time, as a filter of the means y_k over steps of length T.
 
-    dz/dt = f + K (y - S),   K = D H^T 2 N^-1,     dD/dt = A D + D A^T + Q - K H D  [+ D W D],   W = U + H^T 2 N^-1 H
+    dz/dt = f + K (y - S),                        K = D H^T 2 N^-1
+    dD/dt = A D + D A^T + Q - K H D  [+ D W D],   W = U + H^T 2 N^-1 H
 
     are integrated by Euler's scheme, except that the term -K H D is taken implicitly, so that no step is too long for it:
 

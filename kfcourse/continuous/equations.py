@@ -23,7 +23,8 @@ def symmetrised_drift(
 ) -> sp.ImmutableMatrix:
     """What is added to ds/dt = rates(s, noise) in Ito's sense to give the same in the symmetrised (Stratonovich) sense, (n, 1).
 
-    1/2 sum_lm q_lm db_l/ds b_m,   q the intensity, b_l the derivative of the rates by noise l;   of g(x) xi:  g g' S_xi / 4
+    1/2 sum_lm q_lm db_l/ds b_m    q the intensity, b_l the derivative of the rates by noise l
+    g g' S_xi / 4                  of g(x) xi
     """
     b, q = rates.jacobian(sp.Matrix(noise)), range(len(noise))
     terms = [intensity[i, j] / 2 * b.col(i).jacobian(sp.Matrix(state)) * b.col(j) for i in q for j in q]

@@ -66,7 +66,7 @@ FAMILIES: dict[str, Family] = {
         "МДФМП",
         "MDFMP, the modified two-step filter of low order",
         "Модифицированный двухшаговый фильтр малого порядка (МДФМП)",
-        "#AA4499",
+        "#590059",
         ">",
     ),
     "fkp": Family("FKP", "ФКП", "FKP, the filter with finite memory", "Фильтр с конечной памятью (ФКП)", "#117733", "p"),

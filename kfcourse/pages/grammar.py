@@ -35,8 +35,9 @@ Letters: TypeAlias = Mapping[str, Any]
 Side: TypeAlias = Callable[[dict[str, Any]], Value]
 
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
-    r"\sin": np.sin, r"\cos": np.cos, r"\tan": np.tan, r"\sinh": np.sinh, r"\cosh": np.cosh, r"\exp": np.exp, r"\ln": np.log,
-    r"\det": np.linalg.det, r"\max": np.maximum, r"\min": np.minimum, r"\operatorname{sign}": np.sign,
+    r"\sin": np.sin, r"\cos": np.cos, r"\tan": np.tan, r"\sinh": np.sinh, r"\cosh": np.cosh, r"\coth": lambda x: 1 / np.tanh(x),
+    r"\exp": np.exp, r"\ln": np.log, r"\det": np.linalg.det, r"\max": np.maximum, r"\min": np.minimum,
+    r"\operatorname{sign}": np.sign,
 }  # fmt: skip
 _NUMBERS = {r"\pi": np.pi, "e": np.e, r"\infty": np.inf}
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(400)

@@ -12,7 +12,8 @@ A page `my-chapter.md` that types relations in `$$` or in a box has a file `lett
 So a changed letter stops the build: what is computed no longer holds, or what was said is no longer there.
 
 The key points of a page say again what it has shown: a formula in them is computed, or stands elsewhere on the page, letter by
-letter.
+letter.  A relation in any other sentence, an answer for instance, holds if the page's letters can read it, in a world of its own
+where need be; only what gives a letter a value or another name, `T=0.1`, holds where it is said and nowhere else.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib.util import module_from_spec, spec_from_file_location
+from itertools import groupby
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -29,6 +31,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kfcourse.pages.reader import Unread, holds, is_relation, normal, pieces
+from kfcourse.pages.tex import RELATIONS
 from kfcourse.pages.verification import DEFINITION as DEFINITION
 from kfcourse.pages.verification import Unverified
 
@@ -44,12 +47,13 @@ _BOX = re.compile(
 _POINTS = re.compile(r"^(`{3,})\{admonition\} Key points\n(.*?)^\1\s*$", re.DOTALL | re.MULTILINE)
 _DISPLAY = re.compile(r"^(?:\$\$|```\{math\})\n(.*?)\n(?:\$\$|```)(?: \(([\w-]+)\))?\s*$", re.DOTALL | re.MULTILINE)
 _INLINE = re.compile(r"(?<![\\$])\$([^$]+)\$(?!\$)")
+_NO_LETTER = re.compile(r"\\(?:frac|sqrt|cdot|infty|hat|bar|tilde|dot|ddot)\b|'")
 _OPERATOR = re.compile(r"(?:^|\s)([+/]|-|\\frac|\\sqrt|\^ (?:T|\d|\{ - 1 \}))(?=\s|$)")
 
 
 class Formula(NamedTuple):
-    """A formula as a page types it: a "display", in a "box", in a key "point", or in a cell a "side" or "name" that is printed,
-    not checked."""
+    """A formula as a page types it: a "display", in a "box", in a key "point", in a "sentence", or in a cell a "side" or "name"
+    that is printed, not checked."""
 
     kind: str
     latex: str
@@ -111,7 +115,14 @@ class Letters:
         if formula.kind == "point":
             new = [piece for piece in pieces(formula.latex) if not re.search(rf" {re.escape(piece)} (?![\^_'])", elsewhere)]
             return [self._judged(self.equals.get(piece, piece), formula) for piece in new]
+        if formula.kind == "sentence":
+            return [said for piece in self.related(formula) for said in self.read(piece)]
         return [self._judged(piece, formula) for piece in pieces(formula.latex) if self.says(piece)]
+
+    @staticmethod
+    def related(formula: Formula) -> list[str]:
+        """The relations of a formula that hold everywhere on the page."""
+        return [piece for piece in pieces(formula.latex) if is_relation(piece) and not _sets(piece)]
 
     def says(self, piece: str) -> bool:
         """Is there anything in it that can be wrong?  Not where an index begins."""
@@ -123,16 +134,38 @@ class Letters:
             return Said(piece, self.said[piece], False)
         if not is_relation(piece):
             raise Unverified(_unsaid(piece, "an expression that is no relation"))
+        unread = self._against(piece)
+        if unread is None:
+            return Said(piece, self.labels.get(formula.label, COMPUTED), True)
+        raise Unverified(_unsaid(piece, unread or "the page has no letters"))
+
+    def read(self, piece: str) -> list[Said]:
+        """What a relation in a sentence is, if it can be read."""
+        if piece in self.said:
+            return [Said(piece, self.said[piece], False)]
+        return [Said(piece, COMPUTED, True)] if self._against(piece) is None else []
+
+    @cache  # noqa: B019 (the letters of a page are kept)
+    def _against(self, piece: str) -> str | None:
+        """None if a relation holds in a world of the page; why, if none can read it.
+
+        Raises
+        ------
+        Unverified
+            If it holds in none, and one can.
+        """
         reasons: list[Exception] = []
         for world in self.worlds:
             try:
                 for letters in world:
                     holds(piece, letters)
-                return Said(piece, self.labels.get(formula.label, COMPUTED), True)
+                return None
             except (Unread, Unverified) as reason:
                 reasons.append(reason)
         false = [reason for reason in reasons if isinstance(reason, Unverified)]
-        raise Unverified(str(false[0]) if false else _unsaid(piece, "; ".join(map(str, reasons)) or "the page has no letters"))
+        if false:
+            raise Unverified(str(false[0]))
+        return "; ".join(map(str, reasons))
 
 
 def speaks(piece: str) -> bool:
@@ -141,6 +174,16 @@ def speaks(piece: str) -> bool:
         return True
     letters = _without_scripts(piece)
     return bool(_OPERATOR.search(f" {letters}")) and len(re.sub(r"\^ (?:\{[^{}]*\}|\S+)", "", letters).split()) > 1
+
+
+def _sets(piece: str) -> bool:
+    """Does it give a letter a value or another name, as `T = 0.1` or `x_0 = m`?"""
+    plain = _NO_LETTER.sub("", _without_scripts(piece)).split()
+    sides = [list(side) for related, side in groupby(plain, RELATIONS.__contains__) if not related]
+    return all(
+        len(side) == 1 or (side[0] == "-" and len(side) == 2) or not any(one.strip("\\").isalpha() for one in side)
+        for side in sides
+    )
 
 
 def _unsaid(latex: str, why: str) -> str:
@@ -189,6 +232,8 @@ def formulas(text: str) -> Iterator[Formula]:
         yield from (Formula("box", latex) for latex in _INLINE.findall(_DISPLAY.sub("", body)))
     for _, body in _POINTS.findall(prose):
         yield from (Formula("point", latex) for latex in _INLINE.findall(body))
+    sentences = _POINTS.sub("", _BOX.sub("", _DISPLAY.sub("", prose)))
+    yield from (Formula("sentence", latex) for latex in _INLINE.findall(sentences))
     for code in cells(text):
         yield from _printed(code)
 
@@ -230,6 +275,14 @@ def judged(page: Path, text: str | None = None) -> Iterator[tuple[Formula, list[
     elsewhere = outside_points(text)
     for formula in formulas(text):
         yield formula, letters.judge(formula, elsewhere)
+
+
+def unread(page: Path, text: str | None = None) -> list[str]:
+    """The relations in a page's sentences that none of its letters can read, so that nothing holds them."""
+    letters = letters_of(page)
+    text = page.read_text(encoding="utf-8") if text is None else text
+    sentences = [formula for formula in formulas(text) if formula.kind == "sentence"]
+    return [piece for formula in sentences for piece in letters.related(formula) if not letters.read(piece)]
 
 
 def outside_points(text: str) -> str:

@@ -1,8 +1,8 @@
 r"""Numbers and words in the sentences that `claim` and `agree` print, read from the code of a page.
 
-A number that is typed must also stand in the code of its cell outside of the sentence, as it is or as a tolerance (12 digits and
-1e-12, 95 % and 0.95, 10^{-6} and 1e-6); others come from values, `f"{x:.2f}"`.  What is left (years, names, units) the page's
-file in letters/ lists in LITERALS.  A sentence that compares needs a condition that compares.
+A number that is typed, in digits or in words, must also stand in the code of its cell outside of the sentence, as it is or as a
+tolerance (12 digits and 1e-12, 95 % and 0.95, 10^{-6} and 1e-6, a third and 3); others come from values, `f"{x:.2f}"`.  What is
+left (years, names, units) the page's file in letters/ lists in LITERALS.  A sentence that compares needs a condition that does.
 
 A number of two digits or more in the prose around the cells, or in the words of a figure, stands in the code of the page as well:
 where it is computed, or in a condition that holds it.  Numbers that are names (variant 53, lecture 10) need not.
@@ -14,6 +14,8 @@ import ast
 import re
 from collections.abc import Iterator
 from typing import NamedTuple
+
+import numpy as np
 
 from kfcourse.laws import CONFIDENCE
 from kfcourse.pages.relations import calls, cells
@@ -29,6 +31,11 @@ _NO_PROSE = re.compile(
     r"|\b(?:[Vv]ariants?|[Ll]ectures?|Python) \d[\d.]*(?: and \d+)?",
     re.MULTILINE | re.DOTALL,
 )
+_WORDS = {"two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9, "ten": 10, "eleven": 11}
+_WORDS |= {"twelve": 12, "twenty": 20, "thirty": 30, "forty": 40, "fifty": 50, "hundred": 100, "thousand": 1000}
+_WORDS |= {"twice": 2, "double": 2, "doubles": 2, "half": 2, "halves": 2, "halved": 2, "third": 3, "thirds": 3, "quarter": 4}
+_WORDS |= {"fourth": 4, "fifth": 5, "sixth": 6, "eighth": 8, "tenth": 10, "twentieth": 20, "hundredth": 100, "thousandth": 1000}
+_IN_WORDS = re.compile(rf"\b(?:{'|'.join(_WORDS)})(?:[ -](?:hundred|thousand))?\b", re.IGNORECASE)
 _POWER = re.compile(r"10\^(?:\{(-?\d+)\}|(\d))")
 _FORMULA = re.compile(r"\$([^$]*)\$")
 _VALUE = re.compile(r"(?:=|<|>|\\l?eq?|\\ge?|\\approx|^)\s*(-?[\d.]+)\s*$")
@@ -81,6 +88,7 @@ def _numbers(text: str) -> Iterator[str]:
         yield from (value[1] for part in re.split(r"[,;]|\\ ", formula) if (value := _VALUE.search(part)))
     for number in _NUMBER.findall(_FORMULA.sub(" ", text)):
         yield number.replace(",", "")
+    yield from _IN_WORDS.findall(_FORMULA.sub(" ", text))
 
 
 def _constants(tree: ast.AST, without: set[int]) -> set[float]:
@@ -90,6 +98,9 @@ def _constants(tree: ast.AST, without: set[int]) -> set[float]:
 
 
 def _stands(number: str, known: set[float]) -> bool:
+    if words := re.findall("[a-z]{2,}", number.lower()):
+        value = float(np.prod([_WORDS[word] for word in words]))
+        return any(abs(one - other) <= 1e-9 * abs(one) for one in (value, 1 / value, 10.0**-value) for other in known if other)
     value = float(number)
     also = (value, value / 100, value / 1000, 1 - value / 100, 10.0**-value if value < 300 else value)
     return any(abs(one - other) <= 1e-9 * abs(one) for one in also for other in known if one) or value in known

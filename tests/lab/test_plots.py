@@ -20,6 +20,7 @@ pytestmark = pytest.mark.quick
 
 SIDE_BY_SIDE = [  # the bound, the AOF, the DUOF, and what stands beside them
     ("kalman", "aof", "duof", "fos", "mfos", "fos3", "mfos3"),
+    ("kalman", "aof", "duof", "fos", "mfos", "dfmp", "mdfmp"),
     ("kalman", "aof", "duof", "fos", "mfos", "particle"),
     ("kalman", "aof", "iterated", "particle"),
 ]

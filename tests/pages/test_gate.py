@@ -81,7 +81,7 @@ def test_at_most_one_in_twenty_changes_of_typed_relations_is_not_noticed() -> No
     chance = random.Random(53)
     planted = [one for page in sorted(set(BOOK.glob("*.md")) - {gate.MADE}) for one in gate.planted(page, chance, most=5)]
     missed = [one for one in planted if not one.noticed]
-    assert {one.where for one in planted} == {"display", "box", "point", "side", "name"} and len(planted) > 200
+    assert {one.where for one in planted} == {"display", "box", "point", "sentence", "side", "name"} and len(planted) > 200
     assert len(missed) <= gate.MOST * len(planted), gate.report(missed)
 
 
