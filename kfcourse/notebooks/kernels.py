@@ -13,6 +13,7 @@ import os
 import signal
 import sys
 import threading
+import uuid
 from importlib.metadata import entry_points
 from multiprocessing import forkserver
 from multiprocessing.context import ForkServerProcess
@@ -44,9 +45,23 @@ class ForkedProvisioner(LocalProvisioner):
 
     process: Any  # a Fork, or the Popen of the usual way
 
+    async def pre_launch(self, **kwargs: Any) -> dict[str, Any]:
+        """Name the kernel's sockets.
+
+        Ports are chosen here and taken by the kernel much later: meanwhile another process may choose the same.  A name is the
+        kernel's own, and begins with @: known to Linux alone, no file.
+        """
+        manager = self.parent
+        if manager and manager.transport == "tcp" and self._forks(self.kernel_spec.argv):  # started again it keeps its own
+            manager.transport, manager.ip, manager.cache_ports = "ipc", f"@{FORKED}-{uuid.uuid4()}", False
+        return await super().pre_launch(**kwargs)
+
+    def _forks(self, cmd: list[str]) -> bool:
+        return sys.platform == "linux" and LAUNCHER in cmd
+
     async def launch_kernel(self, cmd: list[str], **kwargs: Any) -> KernelConnectionInfo:
         """Start the kernel that `cmd` (python -m ipykernel_launcher ...) would start."""
-        if sys.platform != "linux" or LAUNCHER not in cmd:
+        if not self._forks(cmd):
             return await super().launch_kernel(cmd, **kwargs)
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload(IMPORTED)
