@@ -115,6 +115,7 @@ def serve(arguments: list[str], environment: dict[str, str], folder: str | None)
     """In the fork: be a kernel, with the environment and in the folder that it shall have."""
     from ipykernel.kernelapp import IPKernelApp
 
+    threading.Thread(target=_follow, daemon=True).start()
     gc.freeze()  # what has been imported stays: not to be looked through, nor copied for that, at every collection
     os.environ.clear()
     os.environ.update(environment)
@@ -127,3 +128,11 @@ def serve(arguments: list[str], environment: dict[str, str], folder: str | None)
     if kernel.shell is not None:
         kernel.shell.enable_matplotlib("inline")  # as pyplot does when it is imported in a kernel; here it has been
     kernel.start()
+
+
+def _follow() -> None:
+    """End with the process that wanted the kernel: the fork server would not, as long as one of its forks lives."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)

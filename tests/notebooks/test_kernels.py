@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -121,3 +122,14 @@ def test_it_ends_with_the_fork_server():
     server.kill()
     assert ended(kernel)
     manager.shutdown_kernel(now=True)
+
+
+def test_it_ends_with_the_process_that_wanted_it_however_that_ends():
+    """The fork server lives as long as one of its forks does, and they as long as it: both were left."""
+    starts = (
+        "import os; from jupyter_client.manager import start_new_kernel; from kfcourse.notebooks import kernels\n"
+        "kernels.IMPORTED[:] = ['ipykernel.kernelapp']\n"
+        "manager, client = start_new_kernel(); print(manager.provisioner.pid, flush=True); os.kill(os.getpid(), 9)"
+    )
+    started = subprocess.run([sys.executable, "-c", starts], stdout=subprocess.PIPE, text=True, timeout=60)
+    assert ended(int(started.stdout))
