@@ -1,4 +1,4 @@
-"""A time limit for a block of code, in any thread and on any system; a limit of memory, on Linux.
+"""A time limit for a block of code, in any thread and on any system; a limit of memory, on Linux; limits of a whole process.
 
 Two ways to stop code that does not ask whether it should:
 
