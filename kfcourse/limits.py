@@ -1,4 +1,4 @@
-"""A time limit for a block of code, in any thread and on any system; a limit of memory, on Linux.
+"""A time limit for a block of code, in any thread and on any system; a limit of memory, on Linux; limits of a whole process.
 
 Two ways to stop code that does not ask whether it should:
 
@@ -26,6 +26,8 @@ from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any, ClassVar
 
+FILE = 100 * 2**20  # bytes a process that is limited may write to one file
+PROCESSES = 4096  # of the user's, threads included
 AGAIN = 0.01  # seconds after which a loop that survived its end is stopped again
 
 
@@ -168,3 +170,20 @@ class _Watcher:
 
 
 _set_exception = ctypes.pythonapi.PyThreadState_SetAsyncExc
+
+
+def limit_process(memory: int) -> None:
+    """Limit this process and its children, where the system can: memory, size of files, processes, no core dumps."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    limits = {"RLIMIT_AS": memory, "RLIMIT_FSIZE": FILE, "RLIMIT_CORE": 0, "RLIMIT_NPROC": PROCESSES}
+    for name, bound in limits.items():
+        try:
+            kind = getattr(resource, name)
+            _, hard = resource.getrlimit(kind)
+            bound = bound if hard == resource.RLIM_INFINITY else min(bound, hard)
+            resource.setrlimit(kind, (bound, bound))
+        except (AttributeError, ValueError, OSError):  # this system knows no such limit
+            continue

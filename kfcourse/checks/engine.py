@@ -144,7 +144,7 @@ def check(question: Question, exercise: Exercise, answer: Any, seconds: float = 
     past = Attempts() if past is None else past
     past.wrong.pop(question.name, None)
     try:
-        result = _Check(question, exercise, answer, seconds, past).result()
+        result = _Check(posed(question, exercise), answer, seconds, past).result()
     except Exception as error:
         says = "The check itself failed, and that is not your fault. It counts for nothing; please tell your teacher."
         return Result(question.name, question.title, NOT_CHECKED, says, trouble=_trouble(error))
@@ -159,18 +159,17 @@ def _trouble(error: Exception) -> str:
     return f"{told(error)} ({' < '.join(reversed(frames[-4:]))})"
 
 
+def posed(question: Question, exercise: Exercise) -> Posed:
+    """The question as it is posed in an exercise, which keeps it: answers are compared with the same again and again."""
+    return exercise.posed.setdefault(question, Posed(question, exercise))
+
+
 @dataclass(frozen=True)
-class _Check:
-    """A question with what is asked, and an answer to it."""
+class Posed:
+    """What is asked, and what our own answers give."""
 
     question: Question
     exercise: Exercise
-    answer: Any
-    seconds: float
-    past: Attempts
-
-    def _says(self, status: str, message: str, **more: Any) -> Result:
-        return Result(self.question.name, self.question.title, status, message, **more)
 
     @cached_property
     def arguments(self) -> list[tuple]:
@@ -187,12 +186,44 @@ class _Check:
         return _reference(self.key, self.arguments)
 
     @cached_property
+    def known(self) -> list[tuple[Mistake, list[Any] | None]]:
+        """Mistakes with their results, None where impossible."""
+        return [(mistake, _wrong(mistake, self.exercise, self.arguments, self.expected)) for mistake in self.question.mistakes]
+
+    @cached_property
+    def values(self) -> dict[sp.Symbol, Any]:
+        """Of the parameters: of the model's symbols that are no arguments of the answer."""
+        given = {s.name for values in self.arguments for v in values if hasattr(v, "free_symbols") for s in v.free_symbols}
+        return {s: value for s, value in self.exercise.model.values.items() if s.name not in given}
+
+    @cached_property
     def agree(self) -> Agree:
         return partial(_agree, values=self.values, tolerance=self.question.tolerance, places=self.exercise.places)
 
+
+@dataclass(frozen=True)
+class _Check:
+    """An answer to a question."""
+
+    posed: Posed
+    answer: Any
+    seconds: float
+    past: Attempts
+
+    @property
+    def question(self) -> Question:
+        return self.posed.question
+
+    @property
+    def exercise(self) -> Exercise:
+        return self.posed.exercise
+
+    def _says(self, status: str, message: str, **more: Any) -> Result:
+        return Result(self.question.name, self.question.title, status, message, **more)
+
     def result(self) -> Result:
         try:
-            found = call(self.answer, self.arguments, self.expected, self.seconds)
+            found = call(self.answer, self.posed.arguments, self.posed.expected, self.seconds)
         except Missing:
             return self._says(MISSING, "not implemented yet")
         except Unusable as reason:
@@ -201,7 +232,7 @@ class _Check:
             return self._derived(self.question, found)
         try:
             with time_limit(self.seconds):
-                if self.agree(found, self.expected) and not self._in_numbers(found, self.expected):
+                if self.posed.agree(found, self.posed.expected) and not self._in_numbers(found, self.posed.expected):
                     self.past.given.pop(self.question.name, None)
                     return self._says(PASSED, "right", share=1.0)
         except OutOfTime:
@@ -229,33 +260,29 @@ class _Check:
             message += f" {question.advice}"
         return self._says(judged.status, message, diagnosis=judged.diagnosis, share=judged.share)
 
-    @cached_property
-    def values(self) -> dict[sp.Symbol, Any]:
-        """Of the parameters: of the model's symbols that are no arguments of the answer."""
-        given = {s.name for values in self.arguments for v in values if hasattr(v, "free_symbols") for s in v.free_symbols}
-        return {s: value for s, value in self.exercise.model.values.items() if s.name not in given}
-
     def _in_numbers(self, found: Any, expected: Any) -> bool:
         """Whether numbers stand in the place of parameters on which the right formulas depend."""
         return any(
             name not in {s.name for s in mine.free_symbols}
             for mine, right in zip(_flat(found), _flat(expected), strict=True)
-            for name in depends(right, {s.name for s in self.values})
+            for name in depends(right, {s.name for s in self.posed.values})
         )
 
     def _numbers(self, found: list[Any]) -> bool:
         """Whether the formulas are right where parameters have their values, and those that are wrong as they are lack some."""
         wrong = [
-            pair for pair in zip(_flat(found), _flat(self.expected), strict=True) if not self.agree(*([one] for one in pair))
+            pair
+            for pair in zip(_flat(found), _flat(self.posed.expected), strict=True)
+            if not self.posed.agree(*([one] for one in pair))
         ]
         if not all(self._in_numbers(mine, right) for mine, right in wrong):
             return False
-        sides = ([with_values(one, self.values) for one in _flat(side)] for side in (found, self.expected))
-        return bool(_flat(self.expected)) and self.agree(*sides)
+        sides = ([with_values(one, self.posed.values) for one in _flat(side)] for side in (found, self.posed.expected))
+        return bool(_flat(self.posed.expected)) and self.posed.agree(*sides)
 
     def _wrong(self, found: list[Any]) -> Result:
-        pairs = [(part_of(found, place), part_of(self.expected, place)) for place in range(len(self.question.parts))]
-        right = [1 for mine, theirs in pairs if self.agree(mine, theirs) and not self._in_numbers(mine, theirs)]
+        pairs = [(part_of(found, place), part_of(self.posed.expected, place)) for place in range(len(self.question.parts))]
+        right = [1 for mine, theirs in pairs if self.posed.agree(mine, theirs) and not self._in_numbers(mine, theirs)]
         share = len(right) / len(self.question.parts) if right else 0.0
         times = self._times(found)
         follows = self._follows(found)
@@ -264,20 +291,21 @@ class _Check:
             return self._says(WRONG, says, diagnosis=("follows",), share=share, follows=follows)
         if self._numbers(found):
             return self._says(WRONG, NUMBERS, diagnosis=("numbers",), share=share)
-        known = [(mistake, _wrong(mistake, self.exercise, self.arguments, self.expected)) for mistake in self.question.mistakes]
-        wrong = Wrong(self.question, (self.key, self.answer), self.arguments, found, self.expected, known, self.agree)
+        posed = self.posed
+        answers = posed.key, self.answer
+        wrong = Wrong(self.question, answers, posed.arguments, found, posed.expected, posed.known, posed.agree)
         message, names, explained = wrong.told()
-        more = [] if explained else [wrong.case(self.values)]
+        more = [] if explained else [wrong.case(self.posed.values)]
         if times and self.question.advice:
             more.insert(0, self.question.advice)
         if times > (1 if self.question.advice else 0) and explained:
-            more.append(wrong.case(self.values))
+            more.append(wrong.case(self.posed.values))
         return self._says(WRONG, " ".join([message, *filter(None, more)]), diagnosis=tuple(names), share=share)
 
     def _times(self, found: list[Any]) -> int:
         """How many times in a row the same wrong results have come before."""
         before, times = self.past.given.get(self.question.name, (None, 0))
-        again = before is not None and self.agree(found, before)
+        again = before is not None and self.posed.agree(found, before)
         self.past.given[self.question.name] = found, times + 1 if again else 1
         return times if again else 0
 
@@ -295,9 +323,9 @@ class _Check:
                 with time_limit(self.seconds):
                     theirs = [
                         like(step(*copy.deepcopy(values)), wanted)
-                        for values, wanted in zip(self.arguments, self.expected, strict=True)
+                        for values, wanted in zip(self.posed.arguments, self.posed.expected, strict=True)
                     ]
-                    if self.agree(found, theirs):
+                    if self.posed.agree(found, theirs):
                         return tuple(earlier[one].name for one in chosen)
             except (Exception, OutOfTime):  # of the earlier answer
                 continue

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.checks.engine import check
+from kfcourse.checks.engine import Posed, check
 from kfcourse.checks.question import Attempts, Question, Result
 from kfcourse.checks.registry import sets
 from kfcourse.checks.steps import array_functions, noiseless_functions, places, telling_steps
@@ -204,6 +204,11 @@ class Exercise:
     def rng(self, name: str) -> np.random.Generator:
         """Random numbers that belong to this variant and name: for personal numbers and hidden arguments."""
         return np.random.default_rng(zlib.crc32(f"{self.salt}{self.variant.name}/{name}".encode()))
+
+    @cached_property
+    def posed(self) -> dict[Question, Posed]:
+        """Questions that an answer was handed in to."""
+        return {}
 
     @cached_property
     def past(self) -> Attempts:

@@ -7,6 +7,7 @@ report print them, and a test executes them, one trajectory at a time, against t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import sympy as sp
 from sympy.printing.latex import LatexPrinter
@@ -75,6 +76,7 @@ def cov_pinv(of: sp.MatrixSymbol) -> sp.MatrixSymbol:
     return matrix(rf"\mathrm{{Cov}}({of.name})^{{+}}", of.rows, of.rows)
 
 
+@cache  # filters of one construction have the same: half the time in which their equations are made
 def regression(
     coefficient: sp.MatrixSymbol, offset: sp.MatrixSymbol, target: sp.MatrixSymbol, regressor: sp.MatrixSymbol
 ) -> tuple[sp.Eq, sp.Eq]:

@@ -217,8 +217,8 @@ def printed(recipe: Recipe, zeta: sp.MatrixSymbol = s.z, *, consists_of: sp.Matr
         ]
     else:
         equations.append(s.equation(s.lam_next, s.tau_uT))
-    residual = s.cov(s.x_next) - _L * s.cov(s.x_next, _s_next).T
-    return (*equations, s.equation(s.Psi_next, residual if recipe.spread else s.Theta_uT))
+    residual = s.cov(s.x_next) - _L * s.cov(s.x_next, _s_next).T if recipe.spread else s.Theta_uT
+    return (*equations, s.equation(s.Psi_next, residual))
 
 
 EQUATIONS = {name: printed(one) for name, one in (("fos", FOS), ("mfos", MFOS), ("dfmp", DFMP), ("mdfmp", MDFMP))}

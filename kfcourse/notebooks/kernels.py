@@ -13,6 +13,7 @@ import os
 import signal
 import sys
 import threading
+import uuid
 from importlib.metadata import entry_points
 from multiprocessing import forkserver
 from multiprocessing.context import ForkServerProcess
@@ -44,9 +45,23 @@ class ForkedProvisioner(LocalProvisioner):
 
     process: Any  # a Fork, or the Popen of the usual way
 
+    async def pre_launch(self, **kwargs: Any) -> dict[str, Any]:
+        """Name the kernel's sockets.
+
+        Ports are chosen here and taken by the kernel much later: meanwhile another process may choose the same.  A name is the
+        kernel's own, and begins with @: known to Linux alone, no file.
+        """
+        manager = self.parent
+        if manager and manager.transport == "tcp" and self._forks(self.kernel_spec.argv):  # started again it keeps its own
+            manager.transport, manager.ip, manager.cache_ports = "ipc", f"@{FORKED}-{uuid.uuid4()}", False
+        return await super().pre_launch(**kwargs)
+
+    def _forks(self, cmd: list[str]) -> bool:
+        return sys.platform == "linux" and LAUNCHER in cmd
+
     async def launch_kernel(self, cmd: list[str], **kwargs: Any) -> KernelConnectionInfo:
         """Start the kernel that `cmd` (python -m ipykernel_launcher ...) would start."""
-        if sys.platform != "linux" or LAUNCHER not in cmd:
+        if not self._forks(cmd):
             return await super().launch_kernel(cmd, **kwargs)
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload(IMPORTED)
@@ -100,6 +115,7 @@ def serve(arguments: list[str], environment: dict[str, str], folder: str | None)
     """In the fork: be a kernel, with the environment and in the folder that it shall have."""
     from ipykernel.kernelapp import IPKernelApp
 
+    threading.Thread(target=_follow, daemon=True).start()
     gc.freeze()  # what has been imported stays: not to be looked through, nor copied for that, at every collection
     os.environ.clear()
     os.environ.update(environment)
@@ -112,3 +128,11 @@ def serve(arguments: list[str], environment: dict[str, str], folder: str | None)
     if kernel.shell is not None:
         kernel.shell.enable_matplotlib("inline")  # as pyplot does when it is imported in a kernel; here it has been
     kernel.start()
+
+
+def _follow() -> None:
+    """End with the process that wanted the kernel: the fork server would not, as long as one of its forks lives."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)

@@ -1,12 +1,11 @@
 """The engine: right answers pass in any form, wrong ones are told apart, and a known mistake is named."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import sympy as sp
-from tiny import FORMULA, SUM, asks, c, d, outcome, p, raises, x, y
+from tiny import FORMULA, SUM, about, asks, c, d, outcome, p, raises, x, y
 
 from kfcourse.checks.engine import check
 from kfcourse.checks.question import MIME, ForVariant, Mistake, Question, catalogue
@@ -45,7 +44,7 @@ def test_a_formula_must_hold_for_both_signs(wrong):
 
 def test_parameters_have_the_sign_of_their_values():
     question = asks(lambda a: c * a, [(x,)])
-    exercise = SimpleNamespace(model=SimpleNamespace(values={c: sp.Rational(-1, 2)}), places=())
+    exercise = about({c: sp.Rational(-1, 2)})
     assert check(question, exercise, lambda a: -sp.Abs(c) * a).passed
     assert check(question, exercise, lambda a: sp.Abs(c) * a).status == "wrong"
     assert check(question, exercise, lambda a: sp.symbols("c") * a).passed  # a symbol of the student's own, by its name
@@ -64,6 +63,30 @@ def test_a_known_mistake_is_named_and_its_message_shown():
     assert "b enters twice" in result.message
     assert outcome(question, lambda a, b: a - b - b).diagnosis == ("minus",)
     assert "does not look like" in outcome(question, lambda a, b: a * b).message
+
+
+def test_own_answers_are_asked_once_however_many_are_handed_in():
+    """Answers are compared with the same results again and again; and none of them reaches what the next one is given."""
+    asked = []
+
+    def tells(name, function):
+        return lambda *values: asked.append(name) or function(*values)
+
+    def arguments(_):
+        asked.append("arguments")
+        return SUM.arguments(None)
+
+    mistakes = catalogue((("once", "b enters twice", tells("once", lambda a, b: a + b)),))
+    question = Question("t1", "a test", "core", tells("key", lambda a, b: a + 2 * b), arguments, mistakes)
+    task = about()
+
+    def spoiling(a, b):
+        a += b
+        return a
+
+    for answer, diagnosis in ((spoiling, ("once",)), (lambda a, b: a + b, ("once",)), (lambda a, b: a + 2 * b, ())):
+        assert check(question, task, answer).diagnosis == diagnosis
+    assert asked == ["arguments", "key", "key", "once", "once"]  # two calls each
 
 
 def test_parts_are_told_apart():
@@ -145,7 +168,7 @@ def test_not_implemented_is_the_students_own_word():
 
 def test_numbers_in_the_place_of_parameters_are_told():
     question = asks(lambda a: (c * a, c**2 + a), [(x,)], parts=("first", "second"))
-    exercise = SimpleNamespace(model=SimpleNamespace(values={c: sp.Rational(-1, 2)}), places=())
+    exercise = about({c: sp.Rational(-1, 2)})
     for answer in (lambda a: (-a / 2, a + 0.25), lambda a: (c * a, a + 0.25)):
         result = check(question, exercise, answer)
         assert (result.status, result.diagnosis) == ("wrong", ("numbers",)), result

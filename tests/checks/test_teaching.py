@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import sympy as sp
-from tiny import NOTHING, asks, c, d, outcome, p, x, y, z
+from tiny import NOTHING, about, asks, c, d, outcome, p, x, y, z
 
 from kfcourse.checks.diagnosis import GENERAL
 from kfcourse.checks.engine import check
@@ -26,7 +26,7 @@ def test_a_wrong_answer_that_no_hint_explains_gets_its_own_case():
 
 
 def test_the_case_of_a_formula_has_values_of_the_parameters():
-    exercise = SimpleNamespace(model=SimpleNamespace(values={c: sp.Rational(-1, 2)}), places=())
+    exercise = about({c: sp.Rational(-1, 2)})
     message = check(asks(lambda a: c + sp.exp(a), [(x,)]), exercise, lambda a: 3 * c - sp.exp(a)).message
     assert message.endswith("An example: at x = 1.3, c = -0.5 your function gives -5.169.")
 
@@ -87,7 +87,7 @@ def named(name, key, on=None):
 
 
 QUESTIONS = {one.name: one for one in (named("t1", single), named("t2", doubled, doubled_with), named("t3", three, three_with))}
-EXERCISE = SimpleNamespace(model=SimpleNamespace(values={}), places=(), questions=QUESTIONS)
+EXERCISE = about(questions=QUESTIONS)
 
 
 def test_a_right_step_on_a_wrong_one_is_marked_and_said():

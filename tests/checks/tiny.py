@@ -10,7 +10,14 @@ from kfcourse.checks.question import Question
 
 x, y, z, p, m, d = sp.symbols("x y z p m d", real=True)
 c, e, g, f = sp.symbols("c e g f", real=True)
-NOTHING = SimpleNamespace(model=SimpleNamespace(values={}), places=())
+
+
+def about(values=(), **more):
+    """An exercise about a model of these values."""
+    return SimpleNamespace(model=SimpleNamespace(values=dict(values)), places=(), posed={}, **more)
+
+
+NOTHING = about()
 
 
 def asks(right, arguments, mistakes=(), parts=(), **options):

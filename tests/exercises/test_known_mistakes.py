@@ -32,19 +32,6 @@ def opened(letter, variant):
     return exercise(letter, variant)
 
 
-@pytest.fixture
-def each_mistake_once(monkeypatch):
-    """A check evaluates the whole catalogue; for all mistakes of a question in turn that is the same results again and again."""
-    wrong, found = engine._wrong, {}
-
-    def remembered(mistake, *arguments):
-        if id(mistake) not in found:
-            found[id(mistake)] = wrong(mistake, *arguments)
-        return found[id(mistake)]
-
-    monkeypatch.setattr(engine, "_wrong", remembered)
-
-
 def test_names_follow_the_set():
     for letter, one in sets().items():
         assert [question.name for question in one.questions] == [f"{letter}{i + 1}" for i in range(len(one.questions))]
@@ -59,7 +46,6 @@ def test_core_questions_know_five_mistakes(letter, question):
         assert len({mistake.name for mistake in question.mistakes}) >= 5
 
 
-@pytest.mark.usefixtures("each_mistake_once")
 @pytest.mark.parametrize(("letter", "question", "variant"), CASES)
 def test_every_answer_and_every_mistake(letter, question, variant):
     """The right answer passes.  A mistake is diagnosed by its name, or it is the same as the right answer here, or impossible.

@@ -24,6 +24,7 @@ from kfcourse.notebooks.grading.assembly import assembled
 from kfcourse.notebooks.grading.marking import code_of
 from kfcourse.notebooks.grading.running import Site
 from kfcourse.notebooks.grading.sandbox import Sandbox
+from kfcourse.notebooks.grading.staging import FONTS
 from kfcourse.notebooks.grading.submissions import Cell, Unreadable, cells_of, claimed
 from kfcourse.notebooks.grading.table import RUNNING, WAITING, Grade, Told, grade_all, read_table, write_table
 from kfcourse.notebooks.master import read, render, solution, student
@@ -904,8 +905,13 @@ def test_an_answer_with_an_error_is_known_by_its_cell():
 def test_the_kernels_environment(tmp_path, monkeypatch):
     monkeypatch.setenv("MY_TOKEN", "x")
     monkeypatch.setenv("PYTHONPATH", "/home/teacher")
-    found = running.environment(tmp_path, Path("stage"))
-    assert found["PYTHONPATH"] == "stage"
+    staged, home = tmp_path / "stage", tmp_path / "home"
+    (staged / FONTS).mkdir(parents=True)
+    (staged / FONTS / "fontlist.json").touch()
+    home.mkdir()
+    found = running.environment(home, staged)
+    assert found["PYTHONPATH"] == str(staged)
+    assert [path.name for path in Path(found["MPLCONFIGDIR"]).iterdir()] == ["fontlist.json"]
     assert "MY_TOKEN" not in found
     assert found["PATH"] == os.environ["PATH"]
-    assert found["HOME"] == str(tmp_path)
+    assert found["HOME"] == str(home)

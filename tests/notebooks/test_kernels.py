@@ -1,6 +1,8 @@
 """Kernels that are forked: they are kernels like others, only sooner."""
 
+import itertools
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -8,6 +10,7 @@ import nbformat
 import psutil
 import pytest
 from endings import ended
+from jupyter_client.connect import LocalPortCache
 from jupyter_client.manager import start_new_kernel
 from jupyter_client.provisioning import KernelProvisionerFactory
 from nbclient import NotebookClient
@@ -63,6 +66,23 @@ def test_one_notebook_does_not_see_another(tmp_path):
     assert seen == "False False\n"
 
 
+def test_two_processes_that_choose_the_same_ports_have_their_kernels_both(monkeypatch):
+    """Ports are chosen before the kernel takes them: another process may have chosen them, too."""
+    cache = LocalPortCache()
+    chosen = itertools.cycle([cache.find_available_port("127.0.0.1") for _ in range(5)])
+    monkeypatch.setattr(LocalPortCache, "find_available_port", lambda *_: next(chosen))
+    kernels = []
+    try:
+        for _ in range(2):
+            kernels.append(start_new_kernel())
+        for _, client in kernels:
+            assert client.kernel_info(reply=True, timeout=30)["content"]["status"] == "ok"
+    finally:
+        for manager, client in kernels:
+            client.stop_channels()
+            manager.shutdown_kernel(now=True)
+
+
 def test_its_time_ends(tmp_path):
     with pytest.raises(CellTimeoutError):
         run("while True: pass", folder=tmp_path, seconds=1)
@@ -73,7 +93,7 @@ def test_its_death_is_noticed(tmp_path):
         run("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", folder=tmp_path)
 
 
-def test_it_is_interrupted():
+def test_it_is_interrupted_and_started_again():
     manager, client = start_new_kernel()
     try:
         client.execute("print('begun', flush=True)\nwhile True: pass")
@@ -83,6 +103,8 @@ def test_it_is_interrupted():
         while (reply := client.get_shell_msg(timeout=30))["msg_type"] != "execute_reply":
             pass  # a kernel that starts slowly was asked several times who it is
         assert reply["content"]["ename"] == "KeyboardInterrupt"
+        manager.restart_kernel(now=True)
+        client.wait_for_ready(timeout=30)  # where the first was
     finally:
         client.stop_channels()
         manager.shutdown_kernel(now=True)
@@ -100,3 +122,14 @@ def test_it_ends_with_the_fork_server():
     server.kill()
     assert ended(kernel)
     manager.shutdown_kernel(now=True)
+
+
+def test_it_ends_with_the_process_that_wanted_it_however_that_ends():
+    """The fork server lives as long as one of its forks does, and they as long as it: both were left."""
+    starts = (
+        "import os; from jupyter_client.manager import start_new_kernel; from kfcourse.notebooks import kernels\n"
+        "kernels.IMPORTED[:] = ['ipykernel.kernelapp']\n"
+        "manager, client = start_new_kernel(); print(manager.provisioner.pid, flush=True); os.kill(os.getpid(), 9)"
+    )
+    started = subprocess.run([sys.executable, "-c", starts], stdout=subprocess.PIPE, text=True, timeout=60)
+    assert ended(int(started.stdout))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kfcourse.checks import Exercise, Question, exercise
-from kfcourse.checks.engine import standard
+from kfcourse.checks.engine import posed, standard
 from kfcourse.checks.equality import equal
 
 ULPS = 4  # by how many last digits arguments are changed
@@ -47,11 +47,11 @@ def salted(letter: str, opening: str, name: str, salt: str) -> Exercise:
 
 def steady(question: Question, asked: Exercise) -> bool:
     """Whether the right answer hardly changes when its arguments change by a few units in the last place."""
-    rng, key = np.random.default_rng(0), question.answer(asked)
+    rng, as_posed = np.random.default_rng(0), posed(question, asked)
     with np.errstate(all="ignore"):
-        for values in question.arguments(asked):
-            first = standard(key(*copy.deepcopy(values)))
-            second = standard(key(*(_changed(value, rng) for value in values)))
+        for values in as_posed.arguments:
+            first = standard(as_posed.key(*copy.deepcopy(values)))
+            second = standard(as_posed.key(*(_changed(value, rng) for value in values)))
             if not equal(second, first, SHARE * question.tolerance, asked.model.values):
                 return False
     return True

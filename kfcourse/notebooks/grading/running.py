@@ -15,13 +15,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import matplotlib
-
 from kfcourse.checks.engine import Missing
 from kfcourse.checks.equality import Unusable
 from kfcourse.limits import OutOfTime
 from kfcourse.notebooks.grading.channel import Closed, Late, Patient
 from kfcourse.notebooks.grading.sandbox import Process, Sandbox
+from kfcourse.notebooks.grading.staging import FONTS
 from kfcourse.notebooks.grading.submissions import SECONDS
 from kfcourse.notebooks.grading.values import Strange, decode, encode
 from kfcourse.notebooks.texts import clean
@@ -290,9 +289,7 @@ KEPT = re.compile(
 def environment(folder: Path, stage: Path) -> dict[str, str]:
     """Environment variables of a notebook's process: few of ours, and a home of its own."""
     fonts = folder / "matplotlib"
-    fonts.mkdir()
-    for path in Path(matplotlib.get_cachedir()).glob("fontlist*.json"):  # otherwise each process searches for fonts again
-        shutil.copy(path, fonts)
+    shutil.copytree(stage / FONTS, fonts)
     return {name: value for name, value in os.environ.items() if KEPT.fullmatch(name)} | {
         "PYTHONPATH": str(stage),  # nothing of yours
         "PYTHONDONTWRITEBYTECODE": "1",

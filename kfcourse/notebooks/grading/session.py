@@ -22,12 +22,9 @@ from traitlets.config import Config
 import kfcourse.exercises
 from kfcourse.checks import Exercise, Result, exercise
 from kfcourse.checks.engine import in_library, told
-from kfcourse.limits import OutOfTime, time_limit
+from kfcourse.limits import OutOfTime, limit_process, time_limit
 from kfcourse.notebooks.grading.channel import Channel, Closed
 from kfcourse.notebooks.grading.values import decode, encode
-
-FILE = 100 * 2**20  # bytes a notebook may write to one file
-PROCESSES = 4096  # of the user's, threads included
 
 
 class Task:
@@ -135,7 +132,7 @@ def _text(error: BaseException) -> str:
 def serve(channel: Channel, protected: Sequence[str], memory: int) -> None:
     """Do what comes, until nobody is there any more."""
     session = Session(channel)
-    limit(memory)
+    limit_process(memory)
     watch(channel, Path.cwd(), protected)
     work: dict[str, Any] = {"open": session.open, "cell": session.cell, "ask": session.ask}
     while True:
@@ -146,23 +143,6 @@ def serve(channel: Channel, protected: Sequence[str], memory: int) -> None:
         except Closed:
             return
         except KeyboardInterrupt:
-            continue
-
-
-def limit(memory: int) -> None:
-    """Limit this process and its children, where the system can: memory, size of files, processes, no core dumps."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return
-    limits = {"RLIMIT_AS": memory, "RLIMIT_FSIZE": FILE, "RLIMIT_CORE": 0, "RLIMIT_NPROC": PROCESSES}
-    for name, bound in limits.items():
-        try:
-            kind = getattr(resource, name)
-            _, hard = resource.getrlimit(kind)
-            bound = bound if hard == resource.RLIM_INFINITY else min(bound, hard)
-            resource.setrlimit(kind, (bound, bound))
-        except (AttributeError, ValueError, OSError):  # this system knows no such limit
             continue
 
 

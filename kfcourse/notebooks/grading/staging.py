@@ -22,6 +22,7 @@ LEFT_OUT = (
 )  # what a student's notebook has no use for
 NEEDED = ("__init__.py", *(f"grading/{name}.py" for name in ("__init__", "channel", "keeper", "sandbox", "session", "values")))
 ANSWERS = "derivations/worked.py"  # writes right derivations
+FONTS = "fonts"  # on the stage: those that matplotlib has found
 COMPANIONS = "companion.py"  # what the notebooks of a set import; never a key
 
 REGISTRY = '''"""The exercise sets without their questions: what a notebook is graded with."""
@@ -73,7 +74,16 @@ def stage(folder: Path) -> Path:
     rows = [(one.letter, one.title, one.folder.name, one.about_variant, one.angles) for one in registered]
     (target / "exercises" / "__init__.py").write_text(REGISTRY.replace("{rows!r}", repr(rows)), encoding="utf-8")
     compileall.compile_dir(target, quiet=2)
+    (folder / FONTS).mkdir()
+    for path in _cache_of_matplotlib().glob("fontlist*.json"):  # otherwise each process searches for fonts again
+        shutil.copy(path, folder / FONTS)
     return folder
+
+
+def _cache_of_matplotlib() -> Path:
+    import matplotlib  # a tenth of the start of a grading process, which stages nothing
+
+    return Path(matplotlib.get_cachedir())
 
 
 def answers() -> list[Path]:

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from kfcourse.checks import sets
+from kfcourse.limits import limit_process
 from kfcourse.notebooks.grading import keeper, marking
 from kfcourse.notebooks.grading.channel import Channel, Closed
 from kfcourse.notebooks.grading.running import MEMORY, Site
 from kfcourse.notebooks.grading.sandbox import Sandbox
-from kfcourse.notebooks.grading.session import limit
 from kfcourse.notebooks.grading.submissions import Returned
 from kfcourse.notebooks.grading.table import Grade, Told
 
@@ -62,7 +62,7 @@ def main() -> None:
     for stream in range(3):
         os.dup2(nowhere, stream)
     keeper.adopt()
-    limit(3 * MEMORY)
+    limit_process(3 * MEMORY)
     sets()
     try:
         setting = setting_of(channel.receive())

@@ -8,26 +8,15 @@ from kfcourse.checks import engine, exercise
 
 pytest.register_assert_rewrite("answers")
 
-_wrong, _found = engine._wrong, {}
-
 
 @cache
 def opened(letter, variant):
     return exercise(letter, variant)
 
 
-def _remembered(mistake, lab, *rest):
-    """The results of a known mistake, computed once for all answers to its question."""
-    key = id(mistake), lab.variant.name
-    if key not in _found:
-        _found[key] = _wrong(mistake, lab, *rest)
-    return _found[key]
-
-
 @pytest.fixture
-def told(monkeypatch):
+def told():
     """What the check says to an answer: told("g4", function)."""
-    monkeypatch.setattr(engine, "_wrong", _remembered)
 
     def as_the_first(name, answer, variant="53"):
         task = opened(name[0], variant)
