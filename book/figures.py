@@ -1,5 +1,4 @@
-"""Sphinx extension: no figure without a number, a caption, and a text that says what is seen; nothing contradicts the picture,
-and no curve strikes the words of its legend.
+"""Sphinx extension: no figure without a number, a caption, and a text that says what is seen; nothing contradicts the picture.
 
 A warning, and warnings are errors, names every picture that lacks one of them, and each word that `kfcourse.pages.captions` finds
 to be wrong, in them and in a paragraph that refers to one figure.
@@ -44,8 +43,6 @@ def compare(app, env) -> None:
     for page, cells in pages.items():
         for problem in (problem for cell in cells for problem in wrong(cell, figures)):
             log.warning("what is said of a figure contradicts its picture: %s", problem, location=page)
-        for word in (word for cell in cells for word in of_pictures(cell, "struck")):
-            log.warning("a curve or a point strikes %r in the legend of a figure: give it another place", word, location=page)
 
 
 def renumber(app, env) -> None:
@@ -59,14 +56,9 @@ def renumber(app, env) -> None:
 def pictures(cell) -> Iterator[tuple[str, list[dict[str, Any]]]]:
     """The name of a cell's figure, and the panels of its picture."""
     name = cell.metadata.get("mystnb", {}).get("figure", {}).get("name")
-    if name and (panels := of_pictures(cell, "drawn")):
-        yield name, panels
-
-
-def of_pictures(cell, what: str) -> list[Any]:
-    """All that `book_style` has found of this kind in the pictures of a cell."""
-    found = (output.get("metadata", {}).get("image/png", {}).get(what, []) for output in cell.get("outputs", []))
-    return [one for each in found for one in each]
+    for output in cell.get("outputs", []):
+        if name and (panels := output.get("metadata", {}).get("image/png", {}).get("drawn")):
+            yield name, panels
 
 
 def wrong(cell, figures: dict[str, list[dict[str, Any]]]) -> Iterator[str]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import pathlib
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,15 +13,12 @@ from IPython.core.interactiveshell import InteractiveShell
 from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
-from matplotlib.path import Path
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
-from matplotlib.transforms import Bbox
 from matplotlib_inline.backend_inline import set_matplotlib_formats
 
 from kfcourse.pages.captions import drawn
@@ -39,7 +36,7 @@ NARROW = 4.4
 # Labels of axes that count steps; "step $T$ (s)" measures one.
 COUNTED = re.compile(r"steps?( apart)?( \$[kl]\$)?( \(.* each\))?")
 
-FONTS = sorted((pathlib.Path(__file__).parent / "data").glob("*.ttf"))  # the pages' own, Source Sans 3 (OFL.txt)
+FONTS = sorted((Path(__file__).parent / "data").glob("*.ttf"))  # the pages' own, Source Sans 3 (OFL.txt)
 
 _STYLE: dict[Any, Any] = {
     "figure.figsize": (WIDTH, 3.4),
@@ -72,7 +69,7 @@ def book_style(ground: str = "none") -> None:
     A `ground`, "white" say, makes them readable wherever a notebook is opened, also where the page is dark.
 
     The picture of each wider than `NARROW` carries a second one, for telephones, in its output's metadata (book/narrow.py), and
-    each carries there what it shows, with which its caption is compared, and the words that a curve strikes (book/figures.py).
+    each carries there what it shows, with which its caption is compared (book/figures.py).
     One with the label "time, s" raises ValueError: units stand in brackets.
     """
     for font in FONTS:
@@ -89,40 +86,12 @@ def book_style(ground: str = "none") -> None:
         part_thousands(figure)
         if not (made := wide(figure)):  # of a figure without axes
             return None
-        data, metadata = made[0], made[1] | {"drawn": drawn(figure), "struck": struck(figure)}
+        data, metadata = made[0], made[1] | {"drawn": drawn(figure)}
         if lay_narrow(figure):
-            narrow, _ = wide(figure)
-            metadata = metadata | {"narrow": narrow, "struck": metadata["struck"] + struck(figure)}
+            metadata = metadata | {"narrow": wide(figure)[0]}
         return data, metadata
 
     formatter.for_type(Figure, both)
-
-
-def struck(figure: Figure) -> list[str]:
-    """Names in the legends of a figure through which a curve goes, or on which a point lies, as it has been drawn."""
-    figure.set_dpi(2 * figure.dpi)  # a retina's, with which legends have found their places
-    found = [name for ax in figure.axes if ax.name == "rectilinear" for name in _struck(ax)]
-    figure.set_dpi(figure.dpi / 2)
-    return found
-
-
-def _struck(ax: Axes) -> Iterator[str]:
-    curves, points = list[Path](), list[np.ndarray]()
-    for line in ax.lines:
-        places = line.get_transform().transform(line.get_xydata())
-        points += [places] * (line.get_marker() != "None")
-        pieces = np.ma.clump_unmasked(np.ma.masked_invalid(places.sum(axis=1)))  # between missing points
-        curves += [Path(places[piece]) for piece in pieces if line.get_linestyle() != "None"]
-    clouds = [one for one in ax.collections if isinstance(one, PathCollection)]
-    points += [one.get_offset_transform().transform(one.get_offsets()) for one in clouds]
-    for legend in ax.findobj(Legend):
-        for text in legend.get_texts():
-            box = text.get_window_extent()
-            handle = (legend.handlelength + legend.handletextpad) * float(text.get_fontsize()) * ax.figure.dpi / 72
-            box = Bbox([[box.x0 - handle, box.y0], box.max])
-            through = any(path.intersects_bbox(box, filled=False) for path in curves)
-            if through or any(((box.min < each) & (each < box.max)).all(axis=1).any() for each in points):
-                yield text.get_text()
 
 
 def whole_steps(figure: Figure) -> None:

@@ -172,29 +172,6 @@ def test_the_legend_below_narrow_panels_has_room(style) -> None:
     assert box.y1 <= min(ax.get_tightbbox().y0 for ax in figure.axes)
 
 
-def test_a_curve_or_a_point_on_the_words_of_a_legend_is_told(style) -> None:
-    """A line between two of its points, a missing point beside it, a cloud, and a fill, which is told of nothing."""
-
-    def found(draw, **place) -> set[str]:
-        figure = Figure(figsize=(4, 3))
-        ax = figure.subplots()
-        draw(ax)
-        ax.set(xlim=(0, 1), ylim=(0, 1))
-        ax.legend(**place)
-        _, metadata = InteractiveShell.instance().display_formatter.formatters["image/png"](figure)
-        return set(metadata["struck"])
-
-    def cross(ax) -> None:
-        ax.plot([0, 1], [1, 0], label="falls")
-        ax.plot([0, 0.5, 1], [0, np.nan, 1], label="broken")
-        ax.fill_between([0, 1], 0.5, 1, label="filled")
-
-    assert found(cross, loc="upper left") == {"falls", "broken"}
-    assert found(cross, loc="upper right") == found(cross, loc="lower center") == set()
-    for cloud in (lambda ax: ax.plot(0.9, 0.93, "."), lambda ax: ax.scatter([0.1, 0.9], [0.1, 0.93])):
-        assert found(lambda ax, cloud=cloud: [cloud(ax), ax.plot(0.5, 0.5, label="point")], loc="upper right") == {"point"}
-
-
 def test_a_ground_is_painted(style) -> None:
     with matplotlib.rc_context():
         book_style(ground="white")
