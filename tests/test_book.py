@@ -413,6 +413,7 @@ def test_a_link_to_what_is_folded_opens_the_fold(window):
         assert not tab.locator(f"#{name}").is_visible()
         tab.evaluate("name => { location.hash = name; }", name)
         tab.locator(f"#{name}").wait_for()
+    tab.wait_for_load_state("networkidle")  # else the page's icon may be asked for in vain
     tab.goto("about:blank")
     tab.goto((HTML / "integration.html").as_uri() + "#fig-integration-car")
     tab.locator("#fig-integration-car").wait_for()
