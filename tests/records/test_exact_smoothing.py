@@ -205,7 +205,7 @@ def test_it_finds_what_a_record_that_contradicts_the_model_has_lost_in_the_filte
             told = np.array(np.inf)
         found.append((mean.max(), told.max()))
     wrong, told = np.array(found).T
-    assert (told > wrong / 3).all()  # told is the worst of a step, off the worst of the last mean
+    assert (told > wrong / 3).all()  # the worst of a step each, of looking back and of the filter
     assert (wrong[np.isinf(told)] > 0.01).all() and (told[wrong < 1e-6] < 1e-4).all()  # and without false alarm
     assert 3 < np.isinf(told).sum() < 10  # of sixteen: both cases are among them
 
