@@ -113,7 +113,13 @@ class _Group(click.Group):
 
     def invoke(self, ctx: click.Context) -> object:
         with _clear_errors():
-            return super().invoke(ctx)
+            try:
+                return super().invoke(ctx)
+            except click.UsageError as error:
+                if "unexpected extra argument" not in error.message:
+                    raise
+                hint = "separate names by commas (--sets a,b), and repeat --variant for each variant"
+                raise click.UsageError(f"{error.message}: {hint}", error.ctx) from None
 
 
 @click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})

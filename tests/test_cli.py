@@ -280,6 +280,12 @@ def test_a_derivation_is_checked_line_by_line(call, tmp_path):
     assert call("check", file, "--variant", "53").exit_code == 0
 
 
+@pytest.mark.parametrize(("words", "extra"), [("lab 53 --filters laof gaof", "gaof"), ("solutions --out . --sets f j", "j")])
+def test_names_without_a_comma_are_told_how_they_are_separated(call, words, extra):
+    done = call(*words.split())
+    assert done.exit_code == 2 and f"extra argument ({extra}): separate names by commas" in done.output
+
+
 @pytest.mark.parametrize(
     ("content", "options", "says"),
     [
