@@ -1,7 +1,7 @@
 """Sphinx extension: no figure without a number, a caption, and a text that says what is seen; nothing contradicts the picture.
 
 A warning, and warnings are errors, names every picture that lacks one of them, and each word that `kfcourse.pages.captions` finds
-to be wrong, in them and in a paragraph that refers to one figure.
+to be wrong, in them and in a paragraph that refers to one figure; and each legend, of the exercise sets too, that is struck.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import manual
 import nbformat
 from docutils import nodes
 from sphinx.util import logging
@@ -43,6 +44,9 @@ def compare(app, env) -> None:
     for page, cells in pages.items():
         for problem in (problem for cell in cells for problem in wrong(cell, figures)):
             log.warning("what is said of a figure contradicts its picture: %s", problem, location=page)
+    pages |= {job.letter: nbformat.read(job.target, as_version=4).cells for job in manual.solutions()}
+    for page, words in ((page, words) for page, cells in pages.items() for cell in cells for words in struck(cell)):
+        log.warning("a curve or a point runs through a legend: %s", words, location=page)
 
 
 def renumber(app, env) -> None:
@@ -70,6 +74,12 @@ def wrong(cell, figures: dict[str, list[dict[str, Any]]]) -> Iterator[str]:
         names = set(re.findall(r"\{numref\}`(fig-[\w-]+)`", paragraph))
         if len(names) == 1 and (panels := figures.get(names.pop())):
             yield from contradicted(paragraph, panels)
+
+
+def struck(cell) -> list[str]:
+    """The words of legends that something runs through in the pictures of a cell (`kfcourse.pages.legends`)."""
+    outputs = cell.get("outputs", [])
+    return [words for one in outputs for words in one.get("metadata", {}).get("image/png", {}).get("struck", [])]
 
 
 def _ancestors(node: nodes.Node):

@@ -12,6 +12,7 @@ exponents     squares completed in the exponents of normal laws
 tables        tables of numbers
 units         the unit of a label in brackets, long numbers
 figures       the style of the figures, labels at the ends of curves
+legends       what runs through the words of a legend
 diagram       block diagrams from a description
 flights       pictures and tables of a flight and its estimates
 browser       the lab's filters as JavaScript, from their printed equations

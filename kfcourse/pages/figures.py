@@ -22,6 +22,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib_inline.backend_inline import set_matplotlib_formats
 
 from kfcourse.pages.captions import drawn
+from kfcourse.pages.legends import struck
 from kfcourse.pages.units import in_brackets
 from kfcourse.symbolic.writing import by_thousands
 
@@ -69,7 +70,7 @@ def book_style(ground: str = "none") -> None:
     A `ground`, "white" say, makes them readable wherever a notebook is opened, also where the page is dark.
 
     The picture of each wider than `NARROW` carries a second one, for telephones, in its output's metadata (book/narrow.py), and
-    each carries there what it shows, with which its caption is compared (book/figures.py).
+    each carries there what it shows, with which its caption is compared, and what is struck in its legends (book/figures.py).
     One with the label "time, s" raises ValueError: units stand in brackets.
     """
     for font in FONTS:
@@ -86,9 +87,10 @@ def book_style(ground: str = "none") -> None:
         part_thousands(figure)
         if not (made := wide(figure)):  # of a figure without axes
             return None
-        data, metadata = made[0], made[1] | {"drawn": drawn(figure)}
+        data, metadata = made[0], made[1] | {"drawn": drawn(figure), "struck": struck(figure)}
         if lay_narrow(figure):
-            metadata = metadata | {"narrow": wide(figure)[0]}
+            metadata |= {"narrow": wide(figure)[0]}
+            metadata["struck"] += [f"{words} (on a telephone)" for words in struck(figure)]
         return data, metadata
 
     formatter.for_type(Figure, both)

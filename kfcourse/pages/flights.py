@@ -45,7 +45,7 @@ def flight_and_errors(track: Track, estimates: Mapping[str, Array], shown: str) 
         squares = ((positions - track.position[:, None]) ** 2).sum(axis=-1)
         ax.semilogy(track.time, np.sqrt(squares.mean(axis=1)), linewidth=1.2, label=name, **LOOKS[name])
     ax.set(xlabel="time (s)", title="RMS error (m)", ylim=(25, 2000))
-    ax.legend(loc="upper right", bbox_to_anchor=(1, 0.9))
+    fig.legend(loc="outside lower center", ncols=2)
     return fig
 
 
