@@ -93,9 +93,13 @@ def write_report(
 
 
 def save_figure(draw: Callable[[Axes], Axes], folder: Path, name: str) -> None:
-    """A figure for the page and for LaTeX; the same numbers give the same files."""
+    """A figure for the page and for LaTeX, its legend below it, where no curve runs; the same numbers give the same files."""
     figure = Figure(figsize=(7, 4.2), layout="constrained")
-    draw(figure.add_subplot())
+    ax = figure.add_subplot()
+    draw(ax)
+    if legend := ax.get_legend():
+        legend.remove()
+        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize="small")
     with matplotlib.rc_context({"svg.hashsalt": name}):  # else its marks have random names
         for kind, metadata in _UNDATED.items():
             figure.savefig(folder / f"{name}.{kind}", format=kind, metadata=metadata)

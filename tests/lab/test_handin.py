@@ -9,6 +9,7 @@ from importlib import resources
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 
 from kfcourse import Model, compare, gaussian, lab_filters, linearised, load_variants, run, simulate
 from kfcourse.filters import aof
@@ -246,11 +247,9 @@ def test_figures_speak_the_language_of_the_report(result, language, monkeypatch,
 
     def listen(figure, *arguments, **options):
         for ax in figure.axes:
-            legend = ax.get_legend()
             rows = [text.get_text() for text in ax.get_yticklabels()] if "ranking" in str(arguments[0]) else []
-            said.extend(
-                [ax.get_xlabel(), ax.get_ylabel(), *rows, *(t.get_text() for t in (legend.get_texts() if legend else []))]
-            )
+            said.extend([ax.get_xlabel(), ax.get_ylabel(), *rows])
+        said.extend(text.get_text() for legend in figure.findobj(Legend) for text in legend.get_texts())
         draw(figure, *arguments, **options)
 
     monkeypatch.setattr(Figure, "savefig", listen)

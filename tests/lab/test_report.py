@@ -10,13 +10,15 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from kfcourse import Model, compare, gaussian, lab_filters, linearised, load_variants
 from kfcourse.filters import aof
 from kfcourse.lab.handin import write_handin
-from kfcourse.lab.report import conclusions, remarks_in_words, write_json, write_report
+from kfcourse.lab.report import conclusions, remarks_in_words, save_figure, write_json, write_report
 from kfcourse.lab.short_names import LAB, title
 from kfcourse.lab.variants import Variant, find_variant
+from kfcourse.pages.legends import struck
 
 FIGURES = ("accuracy", "relative", "ranking", "consistency")
 
@@ -235,6 +237,25 @@ def test_the_latex_is_balanced_and_names_its_figures(written, name):
     tex = (written[name] / "report.tex").read_text(encoding="utf-8")
     assert balanced(tex)
     assert {f"{figure}.pdf" for figure in FIGURES} == set(re.findall(r"\\includegraphics\[[^]]*\]\{([^}]*)\}", tex))
+
+
+def test_no_curve_runs_through_the_words_of_a_legend(tmp_path, monkeypatch):
+    """Wherever in the axes a legend of eight filters stood, one would."""
+    through, save = [], Figure.savefig
+
+    def look(figure, *arguments, **options):
+        save(figure, *arguments, **options)
+        through.append(struck(figure))
+
+    def everywhere(ax):
+        for filter_ in range(8):
+            ax.plot(np.sin(np.arange(100) + filter_), label=f"filter {filter_}")
+        ax.legend(fontsize="small", ncols=2)
+
+    monkeypatch.setattr(Figure, "savefig", look)
+    save_figure(everywhere, tmp_path, "everywhere")
+    assert through == [[], []]
+    assert all(f"filter {filter_}" in (tmp_path / "everywhere.svg").read_text(encoding="utf-8") for filter_ in range(8))
 
 
 def test_hostile_titles_stay_text(variants, result53, no_figures, tmp_path):
