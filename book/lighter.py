@@ -3,12 +3,14 @@
 The theme's style sheets are made for every page that anyone may write: of 530 kB the book uses 140.  So the rules that ask for
 a class or a name that no page and no script of the built book has are left out.  And the fonts of nearly every page come with a
 script, which is the only way to have them when the first line is laid out: a page is laid out once, not once more for each font
-that arrives, and no line moves.
+that arrives, and no line moves.  The script has the letters that the book shows; the sheets' fonts have all.
 """
 
 from __future__ import annotations
 
 import base64
+import html
+import io
 import json
 import re
 from collections.abc import Iterable, Iterator
@@ -16,6 +18,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import tinycss2
+from fontTools import subset
+from fontTools.ttLib import TTFont
 from tinycss2 import ast
 
 SHEETS = ("styles/*.css", "sphinx-design.min.css", "mystnb.*.css", "basic.css", "togglebutton.css", "pygments.css")
@@ -38,6 +42,8 @@ SCRIPT_OF_FONTS = """for (const [family, style, weight, data] of %s) {
   document.fonts.add(new FontFace(family, bytes, { style, weight }));
 }
 """
+TAG = re.compile(r"<[^>]*>")
+ESCAPED = re.compile(r"\\([0-9A-Fa-f]{1,6})")  # a letter in a style sheet, such as those of formulas
 NAMED = re.compile(r'\b(?:class|id)="([^"]*)"')
 SCRIPT = re.compile(r"<script\b[^>]*>(.*?)</script>", re.DOTALL)
 WORD = re.compile(r"[A-Za-z_][\w-]*")
@@ -104,11 +110,31 @@ def _short(content: list[ast.Node]) -> str:
     return "".join(" " if isinstance(one, ast.WhitespaceToken) else one.serialize() for one in content if one.type != "comment")
 
 
-def carried(folder: Path) -> str:
+def letters(pages: Iterable[str], sheets: Iterable[str], scripts: Iterable[str]) -> str:
+    """What pages, style sheets and scripts may show."""
+    shown = {chr(code) for code in range(0x20, 0x7F)}
+    for page in pages:
+        shown.update(html.unescape(TAG.sub("", page)))
+    for sheet in sheets:
+        shown.update(sheet, *(chr(int(code, 16)) for code in ESCAPED.findall(sheet)))
+    shown.update(*scripts)
+    return "".join(sorted(shown))
+
+
+def cut(font: Path, shown: str) -> bytes:
+    """A font with these letters only."""
+    face = TTFont(font, recalcTimestamp=False)
+    smaller = subset.Subsetter(subset.Options(hinting=False, drop_tables=[*subset.Options().drop_tables, "FFTM"]))
+    smaller.populate(text=shown)
+    smaller.subset(face)
+    face.flavor = "woff2"
+    face.save(file := io.BytesIO())
+    return file.getvalue()
+
+
+def carried(folder: Path, shown: str) -> str:
     """A script with the fonts in it."""
-    return SCRIPT_OF_FONTS % json.dumps(
-        [(*face, base64.b64encode((folder / file).read_bytes()).decode()) for *face, file in FONTS]
-    )
+    return SCRIPT_OF_FONTS % json.dumps([(*face, base64.b64encode(cut(folder / file, shown)).decode()) for *face, file in FONTS])
 
 
 def write(app, exception: Exception | None) -> None:
@@ -116,13 +142,13 @@ def write(app, exception: Exception | None) -> None:
         return
     root = Path(app.outdir)
     static = root / "_static"
-    here = used(
-        (page.read_text(encoding="utf-8") for page in root.rglob("*.html")),
-        (script.read_text(encoding="utf-8") for script in static.rglob("*.js")),
-    )
+    pages = [page.read_text(encoding="utf-8") for page in root.rglob("*.html")]
+    scripts = [script.read_text(encoding="utf-8") for script in static.rglob("*.js")]
+    here = used(pages, scripts)
     for path in (path for pattern in SHEETS for path in static.glob(pattern)):
         path.write_text(pruned(path.read_text(encoding="utf-8"), here), encoding="utf-8")
-    (static / "fonts.js").write_text(carried(static / "fonts"), encoding="utf-8")
+    sheets = [sheet.read_text(encoding="utf-8") for sheet in static.rglob("*.css")]
+    (static / "fonts.js").write_text(carried(static / "fonts", letters(pages, sheets, scripts)), encoding="utf-8")
 
 
 def setup(app) -> dict[str, bool]:

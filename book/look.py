@@ -209,12 +209,13 @@ def write_not_found(app, exception) -> None:
     (Path(app.outdir) / "404.html").write_text(page, encoding="utf-8")
 
 
-def leave_icons_out(app, exception) -> None:
-    """The theme loads a script of 1.5 MB, every icon there is, on each page; _static/icons.css draws the ten that are used."""
+def leave_scripts_out(app, exception) -> None:
+    """Every icon there is (1.5 MB; _static/icons.css draws the ten that are used), and Bootstrap, which would show the titles of
+    five buttons, as browsers do, and the button to the top (page.js): no page asks for them (_templates/layout.html)."""
     if not exception and app.builder.format == "html":
-        for path in (Path(app.outdir) / "_static" / "scripts").glob("fontawesome.js*"):
-            path.unlink()
-        (Path(app.outdir) / "_static" / "scripts" / "fontawesome.js").write_text("", encoding="utf-8")
+        for name in ("fontawesome.js*", "bootstrap.js*"):
+            for path in (Path(app.outdir) / "_static" / "scripts").glob(name):
+                path.unlink()
 
 
 def measure_nothing(app, exception) -> None:
@@ -234,7 +235,7 @@ def setup(app) -> dict[str, bool]:
     app.add_post_transform(InPlace)
     app.connect("config-inited", use_templates, priority=900)
     app.connect("build-finished", write_not_found)
-    app.connect("build-finished", leave_icons_out)
+    app.connect("build-finished", leave_scripts_out)
     app.connect("build-finished", measure_nothing)
     app.connect("html-page-context", complete, priority=300)  # before the theme, which tries the templates
     return {"parallel_read_safe": True, "parallel_write_safe": True}

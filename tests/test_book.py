@@ -404,6 +404,20 @@ def test_the_keyboard_reaches_the_text_first(window):
     assert formulas.count() == tab.locator("div.math mjx-container[tabindex='0'][aria-label]").count() > 0
 
 
+def test_who_turns_back_is_offered_the_top(window):
+    tab, problems = window
+    show_on(tab, "screen", 1280)
+    tab.goto((HTML / "linearisation.html").as_uri())
+    button = tab.locator("#pst-back-to-top")
+    for by, offered in ((3000, False), (-200, True), (100, False), (-100, True)):
+        tab.mouse.wheel(0, by)
+        button.wait_for(state="visible" if offered else "hidden")
+    button.click()
+    tab.wait_for_function("scrollY === 0")
+    button.wait_for(state="hidden")
+    assert problems == []
+
+
 def test_a_reference_shows_what_it_leads_to(window):
     """Under the mouse and on the keyboard's way, not under a finger; Escape closes it, and the link stays a link."""
     tab, problems = window

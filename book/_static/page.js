@@ -26,6 +26,17 @@ addEventListener("DOMContentLoaded", () => {
   for (const link of links) seen.observe(document.getElementById(decodeURIComponent(link.hash.slice(1))));
 });
 
+// Who turns back, far down a page, may want its top.
+addEventListener("DOMContentLoaded", () => {
+  const top = document.getElementById("pst-back-to-top");
+  let before = scrollY;
+  addEventListener("scroll", () => {
+    top.style.display = scrollY < before && scrollY > innerHeight ? "block" : "none";
+    before = scrollY;
+  });
+  top.addEventListener("click", () => scrollTo(0, 0));
+});
+
 // What is wider than its box, the keyboard reaches and scrolls: asked once it is laid out, as sections out of sight are not.
 addEventListener("DOMContentLoaded", () => {
   const measured = new ResizeObserver((changes) => {

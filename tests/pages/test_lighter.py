@@ -1,11 +1,13 @@
-"""Style sheets without the rules that fit nothing: what is left out, and what must stay."""
+"""Style sheets without the rules that fit nothing, fonts without letters that nobody shows: what is left out, what must stay."""
 
 from __future__ import annotations
 
+import io
 import sys
 from pathlib import Path
 
 import pytest
+from fontTools.ttLib import TTFont
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "book"))
 import lighter
@@ -44,3 +46,21 @@ HERE = lighter.used(
 )
 def test_rules_that_fit_no_element_are_left_out(rule, kept):
     assert lighter.pruned(rule, HERE) == kept
+
+
+def test_letters_that_pages_sheets_and_scripts_may_show():
+    page = '<p class="\u0416">\u03c3&nbsp;&#8594; <b>\u2013</b></p><script>show("\u00d7")</script>'
+    shown = lighter.letters([page], ['i::before{content:"\\3b1"}b::before{content:"\u2022"}'], ["`${x} \u00b7`"])
+    assert {*shown} == {*map(chr, range(0x20, 0x7F))} | {*"\u03c3\u00a0\u2192\u2013\u00d7\u03b1\u2022\u00b7"}
+
+
+def test_a_font_with_some_of_its_letters_draws_them_as_before():
+    path = Path(lighter.__file__).parent / "_static" / "fonts" / "source-serif-4-latin-wght-normal.woff2"
+    whole, part = TTFont(path), TTFont(io.BytesIO(lighter.cut(path, "af1\u2013\u0416")))
+    assert {*part.getBestCmap()} == {*map(ord, "af1\u2013")}  # Cyrillic has a font of its own
+    for letter in "af1\u2013":
+        name, before = part.getBestCmap()[ord(letter)], whole.getBestCmap()[ord(letter)]
+        assert part["hmtx"][name] == whole["hmtx"][before]
+        assert part["glyf"][name].getCoordinates(part["glyf"])[0] == whole["glyf"][before].getCoordinates(whole["glyf"])[0]
+    assert [axis.axisTag for axis in part["fvar"].axes] == ["wght"]
+    assert {record.FeatureTag for record in part["GPOS"].table.FeatureList.FeatureRecord} >= {"kern"}
