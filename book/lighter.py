@@ -12,6 +12,7 @@ import base64
 import html
 import io
 import json
+import logging
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -48,6 +49,7 @@ NAMED = re.compile(r'\b(?:class|id)="([^"]*)"')
 SCRIPT = re.compile(r"<script\b[^>]*>(.*?)</script>", re.DOTALL)
 WORD = re.compile(r"[A-Za-z_][\w-]*")
 BEGUN = re.compile(r"([A-Za-z][\w-]*-)(?=[\"'`]|\$\{)")  # "bs-" of `bs-${name}-auto`: what a script puts together
+logging.getLogger("fontTools").setLevel(logging.WARNING)  # it would tell of every table
 
 
 class Used(NamedTuple):
@@ -122,8 +124,10 @@ def letters(pages: Iterable[str], sheets: Iterable[str], scripts: Iterable[str])
 
 
 def cut(font: Path, shown: str) -> bytes:
-    """A font with these letters only."""
+    """A font with these letters only; one that has none of them, as that which gives formulas lines without height, is whole."""
     face = TTFont(font, recalcTimestamp=False)
+    if not {*map(ord, shown)} & {*face.getBestCmap()}:
+        return font.read_bytes()
     smaller = subset.Subsetter(subset.Options(hinting=False, drop_tables=[*subset.Options().drop_tables, "FFTM"]))
     smaller.populate(text=shown)
     smaller.subset(face)

@@ -26,7 +26,7 @@ addEventListener("DOMContentLoaded", () => {
   for (const link of links) seen.observe(document.getElementById(decodeURIComponent(link.hash.slice(1))));
 });
 
-// Who turns back, far down a page, may want its top.
+// Who turns back, far down a page, may want its top; the theme shows the button where there is no room for the contents.
 addEventListener("DOMContentLoaded", () => {
   const top = document.getElementById("pst-back-to-top");
   let before = scrollY;

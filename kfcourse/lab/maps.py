@@ -93,7 +93,7 @@ def parameter_map(
 def draw(found: ParameterMap, step: int, ax: Axes, confidence: float = CONFIDENCE) -> Axes:
     """The map at a step: in each cell the most accurate filter and its distance from the bound, the least accurate and its.
 
-    "and 2 more" counts those that are not significantly worse than the most accurate.
+    "GAOF, 2 more": two others are not significantly worse than the most accurate.
     """
     firsts, seconds = (list(dict.fromkeys(key[i] for key in found.cells)) for i in (0, 1))
     for (a, b), result in found.cells.items():
@@ -101,7 +101,7 @@ def draw(found: ParameterMap, step: int, ax: Axes, confidence: float = CONFIDENC
         gaps = {name: result.gap(name)[step] for name in result.entrants}
         best, *others = result.leaders(step, confidence)
         worst = max(gaps, key=lambda name: float(gaps[name].value))
-        more = f" and {len(others)} more" if others else ""
+        more = f", {len(others)} more" if others else ""
         ax.add_patch(Rectangle((x - 0.5, y - 0.5), 1, 1, color=style(best)["color"], alpha=0.25 if others else 0.5, linewidth=0))
         ax.text(
             x,

@@ -52,7 +52,7 @@ def test_the_map_is_drawn(found):
     assert len(texts) == len(ax.patches) == 4
     for text, result in zip(texts, found.cells.values(), strict=True):
         best, *others = result.leaders(2)
-        assert text.startswith(title(best) + (f" and {len(others)} more\n" if others else "\n"))
+        assert text.startswith(title(best) + (f", {len(others)} more\n" if others else "\n"))
         value, error = (float(number) for number in text.splitlines()[1].removesuffix(" %").split(" ± "))
         gap = result.gap(best)[2]
         assert abs(value - 100 * gap.value) <= 0.05 * error and error == pytest.approx(100 * gap.standard_error, rel=0.05)

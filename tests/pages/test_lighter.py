@@ -64,3 +64,8 @@ def test_a_font_with_some_of_its_letters_draws_them_as_before():
         assert part["glyf"][name].getCoordinates(part["glyf"])[0] == whole["glyf"][before].getCoordinates(whole["glyf"])[0]
     assert [axis.axisTag for axis in part["fvar"].axes] == ["wght"]
     assert {record.FeatureTag for record in part["GPOS"].table.FeatureList.FeatureRecord} >= {"kern"}
+
+
+def test_a_font_with_none_of_the_letters_is_whole():
+    path = next((Path(lighter.__file__).parent / "_static" / "fonts").glob("*-greek-*"))
+    assert lighter.cut(path, "abc") == path.read_bytes()
