@@ -9,7 +9,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.exercises import COURSE, Exercise
-from kfcourse.checks.steps import Function, at_wrong_step
+from kfcourse.checks.steps import STEP, Function, at_wrong_step
 from kfcourse.filters.designed import Scatter
 from kfcourse.laws import Array, transpose
 from kfcourse.scenarios.navigation import Dynamics
@@ -53,15 +53,22 @@ def _like(function: Function, changed: Function) -> Function:
 
 
 def other_functions(exercise: Exercise, measure: Function, predict: Function) -> tuple[Function, Function]:
-    """Structural functions with another h, a full G with its F, a curved tau, and a Theta that depends on p."""
-    n, p = exercise.model.n, exercise.model.p
-    rng = exercise.rng("other-functions")
-    more, shift = rng.uniform(0.3, 0.6, (p, n)), rng.uniform(0.3, 0.6, p)
+    """Structural functions with another h, a full G with its F, a curved tau, and a Theta that depends on p.
+
+    What is added has the units of the model: else a component of large numbers makes F singular to rounding, and an answer with
+    an inverse would be wrong by its last digits.
+    """
+    prior, p = exercise.model.prior, exercise.model.p
+    rng, of_state = exercise.rng("other-functions"), np.sqrt(np.diagonal(prior.cov))
+    F = measure(prior.mean[None], prior.cov[None], *([STEP] if vars(measure).get("of_steps") else []))[2]
+    of_meter = np.sqrt(np.diagonal(F[0]))
+    more = rng.uniform(0.3, 0.6, (p, len(of_state))) * of_meter[:, None] / of_state
+    shift = rng.uniform(0.3, 0.6, p) * of_meter
 
     def other_measure(m: Array, d: Array, *k: int) -> tuple[Array, Array, Array]:
         h, G, F = measure(m, d, *k)
         full_G = G + more
-        return h + m @ more.T + shift, full_G, 1.1 * (F - G @ d @ transpose(G)) + full_G @ d @ transpose(full_G)
+        return h + (m - prior.mean) @ more.T + shift, full_G, 1.1 * (F - G @ d @ transpose(G)) + full_G @ d @ transpose(full_G)
 
     def other_predict(z: Array, p: Array, *k: int) -> tuple[Array, Array]:
         tau, Theta = predict(z, p, *k)

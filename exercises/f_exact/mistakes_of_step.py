@@ -44,6 +44,10 @@ def _deviation(density: Array, x: Array) -> tuple[Array, Array, Array]:
     return density, mean, np.sqrt(variance)
 
 
+def _median(density: Array, x: Array) -> Array:
+    return x[np.searchsorted(np.cumsum(density), density.sum() / 2)]
+
+
 WRONG_MOMENTS: tuple[tuple[str, str, Answer], ...] = (
     ("not-normalised", "The density is not normalised: its integral has to be one before moments are taken.", _not_normalised),
     (
@@ -63,6 +67,11 @@ WRONG_MOMENTS: tuple[tuple[str, str, Answer], ...] = (
         "mode",
         "That is where the density is highest, not its mean.",
         lambda density, x: (normalised(density, x), x[np.argmax(density)], moments(density, x)[2]),
+    ),
+    (
+        "median",
+        "That is the median; the mean is asked for.",
+        lambda density, x: (normalised(density, x), _median(density, x), moments(density, x)[2]),
     ),
     (
         "highest-is-one",
@@ -225,6 +234,15 @@ def _object_at_rest(posterior: Array, x: Array, move: Law) -> Array:
     return predict(posterior, x, lambda nodes: (nodes, move(nodes)[1]))
 
 
+def _normal_prediction(posterior: Array, x: Array, move: Law) -> Array:
+    """With the right variance: the mean of the variances, and the variance of the means."""
+    h, (mean, variance) = x[1] - x[0], move(x)
+    z = h * mean @ posterior
+    return normal(x, z, h * (variance + mean**2) @ posterior - z**2)
+
+
+NORMAL_PREDICTION = "A normal density takes the place of the integral; the law after a step is as a rule not normal."
+
 WRONG_PREDICTIONS: tuple[tuple[str, str, Answer], ...] = (
     *((name, says, prediction_with(kernel)) for name, says, kernel in WRONG_KERNELS),
     (
@@ -268,9 +286,10 @@ WRONG_PREDICTIONS: tuple[tuple[str, str, Answer], ...] = (
         "The nodes are moved, but the noise of the object does not spread them.",
         lambda posterior, x, move: np.interp(x, move(x)[0], posterior),
     ),
+    ("normal-prediction", NORMAL_PREDICTION, _normal_prediction),
     (
         "normal-prediction",
-        "A normal density with the right mean variance takes the place of the integral.",
+        NORMAL_PREDICTION,
         lambda posterior, x, move: normal(x, *((x[1] - x[0]) * part @ posterior for part in move(x))),
     ),
 )

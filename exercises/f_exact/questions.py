@@ -18,7 +18,7 @@ from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.exercises import follow_on
 from kfcourse.exercises.f_exact.companion import Law, companion_numbers
-from kfcourse.exercises.f_exact.keys import correct, moments, nodes_needed, normalised, predict, run_filter
+from kfcourse.exercises.f_exact.keys import correct, moments, nodes_needed, nodes_with, normalised, predict, run_filter
 from kfcourse.exercises.f_exact.mistakes_of_run import WRONG_NODES, WRONG_RUNS
 from kfcourse.exercises.f_exact.mistakes_of_step import WRONG_CORRECTIONS, WRONG_MOMENTS, WRONG_PREDICTIONS
 from kfcourse.laws import Array
@@ -83,12 +83,14 @@ def run_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def nodes_arguments(exercise: Exercise) -> list[tuple]:
-    """Three intervals, widths and errors."""
-    rng = exercise.rng("f5")
-    return [
-        (-rng.uniform(2, 5), rng.uniform(3, 7), rng.uniform(0.002, 0.01), 10 ** -rng.uniform(exponent, exponent + 1))
-        for exponent in (3, 6, 9)
-    ]
+    """Three intervals, widths and errors; less and more than half of a step is left: rounding to the nearest must show."""
+    rng, found = exercise.rng("f5"), []
+    for exponent, part in ((3, 0.3), (6, 0.7), (9, 0.4)):
+        low, high, sigma = -rng.uniform(2, 5), rng.uniform(3, 7), rng.uniform(0.002, 0.01)
+        error = 10 ** -rng.uniform(exponent, exponent + 1)
+        steps = nodes_with(rounded=lambda intervals: intervals, ends=0)(low, high, sigma, error)
+        found.append((low, low + (high - low) * float((np.floor(steps) + part) / steps), sigma, error))
+    return found
 
 
 QUESTIONS = (

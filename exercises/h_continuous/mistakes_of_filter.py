@@ -95,6 +95,14 @@ def _root_forgotten(a: float, s: float, h: float, S_xi: float, N: float) -> tupl
     return D, 2 * D * h / N
 
 
+def _twice_the_root(a: float, s: float, h: float, S_xi: float, N: float) -> tuple[float, float]:
+    """Divided by the coefficient of the square, not by twice that; the gain follows."""
+    D, K = steady_with()(a, s, h, S_xi, N)
+    return 2 * D, 2 * K
+
+
+QUADRATIC_FORMULA = "A factor of the quadratic formula is wrong: write a, b, c of it down."
+
 WRONG_STEADY: tuple[tuple[str, str, Answer], ...] = (
     ("negative-root", messages.NEGATIVE_ROOT, steady_with(root=-1.0)),
     ("process-one-sided", messages.PROCESS_ONE_SIDED, steady_with(q=lambda s, S_xi: s**2 * S_xi)),
@@ -139,9 +147,10 @@ WRONG_STEADY: tuple[tuple[str, str, Answer], ...] = (
         "The root is not divided by the coefficient of the square.",
         lambda a, s, h, S_xi, N: (2 * h**2 / N * steady_with()(a, s, h, S_xi, N)[0], steady_with()(a, s, h, S_xi, N)[1]),
     ),
+    ("quadratic-formula", QUADRATIC_FORMULA, _twice_the_root),
     (
         "quadratic-formula",
-        "A factor of the quadratic formula is wrong: write a, b, c of it down.",
+        QUADRATIC_FORMULA,
         lambda a, s, h, S_xi, N: (
             (np.sqrt(4 * a**2 + h**2 * s**2 * S_xi / N) - 2 * a) / (4 * h**2 / N),
             steady_with()(a, s, h, S_xi, N)[1],

@@ -114,11 +114,11 @@ def _own(p: Array, A: Array) -> Array:
 
 
 WRONG_PAIRS: Rows = (
-    ("transposed", "That is the covariance of x_{k+1} with x_k: the rows belong to x_k.", _pair(lambda p, A: A @ p, _next)),
+    ("transposed", "The covariance of x_{k+1} with x_k stands there: the rows belong to x_k.", _pair(lambda p, A: A @ p, _next)),
     ("A-not-transposed", "A stands on the right of p, and there it is transposed.", _pair(lambda p, A: p @ A, _next)),
     (
         "carried-twice",
-        "That is what becomes of p in a step; only one of the two states has moved.",
+        "What becomes of p in a step stands there; only one of the two states has moved.",
         _pair(lambda p, A: A @ p @ A.T, _next),
     ),
     ("A-forgotten", "The object is missing: the next state is not this one.", _pair(lambda p, A: p, _next)),
@@ -340,7 +340,11 @@ WRONG_ROUNDS: Rows = (
     ("variance-alone", "Only the smoother's variance is there.", _round(lambda y, z, p: np.mean(p))),
     ("sum-for-mean", "It is a sum over the measurements, not a mean.", _round(lambda y, z, p: np.sum((y - z) ** 2 + p))),
     ("missing-counted", "It is divided by the number of all steps; what is missing tells nothing of the meter.", _divided_by_all),
-    ("missing-as-zero", messages.MISSING_AS_ZERO, _zero_for_missing),
+    (
+        "missing-as-zero",
+        "A missing measurement is treated as the number 0; it tells nothing of the meter: leave its step out.",
+        _zero_for_missing,
+    ),
     (
         "about-the-mean",
         ABOUT_THE_MEAN,

@@ -237,6 +237,7 @@ WRONG_FITS: tuple[tuple[str, str, Answer], ...] = (
     ("as-printed", AS_PRINTED, fit_with(True, True)),
     ("mean-of-start", MOMENTS_OF_START, fit_with(chi_of_start=True)),
     ("covariance-of-start", MOMENTS_OF_START, fit_with(T_of_start=True)),
+    ("matrix-of-start", MOMENTS_OF_START, fit_with(gamma_of_start=True)),
     ("all-of-start", "All moments are those of the first state: that is a regression of x_0.", fit_with(True, True, True)),
     (
         "whole-variance",

@@ -100,12 +100,17 @@ class Sensitivity:
         return [name for name in found if name not in self.spare and not self._jumps(name, part, 0)]
 
     def _jumps(self, name: str, part: int, side: int) -> bool:
-        """Whether the right answer (0) or the student's (1) changes if an argument is five times as large.
+        """Whether the right answer (0) or the student's (1) changes if an argument is five times as large, or reversed.
 
-        What is counted or rounded does not feel a small change, and depends on the argument all the same.
+        What is counted or rounded does not feel a small change, a median no factor; they depend on the argument all the same.
         """
-        called = self.called(list(self.names).index(name), lambda value: scaled(value, 5.0))
-        return any(not same(new[side][part], old[side][part]) for new, old in zip(called, self.results, strict=False))
+        place = list(self.names).index(name)
+        called = [
+            self.called(place, change) for change in (lambda value: scaled(value, 5.0), lambda value: changed(value, np.flip))
+        ]
+        return any(
+            not same(new[side][part], old[side][part]) for found in called for new, old in zip(found, self.results, strict=False)
+        )
 
 
 def names_of(answer: Callable, count: int) -> list[str]:

@@ -117,6 +117,12 @@ RIGHT = [
         "53",
         lambda lam, Psi, h, G, F, y: (lam + times(gain(Psi, G, F), y - h), Psi - gain(Psi, G, F) @ F @ T(gain(Psi, G, F))),
     ),
+    # the state's components differ by a factor of a thousand: an inverse keeps its digits all the same
+    (
+        "b2",
+        "D3",
+        lambda lam, Psi, h, G, F, y: (lam + times(gain(Psi, G, F), y - h), Psi - gain(Psi, G, F) @ G @ Psi),
+    ),
     ("b5", "5", lambda Psi, G, F, R: np.linalg.inv(np.linalg.inv(Psi) + T(G) @ np.linalg.inv(R) @ G)),
     ("b5", "20", joseph),
     ("c2", "generated", centred),

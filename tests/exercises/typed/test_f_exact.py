@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from answers import test_no_wrong_kind_of_mistake_is_named, test_right_answers_pass, test_what_cannot_be_compared_is_explained  # noqa: F401
 from scipy.stats import norm
 
@@ -68,6 +69,13 @@ def f3_nodes_moved(posterior, x, move):
 
 def f3_node_by_node(posterior, x, move):
     return normal(x, *move(x)) * posterior
+
+
+def f3_normal(posterior, x, move):
+    mean, variance = move(x)
+    weights = posterior * (x[1] - x[0])
+    z = (weights * mean).sum()
+    return normal(x, z, (weights * variance).sum() + (weights * mean**2).sum() - z**2)
 
 
 right_moments, right_correct, right_predict = f1(), f2(), f3_by_loop
@@ -160,6 +168,8 @@ WRONG = [
     ("f1", "deviation", f1(spread=lambda q, x, h, m: np.sqrt(((x - m) ** 2 * q).sum() * h))),
     ("f1", "not-normalised", f1(returned="as it came")),
     ("f1", "mode", f1(mean_of=lambda q, x, h: x[q.argmax()])),
+    ("f1", "median", f1(mean_of=lambda q, x, h: x[(q.cumsum() * h > 0.5).argmax()])),
+    ("f1", "", f1(mean_of=lambda q, x, h: x[(q.cumsum() * h > 0.25).argmax()])),  # depends on the density, by jumps
     ("f1", "weights-forgotten", f1(mean_of=lambda q, x, h: x.mean(), spread=lambda q, x, h, m: x.var())),
     ("f1", "not-normalised", f1(mass=lambda density, h: 1.0)),
     ("f2", "variance-for-deviation", f2(law=lambda y, m, v: norm.pdf(y, m, v))),
@@ -178,6 +188,7 @@ WRONG = [
     ("f3", "factor-forgotten", f3(law=lambda u, m, v: np.exp(-((u - m) ** 2) / (2 * v)))),
     ("f3", "not-spread", f3_nodes_moved),
     ("f3", "node-by-node", f3_node_by_node),
+    ("f3", "normal-prediction", f3_normal),
     ("f4", "predicted-first", f4(first=True)),
     ("f4", "missing-as-zero", f4(missing="zero")),
     ("f4", "missing-step-skipped sometimes", f4(missing="frozen")),
@@ -200,3 +211,8 @@ UNUSABLE = [
     ("f4", "expected an array of shape", f4_row_left_out),
     ("f4", "a missing measurement used", f4_missing_not_handled),
 ]
+
+
+@pytest.mark.parametrize("variant", ["21", "53", "5"])
+def test_rounding_to_the_nearest_is_not_enough(told, variant):
+    assert told("f5", f5(whole=round), variant).diagnosis == ("sometimes",)

@@ -60,6 +60,12 @@ def h4_root_forgotten(a, s, h, S_xi, N):
     return D, D * h / r
 
 
+def h4_not_twice(a, s, h, S_xi, N):
+    c = 2 * h**2 / N
+    D = (-2 * a + sp.sqrt(4 * a**2 + 2 * c * s**2 * S_xi)) / c
+    return D, D * h * 2 / N
+
+
 def h4_object_alone(a, s, h, S_xi, N):
     D = s**2 * S_xi / (4 * a)
     return D, D * h * 2 / N
@@ -174,6 +180,7 @@ WRONG = [
     ("h4", "gain-one-sided", h4(gain=lambda D, h, r: D * h / (2 * r))),
     ("h4", "gain-discrete", h4(gain=lambda D, h, r: D * h / (h**2 * D + r))),
     ("h4", "one-side-only", h4(decay=sp.Rational(1, 2))),
+    ("h4", "quadratic-formula", h4_not_twice),
     ("h4", "drift-sign", h4(decay=-1)),
     ("h4", "drift-forgotten", h4(decay=0)),
     ("h4", "root-forgotten", h4_root_forgotten),

@@ -36,6 +36,13 @@ def p7(
     return answer
 
 
+def p7_matrix_of_start(x_0, x, z):
+    n = x.shape[1]
+    both = np.cov(x_0.T, z.T, ddof=0)
+    gamma = both[:n, n:] @ np.linalg.inv(both[n:, n:])
+    return gamma, x.mean(axis=0) - gamma @ z.mean(axis=0), np.reshape(np.cov(x.T, ddof=0), (n, n)) - gamma @ both[n:, :n]
+
+
 RIGHT = [
     ("p1", lambda a, q, z, p: (a * z) ** 2 + a**2 * p + q),
     ("p2", lambda gamma, G, d, r: (gamma * G) ** 2 * d + gamma**2 * r),
@@ -89,6 +96,7 @@ WRONG = [
     ("p7", "as-printed", p7(lambda x_0, x: x_0.mean(axis=0), lambda x_0, x: np.cov(x_0.T, ddof=0))),
     ("p7", "mean-of-start", p7(lambda x_0, x: x_0.mean(axis=0))),
     ("p7", "covariance-of-start", p7(cov=lambda x_0, x: np.cov(x_0.T, ddof=0))),
+    ("p7", "matrix-of-start", p7_matrix_of_start),
     ("p7", "square-about-zero", p7(cov=lambda x_0, x: x.T @ x / len(x))),
     ("p7", "divided-by-N-1", lambda x_0, x, z: (*p7()(x_0, x, z)[:2], p7()(x_0, x, z)[2] * len(x) / (len(x) - 1))),
     ("p7", "offset-forgotten", p7(offset=lambda gamma, z: 0)),
