@@ -20,6 +20,7 @@ from kfcourse.checks import Exercise, exercise, sets
 from kfcourse.checks.question import MIME
 from kfcourse.notebooks.course_list import Student
 from kfcourse.notebooks.grading import course, marking, running, submissions
+from kfcourse.notebooks.grading.asking import salted
 from kfcourse.notebooks.grading.assembly import assembled
 from kfcourse.notebooks.grading.marking import code_of
 from kfcourse.notebooks.grading.running import Site
@@ -307,6 +308,7 @@ def changed(name, **fields):
     """A question of set b with other fields."""
     question = next(one for one in sets()["b"].questions if one.name == name)
     before = {field: getattr(question, field) for field in fields}
+    salted.cache_clear()  # its exercises keep what was posed before
     try:
         for field, value in fields.items():
             object.__setattr__(question, field, value)
@@ -314,6 +316,7 @@ def changed(name, **fields):
     finally:
         for field, value in before.items():
             object.__setattr__(question, field, value)
+        salted.cache_clear()
 
 
 def test_a_check_that_fails_in_itself_costs_its_question_only(graded_here):
