@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from urllib.parse import unquote
 
-from bs4 import BeautifulSoup, Tag
+from bs4 import BeautifulSoup
 
 REPEATS = "equations.html"  # shows what it refers to
 LINK = re.compile(r'<a [^>]*class="[^"]*\breference internal\b[^"]*"[^>]*>')
@@ -26,7 +26,7 @@ def write(app, exception: Exception | None) -> None:
     if exception or app.builder.format != "html":
         return
     root = Path(app.outdir)
-    read = cache(lambda name: BeautifulSoup((root / name).read_text(encoding="utf-8"), "html.parser"))
+    read = cache(lambda name: (root / name).read_text(encoding="utf-8"))
     for path in sorted(root.rglob("*.html")):
         name, text = path.relative_to(root).as_posix(), path.read_text(encoding="utf-8")
         here, found = posixpath.dirname(name) or ".", {}
@@ -43,26 +43,35 @@ def write(app, exception: Exception | None) -> None:
             path.write_text(text.replace("</body>", script), encoding="utf-8")
 
 
-def preview(page: BeautifulSoup, identity: str, way: str) -> str:
+def preview(page: str, identity: str, way: str) -> str:
     """The figure, formula or term that stands at a place of a page, as HTML; nothing for anything else.
 
     `way` leads from the page that shows it to the folder of its own.
     """
-    target = page.find(id=identity)
-    if not isinstance(target, Tag):
+    begin = page.rfind("<", 0, max(page.find(f' id="{identity}"'), 0))
+    if not page.startswith(("<figure", "<div", "<dt"), begin):
         return ""
-    if target.find_parent("dl", class_="kf-terms"):
-        russian, meaning = target.find(class_="kf-ru"), target.find_next_sibling("dd")
-        html = f"<p><b>{target.find(string=True)}</b> {russian}</p>{meaning.decode_contents()}"
-    elif target.name == "figure" or "math" in target.get("class", []):
-        html = str(target)
-    else:
+    shown = BeautifulSoup(element(page, begin), "html.parser")
+    target = shown.find()
+    if target.name == "dt" and (russian := target.find(class_="kf-ru")):
+        meaning = BeautifulSoup(element(page, page.index("<dd", begin)), "html.parser").dd
+        shown = BeautifulSoup(f"<p><b>{target.find(string=True)}</b> {russian}</p>{meaning.decode_contents()}", "html.parser")
+    elif target.name != "figure" and "math" not in target.get("class", []):
         return ""
-    shown = BeautifulSoup(html, "html.parser")
     for one in shown.select("[src], [srcset]"):
         for name in {"src", "srcset"} & one.attrs.keys():
             one[name] = posixpath.normpath(f"{way}/{one[name]}")
     return str(shown).strip()
+
+
+def element(page: str, begin: int) -> str:
+    """The source of the element that begins there: a whole page is large, and parsed slowly."""
+    name, depth = re.compile(r"<([\w-]+)").match(page, begin)[1], 0
+    for tag in re.compile(rf"<(/?){name}\b").finditer(page, begin):
+        depth += -1 if tag[1] else 1
+        if not depth:
+            return page[begin : page.index(">", tag.start()) + 1]
+    raise ValueError(f"<{name}> at {begin} has no end")
 
 
 def setup(app) -> dict[str, bool]:

@@ -201,6 +201,8 @@ def lab(
         write_report(chosen, result, place, [one for one in (budget.says, again) if one], found, modes)
         if language:
             write_handin(chosen, result, place, language, modes)
+    if not language and (older := folder / "handin.html").exists():
+        click.echo(f"{older} is of an earlier run; --report en, or ru, writes it anew", err=True)
     click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""), err=to_error)
 
 

@@ -559,6 +559,12 @@ def test_an_end_while_the_report_is_written_leaves_the_one_that_was_there(call, 
         assert snapshot(tmp_path) == before and [path.name for path in tmp_path.glob("r/.*")] == []
 
 
+def test_a_student_s_report_of_an_earlier_run_is_not_taken_for_this_one_s(call, no_figures, tmp_path):
+    """It stays, as nobody asked for another; its numbers are not those of the report that is written now."""
+    run = ("lab", "53", *QUICK, "--filters", "duof", "--out", "r")
+    assert [("earlier run" in call(*run, *more).output) for more in ((), ("--report", "ru"), ())] == [False, False, True]
+
+
 def test_a_read_only_file_of_the_report_is_not_replaced_nor_are_the_others(call, no_figures, tmp_path):
     assert call("lab", "53", *QUICK, "--filters", "duof", "--out", "r").exit_code == 0
     before = snapshot(tmp_path)

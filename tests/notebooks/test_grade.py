@@ -308,7 +308,7 @@ def changed(name, **fields):
     """A question of set b with other fields."""
     question = next(one for one in sets()["b"].questions if one.name == name)
     before = {field: getattr(question, field) for field in fields}
-    salted.cache_clear()  # its exercises keep what was posed before
+    salted.cache_clear()  # its exercises keep what was posed, and a dict finds the same object again at one of eight places
     try:
         for field, value in fields.items():
             object.__setattr__(question, field, value)

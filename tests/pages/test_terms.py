@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from bs4 import BeautifulSoup
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "book"))
 import previews
@@ -116,10 +115,10 @@ PAGE = """<figure id="fig-a"><picture><source srcset="_images/a-narrow.png"/><im
     ],
 )
 def test_what_stands_at_a_place_of_another_page(identity, way, has):
-    shown = previews.preview(BeautifulSoup(PAGE, "html.parser"), identity, way)
+    shown = previews.preview(PAGE, identity, way)
     assert all(one in shown for one in has), shown
 
 
 @pytest.mark.parametrize("identity", ["c", "nowhere"])
 def test_nothing_is_shown_of_other_places(identity):
-    assert previews.preview(BeautifulSoup(PAGE, "html.parser"), identity, ".") == ""
+    assert previews.preview(PAGE, identity, ".") == ""
