@@ -65,10 +65,15 @@ def gain_arguments(exercise: Exercise) -> list[tuple]:
 
 
 def correction_arguments(exercise: Exercise) -> list[tuple]:
-    """A hidden law, what the hidden meter makes of it, and measurements."""
+    """A hidden law, what the hidden meter makes of it, and measurements, in units in which F is neither tiny nor huge.
+
+    Else a gain that is not divided by F, and one that is multiplied by it, are nothing beside the state.
+    """
     at = hidden_law(exercise, "b2")
     expected = hidden_meter(exercise, at)
-    return [(at.mean, at.cov, expected.h, expected.G, expected.F, hidden_measurements(exercise, "b2-y", expected))]
+    y = hidden_measurements(exercise, "b2-y", expected)
+    unit = 10.0 ** -np.round(np.log10(np.diagonal(expected.F, axis1=-2, axis2=-1).mean(axis=0)) / 2)
+    return [(at.mean, at.cov, unit * expected.h, unit[:, None] * expected.G, unit[:, None] * expected.F * unit, unit * y)]
 
 
 # -- b3: a whole step

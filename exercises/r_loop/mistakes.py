@@ -160,7 +160,7 @@ WRONG_RANGES: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "half-a-cycle",
-        "The characteristic is taken along its tangent to half a cycle; it bends, and has a largest value.",
+        "It is pi times what it should be: is the characteristic taken along its tangent to half a cycle, or pi left out?",
         lambda p, A, D, T: sp.pi * lock_in(p, A, D, T),
     ),
     ("amplitude-once", AMPLITUDE, lambda p, A, D, T: lock_in(p, A, D, T) / A),
@@ -201,7 +201,7 @@ WRONG_TIMES: tuple[tuple[str, str, Answer], ...] = (
     ),
     (
         "half-a-cycle",
-        "It is half of what it should be: half a cycle away is no slip yet, every second loop falls back from there.",
+        "It is half of what it should be: is a loop half a cycle away taken as slipped? Every second one falls back from there.",
         lambda s, q: mean_time(s, q) / 2,
     ),
     ("wrong-bessel", "It is the Bessel function of order zero.", lambda s, q: 2 * np.pi**2 / q * scipy.special.iv(1, 1 / s) ** 2),

@@ -63,6 +63,7 @@ class Exercise:
     salt: str = ""
 
     def __post_init__(self) -> None:
+        self.variant.plain("the exercises")  # whatever the set: each check asks the model for its letters
         if self.letter not in sets() or not sets()[self.letter].about_variant:
             return
         for which, where in (("y", "measurement"), ("x", "state")):

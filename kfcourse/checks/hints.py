@@ -71,9 +71,10 @@ def signs_lost(case: Case) -> Said | None:
 
 
 def rounded(case: Case) -> Said | None:
-    """Right, and then rounded."""
+    """Right, and then rounded; to whole numbers where there are several, as ones and zeros say nothing."""
     if case.numeric:
-        for decimals in range(1, 9):
+        whole = len(np.unique(np.concatenate([np.ravel(a) for a in case.found]))) > 2
+        for decimals in range(0 if whole else 1, 9):
             if all(np.array_equal(a, np.round(b, decimals)) for a, b in case.pairs):
                 return "precision", "It is rounded: hand in all digits."
     return None
@@ -104,7 +105,8 @@ def confused(case: Case) -> Said | None:
 def rough(case: Case) -> Said | None:
     """Right to some digits."""
     if case.numeric and all(equal(a, b, ROUGH, {}) for a, b in case.pairs):
-        if all(np.array_equal(mine, np.asarray(mine, np.float32), equal_nan=True) for mine, _ in case.pairs):
+        single = all(np.array_equal(mine, np.asarray(mine, np.float32), equal_nan=True) for mine, _ in case.pairs)
+        if single and any(not np.array_equal(mine, np.round(mine), equal_nan=True) for mine, _ in case.pairs):
             return (
                 "precision",
                 "It is right to the 7 digits of single precision (float32): compute in double precision (float64).",
@@ -145,17 +147,22 @@ def _symbols(case: Case, which: int) -> set[str]:
     return {name for f in formulas for name in depends(f, {s.name for s in f.free_symbols})}
 
 
+NOT_SYMMETRIC = "The result should be symmetric and is not: is a factor missing on one side?"
+DIGITS_LOST = "Some of the matrices are not symmetric, most are: are digits lost, as where something nearly singular is inverted?"
+
+
 def improper(case: Case) -> Said | None:
     """A covariance that is none."""
     for found, expected in case.pairs:
         if isinstance(expected, sp.MatrixBase):
             if expected.rows == expected.cols > 1 and case.agree([expected], [expected.T]) and not case.agree([found], [found.T]):
-                return "not-symmetric", "The result should be symmetric and is not: is a factor missing on one side?"
+                return "not-symmetric", NOT_SYMMETRIC
         elif case.numeric and expected.ndim > 1 and expected.shape[-1] == expected.shape[-2]:
             if not same(expected, expected.swapaxes(-1, -2)):
                 return None
             if not np.allclose(found, found.swapaxes(-1, -2)):
-                return "not-symmetric", "The result should be symmetric and is not: is a factor missing on one side?"
+                symmetric = np.isclose(found, found.swapaxes(-1, -2)).all(axis=(-2, -1))
+                return ("digits-lost", DIGITS_LOST) if symmetric.mean() > 0.5 else ("not-symmetric", NOT_SYMMETRIC)
             own, right = (np.diagonal(matrix, axis1=-2, axis2=-1) for matrix in (found, expected))
             if (own < -1e-9 * np.max(right)).any() and (right >= 0).all():  # zero is negative at times, by rounding
                 return "negative-variance", "There are negative variances in it: what is subtracted there?"

@@ -319,7 +319,8 @@ def direction(case: Case) -> Said | None:
     a, b = (np.concatenate([np.ravel(pair[which]) for pair in case.pairs]) for which in (0, 1))
     told = np.isfinite(b) & ~np.isclose(a, b, rtol=1e-9, atol=0)
     larger = np.abs(a[told]) > np.abs(b[told])
-    if np.sum(told) < 3 or (a[told] * b[told] < 0).any() or larger.any() != larger.all():
+    signs = a[told] * b[told] < 0, (a[told] < 0) & (b[told] == 0)  # below zero is not too large, whatever its size
+    if np.sum(told) < 3 or np.any(signs) or larger.any() != larger.all():
         return None
     if larger.all():
         return "too-large", "It is too large wherever it is wrong: is something added that does not belong there, or not divided?"

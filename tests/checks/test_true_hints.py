@@ -153,3 +153,33 @@ def test_terms_in_another_form_are_not_called_wrong():
 def test_a_formula_is_told_what_it_differs_by(name, words, answer):
     result = outcome(asks(lambda z, p: (e * sp.cos(z), p * z), [(z, p)], parts=("first", "second")), answer)
     assert result.diagnosis == (name,) and words in result.message, result
+
+
+@pytest.mark.parametrize("change", [np.round, np.floor])
+def test_whole_numbers_are_not_single_precision(change):
+    """They are numbers of float32 as well."""
+    question = asks(lambda a: 1e5 * np.exp(a), [(MANY,), (MORE,)])
+    result = outcome(question, lambda a: change(1e5 * np.exp(a)))
+    assert result.diagnosis == ("precision",) and "single" not in result.message and "rounded" in result.message
+    small = asks(lambda a: 3 * np.exp(a) + 2, [(MANY,), (MORE,)])
+    assert outcome(small, lambda a: np.round(3 * np.exp(a) + 2)).message.startswith("not right. It is rounded")
+
+
+def test_below_zero_is_not_too_large():
+    question = asks(lambda a: (a > 0) * 1.0, [(MANY,), (MORE,)])
+    assert "too-large" not in outcome(question, lambda a: np.sign(a)).diagnosis
+    assert outcome(question, lambda a: (a > 0) + 3.0 * (a < 0)).diagnosis == ("too-large",)
+
+
+def test_where_digits_are_lost_no_factor_is_missing():
+    """Information that is nearly none: its inverse takes the digits of what is subtracted."""
+    W = np.array([np.eye(3) * k for k in (1e-16, 1.3, 0.7, 2.0)])
+    H = RNG.normal(size=(4, 3, 3))
+
+    def by_gain(W, H):
+        P, T = np.linalg.inv(W), H.swapaxes(1, 2)
+        return P - P @ T @ np.linalg.inv(H @ P @ T + np.eye(3)) @ H @ P
+
+    question = asks(lambda W, H: np.linalg.inv(W + H.swapaxes(1, 2) @ H), [(W, H)], axes=("trajectory",))
+    assert outcome(question, by_gain).diagnosis == ("digits-lost",)
+    assert outcome(question, lambda W, H: np.linalg.inv(W + H @ H)).diagnosis == ("not-symmetric",)

@@ -18,6 +18,8 @@ def test_no_such_set_question_or_variant():
         exercise("a", "none")
     with pytest.raises(VariantError, match="variant own in this notebook"):
         exercise("a", {"state": "x +", "meter": "x + w"})
+    with pytest.raises(VariantError, match="variant J1 jumps between modes"):
+        exercise("r", "J1")  # its questions do not use the model, its checks do
 
 
 def test_a_variant_of_ones_own():

@@ -266,3 +266,9 @@ UNUSABLE = [
     ("b4", "got the shape (5, 6, 1)", lambda *arguments: b4()(*arguments)[1:]),
     ("b4", "NaN or infinity", b4(gone=lambda missing: missing & False, returned=lambda z, p, lam, y: z + 0 * y)),
 ]
+
+
+def test_a_small_unit_of_the_measurement_hides_no_mistake(told):
+    """Accelerations of a landing on Mars: the gain divided by F, or multiplied by it, was nothing beside the state."""
+    assert told("b2", b2(gain=lambda Psi, G, F: Psi @ T(G)), "D3").diagnosis == ("gain-not-divided",)
+    assert told("b2", b2(gain=lambda Psi, G, F: Psi @ T(G) @ F), "D3").diagnosis == ("gain-multiplied",)

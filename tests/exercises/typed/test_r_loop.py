@@ -85,3 +85,9 @@ UNUSABLE = [
     ("r5", "got the shape ()", lambda s, q: one_time(s[0], q)),
     ("r6", "expected 2 results", lambda error: np.round(error[-1] / (2 * np.pi))),
 ]
+
+
+def test_a_factor_has_more_causes_than_one(told):
+    """Here pi is left out, and the tangent is not taken."""
+    result = told("r4", lambda p, A, D, T: p * A**2 / (2 * D) / (2 * T))
+    assert result.diagnosis == ("half-a-cycle",) and "or pi left out?" in result.message
