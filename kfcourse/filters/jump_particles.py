@@ -166,7 +166,7 @@ def _of_chosen(
     rng: np.random.Generator, prior: Array, heights: list[Array], drawn: list[tuple[Array, Array]], y: Array
 ) -> tuple[Array, Array, Array]:
     """Modes by `prior` (..., J) times the exponents of `heights`; what was drawn in each, and the logarithms of p / q."""
-    missing = np.logical_or.reduce(np.isnan(y), axis=-1)[:, None, None, None]
+    missing = np.logical_and.reduce(np.isnan(y), axis=-1)[:, None, None, None]
     with np.errstate(divide="ignore"):
         logs = np.log(prior)
     seen, _ = normalised(logs + np.where(missing, 0.0, np.nan_to_num(np.stack(heights, axis=-1), nan=-np.inf, neginf=-np.inf)))

@@ -176,8 +176,8 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
 
 
 def by_clouds(before: State, y: Array, after: State) -> Array:
-    """ln of the mean of both clouds' weights, (runs,); 0 where nothing, or not all, was measured."""
-    return np.where(np.isnan(y).any(axis=-1), 0.0, np.logaddexp(*after.memory.evidence) - np.log(2))
+    """ln of the mean of both clouds' weights, (runs,); 0 where nothing was measured."""
+    return np.where(np.isnan(y).all(axis=-1), 0.0, np.logaddexp(*after.memory.evidence) - np.log(2))
 
 
 def even(particles: int) -> None:
