@@ -60,7 +60,7 @@ def run(one: Filter, y: Array) -> Gaussian:
     Raises
     ------
     ValueError
-        Measurements of another shape.
+        Measurements of another shape, none at all, or infinite ones.
     TypeError
         No filter: a `Design`, whose coefficients are still to be found, a model, or structural functions.
     """
@@ -82,6 +82,12 @@ def states(one: Filter, y: Array) -> list[State]:
 
 def walk(one: Filter, y: Array) -> Iterator[State]:
     """The same one after the other: what the exact filter or particles remember of all steps may be gigabytes."""
+    y = measurements(one, y)
+    return accumulate(y, one.step, initial=one.init(y.shape[1]))
+
+
+def measurements(one: Filter, y: Array) -> Array:
+    """What a filter is to be run over, as (steps, runs, p); ValueError if it is none."""
     expect(one, Filter, "a run")
     y, p = np.asarray(y, dtype=float), one.model.p
     if y.ndim == 1 and p == 1:
@@ -90,7 +96,12 @@ def walk(one: Filter, y: Array) -> Iterator[State]:
         raise ValueError(f"measurements must have the shape (steps, runs, {p}), got {y.shape}{_reshaped(y, p)}")
     if y.shape[2] != p:
         raise ValueError(f"{one.name} expects {p} measurement component(s), got {y.shape[2]}")
-    return accumulate(y, one.step, initial=one.init(y.shape[1]))
+    if not y.size:
+        raise ValueError(f"there are no measurements to run over: the shape (steps, runs, {p}) is {y.shape}")
+    if (endless := np.isinf(y)).any():
+        k, run, _ = np.argwhere(endless)[0]
+        raise ValueError(f"the measurement of step {k}, run {run} is infinite; write NaN where one is missing")
+    return y
 
 
 def _reshaped(y: Array, p: int) -> str:
