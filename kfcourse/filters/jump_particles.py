@@ -34,6 +34,7 @@ from kfcourse.filters.particles import (
     where_measured,
 )
 from kfcourse.filters.proposals import Look, component
+from kfcourse.kinds import expect
 from kfcourse.laws import Array
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
@@ -82,6 +83,7 @@ def jump_particle(model: JumpModel, particles: int = 1000, seed: Seed = 0, name:
     ModelError
         There is no density of y given x in some mode.
     """
+    expect(model, JumpModel, "jump_particle")
     even(particles)
     size, count, angles, number = particles // 2, len(model.modes), model.angles.x, seed_number(seed)
     likelihoods = [likelihood(mode) for mode in model.modes]

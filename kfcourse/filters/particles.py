@@ -182,8 +182,8 @@ def by_clouds(before: State, y: Array, after: State) -> Array:
 
 def even(particles: int) -> None:
     """ModelError if so many particles are not two clouds of equal size."""
-    if particles < 2 or particles % 2:
-        raise ModelError(f"a particle filter needs an even number of at least 2 particles, got {particles}")
+    if not isinstance(particles, int | np.integer) or particles < 2 or particles % 2:
+        raise ModelError(f"a particle filter needs an even number of at least 2 particles, got {particles!r}")
 
 
 def at_start(mean: Array, particles: int, number: int) -> tuple[Array, Array, Array, np.random.SeedSequence]:

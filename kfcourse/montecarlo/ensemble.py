@@ -21,6 +21,7 @@ import scipy
 import sympy as sp
 
 from kfcourse.angles import on_circle
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, normalised_square, square_root
 from kfcourse.linear.runs import Trajectories
 from kfcourse.montecarlo.batches import STRATA
@@ -95,6 +96,7 @@ class Ensemble:
     compiled: bool = False
 
     def __post_init__(self) -> None:
+        expect(self.model, Model, "an ensemble", JumpModel)
         if not isinstance(self.seed, np.random.SeedSequence):
             object.__setattr__(self, "seed", np.random.SeedSequence(seed_number(self.seed)))
         if self.wide is not None and not 1 <= self.wide < np.inf:

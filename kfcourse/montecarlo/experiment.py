@@ -306,8 +306,8 @@ def _check_arguments(
         raise ValueError(f"give at least one filter, and each a name of its own: {', '.join(names) or 'none given'}")
     if all(one.slow for one in filters):
         raise ValueError(f"{names[0]} is found through its difference from a fast filter; add one, such as aof-gaussian")
-    if slow_runs < 0:
-        raise ValueError(f"slow_runs must not be negative, got {slow_runs}")
+    if not isinstance(slow_runs, int | np.integer) or slow_runs < 0:
+        raise ValueError(f"slow_runs must be a whole number of trajectories, 0 for none, got {slow_runs!r}")
     if slow_seconds is not None and not slow_seconds > 0:
         raise ValueError(f"slow_seconds must be positive, got {slow_seconds}; slow_runs=0 leaves the slow filters out")
     if slow_memory is not None and not slow_memory >= LEAST:

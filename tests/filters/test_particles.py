@@ -156,8 +156,9 @@ def test_no_measurement_makes_nan(variants, value):
 
 
 def test_impossible_requests_are_refused(variants):
-    with pytest.raises(ModelError, match="at least 2 particles, got 1"):
-        particle(variants["2"], 1)
+    for number in (1, 10.0):
+        with pytest.raises(ModelError, match=f"at least 2 particles, got {number}"):
+            particle(variants["2"], number)
     with pytest.raises(ModelError, match="noise enters nonlinearly"):
         particle(Model.define("x + v", "x + w**2"))
 

@@ -207,6 +207,7 @@ def test_memory_does_not_grow_with_the_number_of_steps(variant53):
         ({"seed": 1.5}, "seed"),
         ({"seed": None}, "seed"),
         ({"slow_runs": -1}, "slow_runs"),
+        ({"slow_runs": 2.5}, "slow_runs"),
         ({"filters": []}, "at least one"),
         ({"filters": "twice"}, "name of its own"),
         ({"filters": "other model"}, "model"),
