@@ -21,7 +21,7 @@ import numpy as np
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
 from kfcourse.filters.fused import Fused, fuse
-from kfcourse.kinds import expect
+from kfcourse.kinds import expect, expect_sizes
 from kfcourse.laws import Array, Gaussian, stacked
 from kfcourse.montecarlo.batches import BATCHES, batch_sizes
 from kfcourse.montecarlo.blocks import progress_bar, run_block, run_stretches
@@ -329,8 +329,7 @@ def _compiled(filters: Sequence[Filter | Design]) -> list[Filter | Design]:
 
 
 def _check_designs(designs: int, same_ensemble: bool, wide: float | None) -> None:
-    if isinstance(designs, bool) or not isinstance(designs, int | np.integer) or designs < 1:
-        raise ValueError(f"designs must be a positive whole number, got {designs!r}")
+    expect_sizes(designs=designs)
     if designs > 1 and same_ensemble:
         raise ValueError("there is one ensemble of the comparison: same_ensemble=True goes with designs=1 only")
     if same_ensemble and wide is not None:
