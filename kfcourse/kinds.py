@@ -10,7 +10,10 @@ NEXT = {  # (what is expected, what came) to what to do
     ("Model", "Structure"): MAKE_MODEL,
     ("Model", "Filter"): MAKE_MODEL,
     ("Model", "Design"): MAKE_MODEL,
-    ("Model", "JumpModel"): "take a filter of several models, such as imm, logic_dynamic, jump_pointmass or jump_particle",
+    (
+        "Model",
+        "JumpModel",
+    ): "it has modes: take one of them, it.modes[0], or a filter of several models, imm or jump_particle",
     ("JumpModel", "Model"): "take the filter of a model without modes, such as pointmass or particle",
     ("JumpModel", "Structure"): MAKE_MODEL,
     ("JumpModel", "Filter"): MAKE_MODEL,

@@ -14,6 +14,7 @@ from kfcourse import (
     likelihood,
     linearised,
     predictions,
+    read_measurements,
     run,
     simulate,
     smooth,
@@ -59,6 +60,7 @@ OF_MODELS = {
     "kalman_filter": kalman_filter, "pointmass": pointmass, "particle": particle, "estimate": lambda one: estimate(one, Y, ["a"]),
     "an exact filter": adaptive_pointmass, "undisturbed": undisturbed, "an ensemble": lambda one: simulate(one, 2, 2, 1),
     "profile": lambda one: profile(one, Y, ["a"], "a", [1.0]), "compare": lambda one: compare([FILTER], one, 10, 2, 1),
+    "read_measurements": lambda one: read_measurements("", one),
 }  # fmt: skip
 
 
@@ -92,7 +94,7 @@ def test_a_model_without_modes_in_the_place_of_one_with_them_and_the_other_way_r
     for one, remedy in ((MODEL, "take the filter of a model without"), (FILTER, "give the model"), (STRUCTURE, "give the model")):
         with pytest.raises(TypeError, match=rf"^{build.__name__} expects a JumpModel, and .* came: {remedy}"):
             build(one)
-    with pytest.raises(TypeError, match=r"^particle expects a Model, and a JumpModel came: take .* jump_particle$"):
+    with pytest.raises(TypeError, match=r"^particle expects a Model, and a JumpModel came: it has modes: take .* jump_particle$"):
         particle(JumpModel.define("x + v", "x + w", modes={"a": {}}, transition=[1.0]))
 
 

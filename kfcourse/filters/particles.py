@@ -103,7 +103,8 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
     Returns
     -------
     Filter
-        Its covariance is an unbiased estimate of the posterior's.
+        Its covariance estimates the posterior's: without bias where all particles weigh the same, as the guided ones of a linear
+        model do; too large where few count, by some tenths where 40 without guidance meet a sharp meter.
     """
     expect(model, Model, "particle")
     even(particles)

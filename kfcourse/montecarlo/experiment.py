@@ -146,7 +146,8 @@ def compare(
         The same seed gives the same numbers, bit by bit, whatever the number of threads.  Another NumPy or processor may do
         linear algebra by another kernel (BLAS): then vector models differ by rounding, up to some 1e-12, and scalar ones hardly.
     design_runs : int, optional
-        Size of the design ensemble, which is held at once, some 0.3 kB a trajectory.  By default `runs`, at most a million:
+        Size of the design ensemble, which is held at once: a trajectory of a scalar model takes 0.15 kB with one designed filter
+        and 0.45 kB with the lab's seven, one of a model of two states twice that.  By default `runs`, at most a million:
         coefficients from so many cost a filter about a millionth of its accuracy, and memory does not grow with `runs`.
     designs : int
         Designed filters are designed on so many ensembles.  The first design is reported; how the others differ from it on the
