@@ -14,6 +14,8 @@ NEXT = {  # (what is expected, what came) to what to do
         "Model",
         "JumpModel",
     ): "it has modes: take one of them, it.modes[0], or a filter of several models, imm or jump_particle",
+    ("Model", "ContinuousModel"): "give a discrete one, kfcourse.continuous.to_discrete(it, step)",
+    ("ContinuousModel", "Model"): "define it in continuous time, ContinuousModel.define(...)",
     ("JumpModel", "Model"): "take the filter of a model without modes, such as pointmass or particle",
     ("JumpModel", "Structure"): MAKE_MODEL,
     ("JumpModel", "Filter"): MAKE_MODEL,

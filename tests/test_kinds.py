@@ -8,6 +8,7 @@ from kfcourse import (
     JumpModel,
     Model,
     compare,
+    continuous,
     design,
     gauss_hermite,
     gaussian,
@@ -20,6 +21,7 @@ from kfcourse import (
     smooth,
     unscented,
 )
+from kfcourse.continuous import ContinuousModel, to_discrete
 from kfcourse.filters import (
     adaptive,
     adaptive_pointmass,
@@ -96,6 +98,14 @@ def test_a_model_without_modes_in_the_place_of_one_with_them_and_the_other_way_r
             build(one)
     with pytest.raises(TypeError, match=r"^particle expects a Model, and a JumpModel came: it has modes: take .* jump_particle$"):
         particle(JumpModel.define("x + v", "x + w", modes={"a": {}}, transition=[1.0]))
+
+
+def test_a_continuous_model_in_the_place_of_a_discrete_one_and_the_other_way_round():
+    with pytest.raises(TypeError, match=r"^linearised expects a Model, and a ContinuousModel came: give .*to_discrete\(it, step"):
+        linearised(ContinuousModel.define("-x", "1", "x"))
+    for use in (lambda one: to_discrete(one, 0.1), lambda one: continuous.simulate(one, 0.1, 2, 3, 1)):
+        with pytest.raises(TypeError, match=r"expects a ContinuousModel, and a Model came: .* ContinuousModel.define"):
+            use(MODEL)
 
 
 def test_a_filter_or_a_design_of_another_model_in_the_place_of_a_design():

@@ -8,7 +8,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.continuous.model import ContinuousModel, check_step, compiled
-from kfcourse.kinds import expect_sizes
+from kfcourse.kinds import expect, expect_sizes
 from kfcourse.laws import Array, apply, square_root
 from kfcourse.montecarlo.designing import NotFinite
 
@@ -43,6 +43,7 @@ def simulate(
     NotFinite
         The trajectories became infinite.
     """
+    expect(model, ContinuousModel, "simulate")
     check_step(step)
     expect_sizes(steps=steps, runs=runs, substeps=substeps)
     rng, dt = np.random.default_rng(seed), step / substeps
