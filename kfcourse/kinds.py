@@ -1,6 +1,8 @@
-"""A model, its structural functions, a filter made of them: one where another is expected, told in a sentence."""
+"""What an argument must be, told in a sentence: a model, structural functions or a filter where it is another one; a size."""
 
 from __future__ import annotations
+
+import numpy as np
 
 MAKE_MODEL = "give the model that it was made for, it.model"
 MAKE_STRUCTURE = "give linearised(model), gaussian(model), unscented(model) or gauss_hermite(model)"
@@ -8,6 +10,15 @@ NEXT = {  # (what is expected, what came) to what to do
     ("Model", "Structure"): MAKE_MODEL,
     ("Model", "Filter"): MAKE_MODEL,
     ("Model", "Design"): MAKE_MODEL,
+    (
+        "Model",
+        "JumpModel",
+    ): "it has modes: take one of them, it.modes[0], or a filter of several models, imm or jump_particle",
+    ("Model", "ContinuousModel"): "give a discrete one, kfcourse.continuous.to_discrete(it, step)",
+    ("ContinuousModel", "Model"): "define it in continuous time, ContinuousModel.define(...)",
+    ("JumpModel", "Model"): "take the filter of a model without modes, such as pointmass or particle",
+    ("JumpModel", "Structure"): MAKE_MODEL,
+    ("JumpModel", "Filter"): MAKE_MODEL,
     ("Structure", "Model"): MAKE_STRUCTURE,
     ("Structure", "Filter"): f"{MAKE_STRUCTURE}, what a filter is made of",
     ("Structure", "Design"): f"{MAKE_STRUCTURE}, what a filter is made of",
@@ -31,6 +42,13 @@ def expect(given: object, kind: type, what: str, *also: type) -> None:
         named = getattr(given, "name", None)
         came = f"the {came} {named}" if isinstance(named, str) else f"{_article(came)} {came}"
     raise TypeError(f"{what} expects {_article(kind.__name__)} {kind.__name__}, and {came} came: {remedy}")
+
+
+def expect_sizes(**sizes: object) -> None:
+    """ValueError for one of these numbers, of steps, runs and so on, that is not a positive whole one."""
+    for name, value in sizes.items():
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+            raise ValueError(f"{name} must be a positive whole number, got {value!r}")
 
 
 def _article(name: str) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.codegen import compile_function
 from kfcourse.symbolic.formula import symbol
@@ -199,6 +200,7 @@ def to_discrete(model: ContinuousModel, step: float) -> Model:
 
     f, g and S at the time t_k = T k.  Both noises are means of white noise over the step.  All discrete filters run on it.
     """
+    expect(model, ContinuousModel, "to_discrete")
     check_step(step)
     T = sp.Rational(str(float(step)))
     v = [model.fresh(name) for name in numbered("v", model.diffusion.cols)]

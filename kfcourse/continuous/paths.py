@@ -8,6 +8,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.continuous.model import ContinuousModel, check_step, compiled
+from kfcourse.kinds import expect, expect_sizes
 from kfcourse.laws import Array, apply, square_root
 from kfcourse.montecarlo.designing import NotFinite
 
@@ -42,10 +43,9 @@ def simulate(
     NotFinite
         The trajectories became infinite.
     """
+    expect(model, ContinuousModel, "simulate")
     check_step(step)
-    for name, value in {"steps": steps, "runs": runs, "substeps": substeps}.items():
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-            raise ValueError(f"{name} must be a positive whole number, got {value!r}")
+    expect_sizes(steps=steps, runs=runs, substeps=substeps)
     rng, dt = np.random.default_rng(seed), step / substeps
     formulas = {"f": model.drift, "g": model.diffusion, "S": model.signal}
     equations = compiled(model, {"x": sp.Matrix(model.x)}, formulas, ["x", "f", "S"])

@@ -38,8 +38,9 @@ def duof(model: Model, equations: tuple[Noiseless, Noiseless] | None = None) -> 
     omega = y - b(lambda, m_w),   z = lambda + H omega + e       H, e: regression of x - lambda on omega
     alpha = a(z, m_v),            lambda' = F alpha + g          F, g: regression of x' on alpha
 
-    Its own covariance is the residual of each regression, (n, n): one for the whole ensemble.  Given `equations` take the place
-    of a(z, m_v) and b(lambda, m_w).
+    Its own covariance is the residual of each regression, (n, n): one for the whole ensemble, whether y came or not.  A
+    measurement of which a component is missing corrects nothing: H is that of whole ones.  Given `equations` take the place of
+    a(z, m_v) and b(lambda, m_w).
     """
     expect(model, Model, "duof")
     (a, b), angles = equations or compile_noiseless(model), model.angles

@@ -45,7 +45,7 @@ def transition(model: Model) -> Callable[..., Gaussian]:
 
 
 def likelihood(model: Model) -> LogLikelihood:
-    """(y (..., p), x (..., n)) -> log p(y | x) (...); 0 where y is missing (NaN).
+    """(y (..., p), x (..., n)) -> log p(y | x) (...); what of y is missing (NaN) does not enter, 0 where all is.
 
     The law of a component that is an angle is wound around the circle: the densities of y and of y plus whole turns add up.
     """
@@ -55,10 +55,19 @@ def likelihood(model: Model) -> LogLikelihood:
 
     def log_likelihood(y: Array, x: Array, k: int | None = None) -> Array:
         mean, cov = law.at(k)(x)
-        innovation = difference(y, mean, model.angles.y)
+        innovation, missing = difference(y, mean, model.angles.y), np.isnan(y)
         sd = np.sqrt(np.diagonal(cov, axis1=-2, axis2=-1).reshape(-1, model.p).max(axis=0))
-        value = wound(lambda turns: log_normal(innovation + turns, cov), sd, model.angles.y)
-        return np.where(np.isnan(y).any(axis=-1), 0.0, value)
+        if model.p == 1 or not missing.any():
+            value = wound(lambda turns: log_normal(innovation + turns, cov), sd, model.angles.y)
+            return np.where(missing.any(axis=-1), 0.0, value)
+        either = missing[..., :, None] | missing[..., None, :]
+        innovation, cov = np.where(missing, 0.0, innovation), np.where(either, np.eye(model.p), cov)
+
+        def of_present(turns: Array) -> Array:  # what is missing is counted once, in no turn, as N(0; 0, 1)
+            return np.where((missing & (turns != 0)).any(axis=-1), -np.inf, log_normal(innovation + turns, cov))
+
+        value = wound(of_present, sd, model.angles.y) + 0.5 * np.log(2 * np.pi) * missing.sum(axis=-1)
+        return np.where(missing.all(axis=-1), 0.0, value)
 
     def log_normal(innovation: Array, cov: Array) -> Array:
         if model.p == 1:

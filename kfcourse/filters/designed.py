@@ -128,7 +128,10 @@ Part = Generator[Regression, Affine, Gaussian]
 
 
 def fitted_correction(lam: Array, direction: Array, y: Array, angles: Angles) -> Part:
-    """z = lambda + H direction + e, H and e from the regression of x - lambda on the direction; p is its residual."""
+    """z = lambda + H direction + e, H and e from the regression of x - lambda on the direction; p is its residual.
+
+    Where a component of y is missing (NaN) z is lambda.
+    """
     fit = yield Regression(lambda x, x_next: difference(x, lam, angles.x), direction)
     return Gaussian(lam + where_measured(y, fit(direction)), fit.residual)
 

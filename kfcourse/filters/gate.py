@@ -66,7 +66,8 @@ def gated(one: Filter, probability: float = 0.999, patience: int | None = 5, str
     probability : float
         With which the gate lets a measurement pass if the filter is right.
     patience : int, optional
-        After so many refusals in a row the track counts as lost, and the prediction is widened; None: never.
+        After so many refusals in a row the track counts as lost, and the prediction is widened; None: never.  A filter that goes
+        on from a memory (modes, particles, a grid) hears nothing of that: the next measurement passes, but moves it little.
     structure : Structure, optional
         By which the gate knows what to expect, from the filter's prediction N(lambda, Psi); the filter's own by default.
 
@@ -129,7 +130,8 @@ def gated(one: Filter, probability: float = 0.999, patience: int | None = 5, str
         expected, size, limit, refused = judged(before, y)
         return log_density(expected, y) + 0.5 * np.where(refused, size - limit, 0.0)
 
-    return replace(one, name=f"gated-{one.name}", init=init, step=step, instead=None, evidence=evidence)
+    # a way of its own to look back needs its own memories, not those of the gate
+    return replace(one, name=f"gated-{one.name}", init=init, step=step, instead=None, evidence=evidence, look_back=None)
 
 
 def _size(expected: Measurement, y: Array) -> Array:

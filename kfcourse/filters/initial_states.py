@@ -41,6 +41,7 @@ from kfcourse.filters.densities import likelihood
 from kfcourse.filters.particle_smoothing import weighted
 from kfcourse.filters.particles import Clouds, at_start, even, normalised, of_both, stream, systematic
 from kfcourse.filters.proposals import FREEDOM, PRIOR, WIDER
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, gain, square_root
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_noiseless
@@ -140,6 +141,7 @@ def undisturbed(model: Model | JumpModel, particles: int = 256, seed: Seed = 0, 
     ModelError
         A noise enters the object, or modes differ in it; a meter has no density.
     """
+    expect(model, Model, "undisturbed", JumpModel)
     even(particles)
     if not is_undisturbed(model):
         raise ModelError(

@@ -27,8 +27,9 @@ import numpy as np
 from kfcourse.filters.base import State, initial_state
 from kfcourse.filters.designed import Design, Equations, Regression
 from kfcourse.filters.finite_memory import STEPS, checked_memory
-from kfcourse.filters.multiple_models import mixture, modes_given, onward
+from kfcourse.filters.multiple_models import expect_each, mixture, modes_given, onward
 from kfcourse.filters.optimal_structure import Memory, Remembered, expected_where_missing
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, Measurement, correct
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
@@ -78,6 +79,8 @@ def logic_dynamic_fbp(model: JumpModel, structures: Sequence[Structure], memory:
 def _remembering(name: str, model: JumpModel, structures: Sequence[Structure], memory: Memory) -> Design:
     """The construction.  A missing measurement is remembered as its prediction, the mean over the modes."""
     what = f"the logic-dynamic {name.upper()}"
+    expect(model, JumpModel, what)
+    expect_each(structures, what)
     model.without_state(what)
     if model.angles.x or model.angles.y:
         raise ModelError(f"{what} takes no components that are angles")

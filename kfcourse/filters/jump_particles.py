@@ -34,6 +34,7 @@ from kfcourse.filters.particles import (
     where_measured,
 )
 from kfcourse.filters.proposals import Look, component
+from kfcourse.kinds import expect
 from kfcourse.laws import Array
 from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
@@ -82,6 +83,7 @@ def jump_particle(model: JumpModel, particles: int = 1000, seed: Seed = 0, name:
     ModelError
         There is no density of y given x in some mode.
     """
+    expect(model, JumpModel, "jump_particle")
     even(particles)
     size, count, angles, number = particles // 2, len(model.modes), model.angles.x, seed_number(seed)
     likelihoods = [likelihood(mode) for mode in model.modes]
@@ -166,7 +168,7 @@ def _of_chosen(
     rng: np.random.Generator, prior: Array, heights: list[Array], drawn: list[tuple[Array, Array]], y: Array
 ) -> tuple[Array, Array, Array]:
     """Modes by `prior` (..., J) times the exponents of `heights`; what was drawn in each, and the logarithms of p / q."""
-    missing = np.logical_or.reduce(np.isnan(y), axis=-1)[:, None, None, None]
+    missing = np.logical_and.reduce(np.isnan(y), axis=-1)[:, None, None, None]
     with np.errstate(divide="ignore"):
         logs = np.log(prior)
     seen, _ = normalised(logs + np.where(missing, 0.0, np.nan_to_num(np.stack(heights, axis=-1), nan=-np.inf, neginf=-np.inf)))

@@ -32,6 +32,7 @@ import numpy as np
 from kfcourse.angles import Components, near, on_circle
 from kfcourse.filters.base import Evidence, Filter, State, initial_state
 from kfcourse.filters.state_transitions import by_state
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, Measurement, correct, log_density
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.structure import Structure, each_once, moving_alike
@@ -70,7 +71,7 @@ def imm(structures: Sequence[Structure], transition: Chain, probabilities: Array
         pi, rows sum to 1; or the step k to the pi from k to k + 1; or the model that has it, which may depend on the state
         (`state_transitions`).
     probabilities : ndarray (M,), optional
-        Of the modes before the first measurement; equal by default.
+        Of the modes before the first measurement; by default those of the JumpModel, else equal.
     name : str
         Name of the filter.
 
@@ -81,9 +82,12 @@ def imm(structures: Sequence[Structure], transition: Chain, probabilities: Array
 
     Raises
     ------
+    TypeError
+        Models, or filters, in the place of the structures.
     ValueError
         Models that do not fit together, numbers that are no probabilities, or too abrupt functions of the state.
     """
+    expect_each(structures, name)
     angles = structures[0].model.angles.x if structures else ()
 
     def following(predict: Predict, laws: Sequence[Gaussian], weights: Array) -> Gaussian:
@@ -102,6 +106,7 @@ def logic_dynamic(
 
     Arguments, result and errors as of `imm`.
     """
+    expect_each(structures, "logic_dynamic")
     angles = structures[0].model.angles.x if structures else ()
 
     def following(predict: Predict, laws: Sequence[Gaussian], weights: Array) -> Gaussian:
@@ -175,6 +180,7 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
 
     Arguments, result and errors as of `imm`; the memory's `predicted` holds the laws of the pairs, i first.
     """
+    expect_each(structures, name)
     models = [structure.model for structure in structures]
     angles, size = models[0].angles.x if models else (), len(models)
     links, first = _checked(structures, transition, probabilities)
@@ -232,6 +238,14 @@ def _shares(joint: Array) -> Array:
     return np.divide(joint, total, out=np.full_like(joint, 1.0 / joint.shape[1]), where=total > 0)
 
 
+def expect_each(structures: Sequence[Structure], what: str) -> None:
+    """TypeError unless these are structural functions, a list of them."""
+    if isinstance(structures, Structure):
+        raise TypeError(f"{what} expects a list of structures, one a mode, and one came: give [{structures.name}, ...]")
+    for one in structures:
+        expect(one, Structure, what)
+
+
 def _checked(structures: Sequence[Structure], transition: Chain, probabilities: Array | None) -> tuple[Links, Array]:
     """Step and laws to pi and what leads from i to j; and first probabilities (M,); ValueError if the parts do not fit."""
     size = len(structures)
@@ -249,26 +263,33 @@ def _checked(structures: Sequence[Structure], transition: Chain, probabilities: 
             raise ValueError("all modes need the same components declared as angles")
         if not all(np.array_equal(ours, theirs) for ours, theirs in zip(model.prior, first.prior, strict=True)):
             raise ValueError("all modes need the same prior: before the first measurement there is one law of the state")
-    depends = isinstance(transition, JumpModel) and transition.by_state
     of_step = transition.transition_at if isinstance(transition, JumpModel) else transition
-    pi = np.full((size, size), 1 / size) if depends else np.asarray(of_step(0) if callable(of_step) else of_step, dtype=float)
-    start = np.full(size, 1.0 / size) if probabilities is None else np.asarray(probabilities, dtype=float)
-    for what, table, shape in (("transition", pi, (size, size)), ("probabilities", start, (size,))):
-        if table.shape != shape:
-            raise ValueError(f"{what} must have the shape {shape} for {size} mode(s), got {table.shape}")
-        if not (np.isfinite(table).all() and table.min() >= 0 and np.allclose(table.sum(axis=-1), 1.0, atol=1e-9)):
-            raise ValueError(
-                f"{what} must be probabilities that sum to 1{' in each row' * (table.ndim - 1)}, got {table.tolist()}"
-            )
-    start = start / start.sum()
+    if probabilities is None:
+        probabilities = transition.first if isinstance(transition, JumpModel) else np.full(size, 1.0 / size)
+    start = _probabilities("probabilities", probabilities, (size,))
     if isinstance(transition, JumpModel) and transition.by_state:
         return by_state(transition), start
-    pi = pi / pi.sum(axis=-1, keepdims=True)
+
+    def pi_at(k: int) -> Array:
+        return _probabilities("transition", of_step(k) if callable(of_step) else of_step, (size, size))
+
+    constant = pi_at(0)
 
     def links(k: int, laws: Sequence[Gaussian]) -> tuple[Array, list[list[Gaussian]]]:
-        return of_step(k) if callable(of_step) else pi, [[law] * size for law in laws]
+        return pi_at(k) if callable(of_step) else constant, [[law] * size for law in laws]
 
     return links, start
+
+
+def _probabilities(what: str, given: Array, shape: tuple[int, ...]) -> Array:
+    """The probabilities, whose rows sum to 1; ValueError if they are none."""
+    table = np.asarray(given, dtype=float)
+    if table.shape != shape:
+        raise ValueError(f"{what} must have the shape {shape} for {shape[0]} mode(s), got {table.shape}")
+    total = table.sum(axis=-1, keepdims=True)
+    if not (np.isfinite(table).all() and table.min() >= 0 and np.allclose(total, 1.0, atol=1e-9)):
+        raise ValueError(f"{what} must be probabilities that sum to 1{' in each row' * (table.ndim - 1)}, got {table.tolist()}")
+    return table / total
 
 
 def modes_given(expected: Array, measurements: Sequence[Measurement], y: Array) -> tuple[Array, Array]:

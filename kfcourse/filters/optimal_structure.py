@@ -161,7 +161,8 @@ def mfos(structure: Structure, arguments: int = 2) -> Design:
     s' = tau(u, T),   lambda' = L s' + n                         regression of x' on s'
     Psi' = Theta(u, T)
 
-    Its own covariance is the residual of the first regression, (n, n).
+    Its own covariance is the residual of the first regression, (n, n).  As in `duof`, a measurement of which a component is
+    missing corrects nothing.
     """
     return _of_last_estimate("mfos", structure, MFOS, arguments)
 

@@ -103,7 +103,8 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
     Returns
     -------
     Filter
-        Its covariance is an unbiased estimate of the posterior's.
+        Its covariance estimates the posterior's: without bias where all particles weigh the same, as the guided ones of a linear
+        model do; too large where few count, by some tenths where 40 without guidance meet a sharp meter.
     """
     expect(model, Model, "particle")
     even(particles)
@@ -176,14 +177,14 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
 
 
 def by_clouds(before: State, y: Array, after: State) -> Array:
-    """ln of the mean of both clouds' weights, (runs,); 0 where nothing, or not all, was measured."""
-    return np.where(np.isnan(y).any(axis=-1), 0.0, np.logaddexp(*after.memory.evidence) - np.log(2))
+    """ln of the mean of both clouds' weights, (runs,); 0 where nothing was measured."""
+    return np.where(np.isnan(y).all(axis=-1), 0.0, np.logaddexp(*after.memory.evidence) - np.log(2))
 
 
 def even(particles: int) -> None:
     """ModelError if so many particles are not two clouds of equal size."""
-    if particles < 2 or particles % 2:
-        raise ModelError(f"a particle filter needs an even number of at least 2 particles, got {particles}")
+    if not isinstance(particles, int | np.integer) or particles < 2 or particles % 2:
+        raise ModelError(f"a particle filter needs an even number of at least 2 particles, got {particles!r}")
 
 
 def at_start(mean: Array, particles: int, number: int) -> tuple[Array, Array, Array, np.random.SeedSequence]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
+from kfcourse.kinds import expect_sizes
 from kfcourse.laws import Array, Gaussian, correct, gain, symmetric
 from kfcourse.linear.system import LinearSystem
 
@@ -32,9 +33,19 @@ def covariances(system: LinearSystem, prior_cov: Array, steps: int, gains: Array
     gains : ndarray (steps, n, p) or (n, p), optional
         Gains of another linear filter with the same A and H (one of a wrong model, or constant): its true errors are then
         found, P = (I - K H) P^- (I - K H)^T + K R K^T for any K.  By default the optimal gains.
+
+    Raises
+    ------
+    ValueError
+        Shapes that do not fit, or no steps.
     """
-    given = None if gains is None else np.broadcast_to(gains, (steps, len(system.A), len(system.H)))
-    cov = np.asarray(prior_cov, dtype=float)
+    expect_sizes(steps=steps)
+    n, p, cov = len(system.A), len(system.H), np.asarray(prior_cov, dtype=float)
+    if cov.shape != (n, n):
+        raise ValueError(f"the prior's covariance must have the shape ({n}, {n}), got {cov.shape}")
+    if gains is not None and np.shape(gains) not in ((n, p), (steps, n, p)):
+        raise ValueError(f"gains must have the shape ({steps}, {n}, {p}) or ({n}, {p}), got {np.shape(gains)}")
+    given = None if gains is None else np.broadcast_to(gains, (steps, n, p))
     rows = []
     for k in range(steps):
         K = gain(cov @ system.H.T, system.measure(np.zeros(len(cov)), cov).F) if given is None else given[k]
@@ -61,16 +72,24 @@ def steady_state(system: LinearSystem) -> Steady:
     Raises
     ------
     ValueError
-        There is no limit that the filter reaches from every start: a part of the state is neither seen nor decays, or has
-        no noise.
+        There is none with which the filter's errors die out: a part of the state does not decay, and is not seen, or neither
+        grows nor has noise.
     """
+    A, H, Q, R = system.A, system.H, system.Q, system.R
     try:
-        predicted = scipy.linalg.solve_discrete_are(system.A.T, system.H.T, system.Q, system.R)
+        predicted = symmetric(scipy.linalg.solve_discrete_are(A.T, H.T, Q, R))
+        measurement = system.measure(np.zeros(len(A)), predicted)
+        posterior = correct(Gaussian(np.zeros(len(A)), predicted), measurement, measurement.h).cov
+        K = gain(predicted @ H.T, measurement.F)
+        # Of what neither grows nor has noise SciPy finds any matrix: its root, at 1, to the square root of rounding
+        left = np.abs(A @ posterior @ A.T + Q - predicted).max()
+        exact = left <= 100 * np.sqrt(np.finfo(A.dtype).eps) * np.abs(predicted).max()
+        settles = exact and np.abs(np.linalg.eigvals(A - A @ K @ H)).max() < 1 - 1e-7
     except (np.linalg.LinAlgError, ValueError):
+        settles = False
+    if not settles:
         raise ValueError(
-            "the Riccati equation has no stabilising solution: a part of the state is neither seen by the meter nor decays, "
-            "or has no noise; use covariances(system, ...) to follow the filter step by step"
-        ) from None
-    law = Gaussian(np.zeros(len(system.A)), symmetric(predicted))
-    measurement = system.measure(*law)
-    return Steady(law.cov, correct(law, measurement, measurement.h).cov, gain(law.cov @ system.H.T, measurement.F))
+            "the Riccati equation has no stabilising solution: a part of the state does not decay, and is not seen by the meter, "
+            "or neither grows nor has noise; use covariances(system, ...) to follow the filter step by step"
+        )
+    return Steady(predicted, posterior, K)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.kinds import expect_sizes
 from kfcourse.laws import Array, Gaussian, apply, square_root, stacked
 from kfcourse.linear.arithmetic import form
 from kfcourse.linear.system import LinearSystem
@@ -57,11 +58,13 @@ def run(system: LinearSystem, prior: Gaussian, y: Array, u: Array | None = None,
     Raises
     ------
     ValueError
-        Shapes that do not fit, a prior or inputs that are not finite.
+        Shapes that do not fit; no measurements, infinite ones, a prior or inputs that are not finite.
     """
     chosen = form(arithmetic, system)
     if y.ndim != 3 or y.shape[2] != len(system.H):
         raise ValueError(f"measurements must have the shape (steps, runs, {len(system.H)}), got {y.shape}")
+    if not y.size or np.isinf(y).any():
+        raise ValueError("measurements must be there, and finite: write NaN where one is missing")
     runs, n, dtype = y.shape[1], len(system.A), system.A.dtype
     _check_input(system, u, len(y), runs)
     _check_prior(prior, runs, n)
@@ -97,6 +100,8 @@ def _check_prior(prior: Gaussian, runs: int, n: int) -> None:
         raise ValueError(f"the prior's covariance must have the shape ({n}, {n}) or ({runs}, {n}, {n}), got {cov}")
     if not (np.isfinite(prior.mean).all() and np.isfinite(prior.cov).all()):
         raise ValueError("the prior must be finite: for an unknown state give a large variance, or start from measurements")
+    if (np.diagonal(prior.cov, axis1=-2, axis2=-1) < 0).any():
+        raise ValueError(f"the prior's variances must not be negative, got the covariance {np.asarray(prior.cov).tolist()}")
 
 
 def simulate(system: LinearSystem, prior: Gaussian, steps: int, runs: int, seed: Seed, u: Array | None = None) -> Trajectories:
@@ -112,6 +117,7 @@ def simulate(system: LinearSystem, prior: Gaussian, steps: int, runs: int, seed:
     u : ndarray (steps, runs, m) or (steps, 1, m), optional
         Known input; u[k] acts between x[k] and x[k+1].
     """
+    expect_sizes(steps=steps, runs=runs)
     _check_input(system, u, steps, runs)
     _check_prior(prior, runs, len(system.A))
     rng = np.random.default_rng(seed)

@@ -21,6 +21,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import sympy as sp
 
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, symmetric, transpose
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.seeds import Seed
@@ -37,7 +38,7 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: Seed) -> Array:
     Parameters
     ----------
     model : Model
-        Both noises enter linearly, with regular covariances.  Angles count as numbers.
+        Both noises enter linearly; their covariances and the prior's are regular.  Angles count as numbers.
     runs, steps : int
         Trajectories over which the means are taken.
     seed : int
@@ -45,7 +46,7 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: Seed) -> Array:
     Raises
     ------
     ModelError
-        A noise enters nonlinearly, or leaves a component without noise: there is no density then.
+        A noise enters nonlinearly, or leaves a component without noise, or the prior has none there: no density then.
     ValueError
         The information is infinite, as where a noise vanishes at a state: the bound is zero then, and says nothing.
 
@@ -56,6 +57,12 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: Seed) -> Array:
     >>> posterior_bound(Model.define("0.9*x + v", "x + 2*w"), runs=10, steps=2, seed=1).ravel().round(4).tolist()
     [0.8, 1.1671]
     """
+    expect(model, Model, "posterior_bound")
+    try:
+        np.linalg.cholesky(model.prior.cov)
+    except np.linalg.LinAlgError:
+        said = "the prior leaves a component, or a sum of some, without variance: there is no density, and no bound of this kind"
+        raise ModelError(said) from None
     object_ = _information(model, model.state_equation, model.v, model.state_noise, "state")
     meter = _information(model, model.meter_equation, model.w, model.meter_noise, "meter")
     J = np.linalg.inv(model.prior.cov)

@@ -15,6 +15,7 @@ import numpy as np
 from kfcourse.filters.base import Filter, State, with_angles_on_circle
 from kfcourse.filters.designed import Affine, Design, Scatter
 from kfcourse.filters.fused import Fused
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, NegativeVariance
 from kfcourse.montecarlo.ensemble import Instant, Serial
 from kfcourse.reasons import Reason
@@ -58,13 +59,24 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: E
 
     Raises
     ------
+    TypeError, ValueError
+        What is no design; a model with other numbers of states or measurements than the ensemble's.
     NotFinite
         If a regression meets infinite or NaN values, or a filter a negative variance: the model or the filter diverges.
     """
+    for one in designs:
+        expect(one, Design, "design")
     coefficients: list[list[list[Affine]]] = [[] for _ in designs]
     states: list[list[State]] = []  # [block][design]
     for k, blocks in enumerate(ensemble):
         if not states:
+            drawn = blocks[0].x.shape[1], blocks[0].y.shape[1]
+            for one in designs:
+                if (one.model.n, one.model.p) != drawn:
+                    raise ValueError(
+                        f"{one.name} was built for a model with {one.model.n} states and {one.model.p} measurements; "
+                        f"the ensemble has {drawn[0]} and {drawn[1]}"
+                    )
             states = [[one.init(len(block.x)) for one in designs] for block in blocks]
         runs = [_BlockStep(designs, before, block, k) for before, block in zip(states, blocks, strict=True)]
         fits = _fit_step(designs, runs, k, pool or Serial())

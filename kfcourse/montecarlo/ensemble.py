@@ -21,6 +21,7 @@ import scipy
 import sympy as sp
 
 from kfcourse.angles import on_circle
+from kfcourse.kinds import expect, expect_sizes
 from kfcourse.laws import Array, Gaussian, normalised_square, square_root
 from kfcourse.linear.runs import Trajectories
 from kfcourse.montecarlo.batches import STRATA
@@ -95,16 +96,14 @@ class Ensemble:
     compiled: bool = False
 
     def __post_init__(self) -> None:
+        expect(self.model, Model, "an ensemble", JumpModel)
         if not isinstance(self.seed, np.random.SeedSequence):
             object.__setattr__(self, "seed", np.random.SeedSequence(seed_number(self.seed)))
         if self.wide is not None and not 1 <= self.wide < np.inf:
             raise ValueError(f"a prior can be drawn wider, not narrower: wide must be at least 1, got {self.wide!r}")
         if self._mixed and self.model.angles.x:
             raise ValueError("initial states that are angles cannot be drawn from a wider law; leave wide=1")
-        for name in ("runs", "steps"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-                raise ValueError(f"{name} must be a positive whole number, got {value!r}")
+        expect_sizes(runs=self.runs, steps=self.steps)
 
     @cached_property
     def sizes(self) -> list[int]:
@@ -354,8 +353,7 @@ class Serial(Executor):
 @contextmanager
 def workers(threads: int) -> Iterator[Executor]:
     """An executor of so many threads, on whose number no result depends; what waits is dropped on an error or interrupt."""
-    if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 1:
-        raise ValueError(f"threads must be a positive whole number, got {threads!r}")
+    expect_sizes(threads=threads)
     pool = Serial() if threads == 1 else ThreadPoolExecutor(int(threads))
     try:
         yield pool

@@ -21,7 +21,7 @@ import numpy as np
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
 from kfcourse.filters.fused import Fused, fuse
-from kfcourse.kinds import expect
+from kfcourse.kinds import expect, expect_sizes
 from kfcourse.laws import Array, Gaussian, stacked
 from kfcourse.montecarlo.batches import BATCHES, batch_sizes
 from kfcourse.montecarlo.blocks import progress_bar, run_block, run_stretches
@@ -60,7 +60,7 @@ def run(one: Filter, y: Array) -> Gaussian:
     Raises
     ------
     ValueError
-        Measurements of another shape.
+        Measurements of another shape, none at all, or infinite ones.
     TypeError
         No filter: a `Design`, whose coefficients are still to be found, a model, or structural functions.
     """
@@ -82,6 +82,12 @@ def states(one: Filter, y: Array) -> list[State]:
 
 def walk(one: Filter, y: Array) -> Iterator[State]:
     """The same one after the other: what the exact filter or particles remember of all steps may be gigabytes."""
+    y = measurements(one, y)
+    return accumulate(y, one.step, initial=one.init(y.shape[1]))
+
+
+def measurements(one: Filter, y: Array) -> Array:
+    """What a filter is to be run over, as (steps, runs, p); ValueError if it is none."""
     expect(one, Filter, "a run")
     y, p = np.asarray(y, dtype=float), one.model.p
     if y.ndim == 1 and p == 1:
@@ -90,7 +96,12 @@ def walk(one: Filter, y: Array) -> Iterator[State]:
         raise ValueError(f"measurements must have the shape (steps, runs, {p}), got {y.shape}{_reshaped(y, p)}")
     if y.shape[2] != p:
         raise ValueError(f"{one.name} expects {p} measurement component(s), got {y.shape[2]}")
-    return accumulate(y, one.step, initial=one.init(y.shape[1]))
+    if not y.size:
+        raise ValueError(f"there are no measurements to run over: the shape (steps, runs, {p}) is {y.shape}")
+    if (endless := np.isinf(y)).any():
+        k, run, _ = np.argwhere(endless)[0]
+        raise ValueError(f"the measurement of step {k}, run {run} is infinite; write NaN where one is missing")
+    return y
 
 
 def _reshaped(y: Array, p: int) -> str:
@@ -135,7 +146,8 @@ def compare(
         The same seed gives the same numbers, bit by bit, whatever the number of threads.  Another NumPy or processor may do
         linear algebra by another kernel (BLAS): then vector models differ by rounding, up to some 1e-12, and scalar ones hardly.
     design_runs : int, optional
-        Size of the design ensemble, which is held at once, some 0.3 kB a trajectory.  By default `runs`, at most a million:
+        Size of the design ensemble, which is held at once: a trajectory of a scalar model takes 0.15 kB with one designed filter
+        and 0.45 kB with the lab's seven, one of a model of two states twice that.  By default `runs`, at most a million:
         coefficients from so many cost a filter about a millionth of its accuracy, and memory does not grow with `runs`.
     designs : int
         Designed filters are designed on so many ensembles.  The first design is reported; how the others differ from it on the
@@ -295,8 +307,8 @@ def _check_arguments(
         raise ValueError(f"give at least one filter, and each a name of its own: {', '.join(names) or 'none given'}")
     if all(one.slow for one in filters):
         raise ValueError(f"{names[0]} is found through its difference from a fast filter; add one, such as aof-gaussian")
-    if slow_runs < 0:
-        raise ValueError(f"slow_runs must not be negative, got {slow_runs}")
+    if not isinstance(slow_runs, int | np.integer) or slow_runs < 0:
+        raise ValueError(f"slow_runs must be a whole number of trajectories, 0 for none, got {slow_runs!r}")
     if slow_seconds is not None and not slow_seconds > 0:
         raise ValueError(f"slow_seconds must be positive, got {slow_seconds}; slow_runs=0 leaves the slow filters out")
     if slow_memory is not None and not slow_memory >= LEAST:
@@ -318,8 +330,7 @@ def _compiled(filters: Sequence[Filter | Design]) -> list[Filter | Design]:
 
 
 def _check_designs(designs: int, same_ensemble: bool, wide: float | None) -> None:
-    if isinstance(designs, bool) or not isinstance(designs, int | np.integer) or designs < 1:
-        raise ValueError(f"designs must be a positive whole number, got {designs!r}")
+    expect_sizes(designs=designs)
     if designs > 1 and same_ensemble:
         raise ValueError("there is one ensemble of the comparison: same_ensemble=True goes with designs=1 only")
     if same_ensemble and wide is not None:

@@ -19,7 +19,7 @@ import numpy as np
 from kfcourse.filters.base import Evidence, Filter, State, structure_of, unknown_error
 from kfcourse.kinds import expect
 from kfcourse.laws import Array, log_density
-from kfcourse.montecarlo.experiment import walk
+from kfcourse.montecarlo.experiment import measurements, walk
 
 
 class NoDensity(ValueError):
@@ -105,8 +105,8 @@ def likelihood_error(one: Filter, y: Array) -> Array:
 
 def _passages(one: Filter, y: Array) -> Iterator[tuple[State, Array, State]]:
     """The states before and after each measurement, and it: (runs, p)."""
-    values = np.reshape(y, (len(y), -1, one.model.p))
-    return ((before, now, after) for (before, after), now in zip(pairwise(walk(one, y)), values, strict=True))
+    y = measurements(one, y)
+    return ((before, now, after) for (before, after), now in zip(pairwise(walk(one, y)), y, strict=True))
 
 
 def _normal(one: Filter) -> Evidence:

@@ -71,17 +71,19 @@ def examine(one: Filter, y: Array, edge: float = 1.0) -> Examination:
     Parameters
     ----------
     one : Filter
-        With structural functions of its own; `gated(...)` too, with its probability as `edge`.
+        With structural functions of its own; `gated(...)` too, with its probability as `edge`, above 0 and at most 1.
     y : ndarray (steps, runs, p)
         As for `run`.
 
     Raises
     ------
     ValueError
-        A filter without structural functions, measurements of another shape, no likelihood (`kfcourse.likelihood`), a noise with
-        a negative variance, as sqrt(u) has where an input u is negative.
+        A filter without structural functions, an edge that is no probability, measurements of another shape, no likelihood
+        (`kfcourse.likelihood`), a noise with a negative variance, as sqrt(u) has where an input u is negative.
     """
     expect(one, Filter, "examine")
+    if not 0 < edge <= 1:
+        raise ValueError(f"edge must be the gate's probability, above 0, or 1 without a gate; got {edge!r}")
     structure = structure_of(one, "an examination of a record")
     visited = states(one, y)
     seen = np.reshape(y, (len(visited) - 1, -1, one.model.p))

@@ -24,6 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.kinds import expect
 from kfcourse.laws import Array
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import shown
@@ -87,6 +88,7 @@ def read_measurements(path: str | Path, model: Model, columns: Mapping[str, str]
     RecordWarning
         The intervals are unequal, and the model's formulas know neither dt nor t.
     """
+    expect(model, Model, "read_measurements")
     source = _Source(str(path))
     lines = _lines(source, Path(path))
     names, delimiter = _header(source, lines)

@@ -38,7 +38,7 @@ from kfcourse.laws import (
     transpose,
 )
 from kfcourse.linear.smoothing import room_for
-from kfcourse.montecarlo.experiment import run, walk
+from kfcourse.montecarlo.experiment import measurements, run, walk
 from kfcourse.symbolic.structure import Structure
 
 
@@ -79,10 +79,11 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     expect(one, Filter, "smooth")
     if one.look_back is not None:
         return stacked([state.posterior for state in _looked_back(one, y, lag)])
-    if np.ndim(y) == 3 and np.shape(y)[1] > (many := max(1, min(MANY_RUNS, NEAR // one.model.n**2))):
-        y = np.asarray(y, dtype=float)
-        if any_missing(y) or run(one, y[:3, :2]).cov.strides[1]:  # else covariances are the same for all, and stored once
-            return _in_parts(one, y, lag, many)
+    y = measurements(one, y)
+    many = max(1, min(MANY_RUNS, NEAR // one.model.n**2))
+    # where all runs have the same covariances, these are stored once
+    if y.shape[1] > many and (any_missing(y) or run(one, y[:3, :2]).cov.strides[1]):
+        return _in_parts(one, y, lag, many)
     return normal_laws(one, islice(walk(one, y), 1, None), lag)
 
 
@@ -135,7 +136,8 @@ def smoothing_error(one: Filter, y: Array, lag: int | None = None) -> Array:
 
 
 def _looked_back(one: Filter, y: Array, lag: int | None) -> list[State]:
-    return looked_back(one, islice(walk(one, y), 1, None), np.reshape(y, (len(y), -1, one.model.p)), lag)
+    y = measurements(one, y)
+    return looked_back(one, islice(walk(one, y), 1, None), y, lag)
 
 
 def smooth_iterated(structure: Structure, y: Array, rounds: int = 5) -> Gaussian:

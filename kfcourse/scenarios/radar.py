@@ -8,6 +8,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import on_circle
+from kfcourse.kinds import expect_sizes
 from kfcourse.laws import Array
 from kfcourse.scenarios.flight import Track
 from kfcourse.symbolic.codegen import compile_function
@@ -98,8 +99,7 @@ def _noisy(true: Array, sigmas: float | Sequence[float], runs: int, seed: int | 
         raise ValueError(f"sigmas must be one number or three, got {sigmas!r}") from None
     if not (np.isfinite(deviations).all() and deviations.min() >= 0):
         raise ValueError(f"standard deviations must be finite and not negative, got {sigmas!r}")
-    if isinstance(runs, bool) or not isinstance(runs, int | np.integer) or runs < 1:
-        raise ValueError(f"runs must be a positive whole number, got {runs!r}")
+    expect_sizes(runs=runs)
     noise = np.random.default_rng(seed).standard_normal((len(true), int(runs), 3))
     return true[:, None, :] + deviations * noise
 

@@ -167,16 +167,20 @@ class Model:
         if angles is None:
             warn_of_angles(dict(zip((s.name for s in x), model.state_equation, strict=True)))
             warn_of_angles(dict(zip(model.measured, model.meter_equation, strict=True)))
-        for what, equation, noise, noise_law in (
-            ("state", model.state_equation, v, model.state_noise),
-            ("meter", model.meter_equation, w, model.meter_noise),
-        ):
-            means = dict(zip(noise, exact_matrix(noise_law.mean), strict=True))
-            if problem := not_computable(equation, model.values, means):
-                raise ModelError(f"the {what} equation {problem}")
+        model._check()
         if not model.meter_equation.has(*x):
             raise ModelError(f"the meter {list(model.meter_equation)} does not depend on the state {list(x)}: nothing to filter")
         return model
+
+    def _check(self) -> None:
+        """ModelError if an equation cannot be computed with the parameters' values."""
+        for what, equation, noise, noise_law in (
+            ("state", self.state_equation, self.v, self.state_noise),
+            ("meter", self.meter_equation, self.w, self.meter_noise),
+        ):
+            means = dict(zip(noise, exact_matrix(noise_law.mean), strict=True))
+            if problem := not_computable(equation, self.values, means):
+                raise ModelError(f"the {what} equation {problem}")
 
     @property
     def n(self) -> int:
@@ -204,12 +208,14 @@ class Model:
         return _measured(self.p)
 
     def replace(self, **parameters: float) -> Model:
-        """The same model with some parameters changed: ``model.replace(f=0.2)``."""
+        """The same model with some parameters changed: ``model.replace(f=0.2)``; ModelError where it cannot be computed."""
         unknown = sorted(set(parameters) - set(self.parameters))
         if unknown:
             raise ModelError(f"the model has no parameter {', '.join(unknown)}; it has {', '.join(self.parameters) or 'none'}")
         values = dict(self.parameters) | {name: exact_number(f"parameter {name}", value) for name, value in parameters.items()}
-        return dataclasses.replace(self, parameters=values)
+        changed = dataclasses.replace(self, parameters=values)
+        changed._check()
+        return changed
 
     @classmethod
     def of_table(cls, table: Mapping[str, Any]) -> Model:

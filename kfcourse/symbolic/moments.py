@@ -44,11 +44,16 @@ class GaussianMoments:
     Parameters
     ----------
     variables : sequence of Symbol
-        The Gaussian variables x, n of them.
+        The Gaussian variables x, n of them.  Any other symbol in a function is a constant.
     mean : sequence of Expr
         Their means m, in any symbols or numbers.
     cov : Matrix
         Their covariance P, n x n, symmetric, in any symbols or numbers.
+
+    Raises
+    ------
+    ValueError
+        Sizes that differ, a covariance that is not symmetric; from its methods, a symbol with a variable's name that is another.
 
     Examples
     --------
@@ -69,6 +74,10 @@ class GaussianMoments:
         self.variables = tuple(variables)
         self.mean = sp.Matrix(mean)
         self.cov = sp.Matrix(cov)
+        n = len(self.variables)
+        if len(self.mean) != n or self.cov.shape != (n, n) or not self.cov.is_symmetric():
+            got = f"got {self.mean.T} and {self.cov}"
+            raise ValueError(f"{n} variable(s) need as many means, and a symmetric covariance {n} x {n}; {got}")
 
     def mean_of(self, function: sp.Expr) -> sp.Expr:
         """M[function(x)]; NoClosedForm names the term if there is none."""
@@ -132,6 +141,10 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
         For a term that is not a polynomial times exponentials, sines and cosines of linear arguments: none other is looked
         for, though some have a closed form (exp(-x**2), abs(x)).
     """
+
+    names = {x.name for x in variables}
+    if strange := [one for one in sp.sympify(function).free_symbols - {*variables} if one.name in names]:
+        raise ValueError(f"{strange[0]} in {function} is not the variable of that name: make both alike, such as real=True")
 
     # Hyperbolic and trigonometric functions of x become exponentials; those of parameters stay.
     def with_variables(e: sp.Basic) -> bool:

@@ -66,7 +66,7 @@ def unscented(model: Model, kappa: float | None = None, root: str = "cholesky", 
     Raises
     ------
     ModelError
-        s + kappa is not positive, or there is no such root.
+        s + kappa is not positive and finite, or there is no such root.
 
     Warns
     -----
@@ -78,8 +78,8 @@ def unscented(model: Model, kappa: float | None = None, root: str = "cholesky", 
 
     def rule(size: int) -> tuple[Array, Array]:
         k = max(3.0 - size, 0.0) if kappa is None else float(kappa)
-        if not size + k > 0:
-            raise ModelError(f"kappa = {kappa} is too small: {size} + kappa must be positive")
+        if not 0 < size + k < np.inf:
+            raise ModelError(f"kappa = {kappa}: {size} + kappa must be positive and finite")
         axes = np.sqrt(size + k) * np.eye(size)
         weights = np.full(2 * size + 1, 0.5 / (size + k))
         weights[0] = k / (size + k)
@@ -96,7 +96,7 @@ def gauss_hermite(model: Model, order: int = 5, root: str = "cholesky", augmente
     Raises
     ------
     ModelError
-        Fewer than two points an axis, too many points together, or there is no such root.
+        Fewer than two points an axis or no whole number, too many points together, or there is no such root.
 
     Warns
     -----
@@ -104,8 +104,8 @@ def gauss_hermite(model: Model, order: int = 5, root: str = "cholesky", augmente
         A function is not finite at a point of the prior law, or twice as many points an axis give other moments there.
     """
     expect(model, Model, "gauss_hermite")
-    if order < 2:
-        raise ModelError(f"Gauss-Hermite quadrature needs an order of at least 2, got {order}")
+    if not isinstance(order, int | np.integer) or order < 2:
+        raise ModelError(f"Gauss-Hermite quadrature needs an order of at least 2, a whole number, got {order!r}")
     return _checked(
         "gauss-hermite", model, product_rule(order), _Equations.of(model, "all" if augmented else _NOT_LINEAR), root, order
     )

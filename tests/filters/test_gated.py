@@ -251,5 +251,8 @@ def test_what_a_gate_cannot_stand_before_is_told():
         gated(duof(walk()))
     with pytest.raises(ValueError, match=r"a gate needs the structural functions.*imm has none"):
         gated(imm([linearised(walk())], [[1.0]]))
+    for one in (pointmass(walk()), particle(walk(), 10)):  # their own ways back need memories that the gate covers
+        with pytest.raises(ValueError, match=rf"looking back needs the structural functions.*gated-{one.name} has none"):
+            smooth(gated(one, structure=linearised(walk())), np.zeros(3))
     with pytest.raises(ValueError, match=r"kalman takes every measurement as it is: ask gated"):
         weights(kalman_filter(walk()), np.zeros(3))

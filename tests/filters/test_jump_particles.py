@@ -362,6 +362,21 @@ def test_a_missing_measurement_tells_nothing(build, model):
     assert np.isfinite(after.posterior.mean).all()
 
 
+@pytest.mark.parametrize(("build", "noise"), [(jump_particle, "v"), (undisturbed, "0")])
+def test_of_a_measurement_with_a_missing_component_the_other_counts(build, noise):
+    """One mode: the Kalman filter's estimate and likelihood, within Monte Carlo error."""
+    state, meter = f"0.9*x + {noise}", ["x + w1", "x + 0.3*w2"]
+    y = np.array([[0.5, 0.1], [np.nan, 1.0], [1.2, np.nan], [np.nan, np.nan]])[:, None]
+    exactly = kalman_filter(Model.define(state, meter))
+    one = build(JumpModel.define(state, meter, modes={"a": {}}, transition=[1.0]), 1000)
+    many = np.repeat(y, REPLICAS, axis=1)
+    for found, expected, unit in (
+        (run(one, many).mean[..., 0], run(exactly, y).mean[..., 0], 1.0),
+        (likelihood(one, many), likelihood(exactly, y), 1.0),
+    ):
+        agree(found[:, :, None], expected, unit, 1000)
+
+
 @pytest.mark.parametrize("value", [0.0, 1e3, -1e8])
 def test_no_measurement_makes_nan(value):
     for one in (jump_particle(moving(), 100), undisturbed(still(), 128), undisturbed(find_variant("J3").model, 128)):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from filterpy.kalman import IMMEstimator, KalmanFilter
 
-from kfcourse import Gaussian, Model, gaussian, likelihood, linearised, run, simulate, unscented
-from kfcourse.filters import aof
+from kfcourse import Gaussian, JumpModel, Model, gaussian, likelihood, linearised, run, simulate, unscented
+from kfcourse.filters import aof, gpb2, logic_dynamic
 from kfcourse.filters.multiple_models import imm, mixture
 from kfcourse.laws import log_density
 from kfcourse.linear.system import linear_system
@@ -307,3 +307,34 @@ def test_models_that_do_not_fit_together_are_refused():
     for other, message in ((scalar, "same state"), (other_names, "same state"), (other_prior, "same prior")):
         with pytest.raises(ValueError, match=message):
             imm([first, other], [[0.9, 0.1], [0.1, 0.9]])
+
+
+@pytest.mark.parametrize("build", [imm, logic_dynamic, gpb2])
+def test_a_model_that_jumps_gives_the_first_probabilities_too(build):
+    jump = JumpModel.define(
+        "x + v",
+        "x + C*w",
+        modes={"a": {"parameters": {"C": 1}}, "b": {"parameters": {"C": 9}}},
+        transition=[[0.9, 0.1], [0.2, 0.8]],
+        first=[1, 0],
+    )
+    structures = [linearised(mode) for mode in jump.modes]
+    np.testing.assert_array_equal(build(structures, jump).init(2).memory.probability, [[1, 0]] * 2)
+    np.testing.assert_array_equal(build(structures, jump.transition_at).init(2).memory.probability, 0.5)
+
+
+@pytest.mark.parametrize("build", [imm, logic_dynamic, gpb2])
+def test_what_is_no_list_of_structures_is_told(build):
+    model = Model.define("x + v", "x + w")
+    with pytest.raises(TypeError, match=f"^{build.__name__} expects a Structure, and a Model came"):
+        build([model], [[1.0]])
+    with pytest.raises(TypeError, match=f"^{build.__name__} expects a list of structures, one a mode"):
+        build(linearised(model), [[1.0]])
+
+
+def test_probabilities_that_are_none_at_a_later_step_are_refused():
+    model = Model.define("x + v", "x + w")
+    one = imm([linearised(model)] * 2, lambda k: [[0.9, 0.1], [0.1, 0.9 + 0.1 * (k == 2)]])
+    run(one, np.zeros(2))
+    with pytest.raises(ValueError, match="transition must be probabilities that sum to 1 in each row"):
+        run(one, np.zeros(3))

@@ -54,6 +54,7 @@ def test_on_a_linear_vector_model_it_is_the_kalman_filter_within_monte_carlo_err
         prior={"mean": [1.0, -1.0], "variance": [[0.5, 0.1], [0.1, 0.4]]},
     )
     _, y = simulate(model, 4, 6, seed=3)
+    y[1, :, 0] = y[2, 1:3, 1] = y[4] = np.nan  # one of two measured, the other, none
     expected = run(kalman_filter(model), y)
     variance = np.diagonal(expected.cov, axis1=-2, axis2=-1)
     mean, own = replicas(model, y)
@@ -73,6 +74,18 @@ def test_the_likelihood_is_the_normal_density_with_its_constant():
                 mean, B = np.array([one[0], one[1] ** 2]), np.array([[0.5, 0], [0.2, one[0]]])
             expected = stats.multivariate_normal(mean + B @ np.full(len(B), 0.2), 1.5 * B @ B.T).logpdf(y)
             assert value == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("angles", [[], ["y1", "y2"]])
+def test_of_a_measurement_with_a_missing_component_it_is_the_density_of_the_others(angles):
+    state, meter, x = ["x1 + v1", "x2 + v2"], ["x1 + 2*w1", "x2**2 + x1*w2 + 0.2*w1"], np.array([[0.3, -1.0], [2.0, 0.5]])
+    both = likelihood(Model.define(state, meter, angles=angles))
+    for i, y in enumerate(([0.7, np.nan], [np.nan, -0.4])):
+        kept = [f"y{i + 1}"] if angles else []
+        names = {"w": ["w1", "w2"]}
+        alone = likelihood(Model.define(state, [meter[i]], symbols=names, angles={"y": ["y"] if kept else []}))
+        np.testing.assert_allclose(both(np.array(y), x), alone(np.array([y[i]]), x), rtol=1e-12)
+    np.testing.assert_array_equal(both(np.full(2, np.nan), x), 0.0)
 
 
 def test_the_prediction_is_the_law_of_the_predicted_particles():
@@ -143,8 +156,9 @@ def test_no_measurement_makes_nan(variants, value):
 
 
 def test_impossible_requests_are_refused(variants):
-    with pytest.raises(ModelError, match="at least 2 particles, got 1"):
-        particle(variants["2"], 1)
+    for number in (1, 10.0):
+        with pytest.raises(ModelError, match=f"at least 2 particles, got {number}"):
+            particle(variants["2"], number)
     with pytest.raises(ModelError, match="noise enters nonlinearly"):
         particle(Model.define("x + v", "x + w**2"))
 

@@ -285,6 +285,17 @@ def test_no_steady_state_of_what_is_not_seen(growth):
         steady_state(LinearSystem(np.diag([0.5, growth]), np.array([[1.0, 0]]), np.eye(2), np.eye(1)))
 
 
+def test_no_steady_state_of_what_stays_as_it_is_without_noise():
+    """Its variance falls for ever, as 1/k; of many such systems SciPy's matrix is none, or negative."""
+    rng = np.random.default_rng(0)
+    for n in rng.integers(1, 6, 100):
+        ways = np.linalg.qr(rng.standard_normal((n, n)))[0]
+        A = ways @ np.diag([*rng.uniform(-0.9, 0.9, n - 1), 1.0]) @ ways.T
+        B = ways[:, : n - 1] @ rng.standard_normal((n - 1, n - 1))
+        with pytest.raises(ValueError, match=r"no stabilising solution.*covariances"):
+            steady_state(LinearSystem(A, rng.standard_normal((1, n)), (B @ B.T + (B @ B.T).T) / 2, np.eye(1)))
+
+
 # ---------------------------------------------------------------- short words
 
 
@@ -520,6 +531,8 @@ GOOD_PRIOR = Gaussian(np.zeros(2), np.eye(2))
     [
         ({"y": np.zeros((4, 1))}, r"shape \(steps, runs, 1\), got \(4, 1\)"),
         ({"y": np.zeros((4, 3, 2))}, r"shape \(steps, runs, 1\)"),
+        ({"y": np.zeros((0, 3, 1))}, "write NaN where one is missing"),
+        ({"y": np.full((4, 3, 1), np.inf)}, "measurements must be there, and finite"),
         ({"u": np.zeros((3, 3, 1))}, r"inputs must have the shape \(4, 3, 1\)"),
         ({"u": np.zeros((4, 2, 1))}, r"or \(4, 1, 1\) for all runs"),
         ({"u": np.zeros((4, 3, 2))}, "inputs must have the shape"),
@@ -527,6 +540,7 @@ GOOD_PRIOR = Gaussian(np.zeros(2), np.eye(2))
         ({"prior": Gaussian(np.zeros(3), np.eye(2))}, "prior's mean must have the shape"),
         ({"prior": Gaussian(np.zeros(2), np.eye(3))}, "prior's covariance must have the shape"),
         ({"prior": Gaussian(np.zeros(2), np.diag([1, np.inf]))}, "prior must be finite"),
+        ({"prior": Gaussian(np.zeros(2), -np.eye(2))}, "prior's variances must not be negative"),
         ({"arithmetic": "exact"}, "no form 'exact' of the Kalman filter; known: covariance, symmetrised"),
     ],
 )
@@ -534,6 +548,19 @@ def test_arguments_that_do_not_fit(change, message):
     arguments = {"system": LinearSystem(**GOOD), "prior": GOOD_PRIOR, "y": np.zeros((4, 3, 1))} | change
     with pytest.raises(ValueError, match=message):
         run(**arguments)
+
+
+def test_sizes_and_gains_that_do_not_fit():
+    one = LinearSystem(**GOOD)
+    for call, message in (
+        (lambda: simulate(one, GOOD_PRIOR, 0, 3, 1), "steps must be a positive whole number, got 0"),
+        (lambda: simulate(one, GOOD_PRIOR, 4, 2.0, 1), "runs must be a positive whole number, got 2.0"),
+        (lambda: covariances(one, np.eye(2), 0), "steps must be a positive whole number, got 0"),
+        (lambda: covariances(one, np.eye(3), 4), r"prior's covariance must have the shape \(2, 2\), got \(3, 3\)"),
+        (lambda: covariances(one, np.eye(2), 4, np.ones(2)), r"gains must have the shape \(4, 2, 1\) or \(2, 1\), got \(2,\)"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            call()
 
 
 def test_an_input_without_its_matrix():

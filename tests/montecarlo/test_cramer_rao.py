@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from kfcourse import Model, compare, gaussian, run, simulate
+from kfcourse import Model, ModelError, compare, gaussian, run, simulate
 from kfcourse.filters import aof, kalman_filter
 from kfcourse.lab import find_variant, lab_filters
 from kfcourse.montecarlo.cramer_rao import posterior_bound
@@ -89,3 +89,12 @@ def test_an_infinite_mean_is_seen_in_several_dimensions_too():
 def test_without_a_normal_density_there_is_none(state, meter, message):
     with pytest.raises(ValueError, match=message):
         posterior_bound(Model.define(state, meter), 10, 2, seed=1)
+
+
+@pytest.mark.parametrize("variance", [[1, 0], [[1, 1], [1, 1]]])
+def test_a_prior_without_a_density_is_refused_and_units_do_not_matter(variance):
+    state, meter = ["x1 + v1", "x2 + v2"], ["x1 + w1", "x2 + w2"]
+    with pytest.raises(ModelError, match="the prior leaves a component"):
+        posterior_bound(Model.define(state, meter, prior={"variance": variance}), 10, 2, seed=1)
+    tiny = posterior_bound(Model.define(state, meter, prior={"variance": [1, 1e-30]}), 10, 1, seed=1)
+    np.testing.assert_allclose(tiny[0], np.diag([0.5, 1e-30]), rtol=1e-12)

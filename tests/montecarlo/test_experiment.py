@@ -12,7 +12,8 @@ from kfcourse.filters.optimal_structure import fos, mfos
 from kfcourse.filters.particles import particle
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import BLOCK, SMALL_BLOCK, Ensemble, simulate, workers
-from kfcourse.montecarlo.experiment import compare, run
+from kfcourse.montecarlo.experiment import compare, predictions, run
+from kfcourse.records import likelihood, smooth
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import gaussian, linearised
 
@@ -206,6 +207,7 @@ def test_memory_does_not_grow_with_the_number_of_steps(variant53):
         ({"seed": 1.5}, "seed"),
         ({"seed": None}, "seed"),
         ({"slow_runs": -1}, "slow_runs"),
+        ({"slow_runs": 2.5}, "slow_runs"),
         ({"filters": []}, "at least one"),
         ({"filters": "twice"}, "name of its own"),
         ({"filters": "other model"}, "model"),
@@ -298,9 +300,13 @@ def test_one_trajectory_of_a_scalar_meter_may_be_a_vector(variant53, vector):
         (one, np.zeros((5, 1, 2)), "expects 1 measurement component"),
         (one, 1.0, r"got \(\)$"),
         (one, np.zeros((5, 3, 1, 1)), r"got \(5, 3, 1, 1\)$"),
+        (one, [], r"no measurements to run over.* is \(0, 1, 1\)$"),
+        (one, np.zeros((5, 0, 1)), r"no measurements to run over"),
+        (one, [0.1, -np.inf], "step 1, run 0 is infinite; write NaN where one is missing"),
     ):
-        with pytest.raises(ValueError, match=message):
-            run(filter_, measurements)
+        for use in (run, predictions, smooth, likelihood):
+            with pytest.raises(ValueError, match=message):
+                use(filter_, measurements)
 
 
 def test_a_design_that_is_run_says_what_to_do(variant53):

@@ -99,3 +99,9 @@ def test_nothing_is_found_of_a_record_that_is_refused():
     y = np.full((5, 1, 2), 1e6)
     told = examine(gated(aof(STRUCTURE), 0.99, patience=None), y, 0.99)
     assert (told.weight == 0).all() and findings(told) == []
+
+
+@pytest.mark.parametrize("edge", [0.0, 2.0, np.nan])
+def test_an_edge_that_is_no_probability_is_refused(edge):
+    with pytest.raises(ValueError, match="edge must be the gate's probability"):
+        examine(aof(STRUCTURE), holed(3, 1, 1), edge)

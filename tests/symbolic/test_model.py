@@ -60,6 +60,14 @@ def test_replace_changes_only_the_named_parameters(variant53):
         variant53.replace(q=1)
 
 
+def test_replaced_parameters_are_checked_as_those_defined():
+    """A variance below 0, which `linearised` took for one: its F was negative."""
+    model = Model.define("x/c + v", "x + w", {"c": 1, "r": 1}, meter_noise={"variance": "r"})
+    for equation, change in (("meter", {"r": -1}), ("state", {"c": 0})):
+        with pytest.raises(ModelError, match=f"the {equation} equation .* has no finite real value with these parameters"):
+            model.replace(**change)
+
+
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), "0.9", None, True, 1j, 1e300, 1e-300])
 def test_a_parameter_is_a_finite_number(value):
     with pytest.raises(ModelError, match="parameter c"):

@@ -164,3 +164,17 @@ def test_sums_of_parameters_in_a_denominator_stay_together():
     by_hand = T * sp.exp(-d / 2) * sp.sin(m) / (1 + s**2) + sp.exp(m / (1 + s) + d / (1 + s) ** 2 / 2) / (1 + T)
     at = {s: sp.Rational(3, 10), T: 2, m: sp.Rational(1, 2), d: sp.Rational(1, 4)}
     assert abs(sp.N((found - by_hand).subs(at), 30)) < 1e-25
+
+
+def test_what_is_no_law_or_another_s_symbol_is_refused():
+    """An x that is not real is another symbol than a real one: its square would be a constant, M[x^2] = x^2."""
+    x, y, m = sp.symbols("x y m", real=True)
+    for means, cov in (([m, m], [[1]]), ([m], [[1, 0], [0, 1]]), ([], [[1]])):
+        with pytest.raises(ValueError, match=r"1 variable\(s\) need as many means, and a symmetric covariance 1 x 1"):
+            GaussianMoments([x], means, sp.Matrix(cov))
+    with pytest.raises(ValueError, match="symmetric covariance 2 x 2"):
+        GaussianMoments([x, y], [m, m], sp.Matrix([[1, 0.5], [0, 1]]))
+    law = GaussianMoments([x], [m], sp.Matrix([[1]]))
+    for use in (law.mean_of, lambda f: law.covariance(x, f)):
+        with pytest.raises(ValueError, match="is not the variable of that name"):
+            use(sp.Symbol("x") ** 2)

@@ -274,8 +274,15 @@ def test_too_many_points_are_refused():
 
 
 def test_kappa_below_minus_the_dimension_is_refused(variant53):
-    with pytest.raises(ModelError, match="kappa"):
-        unscented(variant53, -2)
+    for kappa in (-2, float("nan"), float("inf")):
+        with pytest.raises(ModelError, match="kappa"):
+            unscented(variant53, kappa)
+
+
+@pytest.mark.parametrize("order", [1, 5.0, True, "5"])
+def test_an_order_that_is_no_number_of_points_is_refused(variant53, order):
+    with pytest.raises(ModelError, match="an order of at least 2"):
+        gauss_hermite(variant53, order)
 
 
 @pytest.mark.parametrize("kind", TABLE)

@@ -24,6 +24,7 @@ from kfcourse.filters.exact.merging import MERGED
 from kfcourse.filters.exact.panels import PANEL_NODES, SPLITS, Rule, resolve
 from kfcourse.filters.exact.places import Candidates, explanations
 from kfcourse.filters.exact.roots import halved
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
@@ -58,6 +59,7 @@ class Panels(NamedTuple):
 
 def check_scalar(model: Model) -> None:
     """ModelError unless the model has one state and one measurement."""
+    expect(model, Model, "an exact filter")
     if model.n != 1 or model.p != 1:
         raise ModelError(
             f"the point-mass filter is for scalar models; here the state has dimension {model.n}, the measurement {model.p}: "

@@ -24,6 +24,7 @@ from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved,
 from kfcourse.filters.exact.pointmasses import ACCURACY, FINE, corrected
 from kfcourse.filters.exact.prediction import predictions
 from kfcourse.filters.multiple_models import mixture, onward
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
@@ -83,6 +84,7 @@ def jump_pointmass(model: JumpModel, accuracy: float = ACCURACY) -> Filter:
     Unresolved
         When it runs: a density would need more nodes than the budget has.
     """
+    expect(model, JumpModel, "jump_pointmass")
     for name, mode in zip(model.names, model.modes, strict=True):
         check_scalar(mode)
         if mode.angles.x:
