@@ -37,10 +37,16 @@ FONTS = (  # first in the lists of book.css and formulas.css; other letters, and
     ("Ready MJXTEX-C", "normal", "normal", "MathJax_Calligraphic-Regular.woff"),
     ("Ready MJXTEX-SS", "normal", "normal", "MathJax_SansSerif-Regular.woff"),
 )
-SCRIPT_OF_FONTS = """for (const [family, style, weight, data] of %s) {
-  const text = atob(data), bytes = new Uint8Array(text.length);
-  for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
-  document.fonts.add(new FontFace(family, bytes, { style, weight }));
+SCRIPT_OF_FONTS = """{
+  const slowly = (data) => {
+    const text = atob(data), bytes = new Uint8Array(text.length);
+    for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
+    return bytes;
+  };
+  for (const [family, style, weight, data] of %s) {
+    const bytes = Uint8Array.fromBase64?.(data) ?? slowly(data); // browsers of before 2025 have no fromBase64
+    document.fonts.add(new FontFace(family, bytes, { style, weight }));
+  }
 }
 """
 TAG = re.compile(r"<[^>]*>")

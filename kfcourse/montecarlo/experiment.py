@@ -147,7 +147,7 @@ def compare(
         linear algebra by another kernel (BLAS): then vector models differ by rounding, up to some 1e-12, and scalar ones hardly.
     design_runs : int, optional
         Size of the design ensemble, which is held at once: a trajectory of a scalar model takes 0.15 kB with one designed filter
-        and 0.45 kB with the lab's seven, one of a model of two states twice that.  By default `runs`, at most a million:
+        and 0.45 kB with the lab's seven, one of a model of two states 0.36 kB with one.  By default `runs`, at most a million:
         coefficients from so many cost a filter about a millionth of its accuracy, and memory does not grow with `runs`.
     designs : int
         Designed filters are designed on so many ensembles.  The first design is reported; how the others differ from it on the
