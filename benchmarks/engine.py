@@ -3,6 +3,7 @@
     .venv/bin/python benchmarks/engine.py [--runs 100000 1000000] [--repeats 3]
 
 Prints
+- what compiling costs (numba), of the first model and of further ones, for which most is there already;
 - the linearised AOF, random numbers included, against filterpy's extended Kalman filter in a loop;
 - all seven filters of the lab, designed on one ensemble and compared on another, against the time one NumPy
   Generator needs to draw as many normal numbers (four for each trajectory and step), plain and compiled (numba), also in
@@ -15,14 +16,17 @@ Absolute figures move with the machine; the ratios are what to keep.  Nothing el
 from __future__ import annotations
 
 import argparse
+import os
 import time
 from collections.abc import Callable
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
-from kfcourse import compare, lab_filters, simulate
-from kfcourse.lab.short_names import LAB, title
+from kfcourse import compare, lab_filters, run, simulate
+from kfcourse.filters.fused import fuse
+from kfcourse.lab.short_names import LAB, exact, title
 from kfcourse.lab.variants import find_variant
 from kfcourse.montecarlo.ensemble import Ensemble
 
@@ -57,6 +61,18 @@ def filterpy_loop(runs: int) -> Callable[[], object]:
     return work
 
 
+def compiling(variants: list[str]) -> None:
+    """Compile, with nothing kept from before, the seven filters and the exact one of each variant; what follows uses them."""
+    with TemporaryDirectory() as empty:
+        os.environ |= {"XDG_CACHE_HOME": empty, "NUMBA_CACHE_DIR": empty}
+        for name in variants:
+            model = find_variant(name).model
+            y = simulate(model, 8, 2, seed=1).y
+            one, start = [*lab_filters(model), exact(model)], time.process_time()
+            run(list(map(fuse, one))[-1], y)
+            print(f"compiling variant {name}'s seven filters and exact one: {time.process_time() - start:.1f} s of a processor")
+
+
 def draw(numbers: int) -> Callable[[], object]:
     """What one Generator needs for as many normal numbers, in blocks that stay in the cache."""
     block = np.empty(16_384)
@@ -82,10 +98,7 @@ def main() -> None:
         chosen = [one for one in filters if one.name in names]
         return lambda: compare(chosen, model, runs, steps, seed=1, threads=options.threads, progress=False, compiled=compiled)
 
-    start = time.process_time()
-    lab(runs=1000, compiled=True)()
-    print(f"compiling the seven filters, or reading them from the cache: {time.process_time() - start:.1f} s of a processor")
-
+    compiling(["53", "1", "5"])
     loop = best(filterpy_loop(200), options.repeats) / (200 * STEPS)
     print(f"filterpy EKF loop: {1e6 * loop:.1f} us a trajectory-step")
     for runs in options.runs:
