@@ -4,6 +4,7 @@
 
 Sphinx itself always starts afresh, so that no warning is lost and no stale page is left; only the outputs of
 executed cells are kept (_build/.jupyter_cache), as long as the package, the requirements and the interpreter are the same.
+Where nothing at all has changed since a book was built, it stays.
 """
 
 from __future__ import annotations
@@ -29,6 +30,10 @@ BUILD = ROOT / "_build"
 CACHE = BUILD / ".jupyter_cache"
 KEPT = (CACHE, sample.FOLDER, BUILD / "solutions")  # made anew by themselves when stale
 KEY = BUILD / ".executed-with"
+SOURCES = ("_config.yml", "requirements.txt", "book", "exercises", "kfcourse")
+MADE = ("book/manual", "book/package", "book/equations.md")  # by the build
+BUILT = BUILD / ".built-from"
+PAGE = BUILD / "html" / "index.html"
 NOT_BUILT = "\nThe book was NOT built: see the errors and warnings above."
 
 
@@ -36,6 +41,16 @@ def fingerprint() -> str:
     """Hash of all that the outputs of the chapters depend on, besides their own cells."""
     parts = (sys.version.encode(), package_digest().encode(), (ROOT / "requirements.txt").read_bytes())
     return hashlib.sha256(b"\n".join(parts)).hexdigest()
+
+
+def sources() -> str:
+    """Hash of all files that the book is made of, and of the interpreter."""
+    digest = hashlib.sha256(sys.version.encode())
+    for path in sorted(file for name in SOURCES for file in (ROOT / name, *(ROOT / name).rglob("*")) if file.is_file()):
+        name = path.relative_to(ROOT).as_posix()
+        if not name.startswith(MADE) and "__pycache__" not in name:
+            digest.update(f"{name}\n{hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+    return digest.hexdigest()
 
 
 def prepare() -> None:
@@ -52,6 +67,11 @@ def prepare() -> None:
 
 
 def main() -> int:
+    begun_with = sources()
+    if PAGE.exists() and BUILT.exists() and BUILT.read_text() == begun_with:
+        print("Nothing has changed since the book was built.")
+        return tell()
+    BUILT.unlink(missing_ok=True)
     prepare()
     try:
         terms.check()
@@ -82,9 +102,14 @@ def main() -> int:
         shutil.rmtree(BUILD / "html", ignore_errors=True)
         print(NOT_BUILT, file=sys.stderr)
         return 1
-    page = BUILD / "html" / "index.html"
-    print(f"\nThe book: {page}\nTo read it, open that file in a browser, for instance with:")
-    print(f"\n    {sys.executable} -m webbrowser {page.as_uri()}")
+    BUILT.write_text(begun_with)
+    return tell()
+
+
+def tell() -> int:
+    """Where the book is."""
+    print(f"\nThe book: {PAGE}\nTo read it, open that file in a browser, for instance with:")
+    print(f"\n    {sys.executable} -m webbrowser {PAGE.as_uri()}")
     return 0
 
 
