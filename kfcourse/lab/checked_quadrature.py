@@ -120,6 +120,8 @@ def _meeting(model: Model | JumpModel, structures: list[Structure]) -> Iterator[
         one.at(0).measure(model.prior.mean[None], model.prior.cov)
     yield
     y, designing = simulate(model, RUNS, steps, seed=1).y, Ensemble(model, RUNS, steps, seed=1)  # type: ignore[arg-type]
+    if not np.isfinite(y).all():
+        raise NotFinite("trajectories become infinite")
     if not isinstance(model, JumpModel):
         run(aof(structures[0]), y)
         yield

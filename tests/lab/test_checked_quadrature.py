@@ -231,3 +231,9 @@ def test_the_lab_says_so_in_its_reports(tmp_path, monkeypatch, meter, more, name
     page, handin = ((tmp_path / "r" / f"{name}.html").read_text(encoding="utf-8") for name in ("report", "handin"))
     assert "points an axis" in page and "No&#x000A0;closed&#x000A0;form:&#x000A0;by&#x000A0;quadrature" in page
     assert re.sub(r"узл\w+", "узл.", handin).count(said) == 1 and "экспонент" not in handin and "громоздки" not in handin
+
+
+def test_trajectories_that_become_infinite_are_no_pilot():
+    model = Model.define(["x1**2", "abs(x1) + 0.3*v"], ["x1"])
+    (one,) = admissions(model, ["aof-gaussian"], seconds=5)
+    assert one.one is None and "no closed-form" in one.reason
