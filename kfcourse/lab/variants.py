@@ -58,7 +58,7 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     Raises
     ------
     VariantError
-        The file is missing or not TOML, or no variant in it is a model.
+        The file is missing or not TOML, or no variant in it is a model without modes.
 
     Warns
     -----
@@ -68,6 +68,8 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     found, faults = usable_variants(path)
     for fault in faults.values():
         warnings.warn(str(fault), VariantWarning, stacklevel=2)
+    if not found:
+        raise VariantError(f"all models of {path} jump between modes: `read_variants` reads them, or `find_variant` by name")
     return found
 
 
