@@ -69,7 +69,8 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     for fault in faults.values():
         warnings.warn(str(fault), VariantWarning, stacklevel=2)
     if not found:
-        raise VariantError(f"all models of {path} jump between modes: `read_variants` reads them, or `find_variant` by name")
+        cure = "`read_variants` reads them, or `find_variant` by name"
+        raise VariantError(f"{path} has no other variants than those that jump between modes: {cure}")
     return found
 
 
