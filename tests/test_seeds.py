@@ -21,7 +21,7 @@ MADE = {
     "linear": lambda seed: simulate(LEVEL, NORMAL, 3, 2, seed).y,
     "continuous": lambda seed: continuous.simulate(WIENER, 0.1, 3, 2, seed).y,
     "cartesian": lambda seed: radar.measure_cartesian(TRACK, 1.0, 2, seed),
-    "spherical": lambda seed: radar.measure_spherical(TRACK, 1.0, 2, seed),
+    "spherical": lambda seed: radar.measure_spherical(TRACK, (9.0, 0.1, 0.1), 2, seed),
     "roughly_known": lambda seed: tracking.roughly_known(RADAR, 0.9, np.zeros(6), 2, seed).mean,
     "hand_track": lambda seed: pointer.hand_track(seed).duration,
     "hand": lambda seed: pointer.sample(HAND, 0.1, 1.0, 2, seed).y,

@@ -97,6 +97,8 @@ def measure_spherical(track: Track, sigmas: Sequence[float], runs: int, seed: Se
     The azimuth lies between -pi and pi, so it jumps where the flight crosses the negative x axis: a model of these
     measurements needs `angles=["y2"]`.
     """
+    if np.ndim(sigmas) == 0:
+        raise ValueError(f"a range is in m and angles in rad: sigmas must be three, (range, azimuth, elevation), got {sigmas!r}")
     return on_circle(_noisy(spherical(track.position), sigmas, runs, seed), (1,))
 
 

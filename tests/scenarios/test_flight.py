@@ -308,6 +308,8 @@ def test_no_errors_have_no_standard_error():
 
 def test_a_position_has_three_components():
     assert spherical([3, 4, 0])[0] == 5
+    with pytest.raises(ValueError, match="a range is in m and angles in rad"):
+        measure_spherical(aircraft(100.0), 5.0, 1, seed=1)
     for function in (spherical, cartesian):
         with pytest.raises(ValueError, match=r"three components, \(..., 3\); got the shape \(2, 4\)"):
             function(np.ones((2, 4)))
