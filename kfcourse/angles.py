@@ -33,7 +33,7 @@ def on_circle(vector: Array, which: Components) -> Array:
     """A vector (..., n) with its angles between -pi and pi."""
     if not which:
         return vector
-    result = np.array(vector)
+    result = np.array(vector, dtype=np.result_type(vector, 0.0))  # whole numbers would cut the angles off
     for i in which:  # views: of few trajectories in half the time of picking columns
         result[..., i] = wrapped(result[..., i])
     return result
@@ -52,7 +52,7 @@ def near(vector: Array, reference: Array, which: Components) -> Array:
 
 
 def moments_on_circle(angle: Array, mass: Array) -> tuple[Array, Array]:
-    """Mean and variance of masses at angles: (..., M), (..., M) -> (...), (...), as seen from their circular mean.
+    """Mean and variance of masses, in all 1, at angles: (..., M), (..., M) -> (...), (...), as seen from their circular mean.
 
     c = arg sum_j m_j exp(i x_j),   `mean` = c + sum_j m_j `wrapped`(x_j - c)
     """

@@ -311,7 +311,7 @@ def normalised_square(vector: Vectors, cov: Matrices) -> Array:
 
 
 def log_density(measurement: Measurement, y: Vectors) -> Array:
-    """Logarithm of the normal density N(y; h, F), (runs,); what is missing (NaN) does not enter.
+    """Logarithm of the normal density N(y; h, F), (runs,); what is missing (NaN) does not enter; inf where F is singular.
 
     -1/2 nu^T F^-1 nu - 1/2 ln det(2 pi F),      nu = y - h
     """

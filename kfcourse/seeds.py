@@ -24,3 +24,8 @@ def seed_number(seed: Seed) -> int:
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise ValueError(f"the seed must be a non-negative whole number or a numpy.random.Generator, got {seed!r}")
     return int(seed)
+
+
+def generator(seed: Seed) -> np.random.Generator:
+    """The generator of a seed: itself, which goes on from where it is, or a new one of this number; errors of `seed_number`."""
+    return seed if isinstance(seed, np.random.Generator) else np.random.default_rng(seed_number(seed))

@@ -27,13 +27,13 @@ import numpy as np
 from kfcourse.filters.base import State, initial_state
 from kfcourse.filters.designed import Design, Equations, Regression
 from kfcourse.filters.finite_memory import STEPS, checked_memory
-from kfcourse.filters.multiple_models import expect_each, mixture, modes_given, onward
+from kfcourse.filters.multiple_models import mixture, modes_given, onward
 from kfcourse.filters.optimal_structure import Memory, Remembered, expected_where_missing
 from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, Measurement, correct
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import Structure, each_once, moving_alike
+from kfcourse.symbolic.structure import Structure, each_once, expect_each, moving_alike
 
 RIDGE = 1e-12  # of the largest variance, that a law of zeta without width in a direction has a density
 

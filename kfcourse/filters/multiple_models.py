@@ -32,10 +32,9 @@ import numpy as np
 from kfcourse.angles import Components, near, on_circle
 from kfcourse.filters.base import Evidence, Filter, State, initial_state
 from kfcourse.filters.state_transitions import by_state
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, Measurement, correct, log_density
 from kfcourse.symbolic.jumping import JumpModel
-from kfcourse.symbolic.structure import Structure, each_once, moving_alike
+from kfcourse.symbolic.structure import Structure, each_once, expect_each, moving_alike
 
 Chain: TypeAlias = Array | Callable[[int], Array] | JumpModel
 Predict: TypeAlias = Callable[[Gaussian], Gaussian]
@@ -236,14 +235,6 @@ def _shares(joint: Array) -> Array:
     if np.minimum.reduce(total, axis=None) > 0:
         return joint / total
     return np.divide(joint, total, out=np.full_like(joint, 1.0 / joint.shape[1]), where=total > 0)
-
-
-def expect_each(structures: Sequence[Structure], what: str) -> None:
-    """TypeError unless these are structural functions, a list of them."""
-    if isinstance(structures, Structure):
-        raise TypeError(f"{what} expects a list of structures, one a mode, and one came: give [{structures.name}, ...]")
-    for one in structures:
-        expect(one, Structure, what)
 
 
 def _checked(structures: Sequence[Structure], transition: Chain, probabilities: Array | None) -> tuple[Links, Array]:

@@ -21,6 +21,7 @@ from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.short_names import OF_BEST, JumpStructures, Structures
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.quadrature import axes
 from kfcourse.symbolic.writing import by_thousands
 
 SIZES = (100_000, 20_000, 5_000)  # trajectories
@@ -55,7 +56,9 @@ def _work(one: Filter | Design, model: Model | JumpModel, designs: int) -> int:
     if isinstance(model, JumpModel) and one.name != "duof":
         modes, points = len(model.modes) ** (2 if one.name == "gpb2" else 1), points_of(model)
     if one.name == "aof-gauss-hermite":
-        points = 5**n
+        points = 5 ** axes(one.model)
+    elif one.name == "aof-unscented":
+        points = 2 * (n + max(len(one.model.v), len(one.model.w))) + 1  # fewer, where a noise is only added
     elif one.name.endswith("-gaussian") or one.name in OF_BEST:
         found = (JumpStructures(model) if isinstance(model, JumpModel) else Structures(model)).quadrature
         points += found.points if isinstance(found, Checked) else 0

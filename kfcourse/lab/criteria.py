@@ -69,7 +69,7 @@ def bounded(x: Array) -> Finding:
     if not finite.all():
         return Finding(False, f"trajectories become infinite (step {int(np.argmin(finite))})", float("inf"))
     square, half = (x**2).mean(axis=1), (len(x) + 1) // 2
-    growth = float(ratio(square[half:].max(axis=0), square[:half].max(axis=0), 0.0).max())
+    growth = float(ratio(square[half:].max(axis=0, initial=0.0), square[:half].max(axis=0), 0.0).max())  # of one step 0
     grows = f"the second moment grows {growth:.3g} times from the first half of the steps to the second"
     if growth > GROWTH:
         return Finding(False, grows, growth)

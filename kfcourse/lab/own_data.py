@@ -150,6 +150,8 @@ def estimate_record(
     ValueError
         The file, the model or the parameters cannot be used, or the filter left the finite numbers; the message says where.
     """
+    if structure not in STRUCTURES:
+        raise ValueError(f"structure must be one of {', '.join(STRUCTURES)}, got {structure!r}")
     record = read_measurements(path, variant.plain("estimates from a record"), columns)
 
     def plain(model: Model) -> Filter:
@@ -195,6 +197,8 @@ def write_record(told: Told, folder: Path, track: tuple[str, str] | None = None)
     names = [symbol.name for symbol in told.record.model.x]
     pictures = {}
     if track:
+        if len(track) != 2 or not {*track} <= {*names}:
+            raise ValueError(f"track takes the names of two components of the state, {', '.join(names)}; got {track}")
         across, up = (names.index(name) for name in track)
         pictures["track"] = (f"The track: {track[1]} against {track[0]}.", partial(_track, told, across, up))
     for i, name in enumerate(names):

@@ -58,7 +58,7 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     Raises
     ------
     VariantError
-        The file is missing or not TOML, or no variant in it is a model.
+        The file is missing or not TOML, or no variant in it is a model without modes.
 
     Warns
     -----
@@ -68,6 +68,9 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     found, faults = usable_variants(path)
     for fault in faults.values():
         warnings.warn(str(fault), VariantWarning, stacklevel=2)
+    if not found:
+        cure = "`read_variants` reads them, or `find_variant` by name"
+        raise VariantError(f"{path} has no other variants than those that jump between modes: {cure}")
     return found
 
 

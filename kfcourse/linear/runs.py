@@ -16,7 +16,7 @@ from kfcourse.kinds import expect_sizes
 from kfcourse.laws import Array, Gaussian, apply, square_root, stacked
 from kfcourse.linear.arithmetic import form
 from kfcourse.linear.system import LinearSystem
-from kfcourse.seeds import Seed
+from kfcourse.seeds import Seed, generator
 
 
 class Trajectories(NamedTuple):
@@ -67,7 +67,7 @@ def run(system: LinearSystem, prior: Gaussian, y: Array, u: Array | None = None,
         raise ValueError("measurements must be there, and finite: write NaN where one is missing")
     runs, n, dtype = y.shape[1], len(system.A), system.A.dtype
     _check_input(system, u, len(y), runs)
-    _check_prior(prior, runs, n)
+    check_prior(prior, runs, n)
     mean = np.broadcast_to(prior.mean, (runs, n)).astype(dtype)
     state = chosen.start(Gaussian(mean, np.asarray(prior.cov).astype(dtype)))
     predicted, posterior = [], []
@@ -92,7 +92,8 @@ def _check_input(system: LinearSystem, u: Array | None, steps: int, runs: int) -
         raise ValueError("inputs must be finite: give a missing input the value that the object had, or its mean with a larger Q")
 
 
-def _check_prior(prior: Gaussian, runs: int, n: int) -> None:
+def check_prior(prior: Gaussian, runs: int, n: int) -> None:
+    """ValueError unless this is a law of n components, for each of so many runs or for all."""
     mean, cov = np.shape(prior.mean), np.shape(prior.cov)
     if mean not in ((n,), (1, n), (runs, n)):
         raise ValueError(f"the prior's mean must have the shape ({n},) or ({runs}, {n}), got {mean}")
@@ -119,8 +120,8 @@ def simulate(system: LinearSystem, prior: Gaussian, steps: int, runs: int, seed:
     """
     expect_sizes(steps=steps, runs=runs)
     _check_input(system, u, steps, runs)
-    _check_prior(prior, runs, len(system.A))
-    rng = np.random.default_rng(seed)
+    check_prior(prior, runs, len(system.A))
+    rng = generator(seed)
 
     def noise(cov: Array) -> Array:
         return rng.standard_normal((runs, len(cov))) @ square_root(cov).T

@@ -293,7 +293,10 @@ class Comparison:
         return self._quotient(self._error(name), self._error(reference or self.control))
 
     def score(self, name: str, steps: slice = slice(None)) -> Estimate:
-        """The mean over steps of D_k(name) / D_k(control): one number for a filter, with its standard error."""
+        """The mean over steps of D_k(name) / D_k(control): one number for a filter, with its standard error.
+
+        As all means over steps, over those that are `usable`; NaN if none is, but 0 if it errs by rounding only at all of them.
+        """
         return self._quotient(self._error(name), self._error(self.control), steps)
 
     def score_difference(self, first: str, second: str, steps: slice = slice(None)) -> Estimate:
@@ -525,20 +528,23 @@ class Comparison:
     def _quotient(self, numerator: Terms, denominator: Terms, steps: slice | None = None) -> Estimate:
         """numerator / denominator per step, or its mean over the usable ones of some steps, by the delta method as in `relative`.
 
-        NaN where there is nothing to be a part of.
+        NaN where there is nothing to be a part of; a mean is 0 where all errors are of rounding.  ValueError if `steps` are none.
         """
         below, share = self._estimate(denominator).value, np.ones(self.steps)
         usable = self.usable & (below > 0)
         if steps is not None:
             counted = np.zeros(self.steps, dtype=bool)
-            counted[steps] = usable[steps]
+            counted[steps] = True
+            if not counted.any():
+                raise ValueError(f"{steps} are none of the {self.steps} steps of this comparison")
+            counted &= usable
             share = counted / max(np.count_nonzero(counted), 1)
         below = np.where(usable, below, 0.0)
         values, inverse = share * ratio(self._estimate(numerator).value, below, 0.0), ratio(np.ones(self.steps), below, 0.0)
         linear = numerator.times(share * inverse).plus(denominator.times(-values * inverse))
         found = self._estimate(linear, total=steps is not None)
         if steps is not None:
-            return replace(found, value=values.sum())
+            values, usable = values.sum(), np.asarray(counted.any() or self.without_error[steps].all())
         return replace(
             found, value=np.where(usable, values, np.nan), standard_error=np.where(usable, found.standard_error, np.nan)
         )

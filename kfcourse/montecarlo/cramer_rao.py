@@ -25,6 +25,7 @@ from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, symmetric, transpose
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.seeds import Seed
+from kfcourse.symbolic.choices import jumps
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
@@ -48,7 +49,8 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: Seed) -> Array:
     ModelError
         A noise enters nonlinearly, or leaves a component without noise, or the prior has none there: no density then.
     ValueError
-        The information is infinite, as where a noise vanishes at a state: the bound is zero then, and says nothing.
+        The information is infinite, as where a noise vanishes at a state or an equation jumps there: the bound is zero then,
+        and says nothing.
 
     Examples
     --------
@@ -81,6 +83,9 @@ def _information(
     model: Model, equation: sp.MatrixBase, noise: Sequence[sp.Symbol], law: Gaussian, what: str
 ) -> Callable[[Array, int], tuple[Array, Array, Array]]:
     """(x (runs, n), k) -> I (runs, n, n), m_x^T S^-1 (runs, n, r), S^-1 (runs, r, r) of what the equation makes of x."""
+    choices = equation.atoms(sp.Piecewise)
+    if equation.has(sp.sign, sp.Heaviside, sp.floor) or any(jumps(one, [*model.x, *noise]) for one in choices):
+        raise ValueError(_infinite(what, "it jumps, and a jump has no slope: slopes elsewhere do not tell of it"))
     slopes = equation.jacobian(sp.Matrix(noise))
     if slopes.has(*noise):
         raise ModelError(f"a noise enters the {what} equation nonlinearly; the bound needs normal densities given the state")

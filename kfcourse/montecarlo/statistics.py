@@ -53,13 +53,15 @@ class Estimate:
         return lower, upper
 
     def p_value(self) -> Array:
-        """Probability of a mean at least so far from 0, to either side, if the true one were 0: by the law of `interval`."""
+        """Probability of a mean at least so far from 0, to either side, if the true one were 0: by the law of `interval`.
+
+        NaN where there is no standard error (of one trajectory, of an infinite mean).
+        """
         with np.errstate(divide="ignore", invalid="ignore"):
             t, a = self.value / self.standard_error, np.asarray(self.skewness)
         g = t + a * t**2 / 3 + a**2 * t**3 / 27 + a / 6
-        return np.where(
-            self.standard_error > 0, 2 * scipy.special.stdtr(self.freedom, -np.abs(g)), np.where(self.value == 0, 1.0, 0.0)
-        )
+        certain = np.where(self.value == 0, 1.0, 0.0)
+        return np.where(self.standard_error == 0, certain, 2 * scipy.special.stdtr(self.freedom, -np.abs(g)))
 
     def half_width(self, confidence: float = CONFIDENCE) -> Array:
         """Half the length of the interval."""

@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.kinds import expect_sizes
 from kfcourse.laws import Array
 
-MOVES = 6.0  # s, when the car has begun to move
+MOVES = 6.0  # s, by when the car has pulled away: its course has a meaning
 RADIUS = 6_371_000.0  # m, of a sphere as large as the Earth
 
 
@@ -61,14 +62,18 @@ def recorded() -> Drive:
 
 
 def fixes(every: int = 1) -> tuple[Array, Array]:
-    """Times (steps,) and places (steps, 1, 2) of one fix in so many, when the car has begun to move."""
+    """Times (steps,) and places (steps, 1, 2) of one fix in so many, from `MOVES` on."""
+    expect_sizes(every=every)
     record = recorded()
     there = np.flatnonzero(~np.isnan(record.place[:, 0]) & (record.times >= MOVES))[::every]
     return record.times[there], record.place[there, None]
 
 
 def turned(times: Array) -> Array:
-    """The angle by which the car has turned since the record began, rad: the integral of the yaw rate, each reading held."""
+    """The angle by which the car has turned since the record began, rad: the integral of the yaw rate, each reading held.
+
+    Before the record it is 0, and after its end what it was there.
+    """
     record = recorded()
     angle = np.concatenate([[0.0], np.cumsum(np.diff(record.times) * record.yaw_rate[:-1])])
     return np.interp(times, record.times, angle)

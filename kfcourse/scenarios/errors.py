@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kfcourse.laws import Array
-from kfcourse.montecarlo.statistics import Estimate
+from kfcourse.montecarlo.statistics import Estimate, ratio
 
 
 def rms_by_part(error: Array, part: Array) -> Estimate:
@@ -27,9 +27,10 @@ def rms_by_part(error: Array, part: Array) -> Estimate:
 def rms_difference(error: Array, other: Array, part: Array) -> Estimate:
     """RMS of `error` less that of `other` by part, as `rms_by_part`, on common runs: the standard error is of the pair."""
     ours, theirs = _by_part(error, part), _by_part(other, part)
+    if ours.shape != theirs.shape:
+        raise ValueError(f"both errors must be of the same runs, got {ours.shape[1]} and {theirs.shape[1]}")
     first, second = (np.sqrt(squares.mean(axis=1)) for squares in (ours, theirs))
-    # d sqrt(m) = dm / (2 sqrt(m)), for both from the same run
-    influence = ours / (2 * first[:, None]) - theirs / (2 * second[:, None])
+    influence = _influence(ours, first) - _influence(theirs, second)  # both from the same run
     return Estimate(first - second, _standard_error(influence), ours.shape[1] - 1)
 
 
@@ -45,7 +46,12 @@ def _by_part(error: Array, part: Array) -> Array:
 
 def _root(squares: Array, mean: Array) -> Estimate:
     root = np.sqrt(mean)
-    return Estimate(root, _standard_error(squares / (2 * root[:, None])), squares.shape[1] - 1)
+    return Estimate(root, _standard_error(_influence(squares, root)), squares.shape[1] - 1)
+
+
+def _influence(squares: Array, root: Array) -> Array:
+    """d sqrt(m) = dm / (2 sqrt(m)); of no errors at all 0."""
+    return ratio(squares, 2 * root[:, None], 0.0)
 
 
 def _standard_error(values: Array) -> Array:

@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.kinds import expect_sizes
 from kfcourse.laws import Array
 from kfcourse.montecarlo.ensemble import simulate
-from kfcourse.seeds import Seed
+from kfcourse.seeds import Seed, generator
 from kfcourse.symbolic.model import Model
 
 
@@ -52,11 +53,22 @@ def irregular_track(
         Records with the same times.
     steps : int
     missing, outliers : float
-        Their shares; what is missing is no outlier.
+        The share of the fixes that is missing, and of the others that is grossly wrong: between 0 and 1.
     times : float
         How many times larger an outlier's errors are, on the average.
+
+    Raises
+    ------
+    ValueError
+        Shares that are none; numbers of runs, steps or times that are not positive.
     """
-    rng = np.random.default_rng(seed)
+    expect_sizes(runs=runs, steps=steps)
+    for name, share in (("missing", missing), ("outliers", outliers)):
+        if not 0 <= share <= 1:
+            raise ValueError(f"{name} is a share of the fixes, between 0 and 1; got {share}")
+    if not 0 < times < np.inf:
+        raise ValueError(f"times must be a positive number, got {times}")
+    rng = generator(seed)
     interval = rng.uniform(0.1, 1.5, steps)
     model = Model.define(
         [

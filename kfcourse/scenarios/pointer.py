@@ -26,11 +26,12 @@ import numpy as np
 import sympy as sp
 from numpy.polynomial import Polynomial
 
+from kfcourse.kinds import expect_sizes
 from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.arithmetic import predict_law
 from kfcourse.linear.runs import Run, run
 from kfcourse.linear.system import LinearSystem
-from kfcourse.seeds import Seed
+from kfcourse.seeds import Seed, generator
 
 DT = sp.Symbol("Delta", positive=True)
 _AXES = sp.eye(2)
@@ -91,13 +92,15 @@ def start_up(y: Array, interval: float, R: Array) -> Gaussian:
     Raises
     ------
     ValueError
-        Not three complete samples.
+        Not three complete samples, or R of another shape.
     """
     _positive(interval=interval)
     if y.ndim != 3 or (y.shape[0], y.shape[2]) != (3, 2):
         raise ValueError(f"the start-up takes three samples of two coordinates, (3, runs, 2); got {y.shape}")
     if not np.isfinite(y).all():
         raise ValueError("a sample of the start-up is missing; wait for three complete samples in a row")
+    if np.shape(R) != (2, 2):
+        raise ValueError(f"R is the covariance of the two coordinates' noise, (2, 2); got the shape {np.shape(R)}")
     M = _numeric(START, interval)
     mean = np.einsum("ij,jra->ria", M, y).reshape(y.shape[1], 6)
     return Gaussian(mean, np.kron(M @ M.T, R))
@@ -149,6 +152,8 @@ def follow(
     """
     if len(y) < 4:
         raise ValueError(f"the filter is ready after three samples and needs more to filter; got {len(y)}")
+    if not np.isclose(system.A[0, 2], interval, rtol=1e-9, atol=0):
+        raise ValueError(f"the system was made for an interval of {system.A[0, 2]:g} s, and the samples have {interval:g} s")
     if start is None:
         mean, cov = start_up(y[:3], interval, system.R)
         start = Gaussian(mean[:, :4], cov[:4, :4])
@@ -218,11 +223,10 @@ def hand_track(seed: Seed, strokes: int = 14, screen: tuple[float, float] = (640
     screen : tuple of float
         Width and height, px.
     """
-    if strokes < 1:
-        raise ValueError(f"a track needs at least one stroke, got {strokes}")
+    expect_sizes(strokes=strokes)
     if not min(screen) >= 2 * SHORTEST or not np.isfinite(screen).all():
         raise ValueError(f"strokes are at least {SHORTEST:g} px long: the screen must have twice that, got {screen}")
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     targets = [rng.uniform(0, screen)]
     while len(targets) <= strokes:
         target = rng.uniform(0, screen)
@@ -259,13 +263,14 @@ class Samples(NamedTuple):
 def sample(track: HandTrack, interval: float, measurement_sd: float, runs: int, seed: Seed) -> Samples:
     """The track every `interval` seconds from its start to its end, with `runs` realisations of white noise added."""
     _positive(interval=interval)
+    expect_sizes(runs=runs)
     if not (np.isfinite(measurement_sd) and measurement_sd >= 0):
         raise ValueError(f"measurement_sd is a standard deviation: expected a number that is not negative, got {measurement_sd}")
     time = interval * np.arange(int(track.end / interval) + 1)
     now, following = track.at(time), track.at(time + interval)
     state = np.concatenate([now.position, now.velocity], axis=-1)[:, None]
     acceleration = ((following.velocity - now.velocity) / interval)[:, None]
-    noise = np.random.default_rng(seed).standard_normal((len(time), runs, 2))
+    noise = generator(seed).standard_normal((len(time), runs, 2))
     return Samples(time, state, acceleration, now.position[:, None] + measurement_sd * noise)
 
 

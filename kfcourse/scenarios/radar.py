@@ -11,6 +11,7 @@ from kfcourse.angles import on_circle
 from kfcourse.kinds import expect_sizes
 from kfcourse.laws import Array
 from kfcourse.scenarios.flight import Track
+from kfcourse.seeds import Seed, generator
 from kfcourse.symbolic.codegen import compile_function
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
@@ -48,15 +49,22 @@ _to_cartesian = compile_function(
 
 def spherical(position: Array) -> Array:
     """Range (m), azimuth and elevation (rad) of positions (..., 3) in m: `SPHERICAL`."""
-    return _to_spherical(position)[0]
+    return _to_spherical(_of_three(position))[0]
 
 
 def cartesian(measured: Array) -> Array:
     """Positions (..., 3) in m of range (m), azimuth and elevation (rad): `CARTESIAN`, the inverse of `spherical`."""
-    return _to_cartesian(measured)[0]
+    return _to_cartesian(_of_three(measured))[0]
 
 
-def measure_cartesian(track: Track, sigmas: float | Sequence[float], runs: int, seed: int | np.random.Generator) -> Array:
+def _of_three(vector: Array) -> Array:
+    vector = np.asarray(vector, dtype=float)
+    if vector.shape[-1:] != (3,):
+        raise ValueError(f"a position has three components, (..., 3); got the shape {vector.shape}")
+    return vector
+
+
+def measure_cartesian(track: Track, sigmas: float | Sequence[float], runs: int, seed: Seed) -> Array:
     """The position with independent normal errors on the three axes.
 
     Parameters
@@ -75,7 +83,7 @@ def measure_cartesian(track: Track, sigmas: float | Sequence[float], runs: int, 
     return _noisy(track.position, sigmas, runs, seed)
 
 
-def measure_spherical(track: Track, sigmas: Sequence[float], runs: int, seed: int | np.random.Generator) -> Array:
+def measure_spherical(track: Track, sigmas: Sequence[float], runs: int, seed: Seed) -> Array:
     """Range, azimuth and elevation with independent normal errors, (steps, runs, 3).
 
     Parameters
@@ -89,10 +97,12 @@ def measure_spherical(track: Track, sigmas: Sequence[float], runs: int, seed: in
     The azimuth lies between -pi and pi, so it jumps where the flight crosses the negative x axis: a model of these
     measurements needs `angles=["y2"]`.
     """
+    if np.ndim(sigmas) == 0:
+        raise ValueError(f"a range is in m and angles in rad: sigmas must be three, (range, azimuth, elevation), got {sigmas!r}")
     return on_circle(_noisy(spherical(track.position), sigmas, runs, seed), (1,))
 
 
-def _noisy(true: Array, sigmas: float | Sequence[float], runs: int, seed: int | np.random.Generator) -> Array:
+def _noisy(true: Array, sigmas: float | Sequence[float], runs: int, seed: Seed) -> Array:
     try:
         deviations = np.broadcast_to(np.asarray(sigmas, dtype=float), (3,))
     except (TypeError, ValueError):
@@ -100,7 +110,7 @@ def _noisy(true: Array, sigmas: float | Sequence[float], runs: int, seed: int | 
     if not (np.isfinite(deviations).all() and deviations.min() >= 0):
         raise ValueError(f"standard deviations must be finite and not negative, got {sigmas!r}")
     expect_sizes(runs=runs)
-    noise = np.random.default_rng(seed).standard_normal((len(true), int(runs), 3))
+    noise = generator(seed).standard_normal((len(true), int(runs), 3))
     return true[:, None, :] + deviations * noise
 
 

@@ -12,7 +12,7 @@ from kfcourse.linear.runs import run
 from kfcourse.linear.system import LinearSystem, linear_system
 from kfcourse.scenarios.pointer import acceleration_from
 from kfcourse.scenarios.radar import kinematic
-from kfcourse.seeds import Seed
+from kfcourse.seeds import Seed, generator
 
 
 def roughly_known(system: LinearSystem, first_gain: float, state: Array, runs: int, seed: Seed) -> Gaussian:
@@ -40,9 +40,14 @@ def roughly_known(system: LinearSystem, first_gain: float, state: Array, runs: i
     Raises
     ------
     ValueError
-        No speed is known so well that the first gain is so small; or it is not below one.
+        No speed is known so well that the first gain is so small; or it is not below one.  A system of another order.
     """
     axes = len(system.H)
+    if np.shape(state) != (len(system.A),) or len(system.A) != 2 * axes:
+        raise ValueError(
+            f"expected positions and speeds of {axes} axes, kinematic(..., order=1), and a state ({2 * axes},); "
+            f"got a system of {len(system.A)} components and a state {np.shape(state)}"
+        )
     T, variance = system.A[0, axes], system.R[0, 0]
     least = 1 - variance / (2 * variance + system.Q[0, 0])  # with a speed that is known exactly
     if not least <= first_gain < 1:
@@ -51,7 +56,7 @@ def roughly_known(system: LinearSystem, first_gain: float, state: Array, runs: i
     speed = (position - variance - system.Q[0, 0]) / T**2
     known = np.diag([variance] * axes + [speed] * axes)
     cov = system.A @ known @ system.A.T + system.Q
-    draw = np.random.default_rng(seed).standard_normal((runs, len(cov)))
+    draw = generator(seed).standard_normal((runs, len(cov)))
     return Gaussian(state + draw @ np.linalg.cholesky(cov).T, cov)
 
 
@@ -71,7 +76,7 @@ def kalman_positions(
     start : Gaussian
         Law of the first state, before y_0.
     control : bool
-        The first two steps have none.
+        The first two steps have none, nor has one with a missing measurement among its last three.
     """
     free = linear_system(kinematic(interval, noise_sd=noise_sd, measurement_sd=measurement_sd))[0]
     if not control:

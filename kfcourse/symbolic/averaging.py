@@ -14,11 +14,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, Measurement, Transition, product, transpose
 from kfcourse.symbolic.equations import Noiseless, compile_noiseless
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import Structure, each_once, moving_alike, of_each_step
+from kfcourse.symbolic.structure import Structure, each_once, expect_each, moving_alike, of_each_step
 
 
 def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
@@ -28,11 +29,13 @@ def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
     ------
     ModelError
         A component is an angle, of which there is no such average; transitions depend on the state.
+    ValueError
+        Not a structure for each mode.
     """
-    model.without_state("the average over the modes")
-    if model.angles.x or model.angles.y:
-        raise ModelError("components that are angles have no average over modes; take filters that know the modes")
-
+    _check(model)
+    expect_each(structures, "averaged")
+    if len(structures) != len(model.modes):
+        raise ValueError(f"averaged expects a structure for each of the {len(model.modes)} modes, got {len(structures)}")
     alike = moving_alike(structures)
 
     def at(k: int) -> Structure:
@@ -64,7 +67,7 @@ def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
 
 def averaged_equations(model: JumpModel) -> tuple[Noiseless, Noiseless]:
     """a(x, m_v) and b(x, m_w), averaged over the modes: sum_j q_{k+1}^j a^j, sum_j q_k^j b^j; errors as of `averaged`."""
-    model.without_state("the average over the modes")
+    _check(model)
     each = [compile_noiseless(mode) for mode in model.modes]
 
     def state(x: Array, k: int | None = None) -> Array:
@@ -74,6 +77,13 @@ def averaged_equations(model: JumpModel) -> tuple[Noiseless, Noiseless]:
         return sum(q * one(x, k) for q, (_, one) in zip(model.law_at(k or 0), each, strict=True))
 
     return state, meter
+
+
+def _check(model: JumpModel) -> None:
+    expect(model, JumpModel, "the average over the modes")
+    model.without_state("the average over the modes")
+    if model.angles.x or model.angles.y:
+        raise ModelError("components that are angles have no average over modes; take filters that know the modes")
 
 
 def _mean(weights: Array, values: list[Array]) -> Array:

@@ -7,9 +7,10 @@ prints them as NumPy, `javascript.loop` as JavaScript, `compiled.loop` for numba
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
@@ -80,6 +81,11 @@ def compile_function(
     Compiled
         `function(*arrays)`: leading axes broadcast.  A matrix has those of the arguments that enter it, so what is the same for
         every trajectory is found once; and so has an output of one entry, or one that no argument enters.
+
+    Raises
+    ------
+    ModelError
+        No real number, a number beyond floats, a function that NumPy has not, a symbol that is no argument.
     """
     matrices = (tuple((key, sp.ImmutableMatrix(one)) for key, one in given.items()) for given in (arguments, outputs))
     return _compiled(name, *matrices, tuple(vectors), doc, tuple((definitions or {}).items()))
@@ -105,6 +111,8 @@ def _compiled(
         source = printed(lambda program: numpy_source(name, arguments, program, doc), outputs, vectors, definitions)
     except PrintMethodNotImplementedError as error:  # of a solution that SymPy found, with LambertW
         raise ModelError(f"{name}: {str(error).splitlines()[0].rpartition(' ')[2]} is no function of NumPy") from None
+    if beyond := re.search(r"\bmath\.(\w+)", source):  # Python has erf and gamma, of numbers and not of arrays
+        raise ModelError(f"{name}: {beyond[1]} is no function of NumPy")
     namespace: dict[str, Any] = {"np": np}
     exec(compile(source, f"<generated {name}>", "exec"), namespace)  # our own text: printed from SymPy, no user strings
     return Compiled(namespace[name], source)
@@ -212,8 +220,8 @@ def _in_order(assignments: list[tuple[sp.Symbol, sp.Expr]]) -> list[tuple[sp.Sym
     return ordered
 
 
-def float_text(number: sp.Rational) -> str:
-    """The float nearest to a rational number, as every target prints it; BeyondFloats if there is none."""
+def float_text(number: sp.Rational | sp.Float) -> str:
+    """The float nearest to a number, as every target prints it; BeyondFloats if there is none."""
     value = float(number) if abs(number) < 2**1023 else np.inf
     if not np.isfinite(value) or (number and not value):
         raise BeyondFloats(
@@ -235,6 +243,8 @@ class NumbersPrinter(NumPyPrinter):
         return super()._module_format(fqn, register).replace("numpy.", "np.")
 
     def _print_Symbol(self, expr: sp.Symbol) -> str:
+        if expr not in self.rename:
+            raise ModelError(f"the symbol {expr} is neither an argument nor defined; give it a value, or make it an argument")
         return self.rename[expr]
 
     _print_Dummy = _print_Symbol
@@ -244,6 +254,7 @@ class NumbersPrinter(NumPyPrinter):
 
     _print_Integer = _print_Rational
     _print_Half = _print_Rational
+    _print_Float = _print_Rational
 
     def _print_Mul(self, expr: sp.Mul) -> str:
         rational = sp.Mul(*(a for a in expr.args if a.is_Rational))
@@ -258,6 +269,16 @@ class NumbersPrinter(NumPyPrinter):
         for d in denominators:
             text += "/" + self.parenthesize(d.base, PRECEDENCE["Pow"])
         return text
+
+    def _print_Max(self, expr: sp.Max) -> str:
+        return self._of_two("np.maximum", expr)
+
+    def _print_Min(self, expr: sp.Min) -> str:
+        return self._of_two("np.minimum", expr)
+
+    def _of_two(self, function: str, expr: sp.Basic) -> str:
+        """A function of two numbers, of all arguments one after the other."""
+        return reduce(lambda so_far, one: f"{function}({so_far}, {one})", map(self._print, expr.args))
 
     def _print_Pow(self, expr: sp.Pow, rational: bool = False) -> str:
         base = self.parenthesize(expr.base, PRECEDENCE["Pow"])

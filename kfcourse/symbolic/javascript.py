@@ -77,10 +77,8 @@ def expression(e: sp.Basic, names: Mapping[sp.Basic, str]) -> str:
             return names[e]
         if e in _CONSTANTS:
             return _CONSTANTS[e]
-        if isinstance(e, sp.Rational):
+        if isinstance(e, sp.Rational | sp.Float):
             return float_text(e) if e >= 0 else f"({float_text(e)})"
-        if isinstance(e, sp.Float):
-            return repr(float(e)) if e >= 0 else f"({float(e)!r})"
         if isinstance(e, sp.Add):
             return "(" + " + ".join(map(text, e.args)) + ")"
         if isinstance(e, sp.Mul):

@@ -353,6 +353,14 @@ def _expanded(matrix: sp.ImmutableMatrix, **hints: bool) -> sp.ImmutableMatrix:
     return matrix.applyfunc(partial(sp.expand, **hints))
 
 
+def expect_each(structures: Sequence[Structure], what: str) -> None:
+    """TypeError unless these are structural functions, a list of them."""
+    if isinstance(structures, Structure):
+        raise TypeError(f"{what} expects a list of structures, one a mode, and one came: give [{structures.name}, ...]")
+    for one in structures:
+        expect(one, Structure, what)
+
+
 def moving_alike(structures: Sequence[Structure]) -> list[int]:
     """For each mode the first one with the same tau and Theta: of meters that fail, say, there is one object."""
     keys = [_object(one) for one in structures]

@@ -410,3 +410,9 @@ def test_the_ensemble_is_drawn_on_the_circle():
     for block in ensemble.by_step():
         for instant in block:
             assert np.abs(instant.x[:, 0]).max() <= PI and np.abs(instant.x_next[:, 0]).max() <= PI
+
+
+def test_whole_numbers_are_not_cut_off():
+    np.testing.assert_allclose(on_circle(np.array([4, 1]), (0,)), [4 - 2 * np.pi, 1], rtol=1e-15)
+    np.testing.assert_allclose(difference(np.array([4]), np.array([0]), (0,)), [4 - 2 * np.pi], rtol=1e-15)
+    assert on_circle(np.array([4, 1], dtype=np.float32), (0,)).dtype == np.float32

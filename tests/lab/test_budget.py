@@ -45,6 +45,8 @@ MODES = ("aof-jump-linearised", "imm", "gpb2", "fos-jump-linearised", "duof")
     [
         ("D2", LAB, 42 * 4),  # n = 2
         ("D3", ("aof-linearised", "duof", "fos-linearised"), (1 + 8 + 8) * 9),
+        ("53", ("aof-unscented",), 1 + 5),  # two points an axis, of state and noise, and their mean
+        ("D2", ("aof-unscented", "aof-gauss-hermite"), 4 + 2 * (2 * (2 + 2) + 1) + 4 + 2 * 5**2),
         ("J1", MODES, 2 + 2 + 4 + 2 * 8 + 8),  # two modes, four pairs; DUOF knows of none
         ("J1-overload", ("imm",), 2 * (1 + 32)),  # transitions of the state by 32 points
     ],

@@ -276,3 +276,13 @@ def test_a_maximum_beside_a_jump_of_the_gate_is_found(place, call):
         return re.search(r"^r = .*$", output, re.M)[0]
 
     assert r(result.output) == r(told.output)
+
+
+def test_names_that_are_none_are_told(place):
+    variant = model_of(place / "my.toml", "line")
+    with pytest.raises(ValueError, match=r"structure must be one of linearised, gaussian, .*, got 'extended'"):
+        estimate_record(place / "line.csv", variant, structure="extended")
+    told = estimate_record(place / "line.csv", variant)
+    with pytest.raises(ValueError, match=r"two components of the state, x.*; got \('x', 'z'\)"):
+        own_data.write_record(told, place / "out", ("x", "z"))
+    assert not (place / "out").exists()

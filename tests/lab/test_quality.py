@@ -175,6 +175,7 @@ def test_growth_is_that_of_the_second_moment():
     assert bounded(x).value == pytest.approx(1.1 ** (2 * 25), rel=1e-12)  # maxima at the steps 50 and 25
     assert not bounded(x).ok
     assert bounded(x[::-1]).ok
+    assert bounded(x[:1]).ok  # one step does not grow
     assert bounded(np.concatenate([x[::-1], x], axis=2)).value == pytest.approx(1.1**50, rel=1e-12)  # the worst component
 
 

@@ -11,7 +11,7 @@ from kfcourse.checks.posing import unposed
 from kfcourse.filters import Design, Filter
 from kfcourse.lab import variants as of_variants
 from kfcourse.lab.short_names import FILTERS, LAB, has_exact, title
-from kfcourse.lab.variants import VariantError, VariantWarning, chosen_variants, find_variant
+from kfcourse.lab.variants import VariantError, VariantWarning, chosen_variants, find_variant, read_variants
 
 pytestmark = pytest.mark.quick
 
@@ -292,6 +292,15 @@ def test_a_missing_file_and_a_folder_are_refused_by_name(tmp_path):
         load_variants(tmp_path / "nothing.toml")
     with pytest.raises(VariantError, match=f"{tmp_path}.*cannot be read"):
         load_variants(tmp_path)
+
+
+def test_models_that_all_jump_are_no_empty_list(tmp_path):
+    path = tmp_path / "mine.toml"
+    modes = "[variants.a.modes.one.parameters]\nC = 1\n[variants.a.modes.two.parameters]\nC = 2\n"
+    path.write_text('[variants.a]\nstate = "0.9*x + v"\nmeter = "x + C*w"\ntransition = [0.5, 0.5]\n' + modes, encoding="utf-8")
+    with pytest.raises(VariantError, match=r"has no other variants than those that jump .*`read_variants` reads them"):
+        load_variants(path)
+    assert [*read_variants(path)[0]] == ["a"]
 
 
 def test_time_inputs_and_angles_are_read_and_the_exercises_say_what_they_cannot_ask_about(tmp_path):

@@ -20,7 +20,7 @@ from kfcourse.montecarlo.ensemble import BLOCK, Ensemble
 from kfcourse.montecarlo.exceptional import how_many
 from kfcourse.montecarlo.experiment import compare, run
 from kfcourse.montecarlo.slow_filters import BATCH
-from kfcourse.montecarlo.statistics import Sums, batch_mean
+from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean
 from kfcourse.scenarios.benchmarks import growth_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import gaussian, linearised
@@ -596,3 +596,24 @@ def test_a_printed_comparison_is_short_and_says_what_to_ask(variant53):
     without = replace(found, slow_part=None, left_out={"aof-exact": "too slow"})
     assert str(without).splitlines()[1] == "left out: aof-exact, too slow"
     assert str(replace(without, runs=10_000, seed=10_000)).splitlines()[0].endswith("10,000 trajectories, seed 10000")
+
+
+def test_without_a_standard_error_nothing_is_significant():
+    nan = np.full(3, np.nan)
+    assert np.isnan(Estimate(np.array([np.nan, 1.0, 0.0]), nan, 5).p_value()).all()
+    np.testing.assert_array_equal(Estimate(np.array([1.0, 0.0]), np.zeros(2), 5).p_value(), [0.0, 1.0])
+    model = Model.define("0.9*x + 0.3*v", "x + 0.2*x**2 + 0.4*w")
+    alone = compare([aof(gaussian(model)), aof(linearised(model))], model, 1, 3, seed=1, progress=False)
+    assert not any(verdict.worst for verdict in alone.verdicts())
+
+
+def test_means_over_no_steps():
+    model = Model.define("0.9*x + 0.3*v", "x + 0.2*x**2 + 0.4*w")
+    result = compare([aof(gaussian(model)), aof(linearised(model))], model, 256, 4, seed=1, progress=False)
+    for ask in (result.ranking, lambda steps: result.score("aof-linearised", steps)):
+        with pytest.raises(ValueError, match="none of the 4 steps"):
+            ask(slice(4, None))
+    object.__setattr__(result, "doubtful", np.array([True, True, False, False]))
+    assert np.isnan(result.mean_gap("aof-linearised", slice(2)).value)
+    assert np.isnan(result.mean_gap("aof-linearised", slice(2)).standard_error)
+    assert result.mean_gap("aof-linearised", slice(3)).value == result.gap("aof-linearised").value[2]

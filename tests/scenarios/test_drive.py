@@ -50,3 +50,9 @@ def test_the_angle_turned_is_the_course_s_difference():
     assert np.diff(turned(np.array([10.0, 10.02]))) == pytest.approx(
         0.02 * record.yaw_rate[np.searchsorted(record.times, 10.0) - 1], rel=0.5
     )
+
+
+def test_beyond_the_record():
+    assert turned(np.array([-1.0]))[0] == 0 and turned(np.array([217.0])) == turned(np.array([recorded().times[-1]]))
+    with pytest.raises(ValueError, match="every must be a positive whole number"):
+        fixes(0)

@@ -293,3 +293,23 @@ def test_standard_errors_are_the_scatter_of_repeated_experiments():
         assert (np.abs(claimed / scatter - 1) < 4 / np.sqrt(2 * repeats) + 1 / runs).all()
     assert np.mean([one.value for one in paired]) < 0
     assert rms_difference(common[:, 0], common[:, 0], part).standard_error == pytest.approx([0, 0], abs=1e-15)
+
+
+def test_no_errors_have_no_standard_error():
+    error, part = np.random.default_rng(1).normal(size=(4, 3, 2)), np.array([1, 1, 2, 2])
+    none = rms_by_part(0 * error, part)
+    assert not none.value.any() and not none.standard_error.any()
+    difference, alone = rms_difference(error, 0 * error, part), rms_by_part(error, part)
+    np.testing.assert_array_equal(difference.value, alone.value)
+    np.testing.assert_array_equal(difference.standard_error, alone.standard_error)
+    with pytest.raises(ValueError, match="of the same runs, got 3 and 2"):
+        rms_difference(error, error[:, :2], part)
+
+
+def test_a_position_has_three_components():
+    assert spherical([3, 4, 0])[0] == 5
+    with pytest.raises(ValueError, match="a range is in m and angles in rad"):
+        measure_spherical(aircraft(100.0), 5.0, 1, seed=1)
+    for function in (spherical, cartesian):
+        with pytest.raises(ValueError, match=r"three components, \(..., 3\); got the shape \(2, 4\)"):
+            function(np.ones((2, 4)))

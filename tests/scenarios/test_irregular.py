@@ -47,3 +47,19 @@ def test_a_seed_stands_for_one_track():
     first, again, other = irregular_track(3, steps=9), irregular_track(3, steps=9), irregular_track(4, steps=9)
     np.testing.assert_array_equal(first.y, again.y)
     assert not np.array_equal(first.time, other.time)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"missing": 15}, "missing is a share of the fixes"),
+        ({"outliers": -0.1}, "outliers is a share of the fixes"),
+        ({"missing": np.nan}, "missing is a share of the fixes"),
+        ({"times": 0}, "times must be a positive number"),
+        ({"steps": 0}, "steps must be a positive whole number"),
+        ({"runs": 1.5}, "runs must be a positive whole number"),
+    ],
+)
+def test_what_no_track_is_made_of(given, message):
+    with pytest.raises(ValueError, match=message):
+        irregular_track(1, **given)

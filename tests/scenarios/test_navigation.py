@@ -565,7 +565,15 @@ GOOD = Observation("fast", 1.0, 1.1, np.zeros((3, 1)))
         ({"times": [0.5], "start": 1.0}, "wanted at t = 0.5 s, before the prior's 1 s"),
         ({"by": "tags"}, 'by "tag" or by "arrival", not by \'tags\''),
         ({"sensors": [two_sensors()[0]] * 2}, "a name of its own"),
-        ({"prior": Gaussian(np.zeros(3), np.eye(3))}, "got (3,) and (3, 3)"),
+        ({"prior": Gaussian(np.zeros(3), np.eye(3))}, "prior's mean must have the shape (2,) or (1, 2), got (3,)"),
+        ({"prior": Gaussian(np.zeros(2), -np.eye(2))}, "prior's variances must not be negative"),
+        (
+            {"sensors": [Sensor.define("short", ["s"], "s + w", 1.0)]},
+            "short was defined with 1 state component(s)",
+        ),
+        ({"observations": [GOOD._replace(value=[0.0])]}, "must have the shape (runs, 1), got (1,)"),
+        ({"depth": np.nan}, "expected a number not below 0, got nan"),
+        ({"depth": -1.0}, "expected a number not below 0, got -1.0"),
         ({"prior": Gaussian(np.zeros(2), np.diag([1.0, np.inf]))}, "the prior must be finite"),
         ({"dynamics": DRIVEN}, "have 1 known input(s); give them"),
         ({"inputs": inputs_until(3.0, 0.1)}, "inputs must have the shape (31, runs or 1, 0), got (31, 1, 1)"),
@@ -711,3 +719,41 @@ def test_a_motion_must_know_its_interval():
         Motion(linearised(Model.define("x + k*dt*v", "x + w", inputs={"dt": [1]})))
     with pytest.raises(NoClosedForm):
         Motion(unscented(Model.define("x + dt*v", "x + w", inputs={"dt": [1]})))
+
+
+@pytest.mark.parametrize(
+    ("times", "readings"), [([0, 1, 2], [9, 7, 5]), ([1, 1, 1], [1, 2, 3]), ([1, np.nan, 3], [1, 2, 3]), ([1], [1])]
+)
+def test_no_clock_runs_backwards(times, readings):
+    with pytest.raises(ValueError, match="readings"):
+        Clock.fit(times, readings)
+
+
+@pytest.mark.parametrize("duration", [-1.0, np.nan, np.inf])
+def test_captures_of_no_duration(duration):
+    with pytest.raises(ValueError, match="a duration is a finite number of seconds"):
+        two_sensors()[0].captures(duration)
+
+
+def test_what_paths_are_not_sampled_from():
+    driven = Inputs(np.array([0.0]), np.zeros((1, 3, 1)))
+    for dynamics, prior, runs, inputs, message in (
+        (FREE, Gaussian(np.zeros(1), np.eye(2)), 2, None, "prior's mean must have the shape"),
+        (FREE, Gaussian(np.zeros(2), -np.eye(2)), 2, None, "variances must not be negative"),
+        (FREE, Gaussian(np.full(2, np.nan), np.eye(2)), 2, None, "prior must be finite"),
+        (FREE, PRIOR, 0, None, "runs must be a positive whole number"),
+        (DRIVEN, PRIOR, 2, driven, "the inputs are those of 3 runs, and 2 are sampled"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            sample(dynamics, prior, [0.0, 1.0], runs, 1, inputs)
+
+
+def test_a_motion_is_made_of_a_structure_and_its_inputs_have_times():
+    model = Model.define("x + dt*u + sqrt(dt)*v", "x + w", inputs={"dt": [1], "u": [0]})
+    with pytest.raises(TypeError, match="Motion expects a Structure, and a Model came"):
+        Motion(model)
+    with pytest.raises(TypeError, match="fuse expects a Dynamics, and a Model came"):
+        fuse(model, [], PRIOR, [], [1.0])
+    for inputs in (Inputs(np.zeros(0), np.zeros((0, 1, 1))), Inputs(np.zeros((1, 1)), np.zeros((1, 1, 1)))):
+        with pytest.raises(ValueError, match="times and values of the inputs have the shapes"):
+            fuse(Motion(gaussian(model)), [], Gaussian(np.zeros(1), np.eye(1)), [], [1.0], inputs=inputs)

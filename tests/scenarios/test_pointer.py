@@ -259,9 +259,12 @@ def test_arguments_that_do_not_fit():
         (lambda: follow(system, missing, 0.1), "wait for three complete samples"),
         (lambda: follow(system, y[:3], 0.1), "ready after three samples"),
         (lambda: acceleration_from(y[:2], 0.1), "takes three samples"),
-        (lambda: hand_track(1, strokes=0), "at least one stroke"),
+        (lambda: hand_track(1, strokes=0), "strokes must be a positive whole number"),
         (lambda: hand_track(1, screen=(100.0, 500.0)), "at least 100 px long"),
         (lambda: sample(hand_track(1), 0.1, -1.0, 1, 0), "measurement_sd is a standard deviation"),
+        (lambda: sample(hand_track(1), 0.1, 1.0, 0, 0), "runs must be a positive whole number"),
+        (lambda: follow(system, y, 0.2), "made for an interval of 0.1 s, and the samples have 0.2 s"),
+        (lambda: start_up(y[:3], 0.1, np.eye(3)), r"\(2, 2\); got the shape \(3, 3\)"),
     ):
         with pytest.raises(ValueError, match=message):
             call()

@@ -9,7 +9,9 @@ import sympy as sp
 from kfcourse.lab.variants import find_variant
 from kfcourse.symbolic import codegen
 from kfcourse.symbolic.codegen import compile_function, lower
+from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import gaussian, linearised
 
 pytestmark = pytest.mark.quick
@@ -172,3 +174,30 @@ def test_no_symbol_can_hide_another(name, ensemble):
     )[0]
     first, second = ensemble[0].T
     np.testing.assert_allclose(found[:, 0], first**2 + np.sin(first) + second, rtol=1e-14, atol=1e-14)
+
+
+def compiled(*expressions):
+    x, y = symbol("x"), symbol("y")
+    return compile_function("f", {"x": sp.Matrix([x, y])}, {"o": sp.Matrix(expressions)}, ["x", "o"])
+
+
+def test_largest_and_smallest_of_many():
+    x, y = symbol("x"), symbol("y")
+    points = np.array([[1.0, 2.0], [-3.0, 0.5], [7.0, -8.0]])
+    found = compiled(sp.Max(x, y, 1, x * y), sp.Min(x, y, 1, x * y)).function(points)[0]
+    each = [[a, b, 1, a * b] for a, b in points]
+    np.testing.assert_array_equal(found, [[max(one), min(one)] for one in each])
+
+
+@pytest.mark.parametrize(
+    ("expression", "message"),
+    [
+        (sp.erf(symbol("x")), "f: erf is no function of NumPy"),  # of one number Python has it
+        (sp.loggamma(symbol("x")), "f: lgamma is no function of NumPy"),
+        (symbol("x") * symbol("q"), "the symbol q is neither an argument nor defined"),
+        (symbol("x") * sp.Float("1e400"), "beyond what a float can be"),
+    ],
+)
+def test_what_cannot_be_compiled_is_told(expression, message):
+    with pytest.raises(ModelError, match=message):
+        compiled(expression, 1)

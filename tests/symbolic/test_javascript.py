@@ -48,6 +48,7 @@ def test_entries_of_vectors_and_what_is_written_in_place():
         (sp.I * x, "ImaginaryUnit|no finite real value"),
         (sp.zoo * x, "no finite real value"),
         (x * sp.Rational(10) ** 400, "beyond what a float can be"),
+        (x * sp.Float("-1e400"), "beyond what a float can be"),
         (sp.Piecewise((x, x > 0)), "Piecewise"),
     ],
 )

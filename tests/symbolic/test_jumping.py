@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from kfcourse import JumpModel, Model, ModelError, simulate
-from kfcourse.symbolic.averaging import averaged_equations
+from kfcourse import JumpModel, Model, ModelError, linearised, simulate
+from kfcourse.symbolic.averaging import averaged, averaged_equations
 from kfcourse.symbolic.jumping import model_of_table
 
 pytestmark = pytest.mark.quick
@@ -179,3 +179,19 @@ def test_tables():
             model_of_table(plain | change)
     with pytest.raises(ModelError, match="no meter"):
         model_of_table({"state": "x + v", "modes": {"a": {}}, "transition": [1]})
+
+
+def test_what_has_no_average_over_the_modes():
+    model, circular = define(), define(angles=["x"])
+    structures = [linearised(mode) for mode in model.modes]
+    for average in (averaged_equations, lambda given: averaged(given, structures)):
+        with pytest.raises(ModelError, match="components that are angles have no average"):
+            average(circular)
+        with pytest.raises(TypeError, match="expects a JumpModel"):
+            average(model.modes[0])
+    with pytest.raises(ValueError, match="a structure for each of the 2 modes, got 1"):
+        averaged(model, structures[:1])
+    with pytest.raises(TypeError, match="list of structures, one a mode, and one came"):
+        averaged(model, structures[0])
+    with pytest.raises(TypeError, match="averaged expects a Structure, and a Model came"):
+        averaged(model, model.modes)

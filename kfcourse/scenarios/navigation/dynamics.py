@@ -19,7 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.kinds import expect_sizes
 from kfcourse.laws import Array, Gaussian, apply, square_root, symmetric
+from kfcourse.linear.runs import check_prior
+from kfcourse.seeds import Seed, generator
 
 ROUNDING = 1e-9  # s (or periods): moments that differ by less are the same but for rounding; float64 holds days to 1e-11 s
 TERMS = 20  # of the series: term k is below 1 / (k+1)! relative to the first, the next one left out 2e-20
@@ -210,16 +213,14 @@ def _check_inputs(dynamics: Dynamics, times: Array, values: Array) -> None:
         raise ValueError("inputs must be finite: fill a gap of the fast sensor by what it would have said, and enlarge Qc")
 
 
-def sample(
-    dynamics: Dynamics, prior: Gaussian, times: Array, runs: int, seed: int | np.random.Generator, inputs: Inputs | None = None
-) -> Path:
+def sample(dynamics: Dynamics, prior: Gaussian, times: Array, runs: int, seed: Seed, inputs: Inputs | None = None) -> Path:
     """True paths of the dynamics, exact at the given times.
 
     Parameters
     ----------
     dynamics : Dynamics
     prior : Gaussian
-        Law of the state at times[0]: (n,), (n, n).
+        Law of the state at times[0]: mean (n,) or (runs, n), covariance (n, n).
     times : ndarray (s,)
         Ascending, in seconds: all moments at which the path will be needed.
     runs : int
@@ -230,12 +231,21 @@ def sample(
     -------
     Path
         times (s,) and states (s, runs, n).
+
+    Raises
+    ------
+    ValueError
+        Times not ascending, a prior or inputs that do not fit.
     """
     times = np.asarray(times, dtype=float)
     if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
         raise ValueError("times must be a finite ascending vector; np.unique sorts and removes what is twice")
-    rng, n = np.random.default_rng(seed), len(dynamics.A)
+    expect_sizes(runs=runs)
+    rng, n = generator(seed), len(dynamics.A)
+    check_prior(prior, runs, n)
     over, move = motion(dynamics, inputs)
+    if inputs is not None and (given := np.shape(inputs.values)[1]) not in (1, runs):
+        raise ValueError(f"the inputs are those of {given} runs, and {runs} are sampled: give one run's, for all, or as many")
     states = np.empty((len(times), runs, n))
     states[0] = prior.mean + rng.standard_normal((runs, n)) @ square_root(np.asarray(prior.cov)).T
     for k in range(1, len(times)):

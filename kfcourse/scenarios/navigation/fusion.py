@@ -21,7 +21,9 @@ from typing import NamedTuple
 import numpy as np
 
 from kfcourse.angles import Components, on_circle
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, Measurement, correct, stacked
+from kfcourse.linear.runs import check_prior
 from kfcourse.scenarios.navigation.dynamics import ROUNDING, Dynamics, Inputs, Predictor, predictor
 from kfcourse.scenarios.navigation.nonlinear import Motion
 from kfcourse.scenarios.navigation.sensors import Observation, Sensor, by_name
@@ -114,8 +116,8 @@ def fuse(
     Raises
     ------
     ValueError
-        Sensors not known, moments not finite, before `start`, or after the arrival; a measurement older than `depth`;
-        shapes that do not fit.
+        Sensors not known or of another state, moments not finite, before `start`, or after the arrival; a measurement older
+        than `depth`; a prior with a negative variance; shapes that do not fit.
     """
     return _run(dynamics, sensors, prior, observations, times, inputs, by, depth, start, lambda past: None)
 
@@ -158,12 +160,19 @@ def _run(
     keep: Callable[[Past], None],
 ) -> Gaussian:
     """The estimates; `keep` hears of all that is forgotten, in the order of its moments, and of what is left in the end."""
-    events = sorted(_events(sensors, observations, by, start), key=lambda event: event.arrival)
-    depth = _checked_depth(events, depth)
+    expect(dynamics, Dynamics, "fuse", Motion)
     if isinstance(dynamics, Motion):
         predict, n, angles = dynamics.predictor(inputs), dynamics.n, dynamics.structure.model.angles.x
     else:
         predict, n, angles = predictor(dynamics, inputs), len(dynamics.A), ()
+    for sensor in sensors:
+        if sensor.model.n != n:
+            raise ValueError(
+                f"{sensor.name} was defined with {sensor.model.n} state component(s), and the motion has {n}: "
+                "Sensor.define takes the names of all, in the order of the motion"
+            )
+    events = sorted(_events(sensors, observations, by, start), key=lambda event: event.arrival)
+    depth = _checked_depth(events, depth)
     history = [Past(start, None, _checked_prior(prior, n, events, inputs))]
     laws, taken = [], 0
     for now in _checked_times(times, start):
@@ -212,8 +221,8 @@ def _events(sensors: Sequence[Sensor], observations: Sequence[Observation], by: 
             raise ValueError(
                 f"{name}: tag and arrival must be finite, got {tag} and {arrival}; drop what cannot be placed in time"
             )
-        if value.ndim != 2 or value.shape[1] != sensor.model.p:
-            raise ValueError(f"{name}: a measurement must have the shape (runs, {sensor.model.p}), got {value.shape}")
+        if np.ndim(value) != 2 or np.shape(value)[1] != sensor.model.p:
+            raise ValueError(f"{name}: a measurement must have the shape (runs, {sensor.model.p}), got {np.shape(value)}")
         if np.isinf(value).any():
             raise ValueError(f"{name}: a measurement must be finite, or NaN where it is missing")
         time = sensor.clock.time(tag) if by == "tag" else arrival
@@ -226,12 +235,14 @@ def _events(sensors: Sequence[Sensor], observations: Sequence[Observation], by: 
             raise ValueError(
                 f"{name}: captured at t = {time:g} s, before the prior's {start:g} s; leave it out, or start earlier"
             )
-        events.append(Event(time, arrival, sensor, value))
+        events.append(Event(time, arrival, sensor, np.asarray(value, dtype=float)))
     return events
 
 
 def _checked_depth(events: Sequence[Event], depth: float | None) -> float:
     """Seconds that the filter must remember."""
+    if depth is not None and not depth >= 0:
+        raise ValueError(f"depth is how many seconds back the filter remembers: expected a number not below 0, got {depth}")
     if not events:
         return 0.0
     latest = max(events, key=lambda event: event.arrival - event.time)
@@ -261,11 +272,5 @@ def _checked_prior(prior: Gaussian, n: int, events: Sequence[Event], inputs: Inp
     if len(sizes - {1}) > 1:
         raise ValueError(f"measurements, inputs and prior are of different numbers of runs: {sorted(sizes - {1})}")
     runs = max(sizes)
-    if mean.shape not in ((n,), (1, n), (runs, n)) or cov.shape not in ((n, n), (1, n, n), (runs, n, n)):
-        raise ValueError(
-            f"the prior must have a mean ({n},) or ({runs}, {n}) and a covariance ({n}, {n}) or ({runs}, {n}, {n}), "
-            f"got {mean.shape} and {cov.shape}"
-        )
-    if not (np.isfinite(mean).all() and np.isfinite(cov).all()):
-        raise ValueError("the prior must be finite: for an unknown state give a large variance")
+    check_prior(prior, runs, n)
     return Gaussian(np.broadcast_to(mean, (runs, n)), cov)

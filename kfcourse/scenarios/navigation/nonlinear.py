@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from kfcourse.angles import on_circle
+from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian
 from kfcourse.scenarios.navigation.dynamics import Inputs, Predictor
 from kfcourse.symbolic.reading import ModelError
@@ -42,6 +43,7 @@ class Motion:
     structure: Structure
 
     def __post_init__(self) -> None:
+        expect(self.structure, Structure, "Motion")
         self.structure["tau"]  # NoClosedForm if there are none
         names = {symbol.name for symbol in self.structure.model.known.symbols}
         if INTERVAL not in names or "k" in names - set(self.structure.model.known.inputs):
@@ -94,8 +96,9 @@ class Motion:
         if inputs is None:
             raise ValueError(f"the motion has the known inputs {', '.join(driven)}; give them: inputs=Inputs(times, values)")
         times, values = np.asarray(inputs.times, dtype=float), np.asarray(inputs.values, dtype=float)
-        if values.shape != (len(times), 1, len(driven)):
-            raise ValueError(f"inputs must have the shape ({len(times)}, 1, {len(driven)}), for {driven}; got {values.shape}")
+        if times.ndim != 1 or not len(times) or values.shape != (len(times), 1, len(driven)):
+            wanted = f"{times.shape} and {values.shape}, not (s,) and (s, 1, {len(driven)}), for {driven}"
+            raise ValueError(f"the times and values of the inputs have the shapes {wanted}")
         if not (np.isfinite(times).all() and np.isfinite(values).all() and (np.diff(times) > 0).all()):
             raise ValueError("inputs and their times must be finite, and the times ascending")
         return times, values

@@ -20,6 +20,7 @@ import numpy as np
 from kfcourse.angles import on_circle
 from kfcourse.laws import Array, Measurement, square_root
 from kfcourse.scenarios.navigation.dynamics import ROUNDING
+from kfcourse.seeds import Seed, generator
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import Formula, ModelError
@@ -50,7 +51,7 @@ class Clock(NamedTuple):
         Raises
         ------
         ValueError
-            Fewer than two different readings.
+            Fewer than two different readings, pairs that are not finite, readings that do not grow with the times.
         """
         times, readings = np.asarray(times, dtype=float), np.asarray(readings, dtype=float)
         if times.shape != readings.shape or times.ndim != 1 or len(np.unique(readings)) < 2:
@@ -60,6 +61,8 @@ class Clock(NamedTuple):
         # Around the means: readings such as seconds of the week are large beside their differences.
         deviation = readings - readings.mean()
         slope = deviation @ (times - times.mean()) / (deviation @ deviation)
+        if not slope > 0:
+            raise ValueError("the readings of a clock grow with the times, and both are finite: drop pairs where they do not")
         return cls(float(1 / slope), float(readings.mean() - times.mean() / slope))
 
 
@@ -169,7 +172,9 @@ class Sensor:
         return self.structure(self.model).measure
 
     def captures(self, duration: float) -> Array:
-        """Moments of capture from 0 to duration, in the filter's time (s,); ValueError without a period."""
+        """Moments of capture from 0 to duration, in the filter's time (s,); ValueError without a period, or for no duration."""
+        if not 0 <= duration < math.inf:
+            raise ValueError(f"a duration is a finite number of seconds, not below 0; got {duration}")
         if self.period is None:
             raise ValueError(
                 f"{self.name} has no period, as a recorded sensor: its observations have their moments; give one to simulate it"
@@ -204,9 +209,7 @@ class Observation(NamedTuple):
     value: Array
 
 
-def observe(
-    sensors: Sequence[Sensor], truth: Callable[[Array], Array], duration: float, seed: int | np.random.Generator
-) -> list[Observation]:
+def observe(sensors: Sequence[Sensor], truth: Callable[[Array], Array], duration: float, seed: Seed) -> list[Observation]:
     """What the sensors say of a motion, in the order of arrival.
 
     Parameters
@@ -232,7 +235,7 @@ def observe(
     """
     by_name(sensors)
     messages = []
-    for sensor, rng in zip(sensors, np.random.default_rng(seed).spawn(len(sensors)), strict=True):
+    for sensor, rng in zip(sensors, generator(seed).spawn(len(sensors)), strict=True):
         times, model = sensor.captures(duration), sensor.model
         x = np.asarray(truth(times))
         if x.ndim != 3 or len(x) != len(times) or x.shape[2] != model.n:
