@@ -83,8 +83,8 @@ def _information(
     model: Model, equation: sp.MatrixBase, noise: Sequence[sp.Symbol], law: Gaussian, what: str
 ) -> Callable[[Array, int], tuple[Array, Array, Array]]:
     """(x (runs, n), k) -> I (runs, n, n), m_x^T S^-1 (runs, n, r), S^-1 (runs, r, r) of what the equation makes of x."""
-    choices = equation.atoms(sp.Piecewise)
-    if equation.has(sp.sign, sp.Heaviside, sp.floor) or any(jumps(one, [*model.x, *noise]) for one in choices):
+    steps = [one for one in equation.atoms(sp.sign, sp.Heaviside, sp.floor) if one.has(*model.x, *noise)]
+    if steps or any(jumps(one, [*model.x, *noise]) for one in equation.atoms(sp.Piecewise)):
         raise ValueError(_infinite(what, "it jumps, and a jump has no slope: slopes elsewhere do not tell of it"))
     slopes = equation.jacobian(sp.Matrix(noise))
     if slopes.has(*noise):

@@ -86,6 +86,14 @@ def test_what_jumps_tells_more_than_its_slopes():
     assert kinked[0].item() == pytest.approx(0.5)
 
 
+def test_what_jumps_with_the_step_alone_is_known():
+    free, driven = (
+        posterior_bound(Model.define(f"0.9*x {known}+ v", "x + 2*w"), 10, 4, seed=1)
+        for known in ("", "+ Heaviside(k - 2) + sign(k - 1) + (3 if k > 2 else 1) ")
+    )
+    np.testing.assert_allclose(driven, free, rtol=1e-12)  # the same slopes and noises: by rounding only
+
+
 def test_an_infinite_mean_is_seen_in_several_dimensions_too():
     model = Model.define(["x1 + v1", "x2 + v2"], ["x1 + x2*w1", "x2 + w2"])
     with pytest.raises(ValueError, match=r"meter equation's information is infinite.* step 0 it hangs on one trajectory in 5000"):
