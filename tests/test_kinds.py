@@ -96,7 +96,7 @@ def test_a_model_without_modes_in_the_place_of_one_with_them_and_the_other_way_r
     for one, remedy in ((MODEL, "take the filter of a model without"), (FILTER, "give the model"), (STRUCTURE, "give the model")):
         with pytest.raises(TypeError, match=rf"^{build.__name__} expects a JumpModel, and .* came: {remedy}"):
             build(one)
-    with pytest.raises(TypeError, match=r"^particle expects a Model, and a JumpModel came: take one of its modes, .* jump_particle$"):
+    with pytest.raises(TypeError, match=r"^particle expects a Model, and a JumpModel came: take one of its modes, .* imm"):
         particle(JumpModel.define("x + v", "x + w", modes={"a": {}}, transition=[1.0]))
 
 
