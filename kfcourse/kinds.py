@@ -10,7 +10,7 @@ NEXT = {  # (what is expected, what came) to what to do
     ("Model", "Structure"): MAKE_MODEL,
     ("Model", "Filter"): MAKE_MODEL,
     ("Model", "Design"): MAKE_MODEL,
-    ("Model", "JumpModel"): "take one of its modes, it.modes[0], or a filter of several models, such as imm or jump_particle",
+    ("Model", "JumpModel"): "take one of its modes, it.modes[0], or a filter of several models, such as imm or particle",
     ("Model", "ContinuousModel"): "give a discrete one, kfcourse.continuous.to_discrete(it, step)",
     ("ContinuousModel", "Model"): "define it in continuous time, ContinuousModel.define(...)",
     ("JumpModel", "Model"): "take the filter of a model without modes, such as pointmass or particle",

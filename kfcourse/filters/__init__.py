@@ -38,7 +38,6 @@ from kfcourse.filters.heavy_tails import robust
 from kfcourse.filters.initial_states import undisturbed
 from kfcourse.filters.iterated_ekf import iterated
 from kfcourse.filters.jump_optimal import logic_dynamic_fbp, logic_dynamic_fkp, logic_dynamic_fos
-from kfcourse.filters.jump_particles import jump_particle
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.learnt_noise import adaptive
 from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
@@ -70,7 +69,6 @@ __all__ = [
     "gpb2",
     "imm",
     "iterated",
-    "jump_particle",
     "jump_pointmass",
     "kalman_filter",
     "latex",
