@@ -35,7 +35,6 @@ from kfcourse.montecarlo.statistics import Sums
 from kfcourse.montecarlo.two_phase import Replicas
 from kfcourse.montecarlo.widths import best_width
 from kfcourse.reasons import Reason
-from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.compiled import REMEDY, is_scalar
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -118,7 +117,7 @@ def compare(
     model: Model | JumpModel,
     runs: int,
     steps: int,
-    seed: Seed,
+    seed: int,
     *,
     design_runs: int | None = None,
     designs: int = 1,
@@ -142,7 +141,7 @@ def compare(
     model : Model
     runs, steps : int
         Trajectories, and measurements of each.
-    seed : int or numpy.random.Generator
+    seed : int
         The same seed gives the same numbers, bit by bit, whatever the number of threads.  Another NumPy or processor may do
         linear algebra by another kernel (BLAS): then vector models differ by rounding, up to some 1e-12, and scalar ones hardly.
     design_runs : int, optional
@@ -200,7 +199,7 @@ def compare(
         _check_arguments(smoothers, model, slow_runs, slow_seconds, slow_memory)
     if compiled:
         filters = _compiled(filters)
-    seed, threads = seed_number(seed), cores() if threads is None else threads
+    threads = cores() if threads is None else threads
     names = [one.name for one in filters]
     slow = [one for one in filters if one.slow and slow_runs]
     fast = [one for one in filters if not one.slow]

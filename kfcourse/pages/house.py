@@ -39,8 +39,6 @@ LAYERS = (
     "kinds",
     "reasons",
     "files",
-    "seeds",
-    "exports",
 )
 
 
