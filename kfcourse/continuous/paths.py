@@ -8,7 +8,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.continuous.model import ContinuousModel, check_step, compiled
-from kfcourse.kinds import expect, expect_sizes
+from kfcourse.errors import expect, expect_sizes
 from kfcourse.laws import Array, apply, square_root
 from kfcourse.montecarlo.designing import NotFinite
 

@@ -36,12 +36,12 @@ import numpy as np
 import scipy
 
 from kfcourse.angles import difference, on_circle
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
 from kfcourse.filters.particle_smoothing import weighted
 from kfcourse.filters.particles import Clouds, at_start, even, normalised, of_both, stream, systematic
 from kfcourse.filters.proposals import FREEDOM, PRIOR, WIDER
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, gain, square_root
 from kfcourse.symbolic.equations import compile_noiseless
 from kfcourse.symbolic.jumping import JumpModel

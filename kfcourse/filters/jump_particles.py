@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kfcourse.angles import on_circle
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
 from kfcourse.filters.particle_smoothing import weighted
@@ -34,7 +35,6 @@ from kfcourse.filters.particles import (
     where_measured,
 )
 from kfcourse.filters.proposals import Look, component
-from kfcourse.kinds import expect
 from kfcourse.laws import Array
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.jumping import JumpModel

@@ -21,11 +21,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kfcourse.angles import Components, difference, on_circle
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood, transition
 from kfcourse.filters.particle_smoothing import backwards, weighted
 from kfcourse.filters.proposals import Look
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model

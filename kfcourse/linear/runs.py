@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.kinds import expect_sizes
+from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array, Gaussian, apply, square_root, stacked
 from kfcourse.linear.arithmetic import form
 from kfcourse.linear.system import LinearSystem

@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import sympy as sp
 
-from kfcourse.kinds import expect
+from kfcourse.errors import expect
 from kfcourse.laws import Array, Gaussian, symmetric, transpose
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.symbolic.choices import jumps

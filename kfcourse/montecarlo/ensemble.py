@@ -21,7 +21,7 @@ import scipy
 import sympy as sp
 
 from kfcourse.angles import on_circle
-from kfcourse.kinds import expect, expect_sizes
+from kfcourse.errors import expect, expect_sizes
 from kfcourse.laws import Array, Gaussian, normalised_square, square_root
 from kfcourse.linear.runs import Trajectories
 from kfcourse.montecarlo.batches import STRATA

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
+from kfcourse.errors import Reason, expect, expect_sizes
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
 from kfcourse.filters.fused import Fused, fuse
-from kfcourse.kinds import expect, expect_sizes
 from kfcourse.laws import Array, Gaussian, stacked
 from kfcourse.montecarlo.batches import BATCHES, batch_sizes
 from kfcourse.montecarlo.blocks import progress_bar, run_block, run_stretches
@@ -34,7 +34,6 @@ from kfcourse.montecarlo.slow_filters import LEAST, run_slow_filters
 from kfcourse.montecarlo.statistics import Sums
 from kfcourse.montecarlo.two_phase import Replicas
 from kfcourse.montecarlo.widths import best_width
-from kfcourse.reasons import Reason
 from kfcourse.symbolic.compiled import REMEDY, is_scalar
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -228,7 +227,7 @@ def compare(
             everything, exceptional = _run_blocks(everyone, common, executor, progress, judged)
         sums, replicas = _split(everything, fast, len(others))
         chosen = Chosen.of(few, exceptional)
-        slow_part, left_out = None, dict[str, str]()
+        slow_part, left_out = None, dict[str, Reason]()
         if slow:
             slow_ready = _designed(slow, design_ensemble, pool, progress)
             slow_part, left_out = run_slow_filters(ready, slow_ready, common, chosen, sums.counts, *limits, progress, far=far)
@@ -241,7 +240,7 @@ def compare(
 
 
 def without_failing(
-    filters: Sequence[Filter | Design], *common: Any, left_out: Mapping[str, str] | None = None, **options: Any
+    filters: Sequence[Filter | Design], *common: Any, left_out: Mapping[str, Reason] | None = None, **options: Any
 ) -> Comparison:
     """`compare` of the filters that do not fail; the others are named in `left_out`, beside those given.
 
@@ -260,7 +259,7 @@ def without_failing(
             rest = [one for one in filters if one.name != error.filter_name]
             if not error.filter_name or not [one for one in rest if not one.slow]:
                 raise
-            filters, reasons[error.filter_name] = rest, Reason.of(error)
+            filters, reasons[error.filter_name] = rest, error.with_traceback(None)
         else:
             return replace(found, left_out={**reasons, **found.left_out})
 
@@ -279,7 +278,7 @@ def _smoothing(
     few = len(chosen.places)
     slow, fast = ([one for one in smoothers if one.slow == which and (few or not one.slow)] for which in (True, False))
     sums, _ = _run_blocks(fast, common, far.executor if far else pool, progress, (0, 0), back=True)
-    slow_part, left_out = None, dict[str, str]()
+    slow_part, left_out = None, dict[str, Reason]()
     if slow:
         given = fast, slow, common, chosen, sums.counts
         slow_part, left_out = run_slow_filters(*given, *limits, progress, back=True, far=far)

@@ -36,8 +36,7 @@ LAYERS = (
     "laws",
     "angles",
     "limits",
-    "kinds",
-    "reasons",
+    "errors",
     "files",
 )
 

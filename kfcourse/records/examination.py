@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, structure_of
-from kfcourse.kinds import expect
 from kfcourse.laws import CONFIDENCE, Array, Gaussian, normalised_square, stacked, without_missing
 from kfcourse.linear.consistency import Innovations
 from kfcourse.montecarlo.experiment import states

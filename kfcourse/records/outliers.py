@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter
-from kfcourse.kinds import expect
 from kfcourse.laws import Array
 from kfcourse.montecarlo.experiment import states
 

@@ -19,7 +19,7 @@ from importlib import resources
 
 import numpy as np
 
-from kfcourse.kinds import expect_sizes
+from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.symbolic.model import Model

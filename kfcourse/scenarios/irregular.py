@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.kinds import expect_sizes
+from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.symbolic.model import Model

@@ -26,7 +26,7 @@ import numpy as np
 import sympy as sp
 from numpy.polynomial import Polynomial
 
-from kfcourse.kinds import expect_sizes
+from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.arithmetic import predict_law
 from kfcourse.linear.runs import Run, run

@@ -8,7 +8,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import on_circle
-from kfcourse.kinds import expect_sizes
+from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array
 from kfcourse.scenarios.flight import Track
 from kfcourse.symbolic.codegen import compile_function

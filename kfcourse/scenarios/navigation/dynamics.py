@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.kinds import expect_sizes
+from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array, Gaussian, apply, square_root, symmetric
 from kfcourse.linear.runs import check_prior
 
