@@ -40,7 +40,7 @@ from kfcourse.filters import (
     robust,
     undisturbed,
 )
-from kfcourse.records import estimate, examine, likelihood_error, profile, smooth_iterated, smoothing_error, weights
+from kfcourse.records import estimate, examine, profile, smooth_iterated, smoothing_error, weights
 
 MODEL = Model.define("0.9*x + a*v", "x + w", {"a": 1.0})
 STRUCTURE = linearised(MODEL)
@@ -54,7 +54,7 @@ OF_STRUCTURES = {
 OF_FILTERS = {
     "gated": gated, "a run": lambda one: run(one, Y), "smooth": lambda one: smooth(one, Y),
     "likelihood": lambda one: likelihood(one, Y), "examine": lambda one: examine(one, Y), "weights": lambda one: weights(one, Y),
-    "smoothing_error": lambda one: smoothing_error(one, Y), "likelihood_error": lambda one: likelihood_error(one, Y),
+    "smoothing_error": lambda one: smoothing_error(one, Y),
     "smoothers=": lambda one: compare([FILTER], MODEL, 10, 2, 1, smoothers=[one]),
 }  # fmt: skip
 OF_MODELS = {

@@ -14,7 +14,7 @@ from itertools import islice
 import numpy as np
 
 from kfcourse.filters.base import Filter, State, structure_of
-from kfcourse.laws import Array, product, transpose
+from kfcourse.laws import Array, Gaussian, product, transpose
 from kfcourse.linear.smoothing import Backward, check_lag, look_back
 from kfcourse.symbolic.structure import Structure
 
@@ -28,10 +28,13 @@ def looked_back(one: Filter, states: Iterable[State], y: Array, lag: int | None 
     ValueError for a filter that has no way to look back, or a lag that is none.
     """
     if one.look_back is None:
-        structure, visited = structure_of(one, "looking back"), list(states)
-        back = [_backward(structure, state) for state in visited[:-1]]
-        laws = look_back(back, [state.posterior for state in visited], lag, one.model.angles.x)
-        return [State(k, law, law) for k, law in enumerate(laws, start=1)]
+        structure, back, laws = structure_of(one, "looking back"), list[Backward](), list[Gaussian]()
+        before: State | None = None
+        for state in states:
+            back += [] if before is None else [_backward(structure, before)]
+            laws.append(state.posterior)
+            before = state
+        return [State(k, law, law) for k, law in enumerate(look_back(back, laws, lag, one.model.angles.x), start=1)]
     check_lag(lag)
     back_to, reach = one.look_back(states, y), len(y) if lag is None else min(lag + 1, len(y))
     early = [deque(islice(back_to(end), reach), maxlen=1)[0] for end in range(reach, len(y))]
