@@ -36,12 +36,11 @@ import numpy as np
 import scipy
 
 from kfcourse.angles import Components, difference, on_circle
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
 from kfcourse.filters.particles import FREEDOM, PRIOR, WIDER, weighted
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, gain, square_root
-from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_noiseless
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -188,7 +187,7 @@ def _without_noise(model: Model) -> bool:
     return bool((B * exact_matrix(model.state_noise.cov)).is_zero_matrix)
 
 
-def undisturbed(model: Model | JumpModel, particles: int = 256, seed: Seed = 0, name: str = "particle") -> Filter:
+def undisturbed(model: Model | JumpModel, particles: int = 256, seed: int = 0, name: str = "particle") -> Filter:
     """The exact filter of an object without noise, by importance sampling of its initial state.
 
     Parameters
@@ -217,14 +216,14 @@ def undisturbed(model: Model | JumpModel, particles: int = 256, seed: Seed = 0, 
     if not is_undisturbed(model):
         raise ModelError(
             f"{model}: here the initial state must tell all that follows, without a noise in the object, and with one object in "
-            "all modes; take particle(model), or jump_particle(model) of one with modes"
+            "all modes; take particle(model)"
         )
     modes = model.modes if isinstance(model, JumpModel) else (model,)
     likelihoods, (move, _) = [likelihood(one) for one in modes], compile_noiseless(modes[0])
     meters, tangents = [compile_noiseless(one)[1] for one in modes], _tangents(modes)
     chain = model if isinstance(model, JumpModel) else None
     first_law = np.ones(1) if chain is None else chain.first
-    prior, angles, number = model.prior, modes[0].angles.x, seed_number(seed)
+    prior, angles, number = model.prior, modes[0].angles.x, seed
     root, r, size = square_root(prior.cov), modes[0].n, particles // 2
     gaussian_init = initial_state(modes[0])
 

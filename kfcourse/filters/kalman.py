@@ -11,8 +11,8 @@ the step, and the forms that stand it better, is in `kfcourse.linear.arithmetic`
 from __future__ import annotations
 
 from kfcourse.angles import near
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.kinds import expect
 from kfcourse.laws import Gaussian, Vectors, any_missing, apply, regression, transpose, without_missing
 from kfcourse.linear.system import LinearSystem, linear_systems
 from kfcourse.symbolic.model import Model

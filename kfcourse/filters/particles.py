@@ -37,9 +37,9 @@ import numpy as np
 from scipy.special import gammaln
 
 from kfcourse.angles import Components, difference, moments_on_circle, near, on_circle
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood, transition
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, log_density, square_root, transpose
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.jumping import JumpModel
