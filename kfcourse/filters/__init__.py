@@ -14,8 +14,8 @@ gate, heavy_tails       measurements that are not believed: refused, by any filt
 learnt_noise            a noise of unknown size, learnt on the way
 alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
-                        (jump_equations: as printed;  state_transitions: by the state;  jump_optimal: FOS, FKP, FBP with
-                        modes;  exact.jumps: the exact filter of state and mode)
+                        (jump_equations: as printed;  jump_optimal: FOS, FKP, FBP with modes;
+                         exact.jumps: the exact filter of state and mode)
 initial_states          the exact filter of an object without noise, with modes of its meter or not
 notation                symbols in which the equations are printed
 programs, fused, loops  the printed equations as rules and regressions; compiled steps made of them (numba)
