@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, structure_of
-from kfcourse.kinds import expect
 from kfcourse.laws import (
     Array,
     Gaussian,

@@ -18,9 +18,9 @@ import numpy as np
 import scipy
 from tqdm import tqdm
 
+from kfcourse.errors import expect
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.base import Filter
-from kfcourse.kinds import expect
 from kfcourse.laws import Array
 from kfcourse.records.evidence import likelihood
 from kfcourse.symbolic.model import Model

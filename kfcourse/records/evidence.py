@@ -15,8 +15,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from kfcourse.errors import expect
 from kfcourse.filters.base import Evidence, Filter, State, structure_of
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, log_density
 from kfcourse.montecarlo.experiment import measurements, walk
 

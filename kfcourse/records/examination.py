@@ -20,9 +20,9 @@ import numpy as np
 import scipy
 from tqdm import tqdm
 
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, structure_of
 from kfcourse.filters.looking_back import looked_back
-from kfcourse.kinds import expect
 from kfcourse.laws import CONFIDENCE, Array, Gaussian, normalised_square, stacked, without_missing
 from kfcourse.linear.consistency import Innovations
 from kfcourse.montecarlo.experiment import measurements, walk

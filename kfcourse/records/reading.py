@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.kinds import expect
+from kfcourse.errors import expect
 from kfcourse.laws import Array
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import shown

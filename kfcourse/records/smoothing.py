@@ -19,11 +19,11 @@ from itertools import islice
 import numpy as np
 
 from kfcourse.angles import difference
+from kfcourse.errors import expect
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.base import Filter, State, unknown_error
 from kfcourse.filters.iterated_ekf import seen_from
 from kfcourse.filters.looking_back import looked_back
-from kfcourse.kinds import expect
 from kfcourse.laws import (
     Array,
     Gaussian,
