@@ -16,7 +16,6 @@ import numpy as np
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises import follow_on
 from kfcourse.exercises.f_exact.companion import Law, companion_numbers
 from kfcourse.exercises.f_exact.keys import correct, moments, nodes_needed, nodes_with, normalised, predict, run_filter
 from kfcourse.exercises.f_exact.mistakes_of_run import WRONG_NODES, WRONG_RUNS
@@ -139,7 +138,6 @@ QUESTIONS = (
         advice=(
             "Write the law before and after each measurement for the first two steps, and for a step without any measurement."
         ),
-        on=follow_on.grid_run,
     ),
     Question(
         "f5",

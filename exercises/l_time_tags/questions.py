@@ -14,7 +14,6 @@ import sympy as sp
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises import follow_on
 from kfcourse.exercises.l_time_tags.keys import correct, cost, dimension, fit_clock, fuse, move, own_time
 from kfcourse.exercises.l_time_tags.mistakes_of_clocks import WRONG_COSTS, WRONG_FITS, WRONG_TIMES
 from kfcourse.exercises.l_time_tags.mistakes_of_fusion import WRONG_CORRECTIONS, WRONG_DIMENSIONS, WRONG_FUSIONS, WRONG_MOVES
@@ -148,7 +147,6 @@ QUESTIONS = (
             "Draw the times on a line: captured, arrived, now. Which measurements may be used, in which "
             "order, and over which intervals do you move?"
         ),
-        on=follow_on.fuse,
     ),
     Question(
         "l6",

@@ -14,7 +14,6 @@ import sympy as sp
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises import follow_on
 from kfcourse.exercises.m_smoothing.keys import gate, log_likelihood, neighbours, new_r, smooth, step_back, weight
 from kfcourse.exercises.m_smoothing.mistakes import (
     WRONG_GATES,
@@ -150,7 +149,6 @@ QUESTIONS = (
         catalogue(WRONG_RECORDS),
         ("mean", "covariance"),
         advice="Write down for the last three steps, by hand, which law is used where.",
-        on=follow_on.smoother,
         axes=("step",),
         spare=("ahead", "Psi", "Q"),  # what a filter leaves: ahead = A z, Psi = A p A^T + Q
     ),
