@@ -4,7 +4,7 @@ Answers are functions of densities at the nodes x (M,), at equal distances, and 
 return mean and variance of the next state and of the measurement, given the state x; (M,) -> (M,), (M,).
 
 The hidden densities are smooth, resolved by their nodes, and vanish at both ends of the grid, so that all rules of
-integration agree.  Here are the hidden arguments; the keys are in keys.py, the known mistakes in the modules mistakes_of_*.py.
+integration agree.  Here are the hidden arguments; the keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations

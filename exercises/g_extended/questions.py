@@ -1,7 +1,7 @@
 """Questions of set g: the extended Kalman filter from its Jacobians, and whether it is right about its own errors.
 
 Answers are functions of arrays: vectors (..., n), matrices (..., r, c), trajectories first.  They are called with the hidden
-functions of hidden.py.  The keys are in keys.py, the known mistakes in the modules mistakes_of_*.py.
+functions of hidden.py.  The keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations

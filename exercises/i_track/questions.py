@@ -3,7 +3,7 @@
 What is derived is answered with formulas in the symbols of the arguments, what runs with arrays.  Personal numbers are in
 `track_numbers`; hidden arguments are others, so an answer holds for any.
 
-The keys are in keys.py, the known mistakes in the modules mistakes_of_*.py.
+The keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations

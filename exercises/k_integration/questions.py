@@ -1,7 +1,7 @@
 """Questions of set k: an inertial system integrated with a satellite receiver.
 
 What is derived is answered with formulas in the symbols of the arguments, what runs with arrays.  Personal numbers are in
-`integration_numbers`; hidden arguments are others.  The keys are in keys.py, the known mistakes in the modules mistakes_of_*.py.
+`integration_numbers`; hidden arguments are others.  The keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations

@@ -14,13 +14,14 @@ from types import CodeType, FunctionType
 from typing import Any
 
 import numpy as np
+import scipy
 import sympy as sp
 
 from kfcourse.checks.question import Answer, Mistake
 from kfcourse.checks.steps import at_step, at_wrong_step
 
 SETS = "kfcourse.exercises."
-NAMES = {"np": np, "sp": sp, "at_step": at_step, "at_wrong_step": at_wrong_step}  # for what an edit writes
+NAMES = {"np": np, "sp": sp, "scipy": scipy, "at_step": at_step, "at_wrong_step": at_wrong_step}  # for what an edit writes
 
 
 def edits(key: Answer, *rows: tuple[str, ...]) -> tuple[Mistake, ...]:
