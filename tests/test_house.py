@@ -129,7 +129,7 @@ def test_what_notebooks_import_is_there():
             "from kfcourse.commands import main; main(['variants'])",
             ["joblib", "kfcourse.checks", "kfcourse.filters", "matplotlib", "numba", "scipy", "sympy"],
         ),
-        ("import kfcourse.notebooks.grading.worker", ["IPython", "matplotlib"]),
+        ("import kfcourse.notebooks.grading.pool", ["IPython", "matplotlib"]),
         ("import sympy; del sympy.MatrixBase.jacobian; from kfcourse.checks import sets; sets()", ["scipy.special"]),
     ],
 )
