@@ -13,7 +13,6 @@ from kfcourse.checks.derived import Derivation, Posed
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import ForVariant, Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises import follow_on
 from kfcourse.exercises.o_modes.keys import GIVEN, SPREAD, chain, decide, merged, mixed, posterior, spread_setting, two_steps
 from kfcourse.exercises.o_modes.mistakes import (
     WRONG_CHAINS,
@@ -127,7 +126,6 @@ QUESTIONS = (
         catalogue(WRONG_STEPS),
         ("after_first", "after_second"),
         advice="After each line write down what you hold: probabilities, means, variances. Which of them has y_0 changed?",
-        on=follow_on.two_steps,
     ),
     Question(
         "o4",
@@ -157,7 +155,6 @@ QUESTIONS = (
         catalogue(WRONG_MIXED),
         ("c", "means", "covariances"),
         advice="For one mode: which modes can it come from, with which weights, and what is the mixture of their laws?",
-        on=follow_on.mixed,
     ),
     Question(
         "o7",

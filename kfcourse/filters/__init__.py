@@ -7,15 +7,15 @@ conditionally_optimal   Pugachev's two-step conditionally optimal filter (DUOF)
 optimal_structure       Rudenko's filter of optimal structure (FOS), modified (MFOS), in two steps (DFMP, MDFMP)
 finite_memory           the same with the last measurements (FKP) or the last estimates (FBP) in the place of the last one
 exact                   the AOF itself, on a grid that follows each trajectory: a folder
-looking_back            what the whole record tells of each state (exact.smoothing, particle_smoothing)
-particles               the same by sampling;  proposals: where to look;  densities, inverted: what all need
+looking_back            what the whole record tells of each state (exact.smoothing for the exact filter)
+particles               the same by sampling, with modes or without;  densities, inverted: what all need
 iterated_ekf            the meter linearised again at the estimate
 gate, heavy_tails       measurements that are not believed: refused, by any filter; weighted
 learnt_noise            a noise of unknown size, learnt on the way
 alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
-                        (jump_equations: as printed;  state_transitions: by the state;  jump_optimal: FOS, FKP, FBP with
-                        modes;  exact.jumps: the exact filter of state and mode;  jump_particles: the same by sampling)
+                        (jump_equations: as printed;  jump_optimal: FOS, FKP, FBP with modes;
+                         exact.jumps: the exact filter of state and mode)
 initial_states          the exact filter of an object without noise, with modes of its meter or not
 notation                symbols in which the equations are printed
 programs, fused, loops  the printed equations as rules and regressions; compiled steps made of them (numba)
@@ -38,7 +38,6 @@ from kfcourse.filters.heavy_tails import robust
 from kfcourse.filters.initial_states import undisturbed
 from kfcourse.filters.iterated_ekf import iterated
 from kfcourse.filters.jump_optimal import logic_dynamic_fbp, logic_dynamic_fkp, logic_dynamic_fos
-from kfcourse.filters.jump_particles import jump_particle
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.learnt_noise import adaptive
 from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
@@ -70,7 +69,6 @@ __all__ = [
     "gpb2",
     "imm",
     "iterated",
-    "jump_particle",
     "jump_pointmass",
     "kalman_filter",
     "latex",

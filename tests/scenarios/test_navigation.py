@@ -13,19 +13,14 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from kfcourse import Model, ModelError, NoClosedForm, gaussian, linearised, unscented
-from kfcourse import run as kfcourse_run
-from kfcourse.filters import aof
+from kfcourse import Model
 from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem, run
 from kfcourse.linear.consistency import nees
-from kfcourse.records.reading import intervals
-from kfcourse.scenarios.drive import fixes, turned
 from kfcourse.scenarios.navigation import (
     Clock,
     Dynamics,
     Inputs,
-    Motion,
     Observation,
     Path,
     Sensor,
@@ -653,74 +648,6 @@ def test_a_recorded_sensor_needs_no_period():
         free.captures(1.0)
 
 
-# ---------------------------------------------------------------- nonlinear motion
-
-
-def test_a_linear_motion_written_as_a_model_is_the_dynamics():
-    """Velocity with friction and a known push; late messages, and inputs that change between them."""
-    model = Model.define(
-        ["s + dt*V + dt**2/2*u + sqrt(q*dt**3/12)*v1 + sqrt(q*dt)*dt/2*v2", "V + dt*u + sqrt(q*dt)*v2"],
-        "s + w",
-        {"q": 0.5},
-        symbols={"x": STATES},
-        inputs={"dt": [1], "u": [0]},
-    )
-    pushed = Dynamics([[0, 1], [0, 0]], np.diag([0, 0.5]), [[0], [1]])
-    inputs = Inputs(0.3 * np.arange(20), np.random.default_rng(3).normal(size=(20, 1, 1)))
-    sensors = two_sensors(latency=0.3, jitter=0.2)
-    _, messages = measured(sensors, 3.0, 2, [0.0], dynamics=pushed, inputs=inputs)
-    moments = np.linspace(0.1, 4, 14)
-    exact = follow(pushed, sensors, PRIOR, messages, moments, inputs=inputs)
-    for structure in (linearised, gaussian):
-        ours = follow(Motion(structure(model)), sensors, PRIOR, messages, moments, inputs=inputs)
-        np.testing.assert_allclose(ours.law.mean, exact.law.mean, rtol=0, atol=ROUNDING)
-        np.testing.assert_allclose(ours.law.cov, exact.law.cov, rtol=0, atol=ROUNDING)
-        for one, other in zip(ours.innovations, exact.innovations, strict=True):
-            np.testing.assert_allclose(one.innovation, other.innovation, rtol=0, atol=ROUNDING)
-
-
-def test_a_nonlinear_motion_is_the_filter_s_that_steps_from_event_to_event():
-    """The drive through Dresden, by `fuse` and by `run`."""
-    times, place = fixes(every=10)
-    dt = intervals(times)
-    omega = np.append(np.diff(turned(times - 0.6)) / dt[:-1], 0)
-    model = Model.define(
-        [
-            "e + dt*V*cos(psi + dt*omega/2)",
-            "n + dt*V*sin(psi + dt*omega/2)",
-            "psi + dt*omega + sqrt(q*dt)*v1",
-            "V + sqrt(p*dt)*v2",
-        ],
-        ["e + sqrt(r)*w1", "n + sqrt(r)*w2"],
-        {"q": 0.015, "p": 1.6, "r": 0.035},
-        symbols={"x": ["e", "n", "psi", "V"]},
-        angles={"x": ["psi"]},
-        inputs={"dt": dt, "omega": omega},
-        prior={"mean": [*place[0, 0], 1.0, 10.0], "variance": [4, 4, 0.1, 1]},
-    )
-    expected = kfcourse_run(aof(linearised(model)), place)
-    receiver = Sensor.define("receiver", ["e", "n", "psi", "V"], ["e + w1", "n + w2"], 0.035)
-    messages = [Observation("receiver", t, t, y) for t, y in zip(times.tolist(), place, strict=True)]
-    inputs = Inputs(times, omega[:, None, None])
-    found = fuse(Motion(linearised(model)), [receiver], model.prior, messages, times, inputs=inputs, start=times[0])
-    np.testing.assert_allclose(found.mean, expected.mean, rtol=0, atol=1e-8)  # hundreds of metres to 1e-14, in 200 steps
-    np.testing.assert_allclose(found.cov, expected.cov, rtol=0, atol=1e-8)
-    with pytest.raises(ValueError, match="known inputs omega; give them"):
-        fuse(Motion(linearised(model)), [receiver], model.prior, messages, times, start=times[0])
-    with pytest.raises(ValueError, match="the inputs begin at"):
-        late = Inputs(times + 1, omega[:, None, None])
-        fuse(Motion(linearised(model)), [receiver], model.prior, messages, times, inputs=late, start=times[0])
-
-
-def test_a_motion_must_know_its_interval():
-    with pytest.raises(ModelError, match="write dt into the formulas"):
-        Motion(linearised(Model.define("x + v", "x + w")))
-    with pytest.raises(ModelError, match="t in the place of k"):
-        Motion(linearised(Model.define("x + k*dt*v", "x + w", inputs={"dt": [1]})))
-    with pytest.raises(NoClosedForm):
-        Motion(unscented(Model.define("x + dt*v", "x + w", inputs={"dt": [1]})))
-
-
 @pytest.mark.parametrize(
     ("times", "readings"), [([0, 1, 2], [9, 7, 5]), ([1, 1, 1], [1, 2, 3]), ([1, np.nan, 3], [1, 2, 3]), ([1], [1])]
 )
@@ -748,12 +675,27 @@ def test_what_paths_are_not_sampled_from():
             sample(dynamics, prior, [0.0, 1.0], runs, 1, inputs)
 
 
-def test_a_motion_is_made_of_a_structure_and_its_inputs_have_times():
-    model = Model.define("x + dt*u + sqrt(dt)*v", "x + w", inputs={"dt": [1], "u": [0]})
-    with pytest.raises(TypeError, match="Motion expects a Structure, and a Model came"):
-        Motion(model)
-    with pytest.raises(TypeError, match="fuse expects a Dynamics, and a Model came"):
-        fuse(model, [], PRIOR, [], [1.0])
-    for inputs in (Inputs(np.zeros(0), np.zeros((0, 1, 1))), Inputs(np.zeros((1, 1)), np.zeros((1, 1, 1)))):
-        with pytest.raises(ValueError, match="times and values of the inputs have the shapes"):
-            fuse(Motion(gaussian(model)), [], Gaussian(np.zeros(1), np.eye(1)), [], [1.0], inputs=inputs)
+def test_fuse_takes_dynamics():
+    with pytest.raises(TypeError, match="fuse expects a Dynamics, got Model"):
+        fuse(Model.define("x + v", "x + w"), [], PRIOR, [], [1.0])
+
+
+@pytest.mark.parametrize("start", [0.0, 1_484_649_904.0, 345_600.25])
+def test_where_a_time_scale_begins_changes_nothing(start):
+    """Stamps of Unix hold 2e-7 s: each estimate has the measurement of its own moment, however both were rounded."""
+    rng = np.random.default_rng(3)
+    clock = Clock(1 + 1e-5, 0.1 - start * 1e-5)
+    sensor = Sensor.define("slow", STATES, "s + w", 0.01, clock=clock)
+    moments, values = np.cumsum(rng.uniform(0.05, 0.15, 200)), rng.normal(size=(200, 1, 1))
+    outputs = start + moments
+    messages = [Observation("slow", clock.reading(t), t, y) for t, y in zip(outputs.tolist(), values, strict=True)]
+    found = fuse(FREE, [sensor], PRIOR, messages, outputs, start=start)
+    plain = Sensor.define("slow", STATES, "s + w", 0.01)
+    expected = fuse(
+        FREE, [plain], PRIOR, [Observation("slow", t, t, y) for t, y in zip(moments.tolist(), values, strict=True)], moments
+    )
+    # moments that are off by some 1e-6 s, of a state that moves by less than 10 a second
+    np.testing.assert_allclose(found.mean, expected.mean, rtol=0, atol=1e-4)
+    np.testing.assert_allclose(found.cov, expected.cov, rtol=0, atol=1e-4)
+    path = sample(FREE, PRIOR, outputs, 1, 0)
+    np.testing.assert_array_equal(path(outputs[7] + np.spacing(start) * np.arange(2)), path.states[[7, 7]])
