@@ -162,7 +162,7 @@ def test_what_notebooks_import_is_there():
         ("from kfcourse import *", ["joblib", "matplotlib", "scipy.linalg", "scipy.ndimage", "scipy.special", "scipy.stats"]),
         ("import kfcourse.cli", ["jupyter_client", "jupytext", "nbclient", "nbconvert", "nbformat"]),
         ("from kfcourse.commands import main; main(['variants'])", ["kfcourse.checks", "matplotlib", "numba"]),
-        ("import kfcourse.notebooks.grading.worker", ["IPython", "matplotlib"]),
+        ("import kfcourse.notebooks.grading.pool", ["IPython", "matplotlib"]),
         ("import sympy; del sympy.MatrixBase.jacobian; from kfcourse.checks import sets; sets()", ["scipy.special"]),
     ],
 )
