@@ -730,7 +730,7 @@ def test_a_chapter_is_downloaded_as_a_notebook(window):
         ("ошибки фильтрации", "notation.html", "estimates-and-gains"),  # which says "ошибка", "фильтр"
         ("alpha-beta", "radar-tracking.html", "experiment-1-kalman-against-alpha-beta"),
         ("likelihood", "what-the-data-say.html", "likelihood-from-innovations"),
-        ("likelihood_error", "package/kfcourse.records.html", "module-kfcourse.records.evidence"),
+        ("smoothing_error", "package/kfcourse.records.html", "module-kfcourse.records.smoothing"),
     ],
 )
 def test_search_finds_sections_and_quotes_them(window, words, page, section):
