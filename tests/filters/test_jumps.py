@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 from test_filters import LINEAR, exact_ensemble
-from test_jump_particles import histories
 from test_multiple_models import follow
+from test_particles import histories
 
 from kfcourse import (
     Ensemble,
