@@ -34,8 +34,8 @@ from kfcourse.filters import (
     pointmass,
     undisturbed,
 )
-from kfcourse.filters.finite_memory import STEPS
 from kfcourse.filters.initial_states import is_undisturbed
+from kfcourse.filters.optimal_structure import STEPS
 from kfcourse.lab.checked_quadrature import Checked, of_checked_order
 from kfcourse.lab.families import FAMILIES, family
 from kfcourse.laws import Array

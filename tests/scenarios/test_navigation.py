@@ -65,11 +65,6 @@ def measured(sensors: list[Sensor], duration: float, runs: int, outputs, seed: i
 # ---------------------------------------------------------------- transitions
 
 
-def test_transition_of_a_wiener_process():
-    step = Dynamics([[0.0]], [[0.7]], [[2.0]]).over(1.5)
-    assert (step.A.item(), step.B.item(), step.Q.item()) == pytest.approx((1.0, 3.0, 1.05), rel=1e-14)
-
-
 @pytest.mark.parametrize("dt", [0.0, 1e-6, 0.3, 40.0, 5000.0])
 def test_transition_of_an_exponentially_correlated_process(dt):
     # dt = 5000: exp(+a dt) = exp(4000) would overflow; Q must be the stationary variance
@@ -86,24 +81,6 @@ def test_transition_of_a_double_integrator():
     np.testing.assert_allclose(step.A, [[1, dt], [0, 1]], rtol=1e-14)
     np.testing.assert_allclose(step.B, [[dt**2 / 2], [dt]], rtol=1e-14)
     np.testing.assert_allclose(step.Q, q * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]]), rtol=1e-14)
-
-
-@pytest.mark.parametrize("dt", [1e-3, 0.4, 6.0])
-def test_transition_equals_van_loan(dt):
-    rng = np.random.default_rng(2)
-    root, F, G = rng.normal(size=(4, 4)), rng.normal(size=(4, 4)), rng.normal(size=(4, 2))
-    Qc = root @ root.T
-    Qc = (Qc + Qc.T) / 2
-    step = Dynamics(F, Qc, G).over(dt)
-    loan = scipy.linalg.expm(np.block([[-F, Qc], [np.zeros((4, 4)), F.T]]) * dt)
-    held = scipy.linalg.expm(np.block([[F, G], [np.zeros((2, 6))]]) * dt)
-
-    # The oracle multiplies exp(F dt) with exp(-F dt), which loses as many digits as their norms have.
-    def tolerance(of):
-        return 1e-14 * np.linalg.norm(scipy.linalg.expm(F * dt)) * np.linalg.norm(loan) + 1e-14 * np.abs(of).max()
-
-    for ours, oracle in ((step.A, held[:4, :4]), (step.B, held[:4, 4:]), (step.Q, loan[4:, 4:].T @ loan[:4, 4:])):
-        np.testing.assert_allclose(ours, oracle, rtol=0, atol=tolerance(oracle))
 
 
 def test_two_transitions_are_one():
@@ -247,20 +224,6 @@ def test_what_is_observed():
         assert abs(error.std() / sigma - 1) < 4 / np.sqrt(2 * runs)
 
 
-def test_seeds_and_streams():
-    first, second = two_sensors(jitter=0.1)
-    states = lambda times: np.zeros((len(times), 3, 2))  # noqa: E731
-
-    def values(sensors, seed, name):
-        return [(m.arrival, m.value.tolist()) for m in observe(sensors, states, 2.0, seed) if m.sensor == name]
-
-    assert values([first, second], 1, "slow") == values([first, second], np.random.default_rng(1), "slow")
-    assert values([first, second], 1, "slow") != values([first, second], 2, "slow")
-    assert values([first, second], 1, "fast") == values([first], 1, "fast")  # one more sensor does not change the others
-    a = sample(FREE, PRIOR, np.array([0.0, 1.0]), 4, seed=8).states
-    assert np.array_equal(a, sample(FREE, PRIOR, np.array([0.0, 1.0]), 4, seed=8).states)
-
-
 @pytest.mark.parametrize(
     ("timing", "message"),
     [
@@ -324,23 +287,6 @@ def test_synchronous_sensors_are_the_kalman_filter():
     np.testing.assert_allclose(ours.cov[-1, 0], riccati - gain @ system.H @ riccati, rtol=0, atol=10 * forgotten + ROUNDING)
 
 
-def test_varying_dimension_is_the_stacked_vector_with_gaps():
-    """The slow sensor at every eighth step of the fast one: NaN in between."""
-    sensors = [replace(sensor, latency=0.0) for sensor in two_sensors()]
-    steps, runs = 81, 4
-    outputs = 0.05 * np.arange(steps)
-    _, messages = measured(sensors, 4.0, runs, outputs, 3)
-    ours = fuse(FREE, sensors, PRIOR, messages, outputs)
-    y = np.full((steps, runs, 3), np.nan)
-    for m in messages:
-        y[round(m.tag / 0.05), :, slice(0, 1) if m.sensor == "fast" else slice(1, 3)] = m.value
-    assert np.isnan(y).any(axis=(1, 2)).sum() == 70
-    step, R = FREE.over(0.05), scipy.linalg.block_diag([[0.3]], [[0.5, 0.2], [0.2, 0.8]])
-    expected = run(LinearSystem(step.A, [[-1, 2], [1, 0], [1, 1]], step.Q, R), PRIOR, y).posterior
-    np.testing.assert_allclose(ours.mean, expected.mean, rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(ours.cov, expected.cov, rtol=0, atol=ROUNDING)
-
-
 def slow_filter(messages, sensors, now, inputs=None):
     """Straight from the page, one run: all that has arrived, in the order of capture, from the prior; filterpy's steps."""
     H = {"fast": np.array([[-1.0, 2.0]]), "slow": np.array([[1.0, 0.0], [1.0, 1.0]])}
@@ -389,18 +335,6 @@ def test_late_measurements_are_used_as_on_the_page(with_inputs):
         np.testing.assert_allclose(ours.cov[k, 0], cov, rtol=0, atol=ROUNDING)
 
 
-def test_order_does_not_matter_once_all_has_arrived():
-    sensors = two_sensors(latency=0.3, jitter=0.9)
-    _, messages = measured(sensors, 3.0, 5, [3.0], 5)
-    late = fuse(FREE, sensors, PRIOR, messages, np.linspace(0, 6, 50))
-    at_once = fuse(FREE, sensors, PRIOR, messages[::-1], [6.0])
-    punctual = fuse(FREE, sensors, PRIOR, [m._replace(arrival=m.tag) for m in messages], np.linspace(0, 6, 50))
-    for one in (at_once, punctual):
-        np.testing.assert_allclose(late.mean[-1], one.mean[-1], rtol=0, atol=ROUNDING)
-        np.testing.assert_allclose(late.cov[-1], one.cov[-1], rtol=0, atol=ROUNDING)
-    assert np.abs(late.mean[20] - punctual.mean[20]).max() > 1e-3  # before, it did matter
-
-
 def test_an_estimate_uses_only_what_has_arrived():
     sensors = two_sensors(latency=0.5, jitter=0.3)
     outputs = np.linspace(0, 4, 41)
@@ -418,14 +352,6 @@ def test_a_measurement_of_this_very_moment_counts():
     at, after = (fuse(FREE, [sensor], PRIOR, [message], [time]).mean for time in (0.3, 0.3 + 1e-12))
     assert np.abs(at - after).max() < 1e-10
     assert np.abs(at - fuse(FREE, [sensor], PRIOR, [], [0.3]).mean).max() > 1
-
-
-def test_nothing_measured_is_the_prediction():
-    law = fuse(FREE, two_sensors(), PRIOR, [], [2.0, 2.0, 3.5], start=1.5)
-    step = FREE.over(2.0)
-    assert law.mean.shape == (3, 1, 2)
-    np.testing.assert_allclose(law.mean[2, 0], step.A @ PRIOR.mean, rtol=1e-13)
-    np.testing.assert_allclose(law.cov[2, 0], step.A @ PRIOR.cov @ step.A.T + step.Q, rtol=1e-13)
 
 
 def test_one_run_is_an_ensemble_of_one():
@@ -520,19 +446,6 @@ def test_by_arrival_the_estimate_is_the_motion_of_the_delay_ago():
     np.testing.assert_allclose(by_tag.mean - path(now), 0, atol=1e-6)
     expected = [-speed * tau + acceleration * tau**2 / 2, -acceleration * tau]
     np.testing.assert_allclose((by_arrival.mean - path(now))[0, 0], expected, rtol=0, atol=1e-6)
-
-
-def test_variant_1_of_the_lecture():
-    """INS + receiver: D~ = (q + sqrt(q^2 + 4 q r)) / 2, numbers of the lecture, against control.dare."""
-    q, r, T = 0.01**2, 0.2**2, 0.1
-    ins_error = Dynamics([[0.0]], [[q / T]])
-    receiver = Sensor.define("receiver", ["e"], "u - e + w", r, T, parameters={"u": 0})
-    silent = [Observation("receiver", T * k, T * k, np.zeros((1, 1))) for k in range(1001)]
-    law = fuse(ins_error, [receiver], Gaussian(np.zeros(1), np.eye(1)), silent, [99.95, 100.0])
-    before, after = law.cov[0, 0].item() + q / 2, law.cov[1, 0].item()  # half a period before the last correction, and after it
-    assert before == pytest.approx((q + math.sqrt(q**2 + 4 * q * r)) / 2, rel=1e-12)
-    assert before == pytest.approx(control.dare([[1.0]], [[1.0]], [[q]], [[r]])[0].item(), rel=1e-9)
-    assert (round(before, 7), round(math.sqrt(after), 4), round(0.2 / math.sqrt(after), 1)) == (0.0020506, 0.0442, 4.5)
 
 
 # ---------------------------------------------------------------- fusion: what it refuses
