@@ -223,6 +223,14 @@ WRONG_RUNS = edits(
         "at_wrong_step(function, 0) for function in (S,",
     ),
     (
+        "steps-from-one",
+        messages.STEPS_FROM_ONE,
+        "at_step(function, k) for function in (f,",
+        "at_wrong_step(function, k + 1) for function in (f,",
+        "at_step(function, k) for function in (S,",
+        "at_wrong_step(function, k + 1) for function in (S,",
+    ),
+    (
         "input-of-next-step",
         messages.INPUT_OF_NEXT_STEP,
         "at_step(function, k) for function in (f,",

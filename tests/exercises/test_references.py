@@ -107,7 +107,7 @@ def test_continuous_numbers():
         a, s, h, S_xi, N = arguments
         letters = {"a": a, "s": s, "h": h}
         model = ContinuousModel.define("-a*x", "s", "h*x", letters, spectral_density=S_xi, noise_density=N)
-        assert (D, K) == tuple(pytest.approx(matrix.item()) for matrix in steady_state(model))
+        assert tuple(pytest.approx(matrix.item()) for matrix in steady_state(model)) == (D, K)
         scalar = [np.array([[v]]) for v in (D, -a, s, h, S_xi, N)]
         assert abs(continuous_time.riccati(*scalar).item()) < 1e-9
         late = solve_ivp(riccati, (0, 60), [3.0], args=tuple(arguments), rtol=1e-10, atol=1e-12)
