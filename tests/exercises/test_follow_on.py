@@ -27,7 +27,10 @@ def test_on_top_of_a_wrong_answer_the_right_step_follows(letter, question, step,
     """Each known mistake of an earlier question in turn, until one changes the result: on that, the step is marked as right."""
     task = exercise(letter, "21")
     for mistake in earlier.mistakes:
-        wrong = mistake.answer(task)
+        try:
+            wrong = mistake.answer(task)
+        except ValueError:  # a mistake that this variant does not allow
+            continue
         task.check(earlier.name, wrong)
         built = rebound(step, {earlier.function: wrong})
         result = task.check(question.name, built)
