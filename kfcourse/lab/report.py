@@ -130,8 +130,8 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
         "steps": result.steps,
         "seed": result.seed,
         "slow_runs": result.slow_runs,
-        "left_out": dict(result.left_out),
-        "by_particles": dict(result.replaced),
+        "left_out": {name: str(reason) for name, reason in result.left_out.items()},
+        "by_particles": {name: str(reason) for name, reason in result.replaced.items()},
         "error_variance": {name: e.value.tolist() for name, e in estimates.items()},
         "standard_error": {name: e.standard_error.tolist() for name, e in estimates.items()},
         "error_mean": {name: result.error_mean(name).value.tolist() for name in result.available},
@@ -147,7 +147,10 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
     if result.replicas:
         data["design_deviation"] = {name: result.design_error(name).value.tolist() for name in result.replicas.names}
     text = json.dumps(_finite(data), indent=1, allow_nan=False)
-    save(text, path)
+    if str(path) in ("-", "/dev/stdout"):
+        print(text, flush=True)
+    else:
+        save(text, path)
     return path
 
 

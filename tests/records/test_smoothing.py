@@ -11,7 +11,6 @@ from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem
 from kfcourse.linear import run as run_linear
 from kfcourse.linear import smooth as smooth_linear
-from kfcourse.linear.smoothing import Passages, regressions
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble
 from kfcourse.montecarlo.experiment import states
@@ -129,54 +128,17 @@ def dense(n, lag=None):
 
 
 @pytest.mark.parametrize("lag", [None, 0, 2])
-@pytest.mark.parametrize("n", [1, 3, 5])  # small matrices lie in memory in two ways, and a scalar has no products
+@pytest.mark.parametrize("n", [1, 3, 5])
 def test_of_any_number_of_states_it_is_the_regression_on_what_it_knows(n, lag):
     model, y, expected = dense(n, lag)
     same(smooth(aof(linearised(model)), y, lag), expected)
-    many = smooth(aof(linearised(model)), np.tile(y, (1, 400, 1)), lag)  # solved entry by entry
-    same(Gaussian(many.mean[:, -5:], many.cov[:, -5:]), expected)
 
 
-@pytest.mark.parametrize("lag", [None, 1])
-@pytest.mark.parametrize("n", [1, 3, 5])
-def test_a_great_many_runs_are_looked_back_to_some_after_the_others(monkeypatch, n, lag):
-    model, y, expected = dense(n, lag)
-    monkeypatch.setattr("kfcourse.records.smoothing.MANY_RUNS", 2)  # of five
-    same(smooth(aof(linearised(model)), y, lag), expected)
-    whole = smooth(kalman_filter(model), np.nan_to_num(y))
-    assert whole.cov.strides[1] == 0  # without gaps all have the same, stored once
-
-
-def test_what_all_runs_share_is_found_once():
+def test_what_all_runs_share_is_stored_once():
     """Gains and covariances of a linear model know nothing of the record, unless something is missing in one of the runs."""
     model, y, _ = dense(3)
-    one, full = aof(linearised(model)), np.nan_to_num(y)
-    assert all(law.cov.shape == (3, 3) for state in states(one, full) for law in (state.posterior, state.predicted))
-    gaps = states(one, y)
-    assert gaps[-1].predicted.cov.shape == (5, 3, 3)
-    assert smooth(one, full).cov.strides[1] == 0 != smooth(one, y).cov.strides[1]
-    found = regressions(
-        Passages(*(law_of(states(one, full)[1:-1], name) for name in ("posterior", "predicted")), *transition(one))
-    )
-    assert {(part.S.shape[-1], part.left.shape[-1]) for part in found} == {(1, 1)}  # the axis of runs, entry by entry
-
-
-def test_a_page_of_products_is_no_reason_for_all_cores(monkeypatch):
-    """Shared gains are applied by one product of matrices only while a library keeps it on one core; both ways agree."""
-    model, y, _ = dense(5)
-    one, full = aof(linearised(model)), np.nan_to_num(y)
-    small = smooth(one, full)
-    monkeypatch.setattr("kfcourse.linear.smoothing.ON_ONE_CORE", 0)
-    same(smooth(one, full), small)
-
-
-def law_of(visited, name):
-    laws = [getattr(state, name) for state in visited]
-    return Gaussian(np.stack([law.mean for law in laws]), np.stack([law.cov for law in laws])[:, None])
-
-
-def transition(one):
-    return one.structure.transition(one.model.prior.mean, one.model.prior.cov)
+    one = aof(linearised(model))
+    assert smooth(one, np.nan_to_num(y)).cov.strides[1] == 0 != smooth(one, y).cov.strides[1]
 
 
 def test_given_matrices_are_smoothed_as_the_model_they_come_from():
@@ -301,46 +263,6 @@ def test_the_iterated_extended_smoother_finds_the_likeliest_trajectory():
     assert np.abs(found.mean - once.mean).max() > 0.01  # one round is not the maximum
 
 
-def brute_force(e):
-    """Means and variances of three states given y_0 and y_2: the posterior density on 141^3 points."""
-    grid = np.linspace(-3, 4, 141)
-    x = np.meshgrid(grid, grid, grid, indexing="ij", sparse=True)
-    squares = [((x[0] - 0.5) / np.sqrt(0.3)) ** 2]
-    squares += [((x[k + 1] - x[k] - e * np.sin(x[k])) / 0.4) ** 2 for k in (0, 1)]
-    squares += [((y - x[k] - e * x[k] ** 2) / 0.5) ** 2 for k, y in ((0, 0.9), (2, -0.2))]
-    density = np.exp(-0.5 * sum(squares))
-    masses = [density.sum(axis=tuple({0, 1, 2} - {k})) / density.sum() for k in range(3)]
-    mean = np.array([mass @ grid for mass in masses])
-    return mean, np.array([mass @ (grid - m) ** 2 for mass, m in zip(masses, mean, strict=True)])
-
-
-@pytest.mark.parametrize(
-    "smoother", [lambda s, y: smooth(aof(s), y), lambda s, y: smooth(iterated(s, 5), y), lambda s, y: smooth_iterated(s, y, 5)]
-)
-@pytest.mark.parametrize("build", [gaussian, lambda model: gauss_hermite(model, 7)])
-def test_under_a_mild_curvature_it_is_the_posterior_but_for_the_curvature(smoother, build):
-    """No normal law is the posterior of a curved model: they part in proportion to the curvature, and by little."""
-    off = []
-    for e in (0.05, 0.025):
-        text = ["x + e*sin(x) + 0.4*v", "x + e*x**2 + 0.5*w"]
-        model = Model.define(*text, {"e": e}, prior={"mean": 0.5, "variance": 0.3})
-        found = smoother(build(model), np.array([0.9, np.nan, -0.2]))
-        mean, variance = brute_force(e)
-        off.append(np.concatenate([(found.mean[:, 0, 0] - mean) / np.sqrt(variance), found.cov[:, 0, 0, 0] / variance - 1]))
-    assert np.abs(off[0]).max() < 0.08
-    np.testing.assert_allclose(off[1], off[0] / 2, rtol=0, atol=0.15 * np.abs(off[0]).max())
-
-
-def test_looking_back_is_more_accurate_and_claims_to_be(curved):
-    x, y = simulate(curved, 4000, 12, seed=4)
-    one = aof(gaussian(curved))
-    filtered, smoothed = run(one, y), smooth(one, y)
-    gain = ((filtered.mean - x) ** 2 - (smoothed.mean - x) ** 2).sum(axis=-1)[:-1].mean(axis=0)  # a mean over steps for each run
-    assert gain.mean() > 4 * gain.std() / np.sqrt(gain.size)
-    claimed = np.trace(smoothed.cov - filtered.cov, axis1=-2, axis2=-1)
-    assert claimed.max() < 1e-12
-
-
 def test_angles_go_the_short_way_round_in_the_past_too():
     """A heading that wanders about pi, and the same one seen from a zero that lies elsewhere: only whole turns differ."""
 
@@ -363,14 +285,6 @@ def test_angles_go_the_short_way_round_in_the_past_too():
     again, lagged = smooth_iterated(linearised(model), y, rounds=3), smooth(kalman_filter(model), y, lag=len(y))
     for other in (again, lagged):
         np.testing.assert_allclose(other.mean, smooth(kalman_filter(model), y).mean, atol=1e-9)
-
-
-def test_one_trajectory_gets_the_numbers_it_gets_in_the_ensemble(curved):
-    y = with_gaps(simulate(curved, 6, STEPS, seed=11).y.repeat(1, axis=2)[..., :1].repeat(2, axis=2))[..., :1]
-    one = aof(gaussian(curved))
-    together, alone = smooth(one, y), smooth(one, y[:, 2:3])
-    np.testing.assert_allclose(alone.mean[:, 0], together.mean[:, 2], rtol=1e-11, atol=1e-12)
-    np.testing.assert_allclose(alone.cov[:, 0], together.cov[:, 2], rtol=1e-10, atol=1e-13)
 
 
 def test_a_record_of_one_step_has_no_past(curved):

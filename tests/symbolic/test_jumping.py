@@ -182,7 +182,7 @@ def test_tables():
 
 
 def test_what_has_no_average_over_the_modes():
-    model, circular = define(), define(angles=["x"])
+    model, circular = define(), define(angles={"x": ["x"], "y": []})
     structures = [linearised(mode) for mode in model.modes]
     for average in (averaged_equations, lambda given: averaged(given, structures)):
         with pytest.raises(ModelError, match="components that are angles have no average"):
@@ -193,5 +193,5 @@ def test_what_has_no_average_over_the_modes():
         averaged(model, structures[:1])
     with pytest.raises(TypeError, match="list of structures, one a mode, and one came"):
         averaged(model, structures[0])
-    with pytest.raises(TypeError, match="averaged expects a Structure, and a Model came"):
+    with pytest.raises(TypeError, match="averaged expects a Structure, got Model"):
         averaged(model, model.modes)
