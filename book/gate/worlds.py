@@ -11,6 +11,7 @@ A world is a text whose lines are done one after another::
     c_j = \sum_i\mu_i\pi_{ij}           for each j of a range
     again:                             what follows, down to `then:`, again and again until nothing changes
     keep: K, p                         forget all other letters
+    "|v|" = \sqrt{v^Tv}                a letter that looks like something else
 
 A page's relation must hold in a world with all its letters, so a world says things in another way than the page: an inverse for a
 gain, a sum or an integral for a closed form.
@@ -62,7 +63,7 @@ def world(text: str) -> Callable[[np.random.Generator], dict[str, Any]]:
                 _define(letters, list(group), AGAIN if again else 1)
             else:
                 for line in group:
-                    letters = _drawn(letters, rng, *line.rsplit(":", 1))
+                    letters = _drawn(letters, rng, *(line.split(": ", 1)))
         return letters
 
     return make
@@ -72,7 +73,7 @@ def _kind(line: str, stepped: set[str]) -> str:
     left, equals, _ = line.partition("=")
     if line in ("again:", "then:"):
         return line[:-1]
-    if not equals or line.startswith("keep:"):
+    if not equals or line.startswith("keep: "):
         return "draw"
     if left.strip().removesuffix("_0") in stepped and left.strip().endswith("_0"):
         return "start"
@@ -81,7 +82,7 @@ def _kind(line: str, stepped: set[str]) -> str:
 
 def _drawn(letters: dict[str, Any], rng: np.random.Generator, names: str, what: str) -> dict[str, Any]:
     if names == "keep":
-        return {name.strip(): letters[name.strip()] for name in what.split(",")}
+        return {name: letters[name] for name in what.strip().split(", ")}
     kind, *words = what.split()
     if kind == "nodes":
         x, mean = normal_nodes(*(float(_computed(word, letters, {})) for word in words))
@@ -98,7 +99,7 @@ def _drawn(letters: dict[str, Any], rng: np.random.Generator, names: str, what: 
         "range": lambda *ends: range(*map(int, ends)),
         "share": lambda *sizes: Indexed(rng.dirichlet(np.ones(int(sizes[-1])), size=[int(size) for size in sizes[:-1]])),
     }[kind]
-    return letters | {name.strip(): draw(*words) for name in names.split(",")}
+    return letters | {name: draw(*words) for name in names.split(", ")}
 
 
 def _steps(letters: dict[str, Any], lines: list[str]) -> None:
@@ -118,13 +119,15 @@ def _define(letters: dict[str, Any], lines: list[str], rounds: int) -> None:
             made = _made(*line.split("=", 1), letters)
             letters |= made
             values += [np.array(value) for value in made.values() if not callable(value)]
-        if before and all(map(np.array_equal, values, before)):
+        if before and all(np.allclose(*pair, rtol=1e-14, atol=1e-300) for pair in zip(values, before, strict=True)):
             return
         before = values
 
 
 def _made(left: str, right: str, letters: Mapping[str, Any]) -> dict[str, Any]:
     left = left.strip()
+    if left.startswith('"'):  # a letter that looks like a call, or is an expression
+        return {left.strip('"'): _computed(right, letters, {})}
     indices = re.fullmatch(r"(.+)_(?:\{(\w+)\}|(\w))", left)
     if indices and all(isinstance(letters.get(index), range) for index in indices[2] or indices[3]):
         names = indices[2] or indices[3]

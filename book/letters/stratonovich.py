@@ -105,10 +105,10 @@ def splitting(rng):
     return means | {"p": Indexed([square - z**2]), "z": Indexed([z], z), r"\Psi": Indexed([before]), "k": range(1)}
 
 
-def shadow(rng):
-    """The variance of a state that is 1 with the probability q."""
-    q = rng.uniform(0.2, 0.8)
-    return {"q": q, r"\Psi": np.average((np.array([0, 1]) - q) ** 2, weights=[1 - q, q])}
+shadow = r"""
+q: in .2 .8
+\Psi = q(1-q)^2+(1-q)q^2
+"""
 
 
 LETTERS = (densities, joint, chain, odds, splitting, shadow)

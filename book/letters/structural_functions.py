@@ -2,7 +2,7 @@
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
-from gate.values import Indexed, Operator
+from gate.values import Operator
 from gate.worlds import normal_nodes
 
 from kfcourse import Model, gaussian, linearised
@@ -65,10 +65,14 @@ def over_state(rng):
     return of_package(gaussian(MODEL), m, d) | values | slope | western | {r"\mathsf M": Operator(mean)}
 
 
-def moments(rng):
-    m, d = rng.uniform(0.2, 0.9, size=2)
-    x, mean = normal_nodes(m, d)
-    return {"q": Indexed([mean(x**n) for n in range(8)]), "n": range(1, 6), "m": m, "d": d}
+moments = r"""
+m, d: in .2 .9
+x: nodes m d
+n: range 8
+q_n = \mathsf Mx^n
+n: range 1 6
+keep: q, n, m, d
+"""
 
 
 def variant(rng):

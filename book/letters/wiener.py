@@ -74,17 +74,24 @@ def bucy(rng):
     }  # fmt: skip
 
 
-def shrinking(rng):
-    """The gains of the alpha-beta filter at an interval of 1e-10, where they are those of the limit."""
-    T, Omega = 1e-10, rng.uniform(1, 2)
-    index = (Omega * T) ** 2
-    missing = (np.sqrt(index**2 + 8 * index) - index) / 4  # 1 - sqrt(1 - alpha), without its cancellation
-    return {r"\lim_{T\to0}": 1.0, "T": T, r"\Omega": Omega, r"\alpha": missing * (2 - missing), r"\beta": 2 * missing**2}
+shrinking = r"""
+T = 0.0000000001
+\Omega: in 1 2
+n = (\Omega T)^2
+m = (\sqrt{n^2+8n}-n)/4      # 1 - sqrt(1 - alpha), without its cancellation
+\alpha = m(2-m)
+\beta = 2m^2
+"\lim_{T\to0}" = 1
+keep: \lim_{T\to0}, T, \Omega, \alpha, \beta
+"""
 
 
-def weights(rng):
-    g, s = rng.normal(size=(2, 4))
-    return {"g": Indexed(g), "s": Indexed(s), "k": range(4), "i": range(4), "j": range(4)}
+weights = r"""
+g, s: nums 4
+k: range 4
+i: range 4
+j: range 4
+"""
 
 
 def found(rng):
