@@ -1,6 +1,7 @@
 """The letters of when-linearisation-fails.md: a signal that is a parabola, its moments by quadrature."""
 
 from gate.page import CONDITION, NOTATION
+from gate.worlds import world
 
 course = r"""
 \lambda: num
