@@ -10,8 +10,8 @@ A world is a text whose lines are done one after another::
     \Psi_{k+1} = Ap_kA^T+Q             lines with an index follow each other for k = 0, 1, ...; \Psi_0 = P begins
     c_j = \sum_i\mu_i\pi_{ij}           for each j of a range
     again:                             what follows, down to `then:`, again and again until nothing changes
-    keep: K, p                         forget all other letters
-    "|v|" = \sqrt{v^Tv}                a letter that looks like something else
+    keep: K, p                         forget all other letters; `forget: a, b` these
+    "|v|" = \sqrt{v^Tv}                a letter that looks like something else; `"p(x|z)" of x = ...` moves with x
 
 A page's relation must hold in a world with all its letters, so a world says things in another way than the page: an inverse for a
 gain, a sum or an integral for a closed form.
@@ -29,7 +29,7 @@ import sympy as sp
 
 from gate.relation import Reader, keys_of
 from gate.tex import normal
-from gate.values import Indexed, Operator
+from gate.values import Indexed, Of, Operator
 from kfcourse.filters import aof
 from kfcourse.filters.kalman import correct, predict
 from kfcourse.laws import Gaussian
@@ -58,7 +58,8 @@ def world(text: str) -> Callable[[np.random.Generator], dict[str, Any]]:
                 _steps(letters, list(group))
             elif kind == "start":
                 for left, _, right in (line.partition("=") for line in group):
-                    letters[left.strip().removesuffix("_0")] = Indexed({0: _computed(right, letters, {})})
+                    name, at = left.strip().rsplit("_", 1)
+                    letters[name] = Indexed({int(at): _computed(right, letters, {})})
             elif kind == "once":
                 _define(letters, list(group), AGAIN if again else 1)
             else:
@@ -73,14 +74,18 @@ def _kind(line: str, stepped: set[str]) -> str:
     left, equals, _ = line.partition("=")
     if line in ("again:", "then:"):
         return line[:-1]
-    if not equals or line.startswith("keep: "):
+    if not equals or line.startswith(("keep: ", "forget: ")):
         return "draw"
-    if left.strip().removesuffix("_0") in stepped and left.strip().endswith("_0"):
+    if left.startswith('"'):
+        return "once"
+    if re.sub(r"_\d$", "", left.strip()) in stepped:
         return "start"
     return "step" if re.search(r"_(k|\{k\+1\})$", left.strip()) else "once"
 
 
 def _drawn(letters: dict[str, Any], rng: np.random.Generator, names: str, what: str) -> dict[str, Any]:
+    if names == "forget":
+        return {name: value for name, value in letters.items() if name not in what.strip().split(", ")}
     if names == "keep":
         return {name: letters[name] for name in what.strip().split(", ")}
     kind, *words = what.split()
@@ -126,18 +131,22 @@ def _define(letters: dict[str, Any], lines: list[str], rounds: int) -> None:
 
 def _made(left: str, right: str, letters: Mapping[str, Any]) -> dict[str, Any]:
     left = left.strip()
+    own = dict(letters)
     if left.startswith('"'):  # a letter that looks like a call, or is an expression
-        return {left.strip('"'): _computed(right, letters, {})}
+        name, _, moved = left.removeprefix('"').partition('"')
+        names = moved.removeprefix(" of ").split(", ")
+        if not moved:
+            return {name: _computed(right, own, {})}
+        return {name: Of(lambda *given: _computed(right, own | dict(zip(names, given, strict=True)), {}), *names)}
     indices = re.fullmatch(r"(.+)_(?:\{(\w+)\}|(\w))", left)
     if indices and all(isinstance(letters.get(index), range) for index in indices[2] or indices[3]):
         names = indices[2] or indices[3]
-        own = dict(letters)
         values = {at: _computed(right, own, dict(zip(names, at, strict=True)))
                   for at in product(*(letters[index] for index in names))}  # fmt: skip
         return {indices[1]: Indexed(lambda *at: values[at])}
     if not (call := re.fullmatch(r"(.+?)\(([^()]*)\)", left)):
         return {left: _computed(right, letters, {})}
-    own, arguments = dict(letters), [name.strip() for name in call[2].split(",")]
+    arguments = [name.strip() for name in call[2].split(",")]
     return {call[1]: lambda *given: _computed(right, own | dict(zip(arguments, given, strict=True)), {})}
 
 
