@@ -6,6 +6,7 @@ and another answer may stand in the place of one.
 
 from __future__ import annotations
 
+import ast
 import inspect
 from collections.abc import Callable
 from functools import cache, partial
@@ -13,13 +14,14 @@ from types import CodeType, FunctionType
 from typing import Any
 
 import numpy as np
+import scipy
 import sympy as sp
 
 from kfcourse.checks.question import Answer, Mistake
 from kfcourse.checks.steps import at_step, at_wrong_step
 
 SETS = "kfcourse.exercises."
-NAMES = {"np": np, "sp": sp, "at_step": at_step, "at_wrong_step": at_wrong_step}  # for what an edit writes
+NAMES = {"np": np, "sp": sp, "scipy": scipy, "at_step": at_step, "at_wrong_step": at_wrong_step}  # for what an edit writes
 
 
 def edits(key: Answer, *rows: tuple[str, ...]) -> tuple[Mistake, ...]:
@@ -40,7 +42,7 @@ def edited(key: Answer, *texts: str) -> Answer:
     ValueError
         A text does not stand in exactly one place.
     """
-    sources = {name: inspect.getsource(function) for name, function in pieces(key).items()}
+    sources = {name: _source(function) for name, function in pieces(key).items()}
     for old, new in zip(texts[::2], texts[1::2], strict=True):
         where = [name for name, source in sources.items() if old in source]
         if not where or (where[0] != key.__name__ and len(where) > 1) or sources[where[0]].count(old) > 1:
@@ -51,7 +53,15 @@ def edited(key: Answer, *texts: str) -> Answer:
 
 def rebound(key: Answer, answers: dict[str, Answer]) -> Answer:
     """The key with other answers in the place of functions that it calls."""
-    return _built(key, {name: inspect.getsource(function) for name, function in pieces(key).items()}, answers)
+    return _built(key, {name: _source(function) for name, function in pieces(key).items()}, answers)
+
+
+def _source(function: FunctionType) -> str:
+    """The source without the docstring, whose formulas look like the code."""
+    lines = inspect.getsource(function).splitlines(keepends=True)
+    (definition,) = ast.parse("".join(lines)).body
+    first = definition.body[0]  # type: ignore[attr-defined]
+    return "".join(lines[: first.lineno - 1] + lines[first.end_lineno :]) if inspect.getdoc(function) else "".join(lines)
 
 
 def _built(key: Answer, sources: dict[str, str], answers: dict[str, Answer] | None = None) -> Answer:
