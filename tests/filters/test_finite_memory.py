@@ -7,7 +7,7 @@ import oracles
 import pytest
 from test_filters import LINEAR, OF_MEASUREMENTS, STRUCTURES, designed_on, exact_ensemble
 
-from kfcourse.filters import aof, dfkp, dfmp, fbp, fkp, fos, kalman_filter, mdfkp, mdfmp, mfkp, mfos
+from kfcourse.filters import dfkp, dfmp, fbp, fkp, fos, kalman_filter, mdfkp, mdfmp, mfkp, mfos
 from kfcourse.filters.optimal_structure import Memory, Recipe, Remembered, of_structure
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble, Instant, simulate
@@ -201,14 +201,6 @@ def test_what_cannot_be_is_refused():
                 family(linearised(CURVED), memory)
     with pytest.raises(ValueError, match="2 or 3 arguments, not 4"):
         fos(linearised(CURVED), 4)
-
-
-def test_estimates_do_not_depend_on_what_other_trajectories_do(variant53):
-    structure = gaussian(variant53)
-    filters = design([fkp(structure, 3), fbp(structure, 3)], Ensemble(variant53, 200, 5, seed=1).by_step())
-    y = simulate(variant53, 6, 5, seed=3).y
-    for one in [*filters, aof(structure)]:
-        np.testing.assert_allclose(run(one, y[:, 2:3]).mean[:, 0], run(one, y).mean[:, 2], rtol=1e-13)
 
 
 def test_an_estimate_that_tells_nothing_is_no_measurement_in_disguise():
