@@ -17,7 +17,6 @@ import sympy as sp
 
 from kfcourse.angles import TURN, Components, difference
 from kfcourse.laws import Array, Gaussian
-from kfcourse.reasons import Reason
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError, exact_matrix
@@ -212,4 +211,4 @@ def _of_solved(model: Model, omega: sp.Expr) -> LogLikelihood:
 
 
 def _no_density(message: str) -> ModelError:
-    return ModelError(Reason(message, "no_density"))
+    return ModelError(message, "no_density")

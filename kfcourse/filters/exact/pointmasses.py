@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.exact.columns import (
     ERROR,
@@ -28,7 +29,6 @@ from kfcourse.filters.exact.columns import (
 )
 from kfcourse.filters.exact.laws import constants, load, modes_of, printed
 from kfcourse.filters.multiple_models import mixture
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
