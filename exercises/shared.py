@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
-import sympy as sp
 
 from kfcourse.checks.exercises import COURSE, Exercise
-from kfcourse.checks.steps import STEP, Function, at_wrong_step
-from kfcourse.filters.designed import Scatter
+from kfcourse.checks.steps import STEP, Function
 from kfcourse.laws import Array, transpose
-from kfcourse.scenarios.navigation import Dynamics
 
 Map = Callable[[Array], Array]
 
@@ -30,17 +26,6 @@ def covariance(rng: np.random.Generator, size: int, scale: float = 1.0) -> Array
     """A hidden covariance: correlated, and well away from singular."""
     root = np.eye(size) + 0.4 * rng.normal(size=(size, size))
     return scale * root @ root.T
-
-
-@lru_cache(maxsize=8)
-def vehicle(q: float) -> Dynamics:
-    """Position and velocity, white acceleration of the intensity q."""
-    return Dynamics(np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.0, q]))
-
-
-def substituted(formulas: sp.MatrixBase, names: tuple[sp.Symbol, ...]) -> Callable[..., sp.ImmutableMatrix]:
-    """The formulas as a function of other symbols in the place of these."""
-    return lambda *values: sp.ImmutableMatrix(formulas.xreplace(dict(zip(names, map(sp.sympify, values), strict=True))))
 
 
 # -- other functions than the variant's: where it is linear, or has a zero or a one, a mistake would not show
@@ -90,35 +75,26 @@ def other_equations(exercise: Exercise, a: Function, b: Function) -> tuple[Funct
     return _like(a, other_a), _like(b, other_b)
 
 
-# -- a wrong step, for known mistakes: the function of another step, at step k
-
-
-def first_step(function: Function, k: int) -> Function:
-    """That of step 0, whatever k is."""
-    return at_wrong_step(function, 0)
-
-
-def next_step(function: Function, k: int) -> Function:
-    """That of step k + 1."""
-    return at_wrong_step(function, k + 1)
-
-
-def step_before(function: Function, k: int) -> Function:
-    """That of step k - 1."""
-    return at_wrong_step(function, k - 1)
-
-
 # -- regressions over an ensemble
 
 RUNS = 60  # hidden trajectories: a regression over so few differs clearly from one with N - 1 in the place of N
 
-Fit = Callable[[Array, Array], tuple[Array, Array, Array]]
-
 
 def regression(target: Array, regressor: Array) -> tuple[Array, Array, Array]:
     """matrix (r, s), offset (r,), residual covariance (r, r)."""
-    matrix, offset, residual = Scatter.of(target, regressor).regression()
-    return matrix, offset, residual
+    t, r = target - target.mean(axis=0), regressor - regressor.mean(axis=0)
+    cross, own = t.T @ r / len(t), r.T @ r / len(r)
+    matrix = cross @ np.linalg.pinv(own, hermitian=True)
+    offset = target.mean(axis=0) - matrix @ regressor.mean(axis=0)
+    return matrix, offset, t.T @ t / len(t) - matrix @ cross.T
+
+
+# Edits of it that are mistakes in more than one question: second moments about zero, and no offset.
+MOMENTS = (
+    "t.T @ r / len(t), r.T @ r / len(r)",
+    "target.T @ regressor / len(t), regressor.T @ regressor / len(r)",
+)
+OFFSET = "target.mean(axis=0) - matrix @ regressor.mean(axis=0)", "target.mean(axis=0)"
 
 
 def ensemble(exercise: Exercise, name: str) -> tuple[Array, Array, Array]:
@@ -131,29 +107,3 @@ def predicted(exercise: Exercise, name: str, x: Array) -> Array:
     """What a filter may have predicted of x: near it, and biased a little."""
     spread = x.std(axis=0) + 0.1 * np.sqrt(np.diagonal(exercise.model.prior.cov))
     return x + spread * (0.1 + 0.5 * exercise.rng(name).normal(size=x.shape))
-
-
-def regression_with(moments: Callable[[Array, Array], tuple[Array, Array]], offset: bool = True) -> Fit:
-    """A regression from other second moments: (target, regressor) -> (cross (r, s), of the regressor (s, s))."""
-
-    def fit(target: Array, regressor: Array) -> tuple[Array, Array, Array]:
-        cross, own = moments(target, regressor)
-        matrix = cross @ np.linalg.pinv(own)
-        shift = target.mean(axis=0) - matrix @ regressor.mean(axis=0) if offset else target.mean(axis=0)
-        return matrix, shift, covariance_of(target, target) - matrix @ covariance_of(target, regressor).T
-
-    return fit
-
-
-def covariance_of(a: Array, b: Array) -> Array:
-    """Cross covariance of two samples (N, r), (N, s), over N."""
-    return (a - a.mean(axis=0)).T @ (b - b.mean(axis=0)) / len(a)
-
-
-def raw_moment(a: Array, b: Array) -> Array:
-    """The same about zero."""
-    return a.T @ b / len(a)
-
-
-MOMENTS_ABOUT_ZERO = regression_with(lambda t, r: (raw_moment(t, r), raw_moment(r, r)))
-WITHOUT_OFFSET = regression_with(lambda t, r: (covariance_of(t, r), covariance_of(r, r)), offset=False)

@@ -15,13 +15,20 @@ import click
 from kfcourse.commands import main as main  # scripts that were installed before call it here
 from kfcourse.derivations import check_text
 from kfcourse.derivations.setting import of_model
-from kfcourse.files import is_standard_output, read_only, replacing_together
+from kfcourse.files import replacing_together
 from kfcourse.lab.admission import admissions, on_trial
 from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.budget import SIZES, Budget, usual_runs
-from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
-from kfcourse.lab.report import conclusions, recognised_modes, remarks_in_words, write_json, write_report
+from kfcourse.lab.report import (
+    LANGUAGES,
+    STANDARD_OUTPUT,
+    conclusions,
+    recognised_modes,
+    remarks_in_words,
+    write_json,
+    write_report,
+)
 from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, OF_BEST, has_bound, title
 from kfcourse.lab.variants import STEPS, find_variant
 from kfcourse.listing import VARIANTS
@@ -104,7 +111,7 @@ DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with m
 )
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]")
 @click.option(
-    "--report", "language", type=click.Choice(LANGUAGES), help="Also write the student's report, handin.html and handin.tex."
+    "--report", "language", type=click.Choice(LANGUAGES), default="en", show_default=True, help="Language of the report."
 )
 @click.option(
     "--json", "json_file", type=click.Path(path_type=Path), help="Also write the numbers to this file; - is standard output."
@@ -126,7 +133,7 @@ def lab(
     dask: str | None,
     compiled: bool,
     out: Path | None,
-    language: str | None,
+    language: str,
     json_file: Path | None,
 ) -> None:
     """Compare the filters on VARIANT (such as 53) and write the report.
@@ -190,7 +197,7 @@ def lab(
         click.echo(f"{title(name)} left out: {reason}", err=True)
     for name, reason in result.replaced.items():
         click.echo(f"{title(name)} by particles: {reason}", err=True)
-    to_error = json_file is not None and is_standard_output(json_file)
+    to_error = str(json_file) in STANDARD_OUTPUT
     _tell(result, to_error)
     again = _again(result, variant, variants_file, seed, names, designs, wide, same_ensemble, compiled)
     click.echo(again, err=to_error)
@@ -198,11 +205,7 @@ def lab(
         write_json(chosen, result, json_file)
     with _kept(folder), replacing_together(folder) as place:
         modes = recognised_modes(result, filters)
-        write_report(chosen, result, place, [one for one in (budget.says, again) if one], found, modes)
-        if language:
-            write_handin(chosen, result, place, language, modes)
-    if not language and (older := folder / "handin.html").exists():
-        click.echo(f"{older} is of an earlier run; --report en, or ru, writes it anew", err=True)
+        write_report(chosen, result, place, language, admissions(model, None, DERIVATION, found), modes)
     click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""), err=to_error)
 
 
@@ -410,12 +413,10 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
         for place in made:
             if place.is_dir():
                 place.rmdir()
-    if json_file is None or is_standard_output(json_file):
+    if json_file is None or str(json_file) in STANDARD_OUTPUT:
         return
     if json_file.is_dir() or not json_file.parent.is_dir():
         raise click.ClickException(f"the numbers cannot go to {json_file}: name a file in an existing folder with --json")
-    if read_only(json_file):
-        raise click.ClickException(f"{json_file} is read-only, and is not replaced: name another file with --json")
     if json_file.exists() and not json_file.is_file():  # a pipe or a device is written to, not replaced
         return
     try:

@@ -1,9 +1,8 @@
 """The letters of checking-exact.md: point masses as a plain program, for a noise that enters linearly."""
 
 import numpy as np
-
-from kfcourse.pages.reader import Of, bell
-from kfcourse.pages.relations import CONDITION, DEFINITION, NOTATION
+from gate.page import CONDITION, DEFINITION, NOTATION
+from gate.values import Of, bell
 
 
 def masses(rng):
@@ -50,15 +49,19 @@ def bent(rng):
     return {"y_0": y, r"\lim_{f\to0}\frac{z_0-y_0}{f^2}": (4 * moved(5e-4) - moved(1e-3)) / 3}
 
 
-def crossing(rng):
-    """Where the average line meets the curve, off zero: the greatest root of y^4 - 4 y^2 - 3."""
-    return {"|y_0|": np.roots([1, 0, -4, 0, -3]).real.max()}
+crossing = r"""
+a = 2
+again:
+a = \sqrt{4+3/a^2}      # the greatest root of y^4 - 4 y^2 - 3: where the average line meets the curve
+then:
+"|y_0|" = a
+keep: |y_0|
+"""
 
 
 LETTERS = (masses, bent, crossing)
-SAID = {r"a_v=\frac{\partial a}{\partial v}": DEFINITION}
-SAID |= dict.fromkeys(
-    (r"\frac{dx}{dt}", "I_y(x)"),
-    NOTATION,
-)
-SAID |= {"|y_0|=2": CONDITION}
+SAID = {
+    DEFINITION: [r"a_v=\frac{\partial a}{\partial v}"],
+    NOTATION: [r"\frac{dx}{dt}", "I_y(x)"],
+    CONDITION: ["|y_0|=2"],
+}

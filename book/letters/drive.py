@@ -2,33 +2,26 @@
 
 import numpy as np
 import scipy
-
-from kfcourse.pages.letters import column, covariance
-from kfcourse.pages.relations import DEFINITION, NOTATION
+from gate.page import DEFINITION, NOTATION
+from gate.worlds import column, covariance
 
 EAST, NORTH = (rf"\int_0^\Delta V\{function}(\psi+\omega s)\,ds" for function in ("cos", "sin"))
 
 
-def arc(rng):
-    V, psi, omega, Delta = *rng.normal(size=3), rng.uniform(0.5, 1.5)
-
-    def integral(function):
-        return scipy.integrate.quad(lambda s: V * function(psi + omega * s), 0, Delta)[0]
-
-    return {
-        "V": V, r"\psi": psi, r"\omega": omega, r"\Delta": Delta, "u": omega * Delta / 2,
-        EAST: integral(np.cos), NORTH: integral(np.sin),
-    }  # fmt: skip
+arc = r"""
+V, \psi, \omega: num
+\Delta: in .5 1.5
+u = \omega\Delta/2
+"""
 
 
-def tunnel(rng):
-    """Variances of the place after a straight tunnel: pushes of speed and heading, each carried to the end."""
-    V, t, p_V, p_psi, q_V, q_psi = rng.uniform(0.5, 2, 6)
-    pushes = scipy.integrate.quad(lambda s: (t - s) ** 2, 0, t)[0]
-    return {
-        "V": V, "t": t, "p_V": p_V, r"p_\psi": p_psi, "q_V": q_V, r"q_\psi": q_psi,
-        r"D_\parallel": t * p_V * t + q_V * pushes, r"D_\perp": V * (t * p_psi * t + q_psi * pushes) * V,
-    }  # fmt: skip
+tunnel = r"""
+V, t, p_V, p_\psi, q_V, q_\psi: pos
+i = \int_0^t(t-s)^2ds
+D_\parallel = tp_Vt+q_Vi
+D_\perp = V(tp_\psi t+q_\psi i)V
+keep: V, t, p_V, p_\psi, q_V, q_\psi, D_\parallel, D_\perp
+"""
 
 
 def moved(rng):
@@ -52,24 +45,19 @@ def moved(rng):
     return steps | {"M": M, "b": b, "R": R, "H": H, r"\Psi": Psi, "r": r, "I": np.eye(2), "F": H @ Psi @ H.T + r * np.eye(2)}
 
 
-def long_tunnel(rng):
-    """The speed at which pushes of speed and heading err alike."""
-    q_V, q_psi, t = rng.uniform(0.5, 2, 3)
-    along, across = (q * scipy.integrate.quad(lambda s: (t - s) ** 2, 0, t)[0] for q in (q_V, q_psi))
-    return {"q_V": q_V, r"q_\psi": q_psi, "V": np.sqrt(along / across)}
+long_tunnel = r"""
+q_V, q_\psi, t: pos
+V = \sqrt{q_V\int_0^t(t-s)^2ds/(q_\psi\int_0^t(t-s)^2ds)}
+keep: q_V, q_\psi, V
+"""
 
 
 LETTERS = (arc, tunnel, moved, long_tunnel)
-EQUALS = {
-    EAST: r"V\Delta\cos(\psi+u)\frac{\sin u}{u}",
-    NORTH: r"V\Delta\sin(\psi+u)\frac{\sin u}{u}",
-}
 SAID = {
-    r"e=\rho\cos\varphi_0\,(\ell-\ell_0)": DEFINITION,
-    r"n=\rho\,(\varphi-\varphi_0)": DEFINITION,
-    "e_{k+1}": NOTATION,
-    "n_{k+1}": NOTATION,
-    r"\psi_{k+1}": NOTATION,
-    "V_{k+1}": NOTATION,
-    r"\Delta": NOTATION,
+    DEFINITION: [r"e=\rho\cos\varphi_0\,(\ell-\ell_0)", r"n=\rho\,(\varphi-\varphi_0)"],
+    NOTATION: ["e_{k+1}", "n_{k+1}", r"\psi_{k+1}", "V_{k+1}", r"\Delta"],
+}
+EQUALS = {
+    r"\int_0^\Delta V\cos(\psi+\omega s)\,ds": r"V\Delta\cos(\psi+u)\frac{\sin u}{u}",
+    r"\int_0^\Delta V\sin(\psi+\omega s)\,ds": r"V\Delta\sin(\psi+u)\frac{\sin u}{u}",
 }

@@ -1,12 +1,12 @@
 """The letters of integration-limits.md: the package's covariance analysis, and its filter along a constant bias."""
 
 import numpy as np
+from gate.page import NOTATION
+from gate.values import Indexed
+from gate.worlds import K_RANGE
 
 from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem, covariances, run
-from kfcourse.pages.letters import K_RANGE
-from kfcourse.pages.reader import Indexed
-from kfcourse.pages.relations import NOTATION
 
 
 def analysis(rng):
@@ -23,15 +23,22 @@ def analysis(rng):
     }  # fmt: skip
 
 
-def slow_drift(rng):
-    """True and best variance of a filter that believes in c times a drift of 1e-9."""
-    xi, n, c = 1e-9, rng.uniform(1, 2), rng.uniform(2, 3)
-    size = c * xi / n
-    K = -(size * np.sqrt(size**2 + 4) - size**2) / 2  # Psi = K^2 n^2 / (1 + K) in the steady state
-    true = (K**2 * n**2 + (1 + K) ** 2 * xi**2) / (-K * (2 + K))
-    return {r"\lim_{\sigma_\xi\to0}": 1.0, r"\bar p": true, "p": np.roots([1, xi**2, -((xi * n) ** 2)]).max(), "c": c}
+slow_drift = r"""
+x = 0.000000001
+n: in 1 2
+c: in 2 3
+a = cx/n
+K = -(a\sqrt{a^2+4}-a^2)/2
+\bar p = (K^2n^2+(1+K)^2x^2)/(-K(2+K))
+p = x(\sqrt{x^2+4n^2}-x)/2
+"\lim_{\sigma_\xi\to0}" = 1
+keep: \lim_{\sigma_\xi\to0}, \bar p, p, c
+"""
 
 
 LETTERS = (analysis, slow_drift)
+SAID = {
+    "a setting": ["K_k=0"],
+    NOTATION: [r"\text{mean innovation}"],
+}
 EQUALS = {r"{\lim_{\sigma_\xi\to0}\bar p/p}": r"\frac12(c+1/c)"}
-SAID = {"K_k=0": "a setting", r"\text{mean innovation}": NOTATION}

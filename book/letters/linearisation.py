@@ -4,10 +4,10 @@ from functools import partial
 from itertools import product
 
 import numpy as np
+from gate.page import DEFINITION, NOTATION
+from gate.values import Indexed, Of, Operator
+from gate.worlds import BENT_SCALAR, BENT_SCALAR_LATER, column, extended_run, slope
 
-from kfcourse.pages.letters import BENT_SCALAR, BENT_SCALAR_LATER, column, extended_run, slope
-from kfcourse.pages.reader import Indexed, Of, Operator
-from kfcourse.pages.relations import DEFINITION, NOTATION
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import linearised
 
@@ -66,11 +66,14 @@ def western(rng):
     )
 
 
-def even(rng):
-    """The variance without measurements, each noise carried to its step by itself."""
-    c, g, D_xi, D_0 = rng.uniform(0.5, 2, size=4)
-    Psi = [c ** (2 * k) * D_0 + sum(c ** (2 * j) for j in range(k)) * g**2 * D_xi for k in range(4)]
-    return {"c": c, "g": g, r"D_\xi": D_xi, r"\Psi": Indexed(Psi), "k": range(3), "S": np.cos, "x": rng.normal()}
+even = r"""
+c, g, D_\xi, D_0: pos
+k: range 5
+\Psi_k = c^{2k}D_0+\sum_{i=0}^kc^{2i}g^2D_\xi-c^{2k}g^2D_\xi
+S(x) = \cos x
+x: num
+k: range 3
+"""
 
 
 def multiplied(rng):
@@ -89,31 +92,32 @@ def multiplied(rng):
     }  # fmt: skip
 
 
-def exponent(rng):
-    """Mean and variance of the density exp(a x + b x^2), up to a constant, by a sum."""
-    a, b = rng.normal(), -rng.uniform(0.5, 2)
-    x = np.linspace(-12, 12, 4001)
-    mass = np.exp(a * x + b * x**2)
-    mean = np.average(x, weights=mass)
-    return {"a": a, "b": b, r"m_\text{e}": mean, r"v_\text{e}": np.average((x - mean) ** 2, weights=mass)}
+exponent = r"""
+a: num
+c: pos
+b = -c
+n = \int e^{ax+bx^2}dx
+m_\text{e} = \int xe^{ax+bx^2}dx/n
+v_\text{e} = \int(x-m_\text{e})^2e^{ax+bx^2}dx/n
+keep: a, b, m_\text{e}, v_\text{e}
+"""
 
 
 LETTERS = (course, scalar, western, even, multiplied, exponent)
 SAID = {
-    r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k": DEFINITION,
-    r"y_k=S_k(x_k)+n_k": DEFINITION,
-    "g=ex": DEFINITION,
-    r"\ln p(x_{k-1}\mid y_{0:k-1})": DEFINITION,
-    r"\ln p(x_k\mid x_{k-1})": DEFINITION,
-    r"\ln p(y_k\mid x_k)": DEFINITION,
-}
-SAID |= dict.fromkeys(
-    (
+    DEFINITION: [
+        r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k",
+        "y_k=S_k(x_k)+n_k",
+        "g=ex",
+        r"\ln p(x_{k-1}\mid y_{0:k-1})",
+        r"\ln p(x_k\mid x_{k-1})",
+        r"\ln p(y_k\mid x_k)",
+    ],
+    NOTATION: [
         r"f_{k-1}(x_{k-1})-O\bigl((x_{k-1}-z_{k-1})^2\bigr)",
-        r"g_{k-1}^2(x_{k-1})-O(x_{k-1}-z_{k-1})",
+        "g_{k-1}^2(x_{k-1})-O(x_{k-1}-z_{k-1})",
         r"S_{k}(x_k)-O\bigl((x_k-\lambda_k)^2\bigr)",
         r"\mathsf{M}\,g^2(z+u)-g^2(z)-O(p^2)",
-    ),
-    NOTATION,
-)
+    ],
+}
 EQUALS = {"-1/(2b)": r"v_\text{e}", "-a/(2b)": r"m_\text{e}"}

@@ -1,11 +1,11 @@
 """The letters of manoeuvres.md: three modes with a joint table of probabilities; a place as a radar measures it."""
 
 import numpy as np
+from gate.page import CONDITION, DEFINITION, NOTATION
+from gate.values import Indexed, Of
+from gate.worlds import column, covariance
 from scipy.stats import multivariate_normal
 
-from kfcourse.pages.letters import column, covariance
-from kfcourse.pages.reader import Indexed, Of
-from kfcourse.pages.relations import CONDITION, DEFINITION, NOTATION
 from kfcourse.scenarios.radar import spherical
 
 M, N = 3, 2
@@ -57,30 +57,40 @@ def two_modes(rng):
     return one | backwards | {rf"\pi_{{{i}{i}}}": pi[i - 1, i - 1] for i in (1, 2)}
 
 
-def turned(rng, middle=False):
-    """A velocity turned by an acceleration across it: that of the step's beginning, or of its middle."""
-    v, J = column(rng.normal(size=2)), np.array([[0.0, -1], [1, 0]])
-    omega, T = rng.uniform(0.5, 1), rng.uniform(0.2, 0.3)
-    half = np.eye(2) - omega * T / 2 * J
-    after = np.linalg.solve(half, half.T @ v) if middle else v + omega * T * J @ v
-    sizes = {"|v|": np.hypot(*v.ravel()), "|v'|": np.hypot(*after.ravel())}
-    product = {r"(v'-v)\cdot(v'+v)": ((after - v).T @ (after + v)).item()}
-    return sizes | product | {"v": v, "v'": after, "J": J, r"\omega": omega, "T": T}
+turned = r"""
+v: any 2
+J = \begin{pmatrix}0&-1\\1&0\end{pmatrix}
+\omega: in .5 1
+T: in .2 .3
+v' = v+\omega TJv
+"|v|" = \sqrt{v^Tv}
+"|v'|" = \sqrt{v'^Tv'}
+"(v'-v)\cdot(v'+v)" = (v'-v)^T(v'+v)
+"""
 
 
-def turned_in_the_middle(rng):
-    return turned(rng, middle=True)
+turned_in_the_middle = r"""
+v: any 2
+J = \begin{pmatrix}0&-1\\1&0\end{pmatrix}
+I: eye 2
+\omega: in .5 1
+T: in .2 .3
+h = I-\omega TJ/2
+v' = h^{-1}h^Tv
+"|v|" = \sqrt{v^Tv}
+"|v'|" = \sqrt{v'^Tv'}
+"(v'-v)\cdot(v'+v)" = (v'-v)^T(v'+v)
+keep: v, v', J, \omega, T, |v|, |v'|, (v'-v)\cdot(v'+v)
+"""
 
 
 LETTERS = (modes, mixing, two_modes, place, turned, turned_in_the_middle)
 SAID = {
-    "L_j=1": "a setting",
-    r"\mu_{i|j}(k-1|k-1)": NOTATION,
-    "r_x": NOTATION,
-    "r_y": NOTATION,
-    "r_z": NOTATION,
-    r"\mu_{1\mid1}-\mu_{1\mid2}": NOTATION,
-    r"\frac{\sin\eta}{\eta}-\frac{\eta^4}{120}+\dots": "a series",
+    "a setting": ["L_j=1"],
+    NOTATION: [r"\mu_{i|j}(k-1|k-1)", "r_x", "r_y", "r_z", r"\mu_{1\mid1}-\mu_{1\mid2}"],
+    "a series": [r"\frac{\sin\eta}{\eta}-\frac{\eta^4}{120}+\dots"],
+    CONDITION: [r"\pi_{11}+\pi_{22}=1"],
+    DEFINITION: [r"\Theta=JpJ^T+Q"],
 }
 EQUALS = {
     r"\pi_{ij}\mu_i/c_j": r"\mu_{i\mid j}",
@@ -88,5 +98,3 @@ EQUALS = {
     r"r\cos(\epsilon)\sin(\varphi)": "r_y",
     r"r\sin(\epsilon)": "r_z",
 }
-SAID |= {r"\pi_{11}+\pi_{22}=1": CONDITION}
-SAID |= {r"\Theta=JpJ^T+Q": DEFINITION}

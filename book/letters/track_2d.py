@@ -1,12 +1,12 @@
 """The letters of track-2d.md: a run of the package's filter with a known input; a lost sample; a telescoping sum."""
 
 import numpy as np
+from gate.page import DEFINITION, NOTATION
+from gate.values import Indexed
+from gate.worlds import K_RANGE, column, covariance
 
 from kfcourse.laws import Gaussian
 from kfcourse.linear import run
-from kfcourse.pages.letters import K_RANGE, column, covariance
-from kfcourse.pages.reader import Indexed
-from kfcourse.pages.relations import DEFINITION, NOTATION
 from kfcourse.scenarios import pointer
 
 DELTA, SIGMA, INTENSITY = 0.3, 1.3, 2.0
@@ -51,33 +51,32 @@ def axes(rng):
     }  # fmt: skip
 
 
-def telescope(rng):
-    """What the prediction by second differences is off the mean of the last two measurements."""
-    y = rng.normal(size=9)
-    r, v = y[2], (3 * y[2] - 4 * y[1] + y[0]) / 2
-    off = {}
-    for k in range(2, 8):
-        u = y[k] - 2 * y[k - 1] + y[k - 2]
-        r, v = r + v + u / 2, v + u
-        off[k] = r - (y[k] + y[k - 1]) / 2
-    return {"y": Indexed(y), r"\delta": Indexed([0, 0, *off.values()]), "k": range(2, 7)}
+telescope = r"""
+y: nums 9
+k: range 2 8
+r_2 = y_2
+v_2 = (3y_2-4y_1+y_0)/2
+r_{k+1} = r_k+v_k+(y_k-2y_{k-1}+y_{k-2})/2
+v_{k+1} = v_k+y_k-2y_{k-1}+y_{k-2}
+\delta_k = r_{k+1}-(y_k+y_{k-1})/2
+k: range 2 7
+keep: y, \delta, k
+"""
 
 
 LETTERS = (filtered, sample_lost, axes, telescope)
 _INPUT = r"\begin{pmatrix}\Delta^2a_x/2\\\Delta^2a_y/2\\\Delta a_x\\\Delta a_y\end{pmatrix}"
 SAID = {
-    r"x_{k+1}=Ax_k+B\,(u_k+\xi_k)": DEFINITION,
-    "y_k=Hx_k+w_k": DEFINITION,
-    r"\xi_k\sim\mathcal N(0,\sigma_a^2I)": DEFINITION,
-    r"w_k\sim\mathcal N(0,R)": DEFINITION,
-    r"Q_{\rm const}": NOTATION,
-    r"Q_{\rm white}": NOTATION,
-    r"\delta^2": NOTATION,
-    r"s(\tau)": NOTATION,
-    "0": NOTATION,
+    DEFINITION: [
+        r"x_{k+1}=Ax_k+B\,(u_k+\xi_k)",
+        "y_k=Hx_k+w_k",
+        r"\xi_k\sim\mathcal N(0,\sigma_a^2I)",
+        r"w_k\sim\mathcal N(0,R)",
+    ],
+    NOTATION: [r"Q_{\rm const}", r"Q_{\rm white}", r"\delta^2", r"s(\tau)", "0"],
 }
 EQUALS = {
-    r"G\,(a_x,a_y,a_x,a_y)^T": _INPUT,
-    r"B\,(a_x,a_y)^T": _INPUT,
+    r"G\,(a_x,a_y,a_x,a_y)^T": r"\begin{pmatrix}\Delta^2a_x/2\\\Delta^2a_y/2\\\Delta a_x\\\Delta a_y\end{pmatrix}",
+    r"B\,(a_x,a_y)^T": r"\begin{pmatrix}\Delta^2a_x/2\\\Delta^2a_y/2\\\Delta a_x\\\Delta a_y\end{pmatrix}",
     r"\delta_{k+1}-\delta_k": r"\frac32(y_0-2y_1+y_2)",
 }

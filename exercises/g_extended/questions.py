@@ -1,7 +1,7 @@
 """Questions of set g: the extended Kalman filter from its Jacobians, and whether it is right about its own errors.
 
 Answers are functions of arrays: vectors (..., n), matrices (..., r, c), trajectories first.  They are called with the hidden
-functions of hidden.py.  The keys are in keys.py, the known mistakes in the modules mistakes_of_*.py.
+functions of hidden.py.  The keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -11,20 +11,20 @@ from pathlib import Path
 import numpy as np
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import Question, catalogue
+from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import at_step
-from kfcourse.exercises import follow_on
 from kfcourse.exercises.g_extended.hidden import RUNS, STEPS, cases, changing, curved, hidden_law, root
 from kfcourse.exercises.g_extended.keys import bounds, consistency, correct, information, jacobian, predict, run_filter
-from kfcourse.exercises.g_extended.mistakes_of_consistency import WRONG_BOUNDS, WRONG_NORMALISED
-from kfcourse.exercises.g_extended.mistakes_of_filter import (
+from kfcourse.exercises.g_extended.mistakes import (
+    WRONG_BOUNDS,
     WRONG_CORRECTIONS,
     WRONG_INFORMATION,
     WRONG_JACOBIANS,
+    WRONG_NORMALISED,
     WRONG_PREDICTIONS,
+    WRONG_RUNS,
 )
-from kfcourse.exercises.g_extended.mistakes_of_run import WRONG_RUNS
 from kfcourse.exercises.shared import covariance
 from kfcourse.laws import apply
 
@@ -128,7 +128,7 @@ QUESTIONS = (
         "warm-up",
         jacobian,
         jacobian_arguments,
-        catalogue(WRONG_JACOBIANS),
+        WRONG_JACOBIANS,
         tolerance=1e-8,
         advice=(
             "Try it on a linear function, whose derivative you know, and on a quadratic one: for both, "
@@ -142,7 +142,7 @@ QUESTIONS = (
         "warm-up",
         bounds,
         bounds_arguments,
-        catalogue(WRONG_BOUNDS),
+        WRONG_BOUNDS,
         ("low", "high"),
         advice=(
             "What is the law of the sum? Then of the mean? For many runs the bounds must close in on the degrees of freedom."
@@ -154,7 +154,7 @@ QUESTIONS = (
         "core",
         predict,
         prediction_arguments,
-        catalogue(WRONG_PREDICTIONS),
+        WRONG_PREDICTIONS,
         ("lam", "Psi"),
         advice="Say of each function at which point it is taken, and check with a linear model and no noise.",
         axes=("trajectory",),
@@ -165,7 +165,7 @@ QUESTIONS = (
         "core",
         correct,
         correction_arguments,
-        catalogue(WRONG_CORRECTIONS),
+        WRONG_CORRECTIONS,
         TWO,
         advice=(
             "Try two cases: y equal to what was expected, and a meter that tells nothing. Then look at "
@@ -179,14 +179,13 @@ QUESTIONS = (
         "core",
         run_filter,
         run_arguments,
-        catalogue(WRONG_RUNS),
+        WRONG_RUNS,
         ("z", "p", "lam", "Psi"),
         advice="Follow the first two steps by hand: which law is compared with y_0, and which with y_1?",
         axes=(
             "step",
             "trajectory",
         ),
-        on=follow_on.extended_run,
     ),
     Question(
         "g6",
@@ -194,7 +193,7 @@ QUESTIONS = (
         "core",
         consistency,
         normalised_arguments,
-        catalogue(WRONG_NORMALISED),
+        WRONG_NORMALISED,
         ("NEES", "NIS"),
         advice=(
             "For each of the two: which error, and the covariance of that very error? For a right filter the means are n and p."
@@ -207,7 +206,7 @@ QUESTIONS = (
         "stretch",
         information,
         information_arguments,
-        catalogue(WRONG_INFORMATION),
+        WRONG_INFORMATION,
         ("p", "K"),
         advice="Compare with the gain form for one component by hand: which inverses are there, and of what?",
         axes=("trajectory",),

@@ -5,7 +5,7 @@ import pytest
 
 from kfcourse import JumpModel, Model, ModelError, compare, gaussian, linearised, run, simulate
 from kfcourse.filters import gpb2, imm, logic_dynamic, logic_dynamic_fos, pointmass
-from kfcourse.filters.state_transitions import by_state
+from kfcourse.filters.multiple_models import by_state
 from kfcourse.laws import Gaussian
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 
@@ -182,12 +182,6 @@ def test_the_exact_filter_follows_probabilities_that_jump():
     y = simulate(jump, 40, 8, seed=1).y
     found, expected = run(pointmass(jump), y), run(pointmass(steep), y)
     assert (np.abs(found.mean - expected.mean) < 0.01 * np.sqrt(expected.cov[..., 0])).all()
-
-
-def test_jumps_of_the_probabilities_are_refused_by_who_integrates_them():
-    model = overloaded([["Heaviside(1 - x)", "1 - Heaviside(1 - x)"], [0.3, 0.7]])
-    with pytest.raises(ModelError, match="from mode sound change too abruptly"):
-        of(logic_dynamic, model)
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,7 @@ from kfcourse import JumpModel, cli, load_variants, simulate
 from kfcourse.filters import logic_dynamic, pointmass
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import JUMP_LAB, JumpStructures, title
-from kfcourse.lab.variant_tables import summary
-from kfcourse.lab.variants import VariantError, chosen_variants, find_variant, read_variants
+from kfcourse.lab.variants import VariantError, chosen_variants, find_variant, read_variants, summary
 from kfcourse.montecarlo.modes import recognised
 from kfcourse.notebooks import handing_out
 from kfcourse.notebooks.jobs import Outcome

@@ -136,7 +136,7 @@ def pointmass(model: Model | JumpModel, accuracy: float = ACCURACY) -> Filter:
         raise ModelError(f"the exact filter needs {FINEST:g} <= accuracy < 1, got {accuracy}")
     modes = modes_of(model)
     if len(modes) > 1 and model.angles.x:
-        raise ModelError("the exact filter over modes holds no state that is an angle; use jump_particle(model)")
+        raise ModelError("the exact filter over modes holds no state that is an angle; use particle(model)")
     exact = _Exact(model, printed(model), accuracy)
     back = exact.look_back if len(modes) == 1 else None
     return Filter("aof-exact", modes[0], exact.init, exact.step, slow=True, evidence=_evidence, look_back=back)

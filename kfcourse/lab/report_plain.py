@@ -1,0 +1,165 @@
+"""The student's report of a model without modes: task, both derivations of the structural functions, equations of the filters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import sympy as sp
+
+from kfcourse.filters import EQUATIONS
+from kfcourse.filters import latex as equations_latex
+from kfcourse.lab.checked_quadrature import Checked
+from kfcourse.lab.families import FAMILIES, family
+from kfcourse.lab.report_sections import Block, StudentReport
+from kfcourse.lab.report_text import law, lines_of, matrix, printed
+from kfcourse.lab.short_names import Structures
+from kfcourse.lab.written_out import written_lines
+from kfcourse.montecarlo.comparison import Comparison
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
+from kfcourse.symbolic.reading import exact_matrix
+from kfcourse.symbolic.structure import FUNCTION_LATEX
+from kfcourse.symbolic.writing import formula_latex, number_latex
+
+HIGHEST = 8  # moment that is printed
+
+# Numbers in the school's catalogue of structural functions, for the forms whose numbers the course gives.
+CATALOGUE = {
+    ("tau", "c*z"): 2,
+    ("Theta", "c**2*p + e**2*z**2"): 15,
+    ("Theta", "c**2*p + e**2*p + e**2*z**2"): 22,
+    ("h", "g*m"): 5,
+    ("G", "g"): 8,
+    ("F", "d*g**2 + f**2*m**4"): 16,
+    ("F", "3*d**2*f**2 + 6*d*f**2*m**2 + d*g**2 + f**2*m**4"): 20,
+}
+
+
+class PlainReport(StudentReport):
+    """The report of a model without modes."""
+
+    def __init__(self, result: Comparison, words: dict[str, str]) -> None:
+        super().__init__(result, words)
+        assert isinstance(result.model, Model)  # `write_report` takes the other report for those with modes
+        self.model = result.model
+        self.structures = Structures(self.model)
+        self.derivable: list[str] = []  # kinds whose formulas are found in time, and are not too long
+
+    def task(self) -> Iterator[Block]:
+        model, words = self.model, self.words
+        yield Block("section", words["task"])
+        yield Block("text", words["task_text"])
+        state, *others = lines_of(model.latex(values=False, indexed=True))
+        if model.n == model.p == 1:  # what a and b are called below
+            meter, *others = others
+            k = ", k" if model.timed else ""
+            state = state.replace("&=", f"&= a(x_k, v_k{k}) =", 1)
+            others = [meter.replace("&=", f"&= b(x_k, w_k{k}) =", 1), *others]
+        yield Block("formulas", lines=[state, *others])
+        values = ", ".join(f"${sp.latex(name)} = {number_latex(float(value))}$" for name, value in model.values.items())
+        if values:
+            yield Block("text", self.said("parameters", values=values))
+        laws = (("x_0", model.prior), ("v_k", model.state_noise), ("w_k", model.meter_noise))
+        yield Block("formulas", lines=[rf"{name} &\sim {law(one)}" for name, one in laws])
+        yield Block("text", words["independent"])
+        yield Block("text", self.said("find", filters=", ".join(self.title(name) for name in self.result.entrants)))
+
+    def functions(self) -> Iterator[Block]:
+        if self.kinds:
+            yield Block("section", self.words["functions"])
+        for kind in self.kinds:
+            yield from self.defined(kind)
+            if self.model.n == self.model.p == 1:
+                yield from getattr(self, kind)()
+            yield from self.derived(kind)
+
+    def linearised(self) -> Iterator[Block]:
+        """The derivatives of a scalar model."""
+        model = self.model
+        sides = ((model.state_equation[0], model.v, "a", "v"), (model.meter_equation[0], model.w, "b", "w"))
+        derivatives = [
+            rf"\frac{{\partial {letter}}}{{\partial {by}}} &= {formula_latex(formula.diff(symbol), model.x, noises)}"
+            for formula, noises, letter, noise in sides
+            for by, symbol in [("x", model.x[0]), *([(noise, noises[0])] if len(noises) == 1 else [])]
+        ]
+        yield Block("text", self.words["derivatives"])
+        yield Block("formulas", lines=derivatives)
+
+    def gaussian(self) -> Iterator[Block]:
+        """The means of a scalar model, step by step."""
+        words = self.words
+        if conditional := self.conditional():
+            yield Block("text", words["conditional"])
+            yield Block("formulas", lines=conditional)
+        if moments := self.moments():
+            yield Block("text", words["recursion"])
+            yield Block("formulas", lines=[r"q_0 &= 1,\quad q_1 = m,\quad q_{n+1} = m\,q_n + n\,d\,q_{n-1}", *moments])
+        elif not self.structures.quadrature:
+            yield Block("text", words["exponentials"])
+
+    def conditional(self) -> list[str]:
+        """Means of a, a^2, b, b^2 over their noise, at a fixed state."""
+        model, lines = self.model, []
+        for formula, noises, noise, first, second in (
+            (model.state_equation[0], model.v, model.state_noise, r"\alpha", r"\gamma"),
+            (model.meter_equation[0], model.w, model.meter_noise, r"\beta", r"\eta"),
+        ):
+            over = GaussianMoments(list(noises), list(exact_matrix(noise.mean)), sp.Matrix(exact_matrix(noise.cov)))
+            for letter, power in ((first, 1), (second, 2)):
+                try:
+                    mean = sp.expand(over.mean_of(formula**power))
+                except NoClosedForm:
+                    continue  # the mean over noise and state together has a closed form, this one has none
+                lines.append(f"{letter}(x) &= {formula_latex(mean, model.x)}")
+        return lines
+
+    def moments(self) -> list[str]:
+        """The moments q_2 ... that the meter and the object need, if they are polynomials."""
+        (x,) = self.model.x
+        sides = (self.model.state_equation[0] ** 2, self.model.meter_equation[0] ** 2)
+        if not all(side.is_polynomial(x) for side in sides):
+            return []
+        m, d = sp.symbols("m d", real=True)
+        law = GaussianMoments([x], [m], sp.Matrix([[d]]))
+        highest = min(max(int(sp.degree(sp.expand(side), x)) for side in sides), HIGHEST)
+        return [f"q_{n} &= {formula_latex(sp.expand(law.mean_of(x**n)), (m, d))}" for n in range(2, highest + 1)]
+
+    def derived(self, kind: str) -> Iterator[Block]:
+        """The five functions, with their numbers in the catalogue where it has them."""
+        if kind == "gaussian" and isinstance(found := self.structures.quadrature, Checked):
+            yield Block("text", self.said("by_quadrature", order=found.order))
+            return
+        yield Block("text", self.words["result"])
+        if (lines := printed(self.structures, kind)) is None:
+            yield Block("text", self.words["not_printed"])
+            return
+        self.derivable.append(kind)
+        yield Block("formulas", lines=lines)
+        if self.model.n == self.model.p == 1:
+            structure = getattr(self.structures, kind)
+            forms = {name: (name, str(sp.expand(structure[name]))) for name in FUNCTION_LATEX}
+            numbers = [f"${FUNCTION_LATEX[name]}$ — {CATALOGUE[form]}" for name, form in forms.items() if form in CATALOGUE]
+            if numbers:
+                yield Block("text", self.said("catalogue", numbers=", ".join(numbers)))
+
+    def filters(self) -> Iterator[Block]:
+        words = self.words
+        yield Block("section", words["filters"])
+        yield Block("text", words["start"])
+        mean, cov = self.model.prior
+        yield Block("formulas", lines=[rf"\lambda_0 &= m_0 = {matrix(mean[:, None])},\qquad \Psi_0 = D_0 = {matrix(cov)}"])
+        families = dict.fromkeys(map(family, self.result.entrants))
+        designed = next((one for one in families if one != "aof"), "")
+        for one in (one for one in families if one in EQUATIONS):
+            heading = FAMILIES[one].russian_heading if words["language"] == "ru" else FAMILIES[one].heading
+            yield Block("subsection", heading)
+            if one == "duof":
+                yield Block("text", words["criteria"])
+                yield Block("formulas", lines=words["criteria_formulas"].split("\n"))
+            yield Block("formulas", lines=lines_of(equations_latex(EQUATIONS[one])))
+            if one == "aof" and self.model.n == self.model.p == 1:
+                for name in (f"aof-{kind}" for kind in self.derivable if f"aof-{kind}" in self.result.entrants):
+                    yield Block("text", self.said("written_out", name=self.title(name)))
+                    yield Block("formulas", lines=written_lines(getattr(self.structures, name.removeprefix("aof-"))))
+            if one == designed:
+                yield Block("text", words["over_ensemble"])

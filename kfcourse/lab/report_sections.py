@@ -1,0 +1,224 @@
+"""What all reports have: pieces, the comparison, the conclusion (`report_plain`, `report_modes`: what comes before)."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from kfcourse.lab.admission import Admission
+from kfcourse.lab.report_text import cause, filled, in_percent, power_of_ten, ranges
+from kfcourse.lab.short_names import FILTERS, Entry
+from kfcourse.laws import CONFIDENCE
+from kfcourse.montecarlo.comparison import EXACT, HEAVY, Comparison, Verdict
+
+ROUNDING = 1e-6  # per cent: equal filters may have lost half of their digits on the way
+LEVEL = f"{100 * CONFIDENCE:g} %"
+COLUMNS = 4  # filters side by side in a table, so that it fits a page
+FIGURES = ("accuracy", "relative", "ranking", "consistency")
+
+
+@dataclass(frozen=True)
+class Block:
+    """A piece of the report, of a kind: section, subsection, text, items, formulas, table or figure."""
+
+    kind: str
+    text: str = ""
+    lines: list[str] = field(default_factory=list)
+    rows: list[list[str]] = field(default_factory=list)
+
+
+class StudentReport:
+    """The blocks of the report, section by section; a subclass has the task, the functions and the filters."""
+
+    entries: Mapping[str, Entry] = FILTERS  # where filters have their names from
+
+    def __init__(self, result: Comparison, words: dict[str, str]) -> None:
+        self.result, self.words = result, words
+        self.known: Sequence[Admission] = ()
+        self.kinds = [kind for kind in ("linearised", "gaussian") if any(name.endswith(kind) for name in result.available)]
+        compared = result.has_bound or len(result.entrants) > 1
+        self.figures = [name for name in FIGURES if compared or name not in ("relative", "ranking")]
+
+    def blocks(self) -> Iterator[Block]:
+        """The whole report; the words that SymPy puts into formulas in its language, too."""
+        for block in self.sections():
+            lines = [self.translated(line) for line in block.lines]
+            yield dataclasses.replace(block, text=self.translated(block.text), lines=lines)
+
+    def said(self, key: str, **values: object) -> str:
+        """The words of that name, filled with what they speak of."""
+        return filled(self.words[key], self.words["thousands"], **values)
+
+    def translated(self, text: str) -> str:
+        for english, key in ((r"\text{for}", "if"), (r"\text{otherwise}", "else")):
+            text = text.replace(english, rf"\text{{{self.words[key]}}}")
+        return text
+
+    def sections(self) -> Iterator[Block]:
+        yield from self.task()
+        yield from self.functions()
+        yield from self.filters()
+        yield from self.experiment()
+        yield from self.conclusion()
+        if self.known:
+            yield Block("section", self.words["admitted"])
+            heading = [self.words["filter"], self.words["admitted_verdict"], self.words["admitted_why"]]
+            rows = [[self.title(one.name), self.words[f"admitted_{one.verdict}"], self.why(one)] for one in self.known]
+            yield Block("table", self.words["admitted_text"], heading, rows)
+
+    def why(self, one: Admission) -> str:
+        """Why a filter is not admitted, or what to know of it."""
+        return cause(one.reason, self.result.model, self.words) if one.reason else one.says
+
+    def task(self) -> Iterator[Block]:
+        """The equations, the laws, and what is asked for."""
+        raise NotImplementedError
+
+    def functions(self) -> Iterator[Block]:
+        """The structural functions."""
+        raise NotImplementedError
+
+    def defined(self, kind: str) -> Iterator[Block]:
+        """The heading of a kind of structural functions, and what they are."""
+        yield Block("subsection", self.words[kind])
+        yield Block("text", self.words[f"{kind}_text"])
+        yield Block("formulas", lines=self.words[f"{kind}_formulas"].split("\n"))
+
+    def filters(self) -> Iterator[Block]:
+        """The equations of the filters."""
+        raise NotImplementedError
+
+    def experiment(self) -> Iterator[Block]:
+        result, words = self.result, self.words
+        yield Block("section", words["experiment"])
+        sentences = [self.said("experiment_text", runs=result.runs, steps=result.steps, seed=str(result.seed))]
+        if result.replicas:
+            designed = ", ".join(map(self.title, result.replicas.names))
+            sentences.append(self.said("designs", filters=designed, designs=result.designs))
+        if result.has_bound:
+            sentences.append(self.said("exact", runs=result.slow_runs))
+        yield Block("text", " ".join(sentences))
+        if result.left_out:
+            yield Block("text", words["left_out"])
+            yield Block("items", lines=list(self.left_out()))
+        for start in range(0, len(result.available), COLUMNS):
+            names = result.available[start : start + COLUMNS]
+            estimates = [result.error_variance(name) for name in names]
+            rows = [[f"${k}$", *(power_of_ten(one[k]) for one in estimates)] for k in table_steps(result)]
+            yield Block("table", words["table_goes_on" if start else "table"], ["$k$", *map(self.title, names)], rows)
+        for text in self.remarks():
+            yield Block("text", text)
+        reference = words["of_exact"] if result.has_bound else self.title(result.control)
+        for name in self.figures:
+            yield Block("figure", self.said(f"figure_{name}", reference=reference, level=LEVEL), [name])
+        if "ranking" in self.figures:
+            gaps = [words["diverges"] if name in result.lost else in_percent(gap) for name, gap in result.ranking()]
+            rows = [[self.title(name), gap] for (name, _), gap in zip(result.ranking(), gaps, strict=True)]
+            yield Block("table", self.said("ranking_table", reference=reference), [words["filter"], "%"], rows)
+
+    def remarks(self) -> Iterator[str]:
+        """What a reader must know before he relies on distances from the bound."""
+        for kind, values in remarks(self.result):
+            whose = ", ".join(map(self.title, values.get("names", ())))
+            at = self.at(np.flatnonzero(values["steps"]).tolist())
+            yield self.said(f"remark_{kind}", **values | {"names": whose, "at": at})
+
+    def left_out(self) -> Iterator[str]:
+        """The filters that do not take part, and why, those with the same reason together."""
+        names: dict[str, list[str]] = {}
+        for name, reason in self.result.left_out.items():
+            names.setdefault(cause(reason, self.result.model, self.words), []).append(self.title(name))
+        yield from (f"{', '.join(titles)}: {reason}" for reason, titles in names.items())
+
+    def conclusion(self) -> Iterator[Block]:
+        result, words = self.result, self.words
+        if len(result.entrants) == 1:
+            yield Block("section", words["conclusion"])
+            yield Block("text", self.mean_sentence("alone_bound" if result.has_bound else "alone_control"))
+            return
+        verdicts = result.verdicts()
+        yield Block("section", words["conclusion"])
+        yield Block("text", self.said("verdict_text", level=LEVEL))
+        heading = [words[key] for key in ("step", "best", "not_worse", "worst")]
+        rows = [
+            [f"${k}$", self.title(best), ", ".join(map(self.title, others)) or "–", self.title(worst) if worst else "–"]
+            for k, (best, others, worst) in ((k, verdicts[k]) for k in table_steps(result))
+        ]
+        yield Block("table", words["verdict_table"], heading, rows)
+        yield Block("items", lines=list(self.sentences(verdicts)))
+
+    def sentences(self, verdicts: list[Verdict]) -> Iterator[str]:
+        """The conclusion: who leads and who is last, on how many steps, and how far from the bound."""
+        result, words = self.result, self.words
+        alone = [best for best, others, _ in verdicts if not others]
+        for name in sorted(set(alone), key=lambda one: -alone.count(one)):
+            steps = [k for k, (best, others, _) in enumerate(verdicts) if best == name and not others]
+            yield self.said("leads", name=self.title(name), at=self.at(steps))
+        if not alone:
+            yield words["nobody_leads"]
+        unsure = [k for k, (_, others, _) in enumerate(verdicts) if others]
+        if alone and unsure:  # without a leader it is every step, as has been said
+            yield self.said("together", at=self.at(unsure))
+        last = [worst for _, _, worst in verdicts if worst]
+        if last:
+            name = max(set(last), key=lambda one: (last.count(one), one))
+            yield self.said("last", name=self.title(name), steps=last.count(name), all=result.steps)
+        else:
+            yield words["nobody_last"]
+        leads = not result.has_bound and abs(100 * float(result.ranking()[0][1].value)) < ROUNDING  # the control, or its equal
+        yield self.mean_sentence("mean_first" if leads else "mean_bound" if result.has_bound else "mean_control")
+
+    def at(self, steps: list[int]) -> str:
+        """At step 2; at steps 0–1, 3–50."""
+        return self.said("at_step" if len(steps) == 1 else "at_steps", where=ranges(steps, "${}$"))
+
+    def mean_sentence(self, key: str) -> str:
+        """How far the first filter and the last are from the bound, or from the control."""
+        result = self.result
+        ranked = [one for one in result.ranking() if one[0] not in result.lost] or result.ranking()
+        (first, gap), (final, largest) = ranked[0], ranked[-1]
+        if len(ranked) == 1 and len(result.entrants) > 1:
+            return self.said("mean_alone", first=self.title(first))
+        return self.said(
+            key,
+            first=self.title(result.control if key == "mean_first" else first),
+            gap=in_percent(gap),
+            last=self.title(final),
+            largest=in_percent(largest),
+            control=self.title(result.control),
+        )
+
+    def title(self, name: str) -> str:
+        entry = self.entries[name]
+        exact = self.words["exact_title"] if name == EXACT else ""
+        return exact or (entry.russian if self.words["language"] == "ru" else entry.title)
+
+
+def remarks(result: Comparison) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Kinds of `REMARKS` that this comparison needs, with what is put into the words: steps as a mask, names of filters."""
+    if result.without_error.any():
+        yield "rounding", {"steps": result.without_error}
+    if result.doubtful.any():
+        yield "doubtful", {"steps": result.doubtful}
+    gaps = {name: result.gap(name) for name in result.entrants}
+    bad = {name: result.usable & ~result.trusted(gap, name) for name, gap in gaps.items()}
+    if result.lost:
+        yield "diverged", {"names": [*result.lost], "steps": np.any([*result.lost.values()], axis=0)}
+        bad = {name: steps for name, steps in bad.items() if name not in result.lost}
+    if names := [name for name, steps in bad.items() if steps.any()]:
+        part = max(float(result.heavy(name)[bad[name]].max()) for name in names)
+        more = max(result.missing(gaps[name], name) for name in names)
+        runs, exact = (int(float(f"{more * one:.1g}")) for one in (result.runs, result.slow_runs))
+        told = {"part": f"{100 * part:.0f}", "runs": runs, "exact": exact}
+        kind = ("heavy" if part > HEAVY else "skewed") + ("" if result.has_bound else "_alone")
+        yield kind, {"names": names, "steps": np.any([bad[name] for name in names], axis=0), **told}
+
+
+def table_steps(result: Comparison) -> list[int]:
+    """The first steps and then some, to the last."""
+    steps = [k for k in (0, 1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 50, 100, 200, 500, 1000) if k < result.steps]
+    return steps if steps[-1] == result.steps - 1 else [*steps, result.steps - 1]
