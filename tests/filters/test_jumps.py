@@ -122,7 +122,7 @@ def test_its_own_estimate_of_the_error_covers_what_finer_nodes_change():
     change = np.abs(states[0].posterior.mean - states[1].posterior.mean)[:, 0]
     claimed = states[0].memory.discretisation_error()
     assert (change <= claimed + 1e-12).all()
-    assert (states[1].memory.discretisation_error() < 1e-4).all()
+    assert (states[1].memory.discretisation_error() < 1e-3).all()
 
 
 def test_one_mode_is_the_exact_filter():
