@@ -117,9 +117,7 @@ def run_slow_filters(
             try:
                 sums = _chunks_in_time([*fast, *running], data, end, memory, jobs, progress, back, far)
             except Failed as failed:
-                other = wanted[failed.name].instead
-                (left_out if other is None else replaced)[failed.name] = failed.reason
-                wanted[failed.name] = other or wanted[failed.name]
+                left_out[failed.name] = failed.reason
                 continue
             except BrokenProcessPool:
                 why = "a process that computed it was killed, perhaps as memory ran out: take fewer jobs at once, or less memory"
@@ -160,8 +158,7 @@ def _chunks_in_time(
     size, jobs = len(data.chosen.places), far.cores if far else jobs if may_start() else 1
     chunk = partial(_chunk, filters, data, names.index(EXACT) if EXACT in names else None, back)
     with progress_bar("slow filters", size, "trajectory", progress) as bar:
-        replaceable = any(one.name == EXACT and one.instead is not None for one in filters)
-        work = _Work(size, end, bar, jobs if replaceable else 0)
+        work = _Work(size, end, bar, 0)
         while not work.over:
             jobs = min(jobs, work.chunks())
             try:
