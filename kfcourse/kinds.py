@@ -22,7 +22,7 @@ NEXT = {  # (what is expected, what came) to what to do
     ("Filter", "Model"): "make a filter for it, such as aof(linearised(model)) or kalman_filter(model)",
     ("Filter", "Structure"): "make a filter of it, such as aof(structure)",
     ("Filter", "Design"): "find its coefficients over an ensemble, "
-    "design([it], Ensemble(model, 100_000, steps, seed=1).by_step())[0], or give it to compare([it], model, ...), which does so",
+    "design([it], Ensemble(model, 100_000, steps, seed=1))[0], or give it to compare([it], model, ...), which does so",
 }
 
 

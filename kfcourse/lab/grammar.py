@@ -25,7 +25,7 @@ from tqdm import tqdm
 from kfcourse.lab.quality import Ask, Quality, examine
 from kfcourse.lab.variant_tables import RUNS
 from kfcourse.lab.variants import Variant, read_variant
-from kfcourse.montecarlo.batches import FEWEST
+from kfcourse.montecarlo import FEWEST
 from kfcourse.seeds import Seed, seed_number
 
 VECTORS = 0.1  # probability of a vector model

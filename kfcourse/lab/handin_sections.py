@@ -35,7 +35,7 @@ class StudentReport:
 
     def __init__(self, result: Comparison, words: dict[str, str]) -> None:
         self.result, self.words = result, words
-        self.kinds = [kind for kind in ("linearised", "gaussian") if any(name.endswith(kind) for name in result.available)]
+        self.kinds = [kind for kind in ("linearised", "gaussian") if any(name.endswith(kind) for name in result.names)]
         compared = result.has_bound or len(result.entrants) > 1
         self.figures = [name for name in FIGURES if compared or name not in ("relative", "ranking")]
 
@@ -83,17 +83,16 @@ class StudentReport:
         result, words = self.result, self.words
         yield Block("section", words["experiment"])
         sentences = [self.said("experiment_text", runs=result.runs, steps=result.steps, seed=str(result.seed))]
-        if result.replicas:
-            designed = ", ".join(map(self.title, result.replicas.names))
-            sentences.append(self.said("designs", filters=designed, designs=result.designs))
+        if result.designed:
+            sentences.append(self.said("designs", filters=", ".join(map(self.title, result.designed))))
         if result.has_bound:
-            sentences.append(self.said("exact", runs=result.slow_runs))
+            sentences.append(words["exact"])
         yield Block("text", " ".join(sentences))
         if result.left_out:
             yield Block("text", words["left_out"])
             yield Block("items", lines=list(self.left_out()))
-        for start in range(0, len(result.available), COLUMNS):
-            names = result.available[start : start + COLUMNS]
+        for start in range(0, len(result.names), COLUMNS):
+            names = result.names[start : start + COLUMNS]
             estimates = [result.error_variance(name) for name in names]
             rows = [[f"${k}$", *(power_of_ten(one[k]) for one in estimates)] for k in table_steps(result)]
             yield Block("table", words["table_goes_on" if start else "table"], ["$k$", *map(self.title, names)], rows)

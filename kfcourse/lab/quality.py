@@ -17,7 +17,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import joblib
 import numpy as np
@@ -45,7 +44,7 @@ from kfcourse.lab.variants import Variant
 from kfcourse.laws import Array, Gaussian
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.linear.system import is_linear
-from kfcourse.montecarlo.batches import FEWEST
+from kfcourse.montecarlo import FEWEST
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate
@@ -163,7 +162,7 @@ def _simulated(found: Quality, structures: Structures, runs: int, steps: int, se
     if not moments.ok or not filters:
         return found
     try:
-        result = compare([*filters, unmeasured(model, x)], model, runs, steps, seed, wide=1, threads=1, progress=False)
+        result = compare([*filters, unmeasured(model, x)], model, runs, steps, seed, jobs=1, progress=False)
     except FAILURES as error:
         return dataclasses.replace(found, bounded=Finding(False, str(error), moments.value))
     return dataclasses.replace(
@@ -202,7 +201,7 @@ def _fragile(result: Comparison, x: Array, filters: Sequence[Filter | Design], h
     if worse := [title(one) for one in measured(result) if shares(result, one).value.max() > 1]:
         yield f"worse than {UNMEASURED}: {', '.join(worse)}"
     try:
-        compare(filters, harsh, max(result.runs // 4, FEWEST), result.steps, seed, wide=1, threads=1, progress=False)
+        compare(filters, harsh, max(result.runs // 4, FEWEST), result.steps, seed, jobs=1, progress=False)
     except FAILURES:
         yield f"a filter diverges when deviations are {STRESS:g} times larger"
 
@@ -219,12 +218,9 @@ def examine_all(
 
     `dask` is the address of a Dask scheduler whose workers do it instead.
     """
-    with cluster(dask) as far:
-        if far is None:
-            parallel = joblib.Parallel(n_jobs=max(1, min(jobs, len(variants))), return_as="generator")
-            done = parallel(joblib.delayed(examine)(one, runs, seed, ask) for one in variants)
-        else:
-            done = far.executor.map(partial(examine, runs=runs, seed=seed, ask=ask), variants)
+    with cluster(dask):
+        parallel = joblib.Parallel(n_jobs=max(1, min(jobs, len(variants))), return_as="generator")
+        done = parallel(joblib.delayed(examine)(one, runs, seed, ask) for one in variants)
         yield from tqdm(done, desc="checking", total=len(variants), unit="variant", disable=None)
 
 

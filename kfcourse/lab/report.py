@@ -31,9 +31,9 @@ from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, WITH_MODES, JumpStru
 from kfcourse.lab.variants import Variant
 from kfcourse.laws import CONFIDENCE, Array
 from kfcourse.limits import OutOfTime, time_limit
-from kfcourse.montecarlo.comparison import EXACT, HEAVY, Comparison
-from kfcourse.montecarlo.modes import SLOW, Recognised, recognised
-from kfcourse.montecarlo.statistics import Estimate, ratio
+from kfcourse.montecarlo.comparison import EXACT, Comparison
+from kfcourse.montecarlo.modes import Recognised, recognised
+from kfcourse.montecarlo.statistics import Estimate
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.markup import mathml
 from kfcourse.symbolic.model import Model
@@ -74,21 +74,19 @@ def write_report(
     variant: Variant,
     result: Comparison,
     folder: Path,
-    notes: Sequence[str] = (),
     known: Sequence[Admission] = (),
     modes: Recognised | None = None,
 ) -> list[Path]:
     """Write report.html, report.tex and the figures, all of them or none; returns the paths.
 
-    `notes` stand before the remarks: why there are so few trajectories, how to repeat the comparison.  Filters of which it is
-    `known` whether the model admits them are not looked at again; `modes` are the `recognised_modes`.
+    Filters of which it is `known` whether the model admits them are not looked at again; `modes` are the `recognised_modes`.
     """
     with replacing_together(folder) as place:
         for name, (_, draw) in _FIGURES.items():
             save_figure(partial(draw, result), place, name)
         if modes:
             save_figure(partial(plots.mode_probabilities, modes), place, "modes")
-        save_texts(("report.html", "report.tex"), place, _content(variant, result, notes, known, modes))
+        save_texts(("report.html", "report.tex"), place, _content(variant, result, known, modes))
         return [folder / path.name for path in place.iterdir()]
 
 
@@ -122,30 +120,25 @@ _UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationD
 
 def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
     """Write the numbers, for programs: lists over the steps, keyed by the filters' short names."""
-    estimates = {name: result.error_variance(name) for name in result.available}
+    estimates = {name: result.error_variance(name) for name in result.names}
     data: dict[str, Any] = {
         "variant": variant.name,
         "model": _model_in_numbers(result.model),
         "runs": result.runs,
         "steps": result.steps,
         "seed": result.seed,
-        "slow_runs": result.slow_runs,
         "left_out": dict(result.left_out),
-        "by_particles": dict(result.replaced),
         "error_variance": {name: e.value.tolist() for name, e in estimates.items()},
         "standard_error": {name: e.standard_error.tolist() for name, e in estimates.items()},
-        "error_mean": {name: result.error_mean(name).value.tolist() for name in result.available},
-        "own_variance": {name: result.own_variance(name).value.tolist() for name in result.available},
+        "error_mean": {name: result.error_mean(name).value.tolist() for name in result.names},
+        "own_variance": {name: result.own_variance(name).value.tolist() for name in result.names},
         "score": {name: _number(result.score(name)) for name, _ in result.ranking()},
-        "designs": result.designs,
     }
     if result.has_bound:
         above = {name: result.gap(name) for name in result.entrants}
         data["above_bound"] = {name: e.value.tolist() for name, e in above.items()}
         data["above_bound_standard_error"] = {name: e.standard_error.tolist() for name, e in above.items()}
         data["mean_above_bound"] = {name: _number(gap) for name, gap in result.ranking()}
-    if result.replicas:
-        data["design_deviation"] = {name: result.design_error(name).value.tolist() for name in result.replicas.names}
     text = json.dumps(_finite(data), indent=1, allow_nan=False)
     save(text, path)
     return path
@@ -200,32 +193,25 @@ def _three_digits(value: float) -> str:
 
 
 def recognised_modes(result: Comparison, filters: Sequence[Filter | Design]) -> Recognised | None:
-    """What those of the filters compared that carry probabilities of modes know of them; None of a model without modes.
-
-    The exact filter tells only if it came through as many trajectories in its time.
-    """
+    """What those of the filters compared that carry probabilities of modes know of them; None of a model without modes."""
     model = result.model
     if not isinstance(model, JumpModel):
         return None
     runs = min(result.runs, RECOGNISED)
-    short = {EXACT} if result.slow_runs < runs // SLOW else set()
-    names = {name for name in result.available if name in WITH_MODES and name not in {*result.replaced, *short}}
+    names = {name for name in result.names if name in WITH_MODES}
     of_modes = [one for one in filters if isinstance(one, Filter) and one.name in names]
     return recognised(of_modes, model, runs, result.steps, result.seed) if of_modes else None
 
 
-def _content(
-    variant: Variant, result: Comparison, notes: Sequence[str], known: Sequence[Admission], modes: Recognised | None
-) -> dict[str, Any]:
+def _content(variant: Variant, result: Comparison, known: Sequence[Admission], modes: Recognised | None) -> dict[str, Any]:
     # the bound before those that it bounds
-    names = tuple(sorted(result.available, key=lambda name: name != EXACT))
+    names = tuple(sorted(result.names, key=lambda name: name != EXACT))
     entries = JUMP_FILTERS if isinstance(result.model, JumpModel) else FILTERS
     compared = [name for name in result.entrants if result.has_bound or name != result.control]
     return {
         "variant": variant,
         "result": result,
         "left_out": [(title(name), reason) for name, reason in result.left_out.items()],
-        "replaced": [(title(name), reason) for name, reason in result.replaced.items()],
         "admissions": [(title(one.name), one.verdict, one.says) for one in admissions(result.model, None, FORMULAS, known)],
         "model": Section.of("Model", result.model.latex()),
         "structures": _structure_sections(result.model, names),
@@ -235,18 +221,12 @@ def _content(
             for name in names
         ],
         "table": _table(result, [_cells(result, name) for name in names]),
-        "remarks": [*notes, *remarks_in_words(result)],
+        "remarks": remarks_in_words(result),
         "compared": [title(name) for name in compared],
         "gaps": _table(result, [[percent(one) for one in result.gap(name)] for name in compared]) if compared else [],
-        "ranking": [
-            (
-                title(name),
-                percent(mean) if name not in result.lost else "diverges",
-                _between_designs(result, name),
-            )
-            for name, mean in result.ranking()
-        ],
-        "reference": title(EXACT if result.has_bound else result.control),
+        "ranking": [(title(name), percent(mean) if name not in result.lost else "diverges") for name, mean in result.ranking()],
+        "designed": ", ".join(map(title, result.designed)),
+        "reference": title(result.reference),
         "conclusions": conclusions(result),
         "modes": [] if modes is None else [(title(name), percent(share)) for name, share in modes.share.items()],
         "guess": "" if modes is None else f"{100 * modes.guess:.1f}",
@@ -299,14 +279,6 @@ REMARKS = {
     "itself, or another filter is more accurate. Means leave these steps out.",
     "diverged": "{names}: at {steps} D_k is more than a hundred times that of the most accurate filter, and a few trajectories "
     "make it: on these the filtering diverges. How much worse it is no number here tells; rank the other filters.",
-    "heavy": "{names}: at {steps} the accuracy rests on a few rare trajectories: a single one makes up to {part} % of the sum. "
-    "The interval there cannot be trusted; about {runs} trajectories, {exact} of them with the exact AOF, would do.",
-    "skewed": "{names}: at {steps} the accuracy rests on a few rare trajectories. "
-    "The interval there cannot be trusted; about {runs} trajectories, {exact} of them with the exact AOF, would do.",
-    "heavy_alone": "{names}: at {steps} the accuracy rests on a few rare trajectories: a single one makes up to {part} % of the "
-    "sum. The interval there cannot be trusted; about {runs} trajectories would do.",
-    "skewed_alone": "{names}: at {steps} the accuracy rests on a few rare trajectories. "
-    "The interval there cannot be trusted; about {runs} trajectories would do.",
 }
 
 
@@ -316,18 +288,8 @@ def remarks(result: Comparison) -> Iterator[tuple[str, dict[str, Any]]]:
         yield "rounding", {"steps": result.without_error}
     if result.doubtful.any():
         yield "doubtful", {"steps": result.doubtful}
-    gaps = {name: result.gap(name) for name in result.entrants}
-    bad = {name: result.usable & ~result.trusted(gap, name) for name, gap in gaps.items()}
     if result.lost:
         yield "diverged", {"names": [*result.lost], "steps": np.any([*result.lost.values()], axis=0)}
-        bad = {name: steps for name, steps in bad.items() if name not in result.lost}
-    if names := [name for name, steps in bad.items() if steps.any()]:
-        part = max(float(result.heavy(name)[bad[name]].max()) for name in names)
-        more = max(result.missing(gaps[name], name) for name in names)
-        runs, exact = (int(float(f"{more * one:.1g}")) for one in (result.runs, result.slow_runs))
-        told = {"part": f"{100 * part:.0f}", "runs": runs, "exact": exact}
-        kind = ("heavy" if part > HEAVY else "skewed") + ("" if result.has_bound else "_alone")
-        yield kind, {"names": names, "steps": np.any([bad[name] for name in names], axis=0), **told}
 
 
 def remarks_in_words(result: Comparison) -> list[str]:
@@ -363,14 +325,6 @@ def percent(part: Estimate) -> str:
     value, error = 100 * float(part.value), 100 * float(part.standard_error)
     places = int(np.clip(1 - np.floor(np.log10(error)), 0, 6)) if np.isfinite(error) and error > 0 else 2
     return f"{value:.{places}f} ± {error:.{places}f}"
-
-
-def _between_designs(result: Comparison, name: str) -> str:
-    """How much D_k varies from one design to another: mean over the steps of its deviation, in per cent of D_k."""
-    if not result.replicas or name not in result.replicas.names:
-        return ""
-    variance = result.error_variance(name).value
-    return f"{100 * float(np.mean(ratio(result.design_error(name).value, variance, 0.0))):.2g}"
 
 
 def _number(estimate: Estimate) -> dict[str, float]:

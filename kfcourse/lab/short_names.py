@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -273,21 +272,15 @@ def check_names(names: Sequence[str], known: Mapping[str, object] = FILTERS) -> 
 def exact(model: Model | JumpModel) -> Filter:
     """The exact AOF, by point masses where they reach, else by particles, whose own error does not enter the bound.
 
-    Where point masses fail in the middle of a comparison, particles take over (`Filter.instead`).
-
     Raises
     ------
     ModelError
         Neither can be had: there is no density of y given x.
     """
     try:
-        found = jump_pointmass(model) if isinstance(model, JumpModel) else pointmass(model)
+        return jump_pointmass(model) if isinstance(model, JumpModel) else pointmass(model)
     except ModelError:
         return _sampled(model)
-    try:
-        return dataclasses.replace(found, instead=_sampled(model))
-    except ModelError:  # without noise in the meter there are no weights
-        return found
 
 
 def _sampled(model: Model | JumpModel) -> Filter:
@@ -299,10 +292,10 @@ def _sampled(model: Model | JumpModel) -> Filter:
     return particle(model, BOUND, name="aof-exact")
 
 
-def has_exact(model: Model) -> bool:
+def has_exact(model: Model | JumpModel) -> bool:
     """Whether the exact AOF can be computed for the model by point masses: scalar, noises entering linearly."""
     try:
-        pointmass(model)
+        jump_pointmass(model) if isinstance(model, JumpModel) else pointmass(model)
     except ModelError:
         return False
     return True

@@ -177,10 +177,8 @@ def _backend(dask: str | None, workers: int) -> Iterator[joblib.Parallel]:
         prefer_forked()
         yield joblib.Parallel(n_jobs=workers, return_as="generator_unordered")
         return
-    with cluster(dask) as far:
-        assert far is not None
-        with far.client.as_current(), joblib.parallel_config(backend="dask", wait_for_workers_timeout=60):
-            yield joblib.Parallel(return_as="generator_unordered")
+    with cluster(dask):
+        yield joblib.Parallel(return_as="generator_unordered")
 
 
 def plan(

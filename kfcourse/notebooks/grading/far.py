@@ -54,8 +54,8 @@ def far_grading(order: Order, address: str) -> Iterator[tuple[RunAll, set[str]]]
 
         def run(works: Sequence[Returned], started: Started) -> Iterator[Grade]:
             named = {work.name: work for work in works}
-            far.client.subscribe_topic(topic, lambda event: started(named[event[1]]))
-            submit = far.client.get_executor(retries=1).submit
+            far.subscribe_topic(topic, lambda event: started(named[event[1]]))
+            submit = far.get_executor(retries=1).submit
             tasks = {submit(graded, work, order, package_digest(), topic): work for work in works}
             for task in tqdm(as_completed(tasks), desc="grade", total=len(tasks), unit="notebook", disable=None):
                 try:
