@@ -127,7 +127,7 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
         "runs": result.runs,
         "steps": result.steps,
         "seed": result.seed,
-        "left_out": dict(result.left_out),
+        "left_out": {name: str(reason) for name, reason in result.left_out.items()},
         "error_variance": {name: e.value.tolist() for name, e in estimates.items()},
         "standard_error": {name: e.standard_error.tolist() for name, e in estimates.items()},
         "error_mean": {name: result.error_mean(name).value.tolist() for name in result.names},

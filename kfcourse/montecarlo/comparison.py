@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.errors import Reason
 from kfcourse.laws import CONFIDENCE, Array
 from kfcourse.montecarlo.statistics import Estimate, Sums, ratio, rejected
 from kfcourse.symbolic.jumping import JumpModel
@@ -67,7 +68,7 @@ class Comparison:
     seed: int
     sums: Sums
     designed: tuple[str, ...] = ()
-    left_out: Mapping[str, str] = field(default_factory=dict)
+    left_out: Mapping[str, Reason] = field(default_factory=dict)
     smoothing: Comparison | None = None
 
     def __repr__(self) -> str:

@@ -11,32 +11,17 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from kfcourse.errors import NotFinite, expect
 from kfcourse.filters.base import Filter, State, with_angles_on_circle
 from kfcourse.filters.designed import Affine, Design
-from kfcourse.kinds import expect
 from kfcourse.laws import NegativeVariance
 from kfcourse.montecarlo.ensemble import Instant
-from kfcourse.reasons import Reason
-
-
-class NotFinite(ArithmeticError):
-    """A filter or trajectory left the finite numbers.
-
-    Attributes
-    ----------
-    filter_name : str
-        Of the filter; empty if it was the model's trajectories.
-    """
-
-    def __init__(self, message: str, filter_name: str = ""):
-        super().__init__(message)
-        self.filter_name = filter_name
 
 
 def failed(name: str, step: int, error: Exception) -> NotFinite:
     """What a filter's linear algebra raised at a step, as the reason for which it is left out."""
     kind = "negative" if isinstance(error, NegativeVariance) else ""
-    return NotFinite(Reason(f"step {step}: {name} failed: {error}", kind, step=step), name)
+    return NotFinite(f"step {step}: {name} failed: {error}", name, kind, step=step)
 
 
 def design(designs: Sequence[Design], ensemble: Iterable[Instant], jobs: int = 1) -> list[Filter]:
@@ -117,4 +102,4 @@ def _diverged(name: str, instant: Instant, k: int) -> NotFinite:
     if not (np.isfinite(instant.x_next).all() and np.isfinite(instant.y).all()):
         return NotFinite(f"step {k}: the model's trajectories become infinite, check its equations and parameters")
     words = f"{name}, step {k}: the design met infinite or NaN values; the model or this filter diverges"
-    return NotFinite(Reason(words, "infinite", step=k), name)
+    return NotFinite(words, name, "infinite", step=k)

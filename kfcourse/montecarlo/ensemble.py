@@ -14,10 +14,9 @@ import numpy as np
 import scipy
 
 from kfcourse.angles import on_circle
-from kfcourse.kinds import expect, expect_sizes
+from kfcourse.errors import expect, expect_sizes
 from kfcourse.laws import Array, Gaussian, normalised_square, square_root
 from kfcourse.linear.runs import Trajectories
-from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -56,7 +55,7 @@ class Ensemble:
     runs, steps : int
         Trajectories, and measurements y_0 ... y_{steps-1} of each.
     seed : numpy.random.SeedSequence
-        A number or a `numpy.random.Generator` becomes one.
+        A number becomes one.
     """
 
     model: Model | JumpModel
@@ -67,7 +66,7 @@ class Ensemble:
     def __post_init__(self) -> None:
         expect(self.model, Model, "an ensemble", JumpModel)
         if not isinstance(self.seed, np.random.SeedSequence):
-            object.__setattr__(self, "seed", np.random.SeedSequence(seed_number(self.seed)))
+            object.__setattr__(self, "seed", np.random.SeedSequence(self.seed))
         expect_sizes(runs=self.runs, steps=self.steps)
 
     def __iter__(self) -> Iterator[Instant]:
@@ -98,15 +97,15 @@ def instants(
 
 
 @overload
-def simulate(model: Model, runs: int, steps: int, seed: Seed) -> Trajectories: ...
+def simulate(model: Model, runs: int, steps: int, seed: int) -> Trajectories: ...
 @overload
-def simulate(model: JumpModel, runs: int, steps: int, seed: Seed) -> JumpTrajectories: ...
-def simulate(model: Model | JumpModel, runs: int, steps: int, seed: Seed) -> Trajectories | JumpTrajectories:
+def simulate(model: JumpModel, runs: int, steps: int, seed: int) -> JumpTrajectories: ...
+def simulate(model: Model | JumpModel, runs: int, steps: int, seed: int) -> Trajectories | JumpTrajectories:
     """Trajectories to look at: x (steps, runs, n) and y (steps, runs, p), the same for the same seed.
 
     Of a model that jumps also its modes (steps, runs).
     """
-    ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(seed_number(seed)))
+    ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(seed))
     x, y, _, mode, _ = zip(*ensemble, strict=True)
     if isinstance(model, JumpModel):
         return JumpTrajectories(np.stack(x), np.stack(y), np.stack(mode))

@@ -21,19 +21,17 @@ import numpy as np
 from tqdm import tqdm
 
 from kfcourse.angles import difference, near
+from kfcourse.errors import NotFinite, Reason, expect, expect_sizes
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
 from kfcourse.filters.looking_back import looked_back
-from kfcourse.kinds import expect, expect_sizes
 from kfcourse.laws import Array, Gaussian, NegativeVariance, stacked
 from kfcourse.montecarlo import BATCHES
 from kfcourse.montecarlo.comparison import EXACT, Comparison
-from kfcourse.montecarlo.designing import NotFinite, design, failed
+from kfcourse.montecarlo.designing import design, failed
 from kfcourse.montecarlo.ensemble import Instant, instants, weights
 from kfcourse.montecarlo.parallel import cluster, cores
 from kfcourse.montecarlo.statistics import Sums
-from kfcourse.reasons import Reason
-from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
@@ -120,7 +118,7 @@ def compare(
     model: Model | JumpModel,
     runs: int,
     steps: int,
-    seed: Seed,
+    seed: int,
     *,
     design_runs: int | None = None,
     same_ensemble: bool = False,
@@ -139,7 +137,7 @@ def compare(
     model : Model
     runs, steps : int
         Trajectories, and measurements of each.
-    seed : int or numpy.random.Generator
+    seed : int
         The same seed gives the same numbers, bit by bit, whatever the number of jobs.  Another NumPy or processor may do
         linear algebra by another kernel (BLAS): then vector models differ by rounding, up to some 1e-12, and scalar ones hardly.
     design_runs : int, optional
@@ -171,9 +169,11 @@ def compare(
             expect(one, Filter, "smoothers=")
         _check_arguments(smoothers, model)
     jobs = cores() if jobs is None else jobs
+    expect_sizes(runs=runs, steps=steps, jobs=jobs)
     design_runs = min(10 * runs, DESIGN_RUNS) if design_runs is None else design_runs
-    expect_sizes(runs=runs, steps=steps, design_runs=design_runs, jobs=jobs)
-    seed = seed_number(seed)
+    expect_sizes(design_runs=design_runs)
+    if not isinstance(seed, int | np.integer) or seed < 0:
+        raise ValueError(f"the seed must be a whole number, not negative, got {seed!r}")
     design_seed, *seeds = np.random.SeedSequence(seed).spawn(1 + min(BATCHES, runs))
     sizes = batch_sizes(runs)
     where = (sizes, seeds) if same_ensemble else ([design_runs], [design_seed])
@@ -200,7 +200,7 @@ def batch_sizes(runs: int) -> list[int]:
 
 
 def without_failing(
-    filters: Sequence[Filter | Design], *common: Any, left_out: Mapping[str, str] | None = None, **options: Any
+    filters: Sequence[Filter | Design], *common: Any, left_out: Mapping[str, Reason] | None = None, **options: Any
 ) -> Comparison:
     """`compare` of the filters that do not fail; the others are named in `left_out`, beside those given.
 
@@ -219,7 +219,7 @@ def without_failing(
             rest = [one for one in filters if one.name != error.filter_name]
             if not error.filter_name or not [one for one in rest if not one.slow]:
                 raise
-            filters, reasons[error.filter_name] = rest, Reason.of(error)
+            filters, reasons[error.filter_name] = rest, error.with_traceback(None)
         else:
             return replace(found, left_out={**reasons, **found.left_out})
 
@@ -267,7 +267,7 @@ def _compared(
     back: bool = False,
 ) -> Comparison:
     """All filters on the sample; a slow one that fails is left out, and the others start again."""
-    running, left_out = list(filters), dict[str, str]()
+    running, left_out = list(filters), dict[str, Reason]()
     while True:
         # slow filters take much memory for each trajectory, and so does looking back
         dear = back or any(one.slow for one in running)
@@ -281,7 +281,7 @@ def _compared(
             left_out[failure.filter_name] = failure.reason
             running = [one for one in running if one.name != failure.filter_name]
             if not running:
-                raise NotFinite(failure.reason, failure.filter_name) from None
+                raise NotFinite(str(failure.reason), failure.filter_name) from None
         else:
             names = tuple(one.name for one in running)
             runs = sum(sample.sizes)
@@ -291,7 +291,7 @@ def _compared(
 class SlowFailure(Exception):
     """A slow filter failed."""
 
-    def __init__(self, filter_name: str, reason: str):
+    def __init__(self, filter_name: str, reason: Reason):
         super().__init__(filter_name, reason)
         self.filter_name, self.reason = filter_name, reason
 
@@ -366,7 +366,7 @@ def _named(one: Filter, step: int) -> Iterator[None]:
         yield
     except (ValueError, ArithmeticError, MemoryError) as error:
         if one.slow:
-            raise SlowFailure(one.name, Reason.of(error)) from None
+            raise SlowFailure(one.name, error.with_traceback(None)) from None
         if isinstance(error, NegativeVariance | np.linalg.LinAlgError):
             raise failed(one.name, step, error) from None
         raise
@@ -384,8 +384,8 @@ def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
     one = filters[int(np.argmin(finite[:, step]))]
     words = f"step {step}: {one.name} became infinite or NaN although the trajectories are finite"
     if one.slow:
-        raise SlowFailure(one.name, Reason(words, "infinite", step=step))
-    raise NotFinite(Reason(f"{words}: it diverges; leave it out, or check the model", "infinite", step=step), one.name)
+        raise SlowFailure(one.name, NotFinite(words, one.name, "infinite", step=step))
+    raise NotFinite(f"{words}: it diverges; leave it out, or check the model", one.name, "infinite", step=step)
 
 
 def _progress(what: str, total: int, unit: str, progress: bool | None, items: Iterable[T]) -> Iterable[T]:

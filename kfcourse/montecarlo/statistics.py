@@ -161,4 +161,6 @@ class Sums(NamedTuple):
 
 def _without_each(sums: Array) -> Array:
     total = sums.sum(axis=-1, keepdims=True)
+    if sums.shape[-1] == 1:
+        return total
     return np.concatenate([total, total - sums], axis=-1)

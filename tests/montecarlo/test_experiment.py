@@ -9,7 +9,6 @@ from kfcourse.filters.approximations import aof
 from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.optimal_structure import fos, mfos
-from kfcourse.filters.particles import particle
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, instants, simulate
 from kfcourse.montecarlo.experiment import compare, predictions, run
@@ -155,7 +154,7 @@ def test_the_design_ensemble_is_another_one(variant53):
     """On the design's own trajectories MFOS looks better than on fresh ones, and never worse than it would by chance."""
     filters = [aof(gaussian(variant53)), mfos(gaussian(variant53))]
     same = compare(filters, variant53, 60, 1, seed=11, same_ensemble=True, progress=False)
-    fresh = compare(filters, variant53, 60, 1, seed=11, design_runs=60, progress=False)
+    fresh = compare(filters, variant53, 60, 1, seed=11, design_runs=20, progress=False)
     # At k = 0 the MFOS's correction is the best affine one over its own ensemble: no other coefficients can be below.
     own, others = (result.gap("mfos-gaussian").value[0] for result in (same, fresh))
     assert own <= 0 < others
@@ -228,44 +227,6 @@ def test_a_diverging_filter_is_named():
 # ---------------------------------------------------------------- seeds and shapes
 
 
-def test_a_generator_is_a_seed_everywhere(variant53):
-    """A generator draws the seed: equal states give equal numbers, and a second call with the same one gives others."""
-
-    def numbers(make):
-        rng = np.random.default_rng(7)
-        return simulate(variant53, 3, 2, make(rng)).y, simulate(variant53, 3, 2, make(rng)).y
-
-    (first, second), (again, _) = numbers(lambda rng: rng), numbers(lambda rng: rng)
-    np.testing.assert_array_equal(first, again)
-    assert not np.isin(first, second).any()
-
-    filters = [aof(gaussian(variant53)), duof(variant53)]
-    seed = int(np.random.default_rng(7).integers(2**63))
-    by_generator = compare(filters, variant53, 300, 2, np.random.default_rng(7), jobs=1)
-    assert by_generator.seed == seed  # so the report can name it
-    by_number = compare(filters, variant53, 300, 2, seed, jobs=1)
-    np.testing.assert_array_equal(by_generator.error_variance("duof").value, by_number.error_variance("duof").value)
-
-    for makes in (lambda rng: Ensemble(variant53, 3, 2, rng), lambda rng: Ensemble(variant53, 3, 2, seed)):
-        np.testing.assert_array_equal(next(iter(makes(np.random.default_rng(7)))).y, simulate(variant53, 3, 2, seed).y[0])
-    y = simulate(variant53, 3, 2, 1).y
-    particles = [run(particle(variant53, 50, chosen), y).mean for chosen in (np.random.default_rng(7), seed, seed + 1)]
-    np.testing.assert_array_equal(particles[0], particles[1])
-    assert (particles[0] != particles[2]).all()
-
-
-@pytest.mark.parametrize("seed", [-1, True, 1.0, None, "1"])
-def test_what_is_no_seed_is_refused(variant53, seed):
-    for use in (
-        lambda: simulate(variant53, 3, 2, seed),
-        lambda: compare([duof(variant53)], variant53, 3, 2, seed),
-        lambda: particle(variant53, 50, seed),
-        lambda: Ensemble(variant53, 3, 2, seed),
-    ):
-        with pytest.raises(ValueError, match=r"non-negative whole number or a numpy\.random\.Generator"):
-            use()
-
-
 def test_one_trajectory_of_a_scalar_meter_may_be_a_vector(variant53, vector):
     y, one = simulate(variant53, 1, 5, seed=1).y, aof(gaussian(variant53))
     for given in (y[:, 0, 0], y[:, 0, 0].tolist()):
@@ -295,7 +256,7 @@ def test_one_trajectory_of_a_scalar_meter_may_be_a_vector(variant53, vector):
 
 def test_a_design_that_is_run_says_what_to_do(variant53):
     y = simulate(variant53, 2, 3, seed=1).y
-    with pytest.raises(TypeError, match=r"the Design duof came.*design\(\[it\], Ensemble\(model, 100_000, steps, seed=1"):
+    with pytest.raises(TypeError, match=r"got Design duof: .*design\(\.\.\.\) makes one of a design"):
         run(duof(variant53), y)
-    one = design([duof(variant53)], Ensemble(variant53, 1000, 3, seed=1))[0]  # what the message says
+    one = design([duof(variant53)], Ensemble(variant53, 1000, 3, seed=1))[0]
     assert np.isfinite(run(one, y).mean).all()
