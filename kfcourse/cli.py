@@ -24,7 +24,7 @@ from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, OF_BE
 from kfcourse.lab.variants import STEPS, find_variant
 from kfcourse.listing import VARIANTS
 from kfcourse.montecarlo.comparison import EXACT, Comparison
-from kfcourse.montecarlo.experiment import DESIGN_RUNS, without_failing
+from kfcourse.montecarlo.experiment import without_failing
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
@@ -61,6 +61,8 @@ RUNS = 20_000  # trajectories
 @click.option("--same-ensemble", is_flag=True, help="Design DUOF, FOS and MFOS on the trajectories they are compared on, once.")
 @click.option(
     "--jobs",
+    "--threads",
+    "jobs",
     type=click.IntRange(min=1),
     help="Processor cores to use; does not change the numbers.  [default: all]",
 )
@@ -127,7 +129,6 @@ def lab(
         steps or chosen.steps,
         seed,
         left_out=refused,
-        design_runs=DESIGN_RUNS,
         same_ensemble=same_ensemble,
         jobs=jobs,
         dask=dask,

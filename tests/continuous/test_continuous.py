@@ -571,7 +571,7 @@ def test_it_runs_in_a_comparison():
     result = compare(filters, discrete, 400, 20, seed=1, progress=False)
     ratio = result.relative("kalman-bucy", "aof-linearised").value
     assert (abs(ratio - 1) < 0.02).all()  # two schemes for the same equations
-    assert result.available == ("kalman-bucy", "kalman-bucy-second", "aof-linearised")
+    assert result.names == ("kalman-bucy", "kalman-bucy-second", "aof-linearised")
 
 
 def test_a_missing_measurement_corrects_nothing():

@@ -300,7 +300,7 @@ def test_without_modes_an_object_without_noise_has_its_kalman_filter():
 def test_the_gap_found_by_particles_is_the_gap_to_the_sum_over_all_histories():
     model = moving()
     filters = [logic_dynamic([linearised(mode) for mode in model.modes], model, model.first)]
-    result = compare([*filters, jump_particle(model, 200, name="aof-exact")], model, 2000, 5, 3, slow_runs=200, threads=1)
+    result = compare([*filters, jump_particle(model, 200, name="aof-exact")], model, 200, 5, 3, jobs=1)
     y = simulate(model, 150, 4, seed=9).y
     z = np.stack([[histories(model, y[: k + 1, i])[0] for i in range(150)] for k in (1, 3)])
     own = run(filters[0], y).mean[[1, 3]]

@@ -130,7 +130,7 @@ def test_the_gap_from_particles_is_that_of_the_exact_filter(variants):
     model = variants["5"]
     filters = lab_filters(model)
     results = [
-        compare([*filters, one], model, 4000, 6, 3, slow_runs=1000, progress=False)
+        compare([*filters, one], model, 1000, 6, 3, progress=False)
         for one in (pointmass(model), particle(model, 100, name="aof-exact"))
     ]
     for name in LAB:
@@ -143,7 +143,7 @@ def test_the_gap_from_particles_is_that_of_the_exact_filter(variants):
 
 def test_on_a_linear_vector_model_the_gap_of_the_kalman_filter_is_nothing(linear):
     filters = [aof(gaussian(linear)), particle(linear, 200, name="aof-exact")]
-    result = compare(filters, linear, 2000, 6, 1, slow_runs=800, progress=False)
+    result = compare(filters, linear, 800, 6, 1, progress=False)
     gap, bound = result.gap("aof-gaussian"), result.bound()
     # 100 particles a cloud: a bias of 1/100 of a deviation, squared
     assert (abs(gap.value) < SIGMA * gap.standard_error + 1e-3).all()
@@ -155,7 +155,7 @@ def test_vector_variants_have_a_bound(variants):
     for name in ("20", "21"):
         assert has_bound(variants[name])
         filters = [*lab_filters(variants[name], ["aof-gaussian", "duof"]), exact(variants[name])]
-        result = compare(filters, variants[name], 500, 5, 1, slow_runs=112, progress=False)
+        result = compare(filters, variants[name], 112, 5, 1, progress=False)
         assert result.has_bound
         for one in result.entrants:
             gap = result.gap(one)

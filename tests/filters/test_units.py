@@ -75,7 +75,7 @@ def test_designs_from_the_same_trajectories_are_the_same_in_other_units(name):
     other, s, t = in_units(model), OF_STATE, OF_METER
     x, y = simulate(model, 400, steps + 1, seed=2)
     z, u = s[: model.n] * x, t[: model.p] * y
-    here = design([of(model) for of in DESIGNS], ([Instant(x[k], y[k], x[k + 1])] for k in range(steps)))
-    there = design([of(other) for of in DESIGNS], ([Instant(z[k], u[k], z[k + 1])] for k in range(steps)))
+    here = design([of(model) for of in DESIGNS], (Instant(x[k], y[k], x[k + 1]) for k in range(steps)))
+    there = design([of(other) for of in DESIGNS], (Instant(z[k], u[k], z[k + 1]) for k in range(steps)))
     for one, another in zip(here, there, strict=True):
         assert_same(run(another, u[:steps, :50]), run(one, y[:steps, :50]))
