@@ -81,19 +81,9 @@ def another_design(
     jobs: int,
 ) -> tuple[float, float]:
     """Standard deviation of the designed filters' gaps over designs, over the width of the interval: median and largest."""
-    model = filters[0].model
-    results = [
-        compare(
-            designed(filters, min(10 * runs, DESIGN_RUNS), steps, 1000 + i, jobs),
-            model,
-            runs,
-            steps,
-            1,
-            jobs=jobs,
-            progress=False,
-        )
-        for i in range(designs)
-    ]
+    ensembles = [Ensemble(model, min(10 * runs, DESIGN_RUNS), steps, 1000 + i) for i in range(designs)]
+    work = {"jobs": jobs, "progress": False}
+    results = [compare(designed(filters, one, jobs), model, runs, steps, 1, **work) for one in ensembles]
     names = [one.name for one in filters if isinstance(one, Design)]
     gaps = np.array([[result.gap(name).value for name in names] for result in results])
     widths: Array = np.array([2 * results[0].gap(name).half_width() for name in names])
@@ -106,10 +96,9 @@ def line(name: str, seeds: int, runs: int, steps: int | None, designs: int, jobs
     variant, start = find_variant(name), time.monotonic()
     steps = steps or variant.steps
     filters = filters_of(name)
-    ready = designed(filters, min(10 * runs, DESIGN_RUNS), steps, 0, jobs)
-    results = [
-        questions(compare(ready, variant.model, runs, steps, seed, jobs=jobs, progress=False)) for seed in range(1, 1 + seeds)
-    ]
+    model, work = variant.model, {"jobs": jobs, "progress": False}
+    ready = designed(filters, Ensemble(model, min(10 * runs, DESIGN_RUNS), steps, 0), jobs)
+    results = [questions(compare(ready, model, runs, steps, seed, **work)) for seed in range(1, 1 + seeds)]
     cells = ["{:6.3f} {:6.3f} {:6.2f}".format(*coverage([one[kind] for one in results])) for kind in results[0]]
     moved = "{:6.2f} {:6.2f}".format(*another_design(filters, model, runs, steps, designs, jobs)) if designs > 1 else " " * 13
     return f"{name:>12} " + " | ".join([*cells, moved]) + f" | {time.monotonic() - start:6.0f}"
