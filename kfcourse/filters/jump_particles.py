@@ -7,7 +7,7 @@ r"""Particles of a model that jumps: each is a state and a mode, and looks at th
 
 r_j is the probability of the next mode given this particle and y_k, by a normal law; for affine equations it is exactly that, and
 all that is random is which particles are kept.  Two clouds that know nothing of each other, as of `particles`.  An object without
-noise makes copies of copies: `undisturbed` is for that.  Doucet, Godsill and Andrieu (2000), with a mode beside the state.
+noise makes copies of copies.  Doucet, Godsill and Andrieu (2000), with a mode beside the state.
 """
 
 from __future__ import annotations

@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from kfcourse.angles import Components, difference, moments_on_circle
-from kfcourse.filters.exact.kernels import chunks
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.reading import ModelError
 
@@ -53,7 +52,8 @@ def backwards(
     after = clouds[-1][:, :, np.arange(paths) * size // paths]
     for k in reversed(range(len(clouds) - 1)):
         x, weights, before = clouds[k], np.empty(even.shape), np.empty(after.shape)
-        for some in chunks(runs, 2 * paths * size * n, ELEMENTS):
+        at_once = max(1, ELEMENTS // (2 * paths * size * n))
+        for some in (slice(start, start + at_once) for start in range(0, runs, at_once)):
             shares = _ancestors(after[some], *law(x[some], k), angles)
             weights[some] = shares.mean(axis=2)
             cumulative = np.cumsum(shares, axis=-1)

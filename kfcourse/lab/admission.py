@@ -16,8 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kfcourse.errors import NoClosedForm, NotFinite, Reason, Refused
-from kfcourse.filters import Design, Filter, jump_pointmass, pointmass
-from kfcourse.filters.initial_states import is_undisturbed
+from kfcourse.filters import Design, Filter, pointmass
 from kfcourse.filters.particles import particle
 from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, OF_BEST, JumpStructures, Structures, check_names, has_exact, title
@@ -233,7 +232,7 @@ def _share_starved(model: Model, guided: bool) -> float:
 
 def _by_particles(structures: Structures) -> Iterator[str]:
     """The exact filter where point masses do not reach."""
-    if not has_exact(structures.model) and not is_undisturbed(structures.model):
+    if not has_exact(structures.model):
         yield from _starved(structures)
 
 
@@ -256,12 +255,10 @@ def _with_modes(name: str, structures: JumpStructures) -> Iterator[str]:
 
 def _not_by_points(structures: Structures | JumpStructures) -> Iterator[str]:
     """Why the exact filter is one of particles."""
-    model = structures.model
     try:
-        jump_pointmass(model) if isinstance(model, JumpModel) else pointmass(model)
+        pointmass(structures.model)
     except ModelError as error:
-        drawn = "initial states, as no noise enters the object" if is_undisturbed(model) else "particles"
-        yield f"by {drawn}: {error}"
+        yield f"by particles: {error}"
 
 
 # By a part of the short name.

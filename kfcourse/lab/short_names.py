@@ -21,7 +21,6 @@ from kfcourse.filters import (
     gpb2,
     imm,
     jump_particle,
-    jump_pointmass,
     logic_dynamic,
     logic_dynamic_fbp,
     logic_dynamic_fkp,
@@ -32,10 +31,10 @@ from kfcourse.filters import (
     mfos,
     particle,
     pointmass,
-    undisturbed,
 )
+from kfcourse.filters.densities import has_object_noise
+from kfcourse.filters.exact.laws import modes_of
 from kfcourse.filters.finite_memory import STEPS
-from kfcourse.filters.initial_states import is_undisturbed
 from kfcourse.lab.checked_quadrature import Checked, of_checked_order
 from kfcourse.lab.families import FAMILIES, family
 from kfcourse.laws import Array
@@ -275,18 +274,12 @@ def exact(model: Model | JumpModel) -> Filter:
     Raises
     ------
     ModelError
-        Neither can be had: there is no density of y given x.
+        Neither can be had: there is no density of y given x, or no noise enters the object.
     """
-    try:
-        return jump_pointmass(model) if isinstance(model, JumpModel) else pointmass(model)
-    except ModelError:
-        return _sampled(model)
-
-
-def _sampled(model: Model | JumpModel) -> Filter:
-    """The exact AOF by sampling: of initial states if they tell all that follows."""
-    if is_undisturbed(model):
-        return undisturbed(model, name="aof-exact")
+    if has_exact(model):
+        return pointmass(model)
+    if not all(map(has_object_noise, modes_of(model))):
+        raise ModelError("no noise enters the object, and copies of a particle stay copies: there is no bound")
     if isinstance(model, JumpModel):
         return jump_particle(model, BOUND, name="aof-exact")
     return particle(model, BOUND, name="aof-exact")
@@ -295,7 +288,7 @@ def _sampled(model: Model | JumpModel) -> Filter:
 def has_exact(model: Model | JumpModel) -> bool:
     """Whether the exact AOF can be computed for the model by point masses: scalar, noises entering linearly."""
     try:
-        jump_pointmass(model) if isinstance(model, JumpModel) else pointmass(model)
+        pointmass(model)
     except ModelError:
         return False
     return True

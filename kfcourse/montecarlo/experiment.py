@@ -21,7 +21,7 @@ import numpy as np
 from tqdm import tqdm
 
 from kfcourse.angles import difference, near
-from kfcourse.errors import NotFinite, Reason, expect, expect_sizes
+from kfcourse.errors import NotFinite, Reason, Refused, expect, expect_sizes
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
 from kfcourse.filters.looking_back import looked_back
@@ -133,7 +133,7 @@ def compare(
     ----------
     filters : sequence of Filter or Design
         Designs are designed first, on an ensemble of their own; standard errors hold for the filters as they were designed.
-        A slow filter (exact, particle) that fails is left out, and `Comparison.left_out` tells why.
+        One that cannot go on (the exact one, particles) is left out, and `Comparison.left_out` tells why.
     model : Model
     runs, steps : int
         Trajectories, and measurements of each.
@@ -266,7 +266,7 @@ def _compared(
     *,
     back: bool = False,
 ) -> Comparison:
-    """All filters on the sample; a slow one that fails is left out, and the others start again."""
+    """All filters on the sample; one that cannot go on is left out, and the others start again."""
     running, left_out = list(filters), dict[str, Reason]()
     while True:
         # slow filters take much memory for each trajectory, and so does looking back
@@ -277,7 +277,7 @@ def _compared(
         done = joblib.Parallel(jobs, prefer="threads", return_as="generator")(work)
         try:
             sums = Sums.together([*_progress("comparing", len(parts), "part", progress, done)])
-        except SlowFailure as failure:
+        except LeftOut as failure:
             left_out[failure.filter_name] = failure.reason
             running = [one for one in running if one.name != failure.filter_name]
             if not running:
@@ -288,8 +288,8 @@ def _compared(
             return Comparison(sample.model, names, runs, sample.steps, seed, sums, left_out=left_out)
 
 
-class SlowFailure(Exception):
-    """A slow filter failed."""
+class LeftOut(Exception):
+    """A filter that cannot go on, as it is slow or says so itself, and that the others do without."""
 
     def __init__(self, filter_name: str, reason: Reason):
         super().__init__(filter_name, reason)
@@ -365,8 +365,8 @@ def _named(one: Filter, step: int) -> Iterator[None]:
     try:
         yield
     except (ValueError, ArithmeticError, MemoryError) as error:
-        if one.slow:
-            raise SlowFailure(one.name, error.with_traceback(None)) from None
+        if one.slow or isinstance(error, Refused):
+            raise LeftOut(one.name, error.with_traceback(None)) from None
         if isinstance(error, NegativeVariance | np.linalg.LinAlgError):
             raise failed(one.name, step, error) from None
         raise
@@ -384,7 +384,7 @@ def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
     one = filters[int(np.argmin(finite[:, step]))]
     words = f"step {step}: {one.name} became infinite or NaN although the trajectories are finite"
     if one.slow:
-        raise SlowFailure(one.name, NotFinite(words, one.name, "infinite", step=step))
+        raise LeftOut(one.name, NotFinite(words, one.name, "infinite", step=step))
     raise NotFinite(f"{words}: it diverges; leave it out, or check the model", one.name, "infinite", step=step)
 
 
