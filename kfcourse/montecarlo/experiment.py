@@ -38,7 +38,7 @@ from kfcourse.symbolic.model import Model
 PIECE = 2500  # trajectories of a piece of work: a pass over fewer takes as long as the interpreter does
 DESIGN_RUNS = 200_000  # coefficients of so many cost a filter some hundred-thousandth of its accuracy
 
-WIDE = 2.0  # times as wide as the prior: a law from which half of the initial states are drawn
+WIDE = 1.5  # times as wide as the prior: a law from which half of the initial states are drawn
 
 T = TypeVar("T")
 
@@ -180,7 +180,13 @@ def compare(
     ready = _designed(filters, instants(model, where[0], steps, where[1]), steps, jobs, progress)
     sample = Sample(model, steps, sizes, seeds, None if same_ensemble else width(model))
     with cluster(dask):
-        result = _compared(ready, sample, seed, jobs, progress)
+        try:
+            result = _compared(ready, sample, seed, jobs, progress)
+        except NotFinite:
+            if sample.wide is None:
+                raise
+            sample = sample._replace(wide=None)  # some far start is too far: none but the prior's own
+            result = _compared(ready, sample, seed, jobs, progress)
         if not same_ensemble:
             result = replace(result, designed=tuple(one.name for one in filters if isinstance(one, Design)))
         if smoothers:

@@ -163,4 +163,5 @@ def _without_each(sums: Array) -> Array:
     total = sums.sum(axis=-1, keepdims=True)
     if sums.shape[-1] == 1:
         return total
-    return np.concatenate([total, total - sums], axis=-1)
+    with np.errstate(invalid="ignore"):  # an infinite sum has no part
+        return np.concatenate([total, total - sums], axis=-1)
