@@ -14,7 +14,7 @@ import click
 from kfcourse.commands import main as main  # scripts that were installed before call it here
 from kfcourse.derivations import check_text
 from kfcourse.derivations.setting import of_model
-from kfcourse.files import is_standard_output, read_only, replacing_together
+from kfcourse.files import replacing_together
 from kfcourse.lab.admission import admissions, on_trial
 from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.handin import LANGUAGES, write_handin
@@ -29,6 +29,7 @@ from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
 DERIVATION = 180.0  # seconds for the formulas of the filters: a busy machine must not leave out what a quiet one has
+STANDARD_OUTPUT = ("-", "/dev/stdout")
 LONGEST = 1_000_000  # bytes of a derivation; /dev/zero never ends
 RUNS = 20_000  # trajectories
 
@@ -135,7 +136,7 @@ def lab(
     )
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
-    to_error = json_file is not None and is_standard_output(json_file)
+    to_error = str(json_file) in STANDARD_OUTPUT
     _tell(result, to_error)
     if json_file:
         write_json(chosen, result, json_file)
@@ -320,12 +321,10 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
         for place in made:
             if place.is_dir():
                 place.rmdir()
-    if json_file is None or is_standard_output(json_file):
+    if json_file is None or str(json_file) in STANDARD_OUTPUT:
         return
     if json_file.is_dir() or not json_file.parent.is_dir():
         raise click.ClickException(f"the numbers cannot go to {json_file}: name a file in an existing folder with --json")
-    if read_only(json_file):
-        raise click.ClickException(f"{json_file} is read-only, and is not replaced: name another file with --json")
     if json_file.exists() and not json_file.is_file():  # a pipe or a device is written to, not replaced
         return
     try:

@@ -140,7 +140,10 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
         data["above_bound_standard_error"] = {name: e.standard_error.tolist() for name, e in above.items()}
         data["mean_above_bound"] = {name: _number(gap) for name, gap in result.ranking()}
     text = json.dumps(_finite(data), indent=1, allow_nan=False)
-    save(text, path)
+    if str(path) in ("-", "/dev/stdout"):
+        print(text, flush=True)
+    else:
+        save(text, path)
     return path
 
 

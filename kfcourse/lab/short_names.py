@@ -20,7 +20,6 @@ from kfcourse.filters import (
     fos,
     gpb2,
     imm,
-    jump_particle,
     logic_dynamic,
     logic_dynamic_fbp,
     logic_dynamic_fkp,
@@ -34,7 +33,7 @@ from kfcourse.filters import (
 )
 from kfcourse.filters.densities import has_object_noise
 from kfcourse.filters.exact.laws import modes_of
-from kfcourse.filters.finite_memory import STEPS
+from kfcourse.filters.optimal_structure import STEPS
 from kfcourse.lab.checked_quadrature import Checked, of_checked_order
 from kfcourse.lab.families import FAMILIES, family
 from kfcourse.laws import Array
@@ -280,8 +279,6 @@ def exact(model: Model | JumpModel) -> Filter:
         return pointmass(model)
     if not all(map(has_object_noise, modes_of(model))):
         raise ModelError("no noise enters the object, and copies of a particle stay copies: there is no bound")
-    if isinstance(model, JumpModel):
-        return jump_particle(model, BOUND, name="aof-exact")
     return particle(model, BOUND, name="aof-exact")
 
 
