@@ -237,7 +237,7 @@ BEYOND = 40.0  # the states of the oracles below lie within
 
 
 def by_midpoints(y, prior, mean, deviation, meter=lambda x: x):
-    """Means and deviations of of the posterior, y = b(x) + w, with the midpoint rule on cells none of which holds the jump at 0."""
+    """Means and deviations of the posterior, y = b(x) + w, by the midpoint rule on cells none of which holds the jump at 0."""
     x = np.arange(-BEYOND, BEYOND, 0.02) + 0.01
     kernel = np.exp(-0.5 * ((x[:, None] - mean(x)) / deviation(x)) ** 2) / deviation(x)
     ahead = np.exp(-0.5 * (x - prior.mean) ** 2 / prior.cov[0, 0])[:, None]
