@@ -17,9 +17,16 @@ from kfcourse.derivations.setting import of_model
 from kfcourse.files import replacing_together
 from kfcourse.lab.admission import admissions, on_trial
 from kfcourse.lab.admission import table as table_of_filters
-from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
-from kfcourse.lab.report import conclusions, recognised_modes, remarks_in_words, write_json, write_report
+from kfcourse.lab.report import (
+    LANGUAGES,
+    STANDARD_OUTPUT,
+    conclusions,
+    recognised_modes,
+    remarks_in_words,
+    write_json,
+    write_report,
+)
 from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, OF_BEST, has_exact, title
 from kfcourse.lab.variants import STEPS, find_variant
 from kfcourse.listing import VARIANTS
@@ -29,7 +36,6 @@ from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
 DERIVATION = 180.0  # seconds for the formulas of the filters: a busy machine must not leave out what a quiet one has
-STANDARD_OUTPUT = ("-", "/dev/stdout")
 LONGEST = 1_000_000  # bytes of a derivation; /dev/zero never ends
 RUNS = 20_000  # trajectories
 
@@ -70,7 +76,7 @@ RUNS = 20_000  # trajectories
 @click.option("--dask", help="Address of a Dask scheduler whose workers run the filters instead.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]")
 @click.option(
-    "--report", "language", type=click.Choice(LANGUAGES), help="Also write the student's report, handin.html and handin.tex."
+    "--report", "language", type=click.Choice(LANGUAGES), default="en", show_default=True, help="Language of the report."
 )
 @click.option(
     "--json", "json_file", type=click.Path(path_type=Path), help="Also write the numbers to this file; - is standard output."
@@ -87,7 +93,7 @@ def lab(
     jobs: int | None,
     dask: str | None,
     out: Path | None,
-    language: str | None,
+    language: str,
     json_file: Path | None,
 ) -> None:
     """Compare the filters on VARIANT (such as 53) and write the report.
@@ -142,11 +148,7 @@ def lab(
         write_json(chosen, result, json_file)
     with _kept(folder), replacing_together(folder) as place:
         modes = recognised_modes(result, filters)
-        write_report(chosen, result, place, found, modes)
-        if language:
-            write_handin(chosen, result, place, language, modes)
-    if not language and (older := folder / "handin.html").exists():
-        click.echo(f"{older} is of an earlier run; --report en, or ru, writes it anew", err=True)
+        write_report(chosen, result, place, language, admissions(model, None, DERIVATION, found), modes)
     click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""), err=to_error)
 
 

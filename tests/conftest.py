@@ -19,5 +19,5 @@ def variant53() -> Model:
 @pytest.fixture
 def no_figures(monkeypatch):
     """Drawing takes most of the time of a report; for tests of its text, and of what becomes of files."""
-    monkeypatch.setattr(report, "_FIGURES", {name: (caption, lambda *_: None) for name, (caption, _) in report._FIGURES.items()})
+    monkeypatch.setattr(report, "FIGURES", dict.fromkeys(report.FIGURES, lambda *_, **__: None))
     monkeypatch.setattr(report.Figure, "savefig", lambda _, path, **__: path.touch())

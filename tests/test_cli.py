@@ -19,7 +19,6 @@ from kfcourse import cli, compare
 from kfcourse.lab import report
 from kfcourse.lab.short_names import FILTERS, LAB, lab_filters
 from kfcourse.lab.variants import find_variant
-from kfcourse.symbolic.structure import Structure
 
 QUICK = ("--runs", "100", "--steps", "3")
 EXAMPLE = """
@@ -411,22 +410,6 @@ def test_formulas_that_are_not_found_in_time_are_refused_with_a_way_out(call, no
     assert "simplify" in line
 
 
-def spaced(page):
-    """The page's text with plain spaces, as MathML has others."""
-    return page.read_text(encoding="utf-8").replace("&#x000A0;", " ")
-
-
-def test_formulas_too_long_to_print_are_left_out_of_the_report(call, no_figures, tmp_path, monkeypatch):
-    monkeypatch.setattr(report, "LONGEST", 100)
-    assert call("lab", "53", *QUICK, "--filters", "aof-gaussian,duof", "--out", "a").exit_code == 0
-    html = spaced(tmp_path / "a" / "report.html")
-    assert re.search(r"They are too long to print: \d\d\d+ characters of LaTeX", html)
-    monkeypatch.setattr(report, "FORMULAS", 0.05)
-    monkeypatch.setattr(Structure, "latex", lambda _: time.sleep(10))
-    assert call("lab", "53", *QUICK, "--filters", "aof-gaussian,duof", "--out", "b").exit_code == 0
-    assert "They are not written within 0.05 s" in spaced(tmp_path / "b" / "report.html")
-
-
 @pytest.mark.parametrize(
     ("error", "words"),
     [
@@ -462,29 +445,21 @@ def test_an_end_while_the_report_is_written_leaves_the_one_that_was_there(call, 
     """Of both reports: what is new appears when all of it is written."""
     assert call("lab", "53", *QUICK, "--filters", "duof", "--out", "r", "--report", "ru").exit_code == 0
     before = snapshot(tmp_path)
-    for name, writes in (("write_handin", cli.write_handin), ("write_report", cli.write_report)):
 
-        def ended(*arguments, writes=writes):
-            writes(*arguments)
-            raise KeyboardInterrupt
+    def ended(*arguments):
+        report.write_report(*arguments)
+        raise KeyboardInterrupt
 
-        with monkeypatch.context() as patch:
-            patch.setattr(cli, name, ended)
-            assert call("lab", "53", *QUICK, "--seed", 2, "--filters", "duof", "--out", "r", "--report", "ru").exit_code == 130
-        assert snapshot(tmp_path) == before and [path.name for path in tmp_path.glob("r/.*")] == []
-
-
-def test_a_student_s_report_of_an_earlier_run_is_not_taken_for_this_one_s(call, no_figures, tmp_path):
-    """It stays, as nobody asked for another; its numbers are not those of the report that is written now."""
-    run = ("lab", "53", *QUICK, "--filters", "duof", "--out", "r")
-    assert [("earlier run" in call(*run, *more).output) for more in ((), ("--report", "ru"), ())] == [False, False, True]
+    monkeypatch.setattr(cli, "write_report", ended)
+    assert call("lab", "53", *QUICK, "--seed", 2, "--filters", "duof", "--out", "r", "--report", "ru").exit_code == 130
+    assert snapshot(tmp_path) == before and [path.name for path in tmp_path.glob("r/.*")] == []
 
 
 @pytest.mark.parametrize("target", ["-", "/dev/stdout"])
 @pytest.mark.skipif(sys.platform == "win32", reason="no /dev/stdout")
 def test_numbers_and_ranking_to_one_place_lose_nothing(tmp_path, target):
     """Standard output is a file, and takes the numbers: the file has them and nothing else."""
-    code = "from kfcourse.lab import report; report._FIGURES = {}; from kfcourse.commands import main; main()"
+    code = "from kfcourse.commands import main; main()"
     lab = [sys.executable, "-c", code, "lab", "53", *QUICK, "--filters", "aof-gaussian,duof", "--json", target]
     with (tmp_path / "same.json").open("w", encoding="utf-8") as out:
         done = subprocess.run(lab, cwd=tmp_path, stdout=out, stderr=subprocess.PIPE, text=True, timeout=120, check=False)

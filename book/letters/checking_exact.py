@@ -49,9 +49,14 @@ def bent(rng):
     return {"y_0": y, r"\lim_{f\to0}\frac{z_0-y_0}{f^2}": (4 * moved(5e-4) - moved(1e-3)) / 3}
 
 
-def crossing(rng):
-    """Where the average line meets the curve, off zero: the greatest root of y^4 - 4 y^2 - 3."""
-    return {"|y_0|": np.roots([1, 0, -4, 0, -3]).real.max()}
+crossing = r"""
+a = 2
+again:
+a = \sqrt{4+3/a^2}      # the greatest root of y^4 - 4 y^2 - 3: where the average line meets the curve
+then:
+"|y_0|" = a
+keep: |y_0|
+"""
 
 
 LETTERS = (masses, bent, crossing)

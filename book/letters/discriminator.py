@@ -73,19 +73,20 @@ def carrier(rng):
     return numbers | {"U": U, "u": u, r"\mathsf M": Operator(lambda value: value)}
 
 
-def drifting(rng):
-    """The loop without noise under a drift of the frequency, until it rests."""
-    T, p_phi, p_nu, a = 0.7, *rng.uniform(0.1, 0.3, 2), rng.uniform(0.02, 0.06)
-
-    def U(at):
-        return 0.8 * np.sin(at)
-
-    error = off = 0.0
-    for _ in range(5000):
-        push = U(error)
-        error, off = error - p_phi * push + T * (off - p_nu * push), off - p_nu * push + a * T
-    gains = {r"p_{\varphi\varphi}": p_phi, r"p_{\nu\varphi}": p_nu}
-    return gains | {"U": U, r"\Delta": error, r"\delta": off, "a": a, "T": T}
+drifting = r"""
+p_{\varphi\varphi}, p_{\nu\varphi}: in .1 .3
+a: in .02 .06
+T = 0.7
+U(x) = 0.8\sin x
+\Delta = 0
+\delta = 0
+again:
+u = U(\Delta)
+\Delta = \Delta-p_{\varphi\varphi}u+T(\delta-p_{\nu\varphi}u)
+\delta = \delta-p_{\nu\varphi}u+aT
+then:
+keep: p_{\varphi\varphi}, p_{\nu\varphi}, U, \Delta, \delta, a, T
+"""
 
 
 LETTERS = (run, display, western, carrier, drifting)

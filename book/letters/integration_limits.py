@@ -23,13 +23,17 @@ def analysis(rng):
     }  # fmt: skip
 
 
-def slow_drift(rng):
-    """True and best variance of a filter that believes in c times a drift of 1e-9."""
-    xi, n, c = 1e-9, rng.uniform(1, 2), rng.uniform(2, 3)
-    size = c * xi / n
-    K = -(size * np.sqrt(size**2 + 4) - size**2) / 2  # Psi = K^2 n^2 / (1 + K) in the steady state
-    true = (K**2 * n**2 + (1 + K) ** 2 * xi**2) / (-K * (2 + K))
-    return {r"\lim_{\sigma_\xi\to0}": 1.0, r"\bar p": true, "p": np.roots([1, xi**2, -((xi * n) ** 2)]).max(), "c": c}
+slow_drift = r"""
+x = 0.000000001
+n: in 1 2
+c: in 2 3
+a = cx/n
+K = -(a\sqrt{a^2+4}-a^2)/2
+\bar p = (K^2n^2+(1+K)^2x^2)/(-K(2+K))
+p = x(\sqrt{x^2+4n^2}-x)/2
+"\lim_{\sigma_\xi\to0}" = 1
+keep: \lim_{\sigma_\xi\to0}, \bar p, p, c
+"""
 
 
 LETTERS = (analysis, slow_drift)

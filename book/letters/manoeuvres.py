@@ -57,19 +57,31 @@ def two_modes(rng):
     return one | backwards | {rf"\pi_{{{i}{i}}}": pi[i - 1, i - 1] for i in (1, 2)}
 
 
-def turned(rng, middle=False):
-    """A velocity turned by an acceleration across it: that of the step's beginning, or of its middle."""
-    v, J = column(rng.normal(size=2)), np.array([[0.0, -1], [1, 0]])
-    omega, T = rng.uniform(0.5, 1), rng.uniform(0.2, 0.3)
-    half = np.eye(2) - omega * T / 2 * J
-    after = np.linalg.solve(half, half.T @ v) if middle else v + omega * T * J @ v
-    sizes = {"|v|": np.hypot(*v.ravel()), "|v'|": np.hypot(*after.ravel())}
-    product = {r"(v'-v)\cdot(v'+v)": ((after - v).T @ (after + v)).item()}
-    return sizes | product | {"v": v, "v'": after, "J": J, r"\omega": omega, "T": T}
+turned = r"""
+v: any 2
+J = \begin{pmatrix}0&-1\\1&0\end{pmatrix}
+\omega: in .5 1
+T: in .2 .3
+v' = v+\omega TJv
+"|v|" = \sqrt{v^Tv}
+"|v'|" = \sqrt{v'^Tv'}
+"(v'-v)\cdot(v'+v)" = (v'-v)^T(v'+v)
+"""
 
 
-def turned_in_the_middle(rng):
-    return turned(rng, middle=True)
+turned_in_the_middle = r"""
+v: any 2
+J = \begin{pmatrix}0&-1\\1&0\end{pmatrix}
+I: eye 2
+\omega: in .5 1
+T: in .2 .3
+h = I-\omega TJ/2
+v' = h^{-1}h^Tv
+"|v|" = \sqrt{v^Tv}
+"|v'|" = \sqrt{v'^Tv'}
+"(v'-v)\cdot(v'+v)" = (v'-v)^T(v'+v)
+keep: v, v', J, \omega, T, |v|, |v'|, (v'-v)\cdot(v'+v)
+"""
 
 
 LETTERS = (modes, mixing, two_modes, place, turned, turned_in_the_middle)

@@ -74,11 +74,15 @@ def nearest(rng):
     }
 
 
-def failed(rng):
-    """What one innovation adds to the odds of a failed sensor."""
-    F, nu = rng.uniform(0.5, 2, size=2), rng.normal()
-    sound, failed = (multivariate_normal(0, one).logpdf(nu) for one in F)
-    return {"F": Indexed(F), r"\nu": nu, r"\ell": failed - sound, r"\varrho": F[1] / F[0]}
+failed = r"""
+\nu: num
+a, b: pos
+j: range 2
+F_j = a+(b-a)j
+\ell = \ln\mathcal N(\nu;0,F_1)-\ln\mathcal N(\nu;0,F_0)
+\varrho = b/a
+keep: F, \nu, \ell, \varrho
+"""
 
 
 LETTERS = (correcting, predicting, remembering, nearest, failed)

@@ -51,16 +51,17 @@ def axes(rng):
     }  # fmt: skip
 
 
-def telescope(rng):
-    """What the prediction by second differences is off the mean of the last two measurements."""
-    y = rng.normal(size=9)
-    r, v = y[2], (3 * y[2] - 4 * y[1] + y[0]) / 2
-    off = {}
-    for k in range(2, 8):
-        u = y[k] - 2 * y[k - 1] + y[k - 2]
-        r, v = r + v + u / 2, v + u
-        off[k] = r - (y[k] + y[k - 1]) / 2
-    return {"y": Indexed(y), r"\delta": Indexed([0, 0, *off.values()]), "k": range(2, 7)}
+telescope = r"""
+y: nums 9
+k: range 2 8
+r_2 = y_2
+v_2 = (3y_2-4y_1+y_0)/2
+r_{k+1} = r_k+v_k+(y_k-2y_{k-1}+y_{k-2})/2
+v_{k+1} = v_k+y_k-2y_{k-1}+y_{k-2}
+\delta_k = r_{k+1}-(y_k+y_{k-1})/2
+k: range 2 7
+keep: y, \delta, k
+"""
 
 
 LETTERS = (filtered, sample_lost, axes, telescope)

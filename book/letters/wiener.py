@@ -1,9 +1,9 @@
 """The letters of wiener.md: spectra as sums over correlations, a limit by python-control, least squares for the amplitude."""
 
 import numpy as np
-from control import dare
 from gate.page import DEFINITION, NOTATION
 from gate.values import Indexed
+from gate.worlds import world
 from scipy.linalg import solve_continuous_are
 from scipy.stats import norm
 
@@ -11,25 +11,27 @@ from kfcourse.filters.kalman import correct
 from kfcourse.laws import Gaussian
 from kfcourse.linear.system import LinearSystem
 
-
-def signal(rng):
-    """x' = a x + v in white noise; its spectrum at a real zeta, where the sum of the correlations converges, too."""
-    a, Q, R, zeta = rng.uniform(0.5, 0.8), rng.uniform(1, 2), rng.uniform(1, 2), 1.1
-    spectrum = sum(Q * a ** abs(k) / (1 - a**2) * zeta ** (-k) for k in range(-300, 301))
-    Psi = dare(*(np.array([[one]]) for one in (a, 1, Q, R)))[0].item()
-    K = Psi / (Psi + R)
-    z, y = rng.normal(size=2)
-    after = a * z + K * (y - a * z)
-    return {
-        "a": a, "Q": Q, "R": R, r"\zeta": zeta, r"S_x(\zeta)": spectrum, r"S_y(\zeta)": spectrum + R, "K": K,
-        r"\gamma": a * (1 - K),
-        "z": z, "y_k": y, r"z\leftarrow": after,
-    }  # fmt: skip
+signal = r"""
+a: in .5 .8
+Q, R: in 1 2
+\zeta = 1.1               # where the sum of the correlations converges, too
+"S_x(\zeta)" = Q/(1-a^2)(1+\sum_{i=1}^{400}a^i(\zeta^i+\zeta^{-i}))
+"S_y(\zeta)" = S_x(\zeta)+R
+\Psi = Q
+again:
+\Psi = Q+a^2/(1/\Psi+1/R)
+then:
+K = \Psi/(\Psi+R)
+\gamma = a(1-K)
+z, y_k: num
+z\leftarrow = az+K(y_k-az)
+keep: a, Q, R, \zeta, S_x(\zeta), S_y(\zeta), K, \gamma, z, y_k, z\leftarrow
+"""
 
 
 def waiting(rng, m=3):
     """The best linear estimate of a state from a long record that ends m steps later, and from one that ends with it."""
-    found = signal(rng)
+    found = world(signal)(rng)
     a, Q, R, K = (found[name] for name in "aQRK")
 
     def left(last):
@@ -74,17 +76,24 @@ def bucy(rng):
     }  # fmt: skip
 
 
-def shrinking(rng):
-    """The gains of the alpha-beta filter at an interval of 1e-10, where they are those of the limit."""
-    T, Omega = 1e-10, rng.uniform(1, 2)
-    index = (Omega * T) ** 2
-    missing = (np.sqrt(index**2 + 8 * index) - index) / 4  # 1 - sqrt(1 - alpha), without its cancellation
-    return {r"\lim_{T\to0}": 1.0, "T": T, r"\Omega": Omega, r"\alpha": missing * (2 - missing), r"\beta": 2 * missing**2}
+shrinking = r"""
+T = 0.0000000001
+\Omega: in 1 2
+n = (\Omega T)^2
+m = (\sqrt{n^2+8n}-n)/4      # 1 - sqrt(1 - alpha), without its cancellation
+\alpha = m(2-m)
+\beta = 2m^2
+"\lim_{T\to0}" = 1
+keep: \lim_{T\to0}, T, \Omega, \alpha, \beta
+"""
 
 
-def weights(rng):
-    g, s = rng.normal(size=(2, 4))
-    return {"g": Indexed(g), "s": Indexed(s), "k": range(4), "i": range(4), "j": range(4)}
+weights = r"""
+g, s: nums 4
+k: range 4
+i: range 4
+j: range 4
+"""
 
 
 def found(rng):

@@ -37,7 +37,6 @@ TRANSFORMATIONS: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
     ("factor-2", "It is half of what it should be.", lambda v: v * 2),
     ("factor-half", "It is twice what it should be.", lambda v: v / 2),
     ("inverse", INVERSE, lambda v: _each(v, lambda entry: 1 / entry)),
-    ("complement", "It is one minus what it should be.", lambda v: 1 - v),  # no matrix of formulas: zeros and ones say nothing
 )
 
 
@@ -60,13 +59,6 @@ def transformed(case: Case) -> Said | None:
                 return name, says
         except Exception:  # this result cannot be changed so
             continue
-    return None
-
-
-def signs_lost(case: Case) -> Said | None:
-    """Right but for the signs of some entries."""
-    if case.numeric and case.agree([np.abs(a) for a in case.found], [np.abs(b) for b in case.expected]):
-        return "some-signs", "All sizes are right, some signs are not."
     return None
 
 
@@ -117,8 +109,9 @@ def rough(case: Case) -> Said | None:
 
 def dependence(case: Case) -> Said | None:
     """Arguments or symbols that are missing, or too many."""
+    extra: list[str] = []
     if case.numeric:
-        missing, extra = case.sensitivity.unused(case.part), case.sensitivity.superfluous(case.part)
+        missing = case.sensitivity.unused(case.part)
         if all(
             np.array_equal(one, np.round(one)) for pair in case.pairs for one in pair
         ):  # what is rounded does not feel a small change
@@ -137,7 +130,7 @@ def dependence(case: Case) -> Said | None:
             f"It does not depend on {which} and should: forgotten, or cancelled, or is something of the notebook used instead?",
         )
     if extra:
-        return "superfluous", f"It depends on {', '.join(map(form.format, extra))} and should not."
+        return "superfluous", f"It depends on {', '.join(extra)} and should not."
     return None
 
 
@@ -225,18 +218,11 @@ def entries(case: Case) -> Said | None:
         return None
     if right.ndim == 1:
         return "components", f"Only component{_numbers(~right)} wrong."
-    rows = right.all(axis=1)
     if (~right).sum() == 1:
         i, j = np.argwhere(~right)[0] + 1
         return "entry", f"Only the entry in row {i}, column {j} is wrong."
-    if rows.any():
-        return "rows", f"Only row{_numbers(~rows)} wrong."
-    if right.all(axis=0).any():
-        return "columns", f"Only column{_numbers(~right.all(axis=0))} wrong."
-    if right.shape[0] == right.shape[1] and np.array_equal(right, np.eye(len(right), dtype=bool)):
+    if len(set(right.shape)) == 1 and np.array_equal(right, np.eye(len(right), dtype=bool)):
         return "off-diagonal", "The diagonal is right, the rest is not: what has one component to do with another?"
-    if right.shape[0] == right.shape[1] and np.array_equal(right, ~np.eye(len(right), dtype=bool)):
-        return "diagonal", "Only the diagonal is wrong."
     return None
 
 
@@ -270,7 +256,6 @@ HINTS: tuple[Callable[[Case], Said | None], ...] = (
     transformed,
     rounded,
     squared,
-    signs_lost,
     confused,
     rough,
     sometimes,

@@ -14,7 +14,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.case import Case, Said
-from kfcourse.checks.dependence import changed, same, scaled
+from kfcourse.checks.dependence import changed, scaled
 from kfcourse.checks.equality import depends, like
 from kfcourse.limits import OutOfTime
 
@@ -219,43 +219,13 @@ def replaced(case: Case) -> Said | None:
     return None
 
 
-REVERSED = "reversed", "All values are right, but in the reverse order."
-
-
-def ordered(case: Case) -> Said | None:
-    """Right, but in another order, or a step too early or too late."""
-    if not case.numeric and len(case.formulas[0][1]) > 1:
-        for across in (False, True):
-            if case.agree([a[:, ::-1] if across else a[::-1, :] for a in case.found], case.expected):
-                return REVERSED
-    if not case.numeric or not all(np.ndim(b) for b in case.expected):
-        return None
-    for axis in range(min(np.ndim(b) for b in case.expected)):
-        if case.agree([np.flip(a, axis) for a in case.found], case.expected):
-            return REVERSED
-    square = all(b.ndim > 1 and b.shape[0] == b.shape[1] for b in case.expected)
-    if square and case.agree([np.swapaxes(a, 0, 1) for a in case.found], case.expected):
-        return "axes", "All values are right, but two axes are exchanged."
-    if case.axes[:1] == ("step",) and all(len(b) > 3 for b in case.expected):
+def shifted(case: Case) -> Said | None:
+    """A step too early or too late."""
+    if case.numeric and case.axes[:1] == ("step",) and all(np.ndim(b) and len(b) > 3 for b in case.expected):
         for which, late in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
             if case.agree([a[which] for a in case.found], [b[late] for b in case.expected]):
                 word = "late" if which.start else "early"
                 return "shifted", f"The values are right, but each stands one step too {word}."
-    return None
-
-
-def differentiated(case: Case) -> Said | None:
-    """A derivative too many, or too few, or of another result."""
-    if case.numeric:
-        return None
-    for s in dict.fromkeys(v for values in case.arguments for v in values if isinstance(v, sp.Symbol)):
-        if case.agree([sp.diff(a, s) for a in case.found], case.expected):
-            return "not-differentiated", f"It has still to be differentiated by {s}."
-        for name, wanted in (("what should be there", case.expected), *case.others):
-            slopes = [sp.diff(b, s) for b in wanted]
-            shaped = all(np.shape(a) == np.shape(b) for a, b in zip(case.found, slopes, strict=True))
-            if shaped and not _empty(slopes) and case.agree(case.found, slopes):
-                return "derivative", f"It is the derivative of {name} by {s}."
     return None
 
 
@@ -277,41 +247,6 @@ def _depends(formula: sp.Expr) -> list[str]:
     return depends(formula, {s.name for s in formula.free_symbols})
 
 
-def alike(case: Case) -> Said | None:
-    """The same for all trajectories, or at all steps, where the right one is not."""
-    if not case.numeric:
-        return None
-    for axis, name in enumerate(case.axes):
-        if all(b.ndim > axis and b.shape[axis] > 1 for b in case.expected):
-            spread = [[np.ptp(one, axis=axis).max() / np.abs(one).max() for one in side] for side in (case.found, case.expected)]
-            if max(spread[0]) < 1e-12 < 1e-6 < min(spread[1]):
-                return "one-for-all", f"It is the same for every {name}; each has one of its own."
-    return None
-
-
-def mixed(case: Case) -> Said | None:
-    """The result of a trajectory that changes with the others."""
-    if not case.numeric or case.axes[:1] != ("trajectory",):
-        return None
-    runs = len(case.expected[0])
-
-    def fewer(value: Any) -> Any:
-        return value[: runs // 2] if isinstance(value, np.ndarray) and len(value) == runs else value
-
-    values = [fewer(value) for value in copy.deepcopy(case.arguments[0])]
-    try:
-        results = [answer(*copy.deepcopy(values)) for answer in case.sensitivity.answers]
-    except (OutOfTime, KeyboardInterrupt):
-        raise
-    except BaseException:
-        return None
-    parts = [np.asarray(one[case.part] if case.sensitivity.several else one, float) for one in results]
-    whole = [case.expected[0][: runs // 2], case.found[0][: runs // 2]]
-    if same(parts[0], whole[0]) and not np.allclose(parts[1], whole[1], rtol=1e-6):
-        return "mixed", "The result of one trajectory changes with the others: each has arrays of its own."
-    return None
-
-
 def direction(case: Case) -> Said | None:
     """Too large, or too small, wherever it is wrong."""
     if not case.numeric:
@@ -329,11 +264,8 @@ def direction(case: Case) -> Said | None:
 
 RELATIONS: tuple[Callable[[Case], Said | None], ...] = (
     exchanged,
-    ordered,
-    alike,
-    mixed,
+    shifted,
     differs,
-    differentiated,
     limit,
     power,
     narrow,

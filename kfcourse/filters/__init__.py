@@ -7,7 +7,7 @@ conditionally_optimal   Pugachev's two-step conditionally optimal filter (DUOF)
 optimal_structure       Rudenko's filter of optimal structure (FOS), modified (MFOS), in two steps (DFMP, MDFMP), and those
                         with the last measurements (FKP) or the last estimates (FBP) in the place of the last one
 exact                   the AOF itself, of scalar models with modes or without, compiled: a folder
-looking_back            what the whole record tells of each state
+looking_back            what the whole record tells of each state (exact, particles have ways of their own)
 particles               the same by sampling, with modes or without;  densities: what all need
 iterated_ekf            the meter linearised again at the estimate
 gate, robust            measurements that are not believed: refused, by any filter; weighted; a noise of unknown size, learnt
@@ -15,7 +15,7 @@ alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
                         (jump_equations: as printed;  jump_optimal: FOS, FKP, FBP with modes)
 notation                symbols in which the equations are printed
-programs                the printed equations as rules and regressions
+programs, fused, loops  the printed equations as rules and regressions; compiled steps made of them (numba)
 """
 
 from kfcourse.filters.alphabeta import alpha_beta, alpha_beta_gamma

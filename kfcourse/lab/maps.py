@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
 from kfcourse.lab.plots import style
-from kfcourse.lab.report import percent
+from kfcourse.lab.report_text import percent
 from kfcourse.lab.short_names import LAB, lab_filters, title
 from kfcourse.laws import CONFIDENCE
 from kfcourse.montecarlo.comparison import EXACT, Comparison

@@ -28,7 +28,6 @@ from kfcourse import (
     unscented,
 )
 from kfcourse.filters import aof, duof, fbp, fkp, fos, kalman_filter, mfos, pointmass
-from kfcourse.filters.exact.jumps import jump_pointmass
 from kfcourse.filters.jump_optimal import logic_dynamic_fbp, logic_dynamic_fkp, logic_dynamic_fos
 from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
 from kfcourse.lab.variants import find_variant
@@ -80,8 +79,8 @@ def of(build, model, kind=gaussian):
 @pytest.mark.parametrize("model", [failing(), AFFINE], ids=["sensor", "three modes"])
 def test_the_exact_filter_is_the_sum_over_all_histories(model):
     y = simulate(model, 4, 6, seed=3).y
-    mean, cov, probability, *_ = follow(jump_pointmass(model), y)
-    total = likelihood(jump_pointmass(model), y).sum(axis=0)
+    mean, cov, probability, *_ = follow(pointmass(model), y)
+    total = likelihood(pointmass(model), y).sum(axis=0)
     for trajectory in range(4):
         for k in (0, 1, 3, 5):
             z, variance, expected, evidence = histories(model, y[: k + 1, trajectory])
@@ -96,7 +95,7 @@ def test_the_exact_filter_is_a_plain_grid_of_both():
     x = np.linspace(-9, 9, 2001)  # 44 points to the narrowest kernel's deviation: sums are as good as integrals
     kernels = [np.exp(-0.5 * ((x[:, None] - (x - 0.4 * np.sin(x))) / s) ** 2) / s for s in (0.4, 0.8)]
     y = simulate(CURVED, 3, 8, seed=5).y
-    mean, cov, probability, *_ = follow(jump_pointmass(CURVED), y)
+    mean, cov, probability, *_ = follow(pointmass(CURVED), y)
     for trajectory in range(3):
         density = np.stack([q * np.exp(-0.5 * x * x) for q in CURVED.first])
         for k, value in enumerate(y[:, trajectory, 0]):
@@ -116,7 +115,7 @@ def test_the_exact_filter_is_a_plain_grid_of_both():
 
 def test_its_own_estimate_of_the_error_covers_what_finer_nodes_change():
     y = simulate(failing(), 40, 15, seed=8).y
-    rough, fine = (jump_pointmass(failing(), accuracy) for accuracy in (1e-2, 1e-6))
+    rough, fine = (pointmass(failing(), accuracy) for accuracy in (1e-2, 1e-6))
     states = [rough.init(40), fine.init(40)]
     for measured in y:
         states = [one.step(state, measured) for one, state in zip((rough, fine), states, strict=True)]
@@ -126,27 +125,11 @@ def test_its_own_estimate_of_the_error_covers_what_finer_nodes_change():
     assert (states[1].memory.discretisation_error() < 1e-4).all()
 
 
-def test_every_second_and_fourth_kernel_of_all_modes_is_a_prediction_too():
-    """The rough looks of the exact filter take these; a mode whose kernels they missed would be looked for in vain."""
-    one, y = jump_pointmass(failing()), simulate(failing(), 30, 4, seed=2).y
-    state = one.init(30)
-    for measured in y:
-        state = one.step(state, measured)
-    for groups in state.memory.groups:
-        for _, kernels in groups:
-            mean, variance = kernels.moments()
-            thinned = kernels.thinned()
-            np.testing.assert_allclose(thinned.mass.sum(axis=1), 1.0, rtol=1e-12)
-            for rough in (thinned, kernels._replace(mass=kernels.quarter())):
-                # half and a quarter of the nodes: the first are as good as 1e-3, the second as its root
-                assert (np.abs(rough.moments()[0] - mean) < 0.03 * np.sqrt(variance)).all()
-
-
 def test_one_mode_is_the_exact_filter():
     plain = Model.define("0.9*x + 0.3*x*v", "x + 0.2*x**2*w")
     model = JumpModel.define("0.9*x + 0.3*x*v", "x + 0.2*x**2*w", modes={"only": {}}, transition=[1.0])
     y = simulate(plain, 20, 8, seed=2).y
-    found, expected = run(jump_pointmass(model), y), run(pointmass(plain), y)
+    found, expected = run(pointmass(model), y), run(pointmass(plain), y)
     np.testing.assert_array_equal(found.mean, expected.mean)
     np.testing.assert_array_equal(found.cov, expected.cov)
 
@@ -154,14 +137,14 @@ def test_one_mode_is_the_exact_filter():
 def test_two_equal_modes_are_the_exact_filter():
     model = failing(modes={"one": {"parameters": {"C": 1}}, "other": {"parameters": {"C": 1}}})
     y = simulate(model, 10, 8, seed=2).y
-    found, expected = run(jump_pointmass(model), y), run(pointmass(model.modes[0]), y)
+    found, expected = run(pointmass(model), y), run(pointmass(model.modes[0]), y)
     sd = np.sqrt(expected.cov[..., 0])
     assert (np.abs(found.mean - expected.mean) < 1e-3 * sd).all()  # both of that accuracy
 
 
 def test_missing_measurements_leave_the_exact_filter_as_predicted():
     y = simulate(failing(), 2, 4, seed=1).y
-    one = jump_pointmass(failing())
+    one = pointmass(failing())
     state = one.init(2)
     for measured in y:
         state = one.step(state, measured)
@@ -174,12 +157,12 @@ def test_missing_measurements_leave_the_exact_filter_as_predicted():
     ("model", "message"),
     [
         (JumpModel.define(["x1 + v1", "x2 + v2"], "x1 + w", modes={"a": {}}, transition=[1]), "scalar models"),
-        (JumpModel.define("x + v", "x", modes={"a": {}}, transition=[1]), "without noise in the meter"),
+        (JumpModel.define("x + v", "x", modes={"a": {}}, transition=[1]), "no noise enters the meter"),
     ],
 )
 def test_the_exact_filter_says_what_it_cannot_do(model, message):
     with pytest.raises(ModelError, match=message):
-        jump_pointmass(model)
+        pointmass(model)
 
 
 # --- filters of one law for each mode
@@ -298,7 +281,7 @@ def test_a_chain_that_changes_with_time():
     model = failing(transition=[["Heaviside(3.5 - k)", "Heaviside(k - 3.5)"], [0, 1]], first=[1, 0])
     y = simulate(model, 3, 10, seed=1)
     assert (y.mode == (np.arange(10) >= 5)[:, None]).all()
-    for one in (of(logic_dynamic, model), of(gpb2, model), jump_pointmass(model)):
+    for one in (of(logic_dynamic, model), of(gpb2, model), pointmass(model)):
         probability = follow(one, y.y)[2]
         np.testing.assert_allclose(probability[..., 1], np.tile((np.arange(10) >= 5)[:, None], 3), atol=1e-12)
 
@@ -543,7 +526,7 @@ def test_who_wins():
             duof(model.modes[0], averaged_equations(model)),
             fos(structure),
             mfos(structure),
-            jump_pointmass(model),
+            pointmass(model),
         ],
         model,
         200,

@@ -106,14 +106,14 @@ def test_a_trial_tells_a_filter_from_the_model():
     [("53", "aof-gaussian,duof", FILTERS), ("J1", "imm,aof-jump-gaussian,duof", JUMP_FILTERS)],
 )
 def test_the_lab_looks_at_each_filter_once(variant, filters, all_of_them, tmp_path, monkeypatch):
-    """Those compared, then the others for the report's table; the student's report and its modes take what is there."""
+    """Those compared, then the others for the report's table; the report and its modes take what is there."""
     looked, look = [], admission._admitted
     monkeypatch.setattr(admission, "_admitted", lambda name, structures: looked.append(name) or look(name, structures))
     few = ["--runs", "40", "--steps", "2", "--slow-runs", "0", "--designs", "1", "--report", "en", "--out", str(tmp_path)]
     result = CliRunner().invoke(cli.main, ["lab", variant, "--filters", filters, *few])
     assert result.exit_code == 0, result.output
     assert looked[: filters.count(",") + 1] == filters.split(",") and sorted(looked) == sorted(all_of_them)
-    assert (tmp_path / "handin-modes.svg").exists() == (variant == "J1")
+    assert (tmp_path / "modes.svg").exists() == (variant == "J1")
 
 
 def test_formulas_that_were_not_derived_in_time_are_not_derived_again():

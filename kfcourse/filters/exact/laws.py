@@ -16,17 +16,17 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from hashlib import sha256
 from importlib.util import module_from_spec, spec_from_file_location
+from itertools import count
 from pathlib import Path
 from textwrap import indent
 from typing import Any
 
 import numpy as np
 import sympy as sp
-from sympy.core.relational import Relational
 from sympy.printing.pycode import PythonCodePrinter
 
 from kfcourse.files import save
-from kfcourse.filters.densities import scalar_formulas
+from kfcourse.filters.densities import Y, scalar_formulas
 from kfcourse.laws import Array
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -60,27 +60,29 @@ def constants(model: Model | JumpModel, k: int) -> Array:
 
 def printed(model: Model | JumpModel) -> str:
     """The function's text; ModelError for a model that has no densities."""
-    modes, names, cases = modes_of(model), dict[sp.Basic, str](), list[tuple[int, list[sp.Expr]]]()
+    modes, entries, cases = modes_of(model), count(), list[tuple[int, Sequence[sp.Expr]]]()
 
-    def named(letters: Iterable[sp.Symbol]) -> dict[sp.Symbol, sp.Dummy]:
-        """Symbols that stand for the next entries of c."""
-        own = {letter: sp.Dummy() for letter in letters}
-        for entry in own.values():
-            names[entry] = f"c[{len(names)}]"
-        return own
+    def names(letters: Iterable[sp.Symbol]) -> dict[sp.Symbol, sp.Symbol]:
+        """Symbols that are called as the next entries of c."""
+        return {letter: _real(f"c[{next(entries)}]") for letter in letters}
 
-    of_modes = [named([*mode.values, *mode.known.symbols]) for mode in modes]
+    fixed = {modes[0].x[0]: _real("x[i]"), Y: _real("y")}
+    of_modes = [fixed | names([*mode.values, *mode.known.symbols]) for mode in modes]
     for j, (mode, own) in enumerate(zip(modes, of_modes, strict=True)):
-        mean, deviation, meter, meter_deviation = (part.subs(own) for part in scalar_formulas(mode))
+        mean, deviation, meter, meter_deviation = (part.xreplace(own) for part in scalar_formulas(mode))
         cases += [(2 * j, [mean, deviation]), (2 * j + 1, [meter, meter_deviation])]
     if isinstance(model, JumpModel) and model.by_state:
-        own = of_modes[0] | named(model.chain_of_step.known.symbols)
-        cases += [(-1 - e, [entry.subs(own), sp.S.Zero]) for e, entry in enumerate(model.chain)]
-    printer = _Printer({**names, modes[0].x[0]: "x[i]"})
-    return HEADER + "".join(_case(printer, which, outputs) for which, outputs in cases)
+        own = of_modes[0] | names(model.chain_of_step.known.symbols)
+        cases += [(-1 - i, [entry.xreplace(own), sp.S.Zero]) for i, entry in enumerate(model.chain)]
+    return HEADER + "".join(_case(which, outputs) for which, outputs in cases)
 
 
-def _case(printer: _Printer, which: int, outputs: Sequence[sp.Expr]) -> str:
+def _real(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)
+
+
+def _case(which: int, outputs: Sequence[sp.Expr]) -> str:
+    printer = _Printer({"fully_qualified_modules": False})
     shared, (mean, deviation) = sp.cse(outputs, symbols=sp.numbered_symbols("s"))
     lines = [f"{name} = {printer.doprint(value)}" for name, value in shared]
     lines += [f"mean[i] = {printer.doprint(mean)}", f"deviation[i] = {printer.doprint(deviation)}"]
@@ -89,34 +91,19 @@ def _case(printer: _Printer, which: int, outputs: Sequence[sp.Expr]) -> str:
 
 
 class _Printer(PythonCodePrinter):
-    """One number at a time, with names of its own for some symbols."""
-
-    def __init__(self, names: dict[sp.Basic, str]):
-        super().__init__({"fully_qualified_modules": False})
-        self.names = names
-
-    def _print_Symbol(self, expr: sp.Symbol) -> str:
-        return self.names.get(expr, expr.name)
-
-    _print_Dummy = _print_Symbol
-
-    def _print_Relational(self, expr: Relational) -> str:
-        return f"({self._print(expr.lhs)} {expr.rel_op} {self._print(expr.rhs)})"
+    """One number at a time, of functions that numba knows."""
 
     def _print_sign(self, expr: sp.sign) -> str:
         value = self._print(expr.args[0])
         return f"(0.0 if {value} == 0 else copysign(1.0, {value}))"
 
     def _print_Heaviside(self, expr: sp.Heaviside) -> str:
-        value, middle = map(self._print, (expr.args[0], expr.args[1]))
+        value, middle = map(self._print, expr.args)
         return f"({middle} if {value} == 0 else 1.0 if {value} > 0 else 0.0)"
 
     def _print_Piecewise(self, expr: sp.Piecewise) -> str:
         cases = [f"{self._print(value)} if {self._print(holds)}" for value, holds in expr.args]
         return f"({' else '.join(cases)} else nan)"
-
-    def _print_Rational(self, expr: sp.Rational) -> str:
-        return repr(float(expr))
 
 
 @lru_cache(maxsize=256)

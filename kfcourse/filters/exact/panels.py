@@ -48,7 +48,7 @@ from kfcourse.filters.exact.columns import (
     Q,
 )
 
-SPAN = 5.0  # deviations that the kernels of a panel may cover: eight of them then sum to 1 within 1e-7
+SPAN = 5.0  # deviations that the kernels of a panel may cover at accuracy 1e-3: eight points err with the 14th power
 BLUR = 0.01  # of a panel's length: kernels are widened to it, its fourth power is the error that is left
 REACH = 7.0  # deviations of a law that count: 1e-11 lies beyond
 WINDOW = 9.0  # deviations beyond which a kernel is left out of a sum: 1e-18 of its height
@@ -483,8 +483,9 @@ def corrected(model, room, y, n, total, later, accuracy, first, expected, number
         return PANELLED, 0
     whole, top = peak + log(integral), P[likeliest, BEFORE]
     error += ROUNDING * abs(origin) / sqrt(variance)
-    if not variance > 1e-300 or P[likeliest, FIT] > IMPOSSIBLE:
+    if not variance > 1e-300:
         return EMPTY, 0
+    error += 1.0 if P[likeliest, FIT] > IMPOSSIBLE else 0.0
     if not first:
         lost = numbers[LOST] + LEFT_OUT
         numbers[LOST] = lost * expected * grown(P, n, total.height, whole)
@@ -559,6 +560,7 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
     kernel, group, edge, stack = room.kernel, room.group, room.edge, room.stack
     (x, m, s, _), (power, mass, deviation, weight) = room.point, room.work
     count, many, height, error = total
+    span = SPAN * min(accuracy / 1e-3, 1.0) ** (1 / 14)
     for p in range(len(B)):
         middle, size = 0.5 * (B[p, LEFT] + B[p, RIGHT]), 0.5 * (B[p, RIGHT] - B[p, LEFT])
         top, (before, after) = highest(B[p], 0), widths(B, p)
@@ -572,7 +574,9 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
             if weight_law < 0:
                 model.law(weight_law, Q, 0.0, model.constants, x, weight, s)
             model.law(2 * model.mode + MOVES, Q, 0.0, model.constants, x, m, s)
-            share, covered, least, rough = 0.0, 0.0, np.inf, 0.0
+            share, covered, least, calm, steep = 0.0, 0.0, np.inf, np.inf, False
+            for i in range(1, Q):
+                covered = max(covered, abs(m[i] - m[0]))
             d = e = f = g = 0.0
             for i in range(Q):
                 t, slope = 0.5 * (a + b) + part * POINT[i], 0.0
@@ -581,10 +585,11 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                 if weight_law < 0:
                     mass[i] *= weight[i]
                 share += mass[i]
-                covered = max(covered, abs(m[i] - m[0]))
                 for k in range(Q):
                     slope += SLOPE[i, k] * m[k]
-                blur = slope / (part * size) * between(before, after, t)
+                blur = abs(slope) / (part * size) * between(before, after, t)
+                # beside a jump or a pole the slope of a point is no measure of a panel's
+                steep, calm, blur = steep or blur > covered, min(calm, s[i]), min(blur, covered / span)
                 deviation[i] = sqrt(s[i] * s[i] + blur * blur + 1e-300)
                 least = min(least, deviation[i])
                 d += LAST[i] * m[i]
@@ -592,8 +597,9 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                 f += LAST[i] * s[i]
                 g += LAST_BUT_ONE[i] * s[i]
             digits = 10 * ROUNDING * abs(m[0])
-            rough = share * max(abs(d) + abs(e) + abs(f) + abs(g) - digits, 0.0) / least
-            gaps = covered > SPAN * least or rough > 0.03 * accuracy
+            rough = max(abs(d) + abs(e) + abs(f) + abs(g) - digits, 0.0) / least
+            # a measurement may ask for what has little share
+            gaps = covered > span * least or sqrt(share) * rough > 0.03 * accuracy or (steep and covered > calm)
             if share > 1e-10 and gaps and part > 1e-9:
                 waiting = in_halves(stack, waiting, a, b)
                 continue
@@ -601,7 +607,7 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                 return KERNELLED, Sum(0, 0, 0.0, 0.0)
             group[0, count], group[1, count], group[2, count] = np.inf, -np.inf, least
             for i in range(Q):
-                j, wide = Q * count + i, max(deviation[i], covered / SPAN)
+                j, wide = Q * count + i, max(deviation[i], covered / span)
                 rate, extra = sqrt(0.5 / LN2) / wide, 0.5 - 0.5 * (s[i] / wide) ** 2
                 amount = mass[i] * rate * sqrt(LN2 / np.pi)
                 kernel[0, j], kernel[1, j] = rate, m[i] * rate
@@ -614,12 +620,12 @@ def kernels(model, weight_law, shift, B, room, total, accuracy):
                     low = min(low, m[i] - sqrt(reach) * wide)
                     high = max(high, m[i] + sqrt(reach) * wide)
             count += 1
-            error += rough
+            error += share * rough
             if a == -1:
-                edge[0, many], edge[1, many], edge[2, many] = m[0], 0.0, s[0]
+                edge[0, many], edge[1, many], edge[2, many] = m[0], 0.0, deviation[0]
                 many += 1
             if b == 1:
-                edge[0, many], edge[1, many], edge[2, many] = m[Q - 1], 0.0, s[Q - 1]
+                edge[0, many], edge[1, many], edge[2, many] = m[Q - 1], 0.0, deviation[Q - 1]
                 many += 1
         if low < high:
             edge[0, many], edge[1, many], edge[2, many] = low, 1.0, 0.0
@@ -844,7 +850,9 @@ def advance(law, constants, turns, y, prior, before, begin, later, later_begin, 
     for t in range(T):
         start = t * modes
         here = numbers[start : start + modes]
-        known, n, later_count = here.copy(), 0, 0
+        known, n, later_count, lost = here.copy(), 0, 0, 0.0
+        for j in range(modes):
+            lost += known[j, PROBABILITY] * known[j, LOST]
         for j in range(modes):
             model = Model(law, j, constants[0], turns[0], turns[1])
             if first:
@@ -859,7 +867,7 @@ def advance(law, constants, turns, y, prior, before, begin, later, later_begin, 
                 rows = later[later_begin[t] : later_begin[t + 1]]
                 later_count = sources(rows, least_deviation(model, room, n), room)
                 status = status if later_count or not len(rows) else KERNELLED
-            kept, here[j, EVIDENCE] = 0, -np.inf
+            kept, here[j, EVIDENCE], here[j, LOST] = 0, -np.inf, lost
             if status == FINE and n:
                 status, kept = corrected(model, room, y[t], n, total, later_count, accuracy, first, known[j, EXPECTED], here[j])
             here[j, STATUS] = status

@@ -41,7 +41,7 @@ FINEST = 1e-6  # what a sum of eight kernels over five deviations allows
 TOLERABLE = 0.1  # error of a step, in deviations, beyond which there is no posterior
 CHUNK = 64  # trajectories that a thread takes at once: some milliseconds
 SHARPEST = 1e-7  # deviation of a prior without variance, in units of its mean, or of 1
-IMPOSSIBLE = 1e-12  # probability of a mode whose density need not be found
+NEGLIGIBLE = 1e-12  # probability of a mode whose density need not be found
 REASONS = (
     "its error is above a tenth of a deviation: the measurement contradicts the model, or digits are lost",
     "the posterior needs too many panels",
@@ -136,7 +136,7 @@ def pointmass(model: Model | JumpModel, accuracy: float = ACCURACY) -> Filter:
         raise ModelError(f"the exact filter needs {FINEST:g} <= accuracy < 1, got {accuracy}")
     modes = modes_of(model)
     if len(modes) > 1 and model.angles.x:
-        raise ModelError("the exact filter over modes holds no state that is an angle; use jump_particle(model)")
+        raise ModelError("the exact filter over modes holds no state that is an angle; use particle(model)")
     exact = _Exact(model, printed(model), accuracy)
     back = exact.look_back if len(modes) == 1 else None
     return Filter("aof-exact", modes[0], exact.init, exact.step, evidence=_evidence, look_back=back)
@@ -249,7 +249,7 @@ class _Exact:
 
     def _check(self, where: str, memory: PointMass, expected: Array, error: Array) -> None:
         """Unresolved if a mode that is possible has no posterior, or an error is too large."""
-        empty = (np.diff(memory.begin).reshape(expected.shape) == 0) & (expected > IMPOSSIBLE)
+        empty = (np.diff(memory.begin).reshape(expected.shape) == 0) & (expected > NEGLIGIBLE)
         wrong = empty.any(axis=1) | ~(error < TOLERABLE)
         if not wrong.any():
             return
