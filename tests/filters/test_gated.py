@@ -234,18 +234,6 @@ def test_the_tests_of_innovations_take_a_gated_record(plane):
 # ---------------------------------------------------------------- what is refused
 
 
-@pytest.mark.parametrize("probability", [0, 1, -0.1, 1.5, float("nan")])
-def test_a_probability_that_is_none_is_refused(probability):
-    with pytest.raises(ValueError, match="probability must lie between 0 and 1"):
-        gated(kalman_filter(walk()), probability)
-
-
-@pytest.mark.parametrize("patience", [0, -1, 2.0, True, "3"])
-def test_a_patience_that_is_no_number_is_refused(patience):
-    with pytest.raises(ValueError, match="patience must be a whole number of refusals"):
-        gated(kalman_filter(walk()), patience=patience)
-
-
 def test_what_a_gate_cannot_stand_before_is_told():
     with pytest.raises(TypeError, match=r"gated expects a Filter, got Design duof: .*design"):
         gated(duof(walk()))

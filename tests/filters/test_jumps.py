@@ -179,18 +179,6 @@ def test_one_mode_is_the_plain_filter_bit_for_bit(build, kind):
     np.testing.assert_array_equal(found.cov, expected.cov)
 
 
-@pytest.mark.parametrize("build", SEQUENTIAL)
-def test_equal_modes_are_the_plain_filter(build):
-    model = failing(modes={"one": {"parameters": {"C": 1}}, "other": {"parameters": {"C": 1}}})
-    y = simulate(model, 5, 20, seed=4).y
-    mean, cov, probability, *_ = follow(of(build, model), y)
-    expected = run(aof(gaussian(model.modes[0])), y)
-    np.testing.assert_allclose(mean, expected.mean, rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(cov, np.broadcast_to(expected.cov, cov.shape), rtol=0, atol=ROUNDING)
-    for k in range(20):  # the measurements say nothing of the mode
-        np.testing.assert_allclose(probability[k], np.tile(model.law_at(k), (5, 1)), atol=1e-12)
-
-
 def test_the_imm_is_the_logic_dynamic_filter_for_affine_objects_and_no_other():
     y = simulate(AFFINE, 6, 25, seed=1).y
     one, other = (follow(of(build, AFFINE), y) for build in (imm, logic_dynamic))
