@@ -151,8 +151,8 @@ def test_who_knows_of_the_state_gains():
     rows = [(mode[1:] == 1)[mode[:-1] == i].mean() for i in (0, 1)]
     without = logic_dynamic([gaussian(one) for one in model.modes], [[1 - p, p] for p in rows], model.first, name="aof-without")
     result = compare(
-        [of(logic_dynamic, model), of(gpb2, model), without, pointmass(model)], model, 4000, 12, 1, slow_runs=160,
-        progress=False, threads=1,
+        [of(logic_dynamic, model), of(gpb2, model), without, pointmass(model)], model, 160, 12, 1,
+        progress=False, jobs=1,
     )  # fmt: skip
     gain = result.mean_gap_difference("aof-without", "aof-jump-gaussian", slice(3, None))
     assert gain.value > 4 * gain.standard_error
