@@ -32,7 +32,7 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 from kfcourse.files import save
-from kfcourse.symbolic.codegen import NumbersPrinter, Program, printed
+from kfcourse.symbolic.codegen_old import NumbersPrinter, Program, printed
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
