@@ -6,43 +6,7 @@ Smoother over filter, and likelihood over filter (each runs the filter itself, t
 is driven, and the first measured: linear, whole and with a tenth of the measurements missing, by `kalman_filter`, or with the
 sine of the first in the last. And for variant 53, the pendulum of Sarkka and Svensson, an aircraft that turns, radar D3, the
 exact filter and particles. Ratios of processor times, the three one after the other in each of so many turns: their medians, and
-the smoother's worst. A smoother is to cost at most 2.5 times its filter; particles, which draw each ancestor anew among all, are
-the exception.
-
-Found on two cores that were busy with much else (a load of 15 to 22), smoother over filter, median of five to seven turns:
-
-    runs                1     300   5,000   50,000
-    linear, 1 state    1.9    1.3    1.8    1.5
-            2          1.4    1.9    2.1    1.5
-            3          1.6    1.5    1.9    1.4
-            4          1.3    1.6    1.9    1.4
-            6          1.2    1.4    1.8    1.5
-    with gaps, 1       1.5    1.4    1.6    1.3
-            2          1.5    1.9    1.5    1.8
-            3          1.8    2.4    1.8    1.9
-            4          1.5    2.2    1.9    2.3
-            6          1.4    2.1    2.7    2.8
-    linearised, 1      1.3    1.9    1.7    1.8
-            2          1.3    1.7    1.7    1.4
-            3          1.8    2.0    2.0    1.8
-            4          1.5    2.1    2.3    1.6
-            6          1.2    2.0    2.0    1.3
-    gaussian, 1        1.5    1.7    1.8    2.4
-            2          1.4    1.7    1.6    2.0
-            3          1.4    2.0    2.0    2.0
-            4          1.4    1.9    2.2    1.7
-            6          1.1    2.1    2.3    1.3
-    kalman_filter, 1   1.1    1.2    1.0    1.3
-            2          2.1    1.7    1.9    1.5
-            3          2.1    1.8    1.8    1.6
-            4          1.9    1.7    1.9    1.6
-            6          1.5    1.7    1.8    1.6
-
-Six states with gaps, whose filter is the cheapest of those that have a covariance for each run, are above it. Worst turns had up
-to 3.4, single ones more: the machine's, where a page of new memory cost as much as a hundred products. Quadrature filters are
-dearer: smoothers of unscented filters cost 1.1 to 2.4 times as much. Where the motion is linear and nothing is missing all runs
-have one covariance: a step of a filter of six states costs .08 us a run on 5,000 runs, where it took 1.1 us as long as each had
-its own.
+the smoother's worst.
 """
 
 from __future__ import annotations

@@ -21,7 +21,6 @@ import equations
 import manual
 import package
 import sample
-import terms
 
 from kfcourse.files import package_digest
 
@@ -73,11 +72,6 @@ def main() -> int:
         return tell()
     BUILT.unlink(missing_ok=True)
     prepare()
-    try:
-        terms.check()
-    except terms.Disagreement as found:
-        print(f"{found}\n{NOT_BUILT}", file=sys.stderr)
-        return 1
     # Small matrices: several threads inside one kernel cost more than they gain, and the kernels share the processors.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     # On a new machine matplotlib announces its font cache on stderr; not in a chapter, please.

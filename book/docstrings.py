@@ -1,22 +1,18 @@
-"""Sphinx extension: docstrings written to be read with `help()`, shown well in the book.
+"""Sphinx extension: docstrings written to be read with `help()`, as reStructuredText for numpydoc.
 
-They are plain text.  Before numpydoc reads them, characters with a meaning in reStructuredText are escaped, and
-
-- a paragraph that is indented, or begins with a formula and ends without a full stop, is an equation, which `plain.py` sets;
-- what is indented behind "::" is a program, a picture, or what else stands as it is;
-- lines of two columns, parted by two spaces or more, are a table of names, which may go on in lines that are indented.
-
-The sections (Parameters, Returns, ...) are numpydoc's.
+Characters with a meaning in reStructuredText are escaped.  A paragraph that is indented, or that has
+a relation and ends without a full stop, is an equation and stands as it is, like what follows "::".
+Lines of two columns, parted by two spaces or more, are a table of names, which may go on in lines
+that are indented.  The sections (Parameters, Returns, ...) are numpydoc's.
 """
 
 from __future__ import annotations
 
 import re
 
-import plain
-
-COLUMNS = re.compile(r"[^\s.:;!?] {2,}\S|^ {2,}\S")  # two spaces after a full stop are between sentences
+COLUMNS = re.compile(r"[^\s.:;!?] {2,}\S|^ {2,}\S")  # after a full stop they part sentences
 PARTED = re.compile(r"(?<=[^\s.:;!?]) {2,}(?=\S)")
+RELATION = re.compile(r" (?:[=<>~∝≈]|[<-][->]|[<>]=) ")
 APART = re.compile(r",\s*(?![^()]*\))")
 INDENT = "    "
 SPECIAL = re.compile(r"(?!^\s*\* )([*|\\]|(?<=\w)_(?=\W|$))")
@@ -25,30 +21,30 @@ QUOTED = re.compile(r"(`+[^`]+`+)")
 
 def paragraphs(lines: list[str]) -> list[tuple[str, list[str]]]:
     """Each paragraph with its kind: prose, sections, equations, verbatim, names."""
-    found: list[tuple[str, list[str]]] = []
+    result: list[tuple[str, list[str]]] = []
     for paragraph in "\n".join(lines).split("\n\n"):
         rows = paragraph.strip("\n").split("\n")
-        before, last = found[-1] if found else ("", [""])
+        before, last = result[-1] if result else ("", [""])
         indented = all(row.startswith(INDENT) for row in rows)
         kind = "prose"
         if before == "sections" or (len(rows) > 1 and set(rows[1].strip()) == {"-"}):
             kind = "sections"
         elif rows[0].startswith(">>>") or (indented and (before == "verbatim" or last[-1].endswith("::"))):
             kind = "verbatim"
-        elif indented or (found and rows[-1][-1] not in ".:?" and plain.begins_with_formula(rows[0])):
+        elif indented or (result and rows[-1][-1:] not in ".:?" and RELATION.search(rows[0])):
             kind = "equations"
-        elif found and len(rows) > 1 and all(map(COLUMNS.search, rows)):
+        elif result and len(rows) > 1 and all(map(COLUMNS.search, rows)):
             kind = "names"
-        found.append((kind, rows))
-    return found
+        result.append((kind, rows))
+    return result
 
 
 def to_restructured(lines: list[str]) -> list[str]:
-    """The docstring in reStructuredText: equations for `plain.py`, prose escaped."""
+    """The docstring in reStructuredText."""
     result: list[str] = []
     for kind, rows in paragraphs(lines):
         if kind == "equations":
-            result += [".. equations::", "", *(INDENT + row for row in rows), ""]
+            result += ["::", "", *(INDENT + row for row in rows), ""]
         elif kind == "names":
             result += table(rows)
         elif kind == "verbatim":
@@ -59,12 +55,13 @@ def to_restructured(lines: list[str]) -> list[str]:
 
 
 def table(rows: list[str]) -> list[str]:
-    """The table of names: each, and what is said of it."""
+    """The table of names: each, and what it is."""
     entries = re.sub(r"\n +", " ", "\n".join(rows)).split("\n")
     result = [".. list-table::", "   :class: kf-names", ""]
-    for name, said in (PARTED.split(entry, maxsplit=1) for entry in entries):
-        names = (f"``{one}``" for one in APART.split(name.replace("`", "")))  # a line may break between them
-        result += [f"   * - {', '.join(names)}", f"     - {escape(said)}"]
+    for name, words in (PARTED.split(entry, maxsplit=1) for entry in entries):
+        # a line may break between names
+        names = (f"``{each}``" for each in APART.split(name.replace("`", "")))
+        result += [f"   * - {', '.join(names)}", f"     - {escape(words)}"]
     return [*result, ""]
 
 

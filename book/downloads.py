@@ -18,7 +18,7 @@ ATTRIBUTES = re.compile(r"^(\{[.#][^}]*\}|\([\w-]+\)=)[ \t]*\n", re.MULTILINE)
 NUMBERED = re.compile(r"\$\$[ \t]*\(([\w:-]+)\)")
 TITLED = re.compile(r"\{(?:doc|ref|numref|term|download)\}`([^`<]+?)\s*<[^`>]*>`")
 ROLE = re.compile(r"\{[\w:]+\}`([^`]*)`")
-DROPPED = ("chapter", "toctree", "map", "more", "bibliography")
+DROPPED = ("chapter", "toctree", "more", "bibliography")
 
 
 def plain(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:

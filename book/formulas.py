@@ -24,7 +24,6 @@ from sphinx.writers.html5 import HTML5Translator
 MATHJAX = Path(str(resources.files("sphinx-mathjax-offline"))) / "static" / "mathjax"
 FONTS = MATHJAX / "output" / "chtml" / "fonts" / "woff-v2"
 SHEET = "formulas.css"
-LISTS = re.compile(r"(?<=font-family: )MJX[\w-]+(?:, MJX[\w-]+)+")  # of fonts, for each kind of letters
 log = logging.getLogger(__name__)
 
 
@@ -104,17 +103,12 @@ def _lines(tex: str) -> str:
     return together if len(parts) == 1 else rf"\begin{{align}}\begin{{aligned}}{together}\end{{aligned}}\end{{align}}"
 
 
-def _ready_first(fonts: re.Match[str]) -> str:
-    """Those that the page has before its first line is laid out (lighter.py) stand before those of the style sheet."""
-    return ", ".join(f'"Ready {name}"' for name in fonts[0].split(", ")) + f", {fonts[0]}"
-
-
 def write(app, exception: Exception | None) -> None:
     """The style sheet, and the fonts that it names."""
     try:
         if exception is None and app.builder.format == "html":
             static = Path(app.outdir, "_static")
-            sheet = LISTS.sub(_ready_first, SETTER.sheet())
+            sheet = SETTER.sheet()
             (static / SHEET).write_text(sheet, encoding="utf-8")
             for name in re.findall(r"MathJax_[\w-]+\.woff", sheet):
                 shutil.copyfile(FONTS / name, static / "fonts" / name)

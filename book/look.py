@@ -1,7 +1,7 @@
 """Sphinx extension: what the theme leaves to the book.
 
 The folding side bar with short titles, the line above a title, descriptions for search engines and previews, formulas
-that the keyboard reaches, small stars, and a page for addresses that do not exist.
+that the keyboard reaches, and a page for addresses that do not exist.
 """
 
 from __future__ import annotations
@@ -15,16 +15,13 @@ from pathlib import Path
 import contents
 from docutils import nodes
 from folds import FoldsBelow
-from sphinx.errors import ExtensionError
 from sphinx.transforms.post_transforms import SphinxPostTransform
 from sphinx.writers.html5 import HTML5Translator
 
 HERE = Path(__file__).resolve().parent
 NUMBER = re.compile(r"(?:(?<=>)|^)\s*\d+(\.\d+)*\.\s")  # of a section
 SIZE = re.compile(r"width: (\d+)px; height: (\d+)px;")
-STAR = "★"
 LIVE = re.compile(r'<div class="kf-(?:live|explore)" data-name="([^"]+)"')  # a figure that answers, and whose place it takes
-MEASURING = ',"complete"===document.readyState?O():window.addEventListener("load",O)'
 
 
 class Captions(SphinxPostTransform):
@@ -40,21 +37,6 @@ class Captions(SphinxPostTransform):
                 before.parent.remove(before)
                 table.insert(0, nodes.title("", "", *before.children[1:-1]))
                 table["classes"].append("kf-table")
-
-
-class SmallStars(SphinxPostTransform):
-    """The star before the title of what goes beyond the course, in headings and in links to them."""
-
-    default_priority = 450  # when links are resolved, before typography.py
-    formats = ("html",)
-
-    def run(self, **kwargs) -> None:
-        for above in [*self.document.findall(nodes.title), *self.document.findall(nodes.reference)]:
-            text = above.next_node(nodes.Text)
-            if text is not None and text.startswith(STAR):
-                star = nodes.inline(STAR, STAR, classes=["kf-star"])
-                rest = nodes.Text(f"\N{NO-BREAK SPACE}{text.removeprefix(STAR).lstrip()}")  # never alone at the end of a line
-                text.parent.replace(text, [star, rest])
 
 
 class InPlace(SphinxPostTransform):
@@ -78,12 +60,9 @@ class Translator(HTML5Translator):
     """Pages as Sphinx writes them, but for what the keyboard, a screen reader, and the rules of HTML need."""
 
     def starttag(self, node, tagname, suffix="\n", empty=False, **attributes) -> str:
-        if tagname == "table" and "kf-formulas" in node["classes"]:  # the keyboard can scroll one of formulas, which may be wide
-            attributes |= {"tabindex": "0", "aria-label": "Equations"}
-        elif tagname == "img":  # the room that it will take, and none is loaded before the reader comes near
+        if tagname == "img":  # the room that it will take, and none is loaded before the reader comes near
             if size := SIZE.fullmatch(attributes.get("style", "")):
-                del attributes["style"]
-                attributes |= {"width": size[1], "height": size[2]}
+                attributes |= {"width": size[1], "height": size[2], "style": f"--kf-width: {size[1]}px"}
             if node is not self.document.next_node(nodes.image):
                 attributes["loading"] = "lazy"
         return super().starttag(node, tagname, suffix, empty, **attributes)
@@ -147,7 +126,7 @@ def complete(app, pagename: str, templatename: str, context: dict, doctree) -> N
     """Everything a page of the book has besides its text."""
     context["kf_parts"] = [_part(part, pagename, context["pathto"]) for part in contents.parts(app.env)]
     context["kf_home"] = {"href": context["pathto"](app.config.root_doc), "current": pagename == app.config.root_doc}
-    context["kf_small_stars"] = lambda toc: NUMBER.sub("", toc).replace(STAR, '<span class="kf-star">★</span>')
+    context["kf_unnumbered"] = lambda toc: NUMBER.sub("", toc)
     for step in ("prev", "next"):
         if context.get(step):
             first = context[step]["link"] == context["pathto"](app.config.root_doc)
@@ -218,24 +197,12 @@ def leave_scripts_out(app, exception) -> None:
                 path.unlink()
 
 
-def measure_nothing(app, exception) -> None:
-    """The theme lays out all code of a page once it is loaded, to see what scrolls; page.js asks what is laid out anyway."""
-    if not exception and app.builder.format == "html":
-        script = Path(app.outdir) / "_static" / "scripts" / "pydata-sphinx-theme.js"
-        before, measuring, after = script.read_text(encoding="utf-8").partition(MEASURING)
-        if not measuring:
-            raise ExtensionError(f"the theme's script does not have {MEASURING!r} any more: see look.measure_nothing")
-        script.write_text(before + after, encoding="utf-8")
-
-
 def setup(app) -> dict[str, bool]:
     app.set_translator("html", Translator)
     app.add_post_transform(Captions)
-    app.add_post_transform(SmallStars)
     app.add_post_transform(InPlace)
     app.connect("config-inited", use_templates, priority=900)
     app.connect("build-finished", write_not_found)
     app.connect("build-finished", leave_scripts_out)
-    app.connect("build-finished", measure_nothing)
     app.connect("html-page-context", complete, priority=300)  # before the theme, which tries the templates
     return {"parallel_read_safe": True, "parallel_write_safe": True}

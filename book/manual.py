@@ -12,7 +12,6 @@ from pathlib import Path
 
 import nbformat
 import sympy as sp
-from narrow import ENDING, shown_size
 
 from kfcourse.checks import exercise, sets
 from kfcourse.lab.variants import load_variants
@@ -48,14 +47,17 @@ def write() -> None:
         found = pictures(executed)
         for name, png in found.items():
             (PAGES / f"{name}.png").write_bytes(png)
-        for name, png in pictures(executed, narrow=True).items():
-            (PAGES / f"{name}{ENDING}").write_bytes(png)
         file = sets()[job.letter].name
-        heading, rest = statement(notebook, {name: (f"{name}.png", shown_size(png)[0]) for name, png in found.items()}).split(
+        heading, rest = statement(notebook, {name: (f"{name}.png", shown_width(png)) for name, png in found.items()}).split(
             "\n", 1
         )
         (PAGES / f"{file}.md").write_text(f"{heading}\n{NOTE.format(variant=VARIANT, file=file)}{rest}", encoding="utf-8")
         nbformat.write(student(notebook, found), PAGES / "notebooks" / f"{file}.ipynb")
+
+
+def shown_width(png: bytes) -> int:
+    """Width of a picture on a page: it has twice the pixels of a screen."""
+    return int.from_bytes(png[16:20], "big") // 2
 
 
 def table() -> str:

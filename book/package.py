@@ -1,29 +1,28 @@
 """The pages of the package, one for each folder, made from the folders themselves.
 
-Into book/package/ go, for every folder, its page: what it says of itself, its files with a sentence each, and then what each
-file exports; and the table of all folders for book/api.md.
+Into book/package/ go, for every folder, its page: what it is, its files with a sentence each, and
+what each file exports; and the table of all folders for book/api.md.
 """
 
 from __future__ import annotations
 
+import ast
 import shutil
 from pathlib import Path
 
-from kfcourse.pages.house import LAYERS, layer, modules, sentence
-
 PAGES = Path(__file__).resolve().parent / "package"
-TOP = "kfcourse"
+PACKAGE = Path(__file__).resolve().parent.parent / "kfcourse"
 ALONE = "The files that stand alone."
 
 
 def folders() -> dict[str, dict[str, Path]]:
-    """The files of each folder, from the top floor down, by name; those without a folder belong to `kfcourse` itself."""
-    found: dict[str, dict[str, Path]] = {}
-    for name, path in sorted(modules(), key=lambda row: (LAYERS.index(layer(row[0])), row[0])):
-        if layer(name) != "exercises":
-            folder = name if path.name == "__init__.py" else name.rpartition(".")[0]
-            found.setdefault(f"{TOP}.{folder}" if folder else TOP, {})[f"{TOP}.{name}"] = path
-    return found
+    """The files of each folder by name; `kfcourse` has those without a folder of their own."""
+    result: dict[str, dict[str, Path]] = {}
+    for folder in sorted({path.parent for path in PACKAGE.rglob("*.py")}):
+        name = ".".join(folder.relative_to(PACKAGE.parent).parts)
+        files = {f"{name}.{path.stem}": path for path in sorted(folder.glob("*.py"))}
+        result[name] = {key: path for key, path in files.items() if not path.stem.startswith("__")}
+    return result
 
 
 def write() -> None:
@@ -37,25 +36,28 @@ def write() -> None:
 
 def page(folder: str, files: dict[str, Path]) -> str:
     """A folder's page in MyST Markdown."""
-    inside = {name: path for name, path in files.items() if name != folder}
-    said = [documented(folder, members=False)] if folder in files else [ALONE, ""]
-    rows = [f"| {{py:mod}}`~{name}` | {without_formulas(sentence(path))} |" for name, path in inside.items()]
-    parts = [line for name in inside for line in (f"## {name.removeprefix(folder + '.')}", "", documented(name))]
-    return "\n".join([f"# {folder}", "", *said, "| file | what it is for |", "| --- | --- |", *rows, "", *parts])
-
-
-def without_formulas(text: str) -> str:
-    """A sentence of a docstring, whose dollars are no formulas."""
-    return text.replace("$", r"\$")
+    about = ALONE if folder == PACKAGE.name else documented(folder, members=False)
+    rows = [f"| {{py:mod}}`~{name}` | {sentence(path)} |" for name, path in files.items()]
+    head = [f"# {folder}", "", about, "", "| file | what it is for |", "| --- | --- |", *rows, ""]
+    parts = [f"## {name.removeprefix(folder + '.')}\n\n{documented(name)}" for name in files]
+    return "\n".join([*head, *parts])
 
 
 def documented(name: str, members: bool = True) -> str:
     """A module's own text, and that of what it exports."""
-    return "\n".join(["```{eval-rst}", f".. automodule:: {name}", *["   :members:"] * members, "```", ""])
+    options = ["   :members:"] if members else []
+    return "\n".join(["```{eval-rst}", f".. automodule:: {name}", *options, "```", ""])
+
+
+def sentence(path: Path) -> str:
+    """The first sentence of a module's docstring; its dollars are no formulas."""
+    text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+    return text.partition("\n\n")[0].replace("\n", " ").replace("$", r"\$")
 
 
 def table() -> str:
     """The folders with a sentence each."""
-    said = {name: sentence(files[name]) if name in files else ALONE for name, files in folders().items()}
-    rows = [f"| {{doc}}`{name} <package/{name}>` | {text} |" for name, text in said.items()]
+    about = {name: sentence(PACKAGE.parent.joinpath(*name.split("."), "__init__.py")) for name in folders()}
+    about[PACKAGE.name] = ALONE
+    rows = [f"| {{doc}}`{name} <package/{name}>` | {text} |" for name, text in about.items()]
     return "\n".join(["| folder | what lives there |", "| --- | --- |", *rows, ""])

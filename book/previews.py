@@ -58,9 +58,8 @@ def preview(page: str, identity: str, way: str) -> str:
         shown = BeautifulSoup(f"<p><b>{target.find(string=True)}</b> {russian}</p>{meaning.decode_contents()}", "html.parser")
     elif target.name != "figure" and "math" not in target.get("class", []):
         return ""
-    for one in shown.select("[src], [srcset]"):
-        for name in {"src", "srcset"} & one.attrs.keys():
-            one[name] = posixpath.normpath(f"{way}/{one[name]}")
+    for image in shown.select("[src]"):
+        image["src"] = posixpath.normpath(f"{way}/{image['src']}")
     return str(shown).strip()
 
 

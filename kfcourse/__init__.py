@@ -6,30 +6,25 @@ compare(lab_filters(model), model, 100_000, 51, seed=1).ranking()
 
 A folder is a floor; each one's docstring says what lives there.  Below them all: `laws` (normal laws, gain with its
 pseudo-inverse, correction, missing measurements), `angles` (the short way round), `limits` (a time limit for a block of
-code), `kinds` (a model where a filter is expected, told), `reasons` (messages that a report says in its own words), `files`
-(whole or not at all), `seeds` (a number, or a generator that draws one), `exports` (names that are imported when they are used).
+code), `errors` (exceptions that a report can reword, checks of arguments), `files`
+(whole or not at all).
 """
 
-from typing import TYPE_CHECKING
-
-from kfcourse.exports import lazily
-
-if TYPE_CHECKING:
-    from kfcourse.lab import lab_filters, load_variants
-    from kfcourse.laws import Gaussian
-    from kfcourse.montecarlo.comparison import Comparison
-    from kfcourse.montecarlo.designing import NotFinite, design
-    from kfcourse.montecarlo.ensemble import Ensemble, Trajectories, simulate
-    from kfcourse.montecarlo.experiment import compare, predictions, run
-    from kfcourse.records import likelihood, read_measurements, smooth
-    from kfcourse.symbolic.angular import AngleWarning
-    from kfcourse.symbolic.formula import FormulaError
-    from kfcourse.symbolic.jumping import JumpModel
-    from kfcourse.symbolic.model import Model
-    from kfcourse.symbolic.moments import GaussianMoments, NoClosedForm
-    from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite, unscented
-    from kfcourse.symbolic.reading import ModelError
-    from kfcourse.symbolic.structure import Structure, gaussian, linearised
+from kfcourse.errors import ModelError, NoClosedForm, NotFinite
+from kfcourse.lab import lab_filters, load_variants
+from kfcourse.laws import Gaussian
+from kfcourse.montecarlo.comparison import Comparison
+from kfcourse.montecarlo.designing import design
+from kfcourse.montecarlo.ensemble import Ensemble, Trajectories, simulate
+from kfcourse.montecarlo.experiment import compare, predictions, run
+from kfcourse.records import likelihood, read_measurements, smooth
+from kfcourse.symbolic.angular import AngleWarning
+from kfcourse.symbolic.formula import FormulaError
+from kfcourse.symbolic.jumping import JumpModel
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.moments import GaussianMoments
+from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite, unscented
+from kfcourse.symbolic.structure import Structure, gaussian, linearised
 
 __all__ = [
     "AngleWarning",
@@ -61,5 +56,3 @@ __all__ = [
     "smooth",
     "unscented",
 ]
-
-__getattr__, __dir__ = lazily(__name__, __file__)

@@ -336,6 +336,7 @@ def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
     metavar="PROBABILITY",
     help="Refuse measurements that a right filter would not see with this probability, such as 0.999.",
 )
+@click.option("--by-component", is_flag=True, help="Let the gate judge each component of a row, y1, y2, ..., for itself.")
 @click.option("--unknown", default="", metavar="NAMES", help="Parameters to find by likelihood first, separated by commas.")
 @click.option("--positive", default="", metavar="NAMES", help="Those of them that are positive, such as variances.")
 @click.option("--track", metavar="X,Y", help="Two components of the state, drawn against each other.")
@@ -347,6 +348,7 @@ def estimate(
     pairs: tuple[str, ...],
     structure: str,
     gate: float | None,
+    by_component: bool,
     unknown: str,
     positive: str,
     track: str | None,
@@ -374,8 +376,9 @@ def estimate(
     _check_places(folder, None)  # before the long part
     click.echo(f"Model {variant.name}: {variant.title or variant.model}", err=True)
     told = estimate_record(
-        file, variant, columns=columns, structure=structure, gate=gate, unknown=_names(unknown), positive=_names(positive)
-    )
+        file, variant, columns=columns, structure=structure, gate=gate, by_component=by_component,
+        unknown=_names(unknown), positive=_names(positive),
+    )  # fmt: skip
     click.echo("\n".join(told.says()))
     with _kept(folder), replacing_together(folder) as place:
         write_record(told, place, drawn)

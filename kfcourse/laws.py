@@ -85,14 +85,6 @@ def column(array: Array) -> Array:
     return flat if fits else np.array(flat, dtype=float)
 
 
-@cache
-def identity(n: int, dtype: np.dtype[Any]) -> Matrices:
-    """The unit matrix, read-only and made once: a step on few trajectories costs little more than making it."""
-    found = np.eye(n, dtype=dtype)
-    found.flags.writeable = False
-    return found
-
-
 def apply(matrix: Matrices, vector: Vectors) -> Vectors:
     """matrix @ vector: (..., r, c), (..., c) -> (..., r)."""
     if matrix.shape[-2:] == (1, 1):
@@ -157,24 +149,6 @@ def gain(cross: Matrices, cov: Matrices, broken: bool = False) -> Matrices:
         zero = np.zeros(np.broadcast_shapes(cross.shape, cov.shape), dtype=np.result_type(cross, cov))
         return np.divide(cross, cov, out=zero, where=cov != 0)
     singular = rounding(cov.dtype)
-    if cov.shape[-1] == 2:  # as below, without the calls that a small matrix is not worth
-        first, second, both = cov[..., 0, 0], cov[..., 1, 1], cov[..., 0, 1]
-        product_of_both = first * second
-        determinant = product_of_both - both * both
-        certain = determinant - singular**2 * product_of_both  # and if the first variance is positive, so is the second
-        if min(np.minimum.reduce(one, axis=None) for one in (first, certain)) > 0:
-            first, second, both, determinant = (one[..., None] for one in (first, second, both, determinant))
-            left, right = cross[..., 0], cross[..., 1]
-            by_first = left * second - right * both
-            solved = np.empty((*by_first.shape, 2), dtype=by_first.dtype)
-            solved[..., 0], solved[..., 1] = by_first, right * first - left * both
-            solved /= determinant[..., None]
-            return solved
-    if cov[..., 0, 0].size >= MANY:
-        every = np.broadcast_to(cross, (*np.broadcast_shapes(cross.shape[:-2], cov.shape[:-2]), *cross.shape[-2:]))
-        solved = runs_last(every.swapaxes(-1, -2))
-        if solve_by_entries(solved, runs_last(cov)):
-            return np.ascontiguousarray(runs_first(solved.swapaxes(0, 1)))
     # Scaling to correlations first: components may differ by orders of magnitude in size.
     variance = np.diagonal(cov, axis1=-2, axis2=-1)
     scale = np.sqrt(np.abs(variance))
@@ -267,7 +241,7 @@ def regression(cov: Matrices, G: Matrices, F: Matrices, R: Matrices) -> tuple[Ma
         share = cov / F if varies else gain(cov, np.maximum(F, 0.0))
         return share * G, share * R if varies else np.where(F <= 0, cov, share * R)  # what cannot vary tells nothing
     K = gain(product(cov, transpose(G)), F, broken=True)
-    rest = identity(cov.shape[-1], cov.dtype) - product(K, G)
+    rest = np.eye(cov.shape[-1], dtype=cov.dtype) - product(K, G)
     return K, symmetric(product(product(rest, cov), transpose(rest)) + product(product(K, R), transpose(K)))
 
 
@@ -275,7 +249,7 @@ def without_missing(innovation: Vectors, G: Matrices, F: Matrices, R: Matrices) 
     """Take missing components out: no innovation, no sensitivity, a variance of their own."""
     missing = np.isnan(innovation)
     either = missing[..., :, None] | missing[..., None, :]
-    own = identity(innovation.shape[-1], F.dtype)
+    own = np.eye(innovation.shape[-1], dtype=F.dtype)
     return (
         np.where(missing, 0.0, innovation),
         np.where(missing[..., :, None], 0.0, G),

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from kfcourse.kinds import expect
+from kfcourse.errors import expect
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.codegen import compile_function
 from kfcourse.symbolic.formula import symbol

@@ -8,10 +8,9 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.continuous.model import ContinuousModel, check_step, compiled
-from kfcourse.kinds import expect, expect_sizes
+from kfcourse.errors import expect, expect_sizes
 from kfcourse.laws import Array, apply, square_root
 from kfcourse.montecarlo.designing import NotFinite
-from kfcourse.seeds import Seed, generator
 
 
 class Path(NamedTuple):
@@ -27,7 +26,9 @@ class Path(NamedTuple):
     y: Array
 
 
-def simulate(model: ContinuousModel, step: float, steps: int, runs: int, seed: Seed, substeps: int = 1) -> Path:
+def simulate(
+    model: ContinuousModel, step: float, steps: int, runs: int, seed: int | np.random.Generator, substeps: int = 1
+) -> Path:
     """Trajectories by the Euler-Maruyama scheme with the step T / substeps.
 
     x' = x + dt f(x, t) + g(x, t) N(0, S_xi dt / 2),     y_k = 1/dt Integral S(x, t) dt + N(0, N / (2 dt))
@@ -45,7 +46,7 @@ def simulate(model: ContinuousModel, step: float, steps: int, runs: int, seed: S
     expect(model, ContinuousModel, "simulate")
     check_step(step)
     expect_sizes(steps=steps, runs=runs, substeps=substeps)
-    rng, dt = generator(seed), step / substeps
+    rng, dt = np.random.default_rng(seed), step / substeps
     formulas = {"f": model.drift, "g": model.diffusion, "S": model.signal}
     equations = compiled(model, {"x": sp.Matrix(model.x)}, formulas, ["x", "f", "S"])
     xi_root, n_root = square_root(model.spectral_density * dt / 2), square_root(model.noise_density / (2 * dt))

@@ -13,9 +13,9 @@ Stratonovich (1960); Jazwinski (1970); Julier and Uhlmann (2004); all of them as
 
 from __future__ import annotations
 
+from kfcourse.errors import expect
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.kinds import expect
 from kfcourse.laws import Vectors, correct
 from kfcourse.symbolic.structure import Structure
 

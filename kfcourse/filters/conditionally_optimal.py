@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from kfcourse.angles import difference
+from kfcourse.errors import expect
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import State
 from kfcourse.filters.designed import Design, Equations, fitted_correction, fitted_prediction
-from kfcourse.kinds import expect
 from kfcourse.laws import Array
 from kfcourse.symbolic.equations import Noiseless, compile_noiseless
 from kfcourse.symbolic.model import Model

@@ -16,7 +16,6 @@ from sympy.core.relational import Relational
 from kfcourse.angles import TURN, Components, difference, wrapped
 from kfcourse.filters.inverted import by_change_of_variable
 from kfcourse.laws import MANY, Array, Gaussian, runs_last, solve_by_entries
-from kfcourse.reasons import Reason
 from kfcourse.symbolic.choices import decides, jumps
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
@@ -340,4 +339,4 @@ def _singular(law: Stepwise, model: Model) -> bool:
 
 
 def _no_density(message: str) -> ModelError:
-    return ModelError(Reason(message, "no_density"))
+    return ModelError(message, "no_density")

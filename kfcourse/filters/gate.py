@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, structure_of
-from kfcourse.kinds import expect
 from kfcourse.laws import (
     Array,
     Gaussian,
@@ -44,19 +44,28 @@ class Gate(NamedTuple):
     Attributes
     ----------
     weight : ndarray (runs,)
-        Of the last measurement: 1, or 0 if it was refused; NaN where there was none.
+        Of the last measurement: 1, or 0 if it was refused, or the part of its components that passed; NaN where there was none.
     in_a_row : ndarray of int (runs,)
-        How many were refused since the last that was not.
+        How many were refused, with all their components, since the last that was not.
+    passed : ndarray of bool (runs, p)
+        Which components passed.
     inner : object
         The memory of the filter behind the gate.
     """
 
     weight: Array
     in_a_row: Array
+    passed: Array
     inner: Any
 
 
-def gated(one: Filter, probability: float = 0.999, patience: int | None = 5, structure: Structure | None = None) -> Filter:
+def gated(
+    one: Filter,
+    probability: float = 0.999,
+    patience: int | None = 5,
+    structure: Structure | None = None,
+    by_component: bool = False,
+) -> Filter:
     """The same filter behind a gate.
 
     Parameters
@@ -70,6 +79,9 @@ def gated(one: Filter, probability: float = 0.999, patience: int | None = 5, str
         on from a memory (modes, particles, a grid) hears nothing of that: the next measurement passes, but moves it little.
     structure : Structure, optional
         By which the gate knows what to expect, from the filter's prediction N(lambda, Psi); the filter's own by default.
+    by_component : bool
+        Judge each component of a measurement for itself, nu_i^2 <= gamma F_ii with one degree of freedom: a fault of one sensor
+        does not cost the others' components of the same row.
 
     Returns
     -------
@@ -105,30 +117,41 @@ def gated(one: Filter, probability: float = 0.999, patience: int | None = 5, str
     limits = np.array([np.inf, *scipy.special.chdtri(np.arange(1, one.model.p + 1), 1 - probability)])
 
     def judged(state: State, y: Array) -> tuple[Measurement, Array, Array, Array]:
-        """What was expected, nu^T F^-1 nu, gamma, and whether it is beyond and the track not lost."""
+        """What was expected; squares of innovations, gamma, whether they are beyond and the track not lost: (runs, p or 1)."""
         expected = expecting.at(state.step).measure(*state.predicted)
-        size, limit = _size(expected, y), limits[(~np.isnan(y)).sum(axis=-1)]
+        if by_component:
+            variances = np.diagonal(expected.F, axis1=-2, axis2=-1)
+            size, limit = expected.innovation(y) ** 2 / variances, limits[[1]]
+        else:
+            size, limit = _size(expected, y)[:, None], limits[(~np.isnan(y)).sum(axis=-1)][:, None]
         lost = patience is not None and state.memory.in_a_row >= patience
-        return expected, size, limit, (size > limit) & ~np.asarray(lost)
+        return expected, size, limit, (size > limit) & ~np.asarray(lost)[..., None]
 
     def init(runs: int) -> State:
         state = one.init(runs)
-        return state._replace(memory=Gate(np.full(runs, np.nan), np.zeros(runs, dtype=int), state.memory))
+        nothing = np.zeros((runs, one.model.p), dtype=bool)
+        return state._replace(memory=Gate(np.full(runs, np.nan), np.zeros(runs, dtype=int), nothing, state.memory))
 
     def step(state: State, y: Array) -> State:
-        expected, _, _, refused = judged(state, y)
-        after = one.step(state._replace(memory=state.memory.inner), np.where(refused[:, None], np.nan, y))
-        missing = np.isnan(y).all(axis=-1)
+        expected, _, _, beyond = judged(state, y)
+        after = one.step(state._replace(memory=state.memory.inner), np.where(beyond, np.nan, y))
+        measured = ~np.isnan(y)
+        passed, missing = measured & ~beyond, ~measured.any(axis=-1)
+        weight = np.where(missing, np.nan, passed.sum(axis=-1) / np.maximum(measured.sum(axis=-1), 1))
+        refused = weight == 0
         in_a_row = np.where(missing, state.memory.in_a_row, np.where(refused, state.memory.in_a_row + 1, 0))
-        memory = Gate(np.where(missing, np.nan, ~refused), in_a_row, after.memory)
         if patience is not None and (losing := refused & (in_a_row == patience)).any():
             wider = np.where(losing, _widening(expected, state.predicted, y), 1.0)
             after = after._replace(predicted=Gaussian(after.predicted.mean, after.predicted.cov * wider[:, None, None]))
-        return after._replace(memory=memory)
+        return after._replace(memory=Gate(weight, in_a_row, passed, after.memory))
 
     def evidence(before: State, y: Array, after: State) -> Array:
-        expected, size, limit, refused = judged(before, y)
-        return log_density(expected, y) + 0.5 * np.where(refused, size - limit, 0.0)
+        expected, size, limit, beyond = judged(before, y)
+        if not by_component:
+            return log_density(expected, y) + 0.5 * np.where(beyond, size - limit, 0.0)[:, 0]
+        variances = np.diagonal(expected.F, axis1=-2, axis2=-1)
+        at_the_edge = -0.5 * np.where(beyond, limit + np.log(2 * np.pi * variances), 0.0).sum(axis=-1)
+        return log_density(expected, np.where(beyond, np.nan, y)) + at_the_edge
 
     # a way of its own to look back needs its own memories, not those of the gate
     return replace(one, name=f"gated-{one.name}", init=init, step=step, instead=None, evidence=evidence, look_back=None)

@@ -24,8 +24,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, gain, product, transpose, without_missing
 from kfcourse.symbolic.structure import Structure
 

@@ -36,14 +36,13 @@ import numpy as np
 import scipy
 
 from kfcourse.angles import difference, on_circle
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
 from kfcourse.filters.particle_smoothing import weighted
 from kfcourse.filters.particles import Clouds, at_start, even, normalised, of_both, stream, systematic
 from kfcourse.filters.proposals import FREEDOM, PRIOR, WIDER
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, gain, square_root
-from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_noiseless
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -117,7 +116,7 @@ def _without_noise(model: Model) -> bool:
     return bool((B * exact_matrix(model.state_noise.cov)).is_zero_matrix)
 
 
-def undisturbed(model: Model | JumpModel, particles: int = 256, seed: Seed = 0, name: str = "particle") -> Filter:
+def undisturbed(model: Model | JumpModel, particles: int = 256, seed: int = 0, name: str = "particle") -> Filter:
     """The exact filter of an object without noise, by importance sampling of its initial state.
 
     Parameters
@@ -126,7 +125,7 @@ def undisturbed(model: Model | JumpModel, particles: int = 256, seed: Seed = 0, 
         No noise enters the object, the same in all modes; the meters have densities.
     particles : int
         Initial states per trajectory, even, half of them in each cloud.
-    seed : int or numpy.random.Generator
+    seed : int
         The same state and measurement give the same result.
     name : str
         Of the filter: "aof-exact" where it stands for the exact one.
@@ -153,7 +152,7 @@ def undisturbed(model: Model | JumpModel, particles: int = 256, seed: Seed = 0, 
     meters, tangents = [compile_noiseless(one)[1] for one in modes], _tangents(modes)
     chain = model if isinstance(model, JumpModel) else None
     first_law = np.ones(1) if chain is None else chain.first
-    prior, angles, number = model.prior, modes[0].angles.x, seed_number(seed)
+    prior, angles, number = model.prior, modes[0].angles.x, seed
     root, r, size = square_root(prior.cov), modes[0].n, particles // 2
     gaussian_init = initial_state(modes[0])
 

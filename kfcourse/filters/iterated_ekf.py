@@ -19,9 +19,9 @@ from __future__ import annotations
 import numpy as np
 
 from kfcourse.angles import Components, difference
+from kfcourse.errors import expect
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, product, symmetric, transpose
 from kfcourse.symbolic.structure import Structure
 

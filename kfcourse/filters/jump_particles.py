@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kfcourse.angles import on_circle
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
 from kfcourse.filters.particle_smoothing import weighted
@@ -34,9 +35,7 @@ from kfcourse.filters.particles import (
     where_measured,
 )
 from kfcourse.filters.proposals import Look, component
-from kfcourse.kinds import expect
 from kfcourse.laws import Array
-from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.jumping import JumpModel
 
@@ -59,7 +58,7 @@ class JumpParticles(Particles):
     probability: Array
 
 
-def jump_particle(model: JumpModel, particles: int = 1000, seed: Seed = 0, name: str = "particle") -> Filter:
+def jump_particle(model: JumpModel, particles: int = 1000, seed: int = 0, name: str = "particle") -> Filter:
     """The particle filter of a model that jumps, of any dimension.
 
     Parameters
@@ -68,7 +67,7 @@ def jump_particle(model: JumpModel, particles: int = 1000, seed: Seed = 0, name:
         In each mode the meter's noise enters linearly, or can be solved for, so that p_j(y | x) is known.
     particles : int
         Per trajectory, even, half of them in each cloud.
-    seed : int or numpy.random.Generator
+    seed : int
         The same state and measurement give the same result.
     name : str
         Of the filter: "aof-exact" where it stands for the exact one.
@@ -85,7 +84,7 @@ def jump_particle(model: JumpModel, particles: int = 1000, seed: Seed = 0, name:
     """
     expect(model, JumpModel, "jump_particle")
     even(particles)
-    size, count, angles, number = particles // 2, len(model.modes), model.angles.x, seed_number(seed)
+    size, count, angles, number = particles // 2, len(model.modes), model.angles.x, seed
     likelihoods = [likelihood(mode) for mode in model.modes]
     equations = [compile_model(mode)[0] for mode in model.modes]
     starts, aheads = [Look.at_start(mode) for mode in model.modes], [Look.ahead(mode) for mode in model.modes]

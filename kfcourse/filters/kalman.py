@@ -11,9 +11,9 @@ the step, and the forms that stand it better, is in `kfcourse.linear.arithmetic`
 from __future__ import annotations
 
 from kfcourse.angles import near
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.kinds import expect
-from kfcourse.laws import Gaussian, Vectors, any_missing, apply, gain, transpose, without_missing
+from kfcourse.laws import Gaussian, Vectors, any_missing, apply, regression, transpose, without_missing
 from kfcourse.linear.system import LinearSystem, linear_systems
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import linearised
@@ -23,14 +23,17 @@ def correct(system: LinearSystem, predicted: Gaussian, y: Vectors) -> Gaussian:
     """The law of the state after a measurement y, (..., p); its missing components (NaN) tell nothing.
 
     K = P^- H^T (H P^- H^T + R)^-1,   z = x^- + K (y - H x^-),   P = P^- - K H P^-
+
+    P is evaluated as `kfcourse.laws.regression` does: a difference would lose the digits of a variance
+    that is far smaller than that of the prediction.
     """
     x, P = predicted
     H, R = system.H, system.R
     innovation = y - apply(H, x)
     if any_missing(innovation):
         innovation, H, R, _ = without_missing(innovation, H, R, R)
-    K = gain(P @ transpose(H), H @ P @ transpose(H) + R)
-    return Gaussian(x + apply(K, innovation), P - K @ H @ P)
+    K, cov = regression(P, H, H @ P @ transpose(H) + R, R)
+    return Gaussian(x + apply(K, innovation), cov)
 
 
 def predict(system: LinearSystem, posterior: Gaussian) -> Gaussian:

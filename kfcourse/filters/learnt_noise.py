@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.heavy_tails import residual_square, trusted
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, correct, log_density
 from kfcourse.symbolic.structure import Structure
 

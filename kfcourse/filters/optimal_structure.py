@@ -36,10 +36,10 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import Components, near
+from kfcourse.errors import expect
 from kfcourse.filters import notation as s
 from kfcourse.filters.base import State
 from kfcourse.filters.designed import Design, Equations, Regression, fitted_correction, fitted_prediction
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, gain, product, transpose
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure

@@ -21,13 +21,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kfcourse.angles import Components, difference, on_circle
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood, transition
 from kfcourse.filters.particle_smoothing import backwards, weighted
 from kfcourse.filters.proposals import Look
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian
-from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
@@ -82,7 +81,7 @@ class Particles(Clouds):
         return 0.5 * np.abs(self.evidence[0] - self.evidence[1])
 
 
-def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: bool = True, name: str = "particle") -> Filter:
+def particle(model: Model, particles: int = 1000, seed: int = 0, *, guided: bool = True, name: str = "particle") -> Filter:
     """The particle filter (Gordon, Salmond and Smith, 1993; guided as by Doucet, Godsill and Andrieu, 2000).
 
     Resampled systematically at each step, each cloud for itself.
@@ -93,7 +92,7 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
         Any dimension; the meter's noise must enter linearly, so that p(y | x) is known.
     particles : int
         Particles per trajectory, even, half of them in each cloud; `state.memory.effective` tells how many of them count.
-    seed : int or numpy.random.Generator
+    seed : int
         Steps are reproducible: the same state and measurement give the same result.
     guided : bool
         Whether the proposal looks at the measurement.  Without, it is the bootstrap filter.
@@ -108,7 +107,7 @@ def particle(model: Model, particles: int = 1000, seed: Seed = 0, *, guided: boo
     """
     expect(model, Model, "particle")
     even(particles)
-    number, log_likelihood, angles = seed_number(seed), likelihood(model), model.angles.x
+    number, log_likelihood, angles = seed, likelihood(model), model.angles.x
     state_equation, _ = compile_model(model)
     gaussian_init = initial_state(model)
     start, ahead = Look.at_start(model), Look.ahead(model)

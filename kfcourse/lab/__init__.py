@@ -14,13 +14,8 @@ report       what `kfcourse lab` writes;  handin: the student's report (handin_s
 own_data     what `kfcourse estimate` writes of a record from a file
 """
 
-from typing import TYPE_CHECKING
-
-from kfcourse.exports import lazily
-
-if TYPE_CHECKING:
-    from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_bound, has_exact, lab_filters, title
-    from kfcourse.lab.variants import Variant, VariantError, find_variant, load_variants, read_variant
+from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_bound, has_exact, lab_filters, title
+from kfcourse.lab.variants import Variant, VariantError, find_variant, load_variants, read_variant
 
 __all__ = [
     "FILTERS",
@@ -36,5 +31,3 @@ __all__ = [
     "read_variant",
     "title",
 ]
-
-__getattr__, __dir__ = lazily(__name__, __file__)

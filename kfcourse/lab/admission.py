@@ -15,20 +15,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kfcourse.errors import NoClosedForm, NotFinite, Reason, Refused
 from kfcourse.filters import Design, Filter, jump_pointmass, pointmass
 from kfcourse.filters.initial_states import is_undisturbed
 from kfcourse.filters.particles import particle
 from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, OF_BEST, JumpStructures, Structures, check_names, has_exact, title
 from kfcourse.limits import OutOfTime, time_limit
-from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.slow_filters import FEWEST
-from kfcourse.reasons import Reason
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite, unscented
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure
@@ -50,7 +48,7 @@ class Admission:
         Short name.
     one : Filter or Design or None
         None if it cannot be built.
-    reason : str
+    reason : str or Exception
         Why not; empty if it can.
     warnings : tuple of str
         Why it will not do well, or not at all.
@@ -60,7 +58,7 @@ class Admission:
 
     name: str
     one: Filter | Design | None
-    reason: str = ""
+    reason: Reason = ""
     warnings: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
 
@@ -71,7 +69,7 @@ class Admission:
 
     @property
     def says(self) -> str:
-        return "; ".join([self.reason] if self.reason else [*self.warnings, *self.remarks])
+        return "; ".join([str(self.reason)] if self.reason else [*self.warnings, *self.remarks])
 
 
 def admissions(
@@ -105,7 +103,7 @@ def admissions(
                     found[name] = _admitted(name, structures)
                 continue
             except OutOfTime:
-                reason = too_long[_kind(name)] = Reason(_TOO_LONG.format(seconds), "too_long", seconds=f"{seconds:g}")
+                reason = too_long[_kind(name)] = Refused(_TOO_LONG.format(seconds), "too_long", seconds=f"{seconds:g}")
         found[name] = Admission(name, None, reason)
     return [found[name] for name in dict.fromkeys(names)]
 
@@ -130,7 +128,7 @@ def _admitted(name: str, structures: Structures | JumpStructures) -> Admission:
                 return Admission(name, one, remarks=tuple(_with_modes(name, structures)))
             one = FILTERS[name].build(structures)
         except (NoClosedForm, ModelError) as error:
-            return Admission(name, None, Reason.of(error))
+            return Admission(name, None, error.with_traceback(None))
     found = [str(warning.message) for warning in caught]
     with np.errstate(all="ignore"):
         found += [text for kind, look in _LOOKS.items() if kind in name for text in look(structures)]
@@ -157,7 +155,7 @@ def _failure(model: Model | JumpModel, one: Filter | Design, steps: int) -> str:
         with np.errstate(all="ignore"):
             finite = np.isfinite(simulate(model, RUNS, steps, seed=1).x).all()
         return f"on a trial of {RUNS} trajectories it left the finite numbers" if finite else str(error)
-    return found.left_out.get(one.name, "")
+    return str(found.left_out.get(one.name, ""))
 
 
 # ---------------------------------------------------------------- what can be seen without a trial

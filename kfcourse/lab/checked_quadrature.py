@@ -22,7 +22,6 @@ from kfcourse.laws import Array, Gaussian, Measurement, NegativeVariance
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, simulate
 from kfcourse.montecarlo.experiment import run
-from kfcourse.reasons import Reason
 from kfcourse.symbolic.averaging import averaged
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -94,7 +93,7 @@ def of_checked_order(model: Model | JumpModel, why: NoClosedForm) -> Checked:
             return Checked([_in_pieces(one, max(1, PIECE // points)) for one in named], order, points, apart)
         error = f"by {100 * apart:.2g} %" if apart < 1 else "without bound"
         found = f"; Gauss-Hermite quadrature with {order} points an axis still errs {error} on the laws that occur"
-    raise NoClosedForm(Reason.of(why).reworded(f"{why}{found}"))
+    raise NoClosedForm(f"{why}{found}", why.kind, **why.parts)
 
 
 def _formulas(model: Model) -> Structure | None:

@@ -26,7 +26,6 @@ from kfcourse.lab.quality import Ask, Quality, examine
 from kfcourse.lab.variant_tables import RUNS
 from kfcourse.lab.variants import Variant, read_variant
 from kfcourse.montecarlo.batches import FEWEST
-from kfcourse.seeds import Seed, seed_number
 
 VECTORS = 0.1  # probability of a vector model
 SCREEN = 10  # a candidate is first tried on that many times fewer trajectories
@@ -175,13 +174,13 @@ def _value(value: Any) -> str:
     return json.dumps(value)  # strings, numbers and lists of them are written alike in JSON and TOML
 
 
-def generate(wanted: int, seed: Seed = 1, runs: int = RUNS, jobs: int = 2, ask: Ask | None = None) -> Generated:
+def generate(wanted: int, seed: int = 1, runs: int = RUNS, jobs: int = 2, ask: Ask | None = None) -> Generated:
     """Well-posed variants g1, g2, ...: candidates in order, without those that fail a criterion or repeat formulas.
 
     Parameters
     ----------
     wanted : int
-    seed : int or numpy.random.Generator
+    seed : int
     runs : int
         Trajectories of each check, see `kfcourse.lab.quality.examine`; a tenth of them for a first one.
     jobs : int
@@ -199,7 +198,6 @@ def generate(wanted: int, seed: Seed = 1, runs: int = RUNS, jobs: int = 2, ask: 
     ValueError
         Numbers that are not positive, a negative seed, too few trajectories.
     """
-    seed = seed_number(seed)
     if wanted < 1 or jobs < 1 or runs < FEWEST:
         raise ValueError(f"expected at least 1 variant, 1 job and {FEWEST} trajectories, got {wanted}, {jobs} and {runs}")
     found: list[tuple[Variant, Quality]] = []

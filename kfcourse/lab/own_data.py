@@ -26,7 +26,6 @@ from kfcourse.linear.consistency import Autocorrelation, Innovations, autocorrel
 from kfcourse.records.estimation import Likeliest, NoMaximum, estimate
 from kfcourse.records.evidence import NoDensity
 from kfcourse.records.examination import Examination, Finding, examine, findings, normal_bound
-from kfcourse.records.outliers import weights
 from kfcourse.records.reading import Record, RecordError, read_measurements
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.quadrature import gauss_hermite, unscented
@@ -65,8 +64,8 @@ class Told(NamedTuple):
 
     @property
     def refused(self) -> Array:
-        """Steps whose measurement was refused."""
-        return np.flatnonzero(self.examined.weight[:, 0] == 0)
+        """Steps whose measurement was refused, with some of its components at least."""
+        return np.flatnonzero(self.examined.weight[:, 0] < 1)
 
     @property
     def findings(self) -> list[Finding]:
@@ -128,6 +127,7 @@ def estimate_record(
     columns: Mapping[str, str] | None = None,
     structure: str = "linearised",
     gate: float | None = None,
+    by_component: bool = False,
     unknown: Sequence[str] = (),
     positive: Sequence[str] = (),
 ) -> Told:
@@ -142,6 +142,8 @@ def estimate_record(
         A key of `STRUCTURES`.
     gate : float, optional
         Probability with which a measurement passes (`kfcourse.filters.gated`).
+    by_component : bool
+        Whether the gate judges each component of a measurement for itself.
     unknown, positive : sequence of str
         As of `kfcourse.records.estimate`.
 
@@ -158,7 +160,7 @@ def estimate_record(
         return aof(STRUCTURES[structure](model))
 
     def build(model: Model) -> Filter:
-        return plain(model) if gate is None else gated(plain(model), gate)
+        return plain(model) if gate is None else gated(plain(model), gate, by_component=by_component)
 
     build(record.model)  # what cannot be had is said before the long part
     without_refused = False
@@ -169,25 +171,24 @@ def estimate_record(
             if gate is None:
                 raise
             without_refused = True
-            refused = weights(build(stopped.model), record.y) == 0
-            passed = np.where(refused[:, :, None], np.nan, record.y)
+            passed = np.where(examine(build(stopped.model), record.y, gate, by_component).passed, record.y, np.nan)
             likeliest = estimate(stopped.model, passed, unknown, positive, plain)
         if likeliest:
             record = record._replace(model=likeliest.model)
-        examined = examine(build(record.model), record.y, 1.0 if gate is None else gate)
+        examined = examine(build(record.model), record.y, 1.0 if gate is None else gate, by_component)
     except NoDensity as error:
         raise RecordError(
-            f"{path}: row {error.step + 1}, time {record.times[error.step]:g}, cannot be judged: what the filter expects there "
-            "has a covariance that is singular or not finite; look at the measurements up to it (--gate refuses those out of all "
-            "bounds) and at the formulas, and give every component of the meter a noise"
+            f"{path}: row {error.step + 1}, time {record.times[error.step]:.16g}, cannot be judged: what the filter expects "
+            "there has a covariance that is singular or not finite; look at the measurements up to it (--gate refuses those out "
+            "of all bounds) and at the formulas, and give every component of the meter a noise"
         ) from None
     for law in (examined.estimate, examined.smoothed):
         bad = ~(np.isfinite(law.mean).all(axis=(1, 2)) & np.isfinite(law.cov).all(axis=(1, 2, 3)))
         if bad.any():
             k = int(np.argmax(bad))
             raise RecordError(
-                f"{path}: the estimate is not finite from row {k + 1}, time {record.times[k]:g}: look at the formulas there (an "
-                "interval of 0, a root of what is negative), or begin with a smaller prior variance"
+                f"{path}: the estimate is not finite from row {k + 1}, time {record.times[k]:.16g}: look at the formulas there "
+                "(an interval of 0, a root of what is negative), or begin with a smaller prior variance"
             )
     return Told(variant, record, structure, gate, likeliest, examined, without_refused)
 
@@ -238,7 +239,13 @@ def write_numbers(told: Told, path: Path) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         rows = csv.writer(file, lineterminator="\n")
         rows.writerow(columns)  # names of symbols, and numbers: nothing that a spreadsheet takes for a formula
-        rows.writerows(["" if np.isnan(one) else f"{one:.10g}" for one in row] for row in zip(*columns.values(), strict=True))
+        times = columns.pop("time").tolist()  # with all their digits: stamps of Unix have ten before the point
+        values = ([time, *map(_cell, row)] for time, *row in zip(times, *columns.values(), strict=True))
+        rows.writerows(values)
+
+
+def _cell(value: float) -> str:
+    return "" if np.isnan(value) else f"{value:.10g}"
 
 
 def _deviation(law: Gaussian, i: int) -> Array:
@@ -288,7 +295,8 @@ def _innovations(told: Told, i: int, ax: Axes) -> Axes:
     """Innovations of a component of the meter, and what was expected of them."""
     times, value = told.record.times, told.examined.found.value[:, 0, i]
     two, many = 2 * np.sqrt(told.examined.found.cov[:, 0, i, i]), len(times) > MANY
-    there, refused = ~np.isnan(value), np.isin(np.arange(len(times)), told.refused)
+    there = ~np.isnan(value)
+    refused = there & ~told.examined.passed[:, 0, i]
     ax.fill_between(times[there], -two[there], two[there], color=ESTIMATE, alpha=0.2, linewidth=0, rasterized=many)
     ax.plot(times[~refused], value[~refused], ".", color=MEASURED, markersize=4, rasterized=many)
     if refused.any():
@@ -313,7 +321,7 @@ def _whiteness(told: Told, i: int, ax: Axes) -> Axes:
 
 def _autocorrelation(examined: Examination, i: int) -> Autocorrelation | None:
     """Of one component, from each measurement that was taken to the next ones; None of fewer than three."""
-    used = (examined.weight[:, 0] > 0) & ~np.isnan(examined.found.value[:, 0, i])
+    used = examined.passed[:, 0, i]
     if used.sum() < 3:
         return None
     value, F = examined.found.value[used][..., [i]], examined.found.cov[used][..., [i], :][..., [i]]

@@ -51,7 +51,6 @@ from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.parallel import cluster
-from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
@@ -105,7 +104,7 @@ class Quality:
         return not self.faults
 
 
-def examine(variant: Variant, runs: int = RUNS, seed: Seed = 1, ask: Ask | None = None) -> Quality:
+def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None = None) -> Quality:
     """Check a variant.
 
     Parameters
@@ -113,7 +112,7 @@ def examine(variant: Variant, runs: int = RUNS, seed: Seed = 1, ask: Ask | None 
     variant : Variant
     runs : int
         Trajectories, at least 256; a vector model gets an eighth of them.
-    seed : int or numpy.random.Generator
+    seed : int
     ask : callable, optional
         Variant -> the question of the exercises that cannot be posed, as a `Finding`, or None; `kfcourse.checks.posing.unposed`.
 
@@ -124,7 +123,6 @@ def examine(variant: Variant, runs: int = RUNS, seed: Seed = 1, ask: Ask | None 
     """
     if runs < FEWEST:
         raise ValueError(f"standard errors need at least {FEWEST} trajectories, got {runs}")
-    seed = seed_number(seed)
     if isinstance(variant.model, JumpModel):
         return _of_modes(variant, variant.model, runs, seed)
     model = variant.model

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from kfcourse.reasons import Reason
+from kfcourse.errors import NotFinite, Reason, Refused
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.writing import formula_latex
 
 
-def cause(reason: str, model: Model | JumpModel, words: Mapping[str, str]) -> str:
-    """The sentence for a `Reason`, `left_KIND` of the report's words; a message of no kind is quoted."""
-    if not (isinstance(reason, Reason) and reason.kind):
+def cause(reason: Reason, model: Model | JumpModel, words: Mapping[str, str]) -> str:
+    """The sentence for an error of a kind, `left_KIND` of the report's words; other messages are quoted."""
+    if not (isinstance(reason, Refused | NotFinite) and reason.kind):
         return words["left_other"].format(reason=reason)
     parts = {name: formula_latex(part, model.x) if name == "term" else part for name, part in reason.parts.items()}
     return words[f"left_{reason.kind}"].format(**parts)

@@ -12,11 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.kinds import expect_sizes
+from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array, Gaussian, apply, square_root, stacked
 from kfcourse.linear.arithmetic import form
 from kfcourse.linear.system import LinearSystem
-from kfcourse.seeds import Seed, generator
 
 
 class Trajectories(NamedTuple):
@@ -105,7 +104,9 @@ def check_prior(prior: Gaussian, runs: int, n: int) -> None:
         raise ValueError(f"the prior's variances must not be negative, got the covariance {np.asarray(prior.cov).tolist()}")
 
 
-def simulate(system: LinearSystem, prior: Gaussian, steps: int, runs: int, seed: Seed, u: Array | None = None) -> Trajectories:
+def simulate(
+    system: LinearSystem, prior: Gaussian, steps: int, runs: int, seed: int | np.random.Generator, u: Array | None = None
+) -> Trajectories:
     """Trajectories of the system with normal noises, from x_0 drawn from the prior.
 
     Parameters
@@ -121,7 +122,7 @@ def simulate(system: LinearSystem, prior: Gaussian, steps: int, runs: int, seed:
     expect_sizes(steps=steps, runs=runs)
     _check_input(system, u, steps, runs)
     check_prior(prior, runs, len(system.A))
-    rng = generator(seed)
+    rng = np.random.default_rng(seed)
 
     def noise(cov: Array) -> Array:
         return rng.standard_normal((runs, len(cov))) @ square_root(cov).T

@@ -11,6 +11,7 @@ import numpy as np
 from tqdm import tqdm
 
 from kfcourse.angles import near
+from kfcourse.errors import Reason
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.fused import Steps
 from kfcourse.filters.looking_back import looked_back
@@ -20,7 +21,6 @@ from kfcourse.montecarlo.designing import NotFinite, failed
 from kfcourse.montecarlo.ensemble import Instant
 from kfcourse.montecarlo.exceptional import Scores
 from kfcourse.montecarlo.statistics import Sums
-from kfcourse.reasons import Reason
 
 T = TypeVar("T")
 
@@ -28,7 +28,7 @@ T = TypeVar("T")
 class Failed(Exception):
     """A slow filter failed: its name, and why."""
 
-    def __init__(self, name: str, reason: str):
+    def __init__(self, name: str, reason: Reason):
         super().__init__(name, reason)
         self.name, self.reason = name, reason
 
@@ -153,7 +153,7 @@ def _affair_of(one: Filter, step: int) -> Iterator[None]:
         yield
     except (ValueError, ArithmeticError, MemoryError) as error:
         if one.slow:
-            raise TooMuch(one.name, step) if isinstance(error, MemoryError) else Failed(one.name, Reason.of(error)) from None
+            raise TooMuch(one.name, step) if isinstance(error, MemoryError) else Failed(one.name, error) from None
         if isinstance(error, NegativeVariance | np.linalg.LinAlgError):
             raise failed(one.name, step, error) from None
         raise
@@ -171,8 +171,8 @@ def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
     one = filters[int(np.argmin(finite[:, step]))]
     said = f"step {step}: {one.name} became infinite or NaN although the trajectories are finite"
     if one.slow:
-        raise Failed(one.name, Reason(said, "infinite", step=step))
-    raise NotFinite(Reason(f"{said}: it diverges; leave it out, or check the model", "infinite", step=step), one.name)
+        raise Failed(one.name, NotFinite(said, one.name, "infinite", step=step))
+    raise NotFinite(f"{said}: it diverges; leave it out, or check the model", one.name, "infinite", step=step)
 
 
 def progress_bar(what: str, total: int, unit: str, progress: bool | None, items: Iterable[T] | None = None) -> tqdm[T]:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.errors import Reason
 from kfcourse.laws import CONFIDENCE, Array
 from kfcourse.montecarlo.statistics import Estimate, Sums, batch_mean, ratio, rejected
 from kfcourse.montecarlo.two_phase import Replicas, Terms, batch_sums, estimate, with_design
@@ -47,7 +48,7 @@ class SlowPart:
     slow: list[str]
     first: Sums
     exceptional: Sums | None = None
-    replaced: Mapping[str, str] = field(default_factory=dict)
+    replaced: Mapping[str, Reason] = field(default_factory=dict)
 
     def without_exact(self) -> SlowPart | None:
         """Without the exact AOF, if any other slow filter is left."""
@@ -123,7 +124,7 @@ class Comparison:
     seed: int
     sums: Sums
     slow_part: SlowPart | None
-    left_out: Mapping[str, str] = field(default_factory=dict)
+    left_out: Mapping[str, Reason] = field(default_factory=dict)
     replicas: Replicas | None = None
     smoothing: Comparison | None = None
 
@@ -250,7 +251,7 @@ class Comparison:
         return len(self.replicas.sums) if self.replicas else 0
 
     @property
-    def replaced(self) -> Mapping[str, str]:
+    def replaced(self) -> Mapping[str, Reason]:
         """Slow filters that failed, and for which another one ran (`Filter.instead`): name to the reason."""
         return {} if self.slow_part is None else self.slow_part.replaced
 

@@ -21,10 +21,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import sympy as sp
 
-from kfcourse.kinds import expect
+from kfcourse.errors import expect
 from kfcourse.laws import Array, Gaussian, symmetric, transpose
 from kfcourse.montecarlo.ensemble import simulate
-from kfcourse.seeds import Seed
 from kfcourse.symbolic.choices import jumps
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
@@ -33,7 +32,7 @@ from kfcourse.symbolic.reading import ModelError, exact_matrix
 SHARE = 0.05  # of one trajectory in a mean of information: where it is more, the mean is infinite, or as good as
 
 
-def posterior_bound(model: Model, runs: int, steps: int, seed: Seed) -> Array:
+def posterior_bound(model: Model, runs: int, steps: int, seed: int) -> Array:
     """J_k^-1, the covariances below which no filter's errors are, (steps, n, n); after y_k, as the filters' estimates.
 
     Parameters

@@ -12,33 +12,18 @@ from concurrent.futures import Executor, Future
 
 import numpy as np
 
+from kfcourse.errors import NotFinite, expect
 from kfcourse.filters.base import Filter, State, with_angles_on_circle
 from kfcourse.filters.designed import Affine, Design, Scatter
 from kfcourse.filters.fused import Fused
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, NegativeVariance
 from kfcourse.montecarlo.ensemble import Instant, Serial
-from kfcourse.reasons import Reason
-
-
-class NotFinite(ArithmeticError):
-    """A filter or trajectory left the finite numbers.
-
-    Attributes
-    ----------
-    filter_name : str
-        Of the filter; empty if it was the model's trajectories.
-    """
-
-    def __init__(self, message: str, filter_name: str = ""):
-        super().__init__(message)
-        self.filter_name = filter_name
 
 
 def failed(name: str, step: int, error: Exception) -> NotFinite:
     """What a filter's linear algebra raised at a step, as the reason for which it is left out."""
     kind = "negative" if isinstance(error, NegativeVariance) else ""
-    return NotFinite(Reason(f"step {step}: {name} failed: {error}", kind, step=step), name)
+    return NotFinite(f"step {step}: {name} failed: {error}", name, kind, step=step)
 
 
 def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: Executor | None = None) -> list[Filter]:
@@ -159,7 +144,7 @@ def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int, poo
                 if not all(np.isfinite(run.block.x_next).all() and np.isfinite(run.block.y).all() for run in runs):
                     raise NotFinite(f"step {k}: the model's trajectories become infinite, check its equations and parameters")
                 said = f"{designs[i].name}, step {k}: the design met infinite or NaN values; the model or this filter diverges"
-                raise NotFinite(Reason(said, "infinite", step=k), designs[i].name)
+                raise NotFinite(said, designs[i].name, "infinite", step=k)
             fits[i].append(merged.regression())
             asked.append(i)
         active = asked

@@ -21,11 +21,10 @@ import scipy
 import sympy as sp
 
 from kfcourse.angles import on_circle
-from kfcourse.kinds import expect, expect_sizes
+from kfcourse.errors import expect, expect_sizes
 from kfcourse.laws import Array, Gaussian, normalised_square, square_root
 from kfcourse.linear.runs import Trajectories
 from kfcourse.montecarlo.batches import STRATA
-from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.compiled import Pass, is_scalar, load, loop
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.jumping import JumpModel
@@ -79,7 +78,7 @@ class Ensemble:
     runs, steps : int
         Trajectories, and measurements y_0 ... y_{steps-1} of each.
     seed : numpy.random.SeedSequence
-        A number or a `numpy.random.Generator` becomes one.
+        A number becomes one.
     wide : float, optional
         Initial states drawn for small standard errors, in sets of `STRATA`: half of them from the prior, half from a law so many
         times as wide, each half by strata of equal probability.  `weight` makes up for it.  1: by strata of the prior alone;
@@ -98,7 +97,7 @@ class Ensemble:
     def __post_init__(self) -> None:
         expect(self.model, Model, "an ensemble", JumpModel)
         if not isinstance(self.seed, np.random.SeedSequence):
-            object.__setattr__(self, "seed", np.random.SeedSequence(seed_number(self.seed)))
+            object.__setattr__(self, "seed", np.random.SeedSequence(self.seed))
         if self.wide is not None and not 1 <= self.wide < np.inf:
             raise ValueError(f"a prior can be drawn wider, not narrower: wide must be at least 1, got {self.wide!r}")
         if self._mixed and self.model.angles.x:
@@ -362,15 +361,15 @@ def workers(threads: int) -> Iterator[Executor]:
 
 
 @overload
-def simulate(model: Model, runs: int, steps: int, seed: Seed) -> Trajectories: ...
+def simulate(model: Model, runs: int, steps: int, seed: int) -> Trajectories: ...
 @overload
-def simulate(model: JumpModel, runs: int, steps: int, seed: Seed) -> JumpTrajectories: ...
-def simulate(model: Model | JumpModel, runs: int, steps: int, seed: Seed) -> Trajectories | JumpTrajectories:
+def simulate(model: JumpModel, runs: int, steps: int, seed: int) -> JumpTrajectories: ...
+def simulate(model: Model | JumpModel, runs: int, steps: int, seed: int) -> Trajectories | JumpTrajectories:
     """Trajectories to look at: x (steps, runs, n) and y (steps, runs, p), the same for the same seed.
 
     Of a model that jumps also its modes (steps, runs).
     """
-    ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(seed_number(seed)))
+    ensemble = Ensemble(model, runs, steps, np.random.SeedSequence(seed))
     x, y, mode = np.empty((steps, runs, model.n)), np.empty((steps, runs, model.p)), np.zeros((steps, runs), dtype=np.int8)
     start = 0
     for index, size in enumerate(ensemble.sizes):

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
+from kfcourse.errors import Reason, expect, expect_sizes
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
 from kfcourse.filters.fused import Fused, fuse
-from kfcourse.kinds import expect, expect_sizes
 from kfcourse.laws import Array, Gaussian, stacked
 from kfcourse.montecarlo.batches import BATCHES, batch_sizes
 from kfcourse.montecarlo.blocks import progress_bar, run_block, run_stretches
@@ -34,8 +34,6 @@ from kfcourse.montecarlo.slow_filters import LEAST, run_slow_filters
 from kfcourse.montecarlo.statistics import Sums
 from kfcourse.montecarlo.two_phase import Replicas
 from kfcourse.montecarlo.widths import best_width
-from kfcourse.reasons import Reason
-from kfcourse.seeds import Seed, seed_number
 from kfcourse.symbolic.compiled import REMEDY, is_scalar
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -118,7 +116,7 @@ def compare(
     model: Model | JumpModel,
     runs: int,
     steps: int,
-    seed: Seed,
+    seed: int,
     *,
     design_runs: int | None = None,
     designs: int = 1,
@@ -142,7 +140,7 @@ def compare(
     model : Model
     runs, steps : int
         Trajectories, and measurements of each.
-    seed : int or numpy.random.Generator
+    seed : int
         The same seed gives the same numbers, bit by bit, whatever the number of threads.  Another NumPy or processor may do
         linear algebra by another kernel (BLAS): then vector models differ by rounding, up to some 1e-12, and scalar ones hardly.
     design_runs : int, optional
@@ -200,7 +198,7 @@ def compare(
         _check_arguments(smoothers, model, slow_runs, slow_seconds, slow_memory)
     if compiled:
         filters = _compiled(filters)
-    seed, threads = seed_number(seed), cores() if threads is None else threads
+    threads = cores() if threads is None else threads
     names = [one.name for one in filters]
     slow = [one for one in filters if one.slow and slow_runs]
     fast = [one for one in filters if not one.slow]
@@ -229,7 +227,7 @@ def compare(
             everything, exceptional = _run_blocks(everyone, common, executor, progress, judged)
         sums, replicas = _split(everything, fast, len(others))
         chosen = Chosen.of(few, exceptional)
-        slow_part, left_out = None, dict[str, str]()
+        slow_part, left_out = None, dict[str, Reason]()
         if slow:
             slow_ready = _designed(slow, design_ensemble, pool, progress)
             slow_part, left_out = run_slow_filters(ready, slow_ready, common, chosen, sums.counts, *limits, progress, far=far)
@@ -242,7 +240,7 @@ def compare(
 
 
 def without_failing(
-    filters: Sequence[Filter | Design], *common: Any, left_out: Mapping[str, str] | None = None, **options: Any
+    filters: Sequence[Filter | Design], *common: Any, left_out: Mapping[str, Reason] | None = None, **options: Any
 ) -> Comparison:
     """`compare` of the filters that do not fail; the others are named in `left_out`, beside those given.
 
@@ -261,7 +259,7 @@ def without_failing(
             rest = [one for one in filters if one.name != error.filter_name]
             if not error.filter_name or not [one for one in rest if not one.slow]:
                 raise
-            filters, reasons[error.filter_name] = rest, Reason.of(error)
+            filters, reasons[error.filter_name] = rest, error.with_traceback(None)
         else:
             return replace(found, left_out={**reasons, **found.left_out})
 
@@ -280,7 +278,7 @@ def _smoothing(
     few = len(chosen.places)
     slow, fast = ([one for one in smoothers if one.slow == which and (few or not one.slow)] for which in (True, False))
     sums, _ = _run_blocks(fast, common, far.executor if far else pool, progress, (0, 0), back=True)
-    slow_part, left_out = None, dict[str, str]()
+    slow_part, left_out = None, dict[str, Reason]()
     if slow:
         given = fast, slow, common, chosen, sums.counts
         slow_part, left_out = run_slow_filters(*given, *limits, progress, back=True, far=far)

@@ -11,7 +11,6 @@ from kfcourse.filters.base import Filter
 from kfcourse.laws import Array
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.statistics import Estimate
-from kfcourse.seeds import Seed
 from kfcourse.symbolic.jumping import JumpModel
 
 SLOW = 8  # a slow filter runs on so many times fewer trajectories
@@ -39,7 +38,7 @@ class Recognised(NamedTuple):
     probability: dict[str, Array]
 
 
-def recognised(filters: Sequence[Filter], model: JumpModel, runs: int, steps: int, seed: Seed) -> Recognised:
+def recognised(filters: Sequence[Filter], model: JumpModel, runs: int, steps: int, seed: int) -> Recognised:
     """Run the filters that carry probabilities of modes on common trajectories; slow ones on an eighth of them.
 
     The standard errors are those of means over independent trajectories.

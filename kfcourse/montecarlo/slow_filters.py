@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
+from kfcourse.errors import Reason
 from kfcourse.filters.base import Filter
 from kfcourse.laws import Array
 from kfcourse.limits import OutOfTime, memory_limit, time_limit
@@ -70,7 +71,7 @@ def run_slow_filters(
     *,
     back: bool = False,
     far: Cluster | None = None,
-) -> tuple[SlowPart | None, dict[str, str]]:
+) -> tuple[SlowPart | None, dict[str, Reason]]:
     """All filters on the chosen trajectories, in `jobs` processes, as threads would wait for one another.
 
     Batches of such sizes have the fast filters' sums over all trajectories.  With `back` they look back from the end; `far` away
@@ -78,8 +79,8 @@ def run_slow_filters(
     runs instead.
     """
     data, size = _data(ensemble, chosen), len(chosen.places)
-    left_out: dict[str, str] = {}
-    replaced: dict[str, str] = {}
+    left_out: dict[str, Reason] = {}
+    replaced: dict[str, Reason] = {}
     wanted = {one.name: one for one in slow}
     if size < FEWEST and EXACT in wanted:
         left_out[EXACT] = f"on {size} trajectories the rare ones that matter are missing: take at least {FEWEST}, or 0"
@@ -292,7 +293,7 @@ def _data(ensemble: Ensemble, chosen: Chosen) -> _Data:
     return _Data(x, y, x_next, weight, chosen)
 
 
-def _slow_part(names: list[str], sums: Sums, chosen: Chosen, batches: Array, replaced: Mapping[str, str]) -> SlowPart:
+def _slow_part(names: list[str], sums: Sums, chosen: Chosen, batches: Array, replaced: Mapping[str, Reason]) -> SlowPart:
     """What was found on the first so many of the chosen trajectories.
 
     Exceptional ones for which there was no time are like those for which there was: these stand for them.

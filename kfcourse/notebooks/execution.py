@@ -106,15 +106,13 @@ def first_error(notebook: NotebookNode) -> tuple[NotebookNode, NotebookNode] | N
     return None
 
 
-def pictures(executed: NotebookNode, narrow: bool = False) -> dict[str, bytes]:
-    """PNG of every cell tagged `picture`, by cell id; `narrow`: those for telephones (`kfcourse.pages.figures.book_style`)."""
+def pictures(executed: NotebookNode) -> dict[str, bytes]:
+    """PNG of every cell tagged `picture`, by cell id."""
     found = {}
     for cell in executed.cells:
         if "picture" in cell.metadata.get("tags", []):
             for output in cell.outputs:
-                wide = output.get("data", {}).get("image/png")
-                png = output.get("metadata", {}).get("image/png", {}).get("narrow") if narrow else wide
-                if png:
+                if png := output.get("data", {}).get("image/png"):
                     found[cell.id] = base64.b64decode(png)
     return found
 

@@ -10,16 +10,12 @@ letters       numbers for the letters that many pages share
 sentences     numbers and words in the sentences of a page
 exponents     squares completed in the exponents of normal laws
 tables        tables of numbers
-units         the unit of a label in brackets, long numbers
 figures       the style of the figures, labels at the ends of curves
-legends       what runs through the words of a legend
-diagram       block diagrams from a description
 flights       pictures and tables of a flight and its estimates
 browser       the lab's filters as JavaScript, from their printed equations
 explore       figures that answer when they are touched
 scenes        those of single chapters, and of the front page
 live          the page on which a reader moves the pointer
-house         the structure of this package, read from its imports
 """
 
 from kfcourse.pages.figures import COLOURS, book_style, label_ends

@@ -24,7 +24,6 @@ from kfcourse.laws import Array
 from kfcourse.pages import explore
 from kfcourse.scenarios import pointer
 from kfcourse.scenarios.pointer import HandTrack, sample
-from kfcourse.seeds import Seed
 
 GRID = 0.01  # s between the points of a recording; sampling intervals are multiples of it
 SCREEN = (640, 400)  # px, the field of the page
@@ -89,7 +88,7 @@ class Recording(NamedTuple):
         return truth, (truth + measurement_sd * self.noise[::every])[:, None]
 
 
-def record(track: HandTrack, seed: Seed) -> Recording:
+def record(track: HandTrack, seed: int) -> Recording:
     """The track and one realisation of the noise, rounded to what the page holds: 0.001 px, 0.001 sigma."""
     samples = sample(track, GRID, 1.0, runs=1, seed=seed)
     position = samples.state[:, 0, :2]

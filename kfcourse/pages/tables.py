@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from kfcourse.pages.units import in_brackets
 from kfcourse.pages.verification import Shown
 from kfcourse.symbolic.writing import by_thousands
 
@@ -28,9 +27,8 @@ def table(columns: Mapping[str, Iterable[Any]], formats: Mapping[str, str] | str
     Raises
     ------
     ValueError
-        If there is no column, or their lengths differ, or a heading's or the caption's unit stands after a comma.
+        If there is no column, or their lengths differ.
     """
-    in_brackets([*columns, caption])
     listed = {heading: list(entries) for heading, entries in columns.items()}
     lengths = {heading: len(entries) for heading, entries in listed.items()}
     if len(set(lengths.values())) != 1:

@@ -2,17 +2,16 @@
 
 smoothing    `smooth`: the states given all measurements, or some steps ahead; `smooth_iterated`: linearised there again;
              `smoothing_error`: how good they are, where that is known
-evidence     `likelihood`: of each measurement, given all before it; `likelihood_error`: how good it is
+evidence     `likelihood`: of each measurement, given all before it
 estimation   `estimate`: parameters and noise variances of the largest likelihood, and what the record does not tell; `profile`
-outliers     `weights`: how much each counted, behind a gate or where the filter doubts
 reading      `read_measurements`: measurements, times and inputs from a CSV file
-examination  `examine`: all that a filter says of a record; `findings`: whether the record bears it out
+examination  `examine`: all that a filter says of a record; `findings`: whether the record bears it out; `weights`: how much
+             each measurement counted, behind a gate or where the filter doubts
 """
 
 from kfcourse.records.estimation import estimate, profile
-from kfcourse.records.evidence import likelihood, likelihood_error
-from kfcourse.records.examination import examine, findings
-from kfcourse.records.outliers import weights
+from kfcourse.records.evidence import likelihood
+from kfcourse.records.examination import examine, findings, weights
 from kfcourse.records.reading import read_measurements
 from kfcourse.records.smoothing import smooth, smooth_iterated, smoothing_error
 
@@ -21,7 +20,6 @@ __all__ = [
     "examine",
     "findings",
     "likelihood",
-    "likelihood_error",
     "profile",
     "read_measurements",
     "smooth",

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
+from kfcourse.errors import expect
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.base import Filter
-from kfcourse.kinds import expect
 from kfcourse.laws import Array
 from kfcourse.records.evidence import likelihood
 from kfcourse.symbolic.model import Model

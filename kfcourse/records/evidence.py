@@ -4,20 +4,19 @@ r"""How likely a record is under a model: the sum of what each measurement added
 
 A filter knows each term before the measurement comes: its innovation and F.  For a linear model with normal noises the sum is
 exact; for others it is as good as the filter's normal laws.  The exact filter's terms are the constants of Bayes' rule
-themselves, those of particles estimates of them by the mean of their weights; `likelihood_error` tells how good both are.  Two
-models of the same measurements are compared by it, and `kfcourse.records.estimation` looks for the parameters that make it
-largest.
+themselves, those of particles estimates of them by the mean of their weights.  Two models of the same measurements are
+compared by it, and `kfcourse.records.estimation` looks for the parameters that make it largest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from itertools import pairwise
 
 import numpy as np
 
-from kfcourse.filters.base import Evidence, Filter, State, structure_of, unknown_error
-from kfcourse.kinds import expect
+from kfcourse.errors import expect
+from kfcourse.filters.base import Evidence, Filter, State, structure_of
 from kfcourse.laws import Array, log_density
 from kfcourse.montecarlo.experiment import measurements, walk
 
@@ -66,47 +65,17 @@ def likelihood(one: Filter, y: Array) -> Array:
     -641.5856
     """
     expect(one, Filter, "likelihood")
-    evidence = one.evidence or _normal(one)
-    found = np.stack([evidence(before, now, after) for before, now, after in _passages(one, y)])
-    if not np.isfinite(found).all():
-        raise NoDensity(one.name, *np.argwhere(~np.isfinite(found))[0])
-    return found
-
-
-def likelihood_error(one: Filter, y: Array) -> Array:
-    """How far the terms of `likelihood` may be from the true ones, (steps, runs).
-
-    Of the exact filter the estimated error of its integrals, of this step and all before; of particles the standard error, by
-    the distance of two clouds that know nothing of each other.  Arguments as of `likelihood`.
-
-    Raises
-    ------
-    ValueError
-        Another filter: how good its normal laws are it does not know.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from kfcourse import Model
-    >>> from kfcourse.filters import pointmass
-    >>> from kfcourse.records import likelihood_error
-    >>> y, model = np.array([0.5, 1.0]), Model.define("sin(x) + 0.3*v", "x + 0.1*w")
-    >>> bool((likelihood_error(pointmass(model, accuracy=1e-6), y) < 2e-6).all())
-    True
-    """
-    expect(one, Filter, "likelihood_error")
-    found = []
-    for _, _, after in _passages(one, y):
-        if not hasattr(after.memory, "evidence_error"):
-            raise unknown_error(one)
-        found.append(after.memory.evidence_error())
-    return np.stack(found)
-
-
-def _passages(one: Filter, y: Array) -> Iterator[tuple[State, Array, State]]:
-    """The states before and after each measurement, and it: (runs, p)."""
     y = measurements(one, y)
-    return ((before, now, after) for (before, after), now in zip(pairwise(walk(one, y)), y, strict=True))
+    return log_densities(one, walk(one, y), y)
+
+
+def log_densities(one: Filter, visited: Iterable[State], y: Array) -> Array:
+    """As `likelihood`, from the filter's states: before the first measurement (steps, runs, p), and after each."""
+    evidence = one.evidence or _normal(one)
+    terms = np.stack([evidence(before, now, after) for (before, after), now in zip(pairwise(visited), y, strict=True)])
+    if not np.isfinite(terms).all():
+        raise NoDensity(one.name, *np.argwhere(~np.isfinite(terms))[0])
+    return terms
 
 
 def _normal(one: Filter) -> Evidence:

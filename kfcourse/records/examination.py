@@ -12,19 +12,23 @@ true state.  It is what can be said of a recorded track, beside the likelihood, 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator
+from itertools import islice
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import scipy
+from tqdm import tqdm
 
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, structure_of
-from kfcourse.kinds import expect
+from kfcourse.filters.looking_back import looked_back
 from kfcourse.laws import CONFIDENCE, Array, Gaussian, normalised_square, stacked, without_missing
 from kfcourse.linear.consistency import Innovations
-from kfcourse.montecarlo.experiment import states
-from kfcourse.records.evidence import likelihood
-from kfcourse.records.smoothing import smooth
+from kfcourse.montecarlo.experiment import measurements, walk
+from kfcourse.records.evidence import log_densities
 
+T = TypeVar("T")
 TAILS = np.array([(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
 
 
@@ -39,17 +43,23 @@ class Examination(NamedTuple):
         nu (steps, runs, p), NaN where nothing was measured, and F (steps, runs, p, p).
     weight : ndarray (steps, runs)
         How much each measurement counted: 1 in full, 0 refused, NaN where there was none.
+    passed : ndarray of bool (steps, runs, p)
+        Which components counted: False where a gate refused them, or nothing was measured.
     log_likelihood : ndarray (steps, runs)
     edge : float
         Probability with which a gate lets pass; 1 without a gate.
+    by_component : bool
+        Whether the gate judges each component for itself.
     """
 
     estimate: Gaussian
     smoothed: Gaussian
     found: Innovations
     weight: Array
+    passed: Array
     log_likelihood: Array
     edge: float = 1.0
+    by_component: bool = False
 
 
 class Finding(NamedTuple):
@@ -65,13 +75,14 @@ class Finding(NamedTuple):
         return bool(self.low <= self.value <= self.high)
 
 
-def examine(one: Filter, y: Array, edge: float = 1.0) -> Examination:
-    """Run a filter over a record, look back, and keep what it expected.
+def examine(one: Filter, y: Array, edge: float = 1.0, by_component: bool = False) -> Examination:
+    """Run a filter over a record, look back, and keep what it expected.  A long record shows its progress.
 
     Parameters
     ----------
     one : Filter
-        With structural functions of its own; `gated(...)` too, with its probability as `edge`, above 0 and at most 1.
+        With structural functions of its own; `gated(...)` too, with its probability as `edge`, above 0 and at most 1, and
+        its `by_component`.
     y : ndarray (steps, runs, p)
         As for `run`.
 
@@ -84,27 +95,58 @@ def examine(one: Filter, y: Array, edge: float = 1.0) -> Examination:
     expect(one, Filter, "examine")
     if not 0 < edge <= 1:
         raise ValueError(f"edge must be the gate's probability, above 0, or 1 without a gate; got {edge!r}")
-    structure = structure_of(one, "an examination of a record")
-    visited = states(one, y)
-    seen = np.reshape(y, (len(visited) - 1, -1, one.model.p))
-    expected = [structure.at(state.step).measure(*state.predicted) for state in visited[:-1]]
-    for k, (each, after) in enumerate(zip(expected, visited[1:], strict=True)):
-        _noise_of(each.R, each.F, f"the meter's noise at step {k}")
-        if k < len(expected) - 1:
+    structure, y = structure_of(one, "an examination of a record"), measurements(one, y)
+    visited = list(shown_progress(walk(one, y), "filter", len(y) + 1))
+    innovations, F = np.empty(y.shape), np.empty((*y.shape, y.shape[-1]))
+    for k, (state, after, now) in enumerate(zip(visited[:-1], visited[1:], y, strict=True)):
+        expected = structure.at(k).measure(*state.predicted)
+        innovations[k], F[k] = expected.innovation(now), expected.F
+        _noise_of(expected.R, expected.F, f"the meter's noise at step {k}")
+        if k < len(y) - 1:
             noise = structure.at(k).transition(*after.posterior).Q
             _noise_of(noise, after.predicted.cov, f"the state's noise from step {k} to {k + 1}")
-    innovations = np.stack([each.innovation(now) for each, now in zip(expected, seen, strict=True)])
-    F = np.stack([np.broadcast_to(each.F, (*now.shape, now.shape[-1])) for each, now in zip(expected, seen, strict=True)])
-    missing = np.isnan(seen).all(axis=-1)
-    weight = np.stack([getattr(state.memory, "weight", np.ones(seen.shape[1])) for state in visited[1:]])
+    passed = ~np.isnan(y)
+    weight = np.stack([getattr(state.memory, "weight", np.ones(y.shape[1])) for state in visited[1:]])
+    for k, state in enumerate(visited[1:]):
+        passed[k] &= getattr(state.memory, "passed", weight[k][:, None] > 0)
+    smoothed = looked_back(one, shown_progress(visited[1:], "looking back", len(y)), y)
     return Examination(
         stacked([state.posterior for state in visited[1:]]),
-        smooth(one, y),
+        stacked([state.posterior for state in smoothed]),
         Innovations(innovations, F),
-        np.where(missing, np.nan, weight),
-        likelihood(one, y),
+        np.where(np.isnan(y).all(axis=-1), np.nan, weight),
+        passed,
+        log_densities(one, visited, y),
         edge,
+        by_component,
     )
+
+
+def shown_progress(items: Iterable[T], what: str, total: int) -> Iterator[T]:
+    """The items, with a bar on a terminal if they take more than two seconds."""
+    return iter(tqdm(items, desc=what, total=total, unit="row", disable=None, delay=2))
+
+
+def weights(one: Filter, y: Array) -> Array:
+    """How much each measurement counted, (steps, runs): 1 in full, 0 refused, NaN where it was missing.
+
+    Parameters
+    ----------
+    one : Filter
+        `gated(...)` or `robust(...)`.
+    y : ndarray (steps, runs, p)
+        As for `run`.
+
+    Raises
+    ------
+    ValueError
+        A filter that weighs nothing, measurements of another shape.
+    """
+    expect(one, Filter, "weights")
+    memories = [state.memory for state in islice(walk(one, y), 1, None)]
+    if not all(hasattr(memory, "weight") for memory in memories):
+        raise ValueError(f"{one.name} takes every measurement as it is: ask gated(one) or robust(structure) for weights")
+    return np.stack([memory.weight for memory in memories])
 
 
 def _noise_of(cov: Array, scale: Array, what: str) -> None:
@@ -122,17 +164,22 @@ def normal_bound() -> float:
 def findings(told: Examination, run: int = 0) -> list[Finding]:
     """Size, mean and neighbours of a record's innovations; those that a gate refused are left out.
 
-    That of the size is exact without a gate, and behind one that of a gamma law with the same mean and variance; the others are
+    That of the size is exact without a gate, and behind one that of a gamma law with the same mean and variance (behind one that
+    judges each component, of innovations that are not correlated with each other); the others are
     those of normal laws for sums of many terms: thirty measurements are enough.  Under weights that are neither 0 nor 1 none of
     this holds; nothing is found of a record that was refused altogether.
     """
-    used, z = told.weight[:, run] > 0, normal_bound()
+    used, z = told.passed[:, run].any(axis=-1), normal_bound()
     if not used.any():
         return []
-    value, F = told.found.value[used, run], told.found.cov[used, run]
+    value, F = np.where(told.passed[used, run], told.found.value[used, run], np.nan), told.found.cov[used, run]
     degrees = (~np.isnan(value)).sum(axis=-1)
-    size = _sizes(value, F).sum() / degrees.sum()
-    mean, variance = _below(degrees, told.edge)
+    if told.by_component:
+        size = np.nansum(value**2 / np.diagonal(F, axis1=-2, axis2=-1)) / degrees.sum()
+        mean, variance = (degrees * part for part in _below(np.ones(1), told.edge))
+    else:
+        size = _sizes(value, F).sum() / degrees.sum()
+        mean, variance = _below(degrees, told.edge)
     scale = variance.sum() / mean.sum()
     low, high = scale * scipy.special.gammaincinv(mean.sum() / scale, TAILS) / degrees.sum()
     result = [Finding("size", float(size), float(low), float(high))]

@@ -7,9 +7,9 @@
     0.13,,40.7,
     0.41,12.9,41.3,0.03
 
-A row is a step, a column is found by its name.  An empty cell of a measurement is missing, so sensors of different rates share
-a file; where it is the only column, so is an empty line.  An input holds until the next one is given.  The interval to the next
-row is the input `dt`, if the model has one.
+A row is a step, a column is found by its name.  An empty cell of a measurement is missing, so sensors of
+different rates share a file; where it is the only column, so is an empty line.  An input holds until the next
+one is given.  The interval to the next row is the input `dt`, if the model has one.
 """
 
 from __future__ import annotations
@@ -17,14 +17,13 @@ from __future__ import annotations
 import csv
 import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from io import StringIO
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.kinds import expect
+from kfcourse.errors import expect
 from kfcourse.laws import Array
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import shown
@@ -33,7 +32,9 @@ LARGEST = 100_000_000  # bytes; a million rows.  /dev/zero never ends
 TIMES = ("time", "t")  # names of the column of times
 INTERVAL = "dt"
 UNEVEN = 0.01  # intervals that differ by more than this part of their median are not of one length
+HOUR = 3600.0  # s: by so much clocks are set back in autumn
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+DATE = re.compile(r"\d{4}-\d\d?-\d\d?|\d+[:/.]\d+[:/.]\d+|\d\d?:\d\d")
 
 
 class RecordError(ValueError):
@@ -67,56 +68,90 @@ def read_measurements(path: str | Path, model: Model, columns: Mapping[str, str]
     Parameters
     ----------
     path : path
-        UTF-8, a line of names and a line for each step.  Cells are separated by commas, tabs, or semicolons; between semicolons
-        decimals may have a comma.
+        UTF-8, a line of names and a line for each step.  Cells are separated by commas, tabs, or semicolons;
+        between semicolons decimals may have a comma.
     model : Model
-        A column for each of `model.measured` (y, or y1, y2, ...) and for each input; a column `time` or `t`, in the unit of the
-        model's formulas.  Of the inputs only the names count, `inputs={"dt": [1], "u": [0]}`: the record has their values.
-        The step k lasts from row k to row k + 1, so dt_k = t_{k+1} - t_k, and u_k acts in it; the last has the length of the one
-        before.  Without times every step has the model's `interval`.
+        A column for each of `model.measured` (y, or y1, y2, ...) and for each input; a column `time` or `t`, in
+        the unit of the model's formulas.  Of the inputs only the names count, `inputs={"dt": [1], "u": [0]}`: the
+        record has their values.  The step k lasts from row k to row k + 1, so dt_k = t_{k+1} - t_k, and u_k acts
+        in it; the last has the length of the one before.  Without times every step has the model's `interval`.
     columns : dict, optional
         The model's name to the column's, {"y1": "east", "time": "time_s"}, where they differ.
 
     Raises
     ------
     RecordError
-        The file cannot be read, has no column of such a name or no rows, something in a cell that is no finite number, lines of
-        different lengths, times that go back, no first value of an input.
+        The file cannot be read, has no column of such a name or no rows, something in a cell that is no finite
+        number, lines of different lengths, times that go back, no first value of an input.
 
     Warns
     -----
     RecordWarning
-        The intervals are unequal, and the model's formulas know neither dt nor t.
+        The intervals are unequal, and the model's formulas know neither dt nor t; or a column that is not used
+        may be that of the times.
     """
     expect(model, Model, "read_measurements")
-    source = _Source(str(path))
-    lines = _lines(source, Path(path))
-    names, delimiter = _header(source, lines)
-    places = _places(source, names, model, dict(columns or {}))
-    rows = list(_rows(source, lines, names, places, delimiter))
-    if not rows:
-        raise RecordError(f"{path} has a line of names and no rows below it: there is nothing to estimate from")
-    table = dict(zip(places, np.array([cells for _, cells in rows]).T, strict=True))
-    numbers = [number for number, _ in rows]
+    names, cells, lines, comma = _table(str(path), _text(path))
+    columns = dict(columns or {})
+    inputs, used = model.known.inputs, {symbol.name for symbol in model.known.symbols}
+    wanted = [*model.measured, *(name for name in inputs if name != INTERVAL)]
+    if unknown := sorted(set(columns) - {*wanted, INTERVAL, "time"}):
+        known = ", ".join(sorted({*wanted, INTERVAL, "time"}))
+        raise RecordError(f"columns are given for {', '.join(unknown)}; the model needs {known}")
+    clock = columns.get("time") or next((name for name in TIMES if name in names and name not in wanted), None)
+    if clock is not None:
+        columns["time"] = clock
+        wanted.insert(0, "time")
+    elif INTERVAL in inputs and columns.get(INTERVAL, INTERVAL) in names:
+        wanted.insert(0, INTERVAL)
+    elif similar := _similar("time", set(names) - {columns.get(name, name) for name in wanted}):
+        remedy = f"say so: columns={{'time': {similar!r}}}, or --column time={similar}"
+        if used & {INTERVAL, "t"}:
+            raise RecordError(f"{path} has no column time, which the model needs; if {shown(similar)} is it, " + remedy)
+        message = f"{path}: the column {shown(similar)} is not used; if it has the times, {remedy}"
+        warnings.warn(message, RecordWarning, stacklevel=2)
+    elif INTERVAL in inputs:
+        wanted.insert(0, INTERVAL)
+    named = {name: columns.get(name, name) for name in wanted}
+    for name, column in named.items():
+        if column not in names:
+            raise RecordError(f"{path} has no column {shown(column)}{_what_may_be(name, names)}")
+    places = {name: names.index(column) for name, column in named.items()}
+    _refuse_units(str(path), [cells[0][i] for i in places.values()], lines[0])
+    table = {name: _numbers(str(path), names[i], [row[i] for row in cells], lines, comma) for name, i in places.items()}
     for name in model.measured:
         if np.isnan(table[name]).all():
-            raise RecordError(f"{path}: the column {names[places[name]]} has no number at all; leave it out of the model")
-    inputs = {name: _held(source, names[place], table[name]) for name, place in places.items() if name in model.known.inputs}
-    times = _times(source, {name: names[place] for name, place in places.items()}, table, numbers, model, inputs)
-    used = {symbol.name for symbol in model.known.symbols}
-    if "t" in used and "t" not in model.known.inputs:
-        inputs["t"] = times
-    if INTERVAL in model.known.inputs and INTERVAL not in inputs:
-        inputs[INTERVAL] = intervals(times, float(model.known.interval))
-    elif not used & {INTERVAL, "t"} and _uneven(times):
-        steps = np.diff(times)
-        warnings.warn(
-            f"{path}: the intervals are {steps.min():g} to {steps.max():g}, but the model takes every step alike: write dt into "
-            "its formulas, with inputs = { dt = [1] }",
-            RecordWarning,
-            stacklevel=2,
-        )
-    return Record(times, np.stack([table[name] for name in model.measured], axis=-1)[:, None], model.with_inputs(inputs))
+            raise RecordError(f"{path}: the column {named[name]} has no number at all; leave it out of the model")
+    record_inputs = {name: _held(table[name]) for name in inputs if name in table}
+    for name, values in record_inputs.items():
+        if np.isnan(values[0]):
+            raise RecordError(f"{path}, first row, column {named[name]}: an input needs a value from the first row on")
+    interval = float(model.known.interval)
+    times = interval * np.arange(len(cells))
+    if "time" in table:
+        times = table["time"]
+        _check_times(str(path), named["time"], times, lines)
+        if INTERVAL in inputs:
+            record_inputs[INTERVAL] = intervals(times, interval)
+        if not used & {INTERVAL, "t"} and _uneven(times):
+            steps = np.diff(times)
+            warnings.warn(
+                f"{path}: the intervals are {steps.min():g} to {steps.max():g}, but the model takes every step "
+                "alike: write dt into its formulas, with inputs = { dt = [1] }",
+                RecordWarning,
+                stacklevel=2,
+            )
+    elif INTERVAL in record_inputs:
+        steps = record_inputs[INTERVAL]
+        if (steps < 0).any():
+            raise RecordError(
+                f"{path}, line {lines[int(np.argmax(steps < 0))]}, column {named[INTERVAL]}: an interval must not be negative"
+            )
+        times = np.concatenate([[0.0], np.cumsum(steps[:-1])])
+    if "t" in used - set(inputs):
+        record_inputs["t"] = times
+    y = np.stack([table[name] for name in model.measured], axis=-1)[:, None]
+    return Record(times, y, model.with_inputs(record_inputs))
 
 
 def intervals(times: Array, single: float = 1.0) -> Array:
@@ -125,159 +160,164 @@ def intervals(times: Array, single: float = 1.0) -> Array:
     return np.append(steps, steps[-1] if len(steps) else single)
 
 
-class _Source(NamedTuple):
-    """A file, for messages."""
-
-    name: str
-
-    def fault(self, line: int, column: str, problem: str) -> RecordError:
-        return RecordError(f"{self.name}, line {line}, column {column}: {problem}")
-
-
-def _lines(source: _Source, path: Path) -> Iterator[tuple[int, str]]:
-    """Number and text of each line, without the blank ones at either end."""
+def _text(path: str | Path) -> str:
     try:
-        with path.open("rb") as file:
+        with Path(path).open("rb") as file:
             content = file.read(LARGEST + 1)
     except FileNotFoundError:
-        raise RecordError(f"no file of measurements at {source.name}; check the path") from None
+        raise RecordError(f"no file of measurements at {path}; check the path") from None
     except OSError as error:
-        raise RecordError(f"{source.name} cannot be read: {error.strerror or error}") from None
+        raise RecordError(f"{path} cannot be read: {error.strerror or error}") from None
     if len(content) > LARGEST:
-        raise RecordError(
-            f"{source.name} has more than {LARGEST:,} bytes: cut it into parts, or keep the columns that are needed"
-        )
+        raise RecordError(f"{path} has more than {LARGEST:,} bytes: cut it into parts, or keep the columns that are needed")
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise RecordError(f"{source.name} is UTF-16; save it as CSV in UTF-8")
+        raise RecordError(f"{path} is UTF-16; save it as CSV in UTF-8")
     try:
-        text = content.decode("utf-8-sig")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content[: error.start].count(b"\n") + 1
-        raise RecordError(f"{source.name}, line {line}: a byte that is not UTF-8; save the file as CSV in UTF-8") from None
-    # A quoted cell must not swallow the lines below it: rows are lines.
-    lines = list(enumerate(re.split("\r\n|\r|\n", text), start=1))
-    told = [place for place, (_, line) in enumerate(lines) if line.strip()]
-    return iter(lines[told[0] : told[-1] + 1] if told else [])
+        raise RecordError(f"{path}, line {line}: a byte that is not UTF-8; save the file as CSV in UTF-8") from None
 
 
-def _header(source: _Source, lines: Iterator[tuple[int, str]]) -> tuple[list[str], str]:
-    """Names of the columns, and what separates them; the rest of the lines is left."""
-    number, line = next(lines, (1, ""))
-    if not line:
-        raise RecordError(f"{source.name} is empty; its first line names the columns, such as time,y")
-    delimiter = next((one for one in (";", "\t") if one in line), ",")
-    names = [name.strip() for name in _cells(source, number, line, delimiter)]
-    if twice := sorted({name for name in names if names.count(name) > 1 and name}):
-        raise RecordError(f"{source.name}, line {number}: two columns are named {shown(twice[0])}; give each a name of its own")
-    return names, delimiter
-
-
-def _cells(source: _Source, number: int, line: str, delimiter: str) -> list[str]:
-    try:
-        return next(csv.reader(StringIO(line), delimiter=delimiter, strict=True), [""])
-    except csv.Error as error:
-        raise RecordError(f"{source.name}, line {number}: {error}; a quoted cell must end in its line") from None
-
-
-def _places(source: _Source, names: Sequence[str], model: Model, columns: dict[str, str]) -> dict[str, int]:
-    """Where the columns stand that the model needs, by the model's names."""
-    wanted = [*model.measured, *(name for name in model.known.inputs if name != INTERVAL)]
-    known = {*wanted, INTERVAL, "time"}
-    if unknown := sorted(set(columns) - known):
-        raise RecordError(f"columns are given for {', '.join(unknown)}; the model needs {', '.join(sorted(known))}")
-    clock = next((name for name in (columns.get("time"), *TIMES) if name in names and name not in wanted), None)
-    if "time" in columns and clock != columns["time"]:
-        raise RecordError(f"{source.name} has no column {shown(columns['time'])}; it has {_listed(names)}")
-    if clock is not None:
-        columns["time"] = clock
-        wanted.insert(0, "time")
-    elif INTERVAL in model.known.inputs:
-        wanted.insert(0, INTERVAL)
-    places = {}
-    for name in wanted:
-        column = columns.get(name, name)
-        if column not in names:
-            remedy = "; give it a column time" if name == INTERVAL else ""
+def _table(name: str, text: str) -> tuple[list[str], list[list[str]], list[int], bool]:
+    """Names of the columns, cells of each row, numbers of the rows' lines, and whether decimals have commas."""
+    lines = re.split("\r\n|\r|\n", text.rstrip())
+    delimiter = next((sign for sign in ";\t" if sign in text.lstrip().partition("\n")[0]), ",")
+    names, rows, numbers, before = list[str](), list[list[str]](), list[int](), 0
+    reader = csv.reader(lines, delimiter=delimiter, strict=True)
+    while True:
+        try:
+            row = next(reader, None)
+        except csv.Error as error:
+            raise RecordError(f"{name}, line {before + 1}: {error}; a quoted cell must end in its line") from None
+        if row is None:
+            break
+        if reader.line_num > before + 1:  # rows are lines: a cell must not swallow those below it
+            raise RecordError(f"{name}, line {before + 1}: a quoted cell must end in its line")
+        before = reader.line_num
+        if not any(map(str.strip, row)) and len(row) < 2:
+            if len(names) != 1:
+                continue
+            row = [""]  # of one column an empty line is a row: a measurement that is missing
+        if not names:
+            names = [cell.strip() for cell in row]
+            if names[0].startswith(("#", "%", "//")) and len(names[0]) > 2:
+                raise RecordError(
+                    f"{name}, line {before}: {shown(names[0])} is a comment, but the first line must name the "
+                    'columns: delete what stands above the names, or before them (numpy.savetxt: comments="")'
+                )
+        elif len(row) == len(names):
+            rows.append(row)
+            numbers.append(before)
+        else:
             raise RecordError(
-                f"{source.name} has no column {shown(column)}, which the model needs{remedy}; it has {_listed(names)}: rename "
-                f'one, or say which it is, as in columns={{"{name}": "..."}} or --column {name}=...'
-            )
-        places[name] = names.index(column)
-    return places
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(map(shown, names[:20])) + (f", ... ({len(names)} in all)" if len(names) > 20 else "")
-
-
-def _rows(
-    source: _Source, lines: Iterator[tuple[int, str]], names: Sequence[str], places: Mapping[str, int], delimiter: str
-) -> Iterator[tuple[int, list[float]]]:
-    """Number of the line, and the numbers in the places wanted."""
-    comma = delimiter == ";"
-    for number, line in lines:
-        if len(names) > 1 and not line.strip():
-            continue  # of one column it is a row: a measurement that is missing
-        cells = _cells(source, number, line, delimiter)
-        if len(cells) != len(names):
-            raise RecordError(
-                f"{source.name}, line {number}: {len(cells)} cells, but the first line names {len(names)} columns"
+                f"{name}, line {before}: {len(row)} cells, but the first line names {len(names)} columns"
                 + ("; where a comma separates decimals, separate cells by semicolons" if delimiter == "," else "")
             )
-        yield number, [_number(source, number, names[place], cells[place], comma) for place in places.values()]
+    if not names:
+        raise RecordError(f"{name} is empty; its first line names the columns, such as time,y")
+    if not rows:
+        raise RecordError(f"{name} has a line of names and no rows below it: there is nothing to estimate from")
+    if len(names) == 1 and min(len(line.split()) for line in (names[0], rows[0][0])) > 1:
+        raise RecordError(
+            f"{name} has one column, {shown(names[0])}, as spaces do not separate cells: "
+            "write commas, tabs or semicolons between them"
+        )
+    if twice := sorted({column for column in names if column and names.count(column) > 1}):
+        raise RecordError(f"{name}: two columns are named {shown(twice[0])}; give each a name of its own")
+    return names, rows, numbers, delimiter == ";"
 
 
-def _number(source: _Source, line: int, column: str, cell: str, comma: bool) -> float:
-    """The number in a cell; NaN if it is empty."""
-    text = cell.strip()
-    if not text or text.lower() == "nan":
-        return np.nan
-    if comma and text.count(",") == 1 and "." not in text:
-        text = text.replace(",", ".")
-    if not NUMBER.fullmatch(text):
-        if "," in text:
-            remedy = "; if the comma separates decimals, separate cells by semicolons"
+def _key(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.casefold())
+
+
+def _similar(wanted: str, names: set[str]) -> str | None:
+    """The column that may be the one wanted, in other letters or with a unit."""
+    short = {"t", "ts", "tsec", "date"} if wanted == "time" else set[str]()
+    keys = {name: _key(name) for name in sorted(names)}
+    return next((name for name, key in keys.items() if key in short or key.startswith(_key(wanted))), None)
+
+
+def _what_may_be(name: str, names: Sequence[str]) -> str:
+    """What a message adds where a column that the model needs is not there."""
+    listed = ", ".join(map(shown, names[:20]))
+    listed += f", ... ({len(names)} in all)" if len(names) > 20 else ""
+    similar = _similar(name, set(names))
+    remedy = f'rename one, or say which it is, as in columns={{"{name}": "..."}} or --column {name}=...'
+    if similar:
+        remedy = f'if {shown(similar)} is it, say so: columns={{"{name}": "{similar}"}}, or --column {name}={similar}'
+    needed = "; give it a column time" if name == INTERVAL else ""
+    return f", which the model needs{needed}; it has {listed}: {remedy}"
+
+
+def _refuse_units(name: str, cells: Sequence[str], line: int) -> None:
+    """RecordError for a first row of words: units, or more names."""
+    words = [cell.strip() for cell in cells if cell.strip() and cell.strip().lower() != "nan"]
+    if words and not any(re.search(r"\d", word) for word in words) and len(words) == len(cells):
+        raise RecordError(
+            f"{name}, line {line}: {shown(', '.join(words))} and no number; if these are units, delete the "
+            "line: measurements begin below the names"
+        )
+
+
+def _numbers(name: str, column: str, cells: Sequence[str], lines: Sequence[int], comma: bool) -> Array:
+    """The numbers of a column; NaN where it is empty."""
+    values = np.full(len(cells), np.nan)
+    for k, cell in enumerate(cells):
+        text = cell.strip()
+        if not text or text.lower() == "nan":
+            continue
+        if comma and text.count(",") == 1 and "." not in text:
+            text = text.replace(",", ".")
+        if not NUMBER.fullmatch(text):
+            fault = f"expected a number or nothing, got {shown(cell)}; {_cause(text)}"
+        elif not np.isfinite(value := float(text)):
+            fault = f"{shown(cell)} is beyond all numbers of double precision"
         else:
-            remedy = "; leave the cell empty if it is missing"
-        raise source.fault(line, column, f"expected a number or nothing, got {shown(cell)}{remedy}")
-    value = float(text)
-    if not np.isfinite(value):
-        raise source.fault(line, column, f"{shown(cell)} is beyond all numbers of double precision")
-    return value
+            values[k] = value
+            continue
+        raise RecordError(f"{name}, line {lines[k]}, column {column}: {fault}")
+    return values
 
 
-def _held(source: _Source, column: str, values: Array) -> Array:
+def _cause(text: str) -> str:
+    """Why a cell may be no number, and what to do."""
+    if DATE.match(text):
+        return (
+            "a date or a clock's time: write seconds, such as datetime.fromisoformat(...).timestamp() gives, "
+            "of UTC, which has no hour twice"
+        )
+    if "\u2212" in text:
+        return "its sign is a typographic minus (U+2212): write the hyphen, -"
+    if "," in text:
+        return "if the comma separates decimals, separate cells by semicolons"
+    return "leave the cell empty if it is missing"
+
+
+def _held(values: Array) -> Array:
     """An input with its gaps filled by the value before."""
-    given = ~np.isnan(values)
-    if not given[0]:
-        raise RecordError(f"{source.name}, first row, column {column}: an input needs a value from the first row on")
-    return values[np.maximum.accumulate(np.where(given, np.arange(len(values)), 0))]
+    return values[np.maximum.accumulate(np.where(np.isnan(values), 0, np.arange(len(values))))]
 
 
-def _times(
-    source: _Source,
-    named: Mapping[str, str],
-    table: Mapping[str, Array],
-    numbers: Sequence[int],
-    model: Model,
-    inputs: Mapping[str, Array],
-) -> Array:
-    """Times of the rows, from their column, from intervals, or by the model's."""
-    if "time" in table:
-        times = table["time"]
-        if (empty := np.isnan(times)).any():
-            raise source.fault(numbers[int(np.argmax(empty))], named["time"], "empty; every row needs its time")
-        if (back := np.diff(times) < 0).any():
-            k = int(np.argmax(back)) + 1
-            problem = f"{times[k]:.10g} comes after {times[k - 1]:.10g}; sort the rows by time"
-            raise source.fault(numbers[k], named["time"], problem)
-        return times
-    if INTERVAL in inputs:
-        steps = inputs[INTERVAL]
-        if (steps < 0).any():
-            raise source.fault(numbers[int(np.argmax(steps < 0))], named[INTERVAL], "an interval must not be negative")
-        return np.concatenate([[0.0], np.cumsum(steps[:-1])])
-    return float(model.known.interval) * np.arange(len(numbers))
+def _check_times(name: str, column: str, times: Array, lines: Sequence[int]) -> None:
+    """RecordError for a time that is missing, or goes back."""
+    if (empty := np.isnan(times)).any():
+        k = int(np.argmax(empty))
+        raise RecordError(f"{name}, line {lines[k]}, column {column}: empty; every row needs its time")
+    steps = np.diff(times)
+    if not (back := steps < 0).any():
+        return
+    k = int(np.argmax(back))
+    remedy = "sort the rows by time"
+    if back.sum() == 1 and (times[k + 1 :] <= times[k]).sum() > 1:  # not one row in a wrong place
+        usual = float(np.median(steps))
+        hour = " of daylight saving" if abs(steps[k] + HOUR - usual) <= usual else ""
+        remedy = (
+            f"the clock was set back once, here: an hour{hour} that is there twice, or a second record? Do not sort, "
+            "which would interleave the two: write times that only grow, such as UTC"
+        )
+    raise RecordError(f"{name}, line {lines[k + 1]}, column {column}: {times[k + 1]:.16g} comes after {times[k]:.16g}; {remedy}")
 
 
 def _uneven(times: Array) -> bool:

@@ -19,17 +19,16 @@ from itertools import islice
 import numpy as np
 
 from kfcourse.angles import difference
+from kfcourse.errors import expect
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.base import Filter, State, unknown_error
 from kfcourse.filters.iterated_ekf import seen_from
-from kfcourse.filters.looking_back import looked_back, normal_laws
-from kfcourse.kinds import expect
+from kfcourse.filters.looking_back import looked_back
 from kfcourse.laws import (
     Array,
     Gaussian,
     Measurement,
     Transition,
-    any_missing,
     apply,
     measurement_of,
     product,
@@ -37,8 +36,7 @@ from kfcourse.laws import (
     symmetric,
     transpose,
 )
-from kfcourse.linear.smoothing import room_for
-from kfcourse.montecarlo.experiment import measurements, run, walk
+from kfcourse.montecarlo.experiment import measurements, walk
 from kfcourse.symbolic.structure import Structure
 
 
@@ -77,30 +75,7 @@ def smooth(one: Filter, y: Array, lag: int | None = None) -> Gaussian:
     [0.944, 1.833, 2.556, 3.278]
     """
     expect(one, Filter, "smooth")
-    if one.look_back is not None:
-        return stacked([state.posterior for state in _looked_back(one, y, lag)])
-    y = measurements(one, y)
-    many = max(1, min(MANY_RUNS, NEAR // one.model.n**2))
-    # where all runs have the same covariances, these are stored once
-    if y.shape[1] > many and (any_missing(y) or run(one, y[:3, :2]).cov.strides[1]):
-        return _in_parts(one, y, lag, many)
-    return normal_laws(one, islice(walk(one, y), 1, None), lag)
-
-
-MANY_RUNS = 5000  # at most, whose record is looked back to together
-NEAR = 60_000  # numbers of their covariances at a step, that what is kept of the steps meanwhile stays near the processor
-
-
-def _in_parts(one: Filter, y: Array, lag: int | None, many: int) -> Gaussian:
-    """The normal laws given the record, of so many runs at a time."""
-    steps, runs, n = *y.shape[:2], one.model.n
-    many = -(-runs // -(-runs // many))  # all parts alike
-    found, room = Gaussian(np.empty((steps, runs, n)), np.empty((steps, runs, n, n))), room_for(steps - 1, many, n)
-    for start in range(0, runs, many):
-        some = np.s_[:, start : start + many]
-        into = Gaussian(found.mean[some], found.cov[some])
-        normal_laws(one, islice(walk(one, y[some]), 1, None), lag, into, room)
-    return found
+    return stacked([state.posterior for state in _looked_back(one, y, lag)])
 
 
 def smoothing_error(one: Filter, y: Array, lag: int | None = None) -> Array:

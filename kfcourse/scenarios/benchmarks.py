@@ -19,10 +19,9 @@ from importlib import resources
 
 import numpy as np
 
-from kfcourse.kinds import expect_sizes
+from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array
 from kfcourse.montecarlo.ensemble import simulate
-from kfcourse.seeds import Seed, generator
 from kfcourse.symbolic.model import Model
 
 # Root mean square errors of the angle over the 500 steps of the data, as Särkkä and Svensson's notebooks print them.
@@ -193,13 +192,13 @@ def bearings() -> Model:
     )
 
 
-def bearings_data(runs: int, seed: Seed) -> tuple[Array, Array]:
+def bearings_data(runs: int, seed: int | np.random.Generator) -> tuple[Array, Array]:
     """Courses (500, runs, 2) with three turns of 90 degrees, and measurements (501, runs, 2), the first of them missing.
 
     The courses do not come from the model: speed 1, and a turn rate of pi/2 in 0.51 s, with an error of 0.01 a step.
     """
     expect_sizes(runs=runs)
-    rng, dt = generator(seed), 0.01
+    rng, dt = np.random.default_rng(seed), 0.01
     rate = np.zeros((500, runs))
     for start in (49, 199, 349):
         rate[start : start + 51] = np.pi / 2 / (51 * dt) + 0.01 * rng.standard_normal((51, runs))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.kinds import expect_sizes
+from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array
 
 MOVES = 6.0  # s, by when the car has pulled away: its course has a meaning

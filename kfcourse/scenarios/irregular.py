@@ -10,10 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.kinds import expect_sizes
+from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array
 from kfcourse.montecarlo.ensemble import simulate
-from kfcourse.seeds import Seed, generator
 from kfcourse.symbolic.model import Model
 
 
@@ -42,7 +41,12 @@ class IrregularTrack(NamedTuple):
 
 
 def irregular_track(
-    seed: Seed, runs: int = 1, steps: int = 300, missing: float = 0.15, outliers: float = 0.05, times: float = 20.0
+    seed: int | np.random.Generator,
+    runs: int = 1,
+    steps: int = 300,
+    missing: float = 0.15,
+    outliers: float = 0.05,
+    times: float = 20.0,
 ) -> IrregularTrack:
     """Tracks of unequal intervals, 0.1 to 1.5 s, of whose fixes a part is missing and a part grossly wrong.
 
@@ -68,7 +72,7 @@ def irregular_track(
             raise ValueError(f"{name} is a share of the fixes, between 0 and 1; got {share}")
     if not 0 < times < np.inf:
         raise ValueError(f"times must be a positive number, got {times}")
-    rng = generator(seed)
+    rng = np.random.default_rng(seed)
     interval = rng.uniform(0.1, 1.5, steps)
     model = Model.define(
         [
@@ -83,7 +87,7 @@ def irregular_track(
         prior={"mean": [0, 0, 10, 0], "variance": [100, 100, 25, 25]},
         inputs={"dt": interval.tolist()},
     )
-    x, y = simulate(model, runs, steps, seed=rng)
+    x, y = simulate(model, runs, steps, seed=int(rng.integers(2**63)))
     wrong = rng.random((steps, runs)) < outliers
     fixes = x[..., :2] + (y - x[..., :2]) * np.where(wrong, times, 1.0)[..., None]
     gone = rng.random((steps, runs)) < missing

@@ -26,12 +26,11 @@ import numpy as np
 import sympy as sp
 from numpy.polynomial import Polynomial
 
-from kfcourse.kinds import expect_sizes
+from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.arithmetic import predict_law
 from kfcourse.linear.runs import Run, run
 from kfcourse.linear.system import LinearSystem
-from kfcourse.seeds import Seed, generator
 
 DT = sp.Symbol("Delta", positive=True)
 _AXES = sp.eye(2)
@@ -212,7 +211,7 @@ class HandTrack:
 SHORTEST, FITTS, OVERLAP, PAUSE = 100.0, (0.1, 0.15, 20.0), 0.4, 0.3
 
 
-def hand_track(seed: Seed, strokes: int = 14, screen: tuple[float, float] = (640.0, 400.0)) -> HandTrack:
+def hand_track(seed: int | np.random.Generator, strokes: int = 14, screen: tuple[float, float] = (640.0, 400.0)) -> HandTrack:
     """A track like that of a hand: strokes between random targets on a screen, with pauses and overlaps.
 
     Parameters
@@ -226,7 +225,7 @@ def hand_track(seed: Seed, strokes: int = 14, screen: tuple[float, float] = (640
     expect_sizes(strokes=strokes)
     if not min(screen) >= 2 * SHORTEST or not np.isfinite(screen).all():
         raise ValueError(f"strokes are at least {SHORTEST:g} px long: the screen must have twice that, got {screen}")
-    rng = generator(seed)
+    rng = np.random.default_rng(seed)
     targets = [rng.uniform(0, screen)]
     while len(targets) <= strokes:
         target = rng.uniform(0, screen)
@@ -260,7 +259,7 @@ class Samples(NamedTuple):
     y: Array
 
 
-def sample(track: HandTrack, interval: float, measurement_sd: float, runs: int, seed: Seed) -> Samples:
+def sample(track: HandTrack, interval: float, measurement_sd: float, runs: int, seed: int | np.random.Generator) -> Samples:
     """The track every `interval` seconds from its start to its end, with `runs` realisations of white noise added."""
     _positive(interval=interval)
     expect_sizes(runs=runs)
@@ -270,7 +269,7 @@ def sample(track: HandTrack, interval: float, measurement_sd: float, runs: int, 
     now, following = track.at(time), track.at(time + interval)
     state = np.concatenate([now.position, now.velocity], axis=-1)[:, None]
     acceleration = ((following.velocity - now.velocity) / interval)[:, None]
-    noise = generator(seed).standard_normal((len(time), runs, 2))
+    noise = np.random.default_rng(seed).standard_normal((len(time), runs, 2))
     return Samples(time, state, acceleration, now.position[:, None] + measurement_sd * noise)
 
 

@@ -8,10 +8,9 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import on_circle
-from kfcourse.kinds import expect_sizes
+from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array
 from kfcourse.scenarios.flight import Track
-from kfcourse.seeds import Seed, generator
 from kfcourse.symbolic.codegen import compile_function
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
@@ -64,7 +63,7 @@ def _of_three(vector: Array) -> Array:
     return vector
 
 
-def measure_cartesian(track: Track, sigmas: float | Sequence[float], runs: int, seed: Seed) -> Array:
+def measure_cartesian(track: Track, sigmas: float | Sequence[float], runs: int, seed: int | np.random.Generator) -> Array:
     """The position with independent normal errors on the three axes.
 
     Parameters
@@ -83,7 +82,7 @@ def measure_cartesian(track: Track, sigmas: float | Sequence[float], runs: int, 
     return _noisy(track.position, sigmas, runs, seed)
 
 
-def measure_spherical(track: Track, sigmas: Sequence[float], runs: int, seed: Seed) -> Array:
+def measure_spherical(track: Track, sigmas: Sequence[float], runs: int, seed: int | np.random.Generator) -> Array:
     """Range, azimuth and elevation with independent normal errors, (steps, runs, 3).
 
     Parameters
@@ -102,7 +101,7 @@ def measure_spherical(track: Track, sigmas: Sequence[float], runs: int, seed: Se
     return on_circle(_noisy(spherical(track.position), sigmas, runs, seed), (1,))
 
 
-def _noisy(true: Array, sigmas: float | Sequence[float], runs: int, seed: Seed) -> Array:
+def _noisy(true: Array, sigmas: float | Sequence[float], runs: int, seed: int | np.random.Generator) -> Array:
     try:
         deviations = np.broadcast_to(np.asarray(sigmas, dtype=float), (3,))
     except (TypeError, ValueError):
@@ -110,7 +109,7 @@ def _noisy(true: Array, sigmas: float | Sequence[float], runs: int, seed: Seed) 
     if not (np.isfinite(deviations).all() and deviations.min() >= 0):
         raise ValueError(f"standard deviations must be finite and not negative, got {sigmas!r}")
     expect_sizes(runs=runs)
-    noise = generator(seed).standard_normal((len(true), int(runs), 3))
+    noise = np.random.default_rng(seed).standard_normal((len(true), int(runs), 3))
     return true[:, None, :] + deviations * noise
 
 

@@ -12,10 +12,9 @@ from kfcourse.linear.runs import run
 from kfcourse.linear.system import LinearSystem, linear_system
 from kfcourse.scenarios.pointer import acceleration_from
 from kfcourse.scenarios.radar import kinematic
-from kfcourse.seeds import Seed, generator
 
 
-def roughly_known(system: LinearSystem, first_gain: float, state: Array, runs: int, seed: Seed) -> Gaussian:
+def roughly_known(system: LinearSystem, first_gain: float, state: Array, runs: int, seed: int | np.random.Generator) -> Gaussian:
     """A law of the first state with which the filter's first gain of the position is `first_gain`.
 
     One measurement gave the position, something else the speed, known to sigma_s on each axis; then one prediction,
@@ -56,7 +55,7 @@ def roughly_known(system: LinearSystem, first_gain: float, state: Array, runs: i
     speed = (position - variance - system.Q[0, 0]) / T**2
     known = np.diag([variance] * axes + [speed] * axes)
     cov = system.A @ known @ system.A.T + system.Q
-    draw = generator(seed).standard_normal((runs, len(cov)))
+    draw = np.random.default_rng(seed).standard_normal((runs, len(cov)))
     return Gaussian(state + draw @ np.linalg.cholesky(cov).T, cov)
 
 

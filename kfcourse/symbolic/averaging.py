@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kfcourse.kinds import expect
+from kfcourse.errors import expect
 from kfcourse.laws import Array, Gaussian, Measurement, Transition, product, transpose
 from kfcourse.symbolic.equations import Noiseless, compile_noiseless
 from kfcourse.symbolic.jumping import JumpModel

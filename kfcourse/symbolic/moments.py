@@ -22,13 +22,9 @@ from typing import NamedTuple
 import sympy as sp
 from sympy.codegen.cfunctions import expm1
 
-from kfcourse.reasons import Reason
+from kfcourse.errors import NoClosedForm
 
 MAX_DEGREE = 40
-
-
-class NoClosedForm(ValueError):
-    """The Gaussian mean of a term is not an elementary expression this module can find."""
 
 
 class Term(NamedTuple):
@@ -153,11 +149,9 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
     rewritten = sp.sympify(function).replace(with_variables, lambda e: e.rewrite(sp.exp))
     if _polynomial_degree(rewritten, variables) > MAX_DEGREE:
         raise NoClosedForm(
-            Reason(
-                f"the degree of {function} is above {MAX_DEGREE}: its exact moments would be too long; "
-                "use a numerical structure, unscented(model) or gauss_hermite(model)",
-                "degree",
-            )
+            f"the degree of {function} is above {MAX_DEGREE}: its exact moments would be too long; "
+            "use a numerical structure, unscented(model) or gauss_hermite(model)",
+            "degree",
         )
     # Sums of parameters in a denominator are one symbol while the products are multiplied out.
     quotients: dict[sp.Basic, sp.Symbol] = {}
@@ -192,12 +186,10 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
 
 def _no_closed_form(factor: sp.Expr, function: sp.Expr) -> NoClosedForm:
     return NoClosedForm(
-        Reason(
-            f"the package knows no closed-form Gaussian mean of the term {factor} in {function}; "
-            "use linearised(model), or a numerical structure: unscented(model) or gauss_hermite(model)",
-            "no_mean",
-            term=factor,
-        )
+        f"the package knows no closed-form Gaussian mean of the term {factor} in {function}; "
+        "use linearised(model), or a numerical structure: unscented(model) or gauss_hermite(model)",
+        "no_mean",
+        term=factor,
     )
 
 

@@ -18,7 +18,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import Components, difference, near, on_circle
-from kfcourse.kinds import expect
+from kfcourse.errors import expect
 from kfcourse.laws import (
     SINGULAR,
     Array,

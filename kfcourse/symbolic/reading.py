@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import sympy as sp
 
+from kfcourse.errors import ModelError
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.formula import check_name, parse
 from kfcourse.symbolic.sense import is_covariance, unfit
@@ -19,10 +20,6 @@ from kfcourse.symbolic.sense import is_covariance, unfit
 Formula: TypeAlias = str | sp.Expr
 Formulas: TypeAlias = Formula | Sequence[Formula] | sp.MatrixBase
 Names: TypeAlias = Sequence[str]
-
-
-class ModelError(ValueError):
-    """The description of a model is inconsistent; the message says what to change."""
 
 
 def by_name(*groups: tuple[sp.Symbol, ...]) -> dict[str, sp.Symbol]:

@@ -24,9 +24,8 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import Components, on_circle
-from kfcourse.kinds import expect
+from kfcourse.errors import expect
 from kfcourse.laws import Array, Gaussian, Matrices, Measurement, Transition, Vectors, measurement_of
-from kfcourse.reasons import Reason
 from kfcourse.symbolic.choices import jumps, masked
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.known import Stepwise
@@ -285,11 +284,8 @@ def _taylor(equation, x, mean, noise, noise_mean):
     for part in parts:
         if part.has(sp.Derivative, sp.DiracDelta) or any(jumps(one, [*x, *noise]) for one in equation.atoms(sp.Piecewise)):
             raise NoClosedForm(
-                Reason(
-                    f"{list(equation)} is not differentiable and cannot be linearised; "
-                    "use unscented(model) or gauss_hermite(model)",
-                    "no_slope",
-                )
+                f"{list(equation)} is not differentiable and cannot be linearised; use unscented(model) or gauss_hermite(model)",
+                "no_slope",
             )
     return tuple(part.subs(point, simultaneous=True) for part in parts)
 
@@ -326,9 +322,8 @@ def _moments(equation, x, mean, cov, noise, noise_mean, noise_cov, known: tuple[
     try:
         means = sp.Matrix([joint.mean_of(formula) for formula in equation])
     except NoClosedForm as error:
-        why = Reason.of(error)
         text = reduce(lambda text, mask: text.replace(str(mask), str(masks[mask])), masks, str(error))
-        raise NoClosedForm(Reason(text, why.kind, **{name: part.xreplace(masks) for name, part in why.parts.items()})) from None
+        raise NoClosedForm(text, error.kind, **{name: part.xreplace(masks) for name, part in error.parts.items()}) from None
     covs = sp.zeros(size, size)
     for i in range(size):
         for j in range(i, size):

@@ -247,7 +247,7 @@ def test_a_patience_that_is_no_number_is_refused(patience):
 
 
 def test_what_a_gate_cannot_stand_before_is_told():
-    with pytest.raises(TypeError, match=r"gated expects a Filter, and the Design duof came: find its coefficients.*design"):
+    with pytest.raises(TypeError, match=r"gated expects a Filter, got Design duof: .*design"):
         gated(duof(walk()))
     with pytest.raises(ValueError, match=r"a gate needs the structural functions.*imm has none"):
         gated(imm([linearised(walk())], [[1.0]]))
@@ -256,3 +256,34 @@ def test_what_a_gate_cannot_stand_before_is_told():
             smooth(gated(one, structure=linearised(walk())), np.zeros(3))
     with pytest.raises(ValueError, match=r"kalman takes every measurement as it is: ask gated"):
         weights(kalman_filter(walk()), np.zeros(3))
+
+
+def test_components_are_judged_each_for_itself_on_request(plane):
+    """A gross error of one component costs that component alone; the likelihood counts it as one at the gate's edge."""
+    y = spoiled(simulate(plane, 3, 9, seed=4).y)
+    one = aof(linearised(plane))
+    behind = gated(one, 0.999, by_component=True)
+    seen = y.copy()
+    seen[2, 0] = seen[4, 1] = seen[5, 1, 0] = np.nan
+    found = run(behind, y)
+    np.testing.assert_allclose(found.mean, run(one, seen).mean, rtol=1e-12)
+    np.testing.assert_array_equal(weights(behind, y)[5], [1, 0.5, 1])
+    assert weights(gated(one, 0.999), y)[5, 1] == 0  # the whole row
+    edge = chi2(1).ppf(0.999)
+    _, F = innovations(plane_meter(plane), predictions(behind, y), y)
+    expected = likelihood(one, seen)[5, 1] - 0.5 * (edge + np.log(2 * np.pi * F[5, 1, 0, 0]))
+    assert likelihood(behind, y)[5, 1] == pytest.approx(expected, rel=1e-12)
+
+
+def plane_meter(plane):
+    return linearised(plane).measure
+
+
+def test_a_track_is_lost_only_where_all_components_are_refused(plane):
+    y = simulate(plane, 1, 12, seed=4).y
+    y[3:, 0, 0] += 1e3
+    found = weights(gated(aof(linearised(plane)), 0.999, patience=2, by_component=True), y)[:, 0]
+    np.testing.assert_array_equal(found[3:], 0.5)
+    y[3:, 0, 1] += 1e3
+    found = weights(gated(aof(linearised(plane)), 0.999, patience=2, by_component=True), y)[:, 0]
+    np.testing.assert_array_equal(found[3:6], [0, 0, 1])

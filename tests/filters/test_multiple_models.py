@@ -326,7 +326,7 @@ def test_a_model_that_jumps_gives_the_first_probabilities_too(build):
 @pytest.mark.parametrize("build", [imm, logic_dynamic, gpb2])
 def test_what_is_no_list_of_structures_is_told(build):
     model = Model.define("x + v", "x + w")
-    with pytest.raises(TypeError, match=f"^{build.__name__} expects a Structure, and a Model came"):
+    with pytest.raises(TypeError, match=f"^{build.__name__} expects a Structure, got Model"):
         build([model], [[1.0]])
     with pytest.raises(TypeError, match=f"^{build.__name__} expects a list of structures, one a mode"):
         build(linearised(model), [[1.0]])

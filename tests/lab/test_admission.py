@@ -121,7 +121,7 @@ def test_formulas_that_were_not_derived_in_time_are_not_derived_again():
     known = admissions(model, ["aof-gaussian"], seconds=0.01)
     found = admissions(model, ["fos-gaussian", "aof-gaussian", "duof"], seconds=60, known=known)
     assert [one.name for one in found] == ["fos-gaussian", "aof-gaussian", "duof"]
-    assert [one.reason for one in found] == [known[0].reason] * 2 + [""] and "within 0.01 s" in known[0].reason
+    assert [one.reason for one in found] == [known[0].reason] * 2 + [""] and "within 0.01 s" in str(known[0].reason)
 
 
 def test_an_unknown_filter_is_refused():
@@ -154,7 +154,7 @@ def test_a_comparison_goes_on_without_the_filters_that_fail():
     good = [duof(model), aof(gaussian(model))]
     found = without_failing([broken("one"), good[0], broken("two"), good[1]], *size, left_out={"aof-exact": "reason"}, **options)
     assert found.names == ("duof", "aof-gaussian") and list(found.left_out) == ["aof-exact", "one", "two"]
-    assert "one became infinite or NaN" in found.left_out["one"] and found.left_out["one"].kind == "infinite"
+    assert "one became infinite or NaN" in str(found.left_out["one"]) and found.left_out["one"].kind == "infinite"
     np.testing.assert_array_equal(
         found.error_variance("duof").value, compare(good, *size, **options).error_variance("duof").value
     )
@@ -178,7 +178,7 @@ def test_a_negative_variance_is_the_affair_of_its_filter():
     found = without_failing(filters, *size, **options)
     assert found.names == names[1:]
     failed = r"step \d+: mfos-gaussian (failed: a covariance has the variance -|became infinite)"
-    assert re.match(failed, found.left_out["mfos-gaussian"])
+    assert re.match(failed, str(found.left_out["mfos-gaussian"]))
     expected = compare(filters[1:], *size, **options).error_variance("aof-gaussian").value
     np.testing.assert_array_equal(found.error_variance("aof-gaussian").value, expected)
 
@@ -205,7 +205,7 @@ def test_measurements_whose_noises_depend_on_one_another_have_no_density(meter):
     """Two equal rows, and sums of rows: particles would meet a singular matrix; the Gaussian filters take the pseudo-inverse."""
     model = Model.define("0.9*x + v", meter)
     particles, normal = admissions(model, ["particle", "aof-gaussian"])
-    assert particles.one is None and "depend on one another" in particles.reason and not has_bound(model)
+    assert particles.one is None and "depend on one another" in str(particles.reason) and not has_bound(model)
     assert normal.verdict == "yes"
     result = compare([normal.one], model, 100, 4, 1, threads=1, progress=False)
     assert np.isfinite(result.error_variance("aof-gaussian").value).all()

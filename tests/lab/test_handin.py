@@ -27,7 +27,6 @@ from kfcourse.laws import NegativeVariance
 from kfcourse.montecarlo.comparison import Verdict
 from kfcourse.montecarlo.designing import NotFinite, failed
 from kfcourse.montecarlo.statistics import Estimate
-from kfcourse.reasons import Reason
 
 WORDS = tomllib.loads((resources.files("kfcourse.lab") / "handin.toml").read_text(encoding="utf-8"))
 
@@ -289,7 +288,7 @@ def test_a_filter_that_diverges_and_other_reasons():
         cubic = Model.define("2*x + x**3 + v", "x + w")
         compare(lab_filters(cubic, ["aof-linearised"]), cubic, 50, 40, 1, progress=False)
     assert "trajectories" in cause(str(caught.value), model, WORDS["ru"])  # not the filter's fault: quoted
-    negative = Reason.of(failed("mfos-gaussian", 28, NegativeVariance("a covariance has the variance -165479")))
+    negative = failed("mfos-gaussian", 28, NegativeVariance("a covariance has the variance -165479"))
     assert "на шаге 28" in cause(negative, model, WORDS["ru"]) and "at step 28" in cause(negative, model, WORDS["en"])
     assert cause(pickle.loads(pickle.dumps(negative)), model, WORDS["ru"]) == cause(negative, model, WORDS["ru"])  # of a worker
     (long,) = admissions(Model.define("0.9*x + v", "(1 + x)**14 + w"), ["aof-gaussian"], seconds=0.01)

@@ -144,6 +144,20 @@ def test_the_command_writes_numbers_and_a_report(call, place):
         assert sentence.split(":")[0] in html
 
 
+def test_times_keep_all_their_digits_and_a_gate_may_judge_components(call, place):
+    """Stamps of Unix have ten digits before the point."""
+    stamps = [1484649904.25 + 0.5 * k for k in range(6)]
+    rows = [f"{stamp},{1 + k % 2},{1e3 if k == 3 else 1}" for k, stamp in enumerate(stamps)]
+    (place / "stamps.csv").write_text("\n".join(["time,y1,y2", *rows]))
+    arguments = ("stamps.csv", "--model", "my.toml", "--variant", "plane", "--gate", "0.999", "--out", "out")
+    assert "refused 1 of 6 measurements: rows 4" in call(*arguments, "--by-component").output
+    table = numbers(place / "out" / "estimate.csv")
+    np.testing.assert_array_equal(table["time"], stamps)
+    np.testing.assert_array_equal(table["weight"], [1, 1, 1, 0.5, 1, 1])
+    (place / "stamps.csv").write_text("\n".join(["time,y1,y2", *rows[:2], rows[0]]))
+    assert "1484649904.25 comes after 1484649904.75" in call(*arguments).output
+
+
 def test_the_model_in_the_help_can_be_copied(call, place):
     model = re.search(r"(\[variants.*?)\n\nOptions:", call("--help").output, re.DOTALL)[1]
     (place / "copied.toml").write_text(model)

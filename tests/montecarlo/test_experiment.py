@@ -9,7 +9,6 @@ from kfcourse.filters.approximations import aof
 from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.optimal_structure import fos, mfos
-from kfcourse.filters.particles import particle
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import BLOCK, SMALL_BLOCK, Ensemble, simulate, workers
 from kfcourse.montecarlo.experiment import compare, predictions, run
@@ -242,44 +241,6 @@ def test_a_diverging_filter_is_named():
 
 
 # ---------------------------------------------------------------- seeds and shapes
-
-
-def test_a_generator_is_a_seed_everywhere(variant53):
-    """A generator draws the seed: equal states give equal numbers, and a second call with the same one gives others."""
-
-    def numbers(make):
-        rng = np.random.default_rng(7)
-        return simulate(variant53, 3, 2, make(rng)).y, simulate(variant53, 3, 2, make(rng)).y
-
-    (first, second), (again, _) = numbers(lambda rng: rng), numbers(lambda rng: rng)
-    np.testing.assert_array_equal(first, again)
-    assert not np.isin(first, second).any()
-
-    filters = [aof(gaussian(variant53)), duof(variant53)]
-    seed = int(np.random.default_rng(7).integers(2**63))
-    by_generator = compare(filters, variant53, 300, 2, np.random.default_rng(7), threads=1)
-    assert by_generator.seed == seed  # so the report can name it
-    by_number = compare(filters, variant53, 300, 2, seed, threads=1)
-    np.testing.assert_array_equal(by_generator.error_variance("duof").value, by_number.error_variance("duof").value)
-
-    for makes in (lambda rng: Ensemble(variant53, 3, 2, rng), lambda rng: Ensemble(variant53, 3, 2, seed)):
-        np.testing.assert_array_equal(next(makes(np.random.default_rng(7)).block(0)).y, simulate(variant53, 3, 2, seed).y[0])
-    y = simulate(variant53, 3, 2, 1).y
-    particles = [run(particle(variant53, 50, chosen), y).mean for chosen in (np.random.default_rng(7), seed, seed + 1)]
-    np.testing.assert_array_equal(particles[0], particles[1])
-    assert (particles[0] != particles[2]).all()
-
-
-@pytest.mark.parametrize("seed", [-1, True, 1.0, None, "1"])
-def test_what_is_no_seed_is_refused(variant53, seed):
-    for use in (
-        lambda: simulate(variant53, 3, 2, seed),
-        lambda: compare([duof(variant53)], variant53, 3, 2, seed),
-        lambda: particle(variant53, 50, seed),
-        lambda: Ensemble(variant53, 3, 2, seed),
-    ):
-        with pytest.raises(ValueError, match=r"non-negative whole number or a numpy\.random\.Generator"):
-            use()
 
 
 def test_one_trajectory_of_a_scalar_meter_may_be_a_vector(variant53, vector):

@@ -147,7 +147,7 @@ def test_a_process_that_is_killed_is_told_in_words(model, control, started):
             os.kill(os.getpid(), signal.SIGKILL)
 
     result = together([control, slow(control, "dying", dies)], model, threads=2)()
-    assert "was killed" in result.left_out["dying"] and "fewer jobs" in result.left_out["dying"]
+    assert "was killed" in str(result.left_out["dying"]) and "fewer jobs" in str(result.left_out["dying"])
     assert result.available == ("aof-gaussian",)
     assert started == [2] and not multiprocessing.active_children()
 

@@ -1,4 +1,4 @@
-"""Docstrings as the book shows them: equations in blocks, prose as prose."""
+"""Docstrings as the book shows them: equations as they are written, prose as prose."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "book"))
 import docstrings
-
-from kfcourse.pages.house import layer, modules
+import package
 
 pytestmark = pytest.mark.quick
 
@@ -29,8 +28,8 @@ pytestmark = pytest.mark.quick
         ("Shapes as of `run`.", False),
     ],
 )
-def test_paragraphs_of_equations_are_set_and_sentences_are_not(paragraph, equation):
-    assert (".. equations::" in docstrings.to_restructured(["Summary.", "", paragraph])) == equation
+def test_paragraphs_of_equations_stand_as_they_are_and_sentences_do_not(paragraph, equation):
+    assert ("::" in docstrings.to_restructured(["Summary.", "", paragraph])) == equation
 
 
 def test_programs_and_examples_stand_as_they_are():
@@ -68,7 +67,7 @@ def entries(section, doc):
 
 def documented():
     """Name and value of each class and function of the package."""
-    for module in (importlib.import_module(f"kfcourse.{name}") for name, _ in modules() if layer(name) != "exercises"):
+    for module in (importlib.import_module(name) for files in package.folders().values() for name in files):
         for name, one in vars(module).items():
             if (inspect.isclass(one) or inspect.isfunction(one)) and one.__module__ == module.__name__:
                 yield f"{module.__name__}.{name}", one

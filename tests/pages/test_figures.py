@@ -1,22 +1,20 @@
 """The style of the figures."""
 
-import base64
 import logging
-import struct
 
 import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from IPython.core.interactiveshell import InteractiveShell
-from matplotlib import font_manager, rcParams
+from matplotlib import font_manager
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.ticker import MaxNLocator
 
 from kfcourse.pages import book_style, label_ends
-from kfcourse.pages.figures import FONTS, NARROW, lay_narrow
+from kfcourse.pages.figures import FONTS
 
 
 @pytest.fixture
@@ -42,7 +40,7 @@ def test_labels_are_in_the_font_of_the_pages_whatever_their_letters(style, caplo
 
 @pytest.mark.parametrize("label", ["step", "step $k$", "steps apart $l$", "step $k$ (5 ms each)"])
 def test_marks_of_an_axis_that_counts_steps_are_whole_numbers(style, label):
-    """Also above a shared axis, and in the picture for telephones; an axis of time keeps its halves, and chosen marks stay."""
+    """Also above a shared axis; an axis of time keeps its halves, and chosen marks stay."""
     figure, axes = plt.subplots(2, sharex=True)
     other, (time, chosen) = plt.subplots(1, 2)
     for ax in (*axes, time, chosen):
@@ -111,65 +109,6 @@ def test_a_label_has_the_dashes_and_the_marker_of_its_curve_and_a_line_to_it_whe
     assert len(leaders) == 2
     assert all(abs(np.diff(line.get_ydata())[0]) > 0.05 for line in leaders)
     plt.close()
-
-
-def test_on_a_telephone_panels_stand_one_under_the_other_and_letters_have_ten_pixels(style) -> None:
-    figure, (left, right) = plt.subplots(1, 2, figsize=(7.2, 3), sharey=True)
-    left.set(ylabel="error", xlabel="step")
-    assert lay_narrow(figure)
-    FigureCanvasAgg(figure).draw()
-    above, below = (ax.get_window_extent() for ax in (left, right))
-    assert above.y0 > below.y1
-    assert abs(above.x0 - below.x0) < 1
-    assert right.get_ylabel() == "error"
-    assert right.yaxis.get_tick_params()["labelleft"]
-    column = 338 / 96  # inches of CSS on a screen of 390 px
-    letters = rcParams["font.size"] * 96 / 72 * column / figure.get_figwidth()
-    assert letters > 10
-    assert not lay_narrow(figure)  # is narrow already
-    plt.close()
-
-
-def test_the_picture_of_a_wide_figure_carries_one_for_telephones(style) -> None:
-    formatter = InteractiveShell.instance().display_formatter.formatters["image/png"]
-    figure = Figure(figsize=(7.2, 3))
-    figure.subplots(1, 2)
-    _, metadata = formatter(figure)
-    narrow = base64.b64decode(metadata["narrow"])
-    width, height = struct.unpack(">II", narrow[16:24])
-    assert width == pytest.approx(2 * NARROW * rcParams["figure.dpi"], abs=1)
-    assert height > width
-    figure = Figure(figsize=(4, 3))
-    figure.subplots()
-    _, metadata = formatter(figure)
-    assert "narrow" not in metadata
-
-
-@pytest.mark.parametrize("label", ["xlabel", "ylabel", "title"])
-def test_a_picture_whose_unit_follows_a_comma_is_not_drawn(style, label) -> None:
-    formatter = InteractiveShell.instance().display_formatter.formatters["image/png"].lookup_by_type(Figure)
-    figure = Figure(figsize=(4, 3))
-    ax = figure.subplots()
-    ax.set(**{label: "time (s)"})
-    assert formatter(figure)
-    ax.set(**{label: "time, s"})
-    with pytest.raises(ValueError, match=r"time \(s\)"):
-        formatter(figure)
-
-
-def test_the_legend_below_narrow_panels_has_room(style) -> None:
-    """As that of set f, four columns wide."""
-    figure = Figure(figsize=(7.2, 3.2))
-    left, _ = figure.subplots(1, 2)
-    for name in ("prediction (at $k=0$ the prior)", "posterior", "normal, same moments", "state"):
-        left.plot([0, 1], [0, 1], label=name)
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    assert lay_narrow(figure)
-    FigureCanvasAgg(figure).draw()
-    (legend,) = figure.legends
-    box, whole = legend.get_window_extent(), figure.bbox
-    assert whole.x0 <= box.x0 < box.x1 <= whole.x1 and whole.y0 <= box.y0
-    assert box.y1 <= min(ax.get_tightbbox().y0 for ax in figure.axes)
 
 
 def test_a_ground_is_painted(style) -> None:

@@ -85,10 +85,3 @@ def test_a_process_that_ends_is_named_with_the_formula(monkeypatch, tmp_path):
     with pytest.raises(RuntimeError, match=r"Node ended while it set \['x', False\]"):
         one.html("x", display=False)
     one.close()
-
-
-def test_fonts_that_are_there_before_the_first_line_come_first():
-    sheet = ".TEX-I {\n  font-family: MJXZERO, MJXTEX-I;\n}\n@font-face /* 0 */ {\n  font-family: MJXZERO;\n}"
-    assert formulas.LISTS.sub(formulas._ready_first, sheet) == sheet.replace(
-        "MJXZERO, MJXTEX-I;", '"Ready MJXZERO", "Ready MJXTEX-I", MJXZERO, MJXTEX-I;'
-    )

@@ -59,12 +59,14 @@ def test_the_size_of_a_short_record_has_an_interval_that_covers(edge):
     assert np.mean([one.fits for one in sizes]) == pytest.approx(0.95, abs=0.02)
 
 
+@pytest.mark.parametrize("by_component", [False, True])
 @pytest.mark.parametrize("edge", [1.0, 0.999, 0.99])
-def test_the_intervals_cover(edge):
+def test_the_intervals_cover(edge, by_component):
     """300 records of 60 steps, a fifth of the cells empty: 95 % with a standard error of 1.3 %."""
     y, one = holed(60, 300, 7), aof(STRUCTURE)
     # with a narrower gate what it refuses, large in truth, makes the prediction after it too sure
-    told = examine(one if edge == 1 else gated(one, edge, patience=None), y, edge)
+    gate = gated(one, min(edge, 0.9999), patience=None, by_component=by_component)
+    told = examine(one if edge == 1 else gate, y, edge, by_component)
     kept = [run for run in range(300) if (told.weight[:, run] > 0).sum() > 30]  # not those whose track was lost
     assert len(kept) > 295
     inside = np.mean([[one.fits for one in findings(told, run=run)] for run in kept], axis=0)

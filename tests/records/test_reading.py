@@ -88,6 +88,14 @@ def test_uneven_steps_that_the_model_does_not_know_of(read):
     assert len(read("time,y\n0,1\n1,1\n2.001,1\n", PLAIN).y) == 3  # an hour of a clock's jitter is no warning
 
 
+def test_a_column_that_may_be_the_times_is_named(read):
+    """A model that takes every step alike needs no times: a warning."""
+    with pytest.warns(RecordWarning, match="the column 'Time' is not used; if it has the times.*--column time=Time"):
+        assert len(read("Time,y\n0,1\n1,1\n", PLAIN).y) == 2
+    with pytest.warns(RecordWarning, match="intervals are 1 to 4"):
+        read("Time,y\n0,1\n1,1\n5,1\n", PLAIN, columns={"time": "Time"})
+
+
 def test_of_a_single_column_an_empty_line_is_a_missing_measurement(read):
     """But not those before the names or after the last row, nor of several columns, where a missing row has its commas."""
     for end in ("", "\n", "\n\n\n"):
@@ -148,7 +156,25 @@ def test_a_filter_on_what_was_read_is_the_one_with_the_inputs_typed(read):
         ("dt,y1,y2,a\n1,1,2,3\n-1,1,2,3\n", "line 3, column dt: an interval must not be negative"),
         (GOOD.encode("utf-16"), "is UTF-16"),
         (GOOD.replace("-3e0", "é").encode("latin-1"), "line 3: a byte that is not UTF-8"),
-        (b"\x00" * 100, "no column"),
+        (b"\x00" * 100, "no rows"),
+        # what people bring
+        (GOOD.replace("time", "Time"), "no column time, which the model needs; if 'Time' is it.*--column time=Time"),
+        (GOOD.replace("time", "timestamp"), "if 'timestamp' is it"),
+        (GOOD.replace("time", "time_s"), "if 'time_s' is it"),
+        (GOOD.replace("y2", "Y2 [m]"), r"no column 'y2'.*if 'Y2 \[m\]' is it, say so"),
+        (GOOD.replace("0.5,", "2014-03-26T10:00:00Z,"), "line 3, column time: .*a date or a clock's time: write seconds"),
+        (GOOD.replace("0.5,", "10:00:01,"), "line 3, column time: .*a clock's time"),
+        (GOOD.replace("-3e0", "\u22123"), r"line 3, column y2: .*typographic minus \(U\+2212\)"),
+        (GOOD.replace("a\n", "a\ns,m,m,N\n"), "line 2: 's, m, m, N' and no number; if these are units, delete the line"),
+        (GOOD.replace(",", " "), "spaces do not separate cells"),
+        ("# recorded by me\n" + GOOD, "line 1: '# recorded by me' is a comment.*delete what stands above"),
+        ("# recorded, by, me, a\n" + GOOD, "line 1: '# recorded' is a comment"),
+        ("# " + GOOD.replace("time", "y1").replace("y1,y1", "y1,b"), r"is a comment.*numpy\.savetxt"),
+        ("time,y1,y2,a\n" + "".join(f"{t},1,2,3\n" for t in (0, 1800, 3600, 1800, 3600, 5400)),
+         "line 5, column time: 1800 comes after 3600; the clock was set back once.*Do not sort"),
+        ("time,y1,y2,a\n" + "".join(f"{t},1,2,3\n" for t in (0, 1200, 2400, 3600, 1200, 2400)),
+         "an hour of daylight saving that is there twice"),
+        ("time,y1,y2,a\n1484649904.25,1,2,3\n1484649904.2,1,2,3\n", "1484649904.2 comes after 1484649904.25"),
     ],
 )  # fmt: skip
 def test_a_bad_file_is_refused_with_its_place(read, content, message):

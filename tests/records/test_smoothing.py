@@ -11,7 +11,6 @@ from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem
 from kfcourse.linear import run as run_linear
 from kfcourse.linear import smooth as smooth_linear
-from kfcourse.linear.smoothing import Passages, regressions
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble
 from kfcourse.montecarlo.experiment import states
@@ -129,54 +128,17 @@ def dense(n, lag=None):
 
 
 @pytest.mark.parametrize("lag", [None, 0, 2])
-@pytest.mark.parametrize("n", [1, 3, 5])  # small matrices lie in memory in two ways, and a scalar has no products
+@pytest.mark.parametrize("n", [1, 3, 5])
 def test_of_any_number_of_states_it_is_the_regression_on_what_it_knows(n, lag):
     model, y, expected = dense(n, lag)
     same(smooth(aof(linearised(model)), y, lag), expected)
-    many = smooth(aof(linearised(model)), np.tile(y, (1, 400, 1)), lag)  # solved entry by entry
-    same(Gaussian(many.mean[:, -5:], many.cov[:, -5:]), expected)
 
 
-@pytest.mark.parametrize("lag", [None, 1])
-@pytest.mark.parametrize("n", [1, 3, 5])
-def test_a_great_many_runs_are_looked_back_to_some_after_the_others(monkeypatch, n, lag):
-    model, y, expected = dense(n, lag)
-    monkeypatch.setattr("kfcourse.records.smoothing.MANY_RUNS", 2)  # of five
-    same(smooth(aof(linearised(model)), y, lag), expected)
-    whole = smooth(kalman_filter(model), np.nan_to_num(y))
-    assert whole.cov.strides[1] == 0  # without gaps all have the same, stored once
-
-
-def test_what_all_runs_share_is_found_once():
+def test_what_all_runs_share_is_stored_once():
     """Gains and covariances of a linear model know nothing of the record, unless something is missing in one of the runs."""
     model, y, _ = dense(3)
-    one, full = aof(linearised(model)), np.nan_to_num(y)
-    assert all(law.cov.shape == (3, 3) for state in states(one, full) for law in (state.posterior, state.predicted))
-    gaps = states(one, y)
-    assert gaps[-1].predicted.cov.shape == (5, 3, 3)
-    assert smooth(one, full).cov.strides[1] == 0 != smooth(one, y).cov.strides[1]
-    found = regressions(
-        Passages(*(law_of(states(one, full)[1:-1], name) for name in ("posterior", "predicted")), *transition(one))
-    )
-    assert {(part.S.shape[-1], part.left.shape[-1]) for part in found} == {(1, 1)}  # the axis of runs, entry by entry
-
-
-def test_a_page_of_products_is_no_reason_for_all_cores(monkeypatch):
-    """Shared gains are applied by one product of matrices only while a library keeps it on one core; both ways agree."""
-    model, y, _ = dense(5)
-    one, full = aof(linearised(model)), np.nan_to_num(y)
-    small = smooth(one, full)
-    monkeypatch.setattr("kfcourse.linear.smoothing.ON_ONE_CORE", 0)
-    same(smooth(one, full), small)
-
-
-def law_of(visited, name):
-    laws = [getattr(state, name) for state in visited]
-    return Gaussian(np.stack([law.mean for law in laws]), np.stack([law.cov for law in laws])[:, None])
-
-
-def transition(one):
-    return one.structure.transition(one.model.prior.mean, one.model.prior.cov)
+    one = aof(linearised(model))
+    assert smooth(one, np.nan_to_num(y)).cov.strides[1] == 0 != smooth(one, y).cov.strides[1]
 
 
 def test_given_matrices_are_smoothed_as_the_model_they_come_from():

@@ -750,9 +750,9 @@ def test_what_paths_are_not_sampled_from():
 
 def test_a_motion_is_made_of_a_structure_and_its_inputs_have_times():
     model = Model.define("x + dt*u + sqrt(dt)*v", "x + w", inputs={"dt": [1], "u": [0]})
-    with pytest.raises(TypeError, match="Motion expects a Structure, and a Model came"):
+    with pytest.raises(TypeError, match="Motion expects a Structure, got Model"):
         Motion(model)
-    with pytest.raises(TypeError, match="fuse expects a Dynamics, and a Model came"):
+    with pytest.raises(TypeError, match="fuse expects a Dynamics, got Model"):
         fuse(model, [], PRIOR, [], [1.0])
     for inputs in (Inputs(np.zeros(0), np.zeros((0, 1, 1))), Inputs(np.zeros((1, 1)), np.zeros((1, 1, 1)))):
         with pytest.raises(ValueError, match="times and values of the inputs have the shapes"):

@@ -193,5 +193,5 @@ def test_what_has_no_average_over_the_modes():
         averaged(model, structures[:1])
     with pytest.raises(TypeError, match="list of structures, one a mode, and one came"):
         averaged(model, structures[0])
-    with pytest.raises(TypeError, match="averaged expects a Structure, and a Model came"):
+    with pytest.raises(TypeError, match="averaged expects a Structure, got Model"):
         averaged(model, model.modes)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
 from kfcourse.filters.exact.batch import ROUNDING, Place
@@ -24,7 +25,6 @@ from kfcourse.filters.exact.merging import MERGED
 from kfcourse.filters.exact.panels import PANEL_NODES, SPLITS, Rule, resolve
 from kfcourse.filters.exact.places import Candidates, explanations
 from kfcourse.filters.exact.roots import halved
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError

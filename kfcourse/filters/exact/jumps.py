@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, scalar_densities
 from kfcourse.filters.exact.adaptive import check_scalar
@@ -24,7 +25,6 @@ from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved,
 from kfcourse.filters.exact.pointmasses import ACCURACY, FINE, corrected
 from kfcourse.filters.exact.prediction import predictions
 from kfcourse.filters.multiple_models import mixture, onward
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError

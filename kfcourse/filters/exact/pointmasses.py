@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kfcourse.angles import moments_on_circle
+from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import ScalarDensities, is_nonlinear, scalar_densities
 from kfcourse.filters.exact.adaptive import TENTH, check_scalar, on_panels
@@ -22,7 +23,6 @@ from kfcourse.filters.exact.prediction import predictions
 from kfcourse.filters.exact.roots import at_roots
 from kfcourse.filters.exact.smoothing import smoothed
 from kfcourse.filters.exact.usual import Packed, UsualWay, compiled_usual_way
-from kfcourse.kinds import expect
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.compiled import is_scalar
 from kfcourse.symbolic.model import Model

@@ -19,10 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.kinds import expect_sizes
+from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array, Gaussian, apply, square_root, symmetric
 from kfcourse.linear.runs import check_prior
-from kfcourse.seeds import Seed, generator
 
 ROUNDING = 1e-9  # s (or periods): moments that differ by less are the same but for rounding; float64 holds days to 1e-11 s
 TERMS = 20  # of the series: term k is below 1 / (k+1)! relative to the first, the next one left out 2e-20
@@ -213,7 +212,9 @@ def _check_inputs(dynamics: Dynamics, times: Array, values: Array) -> None:
         raise ValueError("inputs must be finite: fill a gap of the fast sensor by what it would have said, and enlarge Qc")
 
 
-def sample(dynamics: Dynamics, prior: Gaussian, times: Array, runs: int, seed: Seed, inputs: Inputs | None = None) -> Path:
+def sample(
+    dynamics: Dynamics, prior: Gaussian, times: Array, runs: int, seed: int | np.random.Generator, inputs: Inputs | None = None
+) -> Path:
     """True paths of the dynamics, exact at the given times.
 
     Parameters
@@ -241,7 +242,7 @@ def sample(dynamics: Dynamics, prior: Gaussian, times: Array, runs: int, seed: S
     if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
         raise ValueError("times must be a finite ascending vector; np.unique sorts and removes what is twice")
     expect_sizes(runs=runs)
-    rng, n = generator(seed), len(dynamics.A)
+    rng, n = np.random.default_rng(seed), len(dynamics.A)
     check_prior(prior, runs, n)
     over, move = motion(dynamics, inputs)
     if inputs is not None and (given := np.shape(inputs.values)[1]) not in (1, runs):

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kfcourse.angles import Components, on_circle
-from kfcourse.kinds import expect
+from kfcourse.errors import expect
 from kfcourse.laws import Array, Gaussian, Measurement, correct, stacked
 from kfcourse.linear.runs import check_prior
 from kfcourse.scenarios.navigation.dynamics import ROUNDING, Dynamics, Inputs, Predictor, predictor

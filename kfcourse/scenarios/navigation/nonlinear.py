@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from kfcourse.angles import on_circle
-from kfcourse.kinds import expect
+from kfcourse.errors import expect
 from kfcourse.laws import Array, Gaussian
 from kfcourse.scenarios.navigation.dynamics import Inputs, Predictor
 from kfcourse.symbolic.reading import ModelError

@@ -20,7 +20,6 @@ import numpy as np
 from kfcourse.angles import on_circle
 from kfcourse.laws import Array, Measurement, square_root
 from kfcourse.scenarios.navigation.dynamics import ROUNDING
-from kfcourse.seeds import Seed, generator
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import Formula, ModelError
@@ -209,7 +208,9 @@ class Observation(NamedTuple):
     value: Array
 
 
-def observe(sensors: Sequence[Sensor], truth: Callable[[Array], Array], duration: float, seed: Seed) -> list[Observation]:
+def observe(
+    sensors: Sequence[Sensor], truth: Callable[[Array], Array], duration: float, seed: int | np.random.Generator
+) -> list[Observation]:
     """What the sensors say of a motion, in the order of arrival.
 
     Parameters
@@ -235,7 +236,7 @@ def observe(sensors: Sequence[Sensor], truth: Callable[[Array], Array], duration
     """
     by_name(sensors)
     messages = []
-    for sensor, rng in zip(sensors, generator(seed).spawn(len(sensors)), strict=True):
+    for sensor, rng in zip(sensors, np.random.default_rng(seed).spawn(len(sensors)), strict=True):
         times, model = sensor.captures(duration), sensor.model
         x = np.asarray(truth(times))
         if x.ndim != 3 or len(x) != len(times) or x.shape[2] != model.n:

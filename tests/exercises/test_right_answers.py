@@ -1,0 +1,387 @@
+"""Right answers in unusual forms pass: written from the statements alone, in none of the ways of the worked solutions."""
+
+import numpy as np
+import pytest
+import sympy as sp
+from numpy import matrix_transpose as T
+from scipy.integrate import quad
+from scipy.linalg import solve_discrete_are
+from scipy.stats import chi2, norm
+from sympy import cos, sin
+
+from kfcourse.checks import exercise
+
+GENERATED = {
+    "name": "generated",
+    "state": "c*x + r + e*cos(x)*v",
+    "meter": "g*x + q*x**2 + f*w",
+    "parameters": {"c": 0.83, "r": 0.86, "e": 0.24, "g": 0.9, "q": 0.39, "f": 0.33},
+    "prior": {"mean": 0.0, "variance": 0.75},
+}
+c, e, g, f, r, q, mu, z1, z2, p1, p2 = sp.symbols("c e g f r q mu z1 z2 p1 p2", real=True)
+
+
+def gain(Psi, G, F):
+    return Psi @ T(G) @ np.linalg.inv(F)
+
+
+def times(matrix, vector):
+    return (matrix @ vector[..., None])[..., 0]
+
+
+def joseph(Psi, G, F, R):
+    K = gain(Psi, G, F)
+    rest = np.eye(Psi.shape[-1]) - K @ G
+    return rest @ Psi @ T(rest) + K @ R @ T(K)
+
+
+def correction(covariance):
+    def answer(lam, Psi, h, G, F, y):
+        K = gain(Psi, G, F)
+        return lam + times(K, y - h), covariance(Psi, K, G, F)
+
+    return answer
+
+
+def centred(target, regressor):
+    r_, t = regressor - regressor.mean(axis=0), target - target.mean(axis=0)
+    B = np.linalg.lstsq(r_, t, rcond=None)[0].T
+    return B, target.mean(axis=0) - B @ regressor.mean(axis=0), (t - r_ @ B.T).T @ (t - r_ @ B.T) / len(t)
+
+
+def designed(start=lambda mean: mean):
+    def answer(x, y_design, y, mean, a, b):
+        lam, mine = np.tile(start(mean), (x.shape[1], 1)), np.tile(start(mean), (y.shape[1], 1))
+        estimates = []
+        for k in range(len(x)):
+            omega = y_design[k] - b(lam)
+            H, shift, _ = centred(x[k] - lam, omega)
+            z = lam + omega @ H.T + shift
+            estimates.append(mine + (y[k] - b(mine)) @ H.T + shift)
+            if k + 1 < len(x):
+                F, shift, _ = centred(x[k + 1], a(z))
+                lam, mine = a(z) @ F.T + shift, a(estimates[-1]) @ F.T + shift
+        return np.array(estimates)
+
+    return answer
+
+
+def nees_per_component(x, z, p):
+    return np.einsum("kni,knij,knj->k", x - z, np.linalg.inv(p), x - z) / x.shape[1] / x.shape[2]
+
+
+def deviations(mu, z, p):
+    z_bar = sum(weight * mean for weight, mean in zip(mu, z, strict=True))
+    spread = [mean - z_bar for mean in z]
+    terms = zip(mu, p, spread, strict=True)
+    return z_bar, sum(weight * (cov + np.outer(error, error)) for weight, cov, error in terms)
+
+
+def f2_by_logarithms(predicted, y, x, see):
+    mean, variance = see(x)
+    exponent = -0.5 * (y - mean) ** 2 / variance - 0.5 * np.log(2 * np.pi * variance)
+    scaled = np.exp(exponent - exponent.max()) * predicted
+    mass = np.trapezoid(scaled, x)
+    return scaled / mass, mass * np.exp(exponent.max())
+
+
+def f3_by_loop(posterior, x, move):
+    following = np.zeros_like(x)
+    for weight, mean, variance in zip(posterior, *move(x), strict=True):
+        following += weight * norm.pdf(x, mean, np.sqrt(variance))
+    return following * (x[1] - x[0])
+
+
+def g1_by_loops(function, x, h):
+    result = np.empty((len(x), function(x).shape[1], x.shape[1]))
+    for j in range(x.shape[1]):
+        right, left = x.copy(), x.copy()
+        right[:, j] += h
+        left[:, j] -= h
+        result[:, :, j] = (function(right) - function(left)) / 2 / h
+    return result
+
+
+def h2_by_variances(x, xi, n, T, f, g, S, S_xi, N):
+    v, w = S_xi / 2 / T, N / 2 / T
+    return x + (f(x) + g(x) * v**0.5 * xi) * T, S(x) + w**0.5 * n
+
+
+def h4_solved(a, s, h, S_xi, N):
+    D = sp.Symbol("D", positive=True)
+    roots = sp.solve(-2 * a * D + s**2 * S_xi / 2 - D**2 * h**2 * 2 / N, D)
+    D = next(root for root in roots if root.subs({a: 1, s: 1, h: 1, S_xi: 1, N: 1}) > 0)
+    return D, 2 * D * h / N
+
+
+def i3_solved(y0, y1, y2, dt):
+    r, v, a = sp.symbols("r v a")
+    equations = [r - v * k * dt + a * (k * dt) ** 2 / 2 - y for k, y in ((0, y2), (1, y1), (2, y0))]
+    found = sp.solve(equations, [r, v, a])
+    return found[r], found[v], found[a]
+
+
+def i4_by_information(z, p, u, y, A, B, H, Q, R):
+    lam = B @ u + A @ z
+    Psi = Q + A @ p @ A.T
+    new = np.linalg.inv(np.linalg.inv(Psi) + H.T @ np.linalg.inv(R) @ H)
+    return lam, Psi, lam + new @ H.T @ np.linalg.inv(R) @ (y - H @ lam), new
+
+
+def i5_column_by_column(lam, S, y, H, R):
+    """Givens rotations instead of a ready factorisation."""
+    p, n = H.shape
+    M = np.block([[np.linalg.cholesky(R), H @ S], [np.zeros((n, p)), S]])
+    for row in range(n + p):
+        for column in range(row + 1, n + p):
+            size = np.hypot(M[row, row], M[row, column])
+            if size > 0:
+                c, s = M[row, row] / size, M[row, column] / size
+                M[:, [row, column]] = M[:, [row, column]] @ np.array([[c, -s], [s, c]])
+    Z = M[p:, p:]
+    return lam + M[p:, :p] @ np.linalg.solve(M[:p, :p], y - H @ lam), Z * np.where(np.diag(Z) < 0, -1, 1)
+
+
+def j1_by_rotations(r, phi, eps):
+    up = sp.Matrix([[cos(eps), 0, -sin(eps)], [0, 1, 0], [sin(eps), 0, cos(eps)]])
+    about = sp.Matrix([[cos(phi), -sin(phi), 0], [sin(phi), cos(phi), 0], [0, 0, 1]])
+    return tuple(about * up * sp.Matrix([r, 0, 0]))
+
+
+def j3_by_the_filter(alpha):
+    """The index at which the gain of a Kalman filter converges to alpha, by bisection; T and sigma are 1."""
+    A, b, H = np.array([[1, 1], [0, 1]]), np.array([[0.5], [1]]), np.array([[1, 0]])
+    low, high = 1e-4, 1e4
+    while high / low > 1 + 1e-13:
+        index = np.sqrt(low * high)
+        Psi = solve_discrete_are(A.T, H.T, index**2 * b @ b.T, np.eye(1))
+        K = Psi[:, 0] / (Psi[0, 0] + 1)
+        low, high = (index, high) if K[0] < alpha else (low, index)
+    return K[1], index
+
+
+def j4_matrices(y, T, alpha, beta, r, v):
+    A, K, H = np.array([[1, T], [0, 1]]), np.array([[alpha], [beta / T]]), np.array([[1, 0]])
+    s = np.array([r, v])[:, None, :] * np.ones((1, y.shape[1], 1))
+    found = []
+    for row in y:
+        s = s + np.einsum("ij,jnc->inc", K, row[None] - np.einsum("ij,jnc->inc", H, s))
+        found.append(s)
+        s = np.einsum("ij,jnc->inc", A, s)
+    return tuple(np.array(found).transpose(1, 0, 2, 3))
+
+
+def j5_solved(a, T, alpha, beta):
+    e, d = sp.symbols("e d")
+    before = e + T * d + a * T**2 / 2
+    found = sp.solve([before * (1 - alpha) - e, d + a * T - beta / T * before - d], [e, d])
+    return found[e], found[d]
+
+
+def j6_closed(alpha, beta):
+    return (2 * alpha**2 + beta * (2 - 3 * alpha)) / (alpha * (4 - 2 * alpha - beta))
+
+
+def k2_through_p(sigma_xi, sigma_n):
+    p = sigma_xi * (sp.sqrt(sigma_xi**2 + 4 * sigma_n**2) - sigma_xi) / 2
+    return p + sigma_xi**2, p, -p / sigma_n**2
+
+
+def k3_velocity_carried_on(y_ins, y_sr, sigma_xi, sigma_n, p0):
+    """The velocity itself is carried on by the differences of the INS."""
+    V, Psi, found, variances = y_ins[0], p0, [], []
+    for k, sr in enumerate(y_sr):
+        if k:
+            V, Psi = V + y_ins[k] - y_ins[k - 1], Psi + sigma_xi**2
+        weight = 0.0 if np.isnan(sr).any() else Psi / (Psi + sigma_n**2)
+        V, Psi = V + weight * (np.nan_to_num(sr) - V), Psi * (1 - weight)
+        found.append(V)
+        variances.append(Psi)
+    return np.array(found), np.array(variances)
+
+
+def l1_by_slice(steps, ratio, first):
+    sizes = np.ones(steps)
+    sizes[first::ratio] += 1
+    return sizes
+
+
+def l3_by_information(m, P, y, H, R):
+    use = ~np.isnan(y)
+    W = H[use].T @ np.linalg.inv(R[np.ix_(use, use)]) if use.any() else np.zeros((len(m), 0))
+    new = np.linalg.inv(np.linalg.inv(P) + W @ H[use])
+    return new @ (np.linalg.inv(P) @ m + W @ y[use]), new
+
+
+def l4_in_small_steps(m, P, dt, q):
+    for part in (0.25, 0.5, 0.25):
+        t = part * dt
+        P = np.array(
+            [
+                [P[0, 0] + 2 * t * P[0, 1] + t**2 * P[1, 1] + q * t**3 / 3, P[0, 1] + t * P[1, 1] + q * t**2 / 2],
+                [P[0, 1] + t * P[1, 1] + q * t**2 / 2, P[1, 1] + q * t],
+            ]
+        )
+        m = m + t * np.array([m[1], 0])
+    return m, P
+
+
+def l6_from_the_motion(V, a, tau):
+    t = sp.Symbol("t")
+    s = V * t + a * t**2 / 2
+    return s.subs(t, -tau) - s.subs(t, 0), sp.diff(s, t).subs(t, -tau) - V
+
+
+def l7_normal_equations(edges, stamps):
+    A = np.column_stack([stamps, np.ones(len(stamps))])
+    slope, level = np.linalg.lstsq(A, edges, rcond=None)[0]
+    return 1 / slope, -level / slope
+
+
+def m3_by_blocks(p, A, Q):
+    """The joint covariance of both states, cut into blocks."""
+    lift = np.vstack([np.eye(2), A])
+    joint = lift @ p @ lift.T + np.block([[np.zeros((2, 4))], [np.zeros((2, 2)), Q]])
+    return joint[:2, 2:], joint[:2, 2:] @ np.linalg.inv(joint[2:, 2:])
+
+
+def m5_at_once(z, p, ahead, Psi, A, Q):
+    """One dense law of the record: the information of the filter's corrections, and the motion."""
+    steps, n = z.shape
+    J, b = np.zeros((steps * n, steps * n)), np.zeros(steps * n)
+    for k in range(steps):
+        at = slice(k * n, k * n + n)
+        own = np.linalg.inv(p[k]) - (np.linalg.inv(Psi[k]) if k else 0)
+        J[at, at] += own
+        b[at] += np.linalg.solve(p[k], z[k]) - (np.linalg.solve(Psi[k], ahead[k]) if k else 0)
+        if k:
+            both = slice((k - 1) * n, (k + 1) * n)
+            D = np.hstack([-A, np.eye(n)])
+            c = ahead[k] - A @ z[k - 1]
+            J[both, both] += D.T @ np.linalg.solve(Q, D)
+            b[both] += D.T @ np.linalg.solve(Q, c)
+    P = np.linalg.inv(J)
+    return (P @ b).reshape(steps, n), np.array([P[k * n : k * n + n, k * n : k * n + n] for k in range(steps)])
+
+
+def m6_loop(y, z, p):
+    total, count = 0.0, 0
+    for value, mean, variance in zip(y, z, p, strict=True):
+        if not np.isnan(value):
+            total, count = total + value**2 - 2 * value * mean + mean**2 + variance, count + 1
+    return total / count
+
+
+def n1_by_loop(times):
+    found = [times[k + 1] - times[k] for k in range(len(times) - 1)]
+    return [*found, found[-1]]
+
+
+def n2_in_two_halves(dt, q):
+    """What the first half has added is carried over the second."""
+    found = []
+    for t in dt / 2:
+        half, A = q * np.array([[t**3 / 3, t**2 / 2], [t**2 / 2, t]]), np.array([[1, t], [0, 1]])
+        found.append(A @ half @ A.T + half)
+    return np.stack(found)
+
+
+def n4_by_whitening(nu, F, probability):
+    white = np.stack([np.linalg.solve(np.linalg.cholesky(cov), entry) for entry, cov in zip(nu, F, strict=True)])
+    return np.linalg.norm(white, axis=1) ** 2, -chi2.isf(1 - probability, 3) * -1
+
+
+def n6_by_loop(nu, F):
+    last, products = None, []
+    for entry, variance in zip(nu, F, strict=True):
+        if np.isfinite(entry):
+            if last is not None:
+                products.append(last * entry / np.sqrt(variance))
+            last = entry / np.sqrt(variance)
+    return sum(products) / len(products), 1 / np.sqrt(len(products))
+
+
+def one_time(variance, q):
+    """Pontryagin's double integral, as the chapter has it before it is simplified."""
+
+    def V(x):
+        return (1 - np.cos(x)) / variance
+
+    up, down = (quad(lambda x, sign=sign: np.exp(sign * V(x)), 0, 2 * np.pi)[0] for sign in (1, -1))
+    return up * down / (2 * q)
+
+
+RIGHT = [
+    ("a1", "53", lambda z: sp.Matrix([c, e * z])),
+    ("a2", "53", lambda z, p: [[c * z], [(c * sp.sqrt(p)) ** 2 + (e * z) ** 2]]),
+    ("a2", "53", lambda z, p: [z * c, p * c**2 + (e * z) ** 2]),
+    ("a3", "5", lambda m, d: (g * sp.sin(m), g * sp.cos(m), g**2 * (1 - sp.sin(m) ** 2) * d + f**2)),
+    ("a3", "20", lambda m, d: ([m[0]], [1, 0], [[d[0, 0] + r**2]])),
+    ("a4", "53", lambda z, p: (c * z, p * (c**2 + e**2) + e**2 * z**2)),
+    ("a5", "53", lambda m, d: (g * m, g, g**2 * d + f**2 * ((m**2 + 3 * d) ** 2 - 6 * d**2))),
+    ("a5", "generated", lambda m, d: (g * m + q * (m**2 + d), g + 2 * q * m, (g + 2 * q * m) ** 2 * d + 2 * (q * d) ** 2 + f**2)),
+    ("a6", "20", lambda m, d: sp.Matrix([[r**2]])),
+    ("a6", "53", lambda m, d: f**2 * ((m**2 + 3 * d) ** 2 - 6 * d**2)),
+    ("a7", "53", lambda: "F = M[(g*(x - m) + f*x^2*w)^2]\n= g^2*d + f^2*M[x^4]\n= g^2*d + f^2*(m^4 + 6*m^2*d + 3*d^2)"),
+    (
+        "a7",
+        "53",
+        lambda: "F = M[y^2] - h^2\n= g^2*(m^2 + d) + f^2*M[x**4] - (g*m)^2\n= d*g^2 + f^2*((m^2 + 3*d)^2 - 6*d^2)  # done",
+    ),
+    ("b1", "53", lambda Psi, G, F: T(np.linalg.solve(F, G @ Psi))),
+    ("b1", "20", lambda Psi, G, F: [(P @ H.T @ np.linalg.pinv(V)).tolist() for P, H, V in zip(Psi, G, F, strict=True)]),
+    ("b2", "53", correction(lambda Psi, K, G, F: Psi - K @ F @ T(K))),
+    # the state's components differ by a factor of a thousand: an inverse keeps its digits all the same
+    ("b2", "D3", correction(lambda Psi, K, G, F: Psi - K @ G @ Psi)),
+    ("b5", "5", lambda Psi, G, F, R: np.linalg.inv(np.linalg.inv(Psi) + T(G) @ np.linalg.inv(R) @ G)),
+    ("b5", "20", joseph),
+    ("c2", "generated", centred),
+    ("c4", "53", designed()),
+    ("c4", "53", designed(lambda mean: 0 * mean)),  # the offset makes it good, at every step
+    ("e1", "53", lambda x, z: np.einsum("kni,kni->k", x - z, x - z) / x.shape[1]),
+    ("e5", "53", nees_per_component),
+    ("h1", "53", lambda S_xi, N, T: [0.5 * S_xi / T, 0.5 * N / T]),
+    ("j3", "5", lambda a: (2 * (1 - np.sqrt(1 - a)) ** 2, 2 * (1 - np.sqrt(1 - a)) ** 2 / np.sqrt(1 - a))),
+    ("l2", "53", lambda reading, rate, shift: reading / rate - shift / rate),
+    ("m1", "53", lambda beta: 2 * np.log(1 / (1 - beta))),
+    ("m2", "53", lambda nu, F: -sp.log(sp.sqrt(2 * sp.pi * F)) - (nu / sp.sqrt(F)) ** 2 / 2),
+    ("o4", "53", deviations),
+    ("p2", "53", lambda gamma, G, d, r: (gamma * G) ** 2 * d + gamma**2 * r),
+    ("p8", "53", lambda x, mode: (x.mean(), x.var())),
+    ("r4", "53", lambda p, A, D, T: p * A**2 / D / T / 4 / sp.pi),
+    ("r4", "53", lambda p, A, D, T: p * A**2 / (2 * D) / (2 * np.pi * T)),  # pi with the digits of a float
+    ("r5", "53", lambda variance, q: np.array([one_time(s, q) for s in variance])),
+    ("f2", "53", f2_by_logarithms),
+    ("f3", "53", f3_by_loop),
+    ("g1", "53", g1_by_loops),
+    ("h2", "53", h2_by_variances),
+    ("h4", "53", h4_solved),
+    ("i3", "53", i3_solved),
+    ("i4", "53", i4_by_information),
+    ("i5", "53", i5_column_by_column),
+    ("j1", "53", j1_by_rotations),
+    ("j3", "53", j3_by_the_filter),
+    ("j4", "53", j4_matrices),
+    ("j5", "53", j5_solved),
+    ("j6", "53", j6_closed),
+    ("k2", "53", k2_through_p),
+    ("k3", "53", k3_velocity_carried_on),
+    ("l1", "53", l1_by_slice),
+    ("l3", "53", l3_by_information),
+    ("l4", "53", l4_in_small_steps),
+    ("l6", "53", l6_from_the_motion),
+    ("l7", "53", l7_normal_equations),
+    ("m3", "53", m3_by_blocks),
+    ("m5", "53", m5_at_once),
+    ("m6", "53", m6_loop),
+    ("n1", "53", n1_by_loop),
+    ("n2", "53", n2_in_two_halves),
+    ("n4", "53", n4_by_whitening),
+    ("n6", "53", n6_by_loop),
+]
+
+
+@pytest.mark.parametrize(("name", "variant", "answer"), [pytest.param(*row, id=f"{row[0]}-{i}") for i, row in enumerate(RIGHT)])
+def test_right_answers_in_unusual_forms_pass(name, variant, answer):
+    result = exercise(name[0], GENERATED if variant == "generated" else variant).check(name, answer)
+    assert result.passed, result

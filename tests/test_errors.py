@@ -1,0 +1,77 @@
+"""Errors: another kind of value than is expected is refused in words; what a report needs survives a process."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from kfcourse import (
+    Ensemble,
+    JumpModel,
+    Model,
+    NoClosedForm,
+    NotFinite,
+    compare,
+    continuous,
+    design,
+    gaussian,
+    likelihood,
+    linearised,
+    predictions,
+    run,
+    smooth,
+)
+from kfcourse.filters import aof, duof, fos, gated, kalman_filter, particle, pointmass
+
+pytestmark = pytest.mark.quick
+
+MODEL = Model.define("0.9*x + a*v", "x + w", {"a": 1.0})
+JUMPS = JumpModel.define("x + v", "x + w", modes={"a": {}}, transition=[1.0])
+STRUCTURE = linearised(MODEL)
+FILTER = aof(STRUCTURE)
+Y = np.zeros(3)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: aof(MODEL), r"^aof expects a Structure, got Model: give linearised\(model\)"),
+        (lambda: fos(FILTER), r"^fos expects a Structure, got Filter aof-linearised: give linear"),
+        (lambda: run(STRUCTURE, Y), r"^a run expects a Filter, got Structure linearised: give a filter"),
+        (lambda: smooth(MODEL, Y), r"^smooth expects a Filter, got Model: give a filter, such as aof"),
+        (lambda: likelihood(duof(MODEL), Y), r"^likelihood expects a Filter, got Design duof: .* design"),
+        (lambda: gated(Y), r"^gated expects a Filter, got ndarray: give a filter"),
+        (lambda: predictions(aof, Y), r"^a run expects a Filter, got function aof: give a filter"),
+        (lambda: gaussian(FILTER), r"^gaussian expects a Model, got Filter aof-lin.*: give a model, .* filter"),
+        (lambda: kalman_filter(STRUCTURE), r"^kalman_filter expects a Model, got Structure linearised"),
+        (lambda: particle(Y), r"^particle expects a Model, got ndarray"),
+        (lambda: continuous.to_discrete(MODEL, 0.1), r"expects a ContinuousModel, got Model"),
+        (lambda: pointmass(STRUCTURE), r"^pointmass expects a Model, got Structure linearised"),
+        (
+            lambda: design([FILTER], Ensemble(MODEL, 10, 2, 1).by_step()),
+            r"^design expects a Design, got Filter",
+        ),
+        (
+            lambda: compare([FILTER, MODEL], MODEL, 10, 2, 1),
+            r"^compare expects a Filter, got Model: give a filter",
+        ),
+    ],
+)
+def test_another_kind_of_value_is_refused_in_words(call, message):
+    with pytest.raises(TypeError, match=message):
+        call()
+
+
+def test_a_model_with_modes_is_no_model_without():
+    with pytest.raises(TypeError, match="got JumpModel"):
+        linearised(JUMPS)
+
+
+def test_what_a_report_says_of_an_error_survives_a_process():
+    for error in (
+        NoClosedForm("no mean of x", "no_mean", term="x"),
+        NotFinite("step 3: it diverges", "duof", "infinite", step=3),
+    ):
+        copy = pickle.loads(pickle.dumps(error))
+        assert (str(copy), copy.kind, copy.parts) == (str(error), error.kind, error.parts)
+        assert getattr(copy, "filter_name", "") == getattr(error, "filter_name", "")
