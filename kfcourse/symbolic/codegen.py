@@ -95,9 +95,7 @@ def _compiled(
 
     def function(*arrays: Array) -> tuple[Array, ...]:
         values = iter(formulas(*(arrays[number][(..., *index)] for _, number, index in taken)))
-        leads = [
-            array.shape[: -1 if key in vectors else -2] for array, (key, _) in zip(arrays, arguments, strict=True)
-        ]
+        leads = [array.shape[: -1 if key in vectors else -2] for array, (key, _) in zip(arrays, arguments, strict=True)]
         return tuple(assemble(values, leads) for assemble in assembled)
 
     return Compiled(function, inspect.getsource(formulas).replace("_lambdifygenerated", name))

@@ -42,9 +42,7 @@ _OTHERS = (sp.Symbol, sp.Number, type(sp.pi), type(sp.E), sp.Add, sp.Mul, sp.Pow
 _KNOWN = (*FUNCTIONS, *_OTHERS, Relational, sp.And, sp.Or, type(sp.true))
 # What the printed functions call beside JavaScript's own.
 RUNTIME = "const kfInverse = (x) => (x === 0 ? 0 : 1 / x);\n"
-_printer = JavascriptCodePrinter(
-    {"user_functions": {"inverse": "kfInverse", "expm1": "Math.expm1", "log1p": "Math.log1p"}}
-)
+_printer = JavascriptCodePrinter({"user_functions": {"inverse": "kfInverse", "expm1": "Math.expm1", "log1p": "Math.log1p"}})
 
 
 def expression(e: sp.Basic, names: Mapping[sp.Symbol, str]) -> str:
@@ -115,7 +113,9 @@ def loop(
     # All is read before anything is written: an output may stand in the place of an argument.
     lines += [f"const o{number} = {expression(value, names)};" for number, value in enumerate(reduced)]
     lines += [f"{place} = o{number};" for number, place in enumerate(places)]
-    return "\n".join([f"function {name}(n, v, c, a) {{", "  for (let i = 0; i < n; i++) {", *(f"    {x}" for x in lines), "  }", "}", ""])
+    return "\n".join(
+        [f"function {name}(n, v, c, a) {{", "  for (let i = 0; i < n; i++) {", *(f"    {x}" for x in lines), "  }", "}", ""]
+    )
 
 
 def _index(size: int, place: int) -> str:

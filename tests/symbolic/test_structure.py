@@ -1,7 +1,5 @@
 """Structural functions: the page's table, quadrature, and what each kind is exact for."""
 
-import re
-
 import numpy as np
 import oracles
 import pytest
