@@ -187,7 +187,7 @@ def test_jumps_of_the_probabilities_are_refused_by_who_integrates_them():
     ("row", "message"),
     [
         (["1 - x/20", "x/20"], r"at step 0, where x = 30: row 1 has an entry that is no"),
-        (["exp(-x**2)", "0.5"], r"at step 0, where x = 30: row 1 sums to"),
+        (["exp(-x**2)", "0.5"], r"at step 0, where x = 0: row 1 sums to"),
     ],
 )
 def test_what_is_no_probability_for_a_state_is_refused_there(row, message):
