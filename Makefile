@@ -37,8 +37,7 @@ help:
 book: install
 	$(BIN)/python book/build.py
 
-test: install
-	@$(BIN)/python .ci/cost.py "$(MAKE)" lint unit book notebooks
+test: lint unit book notebooks
 
 quick: lint
 	$(BIN)/pytest -q -n auto --dist loadscope -m quick --ignore tests/test_book.py
@@ -79,10 +78,16 @@ benchmark: install
 	$(BIN)/python benchmarks/looking_back.py
 	$(BIN)/python benchmarks/jumps.py
 
+.venv/installed: requirements.txt pyproject.toml
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --require-hashes -r requirements.txt
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	@touch .venv/installed
+
 install:
 	@$(PYTHON) -c "" 2>/dev/null || { echo "$(PYTHON) does not start. Install Python 3.11 or newer, or name it: make PYTHON=/path/to/python3 $(MAKECMDGOALS)" >&2; exit 1; }
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; v >= (3, 11) or sys.exit("$(PYTHON) is Python %d.%d, too old: 3.11 or newer is needed. Name another one: make PYTHON=python3.12 $(MAKECMDGOALS)" % v)'
-	@$(PYTHON) .ci/environment.py $(MAKECMDGOALS)
+	@$(MAKE) --no-print-directory .venv/installed
 
 # One lock for all: versions and hashes for every Python from 3.11.0 on and every system. Versions stay unless a bound forces them.
 COMPILE := pip compile --quiet --universal --python-version 3.11.0 --generate-hashes --all-extras --no-annotate \

@@ -1,6 +1,6 @@
 """Sphinx extension: what each typed relation is, under its display, and in a word at the end of its box.
 
-Displays and boxes that a page types are judged by the letters of the page (`kfcourse.pages.relations`, `letters/`).  A relation
+Displays and boxes that a page types are judged by the letters of the page (`gate.page`, `letters/`).  A relation
 that does not hold, or of which nothing says what it is, is a warning, and warnings are errors.
 """
 
@@ -11,10 +11,10 @@ from pathlib import Path
 
 from docutils import nodes
 from equations import PAGE
+from gate.page import Formula, Letters, Said, letters_file, letters_of, mark
 from sphinx.util import logging
 
-from kfcourse.pages.relations import Formula, Letters, Said, letters_file, letters_of, mark
-from kfcourse.pages.verification import Unverified
+from kfcourse.pages import Unverified
 
 BOXES = {"algorithm", "definition"}
 log = logging.getLogger(__name__)

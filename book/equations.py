@@ -1,7 +1,7 @@
 """The page of all displayed equations, each with what it is.
 
 `verified` and `typeset` (kfcourse.pages) leave a record beside each equation that they print: LaTeX, how it was verified or
-what it is, its label.  Equations that a chapter types are judged with the letters of the page (kfcourse.pages.relations).
+what it is, its label.  Equations that a chapter types are judged with the letters of the page (gate.page).
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
-from kfcourse.pages.relations import judged, mark
+from gate.page import judged, mark
+
 from kfcourse.pages.verification import VERIFIED
 
 PAGE = Path(__file__).resolve().parent / "equations.md"

@@ -10,7 +10,6 @@ import sympy as sp
 
 from kfcourse.checks.exercises import COURSE, Exercise
 from kfcourse.checks.steps import STEP, Function, at_wrong_step
-from kfcourse.filters.designed import Scatter
 from kfcourse.laws import Array, transpose
 from kfcourse.scenarios.navigation import Dynamics
 
@@ -90,6 +89,40 @@ def other_equations(exercise: Exercise, a: Function, b: Function) -> tuple[Funct
     return _like(a, other_a), _like(b, other_b)
 
 
+# -- regressions over an ensemble
+
+RUNS = 60  # hidden trajectories: a regression over so few differs clearly from one with N - 1 in the place of N
+
+
+def regression(target: Array, regressor: Array) -> tuple[Array, Array, Array]:
+    """matrix (r, s), offset (r,), residual covariance (r, r)."""
+    t, r = target - target.mean(axis=0), regressor - regressor.mean(axis=0)
+    cross, own = t.T @ r / len(t), r.T @ r / len(r)
+    matrix = cross @ np.linalg.pinv(own, hermitian=True)
+    offset = target.mean(axis=0) - matrix @ regressor.mean(axis=0)
+    return matrix, offset, t.T @ t / len(t) - matrix @ cross.T
+
+
+# Edits of it that are mistakes in more than one question: second moments about zero, and no offset.
+MOMENTS = (
+    "t.T @ r / len(t), r.T @ r / len(r)",
+    "target.T @ regressor / len(t), regressor.T @ regressor / len(r)",
+)
+OFFSET = "target.mean(axis=0) - matrix @ regressor.mean(axis=0)", "target.mean(axis=0)"
+
+
+def ensemble(exercise: Exercise, name: str) -> tuple[Array, Array, Array]:
+    """x_k, y_k and x_{k+1} of hidden trajectories, (N, ...), at a step when the filter is under way."""
+    x, y = exercise.simulate(RUNS, 4, name)
+    return x[2], y[2], x[3]
+
+
+def predicted(exercise: Exercise, name: str, x: Array) -> Array:
+    """What a filter may have predicted of x: near it, and biased a little."""
+    spread = x.std(axis=0) + 0.1 * np.sqrt(np.diagonal(exercise.model.prior.cov))
+    return x + spread * (0.1 + 0.5 * exercise.rng(name).normal(size=x.shape))
+
+
 # -- a wrong step, for known mistakes: the function of another step, at step k
 
 
@@ -108,43 +141,6 @@ def step_before(function: Function, k: int) -> Function:
     return at_wrong_step(function, k - 1)
 
 
-# -- regressions over an ensemble
-
-RUNS = 60  # hidden trajectories: a regression over so few differs clearly from one with N - 1 in the place of N
-
-Fit = Callable[[Array, Array], tuple[Array, Array, Array]]
-
-
-def regression(target: Array, regressor: Array) -> tuple[Array, Array, Array]:
-    """matrix (r, s), offset (r,), residual covariance (r, r)."""
-    matrix, offset, residual = Scatter.of(target, regressor).regression()
-    return matrix, offset, residual
-
-
-def ensemble(exercise: Exercise, name: str) -> tuple[Array, Array, Array]:
-    """x_k, y_k and x_{k+1} of hidden trajectories, (N, ...), at a step when the filter is under way."""
-    x, y = exercise.simulate(RUNS, 4, name)
-    return x[2], y[2], x[3]
-
-
-def predicted(exercise: Exercise, name: str, x: Array) -> Array:
-    """What a filter may have predicted of x: near it, and biased a little."""
-    spread = x.std(axis=0) + 0.1 * np.sqrt(np.diagonal(exercise.model.prior.cov))
-    return x + spread * (0.1 + 0.5 * exercise.rng(name).normal(size=x.shape))
-
-
-def regression_with(moments: Callable[[Array, Array], tuple[Array, Array]], offset: bool = True) -> Fit:
-    """A regression from other second moments: (target, regressor) -> (cross (r, s), of the regressor (s, s))."""
-
-    def fit(target: Array, regressor: Array) -> tuple[Array, Array, Array]:
-        cross, own = moments(target, regressor)
-        matrix = cross @ np.linalg.pinv(own)
-        shift = target.mean(axis=0) - matrix @ regressor.mean(axis=0) if offset else target.mean(axis=0)
-        return matrix, shift, covariance_of(target, target) - matrix @ covariance_of(target, regressor).T
-
-    return fit
-
-
 def covariance_of(a: Array, b: Array) -> Array:
     """Cross covariance of two samples (N, r), (N, s), over N."""
     return (a - a.mean(axis=0)).T @ (b - b.mean(axis=0)) / len(a)
@@ -153,7 +149,3 @@ def covariance_of(a: Array, b: Array) -> Array:
 def raw_moment(a: Array, b: Array) -> Array:
     """The same about zero."""
     return a.T @ b / len(a)
-
-
-MOMENTS_ABOUT_ZERO = regression_with(lambda t, r: (raw_moment(t, r), raw_moment(r, r)))
-WITHOUT_OFFSET = regression_with(lambda t, r: (covariance_of(t, r), covariance_of(r, r)), offset=False)

@@ -15,7 +15,7 @@ import click
 from kfcourse.commands import main as main  # scripts that were installed before call it here
 from kfcourse.derivations import check_text
 from kfcourse.derivations.setting import of_model
-from kfcourse.files import is_standard_output, read_only, replacing_together
+from kfcourse.files import replacing_together
 from kfcourse.lab.admission import admissions, on_trial
 from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.budget import SIZES, Budget, usual_runs
@@ -34,6 +34,7 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.writing import by_thousands
 
 DERIVATION = 180.0  # seconds for the formulas of the filters: a busy machine must not leave out what a quiet one has
+STANDARD_OUTPUT = ("-", "/dev/stdout")
 LONGEST = 1_000_000  # bytes of a derivation; /dev/zero never ends
 ENOUGH = 3600  # seconds for slow filters, where their number is given
 DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with more, the lab takes longer
@@ -190,7 +191,7 @@ def lab(
         click.echo(f"{title(name)} left out: {reason}", err=True)
     for name, reason in result.replaced.items():
         click.echo(f"{title(name)} by particles: {reason}", err=True)
-    to_error = json_file is not None and is_standard_output(json_file)
+    to_error = str(json_file) in STANDARD_OUTPUT
     _tell(result, to_error)
     again = _again(result, variant, variants_file, seed, names, designs, wide, same_ensemble, compiled)
     click.echo(again, err=to_error)
@@ -410,12 +411,10 @@ def _check_places(folder: Path, json_file: Path | None) -> None:
         for place in made:
             if place.is_dir():
                 place.rmdir()
-    if json_file is None or is_standard_output(json_file):
+    if json_file is None or str(json_file) in STANDARD_OUTPUT:
         return
     if json_file.is_dir() or not json_file.parent.is_dir():
         raise click.ClickException(f"the numbers cannot go to {json_file}: name a file in an existing folder with --json")
-    if read_only(json_file):
-        raise click.ClickException(f"{json_file} is read-only, and is not replaced: name another file with --json")
     if json_file.exists() and not json_file.is_file():  # a pipe or a device is written to, not replaced
         return
     try:

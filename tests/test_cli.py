@@ -16,7 +16,6 @@ import pytest
 from click.testing import CliRunner
 
 from kfcourse import cli, compare
-from kfcourse.files import replacing_together, save
 from kfcourse.lab import report
 from kfcourse.lab.short_names import FILTERS, LAB, lab_filters
 from kfcourse.lab.variants import find_variant
@@ -448,12 +447,6 @@ def test_an_end_leaves_no_folder(call, tmp_path, end_by):
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_the_way_signals_are_met_is_restored(call):
-    before = signal.getsignal(signal.SIGTERM)
-    assert call("variants").exit_code == 0
-    assert signal.getsignal(signal.SIGTERM) is before
-
-
 def test_formulas_that_are_not_found_in_time_are_refused_with_a_way_out(call, no_computation, monkeypatch, tmp_path):
     product = "*".join(f"(x + {k})" for k in range(23))
     table = f'[variants.long]\nstate = "1e-30*{product} + v"\nmeter = "x + w"\n'
@@ -514,35 +507,6 @@ def test_a_report_that_fails_keeps_ranking_and_numbers(call, tmp_path, monkeypat
     assert not (tmp_path / "lab-53").exists()
 
 
-@pytest.mark.parametrize("after", range(0, 30, 3))
-def test_an_end_while_files_are_moved_mixes_no_old_and_new(tmp_path, monkeypatch, after):
-    """A report is exchanged for another one of other names, in part; Ctrl-C comes after so many moves."""
-    folder, moves, whole = tmp_path / "report", [], Path.replace
-    for number, names in (("old", "abcdefgh"), ("new", "efghijkl")):
-
-        def interrupted(source, target, number=number):
-            if number == "new" and len(moves) == after:
-                moves.append("end")
-                raise KeyboardInterrupt
-            moves.append(target) if number == "new" else None
-            return whole(source, target)
-
-        before = snapshot(folder) if number == "new" else {}
-        monkeypatch.setattr(Path, "replace", interrupted)
-        try:
-            with replacing_together(folder) as place:
-                for name in names:
-                    (place / name).write_text(number, encoding="utf-8")
-        except KeyboardInterrupt:
-            assert snapshot(folder) == before
-        else:
-            assert after >= 12 or number == "old"
-    assert not [path for path in folder.iterdir() if path.name.startswith(".")]
-    assert {path.read_text(encoding="utf-8") for path in folder.iterdir() if path.name in "efghijkl"} == (
-        {"old"} if after < 12 else {"new"}
-    )
-
-
 def test_an_end_while_the_report_is_written_leaves_the_one_that_was_there(call, no_figures, tmp_path, monkeypatch):
     """Of both reports: what is new appears when all of it is written."""
     assert call("lab", "53", *QUICK, "--filters", "duof", "--out", "r", "--report", "ru").exit_code == 0
@@ -565,15 +529,7 @@ def test_a_student_s_report_of_an_earlier_run_is_not_taken_for_this_one_s(call, 
     assert [("earlier run" in call(*run, *more).output) for more in ((), ("--report", "ru"), ())] == [False, False, True]
 
 
-def test_a_read_only_file_of_the_report_is_not_replaced_nor_are_the_others(call, no_figures, tmp_path):
-    assert call("lab", "53", *QUICK, "--filters", "duof", "--out", "r").exit_code == 0
-    before = snapshot(tmp_path)
-    (tmp_path / "r" / "report.tex").chmod(0o444)
-    refused(call("lab", "53", *QUICK, "--seed", 2, "--filters", "duof", "--out", "r"), "report.tex is read-only")
-    assert snapshot(tmp_path) == before
-
-
-@pytest.mark.parametrize("target", ["-", "/dev/stdout", "same.json"])
+@pytest.mark.parametrize("target", ["-", "/dev/stdout"])
 @pytest.mark.skipif(sys.platform == "win32", reason="no /dev/stdout")
 def test_numbers_and_ranking_to_one_place_lose_nothing(tmp_path, target):
     """Standard output is a file, and takes the numbers: the file has them and nothing else."""
@@ -586,28 +542,10 @@ def test_numbers_and_ranking_to_one_place_lose_nothing(tmp_path, target):
     assert "GAOF is" in done.stderr and "Report: " in done.stderr
 
 
-def test_a_read_only_file_of_numbers_is_not_replaced(call, no_computation, tmp_path):
-    (tmp_path / "n.json").write_text("mine", encoding="utf-8")
-    (tmp_path / "n.json").chmod(0o444)
-    refused(call("lab", "53", *QUICK, "--json", "n.json"), "n.json is read-only", "--json")
-    assert (tmp_path / "n.json").read_text(encoding="utf-8") == "mine"
-    with pytest.raises(PermissionError, match="read-only"):
-        save("other", tmp_path / "n.json")
-    assert (tmp_path / "n.json").read_text(encoding="utf-8") == "mine"
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="a folder in which nobody may make a file: /proc")
 def test_a_place_where_no_file_can_be_made_is_refused_before_the_computation(call, no_computation):
     refused(call("lab", "53", *QUICK, "--out", "/proc"), "the report cannot go to /proc", "--out")
     refused(call("lab", "53", *QUICK, "--json", "/proc/n.json"), "the numbers cannot go to /proc/n.json", "--json")
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="no modes")
-def test_a_replaced_file_keeps_its_mode(tmp_path):
-    (tmp_path / "n.json").write_text("old", encoding="utf-8")
-    (tmp_path / "n.json").chmod(0o600)
-    save("new", tmp_path / "n.json")
-    assert ((tmp_path / "n.json").read_text(encoding="utf-8"), (tmp_path / "n.json").stat().st_mode & 0o777) == ("new", 0o600)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")

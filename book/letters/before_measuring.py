@@ -1,13 +1,13 @@
 """The letters of before-measuring.md: a run of the Kalman filter; the same step with all noises scaled; a small index."""
 
 import numpy as np
+from gate.page import NOTATION
+from gate.worlds import covariance, kalman_run
 
 from kfcourse.filters.alphabeta import steady_beta
 from kfcourse.filters.kalman import correct, predict
 from kfcourse.laws import Gaussian
 from kfcourse.linear.system import LinearSystem
-from kfcourse.pages.letters import covariance, kalman_run
-from kfcourse.pages.relations import NOTATION
 
 
 def scaled(rng):
@@ -52,7 +52,7 @@ def small_gains(rng):
 
 LETTERS = (kalman_run, scaled, small_index, steady, small_gains)
 SAID = {
-    "Q=0": "a setting",
-    **dict.fromkeys((r"\Psi'_c", r"\psi'_{22}", r"\sigma_r", "p_{22}", r"p_{22}\big|_{\Lambda\to0}"), NOTATION),
+    "a setting": ["Q=0"],
+    NOTATION: [r"\Psi'_c", r"\psi'_{22}", r"\sigma_r", "p_{22}", r"p_{22}\big|_{\Lambda\to0}"],
 }
 EQUALS = {r"c\,\Psi'": r"\Psi'_c", r"\lim_{\Lambda\to0}\alpha\,/\sqrt{2\Lambda}": "1"}

@@ -1,11 +1,11 @@
 """The letters of better-than-a-tangent.md: moments of signals over a normal law, by quadrature and by the package."""
 
 import numpy as np
+from gate.page import DEFINITION, NOTATION
+from gate.values import Operator
+from gate.worlds import normal_nodes
 
 from kfcourse import Model, gaussian
-from kfcourse.pages.letters import normal_nodes
-from kfcourse.pages.reader import Operator
-from kfcourse.pages.relations import DEFINITION, NOTATION
 
 
 def line(rng):
@@ -51,12 +51,7 @@ def statistical(rng):
 
 
 LETTERS = (line, second_order, statistical)
-SAID = {r"x\sim\mathcal N(\lambda,\Psi)": DEFINITION, r"g^2D_\xi": NOTATION}
-SAID |= dict.fromkeys(
-    (
-        r"(\Theta-G^2p)_{1}",
-        r"(\Theta-G^2p)_{2}",
-        r"\mathsf{M}[e^2]",
-    ),
-    NOTATION,
-)
+SAID = {
+    DEFINITION: [r"x\sim\mathcal N(\lambda,\Psi)"],
+    NOTATION: [r"g^2D_\xi", r"(\Theta-G^2p)_{1}", r"(\Theta-G^2p)_{2}", r"\mathsf{M}[e^2]"],
+}

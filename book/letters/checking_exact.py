@@ -1,9 +1,8 @@
 """The letters of checking-exact.md: point masses as a plain program, for a noise that enters linearly."""
 
 import numpy as np
-
-from kfcourse.pages.reader import Of, bell
-from kfcourse.pages.relations import CONDITION, DEFINITION, NOTATION
+from gate.page import CONDITION, DEFINITION, NOTATION
+from gate.values import Of, bell
 
 
 def masses(rng):
@@ -56,9 +55,8 @@ def crossing(rng):
 
 
 LETTERS = (masses, bent, crossing)
-SAID = {r"a_v=\frac{\partial a}{\partial v}": DEFINITION}
-SAID |= dict.fromkeys(
-    (r"\frac{dx}{dt}", "I_y(x)"),
-    NOTATION,
-)
-SAID |= {"|y_0|=2": CONDITION}
+SAID = {
+    DEFINITION: [r"a_v=\frac{\partial a}{\partial v}"],
+    NOTATION: [r"\frac{dx}{dt}", "I_y(x)"],
+    CONDITION: ["|y_0|=2"],
+}

@@ -1,11 +1,11 @@
 """The letters of comparison.md: a state, its posterior mean and another estimate, with finitely many measurements."""
 
 import numpy as np
+from gate.values import Indexed, Operator
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from kfcourse.filters import aof
-from kfcourse.pages.reader import Indexed, Operator
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import linearised
 
@@ -60,5 +60,3 @@ def linearised_start(rng):
 
 
 LETTERS = (exact, against_the_bound, other_law, linearised_start)
-SAID = {}
-LITERALS = ("20",)

@@ -1,10 +1,9 @@
 """The letters of consistency.md: a run of the package's Kalman filter, in both notations."""
 
 import numpy as np
-
-from kfcourse.pages.letters import kalman_run
-from kfcourse.pages.reader import Indexed
-from kfcourse.pages.relations import CONDITION, NOTATION
+from gate.page import CONDITION, NOTATION
+from gate.values import Indexed
+from gate.worlds import kalman_run
 
 
 def course(rng):
@@ -39,17 +38,14 @@ def constant_gain(rng):
 
 LETTERS = (course, western, constant_gain)
 SAID = {
-    r"\chi^2_{N\dim x}/N": NOTATION,
-    "Q/R": NOTATION,
-    r"H\Phi K>0": CONDITION,
-    r"\mathsf P(e^Tp^{-1}e<\rho^2)": NOTATION,
-    r"\mathsf M(e^Tp^{-1}e)\big|_{P=p}": NOTATION,
-    r"\mathsf M(\nu_{k+1}\nu_k)": NOTATION,
-}
-SAID |= dict.fromkeys(
-    (
+    NOTATION: [
+        r"\chi^2_{N\dim x}/N",
+        "Q/R",
+        r"\mathsf P(e^Tp^{-1}e<\rho^2)",
+        r"\mathsf M(e^Tp^{-1}e)\big|_{P=p}",
+        r"\mathsf M(\nu_{k+1}\nu_k)",
         r"\mathsf{M}(e^Tp^{-1}e)",
         r"\operatorname{tr}(p^{-1}P)",
-    ),
-    NOTATION,
-)
+    ],
+    CONDITION: [r"H\Phi K>0"],
+}

@@ -2,14 +2,14 @@
 
 import numpy as np
 import sympy as sp
+from gate.page import DEFINITION, NOTATION
+from gate.values import Indexed
+from gate.worlds import column, covariance, slope
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from kfcourse.continuous import ContinuousModel, extended_kalman_bucy, steady_state, to_discrete
 from kfcourse.continuous.equations import filter_equations
-from kfcourse.pages.letters import column, covariance, slope
-from kfcourse.pages.reader import Indexed
-from kfcourse.pages.relations import DEFINITION, NOTATION
 from kfcourse.symbolic.structure import linearised
 
 SIGNAL = ["x1 + 0.2*x2**2", "x2 - 0.3*x1*x2"]
@@ -225,17 +225,23 @@ LETTERS = (
     from_infinity,
 )
 SAID = {
-    r"\frac{dx}{dt}=f(x,t)+g(x,t)\,\xi(t)": DEFINITION,
-    r"y(t)=S(cx,t)+n(t)": DEFINITION,
-    r"x(0)\sim\mathcal N(m,d)": DEFINITION,
-    r"\text{intensity}=\text{two-sided density}=\tfrac12\,\text{one-sided density}=\tfrac N2 .": DEFINITION,
-    r"\mathsf D\Bigl[\textstyle\frac1T\int_0^Tn\,dt\Bigr]": NOTATION,
-    r"\mathsf M[\text{middle}]-\mathsf M[\text{beginning}]": NOTATION,
+    DEFINITION: [
+        r"\frac{dx}{dt}=f(x,t)+g(x,t)\,\xi(t)",
+        "y(t)=S(cx,t)+n(t)",
+        r"x(0)\sim\mathcal N(m,d)",
+        r"\text{intensity}=\text{two-sided density}=\tfrac12\,\text{one-sided density}=\tfrac N2 .",
+        r"q=s^2S_\xi/2",
+        "r=2h^2/N",
+    ],
+    NOTATION: [
+        r"\mathsf D\Bigl[\textstyle\frac1T\int_0^Tn\,dt\Bigr]",
+        r"\mathsf M[\text{middle}]-\mathsf M[\text{beginning}]",
+        r"{\textstyle\frac12}",
+    ],
 }
-EQUALS = {r"N\cdot\frac1{2T}": r"\frac N{2T}", r"D\big|_{a=0}": r"\sqrt{q/r}", "D_{4N}": "2D"}
-SAID |= dict.fromkeys(
-    (r"{\textstyle\frac12}",),
-    NOTATION,
-)
-SAID |= dict.fromkeys((r"q=s^2S_\xi/2", r"r=2h^2/N"), DEFINITION)
-EQUALS |= {r"2\rho/\bigl(r(e^{2\rho t}-1)\bigr)": r"\delta_\infty"}
+EQUALS = {
+    r"N\cdot\frac1{2T}": r"\frac N{2T}",
+    r"D\big|_{a=0}": r"\sqrt{q/r}",
+    "D_{4N}": "2D",
+    r"2\rho/\bigl(r(e^{2\rho t}-1)\bigr)": r"\delta_\infty",
+}

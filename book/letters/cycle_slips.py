@@ -1,12 +1,11 @@
 """The letters of cycle-slips.md: the mean time to a slip by Pontryagin's equation, the loop by iteration."""
 
 import numpy as np
+from gate.page import CONDITION, DEFINITION, NOTATION
+from gate.values import Of
 from scipy.integrate import quad, solve_ivp
 from scipy.linalg import solve_continuous_are
 from scipy.special import iv
-
-from kfcourse.pages.reader import Of
-from kfcourse.pages.relations import CONDITION, DEFINITION, NOTATION
 
 
 def slips(rng):
@@ -70,8 +69,7 @@ def carrier(rng):
 
 LETTERS = (slips, loop, saw, pushed, carrier)
 SAID = {
-    r"\Delta_{k+1}=\Delta_k-p\,U(\Delta_k)-p\,\tilde n_k+s_\varphi v_k": DEFINITION,
-    "2D_n/A^2": NOTATION,
-    r"1/\sigma_\varphi^2": NOTATION,
+    DEFINITION: [r"\Delta_{k+1}=\Delta_k-p\,U(\Delta_k)-p\,\tilde n_k+s_\varphi v_k"],
+    NOTATION: ["2D_n/A^2", r"1/\sigma_\varphi^2"],
+    CONDITION: [r"\tau(2\pi)=0"],
 }
-SAID |= {r"\tau(2\pi)=0": CONDITION}

@@ -1,11 +1,13 @@
 """The letters of derive-it.md: it types no relation of its own, the chains are checked where they stand."""
 
-from kfcourse.pages.relations import NOTATION
+from gate.page import NOTATION
 
 LETTERS = ()
 SAID = {
-    r"\mathsf Mx^4": NOTATION,
-    r"\mathsf Mx^6": NOTATION,
-    r"\text{two nodes lack of }\mathsf M x^4": NOTATION,
-    r"\text{three nodes lack of }\mathsf M x^6": NOTATION,
+    NOTATION: [
+        r"\mathsf Mx^4",
+        r"\mathsf Mx^6",
+        r"\text{two nodes lack of }\mathsf M x^4",
+        r"\text{three nodes lack of }\mathsf M x^6",
+    ],
 }

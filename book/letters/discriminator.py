@@ -1,10 +1,9 @@
 """The letters of discriminator.md: a loop with several components in the gain form, and the characteristic of a carrier."""
 
 import numpy as np
-
-from kfcourse.pages.letters import K_RANGE, column, covariance, given, slope
-from kfcourse.pages.reader import Indexed, Of, Operator
-from kfcourse.pages.relations import NOTATION
+from gate.page import NOTATION
+from gate.values import Indexed, Of, Operator
+from gate.worlds import K_RANGE, column, covariance, given, slope
 
 C = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
@@ -91,8 +90,7 @@ def drifting(rng):
 
 LETTERS = (run, display, western, carrier, drifting)
 SAID = {
-    latex: NOTATION
-    for latex in (
+    NOTATION: [
         r"\frac1p",
         r"\frac{\partial\ln p(x\mid y)}{\partial x}\Big|_{\lambda}",
         r"\mathsf D[u]_\text{carrier}",
@@ -102,5 +100,5 @@ SAID = {
         r"\tfrac12\textstyle\sum_{k=0}^1\mathsf M[u]",
         r"\mathsf M[u]",
         "p_kc^T",
-    )
+    ],
 }

@@ -2,9 +2,8 @@
 
 import numpy as np
 import scipy
-
-from kfcourse.pages.letters import column, covariance
-from kfcourse.pages.relations import DEFINITION, NOTATION
+from gate.page import DEFINITION, NOTATION
+from gate.worlds import column, covariance
 
 EAST, NORTH = (rf"\int_0^\Delta V\{function}(\psi+\omega s)\,ds" for function in ("cos", "sin"))
 
@@ -60,16 +59,11 @@ def long_tunnel(rng):
 
 
 LETTERS = (arc, tunnel, moved, long_tunnel)
-EQUALS = {
-    EAST: r"V\Delta\cos(\psi+u)\frac{\sin u}{u}",
-    NORTH: r"V\Delta\sin(\psi+u)\frac{\sin u}{u}",
-}
 SAID = {
-    r"e=\rho\cos\varphi_0\,(\ell-\ell_0)": DEFINITION,
-    r"n=\rho\,(\varphi-\varphi_0)": DEFINITION,
-    "e_{k+1}": NOTATION,
-    "n_{k+1}": NOTATION,
-    r"\psi_{k+1}": NOTATION,
-    "V_{k+1}": NOTATION,
-    r"\Delta": NOTATION,
+    DEFINITION: [r"e=\rho\cos\varphi_0\,(\ell-\ell_0)", r"n=\rho\,(\varphi-\varphi_0)"],
+    NOTATION: ["e_{k+1}", "n_{k+1}", r"\psi_{k+1}", "V_{k+1}", r"\Delta"],
+}
+EQUALS = {
+    r"\int_0^\Delta V\cos(\psi+\omega s)\,ds": r"V\Delta\cos(\psi+u)\frac{\sin u}{u}",
+    r"\int_0^\Delta V\sin(\psi+\omega s)\,ds": r"V\Delta\sin(\psi+u)\frac{\sin u}{u}",
 }

@@ -1,11 +1,10 @@
 """The letters of extended-kalman.md: a run of the package's extended filter, and the same filter in Western letters."""
 
 import numpy as np
+from gate.page import CONDITION, DEFINITION, NOTATION
+from gate.values import Indexed, Of
+from gate.worlds import BENT_LATER, covariance, extended_run, given
 from scipy.stats import multivariate_normal
-
-from kfcourse.pages.letters import BENT_LATER, covariance, extended_run, given
-from kfcourse.pages.reader import Indexed, Of
-from kfcourse.pages.relations import CONDITION, DEFINITION, NOTATION
 
 
 def course(rng):
@@ -85,26 +84,22 @@ def across(rng):
 
 LETTERS = (course, western, beams, perfect, no_prior, tangents, across)
 SAID = {
-    r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k": DEFINITION,
-    r"y_k=S_k(x_k)+n_k": DEFINITION,
-    r"\Phi": NOTATION,
-    "H": NOTATION,
+    DEFINITION: [r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k", "y_k=S_k(x_k)+n_k", "x=z+e"],
+    NOTATION: [
+        r"\Phi",
+        "H",
+        "{p^{-1}}",
+        r"{\frac{\partial J}{\partial x}}",
+        r"{-\frac{\partial^2J}{\partial x^2}}",
+        r"{\textstyle\sum_i\frac{\partial^2S_i}{\partial x^2}\bigl(D_n^{-1}\nu\bigr)_i}",
+        "g_{k-1}=g_{k-1}(z_{k-1})",
+    ],
+    CONDITION: [r"\Psi^{-1}=0", "D_n^{-1}=0"],
 }
 EQUALS = {
     r"\bigl(\Psi^{-1}+H^TD_n^{-1}H\bigr)\bigl(\Psi-\Psi H^TF^{-1}H\Psi\bigr)": "I",
     r"\bigl(\Psi-\Psi H^TF^{-1}H\Psi\bigr)H^TD_n^{-1}": r"\Psi H^TF^{-1}",
     "p_k": r"\Psi_k-K_kH_k\Psi_k",
-    "K_k": r"p_kH_k^TD_n^{-1}",
+    "K_k": "p_kH_k^TD_n^{-1}",
     r"\det\textstyle\sum_iH_i^TH_i/D_i": r"\frac{\sin^2(\theta_1-\theta_2)}{D_1D_2}",
 }
-SAID |= dict.fromkeys(
-    (
-        r"{p^{-1}}",
-        r"{\frac{\partial J}{\partial x}}",
-        r"{-\frac{\partial^2J}{\partial x^2}}",
-        r"{\textstyle\sum_i\frac{\partial^2S_i}{\partial x^2}\bigl(D_n^{-1}\nu\bigr)_i}",
-    ),
-    NOTATION,
-)
-SAID |= dict.fromkeys((r"\Psi^{-1}=0", r"D_n^{-1}=0"), CONDITION)
-SAID |= {r"g_{k-1}=g_{k-1}(z_{k-1})": NOTATION, "x=z+e": DEFINITION}

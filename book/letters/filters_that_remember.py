@@ -1,9 +1,8 @@
 """The letters of filters-that-remember.md: a filter that remembers two measurements, as a plain program with NumPy's fits."""
 
 import numpy as np
-
-from kfcourse.pages.reader import Indexed
-from kfcourse.pages.relations import DEFINITION, NOTATION
+from gate.page import DEFINITION, NOTATION
+from gate.values import Indexed
 
 STEPS, RUNS = 6, 80
 
@@ -97,13 +96,11 @@ def slow(rng):
 
 LETTERS = (windowed, lengthened, slow)
 SAID = {
-    "H=1": DEFINITION,
-    "e=0": DEFINITION,
-    "L=1": DEFINITION,
-    "n=0": DEFINITION,
-    r"p_k\text{ of the filter begun anew}": NOTATION,
-    r"\frac{\partial p_{k+1}}{\partial p_k}": NOTATION,
-    r"\Psi_{k+1}": NOTATION,
-    r"\mathsf M\,\Theta(u_k,T_k)": NOTATION,
+    DEFINITION: ["H=1", "e=0", "L=1", "n=0"],
+    NOTATION: [
+        r"p_k\text{ of the filter begun anew}",
+        r"\frac{\partial p_{k+1}}{\partial p_k}",
+        r"\Psi_{k+1}",
+        r"\mathsf M\,\Theta(u_k,T_k)",
+    ],
 }
-LITERALS = ("third", "two", "five")  # of names

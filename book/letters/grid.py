@@ -1,10 +1,9 @@
 """The letters of grid.md: a filter on a grid as a plain program, and the sum of bells on nodes of any distance."""
 
 import numpy as np
-
-from kfcourse.pages.letters import chain_run
-from kfcourse.pages.reader import Of, bell
-from kfcourse.pages.relations import CONDITION
+from gate.page import CONDITION
+from gate.values import Of, bell
+from gate.worlds import chain_run
 
 NODES = 7
 
@@ -41,8 +40,7 @@ def widths(rng):
 
 
 LETTERS = (bells, course, widths)
-SAID = {r"h\le\sigma": CONDITION}
-EQUALS = {
-    r"\frac2h\int_0^hh\sum_j\mathcal N(s+jh)\cos\frac{2\pi ms}h\,ds": r"2e^{-2\pi^2m^2\sigma^2/h^2}",
+SAID = {
+    CONDITION: [r"h\le\sigma", r"2e^{-2\pi^2\sigma^2/h^2}=10^{-6}"],
 }
-SAID |= {r"2e^{-2\pi^2\sigma^2/h^2}=10^{-6}": CONDITION}
+EQUALS = {r"\frac2h\int_0^hh\sum_j\mathcal N(s+jh)\cos\frac{2\pi ms}h\,ds": r"2e^{-2\pi^2m^2\sigma^2/h^2}"}

@@ -2,14 +2,14 @@
 
 import numpy as np
 from control import dare
+from gate.page import CONDITION, DEFINITION, NOTATION
+from gate.values import Indexed, Of
+from gate.worlds import K_RANGE, column, covariance
 from scipy.integrate import quad
 
 from kfcourse.filters.kalman import correct, predict
 from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem, run
-from kfcourse.pages.letters import K_RANGE, column, covariance
-from kfcourse.pages.reader import Indexed, Of
-from kfcourse.pages.relations import CONDITION, DEFINITION, NOTATION
 from kfcourse.scenarios.navigation import Dynamics
 
 SENSOR, RADIO = r"y_{\mathrm{NR},k}", r"y_{\mathrm R,k}"
@@ -162,10 +162,12 @@ LETTERS = (
     lecture,
 )
 SAID = {
-    r"x_k=f(x_{k-1},\,y_{\mathrm{NR},k-1}-\varepsilon_{k-1})+g\,\xi_{k-1}": DEFINITION,
-    r"\varepsilon_k=\varepsilon_{k-1}+\zeta_{k-1}": DEFINITION,
-    "p": NOTATION,
-    r"S(\lambda)-S(\lambda+\delta)": NOTATION,
+    DEFINITION: [
+        r"x_k=f(x_{k-1},\,y_{\mathrm{NR},k-1}-\varepsilon_{k-1})+g\,\xi_{k-1}",
+        r"\varepsilon_k=\varepsilon_{k-1}+\zeta_{k-1}",
+    ],
+    NOTATION: ["p", r"S(\lambda)-S(\lambda+\delta)"],
+    CONDITION: [r"m=2\sigma_n/\sigma_\xi", r"\mathcal F+\mathcal G=1", r"\mathcal F=1-\mathcal G"],
 }
 EQUALS = {
     r"\sqrt{\sigma_n/\sigma_\xi}": r"\sigma_n/\sqrt p",
@@ -177,4 +179,3 @@ EQUALS = {
     r"\det\begin{pmatrix}H\\HA\\HA^2\end{pmatrix}": "-T_a^3",
     r"\textstyle\int_0^t\bigl(\frac12(t-s)^2\bigr)^2q_b\,ds": "q_bt^5/20",
 }
-SAID |= dict.fromkeys((r"m=2\sigma_n/\sigma_\xi", r"\mathcal F+\mathcal G=1", r"\mathcal F=1-\mathcal G"), CONDITION)

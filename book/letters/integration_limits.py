@@ -1,12 +1,12 @@
 """The letters of integration-limits.md: the package's covariance analysis, and its filter along a constant bias."""
 
 import numpy as np
+from gate.page import NOTATION
+from gate.values import Indexed
+from gate.worlds import K_RANGE
 
 from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem, covariances, run
-from kfcourse.pages.letters import K_RANGE
-from kfcourse.pages.reader import Indexed
-from kfcourse.pages.relations import NOTATION
 
 
 def analysis(rng):
@@ -33,5 +33,8 @@ def slow_drift(rng):
 
 
 LETTERS = (analysis, slow_drift)
+SAID = {
+    "a setting": ["K_k=0"],
+    NOTATION: [r"\text{mean innovation}"],
+}
 EQUALS = {r"{\lim_{\sigma_\xi\to0}\bar p/p}": r"\frac12(c+1/c)"}
-SAID = {"K_k=0": "a setting", r"\text{mean innovation}": NOTATION}

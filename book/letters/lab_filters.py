@@ -1,10 +1,10 @@
 """The letters of lab-filters.md: three filters on an ensemble as plain programs with NumPy's fits, and a run of the package's."""
 
 import numpy as np
+from gate.page import DEFINITION, NOTATION
+from gate.values import Indexed, Of, Operator
+from gate.worlds import BENT, K_RANGE, extended_run, normal_nodes
 
-from kfcourse.pages.letters import BENT, K_RANGE, extended_run, normal_nodes
-from kfcourse.pages.reader import Indexed, Of, Operator
-from kfcourse.pages.relations import DEFINITION, NOTATION
 from kfcourse.symbolic.structure import linearised
 
 STEPS, RUNS = 5, 60
@@ -158,24 +158,23 @@ def linear_meter(rng):
 
 LETTERS = (two_step, second_fit, optimal_structure, plain_prediction, optimal, western, regression, linear_meter)
 SAID = {
-    r"\lambda_0=m": DEFINITION,
-    r"\Psi_0=d": DEFINITION,
-    r"m^-=\mathrm E f": NOTATION,
-    r"P^-=\mathrm{Cov}f+Q": NOTATION,
-    r"e_k=\operatorname{line}(x_k-\lambda_k\mid\omega_k)": DEFINITION,
-    r"g_k=\operatorname{line}(x_{k+1}\mid\alpha_k)": DEFINITION,
-    r"T_k=\operatorname{line}(x_k\mid z_k)": DEFINITION,
-    r"e_k=\operatorname{line}(x_k-\lambda_k\mid\sigma_k)": DEFINITION,
-    r"n=\operatorname{line}(x_{k+1}\mid s_{k+1})": DEFINITION,
-    r"\mathsf{D}\sigma": NOTATION,
-    r"\bar{\sigma}": NOTATION,
-    r"\Psi G^T": NOTATION,
-}
-SAID |= dict.fromkeys(
-    (
+    DEFINITION: [
+        r"\lambda_0=m",
+        r"\Psi_0=d",
+        r"e_k=\operatorname{line}(x_k-\lambda_k\mid\omega_k)",
+        r"g_k=\operatorname{line}(x_{k+1}\mid\alpha_k)",
+        r"T_k=\operatorname{line}(x_k\mid z_k)",
+        r"e_k=\operatorname{line}(x_k-\lambda_k\mid\sigma_k)",
+        r"n=\operatorname{line}(x_{k+1}\mid s_{k+1})",
+    ],
+    NOTATION: [
+        r"m^-=\mathrm E f",
+        r"P^-=\mathrm{Cov}f+Q",
+        r"\mathsf{D}\sigma",
+        r"\bar{\sigma}",
+        r"\Psi G^T",
         r"\tfrac{1}{2}\,\partial J/\partial{H}_k",
         r"\tfrac{1}{2}\,\partial J/\partial{e}_k",
         r"J(1,0)-J_{\min}",
-    ),
-    NOTATION,
-)
+    ],
+}

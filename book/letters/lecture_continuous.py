@@ -4,13 +4,13 @@ import importlib.util
 from pathlib import Path
 
 import numpy as np
+from gate.page import CONDITION, NOTATION
+from gate.worlds import column, covariance, normal_nodes, slope
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from kfcourse import linearised
 from kfcourse.continuous import to_discrete
-from kfcourse.pages.letters import column, covariance, normal_nodes, slope
-from kfcourse.pages.relations import CONDITION, NOTATION
 
 _spec = importlib.util.spec_from_file_location("letters.continuous", Path(__file__).with_name("continuous.py"))
 shared = importlib.util.module_from_spec(_spec)
@@ -172,8 +172,7 @@ LETTERS = (
     near_estimate,
 )
 SAID = {
-    latex: NOTATION
-    for latex in (
+    NOTATION: [
         r"S(z)+\frac12S''D",
         r"\varepsilon",
         r"\Delta\dot z_\text{moments}",
@@ -182,18 +181,13 @@ SAID = {
         r"\Delta\dot D_\text{maximum}",
         r"\text{noise in }\dot z",
         r"\text{noise in }\dot D",
-    )
-}
-EQUALS = {r"\varepsilon^2": r"\frac{DS''^2}{S'^2}"}
-SAID |= dict.fromkeys(
-    (
         r"{\textstyle\sum_i\bigl[2N^{-1}(y-S)\bigr]_i\frac{\partial^2S_i}{\partial x^2}}",
-        r"{(y-S)}",
+        "{(y-S)}",
         r"{\textstyle\frac12}",
         r"{\dot{J}_{\text{Ito}}-\dot{J}}",
-        r"{-T(y_k-S)^TN^{-1}(y_k-S)}",
-        r"{Ty_k^TN^{-1}y_k}",
-    ),
-    NOTATION,
-)
-SAID |= {r"U<a^2/q": CONDITION}
+        "{-T(y_k-S)^TN^{-1}(y_k-S)}",
+        "{Ty_k^TN^{-1}y_k}",
+    ],
+    CONDITION: ["U<a^2/q"],
+}
+EQUALS = {r"\varepsilon^2": r"\frac{DS''^2}{S'^2}"}

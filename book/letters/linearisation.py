@@ -4,10 +4,10 @@ from functools import partial
 from itertools import product
 
 import numpy as np
+from gate.page import DEFINITION, NOTATION
+from gate.values import Indexed, Of, Operator
+from gate.worlds import BENT_SCALAR, BENT_SCALAR_LATER, column, extended_run, slope
 
-from kfcourse.pages.letters import BENT_SCALAR, BENT_SCALAR_LATER, column, extended_run, slope
-from kfcourse.pages.reader import Indexed, Of, Operator
-from kfcourse.pages.relations import DEFINITION, NOTATION
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import linearised
 
@@ -100,20 +100,19 @@ def exponent(rng):
 
 LETTERS = (course, scalar, western, even, multiplied, exponent)
 SAID = {
-    r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k": DEFINITION,
-    r"y_k=S_k(x_k)+n_k": DEFINITION,
-    "g=ex": DEFINITION,
-    r"\ln p(x_{k-1}\mid y_{0:k-1})": DEFINITION,
-    r"\ln p(x_k\mid x_{k-1})": DEFINITION,
-    r"\ln p(y_k\mid x_k)": DEFINITION,
-}
-SAID |= dict.fromkeys(
-    (
+    DEFINITION: [
+        r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k",
+        "y_k=S_k(x_k)+n_k",
+        "g=ex",
+        r"\ln p(x_{k-1}\mid y_{0:k-1})",
+        r"\ln p(x_k\mid x_{k-1})",
+        r"\ln p(y_k\mid x_k)",
+    ],
+    NOTATION: [
         r"f_{k-1}(x_{k-1})-O\bigl((x_{k-1}-z_{k-1})^2\bigr)",
-        r"g_{k-1}^2(x_{k-1})-O(x_{k-1}-z_{k-1})",
+        "g_{k-1}^2(x_{k-1})-O(x_{k-1}-z_{k-1})",
         r"S_{k}(x_k)-O\bigl((x_k-\lambda_k)^2\bigr)",
         r"\mathsf{M}\,g^2(z+u)-g^2(z)-O(p^2)",
-    ),
-    NOTATION,
-)
+    ],
+}
 EQUALS = {"-1/(2b)": r"v_\text{e}", "-a/(2b)": r"m_\text{e}"}

@@ -1,16 +1,14 @@
 """What the printed names of literature.md are: their values are checked beside them."""
 
-from kfcourse.pages.relations import NOTATION
+from gate.page import NOTATION
 
-SAID = dict.fromkeys(
-    (
+SAID = {
+    NOTATION: [
         r"\rho_1^2",
         "x_3'",
         r"\partial x_3'/\partial x_5",
         r"\sin^2\gamma",
         r"\operatorname{tr}I^{-1}/\sigma^2",
         r"\min_h\,\operatorname{tr}I^{-1}/\sigma^2",
-    ),
-    NOTATION,
-)
-LITERALS = ("ten", "five", "thousand", "four thousand")  # of names
+    ],
+}

@@ -1,10 +1,9 @@
 """The letters of live-lab.md: the arguments of a gain, which is that of the best line through its law."""
 
 import numpy as np
+from gate.page import NOTATION
 from numpy.polynomial.hermite_e import hermegauss
 from scipy.optimize import minimize_scalar
-
-from kfcourse.pages.relations import NOTATION
 
 NODES, WEIGHTS = hermegauss(5)  # exact for polynomials up to degree 9
 
@@ -26,12 +25,14 @@ def best_line(rng):
 
 LETTERS = (best_line,)
 SAID = {
-    r"\lambda": NOTATION,
-    r"\Psi": NOTATION,
-    r"\varrho": NOTATION,
-    "1/K": NOTATION,
-    r"1/K\,\big|_{\Psi=\lambda^2/\sqrt3}": NOTATION,
-    r"\frac{\partial}{\partial\Psi}\frac1K\Big|_{\Psi=\lambda^2/\sqrt3}": NOTATION,
-    r"\mathsf D(e+d)^2": NOTATION,
-    r"\mathsf Dd^2": NOTATION,
+    NOTATION: [
+        r"\lambda",
+        r"\Psi",
+        r"\varrho",
+        "1/K",
+        r"1/K\,\big|_{\Psi=\lambda^2/\sqrt3}",
+        r"\frac{\partial}{\partial\Psi}\frac1K\Big|_{\Psi=\lambda^2/\sqrt3}",
+        r"\mathsf D(e+d)^2",
+        r"\mathsf Dd^2",
+    ],
 }

@@ -1,10 +1,10 @@
 """The letters of live-track.md: the package's filter, settled on a constant acceleration."""
 
 import numpy as np
+from gate.page import NOTATION
 
 from kfcourse.laws import Gaussian
 from kfcourse.linear import run, steady_state
-from kfcourse.pages.relations import NOTATION
 from kfcourse.scenarios import pointer
 
 
@@ -23,9 +23,11 @@ def settled(rng):
 
 LETTERS = (settled,)
 SAID = {
-    r"\int_0^\infty e^{-st}\,w\,dt": NOTATION,
-    r"\int_0^\infty w\,dt": NOTATION,
-    r"\int_0^\infty t\,w\,dt": NOTATION,
-    r"\dot w\left(\tfrac{3\pi}{4a}\right)": NOTATION,
-    r"w\left(\tfrac{3\pi}{4a}\right)/w(0)": NOTATION,
+    NOTATION: [
+        r"\int_0^\infty e^{-st}\,w\,dt",
+        r"\int_0^\infty w\,dt",
+        r"\int_0^\infty t\,w\,dt",
+        r"\dot w\left(\tfrac{3\pi}{4a}\right)",
+        r"w\left(\tfrac{3\pi}{4a}\right)/w(0)",
+    ],
 }

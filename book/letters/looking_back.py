@@ -2,12 +2,12 @@
 
 import numpy as np
 from control import dare
+from gate.page import NOTATION
+from gate.values import Indexed, Of
+from gate.worlds import K_RANGE, column, covariance
 
 from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem, run, smooth
-from kfcourse.pages.letters import K_RANGE, column, covariance
-from kfcourse.pages.reader import Indexed, Of
-from kfcourse.pages.relations import NOTATION
 
 STEPS, STATES, SEEN = 6, 3, 2
 
@@ -101,13 +101,15 @@ def one_component(rng):
 
 LETTERS = (course, meeting, walk, slow_walk, one_component)
 SAID = {
-    r"\bar z=z": NOTATION,
-    r"\bar p=p": NOTATION,
-    r"\frac{\partial\mathcal N(x;z,p)}{\partial z}": NOTATION,
-    r"\mathcal N(x;z,p)": NOTATION,
-    r"\Delta t": NOTATION,
-    "J_k": NOTATION,
-    r"\tilde J_{k+1}": NOTATION,
-    r"\tilde\eta_{k+1}": NOTATION,
-    r"\eta_k": NOTATION,
+    NOTATION: [
+        r"\bar z=z",
+        r"\bar p=p",
+        r"\frac{\partial\mathcal N(x;z,p)}{\partial z}",
+        r"\mathcal N(x;z,p)",
+        r"\Delta t",
+        "J_k",
+        r"\tilde J_{k+1}",
+        r"\tilde\eta_{k+1}",
+        r"\eta_k",
+    ],
 }

@@ -1,11 +1,11 @@
 """The letters of manoeuvres.md: three modes with a joint table of probabilities; a place as a radar measures it."""
 
 import numpy as np
+from gate.page import CONDITION, DEFINITION, NOTATION
+from gate.values import Indexed, Of
+from gate.worlds import column, covariance
 from scipy.stats import multivariate_normal
 
-from kfcourse.pages.letters import column, covariance
-from kfcourse.pages.reader import Indexed, Of
-from kfcourse.pages.relations import CONDITION, DEFINITION, NOTATION
 from kfcourse.scenarios.radar import spherical
 
 M, N = 3, 2
@@ -74,13 +74,11 @@ def turned_in_the_middle(rng):
 
 LETTERS = (modes, mixing, two_modes, place, turned, turned_in_the_middle)
 SAID = {
-    "L_j=1": "a setting",
-    r"\mu_{i|j}(k-1|k-1)": NOTATION,
-    "r_x": NOTATION,
-    "r_y": NOTATION,
-    "r_z": NOTATION,
-    r"\mu_{1\mid1}-\mu_{1\mid2}": NOTATION,
-    r"\frac{\sin\eta}{\eta}-\frac{\eta^4}{120}+\dots": "a series",
+    "a setting": ["L_j=1"],
+    NOTATION: [r"\mu_{i|j}(k-1|k-1)", "r_x", "r_y", "r_z", r"\mu_{1\mid1}-\mu_{1\mid2}"],
+    "a series": [r"\frac{\sin\eta}{\eta}-\frac{\eta^4}{120}+\dots"],
+    CONDITION: [r"\pi_{11}+\pi_{22}=1"],
+    DEFINITION: [r"\Theta=JpJ^T+Q"],
 }
 EQUALS = {
     r"\pi_{ij}\mu_i/c_j": r"\mu_{i\mid j}",
@@ -88,5 +86,3 @@ EQUALS = {
     r"r\cos(\epsilon)\sin(\varphi)": "r_y",
     r"r\sin(\epsilon)": "r_z",
 }
-SAID |= {r"\pi_{11}+\pi_{22}=1": CONDITION}
-SAID |= {r"\Theta=JpJ^T+Q": DEFINITION}

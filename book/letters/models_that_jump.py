@@ -1,11 +1,10 @@
 """The letters of models-that-jump.md: three modes with a joint table of probabilities, mixtures by their second moments."""
 
 import numpy as np
+from gate.page import NOTATION
+from gate.values import Indexed, Of, Operator
+from gate.worlds import column, covariance
 from scipy.stats import multivariate_normal
-
-from kfcourse.pages.letters import column, covariance
-from kfcourse.pages.reader import Indexed, Of, Operator
-from kfcourse.pages.relations import NOTATION
 
 M, N = 3, 2
 
@@ -84,11 +83,12 @@ def failed(rng):
 
 LETTERS = (correcting, predicting, remembering, nearest, failed)
 SAID = {
-    r"x_{k+1}=a^{i_{k+1}}(x_k,v_k)": NOTATION,
-    r"y_k=b^{i_k}(x_k,w_k)": NOTATION,
-    r"\lambda^{\text{before}}": NOTATION,
-    r"\lambda^{\text{after}}": NOTATION,
-    r"\Psi^{\text{before}}": NOTATION,
-    r"\Psi^{\text{after}}": NOTATION,
+    NOTATION: [
+        "x_{k+1}=a^{i_{k+1}}(x_k,v_k)",
+        "y_k=b^{i_k}(x_k,w_k)",
+        r"\lambda^{\text{before}}",
+        r"\lambda^{\text{after}}",
+        r"\Psi^{\text{before}}",
+        r"\Psi^{\text{after}}",
+    ],
 }
-LITERALS = ("third", "thousand")  # of names

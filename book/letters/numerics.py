@@ -1,14 +1,14 @@
 """The letters of numerics.md: corrections of the package, Joseph's form for any gain, the array, Bierman's loop."""
 
 import numpy as np
+from gate.page import DEFINITION, NOTATION
+from gate.values import Indexed, Of
+from gate.worlds import column, covariance
 
 from kfcourse.filters.kalman import correct
 from kfcourse.laws import Gaussian
 from kfcourse.linear.factored import factors
 from kfcourse.linear.system import LinearSystem
-from kfcourse.pages.letters import column, covariance
-from kfcourse.pages.reader import Indexed, Of
-from kfcourse.pages.relations import DEFINITION, NOTATION
 
 
 def _corrected(rng, seen):
@@ -112,21 +112,21 @@ def one_measurement(rng):
 
 LETTERS = (any_gain, wrong_gain, array, bierman, at_the_end, at_the_beginning, two_measurements, one_measurement)
 _BEFORE = r"\begin{pmatrix}R^{1/2}&HS\\0&S\end{pmatrix}"
+_AFTER = r"\begin{pmatrix}X&0\\Y&Z\end{pmatrix}"
 _BLOCKS = r"\begin{pmatrix}F&H\Psi\\\Psi H^T&\Psi\end{pmatrix}"
 _WRONG = r"(K+\epsilon\gamma)"
 SAID = {
-    r"\mathsf Mw^2=\delta^2": DEFINITION,
-    "R>0": "a condition",
-    r"p_{\rm Joseph}": NOTATION,
-    r"p_{\rm textbook}": NOTATION,
+    DEFINITION: [r"\mathsf Mw^2=\delta^2"],
+    "a condition": ["R>0"],
+    NOTATION: [r"p_{\rm Joseph}", r"p_{\rm textbook}"],
 }
 EQUALS = {
-    _BEFORE: r"\begin{pmatrix}X&0\\Y&Z\end{pmatrix}T^T",
+    _BEFORE: f"{_AFTER}T^T",
     r"\begin{pmatrix}AS&Q^{1/2}\end{pmatrix}": "S'T'^T",
     r"p-\epsilon\,\gamma H\Psi": rf"(I-{_WRONG}H)\Psi",
     r"p+\epsilon^2F\,\gamma\gamma^T": rf"(I-{_WRONG}H)\Psi(I-{_WRONG}H)^T+{_WRONG}R{_WRONG}^T",
-    rf"{_BEFORE}{_BEFORE}^T": _BLOCKS,
-    _BLOCKS: r"\begin{pmatrix}X&0\\Y&Z\end{pmatrix}\begin{pmatrix}X&0\\Y&Z\end{pmatrix}^T",
+    f"{_BEFORE}{_BEFORE}^T": _BLOCKS,
+    _BLOCKS: f"{_AFTER}{_AFTER}^T",
     "YX^{-1}": "K",
     "ZZ^T": r"(I-KH)\Psi",
     r"(I-KH)\Psi": "p",

@@ -1,9 +1,8 @@
 """The letters of outliers.md: one correction of a plain program, with a weight that has settled."""
 
 import numpy as np
-
-from kfcourse.pages.letters import column, covariance
-from kfcourse.pages.relations import CONDITION, NOTATION
+from gate.page import CONDITION, NOTATION
+from gate.worlds import column, covariance
 
 
 def doubting(rng, states=3, m=2):
@@ -35,15 +34,17 @@ def doubtful(rng):
 
 LETTERS = (doubting, scalar, doubtful)
 SAID = {
-    "w=1": NOTATION,
-    r"\nu^TF^{-1}\nu>\gamma": CONDITION,
-    r"\mathsf P(\nu^TF^{-1}\nu<\gamma)": NOTATION,
-    r"\mathsf P\big|_{\gamma=-2\ln(1-\beta)}": NOTATION,
-    r"z\,(\text{from } y_1)": NOTATION,
-    r"\lim_{R_{22}\to\infty}z\,(\text{from } y_1,y_2)": NOTATION,
-    r"\Delta t_k": NOTATION,
-    "p(e)": NOTATION,
-    r"\mathsf M[u\mid e]": NOTATION,
-    r"w\big|_{t>c}": NOTATION,
-    r"\frac{d\rho}{dt}": NOTATION,
+    NOTATION: [
+        "w=1",
+        r"\mathsf P(\nu^TF^{-1}\nu<\gamma)",
+        r"\mathsf P\big|_{\gamma=-2\ln(1-\beta)}",
+        r"z\,(\text{from } y_1)",
+        r"\lim_{R_{22}\to\infty}z\,(\text{from } y_1,y_2)",
+        r"\Delta t_k",
+        "p(e)",
+        r"\mathsf M[u\mid e]",
+        r"w\big|_{t>c}",
+        r"\frac{d\rho}{dt}",
+    ],
+    CONDITION: [r"\nu^TF^{-1}\nu>\gamma"],
 }

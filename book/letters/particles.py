@@ -1,8 +1,7 @@
 """The letters of particles.md: the share of particles that counts after one measurement; names are checked beside them."""
 
 import numpy as np
-
-from kfcourse.pages.relations import NOTATION
+from gate.page import NOTATION
 
 
 def weighted(rng):
@@ -16,7 +15,5 @@ def weighted(rng):
 
 LETTERS = (weighted,)
 SAID = {
-    r"\mathsf M_q\left[x^2\,\tfrac{p}{q}\right]": NOTATION,
-    r"\frac{N_e}{N}\to\frac{(\mathsf M w)^2}{\mathsf M w^2}": NOTATION,
+    NOTATION: [r"\mathsf M_q\left[x^2\,\tfrac{p}{q}\right]", r"\frac{N_e}{N}\to\frac{(\mathsf M w)^2}{\mathsf M w^2}"],
 }
-LITERALS = ("thousand",)

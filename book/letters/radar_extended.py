@@ -1,14 +1,14 @@
 """The letters of radar-extended.md: the package's filter with an acceleration made of measurements, and transfers by matrices."""
 
 import numpy as np
+from gate.page import CONDITION, NOTATION
+from gate.values import Indexed
+from gate.worlds import column, covariance
 
 from kfcourse.filters.alphabeta import steady_beta, tracking_index
 from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem, run
 from kfcourse.linear.system import linear_system
-from kfcourse.pages.letters import column, covariance
-from kfcourse.pages.reader import Indexed
-from kfcourse.pages.relations import CONDITION, NOTATION, quoted
 from kfcourse.scenarios.pointer import acceleration_from
 from kfcourse.scenarios.radar import kinematic
 
@@ -115,9 +115,10 @@ def far_apart(rng, j=3):
 
 LETTERS = (axis, filtered, in_one_step, expanded, transfers, far_apart)
 SAID = {
-    r"z_k=z_{k-1}+K\bigl[y_k-h(\lambda_k)-H(\hat x_{k-1}-z_{k-1})\bigr]": quoted("the radar paper"),
-    "u_k=0": "a setting",
-    r"E(\zeta)": NOTATION,
+    "quoted from the radar paper": [r"z_k=z_{k-1}+K\bigl[y_k-h(\lambda_k)-H(\hat x_{k-1}-z_{k-1})\bigr]"],
+    "a setting": ["u_k=0"],
+    NOTATION: [r"E(\zeta)"],
+    CONDITION: [r"|\zeta|=1"],
 }
 EQUALS = {
     r"y-h(z_{k-1})-H(\lambda_k-z_{k-1})": r"y-H\lambda_k",
@@ -125,4 +126,3 @@ EQUALS = {
     r"E_{\rm literal}(1)": r"\frac{2\beta}{\alpha+2\beta}",
     r"\frac{E_u(\zeta)}{E(\zeta)}": r"\frac{(\zeta-1)(2\zeta+1)}{2\zeta^2}",
 }
-SAID |= {r"|\zeta|=1": CONDITION}

@@ -2,13 +2,13 @@
 
 import numpy as np
 from control import dare
+from gate.page import CONDITION, DEFINITION, NOTATION
+from gate.values import Indexed
+from gate.worlds import column
 
 from kfcourse import run
 from kfcourse.filters.alphabeta import alpha_beta, steady_beta, tracking_index
 from kfcourse.linear.system import linear_system
-from kfcourse.pages.letters import column
-from kfcourse.pages.reader import Indexed
-from kfcourse.pages.relations import CONDITION, DEFINITION, NOTATION, quoted
 from kfcourse.scenarios.flight import aircraft
 from kfcourse.scenarios.radar import kinematic
 
@@ -140,15 +140,11 @@ def errors(rng):
 
 LETTERS = (model, flight, limit, growing, start, step, noise_alone, small_gains, limit_at_once, errors)
 SAID = {
-    r"v_k\sim\mathcal N(0,\sigma_a^2)": DEFINITION,
-    r"w_k\sim\mathcal N(0,\sigma^2)": DEFINITION,
-    r"K=[\alpha,\beta/T]^T": quoted("the radar paper"),
-    "0": NOTATION,
-    r"\beta_-": NOTATION,
-    r"\beta_+": NOTATION,
-    r"E(\zeta)": NOTATION,
-    r"\text{lag}": NOTATION,
-    r"\text{instead of}\quad0": NOTATION,
+    DEFINITION: [r"v_k\sim\mathcal N(0,\sigma_a^2)", r"w_k\sim\mathcal N(0,\sigma^2)"],
+    "quoted from the radar paper": [r"K=[\alpha,\beta/T]^T"],
+    NOTATION: ["0", r"\beta_-", r"\beta_+", r"E(\zeta)", r"\text{lag}", r"\text{instead of}\quad0"],
+    "quoted from Benedict and Bordner": [r"\beta=\alpha^2/(2-\alpha)"],
+    CONDITION: [r"\chi(-1)<0", r"\beta=4-2\alpha"],
 }
 EQUALS = {
     r"\chi(-1)": r"4-2\alpha-\beta",
@@ -156,5 +152,3 @@ EQUALS = {
     r"\chi(-1)\big|_{\beta=\beta_+}": r"-4\sqrt{1-\alpha}",
     r"\lim_{\zeta\to1}\frac{E(\zeta)}{(\zeta-1)^2}\,T^2": r"T^2(1-\alpha)/\beta",
 }
-SAID |= {r"\beta=\alpha^2/(2-\alpha)": quoted("Benedict and Bordner")}
-SAID |= dict.fromkeys((r"\chi(-1)<0", r"\beta=4-2\alpha"), CONDITION)

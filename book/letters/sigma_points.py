@@ -1,11 +1,10 @@
 """The letters of sigma-points.md: a correction that is iterated, and one by points, as plain programs."""
 
 import numpy as np
+from gate.values import Indexed, Of, Operator, Unread
+from gate.worlds import column, covariance, slope
 from scipy.optimize import brentq
 from scipy.stats import multivariate_normal
-
-from kfcourse.pages.letters import column, covariance, slope
-from kfcourse.pages.reader import Indexed, Of, Operator, Unread
 
 
 def S(x):
@@ -125,4 +124,3 @@ EQUALS = {
     r"\mathsf M(x-\lambda)^2": r"\sigma^2",
     r"\mathsf M(x-\lambda)^4\big|_{\kappa=2}": r"3\sigma^4",
 }
-LITERALS = ("2",)

@@ -1,11 +1,10 @@
 """The letters of stratonovich.md: a linear model whose densities are all known, and a chain as a plain program."""
 
 import numpy as np
+from gate.page import DEFINITION, NOTATION
+from gate.values import Indexed, Of, Operator, bell
+from gate.worlds import chain_run
 from scipy.optimize import minimize_scalar
-
-from kfcourse.pages.letters import chain_run
-from kfcourse.pages.reader import Indexed, Of, Operator, bell
-from kfcourse.pages.relations import DEFINITION, NOTATION
 
 
 def densities(rng):
@@ -114,19 +113,18 @@ def shadow(rng):
 
 LETTERS = (densities, joint, chain, odds, splitting, shadow)
 SAID = {
-    r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k": DEFINITION,
-    r"y_k=S_k(x_k)+n_k": DEFINITION,
-    r"x_0\sim\mathcal N(m_0,D_0)": DEFINITION,
-    r"P_{ij}=p(x_k=x_j\mid x_{k-1}=x_i)": DEFINITION,
-    r"Z_k=p(y_k\mid y_{1:k-1})": NOTATION,
-    r"\prod_kC_k^{-1}": NOTATION,
-}
-SAID |= dict.fromkeys(
-    (
+    DEFINITION: [
+        r"x_{k+1}=f_k(x_k)+g_k(x_k)\,\xi_k",
+        "y_k=S_k(x_k)+n_k",
+        r"x_0\sim\mathcal N(m_0,D_0)",
+        r"P_{ij}=p(x_k=x_j\mid x_{k-1}=x_i)",
+    ],
+    NOTATION: [
+        r"Z_k=p(y_k\mid y_{1:k-1})",
+        r"\prod_kC_k^{-1}",
         r"\frac{p(x_2\mid y_{0:2})}{p(x_2,y_{0:2})/p(y_{0:2})}",
         r"\frac{C_0^{-1}C_1^{-1}C_2^{-1}}{p(y_{0:2})}",
         r"\mathsf{M}[x^2|y]",
         r"\ln{C}_k^{-1}",
-    ),
-    NOTATION,
-)
+    ],
+}

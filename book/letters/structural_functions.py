@@ -1,11 +1,11 @@
 """The letters of structural-functions.md: the structures of the package, and means by quadrature."""
 
 import numpy as np
+from gate.page import DEFINITION, NOTATION
+from gate.values import Indexed, Operator
+from gate.worlds import normal_nodes
 
 from kfcourse import Model, gaussian, linearised
-from kfcourse.pages.letters import normal_nodes
-from kfcourse.pages.reader import Indexed, Operator
-from kfcourse.pages.relations import DEFINITION, NOTATION
 
 MODEL = Model.define("c*x + 0.2*x**2 + e*x*v + 0.1*v", "g*x + f*x**2*w + 0.3*w", dict(c=0.9, e=0.5, g=1.2, f=0.4))
 
@@ -85,14 +85,11 @@ def variant(rng):
 
 LETTERS = (by_tangents, over_noise, in_short, over_state, moments, variant)
 SAID = {
-    r"x_{k+1}=a(x_k,v_k)": DEFINITION,
-    r"y_k=b(x_k,w_k)": DEFINITION,
-    r"x\sim\mathcal N(z,p)": DEFINITION,
-    r"x\sim\mathcal N(m,d)": DEFINITION,
-    r"\mathsf M(x_{k+1}-\tau)^3": NOTATION,
+    DEFINITION: ["x_{k+1}=a(x_k,v_k)", "y_k=b(x_k,w_k)", r"x\sim\mathcal N(z,p)", r"x\sim\mathcal N(m,d)"],
+    NOTATION: [r"\mathsf M(x_{k+1}-\tau)^3"],
 }
 EQUALS = {
-    r"3f^2d(2m^2+d)": r"F_\text{Gaussian}-F_\text{linearised}",
+    "3f^2d(2m^2+d)": r"F_\text{Gaussian}-F_\text{linearised}",
     r"\Theta_\text{Gaussian}-\Theta_\text{linearised}": "e^2p",
     r"F_\text{Gaussian}-F_\text{linearised}": "3df^2(2m^2+d)",
 }

@@ -3,9 +3,10 @@
 import re
 from pathlib import Path
 
+from gate.page import DEFINITION, cells
+from gate.values import Indexed
+
 from kfcourse import Model
-from kfcourse.pages.reader import Indexed
-from kfcourse.pages.relations import DEFINITION, cells
 
 CODE = "\n".join(cells(Path(__file__).parents[1].joinpath("ten-minutes.md").read_text(encoding="utf-8")))
 
@@ -39,4 +40,6 @@ def _letters(x, x_next, y, v, w):
 
 
 LETTERS = (first, variant)
-SAID = {r"x_0\sim\mathcal N(0,1)": DEFINITION}
+SAID = {
+    DEFINITION: [r"x_0\sim\mathcal N(0,1)"],
+}

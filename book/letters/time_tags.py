@@ -1,9 +1,9 @@
 """The letters of time-tags.md: a foreign clock, and the package's prediction over an interval."""
 
 import numpy as np
+from gate.page import DEFINITION
+from gate.worlds import column, covariance
 
-from kfcourse.pages.letters import column, covariance
-from kfcourse.pages.relations import DEFINITION
 from kfcourse.scenarios.navigation import Clock, Dynamics
 
 
@@ -50,14 +50,7 @@ def late_gain(rng):
 
 
 LETTERS = (clock, prediction, late, one_step_late, late_gain)
-EQUALS = {
-    r"{\hat{s}-s}": r"-V_0\tau+a_0\tau^2/2-j\tau^3/6",
-    r"{\hat{V}-V}": r"-a_0\tau+j\tau^2/2",
-    r"{\hat{b}-b}": r"j\tau",
-}
 SAID = {
-    r"\hat s(t)=s(t-\tau)": DEFINITION,
-    r"\hat V(t)=\dot s(t-\tau)": DEFINITION,
-    r"\hat b(t)=u(t)-\ddot s(t-\tau)": DEFINITION,
+    DEFINITION: [r"\hat s(t)=s(t-\tau)", r"\hat V(t)=\dot s(t-\tau)", r"\hat b(t)=u(t)-\ddot s(t-\tau)", "c(t)=rt+c_0"],
 }
-SAID |= {"c(t)=rt+c_0": DEFINITION}
+EQUALS = {r"{\hat{s}-s}": r"-V_0\tau+a_0\tau^2/2-j\tau^3/6", r"{\hat{V}-V}": r"-a_0\tau+j\tau^2/2", r"{\hat{b}-b}": r"j\tau"}

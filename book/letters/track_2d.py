@@ -1,12 +1,12 @@
 """The letters of track-2d.md: a run of the package's filter with a known input; a lost sample; a telescoping sum."""
 
 import numpy as np
+from gate.page import DEFINITION, NOTATION
+from gate.values import Indexed
+from gate.worlds import K_RANGE, column, covariance
 
 from kfcourse.laws import Gaussian
 from kfcourse.linear import run
-from kfcourse.pages.letters import K_RANGE, column, covariance
-from kfcourse.pages.reader import Indexed
-from kfcourse.pages.relations import DEFINITION, NOTATION
 from kfcourse.scenarios import pointer
 
 DELTA, SIGMA, INTENSITY = 0.3, 1.3, 2.0
@@ -66,18 +66,16 @@ def telescope(rng):
 LETTERS = (filtered, sample_lost, axes, telescope)
 _INPUT = r"\begin{pmatrix}\Delta^2a_x/2\\\Delta^2a_y/2\\\Delta a_x\\\Delta a_y\end{pmatrix}"
 SAID = {
-    r"x_{k+1}=Ax_k+B\,(u_k+\xi_k)": DEFINITION,
-    "y_k=Hx_k+w_k": DEFINITION,
-    r"\xi_k\sim\mathcal N(0,\sigma_a^2I)": DEFINITION,
-    r"w_k\sim\mathcal N(0,R)": DEFINITION,
-    r"Q_{\rm const}": NOTATION,
-    r"Q_{\rm white}": NOTATION,
-    r"\delta^2": NOTATION,
-    r"s(\tau)": NOTATION,
-    "0": NOTATION,
+    DEFINITION: [
+        r"x_{k+1}=Ax_k+B\,(u_k+\xi_k)",
+        "y_k=Hx_k+w_k",
+        r"\xi_k\sim\mathcal N(0,\sigma_a^2I)",
+        r"w_k\sim\mathcal N(0,R)",
+    ],
+    NOTATION: [r"Q_{\rm const}", r"Q_{\rm white}", r"\delta^2", r"s(\tau)", "0"],
 }
 EQUALS = {
-    r"G\,(a_x,a_y,a_x,a_y)^T": _INPUT,
-    r"B\,(a_x,a_y)^T": _INPUT,
+    r"G\,(a_x,a_y,a_x,a_y)^T": r"\begin{pmatrix}\Delta^2a_x/2\\\Delta^2a_y/2\\\Delta a_x\\\Delta a_y\end{pmatrix}",
+    r"B\,(a_x,a_y)^T": r"\begin{pmatrix}\Delta^2a_x/2\\\Delta^2a_y/2\\\Delta a_x\\\Delta a_y\end{pmatrix}",
     r"\delta_{k+1}-\delta_k": r"\frac32(y_0-2y_1+y_2)",
 }

@@ -1,14 +1,14 @@
 """The letters of what-the-data-say.md: a level that wanders, its record's density at once, and one round of EM by a dense law."""
 
 import numpy as np
+from gate.page import NOTATION, STATED
+from gate.values import Indexed, bell
+from gate.worlds import normal_nodes
 from scipy.stats import multivariate_normal
 
 from kfcourse.filters import kalman_filter
 from kfcourse.linear.consistency import innovations
 from kfcourse.montecarlo.experiment import predictions, run
-from kfcourse.pages.letters import normal_nodes
-from kfcourse.pages.reader import Indexed, bell
-from kfcourse.pages.relations import NOTATION, STATED
 from kfcourse.records import smooth
 from kfcourse.symbolic.model import Model
 
@@ -91,9 +91,7 @@ def seen_states(rng):
 
 LETTERS = (wandering, whittle, rounds, quiet_rounds, edge_rounds, seen_states)
 SAID = {
-    r"p(y_0,\dots,y_N)=\prod_kp(y_k\mid y_0,\dots,y_{k-1})": STATED,
-    r"\ln p(y_0)+\ln p(y_1\mid y_0)": NOTATION,
-    r"\ln p(y_0,y_1)": NOTATION,
-    r"\mathsf M r_k^2": NOTATION,
+    STATED: [r"p(y_0,\dots,y_N)=\prod_kp(y_k\mid y_0,\dots,y_{k-1})"],
+    NOTATION: [r"\ln p(y_0)+\ln p(y_1\mid y_0)", r"\ln p(y_0,y_1)", r"\mathsf M r_k^2"],
 }
-EQUALS = {r"N/(2q^2)": r"I_\text{states}", r"N/\bigl(2(q+r)^2\bigr)": r"I_\text{record}", r"(1-q/\sqrt a)/r": r"\bar s_r"}
+EQUALS = {"N/(2q^2)": r"I_\text{states}", r"N/\bigl(2(q+r)^2\bigr)": r"I_\text{record}", r"(1-q/\sqrt a)/r": r"\bar s_r"}

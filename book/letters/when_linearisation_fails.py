@@ -1,9 +1,8 @@
 """The letters of when-linearisation-fails.md: a signal that is a parabola, its moments by quadrature."""
 
 import numpy as np
-
-from kfcourse.pages.letters import normal_nodes
-from kfcourse.pages.relations import CONDITION, NOTATION
+from gate.page import CONDITION, NOTATION
+from gate.worlds import normal_nodes
 
 
 def course(rng):
@@ -77,12 +76,7 @@ def nearly_straight(rng):
 
 
 LETTERS = (course, display, western, again, perfect, nearly_straight)
-SAID = {r"\nu\ll1": CONDITION, r"\frac34\kappa^2\ll1": CONDITION, r"S'\approx0": CONDITION}
-SAID |= dict.fromkeys(
-    (
-        r"\mathsf{M}[e^2]/p",
-        r"(\mathsf{M}{e})^2/p",
-        r"\mathsf{M}[e^2]/\Psi",
-    ),
-    NOTATION,
-)
+SAID = {
+    CONDITION: [r"\nu\ll1", r"\frac34\kappa^2\ll1", r"S'\approx0"],
+    NOTATION: [r"\mathsf{M}[e^2]/p", r"(\mathsf{M}{e})^2/p", r"\mathsf{M}[e^2]/\Psi"],
+}

@@ -2,14 +2,14 @@
 
 import numpy as np
 from control import dare
+from gate.page import DEFINITION, NOTATION
+from gate.values import Indexed
 from scipy.linalg import solve_continuous_are
 from scipy.stats import norm
 
 from kfcourse.filters.kalman import correct
 from kfcourse.laws import Gaussian
 from kfcourse.linear.system import LinearSystem
-from kfcourse.pages.reader import Indexed
-from kfcourse.pages.relations import DEFINITION, NOTATION, quoted
 
 
 def signal(rng):
@@ -95,27 +95,20 @@ def found(rng):
 
 LETTERS = (signal, waiting, amplitude, correlator, weights, bucy, shrinking, found)
 SAID = {
-    r"\zeta=e^{i\theta}": DEFINITION,
-    r"W(\zeta)=\frac{1-a\zeta^{-1}}{\rho\,(1-\gamma\zeta^{-1})}\left[\frac{Q}{(1-a\zeta^{-1})(1-\gamma\zeta)}\right]_+": quoted(
-        "Van Trees"
-    ),
-    r"\frac{b^2\left(\sum g_ks_k\right)^2}{R\sum g_k^2}\;\le\;\frac{b^2}{R}\sum s_k^2": "verified below, for four samples",
-    "x_{k+1}=ax_k+v_k": DEFINITION,
-    r"|\gamma|<1": "a condition",
-    r"\bigl[\,\cdot\,\bigr]": NOTATION,
-    r"W(\zeta)": NOTATION,
-    "W(p)": NOTATION,
-    "C(p)": NOTATION,
-    "C(-p)": NOTATION,
-    "|D|^2": NOTATION,
-    "|C|^2": NOTATION,
+    DEFINITION: [r"\zeta=e^{i\theta}", "x_{k+1}=ax_k+v_k"],
+    "quoted from Van Trees": [
+        r"W(\zeta)=\frac{1-a\zeta^{-1}}{\rho\,(1-\gamma\zeta^{-1})}\left[\frac{Q}{(1-a\zeta^{-1})(1-\gamma\zeta)}\right]_+"
+    ],
+    "verified below, for four samples": [r"\frac{b^2\left(\sum g_ks_k\right)^2}{R\sum g_k^2}\;\le\;\frac{b^2}{R}\sum s_k^2"],
+    "a condition": [r"|\gamma|<1"],
+    NOTATION: [r"\bigl[\,\cdot\,\bigr]", r"W(\zeta)", "W(p)", "C(p)", "C(-p)", "|D|^2", "|C|^2"],
+    "a setting": ["d^2=13"],
 }
 EQUALS = {
-    r"H(pI-A+KH)^{-1}K": "W(p)",
+    "H(pI-A+KH)^{-1}K": "W(p)",
     r"\lim_{T\to0}\frac{\alpha}{T}": r"\sqrt2\Omega",
     r"\lim_{T\to0}\frac{\beta}{T^2}": r"\Omega^2",
     r"C_k/\sum s_i^2": r"\hat b_k",
     r"\textstyle\sum g_k^2\sum s_k^2-(\sum g_ks_k)^2": r"\frac12\sum_i\sum_j(g_is_j-g_js_i)^2",
-    r"\ln\frac{\mathcal L(b)}{\mathcal L(0)}": r"(bC-b^2E/2)/R",
+    r"\ln\frac{\mathcal L(b)}{\mathcal L(0)}": "(bC-b^2E/2)/R",
 }
-SAID |= {"d^2=13": "a setting"}

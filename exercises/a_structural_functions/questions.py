@@ -15,7 +15,7 @@ from kfcourse.checks.derived import Derivation, posed_by
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Answer, ForVariant, Mistake, Question
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises import follow_on, messages
+from kfcourse.exercises import messages
 from kfcourse.exercises.a_structural_functions.mistakes import (
     CORRELATION_FORGOTTEN,
     FUNCTION_FOR_DERIVATIVE,
@@ -373,7 +373,6 @@ QUESTIONS = (
             "Write all three functions of question 5 below each other before you subtract; what is left if "
             "the meter is a straight line?"
         ),
-        on=follow_on.unexplained,
     ),
     Derivation(
         "a7",

@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import Question, catalogue
+from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import STEP, array_functions
-from kfcourse.exercises import follow_on
 from kfcourse.exercises.b_aof.keys import correct, covariance, gain, run_filter, step
 from kfcourse.exercises.b_aof.mistakes import WRONG_CORRECTIONS, WRONG_COVARIANCES, WRONG_GAINS, WRONG_RUNS, WRONG_STEPS
 from kfcourse.exercises.shared import other_functions
@@ -117,7 +116,7 @@ QUESTIONS = (
         "warm-up",
         gain,
         gain_arguments,
-        catalogue(WRONG_GAINS),
+        WRONG_GAINS,
         advice=(
             "Take one trajectory with one component by hand; then look at the shapes: which product of them gives (N, n, p)?"
         ),
@@ -129,14 +128,13 @@ QUESTIONS = (
         "core",
         correct,
         correction_arguments,
-        catalogue(WRONG_CORRECTIONS),
+        WRONG_CORRECTIONS,
         ("z", "p"),
         advice=(
             "Try two cases: a measurement that is exactly what was expected, and a meter that tells "
             "nothing, G = 0. What must z and p be?"
         ),
         axes=("trajectory",),
-        on=follow_on.correct,
     ),
     Question(
         "b3",
@@ -144,11 +142,10 @@ QUESTIONS = (
         "core",
         step,
         step_arguments,
-        catalogue(WRONG_STEPS),
+        WRONG_STEPS,
         ("z", "p", "lam_next", "Psi_next"),
         advice=("Write down which law each function is called with: what is known before the measurement, and what after it?"),
         axes=("trajectory",),
-        on=follow_on.step,
     ),
     Question(
         "b4",
@@ -156,7 +153,7 @@ QUESTIONS = (
         "core",
         run_filter,
         run_arguments,
-        catalogue(WRONG_RUNS),
+        WRONG_RUNS,
         advice=(
             "Follow one trajectory for two steps by hand; then one whose first measurement is missing: what "
             "is its estimate, and what its covariance?"
@@ -165,7 +162,6 @@ QUESTIONS = (
             "step",
             "trajectory",
         ),
-        on=follow_on.run_filter,
     ),
     Question(
         "b5",
@@ -173,11 +169,10 @@ QUESTIONS = (
         "stretch",
         covariance,
         covariance_arguments,
-        catalogue(WRONG_COVARIANCES),
+        WRONG_COVARIANCES,
         tolerance=1e-6,
         advice=("Write the error of the estimate as a sum of two independent parts; each has a covariance of the form M C M^T."),
         axes=("trajectory",),
-        on=follow_on.covariance,
     ),
 )
 

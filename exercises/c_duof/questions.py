@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import Question, catalogue
+from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import STEP, Function, at_step, of_steps
-from kfcourse.exercises import follow_on
 from kfcourse.exercises.c_duof.keys import design_and_run, design_step, structure
 from kfcourse.exercises.c_duof.mistakes import WRONG_DUOF_RUNS, WRONG_DUOF_STEPS, WRONG_REGRESSIONS, WRONG_STRUCTURES
 from kfcourse.exercises.shared import RUNS, ensemble, other_equations, predicted, regression
@@ -82,7 +81,7 @@ QUESTIONS = (
         "warm-up",
         structure,
         structure_arguments,
-        catalogue(WRONG_STRUCTURES),
+        WRONG_STRUCTURES,
         ("omega", "alpha"),
         advice=(
             "One of the two results is about the measurement of this step, the other about the next state: "
@@ -96,7 +95,7 @@ QUESTIONS = (
         "core",
         regression,
         regression_arguments,
-        catalogue(WRONG_REGRESSIONS),
+        WRONG_REGRESSIONS,
         ("matrix", "offset", "residual"),
         advice=("Try a target that is exactly an affine function of the regressor: what must the three results be?"),
     ),
@@ -106,14 +105,13 @@ QUESTIONS = (
         "core",
         design_step,
         duof_arguments,
-        catalogue(WRONG_DUOF_STEPS),
+        WRONG_DUOF_STEPS,
         ("z", "lam_next"),
         advice=(
             "Say for each regression what is to be estimated, and from what; then put the regression's "
             "result where the formula of the filter has it."
         ),
         axes=("trajectory",),
-        on=follow_on.design_step,
     ),
     Question(
         "c4",
@@ -121,7 +119,7 @@ QUESTIONS = (
         "core",
         design_and_run,
         duof_run_arguments,
-        catalogue(WRONG_DUOF_RUNS),
+        WRONG_DUOF_RUNS,
         advice=(
             "Two ensembles go through the same steps: only one of them has known states, and both use the same coefficients."
         ),
@@ -129,7 +127,6 @@ QUESTIONS = (
             "step",
             "trajectory",
         ),
-        on=follow_on.design_and_run,
     ),
 )
 

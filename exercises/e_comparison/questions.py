@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import Question, catalogue
+from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.exercises.e_comparison.keys import difference, error_variance, normalised_error, ratio, with_standard_error
 from kfcourse.exercises.e_comparison.mistakes import (
@@ -65,7 +65,7 @@ QUESTIONS = (
         "warm-up",
         error_variance,
         asked("e1", 0, 1),
-        catalogue(WRONG_VARIANCES),
+        WRONG_VARIANCES,
         advice="Look at the axes: over which of them is a sum taken, over which a mean, and which one is left?",
         axes=("step",),
     ),
@@ -75,7 +75,7 @@ QUESTIONS = (
         "core",
         with_standard_error,
         asked("e2", 0, 1),
-        catalogue(WRONG_ERRORS),
+        WRONG_ERRORS,
         TWO,
         advice=(
             "The standard error belongs to a mean of N numbers. Which numbers, how much do they scatter, "
@@ -89,7 +89,7 @@ QUESTIONS = (
         "core",
         difference,
         asked("e3", 0, 1, 2),
-        catalogue(WRONG_DIFFERENCES),
+        WRONG_DIFFERENCES,
         TWO,
         advice=("Make one number of each trajectory that holds all you want to average; then question 2 applies to it."),
         axes=("step",),
@@ -100,7 +100,7 @@ QUESTIONS = (
         "stretch",
         ratio,
         asked("e4", 0, 1, 2),
-        catalogue(WRONG_RATIOS),
+        WRONG_RATIOS,
         TWO,
         advice=(
             "Change the mean above a little, then the mean below: how does the ratio change? Keep each "
@@ -114,7 +114,7 @@ QUESTIONS = (
         "core",
         normalised_error,
         asked("e5", 0, 1, 3),
-        catalogue(WRONG_NORMALISED),
+        WRONG_NORMALISED,
         advice=(
             "Take one trajectory at one step: a vector, a matrix and a number. Then average the numbers "
             "over the trajectories, and look at the 1/n."

@@ -4,7 +4,7 @@ Answers are functions of densities at the nodes x (M,), at equal distances, and 
 return mean and variance of the next state and of the measurement, given the state x; (M,) -> (M,), (M,).
 
 The hidden densities are smooth, resolved by their nodes, and vanish at both ends of the grid, so that all rules of
-integration agree.  Here are the hidden arguments; the keys are in keys.py, the known mistakes in the modules mistakes_of_*.py.
+integration agree.  Here are the hidden arguments; the keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import numpy as np
 from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises import follow_on
 from kfcourse.exercises.f_exact.companion import Law, companion_numbers
 from kfcourse.exercises.f_exact.keys import correct, moments, nodes_needed, nodes_with, normalised, predict, run_filter
 from kfcourse.exercises.f_exact.mistakes_of_run import WRONG_NODES, WRONG_RUNS
@@ -139,7 +138,6 @@ QUESTIONS = (
         advice=(
             "Write the law before and after each measurement for the first two steps, and for a step without any measurement."
         ),
-        on=follow_on.grid_run,
     ),
     Question(
         "f5",

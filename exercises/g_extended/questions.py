@@ -1,7 +1,7 @@
 """Questions of set g: the extended Kalman filter from its Jacobians, and whether it is right about its own errors.
 
 Answers are functions of arrays: vectors (..., n), matrices (..., r, c), trajectories first.  They are called with the hidden
-functions of hidden.py.  The keys are in keys.py, the known mistakes in the modules mistakes_of_*.py.
+functions of hidden.py.  The keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from kfcourse.checks.exercises import Exercise
 from kfcourse.checks.question import Question, catalogue
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import at_step
-from kfcourse.exercises import follow_on
 from kfcourse.exercises.g_extended.hidden import RUNS, STEPS, cases, changing, curved, hidden_law, root
 from kfcourse.exercises.g_extended.keys import bounds, consistency, correct, information, jacobian, predict, run_filter
 from kfcourse.exercises.g_extended.mistakes_of_consistency import WRONG_BOUNDS, WRONG_NORMALISED
@@ -186,7 +185,6 @@ QUESTIONS = (
             "step",
             "trajectory",
         ),
-        on=follow_on.extended_run,
     ),
     Question(
         "g6",

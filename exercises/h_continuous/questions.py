@@ -1,7 +1,7 @@
 """Questions of set h: the filter in continuous time, for white noises of given one-sided spectral densities.
 
 Answers are functions of numbers, of arrays (one number for each run, or matrices), and in the last question of formulas.
-The keys are in keys.py, the known mistakes in the modules mistakes_of_*.py.
+The keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations

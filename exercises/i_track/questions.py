@@ -3,7 +3,7 @@
 What is derived is answered with formulas in the symbols of the arguments, what runs with arrays.  Personal numbers are in
 `track_numbers`; hidden arguments are others, so an answer holds for any.
 
-The keys are in keys.py, the known mistakes in the modules mistakes_of_*.py.
+The keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -14,12 +14,10 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import Question, catalogue
+from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises import follow_on
 from kfcourse.exercises.i_track.keys import correct_root, matrices, process_noise, start_up, step
-from kfcourse.exercises.i_track.mistakes_of_filter import WRONG_ROOTS, WRONG_STEPS
-from kfcourse.exercises.i_track.mistakes_of_model import WRONG_MATRICES, WRONG_NOISES, WRONG_STARTS
+from kfcourse.exercises.i_track.mistakes import WRONG_MATRICES, WRONG_NOISES, WRONG_ROOTS, WRONG_STARTS, WRONG_STEPS
 from kfcourse.exercises.shared import covariance, personal
 
 
@@ -66,7 +64,7 @@ QUESTIONS = (
         "warm-up",
         matrices,
         lambda e: [(sp.Symbol("dt", positive=True),)],
-        catalogue(WRONG_MATRICES),
+        WRONG_MATRICES,
         ("A", "B", "H"),
         advice=("Put a state of one component, all others zero, and one interval: where is the point afterwards, and how fast?"),
     ),
@@ -76,9 +74,8 @@ QUESTIONS = (
         "core",
         process_noise,
         lambda e: [sp.symbols("dt sigma_a", positive=True)],
-        catalogue(WRONG_NOISES),
+        WRONG_NOISES,
         advice=("Take one axis: two components, one push. Their covariance has three different entries; what are their units?"),
-        on=follow_on.process_noise,
     ),
     Question(
         "i3",
@@ -86,7 +83,7 @@ QUESTIONS = (
         "core",
         start_up,
         lambda e: [(*sp.symbols("y0 y1 y2", real=True), sp.Symbol("dt", positive=True))],
-        catalogue(WRONG_STARTS),
+        WRONG_STARTS,
         ("r", "v", "a"),
         advice=("Try the motion r = t^2: three samples, and position, velocity and acceleration at the third are known."),
     ),
@@ -96,7 +93,7 @@ QUESTIONS = (
         "core",
         step,
         step_arguments,
-        catalogue(WRONG_STEPS),
+        WRONG_STEPS,
         ("lam", "Psi", "z", "p"),
         advice=("Take all matrices as numbers and do one step by hand; then look at which of the two laws each line needs."),
     ),
@@ -106,7 +103,7 @@ QUESTIONS = (
         "stretch",
         correct_root,
         root_arguments,
-        catalogue(WRONG_ROOTS),
+        WRONG_ROOTS,
         ("z", "S"),
         tolerance=1e-5,
         advice="Multiply your array by its own transpose: which blocks come out? Then compare with X, Y, Z.",

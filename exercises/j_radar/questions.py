@@ -3,7 +3,7 @@
 What is derived is answered with formulas in the symbols of the arguments, what runs with arrays.  Personal numbers are in
 `radar_numbers`; hidden arguments are others, so an answer holds for any.
 
-The keys are in keys.py, the known mistakes in the modules mistakes_of_*.py.
+The keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -15,11 +15,17 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import Question, catalogue
+from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.exercises.j_radar.keys import alpha_beta, cartesian, lag, meter_jacobian, noise_left, steady_gain
-from kfcourse.exercises.j_radar.mistakes_of_filter import WRONG_FILTERS, WRONG_GAINS, WRONG_LAGS, WRONG_SHARES
-from kfcourse.exercises.j_radar.mistakes_of_geometry import WRONG_CARTESIANS, WRONG_JACOBIANS
+from kfcourse.exercises.j_radar.mistakes import (
+    WRONG_CARTESIANS,
+    WRONG_FILTERS,
+    WRONG_GAINS,
+    WRONG_JACOBIANS,
+    WRONG_LAGS,
+    WRONG_SHARES,
+)
 from kfcourse.exercises.shared import personal
 from kfcourse.filters.alphabeta import steady_beta
 
@@ -70,7 +76,7 @@ QUESTIONS = (
         "warm-up",
         cartesian,
         lambda e: [sp.symbols("r phi eps", positive=True)],
-        catalogue(WRONG_CARTESIANS),
+        WRONG_CARTESIANS,
         ("x", "y", "z"),
         advice="Try the horizon, the zenith, and an azimuth of zero and of a right angle.",
     ),
@@ -80,7 +86,7 @@ QUESTIONS = (
         "core",
         meter_jacobian,
         lambda e: [sp.symbols("x y z", positive=True)],
-        catalogue(WRONG_JACOBIANS),
+        WRONG_JACOBIANS,
         advice=(
             "Differentiate one measurement at a time, by x, y, z in turn; each row has the unit of its measurement over a length."
         ),
@@ -91,7 +97,7 @@ QUESTIONS = (
         "core",
         steady_gain,
         several("j3", ((0.15, 0.7),)),
-        catalogue(WRONG_GAINS),
+        WRONG_GAINS,
         ("beta", "index"),
         advice=("Put your beta into the three equations of the hint: do they hold? For small alpha, beta is about alpha^2/2."),
     ),
@@ -101,7 +107,7 @@ QUESTIONS = (
         "core",
         alpha_beta,
         filter_arguments,
-        catalogue(WRONG_FILTERS),
+        WRONG_FILTERS,
         ("r", "v"),
         advice=("Follow the first two steps by hand: what is given is the prediction for the first measurement already."),
         axes=(
@@ -115,7 +121,7 @@ QUESTIONS = (
         "core",
         lag,
         lambda e: [sp.symbols("a T alpha beta", positive=True)],
-        catalogue(WRONG_LAGS),
+        WRONG_LAGS,
         ("position", "velocity"),
         advice="Put your two lags into the two equations of the hint: do they repeat themselves?",
     ),
@@ -125,7 +131,7 @@ QUESTIONS = (
         "stretch",
         noise_left,
         share_arguments,
-        catalogue(WRONG_SHARES),
+        WRONG_SHARES,
         advice=(
             "Try alpha = 1 with a small beta: the estimate is the measurement itself; and check that the "
             "answer is below one for a small alpha."

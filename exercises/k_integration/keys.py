@@ -6,17 +6,11 @@ Letters are the book's: Psi and p are the lecture's D with a tilde and D.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
 import sympy as sp
 
-from kfcourse.exercises.shared import substituted
-from kfcourse.laws import Array, Gaussian
-from kfcourse.linear.runs import run as run_linear
-from kfcourse.linear.system import LinearSystem
-
-# -- k1: the error of the slow sensor as the state
+from kfcourse.laws import Array
 
 
 def error_meter(signal: Callable, y: sp.Expr, eps: sp.Expr) -> tuple[sp.Expr, ...]:
@@ -25,24 +19,15 @@ def error_meter(signal: Callable, y: sp.Expr, eps: sp.Expr) -> tuple[sp.Expr, ..
     return h, sp.diff(h, eps)
 
 
-# -- k2, k4: the steady state
-
-S_XI, S_N = sp.symbols("sigma_xi sigma_n", positive=True)
-
-
-@lru_cache(maxsize=1)
-def _steady() -> sp.ImmutableMatrix:
-    """(Psi, p, K): the positive fixed point of Psi = p + sigma_xi^2, K = -Psi/(Psi + sigma_n^2), p = (1 + K) Psi."""
-    Psi = sp.Symbol("Psi")
-    K = -Psi / (Psi + S_N**2)
-    roots = sp.solve(sp.numer(sp.together((1 + K) * Psi + S_XI**2 - Psi)), Psi)
-    (found,) = [root for root in roots if root.subs({S_XI: 1, S_N: 1}) > 0]
-    return sp.ImmutableMatrix([found, found - S_XI**2, K.subs(Psi, found)])
-
-
 def steady_state(sigma_xi: sp.Expr, sigma_n: sp.Expr) -> tuple[sp.Expr, ...]:
-    """Psi, p, K that a step leaves as they are."""
-    return tuple(substituted(_steady(), (S_XI, S_N))(sigma_xi, sigma_n))
+    """Psi, p, K that a step leaves as they are.
+
+    The positive fixed point of Psi = p + sigma_xi^2, K = -Psi/(Psi + sigma_n^2), p = (1 + K) Psi.
+    """
+    Psi = (sigma_xi**2 + sp.sqrt(sigma_xi**4 + 4 * sigma_xi**2 * sigma_n**2)) / 2
+    p = Psi - sigma_xi**2
+    K = -Psi / (Psi + sigma_n**2)
+    return Psi, p, K
 
 
 def gained(sigma_xi: sp.Expr, sigma_n: sp.Expr, T: sp.Expr) -> tuple[sp.Expr, ...]:
@@ -51,19 +36,19 @@ def gained(sigma_xi: sp.Expr, sigma_n: sp.Expr, T: sp.Expr) -> tuple[sp.Expr, ..
     return sigma_n / sp.sqrt(p), -T / sp.log(1 + K)
 
 
-# -- k3: the filter
-
-
 def integrate(y_ins: Array, y_sr: Array, sigma_xi: float, sigma_n: float, p0: float) -> tuple[Array, Array]:
     """Velocities less the estimated error, and its variances p."""
-    steps, runs, axes = y_ins.shape
-    system = LinearSystem(np.eye(1), -np.eye(1), np.array([[sigma_xi**2]]), np.array([[sigma_n**2]]))
-    each_axis = (y_sr - y_ins).reshape(steps, runs * axes, 1)  # the axes are independent: so many runs of one filter
-    laws = run_linear(system, Gaussian(np.zeros(1), np.array([[p0]])), each_axis).posterior
-    return y_ins - laws.mean.reshape(y_ins.shape), laws.cov[:, 0, 0, 0]
-
-
-# -- k5: the receiver drops out; k6: the receiver is biased
+    eps, Psi = np.zeros(y_ins.shape[1:]), p0
+    velocities, variances = [], []
+    for ins, sr in zip(y_ins, y_sr, strict=True):
+        lost = np.isnan(sr).any()
+        K = 0 if lost else -Psi / (Psi + sigma_n**2)
+        eps = eps if lost else eps + K * (sr - (ins - eps))
+        p = (1 + K) * Psi
+        velocities.append(ins - eps)
+        variances.append(p)
+        Psi = p + sigma_xi**2
+    return np.array(velocities), np.array(variances)
 
 
 def lost(p: sp.Expr, sigma_xi: sp.Expr, sigma_n: sp.Expr, n: sp.Expr, T: sp.Expr) -> tuple[sp.Expr, ...]:

@@ -1,7 +1,7 @@
 """Questions of set k: an inertial system integrated with a satellite receiver.
 
 What is derived is answered with formulas in the symbols of the arguments, what runs with arrays.  Personal numbers are in
-`integration_numbers`; hidden arguments are others.  The keys are in keys.py, the known mistakes in the modules mistakes_of_*.py.
+`integration_numbers`; hidden arguments are others.  The keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -12,13 +12,20 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import Question, catalogue
+from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises import follow_on
-from kfcourse.exercises.k_integration.keys import S_N, S_XI, bias_error, error_meter, gained, integrate, lost, steady_state
-from kfcourse.exercises.k_integration.mistakes_of_accuracy import WRONG_BIASES, WRONG_GROWTHS, WRONG_IMPROVEMENTS, WRONG_STEADY
-from kfcourse.exercises.k_integration.mistakes_of_filter import WRONG_FILTERS, WRONG_METERS
+from kfcourse.exercises.k_integration.keys import bias_error, error_meter, gained, integrate, lost, steady_state
+from kfcourse.exercises.k_integration.mistakes import (
+    WRONG_BIASES,
+    WRONG_FILTERS,
+    WRONG_GROWTHS,
+    WRONG_IMPROVEMENTS,
+    WRONG_METERS,
+    WRONG_STEADY,
+)
 from kfcourse.exercises.shared import personal
+
+S_XI, S_N = sp.symbols("sigma_xi sigma_n", positive=True)
 
 
 def integration_numbers(exercise: Exercise) -> dict[str, float]:
@@ -59,7 +66,7 @@ QUESTIONS = (
         "warm-up",
         error_meter,
         signals,
-        catalogue(WRONG_METERS),
+        WRONG_METERS,
         ("signal", "slope"),
         advice="Try S(V) = V^2 by hand: put V = y - eps in, and differentiate by eps.",
     ),
@@ -69,7 +76,7 @@ QUESTIONS = (
         "core",
         steady_state,
         lambda e: [(S_XI, S_N)],
-        catalogue(WRONG_STEADY),
+        WRONG_STEADY,
         ("Psi", "p", "K"),
         advice="Put your three results into the three equations of the hint: do they hold?",
     ),
@@ -79,7 +86,7 @@ QUESTIONS = (
         "core",
         integrate,
         filter_arguments,
-        catalogue(WRONG_FILTERS),
+        WRONG_FILTERS,
         ("V", "p"),
         advice=(
             "Follow one axis for two steps by hand: the prior is for the first measurement; without a "
@@ -93,10 +100,9 @@ QUESTIONS = (
         "core",
         gained,
         lambda e: [(S_XI, S_N, sp.Symbol("T", positive=True))],
-        catalogue(WRONG_IMPROVEMENTS),
+        WRONG_IMPROVEMENTS,
         ("factor", "time_constant"),
         advice="Check the units: the first is a pure number, the second a time. Is the first larger than one?",
-        on=follow_on.gained,
     ),
     Question(
         "k5",
@@ -104,7 +110,7 @@ QUESTIONS = (
         "core",
         lost,
         lambda e: [(sp.Symbol("p", positive=True), S_XI, S_N, *sp.symbols("n T", positive=True))],
-        catalogue(WRONG_GROWTHS),
+        WRONG_GROWTHS,
         ("deviation", "until"),
         advice=(
             "Variances grow in proportion to the number of periods; convert to a standard deviation, and "
@@ -117,7 +123,7 @@ QUESTIONS = (
         "stretch",
         bias_error,
         lambda e: [(*sp.symbols("beta K", real=True), sp.Symbol("j", integer=True, positive=True))],
-        catalogue(WRONG_BIASES),
+        WRONG_BIASES,
         advice="Try the first and the second biased measurement by hand, then an infinite number of them.",
     ),
 )

@@ -1,7 +1,7 @@
 """Questions of set l: sensors of different rates, late and by clocks of their own.
 
 What is derived is answered with formulas in the symbols of the arguments, what runs with arrays.  Personal numbers are in
-`timing_numbers`; hidden arguments are others.  The keys are in keys.py, the known mistakes in the modules mistakes_of_*.py.
+`timing_numbers`; hidden arguments are others.  The keys are in keys.py, the known mistakes in mistakes.py.
 """
 
 from __future__ import annotations
@@ -12,12 +12,18 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import Question, catalogue
+from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises import follow_on
 from kfcourse.exercises.l_time_tags.keys import correct, cost, dimension, fit_clock, fuse, move, own_time
-from kfcourse.exercises.l_time_tags.mistakes_of_clocks import WRONG_COSTS, WRONG_FITS, WRONG_TIMES
-from kfcourse.exercises.l_time_tags.mistakes_of_fusion import WRONG_CORRECTIONS, WRONG_DIMENSIONS, WRONG_FUSIONS, WRONG_MOVES
+from kfcourse.exercises.l_time_tags.mistakes import (
+    WRONG_CORRECTIONS,
+    WRONG_COSTS,
+    WRONG_DIMENSIONS,
+    WRONG_FITS,
+    WRONG_FUSIONS,
+    WRONG_MOVES,
+    WRONG_TIMES,
+)
 from kfcourse.exercises.shared import covariance, personal
 
 
@@ -100,7 +106,7 @@ QUESTIONS = (
         "warm-up",
         dimension,
         dimension_arguments,
-        catalogue(WRONG_DIMENSIONS),
+        WRONG_DIMENSIONS,
         advice="Write out k = 0, 1, 2, ... for a ratio of three and a first step of four, and count by hand.",
         axes=("step",),
     ),
@@ -110,7 +116,7 @@ QUESTIONS = (
         "warm-up",
         own_time,
         lambda e: [sp.symbols("reading rate shift", positive=True)],
-        catalogue(WRONG_TIMES),
+        WRONG_TIMES,
         advice="Try a clock that is right but for a shift, then one that only runs twice as fast.",
     ),
     Question(
@@ -119,7 +125,7 @@ QUESTIONS = (
         "core",
         correct,
         correction_arguments,
-        catalogue(WRONG_CORRECTIONS),
+        WRONG_CORRECTIONS,
         ("m", "P"),
         advice=(
             "Choose the components that are there first, of everything that has a component for each; then "
@@ -132,7 +138,7 @@ QUESTIONS = (
         "core",
         move,
         move_arguments,
-        catalogue(WRONG_MOVES),
+        WRONG_MOVES,
         ("m", "P"),
         advice="Two intervals one after the other must give the same as the whole one: try it with your Q.",
     ),
@@ -142,13 +148,12 @@ QUESTIONS = (
         "core",
         fuse,
         fusion_arguments,
-        catalogue(WRONG_FUSIONS),
+        WRONG_FUSIONS,
         ("m", "P"),
         advice=(
             "Draw the times on a line: captured, arrived, now. Which measurements may be used, in which "
             "order, and over which intervals do you move?"
         ),
-        on=follow_on.fuse,
     ),
     Question(
         "l6",
@@ -156,7 +161,7 @@ QUESTIONS = (
         "core",
         cost,
         lambda e: [sp.symbols("V a tau", positive=True)],
-        catalogue(WRONG_COSTS),
+        WRONG_COSTS,
         ("position", "velocity"),
         advice="Expand s(-tau) and its derivative for a motion that you can follow by hand, such as V = 0.",
     ),
@@ -166,7 +171,7 @@ QUESTIONS = (
         "stretch",
         fit_clock,
         fit_arguments,
-        catalogue(WRONG_FITS),
+        WRONG_FITS,
         ("rate", "shift"),
         advice=("Which of the two has an error? That one is the target of the fit; then solve the line for the other."),
     ),

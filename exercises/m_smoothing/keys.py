@@ -2,34 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
-import scipy
 import sympy as sp
 
-from kfcourse.laws import Array, gain, normalised_square
-
-# -- m1: the gate; m2: the likelihood of one innovation
+from kfcourse.laws import Array
 
 
 def gate(beta: float) -> float:
     """The value that chi-squared with two degrees stays below with the probability beta."""
-    return float(scipy.special.chdtri(2, 1 - beta))
+    return -2 * np.log(1 - beta)
 
 
 def log_likelihood(nu: sp.Expr, F: sp.Expr) -> sp.Expr:
     """ln N(nu; 0, F)."""
-    return sp.log(sp.exp(-(nu**2) / (2 * F)) / sp.sqrt(2 * sp.pi * F))
-
-
-# -- m3: neighbours; m4: one step back; m5: a whole record
+    return -(nu**2) / F / 2 - sp.log(2 * sp.pi * F) / 2
 
 
 def neighbours(p: Array, A: Array, Q: Array) -> tuple[Array, Array]:
     """Cov(x_k, x_{k+1}) and the smoother's gain."""
     cross = p @ A.T
-    return cross, gain(cross, A @ p @ A.T + Q)
+    return cross, cross @ np.linalg.inv(A @ p @ A.T + Q)
 
 
 def step_back(z: Array, p: Array, ahead: Array, Psi: Array, later: Array, later_p: Array, S: Array) -> tuple[Array, Array]:
@@ -39,34 +31,24 @@ def step_back(z: Array, p: Array, ahead: Array, Psi: Array, later: Array, later_
 
 def smooth(z: Array, p: Array, ahead: Array, Psi: Array, A: Array, Q: Array) -> tuple[Array, Array]:
     """All steps, from what a filter left."""
-    return smooth_with(neighbours, step_back)(z, p, ahead, Psi, A, Q)
-
-
-def smooth_with(neighbours: Callable, step_back: Callable) -> Callable:
-    """m5 by these answers to m3 and m4."""
-
-    def answer(z: Array, p: Array, ahead: Array, Psi: Array, A: Array, Q: Array) -> tuple[Array, Array]:
-        means, covs = [z[-1]], [p[-1]]
-        for k in range(len(z) - 2, -1, -1):
-            _, S = neighbours(p[k], A, Q)
-            mean, cov = step_back(z[k], p[k], ahead[k + 1], Psi[k + 1], means[-1], covs[-1], S)
-            means.append(np.asarray(mean))
-            covs.append(np.asarray(cov))
-        return np.stack(means[::-1]), np.stack(covs[::-1])
-
-    return answer
-
-
-# -- m6: a round of EM; m7: a weight
+    means, covs = [z[-1]], [p[-1]]
+    for k in range(len(z) - 2, -1, -1):
+        _, S = neighbours(p[k], A, Q)
+        mean, cov = step_back(z[k], p[k], ahead[k + 1], Psi[k + 1], means[-1], covs[-1], S)
+        means.append(mean)
+        covs.append(cov)
+    return np.stack(means[::-1]), np.stack(covs[::-1])
 
 
 def new_r(y: Array, z: Array, p: Array) -> float:
     """The meter's variance after a round: the mean of what is expected of w^2."""
     there = np.isfinite(y)
-    return float(np.mean((y[there] - z[there]) ** 2 + p[there]))
+    y, z, p = y[there], z[there], p[there]
+    return float(np.mean((y - z) ** 2 + p))
 
 
 def weight(r: Array, R: Array, G: Array, p: Array, s: float) -> float:
     """How much a measurement with this residual counts under Student noise of s degrees."""
-    unsure = np.trace(gain(np.eye(len(R)), R) @ G @ p @ G.T)
-    return float((s + len(r)) / (s + normalised_square(r, R) + unsure))
+    inverse = np.linalg.inv(R)
+    size = r @ inverse @ r + np.trace(inverse @ G @ p @ G.T)
+    return float((s + len(r)) / (s + size))

@@ -12,9 +12,8 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import Question, catalogue
+from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises import follow_on
 from kfcourse.exercises.m_smoothing.keys import gate, log_likelihood, neighbours, new_r, smooth, step_back, weight
 from kfcourse.exercises.m_smoothing.mistakes import (
     WRONG_GATES,
@@ -109,7 +108,7 @@ QUESTIONS = (
         "warm-up",
         gate,
         gate_arguments,
-        catalogue(WRONG_GATES),
+        WRONG_GATES,
         advice="Let beta go to 1, then to 0: what must become of the gate?",
     ),
     Question(
@@ -118,7 +117,7 @@ QUESTIONS = (
         "warm-up",
         log_likelihood,
         lambda e: [(sp.Symbol("nu", real=True), sp.Symbol("F", positive=True))],
-        catalogue(WRONG_LOGARITHMS),
+        WRONG_LOGARITHMS,
         advice="Write the normal density, and take the logarithm factor by factor.",
     ),
     Question(
@@ -127,7 +126,7 @@ QUESTIONS = (
         "core",
         neighbours,
         neighbour_arguments,
-        catalogue(WRONG_PAIRS),
+        WRONG_PAIRS,
         ("covariance", "gain"),
         advice="Write x_{k+1} = A x_k + v, subtract the means, multiply by the error of x_k on the left, and take the mean.",
     ),
@@ -137,7 +136,7 @@ QUESTIONS = (
         "core",
         step_back,
         step_arguments,
-        catalogue(WRONG_STEPS),
+        WRONG_STEPS,
         ("mean", "covariance"),
         advice="If the later law is just the prediction, nothing has been learned, and the law of this step must stay.",
     ),
@@ -147,10 +146,9 @@ QUESTIONS = (
         "core",
         smooth,
         record_arguments,
-        catalogue(WRONG_RECORDS),
+        WRONG_RECORDS,
         ("mean", "covariance"),
         advice="Write down for the last three steps, by hand, which law is used where.",
-        on=follow_on.smoother,
         axes=("step",),
         spare=("ahead", "Psi", "Q"),  # what a filter leaves: ahead = A z, Psi = A p A^T + Q
     ),
@@ -160,7 +158,7 @@ QUESTIONS = (
         "core",
         new_r,
         round_arguments,
-        catalogue(WRONG_ROUNDS),
+        WRONG_ROUNDS,
         advice="What would r be if the states were seen? Then take the mean of that over what the smoother does not know.",
     ),
     Question(
@@ -169,7 +167,7 @@ QUESTIONS = (
         "stretch",
         weight,
         weight_arguments,
-        catalogue(WRONG_WEIGHTS),
+        WRONG_WEIGHTS,
         advice="Let the degrees grow without end: then every measurement must count in full.",
     ),
 )

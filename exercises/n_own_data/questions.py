@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import Question, catalogue
+from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.exercises.n_own_data.keys import follow, gate, held_out, intervals, neighbours, process_noise
 from kfcourse.exercises.n_own_data.mistakes import (
@@ -83,7 +83,7 @@ QUESTIONS = (
         "warm-up",
         intervals,
         lambda e: [(_times(e.rng("n1"), 7),)],
-        catalogue(WRONG_INTERVALS),
+        WRONG_INTERVALS,
         advice="Write down three times, and the length of the step that begins at each of them.",
         axes=("step",),
     ),
@@ -93,7 +93,7 @@ QUESTIONS = (
         "core",
         process_noise,
         lambda e: [(e.rng("n2").uniform(0.3, 2.6, 4), float(e.rng("n2").uniform(1.3, 2)))],
-        catalogue(WRONG_NOISES),
+        WRONG_NOISES,
         advice="Two intervals one after the other must add as much as the whole one: A Q A^T + Q. Try it with your Q.",
     ),
     Question(
@@ -102,7 +102,7 @@ QUESTIONS = (
         "core",
         follow,
         filter_arguments,
-        catalogue(WRONG_FILTERS),
+        WRONG_FILTERS,
         ("z", "p"),
         advice="Follow three rows by hand, the second of them empty: correct, predict, predict, correct.",
         axes=("step",),
@@ -113,7 +113,7 @@ QUESTIONS = (
         "core",
         gate,
         gate_arguments,
-        catalogue(WRONG_GATES),
+        WRONG_GATES,
         ("size", "edge"),
         advice="For a single component the size is nu^2 / F, and the edge for 95 % is 1.96 squared: try that first.",
     ),
@@ -123,7 +123,7 @@ QUESTIONS = (
         "core",
         held_out,
         held_out_arguments,
-        catalogue(WRONG_JUDGEMENTS),
+        WRONG_JUDGEMENTS,
         ("rms", "claimed", "nis"),
         advice="Take F = I for all: then the second is the root of 2, and the third is the square of the first.",
     ),
@@ -133,7 +133,7 @@ QUESTIONS = (
         "stretch",
         neighbours,
         neighbour_arguments,
-        catalogue(WRONG_NEIGHBOURS),
+        WRONG_NEIGHBOURS,
         ("correlation", "deviation"),
         advice="First make a list without gaps, of innovations with the variance 1; then count the pairs in it.",
     ),

@@ -1,4 +1,4 @@
-"""Keys of set o: probabilities of modes, merged laws, the IMM's mixing, a decision; by the functions of the package's filters.
+"""Keys of set o: probabilities of modes, merged laws, the IMM's mixing, a decision.
 
 A scalar meter that may fail: x' = a x + sqrt(q) v, y = x + C_i w in mode i.
 """
@@ -9,37 +9,39 @@ import numpy as np
 
 from kfcourse.derivations.setting import Setting
 from kfcourse.derivations.typed import read_line
-from kfcourse.filters.multiple_models import mixture, modes_given, onward
-from kfcourse.laws import Array, Gaussian, Measurement
+from kfcourse.laws import Array
 
 
 def chain(mu: Array, pi: Array) -> tuple[Array, Array]:
     """Probabilities of the modes at the next step, (J,), and where each comes from, (J, J): column j sums to one."""
-    expected, weights = onward(mu[None], pi)
-    return expected[0], weights[0]
+    joint = mu[:, None] * pi
+    return joint.sum(axis=0), joint / joint.sum(axis=0)
 
 
 def posterior(c: Array, y: float, h: Array, F: Array) -> Array:
     """Probabilities of the modes after y, (J,)."""
-    one = np.ones((1, 1))  # the density does not ask how the state is measured
-    expected = [Measurement(np.array([[h_j]]), one, np.array([[F_j]]), one) for h_j, F_j in zip(h, F, strict=True)]
-    return modes_given(c[None], expected, np.array([[y]]))[0][0]
+    nu = y - h
+    logs = -(nu**2) / (2 * F) - np.log(F) / 2
+    joint = c * np.exp(logs - logs.max())
+    return joint / joint.sum()
 
 
 def merged(mu: Array, z: Array, p: Array) -> tuple[Array, Array]:
     """Mean (n,) and covariance (n, n) of the mixture of N(z[j], p[j]) with the weights mu."""
-    laws = [Gaussian(mean[None], cov[None]) for mean, cov in zip(z, p, strict=True)]
-    found = mixture(laws, mu[None])
-    return found.mean[0], found.cov[0]
+    mean = mu @ z
+    e = z - mean
+    spread = np.einsum("j,ja,jb->ab", mu, e, e)
+    return mean, np.tensordot(mu, p, 1) + spread
 
 
 def two_steps(y: Array, m: float, d: float, a: float, q: float, C: Array, pi: Array, first: Array) -> tuple[Array, Array]:
     """Probabilities of the modes after y_0 and after y_1, of x' = a x + sqrt(q) v, y = x + C_i w, x_0 ~ N(m, d)."""
     before = posterior(first, y[0], np.full(len(C), m), d + C**2)
-    gain = d / (d + C**2)
-    z, p = m + gain * (y[0] - m), gain * C**2
-    c, weights = chain(before, pi)
-    laws = [merged(column, a * z[:, None], (a**2 * p + q)[:, None, None]) for column in weights.T]
+    K = d / (d + C**2)
+    z, p = m + K * (y[0] - m), d - K * d
+    z, p = a * z, a**2 * p + q
+    c, w = chain(before, pi)
+    laws = [merged(column, z[:, None], p[:, None, None]) for column in w.T]
     h, Psi = (np.array([law[which].item() for law in laws]) for which in (0, 1))
     return before, posterior(c, y[1], h, Psi + C**2)
 
@@ -53,8 +55,9 @@ def mixed(mu: Array, pi: Array, z: Array, p: Array) -> tuple[Array, Array, Array
 
 def decide(faulty: Array, missed: float, alarm: float) -> tuple[Array, Array]:
     """1 where the meter is called faulty, else 0, and the mean loss of that; of probabilities that it is faulty."""
-    losses = np.stack([np.multiply(faulty, missed), np.multiply(1 - faulty, alarm)])
-    return (losses[1] < losses[0]).astype(float), losses.min(axis=0)
+    say_sound, say_faulty = faulty * missed, (1 - faulty) * alarm
+    called = say_faulty < say_sound
+    return called * 1.0, np.where(called, say_faulty, say_sound)
 
 
 # -- o5: the spread of the means, line by line

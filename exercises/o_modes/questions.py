@@ -11,9 +11,8 @@ import numpy as np
 
 from kfcourse.checks.derived import Derivation, Posed
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import ForVariant, Question, catalogue
+from kfcourse.checks.question import ForVariant, Question
 from kfcourse.checks.registry import ExerciseSet
-from kfcourse.exercises import follow_on
 from kfcourse.exercises.o_modes.keys import GIVEN, SPREAD, chain, decide, merged, mixed, posterior, spread_setting, two_steps
 from kfcourse.exercises.o_modes.mistakes import (
     WRONG_CHAINS,
@@ -105,7 +104,7 @@ QUESTIONS = (
         "warm-up",
         chain,
         chains,
-        catalogue(WRONG_CHAINS),
+        WRONG_CHAINS,
         ("c", "w"),
         advice="Draw an arrow for each pair of modes and write its probability on it; then add up what arrives.",
     ),
@@ -115,7 +114,7 @@ QUESTIONS = (
         "core",
         posterior,
         measured,
-        catalogue(WRONG_POSTERIORS),
+        WRONG_POSTERIORS,
         advice="Two modes expect the same: what decides between them if y is just what was expected, and if it is far off?",
     ),
     Question(
@@ -124,10 +123,9 @@ QUESTIONS = (
         "core",
         two_steps,
         two_measurements,
-        catalogue(WRONG_STEPS),
+        WRONG_STEPS,
         ("after_first", "after_second"),
         advice="After each line write down what you hold: probabilities, means, variances. Which of them has y_0 changed?",
-        on=follow_on.two_steps,
     ),
     Question(
         "o4",
@@ -135,7 +133,7 @@ QUESTIONS = (
         "core",
         merged,
         to_merge,
-        catalogue(WRONG_MERGED),
+        WRONG_MERGED,
         ("mean", "covariance"),
         advice="Two laws without any variance, at +1 and -1, equally likely: which variance has their mixture?",
     ),
@@ -154,10 +152,9 @@ QUESTIONS = (
         "core",
         mixed,
         to_mix,
-        catalogue(WRONG_MIXED),
+        WRONG_MIXED,
         ("c", "means", "covariances"),
         advice="For one mode: which modes can it come from, with which weights, and what is the mixture of their laws?",
-        on=follow_on.mixed,
     ),
     Question(
         "o7",
@@ -165,7 +162,7 @@ QUESTIONS = (
         "warm-up",
         decide,
         to_decide,
-        catalogue(WRONG_DECISIONS),
+        WRONG_DECISIONS,
         ("called", "loss"),
         advice="For one probability: what does it cost on the average to say faulty, and what to say sound?",
     ),

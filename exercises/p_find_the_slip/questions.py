@@ -12,7 +12,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import Question, catalogue
+from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.exercises.p_find_the_slip import keys
 from kfcourse.exercises.p_find_the_slip.mistakes import (
@@ -67,12 +67,10 @@ def modes(exercise: Exercise) -> list[tuple]:
     return found
 
 
-def symbols(*names: sp.Symbol) -> list[tuple]:
-    return [names]
+def symbols(names: str) -> list[tuple]:
+    """One call with these symbols."""
+    return [sp.symbols(names, real=True)]
 
-
-LAW = (keys.M1, keys.M2, keys.D11, keys.D12, keys.D22)
-LAW_OF_STATE = (keys.Z1, keys.Z2, keys.P11, keys.P12, keys.P22)
 
 QUESTIONS = (
     Question(
@@ -80,8 +78,8 @@ QUESTIONS = (
         "a factor comes out of a mean square",
         "warm-up",
         keys.second_moment,
-        lambda e: symbols(keys.A, keys.Q, keys.Z, keys.P),
-        catalogue(WRONG_SECOND),
+        lambda e: symbols("a q z p"),
+        WRONG_SECOND,
         advice="Put a = 2, q = 0 and p = 0 in: what is x', and what is its square?",
     ),
     Question(
@@ -89,8 +87,8 @@ QUESTIONS = (
         "a meter that measures too little",
         "core",
         keys.scaled_meter,
-        lambda e: symbols(keys.GAMMA, keys.SLOPE, keys.D, keys.R),
-        catalogue(WRONG_SCALED),
+        lambda e: symbols("gamma G d r"),
+        WRONG_SCALED,
         advice="Multiply the bracket out before you take variances: what multiplies the noise?",
     ),
     Question(
@@ -98,8 +96,8 @@ QUESTIONS = (
         "the variance of which component?",
         "core",
         keys.noise_intensity,
-        lambda e: symbols(*LAW_OF_STATE),
-        catalogue(WRONG_INTENSITIES),
+        lambda e: symbols("z1 z2 p11 p12 p22"),
+        WRONG_INTENSITIES,
         advice="Which component stands in B? Write the mean of its square, and nothing else.",
     ),
     Question(
@@ -107,8 +105,8 @@ QUESTIONS = (
         "moments of a measured square",
         "core",
         keys.meter_variance,
-        lambda e: symbols(*LAW),
-        catalogue(WRONG_METERS),
+        lambda e: symbols("m1 m2 d11 d12 d22"),
+        WRONG_METERS,
         advice="Check with d = 0: what is left must be the noise alone. Then put x1 = m1 + a deviation, and multiply out.",
     ),
     Question(
@@ -116,8 +114,8 @@ QUESTIONS = (
         "a derivative by the angle",
         "core",
         keys.by_angle,
-        lambda e: symbols(keys.FORCE, keys.KAPPA, keys.ANGLE),
-        catalogue(WRONG_SLOPES),
+        lambda e: symbols("E kappa x2"),
+        WRONG_SLOPES,
         ("first", "second"),
         advice="Differentiate each of the four terms by itself, with a table of sines and cosines beside you.",
     ),
@@ -127,7 +125,7 @@ QUESTIONS = (
         "core",
         keys.correction_matrix,
         errors,
-        catalogue(WRONG_MATRICES),
+        WRONG_MATRICES,
         advice="What must be uncorrelated with sigma, if nothing better can be made of it? Write that as an equation for H.",
     ),
     Question(
@@ -136,7 +134,7 @@ QUESTIONS = (
         "core",
         keys.coefficients,
         steps,
-        catalogue(WRONG_FITS),
+        WRONG_FITS,
         ("Gamma", "chi", "T"),
         advice="Take the mean of x - Gamma z - chi over the ensemble: it must be zero, and T is what is left of x.",
     ),
@@ -146,7 +144,7 @@ QUESTIONS = (
         "stretch",
         keys.moments,
         modes,
-        catalogue(WRONG_MOMENTS),
+        WRONG_MOMENTS,
         ("mean", "variance"),
         advice="Nine trajectories in one mode and one in the other: what does each of them count?",
     ),

@@ -8,9 +8,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import sympy as sp
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import Question, catalogue
+from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.exercises.r_loop import keys
 from kfcourse.exercises.r_loop.mistakes import (
@@ -22,6 +23,9 @@ from kfcourse.exercises.r_loop.mistakes import (
     WRONG_TIMES,
 )
 from kfcourse.exercises.shared import personal
+
+DELTA = (sp.Symbol("Delta", real=True), *sp.symbols("A D", positive=True))
+NOISES, LOOP = sp.symbols("q r", positive=True), sp.symbols("p A D T", positive=True)
 
 
 def loop_numbers(exercise: Exercise) -> dict[str, float]:
@@ -59,7 +63,7 @@ QUESTIONS = (
         "warm-up",
         keys.discriminator,
         samples,
-        catalogue(WRONG_DISCRIMINATORS),
+        WRONG_DISCRIMINATORS,
         advice="Write the log-likelihood of the phase down, and differentiate it by the phase.",
         axes=("sample",),
     ),
@@ -68,8 +72,8 @@ QUESTIONS = (
         "its characteristic",
         "core",
         keys.characteristic,
-        lambda e: [(keys.DELTA, keys.A, keys.D)],
-        catalogue(WRONG_CHARACTERISTICS),
+        lambda e: [DELTA],
+        WRONG_CHARACTERISTICS,
         ("U", "slope", "noise"),
         advice="Put y in without its noise, and write products of sine and cosine as sums: which are left after a period?",
     ),
@@ -78,8 +82,8 @@ QUESTIONS = (
         "the steady state of the loop",
         "core",
         keys.steady,
-        lambda e: [(keys.Q, keys.R)],
-        catalogue(WRONG_STEADY),
+        lambda e: [NOISES],
+        WRONG_STEADY,
         ("Psi", "p"),
         advice="Put your two results into both equations of the hint: do they hold? Try q = 1, r = 2.",
     ),
@@ -88,8 +92,8 @@ QUESTIONS = (
         "the lock-in range",
         "core",
         keys.lock_in,
-        lambda e: [(keys.P, keys.A, keys.D, keys.T)],
-        catalogue(WRONG_RANGES),
+        lambda e: [LOOP],
+        WRONG_RANGES,
         advice="By how much can one correction move the phase at most? By how much does an offset move it between two samples?",
     ),
     Question(
@@ -98,7 +102,7 @@ QUESTIONS = (
         "core",
         keys.mean_time,
         variances,
-        catalogue(WRONG_TIMES),
+        WRONG_TIMES,
         advice="Check a sure loop against the exponential formula of the chapter, and an unsure one against a free random walk.",
     ),
     Question(
@@ -107,7 +111,7 @@ QUESTIONS = (
         "core",
         keys.slips,
         paths,
-        catalogue(WRONG_SLIPS),
+        WRONG_SLIPS,
         ("cycles", "time"),
         advice="Take two runs of ten steps by hand: one slips at step 4, the other never. How many steps were without a slip?",
     ),

@@ -8,7 +8,6 @@ Nothing that a student hands in may crash a check, and no message contains the a
 from __future__ import annotations
 
 import copy
-import inspect
 import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ import sympy as sp
 from kfcourse.checks.case import Agree
 from kfcourse.checks.derived import Derivation
 from kfcourse.checks.diagnosis import GENERAL, Wrong, part_of
+from kfcourse.checks.edits import pieces, rebound
 from kfcourse.checks.equality import Places, Unusable, depends, equal, like, with_values
 from kfcourse.checks.question import (
     MISSING,
@@ -35,7 +35,6 @@ from kfcourse.checks.question import (
     Mistake,
     Question,
     Result,
-    answer_for,
 )
 from kfcourse.checks.registry import folders
 from kfcourse.limits import OutOfTime, time_limit
@@ -311,15 +310,14 @@ class _Check:
 
     def _follows(self, found: list[Any]) -> tuple[str, ...]:
         """Earlier questions on whose wrong answers this one is right: all of them, or one."""
-        on = self.question.on
-        if on is None:
+        if isinstance(self.question, Derivation):
             return ()
         earlier = {one.function: one for one in self.exercise.questions.values() if one.name in self.past.wrong}
-        own = [function for function in inspect.signature(on).parameters if function in earlier]
+        own = [function for function in pieces(self.posed.key) if function in earlier]
         for chosen in ([own] if len(own) > 1 else []) + [[one] for one in own]:
             try:
                 answers = {function: self._in_form(earlier[function]) for function in chosen}
-                step = answer_for(self.exercise, on(**answers))
+                step = rebound(self.posed.key, answers)
                 with time_limit(self.seconds):
                     theirs = [
                         like(step(*copy.deepcopy(values)), wanted)

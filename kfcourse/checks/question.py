@@ -83,8 +83,6 @@ class Question:
         Relative difference of numbers that still counts as equal.
     advice : str
         Said when the same wrong answer comes again: where to look, never the answer.
-    on : callable, optional
-        The key on top of earlier answers, `on(gain=...)`: its parameters have the names of functions of earlier questions.
     axes : tuple of str
         What the leading axes of the results are, ("step", "trajectory"); of arguments of such a shape, too.
     spare : tuple of str
@@ -100,7 +98,6 @@ class Question:
     parts: tuple[str, ...] = ()
     tolerance: float = ROUNDING
     advice: str = ""
-    on: Callable[..., Answer | ForVariant] | None = None
     axes: tuple[str, ...] = ()
     spare: tuple[str, ...] = ()
 

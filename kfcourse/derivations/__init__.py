@@ -4,7 +4,6 @@ terms     the tree of a line as it was typed: nothing is simplified, so that its
 typed     text -> tree, read without running it
 setting   what letters mean: the law of the state, noises, the structural functions of a model
 values    a tree at random points; means by Gauss-Hermite quadrature
-exact     polynomials and quotients of them multiplied out: moments of normal laws by recursion
 compared  are two lines equal?
 slips     which single change of a line makes it equal to the one above?
 said      what is said of a slip, and which rule the right step uses

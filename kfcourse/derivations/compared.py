@@ -1,10 +1,9 @@
-"""Are two lines equal?  Quotients of polynomials exactly; what has other functions by values at random points."""
+"""Are two lines equal?  By values at random points, with a bound of their rounding."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from kfcourse.derivations.exact import Exact, NotPolynomial
 from kfcourse.derivations.setting import Setting
 from kfcourse.derivations.terms import Node
 from kfcourse.derivations.values import ROUNDING, Values, agree
@@ -22,13 +21,7 @@ def compare(setting: Setting, first: Node, second: Node) -> str:
     Uncomputed
         A mean is not computed here.
     """
-    try:
-        exact = Exact(setting, [first, second])
-        return EQUAL if exact.equal(exact.of(first), exact.of(second)) else DIFFERENT
-    except ZeroDivisionError:
-        return NO_VALUE
-    except NotPolynomial:
-        values = Values(setting, [first, second])
+    values = Values(setting, [first, second])
     pairs = values.sized(first), values.sized(second)
     defined = np.array([np.isfinite(value) & (ROUNDING * size < CLEAR * (1 + np.abs(value))) for value, size in pairs])
     positive = np.arange(values.points) < values.points / 3

@@ -4,18 +4,17 @@ kalman                  the textbook step
 base, designed          what a filter is: ready to run, or with coefficients to be found over an ensemble
 approximations          approximations of the absolutely optimal filter (AOF): EKF, normal, unscented, quadrature
 conditionally_optimal   Pugachev's two-step conditionally optimal filter (DUOF)
-optimal_structure       Rudenko's filter of optimal structure (FOS), modified (MFOS), in two steps (DFMP, MDFMP)
-finite_memory           the same with the last measurements (FKP) or the last estimates (FBP) in the place of the last one
+optimal_structure       Rudenko's filter of optimal structure (FOS), modified (MFOS), in two steps (DFMP, MDFMP), and those
+                        with the last measurements (FKP) or the last estimates (FBP) in the place of the last one
 exact                   the AOF itself, on a grid that follows each trajectory: a folder
-looking_back            what the whole record tells of each state (exact.smoothing, particle_smoothing)
-particles               the same by sampling;  proposals: where to look;  densities, inverted: what all need
+looking_back            what the whole record tells of each state (exact.smoothing for the exact filter)
+particles               the same by sampling, with modes or without;  densities, inverted: what all need
 iterated_ekf            the meter linearised again at the estimate
-gate, heavy_tails       measurements that are not believed: refused, by any filter; weighted
-learnt_noise            a noise of unknown size, learnt on the way
+gate, robust            measurements that are not believed: refused, by any filter; weighted; a noise of unknown size, learnt
 alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
-                        (jump_equations: as printed;  state_transitions: by the state;  jump_optimal: FOS, FKP, FBP with
-                        modes;  exact.jumps: the exact filter of state and mode;  jump_particles: the same by sampling)
+                        (jump_equations: as printed;  jump_optimal: FOS, FKP, FBP with modes;
+                         exact.jumps: the exact filter of state and mode)
 initial_states          the exact filter of an object without noise, with modes of its meter or not
 notation                symbols in which the equations are printed
 programs, fused, loops  the printed equations as rules and regressions; compiled steps made of them (numba)
@@ -31,24 +30,20 @@ from kfcourse.filters.designed import Design
 from kfcourse.filters.exact.adaptive import adaptive_pointmass
 from kfcourse.filters.exact.jumps import jump_pointmass
 from kfcourse.filters.exact.pointmasses import pointmass
-from kfcourse.filters.finite_memory import EQUATIONS as _FINITE
-from kfcourse.filters.finite_memory import dfkp, fbp, fkp, mdfkp, mfkp
 from kfcourse.filters.gate import gated
-from kfcourse.filters.heavy_tails import robust
 from kfcourse.filters.initial_states import undisturbed
 from kfcourse.filters.iterated_ekf import iterated
 from kfcourse.filters.jump_optimal import logic_dynamic_fbp, logic_dynamic_fkp, logic_dynamic_fos
-from kfcourse.filters.jump_particles import jump_particle
 from kfcourse.filters.kalman import kalman_filter
-from kfcourse.filters.learnt_noise import adaptive
 from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
 from kfcourse.filters.notation import latex
 from kfcourse.filters.optimal_structure import EQUATIONS as _OPTIMAL
-from kfcourse.filters.optimal_structure import dfmp, fos, mdfmp, mfos
+from kfcourse.filters.optimal_structure import dfkp, dfmp, fbp, fkp, fos, mdfkp, mdfmp, mfkp, mfos
 from kfcourse.filters.particles import particle
+from kfcourse.filters.robust import adaptive, robust
 
 # The printed equations of each family, as SymPy matrix equations.
-EQUATIONS = {"aof": _AOF, "duof": _DUOF, **_OPTIMAL, **_FINITE}
+EQUATIONS = {"aof": _AOF, "duof": _DUOF, **_OPTIMAL}
 
 __all__ = [
     "EQUATIONS",
@@ -70,7 +65,6 @@ __all__ = [
     "gpb2",
     "imm",
     "iterated",
-    "jump_particle",
     "jump_pointmass",
     "kalman_filter",
     "latex",

@@ -35,13 +35,11 @@ from functools import partial
 import numpy as np
 import scipy
 
-from kfcourse.angles import difference, on_circle
+from kfcourse.angles import Components, difference, on_circle
 from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood
-from kfcourse.filters.particle_smoothing import weighted
-from kfcourse.filters.particles import Clouds, at_start, even, normalised, of_both, stream, systematic
-from kfcourse.filters.proposals import FREEDOM, PRIOR, WIDER
+from kfcourse.filters.particles import FREEDOM, PRIOR, WIDER, weighted
 from kfcourse.laws import Array, Gaussian, gain, square_root
 from kfcourse.symbolic.equations import compile_noiseless
 from kfcourse.symbolic.jumping import JumpModel
@@ -61,6 +59,79 @@ SEEN = 20  # particles that a mode's meter must find within its own error; else 
 RIDGE = 1e-12  # of the curvature in all directions together, in each, so that it has a root
 WITHIN = 5.0  # times the standard error is stated
 FARTHEST = 1.0  # that a step to the top of a hump leads, in standard deviations of the prior
+
+
+@dataclass(frozen=True, eq=False)
+class Clouds:
+    """What a filter remembers of two clouds of particles that know nothing of each other.
+
+    Attributes
+    ----------
+    halves : ndarray (2, runs, n)
+        The estimate of each cloud.
+    effective : ndarray (runs,)
+        How many particles counted.
+    evidence : ndarray (2, runs)
+        ln p(y_k | y_0, ..., y_{k-1}) as each cloud has it: the logarithm of its mean weight.
+    seed : numpy.random.SeedSequence
+    """
+
+    halves: Array
+    effective: Array
+    evidence: Array
+    seed: np.random.SeedSequence
+
+    def apart(self) -> Array:
+        """Standard error of the estimates, (runs,): half the distance of both clouds."""
+        return np.asarray(0.5 * np.linalg.norm(self.halves[0] - self.halves[1], axis=1))
+
+    def discretisation_error(self) -> Array:
+        """What is stated of the error, (runs,): the standard error."""
+        return self.apart()
+
+
+def even(particles: int) -> None:
+    """ModelError if so many particles are not two clouds of equal size."""
+    if not isinstance(particles, int | np.integer) or particles < 2 or particles % 2:
+        raise ModelError(f"a particle filter needs an even number of at least 2 particles, got {particles!r}")
+
+
+def at_start(mean: Array, particles: int, number: int) -> tuple[Array, Array, Array, np.random.SeedSequence]:
+    """The fields of `Clouds` before the first measurement, from the prior's means (runs, n)."""
+    runs = len(mean)
+    return np.stack([mean] * 2), np.full(runs, float(particles)), np.zeros((2, runs)), np.random.SeedSequence([number, runs])
+
+
+def of_both(mean: Array, cov: Array, angles: Components) -> Gaussian:
+    """The law by both clouds, from theirs (runs, 2, ...)."""
+    apart = difference(mean[:, 0], mean[:, 1], angles)
+    return Gaussian(on_circle(mean[:, 1] + 0.5 * apart, angles), cov.mean(axis=1) + 0.5 * apart[:, :, None] * apart[:, None, :])
+
+
+def stream(root: np.random.SeedSequence, step: int) -> np.random.Generator:
+    return np.random.default_rng(np.random.SeedSequence(root.entropy, spawn_key=(step,)))
+
+
+def normalised(logs: Array) -> tuple[Array, Array]:
+    """Weights (..., M) that sum to 1, all equal where nothing is left of them, and the logarithm of their mean before (...)."""
+    peak = logs.max(axis=-1, keepdims=True)
+    weights = np.exp(logs - np.where(np.isfinite(peak), peak, 0.0))
+    weights = np.where(np.isfinite(weights), weights, 0.0)
+    total = weights.sum(axis=-1, keepdims=True)
+    with np.errstate(divide="ignore"):
+        mean = peak + np.log(total / logs.shape[-1])
+    return np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / logs.shape[-1]), mean[..., 0]
+
+
+def systematic(weights: Array, rng: np.random.Generator) -> Array:
+    """Indices (clouds, M) of systematic resampling: one uniform number a cloud, M equal steps."""
+    clouds, m = weights.shape
+    cumulative = np.cumsum(weights, axis=1)
+    cumulative /= cumulative[:, -1:]
+    wanted = (np.arange(m) + rng.random((clouds, 1))) / m
+    shift = 2.0 * np.arange(clouds)[:, None]
+    flat = np.searchsorted((cumulative + shift).ravel(), (wanted + shift).ravel()).reshape(clouds, m)
+    return np.minimum(flat - np.arange(clouds)[:, None] * m, m - 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +196,7 @@ def undisturbed(model: Model | JumpModel, particles: int = 256, seed: int = 0, n
         No noise enters the object, the same in all modes; the meters have densities.
     particles : int
         Initial states per trajectory, even, half of them in each cloud.
-    seed : int
+    seed : int or numpy.random.Generator
         The same state and measurement give the same result.
     name : str
         Of the filter: "aof-exact" where it stands for the exact one.
@@ -145,7 +216,7 @@ def undisturbed(model: Model | JumpModel, particles: int = 256, seed: int = 0, n
     if not is_undisturbed(model):
         raise ModelError(
             f"{model}: here the initial state must tell all that follows, without a noise in the object, and with one object in "
-            "all modes; take particle(model), or jump_particle(model) of one with modes"
+            "all modes; take particle(model)"
         )
     modes = model.modes if isinstance(model, JumpModel) else (model,)
     likelihoods, (move, _) = [likelihood(one) for one in modes], compile_noiseless(modes[0])

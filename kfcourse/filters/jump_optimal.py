@@ -27,9 +27,8 @@ import numpy as np
 from kfcourse.errors import expect
 from kfcourse.filters.base import State, initial_state
 from kfcourse.filters.designed import Design, Equations, Regression
-from kfcourse.filters.finite_memory import STEPS, checked_memory
 from kfcourse.filters.multiple_models import mixture, modes_given, onward
-from kfcourse.filters.optimal_structure import Memory, Remembered, expected_where_missing
+from kfcourse.filters.optimal_structure import STEPS, Memory, Remembered, checked_memory, expected_where_missing
 from kfcourse.laws import Array, Gaussian, Measurement, correct
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError

@@ -19,6 +19,16 @@ and then they differ by when they merge:
 
 The first two are the same for affine tau.  Blom and Bar-Shalom (1988); Bar-Shalom, Li, Kirubarajan (2001), section 11.6; for
 the second Rudenko's logic-dynamic filters.
+
+Transitions may depend on the state, pi_ij(x).  With the law N(z, p) of x_k in mode i, Bayes' formula for the next mode gives
+
+    nu_ij = M_N[pi_ij(x)]                                      how probable j is
+    z_ij  = M_N[x pi_ij(x)] / nu_ij                            the law of x_k, given that j comes next: N weighted by pi_ij,
+    p_ij  = M_N[(x - z_ij)(x - z_ij)^T pi_ij(x)] / nu_ij       taken for a normal one
+
+which takes the places of pi_ij and (z_i, p_i) before a prediction; for affine a that is exact.  The means are found by
+Gauss-Hermite quadrature over the components that pi_ij contains, which a jump of pi_ij deceives by some per cent; the other
+components follow by regression on these.
 """
 
 from __future__ import annotations
@@ -28,16 +38,22 @@ from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from scipy.special import logsumexp
 
 from kfcourse.angles import Components, near, on_circle
-from kfcourse.filters.base import Evidence, Filter, State, initial_state
-from kfcourse.filters.state_transitions import by_state
-from kfcourse.laws import Array, Gaussian, Measurement, correct, log_density
+from kfcourse.errors import ModelError
+from kfcourse.filters.base import Filter, State, initial_state
+from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, gain, log_density, square_root, transpose
 from kfcourse.symbolic.jumping import JumpModel
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.quadrature import product_rule
 from kfcourse.symbolic.structure import Structure, each_once, expect_each, moving_alike
+
+ORDER = {1: 32, 2: 12, 3: 7}  # points an axis, by the number of components in the formulas of pi
 
 Chain: TypeAlias = Array | Callable[[int], Array] | JumpModel
 Predict: TypeAlias = Callable[[Gaussian], Gaussian]
+# Step and laws in each mode to pi, (M, M) or (runs, M, M), and the laws that lead from i to j.
 Links: TypeAlias = Callable[[int, Sequence[Gaussian]], tuple[Array, list[list[Gaussian]]]]
 
 
@@ -67,8 +83,7 @@ def imm(structures: Sequence[Structure], transition: Chain, probabilities: Array
     structures : sequence of M Structure
         Models with the same state, measurement and prior.
     transition : ndarray (M, M), callable, or JumpModel
-        pi, rows sum to 1; or the step k to the pi from k to k + 1; or the model that has it, which may depend on the state
-        (`state_transitions`).
+        pi, rows sum to 1; or the step k to the pi from k to k + 1; or the model that has it, which may depend on the state.
     probabilities : ndarray (M,), optional
         Of the modes before the first measurement; by default those of the JumpModel, else equal.
     name : str
@@ -84,12 +99,12 @@ def imm(structures: Sequence[Structure], transition: Chain, probabilities: Array
     TypeError
         Models, or filters, in the place of the structures.
     ValueError
-        Models that do not fit together, numbers that are no probabilities, or too abrupt functions of the state.
+        Models that do not fit together, numbers that are no probabilities.
+    ModelError
+        Transitions that depend on more than three components of the state.
     """
-    expect_each(structures, name)
-    angles = structures[0].model.angles.x if structures else ()
 
-    def following(predict: Predict, laws: Sequence[Gaussian], weights: Array) -> Gaussian:
+    def following(predict: Predict, laws: Sequence[Gaussian], weights: Array, angles: Components) -> Gaussian:
         return predict(mixture(laws, weights, angles))
 
     return _one_law_a_mode(name, structures, transition, probabilities, following)
@@ -106,13 +121,12 @@ def logic_dynamic(
     Arguments, result and errors as of `imm`.
     """
     expect_each(structures, "logic_dynamic")
-    angles = structures[0].model.angles.x if structures else ()
 
-    def following(predict: Predict, laws: Sequence[Gaussian], weights: Array) -> Gaussian:
+    def following(predict: Predict, laws: Sequence[Gaussian], weights: Array, angles: Components) -> Gaussian:
         return mixture([predict(law) for law in laws], weights, angles)
 
-    given = name or (f"aof-jump-{structures[0].name}" if structures else "")
-    return _one_law_a_mode(given, structures, transition, probabilities, following)
+    name = name or "aof-jump-" + "".join(structure.name for structure in structures[:1])
+    return _one_law_a_mode(name, structures, transition, probabilities, following)
 
 
 def _one_law_a_mode(
@@ -120,55 +134,29 @@ def _one_law_a_mode(
     structures: Sequence[Structure],
     transition: Chain,
     probabilities: Array | None,
-    following: Callable[[Predict, Sequence[Gaussian], Array], Gaussian],
+    following: Callable[[Predict, Sequence[Gaussian], Array, Components], Gaussian],
 ) -> Filter:
     """A filter that merges what may lead to each mode by `following`: (the mode's tau, Theta; laws; weights) -> prediction."""
-    models = [structure.model for structure in structures]
-    angles = models[0].angles.x if models else ()
-    links, first = _checked(structures, transition, probabilities)
-    alike = moving_alike(structures)
+    links, first, model = _checked(name, structures, transition, probabilities)
+    angles, alike = model.angles.x, moving_alike(structures)
 
     def init(runs: int) -> State:
-        start = initial_state(models[0])(runs)
-        expected = np.tile(first, (runs, 1))
-        return start._replace(memory=Modes(expected, expected, (start.predicted,) * len(models)))
+        start, expected = initial_state(model)(runs), np.tile(first, (runs, 1))
+        return start._replace(memory=Modes(expected, expected, (start.predicted,) * len(structures)))
 
     def step(state: State, y: Array) -> State:
-        memory: Modes = state.memory
-        now = [structure.at(state.step) for structure in structures]
-        expectations = _expectations(now, memory)
-        corrected = [correct(prior, one, y) for prior, one in zip(memory.predicted, expectations, strict=True)]
-        mu, _ = modes_given(memory.expected, expectations, y)
+        memory, now = state.memory, [structure.at(state.step) for structure in structures]
+        corrected, mu, _ = _corrected(now, memory, y)
         pi, leading = links(state.step, corrected)
         expected, weights = onward(mu, pi)
-        predict, predicted = each_once(now, alike), list[Gaussian]()
-        drawn_anew = pi.ndim == 2 and bool((pi == pi[0]).all())  # then nothing that leads to a mode tells it from another
-        for j, first_alike in enumerate(alike):
-            if drawn_anew and first_alike < j:
-                predicted.append(predicted[first_alike])
-            else:
-                predicted.append(following(partial(predict, j), [row[j] for row in leading], weights[:, :, j]))
-        return State(
-            state.step + 1,
-            mixture(corrected, mu, angles),
-            mixture(predicted, expected, angles),
-            Modes(mu, expected, tuple(predicted)),
+        predict = each_once(now, alike)
+        predicted = tuple(
+            following(partial(predict, j), [row[j] for row in leading], weights[:, :, j], angles) for j in range(len(now))
         )
+        law, ahead = mixture(corrected, mu, angles), mixture(predicted, expected, angles)
+        return State(state.step + 1, law, ahead, Modes(mu, expected, predicted))
 
-    return Filter(name, models[0], init, step, evidence=_evidence(structures))
-
-
-def _expectations(now: Sequence[Structure], memory: Modes) -> list[Measurement]:
-    """What is expected to be measured in each mode, or for each pair of modes in the second of them."""
-    return [now[i % len(now)].measure(*law) for i, law in enumerate(memory.predicted)]
-
-
-def _evidence(structures: Sequence[Structure]) -> Evidence:
-    def evidence(before: State, y: Array, after: State) -> Array:
-        now = [structure.at(before.step) for structure in structures]
-        return modes_given(before.memory.expected, _expectations(now, before.memory), y)[1]
-
-    return evidence
+    return Filter(name, model, init, step, evidence=partial(_evidence, structures))
 
 
 def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Array | None = None, name: str = "gpb2") -> Filter:
@@ -179,44 +167,53 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
 
     Arguments, result and errors as of `imm`; the memory's `predicted` holds the laws of the pairs, i first.
     """
-    expect_each(structures, name)
-    models = [structure.model for structure in structures]
-    angles, size = models[0].angles.x if models else (), len(models)
-    links, first = _checked(structures, transition, probabilities)
-    alike = moving_alike(structures)
+    links, first, model = _checked(name, structures, transition, probabilities)
+    angles, alike, size = model.angles.x, moving_alike(structures), len(structures)
 
     def init(runs: int) -> State:
-        start = initial_state(models[0])(runs)
-        weights = np.tile(first / size, (runs, size))  # as if any mode had come before, the same law of each
-        return start._replace(memory=Modes(np.tile(first, (runs, 1)), weights, (start.predicted,) * size**2))
+        start = initial_state(model)(runs)
+        pairs = np.tile(first / size, (runs, size))  # as if any mode had come before, the same law of each
+        return start._replace(memory=Modes(np.tile(first, (runs, 1)), pairs, (start.predicted,) * size**2))
 
     def step(state: State, y: Array) -> State:
-        memory: Modes = state.memory
-        now = [structure.at(state.step) for structure in structures]
-        expectations = _expectations(now, memory)
-        corrected = [correct(prior, one, y) for prior, one in zip(memory.predicted, expectations, strict=True)]
-        pairs = modes_given(memory.expected, expectations, y)[0].reshape(len(y), size, size)
-        mu = pairs.sum(axis=1)
-        weights = _shares(pairs)
+        memory, now = state.memory, [structure.at(state.step) for structure in structures]
+        corrected, pairs, _ = _corrected(now, memory, y)
+        pairs = pairs.reshape(len(y), size, size)
+        mu, weights = pairs.sum(axis=1), _shares(pairs)
         laws = [mixture(corrected[j::size], weights[:, :, j], angles) for j in range(size)]
-        combined = mixture(laws, mu, angles)
-        laws = [_of_somebody(law, mu[:, j], combined) for j, law in enumerate(laws)]
+        law = mixture(laws, mu, angles)
+        laws = [_where(mu[:, j] > 0, of_mode, law) for j, of_mode in enumerate(laws)]
         pi, leading = links(state.step, laws)
         predict = each_once(now, alike)
-        predicted = [predict(j, law) for row in leading for j, law in enumerate(row)]
+        predicted = tuple(predict(j, before) for row in leading for j, before in enumerate(row))
         expected = (mu[:, :, None] * pi).reshape(len(y), -1)
-        return State(state.step + 1, combined, mixture(predicted, expected, angles), Modes(mu, expected, tuple(predicted)))
+        return State(state.step + 1, law, mixture(predicted, expected, angles), Modes(mu, expected, predicted))
 
-    return Filter(name, models[0], init, step, evidence=_evidence(structures))
+    return Filter(name, model, init, step, evidence=partial(_evidence, structures))
 
 
-def _of_somebody(law: Gaussian, probability: Array, combined: Gaussian) -> Gaussian:
-    """The law of a mode; where it has no probability the combined one."""
-    nobody = probability == 0
-    if not nobody.any():
+def _expectations(now: Sequence[Structure], memory: Modes) -> list[Measurement]:
+    """What is expected to be measured in each mode, or for each pair of modes in the second of them."""
+    return [now[i % len(now)].measure(*law) for i, law in enumerate(memory.predicted)]
+
+
+def _corrected(now: Sequence[Structure], memory: Modes, y: Array) -> tuple[list[Gaussian], Array, Array]:
+    """The laws corrected with y, their probabilities (runs, ...), and ln p(y)."""
+    expectations = _expectations(now, memory)
+    laws = [correct(law, expected, y) for law, expected in zip(memory.predicted, expectations, strict=True)]
+    return laws, *modes_given(memory.expected, expectations, y)
+
+
+def _evidence(structures: Sequence[Structure], before: State, y: Array, after: State) -> Array:
+    now = [structure.at(before.step) for structure in structures]
+    return modes_given(before.memory.expected, _expectations(now, before.memory), y)[1]
+
+
+def _where(holds: Array, law: Gaussian, other: Gaussian) -> Gaussian:
+    """For each trajectory one of two laws."""
+    if holds.all():
         return law
-    nobody = nobody[:, None]
-    return Gaussian(np.where(nobody, combined.mean, law.mean), np.where(nobody[..., None], combined.cov, law.cov))
+    return Gaussian(np.where(holds[:, None], law.mean, other.mean), np.where(holds[:, None, None], law.cov, other.cov))
 
 
 def onward(mu: Array, pi: Array) -> tuple[Array, Array]:
@@ -232,44 +229,45 @@ def onward(mu: Array, pi: Array) -> tuple[Array, Array]:
 def _shares(joint: Array) -> Array:
     """joint_ij / sum_i joint_ij, (runs, M, M); equal ones where that is nothing."""
     total = joint.sum(axis=1, keepdims=True)
-    if np.minimum.reduce(total, axis=None) > 0:
-        return joint / total
     return np.divide(joint, total, out=np.full_like(joint, 1.0 / joint.shape[1]), where=total > 0)
 
 
-def _checked(structures: Sequence[Structure], transition: Chain, probabilities: Array | None) -> tuple[Links, Array]:
-    """Step and laws to pi and what leads from i to j; and first probabilities (M,); ValueError if the parts do not fit."""
+def _checked(
+    name: str, structures: Sequence[Structure], transition: Chain, probabilities: Array | None
+) -> tuple[Links, Array, Model]:
+    """The links, the first probabilities (M,), and the first model; errors if the parts do not fit."""
+    expect_each(structures, name)
     size = len(structures)
     if not size:
         raise ValueError("give at least one structure, such as linearised(model)")
     first = structures[0].model
     for structure in structures[1:]:
         model = structure.model
-        if [s.name for s in model.x] != [s.name for s in first.x] or model.p != first.p:
-            raise ValueError(
-                f"all modes need the same state and measurement: {[s.name for s in first.x]} with {first.p} component(s) "
-                f"and {[s.name for s in model.x]} with {model.p} differ"
-            )
-        if model.angles != first.angles:
-            raise ValueError("all modes need the same components declared as angles")
-        if not all(np.array_equal(ours, theirs) for ours, theirs in zip(model.prior, first.prior, strict=True)):
-            raise ValueError("all modes need the same prior: before the first measurement there is one law of the state")
-    of_step = transition.transition_at if isinstance(transition, JumpModel) else transition
+        for what, mine, its in (
+            ("state", [s.name for s in first.x], [s.name for s in model.x]),
+            ("number of measured components", first.p, model.p),
+            ("components that are angles", first.angles, model.angles),
+            ("prior", [part.tolist() for part in first.prior], [part.tolist() for part in model.prior]),
+        ):
+            if mine != its:
+                raise ValueError(f"all modes need the same {what}: {mine} and {its} differ")
+    jumps = isinstance(transition, JumpModel)
     if probabilities is None:
-        probabilities = transition.first if isinstance(transition, JumpModel) else np.full(size, 1.0 / size)
+        probabilities = transition.first if jumps else np.full(size, 1.0 / size)
     start = _probabilities("probabilities", probabilities, (size,))
-    if isinstance(transition, JumpModel) and transition.by_state:
-        return by_state(transition), start
+    if jumps and transition.by_state:
+        return by_state(transition), start, first
+    given = transition.transition_at if jumps else transition
 
     def pi_at(k: int) -> Array:
-        return _probabilities("transition", of_step(k) if callable(of_step) else of_step, (size, size))
+        return _probabilities("transition", given(k) if callable(given) else given, (size, size))
 
     constant = pi_at(0)
 
     def links(k: int, laws: Sequence[Gaussian]) -> tuple[Array, list[list[Gaussian]]]:
-        return pi_at(k) if callable(of_step) else constant, [[law] * size for law in laws]
+        return pi_at(k) if callable(given) else constant, [[law] * size for law in laws]
 
-    return links, start
+    return links, start, first
 
 
 def _probabilities(what: str, given: Array, shape: tuple[int, ...]) -> Array:
@@ -283,17 +281,55 @@ def _probabilities(what: str, given: Array, shape: tuple[int, ...]) -> Array:
     return table / total
 
 
-def modes_given(expected: Array, measurements: Sequence[Measurement], y: Array) -> tuple[Array, Array]:
-    """c_j L_j / sum over the modes, (runs, M), and ln of the sum; in logarithms, as likelihoods far from the truth are 0.
+def by_state(model: JumpModel) -> Links:
+    """The function of the step and the laws in each mode that gives nu (runs, J, J), and the laws N(z_ij, p_ij), i first.
 
-    In memory the trajectories of a mode are neighbours, which all that follows inherits: sums over few modes are then fast.
+    ModelError for formulas of more than three components.
     """
+    used = [i for i, component in enumerate(model.x) if model.chain.has(component)]
+    if len(used) > max(ORDER):
+        raise ModelError(
+            f"transitions that depend on {len(used)} components are not integrated: that takes too many points; let them depend "
+            f"on at most {max(ORDER)}, or make one number of the state on which they depend a component of its own"
+        )
+    nodes, weights = product_rule(ORDER[len(used)])(len(used))
+
+    def weighted(i: int, law: Gaussian, k: int) -> tuple[Array, list[Gaussian]]:
+        """nu_ij (runs, J), and N(z_ij, p_ij) for each j."""
+        mean, cov = law.mean, np.broadcast_to(law.cov, (*law.mean.shape, law.mean.shape[-1]))
+        root = square_root(cov[..., used, :][..., used])
+        spread = gain(cov[..., used], cov[..., used, :][..., used]) @ root  # x = z + spread s, but for what s does not tell
+        x = np.repeat(mean[:, None], len(nodes), axis=1)
+        x[..., used] += nodes @ transpose(root)
+        mass = weights[:, None] * model.transition_of(x, k)[..., i, :]
+        nu, laws = mass.sum(axis=1), []
+        mass = np.where(nu[:, None] > 0, mass, weights[:, None])  # where j cannot come the law stays as it is
+        for share in np.moveaxis(mass / mass.sum(axis=1, keepdims=True), -1, 0):
+            centre = share @ nodes
+            away = nodes - centre[:, None]
+            excess = transpose(share[..., None] * away) @ away - np.eye(len(used))
+            laws.append(Gaussian(mean + apply(spread, centre), cov + spread @ excess @ transpose(spread)))
+        return nu, laws
+
+    def links(k: int, laws: Sequence[Gaussian]) -> tuple[Array, list[list[Gaussian]]]:
+        nu, leading = zip(*(weighted(i, law, k) for i, law in enumerate(laws)), strict=True)
+        return np.stack(nu, axis=1), list(leading)
+
+    return links
+
+
+def points_of(model: JumpModel) -> int:
+    """How many points a mean over the state takes; 0 if transitions do not depend on it."""
+    size = sum(model.chain.has(component) for component in model.x)
+    return ORDER[size] ** size if size in ORDER else 0
+
+
+def modes_given(expected: Array, measurements: Sequence[Measurement], y: Array) -> tuple[Array, Array]:
+    """c_j L_j / sum over the modes, (runs, M), and ln of the sum; in logarithms, as likelihoods far from the truth are 0."""
     with np.errstate(divide="ignore"):  # a mode that is excluded stays so
-        logs = np.stack([np.log(expected[:, j]) + log_density(one, y) for j, one in enumerate(measurements)])
-    peak = logs.max(axis=0)
-    weights = np.exp(logs - peak)
-    total = weights.sum(axis=0)
-    return (weights / total).T, peak + np.log(total)
+        logs = np.log(expected) + np.stack([log_density(measurement, y) for measurement in measurements], axis=-1)
+    total = logsumexp(logs, axis=1)
+    return np.exp(logs - total[:, None]), total
 
 
 def mixture(laws: Sequence[Gaussian], weights: Array, angles: Components = ()) -> Gaussian:
@@ -305,14 +341,10 @@ def mixture(laws: Sequence[Gaussian], weights: Array, angles: Components = ()) -
     """
     if all(law is laws[0] for law in laws):
         return laws[0]
-    columns = [weights[:, j, None] for j in range(len(laws))]
-    means = [law.mean for law in laws]
+    means = np.stack([law.mean for law in laws])
     if angles:
-        likeliest = np.take_along_axis(np.stack(means, axis=1), weights.argmax(axis=1)[:, None, None], axis=1)[:, 0]
-        means = [near(one, likeliest, angles) for one in means]
-    mean = sum(w * one for w, one in zip(columns, means, strict=True))
-    cov: Array | float = 0.0
-    for w, one, law in zip(columns, means, laws, strict=True):
-        deviation = one - mean
-        cov = cov + w[..., None] * (law.cov + deviation[..., :, None] * deviation[..., None, :])
-    return Gaussian(on_circle(np.asarray(mean), angles), np.asarray(cov))
+        means = near(means, np.take_along_axis(means, weights.argmax(axis=1)[None, :, None], axis=0), angles)
+    mean, cov = np.einsum("rj,jri->ri", weights, means), np.zeros(())
+    for weight, law, off in zip(weights.T[..., None, None], laws, means - mean, strict=True):
+        cov = cov + weight * (law.cov + off[..., :, None] * off[..., None, :])
+    return Gaussian(on_circle(mean, angles), cov)

@@ -22,9 +22,13 @@ one matrix for all.
     DFMP    L s' + n     residual     lambda + sigma
     MDFMP   L s' + n     residual     lambda + H sigma + e
 
-Rudenko (2010, 2013).
+Those that remember more than the last estimate; FKP and DFKP are the school's, the others come of the construction:
 
-`finite_memory` has those that remember more than the last estimate.
+    FKP, MFKP, DFKP, MDFKP   zeta_k = (y_k, y_{k-1}, ..., y_{k-l+1})     the recipes of FOS, MFOS, DFMP, MDFMP
+    FBP                      zeta_k = (z_k, z_{k-1}, ..., z_{k-l+1})     the recipe of the FOS
+
+With measurements z is not fed back: what older ones knew is lost, and so are their errors.  Until the memory is full it
+holds what there is.  Rudenko (2010, 2013).
 """
 
 from __future__ import annotations
@@ -55,6 +59,7 @@ class Recipe(NamedTuple):
 
 FOS, MFOS = Recipe(), Recipe(mean=True, correction=True)
 DFMP, MDFMP = Recipe(mean=True, spread=True), Recipe(mean=True, spread=True, correction=True)
+STEPS = 4  # the school's length of memory
 
 
 class Memory(NamedTuple):
@@ -188,6 +193,56 @@ def _of_last_estimate(family: str, structure: Structure, recipe: Recipe, argumen
     return of_structure(name, structure, recipe, Memory(estimates=1, measurements=arguments - 2))
 
 
+def fkp(structure: Structure, memory: int = STEPS) -> Design:
+    """The filter with finite memory.
+
+    u = Gamma zeta + chi,  T = `residual`                        regression of x on zeta, the last `memory` measurements
+    lambda' = tau(u, T),  Psi' = Theta(u, T),   z = lambda + K (y - h)
+
+    Raises
+    ------
+    ValueError
+        `memory` is not a positive whole number.
+    ModelError
+        The model has angles.
+    """
+    return _of_measurements("fkp", structure, FOS, memory)
+
+
+def mfkp(structure: Structure, memory: int = STEPS) -> Design:
+    """The modified filter with finite memory (МФКП): the steps of `mfos` with the regressor of `fkp`."""
+    return _of_measurements("mfkp", structure, MFOS, memory)
+
+
+def dfkp(structure: Structure, memory: int = STEPS) -> Design:
+    """The two-step filter with finite memory (ДФКП): the steps of `dfmp` with the regressor of `fkp`.
+
+    lambda' = L tau(u, T) + n.  Where tau is affine that is the regression of x' on zeta itself.
+    """
+    return _of_measurements("dfkp", structure, DFMP, memory)
+
+
+def mdfkp(structure: Structure, memory: int = STEPS) -> Design:
+    """The modified two-step filter with finite memory (МДФКП): the steps of `mdfmp` with the regressor of `fkp`."""
+    return _of_measurements("mdfkp", structure, MDFMP, memory)
+
+
+def fbp(structure: Structure, memory: int = STEPS) -> Design:
+    """The filter of high order (ФБП): the steps of `fos`, with the last `memory` estimates in the place of z."""
+    return of_structure(f"fbp{checked_memory(memory)}", structure, FOS, Memory(estimates=memory))
+
+
+def _of_measurements(family: str, structure: Structure, recipe: Recipe, memory: int) -> Design:
+    return of_structure(f"{family}{checked_memory(memory)}", structure, recipe, Memory(estimates=0, measurements=memory))
+
+
+def checked_memory(memory: int) -> int:
+    """The length of a memory; ValueError if it is not a positive whole number."""
+    if isinstance(memory, bool) or not isinstance(memory, int | np.integer) or memory < 1:
+        raise ValueError(f"a memory holds so many steps, a positive whole number such as 4, got {memory!r}")
+    return memory
+
+
 # ---------------------------------------------------------------- the same in symbols
 
 _sigma, _eps = s.matrix(r"\sigma_{k}", s.n, s.ONE), s.matrix(r"\varepsilon_{k}", s.n, s.ONE)
@@ -222,4 +277,12 @@ def printed(recipe: Recipe, zeta: sp.MatrixSymbol = s.z, *, consists_of: sp.Matr
     return (*equations, s.equation(s.Psi_next, residual))
 
 
-EQUATIONS = {name: printed(one) for name, one in (("fos", FOS), ("mfos", MFOS), ("dfmp", DFMP), ("mdfmp", MDFMP))}
+_zeta = s.matrix(r"\zeta_{k}", s.r, s.ONE)
+MEASUREMENTS = s.matrix(r"(y_{k};\,\dots;\,y_{k-\ell+1})", s.r, s.ONE)
+ESTIMATES = s.matrix(r"(z_{k};\,\dots;\,z_{k-\ell+1})", s.r, s.ONE)
+EQUATIONS = {name: printed(recipe) for name, recipe in (("fos", FOS), ("mfos", MFOS), ("dfmp", DFMP), ("mdfmp", MDFMP))}
+EQUATIONS |= {
+    name: printed(recipe, _zeta, consists_of=MEASUREMENTS)
+    for name, recipe in (("fkp", FOS), ("mfkp", MFOS), ("dfkp", DFMP), ("mdfkp", MDFMP))
+}
+EQUATIONS["fbp"] = printed(FOS, _zeta, consists_of=ESTIMATES)

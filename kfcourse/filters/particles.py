@@ -1,38 +1,60 @@
-"""The particle filter: the Stratonovich equation by sampling, for models of any dimension.
+r"""The particle filter: the Stratonovich equation by sampling, for models of any dimension, with modes or without.
 
     x_k^i ~ q(x | x_{k-1}^i, y_k),    weight  p(y_k | x_k^i) p(x_k^i | x_{k-1}^i) / q(x_k^i | x_{k-1}^i, y_k)
 
-Without looking at the measurement (q = p(x | x_{k-1}), the bootstrap filter) it fails in the lab's own case: where the meter is
-hundreds of times sharper than the prediction, few particles fall where the posterior is.  So the proposal q looks at it
-(`proposals`).
+Without looking at the measurement (q = p(x | x_{k-1}), the bootstrap filter) it fails in the lab's own case: where
+the meter is hundreds of times sharper than the prediction, few particles fall where the posterior is.  So the
+proposal looks at it.  A particle x and standard normal s make the next state and its measurement,
+
+    x' = a(x, m_v + L s),  L L^T = D_v;     y = g(s) + e,   g(s) = b(x', m_w),   Cov(e) = R(s)
+
+and a step of Gauss and Newton, which is a correction with g and R taken for affine and constant at the last s, finds
+a normal law of s; some of them find the posterior's mode and width.  q is a wider law of Student's there, beside a
+part of N(0, I) itself.  The initial state is a noise, too: x_0 = m + L s.
+
+Of a model that jumps a particle is a state and a mode.  The next mode is drawn with probability in proportion to
+pi_ij(x) times the normal density of y_k that the proposal of mode j has left.
 
 The particles are two clouds that know nothing of each other.  Their estimates z_a and z_b err independently, so that
 
     M[|z - z*|^2] = M[(z - z_a)^T (z - z_b)],      z* the exact estimate, z that of any filter,
 
 without any contribution of the sampling: that is how particles bound other filters where `exact` does not reach.
+
+Looking back is backward sampling (Godsill, Doucet and West, 2004): of a state x~ drawn from p(x_{k+1} | Y), the
+particle x^j of step k, resampled, is the ancestor with a probability in proportion to p(x~ | x^j).
+Gordon, Salmond and Smith (1993); Doucet, Godsill and Andrieu (2000).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
+from scipy.special import gammaln
 
-from kfcourse.angles import Components, difference, on_circle
+from kfcourse.angles import Components, difference, moments_on_circle, near, on_circle
 from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
 from kfcourse.filters.densities import likelihood, transition
-from kfcourse.filters.particle_smoothing import backwards, weighted
-from kfcourse.filters.proposals import Look
-from kfcourse.laws import Array, Gaussian
+from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, log_density, square_root, transpose
 from kfcourse.symbolic.equations import compile_model
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
+ROUNDS = 2  # steps of Gauss and Newton: after one a hundredth of the particles may count on variant 53, a third adds nothing
+SMALL = 1e-4  # step in s by which slopes are found, in standard deviations
+NARROWEST = 1e-7  # width of a law of s: the root of a nearly singular covariance is right to as much
+FREEDOM, WIDER = 4.0, 1.2  # of Student's law around the mode, whose tails the posterior's must not exceed
+PRIOR = 0.1  # share drawn from N(0, I) and of modes drawn by pi, for what a normal law does not see
+STARTS = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])  # of the search for the modes of x_0, in standard deviations
 LARGEST = 1e150  # the squares of larger states are infinite
 PATHS = 200  # that each cloud draws when it looks back
+ELEMENTS = 2**21  # of the largest array, 16 MB
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,51 +69,45 @@ class Clouds:
         How many particles counted.
     evidence : ndarray (2, runs)
         ln p(y_k | y_0, ..., y_{k-1}) as each cloud has it: the logarithm of its mean weight.
-    seed : numpy.random.SeedSequence
+    x : ndarray (runs, 2, M/2, n), or None before the first measurement
+        Both clouds, all particles of equal weight.
+    mode : ndarray (runs, 2, M/2), or None before the first measurement
+        Of each particle.
+    probability : ndarray (runs, J)
+        Of the modes after the last measurement.
     """
 
     halves: Array
     effective: Array
     evidence: Array
-    seed: np.random.SeedSequence
+    x: Array | None
+    mode: Array | None
+    probability: Array
 
     def apart(self) -> Array:
         """Standard error of the estimates, (runs,): half the distance of both clouds."""
-        return np.asarray(0.5 * np.linalg.norm(self.halves[0] - self.halves[1], axis=1))
+        return np.asarray(0.5 * np.linalg.norm(self.halves[0] - self.halves[1], axis=-1))
 
     def discretisation_error(self) -> Array:
         """What is stated of the error, (runs,): the standard error."""
         return self.apart()
-
-
-@dataclass(frozen=True, eq=False)
-class Particles(Clouds):
-    """What the filter remembers; the others as of `Clouds`.
-
-    Attributes
-    ----------
-    x : ndarray (runs, 2, M/2, n), or None before the first measurement
-        Both clouds, all particles of equal weight.
-    """
-
-    x: Array | None
 
     def evidence_error(self) -> Array:
         """Standard error of the last ln p(y_k | y_0, ..., y_{k-1}), (runs,): half the distance of both clouds."""
         return 0.5 * np.abs(self.evidence[0] - self.evidence[1])
 
 
-def particle(model: Model, particles: int = 1000, seed: int = 0, *, guided: bool = True, name: str = "particle") -> Filter:
-    """The particle filter (Gordon, Salmond and Smith, 1993; guided as by Doucet, Godsill and Andrieu, 2000).
-
-    Resampled systematically at each step, each cloud for itself.
+def particle(
+    model: Model | JumpModel, particles: int = 1000, seed: int = 0, *, guided: bool = True, name: str = "particle"
+) -> Filter:
+    """The particle filter, resampled systematically at each step, each cloud for itself.
 
     Parameters
     ----------
-    model : Model
-        Any dimension; the meter's noise must enter linearly, so that p(y | x) is known.
+    model : Model or JumpModel
+        Any dimension; p(y | x) must be known, so the meter's noise must enter linearly, or can be solved for.
     particles : int
-        Particles per trajectory, even, half of them in each cloud; `state.memory.effective` tells how many of them count.
+        Particles per trajectory, even, half of them in each cloud; `state.memory.effective` tells how many count.
     seed : int
         Steps are reproducible: the same state and measurement give the same result.
     guided : bool
@@ -102,134 +118,262 @@ def particle(model: Model, particles: int = 1000, seed: int = 0, *, guided: bool
     Returns
     -------
     Filter
-        Its covariance estimates the posterior's: without bias where all particles weigh the same, as the guided ones of a linear
-        model do; too large where few count, by some tenths where 40 without guidance meet a sharp meter.
+        Its covariance estimates the posterior's; too large where few count, by some tenths where 40 without
+        guidance meet a sharp meter.  `state.memory.probability` are the modes' probabilities.
+
+    Raises
+    ------
+    ModelError
+        There is no density of y given x (in some mode); the number of particles is not even.
     """
-    expect(model, Model, "particle")
-    even(particles)
-    number, log_likelihood, angles = seed, likelihood(model), model.angles.x
-    state_equation, _ = compile_model(model)
-    gaussian_init = initial_state(model)
-    start, ahead = Look.at_start(model), Look.ahead(model)
-    size = particles // 2
+    expect(model, Model, "particle", JumpModel)
+    if not isinstance(particles, int | np.integer) or particles < 2 or particles % 2:
+        raise ModelError(f"a particle filter needs an even number of at least 2 particles, got {particles!r}")
+    jumps = isinstance(model, JumpModel)
+    modes = [Mode.of(each) for each in (model.modes if jumps else (model,))]
+    first, size = model.first if jumps else np.ones(1), particles // 2
+    prior, angles = modes[0].model.prior, modes[0].model.angles.x
+    gaussian_init = initial_state(modes[0].model)
+    root = square_root(prior.cov)
 
     def init(runs: int) -> State:
         state = gaussian_init(runs)
-        return state._replace(memory=Particles(*at_start(state.posterior.mean, particles, number), x=None))
+        halves, probability = np.stack([state.posterior.mean] * 2), np.tile(first, (runs, 1))
+        count, evidence = np.full(runs, float(particles)), np.zeros((2, runs))
+        return state._replace(memory=Clouds(halves, count, evidence, None, None, probability))
 
-    def first(rng: np.random.Generator, y: Array) -> tuple[Array, Array]:
-        """x_0 (runs, 2, M/2, n), and the logarithms of p / q."""
-        s, logs = plain(rng, (len(y), 2, size), start)
-        if guided and not start.blind:
-            found = start.proposal(np.zeros((len(y), model.n)), y, start.starts(), 0)
-            heights = log_likelihood(y[:, None, :], start.noise_of(found.mean), 0) - 0.5 * (found.mean**2).sum(axis=-1)
-            heights += np.log(np.diagonal(found.root, axis1=-2, axis2=-1)).sum(axis=-1)
-            for_both = found._replace(share=normalised(heights)[0]).of_clouds(2)
-            s, logs = where_measured(y, start.draw(for_both, rng, size), s)
-        return on_circle(start.noise_of(s), angles), logs
+    def chances(x: Array, mode: Array, k: int) -> Array:
+        """Probabilities of the mode after step k, (runs, 2, M/2, J)."""
+        if not jumps:
+            return np.ones((*mode.shape, 1))
+        return np.take_along_axis(model.transition_of(x, k), mode[..., None, None], axis=-2)[..., 0, :]
 
-    def following(rng: np.random.Generator, x: Array, y: Array, k: int) -> tuple[Array, Array]:
-        """x_k (runs, 2, M/2, n) from the particles of the step before, and the logarithms of p / q."""
-        s, logs = plain(rng, x.shape[:-1], ahead)
-        if guided and not ahead.blind:
-            found = ahead.proposal(x, y[:, None, None, :], np.zeros((1, s.shape[-1])), k)
-            s, logs = where_measured(y, ahead.draw_each(found, rng), s)
-        after = moved(x, s, k - 1)
-        lost = ~np.logical_and.reduce(np.abs(after) < LARGEST, axis=-1)
-        return np.where(lost[..., None], x, after), np.where(lost, -np.inf, logs)
-
-    def moved(x: Array, s: Array, k: int) -> Array:
-        """The states after step k."""
-        return on_circle(np.broadcast_to(state_equation(x, ahead.noise_of(s), k), x.shape), angles)
+    def drawn(rng: np.random.Generator, before: Clouds, y: Array, k: int) -> tuple[Array, Array, Array]:
+        """x_k (runs, 2, M/2, n), its modes, and ln of p over the density with which both were drawn."""
+        shape = (len(y), 2, size)
+        if before.x is None:
+            pi, n = np.broadcast_to(first, (*shape, len(modes))), len(prior.mean)
+            at = np.tile(STARTS[:, None] / np.sqrt(n), (len(y), 1, 1, 1, n))
+            moves = [lambda s: on_circle(prior.mean + s @ root.T, angles)] * len(modes)
+            starts = [at] * len(modes)
+        else:
+            pi = chances(before.x, before.mode, k - 1)
+            moves = [partial(mode.moved, before.x, k=k - 1) for mode in modes]
+            starts = [np.zeros((*shape, 1, mode.noises)) for mode in modes]
+        states, logs, heights = [], [], []
+        for mode, moved, at in zip(modes, moves, starts, strict=True):
+            s, log, height = rng.standard_normal((*shape, at.shape[-1])), np.zeros(shape), np.zeros(shape)
+            if guided:
+                law, tells, height = mode.look(moved, at, y[:, None, None, None], k)
+                wide, log_of_wide = _wide(rng, law, shape)
+                s, log = np.where(tells[..., None], wide, s), np.where(tells, log_of_wide, log)
+            states.append(moved(s))
+            logs.append(log)
+            heights.append(np.broadcast_to(height, shape))
+        seen, _ = _normalised(np.log(pi) + np.stack(heights, axis=-1))
+        share = (1 - PRIOR) * seen + PRIOR * pi
+        mode = _chosen(rng, share)
+        lifted = np.take_along_axis(np.log(pi) - np.log(share), mode[..., None], axis=-1)[..., 0]
+        return np.choose(mode[..., None], states), mode, lifted + np.choose(mode, logs)
 
     def step(state: State, y: Array) -> State:
-        before, root = state.memory.x, state.memory.seed
-        rng = stream(root, state.step)
-        with np.errstate(over="ignore", invalid="ignore"):  # what lies beyond the largest number has no weight
-            x, logs = first(rng, y) if before is None else following(rng, before, y, state.step)
-            weights, log_mean = normalised(logs + log_likelihood(y[:, None, None, :], x, state.step))
+        k, rng = state.step, np.random.default_rng([seed, len(y), state.step])
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            x, mode, logs = drawn(rng, state.memory, y, k)
+            lost = ~(np.abs(x) < LARGEST).all(axis=-1)
+            x = np.where(lost[..., None], np.clip(np.nan_to_num(x), -LARGEST, LARGEST), x)
+            logs = logs + np.choose(mode, [each.log_likelihood(y[:, None, None], x, k) for each in modes])
+            weights, log_mean = _normalised(np.where(lost, -np.inf, logs))
             mean, cov = weighted(x, weights, angles)
-            posterior = of_both(mean, cov, angles)
-        flat, chosen = x.reshape(-1, size, model.n), systematic(weights.reshape(-1, size), rng)
-        kept = np.take_along_axis(flat, chosen[..., None], axis=1).reshape(x.shape)
+            probability = [(weights * (mode == j)).sum(axis=-1).mean(axis=1) for j in range(len(modes))]
+            kept = _systematic(rng, weights)
+            x, mode = np.take_along_axis(x, kept[..., None], axis=2), np.take_along_axis(mode, kept, axis=2)
+            ahead = [each.moved(x, rng.standard_normal((*mode.shape, each.noises)), k) for each in modes]
+            ahead = np.choose(_chosen(rng, chances(x, mode, k))[..., None], ahead)
+            predicted = _of_both(*weighted(ahead, np.full(mode.shape, 1 / size), angles), angles)
         effective = (1 / (weights**2).sum(axis=-1)).sum(axis=1)
-        s, _ = plain(rng, x.shape[:-1], ahead)
-        with np.errstate(over="ignore", invalid="ignore"):
-            following_ones = moved(kept, s, state.step).reshape(len(y), particles, model.n)
-            predicted = weighted(following_ones, np.full(following_ones.shape[:-1], 1.0 / particles), angles)
-        memory = Particles(np.moveaxis(mean, 1, 0), effective, log_mean.T, root, x=kept)
-        return State(state.step + 1, posterior, predicted, memory)
+        halves = np.moveaxis(mean, 1, 0)
+        memory = Clouds(halves, effective, log_mean.T, x, mode, np.stack(probability, axis=-1))
+        return State(k + 1, _of_both(mean, cov, angles), predicted, memory)
 
     def look_back(states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
-        memories = [state.memory for state in states]
+        memories, law = [state.memory for state in states], transition(model)
 
         def back(end: int) -> Iterator[State]:
-            rng = stream(memories[0].seed, end)
-            found = backwards([memory.x for memory in memories[:end]], transition(model), angles, min(size, PATHS), rng)
-            for step, (clouds, effective) in zip(range(end, 0, -1), found, strict=True):
-                law, halves = of_both(*clouds, angles), np.moveaxis(clouds.mean, 1, 0)
-                yield State(step, law, law, replace(memories[step - 1], x=None, halves=halves, effective=effective))
+            rng = np.random.default_rng([seed, end])
+            for step, (clouds, weights) in zip(
+                range(end, 0, -1), _backwards(rng, [memory.x for memory in memories[:end]], law, angles), strict=True
+            ):
+                both, effective = _of_both(*clouds, angles), (1 / (weights**2).sum(axis=-1)).sum(axis=1)
+                halves = np.moveaxis(clouds.mean, 1, 0)
+                yield State(step, both, both, replace(memories[step - 1], x=None, halves=halves, effective=effective))
 
         return back
 
-    return Filter(name, model, init, step, slow=True, evidence=by_clouds, look_back=look_back)
+    way_back = None if jumps else look_back
+    return Filter(name, modes[0].model, init, step, slow=True, evidence=_evidence, look_back=way_back)
 
 
-def by_clouds(before: State, y: Array, after: State) -> Array:
+class Mode(NamedTuple):
+    """What particles must know of a model, or of a mode: its equations with standard normal noises.
+
+    Attributes
+    ----------
+    model : Model
+    noises : int
+        r, the number of the object's noises.
+    state, meter : callable
+        a(x, m_v + L s) and b(x, m_w + L w) at step k: (x (..., n), s (..., r), k), (x, w (..., q), k).
+    log_likelihood : callable
+        (y (..., p), x (..., n), k) -> ln p(y | x).
+    """
+
+    model: Model
+    noises: int
+    state: Callable[[Array, Array, int], Array]
+    meter: Callable[[Array, Array, int], Array]
+    log_likelihood: Callable[[Array, Array, int], Array]
+
+    @classmethod
+    def of(cls, model: Model) -> Mode:
+        a, b = compile_model(model)
+        v, w = model.state_noise, model.meter_noise
+        L, M = square_root(v.cov).T, square_root(w.cov).T
+        return cls(
+            model,
+            len(L),
+            lambda x, s, k: a(x, v.mean + s @ L, k),
+            lambda x, s, k: b(x, w.mean + s @ M, k),
+            likelihood(model),
+        )
+
+    def moved(self, x: Array, s: Array, k: int) -> Array:
+        """The states after step k, (..., n); `x` (..., n) itself, or for several s of each state (..., J, r)."""
+        x = x if x.ndim == s.ndim else x[..., None, :]
+        shape = np.broadcast_shapes(x.shape[:-1], s.shape[:-1])
+        return on_circle(np.broadcast_to(self.state(x, s, k), (*shape, x.shape[-1])), self.model.angles.x)
+
+    def look(self, moved: Callable[[Array], Array], s: Array, y: Array, k: int) -> tuple[Gaussian, Array, Array]:
+        """Normal laws of s (..., J, r) given y_k, searched for from s; whether y tells of s, (...); ln p(y) by these laws."""
+        turning, still = self.model.angles.y, np.zeros(len(self.model.w))
+
+        def slopes(function: Callable[[Array], Array], at: Array, width: float) -> Array:
+            beside = width * np.eye(at.shape[-1])
+            return np.stack([difference(function(at + e), function(at - e), turning) for e in beside], axis=-1) / (2 * width)
+
+        law = Gaussian(s, np.eye(s.shape[-1]))
+        for _ in range(ROUNDS):
+            s, x = law.mean, moved(law.mean)
+            h = self.meter(x, still, k)
+            H = slopes(lambda s: self.meter(moved(s), still, k), s, SMALL)
+            B = slopes(lambda w, x=x: self.meter(x, w, k), still, 1.0)
+            R = B @ transpose(B)
+            seen, value = Measurement(h - apply(H, s), H, H @ transpose(H) + R, R), near(y, h, turning)
+            law = correct(Gaussian(np.zeros_like(s), np.eye(s.shape[-1])), seen, value)
+            law = Gaussian(np.nan_to_num(law.mean, posinf=0.0, neginf=0.0), law.cov)
+        tells = (H != 0).any(axis=(-3, -2, -1)) & ~np.isnan(y).all(axis=(-2, -1))
+        heights = np.nan_to_num(log_density(seen, value), nan=-np.inf)
+        return law, tells, np.logaddexp.reduce(heights, axis=-1) - np.log(heights.shape[-1])
+
+
+def _wide(rng: np.random.Generator, law: Gaussian, shape: tuple[int, ...]) -> tuple[Array, Array]:
+    """s (runs, 2, M/2, r) by a mixture of Student's laws around normal ones (..., J, r) and of N(0, I), and ln N(s; 0, I) / q."""
+    J, r = law.mean.shape[-2:]
+    cov = np.where(np.isfinite(law.cov), law.cov, np.eye(r)) + NARROWEST**2 * np.eye(r)
+    root = WIDER * np.linalg.cholesky(np.broadcast_to(cov, (*law.mean.shape, r)))
+    normal, which = rng.standard_normal((*shape, r)), rng.integers(J, size=(*shape, 1))
+    centre = np.take_along_axis(np.broadcast_to(law.mean, (*shape, J, r)), which[..., None], axis=-2)[..., 0, :]
+    width = np.take_along_axis(np.broadcast_to(root, (*shape, J, r, r)), which[..., None, None], axis=-3)[..., 0, :, :]
+    student = normal * np.sqrt(FREEDOM / rng.chisquare(FREEDOM, shape))[..., None]
+    s = np.where((rng.random(shape) < PRIOR)[..., None], normal, centre + apply(width, student))
+    square = (apply(np.linalg.inv(root), s[..., None, :] - law.mean) ** 2).sum(axis=-1)
+    laws = -0.5 * (FREEDOM + r) * np.log1p(square / FREEDOM) - np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)
+    laws += gammaln((FREEDOM + r) / 2) - gammaln(FREEDOM / 2) - 0.5 * r * np.log(FREEDOM / 2)  # over (2 pi)^(-r/2)
+    standard = -0.5 * (s * s).sum(axis=-1)
+    mixed = np.logaddexp.reduce(laws, axis=-1) + np.log((1 - PRIOR) / J)
+    return s, standard - np.logaddexp(mixed, standard + np.log(PRIOR))
+
+
+def _evidence(before: State, y: Array, after: State) -> Array:
     """ln of the mean of both clouds' weights, (runs,); 0 where nothing was measured."""
     return np.where(np.isnan(y).all(axis=-1), 0.0, np.logaddexp(*after.memory.evidence) - np.log(2))
 
 
-def even(particles: int) -> None:
-    """ModelError if so many particles are not two clouds of equal size."""
-    if not isinstance(particles, int | np.integer) or particles < 2 or particles % 2:
-        raise ModelError(f"a particle filter needs an even number of at least 2 particles, got {particles!r}")
-
-
-def at_start(mean: Array, particles: int, number: int) -> tuple[Array, Array, Array, np.random.SeedSequence]:
-    """The fields of `Clouds` before the first measurement, from the prior's means (runs, n)."""
-    runs = len(mean)
-    return np.stack([mean] * 2), np.full(runs, float(particles)), np.zeros((2, runs)), np.random.SeedSequence([number, runs])
-
-
-def of_both(mean: Array, cov: Array, angles: Components) -> Gaussian:
-    """The law by both clouds, from theirs (runs, 2, ...)."""
-    apart = difference(mean[:, 0], mean[:, 1], angles)
-    return Gaussian(on_circle(mean[:, 1] + 0.5 * apart, angles), cov.mean(axis=1) + 0.5 * apart[:, :, None] * apart[:, None, :])
-
-
-def plain(rng: np.random.Generator, shape: tuple[int, ...], look: Look) -> tuple[Array, Array]:
-    """Standard normal numbers (..., r): a proposal that is the law itself."""
-    return rng.standard_normal((*shape, len(look.noise.mean))), np.zeros(shape)
-
-
-def where_measured(y: Array, guided: tuple[Array, Array], plain: Array) -> tuple[Array, Array]:
-    """The proposal's s and logarithms, but the law itself for trajectories whose measurement is missing."""
-    missing = np.logical_and.reduce(np.isnan(y), axis=-1)[:, None, None]
-    return np.where(missing[..., None], plain, guided[0]), np.where(missing, 0.0, guided[1])
-
-
-def stream(root: np.random.SeedSequence, step: int) -> np.random.Generator:
-    return np.random.default_rng(np.random.SeedSequence(root.entropy, spawn_key=(step,)))
-
-
-def normalised(logs: Array) -> tuple[Array, Array]:
+def _normalised(logs: Array) -> tuple[Array, Array]:
     """Weights (..., M) that sum to 1, all equal where nothing is left of them, and the logarithm of their mean before (...)."""
     peak = logs.max(axis=-1, keepdims=True)
-    weights = np.exp(logs - np.where(np.isfinite(peak), peak, 0.0))
-    weights = np.where(np.isfinite(weights), weights, 0.0)
+    weights = np.nan_to_num(np.exp(logs - np.where(np.isfinite(peak), peak, 0.0)), posinf=0.0)
     total = weights.sum(axis=-1, keepdims=True)
-    with np.errstate(divide="ignore"):
-        mean = peak + np.log(total / logs.shape[-1])
+    mean = peak + np.log(total / logs.shape[-1])
     return np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1.0 / logs.shape[-1]), mean[..., 0]
 
 
-def systematic(weights: Array, rng: np.random.Generator) -> Array:
-    """Indices (clouds, M) of systematic resampling: one uniform number a cloud, M equal steps."""
-    clouds, m = weights.shape
-    cumulative = np.cumsum(weights, axis=1)
-    cumulative /= cumulative[:, -1:]
-    wanted = (np.arange(m) + rng.random((clouds, 1))) / m
-    shift = 2.0 * np.arange(clouds)[:, None]
-    flat = np.searchsorted((cumulative + shift).ravel(), (wanted + shift).ravel()).reshape(clouds, m)
-    return np.minimum(flat - np.arange(clouds)[:, None] * m, m - 1)
+def _systematic(rng: np.random.Generator, weights: Array) -> Array:
+    """Indices (runs, 2, M/2) of systematic resampling: one uniform number a cloud, M/2 equal steps."""
+    size = weights.shape[-1]
+    cumulative = np.cumsum(weights, axis=-1)
+    cumulative /= cumulative[..., -1:]
+    number = np.arange(cumulative[..., 0].size).reshape(*weights.shape[:-1], 1)
+    wanted = (np.arange(size) + rng.random(number.shape)) / size
+    places = np.searchsorted((cumulative + 2.0 * number).ravel(), wanted + 2.0 * number)  # all clouds in one row
+    return np.minimum(places - number * size, size - 1)
+
+
+def _chosen(rng: np.random.Generator, share: Array) -> Array:
+    """An index for each of the probabilities (..., J)."""
+    return (rng.random((*share.shape[:-1], 1)) > np.cumsum(share, axis=-1)[..., :-1]).sum(axis=-1)
+
+
+def weighted(x: Array, weights: Array, angles: Components) -> Gaussian:
+    """Mean (..., n) and covariance (..., n, n) of weighted particles (..., M, n)."""
+    mean = np.einsum("...m,...mi->...i", weights, x)
+    for i in angles:
+        mean[..., i], _ = moments_on_circle(x[..., i], weights)
+    deviation = difference(x, mean[..., None, :], angles)
+    return Gaussian(mean, np.einsum("...m,...mi,...mj->...ij", weights, deviation, deviation))
+
+
+def _of_both(mean: Array, cov: Array, angles: Components) -> Gaussian:
+    """The law by both clouds, from theirs (runs, 2, ...)."""
+    half = 0.5 * difference(mean[:, 0], mean[:, 1], angles)
+    return Gaussian(on_circle(mean[:, 1] + half, angles), cov.mean(axis=1) + half[:, :, None] * half[:, None, :])
+
+
+def _backwards(
+    rng: np.random.Generator, clouds: Sequence[Array], law: Callable[[Array, int], Gaussian], angles: Components
+) -> Iterator[tuple[Gaussian, Array]]:
+    """From the last step to the first: laws (runs, 2, n) of both clouds, and weights of their particles.
+
+    Means are taken over all particles by their probabilities of being an ancestor, before one of them is drawn.
+    ModelError where the next state has no density, as fewer noises than states enter the object.
+    """
+    size = clouds[-1].shape[2]
+    paths = min(size, PATHS)
+    weights = np.full(clouds[-1].shape[:3], 1.0 / size)
+    yield weighted(clouds[-1], weights, angles), weights
+    after = clouds[-1][:, :, np.arange(paths) * size // paths]
+    for k in reversed(range(len(clouds) - 1)):
+        x, drawn = clouds[k], np.empty_like(after)
+        weights, chunk = np.empty(x.shape[:3]), max(1, ELEMENTS // (2 * paths * x[0, 0].size))
+        for rows in (slice(start, start + chunk) for start in range(0, len(x), chunk)):
+            shares = _ancestors(after[rows], *law(x[rows], k), angles)
+            weights[rows] = shares.mean(axis=2)
+            drawn[rows] = np.take_along_axis(x[rows], _chosen(rng, shares)[..., None], axis=2)
+        yield weighted(x, weights, angles), weights
+        after = drawn
+
+
+def _ancestors(after: Array, mean: Array, cov: Array, angles: Components) -> Array:
+    """Probabilities (runs, 2, paths, M) that particles, whose next states have these laws, are ancestors of `after`."""
+    try:
+        root = np.linalg.cholesky(cov)
+    except np.linalg.LinAlgError:
+        raise ModelError(
+            "particles look back by the density of the next state, and it has none: fewer noises than states enter the object; "
+            "give each state a noise, however small, or smooth with a filter of normal laws"
+        ) from None
+    root = np.broadcast_to(root, (*mean.shape, mean.shape[-1]))[:, :, None]
+    apart = difference(after[:, :, :, None], mean[:, :, None], angles)
+    logs = -0.5 * (apply(np.linalg.inv(root), apart) ** 2).sum(axis=-1)
+    with np.errstate(divide="ignore"):
+        return _normalised(logs - np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1))[0]

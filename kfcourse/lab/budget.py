@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from kfcourse.filters import Design, Filter
-from kfcourse.filters.state_transitions import points_of
+from kfcourse.filters.multiple_models import points_of
 from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.short_names import OF_BEST, JumpStructures, Structures
 from kfcourse.symbolic.jumping import JumpModel

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import sympy as sp
 
 from kfcourse.filters import latex as equations_latex
-from kfcourse.filters.finite_memory import ESTIMATES, MEASUREMENTS
 from kfcourse.filters.jump_equations import combination, correction, prediction
+from kfcourse.filters.optimal_structure import ESTIMATES, MEASUREMENTS
 from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.families import family
 from kfcourse.lab.handin_sections import Block, StudentReport

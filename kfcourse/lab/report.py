@@ -147,7 +147,10 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
     if result.replicas:
         data["design_deviation"] = {name: result.design_error(name).value.tolist() for name in result.replicas.names}
     text = json.dumps(_finite(data), indent=1, allow_nan=False)
-    save(text, path)
+    if str(path) in ("-", "/dev/stdout"):
+        print(text, flush=True)
+    else:
+        save(text, path)
     return path
 
 

@@ -21,7 +21,6 @@ from kfcourse.filters import (
     fos,
     gpb2,
     imm,
-    jump_particle,
     jump_pointmass,
     logic_dynamic,
     logic_dynamic_fbp,
@@ -35,8 +34,8 @@ from kfcourse.filters import (
     pointmass,
     undisturbed,
 )
-from kfcourse.filters.finite_memory import STEPS
 from kfcourse.filters.initial_states import is_undisturbed
+from kfcourse.filters.optimal_structure import STEPS
 from kfcourse.lab.checked_quadrature import Checked, of_checked_order
 from kfcourse.lab.families import FAMILIES, family
 from kfcourse.laws import Array
@@ -294,8 +293,6 @@ def _sampled(model: Model | JumpModel) -> Filter:
     """The exact AOF by sampling: of initial states if they tell all that follows."""
     if is_undisturbed(model):
         return undisturbed(model, name="aof-exact")
-    if isinstance(model, JumpModel):
-        return jump_particle(model, BOUND, name="aof-exact")
     return particle(model, BOUND, name="aof-exact")
 
 

@@ -15,7 +15,6 @@ from kfcourse.errors import Reason
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.fused import Steps
 from kfcourse.filters.looking_back import looked_back
-from kfcourse.filters.particles import Clouds
 from kfcourse.laws import Array, NegativeVariance, any_missing
 from kfcourse.montecarlo.designing import NotFinite, failed
 from kfcourse.montecarlo.ensemble import Instant
@@ -134,13 +133,13 @@ def _back(filters: Sequence[Filter], instants: Iterable[Instant], size: int) -> 
 
 def _twice(state: State) -> tuple[Array, Array]:
     """Two estimates of the reference whose errors, if it has any, are independent: those of both clouds of particles."""
-    first, second = state.memory.halves if isinstance(state.memory, Clouds) else (state.posterior.mean,) * 2
+    first, second = getattr(state.memory, "halves", (state.posterior.mean,) * 2)
     return first, second
 
 
 def _doubt(state: State) -> Array:
     """The reference's own error, (runs,): half the distance of two clouds; what discretisation leaves of the nodes' mean."""
-    if isinstance(state.memory, Clouds):
+    if hasattr(state.memory, "apart"):
         return state.memory.apart()
     found = getattr(state.memory, "discretisation_error", None)
     return np.zeros(len(state.posterior.mean)) if found is None else found()

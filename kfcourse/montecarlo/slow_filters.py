@@ -7,14 +7,17 @@ whether they come one after the other or, once they are seen to take their time,
 
 from __future__ import annotations
 
+import gc
+import sys
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +26,7 @@ from tqdm import tqdm
 from kfcourse.errors import Reason
 from kfcourse.filters.base import Filter
 from kfcourse.laws import Array
-from kfcourse.limits import OutOfTime, memory_limit, time_limit
+from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.montecarlo.batches import STRATA
 from kfcourse.montecarlo.blocks import Failed, TooMuch, progress_bar, run_block
 from kfcourse.montecarlo.comparison import EXACT, SlowPart
@@ -38,6 +41,28 @@ FEWEST = 100  # trajectories that are a result: with fewer, the rare ones that m
 LEAST = 10e6  # bytes that can be a limit: interpreter and libraries take some at any time
 WAIT = 0.5  # seconds, so that what waits can be interrupted: on Windows, and by a time limit in another thread
 MARGIN = 1.3  # how much longer than the chunks before the next one may take, for each trajectory
+
+
+@contextmanager
+def memory_limit(more: float | None) -> Iterator[None]:
+    """MemoryError in this block where the process would take so many bytes more than it has; None is no limit.
+
+    Linux only: elsewhere the system has no such limit, and nothing is limited.
+    """
+    if more is None or more == float("inf") or sys.platform != "linux":
+        yield
+        return
+    import resource
+
+    gc.collect()  # garbage that is found later would be room
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    before, most = resource.getrlimit(resource.RLIMIT_AS)
+    limit = pages * resource.getpagesize() + int(more)
+    resource.setrlimit(resource.RLIMIT_AS, (limit if before == resource.RLIM_INFINITY else min(limit, before), most))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (before, most))
 
 
 class _Data(NamedTuple):

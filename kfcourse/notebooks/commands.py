@@ -62,7 +62,7 @@ def _make(kind: str, **options: Any) -> None:
 
 @click.command()
 @click.argument("folder", type=click.Path(exists=True, path_type=Path, file_okay=False))
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="File of the table.  [default: FOLDER/grades.csv]")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="File of the table.  [default: FOLDER-grades.csv]")
 @click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="The file of variants that you handed out.")
 @click.option("--masters", type=click.Path(path_type=Path), help="Folder of other masters, <set>/statement.md each.")
 @click.option("--jobs", "workers", type=click.IntRange(min=1), default=cores, show_default="all cores", help="Notebooks at once.")
@@ -74,7 +74,14 @@ def _make(kind: str, **options: Any) -> None:
     help="Time limit of a cell, and of an answer's call (18 s at most); a notebook may take five times as long.",
 )
 @click.option("--again", is_flag=True, help="Grade those too that have not changed since the last table.")
-@click.option("--sandbox", type=click.Choice(KINDS), default="auto", show_default=True, help="Where the notebooks run.")
+@click.option(
+    "--sandbox",
+    "kind",
+    type=click.Choice(KINDS),
+    default=KINDS[0],
+    show_default=True,
+    help="Where the notebooks run: in bubblewrap's sandbox (you are asked if there is none), or with all your rights.",
+)
 @click.option(
     "--students",
     type=click.Path(path_type=Path),
@@ -83,7 +90,7 @@ def _make(kind: str, **options: Any) -> None:
 @click.option(
     "--report",
     type=click.Path(path_type=Path, file_okay=False),
-    help="Folder of points, feedback for each student and an overview.  [default with --students: FOLDER/report]",
+    help="Folder of points, feedback for each student and an overview.  [default with --students: FOLDER-report]",
 )
 @click.option(
     "--parts",
@@ -99,7 +106,6 @@ def _make(kind: str, **options: Any) -> None:
     show_default=True,
     help="Share of the points for a step that is right on top of the student's own wrong answer to an earlier question.",
 )
-@click.option("--dask", help="Address of a Dask scheduler whose workers grade instead; they need this package and FOLDER.")
 @click.option("--seed", help="Text that the hidden arguments come from.  [default: another each time]")
 def grade(**options: Any) -> None:
     """Run the returned notebooks in FOLDER and write a table of what passed.
@@ -107,14 +113,14 @@ def grade(**options: Any) -> None:
     The notebook of each set is made again from the master, for the variant that the list gives the student, and the
     student's cells are put into it; checks and variants that a student changed do not count.  Each notebook runs in a process
     and an empty folder of its own, with limits of time and memory (4 GB, where the system can limit it).  That process has no
-    answers: it is asked for values, and another one compares them.  With --sandbox none it runs with your rights.
+    answers: it is asked for values, and another one compares them.  With --sandbox none it has all your rights.
 
-    What reaches for more than an exercise needs is noted: look at it.  Links are not followed; they, archives and hidden
-    notebooks are named.
+    Lines that reach for more than an exercise needs are noted: look at them.  Links are not followed; they, archives, hidden
+    notebooks and notebooks by another name are named.
 
-    Marks: a tick is passed, a cross is wrong or not usable, a dash is not implemented or not run, a question mark could not be
-    graded.  Unchanged notebooks are not run again.  Exit status: 0 if every exercise notebook could be graded, however badly;
-    1 if some could not.
+    Marks: a tick is passed, a cross is wrong or not usable, a dash is not implemented or not run, a question mark could not
+    be graded.  Unchanged notebooks are not run again.  Exit status: 0 if every exercise notebook could be graded, however
+    badly; 1 if some could not.
     """
     from kfcourse.notebooks.grading.course import grade_folder
 

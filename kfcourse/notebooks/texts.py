@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import re
 import unicodedata
@@ -14,13 +15,20 @@ from kfcourse.files import save
 
 FORMULA = ("=", "+", "-", "@")  # full-width ones are taken for these
 GUARD = "'"
+LONGEST = 200  # bytes of a name: most systems take 255
 
 
 def safe(name: str) -> str:
-    """A name as one component of a path, on every system: Windows keeps CON and others for devices."""
-    found = re.sub(r"[^\w.-]+", "-", unicodedata.normalize("NFC", name)).strip(".-") or "unnamed"
-    stem, *rest = found.split(".", 1)
-    return ".".join((f"{stem}_", *rest)) if re.fullmatch(r"(?i)con|prn|aux|nul|com\d|lpt\d", stem) else found
+    """A name as one component of a path, on every system: Windows keeps CON and others for devices.
+
+    What is longer than a file's name may be, with an ending and what a temporary file adds, is cut, and ends in its hash.
+    """
+    part = re.sub(r"[^\w.-]+", "-", unicodedata.normalize("NFC", name)).strip(".-") or "unnamed"
+    if len(part.encode()) > LONGEST:
+        cut = part.encode()[: LONGEST - 9].decode(errors="ignore")
+        part = f"{cut}-{hashlib.sha256(part.encode()).hexdigest()[:8]}"
+    stem, *rest = part.split(".", 1)
+    return ".".join((f"{stem}_", *rest)) if re.fullmatch(r"(?i)con|prn|aux|nul|com\d|lpt\d", stem) else part
 
 
 def clean(text: str, length: int = 200) -> str:
@@ -46,7 +54,7 @@ def cautious(text: str) -> str:
     >>> cautious("=1+1"), cautious("\\t=1+1"), cautious("\uff1d1+1"), cautious("a = 1")
     ("'=1+1", "' =1+1", "'\uff1d1+1", 'a = 1')
     """
-    text = "".join(" " if unicodedata.category(c) == "Cc" else c for c in text)
+    text = "".join(" " if unicodedata.category(c) in ("Cc", "Cs") else c for c in text)
     return GUARD + text if _begins_a_formula(text) else text
 
 

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
+from tqdm import tqdm
 
 from kfcourse.errors import expect
 from kfcourse.filters.approximations import aof
@@ -26,8 +27,10 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import gaussian
 
-STEP = 1e-3  # of the differences that stand for derivatives, in the coordinates below
-FLAT = 0.01  # information that is none: the likelihood of an e times larger variance differs by half of this
+STEP = 1e-3  # of the differences that stand for derivatives, in units by which the likelihood changes by about 1
+FLAT = 0.01  # information of a parameter that is none: the likelihood of an e times larger variance differs by half of this
+DIRECTION = 0.01  # of a direction of length 1: components below are rounding of differences
+TOGETHER = 1e-5  # part of their own information that directions have left where differences cannot tell it from none
 
 
 class NoMaximum(ValueError):
@@ -57,7 +60,8 @@ class Likeliest(NamedTuple):
     model : Model
         The model with these values.
     flat : tuple of str
-        What the record does not tell, one sentence for each direction; empty if it tells all.
+        What the record does not tell, one sentence for each direction; empty if it tells all.  Proportions are those of changes,
+        of positive parameters those of their logarithms.
     """
 
     names: tuple[str, ...]
@@ -117,37 +121,34 @@ def estimate(
     expect(model, Model, "estimate", Mapping)
     model = model if isinstance(model, Model) else Model.of_table(model)
     names, logs, start = _checked(model, unknown, positive)
-    # Coordinates: the logarithm of what is positive; what may have any sign in units of its start.
-    unit = np.where(logs | (start == 0), 1.0, np.abs(start))
 
-    def parameters(c: Array) -> Array:
-        return np.where(logs, np.exp(np.where(logs, c, 0.0)), c * unit)
+    def parameters(t: Array) -> Array:
+        return np.where(logs, np.exp(np.where(logs, t, 0.0)), t)
 
-    def log_likelihood(c: Array) -> float:
-        here = model.replace(**dict(zip(names, parameters(c).tolist(), strict=True)))
+    def log_likelihood(t: Array) -> float:
+        here = model.replace(**dict(zip(names, parameters(t).tolist(), strict=True)))
         return float(likelihood(build(here), y).sum())
 
-    def cost(c: Array) -> float:
+    def cost(t: Array) -> float:
+        bar.update()
         try:
             with np.errstate(all="ignore"):
-                return -log_likelihood(c)
+                return -log_likelihood(t)
         except ValueError:  # a step too far, where there is no model or no likelihood: the search takes a shorter one
             return np.inf
 
-    derivatives = cache(lambda c: _derivatives(cost, np.array(c)))
-    first = np.where(logs, np.log(np.where(logs, start, 1.0)), start / unit)
-    log_likelihood(first)  # says what is wrong with the start
-    found = scipy.optimize.minimize(
-        cost, first, method="trust-exact", jac=lambda c: derivatives(tuple(c))[0], hess=lambda c: derivatives(tuple(c))[1],
-        options={"gtol": 1e-6 * max(1.0, abs(cost(first))), "maxiter": 60},
-    )  # fmt: skip
-    value, information = parameters(found.x), derivatives(tuple(found.x))[1]
-    if not (found.success and np.isfinite(information).all() and np.linalg.eigvalsh(information).min() > -FLAT):
-        raise NoMaximum(found.message, model.replace(**dict(zip(names, value.tolist(), strict=True))), names)
-    covariance, flat = _inverse(information, names)
-    error = np.sqrt(covariance) * np.where(logs, value, unit)
-    best = model.replace(**dict(zip(names, value.tolist(), strict=True)))
-    return Likeliest(names, value, error, -float(found.fun), best, flat)
+    t, unit = np.where(logs, np.log(np.where(logs, start, 1.0)), start), np.where(logs | (start == 0), 1.0, np.abs(start))
+    log_likelihood(t)  # says what is wrong with the start
+    with tqdm(desc="likelihood", unit=" evaluations", disable=None, delay=2) as bar:
+        for _ in range(2):  # the second time in the units that the likelihood has at its maximum
+            t, unit, result, information = _climb(cost, t, np.where(logs, 1.0, _units(cost, t, unit)))
+    best = model.replace(**dict(zip(names, parameters(t).tolist(), strict=True)))
+    if not (result.success and np.isfinite(information).all() and np.linalg.eigvalsh(information).min() > -FLAT):
+        raise NoMaximum(result.message, best, names)
+    noise = 10 * np.finfo(float).eps * abs(result.fun) / STEP**2
+    variance, flat = _inverse(information, unit, names, max(TOGETHER, noise))
+    error = np.sqrt(variance) * np.where(logs, parameters(t), 1.0)
+    return Likeliest(names, parameters(t), error, -float(result.fun), best, flat)
 
 
 def profile(
@@ -195,6 +196,34 @@ def _checked(model: Model, unknown: Sequence[str], positive: Sequence[str]) -> t
     return names, logs, start
 
 
+def _units(cost: Callable[[Array], float], t: Array, unit: Array) -> Array:
+    """Changes of each parameter by which the likelihood changes by about 1; as given where none changes it."""
+    here, units = cost(t), unit.copy()
+    for i in range(len(t)):
+        step = unit[i] * np.eye(len(t))[i]
+        for _ in range(20):
+            change = max(abs(cost(t + step) - here), abs(cost(t - step) - here))
+            if 0.05 < change < 5:
+                units[i] = step[i]
+                break
+            step = step * 4 if change <= 0.05 else step / 4
+    return units
+
+
+def _climb(cost: Callable[[Array], float], start: Array, unit: Array) -> tuple[Array, Array, Any, Array]:
+    """The least cost downhill from a start, the units, what the search says, and second derivatives in these units."""
+
+    def scaled(c: Array) -> float:
+        return cost(start + unit * c)
+
+    derivatives = cache(lambda c: _derivatives(scaled, np.array(c)))
+    result = scipy.optimize.minimize(
+        scaled, np.zeros(len(start)), method="trust-exact", jac=lambda c: derivatives(tuple(c))[0],
+        hess=lambda c: derivatives(tuple(c))[1], options={"gtol": max(1e-4, 1e-8 * abs(cost(start))), "maxiter": 100},
+    )  # fmt: skip
+    return start + unit * result.x, unit, result, derivatives(tuple(result.x))[1]
+
+
 def _derivatives(function: Callable[[Array], float], c: Array) -> tuple[Array, Array]:
     """Gradient and second derivatives by central differences."""
     middle, axes = function(c), STEP * np.eye(len(c))
@@ -207,19 +236,30 @@ def _derivatives(function: Callable[[Array], float], c: Array) -> tuple[Array, A
     return (ahead - behind) / (2 * STEP), second
 
 
-def _inverse(information: Array, names: Sequence[str]) -> tuple[Array, tuple[str, ...]]:
-    """Variances of the coordinates, and a sentence for each direction without information."""
-    values, directions = np.linalg.eigh(information)
-    blind = values < FLAT
-    variance = (directions[:, ~blind] ** 2 / values[~blind]).sum(axis=1)
-    sentences = []
-    for direction in directions.T[blind]:
-        part = {name: one for name, one in zip(names, direction.tolist(), strict=True) if abs(one) > 0.1}
-        variance[[names.index(name) for name in part]] = np.inf
-        together = ", ".join(f"{name} ({one / max(part.values(), key=abs):+.2g})" for name, one in part.items())
+def _inverse(information: Array, unit: Array, names: Sequence[str], least: float) -> tuple[Array, tuple[str, ...]]:
+    """Variances of the parameters, and a sentence for each direction without information.
+
+    Each parameter's own information comes first, then that of directions of those which have some, in units of the standard
+    error that each would have if the others were known.
+    """
+    own = np.diagonal(information)
+    blind = own < FLAT
+    sentences = [
+        f"the record does not tell {names[i]}: its likelihood does not depend on it here" for i in np.flatnonzero(blind).tolist()
+    ]
+    scale = np.sqrt(np.where(blind, 1.0, own))
+    related = np.where(blind[:, None] | blind, np.eye(len(own)), information / np.outer(scale, scale))
+    values, directions = np.linalg.eigh(related)
+    told = values > least
+    variance = (directions[:, told] ** 2 / values[told]).sum(axis=1) * (unit / scale) ** 2
+    variance[blind] = np.inf
+    for direction in directions.T[~told]:
+        part = np.flatnonzero(np.abs(direction) > DIRECTION)
+        variance[part] = np.inf
+        change = direction[part] * (unit / scale)[part]
+        change /= change[np.argmax(np.abs(change))]
+        together = ", ".join(f"{names[i]} ({one:+.2g})" for i, one in zip(part.tolist(), change, strict=True))
         sentences.append(
             f"the record does not tell {together} apart: changed together in these proportions they leave its likelihood as it is"
-            if len(part) > 1
-            else f"the record does not tell {', '.join(part)}: its likelihood does not depend on it here"
         )
     return variance, tuple(sentences)

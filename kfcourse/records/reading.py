@@ -25,6 +25,7 @@ import numpy as np
 
 from kfcourse.errors import expect
 from kfcourse.laws import Array
+from kfcourse.symbolic.angular import warn_of_degrees
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import shown
 
@@ -151,6 +152,7 @@ def read_measurements(path: str | Path, model: Model, columns: Mapping[str, str]
     if "t" in used - set(inputs):
         record_inputs["t"] = times
     y = np.stack([table[name] for name in model.measured], axis=-1)[:, None]
+    warn_of_degrees(f"{path}: a measurement", y, model.measured, model.angles.y)
     return Record(times, y, model.with_inputs(record_inputs))
 
 

@@ -6,14 +6,15 @@ import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import sympy as sp
 
-from kfcourse.angles import Angles
+from kfcourse.angles import Angles, Components
 from kfcourse.symbolic.reading import ModelError, Names, shown
 
 
 class AngleWarning(UserWarning):
-    """A formula finds an angle by atan2, and the model does not say that the result is one."""
+    """A formula finds or contains an angle, and the model does not say that it is one; or an angle seems to be in degrees."""
 
 
 def read_angles(given: Names | Mapping[str, Names] | None, x: list[str], y: list[str]) -> Angles:
@@ -50,15 +51,50 @@ def _names(given: Any) -> list[str]:
 
 def warn_of_angles(equations: Mapping[str, sp.Expr]) -> None:
     """AngleWarning for components that are found by atan2 and may pass from pi to -pi."""
-    found = [name for name, equation in equations.items() if _jumps(equation)]
-    if found:
-        names = ", ".join(f'"{name}"' for name in found)
-        warnings.warn(
+    if found := [name for name, equation in equations.items() if _jumps(equation)]:
+        _warn(
             f"{' and '.join(found)}: atan2 jumps from pi to -pi, and a filter takes the jump for an innovation of a turn; "
-            f"say angles=[{names}], or angles=[] if it is no angle or never comes near pi",
-            AngleWarning,
-            stacklevel=3,  # where Model.define was called
+            f"say angles=[{_quoted(found)}], or angles=[] if it is no angle or never comes near pi"
         )
+
+
+def warn_of_meters(measured: Mapping[str, sp.Expr], angles: Angles, x: Sequence[sp.Symbol]) -> None:
+    """AngleWarning for measurements that contain an angle as it is, and are not said to be angles themselves."""
+    turning = [x[i] for i in angles.x]
+    for i, (name, equation) in enumerate(measured.items()):
+        plain = [symbol for symbol in turning if _outside_sines(equation, symbol)]
+        if plain and i not in angles.y:
+            state = _quoted([symbol.name for symbol in turning])
+            _warn(
+                f"{name} contains the angle {plain[0]}, which jumps from pi to -pi, outside sin and cos: say "
+                f'angles={{"x": [{state}], "y": ["{name}"]}}, or "y": [] if it is no angle'
+            )
+
+
+def warn_of_degrees(what: str, values: Any, names: Sequence[str], angles: Components) -> None:
+    """AngleWarning for angles (..., components) beyond a turn."""
+    for i in angles:
+        beyond = np.nanmax(np.abs(np.asarray(values, dtype=float)[..., i]), initial=0.0)
+        if beyond > 2 * np.pi:
+            _warn(
+                f"{what} of the angle {names[i]} is {beyond:.6g}, beyond 2 pi: angles are in radians; "
+                "turn degrees into them by numpy.deg2rad"
+            )
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, AngleWarning, stacklevel=4)  # where Model.define was called
+
+
+def _quoted(names: Sequence[str]) -> str:
+    return ", ".join(f'"{name}"' for name in names)
+
+
+def _outside_sines(formula: sp.Expr, angle: sp.Symbol) -> bool:
+    """Whether the angle stands in it outside sine, cosine and tangent."""
+    if isinstance(formula, sp.sin | sp.cos | sp.tan):
+        return False
+    return formula == angle or any(_outside_sines(argument, angle) for argument in formula.args)
 
 
 def _jumps(formula: sp.Expr) -> bool:

@@ -23,7 +23,7 @@ import sympy as sp
 
 from kfcourse.angles import Angles
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.angular import read_angles, warn_of_angles
+from kfcourse.symbolic.angular import read_angles, warn_of_angles, warn_of_degrees, warn_of_meters
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.known import Known, varying_law
 from kfcourse.symbolic.reading import (
@@ -128,7 +128,8 @@ class Model:
         Warns
         -----
         AngleWarning
-            A formula finds an angle by atan2, which jumps by a turn, and `angles` is not given.
+            A formula finds an angle by atan2, which jumps by a turn, and `angles` is not given; a meter contains an angle outside
+            sin and cos, and no key y of `angles` says whether it is one; the prior mean of an angle is beyond 2 pi.
 
         Examples
         --------
@@ -167,6 +168,9 @@ class Model:
         if angles is None:
             warn_of_angles(dict(zip((s.name for s in x), model.state_equation, strict=True)))
             warn_of_angles(dict(zip(model.measured, model.meter_equation, strict=True)))
+        elif not (isinstance(angles, Mapping) and "y" in angles):  # which says all that is to be said of the meter
+            warn_of_meters(dict(zip(model.measured, model.meter_equation, strict=True)), model.angles, x)
+        warn_of_degrees("the prior mean", model.prior.mean, [s.name for s in x], model.angles.x)
         model._check()
         if not model.meter_equation.has(*x):
             raise ModelError(f"the meter {list(model.meter_equation)} does not depend on the state {list(x)}: nothing to filter")

@@ -195,8 +195,10 @@ def _checked(name: str, model: Model, rule: Rule, equations: _Equations, order: 
         if not all(np.isfinite(moment).all() for _, moment, *_ in found):
             _warn(f"{name}: a function of {model} is not finite at the points of the prior law", stacklevel=4)
         elif (2 * order) ** size <= MOST_POINTS:
-            coarse = found if name == "gauss-hermite" else _moments(_quadrature(name, model, product_rule(order), equations))
-            fine = _moments(_quadrature(name, model, product_rule(2 * order), equations))
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", QuadratureWarning)  # these points are not those that the filter uses
+                coarse = found if name == "gauss-hermite" else _moments(_quadrature(name, model, product_rule(order), equations))
+                fine = _moments(_quadrature(name, model, product_rule(2 * order), equations))
             for (what, less, *_), (_, more, scale, angles) in zip(coarse, fine, strict=True):
                 more = near(more, less, angles)
                 if not (np.abs(more - less) <= CONVERGED * scale).all():
@@ -234,6 +236,17 @@ def _warn(text: str, stacklevel: int) -> None:
     warnings.warn(text, QuadratureWarning, stacklevel=stacklevel)
 
 
+def _warn_of_turns(name: str, model: Model, deviation: Array) -> None:
+    """QuadratureWarning if points of an angle go round the circle: their mean is then that of other angles."""
+    for i in model.angles.x:
+        if (widest := np.nanmax(np.abs(deviation[..., i]), initial=0.0)) > np.pi:
+            _warn(
+                f"{name}: points of the angle {model.x[i]} lie {widest:.3g} to either side of its mean, more than half a turn: "
+                "its variance is too large for these points; take linearised(model), or a smaller prior variance",
+                stacklevel=3,
+            )
+
+
 def _lower_root(cov: Array) -> Array:
     """The Cholesky factor; where cov is singular its column is 0 for a component that the earlier ones determine."""
     try:
@@ -268,6 +281,7 @@ def _of_step(name: str, model: Model, rules: Sequence[tuple[Array, Array]], equa
         and the covariance that noises without points add."""
         scale = _lower_root(cov)
         deviation = points[:, :n] @ transpose(scale)
+        _warn_of_turns(name, model, deviation)
         x = mean[..., None, :] + deviation
         noise = equation.noise.mean + points[:, n:] @ equation.root.T
         values = equation.function(x, np.broadcast_to(noise, x.shape[:-1] + noise.shape[-1:]), equation.k)
@@ -294,8 +308,11 @@ def _of_step(name: str, model: Model, rules: Sequence[tuple[Array, Array]], equa
         cross = transpose(weighed) @ points[:, :n]
         slopes = _slopes(np.where(np.abs(cross) <= _rounding_of(weighed, deviation), 0.0, cross), scale)
         # No difference of nearly equal matrices.
-        left = _weighted(weights, deviation - dx @ transpose(slopes)) + added
-        return value, slopes, left, deviation, added
+        explained = dx @ transpose(slopes)
+        rest = deviation - explained
+        size = (np.abs(deviation) + np.abs(explained)).max(axis=-2, keepdims=True) + np.abs(value)[..., None, :]
+        rest = np.where(np.abs(rest) <= LOST * np.finfo(float).eps * size, 0.0, rest)  # rounding is no noise of the meter
+        return value, slopes, _weighted(weights, rest) + added, deviation, added
 
     def measure(m: Array, d: Array) -> Measurement:
         d = np.broadcast_to(d, (*m.shape, n))

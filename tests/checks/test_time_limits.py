@@ -1,10 +1,10 @@
 """A check ends: answers, comparisons and the search for the mistake are limited in time."""
 
+import contextlib
+import os
 import signal
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 
 import pytest
 from tiny import SUM, asks, endless, outcome, raises, stubborn, very_stubborn
@@ -13,7 +13,10 @@ from kfcourse.checks import engine
 from kfcourse.checks.question import Mistake
 from kfcourse.limits import AGAIN, OutOfTime, time_limit
 
-pytestmark = pytest.mark.quick
+pytestmark = [
+    pytest.mark.quick,
+    pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no alarms here"),
+]
 
 
 @pytest.mark.parametrize("answer", [endless, stubborn, very_stubborn], ids=lambda answer: answer.__name__)
@@ -39,45 +42,23 @@ def test_a_long_search_for_the_mistake_still_says_wrong(monkeypatch):
     assert (result.status, result.diagnosis) == ("wrong", ())
 
 
-@pytest.fixture(params=["alarm", "no alarm", "other thread"])
-def somewhere(request, monkeypatch):
-    """Calls a function in the main thread, there without alarms, as on Windows, or in another thread."""
-    if request.param == "alarm" and not hasattr(signal, "setitimer"):
-        pytest.skip("no alarms here")
-    if request.param == "no alarm":
-        monkeypatch.delattr(signal, "setitimer", raising=False)
-    if request.param != "other thread":
-        return lambda function: function()
-
-    def call(function):
-        with ThreadPoolExecutor(1) as pool:
-            return pool.submit(function).result()
-
-    return call
-
-
 def busy(seconds):
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         pass
 
 
-def test_a_block_ends_in_time_anywhere(somewhere):
+def test_a_block_ends_in_time():
     def stopped():
         start = time.monotonic()
         with pytest.raises(OutOfTime), time_limit(0.2):
             stubborn()
         return time.monotonic() - start
 
-    assert 0.2 <= somewhere(stopped) < 10
+    assert 0.2 <= stopped() < 10
 
 
-def test_a_check_ends_in_time_anywhere(somewhere):
-    result = somewhere(lambda: outcome(SUM, endless, seconds=0.2))
-    assert (result.status, "still running after 0.2 s" in result.message) == ("unusable", True)
-
-
-def test_after_a_block_nothing_comes(somewhere):
+def test_after_a_block_nothing_comes():
     """Blocks that end in time and blocks that end with it, as close as can be: no limit strikes outside of its block."""
 
     def many():
@@ -91,11 +72,10 @@ def test_after_a_block_nothing_comes(somewhere):
         busy(5 * AGAIN)  # what was left would come now
         return late
 
-    assert 0 <= somewhere(many) <= 200
-    assert not [thread for thread in threading.enumerate() if thread.name == "time limit" and thread.join(1)]
+    assert 0 <= many() <= 200
 
 
-def test_blocks_in_blocks_keep_their_own_limits(somewhere):
+def test_blocks_in_blocks_keep_their_own_limits():
     def outer_ends(seconds):
         inner = 0
         with pytest.raises(OutOfTime), time_limit(seconds):
@@ -114,28 +94,35 @@ def test_blocks_in_blocks_keep_their_own_limits(somewhere):
                 endless()
             return "went on"
 
-    assert any(somewhere(partial(outer_ends, seconds)) >= 2 for seconds in (0.3, 3, 30))  # on a busy machine the later ones
-    assert somewhere(inner_ends) == "went on"
+    assert any(outer_ends(seconds) >= 2 for seconds in (0.3, 3, 30))  # on a busy machine the later ones
+    assert inner_ends() == "went on"
 
 
-def test_a_new_thread_is_not_stopped_in_place_of_the_one_that_begins_it():
-    """For a moment both have one number; a parent waits for ever for a child that ended before it could say that it is there."""
-    stopped = []
-
-    def begins_threads():
-        for _ in range(50):
-            with pytest.raises(OutOfTime), time_limit(0.01):
-                while True:
-                    threading.Thread(target=int, daemon=True).start()
-            stopped.append(True)
-
-    parent = threading.Thread(target=begins_threads, daemon=True)
-    parent.start()
-    parent.join(60)
-    assert len(stopped) == 50
+def test_a_fork_inside_a_block_has_no_limit_but_its_own():
+    with time_limit(0.1):
+        child = os.fork()
+        if not child:
+            busy(0.3)
+            try:
+                with time_limit(0.05):
+                    endless()
+            except OutOfTime:
+                os._exit(7)
+        with contextlib.suppress(OutOfTime):
+            busy(10)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
 
 
-@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no alarms here")
+def test_another_thread_is_not_limited():
+    def long():
+        with time_limit(0.05):
+            busy(0.2)
+        return "done"
+
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(long).result() == "done"
+
+
 def test_the_alarm_ends_what_only_looks_for_signals():
     """A wait, and the product of huge integers; without alarms these end by themselves first."""
     for long in (lambda: time.sleep(60), lambda: (7**2_000_000) ** 40):
@@ -145,14 +132,13 @@ def test_the_alarm_ends_what_only_looks_for_signals():
         assert time.monotonic() - start < 20
 
 
-@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no alarms here")
 @pytest.mark.parametrize("seconds", [float("inf"), 1e300])
-def test_a_block_without_end_is_not_stopped(somewhere, seconds):
+def test_a_block_without_end_is_not_stopped(seconds):
     def unlimited():
         with time_limit(seconds):
             return "done"
 
-    assert somewhere(unlimited) == "done"
+    assert unlimited() == "done"
 
 
 def test_time_limit_restores_the_alarm():

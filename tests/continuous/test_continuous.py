@@ -25,7 +25,7 @@ from kfcourse.continuous import (
 from kfcourse.filters import aof
 from kfcourse.laws import Gaussian
 from kfcourse.montecarlo.designing import NotFinite
-from kfcourse.montecarlo.experiment import compare, predictions, run
+from kfcourse.montecarlo.experiment import predictions, run
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.formula import FormulaError
 from kfcourse.symbolic.reading import ModelError
@@ -149,14 +149,6 @@ def test_a_coarse_path_is_the_same_path():
         assert np.allclose(seen.y[k], sum(fine.y[6 * k + i] for i in range(6)) / 6, rtol=0, atol=1e-13)
     twice = coarsen(coarsen(fine, 2), 3)
     assert np.array_equal(twice.x, seen.x) and np.allclose(twice.y, seen.y, rtol=0, atol=1e-13)
-
-
-def test_seeds():
-    model = parabola()
-    first, second = simulate(model, 0.1, 5, 3, 7), simulate(model, 0.1, 5, 3, np.random.default_rng(7))
-    assert np.array_equal(first.x, second.x) and np.array_equal(first.y, second.y)
-    assert not np.array_equal(first.y, simulate(model, 0.1, 5, 3, 8).y)
-    assert first.x.shape == (6, 3, 1) and first.y.shape == (5, 3, 1)
 
 
 def test_an_explosion_is_reported():
@@ -450,30 +442,6 @@ def test_the_covariance_of_a_time_varying_model_solves_its_riccati_equation():
     assert errors[-1] < 0.01
 
 
-def test_simulated_moments_of_a_time_varying_model():
-    """Within four standard errors and the bias of Euler's scheme, at most 0.01 of the moments at dt = 0.0025."""
-    runs, path = 4000, simulate(varying(), 0.5, 6, 4000, 11, substeps=200)
-    mean, variance, _ = varying_moments(path.step * np.arange(7))
-    found = path.x[..., 0]
-    assert (np.abs(found.mean(axis=1) - mean) < 4 * np.sqrt(variance / runs) + 0.01).all()
-    assert (np.abs(found.var(axis=1) / variance - 1) < 4 * np.sqrt(2 / runs) + 0.01).all()
-
-
-def test_the_time_is_a_component_that_is_known():
-    """t in the formulas, or a component s with ds/dt = 1, s(0) = 0: the same signal, noises and estimates."""
-    settings = {"spectral_density": 0.3, "noise_density": 0.2}
-    direct = ContinuousModel.define("-x + t/5", "1 + t/9", "cos(2*t + x)", prior={"mean": 0.3, "variance": 0.5}, **settings)
-    prior = {"mean": [0.3, 0], "variance": [0.5, 0]}
-    carried = ContinuousModel.define(
-        ["-x + s/5", "1"], [["1 + s/9"], ["0"]], "cos(2*s + x)", symbols=["x", "s"], prior=prior, **settings
-    )
-    y = simulate(direct, 0.05, 60, 5, 2).y
-    for options in ({}, {"second_derivatives": True}, {"second_derivatives": True, "symmetrised": True}):
-        one, two = (run(extended_kalman_bucy(model, 0.05, **options), y) for model in (direct, carried))
-        np.testing.assert_allclose(one.mean[..., 0], two.mean[..., 0], rtol=0, atol=1e-12)
-        np.testing.assert_allclose(one.cov[..., 0, 0], two.cov[..., 0, 0], rtol=0, atol=1e-12)
-
-
 def test_the_discrete_model_has_its_functions_at_the_times_of_its_steps():
     """f, g, S at t_k = k T; its Kalman filter has the same covariances, and estimates that differ in proportion to T:
     f is taken at the corrected estimate instead of the predicted one."""
@@ -506,16 +474,6 @@ def test_names_of_the_time():
         steady_state(varying())
 
 
-def test_without_second_derivatives_a_linear_model_has_one_covariance_for_all():
-    model = oscillator()
-    y = simulate(model, 0.02, 30, 4, 9).y
-    plain, second, both = (predictions(extended_kalman_bucy(model, 0.02, *how), y) for how in ((), (True,), (True, True)))
-    for other in (second, both):  # the term vanishes
-        assert np.allclose(other.mean, plain.mean, rtol=1e-12, atol=1e-13)
-        assert np.allclose(other.cov, plain.cov, rtol=1e-12, atol=1e-13)
-    assert np.array_equal(plain.cov[:, 0], plain.cov[:, -1])
-
-
 @pytest.mark.parametrize("make", [ornstein_uhlenbeck, oscillator])
 def test_steady_state_is_that_of_python_control(make):
     model = make()
@@ -526,24 +484,6 @@ def test_steady_state_is_that_of_python_control(make):
     assert np.allclose(found.gain, L, rtol=1e-10, atol=1e-12)
     residual = A @ found.cov + found.cov @ A.T + G @ model.spectral_density @ G.T / 2 - found.gain @ H @ found.cov
     assert np.abs(residual).max() < 1e-12
-
-
-def test_the_filter_settles_in_the_steady_state():
-    model = oscillator()
-    errors = []
-    for T in (0.01, 0.005):
-        steps = round(20 / T)  # many time constants
-        last = run(extended_kalman_bucy(model, T), np.zeros((steps, 1, 2))).cov[-1, 0]
-        errors.append(np.abs(last - steady_state(model).cov).max())
-    assert 1.9 < errors[0] / errors[1] < 2.1  # of the order T
-    assert errors[1] < 0.01
-
-
-def test_linear_matrices_with_constants_and_names():
-    A, G, H = linear_matrices(oscillator())
-    assert np.array_equal(A, [[0, 1], [-2, -0.4]])
-    assert np.array_equal(G, [[0.2, 0], [0.1, 1.2]])
-    assert np.array_equal(H, [[1, 0.3], [0, 0.8]])
 
 
 # --- as a filter among the others -------------------------------------------------------------------------------------------
@@ -562,16 +502,6 @@ def test_the_continuous_and_the_discrete_extended_filter_come_together():
     error = np.sqrt(np.mean((continuous.mean - fine.x[:-1]) ** 2))
     assert differences[0] > 2 * differences[1] > 4 * differences[2]
     assert differences[2] < 0.01 * error
-
-
-def test_it_runs_in_a_comparison():
-    model = parabola()
-    discrete = to_discrete(model, 0.02)
-    filters = [extended_kalman_bucy(model, 0.02), extended_kalman_bucy(model, 0.02, True), aof(linearised(discrete))]
-    result = compare(filters, discrete, 400, 20, seed=1, progress=False)
-    ratio = result.relative("kalman-bucy", "aof-linearised").value
-    assert (abs(ratio - 1) < 0.02).all()  # two schemes for the same equations
-    assert result.available == ("kalman-bucy", "kalman-bucy-second", "aof-linearised")
 
 
 def test_a_missing_measurement_corrects_nothing():
@@ -613,14 +543,6 @@ def test_names_that_the_filter_uses_itself():
     assert np.allclose(a.mean, b.mean, rtol=1e-13) and np.allclose(a.cov, b.cov, rtol=1e-13)
 
 
-def test_covariances_stay_symmetric_and_non_negative_however_long_the_step():
-    model = nonlinear_vector()
-    y = simulate(model, 0.5, 30, 200, 4, substeps=50).y
-    cov = run(extended_kalman_bucy(model, 0.5, second_derivatives=True), y).cov
-    assert np.array_equal(cov, np.swapaxes(cov, -1, -2))
-    assert np.linalg.eigvalsh(cov).min() >= 0
-
-
 def test_a_lost_filter_is_named():
     """Where the log-likelihood curves upwards the symmetrised reading has no finite solution."""
     model = ContinuousModel.define("-x", "1", "3*cos(x)", prior={"variance": 2}, spectral_density=4, noise_density=0.1)
@@ -639,14 +561,6 @@ def test_a_negative_covariance_is_an_error():
 
 
 # --- input ------------------------------------------------------------------------------------------------------------------
-
-
-def test_sympy_and_strings_are_the_same_model():
-    x, a = sp.symbols("x a")  # the caller's symbols, whatever their assumptions
-    theirs = ContinuousModel.define(-a * x, sp.Integer(1), sp.sin(x), {"a": 0.5})
-    assert theirs == ContinuousModel.define("-a*x", "1", "sin(x)", {"a": 0.5})
-    assert repr(theirs) == "ContinuousModel(dx/dt = -a*x + xi, y = sin(x) + n; a = 1/2)"
-    assert "y2 = " in repr(nonlinear_vector()) and "n2" in repr(nonlinear_vector())
 
 
 @pytest.mark.parametrize(

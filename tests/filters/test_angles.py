@@ -30,7 +30,7 @@ from kfcourse.scenarios.navigation import Dynamics, Sensor, fuse, observe
 from kfcourse.scenarios.radar import kinematic
 from kfcourse.symbolic.angular import AngleWarning
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.quadrature import gauss_hermite, unscented
+from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite, unscented
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import gaussian, linearised
 
@@ -97,6 +97,46 @@ def test_an_atan2_that_is_not_said_to_be_an_angle_warns_and_names_the_cure(meter
         warnings.simplefilter("error")
         Model.define(state, ["x1 + w", meter], angles=["y2"])
         Model.define(state, ["x1 + w", meter], angles=[])
+
+
+@pytest.mark.parametrize(
+    ("meter", "angles", "warns"),
+    [
+        ("psi + w", ["psi"], True),
+        ("2*psi*x2 + sin(psi) + w", {"x": ["psi"]}, True),
+        ("sin(psi) + x2*cos(2*psi + x2) + w", ["psi"], False),
+        ("psi + w", ["psi", "y"], False),
+        ("psi + w", {"x": ["psi"], "y": []}, False),  # whoever gives the key has decided
+    ],
+)
+def test_a_meter_that_contains_an_angle_and_is_not_said_to_be_one_warns(meter, angles, warns):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        Model.define(["psi + v1", "x2 + v2"], meter, symbols={"x": ["psi", "x2"]}, angles=angles)
+    assert [type(one.message) for one in caught] == [AngleWarning] * warns
+    if warns:
+        assert "y contains the angle psi" in str(caught[0].message) and '"y": ["y"]}' in str(caught[0].message)
+        assert caught[0].filename == __file__
+
+
+def test_degrees_are_told():
+    with pytest.warns(AngleWarning, match="prior mean of the angle x is 90, beyond 2 pi: angles are in radians"):
+        Model.define("x + v", "x + w", angles=["x", "y"], prior={"mean": 90, "variance": 1})
+
+
+@pytest.mark.parametrize("build", [unscented, gauss_hermite])
+def test_points_of_an_angle_that_go_round_the_circle_warn(build):
+    """Wider than half a turn their mean is another angle's: -.5 for +.5, and nobody sees it in the numbers."""
+
+    def model(variance):
+        return Model.define("x + 0.1*v", "x + 0.3*w", angles=["x", "y"], prior={"mean": 0, "variance": variance})
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        narrow = run(aof(build(model(0.4))), np.array([0.5])).mean.item()
+    assert narrow == pytest.approx(0.5 * 0.4 / (0.4 + 0.09))
+    with pytest.warns(QuadratureWarning, match="points of the angle x lie .* more than half a turn.*take linearised"):
+        build(model(3.5))
 
 
 def test_wrapping_leaves_what_needs_none_and_finds_the_short_way():

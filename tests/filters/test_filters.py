@@ -17,11 +17,10 @@ from kfcourse.filters.approximations import aof
 from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.designed import Design
 from kfcourse.filters.exact.pointmasses import pointmass
-from kfcourse.filters.finite_memory import ESTIMATES, MEASUREMENTS, dfkp, fbp, fkp, mdfkp, mfkp
 from kfcourse.filters.iterated_ekf import iterated
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.multiple_models import imm
-from kfcourse.filters.optimal_structure import dfmp, fos, mdfmp, mfos
+from kfcourse.filters.optimal_structure import ESTIMATES, MEASUREMENTS, dfkp, dfmp, fbp, fkp, fos, mdfkp, mdfmp, mfkp, mfos
 from kfcourse.filters.particles import particle
 from kfcourse.lab.short_names import FILTERS
 from kfcourse.montecarlo.designing import NotFinite, design

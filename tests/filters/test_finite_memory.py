@@ -191,7 +191,7 @@ def test_angles_are_kept_together_where_estimates_are_remembered():
 
 
 def test_what_cannot_be_is_refused():
-    angular = linearised(Model.define("x + 0.1*v", "x + 0.1*w", angles=["x"]))
+    angular = linearised(Model.define("x + 0.1*v", "x + 0.1*w", angles={"x": ["x"], "y": []}))
     with pytest.raises(ModelError, match=r"fkp4 regresses the state on measurements, and angles jump.*fbp\(structure, memory\)"):
         fkp(angular)
     assert fbp(angular, 2).name == "fbp2-linearised"

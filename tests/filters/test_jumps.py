@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 from test_filters import LINEAR, exact_ensemble
-from test_jump_particles import histories
 from test_multiple_models import follow
+from test_particles import histories
 
 from kfcourse import (
     Ensemble,
@@ -475,7 +475,7 @@ def test_the_fos_with_modes_says_what_it_cannot_do():
     rare = failing(transition=[[1 - 1e-9, 1e-9], [0.5, 0.5]], first=[1, 0])
     with pytest.raises(NotFinite, match="no trajectory of the design is in a mode"):
         design([logic_dynamic_fos(rare, [gaussian(one) for one in rare.modes])], Ensemble(rare, 100, 3, seed=1).by_step())
-    turning = JumpModel.define("x + v", "x + w", modes={"a": {}}, transition=[1], angles=["x"])
+    turning = JumpModel.define("x + v", "x + w", modes={"a": {}}, transition=[1], angles={"x": ["x"], "y": []})
     for build, name in ((logic_dynamic_fos, "FOS"), (logic_dynamic_fkp, "FKP4"), (logic_dynamic_fbp, "FBP4")):
         with pytest.raises(ModelError, match=f"the logic-dynamic {name} takes no components that are angles"):
             build(turning, [gaussian(turning.modes[0])])
@@ -565,7 +565,12 @@ def test_who_wins():
 
 def test_of_angles_there_is_no_average():
     model = JumpModel.define(
-        "x + v", "x + C*w", {"C": 1}, modes={"a": {}, "b": {"parameters": {"C": 2}}}, transition=[0.5, 0.5], angles=["x"]
+        "x + v",
+        "x + C*w",
+        {"C": 1},
+        modes={"a": {}, "b": {"parameters": {"C": 2}}},
+        transition=[0.5, 0.5],
+        angles={"x": ["x"], "y": []},
     )
     with pytest.raises(ModelError, match="angles have no average"):
         averaged(model, [linearised(mode) for mode in model.modes])

@@ -5,7 +5,7 @@ import pytest
 
 from kfcourse import JumpModel, Model, ModelError, compare, gaussian, linearised, run, simulate
 from kfcourse.filters import gpb2, imm, jump_pointmass, logic_dynamic, logic_dynamic_fos, pointmass
-from kfcourse.filters.state_transitions import by_state
+from kfcourse.filters.multiple_models import by_state
 from kfcourse.laws import Gaussian
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 
@@ -173,14 +173,6 @@ def test_who_knows_of_the_state_gains():
 def test_what_needs_the_law_of_the_modes_is_refused(build, message):
     with pytest.raises(ModelError, match=message):
         build(overloaded())
-
-
-def test_jumps_of_the_probabilities_are_refused_by_who_integrates_them():
-    model = overloaded([["Heaviside(1 - x)", "1 - Heaviside(1 - x)"], [0.3, 0.7]])
-    with pytest.raises(ModelError, match="from mode sound change too abruptly"):
-        of(logic_dynamic, model)
-    with pytest.raises(ModelError, match=r"step \d of .* too abruptly .*--slow-runs 0"):
-        run(jump_pointmass(model), simulate(model, 40, 8, seed=1).y)
 
 
 @pytest.mark.parametrize(

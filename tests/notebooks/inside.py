@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import nbformat
 
 from kfcourse.notebooks.grading.running import Ran
+from kfcourse.notebooks.grading.session import _of_a_stub
 from kfcourse.notebooks.grading.values import decode, encode
 
 
@@ -32,7 +33,7 @@ class InsideKernel:
     """A kernel for notebooks that do nothing to their process; values are sent as between two."""
 
     def __init__(self, place, opening, seconds):
-        self.notes, self.seconds, self._namespace, self._answers = [], seconds, {}, {}
+        self.seconds, self._namespace, self._answers = seconds, {}, {}
 
     def __enter__(self):
         return self
@@ -45,11 +46,11 @@ class InsideKernel:
         self._namespace.update(dict.fromkeys(names, SimpleNamespace(check=handed_in.__setitem__)))
         try:
             exec(source, self._namespace)
-            error = None
+            error, stub = "", False
         except Exception as raised:
-            error = (type(raised).__name__, str(raised))
+            error, stub = f"{type(raised).__name__}: {raised}", _of_a_stub(raised)
         self._answers |= handed_in
-        return Ran(error, {name: "" if callable(one) else type(one).__name__ for name, one in handed_in.items()})
+        return Ran(error, stub, {name: "" if callable(value) else type(value).__name__ for name, value in handed_in.items()})
 
     def ask(self, question, arguments, seconds):
         functions = []

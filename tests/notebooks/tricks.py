@@ -247,6 +247,8 @@ def gain(Psi, G, F):
 """,
 }
 
+READS = ("the key's file", "the statement's solution")
+
 # -- cells that turn against processes, files and the network: what is to come of them depends on the sandbox
 
 PROCESSES = {

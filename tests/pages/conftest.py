@@ -1,8 +1,13 @@
 """A browser for the tests of pages that compute, and figures that answer opened in it."""
 
+import sys
+from pathlib import Path
+
 import pytest
 from answering import ALONE, STILL, html
 from browsers import chromium, offline
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "book"))  # its extensions and its gate
 
 
 @pytest.fixture(scope="package")

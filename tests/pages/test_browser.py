@@ -240,6 +240,7 @@ COVERAGE = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("id", ["2", "53"])
 def test_intervals_above_the_bound_cover(page, id):
     """95 % intervals of forty sets of draws, against the package's gap from many more trajectories.

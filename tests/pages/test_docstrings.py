@@ -5,14 +5,10 @@ from __future__ import annotations
 import importlib
 import inspect
 import re
-import sys
-from pathlib import Path
 
-import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "book"))
 import docstrings
 import package
+import pytest
 
 pytestmark = pytest.mark.quick
 

@@ -1,23 +1,20 @@
 """The checks of the chapters stop the build: with one sign changed, a chapter fails where it prints the equation.
 
-Changes in typed relations are planted by .ci/gate.py; here a few of them, and one in a cell of each chapter.
+Changes in typed relations are planted by book/gate/plant.py; here a few of them, and one in a cell of each chapter.
 """
 
 from __future__ import annotations
 
 import random
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import pytest
+from gate import plant as gate
 from matplotlib import pyplot as plt
 
 from kfcourse.pages import Unverified
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
-_spec = spec_from_file_location("gate", BOOK.parent / ".ci" / "gate.py")
-gate = module_from_spec(_spec)
-_spec.loader.exec_module(gate)
 
 # Where the changed cell needs nothing but imports, and the cells before are long.
 ALONE = {

@@ -10,10 +10,9 @@ import pytest
 from answering import DRAWS, MADE, MAP, RECORD, WALK, WALKED, drag, fragment, functions, html, said, state_of
 from scipy.stats import norm
 
-from kfcourse import Model, compare, lab_filters, linearised, predictions, run
+from kfcourse import Model, linearised, predictions, run
 from kfcourse.filters import aof, kalman_filter
 from kfcourse.lab.short_names import title
-from kfcourse.lab.variants import load_variants
 from kfcourse.linear.consistency import autocorrelation, innovations, nees, nis
 from kfcourse.pages.scenes import FAULTS, HIDDEN, hidden_fault
 
@@ -144,7 +143,7 @@ def test_the_three_tests_are_the_package_s(opened):
     link_keeps(opened, tab, "fig-consistency-faults", "q=10&r=0.1")
 
 
-@pytest.mark.parametrize("letter", "ABCDE")
+@pytest.mark.parametrize("letter", "AC")
 def test_a_hidden_fault_is_guessed(opened, letter):
     tab = opened("fig-consistency-faults")
     which, guess = tab.get_by_role("combobox", name="Filter"), tab.get_by_role("combobox", name="Which is wrong?")
@@ -275,16 +274,3 @@ def test_the_map_is_consistent():
         for cell, (best, more) in zip(row, leaders, strict=True):
             assert best == min(cell, key=lambda name: cell[name][0]) and 0 <= more < len(cell)
             assert all(low <= value <= high for value, low, high in cell.values())
-
-
-def test_the_map_is_what_the_book_s_code_computes():
-    """A small comparison with another seed agrees with a row of it, within four standard errors of both."""
-    row, steps = MAP["ratios"].index(2), 4
-    model = load_variants()["53"].model.replace(f=0.1)
-    names = ["duof", "aof-linearised", "mfos-gaussian"]
-    result = compare(lab_filters(model, [*names, "aof-exact"]), model, 20_000, steps, seed=9, slow_runs=400, progress=False)
-    for name in names:
-        gap = result.gap(name)
-        for k in range(1, steps):
-            value, low, high = (one / 100 for one in MAP["gaps"][row][k][name])
-            assert abs(gap.value[k] - value) < 4 * np.hypot(gap.standard_error[k], (high - low) / 3.92)

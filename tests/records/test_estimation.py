@@ -40,6 +40,34 @@ def test_a_coefficient_alone_has_its_closed_form():
     assert found.standard_error[0] == pytest.approx(0.3 / np.sqrt(square), rel=1e-5)
 
 
+def test_where_the_search_begins_does_not_matter_for_what_is_told():
+    """Started hundreds of times too small, each is found as in closed form: a regression; two means."""
+    model = Model.define("a*x + v", "x", {"a": 0.001})
+    y = simulate(model.replace(a=0.4), 1, 100, seed=1).y
+    square = (y[:-1] ** 2).sum()
+    found = estimate(model, y, ["a"])
+    assert found.flat == ()
+    # the search ends where the slope is 1e-4 in units of the standard error
+    assert found.value[0] == pytest.approx((y[1:] * y[:-1]).sum() / square, abs=1e-4 / np.sqrt(square))
+    assert found.standard_error[0] == pytest.approx(1 / np.sqrt(square), rel=1e-5)
+    biases = Model.define("x", ["x + b1 + w1", "x + b2 + w2"], {"b1": 0.001, "b2": 0.001}, prior={"mean": 0, "variance": 0})
+    y = simulate(biases.replace(b1=1, b2=-2), 2, 20, seed=1).y
+    found = estimate(biases, y, ["b1", "b2"])
+    assert found.flat == ()
+    np.testing.assert_allclose(found.value, y.mean(axis=(0, 1)), atol=1e-4 / np.sqrt(40))
+    np.testing.assert_allclose(found.standard_error, 1 / np.sqrt(40), rtol=1e-4)
+
+
+@pytest.mark.parametrize("start", [1.0, 3.0])
+def test_a_direction_that_is_not_told_is_named_whole(start):
+    """g of any sign and a positive q: only g^2 q reaches the measurements, and neither gets a finite error."""
+    model = Model.define("0.9*x + sqrt(q)*v", "g*x + w", {"g": 1.0, "q": 1.0}, prior={"mean": 0, "variance": 0})
+    y = simulate(model, 1, 60, seed=1).y
+    found = estimate(model.replace(g=start), y, ["g", "q"], ["q"])
+    assert len(found.flat) == 1 and "does not tell g (" in found.flat[0] and ", q (" in found.flat[0]
+    assert np.isinf(found.standard_error).all()
+
+
 def test_what_the_record_does_not_tell_is_named():
     """Only the product of g and s reaches the measurements: one doubled and the other halved, nothing changes."""
     model = Model.define("0.9*x + s*v", "g*x + r*w", {"g": 1.5, "s": 0.4, "r": 0.3}, prior={"mean": 0, "variance": 0})

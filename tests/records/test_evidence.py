@@ -16,7 +16,6 @@ from kfcourse.scenarios.benchmarks import local_level, nile
 
 pytestmark = pytest.mark.quick
 
-ROUNDING = 1e-12  # of a logarithm of some tens, and a sum of a few hundred terms
 FILTERS = {
     "kalman": kalman_filter,
     "linearised": lambda model: aof(linearised(model)),
@@ -65,33 +64,6 @@ def test_an_angle_s_innovation_goes_the_short_way_round():
     assert wrapped.min() < -3 < 3 < wrapped.max()
     for build in FILTERS.values():
         np.testing.assert_allclose(likelihood(build(model), wrapped), likelihood(kalman_filter(plain), y), rtol=1e-9)
-
-
-def brute_force(e, y):
-    """ln p(y_0), ln p(y_1 | y_0) of the curved model below: sums over both states."""
-
-    def density(value, mean, sigma):
-        return np.exp(-0.5 * ((value - mean) / sigma) ** 2) / (np.sqrt(2 * np.pi) * sigma)
-
-    x = np.linspace(-3, 5, 1601)
-    step = x[1] - x[0]
-    first = density(x, 1.0, 0.5) * density(y[0], x + e * x**2, 0.3 * np.exp(e * x))
-    second = (first @ density(x[None], 0.9 * x[:, None] + e * x[:, None] ** 2, 0.2)) * density(
-        y[1], x + e * x**2, 0.3 * np.exp(e * x)
-    )
-    return np.log([first.sum() * step, second.sum() / first.sum() * step])
-
-
-@pytest.mark.parametrize("kind", ["gaussian", "linearised", "unscented"])
-def test_under_a_mild_curvature_each_part_is_the_density_but_for_the_curvature(kind):
-    off, y = [], np.array([1.6, 0.5])
-    for e in (0.05, 0.025):
-        model = Model.define(
-            "0.9*x + e*x**2 + 0.2*v", "x + e*x**2 + 0.3*exp(e*x)*w", {"e": e}, prior={"mean": 1.0, "variance": 0.25}
-        )
-        off.append(likelihood(FILTERS[kind](model), y).ravel() - brute_force(e, y))
-    assert np.abs(off[0]).max() < 0.06
-    np.testing.assert_allclose(off[1], off[0] / 2, rtol=0, atol=0.2 * np.abs(off[0]).max())
 
 
 # ---------------------------------------------------------------- the exact filter, and particles

@@ -315,7 +315,7 @@ def test_particles_with_a_lag_are_near_the_kalman_smoother_with_that_lag(plane):
 
 def test_backward_weights_are_bayes_rule_over_the_particles():
     """One path and few particles of a noise that depends on the state, an angle among them: shares typed by hand."""
-    from kfcourse.filters.particle_smoothing import _ancestors
+    from kfcourse.filters.particles import _ancestors
 
     rng = np.random.default_rng(1)
     after, mean = rng.normal(size=(1, 2, 3, 2)), rng.normal(size=(1, 2, 4, 2))

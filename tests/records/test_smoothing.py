@@ -263,46 +263,6 @@ def test_the_iterated_extended_smoother_finds_the_likeliest_trajectory():
     assert np.abs(found.mean - once.mean).max() > 0.01  # one round is not the maximum
 
 
-def brute_force(e):
-    """Means and variances of three states given y_0 and y_2: the posterior density on 141^3 points."""
-    grid = np.linspace(-3, 4, 141)
-    x = np.meshgrid(grid, grid, grid, indexing="ij", sparse=True)
-    squares = [((x[0] - 0.5) / np.sqrt(0.3)) ** 2]
-    squares += [((x[k + 1] - x[k] - e * np.sin(x[k])) / 0.4) ** 2 for k in (0, 1)]
-    squares += [((y - x[k] - e * x[k] ** 2) / 0.5) ** 2 for k, y in ((0, 0.9), (2, -0.2))]
-    density = np.exp(-0.5 * sum(squares))
-    masses = [density.sum(axis=tuple({0, 1, 2} - {k})) / density.sum() for k in range(3)]
-    mean = np.array([mass @ grid for mass in masses])
-    return mean, np.array([mass @ (grid - m) ** 2 for mass, m in zip(masses, mean, strict=True)])
-
-
-@pytest.mark.parametrize(
-    "smoother", [lambda s, y: smooth(aof(s), y), lambda s, y: smooth(iterated(s, 5), y), lambda s, y: smooth_iterated(s, y, 5)]
-)
-@pytest.mark.parametrize("build", [gaussian, lambda model: gauss_hermite(model, 7)])
-def test_under_a_mild_curvature_it_is_the_posterior_but_for_the_curvature(smoother, build):
-    """No normal law is the posterior of a curved model: they part in proportion to the curvature, and by little."""
-    off = []
-    for e in (0.05, 0.025):
-        text = ["x + e*sin(x) + 0.4*v", "x + e*x**2 + 0.5*w"]
-        model = Model.define(*text, {"e": e}, prior={"mean": 0.5, "variance": 0.3})
-        found = smoother(build(model), np.array([0.9, np.nan, -0.2]))
-        mean, variance = brute_force(e)
-        off.append(np.concatenate([(found.mean[:, 0, 0] - mean) / np.sqrt(variance), found.cov[:, 0, 0, 0] / variance - 1]))
-    assert np.abs(off[0]).max() < 0.08
-    np.testing.assert_allclose(off[1], off[0] / 2, rtol=0, atol=0.15 * np.abs(off[0]).max())
-
-
-def test_looking_back_is_more_accurate_and_claims_to_be(curved):
-    x, y = simulate(curved, 4000, 12, seed=4)
-    one = aof(gaussian(curved))
-    filtered, smoothed = run(one, y), smooth(one, y)
-    gain = ((filtered.mean - x) ** 2 - (smoothed.mean - x) ** 2).sum(axis=-1)[:-1].mean(axis=0)  # a mean over steps for each run
-    assert gain.mean() > 4 * gain.std() / np.sqrt(gain.size)
-    claimed = np.trace(smoothed.cov - filtered.cov, axis1=-2, axis2=-1)
-    assert claimed.max() < 1e-12
-
-
 def test_angles_go_the_short_way_round_in_the_past_too():
     """A heading that wanders about pi, and the same one seen from a zero that lies elsewhere: only whole turns differ."""
 
@@ -325,14 +285,6 @@ def test_angles_go_the_short_way_round_in_the_past_too():
     again, lagged = smooth_iterated(linearised(model), y, rounds=3), smooth(kalman_filter(model), y, lag=len(y))
     for other in (again, lagged):
         np.testing.assert_allclose(other.mean, smooth(kalman_filter(model), y).mean, atol=1e-9)
-
-
-def test_one_trajectory_gets_the_numbers_it_gets_in_the_ensemble(curved):
-    y = with_gaps(simulate(curved, 6, STEPS, seed=11).y.repeat(1, axis=2)[..., :1].repeat(2, axis=2))[..., :1]
-    one = aof(gaussian(curved))
-    together, alone = smooth(one, y), smooth(one, y[:, 2:3])
-    np.testing.assert_allclose(alone.mean[:, 0], together.mean[:, 2], rtol=1e-11, atol=1e-12)
-    np.testing.assert_allclose(alone.cov[:, 0], together.cov[:, 2], rtol=1e-10, atol=1e-13)
 
 
 def test_a_record_of_one_step_has_no_past(curved):

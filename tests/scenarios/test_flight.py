@@ -5,13 +5,10 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from kfcourse import Model, ModelError, linearised, run
-from kfcourse.filters import aof
 from kfcourse.linear.system import linear_system
 from kfcourse.scenarios.errors import rms_by_part, rms_difference
 from kfcourse.scenarios.flight import aircraft
 from kfcourse.scenarios.radar import CARTESIAN, SPHERICAL, cartesian, kinematic, measure_cartesian, measure_spherical, spherical
-from kfcourse.symbolic.formula import symbol
 
 pytestmark = pytest.mark.quick
 
@@ -98,15 +95,6 @@ def test_the_five_parts_are_as_described(flight):
     assert track.velocity[-1, 2] == -flight.get("descent", 10.0)
 
 
-@FLIGHTS
-def test_the_headings_turn_by_the_given_angles(flight):
-    track = aircraft(0.5, **flight)
-    heading = np.unwrap(np.arctan2(track.velocity[:, 1], track.velocity[:, 0]))
-    turns = flight.get("turns", (1.5 * np.pi, np.pi))
-    assert heading[track.part == 3][-1] - heading[0] == pytest.approx(turns[0], abs=1e-12)
-    assert heading[-1] - heading[0] == pytest.approx(sum(turns), abs=1e-12)
-
-
 def test_the_samples_do_not_depend_on_the_interval():
     coarse, fine = aircraft(1.0), aircraft(0.25)
     same = fine.time[::4][: len(coarse.time)]
@@ -175,48 +163,6 @@ def test_measurements_have_the_given_errors():
         assert (np.abs(correlation) < 4 / np.sqrt(count)).all()
 
 
-def test_the_same_seed_gives_the_same_measurements():
-    track = aircraft(20.0)
-    assert np.array_equal(measure_cartesian(track, 10.0, 3, 7), measure_cartesian(track, 10.0, 3, np.random.default_rng(7)))
-    assert not np.array_equal(measure_cartesian(track, 10.0, 3, 7), measure_cartesian(track, 10.0, 3, 8))
-
-
-def test_a_flight_across_the_azimuth_pi_is_followed_as_any_other():
-    """The same flight turned by 90 degrees: the same errors of measurements, and the extended filter's estimates turn with it."""
-    sigmas, runs, T = (50.0, 2e-3, 3e-3), 20, 2.0
-    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    start = np.array([-40_000.0, -3_000.0, 8_500.0])
-    tracks = [aircraft(T, start=tuple(place), heading=h) for place, h in ((turned.T @ start, 0.0), (start, np.pi / 2))]
-    np.testing.assert_allclose(tracks[1].position, tracks[0].position @ turned.T, atol=1e-6)
-    assert (np.diff(spherical(tracks[1].position)[:, 1]) > 6).any()
-    found, measured = [], [measure_spherical(track, sigmas, runs, seed=5) for track in tracks]
-    assert (np.abs(np.diff(measured[1][..., 1], axis=0)) > 6).any(axis=0).all()  # every record jumps
-    assert np.abs(measured[1][..., 1]).max() <= np.pi
-    apart = measured[1] - measured[0] - [0.0, np.pi / 2, 0.0]
-    apart[..., 1] = np.remainder(apart[..., 1] + np.pi, 2 * np.pi) - np.pi
-    assert np.abs(apart).max() < 1e-6
-    for track, y in zip(tracks, measured, strict=True):
-        prior = {"mean": track.state[0], "variance": np.square([100.0] * 3 + [30.0] * 3)}
-        motion = kinematic(T, noise_sd=5.0, prior=prior)
-        w = [symbol(f"w{i + 1}") for i in range(3)]
-        names = dict(zip((symbol(name) for name in "xyz"), motion.x, strict=False))
-        meter = [formula.subs(names) + noise for formula, noise in zip(SPHERICAL, w, strict=True)]
-        model = Model.define(
-            list(motion.state_equation),
-            meter,
-            dict(motion.parameters),
-            symbols={"x": [s.name for s in motion.x]},
-            angles=["y2"],
-            prior=prior,
-            state_noise={"variance": motion.state_noise.cov},
-            meter_noise={"variance": np.square(sigmas)},
-        )
-        found.append(run(aof(linearised(model)), y).mean[..., :3])
-    np.testing.assert_allclose(found[1], found[0] @ turned.T, atol=1e-3)
-    error = np.linalg.norm(found[1] - tracks[1].position[:, None], axis=-1)
-    assert np.sqrt((error**2).mean()) < 200  # a single measurement: 60 km * 3 mrad = 180 m in elevation, 120 m in azimuth
-
-
 @pytest.mark.parametrize(
     ("sigmas", "runs", "message"),
     [((1.0, 2.0), 3, "one number or three"), (-1.0, 3, "not negative"), (np.nan, 3, "finite"), (1.0, 0, "runs must be")],
@@ -257,11 +203,6 @@ def test_matrices_of_the_kinematic_models():
 def test_kinematic_models_that_cannot_be_are_refused(change, message):
     with pytest.raises(ValueError, match=message):
         kinematic(**({"interval": 1.0} | change))
-
-
-def test_a_bad_prior_of_a_kinematic_model_is_the_models_own_error():
-    with pytest.raises(ModelError, match="prior"):
-        kinematic(1.0, prior={"variance": np.eye(2)})
 
 
 def test_rms_by_part_by_hand():

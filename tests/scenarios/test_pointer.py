@@ -72,12 +72,6 @@ def test_the_covariance_of_the_start_up_is_that_of_its_errors():
     assert (abs(law.mean.T @ law.mean / runs - law.cov) < bound).all()
 
 
-def test_variance_of_velocity_and_acceleration():
-    # v = (3 y2 - 4 y1 + y0) / (2 dt), a = (y2 - 2 y1 + y0) / dt^2: 26/4 and 6, the sums of squares of the coefficients
-    law = start_up(np.zeros((3, 1, 2)), 0.01, 9.0 * np.eye(2))
-    np.testing.assert_allclose(np.diag(law.cov), np.repeat([9, 9 * 6.5 / 0.01**2, 9 * 6 / 0.01**4], 2), rtol=1e-12)
-
-
 def test_the_start_up_is_the_limit_of_a_large_prior():
     # Without noise of the object and with the true input, three measurements after a nearly unknown start leave the law that
     # least squares give: velocity with variance sigma^2 / (2 dt^2) - smaller than from the parabola, which also fits a.
@@ -121,41 +115,6 @@ def test_a_uniformly_accelerated_track_without_noise_is_followed_exactly(arithme
     # Without the input the first prediction misses by B a, and the filter lags.
     without = follow(uniform_acceleration(dt, 100.0, 2.0), position, dt, arithmetic=arithmetic)
     np.testing.assert_allclose((truth[3:] - without.predicted.mean)[0, 0], np.concatenate([a * dt**2 / 2, a * dt]), rtol=1e-9)
-
-
-@pytest.mark.parametrize("given", [True, False])
-def test_the_filter_by_a_slow_loop(given):
-    dt, sd, sigma = 0.05, 400.0, 3.0
-    samples = sample(hand_track(3, strokes=2), dt, sigma, runs=2, seed=1)
-    y = samples.y.copy()
-    y[6, 1, 0] = np.nan
-    u = samples.input if given else None
-    laws = follow(uniform_acceleration(dt, sd, sigma), y, dt, u)
-    A = np.array([[1, 0, dt, 0], [0, 1, 0, dt], [0, 0, 1, 0], [0, 0, 0, 1]])
-    B = np.array([[dt**2 / 2, 0], [0, dt**2 / 2], [dt, 0], [0, dt]])
-    for run in range(2):
-        y0, y1, y2 = y[:3, run]
-        z = np.concatenate([y2, (3 * y2 - 4 * y1 + y0) / (2 * dt)])
-        p = sigma**2 * np.kron([[1, 1.5 / dt], [1.5 / dt, 6.5 / dt**2]], np.eye(2))
-        for k in range(3, len(y)):
-            z, p = A @ z + (B @ u[k - 1, 0] if given else 0), A @ p @ A.T + sd**2 * B @ B.T
-            there = ~np.isnan(y[k, run])
-            H = np.eye(2, 4)[there]
-            K = p @ H.T @ np.linalg.inv(H @ p @ H.T + sigma**2 * np.eye(len(H)))
-            z, p = z + K @ (y[k, run][there] - H @ z), (np.eye(4) - K @ H) @ p
-            np.testing.assert_allclose(laws.posterior.mean[k - 3, run], z, rtol=1e-9, atol=1e-9)
-            np.testing.assert_allclose(laws.posterior.cov[k - 3, run], p, rtol=1e-8, atol=1e-9)
-
-
-def test_a_start_of_one_s_own():
-    samples = sample(hand_track(3, strokes=2), 0.1, 3.0, runs=2, seed=1)
-    system = uniform_acceleration(0.1, 400.0, 3.0)
-    own = start_up(samples.y[:3], 0.1, system.R)
-    own = Gaussian(own.mean[:, :4], own.cov[:4, :4])
-    default, same = (follow(system, samples.y, 0.1, start=start).posterior for start in (None, own))
-    np.testing.assert_array_equal(same.mean, default.mean)
-    diagonal = follow(system, samples.y, 0.1, start=own._replace(cov=np.diag(np.diag(own.cov)))).posterior
-    assert not np.allclose(diagonal.mean[0], default.mean[0], rtol=1e-3)
 
 
 # ---------------------------------------------------------------- the track
@@ -202,12 +161,6 @@ def test_the_track_stays_on_the_screen_and_comes_to_rest(seed):
     np.testing.assert_allclose(after.position, track.origin + track.displacement.sum(axis=0), rtol=1e-12)
     for motion in (before, after):
         assert not motion.velocity.any() and not motion.acceleration.any()
-
-
-def test_a_seed_is_a_track():
-    one, same, other = (hand_track(seed).at(np.arange(0, 5, 0.1)).position for seed in (1, 1, 2))
-    np.testing.assert_array_equal(one, same)
-    assert not np.allclose(one, other)
 
 
 def test_samples_of_different_rates_are_of_one_track():

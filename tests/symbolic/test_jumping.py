@@ -175,7 +175,7 @@ def test_tables():
 
 
 def test_what_has_no_average_over_the_modes():
-    model, circular = define(), define(angles=["x"])
+    model, circular = define(), define(angles={"x": ["x"], "y": []})
     structures = [linearised(mode) for mode in model.modes]
     for average in (averaged_equations, lambda given: averaged(given, structures)):
         with pytest.raises(ModelError, match="components that are angles have no average"):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy
 
-from kfcourse import Model, gaussian, linearised, run, simulate
+from kfcourse import Model, gaussian, likelihood, linearised, run, simulate
 from kfcourse.filters.approximations import aof
 from kfcourse.scenarios.benchmarks import PENDULUM_ERRORS, pendulum, pendulum_data
 from kfcourse.symbolic.equations import compile_model
@@ -230,3 +230,17 @@ def test_what_a_meter_does_not_tell_is_exactly_nothing(kind, units):
         measured = kind(model).measure(np.zeros((3, 1)), np.array([[5.0], [0.1], [7.3]])[:, None])
     np.testing.assert_array_equal(measured.G, 0.0)
     np.testing.assert_array_equal(measured.F, measured.R)
+
+
+@pytest.mark.parametrize("build", [unscented, gauss_hermite])
+def test_a_meter_without_noise_leaves_no_rounding_as_a_variance(build):
+    """The states are then known, as by the closed form; 1e-32 in the place of 0 made a likelihood of -1e29."""
+    model = Model.define("0.9*x + v", "2*x + 1", prior={"mean": 0.3, "variance": 2.0})
+    y = np.array([1.7, 0.2, -3.0])
+    found, exact = (run(aof(one(model)), y) for one in (build, gaussian))
+    np.testing.assert_array_equal(found.cov, np.zeros((3, 1, 1, 1)))
+    np.testing.assert_allclose(found.mean, exact.mean, rtol=1e-12)
+    still = Model.define("x", "x", prior={"mean": 0, "variance": 2.0})
+    np.testing.assert_array_equal(run(aof(build(still)), np.ones(3)).cov, np.zeros((3, 1, 1, 1)))
+    with pytest.raises(ValueError, match="no density for the measurement of step 1"):
+        likelihood(aof(build(still)), np.array([1.0, 1.1]))

@@ -6,17 +6,14 @@ session       in a notebook's process: runs cells, calls functions, knows no ans
 values        what may leave that process: numbers, arrays, formulas, as JSON
 channel       messages between processes
 staging       the package without the right answers, for that process
-sandbox       where that process runs: in bubblewrap's sandbox, or below a keeper
-keeper        its parent otherwise: ends what it leaves behind
+sandbox       where that process runs: in bubblewrap, or with all rights
 running       its cells and answers, with limits of time and memory
 asking        arguments of the grader's own
 marking       one notebook -> its marks and notes
-worker        the grading process, which compares
-pool          several of them, started anew when one ends
-far           the same on the workers of a Dask cluster
+pool          processes that grade, started anew when one ends
 owners        whose notebook it is, and what to look at
 weights       what an answer is worth
 report        tables and pages for students and lecturers
-table         all marks as a CSV table, resumed where it was interrupted
+results       grades as lines of JSON, and their table
 course        from the folder to table, report and screen
 """

@@ -50,15 +50,17 @@ class Step(NamedTuple):
 def assembled(master: NotebookNode, cells: Sequence[Cell]) -> tuple[list[Step], list[Cell]]:
     """The master's cells with the student's in them, and those.
 
-    A cell that defines an asked function takes the place of its stub, wherever it stands; a changed cell of the master, known by
-    its id, takes that cell's place; other cells follow what they followed in the returned notebook.  The master's check cells
-    stay, and get the exercise as it was handed out.
+    A cell that defines an asked function takes the place of its stub, wherever it stands; a changed cell of the master, known
+    by its id, takes that cell's place, but the first one runs all the same: it imports, whatever stops the changed one.  Other
+    cells follow what they followed in the returned notebook.  The master's check cells stay, and get the exercise as it was
+    handed out.
     """
+    cells = [cell for cell in cells if cell.code]
     code = [(index, cell) for index, cell in enumerate(master.cells) if cell.cell_type == "code"]
     checks = check_cells(master)
     place = _places(code, checks, cells)
-    ordered = []  # (place, number, step)
-    for index, cell in code:
+    ordered = [(index, -1, Step(cell.source, f"the master's cell {cell.id}")) for index, cell in code[:1]]
+    for index, cell in code[1:]:
         where = f"the master's cell {cell.id}"
         if cell.id in checks:
             names = tuple(dict.fromkeys(name for name, _ in CHECK.findall(cell.source)))
@@ -68,6 +70,19 @@ def assembled(master: NotebookNode, cells: Sequence[Cell]) -> tuple[list[Step], 
     own = [cell for cell in cells if cell.number in place.of]
     ordered += [(place.of[cell.number], cell.number, Step(cell.source, cell.name, True)) for cell in own]
     return [step for *_, step in sorted(ordered, key=lambda row: row[:2])], own
+
+
+def lost(master: NotebookNode, cells: Sequence[Cell]) -> dict[str, str]:
+    """Names of asked functions whose cells did not come back as code, each with what became of it."""
+    defined = set[str]().union(*(_defined(cell.source) for cell in cells if cell.code))
+    back = {cell.id for cell in cells if cell.code} | {cell.answer for cell in cells if cell.code}
+    fates = {}
+    for stub in (cell for cell in master.cells if "kfcourse" in cell.metadata):
+        name = stub.metadata["kfcourse"]["answer"]
+        if name not in defined and not {stub.id, name} & back:
+            text = any(cell.id == stub.id or f"def {name}(" in cell.source for cell in cells if not cell.code)
+            fates[name] = "has become text: make it a code cell again" if text else "is gone from the notebook"
+    return fates
 
 
 class Places(NamedTuple):

@@ -4,21 +4,32 @@ from __future__ import annotations
 
 import secrets
 import sys
-from collections.abc import Callable, Mapping, Sequence
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from kfcourse.lab.variants import chosen_variants
 from kfcourse.notebooks.course_list import Student, read_assignment
-from kfcourse.notebooks.grading.far import far_grading
-from kfcourse.notebooks.grading.owners import Person, owner
-from kfcourse.notebooks.grading.pool import Order, grading
+from kfcourse.notebooks.grading import pool, sandbox
+from kfcourse.notebooks.grading.marking import Setting
+from kfcourse.notebooks.grading.owners import owner, same_code
 from kfcourse.notebooks.grading.report import write_report
-from kfcourse.notebooks.grading.sandbox import HELD
-from kfcourse.notebooks.grading.submissions import Unreadable, read_document, returned
-from kfcourse.notebooks.grading.table import FAILED, PARTLY, SIGNS, Grade, grade_all
+from kfcourse.notebooks.grading.results import (
+    FAILED,
+    PARTLY,
+    SIGNS,
+    Grade,
+    line,
+    read_lines,
+    write_lines,
+    write_table,
+)
+from kfcourse.notebooks.grading.sandbox import PROTECTION
+from kfcourse.notebooks.grading.submissions import Returned, Unreadable, read_document, returned
 from kfcourse.notebooks.grading.weights import Credit
 from kfcourse.notebooks.texts import clean
 
@@ -31,84 +42,135 @@ def grade_folder(
     workers: int,
     seconds: float,
     again: bool,
-    sandbox: str,
+    kind: str,
     students: Path | None,
     report: Path | None,
     seed: str | None,
     parts: float,
     follow_on: float,
-    dask: str | None,
 ) -> bool:
     """Grade the notebooks of a folder as `kfcourse grade` is asked to; whether all could be graded."""
     course = None if students is None else _course(students, variants_file)
+    folder, masters = folder.resolve(), masters and masters.resolve()
     work = returned(folder, seconds, variants_file, masters, _given(course))
     if not work:
         raise ValueError(f"no notebooks (*.ipynb) in {folder}")
-    table, pages = out or folder / "grades.csv", report or folder / "report"
-    for place in (table, pages):
-        if place.is_symlink() and place.parent == folder:
-            raise ValueError(f"{place} is a link: has a student returned it? Take it away, or name another place")
-    order = Order(folder.resolve(), masters and masters.resolve(), sandbox, seed or secrets.token_hex(8))
-    with far_grading(order, dask) if dask else grading(order, workers) as (graded, kinds):
-        grades, old, kept = grade_all(work, table, again, graded)
+    table = out or folder.with_name(f"{folder.name}-grades.csv")
+    pages = report or folder.with_name(f"{folder.name}-report")
+    if table.suffix == ".jsonl":
+        raise ValueError(f"--out {table}: the grades themselves are written there; end the table's name in .csv")
+    for path in (table, pages):
+        if path.resolve().is_relative_to(folder):
+            raise ValueError(f"{path} is inside of what was returned: a student may have put it there; name another place")
+    salt, protection = seed or secrets.token_hex(8), ["nothing was run"]
+
+    def run(new: Sequence[Returned]) -> Iterator[Grade]:
+        with pool.place(folder, masters, kind) as site:
+            problem = "" if kind == "none" else _problem(site)
+            if problem or kind == "none":
+                _warn(problem)
+                site = site._replace(sandbox=replace(site.sandbox, kind="none"))
+            protection[:] = [PROTECTION[site.sandbox.kind]]
+            yield from pool.graded(new, Setting(site, salt), workers)
+
+    grades, old = grade_all(work, table, again, run)
     _show(grades)
-    held = "; ".join(HELD[kind] for kind in sorted(kinds)) or "nothing was run"
-    for name, reason in sorted(kept.items()):
-        click.echo(f"kept as an earlier run graded it: {clean(name)}; this one could not: {clean(reason, 200)}")
     click.echo(f"\n{len(grades) - old} run, {old} unchanged since the last table. Table: {table}")
-    click.echo(f"Sandbox: {held}\nHidden arguments: --seed {order.salt} repeats them")
+    click.echo(f"Sandbox: {protection[0]}\nHidden arguments: --seed {salt} repeats them")
     if students or report:
-        _show_report(write_report(grades, course, pages, held, Credit(parts, follow_on)), pages)
-    return all(one.status not in (FAILED, PARTLY) for one in grades)
+        persons = write_report(grades, course, pages, protection[0], Credit(parts, follow_on))
+        click.echo(f"\nReport of {len(persons)} students: {pages / 'overview.html'}")
+        for person in persons:
+            if person.flags:
+                click.echo(f"look at {clean(person.student.name)}: {clean('; '.join(person.flags), 200)}")
+        for letter, names in same_code(persons):
+            click.echo(f"set {letter}: the same code came from {clean(', '.join(names))}")
+    return all(grade.status not in (FAILED, PARTLY) for grade in grades)
+
+
+def _problem(site: pool.Site) -> str:
+    with tempfile.TemporaryDirectory() as folder:
+        return sandbox.problem(Path(folder).resolve(), site.stage)
+
+
+def _warn(problem: str) -> None:
+    """Say loudly what a run without a sandbox risks, and ask whether to go on if nobody said so; ValueError if nobody does."""
+    click.secho(f"{problem}{'. ' * bool(problem)}The protection would be {PROTECTION['none']}.", fg="red", bold=True, err=True)
+    if problem and not (sys.stdin.isatty() and click.confirm("Run them all the same?", err=True)):
+        raise ValueError("no notebook was run; --sandbox none runs them without protection")
 
 
 def _course(path: Path, variants_file: Path | None) -> list[Student]:
     """The students, each with a variant that there is."""
-    known = [one.name for one in chosen_variants([], True, variants_file)]
+    known = [variant.name for variant in chosen_variants([], True, variants_file)]
     course = read_assignment(path, known)
-    for one in course:
-        if one.variant not in known:
-            hint = "there are " + ", ".join(known) if variants_file else "name the file that you handed out with --variants"
-            raise ValueError(f"{path} gives {one.name} the variant {one.variant}, which is not known; {hint}")
+    for student in course:
+        if student.variant not in known:
+            hint = f"there are {', '.join(known)}" if variants_file else "name the file that you handed out with --variants"
+            raise ValueError(f"{path} gives {student.name} the variant {student.variant}, which is not known; {hint}")
     return course
 
 
 def _given(course: Sequence[Student] | None) -> Callable[[str, Path], str]:
-    """The variant that was given to the student of a notebook; nothing if there is no list, or the student is not in it."""
+    """The variant that was given to the student of a notebook; nothing without a list, or if the student is not in it."""
 
     def given(name: str, path: Path) -> str:
         whose = owner(Grade(name, ""), course or ())
         if whose is None and course:
             with suppress(Unreadable):  # told when it is graded
                 claim = read_document(path).get("metadata", {}).get("kfcourse")
-                whose = owner(Grade(name, "", student=str(claim.get("student"))), course) if isinstance(claim, Mapping) else None
+                if isinstance(claim, dict):
+                    whose = owner(Grade(name, "", student=str(claim.get("student"))), course)
         return whose.variant if whose else ""
 
     return given
 
 
-def _show_report(persons: Sequence[Person], folder: Path) -> None:
-    """What to look at, and where the rest is."""
-    click.echo(f"\nReport of {len(persons)} students: {folder / 'overview.html'}")
-    for person in persons:
-        if person.flags:
-            click.echo(f"look at {clean(person.student.name)}: {clean('; '.join(person.flags), 200)}")
+def grade_all(
+    work: Sequence[Returned], table: Path, again: bool, run: Callable[[Sequence[Returned]], Iterator[Grade]]
+) -> tuple[list[Grade], int]:
+    """Grade what is new, and write each grade when it comes: an interrupted run goes on where it was.
+
+    Beside the table, with the ending `.jsonl`, stand the grades; the table is made from them, however the run ends.
+
+    Returns
+    -------
+    grades, old : list of Grade, int
+        By name; how many an earlier run had graded.
+    """
+    lines = table.with_suffix(".jsonl")
+    known = {} if again else read_lines(lines)
+    grades = [replace(known[one.digest], name=one.name) for one in work if one.digest in known]
+    old, new = len(grades), [one for one in work if one.digest not in known]
+    write_lines(grades, lines)
+    waiting = {one.name: Grade(one.name, FAILED, notes=("the run ended before it was graded",)) for one in new}
+    try:
+        with lines.open("a", encoding="utf-8") as file:
+            for grade in run(new) if new else ():
+                file.write(line(grade))
+                file.flush()
+                grades.append(grade)
+                waiting.pop(grade.name)
+    finally:
+        write_table([*grades, *waiting.values()], table)
+    return sorted(grades, key=lambda grade: grade.name), old
 
 
 def _show(grades: Sequence[Grade]) -> None:
     """The table on the screen; notes are cut."""
-    names = {one.name: clean(one.name, len(one.name)) for one in grades}
+    names = {grade.name: clean(grade.name, len(grade.name)) for grade in grades}
     width = max(map(len, names.values()))
     signs = _signs()
     click.echo(f"{'notebook':<{width}}  set  variant  passed  checks")
-    for one in grades:
-        if not one.marks:
-            click.echo(f"{names[one.name]:<{width}}  {one.status}{': ' * bool(one.note)}{clean(one.note, 100)}")
+    for grade in grades:
+        name = f"{names[grade.name]:<{width}}"
+        if not grade.marks:
+            click.echo(f"{name}  {grade.status}{': ' * bool(grade.note)}{clean(grade.note, 100)}")
             continue
-        marks = "".join(signs[mark] for mark in one.marks.values())
-        count = f"{one.passed} of {len(one.marks)}"
-        said = f"{clean(one.variant):<7}  {count:<6}  {marks:<7} {clean(one.note, 100)}"
-        click.echo(f"{names[one.name]:<{width}}  {one.letter:<3}  {said}")
+        marks = "".join(signs[mark] for mark in grade.marks.values())
+        count = f"{grade.passed} of {len(grade.marks)}"
+        rest = f"{clean(grade.variant):<7}  {count:<6}  {marks:<7} {clean(grade.note, 100)}"
+        click.echo(f"{name}  {grade.letter:<3}  {rest}")
 
 
 def _signs() -> dict[str, str]:

@@ -1,17 +1,18 @@
 """Marking one returned notebook: what passed, and what the wrong answers look like.
 
-Nothing of a returned notebook is trusted but the student's own cells.  The notebook of its set and variant is made again from the
-master, and the student's cells are put into it.  It runs in a process of its own, which has neither keys nor questions: it is
-asked for the values of the student's functions, at arguments that nobody has seen before, and this process compares them.
+Nothing of a returned notebook is trusted but the student's own cells.  The notebook of its set and variant is made again from
+the master, and the student's cells are put into it.  It runs in a process of its own, which has neither keys nor questions: it
+is asked for the values of the student's functions, at arguments that nobody has seen before, and this process compares them.
 """
 
 from __future__ import annotations
 
 import ast
 import hashlib
+import io
 import re
-from collections.abc import Callable, Container, Iterable, Sequence
-from contextlib import suppress
+import tokenize
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,22 +21,29 @@ from nbformat import NotebookNode
 from kfcourse.checks import Attempts, Exercise, Result
 from kfcourse.checks.engine import SECONDS as CHECK
 from kfcourse.checks.engine import check
-from kfcourse.checks.question import NOT_CHECKED, UNUSABLE, WRONG
+from kfcourse.checks.question import MISSING, NOT_CHECKED, UNUSABLE, WRONG
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.notebooks.grading.asking import salted
-from kfcourse.notebooks.grading.assembly import Step, assembled, generated
-from kfcourse.notebooks.grading.running import WHOLE, Answer, Ended, Kernel, Killed, Opening, Site, Stopped
+from kfcourse.notebooks.grading.assembly import Step, assembled, generated, lost
+from kfcourse.notebooks.grading.results import FAILED, GRADED, NOT_GRADED, NOT_RUN, OTHER, PARTLY, Grade, Told
+from kfcourse.notebooks.grading.running import KILLED, WHOLE, Answer, Kernel, Killed, Opening, Site, Stopped
 from kfcourse.notebooks.grading.staging import opened_elsewhere, personal_numbers
-from kfcourse.notebooks.grading.submissions import Cell, Returned, cells_of, claimed, openings, read_document, syntax
-from kfcourse.notebooks.grading.table import FAILED, GRADED, NOT_GRADED, NOT_RUN, OTHER, PARTLY, Grade, Told
+from kfcourse.notebooks.grading.submissions import (
+    EXPORT,
+    Cell,
+    Returned,
+    cells_of,
+    claimed,
+    openings,
+    read_document,
+    syntax,
+)
 from kfcourse.notebooks.grading.values import Other
 from kfcourse.notebooks.master import opened, read
 from kfcourse.notebooks.texts import clean
 
-ENDED = "the process that compares it was ended, or hung: too large an answer, or somebody ended it"
 LOOKED_AT = "not graded: your teacher is told"  # what a student reads of it
 TELL_US = "the check itself fails, please tell us"
-CODE = 4000  # characters of an answer that are kept
 
 
 @dataclass(frozen=True)
@@ -53,43 +61,28 @@ class Setting:
     salt: str
 
 
-Progress = Callable[[str], None]  # is told the question that is compared now, "" while the notebook runs
-
-
-def grade(
-    work: Returned, setting: Setting, skip: Sequence[str] = (), progress: Progress = lambda _: None, start: Any = Kernel
-) -> Grade:
+def grade(work: Returned, setting: Setting, start: Any = Kernel) -> Grade:
     """Grade one notebook; never raises, what went wrong is in the row.
 
-    Parameters
-    ----------
-    work : Returned
-    setting : Setting
-    skip : sequence of str
-        Questions whose answers earlier processes could not compare: they are not graded.
-    progress : callable
-    start : type
-        Of the notebook's process.
+    `start` is the type of the notebook's process.
     """
     if work.problem:
-        return Grade(work.name, FAILED, note=work.problem)
+        return Grade(work.name, OTHER if work.problem == EXPORT else FAILED, notes=(work.problem,))
     try:
-        progress("")
         document = read_document(work.path)
         cells = cells_of(document)
-        claim = document.get("metadata", {}).get("kfcourse") or _claim(cells)
+        code = [cell for cell in cells if cell.code]
+        claim = document.get("metadata", {}).get("kfcourse") or _claim(code)
         if claim is None:
             return Grade(work.name, OTHER, digest=work.digest)
-        with suppress(Killed):  # by whom is not known: once more
-            return _grade(work, cells, claim, setting, skip, progress, start)
-        return _grade(work, cells, claim, setting, skip, progress, start)
+        return _grade(work, cells, claim, setting, start)
     except OutOfTime:
         problem = "the notebook of its variant cannot be made in time"
-    except Killed as reason:
-        problem = str(reason)
+    except OSError as error:  # a full disk, mostly
+        problem = f"{error.strerror or error}{': ' * bool(error.filename)}{error.filename or ''}"
     except Exception as error:  # also of libraries: one notebook must not stop the others
-        problem = clean(str(error) or type(error).__name__)
-    return Grade(work.name, FAILED, note=problem)
+        problem = str(error) or type(error).__name__
+    return Grade(work.name, FAILED, notes=(clean(problem),))
 
 
 def _claim(cells: Sequence[Cell]) -> dict[str, str] | None:
@@ -101,56 +94,47 @@ def _claim(cells: Sequence[Cell]) -> dict[str, str] | None:
     return None
 
 
-def _grade(
-    work: Returned, cells: Sequence[Cell], claim: Any, setting: Setting, skip: Sequence[str], progress: Progress, start: Any
-) -> Grade:
+def _grade(work: Returned, cells: Sequence[Cell], claim: Any, setting: Setting, start: Any) -> Grade:
+    code = [cell for cell in cells if cell.code]
     with time_limit(WHOLE * work.seconds):
-        exercise, notes = claimed(claim, cells, work.variants_file, work.variant)
+        exercise, looks = claimed(claim, code, work.variants_file, work.variant)
         master = generated(read(exercise.letter, work.masters), exercise.letter, opened(exercise))
-        elsewhere = opened_elsewhere(call for cell in cells for call in openings(cell.source))
+        elsewhere = opened_elsewhere(call for cell in code for call in openings(cell.source))
         opening = Opening(exercise.letter, opened(exercise), personal_numbers(exercise, elsewhere))
     steps, own = assembled(master, cells)
-    marking = Marking(exercise, setting.salt, skip, progress)
+    marking = Marking(exercise, setting.salt, lost(master, cells))
     with start(setting.place, opening, work.seconds) as kernel:
-        stopped = marking.run(kernel, steps)
-    noted = [*notes, *_noted(kernel.notes), *strange_lines(own, master)]
-    notes = [*stopped, *marking.failed(), *marking.errors[:2], *marking.reasons(), *noted]
-    code = {question.name: question.function for question in exercise.questions.values()}
+        marking.run(kernel, steps)
+    functions = {question.function for question in exercise.questions.values()}
     told = {
-        name: Told(
-            one.message,
-            one.diagnosis,
-            _code(own, code[name]) if one.status == WRONG and not one.diagnosis else "",
-            one.share,
-            one.follows,
-        )
-        for name, one in marking.results.items()
+        name: Told(result.message, result.diagnosis, result.share, result.follows) for name, result in marking.results.items()
     }
-    variant, note = exercise.variant.name, "; ".join(dict.fromkeys(notes))
-    whom = clean(str(claim.get("student", ""))) if isinstance(claim, dict) else ""
-    done = code_of(own, set(code.values()))
     status, digest = (PARTLY, "") if NOT_GRADED in marking.marks.values() else (GRADED, work.digest)
-    return Grade(work.name, status, exercise.letter, variant, marking.marks, note, digest, told, whom, done)
-
-
-def _noted(notes: Iterable[str]) -> list[str]:
-    return [f"look: it {note}" for note in list(dict.fromkeys(notes))[:5]]
+    return Grade(
+        work.name,
+        status,
+        exercise.letter,
+        exercise.variant.name,
+        marking.marks,
+        tuple(dict.fromkeys([*marking.notes, *marking.errors[:2], *marking.reasons()])),
+        tuple(dict.fromkeys([*looks, *marking.looks(), *strange_lines(own, master)])),
+        digest,
+        told,
+        clean(str(claim.get("student", ""))) if isinstance(claim, dict) else "",
+        code_of(own, functions),
+    )
 
 
 def code_of(own: Iterable[Cell], functions: Container[str]) -> str:
-    """Hash of the answers as Python reads them, so without comments; empty if there is none but stubs."""
-    found = []
+    """Hash of the answers without comments and spaces; empty if there is none but stubs."""
+    answers = []
     for cell in own:
         for node in (syntax(cell.source) or ast.Module([], [])).body:
             if isinstance(node, ast.FunctionDef) and node.name in functions:
-                found.append(ast.dump(node))
-    return hashlib.sha256("\n".join(sorted(found)).encode()).hexdigest()[:16] if found else ""
-
-
-def _code(own: Iterable[Cell], function: str) -> str:
-    """The cell in which a student defines a function."""
-    found = [cell.source for cell in own if re.search(rf"^(def {function}\b|{function}\s*=)", cell.source, re.MULTILINE)]
-    return "\n".join(found)[:CODE]
+                lines = io.StringIO(ast.get_source_segment(cell.source, node) or "")
+                words = (token.string for token in tokenize.generate_tokens(lines.readline) if token.type != tokenize.COMMENT)
+                answers.append(" ".join(" ".join(words).split()))
+    return hashlib.sha256("\n".join(sorted(answers)).encode()).hexdigest()[:16] if answers else ""
 
 
 class Marking:
@@ -162,81 +146,86 @@ class Marking:
         Question to mark.
     results : dict
         Question to what the check said.
+    notes : list of str
+        Where the notebook stopped, if it did, and which answers are gone from it.
     errors : list of str
         Errors of the student's cells; those of stubs are no news.
     """
 
-    def __init__(self, exercise: Exercise, salt: str, skip: Sequence[str], progress: Progress):
-        self._exercise, self._salt, self._skip, self._progress = exercise, salt, skip, progress
+    def __init__(self, exercise: Exercise, salt: str, gone: Mapping[str, str] | None = None):
+        self._exercise, self._salt = exercise, salt
+        named = {question.function: name for name, question in exercise.questions.items()}
+        self._gone = {named[function]: fate for function, fate in (gone or {}).items() if function in named}
         self.marks = dict.fromkeys(exercise.questions, NOT_RUN)
         self.results: dict[str, Result] = {}
+        self.notes = [f"the cell of {name} {fate}" for name, fate in self._gone.items()]
         self.errors: list[str] = []
         self._reasons: dict[str, list[str]] = {}
         self._failed: dict[str, list[str]] = {}
         self._past = Attempts()
 
-    def run(self, kernel: Kernel, steps: Iterable[Step]) -> list[str]:
-        """Run all cells and ask for all answers; says where and why it did not come to its end, if it did not."""
+    def run(self, kernel: Kernel, steps: Iterable[Step]) -> None:
+        """Run all cells and ask for all answers, as far as the notebook goes."""
         for step in steps:
-            self._progress("")
             try:
                 ran = kernel.cell(step.source, step.names)
             except Stopped as reason:
-                if isinstance(reason, Ended):  # what would have come is not known
-                    self.marks |= {name: NOT_GRADED for name, mark in self.marks.items() if mark == NOT_RUN}
                 for name, mark in self.marks.items():
-                    if mark == NOT_RUN:
+                    if mark == NOT_RUN and isinstance(reason, Killed):  # what would have come is not known
+                        self._not_graded(name, f"{step.where}: {reason}")
+                    elif mark == NOT_RUN:
                         self._not_run(name, f"{step.where}: {reason}")
-                return [f"{'look: ' * isinstance(reason, Ended)}{step.where}: {reason}"]
-            if ran.error and (step.own or "import " in step.source) and ran.error[0] != "NotImplementedError":
-                self.errors.append(clean(f"{step.where}: {': '.join(ran.error)}"))
+                if not isinstance(reason, Killed):
+                    self.notes.append(f"{step.where}: {reason}")
+                return
+            if ran.error and not ran.stub and (step.own or "import " in step.source):
+                self.errors.append(clean(f"{step.where}: {ran.error}"))
             for name in step.questions:
                 if ran.error:
-                    self._not_run(name, ": ".join(ran.error))
-                    self._reason(": ".join(ran.error), name)
+                    self._not_run(name, ran.error)
+                    self._reasons.setdefault(ran.error, []).append(name)
                 elif name in ran.answers and name in self.marks:
                     self._check(name, kernel, ran.answers[name])
-        return []
 
     def _check(self, name: str, kernel: Kernel, kind: str) -> None:
         question = self._exercise.questions[name]
-        if name in self._skip:
-            self._not_graded(name, ENDED)
-            return
-        self._progress(name)
         answer: Any = type(kind, (Other,), {})() if kind else Answer(kernel, name)
         asked = salted(self._exercise.letter, opened(self._exercise), name, self._salt)
         result = check(question, asked, answer, CHECK, self._past)
-        if getattr(answer, "lost", ""):
-            self._not_graded(name, answer.lost)
+        if getattr(answer, "killed", False):
+            self._not_graded(name, KILLED)
             return
         if result.status == NOT_CHECKED:
             self._not_graded(name, f"{TELL_US}: {result.trouble}")
             return
         if result.trouble:
-            self._failed.setdefault(f"the hint is lost, and the mark holds; {TELL_US}: {result.trouble}", []).append(name)
+            said = f"the hint is lost, and the mark holds; {TELL_US}: {result.trouble}"
+            self._failed.setdefault(said, []).append(name)
+        if result.status == MISSING and self._gone:
+            gone = self._gone.get(name)
+            others = ", ".join(other for other in self._gone if other != name)
+            says = f"its cell {gone}" if gone else f"{result.message}, or stands on what is not there: the cell of {others}"
+            result = Result(name, result.title, MISSING, says)
         self.results[name], self.marks[name] = result, result.status
         if result.status == UNUSABLE:
-            self._reason(result.message, name)
+            self._reasons.setdefault(result.message, []).append(name)
         elif result.status == WRONG and result.diagnosis:
-            self._reason(", ".join(result.diagnosis), name)
+            self._reasons.setdefault(", ".join(result.diagnosis), []).append(name)
 
     def _not_run(self, name: str, reason: str) -> None:
         """Say in the student's feedback where the notebook stopped."""
         if name in self.marks:
-            self.results[name] = Result(name, self._exercise.questions[name].title, NOT_RUN, clean(f"not run. {reason}", 300))
+            says = clean(f"not run. {reason}", 300)
+            self.results[name] = Result(name, self._exercise.questions[name].title, NOT_RUN, says)
 
     def _not_graded(self, name: str, reason: str) -> None:
         title = self._exercise.questions[name].title
         self.results[name], self.marks[name] = Result(name, title, NOT_GRADED, LOOKED_AT), NOT_GRADED
         self._failed.setdefault(f"not graded: {reason}", []).append(name)
 
-    def failed(self) -> list[str]:
+    def looks(self) -> list[str]:
         """Which answers are not graded, and why."""
-        return [clean(f"look: {', '.join(names)} {reason}", 500) for reason, names in self._failed.items()]
-
-    def _reason(self, reason: str, question: str) -> None:
-        self._reasons.setdefault(reason, []).append(question)
+        return [clean(f"{', '.join(names)} {reason}", 500) for reason, names in self._failed.items()]
 
     def reasons(self) -> list[str]:
         """What the wrong answers look like."""
@@ -250,12 +239,12 @@ STRANGE = re.compile(
 
 
 def strange_lines(own: Iterable[Cell], master: NotebookNode) -> list[str]:
-    """Lines of the student's that reach for more than an exercise needs, such as what the package computes, or print a tick."""
+    """Lines of the student's that reach for more than an exercise needs: what the package computes, or a tick of one's own."""
     usual = {line.strip() for cell in master.cells for line in cell.source.splitlines()}
-    found = [
-        clean(f"look at {cell.name}: {line.strip()}")
+    strange = [
+        clean(f"{cell.name}: {line.strip()}")
         for cell in own
         for line in cell.source.splitlines()
         if STRANGE.search(line) and line.strip() not in usual
     ]
-    return found[:2]
+    return strange[:2]

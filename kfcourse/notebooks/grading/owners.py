@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
 from kfcourse.checks import sets
+from kfcourse.checks.question import MISSING
 from kfcourse.notebooks.course_list import Student
-from kfcourse.notebooks.grading.table import OTHER, Grade
+from kfcourse.notebooks.grading.results import NOT_RUN, OTHER, Grade
 from kfcourse.notebooks.grading.weights import USUAL, Credit, points
 
 
@@ -48,15 +49,15 @@ def owner(grade: Grade, students: Sequence[Student]) -> Student | None:
     """
     parts = [set(words(part)) for part in PurePosixPath(grade.name).with_suffix("").parts]
     everything = set().union(*parts)
-    found = [one for one in students if any(set(words(one.name)) <= part for part in parts)]
-    if not found:
-        found = [one for one in students if grade.student == f"{one.name}, {one.group}"]
-    ranked = sorted(found, key=lambda one: (set(words(one.group)) <= everything, len(words(one.name))), reverse=True)
-    if len(ranked) > 1:
-        rank = [(set(words(one.group)) <= everything, len(words(one.name))) for one in ranked[:2]]
-        if rank[0] == rank[1]:
-            return None
-    return ranked[0] if ranked else None
+    named = [student for student in students if any(set(words(student.name)) <= part for part in parts)]
+    if not named:
+        named = [student for student in students if grade.student == f"{student.name}, {student.group}"]
+
+    def rank(student: Student) -> tuple[bool, int]:
+        return set(words(student.group)) <= everything, len(words(student.name))
+
+    best = [student for student in named if rank(student) == max(map(rank, named))]
+    return best[0] if len(best) == 1 else None
 
 
 def of_folder(grade: Grade) -> Student:
@@ -76,9 +77,9 @@ def people(
     `students` is the course list; without it every folder is a student.  Of several notebooks of a set the one counts that is
     worth most by the `credit`.
     """
-    persons = {one: Person(one) for one in students or ()}
+    persons = {student: Person(student) for student in students or ()}
     strangers = []
-    for grade in sorted(grades, key=lambda one: one.name):
+    for grade in sorted(grades, key=lambda grade: grade.name):
         if grade.status == OTHER:
             continue
         whose = of_folder(grade) if students is None else owner(grade, students)
@@ -86,12 +87,11 @@ def people(
             strangers.append(grade)
         else:
             _hand_in(persons.setdefault(whose, Person(whose)), grade, credit)
+    everything = {letter for person in persons.values() for letter in person.grades}
     for person in persons.values():
-        asked = person.student.sets.split() or sorted({letter for one in persons.values() for letter in one.grades})
-        missing = [letter for letter in asked if letter not in person.grades]
+        missing = [letter for letter in person.student.sets.split() or sorted(everything) if letter not in person.grades]
         if missing:
             person.flags.append(f"missing: {', '.join(missing)}")
-    _same_code(persons.values())
     return list(persons.values()), strangers
 
 
@@ -103,8 +103,9 @@ def _hand_in(person: Person, grade: Grade, credit: Credit) -> None:
         return
     if grade.student and grade.student != f"{student.name}, {student.group}" and student.variant:
         person.flags.append(f"set {grade.letter}: the notebook was handed out to {grade.student}")
-    looks = [part.removeprefix("look: ") for part in grade.note.split("; ") if part.startswith("look")]
-    person.flags += [f"set {grade.letter}: {part}" for part in looks]
+    if not grade.work and {*grade.marks.values()} <= {MISSING, NOT_RUN}:
+        person.flags.append(f"set {grade.letter}: came back empty")
+    person.flags += [f"set {grade.letter}: {look}" for look in grade.looks]
     other = person.grades.get(grade.letter)
     if other is not None:
         person.flags.append(f"set {grade.letter}: came back more than once, the best counts")
@@ -112,20 +113,17 @@ def _hand_in(person: Person, grade: Grade, credit: Credit) -> None:
         person.grades[grade.letter] = grade
 
 
-def _same_code(persons: Iterable[Person]) -> None:
-    """Flag notebooks of different students whose code differs in nothing but comments and spaces."""
-    code: dict[tuple[str, str], list[Person]] = {}
+def same_code(persons: Iterable[Person]) -> list[tuple[str, list[str]]]:
+    """Groups of students whose code differs in nothing but comments and spaces: the set, and their names."""
+    groups: dict[tuple[str, str], list[str]] = {}
     for person in persons:
         for letter, grade in person.grades.items():
             if grade.work:
-                code.setdefault((letter, grade.work), []).append(person)
-    for (letter, _), same in code.items():
-        for person in same if len(same) > 1 else []:
-            others = ", ".join(one.student.name for one in same if one is not person)
-            person.flags.append(f"set {letter}: the same code as {others}")
+                groups.setdefault((letter, grade.work), []).append(person.student.name)
+    return [(letter, names) for (letter, _), names in sorted(groups.items()) if len(names) > 1]
 
 
 def known_sets(persons: Iterable[Person]) -> list[str]:
     """Letters of the sets that came back, or should have."""
-    found = {letter for one in persons for letter in (*one.grades, *one.student.sets.split())}
-    return [letter for letter in sets() if letter in found]
+    back = {letter for person in persons for letter in (*person.grades, *person.student.sets.split())}
+    return [letter for letter in sets() if letter in back]

@@ -1,187 +1,118 @@
-"""Grading processes, each with a notebook at a time: watched, ended when they hang, and started anew when a notebook ends one."""
+"""Grading processes: each holds the right answers and compares, one notebook after another.
+
+A notebook that ends its grading process, or makes it hang, is not graded; a new process goes on with the next one.
+"""
 
 from __future__ import annotations
 
+import multiprocessing
 import os
-import subprocess
+import signal
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
 from queue import SimpleQueue
 
 from tqdm import tqdm
 
-from kfcourse.notebooks.grading import keeper
-from kfcourse.notebooks.grading.channel import Closed, Late, Patient
+from kfcourse.limits import limit_process
+from kfcourse.notebooks.grading import marking, sandbox
 from kfcourse.notebooks.grading.marking import Setting
-from kfcourse.notebooks.grading.running import START, Site
-from kfcourse.notebooks.grading.sandbox import chosen
+from kfcourse.notebooks.grading.results import FAILED, Grade
+from kfcourse.notebooks.grading.running import MEMORY, START, WHOLE, Site
+from kfcourse.notebooks.grading.sandbox import Sandbox
 from kfcourse.notebooks.grading.staging import answers, stage
 from kfcourse.notebooks.grading.submissions import Returned
-from kfcourse.notebooks.grading.table import FAILED, Grade, RunAll, Started
-from kfcourse.notebooks.grading.values import Strange
-from kfcourse.notebooks.grading.worker import grade_of, packed
 
-QUIET = 150.0  # seconds that a comparison, with the search for the kind of mistake, may take in all
-AGAIN = 3  # answers of a notebook that are left out, because they end or stop the grading process, before it is given up
+QUIET = 600.0  # seconds for what is ours: making the notebook of a variant, comparing, searching for the kinds of mistakes
 
 
-class Family:
-    """The processes of this one: those that were there, the grading processes, and what a notebook has left, which is ended."""
+class Grader:
+    """A grading process, started when there is something to grade, and anew when a notebook has ended it."""
 
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._ours = frozenset(keeper.below(os.getpid())) if os.name == "posix" else frozenset()
-        keeper.adopt()
-
-    def start(self, command: Sequence[str]) -> subprocess.Popen:
-        """Start a grading process."""
-        with self._lock:
-            # Ctrl-C is for the command
-            session = os.name == "posix"
-            process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=session)
-            self._ours |= {process.pid}
-            return process
-
-    def end(self, process: subprocess.Popen) -> None:
-        """End a grading process, all below it, and what a notebook has left that had ended it."""
-        with self._lock:
-            if os.name == "posix":
-                keeper.end(process.pid)
-            process.kill()
-            process.wait()
-            self._ours -= {process.pid}
-            if os.name == "posix":
-                keeper.end(os.getpid(), self._ours)
-
-
-class Worker:
-    """A grading process."""
-
-    def __init__(self, setting: Setting, family: Family):
-        self._setting, self._family = setting, family
-        self._process: subprocess.Popen | None = None
+    def __init__(self, setting: Setting):
+        self._setting = setting
+        self._pool: ProcessPoolExecutor | None = None
+        self._pid: int | None = None
 
     def __call__(self, work: Returned) -> Grade:
-        """The grade; a process that ends or hangs is a row.
-
-        Nobody knows who has killed a process, so the same is done once more; an answer at which it ends again is not graded.
-        """
-        skip: list[str] = []
-        ended = set[str]()
-        while True:
-            self._question = ""
-            try:
-                return self._ask(work, skip)
-            except Late:
-                problem, again = "the grading process hung", False
-            except (Closed, Strange):
-                problem, again = "the grading process was killed, twice: by the notebook, or by somebody else", True
-            self.end()
-            at = self._question or "its cells"
-            if again and at not in ended:
-                ended.add(at)
-                continue
-            if not self._question or len(skip) == AGAIN:
-                return Grade(work.name, FAILED, note=f"{problem}; at {at}")
-            skip.append(self._question)
-
-    def _ask(self, work: Returned, skip: Sequence[str]) -> Grade:
-        if self._process is None or self._process.poll() is not None:
-            self._start()
-        self._channel.send({"work": packed(work), "skip": list(skip)})
-        while True:
-            message = self._channel.wait(time.monotonic() + START + max(QUIET, 2 * work.seconds))
-            if "grade" in message:
-                return grade_of(message["grade"])
-            self._question = message["at"]
-
-    def _start(self) -> None:
-        self._process = self._family.start([sys.executable, "-m", "kfcourse.notebooks.grading.worker"])
-        assert self._process.stdin and self._process.stdout
-        self._channel = Patient(self._process.stdout, self._process.stdin)
-        self._channel.send(packed(self._setting))
+        try:
+            if self._pool is None:
+                context = multiprocessing.get_context("forkserver" if sys.platform == "linux" else "spawn")
+                context.set_forkserver_preload([__name__, "kfcourse.exercises"])
+                self._pool = ProcessPoolExecutor(1, context, _begin)
+                self._pid = self._pool.submit(os.getpid).result()
+            limit = START + 2 * WHOLE * work.seconds + QUIET
+            return self._pool.submit(marking.grade, work, self._setting).result(limit)
+        except TimeoutError:
+            problem = "the grading process hung"
+        except BrokenProcessPool:
+            problem = "the grading process was killed, by the notebook, by somebody else, or for want of memory"
+        self.end()
+        return Grade(work.name, FAILED, notes=(problem,))
 
     def end(self) -> None:
-        """End the process, and what a notebook has started below it."""
-        process, self._process = self._process, None
-        if process is None:
-            return
-        self._family.end(process)
-        for pipe in (process.stdin, process.stdout):
-            with suppress(OSError):
-                pipe.close()  # type: ignore[union-attr]
+        """End the process, and what is below it."""
+        pool, self._pool = self._pool, None
+        if pool is not None:
+            if self._pid is not None:
+                sandbox.end_with_all_below(self._pid)
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
-@dataclass(frozen=True)
-class Order:
-    """How a course's notebooks are to be graded, on whatever machine.
+def _begin() -> None:
+    """In a new grading process: Ctrl-C and the screen are the command's, and without the command it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for stream in range(3):
+        os.dup2(nowhere, stream)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
 
-    Attributes
-    ----------
-    folder : Path
-        Where they are; absolute, as the masters.
-    masters : Path or None
-    sandbox : {"auto", "bwrap", "none"}
-    salt : str
-        Of the hidden arguments.
-    """
+    def follow() -> None:
+        parent.join()
+        os._exit(1)
 
-    folder: Path
-    masters: Path | None
-    sandbox: str
-    salt: str
+    threading.Thread(target=follow, daemon=True).start()
+    limit_process(3 * MEMORY)
 
 
 @contextmanager
-def grading(order: Order, workers: int) -> Iterator[tuple[RunAll, set[str]]]:
-    """A function that grades notebooks in so many processes, and the kind of sandbox they run in.
-
-    The function says when it begins with a notebook, and yields the grades as they come.
-    """
+def place(folder: Path, masters: Path | None, kind: str) -> Iterator[Site]:
+    """Where notebooks run: a copy of the package without the answers, and the sandbox that hides the rest."""
     with tempfile.TemporaryDirectory(prefix="kfcourse-") as made:
-        place = Path(made).resolve()
-        (place / "stage").mkdir()
-        staged = stage(place / "stage")
-        hidden = [Path(str(resources.files("kfcourse"))), *answers(), order.folder, *([order.masters] if order.masters else [])]
-        held = chosen(order.sandbox, hidden, place, staged)
-        with _processes(Setting(Site(staged, held), order.salt), workers) as run:
-            yield run, {held.kind}
+        staged = stage(Path(made).resolve())
+        hidden = [Path(str(resources.files("kfcourse"))), *answers(), folder, *([masters] if masters else [])]
+        yield Site(staged, Sandbox(kind, tuple(str(path.resolve()) for path in hidden)))
 
 
-@contextmanager
-def _processes(setting: Setting, workers: int) -> Iterator[RunAll]:
-    free: SimpleQueue[Worker] = SimpleQueue()
-    family = Family()
-    made = [Worker(setting, family) for _ in range(workers)]
-    for worker in made:
-        free.put(worker)
+def graded(works: Sequence[Returned], setting: Setting, workers: int) -> Iterator[Grade]:
+    """The grades as they come, so many notebooks at once, with a progress bar."""
+    graders = [Grader(setting) for _ in range(workers)]
+    free: SimpleQueue[Grader] = SimpleQueue()
+    for grader in graders:
+        free.put(grader)
 
-    def one(work: Returned, started: Started) -> Grade:
-        worker = free.get()
+    def grade(work: Returned) -> Grade:
+        grader = free.get()
         try:
-            started(work)
-            return worker(work)
+            return grader(work)
         finally:
-            free.put(worker)
-
-    def run(works: Sequence[Returned], started: Started) -> Iterator[Grade]:
-        tasks = [threads.submit(one, work, started) for work in works]
-        for task in tqdm(as_completed(tasks), desc="grade", total=len(tasks), unit="notebook", disable=None):
-            yield task.result()
+            free.put(grader)
 
     threads = ThreadPoolExecutor(workers)
     try:
-        yield run
+        tasks = [threads.submit(grade, work) for work in works]
+        for task in tqdm(as_completed(tasks), desc="grade", total=len(tasks), unit="notebook", disable=None):
+            yield task.result()
     finally:
         threads.shutdown(wait=False, cancel_futures=True)
-        for worker in made:
-            worker.end()
+        for grader in graders:
+            grader.end()
         threads.shutdown()

@@ -1,4 +1,4 @@
-"""Where a returned notebook runs: bubblewrap's sandbox if it is installed and works, else a process of its own."""
+"""Where a returned notebook runs: in bubblewrap's sandbox, or as any program of yours."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from kfcourse.notebooks.grading import keeper
+import psutil  # type: ignore[import-untyped]
 
-KINDS = ("auto", "bwrap", "none")
-HELD = {
+KINDS = ("bwrap", "none")
+PROTECTION = {
     "bwrap": "bubblewrap: no network, no files but the package's and an empty folder, nothing left running",
-    "none": "none: notebooks run with your rights; what a notebook starts is ended, other things it does are noted at best",
+    "none": "NONE: each notebook could read the right answers, change your files and the other notebooks, and use your network",
 }
 SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/opt")
 ETC = ("/etc/ld.so.cache", "/etc/fonts", "/etc/alternatives", "/etc/localtime", "/etc/mime.types")
@@ -33,124 +33,82 @@ class Sandbox:
     ----------
     kind : {"bwrap", "none"}
     hidden : tuple of str
-        Folders that no notebook may see: the package with the answers, the returned notebooks.
+        Folders that no notebook may see in the sandbox: the package with the answers, the returned notebooks.
     """
 
     kind: str
     hidden: tuple[str, ...] = ()
 
-    def start(self, command: Sequence[str], folder: Path, stage: Path, environment: Mapping[str, str]) -> Process:
-        """Start a command in `folder/work`; it may write in `folder`, and read the package in `stage` and Python's libraries."""
-        if self.kind == "bwrap":
-            return Process([*self._bubblewrap(folder, stage), *command], folder / "work", environment)
-        if os.name == "posix":
-            read, write = os.pipe()
-            parent = [sys.executable, "-I", "-S", str(Path(keeper.__file__)), str(read)]
-            try:
-                return Process([*parent, *command], folder / "work", environment, life=(read, write))
-            finally:
-                os.close(read)
-        return Process(command, folder / "work", environment)
-
-    def _bubblewrap(self, folder: Path, stage: Path) -> list[str]:
-        found = ["bwrap", "--unshare-all", "--die-with-parent", "--new-session"]
-        found += ["--proc", "/proc", "--dev", "/dev", "--tmpfs", "/tmp"]
-        for place in SYSTEM:
-            if os.path.islink(place):
-                found += ["--symlink", os.readlink(place), place]
-            elif os.path.isdir(place):
-                found += ["--ro-bind", place, place]
-        for file in ETC:
-            found += ["--ro-bind-try", file, file]
-        libraries = [
-            sys.base_prefix,
-            sys.prefix,
-            *([sysconfig.get_path("purelib", f"{os.name}_user")] if site.ENABLE_USER_SITE else []),
-        ]
-        for place in dict.fromkeys(libraries):
-            if not any(Path(place).is_relative_to(known) for known in SYSTEM):
-                found += ["--ro-bind-try", place, place]
-        for place in self.hidden:
-            seen = (*SYSTEM, *libraries)
-            if os.path.isdir(place) and any(Path(place).resolve().is_relative_to(os.path.realpath(known)) for known in seen):
-                found += ["--tmpfs", place]
-        found += ["--ro-bind", str(stage), str(stage)]  # the package as notebooks see it, whatever was hidden
-        return [*found, "--bind", str(folder), str(folder), "--chdir", str(folder / "work")]
-
-
-class Process:
-    """A notebook's process, what keeps it, and two pipes."""
-
-    def __init__(self, command: Sequence[str], folder: Path, environment: Mapping[str, str], life: tuple[int, int] | None = None):
-        self._life = life[1] if life else None
-        self._others = frozenset(keeper.below(os.getpid())) if os.name == "posix" else frozenset()
-        self.popen = subprocess.Popen(
-            command,
+    def start(self, command: Sequence[str], folder: Path, stage: Path, environment: Mapping[str, str]) -> subprocess.Popen:
+        """Start a command in `folder`, where it may write; it reads the package in `stage` and Python's libraries."""
+        return subprocess.Popen(
+            [*(self.bubblewrap(folder, stage) if self.kind == "bwrap" else ()), *command],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             cwd=folder,
             env=dict(environment),
-            pass_fds=life[:1] if life else (),
-            start_new_session=os.name == "posix",
+            start_new_session=True,
         )
 
-    def killed(self) -> bool:
-        """Whether it was ended from outside, as an administrator or a system without memory does it: by SIGKILL."""
-        with suppress(subprocess.TimeoutExpired):
-            self.popen.wait(2)
-        return self.popen.poll() in (-signal.SIGKILL, 128 + signal.SIGKILL) if os.name == "posix" else False
+    def bubblewrap(self, folder: Path, stage: Path) -> list[str]:
+        """The beginning of a command that runs in the sandbox."""
+        options = ["bwrap", "--unshare-all", "--die-with-parent", "--new-session"]
+        options += ["--proc", "/proc", "--dev", "/dev", "--tmpfs", "/tmp"]
+        for place in SYSTEM:
+            if os.path.islink(place):
+                options += ["--symlink", os.readlink(place), place]
+            elif os.path.isdir(place):
+                options += ["--ro-bind", place, place]
+        for file in ETC:
+            options += ["--ro-bind-try", file, file]
+        libraries = [sys.base_prefix, sys.prefix]
+        if site.ENABLE_USER_SITE:
+            libraries.append(sysconfig.get_path("purelib", f"{os.name}_user"))
+        for place in dict.fromkeys(libraries):
+            if not any(Path(place).is_relative_to(known) for known in SYSTEM):
+                options += ["--ro-bind-try", place, place]
+        seen = [os.path.realpath(place) for place in (*SYSTEM, *libraries)]
+        for place in self.hidden:
+            if os.path.isdir(place) and any(Path(place).resolve().is_relative_to(known) for known in seen):
+                options += ["--tmpfs", place]
+        options += ["--ro-bind", str(stage), str(stage)]  # the package as notebooks see it, whatever was hidden
+        return [*options, "--bind", str(folder), str(folder), "--chdir", str(folder)]
 
-    @property
-    def keeper_killed(self) -> bool:
-        """Whether a signal has ended the process that keeps the notebook's."""
-        return self._life is not None and (self.popen.poll() or 0) < 0
 
-    def end(self) -> bool:
-        """End it with all that it started; whether the notebook had killed what keeps it."""
-        killed = self.keeper_killed
-        if self._life is not None:
-            os.close(self._life)
-            self._life = None
-            with suppress(subprocess.TimeoutExpired):
-                self.popen.wait(3)
-        if os.name == "posix":
-            if self.popen.poll() is None:
-                with suppress(ProcessLookupError, PermissionError):
-                    os.killpg(self.popen.pid, signal.SIGKILL)
-            keeper.end(os.getpid(), self._others)
-        elif shutil.which("taskkill"):
-            subprocess.run(["taskkill", "/F", "/T", "/PID", str(self.popen.pid)], capture_output=True)
+def was_killed(process: subprocess.Popen) -> bool:
+    """Whether a process that has closed its pipe was killed, such as by a system without memory."""
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(2)
+    return process.poll() in (-9, 128 + 9)  # the signal, and as bubblewrap tells it
+
+
+def end(process: subprocess.Popen) -> None:
+    """End a process with all that is still below it or in its session."""
+    end_with_all_below(process.pid)
+    if os.name == "posix":
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    for pipe in (process.stdin, process.stdout):
         with suppress(OSError):
-            self.popen.kill()
-        with suppress(subprocess.TimeoutExpired):
-            self.popen.wait(5)
-        for pipe in (self.popen.stdin, self.popen.stdout):
-            with suppress(OSError):
-                pipe.close()  # type: ignore[union-attr]
-        return killed
+            pipe.close()  # type: ignore[union-attr]
 
 
-def chosen(kind: str, hidden: Sequence[Path | str], folder: Path, stage: Path) -> Sandbox:
-    """The sandbox asked for; with "auto" bubblewrap's if it works here.
+def end_with_all_below(pid: int) -> None:
+    """Kill a process, and what it has started so far as it is still below it."""
+    with suppress(psutil.Error):
+        process = psutil.Process(pid)
+        for one in (*process.children(recursive=True), process):
+            with suppress(psutil.Error):
+                one.kill()
 
-    Raises
-    ------
-    ValueError
-        Bubblewrap is asked for and missing, or does not work; says what it said.
-    """
-    closed = tuple(str(Path(path).resolve()) for path in hidden)
-    if kind == "none":
-        return Sandbox("none", closed)
-    tried = Sandbox("bwrap", closed)
-    problem = "it is not installed (Debian, Ubuntu: apt install bubblewrap)"
-    if shutil.which("bwrap"):
-        (folder / "work").mkdir(exist_ok=True)
-        command = [*tried._bubblewrap(folder, stage), sys.executable, "-I", "-c", "import numpy"]
-        done = subprocess.run(command, capture_output=True, text=True)
-        if not done.returncode:
-            return tried
-        problem = f"it does not work here: {(done.stderr.strip().splitlines() or ['no message'])[-1][:200]}"
-    if kind == "bwrap":
-        raise ValueError(f"--sandbox bwrap: {problem}; or --sandbox none")
-    return Sandbox("none", closed)
+
+def problem(folder: Path, stage: Path) -> str:
+    """Why bubblewrap does not work here; nothing if it does."""
+    if not shutil.which("bwrap"):
+        return "bubblewrap is not installed (Debian, Ubuntu: apt install bubblewrap)"
+    command = [*Sandbox("bwrap").bubblewrap(folder, stage), sys.executable, "-I", "-c", "import numpy"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    words = (done.stderr.strip().splitlines() or ["no message"])[-1][:200]
+    return f"bubblewrap does not work here: {words}" if done.returncode else ""

@@ -20,7 +20,7 @@ LEFT_OUT = (
     "listing.py",
     "__main__.py",
 )  # what a student's notebook has no use for
-NEEDED = ("__init__.py", *(f"grading/{name}.py" for name in ("__init__", "channel", "keeper", "sandbox", "session", "values")))
+NEEDED = ("__init__.py", *(f"grading/{name}.py" for name in ("__init__", "channel", "session", "values")))
 ANSWERS = "derivations/worked.py"  # writes right derivations
 FONTS = "fonts"  # on the stage: those that matplotlib has found
 COMPANIONS = "companion.py"  # what the notebooks of a set import; never a key
@@ -59,7 +59,10 @@ def stage(folder: Path) -> Path:
     """
     own = Path(str(resources.files("kfcourse")))
     target = folder / "kfcourse"
-    shutil.copytree(own, target, ignore=lambda at, names: LEFT_OUT if Path(at) == own else ())
+    try:
+        shutil.copytree(own, target, ignore=lambda at, names: LEFT_OUT if Path(at) == own else ())
+    except shutil.Error as errors:  # a list of all
+        raise OSError(f"the package cannot be copied to {folder}: {errors.args[0][0][2]}") from None
     (target / ANSWERS).unlink()
     for name in NEEDED:
         copied = target / "notebooks" / name

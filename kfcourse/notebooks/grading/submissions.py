@@ -21,8 +21,12 @@ from kfcourse.notebooks.texts import clean
 
 SECONDS = 60.0  # a cell may take
 LARGEST = 64 * 2**20  # bytes of a returned file
-ARCHIVES = {".zip", ".7z", ".rar", ".tar", ".tgz", ".tbz2", ".txz", ".gz", ".bz2", ".xz", ".zst"}
 LINK = "a link, which is not followed: ask for the notebook itself"
+ARCHIVE = "an archive: unpack it, or take it away, and grade again"
+EXPORT = "no notebook, but perhaps made from one: ask for the .ipynb itself, or take it away"
+RENAMED = "a notebook by another name: end its name in .ipynb, and grade again"
+NOT_READ = dict.fromkeys((".zip", ".7z", ".rar", ".tar", ".tgz", ".tbz2", ".txz", ".gz", ".bz2", ".xz", ".zst"), ARCHIVE)
+NOT_READ |= dict.fromkeys((".html", ".htm", ".py", ".json"), EXPORT)
 
 
 class Unreadable(ValueError):
@@ -36,11 +40,11 @@ class Returned:
     Attributes
     ----------
     path : Path
-        Absolute, as the others: a worker process may have another working directory.
+        Absolute, as the others: another process may have another working directory.
     name : str
-        The path in the folder, with slashes.
+        The path in the folder, with slashes; what is not UTF-8 in it is written as `\\xNN`.
     digest : str
-        Of all that its grade depends on, and of the file and the variant given; the same digest gives the same grade.
+        Of all that its grade depends on: the same digest gives the same grade.
     seconds : float
         Time limit of a cell.
     variants_file : Path or None
@@ -68,26 +72,26 @@ def returned(
     masters: Path | None = None,
     given: Callable[[str, Path], str] = lambda name, path: "",
 ) -> list[Returned]:
-    """The notebooks in a folder and the folders in it, and what cannot be read of them: links, hidden ones, archives.
+    """The notebooks in a folder and the folders in it, and what may be one and cannot be read: links, archives, exports.
 
     `given` says which variant the student of a notebook was given, from its name and path.
     """
     folder, masters = folder.absolute(), masters and masters.absolute()
     variants_file = variants_file and variants_file.absolute()
     setting = hashlib.sha256(f"{package_digest()}{seconds}".encode())
-    for path in (*sorted(masters.glob("*/statement.md") if masters else []), *([variants_file] if variants_file else [])):
+    for path in (*sorted(masters.glob("*/statement.md") if masters else []), *filter(None, [variants_file])):
         setting.update(path.read_bytes())
-    found = []
+    works = []
     for path, problem in sorted(_handed_in(folder)):
-        name, content, variant = path.relative_to(folder).as_posix(), hashlib.sha256(), ""
-        if not problem:
-            variant = given(name, path)
-            content.update(f"{variant}\n".encode())
-            with suppress(OSError):  # told when it is graded
-                content.update(_content(path))
-        digest = "" if problem else f"{setting.hexdigest()[:32]}-{content.hexdigest()}"
-        found.append(Returned(path, name, digest, seconds, variants_file, masters, variant, problem))
-    return found
+        name = os.fsencode(path.relative_to(folder).as_posix()).decode("utf-8", "backslashreplace")
+        variant = "" if problem else given(name, path)
+        digest = setting.copy()
+        digest.update(f"{variant}\n".encode())
+        with suppress(OSError):  # told when it is graded
+            digest.update(b"" if problem else _content(path))
+        key = "" if problem else digest.hexdigest()
+        works.append(Returned(path, name, key, seconds, variants_file, masters, variant, problem))
+    return works
 
 
 def _handed_in(folder: Path) -> Iterator[tuple[Path, str]]:
@@ -97,12 +101,17 @@ def _handed_in(folder: Path) -> Iterator[tuple[Path, str]]:
         for name in folders:
             if (path := Path(at, name)).is_symlink():
                 yield path, LINK
-        for name in files:
-            path = Path(at, name)
-            if path.suffix.lower() in ARCHIVES:
-                yield path, "an archive: unpack it, or take it away, and grade again"
-            elif path.suffix.lower() == ".ipynb" and not _is_copy(path):
-                yield path, _unread(path, path.relative_to(folder))
+        for path in (Path(at, name) for name in files):
+            kind = path.suffix.lower()
+            notebook = path.with_name(path.name[: len(path.name) - len(kind)].removesuffix(".ipynb") + ".ipynb")
+            if kind == ".ipynb":
+                if not _is_copy(path):
+                    yield path, _unread(path, path.relative_to(folder))
+            elif path.stem.lower().endswith(".ipynb"):
+                if kind not in (".bak", ".swp"):
+                    yield path, RENAMED
+            elif kind in NOT_READ and not notebook.exists():
+                yield path, NOT_READ[kind]
     for error in unread:
         yield Path(error.filename), f"a folder that cannot be read: {error.strerror}"
 
@@ -134,15 +143,17 @@ def _content(path: Path) -> bytes:
 
 
 class Cell(NamedTuple):
-    """A code cell of a returned notebook.
+    """A cell of a returned notebook.
 
-    number: its place among all cells, from 1;  answer: name of the function that the master asked for here, if still known.
+    number: its place among all cells, from 1;  answer: name of the function that the master asked for here, if still known;
+    code: whether it is one.
     """
 
     number: int
     id: str
     answer: str
     source: str
+    code: bool = True
 
     @property
     def name(self) -> str:
@@ -163,26 +174,26 @@ def read_document(path: Path) -> dict[str, Any]:
 
 
 def cells_of(document: Mapping[str, Any]) -> list[Cell]:
-    """Code cells that are not empty; what is malformed is left out."""
-    found = []
+    """Cells that are not empty; what is malformed is left out."""
     cells = document.get("cells")
     if not isinstance(cells, list):
         raise Unreadable("a notebook without cells, or of an old format: open it in Jupyter and save it again")
+    read = []
     for number, cell in enumerate(cells, 1):
-        if not isinstance(cell, dict) or cell.get("cell_type") != "code":
+        if not isinstance(cell, dict):
             continue
-        source = cell.get("source", "")
+        source, metadata = cell.get("source", ""), cell.get("metadata")
         source = "".join(map(str, source)) if isinstance(source, list) else str(source)
-        metadata = cell.get("metadata")
         mark = metadata.get("kfcourse") if isinstance(metadata, dict) else None
         answer = mark.get("answer") if isinstance(mark, dict) else None
+        answer = answer if isinstance(answer, str) else ""
         if source.strip():
-            found.append(Cell(number, str(cell.get("id", "")), answer if isinstance(answer, str) else "", source))
-    return found
+            read.append(Cell(number, str(cell.get("id", "")), answer, source, cell.get("cell_type") == "code"))
+    return read
 
 
 def claimed(claim: Any, cells: Sequence[Cell], variants_file: Path | None, given: str = "") -> tuple[Exercise, list[str]]:
-    """The set that a notebook claims, for the variant that was given, and what is strange about that.
+    """The set that a notebook claims, for the variant that was given, and what to look at about that.
 
     Without a course list the notebook has only a name of a variant to give; a table in it counts for nothing.
     """
@@ -194,16 +205,16 @@ def claimed(claim: Any, cells: Sequence[Cell], variants_file: Path | None, given
     except VariantError as error:
         hint = "" if variants_file else f"if variant {given or name} is of a file of yours, name that with --variants; "
         raise Unreadable(f"{hint}{error}") from None  # the advice first: the list may be long, and is cut in the table
-    marked = f"look: marked as variant {variant.name}" + ", which was given" * bool(given)
-    notes = [f"{marked}, and says that it is {name}"] if given and name != given else []
+    marked = f"marked as variant {variant.name}" + ", which was given" * bool(given)
+    looks = [f"{marked}, and says that it is {name}"] if given and name != given else []
     for other, what in (call for cell in cells for call in openings(cell.source)):
         table = {key: value for key, value in what.items() if key != "name"} if isinstance(what, dict) else None
         other_name = what.get("name") if isinstance(what, dict) else what
         if (other, other_name) != (letter, variant.name):
-            notes.append(f"look: opens set {other}, variant {other_name}")
+            looks.append(f"opens set {other}, variant {other_name}")
         elif table is not None and table != variant.table:
-            notes.append(f"{marked}, and opens one of its own that has this name")
-    return Exercise(letter, variant), [clean(note) for note in notes]
+            looks.append(f"{marked}, and opens one of its own that has this name")
+    return Exercise(letter, variant), [clean(look) for look in looks]
 
 
 def openings(source: str) -> Iterator[tuple[Any, Any]]:

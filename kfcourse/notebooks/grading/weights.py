@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from kfcourse.checks import Question, sets
 from kfcourse.checks.question import PASSED, WRONG
-from kfcourse.notebooks.grading.table import Grade
+from kfcourse.notebooks.grading.results import Grade
 
 WEIGHTS = {"warm-up": 1, "core": 2, "stretch": 3}  # points of a right answer, by the question's level
 

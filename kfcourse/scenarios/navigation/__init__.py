@@ -3,7 +3,6 @@
     dx = (A x + B u) dt + dW,     y = b(x(t_j), w_j)   at the moments t_j of the sensor's own
 
 Dynamics, Inputs, Path    the motion, and its exact transition over any interval
-Motion                    nonlinear motion: a model whose formulas know the interval
 Sensor, Clock, observe    what the sensors say of it: a list of `Observation`, in the order of arrival
 fuse                      the filter: each measurement is used at its moment of capture, however late it comes
 follow                    the same, with its innovations
@@ -13,14 +12,12 @@ Chapters "Integration of sensors" and "Rates and time tags" of the book; lecture
 
 from kfcourse.scenarios.navigation.dynamics import Dynamics, Inputs, Path, Transition, sample
 from kfcourse.scenarios.navigation.fusion import follow, fuse
-from kfcourse.scenarios.navigation.nonlinear import Motion
 from kfcourse.scenarios.navigation.sensors import Clock, Observation, Sensor, observe
 
 __all__ = [
     "Clock",
     "Dynamics",
     "Inputs",
-    "Motion",
     "Observation",
     "Path",
     "Sensor",

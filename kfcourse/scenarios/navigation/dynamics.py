@@ -13,19 +13,26 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+import scipy.linalg
 
 from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array, Gaussian, apply, square_root, symmetric
 from kfcourse.linear.runs import check_prior
 
 ROUNDING = 1e-9  # s (or periods): moments that differ by less are the same but for rounding; float64 holds days to 1e-11 s
-TERMS = 20  # of the series: term k is below 1 / (k+1)! relative to the first, the next one left out 2e-20
+LAST_PLACES = 4  # units in the last place by which a moment that is computed in two ways differs: tag to time, sums of intervals
 TRANSITIONS = 4096  # intervals remembered: sensors of fixed rates need a few, random delays many
+
+
+def rounding(*moments: Array | float) -> float:
+    """By how much moments may differ that are the same but for rounding: more at stamps of Unix, which hold 2e-7 s."""
+    largest = max(float(np.max(np.abs(moment), initial=0.0)) for moment in moments)
+    return max(ROUNDING, LAST_PLACES * float(np.spacing(largest)))
 
 
 class Transition(NamedTuple):
@@ -85,17 +92,13 @@ class Dynamics:
     def over(self, dt: float) -> Transition:
         """The exact transition over dt seconds, to rounding.
 
-        All three are power series in s = a h, a the norm of A, here for a short part h of dt with s <= 1/2:
+        By Van Loan's exponential (1978) for a part h of dt with |A| h <= 1/2,
 
-            Phi = sum_k s^k (A/a)^k / k!,   Gamma = h sum_k s^k (A/a)^k / (k+1)! B,   Q = h sum_k s^k q_k / (k+1)!
-            q_0 = Q_c,   q_{k+1} = (A/a) q_k + q_k (A/a)^T          from dQ/dt = A Q + Q A^T + Q_c
+            exp([[A, Q_c, B], [0, -A^T, 0], [0, 0, 0]] h) = [[Phi, X, Gamma], [0, Phi^-T, 0], [0, 0, I]],   Q = X Phi^T
 
-        and then doubled until h is dt:
+        and then doubled until h is dt, as exp(-A dt) may be huge where exp(A dt) is small:
 
             Phi(2h) = Phi Phi,   Gamma(2h) = Gamma + Phi Gamma,   Q(2h) = Q + Phi Q Phi^T
-
-        Van Loan's exponential of [[-A, Qc], [0, A^T]] gives the same, but is much slower where sensors with delays of their own
-        ask for thousands of intervals, and loses Q where exp(-A dt) is huge.
 
         Raises
         ------
@@ -104,25 +107,15 @@ class Dynamics:
         """
         if not (math.isfinite(dt) and dt >= 0):
             raise ValueError(f"the interval must be finite and not negative, got {dt}")
-        size, coefficients = self._series
+        n, size = len(self.A), float(np.abs(self.A).sum(axis=1).max())
         doublings = max(0, math.ceil(math.log2(max(2 * size * dt, 1.0))))
-        h = dt / 2**doublings
-        Phi, known, noise = np.tensordot((size * h) ** np.arange(TERMS), coefficients, axes=(0, 0))
-        Gamma, Q = h * known @ self.B, h * noise
+        block = np.zeros((2 * n + self.inputs,) * 2)
+        block[:n], block[n : 2 * n, n : 2 * n] = np.hstack([self.A, self.Qc, self.B]), -self.A.T
+        Phi, X, Gamma = np.split(scipy.linalg.expm(block * (dt / 2**doublings))[:n], [n, 2 * n], axis=1)
+        Q = X @ Phi.T
         for _ in range(doublings):
             Q, Gamma, Phi = Q + Phi @ Q @ Phi.T, Gamma + Phi @ Gamma, Phi @ Phi
         return Transition(Phi, Gamma, symmetric(Q))
-
-    @cached_property
-    def _series(self) -> tuple[float, Array]:
-        """Norm a of A, and coefficients of the series of Phi, Gamma and Q: (TERMS, 3, n, n)."""
-        size = float(np.abs(self.A).sum(axis=1).max())
-        A = self.A / size if size else self.A
-        power, noise, rows = np.eye(len(A)), self.Qc, []
-        for k in range(TERMS):
-            rows.append([power / math.factorial(k), power / math.factorial(k + 1), noise / math.factorial(k + 1)])
-            power, noise = power @ A, A @ noise + noise @ A.T
-        return size, np.array(rows)
 
 
 class Inputs(NamedTuple):
@@ -143,11 +136,12 @@ class Path(NamedTuple):
 
     def __call__(self, times: Array) -> Array:
         """States (len(times), runs, n); ValueError for a time that is not stored."""
-        index = np.minimum(np.searchsorted(self.times, np.asarray(times) - ROUNDING), len(self.times) - 1)
-        missing = np.flatnonzero(np.abs(self.times[index] - times) > 2 * ROUNDING)
+        slack = rounding(self.times, times)
+        index = np.minimum(np.searchsorted(self.times, np.asarray(times) - slack), len(self.times) - 1)
+        missing = np.flatnonzero(np.abs(self.times[index] - times) > 2 * slack)
         if len(missing):
             raise ValueError(
-                f"the path is not known at t = {np.asarray(times)[missing[0]]:g} s; sample it at all moments that are needed: "
+                f"the path is not known at t = {np.asarray(times)[missing[0]]:.16g} s; sample it at all moments that are needed: "
                 "np.unique(np.concatenate([outputs, *(sensor.captures(duration) for sensor in sensors)]))"
             )
         return self.states[index]
@@ -176,7 +170,7 @@ def motion(dynamics: Dynamics, inputs: Inputs | None = None) -> tuple[Callable[[
     def move(x: Array, start: float, end: float) -> Array:
         first = int(np.searchsorted(times, start, side="right")) - 1
         if first < 0:
-            raise ValueError(f"the inputs begin at t = {times[0]:g} s, but are needed from t = {start:g} s")
+            raise ValueError(f"the inputs begin at t = {times[0]:.16g} s, but are needed from t = {start:.16g} s")
         last = int(np.searchsorted(times, end, side="left"))
         edges = [start, *times[first + 1 : last].tolist(), end]
         for i, (left, right) in enumerate(pairwise(edges)):

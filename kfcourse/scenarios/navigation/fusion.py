@@ -20,12 +20,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.angles import Components, on_circle
 from kfcourse.errors import expect
 from kfcourse.laws import Array, Gaussian, Measurement, correct, stacked
 from kfcourse.linear.runs import check_prior
-from kfcourse.scenarios.navigation.dynamics import ROUNDING, Dynamics, Inputs, Predictor, predictor
-from kfcourse.scenarios.navigation.nonlinear import Motion
+from kfcourse.scenarios.navigation.dynamics import Dynamics, Inputs, Predictor, predictor, rounding
 from kfcourse.scenarios.navigation.sensors import Observation, Sensor, by_name
 
 
@@ -75,7 +73,7 @@ class Followed(NamedTuple):
 
 
 def fuse(
-    dynamics: Dynamics | Motion,
+    dynamics: Dynamics,
     sensors: Sequence[Sensor],
     prior: Gaussian,
     observations: Sequence[Observation],
@@ -90,7 +88,7 @@ def fuse(
 
     Parameters
     ----------
-    dynamics : Dynamics or Motion
+    dynamics : Dynamics
     sensors : sequence of Sensor
         As the filter believes them to be: their meters, and clocks that turn tags into the filter's time.
     prior : Gaussian
@@ -123,7 +121,7 @@ def fuse(
 
 
 def follow(
-    dynamics: Dynamics | Motion,
+    dynamics: Dynamics,
     sensors: Sequence[Sensor],
     prior: Gaussian,
     observations: Sequence[Observation],
@@ -148,7 +146,7 @@ def follow(
 
 
 def _run(
-    dynamics: Dynamics | Motion,
+    dynamics: Dynamics,
     sensors: Sequence[Sensor],
     prior: Gaussian,
     observations: Sequence[Observation],
@@ -160,27 +158,26 @@ def _run(
     keep: Callable[[Past], None],
 ) -> Gaussian:
     """The estimates; `keep` hears of all that is forgotten, in the order of its moments, and of what is left in the end."""
-    expect(dynamics, Dynamics, "fuse", Motion)
-    if isinstance(dynamics, Motion):
-        predict, n, angles = dynamics.predictor(inputs), dynamics.n, dynamics.structure.model.angles.x
-    else:
-        predict, n, angles = predictor(dynamics, inputs), len(dynamics.A), ()
+    expect(dynamics, Dynamics, "fuse")
+    predict, n = predictor(dynamics, inputs), len(dynamics.A)
     for sensor in sensors:
         if sensor.model.n != n:
             raise ValueError(
                 f"{sensor.name} was defined with {sensor.model.n} state component(s), and the motion has {n}: "
                 "Sensor.define takes the names of all, in the order of the motion"
             )
-    events = sorted(_events(sensors, observations, by, start), key=lambda event: event.arrival)
-    depth = _checked_depth(events, depth)
+    moments = _checked_times(times, start)
+    slack = rounding(moments, *(one.tag for one in observations), *(one.arrival for one in observations), start)
+    events = sorted(_events(sensors, observations, by, start, slack), key=lambda event: event.arrival)
+    depth = _checked_depth(events, depth, slack)
     history = [Past(start, None, _checked_prior(prior, n, events, inputs))]
     laws, taken = [], 0
-    for now in _checked_times(times, start):
-        arrived = events[taken : bisect_right(events, now + ROUNDING, lo=taken, key=lambda event: event.arrival)]
+    for now in moments:
+        arrived = events[taken : bisect_right(events, now + slack, lo=taken, key=lambda event: event.arrival)]
         taken += len(arrived)
-        history = _with(history, arrived, predict, angles)
+        history = _replayed(history, arrived, predict)
         laws.append(predict(history[-1].law, history[-1].time, max(now, history[-1].time)))
-        oldest = _oldest_needed(history, now - depth - ROUNDING)
+        oldest = _oldest_needed(history, now - depth - slack)
         for past in history[:oldest]:
             keep(past)
         history = history[oldest:]
@@ -189,7 +186,7 @@ def _run(
     return stacked(laws)
 
 
-def _with(history: list[Past], arrived: list[Event], predict: Predictor, angles: Components) -> list[Past]:
+def _replayed(history: list[Past], arrived: list[Event], predict: Predictor) -> list[Past]:
     """The history with the events that have arrived: back to before the earliest of them, and forward again."""
     if not arrived:
         return history
@@ -199,8 +196,7 @@ def _with(history: list[Past], arrived: list[Event], predict: Predictor, angles:
     for event in sorted(again, key=lambda event: event.time):
         law = predict(history[-1].law, history[-1].time, event.time)
         expected = event.sensor.measure(*law)
-        mean, cov = correct(law, expected, event.value)
-        history.append(Past(event.time, event, Gaussian(on_circle(mean, angles), cov), expected))
+        history.append(Past(event.time, event, correct(law, expected, event.value), expected))
     return history
 
 
@@ -209,7 +205,7 @@ def _oldest_needed(history: list[Past], reach: float) -> int:
     return max(bisect_right(history, reach, key=lambda past: past.time) - 1, 0)
 
 
-def _events(sensors: Sequence[Sensor], observations: Sequence[Observation], by: str, start: float) -> list[Event]:
+def _events(sensors: Sequence[Sensor], observations: Sequence[Observation], by: str, start: float, slack: float) -> list[Event]:
     if by not in ("tag", "arrival"):
         raise ValueError(f'measurements are used by "tag" or by "arrival", not by {by!r}')
     table, events = by_name(sensors), []
@@ -226,20 +222,20 @@ def _events(sensors: Sequence[Sensor], observations: Sequence[Observation], by: 
         if np.isinf(value).any():
             raise ValueError(f"{name}: a measurement must be finite, or NaN where it is missing")
         time = sensor.clock.time(tag) if by == "tag" else arrival
-        if time > arrival + ROUNDING:
+        if time > arrival + slack:
             raise ValueError(
-                f"{name}: captured at t = {time:g} s by its tag, but arrived before that, at {arrival:g} s; "
+                f"{name}: captured at t = {time:.16g} s by its tag, but arrived before that, at {arrival:.16g} s; "
                 f"the filter's clock for this sensor, {sensor.clock}, must be wrong: Clock.fit finds it from interrupts"
             )
-        if time < start:
+        if time < start - slack:
             raise ValueError(
-                f"{name}: captured at t = {time:g} s, before the prior's {start:g} s; leave it out, or start earlier"
+                f"{name}: captured at t = {time:.16g} s, before the prior's {start:.16g} s; leave it out, or start earlier"
             )
-        events.append(Event(time, arrival, sensor, np.asarray(value, dtype=float)))
+        events.append(Event(max(time, start), arrival, sensor, np.asarray(value, dtype=float)))
     return events
 
 
-def _checked_depth(events: Sequence[Event], depth: float | None) -> float:
+def _checked_depth(events: Sequence[Event], depth: float | None, slack: float) -> float:
     """Seconds that the filter must remember."""
     if depth is not None and not depth >= 0:
         raise ValueError(f"depth is how many seconds back the filter remembers: expected a number not below 0, got {depth}")
@@ -247,10 +243,10 @@ def _checked_depth(events: Sequence[Event], depth: float | None) -> float:
         return 0.0
     latest = max(events, key=lambda event: event.arrival - event.time)
     needed = latest.arrival - latest.time
-    if depth is not None and needed > depth + ROUNDING:
+    if depth is not None and needed > depth + slack:
         raise ValueError(
-            f"{latest.sensor.name}: captured at t = {latest.time:g} s, arrived at {latest.arrival:g} s, but the filter remembers "
-            f"only {depth:g} s; give depth={needed:g} or more, or leave such measurements out"
+            f"{latest.sensor.name}: captured at t = {latest.time:.16g} s, arrived at {latest.arrival:.16g} s, but "
+            f"the filter remembers only {depth:g} s; give depth={needed:g} or more, or leave such measurements out"
         )
     return needed if depth is None else depth
 
@@ -260,7 +256,7 @@ def _checked_times(times: Array, start: float) -> list[float]:
     if moments.ndim != 1 or not len(moments) or not np.isfinite(moments).all() or (np.diff(moments) < 0).any():
         raise ValueError("times of estimates must be a finite ascending vector")
     if moments[0] < start:
-        raise ValueError(f"an estimate is wanted at t = {moments[0]:g} s, before the prior's {start:g} s; start earlier")
+        raise ValueError(f"an estimate is wanted at t = {moments[0]:.16g} s, before the prior's {start:.16g} s; start earlier")
     return moments.tolist()
 
 

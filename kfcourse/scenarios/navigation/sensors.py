@@ -19,7 +19,7 @@ import numpy as np
 
 from kfcourse.angles import on_circle
 from kfcourse.laws import Array, Measurement, square_root
-from kfcourse.scenarios.navigation.dynamics import ROUNDING
+from kfcourse.scenarios.navigation.dynamics import rounding
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import Formula, ModelError
@@ -178,8 +178,8 @@ class Sensor:
             raise ValueError(
                 f"{self.name} has no period, as a recorded sensor: its observations have their moments; give one to simulate it"
             )
-        first = math.ceil((self.clock.reading(0.0) - self.offset) / self.period - ROUNDING)
-        last = math.floor((self.clock.reading(duration) - self.offset) / self.period + ROUNDING)
+        ends = [(self.clock.reading(end) - self.offset) / self.period for end in (0.0, duration)]
+        first, last = math.ceil(ends[0] - rounding(*ends)), math.floor(ends[1] + rounding(*ends))
         times = self.clock.time(self.offset + self.period * np.arange(first, last + 1))
         return np.clip(times, 0.0, duration)
 

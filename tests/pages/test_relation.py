@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from gate.relation import holds
+from gate.tex import is_relation, normal, pieces
+from gate.values import Indexed, Of, Unread
+from gate.worlds import BENT, extended_run, given, kalman_run, world
 
-from kfcourse.pages.letters import BENT, extended_run, given, kalman_run
-from kfcourse.pages.reader import Indexed, Of, Unread, holds, is_relation, normal, pieces
-from kfcourse.pages.verification import Unverified
+from kfcourse.pages import Unverified
 
 pytestmark = pytest.mark.quick
 RUN = kalman_run(np.random.default_rng(1))
@@ -92,3 +94,32 @@ def test_the_extended_run_knows_its_jacobians():
         holds(relation, run)
     with pytest.raises(Unverified):
         holds(r"\Psi_{k+1}=\Phi_kp_k\Phi_k^T+g_kg_k^T", run)
+
+
+def test_a_world_is_made_of_definitions():
+    letters = world(r"""
+        A, Q: cov 2
+        k: range 4
+        \Psi_0 = Q                          # a letter of its own
+        P = Q
+        again:
+        P = (P^{-1} + Q)^{-1}/2 + Q
+        then:
+        R = P - Q
+        f(x) = x^2 + 1
+        m: range 3
+        \mu: share 3
+        c_{mk} = f(k)\mu_m
+        x: nodes 0.5 2
+        s = \mathsf M(x - 0.5)^2
+        keep: P, Q, R, c, f, s, k, m
+    """)(np.random.default_rng(1))
+    assert set(letters) == {"P", "Q", "R", "c", "f", "s", "k", "m"}
+    holds(r"R=\tfrac12(P^{-1}+Q)^{-1}", letters)  # it has come to rest
+    holds(r"\sum_mc_{mk}=k^2+1", letters)
+    holds("s=2", letters)
+    run = world("k: range 4\na, b: num\nx_0 = b\nx_{k+1} = a x_k")(np.random.default_rng(1))
+    letters = {"x": run["x"], "k": range(3), "a": run["a"]}
+    holds("x_{k+1}=ax_k", letters)
+    with pytest.raises(Unverified):
+        holds("x_{k+1}=2ax_k", letters)

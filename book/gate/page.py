@@ -2,12 +2,12 @@ r"""What each displayed relation of a page is: computed from the page's letters,
 
 A page `my-chapter.md` that types relations in `$$` or in a box has a file `letters/my_chapter.py` beside it::
 
-    def course(rng): return {"p": Indexed(...), ...}     numbers for the letters, from the package or from a plain program
+    def course(rng): return {"p": Indexed(...), ...}     numbers for the letters: a program,
+    western = r"K = PH^TS^{-1}"                          or definitions in LaTeX (gate.worlds)
     LETTERS = (course, western)                          a relation must hold in one of them, with all its letters
-    SAID = {r"x_0\sim\mathcal N(m_0,D_0)": DEFINITION,   what cannot be computed, letter by letter, and what it is
-            "eq-my-model": DEFINITION}                   by its label: computed all the same, but shown under this name
+    SAID = {DEFINITION: [r"x_0\sim\mathcal N(m_0,D_0)",  what cannot be computed, letter by letter, and what it is
+                         "eq-my-model"]}                 by its label: computed all the same, but shown under this name
     EQUALS = {r"\det M": r"ad-bc"}                       a string in a cell, and what the checked sides beside it say
-    LITERALS = ("1960",)                                 numbers in `claim` texts behind which no expression stands, and need not
 
 So a changed letter stops the build: what is computed no longer holds, or what was said is no longer there.
 
@@ -30,10 +30,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kfcourse.pages.reader import Unread, holds, is_relation, normal, pieces
-from kfcourse.pages.tex import RELATIONS
+from gate.relation import holds
+from gate.tex import RELATIONS, is_relation, normal, pieces
+from gate.values import Unread
+from gate.worlds import world
+from kfcourse.pages import Unverified
 from kfcourse.pages.verification import DEFINITION as DEFINITION
-from kfcourse.pages.verification import Unverified
 
 COMPUTED = "both sides computed"
 STATED = "stated without proof"
@@ -48,6 +50,8 @@ _POINTS = re.compile(r"^(`{3,})\{admonition\} Key points\n(.*?)^\1\s*$", re.DOTA
 _DISPLAY = re.compile(r"^(?:\$\$|```\{math\})\n(.*?)\n(?:\$\$|```)(?: \(([\w-]+)\))?\s*$", re.DOTALL | re.MULTILINE)
 _INLINE = re.compile(r"(?<![\\$])\$([^$]+)\$(?!\$)")
 _NO_LETTER = re.compile(r"\\(?:frac|sqrt|cdot|infty|hat|bar|tilde|dot|ddot)\b|'")
+_NUMBER = re.compile(r"(?<![\w.^_{\\])(\d{1,3}(?:,\d{3})+(?:\.\d+)?|\d+(?:\.\d+)?)")
+_NO_NUMBER = re.compile(r"\$[^$]*\$|\{\w+\}`[^`]*`|`[^`]*`|(?:[Vv]ariants?|[Ll]ectures?) \d+")
 _OPERATOR = re.compile(r"(?:^|\s)([+/]|-|\\frac|\\sqrt|\^ (?:T|\d|\{ - 1 \}))(?=\s|$)")
 
 
@@ -78,16 +82,15 @@ class Letters:
 
     def __init__(
         self,
-        worlds: Sequence[Callable[[np.random.Generator], Mapping[str, Any]]] = (),
-        said: Mapping[str, str] = MappingProxyType({}),
+        worlds: Sequence[str | Callable[[np.random.Generator], Mapping[str, Any]]] = (),
+        said: Mapping[str, Sequence[str]] = MappingProxyType({}),
         equals: Mapping[str, str] = MappingProxyType({}),
-        literals: Sequence[str] = (),
     ) -> None:
-        self.worlds = [[world(np.random.default_rng(seed)) for seed in _SEEDS] for world in worlds]
-        self.said = {normal(text): what for text, what in said.items()}
+        makers = [world(one) if isinstance(one, str) else one for one in worlds]
+        self.worlds = [[make(np.random.default_rng(seed)) for seed in _SEEDS] for make in makers]
+        self.said = {normal(text): what for what, texts in said.items() for text in texts}
         self.equals = {normal(text): f"{normal(text)} = {normal(other)}" for text, other in equals.items()}
-        self.literals = literals
-        self.labels = {text: what for text, what in said.items() if text.startswith("eq-")}
+        self.labels = {text: what for what, texts in said.items() for text in texts if text.startswith("eq-")}
         self.indices = {key for (first, *_) in self.worlds for key, value in first.items() if isinstance(value, range)}
 
     @property
@@ -155,9 +158,9 @@ class Letters:
             If it holds in none, and one can.
         """
         reasons: list[Exception] = []
-        for world in self.worlds:
+        for draws in self.worlds:
             try:
-                for letters in world:
+                for letters in draws:
                     holds(piece, letters)
                 return None
             except (Unread, Unverified) as reason:
@@ -215,7 +218,6 @@ def letters_of(page: Path) -> Letters:
         getattr(module, "LETTERS", ()),
         getattr(module, "SAID", {}),
         getattr(module, "EQUALS", {}),
-        getattr(module, "LITERALS", ()),
     )
 
 
@@ -268,6 +270,37 @@ def _texts(nodes: Iterable[ast.expr]) -> list[str]:
     return [one.value for one in nodes if isinstance(one, ast.Constant) and isinstance(one.value, str)]
 
 
+def typed_numbers(text: str) -> Iterator[str]:
+    """Yield the numbers typed in claims and captions of tables that their cell has nowhere else.
+
+    A number stands behind a digit as it is, as a share (95 %) or as a tolerance (12 digits, 1e-12);
+    what a formula or a name (variant 53) says is no number.
+    """
+    for code in cells(text):
+        captions = [word.value for call in calls(code, "table") for word in call.keywords if word.arg == "caption"]
+        sentences = [*captions, *(call.args[0] for call in calls(code, "claim", "agree"))]
+        typed = {_place(node) for sentence in sentences for node in ast.walk(sentence)}
+        constants = [node for node in ast.walk(ast.parse(code)) if isinstance(node, ast.Constant)]
+        known = [node.value for node in constants if isinstance(node.value, int | float) and _place(node) not in typed]
+        for number in _NUMBER.findall(_NO_NUMBER.sub(" ", "…".join(text for sentence in sentences for text in _typed(sentence)))):
+            value = float(number.replace(",", ""))
+            backing = [value, *([10.0**-value] if value < 300 else []), *([value / 100, 1 - value / 100] if value % 100 else [])]
+            if not any(np.isclose(one, abs(other), rtol=1e-9, atol=0) for one in backing for other in known):
+                yield number
+
+
+def _place(node: ast.AST) -> tuple[int, int]:
+    return getattr(node, "lineno", 0), getattr(node, "col_offset", 0)
+
+
+def _typed(sentence: ast.expr) -> Iterator[str]:
+    """The texts of a sentence without what is put in."""
+    values = {id(node) for field in ast.walk(sentence) if isinstance(field, ast.FormattedValue) for node in ast.walk(field)}
+    for node in ast.walk(sentence):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in values:
+            yield node.value
+
+
 def judged(page: Path, text: str | None = None) -> Iterator[tuple[Formula, list[Said]]]:
     """The formulas of a page, each with what its relations are; another text may take the place of the page's."""
     letters = letters_of(page)
@@ -275,14 +308,6 @@ def judged(page: Path, text: str | None = None) -> Iterator[tuple[Formula, list[
     elsewhere = outside_points(text)
     for formula in formulas(text):
         yield formula, letters.judge(formula, elsewhere)
-
-
-def unread(page: Path, text: str | None = None) -> list[str]:
-    """The relations in a page's sentences that none of its letters can read, so that nothing holds them."""
-    letters = letters_of(page)
-    text = page.read_text(encoding="utf-8") if text is None else text
-    sentences = [formula for formula in formulas(text) if formula.kind == "sentence"]
-    return [piece for formula in sentences for piece in letters.related(formula) if not letters.read(piece)]
 
 
 def outside_points(text: str) -> str:

@@ -1,22 +1,150 @@
-"""Numbers for the letters that the relations of many pages share: a run of a filter of the package on a random system."""
+r"""Numbers for the letters of a page: definitions in LaTeX, read by the reader that reads the page, and shared runs.
+
+A world is a text whose lines are done one after another::
+
+    \Psi, R: cov 2                     draw: cov n, any n m, eye n, pos (from .5 to 2), in a b, num, share n (sums to one)
+    k: range 0 4                       an index that runs
+    x: nodes \lambda \Psi              nodes of a normal law, and the operators \mathsf M and \mathsf D over it
+    K = \Psi G^T(G\Psi G^T+R)^{-1}      define, of letters that stand above
+    f(x) = \sin x                      define a function
+    \Psi_{k+1} = Ap_kA^T+Q             lines with an index follow each other for k = 0, 1, ...; \Psi_0 = P begins
+    c_j = \sum_i\mu_i\pi_{ij}           for each j of a range
+    again:                             what follows, down to `then:`, again and again until nothing changes
+    keep: K, p                         forget all other letters
+
+A page's relation must hold in a world with all its letters, so a world says things in another way than the page: an inverse for a
+gain, a sum or an integral for a closed form.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
+from itertools import groupby, product
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
+from gate.relation import Reader, keys_of
+from gate.tex import normal
+from gate.values import Indexed, Operator
 from kfcourse.filters import aof
 from kfcourse.filters.kalman import correct, predict
 from kfcourse.laws import Gaussian
 from kfcourse.linear.system import LinearSystem
 from kfcourse.montecarlo.ensemble import simulate
-from kfcourse.pages.reader import Indexed
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import linearised
+
+AGAIN = 5000  # rounds of what comes to rest; those of the pages take some hundred
+
+
+def world(text: str) -> Callable[[np.random.Generator], dict[str, Any]]:
+    """The letters of a text of definitions, drawn with a generator."""
+    lines = [line for line in (line.partition("#")[0].strip() for line in text.splitlines()) if line]
+
+    stepped = {line.partition("_{k+1}")[0] for line in lines if "_{k+1}" in line.partition("=")[0]}
+
+    def make(rng: np.random.Generator) -> dict[str, Any]:
+        letters: dict[str, Any] = {r"\operatorname{tr}": np.trace}
+        again = False
+        for kind, group in groupby(lines, lambda line: _kind(line, stepped)):
+            if kind in ("again", "then"):
+                again = kind == "again"
+            elif kind == "step":
+                _steps(letters, list(group))
+            elif kind == "start":
+                for left, _, right in (line.partition("=") for line in group):
+                    letters[left.strip().removesuffix("_0")] = Indexed({0: _computed(right, letters, {})})
+            elif kind == "once":
+                _define(letters, list(group), AGAIN if again else 1)
+            else:
+                for line in group:
+                    letters = _drawn(letters, rng, *line.rsplit(":", 1))
+        return letters
+
+    return make
+
+
+def _kind(line: str, stepped: set[str]) -> str:
+    left, equals, _ = line.partition("=")
+    if line in ("again:", "then:"):
+        return line[:-1]
+    if not equals or line.startswith("keep:"):
+        return "draw"
+    if left.strip().removesuffix("_0") in stepped and left.strip().endswith("_0"):
+        return "start"
+    return "step" if re.search(r"_(k|\{k\+1\})$", left.strip()) else "once"
+
+
+def _drawn(letters: dict[str, Any], rng: np.random.Generator, names: str, what: str) -> dict[str, Any]:
+    if names == "keep":
+        return {name.strip(): letters[name.strip()] for name in what.split(",")}
+    kind, *words = what.split()
+    if kind == "nodes":
+        x, mean = normal_nodes(*(float(_computed(word, letters, {})) for word in words))
+        spread = Operator(lambda values: mean(values**2) - mean(values) ** 2)
+        return letters | {names: x, r"\mathsf M": Operator(mean), r"\mathsf D": spread}
+    draw = {
+        "any": lambda *sizes: rng.normal(size=[int(size) for size in (*sizes, 1)[:2]]),
+        "cov": lambda size: covariance(rng, int(size)),
+        "eye": lambda size: np.eye(int(size)),
+        "in": lambda low, high: rng.uniform(float(low), float(high)),
+        "num": rng.normal,
+        "nums": lambda size: Indexed(rng.normal(size=int(size))),
+        "pos": lambda: rng.uniform(0.5, 2),
+        "range": lambda *ends: range(*map(int, ends)),
+        "share": lambda *sizes: Indexed(rng.dirichlet(np.ones(int(sizes[-1])), size=[int(size) for size in sizes[:-1]])),
+    }[kind]
+    return letters | {name.strip(): draw(*words) for name in names.split(",")}
+
+
+def _steps(letters: dict[str, Any], lines: list[str]) -> None:
+    for k in letters.get("k", range(5)):
+        for line in lines:
+            left, right = line.split("=", 1)
+            name, index = left.strip().rsplit("_", 1)
+            values = letters.setdefault(name, Indexed({})).values
+            values[k + ("+1" in index)] = _computed(right, letters, {"k": k})
+
+
+def _define(letters: dict[str, Any], lines: list[str], rounds: int) -> None:
+    before: list[Any] = []
+    for _ in range(rounds):
+        values = []
+        for line in lines:
+            made = _made(*line.split("=", 1), letters)
+            letters |= made
+            values += [np.array(value) for value in made.values() if not callable(value)]
+        if before and all(map(np.array_equal, values, before)):
+            return
+        before = values
+
+
+def _made(left: str, right: str, letters: Mapping[str, Any]) -> dict[str, Any]:
+    left = left.strip()
+    indices = re.fullmatch(r"(.+)_(?:\{(\w+)\}|(\w))", left)
+    if indices and all(isinstance(letters.get(index), range) for index in indices[2] or indices[3]):
+        names = indices[2] or indices[3]
+        own = dict(letters)
+        values = {at: _computed(right, own, dict(zip(names, at, strict=True)))
+                  for at in product(*(letters[index] for index in names))}  # fmt: skip
+        return {indices[1]: Indexed(lambda *at: values[at])}
+    if not (call := re.fullmatch(r"(.+?)\(([^()]*)\)", left)):
+        return {left: _computed(right, letters, {})}
+    own, arguments = dict(letters), [name.strip() for name in call[2].split(",")]
+    return {call[1]: lambda *given: _computed(right, own | dict(zip(arguments, given, strict=True)), {})}
+
+
+def _computed(text: str, letters: Mapping[str, Any], at: Mapping[str, Any]) -> Any:
+    reader = Reader(normal(text).split(), keys_of(letters), at)
+    value = reader.total()
+    if reader.next or reader.failed:
+        raise ValueError(f"cannot make {text}: {reader.failed or reader.text[reader.place :]}")
+    return value
+
 
 K_RANGE = range(1, 4)
 _STEPS = 5
