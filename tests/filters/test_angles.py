@@ -209,8 +209,8 @@ def test_designed_filters_too(scenes):
     plain, turned, x, y, other = scenes
     steps = len(y) - 1
     plain = radar(1)  # declared here too: the filters with three arguments take the innovation of an angle as regressor
-    here = design(designs_of(plain), ([Instant(x[k], y[k], x[k + 1])] for k in range(steps)))
-    there = design(designs_of(turned), ([Instant(-x[k], other[k], -x[k + 1])] for k in range(steps)))
+    here = design(designs_of(plain), (Instant(x[k], y[k], x[k + 1]) for k in range(steps)))
+    there = design(designs_of(turned), (Instant(-x[k], other[k], -x[k + 1]) for k in range(steps)))
     for one, two in zip(here, there, strict=True):
         # coefficients are regressions over 150 trajectories of states that hardly differ: some digits more are lost
         np.testing.assert_allclose(run(two, other[:-1]).mean, -run(one, y[:-1]).mean, atol=1e-2, err_msg=one.name)
@@ -328,7 +328,7 @@ def test_errors_of_a_comparison_go_the_short_way():
         s = linearised(model)
         return [kalman_filter(model), aof(s), duof(model), fos(s), mfos(s), fos(s, arguments=3)]
 
-    line, circle = (compare(filters(m), m, 2000, 30, seed=4, threads=1) for m in (phase([]), phase(["psi", "y"])))
+    line, circle = (compare(filters(m), m, 2000, 30, seed=4, jobs=1) for m in (phase([]), phase(["psi", "y"])))
     np.testing.assert_allclose(circle.error_variance("kalman").value, line.error_variance("kalman").value, rtol=1e-9)
     for name in circle.names:
         ratio = circle.error_variance(name).value / line.error_variance("kalman").value
@@ -440,9 +440,8 @@ def test_the_prediction_of_an_angle_is_as_wide_as_that_on_the_line(sd):
 def test_the_ensemble_is_drawn_on_the_circle():
     model = phase(["psi", "y"])
     ensemble = Ensemble(model, 200, 30, seed=1)
-    for block in ensemble.by_step():
-        for instant in block:
-            assert np.abs(instant.x[:, 0]).max() <= PI and np.abs(instant.x_next[:, 0]).max() <= PI
+    for instant in ensemble:
+        assert np.abs(instant.x[:, 0]).max() <= PI and np.abs(instant.x_next[:, 0]).max() <= PI
 
 
 def test_whole_numbers_are_not_cut_off():

@@ -358,7 +358,7 @@ def test_what_it_states_is_far_finer_than_what_trajectories_could_see(followed53
 @pytest.mark.parametrize("name", ["53", "2", "5", "7", "10"])
 def test_no_filter_beats_it(variants, name):
     model = variants[name]
-    result = compare(lab_filters(model, [*LAB, "aof-exact"]), model, 200, 8, seed=6, design_runs=20_000, slow_runs=200)
+    result = compare(lab_filters(model, [*LAB, "aof-exact"]), model, 200, 8, seed=6, design_runs=20_000)
     for other in LAB:
         excess = result.difference(other, "aof-exact")
         assert (excess.value >= -4 * excess.standard_error).all(), other

@@ -179,21 +179,11 @@ def test_trajectories_satisfy_the_equations_of_each_step():
         expected = A @ expected + B @ [0.2, -0.1] + a
 
 
-def test_blocks_and_steps_drawn_ahead_agree():
-    model = Changing.model()
-    ensemble = Ensemble(model, 40_000, STEPS, seed=2)  # two blocks
-    by_block = [list(ensemble.block(i)) for i in range(len(ensemble.sizes))]
-    for k, blocks in enumerate(ensemble.by_step()):
-        for i, instant in enumerate(blocks):
-            np.testing.assert_array_equal(instant.y, by_block[i][k].y)
-            np.testing.assert_array_equal(instant.x_next, by_block[i][k].x_next)
-
-
 def test_the_duof_of_the_growth_model_by_a_loop_of_hand():
     """Its prediction regresses x_{k+1} on a(z_k, m_v) of step k: a curved function, on which a wrong step is no other scale."""
     model = Model.define("0.5*x + 3*sin(x + 0.9*k) + v", "x + 0.1*k*x**2 + 0.5*w")
     x, y = (array[..., 0] for array in simulate(model, 50, 8, seed=6))
-    blocks = [[Instant(*(one[:, None] for one in step))] for step in zip(x[:-1], y[:-1], x[1:], strict=True)]
+    blocks = [Instant(*(one[:, None] for one in step)) for step in zip(x[:-1], y[:-1], x[1:], strict=True)]
     (filter_,) = design([duof(model)], blocks)
     found = run(filter_, y[:-1, :, None]).mean[..., 0]
     lam = np.zeros(50)
@@ -330,8 +320,8 @@ def test_the_growth_model_works_with_every_filter():
     filters = [aof(s), aof(unscented(model)), aof(g), iterated(s, 2), duof(model)]
     filters += [family(g, arguments) for family in (fos, mfos) for arguments in (2, 3)] + [fos(s), mfos(s)]
     filters += [pointmass(model), particle(model, 300)]
-    found = compare(filters, model, 2000, 20, seed=1, slow_runs=112, threads=1, progress=False)
-    assert not found.left_out and set(found.available) == {one.name for one in filters}
+    found = compare(filters, model, 112, 20, seed=1, jobs=1, progress=False)
+    assert not found.left_out and set(found.names) == {one.name for one in filters}
     extended, conditional = (found.error_variance(name).value.mean() for name in ("aof-linearised", "duof"))
     assert conditional < extended / 3  # the model's fame: linearising fails here
 
@@ -580,7 +570,7 @@ def test_where_there_is_no_closed_form_sampling_and_regressions_do(formula):
     expected = (weight @ grid) / weight.sum(axis=1)
     found = run(particle(model, 20_000), y[:, :20]).mean[0, :, 0]
     np.testing.assert_allclose(found, expected, atol=5 / np.sqrt(20_000 / 10))
-    fitted = design([duof(model)], Ensemble(model, 20_000, 1, seed=1).by_step())[0]
+    fitted = design([duof(model)], Ensemble(model, 20_000, 1, seed=1))[0]
     slope, offset = np.polyfit(y[0, :, 0], x[0, :, 0], 1)
     np.testing.assert_allclose(run(fitted, y).mean[0, :, 0], offset + slope * y[0, :, 0], rtol=1e-6, atol=1e-9)
 

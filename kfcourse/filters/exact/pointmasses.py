@@ -139,7 +139,7 @@ def pointmass(model: Model | JumpModel, accuracy: float = ACCURACY) -> Filter:
         raise ModelError("the exact filter over modes holds no state that is an angle; use particle(model)")
     exact = _Exact(model, printed(model), accuracy)
     back = exact.look_back if len(modes) == 1 else None
-    return Filter("aof-exact", modes[0], exact.init, exact.step, slow=True, evidence=_evidence, look_back=back)
+    return Filter("aof-exact", modes[0], exact.init, exact.step, evidence=_evidence, look_back=back)
 
 
 def _evidence(before: State, y: Array, after: State) -> Array:
