@@ -34,6 +34,7 @@ from kfcourse.montecarlo.slow_filters import LEAST, run_slow_filters
 from kfcourse.montecarlo.statistics import Sums
 from kfcourse.montecarlo.two_phase import Replicas
 from kfcourse.montecarlo.widths import best_width
+from kfcourse.symbolic.angular import warn_of_degrees
 from kfcourse.symbolic.compiled import REMEDY, is_scalar
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -99,6 +100,7 @@ def measurements(one: Filter, y: Array) -> Array:
     if (endless := np.isinf(y)).any():
         k, run, _ = np.argwhere(endless)[0]
         raise ValueError(f"the measurement of step {k}, run {run} is infinite; write NaN where one is missing")
+    warn_of_degrees("a measurement", y, one.model.measured, one.model.angles.y)
     return y
 
 
