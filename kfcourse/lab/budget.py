@@ -18,7 +18,7 @@ from typing import NamedTuple
 from kfcourse.filters import Design, Filter
 from kfcourse.filters.multiple_models import points_of
 from kfcourse.lab.checked_quadrature import Checked
-from kfcourse.lab.short_names import OF_BEST, JumpStructures, Structures
+from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures, Structures
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.quadrature import axes
@@ -59,7 +59,7 @@ def _work(one: Filter | Design, model: Model | JumpModel, designs: int) -> int:
         points = 5 ** axes(one.model)
     elif one.name == "aof-unscented":
         points = 2 * (n + max(len(one.model.v), len(one.model.w))) + 1  # fewer, where a noise is only added
-    elif one.name.endswith("-gaussian") or one.name in OF_BEST:
+    elif one.name.endswith("-gaussian") or (one.name in JUMP_FILTERS and JUMP_FILTERS[one.name].functions == "best"):
         found = (JumpStructures(model) if isinstance(model, JumpModel) else Structures(model)).quadrature
         points += found.points if isinstance(found, Checked) else 0
     return passes * modes * (n**2 + n * points)

@@ -31,7 +31,7 @@ from kfcourse.lab.report_modes import JumpReport
 from kfcourse.lab.report_plain import PlainReport
 from kfcourse.lab.report_sections import ROUNDING, StudentReport
 from kfcourse.lab.report_text import escape_tex, inline_html, inline_tex
-from kfcourse.lab.short_names import WITH_MODES, title
+from kfcourse.lab.short_names import JUMP_FILTERS, title
 from kfcourse.lab.variants import Variant
 from kfcourse.laws import CONFIDENCE
 from kfcourse.montecarlo.comparison import EXACT, Comparison
@@ -226,7 +226,11 @@ def recognised_modes(result: Comparison, filters: Sequence[Filter | Design]) -> 
         return None
     runs = min(result.runs, RECOGNISED)
     short = {EXACT} if result.slow_runs < runs // SLOW else set()
-    names = {name for name in result.available if name in WITH_MODES and name not in {*result.replaced, *short}}
+    names = {
+        name
+        for name in result.available
+        if name in JUMP_FILTERS and JUMP_FILTERS[name].modes and name not in {*result.replaced, *short}
+    }
     of_modes = [one for one in filters if isinstance(one, Filter) and one.name in names]
     return recognised(of_modes, model, runs, result.steps, result.seed) if of_modes else None
 
