@@ -3,10 +3,9 @@
     <letter>_<name>/statement.md    text, stubs and typed solution; Jinja fills in the variant
     <letter>_<name>/questions.py    `SET`: titles, levels, and the hidden arguments
                     keys.py         the right answers: plain functions with the student's names
-                    mistakes.py     the known mistakes and what is said of each; several mistakes_of_*.py if there are many
+                    mistakes.py     the known mistakes: edits of the keys, and what is said of each
                     companion.py    what the notebook itself imports, if it needs more than the package; never a key
     messages.py                     what is said of a mistake that is made in more than one place
-    follow_on.py                    the keys on top of a student's own earlier answers
     shared.py                       what the questions of several sets share
 
 A new folder is a new set: there is no list to add it to.  Only questions.py with its SET is looked for; a small set may hold its

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
-import sympy as sp
 
 from kfcourse.checks.exercises import COURSE, Exercise
-from kfcourse.checks.steps import STEP, Function, at_wrong_step
+from kfcourse.checks.steps import STEP, Function
 from kfcourse.laws import Array, transpose
-from kfcourse.scenarios.navigation import Dynamics
 
 Map = Callable[[Array], Array]
 
@@ -29,17 +26,6 @@ def covariance(rng: np.random.Generator, size: int, scale: float = 1.0) -> Array
     """A hidden covariance: correlated, and well away from singular."""
     root = np.eye(size) + 0.4 * rng.normal(size=(size, size))
     return scale * root @ root.T
-
-
-@lru_cache(maxsize=8)
-def vehicle(q: float) -> Dynamics:
-    """Position and velocity, white acceleration of the intensity q."""
-    return Dynamics(np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.0, q]))
-
-
-def substituted(formulas: sp.MatrixBase, names: tuple[sp.Symbol, ...]) -> Callable[..., sp.ImmutableMatrix]:
-    """The formulas as a function of other symbols in the place of these."""
-    return lambda *values: sp.ImmutableMatrix(formulas.xreplace(dict(zip(names, map(sp.sympify, values), strict=True))))
 
 
 # -- other functions than the variant's: where it is linear, or has a zero or a one, a mistake would not show
@@ -121,31 +107,3 @@ def predicted(exercise: Exercise, name: str, x: Array) -> Array:
     """What a filter may have predicted of x: near it, and biased a little."""
     spread = x.std(axis=0) + 0.1 * np.sqrt(np.diagonal(exercise.model.prior.cov))
     return x + spread * (0.1 + 0.5 * exercise.rng(name).normal(size=x.shape))
-
-
-# -- a wrong step, for known mistakes: the function of another step, at step k
-
-
-def first_step(function: Function, k: int) -> Function:
-    """That of step 0, whatever k is."""
-    return at_wrong_step(function, 0)
-
-
-def next_step(function: Function, k: int) -> Function:
-    """That of step k + 1."""
-    return at_wrong_step(function, k + 1)
-
-
-def step_before(function: Function, k: int) -> Function:
-    """That of step k - 1."""
-    return at_wrong_step(function, k - 1)
-
-
-def covariance_of(a: Array, b: Array) -> Array:
-    """Cross covariance of two samples (N, r), (N, s), over N."""
-    return (a - a.mean(axis=0)).T @ (b - b.mean(axis=0)) / len(a)
-
-
-def raw_moment(a: Array, b: Array) -> Array:
-    """The same about zero."""
-    return a.T @ b / len(a)

@@ -6,10 +6,6 @@ from kfcourse.lab import report
 from kfcourse.symbolic.model import Model
 
 
-def pytest_configure(config):
-    config.addinivalue_line("markers", "slow: dear, and seldom broken by a change; every night (`make nightly`)")
-
-
 @pytest.fixture(scope="session")
 def variant53() -> Model:
     """Variant 53 of the lab, both noises multiplicative."""

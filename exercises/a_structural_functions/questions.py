@@ -48,14 +48,14 @@ def constant(make: Make) -> ForVariant:
     return ForVariant(answer)
 
 
-def key(name: str, make: Make, side: str) -> ForVariant:
-    """The same for a key, with the student's own name and arguments."""
+def key(name: str, make: Make, side: str, step: Answer | None = None) -> ForVariant:
+    """The same for a key, with the student's own name and arguments, and the key on top of earlier answers."""
 
     def answer(exercise: Exercise) -> Answer:
         result = make(exercise)
         return (lambda z, p: result) if side == "object" else (lambda m, d: result)
 
-    return ForVariant(answer, name)
+    return ForVariant(answer, name, step)
 
 
 def right(kind: str, side: str) -> Make:
@@ -261,6 +261,12 @@ def unexplained(exercise: Exercise) -> Formula:
     return exercise.closed("gaussian")["R"]
 
 
+def unexplained_by(m: Formula, d: Formula) -> Formula:
+    """The same from the student's own F and G."""
+    _, G, F = (sp.Matrix([part]) for part in meter_gaussian(m, d))  # type: ignore[name-defined]  # noqa: F821
+    return F - G * sp.Matrix([d]) * G.T
+
+
 def _question(number: int, title: str, kind: str, side: str, mistakes: tuple[Mistake, ...], advice: str) -> Question:
     """A question for the functions of one kind and one side."""
     parts = ("tau", "Theta") if side == "object" else ("h", "G", "F")
@@ -349,7 +355,7 @@ QUESTIONS = (
         "a6",
         "what the state does not explain of the measurement",
         "stretch",
-        key("unexplained", unexplained, "meter"),
+        key("unexplained", unexplained, "meter", unexplained_by),
         lambda e: [symbols(e, "meter")],
         (
             Mistake(

@@ -121,6 +121,13 @@ WRONG_RUNS = edits(
     ),
     ("input-of-next-step", messages.INPUT_OF_NEXT_STEP, "at_step(predict, k)", "at_wrong_step(predict, k + 1)"),
     ("input-of-step-before", messages.INPUT_OF_STEP_BEFORE, "at_step(measure, k)", "at_wrong_step(measure, k - 1)"),
+    ("input-of-step-before", messages.INPUT_OF_STEP_BEFORE, "at_step(predict, k)", "at_wrong_step(predict, k - 1)"),
+    (
+        "steps-from-one",
+        messages.STEPS_FROM_ONE,
+        "at_step(measure, k), at_step(predict, k)",
+        "at_wrong_step(measure, k + 1), at_wrong_step(predict, k + 1)",
+    ),
 )
 
 KEPT, NOISE = "rest @ Psi @ transpose(rest)", "K @ R @ transpose(K)"

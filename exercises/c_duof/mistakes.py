@@ -121,6 +121,7 @@ WRONG_DUOF_RUNS = edits(
     ("innovation-sign", messages.INNOVATION_SIGN, "y[k] - b_k(other)", "b_k(other) - y[k]"),
     ("step-not-passed", messages.STEP_NOT_PASSED, "at_step(a, k), at_step(b, k)", "at_wrong_step(a, 0), at_wrong_step(b, 0)"),
     ("input-of-next-step", messages.INPUT_OF_NEXT_STEP, "at_step(a, k)", "at_wrong_step(a, k + 1)"),
+    ("input-of-step-before", messages.INPUT_OF_STEP_BEFORE, "at_step(b, k)", "at_wrong_step(b, k - 1)"),
     (
         "prediction-offset-not-used",
         "The offset g of the prediction is not used when the filter runs.",

@@ -14,12 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import Question, catalogue
+from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.exercises.f_exact.companion import Law, companion_numbers
-from kfcourse.exercises.f_exact.keys import correct, moments, nodes_needed, nodes_with, normalised, predict, run_filter
-from kfcourse.exercises.f_exact.mistakes_of_run import WRONG_NODES, WRONG_RUNS
-from kfcourse.exercises.f_exact.mistakes_of_step import WRONG_CORRECTIONS, WRONG_MOMENTS, WRONG_PREDICTIONS
+from kfcourse.exercises.f_exact.keys import correct, moments, nodes_needed, predict, run_filter
+from kfcourse.exercises.f_exact.mistakes import WRONG_CORRECTIONS, WRONG_MOMENTS, WRONG_NODES, WRONG_PREDICTIONS, WRONG_RUNS
 from kfcourse.laws import Array
 
 # -- hidden densities and laws
@@ -53,7 +52,7 @@ def hidden_law(exercise: Exercise, name: str) -> Law:
 def correction_arguments(exercise: Exercise) -> list[tuple]:
     """A hidden density and law, and two measurements."""
     x, see = nodes(), hidden_law(exercise, "f2")
-    predicted = normalised(hidden_density(exercise, "f2"), x)
+    predicted = moments(hidden_density(exercise, "f2"), x)[0]
     return [(predicted, float(y), x, see) for y in exercise.rng("f2-y").uniform([0.5, -1.2], [1.5, -0.4])]
 
 
@@ -63,7 +62,7 @@ def correction_arguments(exercise: Exercise) -> list[tuple]:
 def prediction_arguments(exercise: Exercise) -> list[tuple]:
     """A hidden density and law; and the density with part of its mass lost, as beyond the ends of a grid."""
     x = nodes()
-    posterior, law = normalised(hidden_density(exercise, "f3"), x), hidden_law(exercise, "f3")
+    posterior, law = moments(hidden_density(exercise, "f3"), x)[0], hidden_law(exercise, "f3")
     return [(posterior, x, law), (0.8 * posterior, x, law)]
 
 
@@ -75,7 +74,7 @@ def run_arguments(exercise: Exercise) -> list[tuple]:
     x, move, see = nodes(), hidden_law(exercise, "f4-move"), hidden_law(exercise, "f4-see")
     y = exercise.rng("f4-y").uniform(0.4, 1.4, 6) * [1, -1, 1, 1, -1, 1]
     gaps = np.where(np.arange(len(y)) == 3, np.nan, y)
-    return [(values, x, normalised(hidden_density(exercise, "f4"), x), move, see) for values in (y, gaps)]
+    return [(values, x, moments(hidden_density(exercise, "f4"), x)[0], move, see) for values in (y, gaps)]
 
 
 # -- f5: how many nodes
@@ -87,7 +86,7 @@ def nodes_arguments(exercise: Exercise) -> list[tuple]:
     for exponent, part in ((3, 0.3), (6, 0.7), (9, 0.4)):
         low, high, sigma = -rng.uniform(2, 5), rng.uniform(3, 7), rng.uniform(0.002, 0.01)
         error = 10 ** -rng.uniform(exponent, exponent + 1)
-        steps = nodes_with(rounded=lambda intervals: intervals, ends=0)(low, high, sigma, error)
+        steps = (high - low) / (np.pi * sigma * np.sqrt(2 / np.log(2 / error)))
         found.append((low, low + (high - low) * float((np.floor(steps) + part) / steps), sigma, error))
     return found
 
@@ -99,7 +98,7 @@ QUESTIONS = (
         "warm-up",
         moments,
         lambda e: [(hidden_density(e, "f1"), nodes())],
-        catalogue(WRONG_MOMENTS),
+        WRONG_MOMENTS,
         ("density", "mean", "variance"),
         advice="Try a density that is constant over a few nodes: its integral, mean and variance are known.",
     ),
@@ -109,7 +108,7 @@ QUESTIONS = (
         "core",
         correct,
         correction_arguments,
-        catalogue(WRONG_CORRECTIONS),
+        WRONG_CORRECTIONS,
         ("posterior", "density of y"),
         advice=(
             "Check that the posterior integrates to one, and that a measurement which tells nothing leaves "
@@ -122,7 +121,7 @@ QUESTIONS = (
         "core",
         predict,
         prediction_arguments,
-        catalogue(WRONG_PREDICTIONS),
+        WRONG_PREDICTIONS,
         advice=(
             "Look at one entry of your matrix: from which node to which does it lead, and whose mean and variance stand in it?"
         ),
@@ -133,7 +132,7 @@ QUESTIONS = (
         "core",
         run_filter,
         run_arguments,
-        catalogue(WRONG_RUNS),
+        WRONG_RUNS,
         ("z", "p", "ln p(y)"),
         advice=(
             "Write the law before and after each measurement for the first two steps, and for a step without any measurement."
@@ -145,7 +144,7 @@ QUESTIONS = (
         "stretch",
         nodes_needed,
         nodes_arguments,
-        catalogue(WRONG_NODES),
+        WRONG_NODES,
         advice=(
             "Draw three intervals and count their nodes. Then solve the bound for the distance once more, "
             "taking logarithms of both sides."

@@ -11,19 +11,20 @@ from pathlib import Path
 import numpy as np
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import Question, catalogue
+from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.checks.steps import at_step
 from kfcourse.exercises.g_extended.hidden import RUNS, STEPS, cases, changing, curved, hidden_law, root
 from kfcourse.exercises.g_extended.keys import bounds, consistency, correct, information, jacobian, predict, run_filter
-from kfcourse.exercises.g_extended.mistakes_of_consistency import WRONG_BOUNDS, WRONG_NORMALISED
-from kfcourse.exercises.g_extended.mistakes_of_filter import (
+from kfcourse.exercises.g_extended.mistakes import (
+    WRONG_BOUNDS,
     WRONG_CORRECTIONS,
     WRONG_INFORMATION,
     WRONG_JACOBIANS,
+    WRONG_NORMALISED,
     WRONG_PREDICTIONS,
+    WRONG_RUNS,
 )
-from kfcourse.exercises.g_extended.mistakes_of_run import WRONG_RUNS
 from kfcourse.exercises.shared import covariance
 from kfcourse.laws import apply
 
@@ -127,7 +128,7 @@ QUESTIONS = (
         "warm-up",
         jacobian,
         jacobian_arguments,
-        catalogue(WRONG_JACOBIANS),
+        WRONG_JACOBIANS,
         tolerance=1e-8,
         advice=(
             "Try it on a linear function, whose derivative you know, and on a quadratic one: for both, "
@@ -141,7 +142,7 @@ QUESTIONS = (
         "warm-up",
         bounds,
         bounds_arguments,
-        catalogue(WRONG_BOUNDS),
+        WRONG_BOUNDS,
         ("low", "high"),
         advice=(
             "What is the law of the sum? Then of the mean? For many runs the bounds must close in on the degrees of freedom."
@@ -153,7 +154,7 @@ QUESTIONS = (
         "core",
         predict,
         prediction_arguments,
-        catalogue(WRONG_PREDICTIONS),
+        WRONG_PREDICTIONS,
         ("lam", "Psi"),
         advice="Say of each function at which point it is taken, and check with a linear model and no noise.",
         axes=("trajectory",),
@@ -164,7 +165,7 @@ QUESTIONS = (
         "core",
         correct,
         correction_arguments,
-        catalogue(WRONG_CORRECTIONS),
+        WRONG_CORRECTIONS,
         TWO,
         advice=(
             "Try two cases: y equal to what was expected, and a meter that tells nothing. Then look at "
@@ -178,7 +179,7 @@ QUESTIONS = (
         "core",
         run_filter,
         run_arguments,
-        catalogue(WRONG_RUNS),
+        WRONG_RUNS,
         ("z", "p", "lam", "Psi"),
         advice="Follow the first two steps by hand: which law is compared with y_0, and which with y_1?",
         axes=(
@@ -192,7 +193,7 @@ QUESTIONS = (
         "core",
         consistency,
         normalised_arguments,
-        catalogue(WRONG_NORMALISED),
+        WRONG_NORMALISED,
         ("NEES", "NIS"),
         advice=(
             "For each of the two: which error, and the covariance of that very error? For a right filter the means are n and p."
@@ -205,7 +206,7 @@ QUESTIONS = (
         "stretch",
         information,
         information_arguments,
-        catalogue(WRONG_INFORMATION),
+        WRONG_INFORMATION,
         ("p", "K"),
         advice="Compare with the gain form for one component by hand: which inverses are there, and of what?",
         axes=("trajectory",),

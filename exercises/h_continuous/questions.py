@@ -12,11 +12,17 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.checks.exercises import Exercise
-from kfcourse.checks.question import Question, catalogue
+from kfcourse.checks.question import Question
 from kfcourse.checks.registry import ExerciseSet
 from kfcourse.exercises.h_continuous.keys import derivatives, filter_step, noise_variances, riccati, simulate_step, steady_state
-from kfcourse.exercises.h_continuous.mistakes_of_filter import WRONG_DERIVATIVES, WRONG_RATES, WRONG_STEADY, WRONG_STEPS
-from kfcourse.exercises.h_continuous.mistakes_of_simulation import WRONG_SIMULATIONS, WRONG_VARIANCES
+from kfcourse.exercises.h_continuous.mistakes import (
+    WRONG_DERIVATIVES,
+    WRONG_RATES,
+    WRONG_SIMULATIONS,
+    WRONG_STEADY,
+    WRONG_STEPS,
+    WRONG_VARIANCES,
+)
 from kfcourse.exercises.shared import Map, covariance
 
 RUNS = 6
@@ -121,7 +127,7 @@ QUESTIONS = (
         "warm-up",
         noise_variances,
         variances_arguments,
-        catalogue(WRONG_VARIANCES),
+        WRONG_VARIANCES,
         ("D_xi", "D_n"),
         advice="Check the units, and what becomes of the mean when the step is longer.",
     ),
@@ -131,7 +137,7 @@ QUESTIONS = (
         "core",
         simulate_step,
         simulation_arguments,
-        catalogue(WRONG_SIMULATIONS),
+        WRONG_SIMULATIONS,
         ("x_next", "y"),
         advice=(
             "Check the variances: after a step without drift that of the state grows in proportion to T, that of y falls with T."
@@ -144,7 +150,7 @@ QUESTIONS = (
         "core",
         riccati,
         rate_arguments,
-        catalogue(WRONG_RATES),
+        WRONG_RATES,
         advice=(
             "Try one component: the equation of the chapter has three terms. Then ask for each product of "
             "matrices whether it is symmetric."
@@ -156,7 +162,7 @@ QUESTIONS = (
         "core",
         steady_state,
         steady_arguments,
-        catalogue(WRONG_STEADY),
+        WRONG_STEADY,
         ("D", "K"),
         advice=(
             "Put your D into the Riccati equation: is the derivative zero? Then let the meter become "
@@ -169,7 +175,7 @@ QUESTIONS = (
         "core",
         filter_step,
         step_arguments,
-        catalogue(WRONG_STEPS),
+        WRONG_STEPS,
         ("z", "D"),
         advice=("Leave out the noises, then the meter: what remains must be the plain equation x' = f(x) and its variance."),
         axes=("trajectory",),
@@ -180,7 +186,7 @@ QUESTIONS = (
         "stretch",
         derivatives,
         derivatives_arguments,
-        catalogue(WRONG_DERIVATIVES),
+        WRONG_DERIVATIVES,
         ("u", "U"),
         advice="Differentiate F as a product; S and its derivatives are functions of x, y is not.",
     ),

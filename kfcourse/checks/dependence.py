@@ -89,27 +89,19 @@ class Sensitivity:
     def unused(self, part: int) -> list[str]:
         """Arguments that the part should depend on and does not."""
         found = [name for name, right, mine in self._table if right[part] and not mine[part]]
-        return [name for name in found if name not in self.spare and not self._jumps(name, part, 1)]
+        return [name for name in found if name not in self.spare and not self._jumps(name, part)]
 
-    def superfluous(self, part: int) -> list[str]:
-        """Arguments that it depends on and should not, as another part does.
-
-        An argument that changes no result of the right answer may stand in its formula all the same, and cancel there.
-        """
-        found = [name for name, right, mine in self._table if mine[part] and any(right) and not right[part]]
-        return [name for name in found if name not in self.spare and not self._jumps(name, part, 0)]
-
-    def _jumps(self, name: str, part: int, side: int) -> bool:
-        """Whether the right answer (0) or the student's (1) changes if an argument is five times as large, or reversed.
+    def _jumps(self, name: str, part: int) -> bool:
+        """Whether the student's answer changes if an argument is five times as large, or reversed.
 
         What is counted or rounded does not feel a small change, a median no factor; they depend on the argument all the same.
         """
         place = list(self.names).index(name)
-        called = [
-            self.called(place, change) for change in (lambda value: scaled(value, 5.0), lambda value: changed(value, np.flip))
-        ]
+        found = [self.called(place, lambda value: scaled(value, 5.0)), self.called(place, lambda value: changed(value, np.flip))]
         return any(
-            not same(new[side][part], old[side][part]) for found in called for new, old in zip(found, self.results, strict=False)
+            not same(mine[part], before[part])
+            for called in found
+            for (_, mine), (_, before) in zip(called, self.results, strict=False)
         )
 
 

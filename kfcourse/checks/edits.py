@@ -88,6 +88,11 @@ def pieces(key: Answer) -> dict[str, FunctionType]:
     return found
 
 
+def uses(key: Answer) -> set[str]:
+    """Names that the key and what it calls use, also of functions that are put in only later."""
+    return {name for function in pieces(key).values() for name in _names(function.__code__)}
+
+
 def _names(code: CodeType) -> list[str]:
     inner = [name for part in code.co_consts if isinstance(part, CodeType) for name in _names(part)]
     return [*code.co_names, *inner]

@@ -22,7 +22,7 @@ import sympy as sp
 from kfcourse.checks.case import Agree
 from kfcourse.checks.derived import Derivation
 from kfcourse.checks.diagnosis import GENERAL, Wrong, part_of
-from kfcourse.checks.edits import pieces, rebound
+from kfcourse.checks.edits import rebound, uses
 from kfcourse.checks.equality import Places, Unusable, depends, equal, like, with_values
 from kfcourse.checks.question import (
     MISSING,
@@ -32,6 +32,7 @@ from kfcourse.checks.question import (
     WRONG,
     Answer,
     Attempts,
+    ForVariant,
     Mistake,
     Question,
     Result,
@@ -310,14 +311,16 @@ class _Check:
 
     def _follows(self, found: list[Any]) -> tuple[str, ...]:
         """Earlier questions on whose wrong answers this one is right: all of them, or one."""
-        if isinstance(self.question, Derivation):
+        key = self.question.key
+        key = key.step if isinstance(key, ForVariant) else key
+        if key is None:
             return ()
         earlier = {one.function: one for one in self.exercise.questions.values() if one.name in self.past.wrong}
-        own = [function for function in pieces(self.posed.key) if function in earlier]
+        own = [function for function in earlier if function in uses(key)]
         for chosen in ([own] if len(own) > 1 else []) + [[one] for one in own]:
             try:
                 answers = {function: self._in_form(earlier[function]) for function in chosen}
-                step = rebound(self.posed.key, answers)
+                step = rebound(key, answers)
                 with time_limit(self.seconds):
                     theirs = [
                         like(step(*copy.deepcopy(values)), wanted)

@@ -21,11 +21,12 @@ Answer = Callable[..., Any]
 class ForVariant(NamedTuple):
     """An answer that is another function for every variant: Exercise -> function.
 
-    `name` is that of the student's function, if it is a key.
+    `name` is that of the student's function, if it is a key; `step` the answer made of earlier answers, which it calls.
     """
 
     make: Callable[[Exercise], Answer]
     name: str = ""
+    step: Answer | None = None
 
 
 def answer_for(exercise: Exercise, answer: Answer | ForVariant) -> Answer:

@@ -39,12 +39,11 @@ class Checked(NamedTuple):
     """Structures by quadrature, of each mode one; where a mode has formulas they are these.
 
     They are named "gaussian", as what they compute is; `order` is their number of points an axis,
-    `points` that of all, `apart` the largest difference that the pilot found, in the measure of `CLOSE`.
+    `apart` the largest difference that the pilot found, in the measure of `CLOSE`.
     """
 
     structures: list[Structure]
     order: int
-    points: int
     apart: float
 
     @property
@@ -81,7 +80,7 @@ def of_checked_order(model: Model | JumpModel, why: NoClosedForm) -> Checked:
             continue
         if apart <= CLOSE:
             whole = [structure or coarse[j] for j, structure in enumerate(structures)]
-            return Checked(whole, order, points, apart)
+            return Checked(whole, order, apart)
         error = f"by {100 * apart:.2g} %" if apart < 1 else "without bound"
         found = f"; Gauss-Hermite quadrature with {order} points an axis still errs {error} on the laws that occur"
     raise NoClosedForm(f"{why}{found}", why.kind, **why.parts)

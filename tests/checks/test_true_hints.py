@@ -77,12 +77,6 @@ def test_roots_and_squares_are_not_always_deviations(name, answer):
     assert result.diagnosis == (name,) and "of what it should be, as a" in result.message
 
 
-def test_entries_in_the_reverse_order_are_no_complement():
-    row = asks(lambda z: sp.Matrix([[1, 0]]), [(z,)])
-    assert outcome(row, lambda z: sp.Matrix([[0, 1]])).diagnosis == ("reversed",)
-    assert outcome(asks(lambda z: sp.Matrix([z, c]), [(z,)]), lambda z: sp.Matrix([c, z])).diagnosis == ("reversed",)
-
-
 def test_what_is_rounded_up_depends_on_its_arguments():
     question = asks(lambda a, n: np.ceil(3 * a) + n, [(2.2, 1), (3.1, 4)])
     assert "unused" not in outcome(question, lambda a, n: np.ceil(0.03 * a) + n).diagnosis
@@ -108,24 +102,6 @@ def test_what_was_done_to_the_right_result_is_said(name, words, answer):
     assert result.diagnosis == (name,) and words in result.message, result
 
 
-def test_the_diagonal_of_a_matrix_may_be_all_that_is_wrong():
-    question = asks(lambda z: sp.Matrix([[z, p], [p, c]]), [(z,)])
-    assert outcome(question, lambda z: sp.Matrix([[z, p], [p, c]]) + sp.eye(2) * e).diagnosis != ()
-    assert outcome(question, lambda z: sp.Matrix([[z * c, p], [p, c * z]])).diagnosis == ("diagonal",)
-
-
-def test_a_factor_of_results_may_cancel():
-    def law(a):
-        return a**2 + 1, a**2 + 2
-
-    def right(a, law):
-        return law(a)[0] / np.linalg.norm(law(a)[0]), law(a)[0].sum()
-
-    question = asks(right, [(MANY, law)], parts=("direction", "sum"))
-    answer = outcome(question, lambda a, law: (right(a, law)[0] ** 2 + np.sinh(law(a)[1]), right(a, law)[1]))
-    assert "superfluous" not in answer.diagnosis
-
-
 def test_where_nothing_has_come_yet_everything_is_right():
     question = asks(lambda a, now: a + (now > 1) * a**2, [(MANY, 2.0), (MORE, 3.0)])
     assert "`now`" not in outcome(question, lambda a, now: a + (now > 1) * a**3).message
@@ -142,8 +118,6 @@ def test_terms_in_another_form_are_not_called_wrong():
 @pytest.mark.parametrize(
     ("name", "words", "answer"),
     [
-        ("derivative", "the derivative of what should be there by z", lambda z, p: (-e * sp.sin(z), p * z)),
-        ("not-differentiated", "still to be differentiated by z", lambda z, p: (e * sp.sin(z), p * z)),
         ("factor-of", "a factor that depends on z only", lambda z, p: (e * sp.cos(z) * (2 + z**2), p * z)),
         ("term-of", "a term that depends on z only", lambda z, p: (e * sp.cos(z) + sp.exp(z), p * z)),
         ("factor-of", "a factor that is a number", lambda z, p: (3 * e * sp.cos(z), p * z)),

@@ -14,7 +14,7 @@ c, e, g, f = sp.symbols("c e g f", real=True)
 
 def about(values=(), **more):
     """An exercise about a model of these values."""
-    return SimpleNamespace(model=SimpleNamespace(values=dict(values)), places=(), posed={}, **more)
+    return SimpleNamespace(model=SimpleNamespace(values=dict(values)), places=(), posed={}, **{"questions": {}} | more)
 
 
 NOTHING = about()

@@ -1,50 +1,47 @@
-"""A right step on top of a student's own wrong one is marked and said; the keys of follow_on.py are the keys."""
+"""A right step on top of a student's own wrong one is marked and said: keys call earlier answers by their names."""
 
 import numpy as np
 import pytest
 
-from kfcourse.checks import exercise, sets
-from kfcourse.checks.question import answer_for
+from kfcourse.checks import Derivation, exercise, sets
+from kfcourse.checks.edits import rebound, uses
+from kfcourse.checks.question import ForVariant
 
 FOLLOWING = [
-    pytest.param(letter, question.name, id=question.name)
+    pytest.param(letter, question, step, earlier, id=f"{question.name}-{earlier.name}")
     for letter, one in sets().items()
     for question in one.questions
-    if question.on is not None
+    if (step := question.key.step if isinstance(question.key, ForVariant) else question.key)
+    for earlier in one.questions
+    if earlier.name < question.name and earlier.function in uses(step) and not isinstance(question, Derivation)
 ]
 
 
-@pytest.mark.parametrize(("letter", "name"), FOLLOWING)
-def test_on_top_of_a_wrong_answer_the_right_step_follows(letter, name):
+def test_these_steps_stand_on_earlier_ones():
+    names = {row.values[1].name for row in FOLLOWING}
+    assert {"a6", "b2", "b3", "b4", "b5", "c3", "c4", "d2", "d3", "f4", "g5", "i2", "k4", "l5", "m5", "o3", "o6"} <= names
+
+
+@pytest.mark.parametrize(("letter", "question", "step", "earlier"), FOLLOWING)
+def test_on_top_of_a_wrong_answer_the_right_step_follows(letter, question, step, earlier):
     """Each known mistake of an earlier question in turn, until one changes the result: on that, the step is marked as right."""
     task = exercise(letter, "21")
-    question = task.questions[name]
-    earlier = {one.function: one for one in task.questions.values() if one.name < name}
-    below = [earlier[function] for function in question.on.__annotations__ if function in earlier]
-    assert below
-    for one in below:
-        for mistake in one.mistakes:
-            try:
-                wrong = mistake.answer(task)
-                built = answer_for(task, question.on(**{one.function: wrong}))
-                task.check(one.name, wrong)
-                result = task.check(name, built)
-            except ValueError:  # a mistake that this variant does not allow
-                continue
-            if one.name in task.past.wrong and result.follows:
-                assert result.follows == (one.name,)
-                assert (result.status, result.diagnosis) == ("wrong", ("follows",))
-                break
-        else:
-            pytest.fail(f"no mistake of {one.name} changes {name}")
-        task.check(one.name, one.answer(task))
-        assert not task.check(name, built).follows  # the step before is right now
-
-
-@pytest.mark.parametrize(("letter", "name"), [row for row in FOLLOWING if row.id != "a6"])
-def test_nothing_wrong_below_is_the_key(letter, name):
-    task = exercise(letter, "20")
-    assert task.check(name, task.questions[name].on()).passed
+    for mistake in earlier.mistakes:
+        try:
+            wrong = mistake.answer(task)
+        except ValueError:  # a mistake that this variant does not allow
+            continue
+        task.check(earlier.name, wrong)
+        built = rebound(step, {earlier.function: wrong})
+        result = task.check(question.name, built)
+        if earlier.name in task.past.wrong and result.follows:
+            assert result.follows == (earlier.name,)
+            assert (result.status, result.diagnosis) == ("wrong", ("follows",))
+            break
+    else:
+        pytest.fail(f"no mistake of {earlier.name} changes {question.name}")
+    task.check(earlier.name, earlier.answer(task))
+    assert not task.check(question.name, built).follows  # the step before is right now
 
 
 def test_a_step_with_a_wrong_gain_in_words():

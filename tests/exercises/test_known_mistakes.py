@@ -1,6 +1,8 @@
 """Every answer of every set passes, every known mistake is recognised by its name, and no message gives an answer away."""
 
 import ast
+import datetime
+import os
 import random
 from collections import Counter
 from functools import cache
@@ -16,14 +18,17 @@ from kfcourse.lab.variants import load_variants
 # two draws of them.  So are those of sets f and g, g's in the dimensions of the variant: a variant for each of them.
 MODELS = ("53", "7", "9", "12", "20", "21")
 DRAWS = ("53", "21")
+# Each question in one of its variants, in another one every week.
+WEEK = datetime.date.today().toordinal() // 7
 HIDDEN = {"f": DRAWS, "g": ("53", "12", "20", "21")} | {letter: DRAWS for letter, one in sets().items() if not one.about_variant}
 
 QUESTIONS = [pytest.param(letter, question, id=question.name) for letter, one in sets().items() for question in one.questions]
 CASES = [
     pytest.param(letter, question, variant, id=f"{question.name}-{variant}")
     for letter, one in sets().items()
-    for question in one.questions
-    for variant in HIDDEN.get(letter, MODELS)
+    for number, question in enumerate(one.questions)
+    for variants in [HIDDEN.get(letter, MODELS)]
+    for variant in ([variants[(WEEK + number) % len(variants)]] if not os.environ.get("KFCOURSE_ALL") else variants)
 ]
 
 
@@ -83,7 +88,8 @@ def test_hidden_arguments_tell_every_mistake_apart_in_every_variant(letter):
     Set a is called with the model's own formulas: where those are linear, the tangent is exact.
     """
     equal = set()
-    for name in load_variants():
+    names = sorted(load_variants())
+    for name in names if os.environ.get("KFCOURSE_ALL") else names[WEEK % 6 :: 6]:
         try:
             lab = opened(letter, name)
         except ExerciseError:

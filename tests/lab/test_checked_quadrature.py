@@ -138,9 +138,7 @@ def test_the_order_is_the_first_that_does():
 def test_a_comparison_by_a_higher_order_is_the_same():
     """What the comparison sees of the order: no more than CLOSE allows, 2e-4 of the error variance."""
     structures = [replace(gauss_hermite(CUBIC, order), name=f"gh{order}") for order in (checked(CUBIC).order, 100)]
-    result = compare(
-        [family(one) for family in (aof, fos) for one in structures], CUBIC, 4000, 8, 1, threads=1, progress=False, wide=1
-    )
+    result = compare([family(one) for family in (aof, fos) for one in structures], CUBIC, 4000, 8, 1, jobs=1, progress=False)
     for family in ("aof", "fos"):
         one, other = (result.error_variance(f"{family}-{structure.name}").value for structure in structures)
         np.testing.assert_allclose(one, other, rtol=2e-4)
@@ -204,7 +202,7 @@ def test_the_lab_says_so_in_its_reports(tmp_path, monkeypatch, meter, more, name
     monkeypatch.chdir(tmp_path)
     text = f'[variants.c]\nstate = "x/(1 + x**2) + v"\nmeter = "{meter}"\n{more}'
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
-    call = ["lab", "c", "--variants", "mine.toml", "--runs", "300", "--steps", "4", "--slow-runs", "0", "--designs", "1"]
+    call = ["lab", "c", "--variants", "mine.toml", "--runs", "300", "--steps", "4"]
     result = CliRunner().invoke(main, [*call, "--report", language, "--out", "r", "--json", "r.json"])
     assert result.exit_code == 0, result.output
     told = next(line for line in result.output.splitlines() if "no closed form: means over normal laws by Gauss-Hermite" in line)

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from kfcourse import JumpModel, cli, load_variants, simulate
-from kfcourse.filters import jump_pointmass, logic_dynamic
+from kfcourse.filters import logic_dynamic, pointmass
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import JUMP_LAB, JumpStructures, title
 from kfcourse.lab.variants import VariantError, chosen_variants, find_variant, read_variants, summary
@@ -71,7 +71,7 @@ def test_the_published_model_has_the_law_of_its_modes():
 
 
 def test_the_lab_compares_filters_and_tells_the_share_of_right_modes(tmp_path, own):
-    few = ("--runs", 2000, "--steps", 6, "--slow-runs", 112, "--designs", 1)
+    few = ("--runs", 2000, "--steps", 6)
     result = kfcourse("lab", "mine", "--variants", own, *few, "--out", tmp_path / "r", "--json", tmp_path / "n.json")
     assert result.exit_code == 0, result.output
     for name in JUMP_LAB:
@@ -160,7 +160,7 @@ def test_a_wrong_table_is_refused_with_its_name(tmp_path, change, message):
 def test_the_share_of_right_modes_is_that_of_the_trajectories():
     model = JUMPS["J1-lasting"].model
     one = logic_dynamic(JumpStructures(model).gaussian, model.transition_at, model.first)
-    found = recognised([one, jump_pointmass(model)], model, 160, 8, 4)
+    found = recognised([one, pointmass(model)], model, 160, 8, 4)
     _, y, mode = simulate(model, 160, 8, 4)
     state, right = one.init(160), []
     for k in range(8):
