@@ -80,7 +80,6 @@ figure: install
 benchmark: install
 	$(BIN)/python benchmarks/engine.py
 	$(BIN)/python benchmarks/exact.py
-	$(BIN)/python benchmarks/cores.py
 	$(BIN)/python benchmarks/looking_back.py
 	$(BIN)/python benchmarks/jumps.py
 

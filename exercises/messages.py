@@ -1,6 +1,7 @@
 """What is said of a mistake that is made in more than one place; what belongs to one question only stands in its set.
 
-A catalogue's row is name, what to say, wrong answer: `("innovation-sign", messages.INNOVATION_SIGN, correction_with(sign=-1))`.
+A row of a catalogue is name, what to say, old text and new text:
+`("innovation-sign", messages.INNOVATION_SIGN, "y - h", "h - y")`.
 A message names the kind of mistake and never the answer, and it is right in every question in which it is used.
 """
 
@@ -31,12 +32,8 @@ COVARIANCE_KEPT = "The covariance is that of the prediction: a measurement must 
 COVARIANCE_ADDED = "The covariance grows: what the measurement explains is subtracted."
 INFORMATION_FOR_COVARIANCE = "That is the information, not the covariance: invert the sum."
 GAIN_BY_NOISE_ALONE = "The gain is divided by the meter's noise alone; the prediction's error belongs to the innovation too."
-SHARE_ONLY = "That is the share that remains, without units; multiply the covariance of the prediction by it."
 NOISE_INHERITED = "The estimate inherits noise from the measurement through the gain: a term is missing."
-EXPECTED_ADDED = "What was expected is added to the measurement; subtract it."
-EXPLAINED_ONLY = "That is what the measurement explains; subtract it from the covariance of the prediction."
 STATE_FOR_EXPECTED = "The prediction of the state is subtracted; what is expected of y is what the meter makes of it."
-NOISE_BY_DEVIATION = "A standard deviation stands where the covariance of the meter's noise belongs."
 NOISE_SQUARED = "The covariance of the meter's noise enters squared."
 GAIN_MULTIPLIED = "The gain is multiplied by the covariance of the innovation; it is divided by it."
 ONE_COVARIANCE_TOO_MANY = "A covariance is added that the prediction's function has taken into account already."
@@ -45,8 +42,6 @@ CORRECTION_SUBTRACTED = "The correction is subtracted; it is added to the predic
 
 # -- regressions
 
-OFFSET_SIGN = "What the matrix makes of the regressor's mean enters the offset with the wrong sign."
-EXPLAINED_ADDED = "What the regression explains is added; it is subtracted from the covariance of the target."
 UNBIASED_RESIDUAL = "What is left is divided by N - 1, at least in part; use 1/N throughout."
 ERROR_FOR_RESIDUAL = "That is the covariance of x - z; what the regression leaves of x is asked for."
 SCALE_FORGOTTEN = "The matrix Gamma is missing: the regression changes the scale too, not only the offset."
@@ -75,12 +70,7 @@ PROCESS_ONE_SIDED = "The density of the process noise is one-sided; its intensit
 METER_ONE_SIDED = "The density of the meter's noise is one-sided; its intensity is not the whole of it."
 GAIN_ONE_SIDED = "The gain is divided by the one-sided density; the intensity belongs there."
 DISCRETE_GAIN = "That is the gain of a discrete filter; beside the noise of an instant the state's part is negligible."
-GAIN_WITHOUT_SLOPE = "The slope of the signal is missing in the gain."
-NOISE_SIGN = "The noise of the process is subtracted; it makes the covariance larger."
 RICCATI_SIGN = "The sign of the last term: what is measured makes D smaller."
-PROCESS_NOISE_FORGOTTEN = "The noise of the process is missing."
-NOISE_POWER = "The factor of the noise enters the equation of the variance squared."
-SLOPE_POWER = "The slope of the signal enters the equation of the variance squared."
 
 # -- motion, radar, navigation
 

@@ -10,7 +10,7 @@ import click
 
 from kfcourse.files import save
 from kfcourse.lab.variants import RUNS, read_tables, read_variants, summary
-from kfcourse.montecarlo.batches import FEWEST
+from kfcourse.montecarlo import FEWEST
 from kfcourse.montecarlo.parallel import cores
 
 VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")

@@ -2,7 +2,8 @@ r"""Numbers for the letters of a page: definitions in LaTeX, read by the reader 
 
 A world is a text whose lines are done one after another::
 
-    \Psi, R: cov 2                     draw: cov n, any n m, eye n, pos (from .5 to 2), in a b, num, share n (sums to one)
+    \Psi, R: cov 2                     draw: cov n, any n m, eye n, pos (from .5 to 2), in a b, num,
+                                       nums n [plain], share n (they sum to one), list n any m
     k: range 0 4                       an index that runs
     x: nodes \lambda \Psi              nodes of a normal law, and the operators \mathsf M and \mathsf D over it
     K = \Psi G^T(G\Psi G^T+R)^{-1}      define, of letters that stand above
@@ -93,13 +94,18 @@ def _drawn(letters: dict[str, Any], rng: np.random.Generator, names: str, what: 
         x, mean = normal_nodes(*(float(_computed(word, letters, {})) for word in words))
         spread = Operator(lambda values: mean(values**2) - mean(values) ** 2)
         return letters | {names: x, r"\mathsf M": Operator(mean), r"\mathsf D": spread}
+    if kind == "list":
+        count, *each = words
+        return letters | {
+            name: Indexed([_drawn({}, rng, "", " ".join(each))[""] for _ in range(int(count))]) for name in names.split(", ")
+        }
     draw = {
         "any": lambda *sizes: rng.normal(size=[int(size) for size in (*sizes, 1)[:2]]),
         "cov": lambda size: covariance(rng, int(size)),
         "eye": lambda size: np.eye(int(size)),
         "in": lambda low, high: rng.uniform(float(low), float(high)),
         "num": rng.normal,
-        "nums": lambda size: Indexed(rng.normal(size=int(size))),
+        "nums": lambda size, *plain: Indexed(rng.normal(size=int(size)), rng.normal() if plain else None),
         "pos": lambda: rng.uniform(0.5, 2),
         "range": lambda *ends: range(*map(int, ends)),
         "share": lambda *sizes: Indexed(rng.dirichlet(np.ones(int(sizes[-1])), size=[int(size) for size in sizes[:-1]])),
@@ -137,7 +143,13 @@ def _made(left: str, right: str, letters: Mapping[str, Any]) -> dict[str, Any]:
         names = moved.removeprefix(" of ").split(", ")
         if not moved:
             return {name: _computed(right, own, {})}
-        return {name: Of(lambda *given: _computed(right, own | dict(zip(names, given, strict=True)), {}), *names)}
+        running = [isinstance(own.get(each), range) for each in names]
+
+        def function(*given: Any) -> Any:
+            at = {each: value for each, value, runs in zip(names, given, running, strict=True) if runs}
+            return _computed(right, own | {each: value for each, value in zip(names, given, strict=True) if each not in at}, at)
+
+        return {name: Of(function, *names)}
     indices = re.fullmatch(r"(.+)_(?:\{(\w+)\}|(\w))", left)
     if indices and all(isinstance(letters.get(index), range) for index in indices[2] or indices[3]):
         names = indices[2] or indices[3]
@@ -147,7 +159,7 @@ def _made(left: str, right: str, letters: Mapping[str, Any]) -> dict[str, Any]:
     if not (call := re.fullmatch(r"(.+?)\(([^()]*)\)", left)):
         return {left: _computed(right, letters, {})}
     arguments = [name.strip() for name in call[2].split(",")]
-    return {call[1]: lambda *given: _computed(right, own | dict(zip(arguments, given, strict=True)), {})}
+    return {call[1]: lambda *given: _computed(right, own | dict(zip(arguments[: len(given)], given, strict=True)), {})}
 
 
 def _computed(text: str, letters: Mapping[str, Any], at: Mapping[str, Any]) -> Any:

@@ -1,11 +1,6 @@
 """The letters of better-than-a-tangent.md: moments of signals over a normal law, by quadrature and by the package."""
 
-import numpy as np
 from gate.page import DEFINITION, NOTATION
-from gate.values import Operator
-from gate.worlds import normal_nodes
-
-from kfcourse import Model, gaussian
 
 line = r"""
 m, \alpha, \beta: num
@@ -42,16 +37,21 @@ keep: h, G, F, K, z, p, \lambda, \Psi, y, S, S', S'', D_n
 """
 
 
-def statistical(rng):
-    """A sine in the package's Gaussian structure."""
-    lam, Psi, D_n, y = *rng.uniform(0.2, 0.9, size=3), rng.normal()
-    model = Model.define("x + v", "sin(x) + r*w", {"r": np.sqrt(D_n)})
-    at = gaussian(model).measure(np.full((1, 1), lam), np.full((1, 1, 1), Psi))
-    x, mean = normal_nodes(lam, Psi)
-    own = corrected(at.h.item(), at.G.item(), at.F.item(), lam, Psi, y)
-    spread = {r"\mathsf M": Operator(mean), r"\mathsf D": Operator(lambda values: mean(values**2) - mean(values) ** 2)}
-    western = {"C": mean((x - lam) * np.sin(x)), "P^-": Psi}
-    return own | spread | western | {"S": np.sin, "S'": np.cos, "x": x, "D_n": D_n}
+statistical = r"""
+\lambda, \Psi, D_n: in .2 .9
+y: num
+x: nodes \lambda \Psi
+h = \mathsf M\sin x
+G = \mathsf M(x-\lambda)\sin(x)/\Psi
+F = \mathsf D\sin(x)+D_n
+K = \Psi G/F
+z = \lambda+K(y-h)
+p = \Psi-K^2F
+C = \mathsf M(x-\lambda)\sin x
+P^- = \Psi
+S(x) = \sin x
+S'(x) = \cos x
+"""
 
 
 LETTERS = (line, second_order, statistical)

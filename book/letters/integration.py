@@ -7,7 +7,7 @@ from gate.worlds import K_RANGE, column, covariance
 
 from kfcourse.filters.kalman import correct, predict
 from kfcourse.laws import Gaussian
-from kfcourse.linear import LinearSystem, run
+from kfcourse.linear import LinearSystem
 
 SENSOR, RADIO = r"y_{\mathrm{NR},k}", r"y_{\mathrm R,k}"
 
@@ -26,25 +26,25 @@ def sensors(rng):
     }  # fmt: skip
 
 
-def axis(rng):
-    """The package's filter of the inertial system's error, on one axis."""
-    xi, n, p0, V = 0.3, 0.7, 1.4, rng.normal(size=5)
-    drift = rng.normal(size=5)
-    ins, receiver = V + drift, V + rng.normal(size=5)
-    law = run(
-        LinearSystem([[1.0]], [[-1.0]], [[xi**2]], [[n**2]]),
-        Gaussian(np.zeros(1), np.array([[p0]])),
-        (receiver - ins)[:, None, None],
-    )
-    eps, p, Psi = law.posterior.mean[:, 0, 0], law.posterior.cov[:, 0, 0, 0], law.predicted.cov[:, 0, 0, 0]
-    innovation = receiver - ins + law.predicted.mean[:, 0, 0]
-    changes = {"V": Indexed(V), "n": Indexed(receiver - V), r"\varepsilon": Indexed(drift)}
-    return changes | {
-        r"\Psi": Indexed(Psi), "p": Indexed(p), "K": Indexed(-p / n**2), r"\hat\varepsilon": Indexed(eps),
-        r"\nu": Indexed(innovation),
-        r"\hat V": Indexed(ins - eps), r"\sigma_\xi": xi, r"\sigma_n": n, "k": K_RANGE,
-        r"y_{\mathrm{SR},k}": Of(lambda k: receiver[k], "k"), r"y_{\mathrm{INS},k}": Of(lambda k: ins[k], "k"),
-    }  # fmt: skip
+axis = r"""
+\sigma_\xi = 0.3
+\sigma_n = 0.7
+V, n, \varepsilon: nums 6
+"y_{\mathrm{SR},k}" of k = V_k+n_k
+"y_{\mathrm{INS},k}" of k = V_k+\varepsilon_k
+k: range 5
+\Psi_0 = 1.4
+e_0 = 0
+\nu_k = n_k-\varepsilon_k+e_k
+K_k = -\Psi_k/(\Psi_k+\sigma_n^2)
+p_k = 1/(1/\Psi_k+1/\sigma_n^2)
+\hat\varepsilon_k = e_k+K_k\nu_k
+\hat V_k = V_k+\varepsilon_k-\hat\varepsilon_k
+\Psi_{k+1} = p_k+\sigma_\xi^2
+e_{k+1} = \hat\varepsilon_k
+k: range 1 4
+forget: e
+"""
 
 
 errors = r"""

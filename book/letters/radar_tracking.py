@@ -108,15 +108,19 @@ def step(rng):
     }  # fmt: skip
 
 
-def noise_alone(rng):
-    """Steady variances of a filter with fixed gains: what each single error of a measurement leaves, squared and added up."""
-    alpha, beta, sigma = *rng.uniform(0.3, 0.6, 2), rng.uniform(1, 2)
-    r, s, left = alpha, beta, []
-    for _ in range(300):
-        left.append((r, s))
-        r, s = (1 - alpha) * (r + s), s - beta * (r + s)
-    spread = sigma**2 * (np.array(left) ** 2).sum(axis=0)
-    return {r"\alpha": alpha, r"\beta": beta, r"\sigma": sigma, r"\mathsf De^r": spread[0], r"\mathsf De^s": spread[1]}
+noise_alone = r"""
+\alpha, \beta: in .3 .6
+\sigma: in 1 2
+M = \begin{pmatrix}1-\alpha&1-\alpha\\-\beta&1-\beta\end{pmatrix}
+G = \begin{pmatrix}\alpha\\\beta\end{pmatrix}
+P = GG^T
+again:
+P = MPM^T+\sigma^2GG^T
+then:
+\mathsf De^r = \begin{pmatrix}1&0\end{pmatrix}P\begin{pmatrix}1\\0\end{pmatrix}
+\mathsf De^s = \begin{pmatrix}0&1\end{pmatrix}P\begin{pmatrix}0\\1\end{pmatrix}
+keep: \alpha, \beta, \sigma, \mathsf De^r, \mathsf De^s
+"""
 
 
 def small_gains(rng):

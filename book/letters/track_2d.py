@@ -41,14 +41,17 @@ def sample_lost(rng):
     return {"z": z[2], "p": p[2], r"\lambda": lam[2], r"\Psi": Psi[2]}
 
 
-def axes(rng):
-    """The meter's covariance, and the input written twice."""
-    system, a = _run(rng)[0], rng.normal(size=2)
-    doubled = np.diag([DELTA**2 / 2] * 2 + [DELTA] * 2)
-    return {
-        "R": system.R, r"\sigma": SIGMA, "I": np.eye(2), "B": system.B, "G": doubled, r"\Delta": DELTA, "a_x": a[0], "a_y": a[1],
-        r"(a_x,a_y)^T": column(a), r"(a_x,a_y,a_x,a_y)^T": column([*a, *a]),
-    }  # fmt: skip
+axes = r"""
+\Delta = 0.3
+\sigma = 1.3
+I: eye 2
+R = \sigma^2I
+B = \begin{pmatrix}\Delta^2/2&0\\0&\Delta^2/2\\\Delta&0\\0&\Delta\end{pmatrix}
+G = \begin{pmatrix}\Delta^2/2&0&0&0\\0&\Delta^2/2&0&0\\0&0&\Delta&0\\0&0&0&\Delta\end{pmatrix}
+a_x, a_y: num
+"(a_x,a_y)^T" = \begin{pmatrix}a_x\\a_y\end{pmatrix}
+"(a_x,a_y,a_x,a_y)^T" = \begin{pmatrix}a_x\\a_y\\a_x\\a_y\end{pmatrix}
+"""
 
 
 telescope = r"""

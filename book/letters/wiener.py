@@ -2,14 +2,8 @@
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
-from gate.values import Indexed
 from gate.worlds import world
 from scipy.linalg import solve_continuous_are
-from scipy.stats import norm
-
-from kfcourse.filters.kalman import correct
-from kfcourse.laws import Gaussian
-from kfcourse.linear.system import LinearSystem
 
 signal = r"""
 a: in .5 .8
@@ -44,24 +38,29 @@ def waiting(rng, m=3):
     return {"p_m": left(m), "p_0": left(0), "b": K * rho, r"\rho": rho, r"\gamma": found[r"\gamma"], "m": m}
 
 
-def amplitude(rng):
-    """A pulse of which the package's Kalman filter finds the amplitude, sample by sample."""
-    s, y, R, d, b = rng.normal(size=4), rng.normal(size=4), 0.7, 1.9, 0.6
-    law = Gaussian(np.zeros(1), np.array([[d]]))
-    for one, measured in zip(s, y, strict=True):
-        law = correct(LinearSystem([[1.0]], [[one]], [[0.0]], [[R]]), law, np.array([measured]))
-    return {
-        "C": np.dot(s, y), "E": np.dot(s, s), "R": R, "d": d, "z": law.mean.item(), "p": law.cov.item(), "b": b,
-        r"\mathcal L": lambda b: np.prod(norm.pdf(y, b * s, np.sqrt(R))),
-    }  # fmt: skip
+amplitude = r"""
+s, y: nums 4
+R = 0.7
+d = 1.9
+b = 0.6
+C = \sum_{i=0}^3s_iy_i
+E = \sum_{i=0}^3s_i^2
+p = 1/(1/d+E/R)
+z = pC/R
+\mathcal L(b) = \prod_{i=0}^3\mathcal N(y_i;bs_i,R)
+keep: C, E, R, d, z, p, b, \mathcal L
+"""
 
 
-def correlator(rng):
-    """The matched filter along a record, and the amplitude by least squares at each moment."""
-    n, s, y = 3, rng.normal(size=4), rng.normal(size=9)
-    C = [np.convolve(y, s[::-1])[k] for k in range(9)]
-    b = [np.nan] * n + [np.linalg.lstsq(s[:, None], y[k - n : k + 1], rcond=None)[0].item() for k in range(n, 9)]
-    return {"n": n, "s": Indexed(s), "y": Indexed(y), "C": Indexed(C), "i": range(n + 1), "k": range(n, 9), r"\hat b": Indexed(b)}
+correlator = r"""
+n = 3
+s: nums 4
+y: nums 9
+i: range 4
+k: range 3 9
+C_k = \sum_is_iy_{k-3+i}
+\hat b_k = C_k/\sum_is_i^2
+"""
 
 
 def bucy(rng):
@@ -98,7 +97,7 @@ j: range 4
 
 def found(rng):
     """The greatest ratio for one pulse: the mean of the correlator over its deviation, squared."""
-    own = amplitude(rng)
+    own = world(amplitude)(rng)
     return {name: own[name] for name in ("R", "E", "b")} | {"d": own["b"] * own["E"] / np.sqrt(own["R"] * own["E"])}
 
 

@@ -14,7 +14,6 @@ from kfcourse.exercises.h_continuous.keys import (
 )
 
 GAIN_NOT_DIVIDED = "The gain is not divided by the intensity of the meter's noise."
-NOISE_INVERTED = "The intensity of the meter's noise is upside down."
 
 # -- h1: variances of means over a step; h2: a step of a simulation
 

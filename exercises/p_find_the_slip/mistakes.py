@@ -17,6 +17,8 @@ from kfcourse.exercises.p_find_the_slip.keys import (
 from kfcourse.exercises.shared import MOMENTS, OFFSET
 
 AS_PRINTED = "That is the formula as it is printed: the slip is still in it."
+ONE_OF_TWO = "Only one of the two terms of the mean square has the right factor."
+DIVIDED_BY_LESS = "It is divided by N - 1; moments of an ensemble are divided by N here."
 NOISE_FORGOTTEN = "The noise of the meter is missing."
 FOURTH = "A moment of order four is wrong: of a normal law the fourth central one is 3 d^2."
 MOMENTS_OF_START = "Moments of the first step stand there; x has changed since."
@@ -41,13 +43,13 @@ WRONG_SECOND = edits(
     ),
     (
         "one-of-two",
-        "Only one of the two terms of the mean square has the right factor.",
+        ONE_OF_TWO,
         "a**2 * (z**2 + p)",
         "a**2 * z**2 + a * p",
     ),
     (
         "one-of-two",
-        "Only one of the two terms of the mean square has the right factor.",
+        ONE_OF_TWO,
         "a**2 * (z**2 + p)",
         "a * z**2 + a**2 * p",
     ),
@@ -237,7 +239,7 @@ WRONG_FITS = edits(
     ),
     (
         "divided-by-N-1",
-        "It is divided by N - 1; moments of an ensemble are divided by N here.",
+        DIVIDED_BY_LESS,
         "chi, T\n",
         "chi, T * len(x) / (len(x) - 1)\n",
     ),
@@ -270,5 +272,5 @@ WRONG_MOMENTS = edits(
     ),
     ("about-zero", messages.ABOUT_ZERO, "x.var()", "(x**2).mean()"),
     ("first-mode", "Only one mode is looked at.", "    mean, variance =", "    x = x[mode == 0]; mean, variance ="),
-    ("divided-by-N-1", "It is divided by N - 1; moments of an ensemble are divided by N here.", "x.var()", "x.var(ddof=1)"),
+    ("divided-by-N-1", DIVIDED_BY_LESS, "x.var()", "x.var(ddof=1)"),
 )

@@ -10,7 +10,6 @@ diagnosis   what kind of mistake does a wrong answer look like?
 case        one result of a wrong answer: what a hint looks at
 dependence  how a result depends on the arguments
 hints       what can be said of any wrong answer
-relations   how a wrong answer stands to the right one
 failing     one input of a wrong answer, and what it gives there
 equality    are two formulas, two arrays equal?
 posing      can every question be posed for a variant?

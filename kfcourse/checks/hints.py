@@ -1,43 +1,163 @@
 """What can be said of any wrong answer, whatever the question: its sign, an argument without effect, where it is right.
 
-A hint looks at one result of an answer, called with all hidden arguments, and at what was expected; it gives its name and a
-sentence that is true of the answer, or None.  The engine asks them in turn when no known mistake fits.
+Most hints are rows of name, sentence and what would have been found if the sentence were so; one loop compares.  The others
+ask where the answer is right, or how it depends on its arguments.  Each looks at one result of an answer, called with all
+hidden arguments, and at what was expected.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import copy
+from collections.abc import Callable, Iterator, Sequence
+from itertools import combinations
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
 from kfcourse.checks.case import Case, Said
-from kfcourse.checks.dependence import same
-from kfcourse.checks.equality import depends, equal
-from kfcourse.checks.relations import RELATIONS
+from kfcourse.checks.dependence import changed, same, scaled
+from kfcourse.checks.equality import depends, equal, like
+from kfcourse.limits import OutOfTime
 
 ROUGH = 1e-4  # relative difference that hints at a lower precision
 ROUNDING = 1e-13  # of what cancels, beside what should be there
 
+Row = tuple[str, str, Callable[[], Sequence[Any]]]  # name, sentence, what would have been found
 
-def _each(value: Any, change: Callable[[Any], Any]) -> Any:
+
+def each(value: Any, change: Callable[[Any], Any]) -> Any:
     """A change of every entry; the power of a symbolic matrix would be another thing, and may take for ever."""
     return value.applyfunc(change) if isinstance(value, sp.MatrixBase) else change(value)
 
 
-ROOT = "It is the square root of what it should be, as a standard deviation is of a variance."
-SQUARE = "It is the square of what it should be, as a variance is of a standard deviation."
 INVERSE = "It looks like the inverse of what it should be."
-
-TRANSFORMATIONS: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
+OF_RESULT: tuple[tuple[str, str, Callable[[Any], Any]], ...] = (
     ("sign", "The size is right, the sign is not.", lambda v: -v),
     ("transposed", "It looks transposed.", lambda v: v.T if isinstance(v, sp.MatrixBase) else np.swapaxes(v, -1, -2)),
-    ("root", ROOT, lambda v: _each(v, lambda entry: entry**2)),
-    ("factor-2", "It is half of what it should be.", lambda v: v * 2),
-    ("factor-half", "It is twice what it should be.", lambda v: v / 2),
-    ("inverse", INVERSE, lambda v: _each(v, lambda entry: 1 / entry)),
+    (
+        "root",
+        "It is the square root of what it should be, as a standard deviation is of a variance.",
+        lambda v: each(v, lambda entry: entry**sp.S.Half if isinstance(entry, sp.Basic) else np.sqrt(entry)),
+    ),
+    ("factor-2", "It is half of what it should be.", lambda v: v / 2),
+    ("factor-half", "It is twice what it should be.", lambda v: 2 * v),
+    ("inverse", INVERSE, lambda v: each(v, lambda entry: 1 / entry)),
+    ("inverse", INVERSE, lambda v: np.linalg.inv(v)),
+    (
+        "square",
+        "It is the square of what it should be, as a variance is of a standard deviation.",
+        lambda v: each(v, lambda entry: entry**2),
+    ),
 )
+OF_ARGUMENT: tuple[tuple[str, Callable[[Any], Any]], ...] = (
+    ("twice {}", lambda v: 2 * v),
+    ("half of {}", lambda v: v / 2),
+    ("{} with the other sign", lambda v: -v),
+    ("the square of {}", lambda v: v**2),
+    ("the root of {}", lambda v: v**0.5),
+    ("1 less {}", lambda v: 1 - v),
+)
+
+
+def results(case: Case) -> Iterator[Row]:
+    """The right result with one simple thing done to it, another result, or an argument as it came."""
+    for name, says, change in OF_RESULT:
+        yield name, says, lambda change=change: [change(value) for value in case.expected]
+    for name, expected in case.others:
+        yield "another-result", f"That is what belongs in the place of {name}.", lambda expected=expected: expected
+    for place, name in enumerate(case.names if case.numeric else ()):
+        given = [values[place] for values in case.arguments]
+        if all(isinstance(value, np.ndarray) for value in given):
+            yield "unchanged", f"That is the argument `{name}`, unchanged.", lambda given=given: [*map(np.nan_to_num, given)]
+
+
+def arguments(case: Case) -> Iterator[Row]:
+    """What the right answer gives with arguments exchanged; right but for a step, a term or a factor."""
+    for i, j in combinations(range(len(case.names)), 2):
+        if all(alike(values[i], values[j]) for values in case.arguments):
+            says = f"It is right with `{case.names[i]}` and `{case.names[j]}` exchanged: which is which?"
+            yield "exchanged", says, lambda i=i, j=j: instead(case, {i: itemgetter(j), j: itemgetter(i)})
+    known = [(f"the argument `{name}`", [values[i] for values in case.arguments]) for i, name in enumerate(case.names)]
+    known += [(f"the result {name}", list(values)) for name, values in case.others]
+    known += [("one", [1.0 if case.numeric else sp.S.One] * len(case.expected))]
+    for what, values in known:
+        if not all(fits(value, wanted, case.numeric) for value, wanted in zip(values, case.expected, strict=True)):
+            continue
+        for name, change in (
+            ("term", lambda b, v: b - v),
+            ("term", lambda b, v: b + v),
+            ("factor", lambda b, v: b / v),
+            ("factor", lambda b, v: b * v),
+        ):
+            much = "added, or forgotten" if name == "term" else "too many, or forgotten"
+            says = f"It is right but for a {name} that is {what}: {much}?"
+            yield (
+                name,
+                says,
+                lambda change=change, values=values: [change(b, v) for b, v in zip(case.expected, values, strict=True)],
+            )
+
+
+def replaced(case: Case) -> Iterator[Row]:
+    """What the right answer gives with something else in the place of an argument, or of what an argument returns."""
+    for place, name in enumerate(case.names if case.numeric else ()):
+        for words, change in OF_ARGUMENT:
+            for which in range(3) if callable(case.arguments[0][place]) else (None,):
+                other = f"`{name}`" if which is None else f"result {which + 1} of `{name}`"
+                says = f"The right answer would give that with {words.format(other)} in the place of {other}."
+                yield (
+                    "replaced",
+                    says,
+                    lambda place=place, change=change, which=which: instead(
+                        case, {place: lambda values: changed(values[place], change, which)}
+                    ),
+                )
+
+
+def instead(case: Case, other: dict[int, Callable[[Sequence[Any]], Any]]) -> list[Any]:
+    """What the right answer gives with other arguments in some places."""
+    found = []
+    for values, wanted in zip(copy.deepcopy(case.arguments), case.expected, strict=True):
+        result = case.sensitivity.answers[0](*(other[i](values) if i in other else v for i, v in enumerate(values)))
+        found.append(like(result[case.part] if case.sensitivity.several else result, wanted))
+    return found
+
+
+def alike(first: Any, second: Any) -> bool:
+    if isinstance(first, sp.Basic) or isinstance(second, sp.Basic):
+        return isinstance(first, sp.Symbol) and isinstance(second, sp.Symbol)
+    return not callable(first) and not callable(second) and np.shape(first) == np.shape(second)
+
+
+def fits(value: Any, wanted: Any, numeric: bool) -> bool:
+    """Whether a value may be a term of a result: of the same shape, or a number."""
+    if numeric:
+        return not callable(value) and not isinstance(value, sp.Basic) and np.shape(value) in ((), np.shape(wanted))
+    return isinstance(value, sp.Basic | int | float) or np.shape(value) == np.shape(wanted)
+
+
+def compared(rows: Callable[[Case], Iterator[Row]]) -> Callable[[Case], Said | None]:
+    """The hint of the first row that would have given what was found, and not what was expected."""
+
+    def hint(case: Case) -> Said | None:
+        for name, says, made in rows(case):
+            try:
+                would = list(made())
+                shaped = all(np.shape(a) == np.shape(b) for a, b in zip(case.found, would, strict=True))
+                if shaped and case.agree(case.found, would) and not case.agree(would, case.expected):
+                    return name, says
+            except (OutOfTime, KeyboardInterrupt):
+                raise
+            except Exception:  # there is no such result
+                continue
+        return None
+
+    return hint
+
+
+# -- where it is right
 
 
 def vanishing(case: Case) -> Said | None:
@@ -51,17 +171,6 @@ def vanishing(case: Case) -> Said | None:
     return "vanishing", "It is zero: is that what is left when all cancels, or is something multiplied by zero?"
 
 
-def transformed(case: Case) -> Said | None:
-    """The right result with one simple thing done to it."""
-    for name, says, change in TRANSFORMATIONS:
-        try:
-            if case.agree([change(value) for value in case.found], case.expected):
-                return name, says
-        except Exception:  # this result cannot be changed so
-            continue
-    return None
-
-
 def rounded(case: Case) -> Said | None:
     """Right, and then rounded; to whole numbers where there are several, as ones and zeros say nothing."""
     if case.numeric:
@@ -72,72 +181,89 @@ def rounded(case: Case) -> Said | None:
     return None
 
 
-def squared(case: Case) -> Said | None:
-    """The square, or the inverse of a matrix."""
-    if case.agree(case.found, [_each(b, lambda entry: entry**2) for b in case.expected]):
-        return "square", SQUARE
-    if case.numeric and case.agree([np.linalg.inv(a) for a in case.found], case.expected):
-        return "inverse", INVERSE
-    return None
-
-
-def confused(case: Case) -> Said | None:
-    """Another of the results, or an argument as it came."""
-    for name, expected in case.others:
-        if [np.shape(a) for a in case.found] == [np.shape(b) for b in expected] and case.agree(case.found, expected):
-            return "another-result", f"That is what belongs in the place of {name}."
-    for place, name in enumerate(case.names):
-        given = [values[place] for values in case.arguments]
-        alike = all(isinstance(a, np.ndarray) and a.shape == np.shape(b) for a, b in zip(given, case.found, strict=True))
-        if case.numeric and alike and case.agree(case.found, [np.nan_to_num(value) for value in given]):
-            return "unchanged", f"That is the argument `{name}`, unchanged."
-    return None
-
-
 def rough(case: Case) -> Said | None:
     """Right to some digits."""
-    if case.numeric and all(equal(a, b, ROUGH, {}) for a, b in case.pairs):
-        single = all(np.array_equal(mine, np.asarray(mine, np.float32), equal_nan=True) for mine, _ in case.pairs)
-        if single and any(not np.array_equal(mine, np.round(mine), equal_nan=True) for mine, _ in case.pairs):
-            return (
-                "precision",
-                "It is right to the 7 digits of single precision (float32): compute in double precision (float64).",
-            )
-        return "precision", "It is nearly right: is something rounded, or something small left out, added or divided otherwise?"
-    return None
+    if not case.numeric or not all(equal(a, b, ROUGH, {}) for a, b in case.pairs):
+        return None
+    single = all(np.array_equal(mine, np.asarray(mine, np.float32), equal_nan=True) for mine, _ in case.pairs)
+    if single and any(not np.array_equal(mine, np.round(mine), equal_nan=True) for mine, _ in case.pairs):
+        return "precision", "It is right to the 7 digits of single precision (float32): compute in double precision (float64)."
+    return "precision", "It is nearly right: is something rounded, or something small left out, added or divided otherwise?"
 
 
-def dependence(case: Case) -> Said | None:
-    """Arguments or symbols that are missing, or too many."""
-    extra: list[str] = []
-    if case.numeric:
-        missing = case.sensitivity.unused(case.part)
-        if all(
-            np.array_equal(one, np.round(one)) for pair in case.pairs for one in pair
-        ):  # what is rounded does not feel a small change
-            missing = [name for name in missing if isinstance(case.arguments[0][case.names.index(name)], int)]
-        form = "`{}`"
-    else:
-        mine, theirs = (_symbols(case, which) for which in (0, 1))
-        given = {s.name for values in case.arguments for v in values if hasattr(v, "free_symbols") for s in v.free_symbols}
-        numbers = any(not n.is_integer for side in case.formulas for f in side[0] for n in f.atoms(sp.Number))
-        missing, extra = sorted((theirs & given if numbers else theirs) - mine), sorted(mine - theirs)
-        form = "{}"
-    if missing:
-        which = ", ".join(map(form.format, missing))
+def sometimes(case: Case) -> Said | None:
+    """Right for some of the hidden arguments."""
+    right = [case.agree([a], [b]) for a, b in case.pairs]
+    if not any(good and telling for good, telling in zip(right, case.telling, strict=True)):
+        return None
+    sizes = [int(np.size(b)) // (len(b) if np.ndim(b) else 1) for _, b in case.pairs] if case.numeric else [1] * len(right)
+    if len(set(sizes)) > 1 and all((size == 1) == good for size, good in zip(sizes, right, strict=True)):
         return (
-            "unused",
-            f"It does not depend on {which} and should: forgotten, or cancelled, or is something of the notebook used instead?",
+            "scalars-only",
+            "It is right for scalars only: look at the order of the matrices, at what is transposed, "
+            "and at what is done entry by entry or over all axes at once.",
         )
-    if extra:
-        return "superfluous", f"It depends on {', '.join(extra)} and should not."
+    return (
+        "sometimes",
+        f"It is right for {sum(right)} of {len(right)} hidden inputs: a case is left out, or it holds for a special one only.",
+    )
+
+
+def first_step(case: Case) -> Said | None:
+    """A run that starts well, or each step of which stands beside its place."""
+    if not case.numeric or case.axes[:1] != ("step",) or not all(b.ndim and len(b) > 3 for _, b in case.pairs):
+        return None
+    later = [not case.agree([a[k : k + 1]], [b[k : k + 1]]) for a, b in case.pairs for k in range(1, len(b))]
+    if all(case.agree([a[:1]], [b[:1]]) for a, b in case.pairs) and 2 * sum(later) > len(later):
+        return "from-second-step", "The first step is right, later ones are not: what is handed on from one step to the next?"
+    for mine, right, word in ((slice(1, None), slice(None, -1), "late"), (slice(None, -1), slice(1, None), "early")):
+        if case.agree([a[mine] for a in case.found], [b[right] for b in case.expected]):
+            return "shifted", f"The values are right, but each stands one step too {word}."
     return None
 
 
-def _symbols(case: Case, which: int) -> set[str]:
-    """Names of the symbols on whose values a side depends."""
-    formulas = [f for side in case.formulas for f in side[which]]
-    return {name for f in formulas for name in depends(f, {s.name for s in f.free_symbols})}
+def factor_or_term(case: Case) -> Said | None:
+    """A factor, or a term, that is the same everywhere, or for all that a call gives."""
+    if not case.numeric:
+        return None
+    if all(np.ndim(b) > 1 and len(b) > 2 and np.ptp(a - b, axis=0).max() < 1e-9 * np.abs(b).max() for a, b in case.pairs):
+        return "term", "It is right but for a term that is the same everywhere."
+    if all(np.size(b) > 2 and np.ptp(a - b) < 1e-9 * np.abs(b).max() for a, b in case.pairs):
+        return "term", "It is right but for a term that is one number for all that a call gives."
+    a, b = (np.concatenate([np.ravel(pair[which]) for pair in case.pairs]) for which in (0, 1))
+    if len(b) > 1 and np.ptp(b) > 1e-3 * np.abs(b).max():
+        ratio = (a @ b) / (b @ b)
+        if abs(ratio) > 1e-6 and np.allclose(a, ratio * b, rtol=1e-9, atol=1e-9 * np.abs(a).max()):
+            return "factor", "It is right but for a factor that is the same everywhere."
+    return None
+
+
+def entries(case: Case) -> Said | None:
+    """Some entries of a matrix, or some components of a vector."""
+    if case.numeric:
+        lead = len(case.axes)
+        pairs = [(a, b) for a, b in case.pairs if b.ndim > lead and b.size > b.shape[0]]
+    else:
+        lead, pairs = (
+            0,
+            [(np.array(a), np.array(b)) for a, b in case.pairs if isinstance(b, sp.MatrixBase) and len(case.pairs) == 1],
+        )
+    shapes = {b.shape[lead:] for _, b in pairs}
+    if len(shapes) != 1 or len(shape := shapes.pop()) not in (1, 2) or max(shape) > 6 or np.prod(shape) < 2:
+        return None
+    right = np.array([all(case.agree([a[(..., *i)][()]], [b[(..., *i)][()]]) for a, b in pairs) for i in np.ndindex(shape)])
+    wrong = ~right.reshape(shape)
+    if wrong.all() or not wrong.any():
+        return None
+    places = (np.argwhere(wrong) + 1).tolist()
+    if len(shape) == 1:
+        which = ", ".join(str(place) for (place,) in places)
+        return "components", f"Only component{'s' * (len(places) > 1)} {which} {'are' if len(places) > 1 else 'is'} wrong."
+    if len(places) == 1:
+        return "entry", f"Only the entry in row {places[0][0]}, column {places[0][1]} is wrong."
+    if shape[0] == shape[1] and np.array_equal(~wrong, np.eye(len(wrong), dtype=bool)):
+        return "off-diagonal", "The diagonal is right, the rest is not: what has one component to do with another?"
+    return None
 
 
 NOT_SYMMETRIC = "The result should be symmetric and is not: is a factor missing on one side?"
@@ -162,109 +288,167 @@ def improper(case: Case) -> Said | None:
     return None
 
 
-def sometimes(case: Case) -> Said | None:
-    """Right for some of the hidden arguments."""
-    right = [case.agree([a], [b]) for a, b in case.pairs]
-    if not any(good and telling for good, telling in zip(right, case.telling, strict=True)):
-        return None
-    sizes = [int(np.size(b)) // (len(b) if np.ndim(b) else 1) for _, b in case.pairs] if case.numeric else [1] * len(right)
-    if len(set(sizes)) > 1 and all((size == 1) == good for size, good in zip(sizes, right, strict=True)):
-        return (
-            "scalars-only",
-            "It is right for scalars only: look at the order of the matrices, at what is transposed, "
-            "and at what is done entry by entry or over all axes at once.",
-        )
-    return (
-        "sometimes",
-        f"It is right for {sum(right)} of {len(right)} hidden inputs: a case is left out, or it holds for a special one only.",
-    )
+# -- how it depends on what it is made of
 
 
-def first_step(case: Case) -> Said | None:
-    """A run that starts well."""
-    if not case.numeric or case.axes[:1] != ("step",) or not all(b.ndim and len(b) > 3 for _, b in case.pairs):
+def unused(case: Case) -> Said | None:
+    """Arguments or symbols that are missing, or symbols that are too many."""
+    extra: list[str] = []
+    if case.numeric:
+        missing, form = case.sensitivity.unused(case.part), "`{}`"
+        if all(np.array_equal(one, np.round(one)) for pair in case.pairs for one in pair):  # it does not feel a small change
+            missing = [name for name in missing if isinstance(case.arguments[0][case.names.index(name)], int)]
+    else:
+        mine, theirs = ({name for f in formulas(case, which) for name in symbols_of(f)} for which in (0, 1))
+        given = {s.name for values in case.arguments for v in values if hasattr(v, "free_symbols") for s in v.free_symbols}
+        numbers = any(not n.is_integer for f in formulas(case, 0) for n in f.atoms(sp.Number))
+        missing, extra, form = sorted((theirs & given if numbers else theirs) - mine), sorted(mine - theirs), "{}"
+    if missing:
+        which = ", ".join(map(form.format, missing))
+        what = "forgotten, or cancelled, or is something of the notebook used instead?"
+        return "unused", f"It does not depend on {which} and should: {what}"
+    return ("superfluous", f"It depends on {', '.join(extra)} and should not.") if extra else None
+
+
+def formulas(case: Case, which: int) -> list[sp.Expr]:
+    """All entries of one side."""
+    return [f for side in case.formulas for f in side[which]]
+
+
+def symbols_of(formula: sp.Expr) -> list[str]:
+    """Names of the symbols on whose values it depends."""
+    return depends(formula, {s.name for s in formula.free_symbols})
+
+
+def with_symbol(case: Case, change: Callable[[sp.Symbol], sp.Expr]) -> Iterator[tuple[str, list[sp.Expr], list[sp.Expr]]]:
+    """For each symbol of both sides: the student's formulas and the right ones with it changed."""
+    sides = [formulas(case, which) for which in (0, 1)]
+    for name in sorted(set.intersection(*({s.name for f in side for s in f.free_symbols} for side in sides))):
+        mine, right = ([f.xreplace({s: change(s) for s in f.free_symbols if s.name == name}) for f in side] for side in sides)
+        if not any(f.has(sp.nan, sp.zoo, sp.oo) for f in (*mine, *right)):
+            yield name, mine, right
+
+
+def with_argument(case: Case, factor: float) -> Iterator[tuple[str, list[Any], list[Any]]]:
+    """For each argument: the student's results and the right ones with it multiplied."""
+    for place, name in enumerate(case.names):
+        called = case.sensitivity.called(place, lambda value: scaled(value, factor))
+        right, mine = ([pair[side][case.part] for pair in called] for side in (0, 1))
+        if called and all(np.isfinite(one).all() and one.shape == two.shape for one, two in zip(mine, right, strict=True)):
+            yield name, mine, right
+
+
+def limit(case: Case) -> Said | None:
+    """Right where something is zero: what comes in with it is wrong."""
+    pairs = with_argument(case, 0.0) if case.numeric else with_symbol(case, lambda _: sp.S.Zero)
+    where = [name for name, mine, right in pairs if any(map(np.any, right)) and case.agree(mine, right)]
+    if where and case.numeric:  # where nothing is brought in near zero either, that tells nothing
+        near = {name for name, mine, right in with_argument(case, 0.01) if case.agree(mine, right)}
+        where = [name for name in where if name not in near]
+    if not where:
         return None
-    later = [not case.agree([a[k : k + 1]], [b[k : k + 1]]) for a, b in case.pairs for k in range(1, len(b))]
-    if all(case.agree([a[:1]], [b[:1]]) for a, b in case.pairs) and 2 * sum(later) > len(later):
-        return "from-second-step", "The first step is right, later ones are not: what is handed on from one step to the next?"
+    which = " or ".join((f"`{name}`" if case.numeric else name) for name in where[:3])
+    part = f"look at the part that {'this' if len(where) == 1 else 'each of these'} brings in"
+    return "limit", f"It is right where {which} is zero: {part}."
+
+
+POWERS = [sp.Rational(k, 2) for k in range(-8, 9)]
+
+
+def power(case: Case) -> Said | None:
+    """Another power of an argument than in the right answer."""
+    if case.numeric:
+        before, grown = (case.found, case.expected), {}
+        for factor in (2.0, 4.0):
+            for name, *after in with_argument(case, factor):
+                grown.setdefault(name, []).append([ratio(new, old) for new, old in zip(after, before, strict=True)])
+        for name, growth in grown.items():
+            if len(growth) == 2 and None not in (*growth[0], *growth[1]):
+                (mine, right), again = growth
+                if abs(right - mine) > 1e-6 and np.allclose(again, [mine**2, right**2], rtol=1e-6):  # powers, both of them
+                    return "power", f"It grows with another power of `{name}` than it should: check the units."
+        return None
+    for name, *sides in with_symbol(case, lambda s: 2 * s):
+        powers = [
+            [k for k in POWERS if case.agree(new, [2**k * f for f in formulas(case, side)])] for side, new in enumerate(sides)
+        ]
+        if all(len(k) == 1 for k in powers) and powers[0] != powers[1]:
+            return "power", f"It grows with another power of {name} than it should: check the units."
     return None
 
 
-TERM = "It is right but for a term that is the same everywhere."
+def ratio(new: Sequence[Any], old: Sequence[Any]) -> float | None:
+    """By how much everything has grown, if it has grown alike."""
+    pairs = list(zip(new, old, strict=False))
+    if any(np.shape(a) != np.shape(b) for a, b in pairs):
+        return None
+    a, b = (np.concatenate([np.ravel(pair[which]) for pair in pairs]) for which in (0, 1))
+    clear = np.abs(b) > 1e-9 * np.max(np.abs(b), initial=0.0)
+    ratios = a[clear] / b[clear]
+    return float(ratios[0]) if len(ratios) and np.ptp(ratios) <= 1e-7 * np.abs(ratios).max() else None
 
 
-def factor_or_term(case: Case) -> Said | None:
-    """A factor, or a term, that is the same everywhere."""
+def narrow(case: Case) -> Said | None:
+    """Right but for a factor, or a term, that is a number or depends on one symbol, where the right formula has more."""
+    if case.numeric or any(len(side[0]) > 1 for side in case.formulas):
+        return None
+    pairs = [(mine, theirs) for (mine,), (theirs,) in case.formulas]
+    everything = {name for _, theirs in pairs for name in symbols_of(theirs)}
+    for what, apart in (("factor", [a / b for a, b in pairs if b != 0]), ("term", [a - b for a, b in pairs])):
+        on = {name for one in apart for name in symbols_of(one)}
+        if len(apart) == len(pairs) and on < everything and len(on) < 2:
+            which = f"depends on {on.pop()} only" if on else "is a number"
+            return f"{what}-of", f"It is right but for a {what} that {which}."
+    return None
+
+
+def terms(case: Case) -> Said | None:
+    """Some terms of a formula, multiplied out."""
+    if case.numeric or len(case.formulas) != 1 or len(case.formulas[0][0]) != 1:
+        return None
+    mine, theirs = (set(sp.Add.make_args(sp.expand(side[0]))) for side in case.formulas[0])
+    if not mine & theirs or len(mine) > 12:
+        return None
+    if theirs < mine:
+        return "terms", "All terms that belong there are there, and something else besides."
+    right = ", ".join(sorted(map(str, mine & theirs)))
+    more = "another is missing" if mine < theirs else "look at the rest"  # which may be right in another form, in part
+    return "terms", f"Of your terms, multiplied out, {right} {'is' if len(mine & theirs) == 1 else 'are'} right; {more}."
+
+
+def direction(case: Case) -> Said | None:
+    """Too large, or too small, wherever it is wrong."""
     if not case.numeric:
         return None
-    if all(np.ndim(b) > 1 and len(b) > 2 and np.ptp(a - b, axis=0).max() < 1e-9 * np.abs(b).max() for a, b in case.pairs):
-        return "term", TERM
     a, b = (np.concatenate([np.ravel(pair[which]) for pair in case.pairs]) for which in (0, 1))
-    if all(np.size(b) > 2 and np.ptp(a - b) < 1e-9 * np.abs(b).max() for a, b in case.pairs):
-        return "term", "It is right but for a term that is one number for all that a call gives."
-    if len(b) > 1 and np.ptp(b) > 1e-3 * np.abs(b).max():
-        ratio = (a @ b) / (b @ b)
-        if abs(ratio) > 1e-6 and np.allclose(a, ratio * b, rtol=1e-9, atol=1e-9 * np.abs(a).max()):
-            return "factor", "It is right but for a factor that is the same everywhere."
-        if len(b) > 2 and np.ptp(a - b) < 1e-9 * np.abs(b).max():
-            return "term", TERM
-    return None
-
-
-def entries(case: Case) -> Said | None:
-    """Some entries of a matrix, some rows of it, or some components of a vector."""
-    right = _right_entries(case)
-    if right is None or not right.any() or right.all():
+    wrong = np.isfinite(b) & ~np.isclose(a, b, rtol=1e-9, atol=0)
+    larger = np.abs(a[wrong]) > np.abs(b[wrong])
+    signs = a[wrong] * b[wrong] < 0, (a[wrong] < 0) & (b[wrong] == 0)  # below zero is not too large, whatever its size
+    if np.sum(wrong) < 3 or np.any(signs) or larger.any() != larger.all():
         return None
-    if right.ndim == 1:
-        return "components", f"Only component{_numbers(~right)} wrong."
-    if (~right).sum() == 1:
-        i, j = np.argwhere(~right)[0] + 1
-        return "entry", f"Only the entry in row {i}, column {j} is wrong."
-    if len(set(right.shape)) == 1 and np.array_equal(right, np.eye(len(right), dtype=bool)):
-        return "off-diagonal", "The diagonal is right, the rest is not: what has one component to do with another?"
-    return None
-
-
-def _right_entries(case: Case) -> np.ndarray | None:
-    """Which entries of a matrix, or of a vector, are right in every case and everywhere; None if it has no entries."""
-    if isinstance(case.expected[0], sp.MatrixBase):
-        found, expected = case.pairs[0]
-        if len(expected) < 2 or len(case.pairs) > 1:
-            return None
-        return np.reshape([case.agree([a], [b]) for a, b in zip(found, expected, strict=True)], expected.shape)
-    if not case.numeric:
-        return None
-    lead = len(case.axes)
-    shapes = {b.shape[lead:] for _, b in case.pairs if b.ndim > lead and b.size > b.shape[0]}
-    pairs = [(a, b) for a, b in case.pairs if b.shape[lead:] in shapes]
-    if len(shapes) != 1 or len(shape := shapes.pop()) not in (1, 2) or max(shape) > 6 or np.prod(shape) < 2:
-        return None
-    right = np.ones(shape, dtype=bool)
-    for place in np.ndindex(shape):
-        right[place] = all(case.agree([a[(..., *place)]], [b[(..., *place)]]) for a, b in pairs)
-    return right
-
-
-def _numbers(wrong: Any) -> str:
-    places = [str(i + 1) for i in np.flatnonzero(wrong)]
-    return f" {places[0]} is" if len(places) == 1 else f"s {', '.join(places)} are"
+    if larger.all():
+        return "too-large", "It is too large wherever it is wrong: is something added that does not belong there, or not divided?"
+    return "too-small", "It is too small wherever it is wrong: is something missing, or divided once too often?"
 
 
 HINTS: tuple[Callable[[Case], Said | None], ...] = (
     vanishing,
-    transformed,
+    compared(results),
     rounded,
-    squared,
-    confused,
     rough,
     sometimes,
-    dependence,
+    unused,
     improper,
     first_step,
     factor_or_term,
     entries,
-    *RELATIONS,
+    compared(arguments),
+    limit,
+    power,
+    narrow,
+    terms,
+    compared(replaced),
+    direction,
 )
 
 

@@ -26,7 +26,7 @@ from tqdm import tqdm
 
 from kfcourse.lab.quality import Ask, Quality, examine
 from kfcourse.lab.variants import RUNS, Variant, read_variant
-from kfcourse.montecarlo.batches import FEWEST
+from kfcourse.montecarlo import FEWEST
 
 PIECES = tomllib.loads((resources.files("kfcourse.lab") / "grammar.toml").read_text(encoding="utf-8"))
 SCREEN = 10  # a candidate is first tried on that many times fewer trajectories: most are none

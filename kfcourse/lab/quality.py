@@ -39,12 +39,12 @@ from kfcourse.lab.variants import RUNS, Variant
 from kfcourse.laws import Array, Gaussian
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.linear.system import is_linear
-from kfcourse.montecarlo.batches import FEWEST
+from kfcourse.montecarlo import FEWEST
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.parallel import cluster
-from kfcourse.montecarlo.statistics import Estimate, batch_mean, ratio
+from kfcourse.montecarlo.statistics import Estimate, ratio
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
@@ -159,7 +159,7 @@ def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
     if not moments.ok or not filters:
         return {"bounded": moments}
     try:
-        result = compare([*filters, unmeasured(model, x)], model, runs, steps, seed, wide=1, threads=1, progress=False)
+        result = compare([*filters, unmeasured(model, x)], model, runs, steps, seed, jobs=1, progress=False)
     except (NotFinite, np.linalg.LinAlgError) as error:  # a filter, or a decomposition for it
         return {"bounded": Finding(False, str(error), moments.value)}
     return {
@@ -302,15 +302,11 @@ def shares(comparison: Comparison, name: str) -> Estimate:
 
     Steps where the component does not vary are left out; a component that never varies has the share 1.
     """
-    square, base = (comparison.sums.square[comparison.fast.index(one)] for one in (name, UNMEASURED))
-    weights, total = comparison.sums.weights, base.sum(axis=-1)
-    used = total > 1e-24 * total.max(axis=0)
-    steps = np.maximum(used.sum(axis=0), 1)
-    share = np.where(used, ratio(square.sum(axis=-1), total, 0.0), 0.0)
-    weight = np.where(used, ratio(weights.sum() / steps, total, 0.0), 0.0)  # 1 / variance, averaged over the steps
-    deviation = batch_mean(((square - share[..., None] * base) * weight[..., None]).sum(axis=0), weights)  # delta method
-    value = np.where(used.any(axis=0), share.sum(axis=0) / steps, 1.0)
-    return Estimate(value, deviation.standard_error, deviation.freedom)
+    squares = comparison.sums.means("square")
+    square, base = (squares[comparison.names.index(one)] for one in (name, UNMEASURED))
+    used = base[..., :1] > 1e-24 * base[..., :1].max(axis=0)
+    share = np.where(used, ratio(square, base, 0.0), 0.0).sum(axis=0) / np.maximum(used.sum(axis=0), 1)
+    return Estimate.jackknife(np.where(used.any(axis=0), share, 1.0))
 
 
 def observable(model: Model, comparison: Comparison, x: Array) -> Finding:
@@ -348,7 +344,7 @@ def observable_share(model: Model, x: Array) -> float:
     slopes = {name: part.subs(model.values).jacobian(sp.Matrix(model.x)) for name, part in (("A", state), ("C", meter))}
     if any(slope.has(sp.Derivative, sp.DiracDelta) for slope in slopes.values()):
         return 1.0
-    function = Stepwise.compile(model.known, "slopes", {"x": sp.Matrix(model.x)}, slopes, ["x"], f"slopes of {model}")
+    function = Stepwise.compile(model.known, "slopes", {"x": sp.Matrix(model.x)}, slopes, ["x"])
     path = np.broadcast_to(np.diag(x.std(axis=1).max(axis=0)), (x.shape[1], model.n, model.n))
     rows = []
     for k, position in enumerate(x[: 4 * model.n]):
@@ -376,7 +372,7 @@ def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
     control = comparison.error_variance(comparison.control).value
     largest, says = 0.0, f"no two filters differ by more than the statistical error of {comparison.runs} trajectories"
     for first, second in pairs:
-        difference, score = comparison.difference(first, second), comparison.score_difference(first, second)
+        difference, score = comparison.difference(first, second), comparison.mean_gap_difference(first, second)
         relative = np.abs(np.append(ratio(difference.value, control, 0.0), score.value))
         error = np.append(ratio(difference.standard_error, control, 0.0), score.standard_error)
         quantile = scipy.special.stdtrit(difference.freedom, 1 - SIGNIFICANCE / tests / 2)

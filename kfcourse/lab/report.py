@@ -34,8 +34,8 @@ from kfcourse.lab.report_text import escape_tex, inline_html, inline_tex
 from kfcourse.lab.short_names import WITH_MODES, title
 from kfcourse.lab.variants import Variant
 from kfcourse.laws import CONFIDENCE
-from kfcourse.montecarlo.comparison import EXACT, Comparison
-from kfcourse.montecarlo.modes import SLOW, Recognised, recognised
+from kfcourse.montecarlo.comparison import Comparison
+from kfcourse.montecarlo.modes import Recognised, recognised
 from kfcourse.montecarlo.statistics import Estimate
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.markup import mathml
@@ -135,30 +135,25 @@ def save_texts(names: Sequence[str], folder: Path, content: Mapping[str, Any], *
 
 def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
     """Write the numbers, for programs: lists over the steps, keyed by the filters' short names."""
-    estimates = {name: result.error_variance(name) for name in result.available}
+    estimates = {name: result.error_variance(name) for name in result.names}
     data: dict[str, Any] = {
         "variant": variant.name,
         "model": _model_in_numbers(result.model),
         "runs": result.runs,
         "steps": result.steps,
         "seed": result.seed,
-        "slow_runs": result.slow_runs,
         "left_out": {name: str(reason) for name, reason in result.left_out.items()},
-        "by_particles": {name: str(reason) for name, reason in result.replaced.items()},
         "error_variance": {name: e.value.tolist() for name, e in estimates.items()},
         "standard_error": {name: e.standard_error.tolist() for name, e in estimates.items()},
-        "error_mean": {name: result.error_mean(name).value.tolist() for name in result.available},
-        "own_variance": {name: result.own_variance(name).value.tolist() for name in result.available},
+        "error_mean": {name: result.error_mean(name).value.tolist() for name in result.names},
+        "own_variance": {name: result.own_variance(name).value.tolist() for name in result.names},
         "score": {name: _number(result.score(name)) for name, _ in result.ranking()},
-        "designs": result.designs,
     }
     if result.has_bound:
         above = {name: result.gap(name) for name in result.entrants}
         data["above_bound"] = {name: e.value.tolist() for name, e in above.items()}
         data["above_bound_standard_error"] = {name: e.standard_error.tolist() for name, e in above.items()}
         data["mean_above_bound"] = {name: _number(gap) for name, gap in result.ranking()}
-    if result.replicas:
-        data["design_deviation"] = {name: result.design_error(name).value.tolist() for name in result.replicas.names}
     text = json.dumps(_finite(data), indent=1, allow_nan=False)
     if str(path) in STANDARD_OUTPUT:
         print(text, flush=True)
@@ -225,8 +220,7 @@ def recognised_modes(result: Comparison, filters: Sequence[Filter | Design]) -> 
     if not isinstance(model, JumpModel):
         return None
     runs = min(result.runs, RECOGNISED)
-    short = {EXACT} if result.slow_runs < runs // SLOW else set()
-    names = {name for name in result.available if name in WITH_MODES and name not in {*result.replaced, *short}}
+    names = {name for name in result.names if name in WITH_MODES}
     of_modes = [one for one in filters if isinstance(one, Filter) and one.name in names]
     return recognised(of_modes, model, runs, result.steps, result.seed) if of_modes else None
 

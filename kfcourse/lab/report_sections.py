@@ -13,7 +13,7 @@ from kfcourse.lab.admission import Admission
 from kfcourse.lab.report_text import cause, filled, in_percent, power_of_ten, ranges
 from kfcourse.lab.short_names import FILTERS, Entry
 from kfcourse.laws import CONFIDENCE
-from kfcourse.montecarlo.comparison import EXACT, HEAVY, Comparison, Verdict
+from kfcourse.montecarlo.comparison import EXACT, Comparison, Verdict
 
 ROUNDING = 1e-6  # per cent: equal filters may have lost half of their digits on the way
 LEVEL = f"{100 * CONFIDENCE:g} %"
@@ -39,7 +39,7 @@ class StudentReport:
     def __init__(self, result: Comparison, words: dict[str, str]) -> None:
         self.result, self.words = result, words
         self.known: Sequence[Admission] = ()
-        self.kinds = [kind for kind in ("linearised", "gaussian") if any(name.endswith(kind) for name in result.available)]
+        self.kinds = [kind for kind in ("linearised", "gaussian") if any(name.endswith(kind) for name in result.names)]
         compared = result.has_bound or len(result.entrants) > 1
         self.figures = [name for name in FIGURES if compared or name not in ("relative", "ranking")]
 
@@ -96,17 +96,16 @@ class StudentReport:
         result, words = self.result, self.words
         yield Block("section", words["experiment"])
         sentences = [self.said("experiment_text", runs=result.runs, steps=result.steps, seed=str(result.seed))]
-        if result.replicas:
-            designed = ", ".join(map(self.title, result.replicas.names))
-            sentences.append(self.said("designs", filters=designed, designs=result.designs))
+        if result.designed:
+            sentences.append(self.said("designs", filters=", ".join(map(self.title, result.designed))))
         if result.has_bound:
-            sentences.append(self.said("exact", runs=result.slow_runs))
+            sentences.append(words["exact"])
         yield Block("text", " ".join(sentences))
         if result.left_out:
             yield Block("text", words["left_out"])
             yield Block("items", lines=list(self.left_out()))
-        for start in range(0, len(result.available), COLUMNS):
-            names = result.available[start : start + COLUMNS]
+        for start in range(0, len(result.names), COLUMNS):
+            names = result.names[start : start + COLUMNS]
             estimates = [result.error_variance(name) for name in names]
             rows = [[f"${k}$", *(power_of_ten(one[k]) for one in estimates)] for k in table_steps(result)]
             yield Block("table", words["table_goes_on" if start else "table"], ["$k$", *map(self.title, names)], rows)
@@ -204,18 +203,8 @@ def remarks(result: Comparison) -> Iterator[tuple[str, dict[str, Any]]]:
         yield "rounding", {"steps": result.without_error}
     if result.doubtful.any():
         yield "doubtful", {"steps": result.doubtful}
-    gaps = {name: result.gap(name) for name in result.entrants}
-    bad = {name: result.usable & ~result.trusted(gap, name) for name, gap in gaps.items()}
     if result.lost:
         yield "diverged", {"names": [*result.lost], "steps": np.any([*result.lost.values()], axis=0)}
-        bad = {name: steps for name, steps in bad.items() if name not in result.lost}
-    if names := [name for name, steps in bad.items() if steps.any()]:
-        part = max(float(result.heavy(name)[bad[name]].max()) for name in names)
-        more = max(result.missing(gaps[name], name) for name in names)
-        runs, exact = (int(float(f"{more * one:.1g}")) for one in (result.runs, result.slow_runs))
-        told = {"part": f"{100 * part:.0f}", "runs": runs, "exact": exact}
-        kind = ("heavy" if part > HEAVY else "skewed") + ("" if result.has_bound else "_alone")
-        yield kind, {"names": names, "steps": np.any([bad[name] for name in names], axis=0), **told}
 
 
 def table_steps(result: Comparison) -> list[int]:

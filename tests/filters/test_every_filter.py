@@ -83,7 +83,7 @@ def every(name):
     """Measurements (STEPS, 8, p) of a shipped variant, all its filters, designed on 300 trajectories, and the slow ones."""
     model = find_variant(name).model
     x, y = simulate(model, 300, STEPS + 1, seed=1)
-    ensemble = [[Instant(x[k], y[k], x[k + 1])] for k in range(STEPS)]
+    ensemble = [Instant(x[k], y[k], x[k + 1]) for k in range(STEPS)]
     designed = design([duof(model), *designs(gaussian(model), 2)], ensemble)
     slow = [particle(model, 100), *([pointmass(model)] if model.n == model.p == 1 else [])]
     return simulate(model, 8, STEPS, seed=2).y, [build(model) for build in READY.values()] + designed, slow
@@ -192,7 +192,7 @@ def test_on_a_linear_gaussian_model_every_filter_is_the_kalman_filter(name):
     y = simulate(model, 5, STEPS, seed=8).y  # new trajectories, not those of the design
     expected = run(kalman_filter(model), y)
     checked = [(build(model), 1e-10) for build in NEUTRAL.values()]
-    checked += [(one, 1e-9) for one in design(designed, [[moment] for moment in moments])]
+    checked += [(one, 1e-9) for one in design(designed, moments)]
     for filter_, tolerance in checked:
         found = run(filter_, y)
         np.testing.assert_allclose(found.mean, expected.mean, rtol=tolerance, atol=tolerance, err_msg=filter_.name)
@@ -284,7 +284,7 @@ def test_no_measurement_makes_nan(name, value):
 def test_the_same_seed_gives_the_same_bytes():
     model = find_variant("53").model
     x, y = simulate(model, 200, 3, seed=1)
-    again = [design([duof(model), mfos(gaussian(model))], [[Instant(x[0], y[0], x[1])]]) for _ in range(2)]
+    again = [design([duof(model), mfos(gaussian(model))], [Instant(x[0], y[0], x[1])]) for _ in range(2)]
     for left, right in zip(*again, strict=True):
         assert run(left, y[:1]).mean.tobytes() == run(right, y[:1]).mean.tobytes()
     left, right, other = (run(particle(model, 40, seed), y[:, :3]).mean.tobytes() for seed in (1, 1, 2))
@@ -385,7 +385,7 @@ def test_designs_from_the_same_trajectories_are_the_same_in_other_units(name):
     families = [duof, *(lambda one, of=of: of(gaussian(one)) for of in (fos, mfos, partial(fkp, memory=2)))]
     x, y = simulate(model, 400, steps + 1, seed=2)
     z, u = s[: model.n] * x, t[: model.p] * y
-    here = design([of(model) for of in families], ([Instant(x[k], y[k], x[k + 1])] for k in range(steps)))
-    there = design([of(other) for of in families], ([Instant(z[k], u[k], z[k + 1])] for k in range(steps)))
+    here = design([of(model) for of in families], (Instant(x[k], y[k], x[k + 1]) for k in range(steps)))
+    there = design([of(other) for of in families], (Instant(z[k], u[k], z[k + 1]) for k in range(steps)))
     for one, another in zip(here, there, strict=True):
         assert_same(run(another, u[:steps, :50]), run(one, y[:steps, :50]))

@@ -9,7 +9,7 @@ import oracles
 import pytest
 import scipy.linalg
 import sympy as sp
-from test_every_filter import LINEAR, OF_MEASUREMENTS, STEPS, STRUCTURES, designs, exact_ensemble
+from test_every_filter import LINEAR, OF_MEASUREMENTS, STRUCTURES, exact_ensemble
 
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import notation as s
@@ -29,17 +29,6 @@ pytestmark = pytest.mark.quick
 
 
 # ---------------------------------------------------------------- linear-Gaussian models
-
-
-def test_the_design_does_not_depend_on_how_the_ensemble_is_cut():
-    one = LINEAR["n=2, p=2"]
-    moments = exact_ensemble(one, STEPS, seed=3)
-    families = [duof(one.model()), *designs(gaussian(one.model()), STEPS)]
-    whole = design(families, [[moment] for moment in moments])
-    cut = design(families, [[Instant(*(a[:7] for a in m)), Instant(*(a[7:] for a in m))] for m in moments])
-    y = simulate(one.model(), 3, STEPS, seed=9).y
-    for first, second in zip(whole, cut, strict=True):
-        np.testing.assert_allclose(run(second, y).mean, run(first, y).mean, rtol=1e-8, atol=1e-8)
 
 
 def test_the_kalman_filter_is_the_loop_of_the_page():
@@ -148,7 +137,7 @@ def test_the_aof_is_the_loop_of_the_page(variant53, trajectories, kind):
 
 def designed_on(designs, trajectories):
     x, y, x_next = (array[..., None] for array in trajectories)
-    return design(designs, [[Instant(*step)] for step in zip(x, y, x_next, strict=True)])
+    return design(designs, [Instant(*step) for step in zip(x, y, x_next, strict=True)])
 
 
 def test_the_duof_is_the_loop_of_the_page(variant53, trajectories):
@@ -305,7 +294,7 @@ def test_the_printed_equations_are_what_runs(family, size, kind):
     x, y = simulate(model, runs, steps + 1, seed=31)
     filter_ = build(structure)
     if isinstance(filter_, Design):
-        (filter_,) = design([filter_], [[Instant(x[k], y[k], x[k + 1])] for k in range(steps)])
+        (filter_,) = design([filter_], [Instant(x[k], y[k], x[k + 1]) for k in range(steps)])
 
     functions = structural_values(model, structure)
     state = filter_.init(runs)
@@ -425,7 +414,7 @@ def test_the_duof_s_own_covariances_are_those_of_its_errors():
     """
     model, steps = PRINTED["p=2"](), 3
     x, y = simulate(model, 40, steps + 1, seed=14)
-    (filter_,) = design([duof(model)], [[Instant(x[k], y[k], x[k + 1])] for k in range(steps)])
+    (filter_,) = design([duof(model)], [Instant(x[k], y[k], x[k + 1]) for k in range(steps)])
     state = filter_.init(40)
     for k in range(steps):
         state = filter_.step(state, y[k])
@@ -460,6 +449,6 @@ def test_other_numbers_of_arguments_are_refused(variant53, family, arguments):
 
 
 def test_a_design_on_trajectories_that_diverge_says_so(variant53):
-    broken = [[Instant(np.ones((3, 1)), np.full((3, 1), np.inf), np.ones((3, 1)))]]
+    broken = [Instant(np.ones((3, 1)), np.full((3, 1), np.inf), np.ones((3, 1)))]
     with pytest.raises(NotFinite, match=r"step 0.*trajectories become infinite"):
         design([duof(variant53)], broken)

@@ -51,7 +51,7 @@ def without(one, y):
 def every_filter():
     model = walk()
     designs = [duof(model), fos(gaussian(model)), mfos(linearised(model))]
-    designed = design(designs, Ensemble(model, 300, 9, seed=1).by_step())
+    designed = design(designs, Ensemble(model, 300, 9, seed=1))
     modes = [linearised(walk()), linearised(Model.define("0.5*x + v", "x + 0.5*w", prior={"mean": 0.4, "variance": 0.7}))]
     return [
         aof(linearised(model)), aof(unscented(model)), iterated(gaussian(model), 3), kalman_filter(model),

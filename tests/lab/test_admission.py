@@ -193,11 +193,11 @@ def test_a_variance_that_turns_negative_as_the_filter_runs_is_the_affair_of_that
 
     broken = type(good)("broken", model, good.init, step)
     with pytest.raises(NotFinite, match=r"^step 2: broken failed: a covariance has the variance -1") as caught:
-        compare([good, broken], model, 100, 4, 1, threads=1, progress=False)
+        compare([good, broken], model, 100, 4, 1, jobs=1, progress=False)
     assert caught.value.filter_name == "broken"
     with pytest.raises(ModelError, match="the input u has 2 value"):  # a mistake in the model is no filter's affair
         timed = Model.define("0.9*x + u + v", "x + w", inputs={"u": [1, 2]})
-        compare([aof(gaussian(timed))], timed, 10, 4, 1, threads=1, progress=False)
+        compare([aof(gaussian(timed))], timed, 10, 4, 1, jobs=1, progress=False)
 
 
 @pytest.mark.parametrize("meter", [["x + w", "x + w"], ["x + w", "2*x + w"], ["x + w1", "x + w1 + w2", "w2 + x**2"]])
@@ -207,5 +207,5 @@ def test_measurements_whose_noises_depend_on_one_another_have_no_density(meter):
     particles, normal = admissions(model, ["particle", "aof-gaussian"])
     assert particles.one is None and "depend on one another" in str(particles.reason) and not has_bound(model)
     assert normal.verdict == "yes"
-    result = compare([normal.one], model, 100, 4, 1, threads=1, progress=False)
+    result = compare([normal.one], model, 100, 4, 1, jobs=1, progress=False)
     assert np.isfinite(result.error_variance("aof-gaussian").value).all()

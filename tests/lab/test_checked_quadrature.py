@@ -138,9 +138,7 @@ def test_the_order_is_the_first_that_does():
 def test_a_comparison_by_a_higher_order_is_the_same():
     """What the comparison sees of the order: no more than CLOSE allows, 2e-4 of the error variance."""
     structures = [replace(gauss_hermite(CUBIC, order), name=f"gh{order}") for order in (checked(CUBIC).order, 100)]
-    result = compare(
-        [family(one) for family in (aof, fos) for one in structures], CUBIC, 4000, 8, 1, threads=1, progress=False, wide=1
-    )
+    result = compare([family(one) for family in (aof, fos) for one in structures], CUBIC, 4000, 8, 1, jobs=1, progress=False)
     for family in ("aof", "fos"):
         one, other = (result.error_variance(f"{family}-{structure.name}").value for structure in structures)
         np.testing.assert_allclose(one, other, rtol=2e-4)

@@ -37,7 +37,7 @@ from kfcourse.lab.short_names import LAB
 from kfcourse.lab.variants import STEPS, VariantError, read_variant
 from kfcourse.laws import Gaussian
 from kfcourse.linear.system import is_linear
-from kfcourse.montecarlo.batches import FEWEST
+from kfcourse.montecarlo import FEWEST
 from kfcourse.montecarlo.ensemble import simulate
 
 SHIPPED = load_variants()
@@ -52,7 +52,7 @@ def variant(state, meter, parameters=None, **options):
 def compared(model, names, runs, seed, steps=STEPS):
     """A comparison that holds the estimate without measurements too."""
     x = simulate(model, 20_000, steps, seed + 1000).x
-    return compare([*lab_filters(model, names), unmeasured(model, x)], model, runs, steps, seed, threads=1, progress=False)
+    return compare([*lab_filters(model, names), unmeasured(model, x)], model, runs, steps, seed, jobs=1, progress=False)
 
 
 # --- the shipped variants
@@ -355,7 +355,7 @@ def test_false_alarms_are_as_rare_as_promised():
         return Filter(f"meter {place}", model, initial_state(model), step)
 
     filters = [reading(0), reading(1)]
-    alarms = sum(differences(compare(filters, model, 512, 16, seed, threads=1, progress=False), ()).ok for seed in range(60))
+    alarms = sum(differences(compare(filters, model, 512, 16, seed, jobs=1, progress=False), ()).ok for seed in range(60))
     assert alarms <= 3
 
 

@@ -82,7 +82,7 @@ def written(request, tmp_path_factory):
     names = ["aof-jump-gaussian", "imm", "gpb2", "fos-jump-gaussian", "fkp4-jump-gaussian", "aof-averaged", "aof-exact"]
     model = find_variant("J1-lasting").model
     filters = [one.one for one in admissions(model, names)]
-    result = compare(filters, model, 1000, 3, 1, slow_runs=128, progress=False, threads=1)
+    result = compare(filters, model, 128, 3, 1, progress=False, jobs=1)
     folder = tmp_path_factory.mktemp(request.param)
     paths = write_report(find_variant("J1-lasting"), result, folder, request.param, modes=recognised_modes(result, filters))
     texts = [(folder / name).read_text(encoding="utf-8") for name in ("report.tex", "report.html")]
@@ -113,7 +113,7 @@ def test_modes_with_other_equations_are_told_one_by_one(tmp_path):
         "0.9*x + v", "x + w", modes={"calm": {}, "curved": {"meter": "x + 0.1*x**2 + w"}}, transition=[0.8, 0.2]
     )
     both = [logic_dynamic([kind(mode) for mode in model.modes], model, model.first) for kind in (gaussian, linearised)]
-    result = compare(both, model, 400, 3, 1, progress=False, threads=1)
+    result = compare(both, model, 400, 3, 1, progress=False, jobs=1)
     write_report(Variant("own", "", model), result, tmp_path, "en")
     tex = (tmp_path / "report.tex").read_text(encoding="utf-8")
     assert tex.count("In mode $j=2$ (curved):") == 3  # the task, and two kinds of structural functions

@@ -28,7 +28,7 @@ from kfcourse.montecarlo.statistics import Estimate
 @pytest.fixture(scope="module")
 def result():
     model = load_variants()["53"].model
-    return compare(lab_filters(model, [*LAB, "aof-exact"]), model, 2000, 4, 1, slow_runs=200, designs=2, progress=False)
+    return compare(lab_filters(model, [*LAB, "aof-exact"]), model, 200, 4, 1, design_runs=2000, progress=False)
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +110,7 @@ class Told:
     entrants = ("aof-gaussian", "duof", "fos-gaussian")
 
     def __init__(self):
-        self.model, self.available = load_variants()["53"].model, self.entrants
+        self.model, self.names = load_variants()["53"].model, self.entrants
 
     def ranking(self):
         return [(name, Estimate(np.array(0.1), np.array(0.01), 9)) for name in self.entrants]
