@@ -61,7 +61,7 @@ def linearisation(model: Model) -> Functions:
 
     def compiled(name: str) -> Map:
         formula = sp.ImmutableMatrix(matrices[name].subs(model.values))
-        function = Stepwise.compile(model.known, name, {"x": x}, {name: formula}, ["x", "f", "S"], f"{name} of {model}")
+        function = Stepwise.compile(model.known, name, {"x": x}, {name: formula}, ["x", "f", "S"])
         shape = formula.shape[:1] if name in ("f", "S") else formula.shape
 
         def of_arrays(at: Array, k: int | None = None) -> Array:

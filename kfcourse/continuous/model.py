@@ -224,8 +224,7 @@ def compiled(
     numeric = {name: sp.ImmutableMatrix(matrix.subs(model.values)) for name, matrix in outputs.items()}
     if model.time is not None:
         arguments = {**arguments, "t": sp.Matrix([model.time])}
-    doc = f"{', '.join(outputs)} of {model}"
-    function = compile_function("continuous", arguments, numeric, [*vectors, "t"], doc).function
+    function = compile_function("continuous", arguments, numeric, [*vectors, "t"]).function
     return (lambda t, *arrays: function(*arrays)) if model.time is None else lambda t, *arrays: function(*arrays, np.array([t]))
 
 

@@ -344,7 +344,7 @@ def observable_share(model: Model, x: Array) -> float:
     slopes = {name: part.subs(model.values).jacobian(sp.Matrix(model.x)) for name, part in (("A", state), ("C", meter))}
     if any(slope.has(sp.Derivative, sp.DiracDelta) for slope in slopes.values()):
         return 1.0
-    function = Stepwise.compile(model.known, "slopes", {"x": sp.Matrix(model.x)}, slopes, ["x"], f"slopes of {model}")
+    function = Stepwise.compile(model.known, "slopes", {"x": sp.Matrix(model.x)}, slopes, ["x"])
     path = np.broadcast_to(np.diag(x.std(axis=1).max(axis=0)), (x.shape[1], model.n, model.n))
     rows = []
     for k, position in enumerate(x[: 4 * model.n]):

@@ -150,4 +150,4 @@ def _affine(equation: sp.MatrixBase, x: Sequence[sp.Symbol], noise: Sequence[sp.
         raise ModelError(f"{list(equation)} is not linear, so the Kalman filter does not apply; use aof(linearised(model))")
     constant = equation.subs(model.values).subs(dict.fromkeys([*x, *noise], 0))
     outputs = {"A": slopes[:, : len(x)], "B": slopes[:, len(x) :], "constant": constant}
-    return Stepwise.compile(model.known, "matrices", {}, outputs, ["constant"], f"matrices of {model}")
+    return Stepwise.compile(model.known, "matrices", {}, outputs, ["constant"])

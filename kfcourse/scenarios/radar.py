@@ -35,14 +35,12 @@ _to_spherical = compile_function(
     {"position": sp.Matrix([X, Y, Z])},
     {"measured": SPHERICAL},
     ["position", "measured"],
-    "range, azimuth, elevation",
 ).function
 _to_cartesian = compile_function(
     "cartesian",
     {"measured": sp.Matrix([RANGE, AZIMUTH, ELEVATION])},
     {"position": CARTESIAN},
     ["measured", "position"],
-    "x, y, z",
 ).function
 
 

@@ -46,4 +46,4 @@ def compile_noiseless(model: Model) -> tuple[Noiseless, Noiseless]:
 def _compiled(name: str, equation: sp.MatrixBase, arguments: dict[str, tuple[sp.Symbol, ...]], model: Model) -> Stepwise:
     matrices = {key: sp.Matrix(symbols) for key, symbols in arguments.items()}
     numeric = equation.subs(model.values)
-    return Stepwise.compile(model.known, name, matrices, {name: numeric}, [*arguments, name], f"{name} equation of {model}")
+    return Stepwise.compile(model.known, name, matrices, {name: numeric}, [*arguments, name])

@@ -21,14 +21,12 @@ import sympy as sp
 from kfcourse.angles import Angles
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.formula import FormulaError, symbol
-from kfcourse.symbolic.known import CHECKED, SURE, Stepwise
+from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import OF_A_VARIANT, Model
 from kfcourse.symbolic.reading import Formula, Formulas, ModelError, by_name, exact_number, read, shown, table
 
 OF_A_MODE = ("state", "meter", "parameters", "state_noise", "meter_noise")  # in which modes may differ
-MOST = 20  # modes
 NAME = re.compile(r"(?=.*\S)[\w -]{1,40}")  # it stands in tables, reports and LaTeX
-TRIED, FAR = 200, 12.0  # states on which transitions are tried out, to so many deviations of the prior
 SUM = 1e-9  # a row of probabilities written with ten digits sums to 1 within this
 
 
@@ -107,9 +105,10 @@ class JumpModel:
         matrix, of_step = _compiled(chain, fitting[0], common, changed)
         if rows == 1 and first is None and not matrix.has(*fitting[0].x):
             first = np.asarray(of_step.at(0)()[0], dtype=float)[0].tolist()
-        found = cls(tuple(tables), fitting, _law(first, len(built)), matrix, of_step)
-        found._check()
-        return found
+        model = cls(tuple(tables), fitting, _law(first, len(built)), matrix, of_step)
+        if not model.by_state:
+            model.transition_at(0)  # a row that is none is refused here; of later steps and of states, where they are reached
+        return model
 
     @property
     def n(self) -> int:
@@ -178,15 +177,11 @@ class JumpModel:
     def transition_at(self, k: int) -> Array:
         """pi at step k, (J, J): from the mode of y_k to that of y_{k+1}; ModelError if it depends on the state."""
         self.without_state("a matrix of transitions for all states")
-        found = self._entries(k)
+        with np.errstate(all="ignore"):
+            found = np.asarray(self.chain_of_step.at(k)()[0], dtype=float)
         if problem := _not_probabilities(found):
             raise ModelError(f"`transition` at step {k}: {problem}; change its formulas, or run at most {k} steps")
         return found / found.sum(axis=1, keepdims=True)
-
-    def _entries(self, k: int) -> Array:
-        """What the formulas of pi give at step k; what is no probability is told in words, not warned of."""
-        with np.errstate(all="ignore"):
-            return np.asarray(self.chain_of_step.at(k)()[0], dtype=float)
 
     def law_at(self, k: int) -> Array:
         """q_k, (J,): the probabilities of the modes of y_k before anything is measured; ModelError if they are not known."""
@@ -216,44 +211,6 @@ class JumpModel:
         said = (repr(mode).removeprefix("Model(").removesuffix(")") for mode in self.modes)
         return f"JumpModel({' | '.join(f'{name}: {text}' for name, text in zip(self.names, said, strict=True))})"
 
-    def _check(self) -> None:
-        """ModelError if rows are no probabilities at some step, or a mode is never reached."""
-        known = self.chain_of_step.known
-        steps = int(min(CHECKED, self.steps)) if known.symbols else 1
-        reached = self.first > 0
-        if self.by_state:
-            self._check_states(steps, reached)
-            return
-        for k in range(steps):
-            matrix = self._entries(k)
-            if problem := _not_probabilities(matrix):
-                where = f" at step {k}" if known.symbols else ""
-                if k >= SURE:
-                    break  # said when it runs so far
-                raise ModelError(f"`transition`{where}: {problem}")
-            for _ in range(1 if known.symbols else len(matrix)):
-                reached = reached | (reached.astype(float) @ matrix > 0)
-        self._check_reached(reached)
-
-    def _check_states(self, steps: int, reached: Array) -> None:
-        """The same on states as far as a dozen deviations of the prior, for the steps of a run of the lab."""
-        mean, cov = self.prior
-        away = np.random.default_rng(0).standard_normal((TRIED, self.n)) * np.geomspace(0.1, FAR, TRIED)[:, None]
-        x = mean + np.concatenate([np.zeros((1, self.n)), away]) * np.sqrt(np.diagonal(cov))
-        for k in range(min(steps, SURE)):
-            ever = (self.transition_of(x, k) > 0).any(axis=0)
-            for _ in range(1 if self.chain_of_step.known.symbols else len(self.names)):
-                reached = reached | (reached @ ever)
-        self._check_reached(reached)
-
-    def _check_reached(self, reached: Array) -> None:
-        if not reached.all():
-            never = ", ".join(name for name, one in zip(self.names, reached, strict=True) if not one)
-            raise ModelError(
-                f"the mode {never} is never reached from the first law {self.first.tolist()}; leave it out, or give it a "
-                "probability in `first` or in `transition`"
-            )
-
 
 def model_of_table(given: Mapping[str, Any]) -> Model | JumpModel:
     """The model of a table such as [variants.53], or of one with `modes`."""
@@ -275,8 +232,6 @@ def _tables(modes: Any) -> dict[str, dict[str, Any]]:
         raise ModelError(
             f"`modes` must be a table of modes by name, such as {{sound = {{}}, faulty = {{...}}}}, got {shown(modes)}"
         )
-    if len(modes) > MOST:
-        raise ModelError(f"{len(modes)} modes: at most {MOST} are compared, as the work grows with the square of their number")
     if odd := [name for name in modes if not NAME.fullmatch(str(name))]:
         raise ModelError(f"the mode {shown(odd[0])} needs a name of letters, digits, spaces, _ and -, at most 40 of them")
     tables = {str(name): table(f"modes.{name}", change) for name, change in modes.items()}

@@ -115,13 +115,11 @@ class Stepwise(NamedTuple):
         arguments: Mapping[str, sp.MatrixBase],
         outputs: Mapping[str, sp.MatrixBase],
         vectors: Sequence[str],
-        doc: str = "",
-        definitions: Mapping[sp.Symbol, sp.Expr] | None = None,
     ) -> Stepwise:
         """Arguments as of `compile_function`."""
         if known.symbols:
             arguments = {**arguments, "known": sp.Matrix(known.symbols)}
-        return cls(compile_function(name, arguments, outputs, [*vectors, "known"], doc, definitions), known)
+        return cls(compile_function(name, arguments, outputs, [*vectors, "known"]), known)
 
     def at(self, k: int | None) -> Callable[..., Any]:
         """The function at step k."""

@@ -47,26 +47,22 @@ class QuadratureWarning(UserWarning):
     """The points do not integrate a function of the model at its prior law: the structural functions may be far off."""
 
 
-def unscented(model: Model, kappa: float | None = None, root: str = "cholesky", augmented: bool = False) -> Structure:
+def unscented(model: Model, kappa: float | None = None) -> Structure:
     """Structural functions by the unscented transform.
 
-    2 s + 1 points, the mean and +-sqrt(s + kappa) times the columns of a root of the covariance.  Means are exact for
-    quadratic functions, covariances for linear ones only: no point lies off the axes, so a product like x^2 w is not seen.
+    2 s + 1 points, the mean and +-sqrt(s + kappa) times the columns of the lower triangular root of the covariance.  Means are
+    exact for quadratic functions, covariances for linear ones only: no point lies off the axes, so a product like x^2 w is not
+    seen.
 
     Parameters
     ----------
     kappa : float, optional
         The spread is s + kappa; kappa = 3 - s by default (Julier and Uhlmann), but not below 0, so that no weight is negative.
-    root : {"cholesky", "symmetric", "eigenvectors"}
-        Which root of the covariance: the lower triangular one, in which the order of the components counts; the symmetric
-        one; or the eigenvectors times the roots of the eigenvalues, the principal axes of the ellipsoid.
-    augmented : bool
-        Points for all noises, those too that are only added.
 
     Raises
     ------
     ModelError
-        s + kappa is not positive and finite, or there is no such root.
+        s + kappa is not positive and finite.
 
     Warns
     -----
@@ -85,18 +81,18 @@ def unscented(model: Model, kappa: float | None = None, root: str = "cholesky", 
         weights[0] = k / (size + k)
         return np.concatenate([np.zeros((1, size)), axes, -axes]), weights
 
-    return _checked("unscented", model, rule, _Equations.of(model, "all" if augmented else "not only added"), root, order=5)
+    return _checked("unscented", model, rule, _Equations.of(model, "not only added"), order=5)
 
 
-def gauss_hermite(model: Model, order: int = 5, root: str = "cholesky", augmented: bool = False) -> Structure:
+def gauss_hermite(model: Model, order: int = 5) -> Structure:
     """Structural functions by the Gauss-Hermite product rule; exact for polynomials below degree 2*order.
 
-    `order` points an axis, so order**s evaluations, s = `axes(model)`.  `root` and `augmented` as of `unscented`.
+    `order` points an axis, so order**s evaluations, s = `axes(model)`.
 
     Raises
     ------
     ModelError
-        Fewer than two points an axis or no whole number, too many points together, or there is no such root.
+        Fewer than two points an axis or no whole number, or too many points together.
 
     Warns
     -----
@@ -106,9 +102,7 @@ def gauss_hermite(model: Model, order: int = 5, root: str = "cholesky", augmente
     expect(model, Model, "gauss_hermite")
     if not isinstance(order, int | np.integer) or order < 2:
         raise ModelError(f"Gauss-Hermite quadrature needs an order of at least 2, a whole number, got {order!r}")
-    return _checked(
-        "gauss-hermite", model, product_rule(order), _Equations.of(model, "all" if augmented else _NOT_LINEAR), root, order
-    )
+    return _checked("gauss-hermite", model, product_rule(order), _Equations.of(model, _NOT_LINEAR), order)
 
 
 def axes(model: Model) -> int:
@@ -128,7 +122,7 @@ def product_rule(order: int) -> Rule:
     return rule
 
 
-Pointed: TypeAlias = Literal["all", "not only added", "not linear"]  # the noises over which points spread
+Pointed: TypeAlias = Literal["not only added", "not linear"]  # the noises over which points spread
 _NOT_LINEAR: Pointed = "not linear"
 
 
@@ -179,7 +173,7 @@ def _equation(function, formulas, noises, law: Gaussian, model: Model, pointed: 
         and not decides(formulas, [noise])
         for j, noise in enumerate(noises)
     ]
-    other = np.array([pointed == "all" or not p for p in plain], dtype=bool)
+    other = ~np.array(plain, dtype=bool)
     while (correlated := ~other & (law.cov[:, other] != 0).any(axis=1)).any():
         other |= correlated
     rest = sp.Matrix(len(formulas), len(noises), lambda i, j: 0 if other[j] else factors[i, j])
@@ -192,9 +186,9 @@ def _equation(function, formulas, noises, law: Gaussian, model: Model, pointed: 
     return _Equation(function, len(formulas), law._replace(cov=cov), root, stepwise, bool(arguments), angles)
 
 
-def _checked(name: str, model: Model, rule: Rule, equations: _Equations, root: str, order: int) -> Structure:
+def _checked(name: str, model: Model, rule: Rule, equations: _Equations, order: int) -> Structure:
     """The structure, after a comparison at the prior law of Gauss-Hermite rules of this order and of twice the order."""
-    structure = _quadrature(name, model, rule, equations, root)
+    structure = _quadrature(name, model, rule, equations)
     size = equations.size(model)
     with np.errstate(all="ignore"):
         found = _moments(structure)
@@ -203,10 +197,8 @@ def _checked(name: str, model: Model, rule: Rule, equations: _Equations, root: s
         elif (2 * order) ** size <= MOST_POINTS:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", QuadratureWarning)  # these points are not those that the filter uses
-                coarse = (
-                    found if name == "gauss-hermite" else _moments(_quadrature(name, model, product_rule(order), equations, root))
-                )
-                fine = _moments(_quadrature(name, model, product_rule(2 * order), equations, root))
+                coarse = found if name == "gauss-hermite" else _moments(_quadrature(name, model, product_rule(order), equations))
+                fine = _moments(_quadrature(name, model, product_rule(2 * order), equations))
             for (what, less, *_), (_, more, scale, angles) in zip(coarse, fine, strict=True):
                 more = near(more, less, angles)
                 if not (np.abs(more - less) <= CONVERGED * scale).all():
@@ -272,34 +264,22 @@ def _lower_root(cov: Array) -> Array:
     return lower
 
 
-def _symmetric_root(cov: Array) -> Array:
-    """V sqrt(Lambda) V^T."""
-    return symmetric(square_root(cov) @ transpose(np.linalg.eigh(cov)[1]))
-
-
-ROOTS: dict[str, Callable[[Array], Array]] = {"cholesky": _lower_root, "symmetric": _symmetric_root, "eigenvectors": square_root}
-
-
-def _quadrature(name: str, model: Model, rule: Rule, equations: _Equations, root: str) -> Structure:
+def _quadrature(name: str, model: Model, rule: Rule, equations: _Equations) -> Structure:
     """A structure from standard normal points and weights: rule(size) -> (points (q, size), weights (q,))."""
-    if root not in ROOTS:
-        raise ModelError(f"root must be one of {', '.join(map(repr, ROOTS))}, got {root!r}")
     rules = [rule(model.n + equation.root.shape[1]) for equation in equations]
-    whole = of_steps(
-        name, model, lambda k: _of_step(name, model, rules, _Equations(*(one._replace(k=k) for one in equations)), root)
-    )
+    whole = of_steps(name, model, lambda k: _of_step(name, model, rules, _Equations(*(side._replace(k=k) for side in equations))))
     state = equations.state
     numbers = tuple(one.tobytes() for one in (*rules[0], *state.noise, state.root))
-    return replace(whole, moving=(name, root, numbers, *object_equation(model)))
+    return replace(whole, moving=(name, numbers, *object_equation(model)))
 
 
-def _of_step(name: str, model: Model, rules: Sequence[tuple[Array, Array]], equations: _Equations, root: str) -> Structure:
+def _of_step(name: str, model: Model, rules: Sequence[tuple[Array, Array]], equations: _Equations) -> Structure:
     n, measurement = model.n, measurement_of(model.angles.y)
 
     def propagate(equation: _Equation, mean: Array, cov: Array, points: Array, weights: Array):
         """Root of cov, deviations of x, mean of the function, its deviations from that (0 exactly for what does not vary),
         and the covariance that noises without points add."""
-        scale = ROOTS[root](cov)
+        scale = _lower_root(cov)
         deviation = points[:, :n] @ transpose(scale)
         _warn_of_turns(name, model, deviation)
         x = mean[..., None, :] + deviation

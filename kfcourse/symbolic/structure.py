@@ -163,35 +163,22 @@ class StructuralFormulas:
 
     @cached_property
     def compiled_predict(self) -> Stepwise:
-        return self._compile(
-            "predict", {"z": self.z, "p": self.p}, {key: self.functions[key].subs(self.model.values) for key in ("tau", "Theta")}
-        )
+        return self._compile("predict", {"z": self.z, "p": self.p}, {key: self.functions[key] for key in ("tau", "Theta")})
 
     @cached_property
     def compiled_measure(self) -> Stepwise:
-        h, G, R = (part.subs(self.model.values) for part in (self.functions["h"], self.functions["G"], self.R))
-        explained = G * self.d * G.T
-        # F is computed as G d G^T + R: R enters both outputs, and is found once.
-        upper = [(i, j) for i in range(R.rows) for j in range(i, R.rows) if R[i, j].free_symbols]
-        auxiliary = {(i, j): sp.Dummy(f"R{i}{j}", dummy_index=1) for i, j in upper}  # the same each time
-        named = sp.ImmutableMatrix(*R.shape, lambda i, j: auxiliary.get((min(i, j), max(i, j)), R[i, j]))
-        outputs = {"h": h, "G": G, "F": explained + named, "R": named}
-        return self._compile("measure", {"m": self.m, "d": self.d}, outputs, {name: R[ij] for ij, name in auxiliary.items()})
+        """h, G, R, and G d G^T: F is their sum."""
+        G = self.functions["G"]
+        outputs = {"h": self.functions["h"], "G": G, "R": self.R, "explained": G * self.d * G.T}
+        return self._compile("measure", {"m": self.m, "d": self.d}, outputs)
 
     @cached_property
     def compiled_transition(self) -> Stepwise:
-        outputs = {name: part.subs(self.model.values) for name, part in {"A": self.A, "Q": self.Q}.items()}
-        return self._compile("transition", {"z": self.z, "p": self.p}, outputs)
+        return self._compile("transition", {"z": self.z, "p": self.p}, {"A": self.A, "Q": self.Q})
 
-    def _compile(
-        self,
-        name: str,
-        arguments: dict[str, sp.MatrixBase],
-        outputs: dict[str, sp.MatrixBase],
-        definitions: dict[sp.Symbol, sp.Expr] | None = None,
-    ) -> Stepwise:
-        doc = f"{', '.join(outputs)}: {self.name} structural functions of {self.model}"
-        return Stepwise.compile(self.model.known, name, arguments, outputs, ["z", "m", "tau", "h"], doc, definitions)
+    def _compile(self, name: str, arguments: dict[str, sp.MatrixBase], outputs: dict[str, sp.MatrixBase]) -> Stepwise:
+        numeric = {key: part.subs(self.model.values) for key, part in outputs.items()}
+        return Stepwise.compile(self.model.known, name, arguments, numeric, ["z", "m", "tau", "h"])
 
     def structure(self) -> Structure:
         """The structure; of a model that depends on the step, one that must be told which."""
@@ -200,11 +187,16 @@ class StructuralFormulas:
     def _at(self, k: int | None) -> Structure:
         predict, measure = self.compiled_predict.at(k), self.compiled_measure.at(k)
         angles, measurement = self.model.angles, measurement_of(self.model.angles.y)
+
+        def measured(m: Vectors, d: Matrices) -> Measurement:
+            h, G, R, explained = measure(m, d)
+            return measurement(h, G, explained + R, R)
+
         return Structure(
             self.name,
             self.model,
             lambda z, p: _spread(Gaussian(*predict(z, p)), z, angles.x),
-            lambda m, d: measurement(*measure(m, d)),
+            measured,
             lambda z, p: Transition(*self.compiled_transition.at(k)(z, p)),  # compiled where it is asked for
             self,
         )

@@ -185,17 +185,21 @@ def test_the_exact_filter_follows_probabilities_that_jump():
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("row", "message"),
     [
-        ({"transition": [["1 - x/20", "x/20"], [0.3, 0.7]]}, r"at step 0, where x = -?[\d.]+: row 1 has an entry that is no"),
-        ({"transition": [["exp(-x**2)", "0.5"], [0.3, 0.7]]}, r"at step 0, where x = [\d.]+: row 1 sums to"),
-        ({"transition": ["exp(-x**2)", "1 - exp(-x**2)"], "first": None}, "`first` is missing"),
-        ({"transition": [["1 - 0*x", "0*x"], [0.3, 0.7]], "first": [1, 0]}, "the mode faulty is never reached"),
+        (["1 - x/20", "x/20"], r"at step 0, where x = 30: row 1 has an entry that is no"),
+        (["exp(-x**2)", "0.5"], r"at step 0, where x = 0: row 1 sums to"),
     ],
 )
-def test_what_is_no_probability_for_some_state_is_refused(changes, message):
+def test_what_is_no_probability_for_a_state_is_refused_there(row, message):
+    model = overloaded(transition=[row, [0.3, 0.7]])
     with pytest.raises(ModelError, match=message):
-        overloaded(**changes)
+        model.transition_of(np.array([[0.0], [30.0]]), 0)
+
+
+def test_transitions_by_the_state_need_a_first_law():
+    with pytest.raises(ModelError, match="`first` is missing"):
+        overloaded(transition=["exp(-x**2)", "1 - exp(-x**2)"], first=None)
 
 
 def test_transitions_of_many_components_are_refused():

@@ -18,13 +18,9 @@ def printed(formula, **more):
 def test_a_function_in_full():
     assert printed(c * x**2 + sp.exp(-x) / 3, constants=[c]) == (
         "function f(n, v, c, a) {\n"
-        "  const v_c = v.c;\n"
-        "  const a_x = a.x;\n"
-        "  const a_value = a.value;\n"
         "  for (let i = 0; i < n; i++) {\n"
-        "    const x_0 = a_x[i];\n"
-        "    const s0 = (x_0 * x_0);\n"
-        "    a_value[i] = ((0.3333333333333333 * Math.exp(((-1.0) * x_0))) + (v_c * s0));\n"
+        "    const o0 = Math.pow(a.x[i], 2)*v.c + (1/3)*Math.exp(-a.x[i]);\n"
+        "    a.value[i] = o0;\n"
         "  }\n"
         "}\n"
     )
@@ -32,9 +28,8 @@ def test_a_function_in_full():
 
 def test_entries_of_vectors_and_what_is_written_in_place():
     text = javascript.loop("turn", {"p": sp.Matrix([x, y])}, {"p": sp.Matrix([y, x])})
-    assert "const p_1 = a_p[2 * i + 1];" in text and text.count("const a_p = a.p;") == 1
     # all is read before anything is written
-    assert text.index("a_p[2 * i + 0] = p_1") > text.index("const p_1")
+    assert text.index("= a.p[2 * i + 1]") < text.index("= a.p[2 * i + 0]") < text.index("a.p[2 * i + 0] = ")
 
 
 @pytest.mark.parametrize(
@@ -44,7 +39,7 @@ def test_entries_of_vectors_and_what_is_written_in_place():
         (sp.gamma(x) + x, r"gamma, in gamma\(x\)"),
         (sp.Integral(sp.exp(-(x**2)), (x, 0, 1)), "Integral"),
         (sp.Sum(x, (y, 1, 3)), "Sum"),
-        (x + y, "the symbol y, which nothing defines,"),
+        (x + y, "the symbol y is nothing that .* nothing defines it"),
         (sp.I * x, "ImaginaryUnit|no finite real value"),
         (sp.zoo * x, "no finite real value"),
         (x * sp.Rational(10) ** 400, "beyond what a float can be"),

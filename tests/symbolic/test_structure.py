@@ -1,7 +1,5 @@
 """Structural functions: the page's table, quadrature, and what each kind is exact for."""
 
-import re
-
 import numpy as np
 import oracles
 import pytest
@@ -288,9 +286,9 @@ def test_an_order_that_is_no_number_of_points_is_refused(variant53, order):
 @pytest.mark.parametrize("kind", TABLE)
 def test_the_source_that_runs_has_no_powers(variant53, kind):
     for model in (variant53, van_der_pol(), vector_model()):
-        code = re.sub(r'""".*?"""', "", KINDS[kind](model).source(), flags=re.DOTALL)
-        assert "def predict(z, p)" in code
-        assert "def measure(m, d)" in code
+        code = KINDS[kind](model).source()
+        assert "def predict(" in code
+        assert "def measure(" in code
         assert "**" not in code
 
 
