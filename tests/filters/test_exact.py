@@ -129,7 +129,7 @@ def test_it_equals_a_dense_uniform_grid(variants, name, accuracy):
 
 
 @pytest.mark.parametrize("f", [0.02, 0.2])
-@pytest.mark.parametrize("y", [2.0, -1.3, 0.4, 0.01])
+@pytest.mark.parametrize("y", [2.0, -1.3, 0.4, 0.01, -0.055])
 def test_on_variant_53_the_first_posterior_is_prior_times_likelihood(variants, f, y):
     width = f * y * y
 

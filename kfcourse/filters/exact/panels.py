@@ -63,7 +63,7 @@ GOES_ON = 23.0  # below the highest log-density where a density has not ended: 1
 CURVED = 0.1  # times the square of the last coefficients of a density, a bound of the rule's error
 ROUNDING = 1e-15  # of a state
 SHORTEST = 1e-14  # of a state, or of a whole, that a panel may be long
-PANELS, KERNELS = 3000, 40_000  # that a posterior and a prediction may have
+PANELS, KERNELS = 3000, 200_000  # that a posterior and a prediction may have
 TURNS = 100  # halvings one after the other, at most
 WOUND = 50  # turns of an angle whose noise is so large that it tells nothing
 
@@ -192,9 +192,12 @@ def residual(model, which, y, spread, point):
     whole = model.turn if which == METER else model.turn_of_state
     for i in range(Q):
         deviation = max(sqrt(q[i] * q[i] + spread * spread), 1e-150)
-        z[i] = (y - z[i]) / deviation
+        away = y - z[i]
+        z[i] = away / deviation
         noisy = 1e-150 < deviation < np.inf
-        z[i] = min(max(z[i], -1e100), 1e100) if noisy and z[i] == z[i] else 1e100
+        if not noisy or z[i] != z[i]:
+            z[i] = -np.inf if away < 0 else np.inf
+        z[i] = min(max(z[i], -1e100), 1e100)
         q[i] = -ln(min(deviation, 1e150)) - LOG_ROOT if noisy else -345.0
         turn[i] = whole / deviation
         if y != y:
