@@ -24,7 +24,7 @@ all models.  Everything compiled stands in this file, as the compiler keeps its 
 from __future__ import annotations
 
 from math import atan2, cos, exp, floor, log, sin, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, types
@@ -92,10 +92,10 @@ ROOT_BITS, SHIFT_BITS = np.array([np.sqrt(0.5), SHIFT]).view(np.int64).tolist()
 LOG_ROOT = 0.5 * np.log(2 * np.pi)
 TURN = 2 * np.pi
 
-EXACT = {"error_model": "numpy", "fastmath": {"contract"}}
-FAST = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract", "arcp"}}
+EXACT: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+FAST: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract", "arcp"}}
 # Functions with a `Room` are called from here alone: what would let Python call them takes long to compile.
-INNER = {**FAST, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+INNER: dict[str, Any] = {**FAST, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 @njit(**EXACT)
@@ -134,7 +134,7 @@ class Model(NamedTuple):
     The turn of what is no angle is infinite.
     """
 
-    law: object
+    law: Any
     mode: int
     constants: np.ndarray
     turn: float
