@@ -151,9 +151,8 @@ def test_what_a_wrong_answer_is_worth_is_the_teachers_choice():
     (row,) = student_rows([Person(IVANOV, {"b": grade})], "b", Credit(1.0, 0.5))
     assert (row["set b"], row["points"], row["of"]) == (2.67, 2.67, possible("b"))
     assert "0.67/2" in feedback(Person(IVANOV, {"b": grade}), "b", Credit(1.0, 0.5))
-    best = people([grade, replace(grade, name="y", comments=told | {"b2": Comment("no", share=2 / 3)})], None, Credit(1.0, 0.0))[
-        0
-    ]
+    better = replace(grade, name="y", comments=told | {"b2": Comment("no", share=2 / 3)})
+    best = people([grade, better], None, Credit(1.0, 0.0))[0]
     assert {one.grades["b"].name for one in best} <= {"x", "y"}
     unusable = replace(grade, marks=dict.fromkeys(grade.marks, UNUSABLE))
     assert points([unusable], Credit(1.0, 1.0)) == 0  # only what is wrong has right parts
