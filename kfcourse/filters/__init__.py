@@ -15,7 +15,7 @@ alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
                         (jump_equations: as printed;  jump_optimal: FOS, FKP, FBP with modes)
 notation                symbols in which the equations are printed
-programs, fused, loops  the printed equations as rules and regressions; compiled steps made of them (numba)
+programs                the printed equations as rules and regressions
 """
 
 from kfcourse.filters.alphabeta import alpha_beta, alpha_beta_gamma
