@@ -154,7 +154,7 @@ def gated(
         return log_density(expected, np.where(beyond, np.nan, y)) + at_the_edge
 
     # a way of its own to look back needs its own memories, not those of the gate
-    return replace(one, name=f"gated-{one.name}", init=init, step=step, instead=None, evidence=evidence, look_back=None)
+    return replace(one, name=f"gated-{one.name}", init=init, step=step, evidence=evidence, look_back=None)
 
 
 def _size(expected: Measurement, y: Array) -> Array:
