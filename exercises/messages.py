@@ -1,7 +1,6 @@
 """What is said of a mistake that is made in more than one place; what belongs to one question only stands in its set.
 
-A row of a catalogue is name, what to say, old text and new text:
-`("innovation-sign", messages.INNOVATION_SIGN, "y - h", "h - y")`.
+A row of a catalogue is name, what to say, old and new text: `("innovation-sign", messages.INNOVATION_SIGN, "y - h", "h - y")`.
 A message names the kind of mistake and never the answer, and it is right in every question in which it is used.
 """
 

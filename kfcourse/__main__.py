@@ -1,5 +1,5 @@
 """`python -m kfcourse` is the command `kfcourse`."""
 
-from kfcourse.commands import main
+from kfcourse.cli import main
 
 main(prog_name="kfcourse")

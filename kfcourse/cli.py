@@ -1,20 +1,28 @@
-"""The lab's commands: `kfcourse lab 53`, `kfcourse filters 53`, `kfcourse estimate`."""
+"""The command line: `kfcourse lab 53`, `kfcourse variants`, `kfcourse estimate`, ...
+
+The instructor's commands are in `kfcourse.notebooks.commands`.
+"""
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryFile
 
 import click
 
-from kfcourse.commands import main as main  # scripts that were installed before call it here
+from kfcourse.checks.posing import unposed
 from kfcourse.derivations import check_text
 from kfcourse.derivations.setting import of_model
-from kfcourse.files import replacing_together
+from kfcourse.errors import NotFinite
+from kfcourse.files import replacing_together, save
+from kfcourse.lab import grammar, quality
 from kfcourse.lab.admission import admissions, on_trial
 from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
@@ -27,20 +35,76 @@ from kfcourse.lab.report import (
     write_json,
     write_report,
 )
-from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, OF_BEST, has_exact, title
-from kfcourse.lab.variants import STEPS, find_variant
-from kfcourse.listing import VARIANTS
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, has_exact, title
+from kfcourse.lab.variants import RUNS as CHECKED
+from kfcourse.lab.variants import STEPS, find_variant, read_tables, read_variants, summary
+from kfcourse.montecarlo import FEWEST
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.experiment import without_failing
+from kfcourse.montecarlo.parallel import cores
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
 DERIVATION = 180.0  # seconds for the formulas of the filters: a busy machine must not leave out what a quiet one has
+INSTRUCTORS = ("exercises", "grade", "solutions")
 LONGEST = 1_000_000  # bytes of a derivation; /dev/zero never ends
 RUNS = 20_000  # trajectories
 
 
-@click.command()
+VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")
+
+
+@contextmanager
+def _clear_errors() -> Iterator[None]:
+    """What went wrong is said in a sentence, not in a traceback."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # NumPy's: what became infinite is reported by name
+            warnings.showwarning = lambda message, *_: click.echo(f"Warning: {message}", err=True)
+            yield
+    except (ValueError, NotFinite) as error:
+        raise click.ClickException(str(error)) from None
+    except MemoryError:
+        raise click.ClickException("this needs more memory than there is; take fewer --runs, --steps or --jobs") from None
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        where = f": {error.filename}" if error.filename else ""
+        remedy = "; make room, and run it again" if error.errno == errno.ENOSPC else ""
+        raise click.ClickException(f"{error.strerror or error}{where}{remedy}") from None
+    except KeyboardInterrupt:
+        click.echo("Interrupted; files written before are as they were.", err=True)
+        sys.exit(130)
+
+
+class _Group(click.Group):
+    """Commands that say in a sentence what a user did wrong; the instructor's are imported when they are asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted([*self.commands, *INSTRUCTORS])
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        instructors = name in INSTRUCTORS
+        return getattr(import_module("kfcourse.notebooks.commands"), name) if instructors else self.commands.get(name)
+
+    def invoke(self, ctx: click.Context) -> object:
+        with _clear_errors():
+            try:
+                return super().invoke(ctx)
+            except click.UsageError as error:
+                if "unexpected extra argument" not in error.message:
+                    raise
+                hint = "separate names by commas (--sets a,b), and repeat --variant for each variant"
+                raise click.UsageError(f"{error.message}: {hint}", error.ctx) from None
+
+
+@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="kfcourse")
+def main() -> None:
+    """Kalman and nonlinear suboptimal filtering: the lab from the command line."""
+
+
+@main.command()
 @click.argument("variant")
 @VARIANTS
 @click.option(
@@ -116,7 +180,8 @@ def lab(
     for one in found:
         for warning in one.warnings:
             click.echo(f"Warning: {title(one.name)}: {warning}", err=True)
-    of_functions = [one for one in found if one.name.endswith("-gaussian") or one.name in OF_BEST]
+    entries = JUMP_FILTERS if isinstance(model, JumpModel) else FILTERS
+    of_functions = [one for one in found if entries[one.name].functions in ("gaussian", "best")]
     for remark in dict.fromkeys(remark for one in of_functions for remark in one.remarks):
         whose = ", ".join(title(one.name) for one in of_functions if remark in one.remarks)
         click.echo(f"{whose}: {remark}", err=True)
@@ -175,7 +240,7 @@ def _kept(folder: Path) -> Iterator[None]:
         ) from None
 
 
-@click.command()
+@main.command()
 @click.argument("places", nargs=-1, required=True, metavar="[FILE] VARIANT")
 @VARIANTS
 @click.option("--trial/--no-trial", default=True, show_default=True, help="Also run each filter on a few hundred trajectories.")
@@ -189,7 +254,80 @@ def filters(places: tuple[str, ...], variants_file: Path | None, trial: bool) ->
     click.echo(table_of_filters(on_trial(chosen.model, found) if trial else found))
 
 
-@click.command()
+@main.command()
+@VARIANTS
+@click.option("--variant", "names", multiple=True, help="Only this one; may be repeated.")
+@click.option("--check", is_flag=True, help="Say of each whether it is well posed; exit status 1 if one is not.")
+@click.option("--generate", "wanted", type=click.IntRange(1, 200), help="Propose so many new variants that are well posed.")
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of the trajectories and proposals.")
+@click.option(
+    "--runs",
+    type=click.IntRange(min=FEWEST),
+    default=CHECKED,
+    show_default=True,
+    help="Trajectories of a check, an eighth for vectors.",
+)
+@click.option("--jobs", type=click.IntRange(min=1), help="Does not change the results.  [default: all cores]")
+@click.option("--dask", help="Address of a Dask scheduler whose workers check instead.")
+@click.option("--out", type=click.Path(path_type=Path), help="New file for the proposed variants.  [default: print them]")
+def variants(
+    variants_file: Path | None,
+    names: tuple[str, ...],
+    check: bool,
+    wanted: int | None,
+    seed: int,
+    runs: int,
+    jobs: int | None,
+    dask: str | None,
+    out: Path | None,
+) -> None:
+    """List the variants of the lab, check them, or propose new ones."""
+    if dask and not check:
+        raise click.UsageError("--dask goes with --check")
+    if wanted is not None and (check or names or variants_file):
+        raise click.UsageError("--generate goes with --seed, --runs, --jobs and --out only")
+    if wanted is None and out:
+        raise click.UsageError("--out goes with --generate only")
+    if wanted is not None:
+        _generate(wanted, seed, runs, jobs or cores(), out)
+        return
+    if not check and variants_file is None:  # that the shipped ones are models was tested
+        tables = read_tables(names=names)
+        click.echo("\n".join(summary(name, table) for name, table in tables.items()))
+        return
+
+    chosen, faults = read_variants(variants_file, names)
+    good = not faults
+    if check and chosen:
+        found = list(quality.examine_all(list(chosen.values()), runs, seed, jobs or cores(), unposed, dask))
+        click.echo(quality.table(found))
+        good &= all(one.well_posed for one in found)
+    else:
+        for variant in chosen.values():
+            click.echo(summary(variant.name, variant.table))
+    for fault in faults.values():
+        click.echo(f"Error: {fault}", err=True)
+    sys.exit(0 if good else 1)
+
+
+def _generate(wanted: int, seed: int, runs: int, jobs: int, out: Path | None) -> None:
+    """Proposed variants to the file or to standard output, what was rejected to standard error."""
+    if out and (os.path.lexists(out) or not out.parent.is_dir()):
+        raise click.ClickException(f"the variants cannot go to {out}: name a new file in an existing folder with --out")
+    found = grammar.generate(wanted, seed, runs, jobs, unposed)
+    reasons = ", ".join(f"{number} {reason}" for reason, number in found.rejected.most_common())
+    click.echo(f"{found.rejected.total()} candidates rejected{': ' if reasons else ''}{reasons}", err=True)
+    if found.variants:
+        text = f"# Made by: kfcourse variants --generate {wanted} --seed {seed} --runs {runs}\n\n{found.toml()}"
+        if out:
+            save(text, out)
+        else:
+            click.echo(text, nl=False)
+    if len(found.variants) < wanted:
+        raise click.ClickException(f"only {len(found.variants)} of {wanted} variants found; ask for fewer, or try another --seed")
+
+
+@main.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @VARIANTS
 @click.option("--variant", help="Of which the derivation is; a heading of the file may name it as well.")
@@ -224,7 +362,7 @@ def check(file: Path, variants_file: Path | None, variant: str | None) -> None:
     sys.exit(2 if report.undecided else 0 if report.right else 1)
 
 
-@click.command()
+@main.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--model", "model_file", type=click.Path(path_type=Path), required=True, help="TOML file with the model.")
 @click.option("--variant", "name", help="Its name in the file, if there are several.")
@@ -310,28 +448,13 @@ def _pair(text: str, known: list[str]) -> tuple[str, str]:
 
 
 def _check_places(folder: Path, json_file: Path | None) -> None:
-    """ClickException if the report or the numbers cannot be written where they should; leaves nothing there."""
-    made = [place for place in (folder, *folder.parents) if not place.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        TemporaryFile(dir=folder).close()
-    except OSError as error:
+    """ClickException if the report or the numbers cannot be written where they should."""
+    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not (there.is_dir() and os.access(there, os.W_OK)):
         raise click.ClickException(
-            f"the report cannot go to {folder}: {error.strerror}; choose another folder with --out"
-        ) from None
-    finally:
-        for place in made:
-            if place.is_dir():
-                place.rmdir()
-    if json_file is None or str(json_file) in STANDARD_OUTPUT:
+            f"the report cannot go to {folder}: {there} is no folder to write to; choose another one with --out"
+        )
+    if str(json_file) in STANDARD_OUTPUT or json_file is None:
         return
     if json_file.is_dir() or not json_file.parent.is_dir():
         raise click.ClickException(f"the numbers cannot go to {json_file}: name a file in an existing folder with --json")
-    if json_file.exists() and not json_file.is_file():  # a pipe or a device is written to, not replaced
-        return
-    try:
-        TemporaryFile(dir=json_file.parent).close()
-    except OSError as error:
-        raise click.ClickException(
-            f"the numbers cannot go to {json_file}: {error.strerror}; name a file in another folder with --json"
-        ) from None

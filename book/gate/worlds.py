@@ -2,7 +2,8 @@ r"""Numbers for the letters of a page: definitions in LaTeX, read by the reader 
 
 A world is a text whose lines are done one after another::
 
-    \Psi, R: cov 2                     draw: cov n, any n m, eye n, pos (from .5 to 2), in a b, num, nums n, share n, list n any m
+    \Psi, R: cov 2                     draw: cov n, any n m, eye n, pos (from .5 to 2), in a b, num,
+                                       nums n [plain], share n (they sum to one), list n any m
     k: range 0 4                       an index that runs
     x: nodes \lambda \Psi              nodes of a normal law, and the operators \mathsf M and \mathsf D over it
     K = \Psi G^T(G\Psi G^T+R)^{-1}      define, of letters that stand above
@@ -104,7 +105,7 @@ def _drawn(letters: dict[str, Any], rng: np.random.Generator, names: str, what: 
         "eye": lambda size: np.eye(int(size)),
         "in": lambda low, high: rng.uniform(float(low), float(high)),
         "num": rng.normal,
-        "nums": lambda size: Indexed(rng.normal(size=int(size))),
+        "nums": lambda size, *plain: Indexed(rng.normal(size=int(size)), rng.normal() if plain else None),
         "pos": lambda: rng.uniform(0.5, 2),
         "range": lambda *ends: range(*map(int, ends)),
         "share": lambda *sizes: Indexed(rng.dirichlet(np.ones(int(sizes[-1])), size=[int(size) for size in sizes[:-1]])),

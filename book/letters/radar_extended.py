@@ -3,26 +3,27 @@
 import numpy as np
 from gate.page import CONDITION, NOTATION
 from gate.values import Indexed
-from gate.worlds import column, covariance
+from gate.worlds import column, covariance, world
 
-from kfcourse.filters.alphabeta import steady_beta, tracking_index
 from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem, run
-from kfcourse.linear.system import linear_system
 from kfcourse.scenarios.pointer import acceleration_from
-from kfcourse.scenarios.radar import kinematic
 
 SIGMA = 3.0
 
 
-def axis(rng):
-    T, alpha = rng.uniform(0.5, 1), 0.4
-    sigma_a = tracking_index(alpha) * SIGMA / T**2
-    system = linear_system(kinematic(T, noise_sd=sigma_a, measurement_sd=SIGMA))[0]
-    beta = steady_beta(alpha)
-    found = {"A": system.A[::3, ::3], "H": system.H[:1, ::3], "T": T, r"\alpha": alpha, r"\beta": beta, "I": np.eye(2)}
-    B = acceleration_to_state(T)
-    return found | {"B": B, "K": column([alpha, beta / T]), r"\sigma": SIGMA, r"\sigma_a": sigma_a}
+axis = r"""
+T: in .5 1
+I: eye 2
+\alpha = 0.4
+\sigma = 3
+\beta = 2(2-\alpha)-4\sqrt{1-\alpha}
+\sigma_a = \beta/\sqrt{1-\alpha}\sigma/T^2
+A = \begin{pmatrix}1&T\\0&1\end{pmatrix}
+H = \begin{pmatrix}1&0\end{pmatrix}
+B = \begin{pmatrix}\int_0^Tt\,dt\\T\end{pmatrix}
+K = \begin{pmatrix}\alpha\\\beta/T\end{pmatrix}
+"""
 
 
 def acceleration_to_state(T):
@@ -34,7 +35,7 @@ def acceleration_to_state(T):
 
 def filtered(rng, k=3):
     """A run with the control, and the step k of it in plain letters."""
-    found = axis(rng)
+    found = world(axis)(rng)
     y = rng.normal(size=(6, 1, 2))
     u = np.nan_to_num(acceleration_from(y, found["T"]))[..., :1]
     A, H, B = found["A"], found["H"], found["B"]
@@ -62,22 +63,26 @@ def in_one_step(rng, k=3):
     }  # fmt: skip
 
 
-def expanded(rng):
-    """The stationary filter with a linear meter, expanded about any point."""
-    found = axis(rng)
-    z, lam, y = [rng.normal(size=(2, 1))], [rng.normal(size=(2, 1))], rng.normal(size=6)
-    for k in range(1, 5):
-        lam.append(found["A"] @ z[-1])
-        z.append((np.eye(2) - found["K"] @ found["H"]) @ lam[-1] + found["K"] * y[k])
-    return found | {
-        r"\lambda": Indexed(lam), "z": Indexed(z), "y": Indexed(y, y[2]), "k": range(1, 4), r"\bar x": rng.normal(size=(2, 1)),
-        "h": lambda x: found["H"] @ x,
-    }  # fmt: skip
+expanded = (
+    axis
+    + r"""
+\bar x, a, b: any 2
+y: nums 6 plain
+k: range 5
+z_0 = a
+\lambda_0 = b
+\lambda_{k+1} = Az_k
+z_{k+1} = (I-KH)\lambda_{k+1}+Ky_{k+1}
+h(x) = Hx
+k: range 1 4
+forget: a, b
+"""
+)
 
 
 def transfers(rng):
     """What leads from y to the error, by matrices; the literal update by a long run."""
-    found = axis(rng)
+    found = world(axis)(rng)
     A, B, H, K, T = (found[name] for name in "ABHKT")
     rest = np.eye(2) - K @ H
 
@@ -97,7 +102,7 @@ def transfers(rng):
 
 def far_apart(rng, j=3):
     """The same with second differences over j steps, by what the filter makes of a single measurement."""
-    found, zeta = axis(rng), 1.7
+    found, zeta = world(axis)(rng), 1.7
     A, B, H, K, T = (found[name] for name in "ABHKT")
     errors = []
     for control in (0, 1):

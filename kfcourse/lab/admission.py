@@ -1,26 +1,26 @@
 """Which filter may I use?  For a model and each filter: whether it can be built, and what is known of it before any comparison.
 
-A filter is refused if it cannot be built: no closed form, equations that cannot be differentiated, a vector state.  It is
-warned of if it can be built and will not do: points that do not integrate the equations or do not see a noise, a slope that is
-zero, a meter so sharp that hardly a particle survives, and what leaves the finite numbers on a trial.
+A filter is refused if it cannot be built: no closed form, equations that cannot be differentiated, no density.  It is warned of
+if it can be built and will not do: points that do not integrate the equations or do not see a noise, a slope that is zero, and
+what leaves the finite numbers on a trial.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
 
 from kfcourse.errors import NoClosedForm, NotFinite, Reason, Refused
-from kfcourse.filters import Design, Filter, pointmass
-from kfcourse.filters.particles import particle
+from kfcourse.filters import Design, Filter
 from kfcourse.lab.checked_quadrature import Checked
-from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, OF_BEST, JumpStructures, Structures, check_names, has_exact, title
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, Entry, JumpStructures, Structures, check_names, has_exact, title
 from kfcourse.limits import OutOfTime, time_limit
+from kfcourse.montecarlo.comparison import EXACT
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.symbolic.jumping import JumpModel
@@ -30,8 +30,6 @@ from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure
 
 RUNS, STEPS, SLOW = 512, 20, 16  # of a trial; trajectories of a slow filter
-PARTICLES, FEW, OFTEN = 1000, 10.0, 0.05  # fewer effective particles than FEW at so many corrections are too few
-SOME = 32  # trajectories, with some 600 corrections, that tell how often
 BLIND = 0.5  # of the unexplained variance, that must be seen
 
 
@@ -90,24 +88,20 @@ def admissions(
     structures = JumpStructures(model) if isinstance(model, JumpModel) else Structures(model)
     found = {one.name: one for one in known}
     # filters with the same structural functions share the time
-    too_long = {_kind(one.name): one.reason for one in known if getattr(one.reason, "kind", "") == "too_long"}
+    too_long = {there[one.name].functions: one.reason for one in known if getattr(one.reason, "kind", "") == "too_long"}
     for name in names:
+        functions = there[name].functions
         if name in found:
             continue
-        if (reason := too_long.get(_kind(name))) is None:
+        if (reason := too_long.get(functions)) is None:
             try:
                 with nullcontext() if seconds is None else time_limit(seconds):
-                    found[name] = _admitted(name, structures)
+                    found[name] = _admitted(name, there[name], structures)
                 continue
             except OutOfTime:
-                reason = too_long[_kind(name)] = Refused(_TOO_LONG.format(seconds), "too_long", seconds=f"{seconds:g}")
+                reason = too_long[functions] = Refused(_TOO_LONG.format(seconds), "too_long", seconds=f"{seconds:g}")
         found[name] = Admission(name, None, reason)
     return [found[name] for name in dict.fromkeys(names)]
-
-
-def _kind(name: str) -> str:
-    """Which structural functions a filter takes, by its name."""
-    return name.split("-")[-1]
 
 
 _TOO_LONG = (
@@ -116,21 +110,28 @@ _TOO_LONG = (
 )
 
 
-def _admitted(name: str, structures: Structures | JumpStructures) -> Admission:
-    with warnings.catch_warnings(record=True) as caught:
+def _admitted(name: str, entry: Entry, structures: Structures | JumpStructures) -> Admission:
+    with warnings.catch_warnings(record=True) as caught, np.errstate(all="ignore"):
         warnings.simplefilter("always", QuadratureWarning)
         try:
-            if isinstance(structures, JumpStructures):
-                one = JUMP_FILTERS[name].build(structures)
-                return Admission(name, one, remarks=tuple(_with_modes(name, structures)))
-            one = FILTERS[name].build(structures)
+            one = entry.build(structures)
         except (NoClosedForm, ModelError) as error:
             return Admission(name, None, error.with_traceback(None))
-    found = [str(warning.message) for warning in caught]
-    with np.errstate(all="ignore"):
-        found += [text for kind, look in _LOOKS.items() if kind in name for text in look(structures)]
-        remarks = [text for kind, look in _REMARKS.items() if name.endswith(kind) and not found for text in look(structures)]
-    return Admission(name, one, "", tuple(found), tuple(remarks))
+        found = [str(warning.message) for warning in caught]
+        if isinstance(structures, Structures):
+            looks = {"linearised": _flat, "unscented": _blind}
+            found += looks.get(entry.functions, lambda _: ())(structures)
+        return Admission(name, one, "", tuple(found), () if found else tuple(_remarks(name, entry, structures)))
+
+
+def _remarks(name: str, entry: Entry, structures: Structures | JumpStructures) -> Iterator[str]:
+    """What is worth knowing of a filter that was built."""
+    if name == EXACT and not has_exact(structures.model):
+        yield "by particles, as point masses do not reach this model"
+    if entry.functions in ("gaussian", "best") and isinstance(structures.quadrature, Checked):
+        yield structures.quadrature.says
+    if entry.functions == "best" and isinstance(structures, JumpStructures) and structures.best is structures.linearised:
+        yield "with linearised structural functions, as Gaussian ones cannot be had: see aof-jump-gaussian"
 
 
 def on_trial(model: Model | JumpModel, found: Sequence[Admission]) -> list[Admission]:
@@ -197,83 +198,6 @@ def _reference(structures: Structures) -> Structure:
         return structures.gaussian
     except NoClosedForm:
         return gauss_hermite(structures.model, 7)
-
-
-def _starved(structures: Structures) -> Iterator[str]:
-    """A meter so much sharper than the prediction that hardly a particle falls where the measurement says."""
-    model = structures.model
-    if (share := _share_starved(model, guided=True)) > OFTEN:
-        instead = "; use aof-exact" if has_exact(model) else ""
-        yield f"the meter is sharp: at {100 * share:.0f} % of the corrections {_TOO_FEW}{instead}"
-
-
-def _bootstrap(structures: Structures) -> Iterator[str]:
-    """The same for particles that do not look at the measurement."""
-    if (share := _share_starved(structures.model, guided=False)) > OFTEN:
-        yield (
-            f"a bootstrap filter, guided=False, would fail: the meter is sharp, and at {100 * share:.0f} % of the corrections "
-            f"{_TOO_FEW}"
-        )
-
-
-_TOO_FEW = f"fewer than {FEW:.0f} of {PARTICLES} particles count"
-
-
-def _share_starved(model: Model, guided: bool) -> float:
-    """Share of the corrections of some trajectories after which too few particles count."""
-    steps = int(min(STEPS, model.known.steps))
-    one, y = particle(model, PARTICLES, guided=guided), simulate(model, SOME, steps, seed=1).y
-    state, effective = one.init(SOME), np.empty((steps, SOME))
-    for k, measured in enumerate(y):
-        state = one.step(state, measured)
-        effective[k] = state.memory.effective
-    return float((effective < FEW).mean())
-
-
-def _by_particles(structures: Structures) -> Iterator[str]:
-    """The exact filter where point masses do not reach."""
-    if not has_exact(structures.model):
-        yield from _starved(structures)
-
-
-def _by_quadrature(structures: Structures | JumpStructures) -> Iterator[str]:
-    """Gaussian structural functions that are no formulas."""
-    if isinstance(structures.quadrature, Checked):
-        yield structures.quadrature.says
-
-
-def _with_modes(name: str, structures: JumpStructures) -> Iterator[str]:
-    """What to know of a filter for models that jump."""
-    of_best = name in OF_BEST
-    if name == "aof-exact":
-        yield from _not_by_points(structures)
-    elif of_best or name.endswith("-gaussian"):
-        yield from _by_quadrature(structures)
-    if of_best and structures.best is structures.linearised:
-        yield "with linearised structural functions, as Gaussian ones cannot be had: see aof-jump-gaussian"
-
-
-def _not_by_points(structures: Structures | JumpStructures) -> Iterator[str]:
-    """Why the exact filter is one of particles."""
-    try:
-        pointmass(structures.model)
-    except ModelError as error:
-        yield f"by particles: {error}"
-
-
-# By a part of the short name.
-_LOOKS: dict[str, Callable[[Structures], Iterator[str]]] = {
-    "linearised": _flat,
-    "unscented": _blind,
-    "particle": _starved,
-    "aof-exact": _by_particles,
-}
-# By how it ends.
-_REMARKS: dict[str, Callable[[Structures], Iterator[str]]] = {
-    "-gaussian": _by_quadrature,
-    "particle": _bootstrap,
-    "aof-exact": _not_by_points,
-}
 
 
 def table(found: Sequence[Admission]) -> str:

@@ -1,57 +1,49 @@
 """Normal moments where they have no closed form: Gauss-Hermite quadrature of an order that has been checked.
 
-A function such as x/(1 + x^2) has a mean over a normal law, but no formula for it.  How many points it takes depends on how wide
-the laws are that occur, and nobody knows these beforehand.  So a pilot runs the lab's filters with some order, and at each law
-that they meet compares the structural functions with those of twice the order; the order is raised until both agree.  A
-model with modes has one order for all modes without formulas, checked on the laws of filters with modes and of averaged ones.
+A function such as x/(1 + x^2) has a mean over a normal law, but no formula for it.  How many points
+it takes depends on how wide the laws are that occur.  So a pilot runs the AOF with some order, and
+at the laws that it meets compares the structural functions with those of twice the order; the order
+is raised until both agree.  A model with modes has one order for all modes without formulas, each
+checked on trajectories of its own.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import replace
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
 from kfcourse.angles import difference
-from kfcourse.filters import aof, fos, imm, logic_dynamic, logic_dynamic_fos, mfos
-from kfcourse.laws import Array, Gaussian, Measurement, NegativeVariance
-from kfcourse.montecarlo.designing import NotFinite, design
-from kfcourse.montecarlo.ensemble import Ensemble, simulate
+from kfcourse.errors import ModelError, NoClosedForm, NotFinite
+from kfcourse.filters import aof
+from kfcourse.laws import Array, NegativeVariance
+from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import run
-from kfcourse.symbolic.averaging import averaged
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.quadrature import QuadratureWarning, axes, gauss_hermite
-from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure, gaussian
 
 ORDERS = (2, 3, 5, 7, 10, 20, 40, 80, 160)
-# Means may change by this part of a standard deviation when the order is doubled, covariances and slopes by this part of
-# themselves: root mean square over the trajectories of a step.  A prediction that is shifted by a part q of its deviation has an
-# error variance other by 2 q of itself at most, 0.02 %.
+# Means may change by this part of a standard deviation when the order is doubled, covariances by
+# this part of themselves: root mean square over the trajectories of a step.  A prediction that is
+# shifted by a part q of its deviation has an error variance other by 2 q of itself at most, 0.02 %.
 CLOSE = 1e-4
 RUNS, STEPS = 100, 20  # of the pilot
-MOST = 200  # points together: with more, 5,000 trajectories take a quarter of an hour (343 points, D3)
-PIECE = 2**15  # evaluations at once: arrays that a processor's cache holds
-
-Law = TypeVar("Law", Gaussian, Measurement)
+MOST = 200  # points together: with more, a comparison takes a quarter of an hour (343 points, D3)
 
 
 class Checked(NamedTuple):
     """Structures by quadrature, of each mode one; where a mode has formulas they are these.
 
-    They are named "gaussian", as what they compute is; `order` is their number of points an axis, `points` that of all, `apart`
-    the largest difference that the pilot found, in the measure of `CLOSE`.
+    They are named "gaussian", as what they compute is; `order` is their number of points an axis,
+    `apart` the largest difference that the pilot found, in the measure of `CLOSE`.
     """
 
     structures: list[Structure]
     order: int
-    points: int
     apart: float
 
     @property
@@ -71,8 +63,9 @@ def of_checked_order(model: Model | JumpModel, why: NoClosedForm) -> Checked:
         No order does; the message tells how far the highest one tried is from twice that order.
     """
     modes = model.modes if isinstance(model, JumpModel) else (model,)
-    known = [_formulas(mode) for mode in modes]
-    size = max(axes(mode) for mode, formulas in zip(modes, known, strict=True) if formulas is None)
+    structures = [_formulas(mode) for mode in modes]
+    without = [j for j, structure in enumerate(structures) if structure is None]
+    size = max(axes(modes[j]) for j in without)
     found = ""
     for order in ORDERS:
         if (points := order**size) > MOST:
@@ -81,16 +74,13 @@ def of_checked_order(model: Model | JumpModel, why: NoClosedForm) -> Checked:
         try:
             with warnings.catch_warnings(), np.errstate(all="ignore"):
                 warnings.simplefilter("ignore", QuadratureWarning)  # the pilot looks at more than the prior law
-                coarse, fine = (
-                    [formulas or gauss_hermite(mode, n) for mode, formulas in zip(modes, known, strict=True)]
-                    for n in (order, 2 * order)
-                )
-                apart = _apart(model, coarse, fine)
+                coarse = {j: replace(gauss_hermite(modes[j], order), name="gaussian") for j in without}
+                apart = float(np.max([_apart(one, gauss_hermite(one.model, 2 * order)) for one in coarse.values()]))
         except (ModelError, NotFinite, NegativeVariance, np.linalg.LinAlgError):
             continue
         if apart <= CLOSE:
-            named = [one if one.formulas else replace(one, name="gaussian") for one in coarse]
-            return Checked([_in_pieces(one, max(1, PIECE // points)) for one in named], order, points, apart)
+            whole = [structure or coarse[j] for j, structure in enumerate(structures)]
+            return Checked(whole, order, apart)
         error = f"by {100 * apart:.2g} %" if apart < 1 else "without bound"
         found = f"; Gauss-Hermite quadrature with {order} points an axis still errs {error} on the laws that occur"
     raise NoClosedForm(f"{why}{found}", why.kind, **why.parts)
@@ -103,67 +93,27 @@ def _formulas(model: Model) -> Structure | None:
         return None
 
 
-def _apart(model: Model | JumpModel, coarse: Sequence[Structure], fine: Sequence[Structure]) -> float:
-    """How far structures are from others at most, at the laws that filters by the first ones meet; of no use beyond `CLOSE`."""
-    found: list[float] = []
-    for _ in _meeting(model, [_watched(one, other, found) for one, other in zip(coarse, fine, strict=True)]):
-        if not np.max(found) <= CLOSE:
-            break
-    return float(np.max(found))  # NaN, if one is
-
-
-def _meeting(model: Model | JumpModel, structures: list[Structure]) -> Iterator[None]:
-    """Shows the structures the laws that they meet in the lab: the prior law, then those of the filters; stops after each."""
-    steps = int(min(STEPS, model.steps if isinstance(model, JumpModel) else model.known.steps))
-    for one in structures:
-        one.at(0).measure(model.prior.mean[None], model.prior.cov)
-    yield
-    y, designing = simulate(model, RUNS, steps, seed=1).y, Ensemble(model, RUNS, steps, seed=1)  # type: ignore[arg-type]
+def _apart(coarse: Structure, fine: Structure) -> float:
+    """How far structures are from finer ones at most, at the laws that the AOF by the first meets."""
+    model, distances = coarse.model, []
+    steps = int(min(STEPS, model.known.steps))
+    y = simulate(model, RUNS, steps, seed=1).y
     if not np.isfinite(y).all():
         raise NotFinite("trajectories become infinite")
-    if not isinstance(model, JumpModel):
-        run(aof(structures[0]), y)
-        yield
-        design([fos(structures[0]), mfos(structures[0])], designing)
-        yield
-        return
-    for filter_of in (logic_dynamic, imm):  # the laws of pairs, of GPB2, are narrower
-        run(filter_of(structures, model, model.first), y)
-        yield
-    with suppress(ModelError):  # angles, transitions that depend on the state: there are no such filters
-        one = averaged(model, structures)
-        run(aof(one), y)
-        yield
-        with suppress(NotFinite):  # of modes where hardly anybody is
-            design([logic_dynamic_fos(model, structures), fos(one), mfos(one)], designing)
-            yield
-
-
-def _watched(coarse: Structure, fine: Structure, found: list[float]) -> Structure:
-    """The first structure; each time it is called, how far the second is from it goes into the list."""
-    angles = coarse.model.angles
-
-    def at(k: int) -> Structure:
-        one, other = coarse.at(k), fine.at(k)
-
-        def predict(z: Array, p: Array) -> Gaussian:
-            (mean, cov), (tau, theta) = one.predict(z, p), other.predict(z, p)
-            sd = _deviations(theta, tau)
-            found.append(_mean_square(difference(mean, tau, angles.x) / sd))
-            found.append(_mean_square((cov - theta) / (sd[..., :, None] * sd[..., None, :])))
-            return Gaussian(mean, cov)
-
-        def measure(m: Array, d: Array) -> Measurement:
-            less, more = one.measure(m, d), other.measure(m, d)
-            sd = _deviations(more.F, more.h)
-            found.append(_mean_square(difference(less.h, more.h, angles.y) / sd))
-            found.append(_mean_square((less.F - more.F) / (sd[..., :, None] * sd[..., None, :])))
-            found.append(_mean_square((less.G - more.G) * _deviations(d, m)[..., None, :] / sd[..., :, None]))
-            return less
-
-        return replace(one, predict=predict, measure=measure)
-
-    return replace(coarse, at_step=at)
+    laws = run(aof(coarse), y)
+    mean, cov = np.broadcast_to(model.prior.mean, laws.mean[0].shape), model.prior.cov
+    for k in range(steps):
+        less, more = coarse.at(k).measure(mean, cov), fine.at(k).measure(mean, cov)
+        sd = _deviations(more.F, more.h)
+        distances.append(_mean_square(difference(less.h, more.h, model.angles.y) / sd))
+        distances.append(_mean_square((less.F - more.F) / (sd[..., :, None] * sd[..., None, :])))
+        slope = (less.G - more.G) * _deviations(cov, mean)[..., None, :]
+        distances.append(_mean_square(slope / sd[..., :, None]))
+        (mean, cov), (tau, theta) = (one.at(k).predict(laws.mean[k], laws.cov[k]) for one in (coarse, fine))
+        sd = _deviations(theta, tau)
+        distances.append(_mean_square(difference(mean, tau, model.angles.x) / sd))
+        distances.append(_mean_square((cov - theta) / (sd[..., :, None] * sd[..., None, :])))
+    return float(np.max(distances))  # NaN, if one is: no order is close then
 
 
 def _deviations(cov: Array, mean: Array) -> Array:
@@ -174,25 +124,3 @@ def _deviations(cov: Array, mean: Array) -> Array:
 def _mean_square(deviation: Array) -> float:
     """The largest root mean square over trajectories of the components."""
     return float(np.sqrt((deviation**2).mean(axis=0)).max())
-
-
-def _in_pieces(structure: Structure, size: int) -> Structure:
-    """The structure, so many trajectories at a time: arrays over trajectories and points stay small."""
-
-    def pieces(function: Callable[[Array, Array], Law]) -> Callable[[Array, Array], Law]:
-        def computed(mean: Array, cov: Array) -> Law:
-            if mean.ndim < 2 or len(mean) <= size:
-                return function(mean, cov)
-            covs = np.broadcast_to(cov, (*mean.shape, mean.shape[-1]))
-            parts = [function(mean[i : i + size], covs[i : i + size]) for i in range(0, len(mean), size)]
-            return type(parts[0])(*(np.concatenate(each) for each in zip(*parts, strict=True)))
-
-        return computed
-
-    def at(k: int) -> Structure:
-        now = structure.at(k)
-        return replace(now, predict=pieces(now.predict), measure=pieces(now.measure), at_step=None)
-
-    if structure.at_step is None:
-        return at(0)
-    return replace(structure, at_step=at)

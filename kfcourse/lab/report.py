@@ -31,7 +31,7 @@ from kfcourse.lab.report_modes import JumpReport
 from kfcourse.lab.report_plain import PlainReport
 from kfcourse.lab.report_sections import ROUNDING, StudentReport
 from kfcourse.lab.report_text import escape_tex, inline_html, inline_tex
-from kfcourse.lab.short_names import WITH_MODES, title
+from kfcourse.lab.short_names import JUMP_FILTERS, title
 from kfcourse.lab.variants import Variant
 from kfcourse.laws import CONFIDENCE
 from kfcourse.montecarlo.comparison import Comparison
@@ -220,7 +220,7 @@ def recognised_modes(result: Comparison, filters: Sequence[Filter | Design]) -> 
     if not isinstance(model, JumpModel):
         return None
     runs = min(result.runs, RECOGNISED)
-    names = {name for name in result.names if name in WITH_MODES}
+    names = {name for name, entry in JUMP_FILTERS.items() if entry.modes}.intersection(result.names)
     of_modes = [one for one in filters if isinstance(one, Filter) and one.name in names]
     return recognised(of_modes, model, runs, result.steps, result.seed) if of_modes else None
 

@@ -143,20 +143,32 @@ AnyStructures = TypeVar("AnyStructures", Structures, JumpStructures)
 
 
 class Entry(NamedTuple, Generic[AnyStructures]):
-    """A filter of the lab, or of those for models that jump: printed names and how to build it."""
+    """A filter of the lab, or of those for models that jump: printed names, how to build it, and what it is.
+
+    functions : str
+        Of which structural functions: "gaussian", "linearised", "unscented", "gauss-hermite", "best" (Gaussian if they can be
+        had, else linearised); "" of none.
+    memory, modes : bool
+        Whether it remembers several steps, and whether its state has the probabilities of the modes.
+    """
 
     title: str
     russian: str
     build: Callable[[AnyStructures], Filter | Design]
+    functions: str = ""
+    memory: bool = False
+    modes: bool = False
 
 
-def _twice(short: str, build: Callable[[Structure], Filter | Design], russian: str = "") -> dict[str, Entry[Structures]]:
+def _twice(
+    short: str, build: Callable[[Structure], Filter | Design], russian: str = "", memory: bool = False
+) -> dict[str, Entry[Structures]]:
     """The entries of "fos", "fos3": with Gaussian structural functions, and with linearised ones; `russian` ends the name."""
     of = FAMILIES[family(short)]
     title, russian = of.title + short.removeprefix(family(short)), of.russian + russian
     return {
-        f"{short}-gaussian": Entry(f"G{title}", f"Г{russian}", lambda s: build(s.normal)),
-        f"{short}-linearised": Entry(f"L{title}", f"Л{russian}", lambda s: build(s.linearised)),
+        f"{short}-gaussian": Entry(f"G{title}", f"Г{russian}", lambda s: build(s.normal), "gaussian", memory),
+        f"{short}-linearised": Entry(f"L{title}", f"Л{russian}", lambda s: build(s.linearised), "linearised", memory),
     }
 
 
@@ -166,15 +178,32 @@ def _entry(short: str, build: Callable[[Structures], Filter | Design]) -> dict[s
 
 
 def _with_modes(
-    short: str, build: Callable[[JumpModel, list[Structure]], Filter | Design], russian: str = ""
+    short: str,
+    build: Callable[[JumpModel, list[Structure]], Filter | Design],
+    russian: str = "",
+    memory: bool = False,
+    modes: bool = False,
 ) -> dict[str, Entry[JumpStructures]]:
     """The same of a filter with the structural functions of each mode: "fos" is "fos-jump-gaussian", the LD-GFOS."""
     of = FAMILIES[family(short)]
     title = of.title + short.removeprefix(family(short))
     return {
-        f"{short}-jump-gaussian": Entry(f"LD-G{title}", f"Г{of.russian}лд{russian}", lambda s: build(s.model, s.normal)),
-        f"{short}-jump-linearised": Entry(f"LD-L{title}", f"Л{of.russian}лд{russian}", lambda s: build(s.model, s.linearised)),
+        f"{short}-jump-{functions}": Entry(
+            f"LD-{functions[0].upper()}{title}",
+            f"{letter}{of.russian}лд{russian}",
+            partial(_of_modes, build, functions),
+            functions,
+            memory,
+            modes,
+        )
+        for functions, letter in (("gaussian", "Г"), ("linearised", "Л"))
     }
+
+
+def _of_modes(
+    build: Callable[[JumpModel, list[Structure]], Filter | Design], functions: str, structures: JumpStructures
+) -> Filter | Design:
+    return build(structures.model, structures.normal if functions == "gaussian" else structures.linearised)
 
 
 _MEMORY = f", {STEPS} шага"
@@ -188,29 +217,29 @@ FILTERS: dict[str, Entry[Structures]] = {
     **_twice("mfos3", partial(mfos, arguments=3), ", 3 арг."),
     **_twice("dfmp", dfmp),
     **_twice("mdfmp", mdfmp),
-    **_twice(f"fkp{STEPS}", fkp, _MEMORY),
-    **_twice(f"mfkp{STEPS}", mfkp, _MEMORY),
-    **_twice(f"dfkp{STEPS}", dfkp, _MEMORY),
-    **_twice(f"mdfkp{STEPS}", mdfkp, _MEMORY),
-    **_twice(f"fbp{STEPS}", fbp, _MEMORY),
-    "aof-unscented": Entry("UKF", "АОФ, сигма-точки", lambda s: aof(unscented(s.model))),
-    "aof-gauss-hermite": Entry("GHKF", "АОФ, Гаусс–Эрмит", lambda s: aof(gauss_hermite(s.model))),
+    **_twice(f"fkp{STEPS}", fkp, _MEMORY, True),
+    **_twice(f"mfkp{STEPS}", mfkp, _MEMORY, True),
+    **_twice(f"dfkp{STEPS}", dfkp, _MEMORY, True),
+    **_twice(f"mdfkp{STEPS}", mdfkp, _MEMORY, True),
+    **_twice(f"fbp{STEPS}", fbp, _MEMORY, True),
+    "aof-unscented": Entry("UKF", "АОФ, сигма-точки", lambda s: aof(unscented(s.model)), "unscented"),
+    "aof-gauss-hermite": Entry("GHKF", "АОФ, Гаусс–Эрмит", lambda s: aof(gauss_hermite(s.model)), "gauss-hermite"),
     "aof-exact": Entry("exact AOF", "АОФ", lambda s: exact(s.model)),
     **_entry("particle", lambda s: particle(s.model)),
 }
 # The same for models that jump: filters that know the modes, and plain ones on the average over the modes.
 JUMP_FILTERS: dict[str, Entry[JumpStructures]] = {
-    **_with_modes("aof", lambda model, structures: logic_dynamic(structures, model, model.first)),
-    "imm": Entry(*FAMILIES["imm"][:2], lambda s: imm(s.best, *s.chain)),
-    "gpb2": Entry(*FAMILIES["gpb2"][:2], lambda s: gpb2(s.best, *s.chain)),
+    **_with_modes("aof", lambda model, structures: logic_dynamic(structures, model, model.first), modes=True),
+    "imm": Entry(*FAMILIES["imm"][:2], lambda s: imm(s.best, *s.chain), "best", modes=True),
+    "gpb2": Entry(*FAMILIES["gpb2"][:2], lambda s: gpb2(s.best, *s.chain), "best", modes=True),
     **_with_modes("fos", logic_dynamic_fos),
-    **_with_modes(f"fkp{STEPS}", logic_dynamic_fkp, _MEMORY),
-    **_with_modes(f"fbp{STEPS}", logic_dynamic_fbp, _MEMORY),
-    "aof-averaged": Entry("AOF (averaged)", "АОФ (среднее по режимам)", lambda s: aof(s.averaged)),
+    **_with_modes(f"fkp{STEPS}", logic_dynamic_fkp, _MEMORY, memory=True),
+    **_with_modes(f"fbp{STEPS}", logic_dynamic_fbp, _MEMORY, memory=True),
+    "aof-averaged": Entry("AOF (averaged)", "АОФ (среднее по режимам)", lambda s: aof(s.averaged), "best"),
     "duof": Entry(*FAMILIES["duof"][:2], lambda s: duof(s.model.modes[0], averaged_equations(s.model))),
-    "fos-averaged": Entry("FOS (averaged)", "ФОС (среднее по режимам)", lambda s: fos(s.averaged)),
-    "mfos-averaged": Entry("MFOS (averaged)", "МФОС (среднее по режимам)", lambda s: mfos(s.averaged)),
-    "aof-exact": Entry("exact AOF", "АОФ", lambda s: exact(s.model)),
+    "fos-averaged": Entry("FOS (averaged)", "ФОС (среднее по режимам)", lambda s: fos(s.averaged), "best"),
+    "mfos-averaged": Entry("MFOS (averaged)", "МФОС (среднее по режимам)", lambda s: mfos(s.averaged), "best"),
+    "aof-exact": Entry("exact AOF", "АОФ", lambda s: exact(s.model), modes=True),
 }
 # Printed names of filters that are not among the lab's.
 TITLES = {
@@ -221,10 +250,8 @@ TITLES = {
     "alpha-beta-gamma": "alpha-beta-gamma",
 }
 BOUND = 1000  # particles of the exact AOF where there are no point masses
-WITH_MODES = ("aof-jump-gaussian", "aof-jump-linearised", "imm", "gpb2", "aof-exact")  # that carry their probabilities
-OF_BEST = ("imm", "gpb2", "aof-averaged", "fos-averaged", "mfos-averaged")  # by `JumpStructures.best`
 # As of models without jumps, those that remember several steps are asked for by name.
-JUMP_LAB = tuple(name for name in JUMP_FILTERS if name != "aof-exact" and not re.search(r"\d-", name))
+JUMP_LAB = tuple(name for name, entry in JUMP_FILTERS.items() if name != "aof-exact" and not entry.memory)
 LAB = ("aof-gaussian", "aof-linearised", "duof", "fos-gaussian", "fos-linearised", "mfos-gaussian", "mfos-linearised")
 
 

@@ -24,6 +24,7 @@ import sympy as sp
 from kfcourse.errors import expect
 from kfcourse.laws import Array, Gaussian, symmetric, transpose
 from kfcourse.montecarlo.ensemble import simulate
+from kfcourse.montecarlo.statistics import Estimate, means_without_each
 from kfcourse.symbolic.choices import jumps
 from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
@@ -32,8 +33,10 @@ from kfcourse.symbolic.reading import ModelError, exact_matrix
 SHARE = 0.05  # of one trajectory in a mean of information: where it is more, the mean is infinite, or as good as
 
 
-def posterior_bound(model: Model, runs: int, steps: int, seed: int) -> Array:
+def posterior_bound(model: Model, runs: int, steps: int, seed: int) -> Estimate:
     """J_k^-1, the covariances below which no filter's errors are, (steps, n, n); after y_k, as the filters' estimates.
+
+    Its standard error is that of the means over trajectories, by the jackknife over batches.
 
     Parameters
     ----------
@@ -55,7 +58,7 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: int) -> Array:
     --------
     >>> from kfcourse import Model
     >>> from kfcourse.montecarlo.cramer_rao import posterior_bound
-    >>> posterior_bound(Model.define("0.9*x + v", "x + 2*w"), runs=10, steps=2, seed=1).ravel().round(4).tolist()
+    >>> posterior_bound(Model.define("0.9*x + v", "x + 2*w"), runs=10, steps=2, seed=1).value.ravel().round(4).tolist()
     [0.8, 1.1671]
     """
     expect(model, Model, "posterior_bound")
@@ -67,15 +70,15 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: int) -> Array:
     object_ = _information(model, model.state_equation, model.v, model.state_noise, "state")
     meter = _information(model, model.meter_equation, model.w, model.meter_noise, "meter")
     J = np.linalg.inv(model.prior.cov)
-    found = []
+    bounds = []
     for k, x in enumerate(simulate(model, runs, steps, seed).x):
         told, *_ = meter(x, k)
         J = J + _mean(told, "meter", k)
-        found.append(np.linalg.inv(J))
+        bounds.append(np.linalg.inv(J))
         of_state, mixed, of_next = object_(x, k)
-        D12 = -mixed.mean(axis=0)
-        J = _mean(of_next, "state", k) - D12.T @ np.linalg.solve(J + _mean(of_state, "state", k), D12)
-    return symmetric(np.stack(found))
+        D12 = -means_without_each(mixed)
+        J = _mean(of_next, "state", k) - transpose(D12) @ np.linalg.solve(J + _mean(of_state, "state", k), D12)
+    return Estimate.jackknife(np.moveaxis(symmetric(np.stack(bounds)), 1, -1))
 
 
 def _information(
@@ -110,12 +113,12 @@ def _information(
 
 
 def _mean(information: Array, what: str, k: int) -> Array:
-    """Its mean over the trajectories; ValueError if that is infinite, as far as they can tell."""
+    """Its means over the trajectories, (1 + batches, ...); ValueError if they are infinite, as far as these can tell."""
     parts = np.diagonal(information, axis1=-2, axis2=-1)
     total = parts.sum(axis=0)
     if len(parts) > 1 and (parts.max(axis=0) > max(SHARE, 2 / len(parts)) * total).any():
         raise ValueError(_infinite(what, f"at step {k} it hangs on one trajectory in {len(parts)}; or take more runs"))
-    return information.mean(axis=0)
+    return means_without_each(information)
 
 
 def _infinite(what: str, why: str) -> str:

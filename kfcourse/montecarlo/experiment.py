@@ -32,6 +32,7 @@ from kfcourse.montecarlo.designing import design, failed
 from kfcourse.montecarlo.ensemble import Instant, instants, weights
 from kfcourse.montecarlo.parallel import cluster, cores
 from kfcourse.montecarlo.statistics import Sums
+from kfcourse.symbolic.angular import warn_of_degrees
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
@@ -101,6 +102,7 @@ def measurements(one: Filter, y: Array) -> Array:
     if (endless := np.isinf(y)).any():
         k, run, _ = np.argwhere(endless)[0]
         raise ValueError(f"the measurement of step {k}, run {run} is infinite; write NaN where one is missing")
+    warn_of_degrees("a measurement", y, one.model.measured, one.model.angles.y)
     return y
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 
 from kfcourse.laws import CONFIDENCE, Array, Gaussian, normalised_square
+from kfcourse.montecarlo import BATCHES
 
 
 @dataclass(frozen=True)
@@ -157,6 +158,13 @@ class Sums(NamedTuple):
     def means(self, name: str) -> Array:
         """Means of a field over all batches, and without each of them: (..., 1 + batches)."""
         return _without_each(getattr(self, name)) / _without_each(self.weight)
+
+
+def means_without_each(values: Array) -> Array:
+    """Means of values (runs, ...) over all trajectories, and without each of the batches: (1 + batches, ...)."""
+    starts = np.linspace(0, len(values), min(BATCHES, len(values)) + 1).astype(int)
+    sums = np.add.reduceat(values, starts[:-1], axis=0)
+    return np.moveaxis(_without_each(np.moveaxis(sums, 0, -1)) / _without_each(np.diff(starts)), -1, 0)
 
 
 def _without_each(sums: Array) -> Array:

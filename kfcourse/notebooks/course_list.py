@@ -147,17 +147,17 @@ def _row(path: Path, line: int, values: Mapping[str | None, Any]) -> Iterator[Ro
     where = f"{path}, line {line}"
     if any("\n" in str(value) for value in values.values()):
         raise ValueError(f"{where}: a quote is opened and not closed on the line; remove it, or write it twice")
-    found = {key: plain((values.get(key) or "").strip()) for key in ("name", "group", "variant", "sets")}
+    fields = {key: plain((values.get(key) or "").strip()) for key in ("name", "group", "variant", "sets")}
     if any(str(value).strip() for value in values.get(None) or []):
         raise ValueError(f"{where}: more values than columns; put a name that has a comma in it into quotes")
-    if not found["name"] and not found["group"]:
+    if not fields["name"] and not fields["group"]:
         return
-    for key, of in (("name", "a student"), ("group", found["name"])):
-        if not re.search(r"\w", found[key]):
-            raise ValueError(f"{where}: {of} without a {key}" + (f" (got {found[key]!r})" if found[key] else ""))
-        if len(found[key]) > LONGEST:
+    for key, of in (("name", "a student"), ("group", fields["name"])):
+        if not re.search(r"\w", fields[key]):
+            raise ValueError(f"{where}: {of} without a {key}" + (f" (got {fields[key]!r})" if fields[key] else ""))
+        if len(fields[key]) > LONGEST:
             raise ValueError(f"{where}: a {key} of more than {LONGEST} characters; is a quote or a line break missing?")
-    for key, value in found.items():
+    for key, value in fields.items():
         if clean(value, len(value)) != " ".join(value.split()):
             raise ValueError(f"{where}: a {key} with characters that cannot be seen, {value!r}; type it anew")
-    yield Row(line, **found)
+    yield Row(line, **fields)

@@ -86,8 +86,8 @@ def execute(notebook: NotebookNode, name: str, stop_at_error: bool = True) -> No
             raise NotebookFailed(f"{name}, cell {started[-1]}: still running after {SECONDS:g} s") from None
         except DeadKernelError:
             raise NotebookFailed(f"{name}, cell {started[-1]}: the kernel died (out of memory?)") from None
-    if stop_at_error and (found := first_error(result)):
-        cell, shown = found
+    if stop_at_error and (failure := first_error(result)):
+        cell, shown = failure
         raise NotebookFailed(f"{name}, cell {cell.id}: {shown.ename}: {shown.evalue}")
     return result
 
@@ -108,13 +108,13 @@ def first_error(notebook: NotebookNode) -> tuple[NotebookNode, NotebookNode] | N
 
 def pictures(executed: NotebookNode) -> dict[str, bytes]:
     """PNG of every cell tagged `picture`, by cell id."""
-    found = {}
+    images = {}
     for cell in executed.cells:
         if "picture" in cell.metadata.get("tags", []):
             for output in cell.outputs:
                 if png := output.get("data", {}).get("image/png"):
-                    found[cell.id] = base64.b64decode(png)
-    return found
+                    images[cell.id] = base64.b64decode(png)
+    return images
 
 
 def results(executed: NotebookNode) -> list[dict[str, Any]]:

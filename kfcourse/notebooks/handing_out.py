@@ -63,11 +63,11 @@ def hand_out(
 def _say_left_out(variants_file: Path, others: bool) -> None:
     """Name the file's variants with modes, which nobody gets; ValueError if there are no others."""
     jumping = [name for name, one in read_variants(variants_file)[0].items() if isinstance(one.model, JumpModel)]
-    said = f"jump between modes, for which the exercises are not made: {clean(', '.join(jumping), 500)}"
+    reason = f"jump between modes, for which the exercises are not made: {clean(', '.join(jumping), 500)}"
     if not others:
-        raise ValueError(f"{variants_file} has no other variants than those that {said}")
+        raise ValueError(f"{variants_file} has no other variants than those that {reason}")
     if jumping:
-        click.echo(f"Left out, since they {said}\n")
+        click.echo(f"Left out, since they {reason}\n")
 
 
 def _letters(given: str | None) -> list[str]:

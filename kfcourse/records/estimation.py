@@ -140,8 +140,9 @@ def estimate(
     t, unit = np.where(logs, np.log(np.where(logs, start, 1.0)), start), np.where(logs | (start == 0), 1.0, np.abs(start))
     log_likelihood(t)  # says what is wrong with the start
     with tqdm(desc="likelihood", unit=" evaluations", disable=None, delay=2) as bar:
-        for _ in range(2):  # the second time in the units that the likelihood has at its maximum
-            t, unit, result, information = _climb(cost, t, np.where(logs, 1.0, _units(cost, t, unit)))
+        for _ in range(1 if logs.all() else 2):  # the second time in the units that the likelihood has at its maximum
+            unit = _units(cost, t, unit, logs)
+            t, result, information = _climb(cost, t, unit)
     best = model.replace(**dict(zip(names, parameters(t).tolist(), strict=True)))
     if not (result.success and np.isfinite(information).all() and np.linalg.eigvalsh(information).min() > -FLAT):
         raise NoMaximum(result.message, best, names)
@@ -196,10 +197,10 @@ def _checked(model: Model, unknown: Sequence[str], positive: Sequence[str]) -> t
     return names, logs, start
 
 
-def _units(cost: Callable[[Array], float], t: Array, unit: Array) -> Array:
-    """Changes of each parameter by which the likelihood changes by about 1; as given where none changes it."""
+def _units(cost: Callable[[Array], float], t: Array, unit: Array, logs: Array) -> Array:
+    """Changes of each parameter by which the likelihood changes by about 1; as given where none does, and of logarithms."""
     here, units = cost(t), unit.copy()
-    for i in range(len(t)):
+    for i in np.flatnonzero(~logs):
         step = unit[i] * np.eye(len(t))[i]
         for _ in range(20):
             change = max(abs(cost(t + step) - here), abs(cost(t - step) - here))
@@ -210,8 +211,8 @@ def _units(cost: Callable[[Array], float], t: Array, unit: Array) -> Array:
     return units
 
 
-def _climb(cost: Callable[[Array], float], start: Array, unit: Array) -> tuple[Array, Array, Any, Array]:
-    """The least cost downhill from a start, the units, what the search says, and second derivatives in these units."""
+def _climb(cost: Callable[[Array], float], start: Array, unit: Array) -> tuple[Array, Any, Array]:
+    """The least cost downhill from a start, what the search says, and second derivatives in these units."""
 
     def scaled(c: Array) -> float:
         return cost(start + unit * c)
@@ -221,7 +222,7 @@ def _climb(cost: Callable[[Array], float], start: Array, unit: Array) -> tuple[A
         scaled, np.zeros(len(start)), method="trust-exact", jac=lambda c: derivatives(tuple(c))[0],
         hess=lambda c: derivatives(tuple(c))[1], options={"gtol": max(1e-4, 1e-8 * abs(cost(start))), "maxiter": 100},
     )  # fmt: skip
-    return start + unit * result.x, unit, result, derivatives(tuple(result.x))[1]
+    return start + unit * result.x, result, derivatives(tuple(result.x))[1]
 
 
 def _derivatives(function: Callable[[Array], float], c: Array) -> tuple[Array, Array]:

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from tqdm import tqdm
 
 from kfcourse.errors import expect
 from kfcourse.laws import Array
@@ -93,67 +94,31 @@ def read_measurements(path: str | Path, model: Model, columns: Mapping[str, str]
     """
     expect(model, Model, "read_measurements")
     names, cells, lines, comma = _table(str(path), _text(path))
-    columns = dict(columns or {})
-    inputs, used = model.known.inputs, {symbol.name for symbol in model.known.symbols}
-    wanted = [*model.measured, *(name for name in inputs if name != INTERVAL)]
-    if unknown := sorted(set(columns) - {*wanted, INTERVAL, "time"}):
-        known = ", ".join(sorted({*wanted, INTERVAL, "time"}))
-        raise RecordError(f"columns are given for {', '.join(unknown)}; the model needs {known}")
-    clock = columns.get("time") or next((name for name in TIMES if name in names and name not in wanted), None)
-    if clock is not None:
-        columns["time"] = clock
-        wanted.insert(0, "time")
-    elif INTERVAL in inputs and columns.get(INTERVAL, INTERVAL) in names:
-        wanted.insert(0, INTERVAL)
-    elif similar := _similar("time", set(names) - {columns.get(name, name) for name in wanted}):
-        remedy = f"say so: columns={{'time': {similar!r}}}, or --column time={similar}"
-        if used & {INTERVAL, "t"}:
-            raise RecordError(f"{path} has no column time, which the model needs; if {shown(similar)} is it, " + remedy)
-        message = f"{path}: the column {shown(similar)} is not used; if it has the times, {remedy}"
-        warnings.warn(message, RecordWarning, stacklevel=2)
-    elif INTERVAL in inputs:
-        wanted.insert(0, INTERVAL)
-    named = {name: columns.get(name, name) for name in wanted}
-    for name, column in named.items():
-        if column not in names:
-            raise RecordError(f"{path} has no column {shown(column)}{_what_may_be(name, names)}")
+    named = _columns(str(path), names, model, columns or {})
     places = {name: names.index(column) for name, column in named.items()}
     _refuse_units(str(path), [cells[0][i] for i in places.values()], lines[0])
     table = {name: _numbers(str(path), names[i], [row[i] for row in cells], lines, comma) for name, i in places.items()}
     for name in model.measured:
         if np.isnan(table[name]).all():
             raise RecordError(f"{path}: the column {named[name]} has no number at all; leave it out of the model")
-    record_inputs = {name: _held(table[name]) for name in inputs if name in table}
-    for name, values in record_inputs.items():
-        if np.isnan(values[0]):
-            raise RecordError(f"{path}, first row, column {named[name]}: an input needs a value from the first row on")
-    interval = float(model.known.interval)
-    times = interval * np.arange(len(cells))
-    if "time" in table:
-        times = table["time"]
-        _check_times(str(path), named["time"], times, lines)
-        if INTERVAL in inputs:
-            record_inputs[INTERVAL] = intervals(times, interval)
-        if not used & {INTERVAL, "t"} and _uneven(times):
-            steps = np.diff(times)
-            warnings.warn(
-                f"{path}: the intervals are {steps.min():g} to {steps.max():g}, but the model takes every step "
-                "alike: write dt into its formulas, with inputs = { dt = [1] }",
-                RecordWarning,
-                stacklevel=2,
-            )
-    elif INTERVAL in record_inputs:
-        steps = record_inputs[INTERVAL]
-        if (steps < 0).any():
-            raise RecordError(
-                f"{path}, line {lines[int(np.argmax(steps < 0))]}, column {named[INTERVAL]}: an interval must not be negative"
-            )
-        times = np.concatenate([[0.0], np.cumsum(steps[:-1])])
-    if "t" in used - set(inputs):
-        record_inputs["t"] = times
+    inputs = {name: _held(str(path), named[name], table[name]) for name in model.known.inputs if name in table}
+    times = _times(str(path), named, table, lines, float(model.known.interval))
+    used = {symbol.name for symbol in model.known.symbols}
+    if "t" in used - set(model.known.inputs):
+        inputs["t"] = times
+    if INTERVAL in model.known.inputs:
+        inputs.setdefault(INTERVAL, intervals(times, float(model.known.interval)))
+    elif "t" not in used and _uneven(times):
+        steps = np.diff(times)
+        warnings.warn(
+            f"{path}: the intervals are {steps.min():g} to {steps.max():g}, but the model takes every step alike: write dt into "
+            "its formulas, with inputs = { dt = [1] }",
+            RecordWarning,
+            stacklevel=2,
+        )
     y = np.stack([table[name] for name in model.measured], axis=-1)[:, None]
     warn_of_degrees(f"{path}: a measurement", y, model.measured, model.angles.y)
-    return Record(times, y, model.with_inputs(record_inputs))
+    return Record(times, y, model.with_inputs(inputs))
 
 
 def intervals(times: Array, single: float = 1.0) -> Array:
@@ -187,35 +152,27 @@ def _table(name: str, text: str) -> tuple[list[str], list[list[str]], list[int],
     delimiter = next((sign for sign in ";\t" if sign in text.lstrip().partition("\n")[0]), ",")
     names, rows, numbers, before = list[str](), list[list[str]](), list[int](), 0
     reader = csv.reader(lines, delimiter=delimiter, strict=True)
-    while True:
-        try:
-            row = next(reader, None)
-        except csv.Error as error:
-            raise RecordError(f"{name}, line {before + 1}: {error}; a quoted cell must end in its line") from None
-        if row is None:
-            break
-        if reader.line_num > before + 1:  # rows are lines: a cell must not swallow those below it
-            raise RecordError(f"{name}, line {before + 1}: a quoted cell must end in its line")
-        before = reader.line_num
-        if not any(map(str.strip, row)) and len(row) < 2:
-            if len(names) != 1:
+    try:
+        for row in tqdm(reader, desc=name, total=len(lines), unit="row", disable=None, delay=2):
+            if reader.line_num > before + 1:  # rows are lines: a cell must not swallow those below it
+                raise csv.Error("a cell of several lines")
+            before = reader.line_num
+            if not any(map(str.strip, row)) and len(row) < 2:
+                if len(names) != 1:
+                    continue
+                row = [""]  # of one column an empty line is a row: a measurement that is missing
+            if not names:
+                names = _names(f"{name}, line {before}", row)
                 continue
-            row = [""]  # of one column an empty line is a row: a measurement that is missing
-        if not names:
-            names = [cell.strip() for cell in row]
-            if names[0].startswith(("#", "%", "//")) and len(names[0]) > 2:
+            if len(row) != len(names):
+                comma = "; where a comma separates decimals, separate cells by semicolons" if delimiter == "," else ""
                 raise RecordError(
-                    f"{name}, line {before}: {shown(names[0])} is a comment, but the first line must name the "
-                    'columns: delete what stands above the names, or before them (numpy.savetxt: comments="")'
+                    f"{name}, line {before}: {len(row)} cells, but the first line names {len(names)} columns{comma}"
                 )
-        elif len(row) == len(names):
             rows.append(row)
             numbers.append(before)
-        else:
-            raise RecordError(
-                f"{name}, line {before}: {len(row)} cells, but the first line names {len(names)} columns"
-                + ("; where a comma separates decimals, separate cells by semicolons" if delimiter == "," else "")
-            )
+    except csv.Error as error:
+        raise RecordError(f"{name}, line {before + 1}: {error}; a quoted cell must end in its line") from None
     if not names:
         raise RecordError(f"{name} is empty; its first line names the columns, such as time,y")
     if not rows:
@@ -225,9 +182,47 @@ def _table(name: str, text: str) -> tuple[list[str], list[list[str]], list[int],
             f"{name} has one column, {shown(names[0])}, as spaces do not separate cells: "
             "write commas, tabs or semicolons between them"
         )
-    if twice := sorted({column for column in names if column and names.count(column) > 1}):
-        raise RecordError(f"{name}: two columns are named {shown(twice[0])}; give each a name of its own")
     return names, rows, numbers, delimiter == ";"
+
+
+def _names(place: str, row: Sequence[str]) -> list[str]:
+    """Names of the columns."""
+    names = [cell.strip() for cell in row]
+    if names[0].startswith(("#", "%", "//")) and len(names[0]) > 2:
+        raise RecordError(
+            f"{place}: {shown(names[0])} is a comment, but the first line must name the columns: delete what stands above "
+            'the names, or before them (numpy.savetxt: comments="")'
+        )
+    if twice := sorted({column for column in names if column and names.count(column) > 1}):
+        raise RecordError(f"{place}: two columns are named {shown(twice[0])}; give each a name of its own")
+    return names
+
+
+def _columns(path: str, names: Sequence[str], model: Model, given: Mapping[str, str]) -> dict[str, str]:
+    """The column of each thing that the model needs, by the model's names."""
+    wanted = [*model.measured, *(name for name in model.known.inputs if name != INTERVAL)]
+    if unknown := sorted(set(given) - {*wanted, INTERVAL, "time"}):
+        known = ", ".join(sorted({*wanted, INTERVAL, "time"}))
+        raise RecordError(f"columns are given for {', '.join(unknown)}; the model needs {known}")
+    named = {name: given.get(name, name) for name in wanted}
+    clock = given.get("time") or next((name for name in TIMES if name in names and name not in wanted), None)
+    interval, needed = given.get(INTERVAL, INTERVAL), INTERVAL in model.known.inputs
+    if clock is not None:
+        named["time"] = clock
+    elif needed and interval in names:
+        named[INTERVAL] = interval
+    elif similar := _similar("time", set(names) - {*named.values()}):
+        remedy = f"say so: columns={{'time': {similar!r}}}, or --column time={similar}"
+        if needed or "t" in {symbol.name for symbol in model.known.symbols}:
+            raise RecordError(f"{path} has no column time, which the model needs; if {shown(similar)} is it, {remedy}")
+        message = f"{path}: the column {shown(similar)} is not used; if it has the times, {remedy}"
+        warnings.warn(message, RecordWarning, stacklevel=3)
+    elif needed:
+        raise RecordError(f"{path} has no column {shown(interval)}{_what_may_be(INTERVAL, names)}")
+    for name, column in named.items():
+        if column not in names:
+            raise RecordError(f"{path} has no column {shown(column)}{_what_may_be(name, names)}")
+    return named
 
 
 def _key(name: str) -> str:
@@ -297,19 +292,27 @@ def _cause(text: str) -> str:
     return "leave the cell empty if it is missing"
 
 
-def _held(values: Array) -> Array:
+def _held(name: str, column: str, values: Array) -> Array:
     """An input with its gaps filled by the value before."""
+    if np.isnan(values[0]):
+        raise RecordError(f"{name}, first row, column {column}: an input needs a value from the first row on")
     return values[np.maximum.accumulate(np.where(np.isnan(values), 0, np.arange(len(values))))]
 
 
-def _check_times(name: str, column: str, times: Array, lines: Sequence[int]) -> None:
-    """RecordError for a time that is missing, or goes back."""
+def _times(name: str, named: Mapping[str, str], table: Mapping[str, Array], lines: Sequence[int], interval: float) -> Array:
+    """Times of the rows, from their column, from that of intervals, or by the model's; RecordError if they go back."""
+    if "time" not in table:
+        steps = table.get(INTERVAL, np.full(len(lines), interval))
+        if (steps < 0).any():
+            place = f"{name}, line {lines[int(np.argmax(steps < 0))]}, column {named[INTERVAL]}"
+            raise RecordError(f"{place}: an interval must not be negative")
+        return np.concatenate([[0.0], np.cumsum(_held(name, INTERVAL, steps)[:-1])])
+    times, column = table["time"], named["time"]
     if (empty := np.isnan(times)).any():
-        k = int(np.argmax(empty))
-        raise RecordError(f"{name}, line {lines[k]}, column {column}: empty; every row needs its time")
+        raise RecordError(f"{name}, line {lines[int(np.argmax(empty))]}, column {column}: empty; every row needs its time")
     steps = np.diff(times)
     if not (back := steps < 0).any():
-        return
+        return times
     k = int(np.argmax(back))
     remedy = "sort the rows by time"
     if back.sum() == 1 and (times[k + 1 :] <= times[k]).sum() > 1:  # not one row in a wrong place
@@ -319,7 +322,8 @@ def _check_times(name: str, column: str, times: Array, lines: Sequence[int]) -> 
             f"the clock was set back once, here: an hour{hour} that is there twice, or a second record? Do not sort, "
             "which would interleave the two: write times that only grow, such as UTC"
         )
-    raise RecordError(f"{name}, line {lines[k + 1]}, column {column}: {times[k + 1]:.16g} comes after {times[k]:.16g}; {remedy}")
+    place = f"{name}, line {lines[k + 1]}, column {column}"
+    raise RecordError(f"{place}: {times[k + 1]:.16g} comes after {times[k]:.16g}; {remedy}")
 
 
 def _uneven(times: Array) -> bool:

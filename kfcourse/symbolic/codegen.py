@@ -71,7 +71,7 @@ def _compiled(
     vectors: tuple[str, ...],
 ) -> Compiled:
     # Symbols get names of our own, such as z_1 and p_12: no name of a formula reaches the code.
-    places: dict[sp.Symbol, tuple[sp.Symbol, int, tuple[int, ...]]] = {}
+    places: dict[sp.Symbol, tuple[sp.Symbol, int, Any]] = {}
     for number, (key, matrix) in enumerate(arguments):
         for i, j in product(*map(range, matrix.shape)):
             index = (i,) if key in vectors else (i, j)

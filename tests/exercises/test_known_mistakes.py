@@ -5,13 +5,14 @@ import datetime
 import os
 import random
 from collections import Counter
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
 import sympy as sp
 
 from kfcourse.checks import Derivation, ExerciseError, engine, exercise, sets
+from kfcourse.checks.edits import edited
 from kfcourse.lab.variants import load_variants
 
 # Questions about the variant's model are asked for variants of all kinds.  The others are called with hidden functions, numbers:
@@ -49,6 +50,15 @@ def test_core_questions_know_five_mistakes(letter, question):
         assert len(mistake.says) > 15, mistake.name
     if question.level == "core" and not isinstance(question, Derivation):  # whose lines say what is wrong
         assert len({mistake.name for mistake in question.mistakes}) >= 5
+
+
+def test_every_edit_finds_its_text():
+    """In exactly one place of the key, or of a function that it calls; ValueError otherwise."""
+    edits = [m.wrong for one in sets().values() for q in one.questions for m in q.mistakes if isinstance(m.wrong, partial)]
+    assert len(edits) > 600
+    for edit in edits:
+        key, texts = edit.args
+        assert callable(edited(key, *texts))
 
 
 @pytest.mark.parametrize(("letter", "question", "variant"), CASES)

@@ -1,4 +1,4 @@
-"""Keys of sets f, g, h against independent references: the package's filters, derivatives, an integrator."""
+"""Keys of sets f, g, h, j, l, o, p against independent references: the package's filters, derivatives, an integrator."""
 
 import numpy as np
 import pytest
@@ -19,9 +19,14 @@ from kfcourse.exercises.h_continuous import keys as continuous_time
 from kfcourse.exercises.h_continuous import questions as continuous_questions
 from kfcourse.exercises.o_modes import keys as modes
 from kfcourse.exercises.o_modes import questions as modes_questions
-from kfcourse.filters import aof, kalman_filter, logic_dynamic, pointmass
+from kfcourse.exercises.p_find_the_slip import keys as slips
+from kfcourse.filters import alphabeta, aof, kalman_filter, logic_dynamic, pointmass
 from kfcourse.lab.variants import find_variant, load_variants
+from kfcourse.laws import Gaussian
 from kfcourse.linear.consistency import innovations, nees, nis
+from kfcourse.scenarios.navigation import Dynamics, Observation, Sensor, fuse
+from kfcourse.scenarios.radar import kinematic
+from kfcourse.symbolic.moments import GaussianMoments
 
 
 def test_the_grid_is_the_kalman_filter_on_a_linear_model():
@@ -164,3 +169,56 @@ def test_two_steps_of_modes_are_the_package_s_filter(variant):
         after = one.step(before, y[1:, None])
         found = modes.two_steps(y, m, d, a, q, C, pi, first)
         np.testing.assert_allclose(found, [before.memory.probability[0], after.memory.probability[0]], rtol=1e-12)
+
+
+# -- keys that are formulas: the package has them otherwise
+
+
+def asked(letter, name):
+    """Key and hidden arguments of a question."""
+    task = exercise(letter, "21")
+    question = task.questions[name]
+    return question.key, question.arguments(task)
+
+
+def test_the_alpha_beta_filter_and_its_gains_are_the_package_s():
+    key, calls = asked("j", "j4")
+    for y, T, alpha, beta, r, v in calls:
+        prior = {"mean": np.array([*r, *v]), "variance": np.ones(2 * len(r))}
+        laws = run(alphabeta.alpha_beta(kinematic(T, dimensions=len(r), prior=prior), alpha, beta, start="prior"), y)
+        np.testing.assert_allclose(np.concatenate(key(y, T, alpha, beta, r, v), axis=-1), laws.mean, rtol=1e-10, atol=1e-12)
+    key, calls = asked("j", "j3")
+    for (alpha,) in calls:
+        assert key(alpha) == pytest.approx((alphabeta.steady_beta(alpha), alphabeta.tracking_index(alpha)))
+
+
+def test_late_measurements_are_fused_as_by_the_package():
+    key, calls = asked("l", "l5")
+    for tags, arrivals, values, m, P, q, r, now in calls:
+        sensor = Sensor.define("receiver", ["s", "V"], "s + w", variance=r, period=1.0)
+        rows = zip(tags, arrivals, values, strict=True)
+        seen = [Observation("receiver", float(tag), float(at), np.array([[value]])) for tag, at, value in rows]
+        vehicle = Dynamics(np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.0, q]))
+        law = fuse(vehicle, [sensor], Gaussian(m, P), seen, np.array([now]))
+        mean, cov = key(tags, arrivals, values, m, P, q, r, now)
+        np.testing.assert_allclose(mean, law.mean[0, 0], rtol=1e-9)
+        np.testing.assert_allclose(cov, law.cov[0, 0], rtol=1e-9)
+
+
+def test_formulas_without_a_slip_are_moments_of_the_package():
+    x1, x2, v, w1, w2, a, q, G, gamma, r = sp.symbols("x1 x2 v w1 w2 a q G gamma r", real=True)
+    m1, m2, d11, d12, d22 = law = sp.symbols("m1 m2 d11 d12 d22", real=True)
+    root = sp.Symbol("root", positive=True)
+    pair = GaussianMoments([x1, x2, v, w1, w2], [m1, m2, 0, 0, 0], sp.diag(sp.Matrix([[d11, d12], [d12, d22]]), 1, 1, r))
+    square = pair.mean_of(sp.expand((a * x1 + root * v) ** 2)).subs(root, sp.sqrt(q))
+    assert sp.simplify(slips.second_moment(a, q, m1, d11) - square) == 0
+    y = gamma * (G * x1 + w2)
+    assert sp.simplify(slips.scaled_meter(gamma, G, d11, r) - pair.covariance(y, y)) == 0
+    assert sp.simplify(slips.noise_intensity(*law) - pair.mean_of(x1**2)) == 0
+    meters = (x1**2 + v, x2 + w1)
+    F = sp.Matrix(2, 2, lambda i, j: pair.covariance(meters[i], meters[j]))
+    assert sp.simplify(slips.meter_variance(*law) - F) == sp.zeros(2, 2)
+    E, kappa = sp.symbols("E kappa", real=True)
+    forces = E * (sp.cos(x2) - kappa * sp.sin(x2)), E * (sp.sin(x2) + kappa * sp.cos(x2))
+    for slope, force in zip(slips.by_angle(E, kappa, x2), forces, strict=True):
+        assert sp.simplify(slope - force.diff(x2)) == 0

@@ -120,6 +120,9 @@ def test_a_meter_that_contains_an_angle_and_is_not_said_to_be_one_warns(meter, a
 def test_degrees_are_told():
     with pytest.warns(AngleWarning, match="prior mean of the angle x is 90, beyond 2 pi: angles are in radians"):
         Model.define("x + v", "x + w", angles=["x", "y"], prior={"mean": 90, "variance": 1})
+    model = Model.define("x + v", "x + w", angles=["x", "y"])
+    with pytest.warns(AngleWarning, match="a measurement of the angle y is 90, beyond 2 pi"):
+        run(aof(linearised(model)), np.array([0.5, np.nan, 90.0]))
 
 
 @pytest.mark.parametrize("build", [unscented, gauss_hermite])

@@ -70,7 +70,8 @@ def test_in_every_filter_what_is_refused_is_missing():
         found, behind = run(guarded, y), run(one, without(guarded, y))
         np.testing.assert_array_equal(found.mean, behind.mean, err_msg=one.name)
         np.testing.assert_array_equal(found.cov, behind.cov, err_msg=one.name)
-        assert np.abs(run(one, y).mean - found.mean).max() > 0.5 or one.name.startswith("robust")
+        if one.name != "aof-exact":  # which refuses without a gate what contradicts the model
+            assert np.abs(run(one, y).mean - found.mean).max() > 0.5 or one.name.startswith("robust")
 
 
 def test_the_alpha_beta_filter_has_a_gate_too():

@@ -43,7 +43,7 @@ def recipe(monkeypatch):
 
 def test_a_filter_added_by_the_recipe_is_known_everywhere(recipe, tmp_path):
     names = "aof-gaussian,fading-gaussian,fading-linearised"
-    size = ["--runs", "1000", "--steps", "4", "--slow-runs", "0"]
+    size = ["--runs", "1000", "--steps", "4"]
     done = CliRunner().invoke(cli.main, ["lab", "53", "--filters", names, *size, "--report", "ru", "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert "GFading" in done.output

@@ -14,7 +14,7 @@ from kfcourse.cli import main
 from kfcourse.filters import aof, fos, imm, logic_dynamic
 from kfcourse.lab import checked_quadrature as cq
 from kfcourse.lab.admission import admissions
-from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, LAB, OF_BEST, JumpStructures, Structures, lab_filters, title
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, LAB, JumpStructures, Structures, lab_filters, title
 from kfcourse.lab.variants import find_variant
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare, run, states
@@ -129,7 +129,7 @@ def test_modes_for_which_no_order_does_leave_the_others_linearised_and_say_so():
 def test_the_order_is_the_first_that_does():
     found = checked(CUBIC)
     orders = cq.ORDERS[cq.ORDERS.index(found.order) - 1], found.order
-    less, same = (cq._apart(CUBIC, *([gauss_hermite(CUBIC, n)] for n in (order, 2 * order))) for order in orders)
+    less, same = (cq._apart(*(gauss_hermite(CUBIC, n) for n in (order, 2 * order))) for order in orders)
     assert less > cq.CLOSE >= same == found.apart
     narrow = checked(Model.define("x/(1 + x**2) + 0.1*v", "x**3 + x + w", prior={"mean": 0.1, "variance": 0.01}))
     assert narrow.order < found.order  # smoother over narrower laws
@@ -171,23 +171,6 @@ def test_too_many_axes_are_refused_before_they_take_hours(monkeypatch):
         _ = Structures(model).normal
 
 
-@pytest.mark.filterwarnings("ignore::kfcourse.symbolic.quadrature.QuadratureWarning")
-@pytest.mark.parametrize("size", [1, 7, 50])
-@pytest.mark.parametrize("timed", ["", " + 0.1*k"])
-def test_pieces_make_the_whole(size, timed):
-    model = Model.define(["x1/(1 + x2**2) + 0.3*v1" + timed, "0.9*x2 + v2"], "x1 + w*x2")
-    whole = gauss_hermite(model, 3)
-    pieces = cq._in_pieces(whole, size)
-    rng = np.random.default_rng(1)
-    mean = rng.normal(size=(20, 2))
-    for cov in (np.array([[1.0, 0.2], [0.2, 0.5]]), np.stack([np.diag(d) for d in rng.uniform(0.1, 1, size=(20, 2))])):
-        for function in ("predict", "measure"):
-            for one, other in zip(
-                getattr(pieces.at(2), function)(mean, cov), getattr(whole.at(2), function)(mean, cov), strict=True
-            ):
-                np.testing.assert_allclose(one, np.broadcast_to(other, one.shape), rtol=1e-13, atol=1e-15)
-
-
 def test_a_model_with_formulas_keeps_them(variant53):
     structures = Structures(variant53)
     assert structures.quadrature is None and structures.normal is structures.gaussian
@@ -195,7 +178,7 @@ def test_a_model_with_formulas_keeps_them(variant53):
 
 def test_who_chooses_a_filter_is_told():
     for model, names in ((CUBIC, FILTERS), (JUMPING, JUMP_FILTERS)):
-        for one in admissions(model, [name for name in names if name.endswith("-gaussian") or name in OF_BEST]):
+        for one in admissions(model, [name for name, entry in names.items() if entry.functions in ("gaussian", "best")]):
             assert one.verdict == "yes" and f"Gauss-Hermite quadrature, {checked(model).order} points an axis" in one.says
     assert [one.name for one in lab_filters(CUBIC)] == list(LAB)
 
@@ -219,7 +202,7 @@ def test_the_lab_says_so_in_its_reports(tmp_path, monkeypatch, meter, more, name
     monkeypatch.chdir(tmp_path)
     text = f'[variants.c]\nstate = "x/(1 + x**2) + v"\nmeter = "{meter}"\n{more}'
     (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
-    call = ["lab", "c", "--variants", "mine.toml", "--runs", "300", "--steps", "4", "--slow-runs", "0", "--designs", "1"]
+    call = ["lab", "c", "--variants", "mine.toml", "--runs", "300", "--steps", "4"]
     result = CliRunner().invoke(main, [*call, "--report", language, "--out", "r", "--json", "r.json"])
     assert result.exit_code == 0, result.output
     told = next(line for line in result.output.splitlines() if "no closed form: means over normal laws by Gauss-Hermite" in line)

@@ -146,7 +146,7 @@ def test_a_variant_says_how_many_steps_in_a_whole_number(steps):
 
 
 def test_the_lab_takes_the_steps_of_the_variant(tmp_path):
-    few = ("--runs", "300", "--slow-runs", "0", "--filters", "duof", "--designs", "1")
+    few = ("--runs", "300", "--filters", "duof")
     result = CliRunner().invoke(cli.main, ["lab", "D1", *few, "--out", str(tmp_path / "r"), "--json", str(tmp_path / "n")])
     assert result.exit_code == 0, result.output
     assert '"steps": 21,' in (tmp_path / "n").read_text()

@@ -71,7 +71,7 @@ def test_the_published_model_has_the_law_of_its_modes():
 
 
 def test_the_lab_compares_filters_and_tells_the_share_of_right_modes(tmp_path, own):
-    few = ("--runs", 2000, "--steps", 6, "--slow-runs", 112, "--designs", 1)
+    few = ("--runs", 2000, "--steps", 6)
     result = kfcourse("lab", "mine", "--variants", own, *few, "--out", tmp_path / "r", "--json", tmp_path / "n.json")
     assert result.exit_code == 0, result.output
     for name in JUMP_LAB:

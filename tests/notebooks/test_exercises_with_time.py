@@ -2,7 +2,6 @@
 
 import json
 import re
-import warnings
 from functools import cache
 from pathlib import Path
 
@@ -18,7 +17,6 @@ from kfcourse.notebooks.grading import marking, submissions
 from kfcourse.notebooks.grading.running import Site
 from kfcourse.notebooks.grading.sandbox import Sandbox
 from kfcourse.notebooks.master import read, render, solution, student
-from kfcourse.symbolic.quadrature import QuadratureWarning
 
 TABLES = {
     "growth": {
@@ -196,18 +194,6 @@ def test_what_is_given_matches_the_model():
     np.testing.assert_allclose(a(m, 9), 0.9 * m - 0.7, rtol=1e-14)
     np.testing.assert_allclose(at_step(b, 9)(m), 1.2 * m, rtol=1e-14)
     assert lab.hidden_steps == [0, 8, 9]  # u = 0, 1, -1
-
-
-def test_quadrature_stands_in_where_there_is_no_closed_form():
-    """The growth model's mean over N(z, p) against many random points: 4 standard errors of 400,000 of them."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", QuadratureWarning)
-        tau, Theta = opened("growth", "b").functions("gaussian", 3)[1](np.array([[0.7]]), np.array([[[2.0]]]))
-    x = 0.7 + np.sqrt(2) * np.random.default_rng(1).normal(size=400_000)
-    f = x / 2 + 25 * x / (1 + x**2) + 8 * np.cos(3.6)
-    assert tau.item() == pytest.approx(f.mean(), abs=4 * f.std() / np.sqrt(len(x)))
-    squares = (f - f.mean()) ** 2
-    assert Theta.item() == pytest.approx(squares.mean() + 10, abs=4 * squares.std() / np.sqrt(len(x)))
 
 
 def test_what_cannot_be_asked_is_refused_with_the_reason():

@@ -25,7 +25,7 @@ from kfcourse.notebooks.grading import course, marking, pool, running, sandbox, 
 from kfcourse.notebooks.grading.asking import salted
 from kfcourse.notebooks.grading.assembly import assembled
 from kfcourse.notebooks.grading.marking import code_of
-from kfcourse.notebooks.grading.results import Grade, Told, line, read_lines
+from kfcourse.notebooks.grading.results import Comment, Grade, line, read_lines
 from kfcourse.notebooks.grading.running import Site
 from kfcourse.notebooks.grading.sandbox import Sandbox
 from kfcourse.notebooks.grading.staging import FONTS
@@ -343,7 +343,7 @@ def test_a_check_that_fails_in_itself_costs_its_question_only(graded_here):
     with changed("b1", arguments=broken):
         found, marks, note = graded_here(solved(), whole=False)
     assert marks == ("not graded", "passed")
-    assert (found.status, found.digest, found.told["b1"].says) == ("graded in part", "", marking.LOOKED_AT)
+    assert (found.status, found.digest, found.comments["b1"].says) == ("graded in part", "", marking.LOOKED_AT)
     assert note.startswith("look: b1 not graded: the check itself fails, please tell us: AttributeError: 'Mul' object")
 
 
@@ -351,10 +351,10 @@ def test_a_step_on_a_wrong_one_and_right_parts_are_said(graded_here):
     """The second stands on the student's own wrong gain; in the other notebook one of its two results is right."""
     found, marks, note = graded_here(change(solved(), "def gain", "np.linalg.solve(F, cross)", "cross"))
     assert marks == ("wrong", "wrong")
-    assert (found.told["b2"].follows, found.told["b2"].share) == (("b1",), 0.0)
-    assert "b2: follows" in note and "right on top of your b1" in found.told["b2"].says
+    assert (found.comments["b2"].follows, found.comments["b2"].share) == (("b1",), 0.0)
+    assert "b2: follows" in note and "right on top of your b1" in found.comments["b2"].says
     found, marks, _ = graded_here(change(solved(), "def correct", "Psi - K @ G @ Psi", "Psi + K @ G @ Psi"))
-    assert (marks, found.told["b2"].share) == (("passed", "wrong"), 0.5)
+    assert (marks, found.comments["b2"].share) == (("passed", "wrong"), 0.5)
 
 
 def test_faked_results_do_not_count(graded, graded_here):
@@ -396,7 +396,7 @@ def test_taking_the_answer_is_noticed(graded_here):
 def test_an_error_is_reported_by_cell(graded_here):
     found, marks, note = graded_here(syntax())
     assert marks == ("not run", "unusable")
-    assert found.told["b1"].says == "not run. NameError: name 'gain' is not defined"
+    assert found.comments["b1"].says == "not run. NameError: name 'gain' is not defined"
     number = place(syntax(), "def gain")
     assert f"cell {number} (gain): SyntaxError" in note
     assert "b1: NameError: name 'gain' is not defined" in note
@@ -409,7 +409,7 @@ def test_an_endless_loop_is_ended(graded):
     assert note == f"cell {number}: still running after {SECONDS} s"
     grades = read_lines(graded.folder.parent / "returned-grades.jsonl").values()
     (grade,) = [grade for grade in grades if grade.name == "loops.ipynb"]
-    assert grade.told["b2"].says == f"not run. {note}"
+    assert grade.comments["b2"].says == f"not run. {note}"
 
 
 def test_a_dead_kernel_is_reported_and_its_children_are_ended(graded):
@@ -727,7 +727,7 @@ def test_no_notebooks_is_an_error(tmp_path):
 
 @pytest.mark.quick
 def test_grades_come_back_as_they_were(tmp_path):
-    told = {"b2": Told('"no"', ("sign",), 0.5, ("b1",))}
+    told = {"b2": Comment('"no"', ("sign",), 0.5, ("b1",))}
     grades = [
         Grade("М-1/Иванов, И.ipynb", "graded", "b", "53", MARKS, ('b2: "sign"',), ("cell 3: \ud800",), "d1", told, "И", "w"),
         Grade("=1+1.ipynb", "not an exercise notebook", digest="d2"),
@@ -889,8 +889,8 @@ def test_a_cell_that_is_gone_or_text_is_named(graded_here):
     notebook.cells.remove(gain)
     found, marks, note = graded_here(notebook)
     assert marks == NEW and note == "the cell of b1 is gone from the notebook"
-    assert found.told["b1"].says == "its cell is gone from the notebook"
-    assert found.told["b2"].says.endswith("or stands on what is not there: the cell of b1")
+    assert found.comments["b1"].says == "its cell is gone from the notebook"
+    assert found.comments["b2"].says.endswith("or stands on what is not there: the cell of b1")
     gain.cell_type = "markdown"
     notebook.cells.insert(1, gain)
     assert graded_here(notebook)[2] == "the cell of b1 has become text: make it a code cell again"

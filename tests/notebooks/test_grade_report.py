@@ -13,7 +13,7 @@ from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG
 from kfcourse.notebooks.course_list import Student, read_assignment, save_assignment
 from kfcourse.notebooks.grading.owners import Person, of_folder, owner, people, same_code
 from kfcourse.notebooks.grading.report import feedback, question_rows, student_rows, write_report
-from kfcourse.notebooks.grading.results import NOT_RUN, Grade, Told
+from kfcourse.notebooks.grading.results import NOT_RUN, Comment, Grade
 from kfcourse.notebooks.grading.weights import USUAL, WEIGHTS, Credit, points, possible
 from kfcourse.notebooks.texts import cautious
 
@@ -31,7 +31,7 @@ SIGN = next(
 
 def graded(name, letter="b", variant="53", passed=(), student="", work="w", looks=(), **told):
     marks = {one.name: PASSED if one.name in passed else NOT_RUN for one in sets()[letter].questions}
-    told |= {one: Told("right") for one in passed}
+    told |= {one: Comment("right") for one in passed}
     marks |= {one: WRONG for one, said in told.items() if said.says != "right"}
     return Grade(name, "graded", letter, variant, marks, (), looks, name, told, student, work)
 
@@ -137,8 +137,8 @@ def test_points_are_the_weights_of_the_levels():
 @pytest.mark.quick
 def test_what_a_wrong_answer_is_worth_is_the_teachers_choice():
     """b2 has a third of its results right, b3 is right on top of the wrong b1, b4 both."""
-    told = {"b1": Told("no"), "b2": Told("no", share=1 / 3), "b3": Told("no", follows=("b1",))}
-    grade = graded("x", **told, b4=Told("no", share=0.25, follows=("b2",)))
+    told = {"b1": Comment("no"), "b2": Comment("no", share=1 / 3), "b3": Comment("no", follows=("b1",))}
+    grade = graded("x", **told, b4=Comment("no", share=0.25, follows=("b2",)))
     assert grade.marks["b3"] == WRONG
     for credit, expected in (
         (Credit(0.0, 0.0), 0),
@@ -151,14 +151,15 @@ def test_what_a_wrong_answer_is_worth_is_the_teachers_choice():
     (row,) = student_rows([Person(IVANOV, {"b": grade})], "b", Credit(1.0, 0.5))
     assert (row["set b"], row["points"], row["of"]) == (2.67, 2.67, possible("b"))
     assert "0.67/2" in feedback(Person(IVANOV, {"b": grade}), "b", Credit(1.0, 0.5))
-    best = people([grade, replace(grade, name="y", told=told | {"b2": Told("no", share=2 / 3)})], None, Credit(1.0, 0.0))[0]
+    better = replace(grade, name="y", comments=told | {"b2": Comment("no", share=2 / 3)})
+    best = people([grade, better], None, Credit(1.0, 0.0))[0]
     assert {one.grades["b"].name for one in best} <= {"x", "y"}
     unusable = replace(grade, marks=dict.fromkeys(grade.marks, UNUSABLE))
     assert points([unusable], Credit(1.0, 1.0)) == 0  # only what is wrong has right parts
 
 
 def test_right_parts_and_steps_on_wrong_ones_are_counted(tmp_path):
-    grade = graded("РТ-1/Иванов Иван/b.ipynb", b2=Told("no", share=0.5), b3=Told("no", ("follows",), follows=("b1",)))
+    grade = graded("РТ-1/Иванов Иван/b.ipynb", b2=Comment("no", share=0.5), b3=Comment("no", ("follows",), follows=("b1",)))
     write_report([grade], COURSE, tmp_path, "", Credit(1.0, 0.25))
     rows = {row["question"]: row for row in table(tmp_path / "questions.csv")}
     assert [rows[name][key] for name in ("b2", "b3") for key in ("in part", "follows")] == ["1", "0", "0", "1"]
@@ -170,8 +171,8 @@ def test_right_parts_and_steps_on_wrong_ones_are_counted(tmp_path):
 @pytest.fixture
 def written(tmp_path):
     wrong = {
-        "b2": Told("not right. The `sign`: <b>look</b>", ("innovation-sign",)),
-        "b3": Told("not right."),
+        "b2": Comment("not right. The `sign`: <b>look</b>", ("innovation-sign",)),
+        "b3": Comment("not right."),
     }
     grades = [
         graded("РТ-1/Иванов Иван/b.ipynb", passed=["b1", "b5"], **wrong),

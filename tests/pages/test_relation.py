@@ -118,6 +118,18 @@ def test_a_world_is_made_of_definitions():
     holds(r"R=\tfrac12(P^{-1}+Q)^{-1}", letters)  # it has come to rest
     holds(r"\sum_mc_{mk}=k^2+1", letters)
     holds("s=2", letters)
+    modes = world(r"""
+        j: range 3
+        z: list 3 any 2
+        q: share 3
+        "z^j" of j = z_j
+        "|z|" = \sqrt{z_0^Tz_0}
+        m = \sum_jq_jz_j
+        forget: q
+    """)(np.random.default_rng(1))
+    holds("z^j=z_j", modes)
+    holds("|z|^2=z_0^Tz_0", modes)
+    assert "q" not in modes and modes["m"].shape == (2, 1)
     run = world("k: range 4\na, b: num\nx_0 = b\nx_{k+1} = a x_k")(np.random.default_rng(1))
     letters = {"x": run["x"], "k": range(3), "a": run["a"]}
     holds("x_{k+1}=ax_k", letters)

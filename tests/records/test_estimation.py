@@ -47,14 +47,14 @@ def test_where_the_search_begins_does_not_matter_for_what_is_told():
     square = (y[:-1] ** 2).sum()
     found = estimate(model, y, ["a"])
     assert found.flat == ()
-    # the search ends where the slope is 1e-4 in units of the standard error
-    assert found.value[0] == pytest.approx((y[1:] * y[:-1]).sum() / square, abs=1e-4 / np.sqrt(square))
+    # the search ends where the slope is 1e-4, in units of .3 to 3 standard errors
+    assert found.value[0] == pytest.approx((y[1:] * y[:-1]).sum() / square, abs=4e-4 / np.sqrt(square))
     assert found.standard_error[0] == pytest.approx(1 / np.sqrt(square), rel=1e-5)
     biases = Model.define("x", ["x + b1 + w1", "x + b2 + w2"], {"b1": 0.001, "b2": 0.001}, prior={"mean": 0, "variance": 0})
     y = simulate(biases.replace(b1=1, b2=-2), 2, 20, seed=1).y
     found = estimate(biases, y, ["b1", "b2"])
     assert found.flat == ()
-    np.testing.assert_allclose(found.value, y.mean(axis=(0, 1)), atol=1e-4 / np.sqrt(40))
+    np.testing.assert_allclose(found.value, y.mean(axis=(0, 1)), rtol=0, atol=4e-4 / np.sqrt(40))
     np.testing.assert_allclose(found.standard_error, 1 / np.sqrt(40), rtol=1e-4)
 
 

@@ -165,7 +165,7 @@ def test_a_filter_on_what_was_read_is_the_one_with_the_inputs_typed(read):
         (GOOD.replace("0.5,", "2014-03-26T10:00:00Z,"), "line 3, column time: .*a date or a clock's time: write seconds"),
         (GOOD.replace("0.5,", "10:00:01,"), "line 3, column time: .*a clock's time"),
         (GOOD.replace("-3e0", "\u22123"), r"line 3, column y2: .*typographic minus \(U\+2212\)"),
-        (GOOD.replace("a\n", "a\ns,m,m,N\n"), "line 2: 's, m, m, N' and no number; if these are units, delete the line"),
+        (GOOD.replace("a\n", "a\ns,m,m,N\n"), "line 2: 'm, m, N, s' and no number; if these are units, delete the line"),
         (GOOD.replace(",", " "), "spaces do not separate cells"),
         ("# recorded by me\n" + GOOD, "line 1: '# recorded by me' is a comment.*delete what stands above"),
         ("# recorded, by, me, a\n" + GOOD, "line 1: '# recorded' is a comment"),

@@ -24,7 +24,7 @@ all models.  Everything compiled stands in this file, as the compiler keeps its 
 from __future__ import annotations
 
 from math import atan2, cos, exp, floor, log, sin, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, types
@@ -92,10 +92,10 @@ ROOT_BITS, SHIFT_BITS = np.array([np.sqrt(0.5), SHIFT]).view(np.int64).tolist()
 LOG_ROOT = 0.5 * np.log(2 * np.pi)
 TURN = 2 * np.pi
 
-EXACT = {"error_model": "numpy", "fastmath": {"contract"}}
-FAST = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract", "arcp"}}
+EXACT: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
+FAST: dict[str, Any] = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract", "arcp"}}
 # Functions with a `Room` are called from here alone: what would let Python call them takes long to compile.
-INNER = {**FAST, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+INNER: dict[str, Any] = {**FAST, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 @njit(**EXACT)
@@ -134,7 +134,7 @@ class Model(NamedTuple):
     The turn of what is no angle is infinite.
     """
 
-    law: object
+    law: Any
     mode: int
     constants: np.ndarray
     turn: float
@@ -184,7 +184,8 @@ def points(left, right, x):
 def residual(model, which, y, spread, point):
     """At a panel's points: z = (y - b) / sigma, q with ln p(y | x) = q - z^2 / 2, a turn in deviations.
 
-    z is 1e100 where no noise makes y.  A missing y (NaN) tells nothing: z = q = 0.
+    z is 1e100 where no noise makes y, and at a single state without noise, as it has no mass.  A missing
+    y (NaN) tells nothing: z = q = 0.
     """
     x, z, q, turn = point
     model.law(2 * model.mode + which, Q, y, model.constants, x, z, q)
@@ -192,8 +193,10 @@ def residual(model, which, y, spread, point):
     for i in range(Q):
         deviation = max(sqrt(q[i] * q[i] + spread * spread), 1e-150)
         z[i] = (y - z[i]) / deviation
-        z[i] = min(max(z[i], -1e100), 1e100) if z[i] == z[i] and deviation < np.inf else 1e100
-        q[i], turn[i] = -ln(min(deviation, 1e150)) - LOG_ROOT, whole / deviation
+        noisy = 1e-150 < deviation < np.inf
+        z[i] = min(max(z[i], -1e100), 1e100) if noisy and z[i] == z[i] else 1e100
+        q[i] = -ln(min(deviation, 1e150)) - LOG_ROOT if noisy else -345.0
+        turn[i] = whole / deviation
         if y != y:
             z[i], q[i], turn[i] = 0.0, 0.0, np.inf
 

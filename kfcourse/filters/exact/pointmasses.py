@@ -238,11 +238,11 @@ class _Exact:
                 chain, later is not None, self.accuracy, numbers[runs].reshape(-1, NUMBERS),
             )  # fmt: skip
 
-        starts = range(0, len(values), CHUNK)
-        if len(starts) == 1 or config.NUMBA_NUM_THREADS == 1:
+        starts, threads = range(0, len(values), CHUNK), config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+        if len(starts) == 1 or threads == 1:
             parts = [chunk(start) for start in starts]
         else:
-            with ThreadPoolExecutor(config.NUMBA_NUM_THREADS) as pool:
+            with ThreadPoolExecutor(threads) as pool:
                 parts = list(pool.map(chunk, starts))
         lengths = np.concatenate([[0], *(np.diff(begin) for _, begin in parts)])
         return np.concatenate([panels for panels, _ in parts]), np.cumsum(lengths), numbers

@@ -25,7 +25,7 @@ from kfcourse.checks.question import MISSING, NOT_CHECKED, UNUSABLE, WRONG
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.notebooks.grading.asking import salted
 from kfcourse.notebooks.grading.assembly import Step, assembled, generated, lost
-from kfcourse.notebooks.grading.results import FAILED, GRADED, NOT_GRADED, NOT_RUN, OTHER, PARTLY, Grade, Told
+from kfcourse.notebooks.grading.results import FAILED, GRADED, NOT_GRADED, NOT_RUN, OTHER, PARTLY, Comment, Grade
 from kfcourse.notebooks.grading.running import KILLED, WHOLE, Answer, Kernel, Killed, Opening, Site, Stopped
 from kfcourse.notebooks.grading.staging import opened_elsewhere, personal_numbers
 from kfcourse.notebooks.grading.submissions import (
@@ -106,8 +106,8 @@ def _grade(work: Returned, cells: Sequence[Cell], claim: Any, setting: Setting, 
     with start(setting.place, opening, work.seconds) as kernel:
         marking.run(kernel, steps)
     functions = {question.function for question in exercise.questions.values()}
-    told = {
-        name: Told(result.message, result.diagnosis, result.share, result.follows) for name, result in marking.results.items()
+    comments = {
+        name: Comment(result.message, result.diagnosis, result.share, result.follows) for name, result in marking.results.items()
     }
     status, digest = (PARTLY, "") if NOT_GRADED in marking.marks.values() else (GRADED, work.digest)
     return Grade(
@@ -119,7 +119,7 @@ def _grade(work: Returned, cells: Sequence[Cell], claim: Any, setting: Setting, 
         tuple(dict.fromkeys([*marking.notes, *marking.errors[:2], *marking.reasons()])),
         tuple(dict.fromkeys([*looks, *marking.looks(), *strange_lines(own, master)])),
         digest,
-        told,
+        comments,
         clean(str(claim.get("student", ""))) if isinstance(claim, dict) else "",
         code_of(own, functions),
     )
@@ -199,8 +199,8 @@ class Marking:
             self._not_graded(name, f"{TELL_US}: {result.trouble}")
             return
         if result.trouble:
-            said = f"the hint is lost, and the mark holds; {TELL_US}: {result.trouble}"
-            self._failed.setdefault(said, []).append(name)
+            trouble = f"the hint is lost, and the mark holds; {TELL_US}: {result.trouble}"
+            self._failed.setdefault(trouble, []).append(name)
         if result.status == MISSING and self._gone:
             gone = self._gone.get(name)
             others = ", ".join(other for other in self._gone if other != name)

@@ -16,7 +16,7 @@ from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG
 from kfcourse.files import save
 from kfcourse.notebooks.course_list import Student
 from kfcourse.notebooks.grading.owners import Person, known_sets, people, same_code
-from kfcourse.notebooks.grading.results import NOT_GRADED, NOT_RUN, SIGNS, Grade, Told
+from kfcourse.notebooks.grading.results import NOT_GRADED, NOT_RUN, SIGNS, Comment, Grade
 from kfcourse.notebooks.grading.weights import USUAL, WEIGHTS, Credit, points, possible, questions, tidy, worth
 from kfcourse.notebooks.texts import write_csv
 
@@ -102,11 +102,14 @@ def question_rows(persons: Sequence[Person], letters: Sequence[str]) -> list[dic
         marks = (grade.marks.get(name, MISSING) for grade in _grades_of(persons, name))
         counts = Counter(MISSING if mark == NOT_RUN else mark for mark in marks)
         counts[MISSING] += len(persons) - counts.total()
-        told = [grade.told[name] for grade in _grades_of(persons, name) if name in grade.told]
-        mistakes = Counter(_in_words(question, mistake) for one in told for mistake in one.mistakes).most_common()
+        comments = [grade.comments[name] for grade in _grades_of(persons, name) if name in grade.comments]
+        mistakes = Counter(_in_words(question, mistake) for comment in comments for mistake in comment.mistakes).most_common()
         row: dict[str, Any] = {"question": name, "title": question.title, "level": question.level}
         row |= {label: counts[mark] for mark, label in KINDS.items()}
-        row |= {"in part": sum(0 < one.share < 1 for one in told), "follows": sum(bool(one.follows) for one in told)}
+        row |= {
+            "in part": sum(0 < comment.share < 1 for comment in comments),
+            "follows": sum(bool(comment.follows) for comment in comments),
+        }
         rows.append(row | {"mistakes": "; ".join(f"{count}: {mistake}" for mistake, count in mistakes)})
     return rows
 
@@ -115,10 +118,10 @@ def _grades_of(persons: Iterable[Person], question: str) -> Iterator[Grade]:
     return (grade for person in persons for grade in person.grades.values() if question in grade.marks)
 
 
-def _in_words(question: Question, mistake: str) -> str:
+def _in_words(question: Question, name: str) -> str:
     """What is said of a known mistake; of others the name tells it."""
-    known = {one.name: one.says.partition(". ")[0].rstrip(".") for one in question.mistakes}
-    return known.get(mistake, mistake.replace("-", " "))
+    known = {mistake.name: mistake.says.partition(". ")[0].rstrip(".") for mistake in question.mistakes}
+    return known.get(name, name.replace("-", " "))
 
 
 def feedback(person: Person, letters: Sequence[str], credit: Credit = USUAL) -> str:
@@ -129,8 +132,8 @@ def feedback(person: Person, letters: Sequence[str], credit: Credit = USUAL) -> 
         rows = []
         for question in sets()[letter].questions:
             mark = grade.marks.get(question.name, NOT_RUN) if grade else NOT_RUN
-            told = grade.told.get(question.name) if grade else None
-            says = (told or Told("not run: is there an error in a cell before it?")).says if grade else ""
+            comment = grade.comments.get(question.name) if grade else None
+            says = (comment or Comment("not run: is there an error in a cell before it?")).says if grade else ""
             rows.append((question, mark, tidy(worth(grade, question, credit)), WEIGHTS[question.level], says))
         parts.append((sets()[letter], grade, rows, points([grade] if grade else [], credit), possible([letter])))
     came = list(person.grades.values())

@@ -19,7 +19,7 @@ SIGNS = {PASSED: "✓", WRONG: "✗", UNUSABLE: "✗", MISSING: "–", NOT_RUN: 
 
 
 @dataclass(frozen=True)
-class Told:
+class Comment:
     """What was said of an answer.
 
     Attributes
@@ -59,7 +59,7 @@ class Grade:
         What a lecturer should look at.
     digest : str
         Empty if it was not graded, or in part: it is tried again.
-    told : dict
+    comments : dict
         Question to what was said of the answer.
     student : str
         Whom the notebook was handed out to, as it says itself.
@@ -75,7 +75,7 @@ class Grade:
     notes: tuple[str, ...] = ()
     looks: tuple[str, ...] = ()
     digest: str = ""
-    told: Mapping[str, Told] = field(default_factory=dict)
+    comments: Mapping[str, Comment] = field(default_factory=dict)
     student: str = ""
     work: str = ""
 
@@ -101,7 +101,7 @@ def read_lines(path: Path) -> dict[str, Grade]:
         for text in path.read_text(encoding="utf-8").splitlines():
             with suppress(ValueError, TypeError, LookupError, AttributeError):
                 fields = json.loads(text)
-                fields["told"] = {name: Told(**_tuples(told)) for name, told in fields["told"].items()}
+                fields["comments"] = {name: Comment(**_tuples(parts)) for name, parts in fields["comments"].items()}
                 if fields["digest"]:
                     grades[fields["digest"]] = Grade(**_tuples(fields))
     return grades

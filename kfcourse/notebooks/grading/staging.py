@@ -96,11 +96,11 @@ def answers() -> list[Path]:
 
 def personal_numbers(own: Exercise, others: Iterable[Exercise] = ()) -> dict[str, dict[str, float]]:
     """Personal numbers of an exercise, and of the others that a notebook opens so far as they have any, by "letter variant"."""
-    found = {_key(own): own.numbers}
-    for one in others:
+    numbers = {_key(own): own.numbers}
+    for other in others:
         with suppress(Exception):  # of tables of the student's
-            found[_key(one)] = one.numbers
-    return found
+            numbers[_key(other)] = other.numbers
+    return numbers
 
 
 def _key(one: Exercise) -> str:
@@ -109,10 +109,10 @@ def _key(one: Exercise) -> str:
 
 def opened_elsewhere(calls: Iterable[tuple[object, object]]) -> list[Exercise]:
     """The exercises that a notebook opens besides its own, so far as there are such."""
-    found = []
+    exercises = []
     for letter, variant in calls:
         try:
-            found.append(exercise(letter, ast.literal_eval(repr(variant))))  # type: ignore[arg-type]
+            exercises.append(exercise(letter, ast.literal_eval(repr(variant))))  # type: ignore[arg-type]
         except (ExerciseError, ValueError, TypeError, KeyError):
             continue
-    return found
+    return exercises

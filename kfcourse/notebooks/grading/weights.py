@@ -29,10 +29,10 @@ class Credit:
 
     def share(self, grade: Grade, question: str) -> float:
         """Of the question's points."""
-        mark, told = grade.marks.get(question), grade.told.get(question)
-        if mark != WRONG or told is None:
+        mark, comment = grade.marks.get(question), grade.comments.get(question)
+        if mark != WRONG or comment is None:
             return float(mark == PASSED)
-        return max(self.parts * told.share, self.follow_on * bool(told.follows))
+        return max(self.parts * comment.share, self.follow_on * bool(comment.follows))
 
 
 USUAL = Credit()
