@@ -97,16 +97,6 @@ def transpose(matrix: Matrices) -> Matrices:
     return matrix if matrix.shape[-2:] == (1, 1) else np.ascontiguousarray(matrix.swapaxes(-1, -2))
 
 
-def runs_last(matrices: Matrices) -> Array:
-    """A copy (r, c, ...) of (..., r, c): of many small matrices each entry is then a row of numbers, which makes sums fast."""
-    return np.moveaxis(matrices, (-2, -1), (0, 1)).copy()
-
-
-def runs_first(matrices: Array) -> Matrices:
-    """(r, c, ...) -> (..., r, c): a view."""
-    return np.moveaxis(matrices, (0, 1), (-2, -1))
-
-
 def symmetric(matrix: Matrices) -> Matrices:
     """(P + P^T) / 2: rounding must not make a covariance asymmetric."""
     return matrix if matrix.shape[-1] == 1 else 0.5 * (matrix + transpose(matrix))
@@ -162,33 +152,6 @@ def gain(cross: Matrices, cov: Matrices, broken: bool = False) -> Matrices:
 
 # A Cholesky pivot of a correlation matrix below this is rounding, in units of the root of the precision (1.5e-8 in float64).
 SINGULAR = 7.0
-MANY = 512  # matrices, from which on a call for each of their components costs less than LAPACK's for each matrix
-
-
-def solve_by_entries(right: Array, cov: Array) -> bool:
-    """The solution X of cov X = right takes the place of `right`, (n, m, ...), and cov, (n, n, ...), is used up.
-
-    Entry by entry of all matrices at once, and in place, as room costs more than sums.  False if somewhere a pivot is only
-    rounding: what of a component the others do not tell, as a part of its variance.
-    """
-    n, least = len(cov), rounding(cov.dtype) ** 2
-    for j in range(n):
-        needed = least * cov[j, j]
-        if j:
-            cov[j:, j] -= np.einsum("ik...,k...->i...", cov[j:, :j], cov[j, :j])
-        if not np.minimum.reduce(cov[j, j] - needed, axis=None) > 0:
-            return False
-        cov[j, j] = 1 / np.sqrt(cov[j, j])  # a product costs a fifth of a quotient
-        cov[j + 1 :, j] *= cov[j, j]
-    for j in range(n):  # L (L^T X) = right
-        if j:
-            right[j] -= np.einsum("k...,km...->m...", cov[j, :j], right[:j])
-        right[j] *= cov[j, j]
-    for j in reversed(range(n)):
-        if j < n - 1:
-            right[j] -= np.einsum("k...,km...->m...", cov[j + 1 :, j], right[j + 1 :])
-        right[j] *= cov[j, j]
-    return True
 
 
 @cache

@@ -10,12 +10,12 @@ exact                   the AOF itself, of scalar models with modes or without, 
 looking_back            what the whole record tells of each state (exact, particles have ways of their own)
 particles               the same by sampling, with modes or without;  densities: what all need
 iterated_ekf            the meter linearised again at the estimate
-gate, robust            measurements that are not believed: refused, by any filter; weighted; a noise of unknown size, learnt
+gate, robustness        measurements that are not believed: refused, by any filter; weighted; a noise of unknown size, learnt
 alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
                         (jump_equations: as printed;  jump_optimal: FOS, FKP, FBP with modes)
 notation                symbols in which the equations are printed
-programs                the printed equations as rules and regressions
+programs                the printed equations as rules: letter and value
 """
 
 from kfcourse.filters.alphabeta import alpha_beta, alpha_beta_gamma
@@ -35,7 +35,7 @@ from kfcourse.filters.notation import latex
 from kfcourse.filters.optimal_structure import EQUATIONS as _OPTIMAL
 from kfcourse.filters.optimal_structure import dfkp, dfmp, fbp, fkp, fos, mdfkp, mdfmp, mfkp, mfos
 from kfcourse.filters.particles import particle
-from kfcourse.filters.robust import adaptive, robust
+from kfcourse.filters.robustness import adaptive, robust
 
 # The printed equations of each family, as SymPy matrix equations.
 EQUATIONS = {"aof": _AOF, "duof": _DUOF, **_OPTIMAL}

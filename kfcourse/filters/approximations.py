@@ -46,4 +46,4 @@ def aof(structure: Structure) -> Filter:
         return State(state.step + 1, posterior, now.predict(*posterior), expected=expected)
 
     model = structure.model
-    return Filter(f"aof-{structure.name}", model, initial_state(model), step, structure=structure, printed=(step, EQUATIONS))
+    return Filter(f"aof-{structure.name}", model, initial_state(model), step, structure=structure)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-import sympy as sp
 
 from kfcourse.angles import Components, on_circle
 from kfcourse.laws import Array, Gaussian, Measurement, Vectors
@@ -90,10 +89,6 @@ class Filter:
         Where it is another than the normal law's by `structure`: how likely a measurement was before it came.
     look_back : LookBack, optional
         Where it is another than the normal law's by `structure`: what the whole record tells of each state.
-    printed : (Advance, tuple of Eq), optional
-        A step and the equations that it computes, no more: of them `fuse` makes a compiled one, as long as it is this filter's.
-    quick : (Advance, callable), optional
-        A step, and what makes the same one compiled, for `fuse`, as long as it is this filter's.
     """
 
     name: str
@@ -104,8 +99,6 @@ class Filter:
     structure: Structure | None = None
     evidence: Evidence | None = None
     look_back: LookBack | None = None
-    printed: tuple[Advance, tuple[sp.Eq, ...]] | None = None
-    quick: tuple[Advance, Callable[[], Advance]] | None = None
 
     def __post_init__(self) -> None:
         if self.model.angles.x:

@@ -53,4 +53,4 @@ def duof(model: Model, equations: tuple[Noiseless, Noiseless] | None = None) -> 
         predicted = yield from fitted_prediction(alpha, angles)
         return State(k + 1, posterior, predicted)
 
-    return Design("duof", model, step, printed=None if equations else (step, EQUATIONS))
+    return Design("duof", model, step)

@@ -1,7 +1,7 @@
 """Filters of given structure whose coefficients are regressions over an ensemble (DUOF, FOS and their kin).
 
 The equations of such a filter are written once, as a generator that yields each `Regression` it needs and receives the
-fitted `Affine`.  While it is designed the ensemble answers, through the `Scatter` of its blocks
+fitted `Affine`.  While it is designed the ensemble answers, through the `Scatter` of its trajectories
 (`kfcourse.montecarlo.designing`); while it runs, the stored coefficients do.  Both steps of a filter may end in one:
 `fitted_correction`, `fitted_prediction`.
 """
@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import sympy as sp
 
 from kfcourse.angles import Angles, difference, near
 from kfcourse.filters.base import Advance, Filter, Init, State, initial_state
@@ -37,9 +36,9 @@ class Affine(NamedTuple):
 
 
 class Scatter(NamedTuple):
-    """Means and scatter of (target, regressor) over part of an ensemble; `together` merges parts.
+    """Means and scatter of (target, regressor) over an ensemble.
 
-    Scatter is the sum of products of deviations from the part's own mean: large means do not cancel.
+    Scatter is the sum of products of deviations from the mean: large means do not cancel.
     """
 
     size: int
@@ -54,16 +53,6 @@ class Scatter(NamedTuple):
         mean = both.sum(axis=1) / max(size, 1)
         off = both - mean[:, None]
         return cls(size, target.shape[1], mean, np.einsum("in,jn->ij", off, off))  # no thread of a library is started
-
-    @classmethod
-    def together(cls, parts: Sequence[Scatter]) -> Scatter:
-        """Those of all parts taken together (Chan's formula)."""
-        counts = np.array([part.size for part in parts], dtype=float)
-        means = np.array([part.mean for part in parts])
-        mean = counts @ means / counts.sum()
-        shift = means - mean
-        scatter = np.sum([part.scatter for part in parts], axis=0) + (shift * counts[:, None]).T @ shift
-        return cls(int(counts.sum()), parts[0].targets, mean, scatter)
 
     def regression(self, targets: int | None = None) -> Affine:
         """Least squares of the targets on the rest; notebooks handed out with earlier versions also say how many there are.
@@ -143,8 +132,6 @@ class Design:
         For a filter that carries more than a prediction: the state before the first measurement.
     structure : Structure, optional
         The structural functions that the equations use.
-    printed : (equations, tuple of Eq), optional
-        Equations, and how they are printed if that is all: of them `fuse` makes compiled ones, while they are this design's.
     """
 
     name: str
@@ -153,7 +140,6 @@ class Design:
     slow: bool = False
     start: Init | None = None
     structure: Structure | None = None
-    printed: tuple[Callable[[State, Vectors], Equations], tuple[sp.Eq, ...]] | None = None
 
     @property
     def init(self) -> Init:

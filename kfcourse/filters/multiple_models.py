@@ -319,12 +319,6 @@ def by_state(model: JumpModel) -> Links:
     return links
 
 
-def points_of(model: JumpModel) -> int:
-    """How many points a mean over the state takes; 0 if transitions do not depend on it."""
-    size = sum(model.chain.has(component) for component in model.x)
-    return ORDER[size] ** size if size in ORDER else 0
-
-
 def modes_given(expected: Array, measurements: Sequence[Measurement], y: Array) -> tuple[Array, Array]:
     """c_j L_j / sum over the modes, (runs, M), and ln of the sum; in logarithms, as likelihoods far from the truth are 0.
 

@@ -126,8 +126,7 @@ def of_structure(name: str, structure: Structure, recipe: Recipe, memory: Memory
             predicted = fitted if recipe.spread else Gaussian(fitted.mean, predicted.cov)
         return State(state.step + 1, posterior, predicted, remembered)
 
-    equal = (equations, printed(recipe)) if memory == Memory() else None
-    return Design(f"{name}-{structure.name}", structure.model, equations, structure=structure, printed=equal)
+    return Design(f"{name}-{structure.name}", structure.model, equations, structure=structure)
 
 
 def expected_where_missing(y: Array, measurement: Measurement, turning: Components) -> Array:

@@ -84,13 +84,9 @@ class Clouds:
     mode: Array | None
     probability: Array
 
-    def apart(self) -> Array:
+    def discretisation_error(self) -> Array:
         """Standard error of the estimates, (runs,): half the distance of both clouds."""
         return np.asarray(0.5 * np.linalg.norm(self.halves[0] - self.halves[1], axis=-1))
-
-    def discretisation_error(self) -> Array:
-        """What is stated of the error, (runs,): the standard error."""
-        return self.apart()
 
     def evidence_error(self) -> Array:
         """Standard error of the last ln p(y_k | y_0, ..., y_{k-1}), (runs,): half the distance of both clouds."""

@@ -1,16 +1,13 @@
-"""The printed equations of a filter as what is computed: formulas for each trajectory and, between them, regressions.
+"""The printed equations of a filter as what is computed for each trajectory of a scalar model: rules, letter and value.
 
-`kfcourse.filters.EQUATIONS` are statements of two kinds.  Some hold for each trajectory, such as z = lambda + K (y - h): of a
-scalar model they are rules (`in_numbers`), letter and value, with the formulas of the structural functions put in.  Others find
-coefficients from means and covariances over the ensemble, such as H = Cov(eps, omega) Cov(omega)^+ (`stages`).
+In `kfcourse.filters.EQUATIONS`, such as z = lambda + K (y - h), numbers take the place of matrices, and the formulas of the
+model that of the structural functions.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from itertools import product
-from typing import NamedTuple
 
 import sympy as sp
 
@@ -60,15 +57,12 @@ def function_values(structure: Structure) -> dict[sp.Symbol, sp.Expr]:
     formulas = structure.formulas
     if formulas is None or structure.model.n != 1 or structure.model.p != 1:
         raise ValueError(f"only scalar models with derived structural functions are written out, not {structure.model}")
-    return {scalar(value): value_of(structure, *where) for value, where in _VALUES.items()}
-
-
-def value_of(structure: Structure, function: str, mean: sp.MatrixSymbol, cov: sp.MatrixSymbol) -> sp.Expr:
-    """A structural function of a scalar model, as a formula in the letters of the equations."""
-    formulas = structure.formulas
-    assert formulas is not None
-    arguments = formulas.meter_arguments if function in "hGFR" else formulas.state_arguments
-    return structure[function].subs(dict(zip(arguments, (scalar(mean), scalar(cov)), strict=True)), simultaneous=True)
+    values = {}
+    for value, (function, mean, cov) in _VALUES.items():
+        arguments = formulas.meter_arguments if function in "hGF" else formulas.state_arguments
+        taken = dict(zip(arguments, (scalar(mean), scalar(cov)), strict=True))
+        values[scalar(value)] = structure[function].subs(taken, simultaneous=True)
+    return values
 
 
 def in_numbers(
@@ -86,36 +80,6 @@ def in_numbers(
         taken = {state[0]: scalar(at)} | dict(zip(noises, exact_matrix(law.mean), strict=True))
         values[scalar(value)] = equation[0].subs(taken, simultaneous=True)
     return [(scalar(one.lhs), scalar(one.rhs, inverse).xreplace(values)) for one in equations]
-
-
-class Fit(NamedTuple):
-    """Letters of a regression: what is predicted, from what, and what is found: matrix, offset, and residual if it is used."""
-
-    target: sp.Symbol
-    regressor: sp.Symbol
-    found: list[sp.Symbol]
-
-
-def stages(equations: Sequence[sp.Eq], given: Sequence[Rule]) -> tuple[list[list[Rule]], list[Fit]]:
-    """The rules in groups, and the regressions between them, in the order of the equations.
-
-    A residual is a coefficient of the regression before it, though other equations may stand between.
-    """
-    letters = {*(one.lhs for one in equations), s.x, s.x_next}
-    pairs = {scalar(s.cov(left, right)): (scalar(left), scalar(right)) for left, right in product(letters, letters)}
-    inverses = {scalar(s.cov_pinv(one)) for one in letters}
-    ensemble = {*pairs, *inverses, *(scalar(s.mean(one)) for one in letters), *(scalar(s.cov(one)) for one in letters)}
-    groups, fits = [list[Rule]()], list[Fit]()
-    for left, right in given:
-        used = right.free_symbols & ensemble
-        if not used:
-            groups[-1].append((left, right))
-        elif used & inverses:
-            fits.append(Fit(*next(pairs[one] for one in used if one in pairs), [left]))
-            groups.append([])
-        else:
-            fits[-1].found.append(left)
-    return groups, fits
 
 
 def needed(rules: Sequence[Rule], wanted: Iterable[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:

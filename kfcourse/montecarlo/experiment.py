@@ -361,7 +361,7 @@ def _twice(state: State) -> tuple[Array, Array, Array]:
     """
     halves = getattr(state.memory, "halves", None)
     if halves is not None:
-        return *halves, state.memory.apart()
+        return *halves, state.memory.discretisation_error()
     stated = getattr(state.memory, "discretisation_error", None)
     mean = state.posterior.mean
     return mean, mean, np.zeros(len(mean)) if stated is None else stated()
