@@ -130,6 +130,7 @@ def _decoded(data: Any, proxies: Proxies | None) -> Any:
             array = np.load(io.BytesIO(base64.b64decode(text, validate=True)), allow_pickle=False)
             if array.dtype.kind not in "biufc":
                 raise ProtocolError(f"an array of {array.dtype}")
+            array = array.astype(array.dtype.newbyteorder("="))  # as calculations give it
             return array[()] if kind == "scalar" else np.asmatrix(array) if kind == "matrix" else array
         case ["objects", list(shape), list(parts)]:
             array = np.empty(len(parts), dtype=object)
