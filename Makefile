@@ -16,11 +16,12 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help literature book test quick lint unit notebooks lock lock-check clean distclean install figure benchmark fuzz
+.PHONY: help literature book test nightly quick lint unit notebooks lock lock-check clean distclean install figure benchmark fuzz
 
 help:
 	@echo "make book        execute the chapters and build the book in _build/html"
 	@echo "make test        lint, types, unit tests, documentation examples, the book, nbval on its notebooks"
+	@echo "make nightly     the same, and the tests marked slow: coverage of intervals, hostile processes, all pages"
 	@echo "make quick       lint, types and the tests marked quick, before a commit"
 	@echo "make lint        ruff check, ruff format --check, mypy, the columns of the pages"
 	@echo "make unit        unit tests and documentation examples only"
@@ -37,7 +38,12 @@ help:
 book: install
 	$(BIN)/python book/build.py
 
+# What a change needs; the tests marked slow run every night.
+CHOSEN := -m "not slow"
 test: lint unit book notebooks
+
+nightly:
+	$(MAKE) CHOSEN= test
 
 quick: lint
 	$(BIN)/pytest -q -n auto --dist loadscope -m quick --ignore tests/test_book.py
@@ -49,7 +55,7 @@ lint: install
 	$(BIN)/python .ci/columns.py
 
 unit: install
-	$(BIN)/pytest -q -n auto --dist loadscope --ignore tests/test_book.py
+	$(BIN)/pytest -q -n auto --dist loadscope $(CHOSEN) --ignore tests/test_book.py
 
 # Other cases each time; what fails is shown with the case, as small as can be.
 CASES := 20000
@@ -63,7 +69,7 @@ CHECKED := --variant 53 --variant 5 --variant 20
 notebooks: install
 	$(BIN)/kfcourse solutions $(CHECKED) --out _build/solutions
 	JUPYTER_DEFAULT_PROVISIONER_NAME=kfcourse-forked PYTHONSTARTUP=$(CURDIR)/.ci/no_pictures.py KFCOURSE_BOOK=required \
-	  $(BIN)/pytest -q -n 2 --dist loadscope --nbval --nbval-current-env tests/test_book.py _build/jupyter_execute _build/solutions
+	  $(BIN)/pytest -q -n 2 --dist loadscope --nbval --nbval-current-env $(CHOSEN) tests/test_book.py _build/jupyter_execute _build/solutions
 
 literature: install
 	$(BIN)/python book/chapters.py literature
@@ -74,7 +80,6 @@ figure: install
 benchmark: install
 	$(BIN)/python benchmarks/engine.py
 	$(BIN)/python benchmarks/exact.py
-	$(BIN)/python benchmarks/cores.py
 	$(BIN)/python benchmarks/looking_back.py
 	$(BIN)/python benchmarks/jumps.py
 

@@ -7,7 +7,4 @@ from sybil.parsers.markdown import PythonCodeBlockParser
 
 gc.set_threshold(50_000, 20, 50)  # SymPy makes much and leaves little: looking for garbage so often takes a twentieth of the time
 
-# Loops that numba compiles when they are imported: by the process whose tests want them, not by each to look for examples.
-collect_ignore = ["kfcourse/filters/loops.py", "kfcourse/filters/exact/loops.py"]
-
 pytest_collect_file = Sybil(parsers=[PythonCodeBlockParser()], patterns=["README.md"]).pytest()

@@ -3,11 +3,11 @@
     .venv/bin/python benchmarks/engine.py [--runs 100000 1000000] [--repeats 3]
 
 Prints
-- what compiling costs (numba), of the first model and of further ones, for which most is there already;
 - the linearised AOF, random numbers included, against filterpy's extended Kalman filter in a loop;
 - all seven filters of the lab, designed on one ensemble and compared on another, against the time one NumPy
-  Generator needs to draw as many normal numbers (four for each trajectory and step), plain and compiled (numba), also in
-  processor time, which other work on the machine disturbs less;
+  Generator needs to draw as many normal numbers (four for each trajectory and step), also in processor time, which other
+  work on the machine disturbs less;
+- the same beside the exact one, on one core and on several;
 - how the cost grows with runs and steps, and what share drawing and each filter take.
 
 Absolute figures move with the machine; the ratios are what to keep.  Nothing else should run meanwhile.
@@ -16,17 +16,14 @@ Absolute figures move with the machine; the ratios are what to keep.  Nothing el
 from __future__ import annotations
 
 import argparse
-import os
 import time
 from collections.abc import Callable
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 
-from kfcourse import compare, lab_filters, run, simulate
-from kfcourse.filters.fused import fuse
-from kfcourse.lab.short_names import LAB, exact, title
+from kfcourse import compare, lab_filters, simulate
+from kfcourse.lab.short_names import LAB, title
 from kfcourse.lab.variants import find_variant
 from kfcourse.montecarlo.ensemble import Ensemble
 
@@ -61,19 +58,6 @@ def filterpy_loop(runs: int) -> Callable[[], object]:
     return work
 
 
-def compiling(variants: list[str]) -> None:
-    """Compile, with nothing kept from before, the seven filters and the exact one of each variant; what follows uses them."""
-    with TemporaryDirectory() as empty:
-        os.environ |= {"XDG_CACHE_HOME": empty, "NUMBA_CACHE_DIR": empty}
-        for name in variants:
-            model = find_variant(name).model
-            y = simulate(model, 8, 2, seed=1).y
-            filters, start = [*lab_filters(model), exact(model)], time.process_time()
-            *_, fast = map(fuse, filters)
-            run(fast, y)
-            print(f"compiling variant {name}'s seven filters and exact one: {time.process_time() - start:.1f} s of a processor")
-
-
 def draw(numbers: int) -> Callable[[], object]:
     """What one Generator needs for as many normal numbers, in blocks that stay in the cache."""
     block = np.empty(16_384)
@@ -95,11 +79,10 @@ def main() -> None:
     model = find_variant("53").model
     filters = lab_filters(model)
 
-    def lab(names=LAB, runs=options.runs[0], steps=STEPS, compiled=False) -> Callable[[], object]:
+    def lab(names=LAB, runs=options.runs[0], steps=STEPS, jobs=options.threads) -> Callable[[], object]:
         chosen = [one for one in filters if one.name in names]
-        return lambda: compare(chosen, model, runs, steps, seed=1, threads=options.threads, progress=False, compiled=compiled)
+        return lambda: compare(chosen, model, runs, steps, seed=1, design_runs=runs, jobs=jobs, progress=False)
 
-    compiling(["53", "1", "5"])
     loop = best(filterpy_loop(200), options.repeats) / (200 * STEPS)
     print(f"filterpy EKF loop: {1e6 * loop:.1f} us a trajectory-step")
     for runs in options.runs:
@@ -111,14 +94,15 @@ def main() -> None:
         print(f"  linearised AOF, drawing included: {1e9 * one:.1f} ns a trajectory-step")
         print(f"  filterpy's loop takes {loop / one:.0f} times as long")
         print(f"  drawing 4 normals a trajectory-step with one Generator: {1e9 * drawing / count:.1f} ns")
-        for compiled in (False, True):
-            what = "compiled" if compiled else "plain"
-            seven = best(lab(runs=runs, compiled=compiled), options.repeats)
-            of_seven = best(lab(runs=runs, compiled=compiled), options.repeats, time.process_time)
-            print(f"  seven filters, designed and run, {what}: {1e9 * seven / count:.1f} ns = {seven / drawing:.2f} times that,")
-            print(f"    {of_seven / of_drawing:.2f} times in processor time, of {options.threads} threads")
-        alone = best(lab(["aof-linearised"], runs, compiled=True), options.repeats) / count
-        print(f"  linearised AOF, compiled: {1e9 * alone:.1f} ns, {one / alone:.2f} times the plain rate")
+        seven = best(lab(runs=runs), options.repeats)
+        of_seven = best(lab(runs=runs), options.repeats, time.process_time)
+        print(f"  seven filters, designed and run: {1e9 * seven / count:.1f} ns = {seven / drawing:.2f} times that,")
+        print(f"    {of_seven / of_drawing:.2f} times in processor time, of {options.threads} threads")
+
+    print("\nWith the exact filter, 2000 trajectories x 51 steps")
+    filters = lab_filters(model, [*LAB, "aof-exact"])
+    for jobs in (1, 2):
+        print(f"  {jobs} cores: {best(lab([*LAB, 'aof-exact'], 2000, jobs=jobs), options.repeats):.2f} s")
 
     print("\nGrowth of the cost of all seven filters")
     for runs, steps in ((50_000, STEPS), (100_000, STEPS), (200_000, STEPS), (400_000, STEPS), (100_000, 102), (100_000, 204)):
@@ -132,16 +116,16 @@ def main() -> None:
     print(f"\nShares at {runs} x {STEPS}, one thread, ns a trajectory-step")
 
     def trajectories() -> None:
-        ensemble = Ensemble(model, runs, STEPS, np.random.SeedSequence(1))
-        for index in range(len(ensemble.sizes)):
-            for _ in ensemble.block(index):
-                pass
+        for _ in Ensemble(model, runs, STEPS, np.random.SeedSequence(1)):
+            pass
 
     print(f"  drawing and simulating one ensemble {1e9 * best(trajectories, options.repeats) / count:8.1f}")
 
     def alone(names) -> float:
         chosen = [one for one in filters if one.name in names]
-        return best(lambda: compare(chosen, model, runs, STEPS, seed=1, threads=1, progress=False), options.repeats)
+        return best(
+            lambda: compare(chosen, model, runs, STEPS, seed=1, design_runs=runs, jobs=1, progress=False), options.repeats
+        )
 
     base = alone(["aof-linearised"])
     print(f"  with the {title('aof-linearised'):<26} {1e9 * base / count:8.1f}")

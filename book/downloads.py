@@ -52,5 +52,6 @@ def _quoted(match: re.Match) -> str:
     body = text(OPTION.sub("", match["body"])).strip()
     if kind in ("code-block", "code", "math"):
         return f"$$\n{body}\n$$" if kind == "math" else f"```{title}\n{body}\n```"
+    title = "A figure of the book" if kind == "figure" else title
     rows = ([f"**{title}**", ""] if title else []) + body.splitlines()
     return "\n".join(f"> {row}".rstrip() for row in rows)

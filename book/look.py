@@ -20,7 +20,7 @@ from sphinx.writers.html5 import HTML5Translator
 
 HERE = Path(__file__).resolve().parent
 NUMBER = re.compile(r"(?:(?<=>)|^)\s*\d+(\.\d+)*\.\s")  # of a section
-SIZE = re.compile(r"width: (\d+)px; height: (\d+)px;")
+SIZE = re.compile(r"width: (\d+)px;(?: height: (\d+)px;)?")
 LIVE = re.compile(r'<div class="kf-(?:live|explore)" data-name="([^"]+)"')  # a figure that answers, and whose place it takes
 
 
@@ -62,7 +62,8 @@ class Translator(HTML5Translator):
     def starttag(self, node, tagname, suffix="\n", empty=False, **attributes) -> str:
         if tagname == "img":  # the room that it will take, and none is loaded before the reader comes near
             if size := SIZE.fullmatch(attributes.get("style", "")):
-                attributes |= {"width": size[1], "height": size[2], "style": f"--kf-width: {size[1]}px"}
+                attributes |= {"width": size[1], "style": f"--kf-width: {size[1]}px"}
+                attributes |= {"height": size[2]} if size[2] else {}
             if node is not self.document.next_node(nodes.image):
                 attributes["loading"] = "lazy"
         return super().starttag(node, tagname, suffix, empty, **attributes)

@@ -47,7 +47,7 @@ plt.rcParams.update(
 matplotlib.set_loglevel("error")  # the page has the font, this machine need not
 model = find_variant("53").model
 filters = lab_filters(model, [*SHOWN, "aof-exact"])
-result = compare(filters, model, runs=100_000, steps=STEPS.stop, seed=1, slow_runs=10_000, designs=4)
+result = compare(filters, model, runs=100_000, steps=STEPS.stop, seed=1)
 figure, ax = plt.subplots(figsize=(7.2, 3.1))
 steps = np.arange(STEPS.stop)
 for name, label in SHOWN.items():
@@ -68,5 +68,5 @@ PICTURE.write_text(text + "\n", encoding="utf-8")
 
 e = float(model.parameters["e"])
 grid = {"e": (e,), "f": tuple(round(e * ratio, 6) for ratio in RATIOS)}
-found = parameter_map(model, grid, steps=STEPS.stop, runs=100_000, slow_runs=4000)
+found = parameter_map(model, grid, steps=STEPS.stop, runs=20_000)
 MAP.write_text(json.dumps(leading(found), separators=(",", ":")) + "\n", encoding="utf-8")

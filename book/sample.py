@@ -22,7 +22,7 @@ def write() -> None:
     command = [sys.executable, "-m", "kfcourse", *ARGUMENTS, "--out", str(REPORT)]
     done = subprocess.run(command, check=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     for path in REPORT.iterdir():
-        if path.suffix == ".pdf" or not path.name.startswith("handin"):
+        if path.suffix == ".pdf":
             path.unlink()
     lines = [line for line in done.stdout.splitlines() if str(REPORT) not in line]
     said.write_text("\n".join([f"$ kfcourse {' '.join(ARGUMENTS)}", *lines, ""]), encoding="utf-8")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,26 +17,27 @@ from kfcourse.derivations.setting import of_model
 from kfcourse.files import replacing_together
 from kfcourse.lab.admission import admissions, on_trial
 from kfcourse.lab.admission import table as table_of_filters
-from kfcourse.lab.budget import SIZES, Budget, usual_runs
-from kfcourse.lab.handin import LANGUAGES, write_handin
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
-from kfcourse.lab.report import conclusions, recognised_modes, remarks_in_words, write_json, write_report
-from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, OF_BEST, has_bound, title
+from kfcourse.lab.report import (
+    LANGUAGES,
+    STANDARD_OUTPUT,
+    conclusions,
+    recognised_modes,
+    remarks_in_words,
+    write_json,
+    write_report,
+)
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, JUMP_LAB, LAB, OF_BEST, has_exact, title
 from kfcourse.lab.variants import STEPS, find_variant
 from kfcourse.listing import VARIANTS
 from kfcourse.montecarlo.comparison import EXACT, Comparison
 from kfcourse.montecarlo.experiment import without_failing
-from kfcourse.montecarlo.slow_filters import FEWEST as FEWEST_SLOW
-from kfcourse.montecarlo.slow_filters import LEAST
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.writing import by_thousands
 
 DERIVATION = 180.0  # seconds for the formulas of the filters: a busy machine must not leave out what a quiet one has
-STANDARD_OUTPUT = ("-", "/dev/stdout")
 LONGEST = 1_000_000  # bytes of a derivation; /dev/zero never ends
-ENOUGH = 3600  # seconds for slow filters, where their number is given
-DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with more, the lab takes longer
+RUNS = 20_000  # trajectories
 
 
 @click.command()
@@ -46,7 +46,9 @@ DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with m
 @click.option(
     "--runs",
     type=click.IntRange(min=2),
-    help=f"Trajectories.  [default: {SIZES[0]}, or {' or '.join(map(str, SIZES[1:]))} where the filters have more to compute]",
+    default=RUNS,
+    show_default=True,
+    help="Trajectories, the same for all filters.",
 )
 @click.option(
     "--steps", type=click.IntRange(min=1), help=f"Measurements of each trajectory.  [default: {STEPS}, or what the variant says]"
@@ -59,53 +61,22 @@ DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with m
     "[default: the lab's seven and the exact AOF; for variants with modes all but those that remember several steps]",
 )
 @click.option(
-    "--slow-runs",
-    type=click.IntRange(min=0),
-    default=4000,
-    show_default=True,
-    help="Trajectories for the slow filters, if the time allows; 0 leaves them out.",
-)
-@click.option(
-    "--slow-seconds",
-    type=click.FloatRange(min=0, min_open=True),
-    default=30.0,
-    show_default=True,
-    help="Time for the slow filters: what fits is computed, and the report says on how many trajectories.",
-)
-@click.option(
-    "--slow-memory",
-    type=click.FloatRange(min=LEAST / 1e6),
-    default=1000.0,
-    show_default=True,
-    help="Megabytes for the slow filters (Linux): they take as many trajectories at once as have room.",
-)
-@click.option(
-    "--designs",
-    type=click.IntRange(min=1),
-    help="Ensembles to design DUOF, FOS and MFOS on: how much they differ goes into the standard errors.  [default: 4]",
-)
-@click.option(
-    "--wide",
-    type=click.FloatRange(min=1),
-    help="Draw half of the initial states from a law so many times as wide, and weight the trajectories.  [default: by a pilot]",
+    "--bound",
+    is_flag=True,
+    help="Bound vector models, too: the exact AOF by particles, which takes minutes for some thousand trajectories.",
 )
 @click.option("--same-ensemble", is_flag=True, help="Design DUOF, FOS and MFOS on the trajectories they are compared on, once.")
 @click.option(
     "--jobs",
     "--threads",
-    "threads",
+    "jobs",
     type=click.IntRange(min=1),
     help="Processor cores to use; does not change the numbers.  [default: all]",
 )
 @click.option("--dask", help="Address of a Dask scheduler whose workers run the filters instead.")
-@click.option(
-    "--compiled",
-    is_flag=True,
-    help="Run compiled filters (scalar variants; needs numba): equal but for rounding, for many trajectories.",
-)
 @click.option("--out", type=click.Path(path_type=Path), help="Folder of the report.  [default: lab-VARIANT]")
 @click.option(
-    "--report", "language", type=click.Choice(LANGUAGES), help="Also write the student's report, handin.html and handin.tex."
+    "--report", "language", type=click.Choice(LANGUAGES), default="en", show_default=True, help="Language of the report."
 )
 @click.option(
     "--json", "json_file", type=click.Path(path_type=Path), help="Also write the numbers to this file; - is standard output."
@@ -113,21 +84,16 @@ DESIGNS = 4  # with fewer, the deviation between designs is hardly known; with m
 def lab(
     variant: str,
     variants_file: Path | None,
-    runs: int | None,
+    runs: int,
     steps: int | None,
     seed: int,
     names: str | None,
-    slow_runs: int,
-    slow_seconds: float,
-    slow_memory: float,
-    designs: int | None,
-    wide: float | None,
+    bound: bool,
     same_ensemble: bool,
-    threads: int | None,
+    jobs: int | None,
     dask: str | None,
-    compiled: bool,
     out: Path | None,
-    language: str | None,
+    language: str,
     json_file: Path | None,
 ) -> None:
     """Compare the filters on VARIANT (such as 53) and write the report.
@@ -135,17 +101,14 @@ def lab(
     The same seed gives the same numbers, bit by bit on one machine; another one's linear algebra (BLAS) may round
     otherwise, by 1e-13 or so.
     """
-    if 0 < slow_runs < FEWEST_SLOW:
-        raise click.ClickException(
-            f"on {slow_runs} trajectories the rare ones that matter are missing: give --slow-runs 0, or at least {FEWEST_SLOW}"
-        )
-    if same_ensemble and designs not in (None, 1):
-        raise click.UsageError("--same-ensemble designs once, on the ensemble of the comparison: leave --designs out")
     chosen = find_variant(variant, variants_file)
     model = chosen.model
     if names is None:
         usual = JUMP_LAB if isinstance(model, JumpModel) else LAB
-        wanted = [*usual, "aof-exact"] if slow_runs and has_bound(model) else list(usual)
+        bound = bound or has_exact(model)
+        wanted = [*usual, EXACT] if bound else list(usual)
+        if not bound:
+            click.echo("No bound: point masses do not reach this model; --bound runs particles beside the others", err=True)
     else:
         wanted = [name.strip() for name in names.split(",") if name.strip()]
     found = admissions(model, wanted, DERIVATION)
@@ -166,87 +129,36 @@ def lab(
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
     filters = [one.one for one in found if one.one]
-    many = 1 if same_ensemble else designs or DESIGNS
-    budget = Budget(runs) if runs else usual_runs(filters, model, steps or chosen.steps, many)
-    if budget.says:
-        click.echo(budget.says, err=True)
     result = without_failing(
         filters,
         model,
-        budget.runs,
+        runs,
         steps or chosen.steps,
         seed,
         left_out=refused,
-        slow_runs=slow_runs,
-        slow_seconds=slow_seconds,
-        slow_memory=1e6 * slow_memory,
         same_ensemble=same_ensemble,
-        wide=wide,
-        threads=threads,
+        jobs=jobs,
         dask=dask,
-        designs=many,
-        compiled=compiled,
     )
     for name, reason in result.left_out.items():
         click.echo(f"{title(name)} left out: {reason}", err=True)
-    for name, reason in result.replaced.items():
-        click.echo(f"{title(name)} by particles: {reason}", err=True)
     to_error = str(json_file) in STANDARD_OUTPUT
     _tell(result, to_error)
-    again = _again(result, variant, variants_file, seed, names, designs, wide, same_ensemble, compiled)
-    click.echo(again, err=to_error)
     if json_file:
         write_json(chosen, result, json_file)
     with _kept(folder), replacing_together(folder) as place:
         modes = recognised_modes(result, filters)
-        write_report(chosen, result, place, [one for one in (budget.says, again) if one], found, modes)
-        if language:
-            write_handin(chosen, result, place, language, modes)
-    if not language and (older := folder / "handin.html").exists():
-        click.echo(f"{older} is of an earlier run; --report en, or ru, writes it anew", err=True)
+        write_report(chosen, result, place, language, admissions(model, None, DERIVATION, found), modes)
     click.echo(f"Report: {folder / 'report.html'}" + (f"; numbers: {json_file}" if json_file else ""), err=to_error)
 
 
 def _tell(result: Comparison, to_error: bool) -> None:
     """The ranking; to standard error if standard output takes the numbers."""
-    reference = EXACT if result.has_bound else result.control
-    lines = [f"D_k above that of {title(reference)}, %, mean over the steps ± standard error:"]
+    lines = [f"D_k above that of {title(result.reference)}, %, mean over the steps ± standard error:"]
     for name, gap in result.ranking():
         found = f"{100 * float(gap.value):8.3f} ± {100 * float(gap.standard_error):.3f}"
         lines.append(f"{title(name):<18} {'diverges' if name in result.lost else found}")
-    if result.slow_runs:
-        lines.append(by_thousands(f"Slow filters: on {result.slow_runs} of {result.runs} trajectories"))
     click.echo("\n".join([*lines, *remarks_in_words(result), *conclusions(result)]), err=to_error)
-
-
-def _again(
-    result: Comparison,
-    variant: str,
-    variants_file: Path | None,
-    seed: int,
-    names: str | None,
-    designs: int | None,
-    wide: float | None,
-    same_ensemble: bool,
-    compiled: bool,
-) -> str:
-    """The command that repeats the comparison wherever it runs: what was chosen by count or by time is written out."""
-    slow = result.slow_runs if result.slow_runs >= FEWEST_SLOW else 0
-    options: dict[str, object] = {
-        "--variants": variants_file,
-        "--runs": result.runs,
-        "--steps": result.steps,
-        "--seed": seed,
-        "--filters": names,
-        "--slow-runs": slow,
-        "--slow-seconds": ENOUGH if slow else None,
-        "--designs": designs,
-        "--wide": wide,
-    }
-    words = [str(one) for option, value in options.items() if value is not None for one in (option, value)]
-    flags = [flag for flag, given in (("--same-ensemble", same_ensemble), ("--compiled", compiled)) if given]
-    but = ", but for the slow filters, which the time decided" if result.replaced or slow != result.slow_runs else ""
-    return f"The same numbers again{but}: kfcourse lab {shlex.join([variant, *words, *flags])}"
 
 
 @contextmanager

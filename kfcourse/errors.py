@@ -69,3 +69,17 @@ def expect_sizes(**sizes: object) -> None:
     for name, value in sizes.items():
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
             raise ValueError(f"{name} must be a positive whole number, got {value!r}")
+
+
+def expect_positive(**numbers: float) -> None:
+    """ValueError for one of these numbers that is not positive and finite."""
+    for name, value in numbers.items():
+        if not 0 < value < np.inf:
+            raise ValueError(f"{name} must be positive and finite, got {value}")
+
+
+def expect_not_negative(**numbers: float) -> None:
+    """ValueError for one of these numbers that is negative or not finite."""
+    for name, value in numbers.items():
+        if not 0 <= value < np.inf:
+            raise ValueError(f"{name} must be finite and not negative, got {value}")

@@ -78,13 +78,6 @@ def measurement_of(angles: Components) -> type[Measurement]:
     return AngularMeasurement
 
 
-def column(array: Array) -> Array:
-    """The only component of vectors (N, 1) or matrices (N, 1, 1), (N,), as compiled loops take it."""
-    flat = array.reshape(-1)
-    fits = flat.flags.c_contiguous and flat.flags.writeable and flat.dtype == float
-    return flat if fits else np.array(flat, dtype=float)
-
-
 def apply(matrix: Matrices, vector: Vectors) -> Vectors:
     """matrix @ vector: (..., r, c), (..., c) -> (..., r)."""
     if matrix.shape[-2:] == (1, 1):

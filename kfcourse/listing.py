@@ -9,8 +9,8 @@ from pathlib import Path
 import click
 
 from kfcourse.files import save
-from kfcourse.lab.variant_tables import RUNS, read_tables, summary
-from kfcourse.montecarlo.batches import FEWEST
+from kfcourse.lab.variants import RUNS, read_tables, read_variants, summary
+from kfcourse.montecarlo import FEWEST
 from kfcourse.montecarlo.parallel import cores
 
 VARIANTS = click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="Another TOML file of variants.")
@@ -54,10 +54,9 @@ def variants(
         _generate(wanted, seed, runs, jobs or cores(), out)
         return
     if not check and variants_file is None:  # that the shipped ones are models was tested
-        _, tables = read_tables(names=names)
+        tables = read_tables(names=names)
         click.echo("\n".join(summary(name, table) for name, table in tables.items()))
         return
-    from kfcourse.lab.variants import read_variants
 
     chosen, faults = read_variants(variants_file, names)
     good = not faults

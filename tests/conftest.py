@@ -6,10 +6,6 @@ from kfcourse.lab import report
 from kfcourse.symbolic.model import Model
 
 
-def pytest_configure(config):
-    config.addinivalue_line("markers", "slow: dear, and seldom broken by a change; every night (`make nightly`)")
-
-
 @pytest.fixture(scope="session")
 def variant53() -> Model:
     """Variant 53 of the lab, both noises multiplicative."""
@@ -19,5 +15,5 @@ def variant53() -> Model:
 @pytest.fixture
 def no_figures(monkeypatch):
     """Drawing takes most of the time of a report; for tests of its text, and of what becomes of files."""
-    monkeypatch.setattr(report, "_FIGURES", {name: (caption, lambda *_: None) for name, (caption, _) in report._FIGURES.items()})
+    monkeypatch.setattr(report, "FIGURES", dict.fromkeys(report.FIGURES, lambda *_, **__: None))
     monkeypatch.setattr(report.Figure, "savefig", lambda _, path, **__: path.touch())

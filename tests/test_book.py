@@ -98,19 +98,6 @@ def test_style_sheets_load_only_local_files() -> None:
         assert not re.search(r"(@import\s+|url\()\s*[\"']?(https?:)?//", sheet.read_text(encoding="utf-8")), sheet
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_page_is_light_or_dark_before_its_first_line(scheme):
-    """The theme decides when the page is there: until then a page for the night was white."""
-    with chromium() as browser:
-        tab = browser.new_context(offline=True, color_scheme=scheme).new_page()
-        tab.add_init_script(
-            "new MutationObserver((_, self) => { if (document.body) { window.first = document.documentElement.dataset.theme;"
-            " self.disconnect(); } }).observe(document, { childList: true, subtree: true });"
-        )
-        tab.goto((HTML / "comparison.html").as_uri())
-        assert tab.evaluate("[first, document.documentElement.dataset.theme]") == [scheme, scheme]
-
-
 @pytest.mark.parametrize("page", NOTEBOOKS)
 def test_notebook_is_executed_without_errors(page: str) -> None:
     notebook = nbformat.read(EXECUTED / f"{page}.ipynb", as_version=4)
@@ -359,21 +346,6 @@ def test_page_in_a_browser_without_network(window, page: str) -> None:
     assert [*whole, *itertools.chain(*(tab.evaluate(CONTRAST, [theme, COLOURS]) for theme in THEMES))] == []
 
 
-def test_every_page_begins_where_the_others_do(window):
-    """Also one without contents of its own at the right."""
-    tab, _ = window
-    tab.set_viewport_size({"width": 1280, "height": 1000})
-    begins = []
-    for page in ("comparison", "references"):
-        tab.goto((HTML / f"{page}.html").as_uri())
-        begins.append(tab.locator("article h1").bounding_box()["x"])
-    assert begins[0] == begins[1]
-
-
-def test_no_heading_of_a_table_is_empty():
-    assert [path.name for path in HTML.glob("*.html") if '"><p></p></th>' in path.read_text(encoding="utf-8")] == []
-
-
 def test_the_keyboard_reaches_the_text_first(window):
     tab, _ = window
     tab.goto((HTML / "linearisation.html").as_uri())
@@ -383,22 +355,6 @@ def test_the_keyboard_reaches_the_text_first(window):
     assert tab.locator("main#main-content").count() == 1
     formulas = tab.locator("div.math")
     assert formulas.count() == tab.locator("div.math mjx-container[tabindex='0'][aria-label]").count() > 0
-
-
-def test_who_turns_back_is_offered_the_top(window):
-    """On screens without room for the contents at the right."""
-    tab, problems = window
-    show_on(tab, "screen", 390)
-    laid_out(tab, "linearisation")  # or sections that come near move what is read
-    button = tab.locator("#pst-back-to-top")
-    for place, offered in ((3000, False), (2800, True), (2900, False), (600, False), (2900, False), (2800, True)):
-        tab.evaluate("place => scrollTo({ top: place, behavior: 'instant' })", place)
-        tab.evaluate("() => new Promise((seen) => requestAnimationFrame(() => requestAnimationFrame(seen)))")
-        assert button.is_visible() == offered
-    button.click()
-    tab.wait_for_function("scrollY === 0")
-    button.wait_for(state="hidden")
-    assert problems == []
 
 
 def test_a_reference_shows_what_it_leads_to(window):
@@ -518,51 +474,6 @@ def test_the_contents_show_where_the_reader_is(browser):
             tab.wait_for_function(f"wanted => String({marked}) === String(wanted)", arg=both)
 
 
-@pytest.mark.slow
-def test_the_keyboard_scrolls_what_is_wider_than_its_box(browser):
-    """Code on a telephone; where nothing can be scrolled the keyboard does not stop."""
-    wide = "e => [e.scrollWidth > e.clientWidth, e.tabIndex]"
-    found = set()
-    for width in (390, 1280):
-        with browser.new_context(offline=True, viewport={"width": width, "height": 900}) as context:
-            tab = context.new_page()
-            tab.goto((HTML / "track-2d.html").as_uri())
-            tab.evaluate(LAY_OUT)
-            tab.evaluate("for (const e of document.querySelectorAll('details')) e.open = true")
-            tab.wait_for_timeout(300)
-            found |= {tuple(one) for one in tab.locator("article pre").evaluate_all(f"all => all.map({wide})")}
-    assert found == {(True, 0), (False, -1)}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("width", [390, 1280])
-def test_the_names_of_a_folder_s_files_stand_whole_in_a_column(browser, width):
-    """And so do those of a class's fields; the page does not scroll sideways."""
-    with browser.new_context(offline=True, viewport={"width": width, "height": 900}) as context:
-        tab = context.new_page()
-        tab.goto((HTML / "package" / "kfcourse.filters.html").as_uri())
-        tab.evaluate(LAY_OUT)
-        lines = """all => all.map(e => {
-            const text = document.createRange();
-            text.selectNodeContents(e);
-            return new Set([...text.getClientRects()].map(one => Math.round(one.bottom))).size;
-        })"""
-        columns = tab.locator("article > section > .pst-scrollable-table-container td:first-child code")
-        fields = tab.locator("article dl.field-list dt > strong:not(:text-matches(','))")
-        assert columns.count() > 40 and set(columns.evaluate_all(lines)) == {1}
-        assert fields.count() > 15 and set(fields.evaluate_all(lines)) == {1}
-        assert tab.evaluate(FIT)["page"] <= 0
-
-
-def test_words_out_of_sight_are_found(browser):
-    """By the browser's own search in the page."""
-    with browser.new_context(offline=True, viewport={"width": 1280, "height": 900}) as context:
-        tab = context.new_page()
-        tab.goto((HTML / "comparison.html").as_uri())
-        assert tab.evaluate("scrollY") == 0 and tab.evaluate("window.find('Key points')")
-        tab.wait_for_function("scrollY > 2000")
-
-
 @pytest.mark.parametrize("page", [WHOLE, "comparison", "manual/r-loop"])
 def test_a_formula_stays_with_its_comma(page):
     """And with its bracket: no text that begins behind a formula begins with a mark."""
@@ -624,26 +535,6 @@ def test_what_a_link_to_another_page_leads_to_is_shown_too(window):
     assert problems == []
 
 
-@pytest.mark.slow
-def test_a_figure_of_another_page_is_shown_with_its_picture(window):
-    tab, problems = window
-    show_on(tab, "screen", 1280)
-    shown = 0
-    for page in NOTEBOOKS:
-        found = re.search(r'href="(?!#)([^"#]+\.html#fig-[^"]+)"', (HTML / f"{page}.html").read_text(encoding="utf-8"))
-        if not found:
-            continue
-        laid_out(tab, page)
-        hover(tab, tab.locator(f'article a.reference.internal[href="{found[1]}"]').first)
-        picture = tab.locator("#kf-preview img")
-        picture.wait_for()
-        tab.wait_for_function("e => e.complete && e.naturalWidth > 0", arg=picture.element_handle())
-        shown += 1
-        tab.mouse.move(0, 0)
-    assert shown
-    assert problems == []
-
-
 # Sheets of A4 of chapters that had one more: code went overleaf as a whole and figures were as on a screen; the last was blank.
 SHEETS = {"comparison": 9, "linearisation": 10, "live-track": 8, "manual/p-find-the-slip": 5}
 
@@ -675,14 +566,6 @@ def test_hints_are_open_on_paper_and_the_code_of_pictures_is_not_there(window):
     assert not any(tab.evaluate(closed)), "closed again on the screen"
     show_on(tab, "print", PAPER)
     assert tab.locator("details.kf-code").count() == 1 and not tab.locator("details.kf-code").is_visible()
-
-
-def test_the_live_track_is_its_still_picture_on_paper(window):
-    tab, _ = window
-    tab.goto((HTML / "live-track.html").as_uri())
-    show_on(tab, "print", PAPER)
-    assert tab.locator(".kf-live").count() == 1 and not tab.locator(".kf-live").is_visible()
-    assert tab.locator("#fig-live-track img").is_visible()
 
 
 @pytest.mark.parametrize("page", NOTEBOOKS)
@@ -745,18 +628,6 @@ def test_search_finds_sections_and_quotes_them(window, words, page, section):
     assert all(row.locator("p").inner_text() for row in rows.all()[:5])
     assert tab.locator("#search-results mark").count() > 1  # of five: not where only a title has the words
     assert problems == []
-
-
-def test_words_that_stand_apart_are_apart_in_what_is_searched():
-    """A term and its Russian name, for instance."""
-    glued = re.findall(r"[a-z)][а-яё]\w*", (HTML / "_static" / "search" / "sections.js").read_text(encoding="utf-8"))
-    assert glued == []
-
-
-def test_search_says_that_it_finds_nothing(window):
-    tab, _ = window
-    tab.goto((HTML / "search.html").as_uri() + "?q=qwertz")
-    assert "Nothing found" in tab.locator("#kf-found").inner_text() and not tab.locator("#search-results li").count()
 
 
 def test_an_address_that_does_not_exist(window):

@@ -48,7 +48,7 @@ Y = np.zeros(3)
         (lambda: continuous.to_discrete(MODEL, 0.1), r"expects a ContinuousModel, got Model"),
         (lambda: pointmass(STRUCTURE), r"^pointmass expects a Model, got Structure linearised"),
         (
-            lambda: design([FILTER], Ensemble(MODEL, 10, 2, 1).by_step()),
+            lambda: design([FILTER], Ensemble(MODEL, 10, 2, 1)),
             r"^design expects a Design, got Filter",
         ),
         (

@@ -351,12 +351,12 @@ def test_the_lab_of_a_model_has_finite_results_or_says_why_not(given, figure):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", QuadratureWarning)
         try:
-            result = compare(filters, model, 256, 3, seed=1, designs=2, threads=1, progress=False)
+            result = compare(filters, model, 256, 3, seed=1, jobs=1, progress=False)
         except NotFinite as error:
             event("not finite")
             assert "step" in str(error)
             return
-    for name in result.available:
+    for name in result.names:
         estimate = result.error_variance(name)
         assert np.isfinite(estimate.value).all() and (estimate.value >= 0).all()
         assert not np.isnan(result.own_variance(name).value).any()

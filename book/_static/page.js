@@ -26,6 +26,12 @@ addEventListener("DOMContentLoaded", () => {
   for (const link of links) seen.observe(document.getElementById(decodeURIComponent(link.hash.slice(1))));
 });
 
+// On a narrow screen the contents lie over the page, as a dialog: a link in it leads to the page below.
+addEventListener("DOMContentLoaded", () => {
+  const drawer = document.getElementById("pst-secondary-sidebar-modal");
+  drawer?.addEventListener("click", (event) => event.target.closest("a") && drawer.close());
+});
+
 // Who turns back, far down a page, may want its top; the theme shows the button where there is no room for the contents.
 addEventListener("DOMContentLoaded", () => {
   const top = document.getElementById("pst-back-to-top");

@@ -99,7 +99,9 @@ def root(value: Value) -> Value:
 
 
 def raised(value: Value, power: Value) -> Value:
-    return np.linalg.matrix_power(value, whole(power)) if is_matrix(value) else value**power
+    if is_matrix(value):
+        return np.linalg.matrix_power(value, whole(power))
+    return np.asarray(value, float) ** power  # a root of a negative number is NaN
 
 
 def block(rows: list[list[Value]]) -> np.ndarray:

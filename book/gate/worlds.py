@@ -2,7 +2,7 @@ r"""Numbers for the letters of a page: definitions in LaTeX, read by the reader 
 
 A world is a text whose lines are done one after another::
 
-    \Psi, R: cov 2                     draw: cov n, any n m, eye n, pos (from .5 to 2), in a b, num, share n (sums to one)
+    \Psi, R: cov 2                     draw: cov n, any n m, eye n, pos (from .5 to 2), in a b, num, nums n, share n, list n any m
     k: range 0 4                       an index that runs
     x: nodes \lambda \Psi              nodes of a normal law, and the operators \mathsf M and \mathsf D over it
     K = \Psi G^T(G\Psi G^T+R)^{-1}      define, of letters that stand above
@@ -10,7 +10,8 @@ A world is a text whose lines are done one after another::
     \Psi_{k+1} = Ap_kA^T+Q             lines with an index follow each other for k = 0, 1, ...; \Psi_0 = P begins
     c_j = \sum_i\mu_i\pi_{ij}           for each j of a range
     again:                             what follows, down to `then:`, again and again until nothing changes
-    keep: K, p                         forget all other letters
+    keep: K, p                         forget all other letters; `forget: a, b` these
+    "|v|" = \sqrt{v^Tv}                a letter that looks like something else; `"p(x|z)" of x = ...` moves with x
 
 A page's relation must hold in a world with all its letters, so a world says things in another way than the page: an inverse for a
 gain, a sum or an integral for a closed form.
@@ -28,7 +29,7 @@ import sympy as sp
 
 from gate.relation import Reader, keys_of
 from gate.tex import normal
-from gate.values import Indexed, Operator
+from gate.values import Indexed, Of, Operator
 from kfcourse.filters import aof
 from kfcourse.filters.kalman import correct, predict
 from kfcourse.laws import Gaussian
@@ -57,12 +58,13 @@ def world(text: str) -> Callable[[np.random.Generator], dict[str, Any]]:
                 _steps(letters, list(group))
             elif kind == "start":
                 for left, _, right in (line.partition("=") for line in group):
-                    letters[left.strip().removesuffix("_0")] = Indexed({0: _computed(right, letters, {})})
+                    name, at = left.strip().rsplit("_", 1)
+                    letters[name] = Indexed({int(at): _computed(right, letters, {})})
             elif kind == "once":
                 _define(letters, list(group), AGAIN if again else 1)
             else:
                 for line in group:
-                    letters = _drawn(letters, rng, *line.rsplit(":", 1))
+                    letters = _drawn(letters, rng, *(line.split(": ", 1)))
         return letters
 
     return make
@@ -72,21 +74,30 @@ def _kind(line: str, stepped: set[str]) -> str:
     left, equals, _ = line.partition("=")
     if line in ("again:", "then:"):
         return line[:-1]
-    if not equals or line.startswith("keep:"):
+    if not equals or line.startswith(("keep: ", "forget: ")):
         return "draw"
-    if left.strip().removesuffix("_0") in stepped and left.strip().endswith("_0"):
+    if left.startswith('"'):
+        return "once"
+    if re.sub(r"_\d$", "", left.strip()) in stepped:
         return "start"
     return "step" if re.search(r"_(k|\{k\+1\})$", left.strip()) else "once"
 
 
 def _drawn(letters: dict[str, Any], rng: np.random.Generator, names: str, what: str) -> dict[str, Any]:
+    if names == "forget":
+        return {name: value for name, value in letters.items() if name not in what.strip().split(", ")}
     if names == "keep":
-        return {name.strip(): letters[name.strip()] for name in what.split(",")}
+        return {name: letters[name] for name in what.strip().split(", ")}
     kind, *words = what.split()
     if kind == "nodes":
         x, mean = normal_nodes(*(float(_computed(word, letters, {})) for word in words))
         spread = Operator(lambda values: mean(values**2) - mean(values) ** 2)
         return letters | {names: x, r"\mathsf M": Operator(mean), r"\mathsf D": spread}
+    if kind == "list":
+        count, *each = words
+        return letters | {
+            name: Indexed([_drawn({}, rng, "", " ".join(each))[""] for _ in range(int(count))]) for name in names.split(", ")
+        }
     draw = {
         "any": lambda *sizes: rng.normal(size=[int(size) for size in (*sizes, 1)[:2]]),
         "cov": lambda size: covariance(rng, int(size)),
@@ -98,7 +109,7 @@ def _drawn(letters: dict[str, Any], rng: np.random.Generator, names: str, what: 
         "range": lambda *ends: range(*map(int, ends)),
         "share": lambda *sizes: Indexed(rng.dirichlet(np.ones(int(sizes[-1])), size=[int(size) for size in sizes[:-1]])),
     }[kind]
-    return letters | {name.strip(): draw(*words) for name in names.split(",")}
+    return letters | {name: draw(*words) for name in names.split(", ")}
 
 
 def _steps(letters: dict[str, Any], lines: list[str]) -> None:
@@ -118,24 +129,36 @@ def _define(letters: dict[str, Any], lines: list[str], rounds: int) -> None:
             made = _made(*line.split("=", 1), letters)
             letters |= made
             values += [np.array(value) for value in made.values() if not callable(value)]
-        if before and all(map(np.array_equal, values, before)):
+        if before and all(np.allclose(*pair, rtol=1e-14, atol=1e-300) for pair in zip(values, before, strict=True)):
             return
         before = values
 
 
 def _made(left: str, right: str, letters: Mapping[str, Any]) -> dict[str, Any]:
     left = left.strip()
+    own = dict(letters)
+    if left.startswith('"'):  # a letter that looks like a call, or is an expression
+        name, _, moved = left.removeprefix('"').partition('"')
+        names = moved.removeprefix(" of ").split(", ")
+        if not moved:
+            return {name: _computed(right, own, {})}
+        running = [isinstance(own.get(each), range) for each in names]
+
+        def function(*given: Any) -> Any:
+            at = {each: value for each, value, runs in zip(names, given, running, strict=True) if runs}
+            return _computed(right, own | {each: value for each, value in zip(names, given, strict=True) if each not in at}, at)
+
+        return {name: Of(function, *names)}
     indices = re.fullmatch(r"(.+)_(?:\{(\w+)\}|(\w))", left)
     if indices and all(isinstance(letters.get(index), range) for index in indices[2] or indices[3]):
         names = indices[2] or indices[3]
-        own = dict(letters)
         values = {at: _computed(right, own, dict(zip(names, at, strict=True)))
                   for at in product(*(letters[index] for index in names))}  # fmt: skip
         return {indices[1]: Indexed(lambda *at: values[at])}
     if not (call := re.fullmatch(r"(.+?)\(([^()]*)\)", left)):
         return {left: _computed(right, letters, {})}
-    own, arguments = dict(letters), [name.strip() for name in call[2].split(",")]
-    return {call[1]: lambda *given: _computed(right, own | dict(zip(arguments, given, strict=True)), {})}
+    arguments = [name.strip() for name in call[2].split(",")]
+    return {call[1]: lambda *given: _computed(right, own | dict(zip(arguments[: len(given)], given, strict=True)), {})}
 
 
 def _computed(text: str, letters: Mapping[str, Any], at: Mapping[str, Any]) -> Any:

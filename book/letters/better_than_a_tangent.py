@@ -1,25 +1,18 @@
 """The letters of better-than-a-tangent.md: moments of signals over a normal law, by quadrature and by the package."""
 
-import numpy as np
 from gate.page import DEFINITION, NOTATION
-from gate.values import Operator
-from gate.worlds import normal_nodes
 
-from kfcourse import Model, gaussian
-
-
-def line(rng):
-    """J of a sine and a line, from moments."""
-    m, d = rng.normal(), rng.uniform(0.2, 0.5)
-    x, mean = normal_nodes(m, d)
-    S, covariance = mean(np.sin(x)), mean(np.sin(x) * (x - m))
-    variance = mean(np.sin(x) ** 2) - S**2
-    alpha, beta = rng.normal(size=2)
-
-    def J(a, b):
-        return variance + (S - a) ** 2 - 2 * b * covariance + b**2 * d
-
-    return {"J": J, r"\alpha": alpha, r"\beta": beta, r"\mathsf M": Operator(mean), "S": np.sin, "x": x, "m": m}
+line = r"""
+m, \alpha, \beta: num
+d: in .2 .5
+x: nodes m d
+s = \mathsf M\sin x
+c = \mathsf M(x-m)\sin x
+v = \mathsf M(\sin(x)-s)^2
+J(a, b) = v+(s-a)^2-2bc+b^2d
+S(x) = \sin x
+keep: J, \alpha, \beta, \mathsf M, S, x, m
+"""
 
 
 def corrected(h, G, F, lam, Psi, y):
@@ -28,26 +21,37 @@ def corrected(h, G, F, lam, Psi, y):
     return {"h": h, "G": G, "F": F, "K": K, "z": lam + (y - h) * K, "p": Psi - K**2 * F, r"\lambda": lam, r"\Psi": Psi, "y": y}
 
 
-def second_order(rng):
-    """A parabola, whose moments are exact."""
-    lam, Psi, D_n, first, second, y = *rng.uniform(0.2, 0.9, size=3), *rng.normal(size=3)
-    x, mean = normal_nodes(lam, Psi)
-    values = 0.3 + first * (x - lam) + second * (x - lam) ** 2 / 2
-    h = mean(values)
-    own = corrected(h, mean(values * (x - lam)) / Psi, mean((values - h) ** 2) + D_n, lam, Psi, y)
-    return own | {"S": 0.3, "S'": first, "S''": second, "D_n": D_n}
+second_order = r"""
+\lambda, \Psi, D_n: in .2 .9
+S', S'', y: num
+S = 0.3
+x: nodes \lambda \Psi
+s(x) = S+S'(x-\lambda)+S''(x-\lambda)^2/2
+h = \mathsf Ms(x)
+G = \mathsf M(x-\lambda)s(x)/\Psi
+F = \mathsf M(s(x)-h)^2+D_n
+K = \Psi G/F
+z = \lambda+K(y-h)
+p = \Psi-K^2F
+keep: h, G, F, K, z, p, \lambda, \Psi, y, S, S', S'', D_n
+"""
 
 
-def statistical(rng):
-    """A sine in the package's Gaussian structure."""
-    lam, Psi, D_n, y = *rng.uniform(0.2, 0.9, size=3), rng.normal()
-    model = Model.define("x + v", "sin(x) + r*w", {"r": np.sqrt(D_n)})
-    at = gaussian(model).measure(np.full((1, 1), lam), np.full((1, 1, 1), Psi))
-    x, mean = normal_nodes(lam, Psi)
-    own = corrected(at.h.item(), at.G.item(), at.F.item(), lam, Psi, y)
-    spread = {r"\mathsf M": Operator(mean), r"\mathsf D": Operator(lambda values: mean(values**2) - mean(values) ** 2)}
-    western = {"C": mean((x - lam) * np.sin(x)), "P^-": Psi}
-    return own | spread | western | {"S": np.sin, "S'": np.cos, "x": x, "D_n": D_n}
+statistical = r"""
+\lambda, \Psi, D_n: in .2 .9
+y: num
+x: nodes \lambda \Psi
+h = \mathsf M\sin x
+G = \mathsf M(x-\lambda)\sin(x)/\Psi
+F = \mathsf D\sin(x)+D_n
+K = \Psi G/F
+z = \lambda+K(y-h)
+p = \Psi-K^2F
+C = \mathsf M(x-\lambda)\sin x
+P^- = \Psi
+S(x) = \sin x
+S'(x) = \cos x
+"""
 
 
 LETTERS = (line, second_order, statistical)

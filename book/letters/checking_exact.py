@@ -2,38 +2,39 @@
 
 import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
-from gate.values import Of, bell
 
-
-def masses(rng):
-    """One step of variant 53; new nodes x_i with masses mu_i from old ones, x_j and mu_j."""
-    old, mass, c, e = rng.normal(size=4), rng.dirichlet(np.ones(4)), 0.9, 0.5
-    t, middle, scale, y = np.linspace(-1, 1, 5), rng.normal(), 0.7, rng.normal()
-    new = middle + scale * (np.exp(t) - np.exp(-t)) / 2
-
-    def ahead(at):
-        return sum(one * bell(at, c * node, (e * node) ** 2 * 0.8) for one, node in zip(mass, old, strict=True))
-
-    def likelihood(at):
-        return bell(y, at, 0.1 + 0.2 * at**2)
-
-    joint = np.array([ahead(at) * likelihood(at) for at in new])
-    after = joint * scale * (np.exp(t) + np.exp(-t)) / 2
-    after = after / after.sum()
-    nodes = {
-        "x_i": Of(lambda i: new[i], "i"),
-        r"\mu_i": Of(lambda i: after[i], "i"),
-        "t_i": Of(lambda i: t[i], "i"),
-        "x_j": Of(lambda j: old[j], "j"),
-        r"\mu_j": Of(lambda j: mass[j], "j"),
-        "x": Of(lambda k: new[k], "k"),
-        r"p(x\mid y_{0:k})": Of(lambda k: joint[k], "k"),
-        r"p(y_k\mid x)": Of(lambda k: likelihood(new[k]), "k"),
-        r"p(y_k\mid x_i)": Of(lambda i: likelihood(new[i]), "i"),
-    }
-    model = {"a": lambda x, v=0: c * x + e * x * v, "a_v": lambda x: e * x, "D_v": 0.8, "m_v": 0.0, r"\pi": ahead}
-    found = {"z_k": after @ new, "p_k": after @ new**2 - (after @ new) ** 2}
-    return nodes | model | found | {"x_*": middle, "s": scale, "i": range(5), "j": range(4), "k": range(5)}
+masses = r"""
+c = 0.9
+e = 0.5
+D_v = 0.8
+m_v = 0
+s = 0.7
+x_*, y: num
+X: nums 4
+M: share 4
+i: range 5
+j: range 4
+v = 0
+a(x, v) = cx+exv
+a_v(x) = ex
+\pi(x) = \sum_jM_j\mathcal N(x;cX_j,(eX_j)^2D_v)
+l(x) = \mathcal N(y;x,0.1+0.2x^2)
+"t_i" of i = -1+i/2
+"x_i" of i = x_*+s\sinh(-1+i/2)
+W_i = \pi(x_i)l(x_i)s\cosh(-1+i/2)
+w = \sum_iW_i
+"\mu_i" of i = W_i/w
+"x_j" of j = X_j
+"\mu_j" of j = M_j
+"z_k" = \sum_i\mu_ix_i
+"p_k" = \sum_i\mu_ix_i^2-z_k^2
+"p(y_k\mid x_i)" of i = l(x_i)
+k: range 5
+"x" of k = x_*+s\sinh(-1+k/2)
+"p(y_k\mid x)" of k = l(x)
+"p(x\mid y_{0:k})" of k = \pi(x)l(x)
+forget: c, e, v, y, X, M, l, W, w
+"""
 
 
 def bent(rng):
@@ -49,9 +50,14 @@ def bent(rng):
     return {"y_0": y, r"\lim_{f\to0}\frac{z_0-y_0}{f^2}": (4 * moved(5e-4) - moved(1e-3)) / 3}
 
 
-def crossing(rng):
-    """Where the average line meets the curve, off zero: the greatest root of y^4 - 4 y^2 - 3."""
-    return {"|y_0|": np.roots([1, 0, -4, 0, -3]).real.max()}
+crossing = r"""
+a = 2
+again:
+a = \sqrt{4+3/a^2}      # the greatest root of y^4 - 4 y^2 - 3: where the average line meets the curve
+then:
+"|y_0|" = a
+keep: |y_0|
+"""
 
 
 LETTERS = (masses, bent, crossing)

@@ -2,8 +2,6 @@
 
 import numpy as np
 from gate.values import Indexed, Operator
-from scipy.integrate import quad
-from scipy.optimize import brentq
 
 from kfcourse.filters import aof
 from kfcourse.symbolic.model import Model
@@ -39,14 +37,14 @@ def against_the_bound(rng):
     return means | {"p": p, r"\delta": delta, r"\epsilon": epsilon, "e": epsilon + delta}
 
 
-def other_law(rng):
-    """The deviation of the law to draw from at which the mean square has no slope, by integrals."""
-
-    def moment(s, power):
-        return quad(lambda x: np.exp(-(x**2) * (1 - 1 / (2 * s**2))) * x**power, 0, 15, epsabs=0, epsrel=1e-12)[0]
-
-    s = brentq(lambda s: moment(s, 10) / moment(s, 8) - s**2, 1.5, 3, xtol=1e-14)
-    return {"s": s, r"\int\varphi^2x^8/\psi\,dx": 2 * s * moment(s, 8) / np.sqrt(2 * np.pi)}
+other_law = r"""
+s = 2
+again:                  # where the mean square has no slope by the deviation of the law to draw from
+s = \sqrt{\int_0^\infty x^{10}e^{-x^2(1-1/(2s^2))}dx/\int_0^\infty x^8e^{-x^2(1-1/(2s^2))}dx}
+then:
+"\int\varphi^2x^8/\psi\,dx" = 2s\int_0^\infty x^8e^{-x^2(1-1/(2s^2))}dx/\sqrt{2\pi}
+keep: s, \int\varphi^2x^8/\psi\,dx
+"""
 
 
 def linearised_start(rng):

@@ -22,18 +22,20 @@ def western(rng):
     return ours | {r"\epsilon": Indexed(nees), r"\epsilon^\nu": Indexed(nis), r"\nu": run[r"\nu"], "S": run["F"], "k": run["k"]}
 
 
-def constant_gain(rng):
-    """A random walk under a gain: its errors step by step; the filter of that gain and of the right size by its recursion."""
-    K, Q, R = rng.uniform(0.2, 0.8), *rng.uniform(0.5, 2, 2)
-    P = 0.0
-    for _ in range(2000):
-        Psi = P + Q
-        P = (1 - K) ** 2 * Psi + K**2 * R
-    F, p_f = Psi + R, 1.0
-    for _ in range(2000):  # the model R_f = (1 - K) F, Q_f = K^2 F has the gain K and innovations of the variance F
-        p_f = 1 / (1 / (p_f + K**2 * F) + 1 / ((1 - K) * F))
-    covariance = Psi - K * F  # of neighbouring innovations: of e and nu, less K times the variance of nu
-    return {"K": K, "P": P, "F": F, "p_f": p_f, "c": covariance, r"\mathrm{NEES}": P / p_f}
+constant_gain = r"""
+K: in .2 .8
+Q, R: pos
+P = Q
+p_f = 1
+again:
+P = (1-K)^2(P+Q)+K^2R
+F = P+Q+R
+p_f = 1/(1/(p_f+K^2F)+1/((1-K)F))   # R_f = (1 - K) F, Q_f = K^2 F has the gain K and innovations of the variance F
+then:
+c = P+Q-KF
+\mathrm{NEES} = P/p_f
+keep: K, P, F, p_f, c, \mathrm{NEES}
+"""
 
 
 LETTERS = (course, western, constant_gain)

@@ -6,7 +6,6 @@ from gate.page import DEFINITION, NOTATION
 from gate.values import Indexed
 from gate.worlds import column, covariance, slope
 from scipy.linalg import expm
-from scipy.optimize import brentq
 
 from kfcourse.continuous import ContinuousModel, extended_kalman_bucy, steady_state, to_discrete
 from kfcourse.continuous.equations import filter_equations
@@ -138,10 +137,13 @@ def stationary(rng):
     return matrices | {"D": steady_state(own).cov, "N": own.noise_density, r"S_\xi": own.spectral_density}
 
 
-def walk(rng):
-    """A random walk, D = sqrt(q / r); the noise four times as large is a quarter of r."""
-    q, r = rng.uniform(0.5, 2, size=2)
-    return {"q": q, "r": r, "D": np.sqrt(q * r) / r, "D_{4N}": np.sqrt(4 * q / r), "T": q, "N": r}
+walk = r"""
+q, r: pos
+D = \sqrt{qr}/r
+D_{4N} = \sqrt{4q/r}
+T = q
+N = r
+"""
 
 
 def short_step(rng):
@@ -168,45 +170,82 @@ def riccati(a, q, r, start):
     return {"a": a, "q": q, "r": r}, D
 
 
-def forgetting(rng):
-    """A start that is forgotten, and Euler's first step from it."""
-    (a, q, r, D_0), t = rng.uniform(0.5, 2, size=4), rng.uniform(0.2, 0.5)
-    letters, D = riccati(a, q, r, [D_0 + 200, 1])
-    limit = D(40)
-    dot = D(t + 1e-20j).imag / 1e-20
-    negative = brentq(lambda T: D_0 + 200 + T * (q - 2 * a * (D_0 + 200) - r * (D_0 + 200) ** 2), 0, 9, xtol=1e-15)
-    apart = {"D": D(t), r"\dot D": dot, r"D_\infty": limit, r"\rho": np.sqrt(a**2 + q * r), "t": t, "T": 1.01 * negative}
-    errors = {r"\delta": lambda t: D(t) - limit, r"\delta_0": D_0 + 200 - limit, "D_0": D_0 + 200}
-    return letters | apart | errors
+forgetting = r"""
+a, q, r: pos
+\rho = \sqrt{a^2+qr}
+d: pos
+D_0 = d+200
+t: in .2 .5
+f(t) = (\cosh(\rho t)D_0+\sinh(\rho t)(q-aD_0)/\rho)/(\cosh(\rho t)+\sinh(\rho t)(rD_0+a)/\rho)
+h = 0.0005
+D = f(t)
+\dot D = (8(f(t+h)-f(t-h))-(f(t+2h)-f(t-2h)))/(12h)
+D_\infty = f(40)
+T = 1.01D_0/(2aD_0+rD_0^2-q)
+\delta_0 = D_0-D_\infty
+\delta(t) = f(t)-D_\infty
+keep: a, q, r, D, \dot D, D_\infty, \rho, t, T, \delta, \delta_0, D_0
+"""
 
 
-def forgotten(rng):
-    letters = forgetting(rng)
-    delta, dot = letters["D"] - letters[r"D_\infty"], letters[r"\dot D"]
-    return letters | {r"\delta": delta, r"\dot\delta": dot, "w": 1 / delta, r"\dot w": -dot / delta**2}
+forgotten = r"""
+a, q, r: pos
+\rho = \sqrt{a^2+qr}
+d: pos
+D_0 = d+200
+t: in .2 .5
+f(t) = (\cosh(\rho t)D_0+\sinh(\rho t)(q-aD_0)/\rho)/(\cosh(\rho t)+\sinh(\rho t)(rD_0+a)/\rho)
+h = 0.0005
+D = f(t)
+\dot D = (8(f(t+h)-f(t-h))-(f(t+2h)-f(t-2h)))/(12h)
+D_\infty = f(40)
+T = 1.01D_0/(2aD_0+rD_0^2-q)
+\delta_0 = D_0-D_\infty
+\delta = D-D_\infty
+\dot\delta = \dot D
+w = 1/\delta
+\dot w = -\dot D/\delta^2
+keep: a, q, r, D, \dot D, D_\infty, \rho, t, T, \delta, \delta_0, D_0, \dot\delta, w, \dot w
+"""
 
 
-def unknown_start(rng):
-    """A random walk of which nothing was known, when its variance is within one per cent of the limit."""
-    q, r = rng.uniform(0.5, 2, size=2)
-    letters, D = riccati(0, q, r, [1, 0])
-    scale, rate = D(40), np.sqrt(q * r)
-    t = brentq(lambda t: D(t) / scale - 1.01, 0.1, 40, xtol=1e-15)
-    dot = D(t + 1e-20j).imag / 1e-20
-    del letters["a"]
-    return letters | {"D": D(t), r"\dot D": dot, "t": t, r"\theta": rate * t, "u": lambda theta: D(theta / rate) / scale}
+unknown_start = r"""
+q, r: pos
+n = \sqrt{qr}
+f(t) = \sqrt{q/r}\cosh(nt)/\sinh(nt)
+t = \ln(201)/(2n)
+h = 0.0005
+D = f(t)
+\dot D = (8(f(t+h)-f(t-h))-(f(t+2h)-f(t-2h)))/(12h)
+\theta = nt
+u(x) = \cosh(x)/\sinh(x)
+keep: q, r, D, \dot D, t, \theta, u
+"""
 
 
-def unknown_start_now(rng):
-    letters = unknown_start(rng)
-    scale = np.sqrt(letters["q"] / letters["r"])
-    return letters | {"u": letters["D"] / scale, "u'": letters[r"\dot D"] / scale / (letters["q"] * letters["r"]) ** 0.5}
+unknown_start_now = r"""
+q, r: pos
+n = \sqrt{qr}
+f(t) = \sqrt{q/r}\cosh(nt)/\sinh(nt)
+t = \ln(201)/(2n)
+h = 0.0005
+D = f(t)
+\dot D = (8(f(t+h)-f(t-h))-(f(t+2h)-f(t-2h)))/(12h)
+\theta = nt
+u = D\sqrt{r/q}
+u' = \dot D\sqrt{r/q}/n
+keep: q, r, D, \dot D, t, \theta, u, u'
+"""
 
 
-def from_infinity(rng):
-    (a, q, r), t = rng.uniform(0.5, 2, size=3), rng.uniform(0.2, 0.5)
-    letters, D = riccati(a, q, r, [1, 0])
-    return letters | {"t": t, r"\rho": np.sqrt(a**2 + q * r), r"\delta_\infty": D(t) - D(40)}
+from_infinity = r"""
+a, q, r: pos
+t: in .2 .5
+\rho = \sqrt{a^2+qr}
+f(t) = (\cosh(\rho t)-a\sinh(\rho t)/\rho)/(r\sinh(\rho t)/\rho)
+\delta_\infty = f(t)-f(40)
+keep: a, q, r, t, \rho, \delta_\infty
+"""
 
 
 LETTERS = (

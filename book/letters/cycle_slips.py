@@ -4,7 +4,6 @@ import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
 from gate.values import Of
 from scipy.integrate import quad, solve_ivp
-from scipy.linalg import solve_continuous_are
 from scipy.special import iv
 
 
@@ -20,17 +19,19 @@ def slips(rng):
     return {r"\tau": tau, "q": q, r"\sigma_\varphi": np.sqrt(variance), "V": Of(V, r"\Delta"), "I_0": lambda x: iv(0, x)}
 
 
-def loop(rng):
-    """The covariance of a scalar phase that is measured directly, until it repeats itself; U by its mean over a period."""
-    A, D_n, q = rng.uniform(0.5, 2), rng.uniform(0.5, 2), rng.uniform(0.01, 0.1)
-    theta = 2 * np.pi * np.arange(64) / 64
-    slope = np.mean((A * np.sin(theta)) ** 2) / D_n
-    Psi = 1.0
-    for _ in range(5000):
-        p = 1 / (1 / Psi + slope)
-        Psi = p + q
-    numbers = {"A": A, "D_n": D_n, "q": q, "r": 1 / slope, "p": p, r"\Psi": Psi, r"\sigma_\varphi": np.sqrt((p + Psi) / 2)}
-    return numbers | {"U'": lambda at: slope * np.cos(at)}
+loop = r"""
+A, D_n: pos
+q: in .01 .1
+r = 2\pi D_n/\int_0^{2\pi}(A\sin t)^2dt
+\Psi = 1
+again:
+p = 1/(1/\Psi+1/r)
+\Psi = p+q
+then:
+\sigma_\varphi = \sqrt{(p+\Psi)/2}
+U'(x) = \cos(x)/r
+keep: A, D_n, q, r, p, \Psi, \sigma_\varphi, U'
+"""
 
 
 def saw(rng):
@@ -60,11 +61,15 @@ def pushed(rng):
     return {r"\Pi": way.y[0, 0] / way.y[0, 1], "W": Of(W, r"\Delta")}
 
 
-def carrier(rng):
-    """The sine's potential by an integral, and the steady state of the loop."""
-    q, r = rng.uniform(0.5, 2, size=2)
-    p = solve_continuous_are(np.zeros((1, 1)), np.eye(1), [[q]], [[r]]).item()
-    return {"q": q, "r": r, "p": p, "V": lambda x: quad(np.sin, 0, x)[0] / p, r"\sigma_\varphi": np.sqrt(p)}
+carrier = r"""
+q, r: pos
+p = 1
+again:
+p = (p+qr/p)/2
+then:
+V(x) = (1-\cos(x))/p
+\sigma_\varphi = \sqrt p
+"""
 
 
 LETTERS = (slips, loop, saw, pushed, carrier)

@@ -2,7 +2,7 @@
 
 import numpy as np
 from gate.page import NOTATION
-from gate.values import Indexed, Of, Operator
+from gate.values import Indexed, Of
 from gate.worlds import K_RANGE, column, covariance, given, slope
 
 C = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
@@ -51,41 +51,31 @@ def western(rng):
     return {r"\hat x": given(own[r"\lambda"], own["z"]), "P": given(own[r"\Psi"], own["p"]), "c": C, "u": own["u"], "k": own["k"]}
 
 
-def carrier(rng):
-    A, D_n, T, lam, delta, p = rng.uniform(0.5, 2, size=6)
-    errors = np.linspace(0, np.pi, 2001)
-
-    def U(at):
-        theta = 2 * np.pi * np.arange(64) / 64 + lam
-        return np.mean(-A * np.sin(theta) * A * (np.cos(theta + at) - np.cos(theta))) / D_n
-
-    highest = max(map(U, errors))
-    u = Of(lambda theta: -A * np.sin(theta + lam) * A * (np.cos(theta + lam + delta) - np.cos(theta + lam)) / D_n, r"\theta")
-    numbers = {
-        "A": A,
-        "D_n": D_n,
-        r"\Delta": delta,
-        r"p_{\varphi\varphi}": p,
-        r"U_{\max}": highest,
-        "T": T,
-        r"\Delta f_{\max}": highest * p / T / (2 * np.pi),
-    }
-    return numbers | {"U": U, "u": u, r"\mathsf M": Operator(lambda value: value)}
+carrier = r"""
+A, D_n, T, \lambda, \Delta, p_{\varphi\varphi}: pos
+U(x) = \int_0^{2\pi}A\sin(t)A(\cos(t)-\cos(t+x))dt/(2\pi D_n)
+U_{\max} = U(\pi/2)
+\Delta f_{\max} = U_{\max}p_{\varphi\varphi}/T/(2\pi)
+"u" of \theta = A\sin(\theta+\lambda)A(\cos(\theta+\lambda)-\cos(\theta+\lambda+\Delta))/D_n
+\mathsf M(x) = x
+forget: \lambda
+"""
 
 
-def drifting(rng):
-    """The loop without noise under a drift of the frequency, until it rests."""
-    T, p_phi, p_nu, a = 0.7, *rng.uniform(0.1, 0.3, 2), rng.uniform(0.02, 0.06)
-
-    def U(at):
-        return 0.8 * np.sin(at)
-
-    error = off = 0.0
-    for _ in range(5000):
-        push = U(error)
-        error, off = error - p_phi * push + T * (off - p_nu * push), off - p_nu * push + a * T
-    gains = {r"p_{\varphi\varphi}": p_phi, r"p_{\nu\varphi}": p_nu}
-    return gains | {"U": U, r"\Delta": error, r"\delta": off, "a": a, "T": T}
+drifting = r"""
+p_{\varphi\varphi}, p_{\nu\varphi}: in .1 .3
+a: in .02 .06
+T = 0.7
+U(x) = 0.8\sin x
+\Delta = 0
+\delta = 0
+again:
+u = U(\Delta)
+\Delta = \Delta-p_{\varphi\varphi}u+T(\delta-p_{\nu\varphi}u)
+\delta = \delta-p_{\nu\varphi}u+aT
+then:
+keep: p_{\varphi\varphi}, p_{\nu\varphi}, U, \Delta, \delta, a, T
+"""
 
 
 LETTERS = (run, display, western, carrier, drifting)

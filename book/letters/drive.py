@@ -8,26 +8,20 @@ from gate.worlds import column, covariance
 EAST, NORTH = (rf"\int_0^\Delta V\{function}(\psi+\omega s)\,ds" for function in ("cos", "sin"))
 
 
-def arc(rng):
-    V, psi, omega, Delta = *rng.normal(size=3), rng.uniform(0.5, 1.5)
-
-    def integral(function):
-        return scipy.integrate.quad(lambda s: V * function(psi + omega * s), 0, Delta)[0]
-
-    return {
-        "V": V, r"\psi": psi, r"\omega": omega, r"\Delta": Delta, "u": omega * Delta / 2,
-        EAST: integral(np.cos), NORTH: integral(np.sin),
-    }  # fmt: skip
+arc = r"""
+V, \psi, \omega: num
+\Delta: in .5 1.5
+u = \omega\Delta/2
+"""
 
 
-def tunnel(rng):
-    """Variances of the place after a straight tunnel: pushes of speed and heading, each carried to the end."""
-    V, t, p_V, p_psi, q_V, q_psi = rng.uniform(0.5, 2, 6)
-    pushes = scipy.integrate.quad(lambda s: (t - s) ** 2, 0, t)[0]
-    return {
-        "V": V, "t": t, "p_V": p_V, r"p_\psi": p_psi, "q_V": q_V, r"q_\psi": q_psi,
-        r"D_\parallel": t * p_V * t + q_V * pushes, r"D_\perp": V * (t * p_psi * t + q_psi * pushes) * V,
-    }  # fmt: skip
+tunnel = r"""
+V, t, p_V, p_\psi, q_V, q_\psi: pos
+i = \int_0^t(t-s)^2ds
+D_\parallel = tp_Vt+q_Vi
+D_\perp = V(tp_\psi t+q_\psi i)V
+keep: V, t, p_V, p_\psi, q_V, q_\psi, D_\parallel, D_\perp
+"""
 
 
 def moved(rng):
@@ -51,11 +45,11 @@ def moved(rng):
     return steps | {"M": M, "b": b, "R": R, "H": H, r"\Psi": Psi, "r": r, "I": np.eye(2), "F": H @ Psi @ H.T + r * np.eye(2)}
 
 
-def long_tunnel(rng):
-    """The speed at which pushes of speed and heading err alike."""
-    q_V, q_psi, t = rng.uniform(0.5, 2, 3)
-    along, across = (q * scipy.integrate.quad(lambda s: (t - s) ** 2, 0, t)[0] for q in (q_V, q_psi))
-    return {"q_V": q_V, r"q_\psi": q_psi, "V": np.sqrt(along / across)}
+long_tunnel = r"""
+q_V, q_\psi, t: pos
+V = \sqrt{q_V\int_0^t(t-s)^2ds/(q_\psi\int_0^t(t-s)^2ds)}
+keep: q_V, q_\psi, V
+"""
 
 
 LETTERS = (arc, tunnel, moved, long_tunnel)

@@ -3,7 +3,7 @@
 import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
 from gate.values import Indexed, Of
-from gate.worlds import BENT_LATER, covariance, extended_run, given
+from gate.worlds import BENT_LATER, extended_run, given
 from scipy.stats import multivariate_normal
 
 
@@ -46,40 +46,56 @@ def western(rng):
     }
 
 
-def beams(rng):
-    """Two radars that see a body under the angles theta, each with its own variance."""
-    angles, D = rng.uniform(0, np.pi, size=3), rng.uniform(1, 2, size=3)
-    H = [np.array([[np.cos(one), np.sin(one)]]) for one in angles]
-    return {r"\theta": Indexed(angles), "H": Indexed(H), "D": Indexed(D), "i": range(1, 3)}
+beams = r"""
+\theta: nums 3
+i: range 1 3
+D_i = 1+\theta_i^2/2
+H_i = \begin{pmatrix}\cos\theta_i&\sin\theta_i\end{pmatrix}
+"""
 
 
-def perfect(rng):
-    """Without noise of the meter; the best linear estimate by a solver, not by an inverse."""
-    H, Psi = rng.normal(size=(2, 3)), covariance(rng, 3)
-    F = H @ Psi @ H.T
-    return {"H": H, r"\Psi": Psi, "F": F, "p": Psi - Psi @ H.T @ np.linalg.solve(F, H @ Psi)}
+perfect = r"""
+H: any 2 3
+\Psi: cov 3
+F = H\Psi H^T
+p = \Psi-\Psi H^T(H\Psi H^T)^{-1}H\Psi
+"""
 
 
-def no_prior(rng):
-    """Weighted least squares, and what a meter says that has no part in it."""
-    H, D, nu, lam = rng.normal(size=(4, 3)), covariance(rng, 4), rng.normal(size=(4, 1)), rng.normal(size=(3, 1))
-    white = np.linalg.inv(np.linalg.cholesky(D))
-    z = lam + np.linalg.lstsq(white @ H, white @ nu, rcond=None)[0]
-    a = rng.normal(size=(4, 1))
-    return {"H": H, "D_n": D, r"\nu": nu, r"\lambda": lam, "z": z, r"\Psi": covariance(rng, 3), "a": a, "F": H @ H.T + D}
+no_prior = r"""
+H: any 4 3
+D_n: cov 4
+\nu, a: any 4
+\lambda: any 3
+\Psi: cov 3
+z = \lambda+(H^TD_n^{-1}H)^{-1}H^TD_n^{-1}\nu
+F = HH^T+D_n
+"""
 
 
-def tangents(rng):
-    """One component: a sine for f and S, near the place of its tangent."""
-    at, off, p = rng.uniform(0.2, 0.4), rng.uniform(0.2, 0.3), rng.uniform(0.1, 0.2)
-    kept = {r"\Phi": np.cos(at), "e": off, "g": lambda z: p, r"\xi": 1.0, "f": np.sin, "x_{k+1}": np.sin(at + off) + p}
-    return kept | {"S": np.sin, "H": np.cos(at), r"\lambda": at, "z": at, "x": at + off}
+tangents = r"""
+z: in .2 .4
+e: in .2 .3
+p: in .1 .2
+f(x) = \sin x
+S(x) = \sin x
+g(x) = p
+\xi = 1
+\Phi = \cos z
+H = \cos z
+\lambda = z
+x = z+e
+"x_{k+1}" = \sin(z+e)+p
+keep: \Phi, e, g, \xi, f, x_{k+1}, S, H, \lambda, z, x
+"""
 
 
-def across(rng):
-    """A body beside the line of sight; the deviation at which the bend is as large as the error of the range."""
-    r, t, sigma_t = rng.uniform(4, 5), rng.uniform(3, 4), rng.uniform(1, 2)
-    return {"r": r, "t": t, r"\sigma_t": sigma_t, r"\sigma_r": sigma_t**2 / (2 * r)}
+across = r"""
+r: in 4 5
+t: in 3 4
+\sigma_t: in 1 2
+\sigma_r = \sigma_t^2/(2r)
+"""
 
 
 LETTERS = (course, western, beams, perfect, no_prior, tangents, across)

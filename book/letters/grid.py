@@ -28,15 +28,12 @@ def course(rng):
     return run | {"f": f, "g": g, "S": np.sin, "h": h, r"D_\xi": D_xi, "D_n": D_n, "p(x_j)": density}
 
 
-def widths(rng):
-    """A likelihood, a prediction and a transition, all normal: the curvature of the logarithm of their product."""
-    slope, move, g, D_n, D_xi = rng.uniform(0.5, 2, size=5)
-
-    def logarithm(x):
-        return np.log(bell(0.3, slope * x, D_n) * bell(x, 0.1, g**2 * D_xi) * bell(0.7, move * x, g**2 * D_xi))
-
-    precision = 2 * logarithm(0.0) - logarithm(1.0) - logarithm(-1.0)
-    return {r"\sigma": precision**-0.5, "S'": slope, "f'": move, "g": g, "D_n": D_n, r"D_\xi": D_xi}
+widths = r"""
+S', f', g, D_n, D_\xi: pos
+L(x) = \ln(\mathcal N(0.3;S'x,D_n)\mathcal N(x;0.1,g^2D_\xi)\mathcal N(0.7;f'x,g^2D_\xi))
+\sigma = (2L(0)-L(1)-L(-1))^{-1/2}
+keep: \sigma, S', f', g, D_n, D_\xi
+"""
 
 
 LETTERS = (bells, course, widths)

@@ -1,16 +1,13 @@
 """The letters of integration.md: runs of the package's filter of an axis, its Western form with matrices, the accelerometer."""
 
 import numpy as np
-from control import dare
 from gate.page import CONDITION, DEFINITION, NOTATION
 from gate.values import Indexed, Of
 from gate.worlds import K_RANGE, column, covariance
-from scipy.integrate import quad
 
 from kfcourse.filters.kalman import correct, predict
 from kfcourse.laws import Gaussian
-from kfcourse.linear import LinearSystem, run
-from kfcourse.scenarios.navigation import Dynamics
+from kfcourse.linear import LinearSystem
 
 SENSOR, RADIO = r"y_{\mathrm{NR},k}", r"y_{\mathrm R,k}"
 
@@ -29,34 +26,33 @@ def sensors(rng):
     }  # fmt: skip
 
 
-def axis(rng):
-    """The package's filter of the inertial system's error, on one axis."""
-    xi, n, p0, V = 0.3, 0.7, 1.4, rng.normal(size=5)
-    drift = rng.normal(size=5)
-    ins, receiver = V + drift, V + rng.normal(size=5)
-    law = run(
-        LinearSystem([[1.0]], [[-1.0]], [[xi**2]], [[n**2]]),
-        Gaussian(np.zeros(1), np.array([[p0]])),
-        (receiver - ins)[:, None, None],
-    )
-    eps, p, Psi = law.posterior.mean[:, 0, 0], law.posterior.cov[:, 0, 0, 0], law.predicted.cov[:, 0, 0, 0]
-    innovation = receiver - ins + law.predicted.mean[:, 0, 0]
-    changes = {"V": Indexed(V), "n": Indexed(receiver - V), r"\varepsilon": Indexed(drift)}
-    return changes | {
-        r"\Psi": Indexed(Psi), "p": Indexed(p), "K": Indexed(-p / n**2), r"\hat\varepsilon": Indexed(eps),
-        r"\nu": Indexed(innovation),
-        r"\hat V": Indexed(ins - eps), r"\sigma_\xi": xi, r"\sigma_n": n, "k": K_RANGE,
-        r"y_{\mathrm{SR},k}": Of(lambda k: receiver[k], "k"), r"y_{\mathrm{INS},k}": Of(lambda k: ins[k], "k"),
-    }  # fmt: skip
+axis = r"""
+\sigma_\xi = 0.3
+\sigma_n = 0.7
+V, n, \varepsilon: nums 6
+"y_{\mathrm{SR},k}" of k = V_k+n_k
+"y_{\mathrm{INS},k}" of k = V_k+\varepsilon_k
+k: range 5
+\Psi_0 = 1.4
+e_0 = 0
+\nu_k = n_k-\varepsilon_k+e_k
+K_k = -\Psi_k/(\Psi_k+\sigma_n^2)
+p_k = 1/(1/\Psi_k+1/\sigma_n^2)
+\hat\varepsilon_k = e_k+K_k\nu_k
+\hat V_k = V_k+\varepsilon_k-\hat\varepsilon_k
+\Psi_{k+1} = p_k+\sigma_\xi^2
+e_{k+1} = \hat\varepsilon_k
+k: range 1 4
+forget: e
+"""
 
 
-def errors(rng):
-    """One moment: the readings by what they are made of."""
-    V, n, e, guess = rng.normal(size=4)
-    return {
-        "V": V, "n": n, r"\varepsilon": e, r"\hat\varepsilon": guess, r"\hat V": V + e - guess, r"y_{\mathrm{SR}}": V + n,
-        r"y_{\mathrm{INS}}": V + e,
-    }  # fmt: skip
+errors = r"""
+V, n, \varepsilon, \hat\varepsilon: num
+\hat V = V+\varepsilon-\hat\varepsilon
+y_{\mathrm{SR}} = V+n
+y_{\mathrm{INS}} = V+\varepsilon
+"""
 
 
 def western(rng, after=True):
@@ -79,62 +75,86 @@ def western_before(rng):
     return western(rng, after=False)
 
 
-def accelerometer(rng):
-    T = rng.uniform(0.5, 1)
-    moved = Dynamics(A=[[0, 1, 0], [0, 0, -1], [0, 0, 0]], B=[[0], [1], [0]], Qc=np.zeros((3, 3))).over(T)
-    return {"A": moved.A, "H": np.array([[1.0, 0, 0]]), "T_a": T}
+accelerometer = r"""
+T_a: in .5 1
+N = \begin{pmatrix}0&1&0\\0&0&-1\\0&0&0\end{pmatrix}
+I: eye 3
+A = I+T_aN+T_a^2N^2/2
+H = \begin{pmatrix}1&0&0\end{pmatrix}
+keep: A, H, T_a
+"""
 
 
-def failure(rng):
-    t, q = rng.uniform(1, 2, size=2)
-    spread = quad(lambda s: ((t - s) ** 2 / 2) ** 2 * q, 0, t)[0]
-    return {"t": t, "q_b": q, r"\textstyle\int_0^t\bigl(\frac12(t-s)^2\bigr)^2q_b\,ds": spread}
+failure = r"""
+t, q_b: in 1 2
+"""
 
 
-def slow_drift(rng):
-    """The variance of the steady state, from its quadratic equation, at a drift of 1e-10."""
-    xi, n = rng.uniform(1, 2) * 1e-10, rng.uniform(1, 2)
-    return {r"\lim_{\sigma_\xi\to0}": 1.0, r"\sigma_\xi": xi, r"\sigma_n": n, "p": np.roots([1, xi**2, -((xi * n) ** 2)]).max()}
+slow_drift = r"""
+\sigma_\xi: in 1e-10 2e-10
+\sigma_n: in 1 2
+p = \sigma_\xi(\sqrt{\sigma_\xi^2+4\sigma_n^2}-\sigma_\xi)/2
+"\lim_{\sigma_\xi\to0}" = 1
+"""
 
 
-def complementary(rng, kappa=0.4, xi=0.7, n=1.3):
-    """The steady variance of a low-pass filter for the receiver and its complement for the INS: noises added up one by one."""
-    weights = (1 - kappa) ** np.arange(600)  # of the receiver's noises in the error, and of the changes of the INS's error
-    spread = ((kappa * weights) ** 2).sum() * n**2 + (weights[1:] ** 2).sum() * xi**2
-    return {r"\kappa": kappa, r"\sigma_\xi": xi, r"\sigma_n": n, r"\mathsf De": spread}
+complementary = r"""
+\kappa = 0.4
+\sigma_\xi = 0.7
+\sigma_n = 1.3
+\mathsf De = 1
+again:
+\mathsf De = (1-\kappa)^2(\mathsf De+\sigma_\xi^2)+\kappa^2\sigma_n^2
+then:
+"""
 
 
-def best_border(rng):
-    """The low-pass filter with the gain of the steady Kalman filter, for a drift that is slow."""
-    n = rng.uniform(1, 2)
-    xi = n * rng.uniform(0.05, 0.1)
-    p = np.roots([1, xi**2, -((xi * n) ** 2)]).max()
-    return complementary(rng, p / n**2, xi, n)
+best_border = r"""
+\sigma_n: in 1 2
+s: in .05 .1
+\sigma_\xi = s\sigma_n
+\kappa = s(\sqrt{s^2+4}-s)/2      # of the steady Kalman filter, for a drift that is slow
+\mathsf De = 1
+again:
+\mathsf De = (1-\kappa)^2(\mathsf De+\sigma_\xi^2)+\kappa^2\sigma_n^2
+then:
+keep: \kappa, \sigma_\xi, \sigma_n, \mathsf De
+"""
 
 
-def low_pass(rng):
-    """Step by step: the receiver's velocity less the INS's, smoothed, is added to the INS's."""
-    kappa, V, drift, n = rng.uniform(0.3, 0.6), *rng.normal(size=(3, 5))
-    epsilon, smooth = np.cumsum(drift), np.zeros(5)
-    for k in range(1, 5):
-        smooth[k] = (1 - kappa) * smooth[k - 1] + kappa * ((V + n) - (V + epsilon))[k]
-    made = {"V": Indexed(V), "n": Indexed(n), r"\varepsilon": Indexed(epsilon), r"\xi": Indexed(drift[1:])}
-    return made | {r"\kappa": kappa, "e": Indexed(V + epsilon + smooth - V), "k": range(1, 4)}
+low_pass = r"""
+\kappa: in .3 .6
+V, n, \xi: nums 6
+k: range 5
+\varepsilon_0 = \xi_5
+s_0 = 0
+\varepsilon_{k+1} = \varepsilon_k+\xi_k
+s_{k+1} = (1-\kappa)s_k+\kappa(n_{k+1}-\varepsilon_{k+1})
+e_k = \varepsilon_k+s_k
+k: range 1 4
+keep: V, n, \varepsilon, \xi, \kappa, e, k
+"""
 
 
-def two_filters(rng):
-    """At one frequency filters are factors."""
-    V, n, e, F, G = rng.normal(size=5)
-    made = {r"\mathcal F": F, r"\mathcal G": G, r"\hat V": F * (V + e) + G * (V + n), "V": V, "n": n, r"\varepsilon": e}
-    return made | {r"y_{\mathrm{INS}}": V + e, r"y_{\mathrm{SR}}": V + n}
+two_filters = r"""
+V, n, \varepsilon, \mathcal F, \mathcal G: num
+\hat V = \mathcal F(V+\varepsilon)+\mathcal G(V+n)
+y_{\mathrm{INS}} = V+\varepsilon
+y_{\mathrm{SR}} = V+n
+"""
 
 
-def rare(rng):
-    """The steady variances of a receiver that averages over m steps."""
-    m, xi, n = 3, *rng.uniform(0.5, 2, size=2)
-    q, R = m * xi**2, n**2 / m
-    Psi = dare(np.eye(1), np.eye(1), [[q]], [[R]])[0].item()
-    return {"m": m, r"\sigma_\xi": xi, r"\sigma_n": n, "q": q, "R": R, r"\Psi": Psi, "p": Psi - q}
+rare = r"""
+m = 3
+\sigma_\xi, \sigma_n: pos
+q = m\sigma_\xi^2
+R = \sigma_n^2/m
+\Psi = q
+again:
+\Psi = q+1/(1/\Psi+1/R)
+then:
+p = \Psi-q
+"""
 
 
 def lecture(rng):

@@ -3,7 +3,7 @@
 import numpy as np
 from gate.page import DEFINITION, NOTATION
 from gate.values import Indexed, Of, Operator
-from gate.worlds import BENT, K_RANGE, extended_run, normal_nodes
+from gate.worlds import BENT, K_RANGE, extended_run
 
 from kfcourse.symbolic.structure import linearised
 
@@ -134,14 +134,20 @@ def western(rng):
     return names | {"y": own["y"].plain, r"\mu": own["S"].plain(lam)}
 
 
-def regression(rng):
-    """One component, moments by quadrature: the gain is the slope of the best line through all x and y."""
-    lam, Psi, y = rng.normal(), rng.uniform(0.5, 1), rng.normal()
-    x, mean = normal_nodes(lam, Psi)
-    h, G = mean(b(x, 0)), mean(1 + 0.2 * x)
-    C, F = mean((x - lam) * b(x, 0)), mean((b(x, 0) - h) ** 2) + 0.16
-    law = {"C": C, "F": F, "G": G, "h": h, "K": C / F, r"\lambda": lam, r"\Psi": Psi}
-    return law | {"y": y, "z": lam + C / F * (y - h), r"\varepsilon": x - lam, "x": x}
+regression = r"""
+\lambda, y: num
+\Psi: in .5 1
+x: nodes \lambda \Psi
+b = x+0.1x^2
+h = \mathsf Mb
+G = \mathsf M(1+0.2x)
+C = \mathsf M(x-\lambda)b
+F = \mathsf M(b-h)^2+0.16
+K = C/F
+z = \lambda+K(y-h)
+\varepsilon = x-\lambda
+keep: C, F, G, h, K, \lambda, \Psi, y, z, \varepsilon, x
+"""
 
 
 def linear_meter(rng):

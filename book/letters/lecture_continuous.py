@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from gate.page import CONDITION, NOTATION
-from gate.worlds import column, covariance, normal_nodes, slope
+from gate.worlds import column, covariance, slope
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
@@ -67,11 +67,12 @@ def in_short(rng):
     return own | {"S": own["S"](shared.C @ own["x"], 0), "y": own["y"](0)}
 
 
-def sizes(rng):
-    """The relative change of D: its factor squared, times intensity, times the filter's time."""
-    D, first, second, N = *rng.uniform(0.5, 2, size=2), -rng.uniform(0.5, 2), rng.uniform(0.5, 2)
-    share = (D * second * 2 / N) ** 2 * (N / 2) / (D * first**2 * 2 / N)
-    return {"D": D, "S'": first, "S''": second, "N": N, r"\varepsilon": np.sqrt(share)}
+sizes = r"""
+D, N, S'', s: pos
+S' = -s
+\varepsilon = \sqrt{(2DS''/N)^2N/2/(2DS'^2/N)}
+keep: D, S', S'', N, \varepsilon
+"""
 
 
 def step(rng):
@@ -96,9 +97,12 @@ def western(rng):
     return {name: own[name] for name in ("R", "Q", r"S_\xi", "N")}
 
 
-def start(rng):
-    d, m, z = rng.normal(size=3)
-    return {"z(0)": m, "m": m, "D(0)": d, "d": d, "x": z, "z": z}
+start = r"""
+m, d, z: num
+"z(0)" = m
+"D(0)" = d
+x = z
+"""
 
 
 def linear_signal(rng):
@@ -120,12 +124,18 @@ def ahead_of_data(rng):
     return letters | {r"\bar D": above, r"\dot{\bar D}": dot, "E": above - D, r"\dot E": dot - letters[r"\dot D"]}
 
 
-def even_signal(rng):
-    """A cosine at its top: U by the slope of the log-likelihood's gradient, the mean signal of the process."""
-    y, N, x = rng.uniform(-1, 1), rng.uniform(1, 2), rng.normal()
-    U = (2 / N * (y - np.cos(1e-20j)) * -np.sin(1e-20j) / 1e-20).imag
-    nodes, mean = normal_nodes(0, 0.5)
-    return {"y": y, "N": N, "U": U, "S": np.cos(x), "x": x, r"\mathsf My": mean(np.cos(nodes))}
+even_signal = r"""
+y: in -1 1
+N: in 1 2
+x: num
+w: nodes 0 0.5
+"\mathsf My" = \mathsf M\cos w
+g(u) = -2(y-\cos(u))\sin(u)/N
+h = 0.001
+U = (8(g(h)-g(-h))-(g(2h)-g(-2h)))/(12h)
+S = \cos x
+keep: y, N, U, S, x, \mathsf My
+"""
 
 
 def blow_up(rng):
@@ -143,17 +153,24 @@ def blow_up(rng):
     return names | {r"\varphi": np.arctan2(U * D_0 - a, omega), "D_0": D_0, "t_*": end, "N": N, r"\sigma": np.sqrt(2 / N)}
 
 
-def amplitude(rng):
-    x = rng.normal()
-    return {"x": x, "S": np.exp(x)}
+amplitude = r"""
+x: num
+S = e^x
+"""
 
 
-def near_estimate(rng):
-    """A parabola around the estimate, and a measurement of one short step."""
-    (z, e, kappa), tau = rng.normal(size=3), rng.uniform(0.1, 0.2)
-    S = np.polynomial.Polynomial([0, 1, kappa / 2])
-    around = {"S_0": S(z), "S_1": S.deriv()(z), "S_2": S.deriv(2)(z)}
-    return around | {"x": z + e, "z": z, "e": e, "S": S(z + e), "T": tau**2, r"\tau": tau}
+near_estimate = r"""
+z, e, \kappa: num
+\tau: in .1 .2
+s(x) = x+\kappa x^2/2
+S_0 = s(z)
+S_1 = 1+\kappa z
+S_2 = \kappa
+x = z+e
+S = s(x)
+T = \tau^2
+keep: S_0, S_1, S_2, x, z, e, S, T, \tau
+"""
 
 
 LETTERS = (

@@ -66,11 +66,14 @@ def western(rng):
     )
 
 
-def even(rng):
-    """The variance without measurements, each noise carried to its step by itself."""
-    c, g, D_xi, D_0 = rng.uniform(0.5, 2, size=4)
-    Psi = [c ** (2 * k) * D_0 + sum(c ** (2 * j) for j in range(k)) * g**2 * D_xi for k in range(4)]
-    return {"c": c, "g": g, r"D_\xi": D_xi, r"\Psi": Indexed(Psi), "k": range(3), "S": np.cos, "x": rng.normal()}
+even = r"""
+c, g, D_\xi, D_0: pos
+k: range 5
+\Psi_k = c^{2k}D_0+\sum_{i=0}^kc^{2i}g^2D_\xi-c^{2k}g^2D_\xi
+S(x) = \cos x
+x: num
+k: range 3
+"""
 
 
 def multiplied(rng):
@@ -89,13 +92,15 @@ def multiplied(rng):
     }  # fmt: skip
 
 
-def exponent(rng):
-    """Mean and variance of the density exp(a x + b x^2), up to a constant, by a sum."""
-    a, b = rng.normal(), -rng.uniform(0.5, 2)
-    x = np.linspace(-12, 12, 4001)
-    mass = np.exp(a * x + b * x**2)
-    mean = np.average(x, weights=mass)
-    return {"a": a, "b": b, r"m_\text{e}": mean, r"v_\text{e}": np.average((x - mean) ** 2, weights=mass)}
+exponent = r"""
+a: num
+c: pos
+b = -c
+n = \int e^{ax+bx^2}dx
+m_\text{e} = \int xe^{ax+bx^2}dx/n
+v_\text{e} = \int(x-m_\text{e})^2e^{ax+bx^2}dx/n
+keep: a, b, m_\text{e}, v_\text{e}
+"""
 
 
 LETTERS = (course, scalar, western, even, multiplied, exponent)

@@ -1,7 +1,6 @@
 """The letters of looking-back.md: a run of the package's linear filter, and its smoother by one regression on all of it."""
 
 import numpy as np
-from control import dare
 from gate.page import NOTATION
 from gate.values import Indexed, Of
 from gate.worlds import K_RANGE, column, covariance
@@ -72,31 +71,40 @@ def meeting(rng):
     return letters | information | {"A": A, "H": H, "Q": Q, "R": R, "y": _columns(y)}
 
 
-def walk(rng):
-    """A random walk far from both ends: the filter's limit by its Riccati equation, the smoother's by going back long enough."""
-    Q, R = rng.uniform(0.5, 2, size=2)
-    Psi = dare(np.eye(1), np.eye(1), [[Q]], [[R]])[0].item()
-    p = back = Psi * R / (Psi + R)
-    for _ in range(200):
-        back = p + (p / Psi) ** 2 * (back - Psi)
-    return {"Q": Q, "R": R, "p": p, r"\Psi": Psi, r"\bar p": back, "S": p / Psi}
+walk = r"""
+Q, R: pos
+\Psi = Q
+again:
+\Psi = Q+1/(1/\Psi+1/R)
+then:
+p = \Psi-Q
+S = p/\Psi
+\bar p = p
+again:
+\bar p = p+S^2(\bar p-\Psi)
+then:
+"""
 
 
-def slow_walk(rng):
-    Q, R = rng.uniform(0.5, 2) * 1e-3, rng.uniform(1, 2)
-    Psi = dare(np.eye(1), np.eye(1), [[Q]], [[R]])[0].item()
-    return {"Q": Q, "R": R, "p": Psi - Q, r"\Psi": Psi}
+slow_walk = r"""
+Q: in .0005 .002
+R: in 1 2
+\Psi = Q
+again:
+\Psi = Q+1/(1/\Psi+1/R)
+then:
+p = \Psi-Q
+"""
 
 
-def one_component(rng):
-    A, Q, p = rng.uniform(0.5, 2, size=3)
-    return {
-        "A": A,
-        "Q": Q,
-        "p": Indexed([p]),
-        r"\Psi": Indexed([p, np.var(A * np.sqrt(p) * np.array([1, -1])) + Q]),
-        "k": range(1),
-    }
+one_component = r"""
+A, Q, s: pos
+k: range 1
+p_k = s
+\Psi_k = s
+\Psi_{k+1} = (A\sqrt s)^2+Q
+keep: A, Q, p, \Psi, k
+"""
 
 
 LETTERS = (course, meeting, walk, slow_walk, one_component)

@@ -1,44 +1,41 @@
 """The letters of manoeuvres.md: three modes with a joint table of probabilities; a place as a radar measures it."""
 
-import numpy as np
 from gate.page import CONDITION, DEFINITION, NOTATION
-from gate.values import Indexed, Of
-from gate.worlds import column, covariance
-from scipy.stats import multivariate_normal
 
 from kfcourse.scenarios.radar import spherical
 
 M, N = 3, 2
 
 
-def modes(rng):
-    """One cycle of three modes: L by SciPy, moments of the mixture as M(x x^T) - m m^T."""
-    z, p = rng.normal(size=(M, N)), np.array([covariance(rng, N) for _ in range(M)])
-    h, F, y = rng.normal(size=(M, N)), np.array([covariance(rng, N) for _ in range(M)]), rng.normal(size=N)
-    L = np.array([multivariate_normal(one, cov).pdf(y) for one, cov in zip(h, F, strict=True)])
-    c = rng.dirichlet(np.ones(M))
-    joint = c * L
-    mu = joint / np.add.reduce(joint)
-    mean = np.average(z, axis=0, weights=mu)
-    square = np.average(p + np.einsum("ia,ib->iab", z, z), axis=0, weights=mu)
-    return {
-        "i": range(M), "j": range(M), "L": Indexed(L), "c": Indexed(c), r"\mu": Indexed(mu), "y_k": column(y),
-        "h^j": Of(lambda j: column(h[j]), "j"), "F^j": Of(lambda j: F[j], "j"),
-        "z^j": Of(lambda j: column(z[j]), "j"), "p^j": Of(lambda j: p[j], "j"),
-        "z": column(mean), "p": square - np.outer(mean, mean),
-    }  # fmt: skip
+modes = r"""
+i: range 3
+j: range 3
+z, h: list 3 any 2
+p, F: list 3 cov 2
+y_k: any 2
+c: share 3
+"z^j" of j = z_j
+"p^j" of j = p_j
+"h^j" of j = h_j
+"F^j" of j = F_j
+L_j = \mathcal N(y_k;h_j,F_j)
+w = \sum_jc_jL_j
+\mu_j = c_jL_j/w
+m = \sum_j\mu_jz_j
+p = \sum_j\mu_j(p_j+z_jz_j^T)-mm^T
+z = m
+keep: i, j, L, c, \mu, y_k, h^j, F^j, z^j, p^j, z, p
+"""
 
 
-def mixing(rng):
-    """The joint table of the modes of two steps."""
-    pi, mu = rng.dirichlet(np.ones(M), size=M), rng.dirichlet(np.ones(M))
-    table = np.diag(mu) @ pi
-    c = np.ones(M) @ table
-    backwards = table @ np.diag(1 / c)
-    return {
-        "i": range(M), "j": range(M), r"\pi": Indexed(pi.tolist()), r"\mu_{i\mid j}": Of(lambda i, j: backwards[i, j], "i", "j"),
-        r"\mu": Indexed(mu), "c": Indexed(c),
-    }  # fmt: skip
+mixing = r"""
+i: range 3
+j: range 3
+\pi: share 3 3
+\mu: share 3
+c_j = \sum_i\mu_i\pi_{ij}
+"\mu_{i\mid j}" of i, j = \mu_i\pi_{ij}/c_j
+"""
 
 
 def place(rng):
@@ -47,29 +44,45 @@ def place(rng):
     return dict(zip((r"r_x", r"r_y", r"r_z", "r", r"\varphi", r"\epsilon"), (*x, r, phi, epsilon), strict=True))
 
 
-def two_modes(rng):
-    """The joint table of two modes, counted from one."""
-    pi, mu = rng.dirichlet(np.ones(2), size=2), rng.dirichlet(np.ones(2))
-    table = np.diag(mu) @ pi
-    c = np.ones(2) @ table
-    one = {f"{name}_{i}": values[i - 1] for name, values in ((r"\mu", mu), ("c", c)) for i in (1, 2)}
-    backwards = {rf"\mu_{{1\mid{j}}}": table[0, j - 1] / c[j - 1] for j in (1, 2)}
-    return one | backwards | {rf"\pi_{{{i}{i}}}": pi[i - 1, i - 1] for i in (1, 2)}
+two_modes = r"""
+a, b, m: in .1 .9
+"\mu_1" = m
+"\mu_2" = 1-m
+"\pi_{11}" = a
+"\pi_{22}" = b
+"c_1" = ma+(1-m)(1-b)
+"c_2" = m(1-a)+(1-m)b
+"\mu_{1\mid1}" = ma/c_1
+"\mu_{1\mid2}" = m(1-a)/c_2
+forget: a, b, m
+"""
 
 
-def turned(rng, middle=False):
-    """A velocity turned by an acceleration across it: that of the step's beginning, or of its middle."""
-    v, J = column(rng.normal(size=2)), np.array([[0.0, -1], [1, 0]])
-    omega, T = rng.uniform(0.5, 1), rng.uniform(0.2, 0.3)
-    half = np.eye(2) - omega * T / 2 * J
-    after = np.linalg.solve(half, half.T @ v) if middle else v + omega * T * J @ v
-    sizes = {"|v|": np.hypot(*v.ravel()), "|v'|": np.hypot(*after.ravel())}
-    product = {r"(v'-v)\cdot(v'+v)": ((after - v).T @ (after + v)).item()}
-    return sizes | product | {"v": v, "v'": after, "J": J, r"\omega": omega, "T": T}
+turned = r"""
+v: any 2
+J = \begin{pmatrix}0&-1\\1&0\end{pmatrix}
+\omega: in .5 1
+T: in .2 .3
+v' = v+\omega TJv
+"|v|" = \sqrt{v^Tv}
+"|v'|" = \sqrt{v'^Tv'}
+"(v'-v)\cdot(v'+v)" = (v'-v)^T(v'+v)
+"""
 
 
-def turned_in_the_middle(rng):
-    return turned(rng, middle=True)
+turned_in_the_middle = r"""
+v: any 2
+J = \begin{pmatrix}0&-1\\1&0\end{pmatrix}
+I: eye 2
+\omega: in .5 1
+T: in .2 .3
+h = I-\omega TJ/2
+v' = h^{-1}h^Tv
+"|v|" = \sqrt{v^Tv}
+"|v'|" = \sqrt{v'^Tv'}
+"(v'-v)\cdot(v'+v)" = (v'-v)^T(v'+v)
+keep: v, v', J, \omega, T, |v|, |v'|, (v'-v)\cdot(v'+v)
+"""
 
 
 LETTERS = (modes, mixing, two_modes, place, turned, turned_in_the_middle)

@@ -2,62 +2,67 @@
 
 import numpy as np
 from gate.page import NOTATION
-from gate.values import Indexed, Of, Operator
-from gate.worlds import column, covariance
+from gate.values import Operator
 from scipy.stats import multivariate_normal
 
 M, N = 3, 2
 
 
-def correcting(rng):
-    """Probabilities by the joint density of mode and measurement, L by SciPy."""
-    h, F, y = rng.normal(size=(M, N)), np.array([covariance(rng, N) for _ in range(M)]), rng.normal(size=N)
-    z = rng.normal(size=(M, N))
-    L = np.array([multivariate_normal(one, cov).pdf(y) for one, cov in zip(h, F, strict=True)])
-    c = rng.dirichlet(np.ones(M))
-    joint = np.diag(c) @ L
-    mu = joint / np.add.reduce(joint)
-    return {
-        "i": range(M), "j": range(M), "L": Indexed(L), "c": Indexed(c), r"\mu": Indexed(mu), "y_k": column(y), "y": column(y),
-        "h": Indexed([column(one) for one in h]), "F": Indexed(F),
-        "h^j": Of(lambda j: column(h[j]), "j"), "F^j": Of(lambda j: F[j], "j"),
-        "z^j": Of(lambda j: column(z[j]), "j"), "z": column(np.average(z, axis=0, weights=mu)),
-    }  # fmt: skip
+correcting = r"""
+i: range 3
+j: range 3
+z, h: list 3 any 2
+F: list 3 cov 2
+y: any 2
+"y_k" = y
+c: share 3
+"z^j" of j = z_j
+"h^j" of j = h_j
+"F^j" of j = F_j
+L_j = \mathcal N(y;h_j,F_j)
+w = \sum_jc_jL_j
+\mu_j = c_jL_j/w
+z = \sum_j\mu_jz_j
+forget: w
+"""
 
 
-def predicting(rng):
-    """The joint table of the modes of two steps; each mode's prediction as M(x x^T) - m m^T."""
-    pi, mu = rng.dirichlet(np.ones(M), size=M), rng.dirichlet(np.ones(M))
-    tau, Theta = rng.normal(size=(M, M, N)), np.array([[covariance(rng, N) for _ in range(M)] for _ in range(M)])
-    table = np.diag(mu) @ pi
-    c = np.ones(M) @ table
-    w = table @ np.diag(1 / c)
-    mean = np.einsum("ij,ija->ja", w, tau)
-    square = np.einsum("ij,ijab->jab", w, Theta + np.einsum("ija,ijb->ijab", tau, tau))
-    return {
-        "i": range(M), "j": range(M), r"\pi": Indexed(pi.tolist()), r"\mu": Indexed(mu), "c": Indexed(c),
-        "w": Indexed(w.tolist()),
-        r"\tau^{ij}": Of(lambda i, j: column(tau[i, j]), "i", "j"), r"\Theta^{ij}": Of(lambda i, j: Theta[i, j], "i", "j"),
-        r"\lambda^j": Of(lambda j: column(mean[j]), "j"),
-        r"\Psi^j": Of(lambda j: square[j] - np.outer(mean[j], mean[j]), "j"),
-    }  # fmt: skip
+predicting = r"""
+i: range 3
+j: range 3
+\pi: share 3 3
+\mu: share 3
+T: list 9 any 2
+P: list 9 cov 2
+"\tau^{ij}" of i, j = T_{3i+j}
+"\Theta^{ij}" of i, j = P_{3i+j}
+c_j = \sum_i\mu_i\pi_{ij}
+w_{ij} = \mu_i\pi_{ij}/c_j
+m_j = \sum_iw_{ij}T_{3i+j}
+V_j = \sum_iw_{ij}(P_{3i+j}+T_{3i+j}T_{3i+j}^T)-m_jm_j^T
+"\lambda^j" of j = m_j
+"\Psi^j" of j = V_j
+forget: T, P, m, V
+"""
 
 
-def remembering(rng):
-    """Joint normal laws of x and zeta in each mode: M[x | zeta] by their precision, and the table of mode and zeta."""
-    mean, cov = rng.normal(size=(M, N + 1)), np.array([covariance(rng, N + 1) for _ in range(M)])  # x, and zeta of N
-    q, zeta = rng.dirichlet(np.ones(M)), rng.normal(size=N)
-    precision = np.linalg.inv(cov)
-    u = mean[:, 0] - np.einsum("ia,ia->i", precision[:, 0, 1:], zeta - mean[:, 1:]) / precision[:, 0, 0]
-    Gamma = [one[:1, 1:] @ np.linalg.inv(one[1:, 1:]) for one in cov]
-    L = np.array([multivariate_normal(m[1:], d[1:, 1:]).pdf(zeta) for m, d in zip(mean, cov, strict=True)])
-    joint = np.diag(q) @ L
-    return {
-        "i": range(M), "j": range(M), "q": Indexed(q), "L": Indexed(L), r"\xi": Indexed(joint / np.add.reduce(joint)),
-        r"\zeta": column(zeta),
-        "u^i": Of(lambda i: u[i], "i"), r"\Gamma^i": Of(lambda i: Gamma[i], "i"),
-        r"\chi^i": Of(lambda i: mean[i, :1] - Gamma[i] @ mean[i, 1:], "i"),
-    }  # fmt: skip
+remembering = r"""
+i: range 3
+j: range 3
+m: list 3 any 3
+D: list 3 cov 3
+q: share 3
+\zeta: any 2
+E = \begin{pmatrix}1&0&0\end{pmatrix}
+B = \begin{pmatrix}0&1&0\\0&0&1\end{pmatrix}
+"\Gamma^i" of i = ED_iB^T(BD_iB^T)^{-1}
+"u^i" of i = Em_i+ED_iB^T(BD_iB^T)^{-1}(\zeta-Bm_i)
+"\chi^i" of i = Em_i-ED_iB^T(BD_iB^T)^{-1}Bm_i
+L_i = \mathcal N(\zeta;Bm_i,BD_iB^T)
+w = \sum_iq_iL_i
+\xi_i = q_iL_i/w
+forget: m, D, E, B, w
+"""
 
 
 def nearest(rng):
@@ -74,11 +79,15 @@ def nearest(rng):
     }
 
 
-def failed(rng):
-    """What one innovation adds to the odds of a failed sensor."""
-    F, nu = rng.uniform(0.5, 2, size=2), rng.normal()
-    sound, failed = (multivariate_normal(0, one).logpdf(nu) for one in F)
-    return {"F": Indexed(F), r"\nu": nu, r"\ell": failed - sound, r"\varrho": F[1] / F[0]}
+failed = r"""
+\nu: num
+a, b: pos
+j: range 2
+F_j = a+(b-a)j
+\ell = \ln\mathcal N(\nu;0,F_1)-\ln\mathcal N(\nu;0,F_0)
+\varrho = b/a
+keep: F, \nu, \ell, \varrho
+"""
 
 
 LETTERS = (correcting, predicting, remembering, nearest, failed)

@@ -1,16 +1,14 @@
 """The letters of particles.md: the share of particles that counts after one measurement; names are checked beside them."""
 
-import numpy as np
 from gate.page import NOTATION
 
-
-def weighted(rng):
-    """Means of the weight and of its square over the prior, on a fine grid."""
-    r, y = rng.uniform(0.2, 1), rng.normal()
-    x = np.linspace(-12, 12, 20_001)
-    prior, weight = np.exp(-(x**2) / 2), np.exp(-((y - x) ** 2) / (2 * r))
-    share = (prior @ weight) ** 2 / (prior @ weight**2) / prior.sum()
-    return {r"\lim_{N\to\infty}\frac{N_e}N": share, "r": r, "y": y}
+weighted = r"""
+r: in .2 1
+y: num
+w(x) = e^{-(y-x)^2/(2r)}
+"\lim_{N\to\infty}\frac{N_e}N" = (\int\mathcal N(x;0,1)w(x)dx)^2/\int\mathcal N(x;0,1)w(x)^2dx
+keep: \lim_{N\to\infty}\frac{N_e}N, r, y
+"""
 
 
 LETTERS = (weighted,)

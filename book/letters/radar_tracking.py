@@ -25,13 +25,23 @@ def axis(rng, alpha=ALPHA):
     return {"T": T, "A": A, "B": B, "H": H, "Q": Q, r"\sigma_a": sigma_a, r"\sigma": SIGMA}
 
 
-def model(rng):
-    found = axis(rng)
-    x, v, w = [rng.normal(size=(2, 1))], rng.normal(size=6), rng.normal(size=6)
-    for k in range(5):
-        x.append(found["A"] @ x[-1] + found["B"] * v[k])
-    y = [(found["H"] @ x[k]).item() + w[k] for k in range(6)]
-    return found | {"x": Indexed(x), "v": Indexed(v), "w": Indexed(w), "y": Indexed(y), "k": range(4)}
+model = r"""
+T: in .5 1
+\sigma = 3
+\sigma_a: pos
+A = \begin{pmatrix}1&T\\0&1\end{pmatrix}
+B = \begin{pmatrix}T^2/2\\T\end{pmatrix}
+H = \begin{pmatrix}1&0\end{pmatrix}
+Q = \sigma_a^2BB^T
+k: range 5
+v, w: nums 6
+b: any 2
+x_0 = b
+x_{k+1} = Ax_k+Bv_k
+y_k = Hx_k+w_k
+k: range 4
+keep: T, A, B, H, Q, \sigma_a, \sigma, x, v, w, y, k
+"""
 
 
 def flight(rng):
@@ -98,15 +108,19 @@ def step(rng):
     }  # fmt: skip
 
 
-def noise_alone(rng):
-    """Steady variances of a filter with fixed gains: what each single error of a measurement leaves, squared and added up."""
-    alpha, beta, sigma = *rng.uniform(0.3, 0.6, 2), rng.uniform(1, 2)
-    r, s, left = alpha, beta, []
-    for _ in range(300):
-        left.append((r, s))
-        r, s = (1 - alpha) * (r + s), s - beta * (r + s)
-    spread = sigma**2 * (np.array(left) ** 2).sum(axis=0)
-    return {r"\alpha": alpha, r"\beta": beta, r"\sigma": sigma, r"\mathsf De^r": spread[0], r"\mathsf De^s": spread[1]}
+noise_alone = r"""
+\alpha, \beta: in .3 .6
+\sigma: in 1 2
+M = \begin{pmatrix}1-\alpha&1-\alpha\\-\beta&1-\beta\end{pmatrix}
+G = \begin{pmatrix}\alpha\\\beta\end{pmatrix}
+P = GG^T
+again:
+P = MPM^T+\sigma^2GG^T
+then:
+\mathsf De^r = \begin{pmatrix}1&0\end{pmatrix}P\begin{pmatrix}1\\0\end{pmatrix}
+\mathsf De^s = \begin{pmatrix}0&1\end{pmatrix}P\begin{pmatrix}0\\1\end{pmatrix}
+keep: \alpha, \beta, \sigma, \mathsf De^r, \mathsf De^s
+"""
 
 
 def small_gains(rng):
@@ -124,18 +138,20 @@ def limit_at_once(rng):
     return own | answer | {r"\Psi": Psi, "K": K, "q": own[r"\sigma_a"] ** 2}
 
 
-def errors(rng):
-    """Errors of a filter with fixed gains that follows a straight line, in place and in T times speed."""
-    alpha, beta, n = *rng.uniform(0.3, 0.6, 2), rng.normal(size=5)
-    r, s, true = 0.0, 0.0, (rng.normal(), rng.normal())
-    rows = [(-true[0], -true[1])]
-    for k in range(1, 5):
-        place = true[0] + k * true[1]
-        ahead = r + s
-        r, s = ahead + alpha * (place + n[k] - ahead), s + beta * (place + n[k] - ahead)
-        rows.append((r - place, s - true[1]))
-    at_k = {f"e^{name}": Indexed([row[i] for row in rows]) for i, name in enumerate("rs")}
-    return at_k | {r"\alpha": alpha, r"\beta": beta, "n": Indexed(n), "k": range(1, 5)}
+errors = r"""
+\alpha, \beta: in .3 .6
+a, b: num
+n: nums 6
+k: range 5
+r_0 = 0
+s_0 = 0
+r_{k+1} = r_k+s_k+\alpha(a+(k+1)b+n_{k+1}-r_k-s_k)
+s_{k+1} = s_k+\beta(a+(k+1)b+n_{k+1}-r_k-s_k)
+e^r_k = r_k-a-kb
+e^s_k = s_k-b
+k: range 1 5
+keep: e^r, e^s, \alpha, \beta, n, k
+"""
 
 
 LETTERS = (model, flight, limit, growing, start, step, noise_alone, small_gains, limit_at_once, errors)

@@ -3,7 +3,6 @@
 import numpy as np
 from gate.values import Indexed, Of, Operator, Unread
 from gate.worlds import column, covariance, slope
-from scipy.optimize import brentq
 from scipy.stats import multivariate_normal
 
 
@@ -92,29 +91,31 @@ def one_component(rng):
     }
 
 
-def contraction(rng):
-    """One component: the slope of a round at its end, by a difference in the complex plane."""
-    lam, Psi, y, D_n = rng.normal(), rng.uniform(0.5, 1), rng.normal(), rng.uniform(0.5, 1)
-    S, S1, S2 = lambda x: 2 * x + 0.2 * x**2, lambda x: 2 + 0.4 * x, 0.4
+contraction = r"""
+\lambda, y: num
+\Psi, D_n: in .5 1
+S'' = 0.4
+s(x) = 2x+0.2x^2
+t(x) = 2+0.4x
+g(x) = \Psi t(x)/(t(x)^2\Psi+D_n)
+r(x) = \lambda+g(x)(y-s(x)-t(x)(\lambda-x))
+x_* = \lambda
+again:
+x_* = r(x_*)
+then:
+h = 0.001
+\varrho = (8(r(x_*+h)-r(x_*-h))-(r(x_*+2h)-r(x_*-2h)))/(12h)
+K = g(x_*)
+S' = t(x_*)
+keep: \varrho, K, S', S'', x_*, \lambda
+"""
 
-    def gain(x):
-        return Psi * S1(x) / (S1(x) ** 2 * Psi + D_n)
 
-    def one_round(x):
-        return lam + gain(x) * (y - S(x) - S1(x) * (lam - x))
-
-    end = lam
-    for _ in range(500):
-        end = one_round(end)
-    slope_there = one_round(end + 1e-20j).imag / 1e-20
-    return {r"\varrho": slope_there, "K": gain(end), "S'": S1(end), "S''": S2, "x_*": end, r"\lambda": lam}
-
-
-def fourth_moment(rng):
-    """The weight of the centre for which the square of a component has the variance 2, and how long the points are then."""
-    n = 3
-    kappa = brentq(lambda kappa: (n + kappa) ** 2 * 2 / (2 * (n + kappa)) - 1 - 2, -1, 2, xtol=1e-15)
-    return {"n": n, r"\kappa": kappa, "|x|": np.sqrt(n + kappa)}
+fourth_moment = r"""
+n = 3
+\kappa = 2\cdot3/2-n      # (n + kappa)^2 2 w - 1 = 2, with the weight w = 1 / (2 (n + kappa))
+"|x|" = \sqrt{n+\kappa}
+"""
 
 
 LETTERS = (iterated, settled, points, posterior, one_component, contraction, fourth_moment)

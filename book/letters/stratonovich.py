@@ -6,38 +6,32 @@ from gate.values import Indexed, Of, Operator, bell
 from gate.worlds import chain_run
 from scipy.optimize import minimize_scalar
 
-
-def densities(rng):
-    """One step of a linear model: the posterior by Kalman's formulas, the law of y by its variance."""
-    a, Q, H, R, z, p, y = 0.8, 0.5, 1.3, 0.4, *rng.normal(size=1), 0.6, *rng.normal(size=1)
-    ahead, spread = a * z, a**2 * p + Q
-    F = H**2 * spread + R
-    K = spread * H / F
-
-    def posterior(x):
-        return bell(x, ahead + K * (y - H * ahead), spread - K * H * spread)
-
-    def start(x):
-        return bell(x, z, p)
-
-    F_0 = H**2 * p + R
-    return {
-        "x_k": rng.normal(),
-        "x_{k-1}": rng.normal(),
-        "x_0": rng.normal(),
-        "C_k": 1 / bell(y, H * ahead, F),
-        "C_0": 1 / bell(y, H * z, F_0),
-        r"p(x_k\mid x_{k-1})": Of(lambda to, at: bell(to, a * at, Q), "x_k", "x_{k-1}"),
-        r"p(x_k\mid x_{k-1},y_{0:k-1})": Of(lambda to, at: bell(to, a * at, Q), "x_k", "x_{k-1}"),
-        r"p(x_{k-1}\mid y_{0:k-1})": Of(start, "x_{k-1}"),
-        r"p(x_k\mid y_{0:k-1})": Of(lambda x: bell(x, ahead, spread), "x_k"),
-        r"p(y_k\mid x_k)": Of(lambda x: bell(y, H * x, R), "x_k"),
-        r"p(x_k\mid y_{0:k})": Of(posterior, "x_k"),
-        r"p(y_k\mid y_{0:k-1})": bell(y, H * ahead, F),
-        "p(x_0)": Of(start, "x_0"),
-        r"p(y_0\mid x_0)": Of(lambda x: bell(y, H * x, R), "x_0"),
-        r"p(x_0\mid y_0)": Of(lambda x: bell(x, z + p * H / F_0 * (y - H * z), p * R / F_0), "x_0"),
-    }
+densities = r"""
+a = 0.8
+Q = 0.5
+H = 1.3
+R = 0.4
+p = 0.6
+z, y, x_k, x_{k-1}, x_0: num
+m = az
+\Psi = a^2p+Q
+F = H^2\Psi+R
+K = \Psi H/F
+G = H^2p+R
+"C_k" = 1/\mathcal N(y;Hm,F)
+"C_0" = 1/\mathcal N(y;Hz,G)
+"p(x_k\mid x_{k-1})" of x_k, x_{k-1} = \mathcal N(x_k;ax_{k-1},Q)
+"p(x_k\mid x_{k-1},y_{0:k-1})" of x_k, x_{k-1} = \mathcal N(x_k;ax_{k-1},Q)
+"p(x_{k-1}\mid y_{0:k-1})" of x_{k-1} = \mathcal N(x_{k-1};z,p)
+"p(x_k\mid y_{0:k-1})" of x_k = \mathcal N(x_k;m,\Psi)
+"p(y_k\mid x_k)" of x_k = \mathcal N(y;Hx_k,R)
+"p(x_k\mid y_{0:k})" of x_k = \mathcal N(x_k;m+K(y-Hm),\Psi-KH\Psi)
+"p(y_k\mid y_{0:k-1})" = \mathcal N(y;Hm,F)
+"p(x_0)" of x_0 = \mathcal N(x_0;z,p)
+"p(y_0\mid x_0)" of x_0 = \mathcal N(y;Hx_0,R)
+"p(x_0\mid y_0)" of x_0 = \mathcal N(x_0;z+pH(y-Hz)/G,pR/G)
+forget: a, Q, H, R, p, z, y, m, \Psi, F, K, G
+"""
 
 
 def joint(rng):
@@ -105,10 +99,10 @@ def splitting(rng):
     return means | {"p": Indexed([square - z**2]), "z": Indexed([z], z), r"\Psi": Indexed([before]), "k": range(1)}
 
 
-def shadow(rng):
-    """The variance of a state that is 1 with the probability q."""
-    q = rng.uniform(0.2, 0.8)
-    return {"q": q, r"\Psi": np.average((np.array([0, 1]) - q) ** 2, weights=[1 - q, q])}
+shadow = r"""
+q: in .2 .8
+\Psi = q(1-q)^2+(1-q)q^2
+"""
 
 
 LETTERS = (densities, joint, chain, odds, splitting, shadow)

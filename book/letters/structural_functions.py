@@ -2,8 +2,8 @@
 
 import numpy as np
 from gate.page import DEFINITION, NOTATION
-from gate.values import Indexed, Operator
-from gate.worlds import normal_nodes
+from gate.values import Operator
+from gate.worlds import normal_nodes, world
 
 from kfcourse import Model, gaussian, linearised
 
@@ -32,32 +32,45 @@ def by_tangents(rng):
     return of_package(linearised(MODEL), z, p) | slopes | {"a": a, "z": z, "m_v": 0.0, "p": p, "D_v": 1.0}
 
 
-def over_noise(rng):
-    """Means over the noise at one x; the noise is standard."""
-    x = rng.normal()
-    noise, mean = normal_nodes(0, 1)
-    functions = {
-        r"\alpha": lambda x: 0.9 * x + 0.2 * x**2,
-        r"\gamma": lambda x: (0.9 * x + 0.2 * x**2) ** 2 + (0.5 * x + 0.1) ** 2,
-        r"\beta": lambda x: 1.2 * x,
-        r"\eta": lambda x: 1.44 * x**2 + (0.4 * x**2 + 0.3) ** 2,
-    }
-    return functions | {"x": x, "V": noise, "W": noise, "a": a, "b": b, r"\mathsf M": Operator(mean)}
+over_noise = r"""
+x: num
+V: nodes 0 1
+W = V
+a(x, v) = 0.9x+0.2x^2+0.5xv+0.1v
+b(x, w) = 1.2x+0.4x^2w+0.3w
+\alpha(x) = 0.9x+0.2x^2
+\gamma(x) = (0.9x+0.2x^2)^2+(0.5x+0.1)^2
+\beta(x) = 1.2x
+\eta(x) = 1.44x^2+(0.4x^2+0.3)^2
+keep: x, V, W, a, b, \mathsf M, \alpha, \beta, \gamma, \eta
+"""
 
 
-def in_short(rng):
-    """The same without arguments."""
-    own = over_noise(rng)
-    x, noise = own["x"], own["V"]
-    values = {name: own[name](x) for name in (r"\alpha", r"\beta", r"\gamma", r"\eta")}
-    return values | {"a": a(x, noise), "b": b(x, noise), r"\mathsf M": own[r"\mathsf M"]}
+in_short = r"""
+x: num
+V: nodes 0 1
+W = V
+a(x, v) = 0.9x+0.2x^2+0.5xv+0.1v
+b(x, w) = 1.2x+0.4x^2w+0.3w
+\alpha(x) = 0.9x+0.2x^2
+\gamma(x) = (0.9x+0.2x^2)^2+(0.5x+0.1)^2
+\beta(x) = 1.2x
+\eta(x) = 1.44x^2+(0.4x^2+0.3)^2
+\alpha = \alpha(x)
+\beta = \beta(x)
+\gamma = \gamma(x)
+\eta = \eta(x)
+a = a(x, V)
+b = b(x, V)
+keep: a, b, \mathsf M, \alpha, \beta, \gamma, \eta
+"""
 
 
 def over_state(rng):
     """Means over the state, and the package's exact structure; G by a difference of means."""
     m, d = rng.uniform(0.2, 0.9, size=2)
     x, mean = normal_nodes(m, d)
-    functions = over_noise(rng)
+    functions = world(over_noise)(rng)
     values = {name: functions[name](x) for name in (r"\alpha", r"\beta", r"\gamma", r"\eta")}
     G = mean(values[r"\beta"] * (x - m)) / d
     western = {"C": mean(values[r"\beta"] * (x - m)), "d": d}
@@ -65,10 +78,14 @@ def over_state(rng):
     return of_package(gaussian(MODEL), m, d) | values | slope | western | {r"\mathsf M": Operator(mean)}
 
 
-def moments(rng):
-    m, d = rng.uniform(0.2, 0.9, size=2)
-    x, mean = normal_nodes(m, d)
-    return {"q": Indexed([mean(x**n) for n in range(8)]), "n": range(1, 6), "m": m, "d": d}
+moments = r"""
+m, d: in .2 .9
+x: nodes m d
+n: range 8
+q_n = \mathsf Mx^n
+n: range 1 6
+keep: q, n, m, d
+"""
 
 
 def variant(rng):

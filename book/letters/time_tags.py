@@ -1,6 +1,5 @@
 """The letters of time-tags.md: a foreign clock, and the package's prediction over an interval."""
 
-import numpy as np
 from gate.page import DEFINITION
 from gate.worlds import column, covariance
 
@@ -25,28 +24,28 @@ def prediction(rng):
     }  # fmt: skip
 
 
-def late(rng):
-    """At the time 0: what a motion with a constant jerk was a moment tau before, beside what it is."""
-    s, V, a, j, tau, b = rng.normal(size=6)
-    was = np.polynomial.Polynomial([s, V, a / 2, j / 6])
-    return {
-        "s": s, "V": V, "b": b, "V_0": V, "a_0": a, "j": j, r"\tau": tau, r"\hat s": was(-tau), r"\hat V": was.deriv()(-tau),
-        r"\hat b": a + b - was.deriv(2)(-tau),
-    }  # fmt: skip
+late = r"""
+s, V, a, j, \tau, b: num
+p(t) = s+Vt+at^2/2+jt^3/6
+\hat s = p(-\tau)
+\hat V = V-a\tau+j\tau^2/2
+\hat b = a+b-(a-j\tau)
+V_0 = V
+a_0 = a
+keep: s, V, b, V_0, a_0, j, \tau, \hat s, \hat V, \hat b
+"""
 
 
-def one_step_late(rng):
-    """A measurement of the last state: its best gain by least squares over the three errors."""
-    p, Q, R, K = rng.uniform(0.5, 2, 4)
-    unit = np.sqrt(np.array([[p, 0], [Q, 0], [0, R]]))  # of x_{k-1} - z, v, w: what the state holds, what is noise alone
-    state, seen = unit[:, 0], np.array([unit[0, 0], 0, unit[2, 1]])
-    return {"p": p, "Q": Q, "R": R, "K": K, "K_*": np.linalg.lstsq(seen[:, None], state, rcond=None)[0].item()}
+one_step_late = r"""
+p, Q, R, K: pos
+K_* = p/(p+R)
+"""
 
 
-def late_gain(rng):
-    """The gain of one who takes the measurement for one of this moment."""
-    p, Q, R = rng.uniform(0.5, 2, size=3)
-    return {"p": p, "Q": Q, "R": R, "K": 1 - R * np.linalg.inv([[p + Q + R]]).item()}
+late_gain = r"""
+p, Q, R: pos
+K = 1-R/(p+Q+R)
+"""
 
 
 LETTERS = (clock, prediction, late, one_step_late, late_gain)

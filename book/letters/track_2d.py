@@ -41,26 +41,30 @@ def sample_lost(rng):
     return {"z": z[2], "p": p[2], r"\lambda": lam[2], r"\Psi": Psi[2]}
 
 
-def axes(rng):
-    """The meter's covariance, and the input written twice."""
-    system, a = _run(rng)[0], rng.normal(size=2)
-    doubled = np.diag([DELTA**2 / 2] * 2 + [DELTA] * 2)
-    return {
-        "R": system.R, r"\sigma": SIGMA, "I": np.eye(2), "B": system.B, "G": doubled, r"\Delta": DELTA, "a_x": a[0], "a_y": a[1],
-        r"(a_x,a_y)^T": column(a), r"(a_x,a_y,a_x,a_y)^T": column([*a, *a]),
-    }  # fmt: skip
+axes = r"""
+\Delta = 0.3
+\sigma = 1.3
+I: eye 2
+R = \sigma^2I
+B = \begin{pmatrix}\Delta^2/2&0\\0&\Delta^2/2\\\Delta&0\\0&\Delta\end{pmatrix}
+G = \begin{pmatrix}\Delta^2/2&0&0&0\\0&\Delta^2/2&0&0\\0&0&\Delta&0\\0&0&0&\Delta\end{pmatrix}
+a_x, a_y: num
+"(a_x,a_y)^T" = \begin{pmatrix}a_x\\a_y\end{pmatrix}
+"(a_x,a_y,a_x,a_y)^T" = \begin{pmatrix}a_x\\a_y\\a_x\\a_y\end{pmatrix}
+"""
 
 
-def telescope(rng):
-    """What the prediction by second differences is off the mean of the last two measurements."""
-    y = rng.normal(size=9)
-    r, v = y[2], (3 * y[2] - 4 * y[1] + y[0]) / 2
-    off = {}
-    for k in range(2, 8):
-        u = y[k] - 2 * y[k - 1] + y[k - 2]
-        r, v = r + v + u / 2, v + u
-        off[k] = r - (y[k] + y[k - 1]) / 2
-    return {"y": Indexed(y), r"\delta": Indexed([0, 0, *off.values()]), "k": range(2, 7)}
+telescope = r"""
+y: nums 9
+k: range 2 8
+r_2 = y_2
+v_2 = (3y_2-4y_1+y_0)/2
+r_{k+1} = r_k+v_k+(y_k-2y_{k-1}+y_{k-2})/2
+v_{k+1} = v_k+y_k-2y_{k-1}+y_{k-2}
+\delta_k = r_{k+1}-(y_k+y_{k-1})/2
+k: range 2 7
+keep: y, \delta, k
+"""
 
 
 LETTERS = (filtered, sample_lost, axes, telescope)

@@ -2,8 +2,7 @@
 
 import numpy as np
 from gate.page import NOTATION, STATED
-from gate.values import Indexed, bell
-from gate.worlds import normal_nodes
+from gate.values import Indexed
 from scipy.stats import multivariate_normal
 
 from kfcourse.filters import kalman_filter
@@ -40,17 +39,21 @@ def wandering(rng):
     }
 
 
-def whittle(rng):
-    """The information of N differences about their spectrum, by its definition."""
-    q, r, count = *rng.uniform(0.5, 2, 2), 7
-    wave = 2 * (1 - np.cos(2 * np.pi * np.arange(4096) / 4096))
-    slopes = np.array([np.ones_like(wave), wave]) / (q + r * wave)  # of ln S, by q and r
-    (qq, qr), (_, rr) = count / 2 * slopes @ slopes.T / len(wave)
-    at, lags = rng.uniform(1, 2), np.array([-1, 0, 1])  # of the differences, whose covariances are -r, q + 2r, -r
-    S = {"S": lambda omega: np.sum([-r, q + 2 * r, -r] * np.cos(lags * omega)), r"\omega": at}
-    of_S = {rf"\partial\ln S/\partial {one}": slope / S["S"](at) for one, slope in (("q", 1), ("r", 2 - 2 * np.cos(at)))}
-    of_S[r"\bar s_r"] = slopes[1].mean()
-    return S | of_S | {"I_{qq}": qq, "I_{qr}": qr, "I_{rr}": rr, "N": count, "q": q, "r": r, "a": q**2 + 4 * q * r}
+whittle = r"""
+q, r: pos
+N = 7
+\omega: in 1 2
+w(x) = 2(1-\cos(x))
+S(x) = q+rw(x)          # of the differences, whose covariances are -r, q + 2r, -r
+I_{qq} = N\int_0^{2\pi}1/S(x)^2dx/(4\pi)
+I_{qr} = N\int_0^{2\pi}w(x)/S(x)^2dx/(4\pi)
+I_{rr} = N\int_0^{2\pi}w(x)^2/S(x)^2dx/(4\pi)
+\bar s_r = \int_0^{2\pi}w(x)/S(x)dx/(2\pi)
+"\partial\ln S/\partial q" = 1/S(\omega)
+"\partial\ln S/\partial r" = w(\omega)/S(\omega)
+a = q^2+4qr
+forget: w
+"""
 
 
 def rounds(rng, r_of_m=0.5):
@@ -77,16 +80,16 @@ def edge_rounds(rng):
     return rounds(rng, 1)
 
 
-def seen_states(rng):
-    """The information about q by the mean square of the score, of N states and of N measurements."""
-    q, r, count = *rng.uniform(0.5, 2, size=2), 9
-
-    def information(variance):
-        x, mean = normal_nodes(0, variance)
-        score = np.log(bell(x, 0, variance + 1e-20j)).imag / 1e-20
-        return count * mean(score**2)
-
-    return {"q": q, "r": r, "N": count, r"I_\text{states}": information(q), r"I_\text{record}": information(q + r)}
+seen_states = r"""
+q, r: pos
+N = 9
+x: nodes 0 q
+I_\text{states} = N\mathsf M(x^2/q^2-1/q)^2/4
+s = q+r
+x: nodes 0 s
+I_\text{record} = N\mathsf M(x^2/s^2-1/s)^2/4
+keep: q, r, N, I_\text{states}, I_\text{record}
+"""
 
 
 LETTERS = (wandering, whittle, rounds, quiet_rounds, edge_rounds, seen_states)

@@ -1,48 +1,61 @@
 """The letters of when-linearisation-fails.md: a signal that is a parabola, its moments by quadrature."""
 
-import numpy as np
 from gate.page import CONDITION, NOTATION
-from gate.worlds import normal_nodes
+from gate.worlds import world
+
+course = r"""
+\lambda: num
+\Psi, S'': in .2 .5
+D_n: in .3 .6
+a: in 1 2
+S' = -a
+x: nodes \lambda \Psi
+u(x) = 1+S'(x-\lambda)+S''(x-\lambda)^2/2
+H = S'^2\Psi+D_n
+K = \Psi S'/H
+p = \Psi D_n/H
+\kappa = \sqrt{4(\mathsf M(x-\lambda-K(u(x)-1))^2/p+K^2D_n/p-1)/3}
+q = \mathsf Du(x)
+S = 1
+h = \mathsf Mu(x)
+F = q+D_n
+G = \mathsf M(x-\lambda)u(x)/\Psi
+c = \sqrt{2(q-S'^2\Psi)/D_n}
+s = \sqrt{S'^2\Psi/D_n}
+\nu = c/s
+keep: S', S'', S, h, F, G, \Psi, D_n, s, c, \nu, \kappa
+"""
 
 
-def course(rng):
-    """A bent signal; kappa from the error that the linearised correction really has."""
-    lam, Psi, D_n = rng.normal(), rng.uniform(0.2, 0.5), rng.uniform(0.3, 0.6)
-    first, second = -rng.uniform(1, 2), rng.uniform(0.2, 0.5)
-    x, mean = normal_nodes(lam, Psi)
-
-    def S(at):
-        return 1 + first * (at - lam) + second * (at - lam) ** 2 / 2
-
-    F = first**2 * Psi + D_n
-    K, p = Psi * first / F, Psi * D_n / F
-    excess = (mean((x - lam - K * (S(x) - S(lam))) ** 2) + K**2 * D_n) / p - 1
-    exact = mean(S(x) ** 2) - mean(S(x)) ** 2
-    c = np.sqrt(2 * (exact - first**2 * Psi) / D_n)
-    s = np.sqrt((F - D_n) / D_n)
-    derivatives = {"S'": first, "S''": second, "S": S(lam), "h": mean(S(x)), "F": exact + D_n, "G": mean((x - lam) * S(x)) / Psi}
-    return derivatives | {
-        r"\Psi": Psi,
-        "D_n": D_n,
-        "s": s,
-        "c": c,
-        r"\nu": np.sqrt(c**2 / s**2),
-        r"\kappa": np.sqrt(4 * excess / 3),
-    }
-
-
-def display(rng):
-    """Near the prediction the parabola in t."""
-    own = course(rng)
-    t = 10.0
-    first, second, Psi = abs(own["S'"]), own["S''"], own[r"\Psi"]
-    bend = 0.001 * np.sqrt(Psi) ** 3 * t**3  # what the series leaves out
-    ahead = first * np.sqrt(Psi) * t + second * Psi * t**2 / 2 + bend
-    return own | {"S(x)": own["S"] + ahead, r"S(\lambda)": own["S"], "t": t}
+display = r"""
+\lambda: num
+\Psi, S'': in .2 .5
+D_n: in .3 .6
+a: in 1 2
+S' = -a
+x: nodes \lambda \Psi
+u(x) = 1+S'(x-\lambda)+S''(x-\lambda)^2/2
+H = S'^2\Psi+D_n
+K = \Psi S'/H
+p = \Psi D_n/H
+\kappa = \sqrt{4(\mathsf M(x-\lambda-K(u(x)-1))^2/p+K^2D_n/p-1)/3}
+q = \mathsf Du(x)
+S = 1
+h = \mathsf Mu(x)
+F = q+D_n
+G = \mathsf M(x-\lambda)u(x)/\Psi
+c = \sqrt{2(q-S'^2\Psi)/D_n}
+s = \sqrt{S'^2\Psi/D_n}
+\nu = c/s
+t = 10
+"S(x)" = S+a\sqrt\Psi t+S''\Psi t^2/2+0.001(\sqrt\Psi t)^3     # what the series leaves out
+"S(\lambda)" = S
+keep: S', S'', S, h, F, G, \Psi, D_n, s, c, \nu, \kappa, t, S(x), S(\lambda)
+"""
 
 
 def western(rng):
-    own = course(rng)
+    own = world(course)(rng)
     names = {r"\Psi": "P^-", "D_n": "R", "S'": "h'", "S''": "h''"}
     return {names.get(name, name): value for name, value in own.items()}
 
@@ -57,22 +70,24 @@ def again(rng):
     return {r"\kappa": kappa, "n": n, r"\frac{\mathsf Me_n^2}{p_n}": square / claimed}
 
 
-def perfect(rng, nu=1.3):
-    """A parabola without noise: moments by quadrature, and the measurement in the scale of the tangent."""
-    lam, Psi, slope = rng.normal(), rng.uniform(0.5, 2), rng.uniform(1, 2)
-    bend = nu * slope / np.sqrt(Psi)
-    x, mean = normal_nodes(lam, Psi)
+perfect = r"""
+\nu = 1.3
+\lambda: num
+\Psi: pos
+S': in 1 2
+t: in .5 1
+S'' = \nu S'/\sqrt\Psi
+x: nodes \lambda \Psi
+u(x) = S'(x-\lambda)+S''(x-\lambda)^2/2
+h = \mathsf Mu(x)
+F = \mathsf Du(x)
+G = \mathsf M(x-\lambda)u(x)/\Psi
+s = (u(\lambda+t\sqrt\Psi)-h)/(S'\sqrt\Psi)
+keep: \Psi, S', S'', \nu, F, G, t, s
+"""
 
-    def S(x):
-        return slope * (x - lam) + bend * (x - lam) ** 2 / 2
 
-    h, t = mean(S(x)), rng.uniform(0.5, 1)
-    law = {r"\Psi": Psi, "S'": slope, "S''": bend, r"\nu": nu, "F": mean((S(x) - h) ** 2), "G": mean((x - lam) * S(x)) / Psi}
-    return law | {"t": t, "s": (S(lam + t * np.sqrt(Psi)) - h) / slope / np.sqrt(Psi)}
-
-
-def nearly_straight(rng):
-    return perfect(rng, 0.1)
+nearly_straight = perfect.replace("1.3", "0.1")
 
 
 LETTERS = (course, display, western, again, perfect, nearly_straight)

@@ -1,35 +1,31 @@
 """The letters of wiener.md: spectra as sums over correlations, a limit by python-control, least squares for the amplitude."""
 
 import numpy as np
-from control import dare
 from gate.page import DEFINITION, NOTATION
-from gate.values import Indexed
+from gate.worlds import world
 from scipy.linalg import solve_continuous_are
-from scipy.stats import norm
 
-from kfcourse.filters.kalman import correct
-from kfcourse.laws import Gaussian
-from kfcourse.linear.system import LinearSystem
-
-
-def signal(rng):
-    """x' = a x + v in white noise; its spectrum at a real zeta, where the sum of the correlations converges, too."""
-    a, Q, R, zeta = rng.uniform(0.5, 0.8), rng.uniform(1, 2), rng.uniform(1, 2), 1.1
-    spectrum = sum(Q * a ** abs(k) / (1 - a**2) * zeta ** (-k) for k in range(-300, 301))
-    Psi = dare(*(np.array([[one]]) for one in (a, 1, Q, R)))[0].item()
-    K = Psi / (Psi + R)
-    z, y = rng.normal(size=2)
-    after = a * z + K * (y - a * z)
-    return {
-        "a": a, "Q": Q, "R": R, r"\zeta": zeta, r"S_x(\zeta)": spectrum, r"S_y(\zeta)": spectrum + R, "K": K,
-        r"\gamma": a * (1 - K),
-        "z": z, "y_k": y, r"z\leftarrow": after,
-    }  # fmt: skip
+signal = r"""
+a: in .5 .8
+Q, R: in 1 2
+\zeta = 1.1               # where the sum of the correlations converges, too
+"S_x(\zeta)" = Q/(1-a^2)(1+\sum_{i=1}^{400}a^i(\zeta^i+\zeta^{-i}))
+"S_y(\zeta)" = S_x(\zeta)+R
+\Psi = Q
+again:
+\Psi = Q+a^2/(1/\Psi+1/R)
+then:
+K = \Psi/(\Psi+R)
+\gamma = a(1-K)
+z, y_k: num
+z\leftarrow = az+K(y_k-az)
+keep: a, Q, R, \zeta, S_x(\zeta), S_y(\zeta), K, \gamma, z, y_k, z\leftarrow
+"""
 
 
 def waiting(rng, m=3):
     """The best linear estimate of a state from a long record that ends m steps later, and from one that ends with it."""
-    found = signal(rng)
+    found = world(signal)(rng)
     a, Q, R, K = (found[name] for name in "aQRK")
 
     def left(last):
@@ -42,24 +38,29 @@ def waiting(rng, m=3):
     return {"p_m": left(m), "p_0": left(0), "b": K * rho, r"\rho": rho, r"\gamma": found[r"\gamma"], "m": m}
 
 
-def amplitude(rng):
-    """A pulse of which the package's Kalman filter finds the amplitude, sample by sample."""
-    s, y, R, d, b = rng.normal(size=4), rng.normal(size=4), 0.7, 1.9, 0.6
-    law = Gaussian(np.zeros(1), np.array([[d]]))
-    for one, measured in zip(s, y, strict=True):
-        law = correct(LinearSystem([[1.0]], [[one]], [[0.0]], [[R]]), law, np.array([measured]))
-    return {
-        "C": np.dot(s, y), "E": np.dot(s, s), "R": R, "d": d, "z": law.mean.item(), "p": law.cov.item(), "b": b,
-        r"\mathcal L": lambda b: np.prod(norm.pdf(y, b * s, np.sqrt(R))),
-    }  # fmt: skip
+amplitude = r"""
+s, y: nums 4
+R = 0.7
+d = 1.9
+b = 0.6
+C = \sum_{i=0}^3s_iy_i
+E = \sum_{i=0}^3s_i^2
+p = 1/(1/d+E/R)
+z = pC/R
+\mathcal L(b) = \prod_{i=0}^3\mathcal N(y_i;bs_i,R)
+keep: C, E, R, d, z, p, b, \mathcal L
+"""
 
 
-def correlator(rng):
-    """The matched filter along a record, and the amplitude by least squares at each moment."""
-    n, s, y = 3, rng.normal(size=4), rng.normal(size=9)
-    C = [np.convolve(y, s[::-1])[k] for k in range(9)]
-    b = [np.nan] * n + [np.linalg.lstsq(s[:, None], y[k - n : k + 1], rcond=None)[0].item() for k in range(n, 9)]
-    return {"n": n, "s": Indexed(s), "y": Indexed(y), "C": Indexed(C), "i": range(n + 1), "k": range(n, 9), r"\hat b": Indexed(b)}
+correlator = r"""
+n = 3
+s: nums 4
+y: nums 9
+i: range 4
+k: range 3 9
+C_k = \sum_is_iy_{k-3+i}
+\hat b_k = C_k/\sum_is_i^2
+"""
 
 
 def bucy(rng):
@@ -74,22 +75,29 @@ def bucy(rng):
     }  # fmt: skip
 
 
-def shrinking(rng):
-    """The gains of the alpha-beta filter at an interval of 1e-10, where they are those of the limit."""
-    T, Omega = 1e-10, rng.uniform(1, 2)
-    index = (Omega * T) ** 2
-    missing = (np.sqrt(index**2 + 8 * index) - index) / 4  # 1 - sqrt(1 - alpha), without its cancellation
-    return {r"\lim_{T\to0}": 1.0, "T": T, r"\Omega": Omega, r"\alpha": missing * (2 - missing), r"\beta": 2 * missing**2}
+shrinking = r"""
+T = 0.0000000001
+\Omega: in 1 2
+n = (\Omega T)^2
+m = (\sqrt{n^2+8n}-n)/4      # 1 - sqrt(1 - alpha), without its cancellation
+\alpha = m(2-m)
+\beta = 2m^2
+"\lim_{T\to0}" = 1
+keep: \lim_{T\to0}, T, \Omega, \alpha, \beta
+"""
 
 
-def weights(rng):
-    g, s = rng.normal(size=(2, 4))
-    return {"g": Indexed(g), "s": Indexed(s), "k": range(4), "i": range(4), "j": range(4)}
+weights = r"""
+g, s: nums 4
+k: range 4
+i: range 4
+j: range 4
+"""
 
 
 def found(rng):
     """The greatest ratio for one pulse: the mean of the correlator over its deviation, squared."""
-    own = amplitude(rng)
+    own = world(amplitude)(rng)
     return {name: own[name] for name in ("R", "E", "b")} | {"d": own["b"] * own["E"] / np.sqrt(own["R"] * own["E"])}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kfcourse.checks.exercises import Exercise, ExerciseError
 from kfcourse.checks.registry import sets
-from kfcourse.lab.criteria import Finding
+from kfcourse.lab.quality import Finding
 from kfcourse.lab.variants import Variant
 
 

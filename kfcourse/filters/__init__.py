@@ -6,16 +6,14 @@ approximations          approximations of the absolutely optimal filter (AOF): E
 conditionally_optimal   Pugachev's two-step conditionally optimal filter (DUOF)
 optimal_structure       Rudenko's filter of optimal structure (FOS), modified (MFOS), in two steps (DFMP, MDFMP), and those
                         with the last measurements (FKP) or the last estimates (FBP) in the place of the last one
-exact                   the AOF itself, on a grid that follows each trajectory: a folder
-looking_back            what the whole record tells of each state (exact.smoothing for the exact filter)
-particles               the same by sampling, with modes or without;  densities, inverted: what all need
+exact                   the AOF itself, of scalar models with modes or without, compiled: a folder
+looking_back            what the whole record tells of each state (exact, particles have ways of their own)
+particles               the same by sampling, with modes or without;  densities: what all need
 iterated_ekf            the meter linearised again at the estimate
 gate, robust            measurements that are not believed: refused, by any filter; weighted; a noise of unknown size, learnt
 alphabeta               gains from a table, constant in the end
 multiple_models         several ways of moving, one normal law each (IMM, logic-dynamic AOF, GPB2)
-                        (jump_equations: as printed;  jump_optimal: FOS, FKP, FBP with modes;
-                         exact.jumps: the exact filter of state and mode)
-initial_states          the exact filter of an object without noise, with modes of its meter or not
+                        (jump_equations: as printed;  jump_optimal: FOS, FKP, FBP with modes)
 notation                symbols in which the equations are printed
 programs, fused, loops  the printed equations as rules and regressions; compiled steps made of them (numba)
 """
@@ -27,11 +25,8 @@ from kfcourse.filters.base import Filter, State
 from kfcourse.filters.conditionally_optimal import EQUATIONS as _DUOF
 from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.designed import Design
-from kfcourse.filters.exact.adaptive import adaptive_pointmass
-from kfcourse.filters.exact.jumps import jump_pointmass
 from kfcourse.filters.exact.pointmasses import pointmass
 from kfcourse.filters.gate import gated
-from kfcourse.filters.initial_states import undisturbed
 from kfcourse.filters.iterated_ekf import iterated
 from kfcourse.filters.jump_optimal import logic_dynamic_fbp, logic_dynamic_fkp, logic_dynamic_fos
 from kfcourse.filters.kalman import kalman_filter
@@ -51,7 +46,6 @@ __all__ = [
     "Filter",
     "State",
     "adaptive",
-    "adaptive_pointmass",
     "alpha_beta",
     "alpha_beta_gamma",
     "aof",
@@ -65,7 +59,6 @@ __all__ = [
     "gpb2",
     "imm",
     "iterated",
-    "jump_pointmass",
     "kalman_filter",
     "latex",
     "logic_dynamic",
@@ -79,5 +72,4 @@ __all__ = [
     "particle",
     "pointmass",
     "robust",
-    "undisturbed",
 ]

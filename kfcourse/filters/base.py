@@ -83,8 +83,6 @@ class Filter:
         (State, y (runs, p)) -> State.  The estimate and the filter's own error covariance are its `posterior`.
     slow : bool
         Thousands of times the cost of the others: comparisons run it on a part of the trajectories.
-    instead : Filter, optional
-        Of the same name: what comparisons run where a slow filter fails.
     structure : Structure, optional
         For a filter whose laws are normal ones: the structural functions by which it expects measurements from its prediction,
         and predicts from its posterior.  Looking back, likelihood and gates take from it what no filter needs while it runs.
@@ -103,7 +101,6 @@ class Filter:
     init: Init
     step: Advance
     slow: bool = False
-    instead: Filter | None = None
     structure: Structure | None = None
     evidence: Evidence | None = None
     look_back: LookBack | None = None

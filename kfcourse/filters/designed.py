@@ -50,18 +50,10 @@ class Scatter(NamedTuple):
     @classmethod
     def of(cls, target: Array, regressor: Array) -> Scatter:
         """Those of target (N, r) and regressor (N, s) stacked into one vector."""
-        if not len(target):
-            size = target.shape[1] + regressor.shape[1]
-            return cls(0, target.shape[1], np.zeros(size), np.zeros((size, size)))
-        columns = [target[:, i] for i in range(target.shape[1])] + [regressor[:, i] for i in range(regressor.shape[1])]
-        count, size = len(target), len(columns)
-        mean = [float(np.add.reduce(column)) / count for column in columns]
-        deviations = [column - m for column, m in zip(columns, mean, strict=True)]
-        scatter = [[0.0] * size for _ in range(size)]
-        for i in range(size):
-            for j in range(i, size):
-                scatter[i][j] = scatter[j][i] = _dot(deviations[i], deviations[j])
-        return cls(count, target.shape[1], np.array(mean), np.array(scatter))
+        size, both = len(target), np.concatenate([target.T, regressor.T])  # sums run along rows of numbers
+        mean = both.sum(axis=1) / max(size, 1)
+        off = both - mean[:, None]
+        return cls(size, target.shape[1], mean, np.einsum("in,jn->ij", off, off))  # no thread of a library is started
 
     @classmethod
     def together(cls, parts: Sequence[Scatter]) -> Scatter:
@@ -83,11 +75,6 @@ class Scatter(NamedTuple):
         matrix = gain(cross, cov[r:, r:])
         offset = self.mean[:r] - matrix @ self.mean[r:]
         return Affine(matrix, offset, _nonnegative(cov[:r, :r] - matrix @ cross.T))
-
-
-def _dot(left: Array, right: Array) -> float:
-    """Inner product of two long vectors; not `np.dot`, which would start the linear algebra library's own threads."""
-    return float(np.einsum("i,i", left, right))
 
 
 def _nonnegative(matrix: Array) -> Array:

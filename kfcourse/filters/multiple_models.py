@@ -49,6 +49,7 @@ from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.quadrature import product_rule
 from kfcourse.symbolic.structure import Structure, each_once, expect_each, moving_alike
 
+CERTAIN = 1e300  # in the place of the logarithm of an infinite density: infinities have no quotient
 ORDER = {1: 32, 2: 12, 3: 7}  # points an axis, by the number of components in the formulas of pi
 
 Chain: TypeAlias = Array | Callable[[int], Array] | JumpModel
@@ -325,11 +326,15 @@ def points_of(model: JumpModel) -> int:
 
 
 def modes_given(expected: Array, measurements: Sequence[Measurement], y: Array) -> tuple[Array, Array]:
-    """c_j L_j / sum over the modes, (runs, M), and ln of the sum; in logarithms, as likelihoods far from the truth are 0."""
+    """c_j L_j / sum over the modes, (runs, M), and ln of the sum; in logarithms, as likelihoods far from the truth are 0.
+
+    Where y is known before with certainty the density is infinite, and its modes share the probability.
+    """
     with np.errstate(divide="ignore"):  # a mode that is excluded stays so
         logs = np.log(expected) + np.stack([log_density(measurement, y) for measurement in measurements], axis=-1)
+    logs = np.minimum(logs, CERTAIN)
     total = logsumexp(logs, axis=1)
-    return np.exp(logs - total[:, None]), total
+    return np.exp(logs - total[:, None]), np.where(total < CERTAIN, total, np.inf)
 
 
 def mixture(laws: Sequence[Gaussian], weights: Array, angles: Components = ()) -> Gaussian:

@@ -4,7 +4,6 @@ variants     `Variant`, read from variants.toml or a file like it;  variant_tabl
 admission    which filters a model admits, and why not
 families     what each family of filters is called, in both languages, and how it is drawn
 short_names  the lab's filters: "duof" -> how to build it, "DUOF" in tables;  checked_quadrature: where there are no formulas
-budget       how many trajectories by default
 quality      is a variant well posed?  criteria: each criterion;  difficulty: how hard;  grammar: new ones
 maps         who leads, and how far from the bound, over two parameters
 plots        figures of a comparison, one colour and name for each filter

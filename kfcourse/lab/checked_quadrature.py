@@ -124,7 +124,7 @@ def _meeting(model: Model | JumpModel, structures: list[Structure]) -> Iterator[
     if not isinstance(model, JumpModel):
         run(aof(structures[0]), y)
         yield
-        design([fos(structures[0]), mfos(structures[0])], designing.by_step())
+        design([fos(structures[0]), mfos(structures[0])], designing)
         yield
         return
     for filter_of in (logic_dynamic, imm):  # the laws of pairs, of GPB2, are narrower
@@ -135,7 +135,7 @@ def _meeting(model: Model | JumpModel, structures: list[Structure]) -> Iterator[
         run(aof(one), y)
         yield
         with suppress(NotFinite):  # of modes where hardly anybody is
-            design([logic_dynamic_fos(model, structures), fos(one), mfos(one)], designing.by_step())
+            design([logic_dynamic_fos(model, structures), fos(one), mfos(one)], designing)
             yield
 
 

@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
 from kfcourse.lab.plots import style
-from kfcourse.lab.report import percent
+from kfcourse.lab.report_text import percent
 from kfcourse.lab.short_names import LAB, lab_filters, title
 from kfcourse.laws import CONFIDENCE
 from kfcourse.montecarlo.comparison import EXACT, Comparison
@@ -48,7 +48,6 @@ def parameter_map(
     *,
     runs: int = 10_000,
     steps: int = 3,
-    slow_runs: int = 1000,
     design_runs: int = 20_000,
 ) -> ParameterMap:
     """Compare the lab's filters with the exact AOF at every pair of values of two parameters.
@@ -58,8 +57,6 @@ def parameter_map(
     model : Model
     values : mapping
         Two parameters, and the values of each.
-    slow_runs : int
-        Trajectories of the exact AOF in each comparison.
     runs, steps, design_runs
         As of `kfcourse.compare`.
 
@@ -83,8 +80,6 @@ def parameter_map(
                 steps,
                 seed=1,
                 design_runs=design_runs,
-                designs=2,
-                slow_runs=slow_runs,
                 progress=False,
             )
     return ParameterMap((first, second), cells)

@@ -19,7 +19,8 @@ from kfcourse.files import replacing_together
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.base import Filter
 from kfcourse.filters.gate import gated
-from kfcourse.lab.report import Section, ranges, save_figure, save_texts
+from kfcourse.lab.report import save_figure, save_texts
+from kfcourse.lab.report_text import lines_of, ranges
 from kfcourse.lab.variants import Variant, VariantError, find_variant, read_variants
 from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.consistency import Autocorrelation, Innovations, autocorrelation
@@ -256,7 +257,7 @@ def _content(told: Told, figures: Mapping[str, str]) -> dict[str, Any]:
     return {
         "variant": told.variant,
         "told": told,
-        "model": Section.of("Model", told.record.model.latex()),
+        "model": lines_of(told.record.model.latex()),
         "sentences": told.says(),
         "figures": [*figures.items()],
         "unfit": [one for one in told.findings if not one.fits],

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from kfcourse.lab.families import look
 from kfcourse.lab.short_names import title
 from kfcourse.laws import CONFIDENCE, Array
-from kfcourse.montecarlo.comparison import EXACT, Comparison
+from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.modes import Recognised
 
 
@@ -50,7 +50,7 @@ def _steps(ax: Axes, label: str = "step $k$") -> None:
 def accuracy(result: Comparison, ax: Axes, names: Sequence[str] | None = None, words: Words = ENGLISH) -> Axes:
     """Error variance D_k of every filter against the step, on a logarithmic scale."""
     steps = np.arange(result.steps)
-    for name in names or result.available:
+    for name in names or result.names:
         line = style(name) | {"label": words.title(name), "markersize": 4, "markevery": max(1, result.steps // 10)}
         ax.semilogy(steps, result.error_variance(name).value, **line)
     _steps(ax, words.step)
@@ -73,7 +73,7 @@ def relative_accuracy(
     Without the exact AOF the control (the Gaussian AOF) is the zero line.
     """
     k = np.arange(result.steps)[steps]
-    zero = EXACT if result.has_bound else result.control
+    zero = result.reference
     for name in result.entrants if names is None else names:
         if name == zero:
             continue
@@ -103,7 +103,7 @@ def ranking(
         ax.errorbar(100 * middle, row, xerr=ends, fmt=line["marker"], color=line["color"], capsize=3)
     ax.set_yticks(range(len(ranked)), [words.title(name) for name, _ in ranked])
     ax.axvline(0, color="black", linewidth=0.8)
-    ax.set_xlabel(words.mean_above.replace("{name}", words.title(EXACT if result.has_bound else result.control)))
+    ax.set_xlabel(words.mean_above.replace("{name}", words.title(result.reference)))
     ax.grid(True, axis="x", alpha=0.3)
     return ax
 
@@ -113,7 +113,7 @@ def consistency(
 ) -> Axes:
     """Normalised squared error M[e^T p^-1 e]/n per step: 1 if the filter's own covariance is right."""
     steps = np.arange(result.steps)
-    for name in names or result.available:
+    for name in names or result.names:
         value = result.normalised_error(name)
         line = style(name) | {"label": words.title(name)}
         ax.plot(steps, value.value, markersize=4, markevery=max(1, result.steps // 10), **line)

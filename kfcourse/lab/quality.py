@@ -1,13 +1,16 @@
-"""Is a variant well posed, and how hard is it?  Found by a small Monte Carlo and from the formulas, not by eye.
+"""Is a variant well posed?  Found by a small Monte Carlo and from the formulas, not by eye.
 
 A variant is well posed if it is
 
-* bounded: its moments do not explode over the lab's steps, the filters stay finite, and so do trajectories when all deviations
-  are `STRESS` times larger (which shows what would happen to a few of a million);
-* observable: the best filter's error variance is clearly below the variance without measurements, for each component, and the
-  meter, linearised along typical trajectories, sees all directions of the state;
-* such that the filters differ by more than the statistical error; those of a linear variant are equal by design, and need not;
-* solvable: the structural functions have a closed form of sensible length, and every question of the exercises can be posed.
+* bounded: its moments do not explode over the lab's steps, the filters stay finite, and so do
+  trajectories when all deviations are `STRESS` times larger (a few of a million are as large);
+* observable: the best filter's error variance is clearly below the variance without measurements,
+  for each component, and the meter, linearised along typical trajectories, sees all directions of
+  the state;
+* such that the filters differ by more than the statistical error; those of a linear variant are
+  equal by design, and need not;
+* solvable: the structural functions have a closed form of sensible length, and every question of
+  the exercises can be posed.
 
 `examine(variant)` gives a `Quality`, a value; `table` renders it.
 """
@@ -15,89 +18,89 @@ A variant is well posed if it is
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import combinations
+from typing import NamedTuple
 
 import joblib
 import numpy as np
+import scipy
+import sympy as sp
 from tqdm import tqdm
 
+from kfcourse.errors import NoClosedForm, NotFinite
 from kfcourse.filters import Design, Filter
+from kfcourse.filters.base import State, initial_state
 from kfcourse.lab.admission import admissions
-from kfcourse.lab.criteria import (
-    UNMEASURED,
-    Finding,
-    bounded,
-    differences,
-    kurtosis,
-    measured,
-    not_diverging,
-    observable,
-    shares,
-    solvable,
-    unmeasured,
-)
-from kfcourse.lab.difficulty import Hardness, hardness
-from kfcourse.lab.short_names import LAB, Structures, has_exact, title
-from kfcourse.lab.variant_tables import RUNS
-from kfcourse.lab.variants import Variant
+from kfcourse.lab.short_names import LAB, Structures, title
+from kfcourse.lab.variants import RUNS, Variant
 from kfcourse.laws import Array, Gaussian
 from kfcourse.limits import OutOfTime, time_limit
 from kfcourse.linear.system import is_linear
-from kfcourse.montecarlo.batches import FEWEST
+from kfcourse.montecarlo import FEWEST
 from kfcourse.montecarlo.comparison import Comparison
-from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.parallel import cluster
+from kfcourse.montecarlo.statistics import Estimate, ratio
 from kfcourse.symbolic.jumping import JumpModel
+from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.reading import exact_matrix
+from kfcourse.symbolic.structure import Structure
 
-VECTOR = 8  # a vector model takes that much longer, and gets that many times fewer
+VECTOR = 8  # a vector model takes that much longer, and gets that many times fewer trajectories
 STRESS = 1.5  # factor of all deviations
-HEAVY = 20.0  # kurtosis worth a remark; 3 is the normal law's
 SECONDS = 60.0  # for the derivation
-FAILURES = (NotFinite, np.linalg.LinAlgError)  # a filter left the finite numbers, or a decomposition did not converge for it
-NOT_EXAMINED = Finding(None, "not examined")
+GROWTH = 10.0  # of a second moment over the second half of the steps: an unknown velocity has 4
+CARRIERS = 10.0  # trajectories, at least, that carry a second moment
+DIVERGED = 10.0  # a filter's error variance over that without measurements
+UNSEEN = 0.9  # the same of the best filter, when the meter tells too little
+RANK = 1e-6  # singular values below, relative to the largest, are taken for 0
+SIGNIFICANCE = 0.01  # of "the filters differ", for all pairs and steps together
+ROUNDING = 1e-9  # relative differences that rounding alone explains
+LONGEST = 600  # operations of the Gaussian structural functions; the van der Pol oscillator has 309
+UNMEASURED = "without measurements"
+CRITERIA = ("bounded", "observable", "filters differ", "solvable")
 
+
+class Finding(NamedTuple):
+    """One criterion: whether it holds, a sentence, and what was measured (NaN if nothing).
+
+    `ok` is None if it could not be examined, because another criterion fails.
+    """
+
+    ok: bool | None
+    says: str
+    value: float = float("nan")
+
+
+NOT_EXAMINED = Finding(None, "not examined")
 Ask = Callable[[Variant], Finding | None]
 
 
 @dataclass(frozen=True)
 class Quality:
-    """What was found out about a variant.
+    """What was found out about a variant: a finding for each criterion that was examined.
 
-    Attributes
-    ----------
-    name : str
-    bounded, observable, differ, solvable : Finding
-        The criteria; their values are described in `kfcourse.lab.criteria`.
-    linear : bool
-        Linear equations with additive noises: the filters are equal by design.
-    hardness : Hardness or None
-        None if there is no closed form.
-    remarks, fragile : tuple of str
-        Worth knowing, and no fault; and signs that another ensemble may show a fault.
+    `linear`: linear equations with additive noises; the filters are equal by design.
     """
 
     name: str
-    bounded: Finding
-    observable: Finding
-    differ: Finding
-    solvable: Finding
+    findings: Mapping[str, Finding]
     linear: bool = False
-    hardness: Hardness | None = None
     remarks: tuple[str, ...] = ()
-    fragile: tuple[str, ...] = ()
 
     @property
     def faults(self) -> dict[str, str]:
-        """The criteria that fail, and why; not those that could not be examined.  A linear variant's filters need not differ."""
-        criteria = {"bounded": self.bounded, "observable": self.observable, "solvable": self.solvable}
-        if not self.linear:
-            criteria["filters differ"] = self.differ
-        return {name: finding.says for name, finding in criteria.items() if finding.ok is False}
+        """The criteria that fail, and why; a linear variant's filters need not differ."""
+        return {
+            name: finding.says
+            for name, finding in self.findings.items()
+            if finding.ok is False and not (self.linear and name == "filters differ")
+        }
 
     @property
     def well_posed(self) -> bool:
@@ -114,64 +117,56 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None =
         Trajectories, at least 256; a vector model gets an eighth of them.
     seed : int
     ask : callable, optional
-        Variant -> the question of the exercises that cannot be posed, as a `Finding`, or None; `kfcourse.checks.posing.unposed`.
-
-    Raises
-    ------
-    ValueError
-        Too few trajectories.
+        Variant -> the question of the exercises that cannot be posed, as a `Finding`, or None;
+        `kfcourse.checks.posing.unposed`.
     """
     if runs < FEWEST:
         raise ValueError(f"standard errors need at least {FEWEST} trajectories, got {runs}")
-    if isinstance(variant.model, JumpModel):
-        return _of_modes(variant, variant.model, runs, seed)
     model = variant.model
-    structures = Structures(model)
-    try:
-        with time_limit(SECONDS):
-            answers = solvable(structures)
-    except OutOfTime:
-        answers = Finding(False, f"the structural functions are not found in {SECONDS:g} s; simplify the equations")
-        return Quality(variant.name, NOT_EXAMINED, NOT_EXAMINED, NOT_EXAMINED, answers)
-    found = Quality(variant.name, NOT_EXAMINED, NOT_EXAMINED, NOT_EXAMINED, answers, is_linear(model))
     with np.errstate(all="ignore"):  # what diverges is told in the findings
-        if answers.ok:
-            found = dataclasses.replace(found, solvable=(ask(variant) if ask else None) or answers, hardness=hardness(structures))
-        return _simulated(found, structures, runs if model.n == 1 else max(runs // VECTOR, FEWEST), variant.steps, seed)
+        if isinstance(model, JumpModel):
+            moments = bounded(simulate(model, runs, int(min(variant.steps, model.steps)), seed).x)
+            remark = f"has {len(model.modes)} modes: only whether it is bounded is checked"
+            return Quality(variant.name, {"bounded": moments}, remarks=(remark,))
+        structures = Structures(model)
+        try:
+            with time_limit(SECONDS):
+                answers = solvable(structures)
+        except OutOfTime:
+            late = f"the structural functions are not found in {SECONDS:g} s; simplify the equations"
+            return Quality(variant.name, {"solvable": Finding(False, late)})
+        if answers.ok and ask:
+            answers = ask(variant) or answers
+        size = runs if model.n == 1 else max(runs // VECTOR, FEWEST)
+        x = simulate(model, size, variant.steps, seed).x
+        findings = _simulated(model, x, seed) | {"solvable": answers}
+        remarks = []
+        if linear := is_linear(model):
+            remarks.append("linear: the Kalman filter is exact")
+        if (x.var(axis=1)[-1] < 1e-3 * x.var(axis=1)[0]).any():
+            remarks.append("decays to a constant")
+        return Quality(variant.name, findings, linear, tuple(remarks))
 
 
-def _of_modes(variant: Variant, model: JumpModel, runs: int, seed: int) -> Quality:
-    """Of a model that jumps only whether its moments stay finite: the exercises know no modes."""
-    with np.errstate(all="ignore"):
-        moments = bounded(simulate(model, runs, int(min(variant.steps, model.steps)), seed).x)
-    remark = f"has {len(model.modes)} modes: only whether it is bounded is checked, and the exercises do not ask about it"
-    return Quality(variant.name, moments, NOT_EXAMINED, NOT_EXAMINED, NOT_EXAMINED, remarks=(remark,))
-
-
-def _simulated(found: Quality, structures: Structures, runs: int, steps: int, seed: int) -> Quality:
-    """The criteria that need trajectories, and what is remarked about them."""
-    model, harsh = structures.model, _harsh(structures.model)
+def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
+    """The criteria that need trajectories x (steps, runs, n)."""
+    steps, runs = x.shape[:2]
     filters = [one.one for one in admissions(model, LAB) if one.one]
-    x = simulate(model, runs, steps, seed).x
     moments = bounded(x)
-    if moments.ok and not np.isfinite(simulate(harsh, runs, steps, seed).x).all():
-        rare = f"trajectories become infinite when deviations are {STRESS:g} times larger, so a few of very many will"
-        moments = Finding(False, rare, moments.value)
-    found = dataclasses.replace(found, bounded=moments)
+    if moments.ok and not np.isfinite(simulate(_harsh(model), runs, steps, seed).x).all():
+        rare = f"trajectories become infinite when deviations are {STRESS:g} times larger"
+        moments = Finding(False, f"{rare}, so a few of very many will", moments.value)
     if not moments.ok or not filters:
-        return found
+        return {"bounded": moments}
     try:
-        result = compare([*filters, unmeasured(model, x)], model, runs, steps, seed, wide=1, threads=1, progress=False)
-    except FAILURES as error:
-        return dataclasses.replace(found, bounded=Finding(False, str(error), moments.value))
-    return dataclasses.replace(
-        found,
-        bounded=not_diverging(result) or moments,
-        observable=observable(model, result, x),
-        differ=differences(result, [one.name for one in filters if isinstance(one, Design)]),
-        remarks=tuple(_remarks(model, x, found.linear)),
-        fragile=tuple(_fragile(result, x, filters, harsh, seed)),
-    )
+        result = compare([*filters, unmeasured(model, x)], model, runs, steps, seed, jobs=1, progress=False)
+    except (NotFinite, np.linalg.LinAlgError) as error:  # a filter, or a decomposition for it
+        return {"bounded": Finding(False, str(error), moments.value)}
+    return {
+        "bounded": not_diverging(result) or moments,
+        "observable": observable(model, result, x),
+        "filters differ": differences(result, [one.name for one in filters if isinstance(one, Design)]),
+    }
 
 
 def _harsh(model: Model) -> Model:
@@ -181,28 +176,11 @@ def _harsh(model: Model) -> Model:
         return Gaussian(law.mean, STRESS**2 * law.cov)
 
     return dataclasses.replace(
-        model, prior=larger(model.prior), state_noise=larger(model.state_noise), meter_noise=larger(model.meter_noise)
+        model,
+        prior=larger(model.prior),
+        state_noise=larger(model.state_noise),
+        meter_noise=larger(model.meter_noise),
     )
-
-
-def _remarks(model: Model, x: Array, linear: bool) -> Iterator[str]:
-    if linear:
-        yield "linear: the Kalman filter is exact"
-    if (x.var(axis=1)[-1] < 1e-3 * x.var(axis=1)[0]).any():
-        yield "decays to a constant"
-    if model.n == 1 and not has_exact(model):
-        yield "no exact AOF"
-
-
-def _fragile(result: Comparison, x: Array, filters: Sequence[Filter | Design], harsh: Model, seed: int) -> Iterator[str]:
-    if (heavy := kurtosis(x).max()) > HEAVY:
-        yield f"heavy tails (kurtosis {heavy:.0f})"
-    if worse := [title(one) for one in measured(result) if shares(result, one).value.max() > 1]:
-        yield f"worse than {UNMEASURED}: {', '.join(worse)}"
-    try:
-        compare(filters, harsh, max(result.runs // 4, FEWEST), result.steps, seed, wide=1, threads=1, progress=False)
-    except FAILURES:
-        yield f"a filter diverges when deviations are {STRESS:g} times larger"
 
 
 def examine_all(
@@ -213,7 +191,7 @@ def examine_all(
     ask: Ask | None = None,
     dask: str | None = None,
 ) -> Iterator[Quality]:
-    """`examine` every variant, in order, in so many processes, on which no number depends; with a progress bar.
+    """`examine` every variant, in order, in so many processes, on which no number depends.
 
     `dask` is the address of a Dask scheduler whose workers do it instead.
     """
@@ -228,13 +206,12 @@ def examine_all(
 
 LEGEND = """
 observable      error variance of the best filter in per cent of the variance without measurements, worst component
-filters differ  the largest significant difference of two filters' error variances, relative
-hardness        points: length of the formulas, degree, functions, state-dependent noise, dimension, nonlinearity"""
+filters differ  the largest significant difference of two filters' error variances, relative"""
 
 
 def table(found: Sequence[Quality]) -> str:
-    """What `kfcourse variants --check` prints: a line for each variant, then why some are not well posed."""
-    rows = [("variant", "bounded", "observable", "filters differ", "solvable", "hardness", "remarks"), *map(_row, found)]
+    """What `kfcourse variants --check` prints: a line for each variant, then what is not well posed."""
+    rows = [("variant", *CRITERIA, "remarks"), *map(_row, found)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     reasons = [f"variant {one.name} is not well posed, {fault}: {why}" for one in found for fault, why in one.faults.items()]
@@ -242,13 +219,186 @@ def table(found: Sequence[Quality]) -> str:
 
 
 def _row(one: Quality) -> tuple[str, ...]:
-    def cell(finding: Finding) -> str:
-        return {True: "yes", False: "NO", None: "-"}[finding.ok]
+    cells = []
+    for name in CRITERIA:
+        finding = one.findings.get(name, NOT_EXAMINED)
+        cell = {True: "yes", False: "NO", None: "-"}[finding.ok]
+        if name == "filters differ" and one.linear and not finding.ok:
+            cell = "equal"
+        elif name in ("observable", "filters differ") and finding.value > 0:
+            cell += f" {100 * finding.value:.3g} %"
+        cells.append(cell)
+    return one.name, *cells, "; ".join(one.remarks)
 
-    def percent(finding: Finding) -> str:
-        return cell(finding) + (f" {100 * finding.value:.3g} %" if finding.value > 0 else "")
 
-    differ = "equal" if one.linear and one.differ.ok is False else percent(one.differ)
-    hard = f"{one.hardness.level} {one.hardness.score:.1f}" if one.hardness else "-"
-    remarks = "; ".join(one.remarks + one.fragile)
-    return one.name, cell(one.bounded), percent(one.observable), differ, cell(one.solvable), hard, remarks
+# --- bounded
+
+
+def bounded(x: Array) -> Finding:
+    """Whether the second moments of trajectories x (steps, runs, n) stay in bounds.  Value: their growth.
+
+    The maximum of M x_k^2 over the second half of the steps is at most GROWTH times that over the first half, for every
+    component; and the sum of squared deviations u = x - M x is not that of a few trajectories,
+    (sum u^2)^2 / sum u^4 >= CARRIERS.
+    """
+    finite = np.isfinite(x**4).all(axis=(1, 2))
+    if not finite.all():
+        return Finding(False, f"trajectories become infinite (step {int(np.argmin(finite))})", float("inf"))
+    square, half = (x**2).mean(axis=1), (len(x) + 1) // 2
+    growth = float(ratio(square[half:].max(axis=0, initial=0.0), square[:half].max(axis=0), 0.0).max())  # of one step 0
+    grows = f"the second moment grows {growth:.3g} times from the first half of the steps to the second"
+    if growth > GROWTH:
+        return Finding(False, grows, growth)
+    heaviest = float(kurtosis(x).max())
+    if heaviest * CARRIERS > x.shape[1]:
+        few = x.shape[1] / heaviest
+        return Finding(False, f"the second moment is that of {few:.1f} trajectories of {x.shape[1]}: too heavy tails", growth)
+    return Finding(True, grows, growth)
+
+
+def kurtosis(x: Array) -> Array:
+    """M u^4 / (M u^2)^2, u = x - M x, per step and component, (steps, n): 3 for a normal law; 0 for a constant."""
+    u = x - x.mean(axis=1, keepdims=True)
+    variance = np.where(varies(x), (u**2).mean(axis=1), 0.0)
+    return ratio((u**4).mean(axis=1), variance**2, 0.0)
+
+
+def varies(x: Array) -> Array:
+    """Whether a component of x (steps, runs, n) varies at a step, by more than rounding: (steps, n)."""
+    return np.asarray(x.std(axis=1) > 1e-12 * np.abs(x).max(axis=1))
+
+
+def not_diverging(comparison: Comparison) -> Finding | None:
+    """The filter that is DIVERGED times worse than no measurements; None if there is none."""
+    worst, name = max((float(shares(comparison, one).value.max()), one) for one in measured(comparison))
+    if worst <= DIVERGED:
+        return None
+    return Finding(False, f"{title(name)} diverges: its error variance is {worst:.3g} times that without measurements", worst)
+
+
+# --- observable
+
+
+def unmeasured(model: Model, x: Array) -> Filter:
+    """The estimate that uses no measurement: means and covariances of trajectories x (steps, runs, n)."""
+    means = x.mean(axis=1)
+    u = x - means[:, None]
+    covs = np.einsum("kri,krj->kij", u, u) / x.shape[1]
+
+    def step(state: State, y: Array) -> State:
+        law = Gaussian(np.tile(means[state.step], (len(y), 1)), covs[state.step])
+        return State(state.step + 1, law, law)
+
+    return Filter(UNMEASURED, model, initial_state(model), step)
+
+
+def measured(comparison: Comparison) -> list[str]:
+    """Names of the filters that use the measurements."""
+    return [name for name in comparison.names if name != UNMEASURED]
+
+
+def shares(comparison: Comparison, name: str) -> Estimate:
+    """Error variance of a filter over that without measurements, mean over the steps, for each component: (n,).
+
+    Steps where the component does not vary are left out; a component that never varies has the share 1.
+    """
+    squares = comparison.sums.means("square")
+    square, base = (squares[comparison.names.index(one)] for one in (name, UNMEASURED))
+    used = base[..., :1] > 1e-24 * base[..., :1].max(axis=0)
+    share = np.where(used, ratio(square, base, 0.0), 0.0).sum(axis=0) / np.maximum(used.sum(axis=0), 1)
+    return Estimate.jackknife(np.where(used.any(axis=0), share, 1.0))
+
+
+def observable(model: Model, comparison: Comparison, x: Array) -> Finding:
+    """Whether the meter tells something about every component of the state.  Value: the worst component's share.
+
+    The share of the best filter, see `shares`, plus four standard errors, is below UNSEEN; and the linearised model is
+    observable along at least half of the trajectories x (steps, runs, n).
+    """
+    found = [shares(comparison, name) for name in measured(comparison)]
+    upper = np.min([one.value + 4 * one.standard_error for one in found], axis=0)
+    worst = int(np.argmax(upper))
+    share, symbol = float(min(one.value[worst] for one in found)), model.x[worst]
+    if not varies(x).any(axis=0).all():
+        constant = model.x[int(np.argmin(varies(x).any(axis=0)))]
+        return Finding(False, f"{constant} does not vary, there is nothing to estimate", share)
+    left = f"the best filter leaves {100 * share:.3g} % of the variance of {symbol}"
+    if not upper[worst] < UNSEEN:
+        return Finding(False, f"the meter hardly tells: {left}", share)
+    full = observable_share(model, x[:, :200])
+    if full < 0.5:
+        return Finding(
+            False, f"linearised along typical trajectories, the model is observable on {100 * full:.0f} % of them", share
+        )
+    return Finding(True, left, share)
+
+
+def observable_share(model: Model, x: Array) -> float:
+    """Share of the trajectories x (steps, runs, n) along which the linearised model is observable.
+
+    The rows b_x(x_j) a_x(x_{j-1}) ... a_x(x_0) of the first 4 n steps, noises at their means and columns in units of the
+    state's deviation, have rank n.  1 if the equations are not differentiable.
+    """
+    state = model.state_equation.subs(dict(zip(model.v, exact_matrix(model.state_noise.mean), strict=True)))
+    meter = model.meter_equation.subs(dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True)))
+    slopes = {name: part.subs(model.values).jacobian(sp.Matrix(model.x)) for name, part in (("A", state), ("C", meter))}
+    if any(slope.has(sp.Derivative, sp.DiracDelta) for slope in slopes.values()):
+        return 1.0
+    function = Stepwise.compile(model.known, "slopes", {"x": sp.Matrix(model.x)}, slopes, ["x"], f"slopes of {model}")
+    path = np.broadcast_to(np.diag(x.std(axis=1).max(axis=0)), (x.shape[1], model.n, model.n))
+    rows = []
+    for k, position in enumerate(x[: 4 * model.n]):
+        A, C = function.at(k)(position)
+        rows.append(C @ path)
+        path = A @ path
+    values = np.linalg.svd(np.concatenate(rows, axis=1), compute_uv=False)
+    return float(((values > RANK * values[:, :1]).sum(axis=1) == model.n).mean())
+
+
+# --- the filters differ
+
+
+def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
+    """Whether two filters differ in error variance by more than the statistical error, at a step or on average.
+
+    |D_a - D_b| > t SE + c D / runs.  t is Student's quantile of SIGNIFICANCE, shared by all pairs and steps (Bonferroni).  The
+    second term is for the `designed` filters, whose coefficients are fitted over as many trajectories: each costs 1/runs of the
+    error variance.  There are n + p + 1 for a component, and the prediction has its own.  Value: the largest significant
+    difference, relative to the error variance of the control.
+    """
+    pairs = list(combinations(measured(comparison), 2))
+    tests = max(len(pairs), 1) * (comparison.steps + 1)
+    fitted = 2 * (comparison.model.n + comparison.model.p + 1) / comparison.runs
+    control = comparison.error_variance(comparison.control).value
+    largest, says = 0.0, f"no two filters differ by more than the statistical error of {comparison.runs} trajectories"
+    for first, second in pairs:
+        difference, score = comparison.difference(first, second), comparison.mean_gap_difference(first, second)
+        relative = np.abs(np.append(ratio(difference.value, control, 0.0), score.value))
+        error = np.append(ratio(difference.standard_error, control, 0.0), score.standard_error)
+        quantile = scipy.special.stdtrit(difference.freedom, 1 - SIGNIFICANCE / tests / 2)
+        allowed = quantile * error + ROUNDING + (fitted if first in designed or second in designed else 0.0)
+        significant = np.where(relative > allowed, relative, 0.0)
+        if significant.max() > largest:
+            largest, step = float(significant.max()), int(significant.argmax())
+            when = f"at step {step}" if step < comparison.steps else "on average"
+            says = f"{title(first)} and {title(second)} differ by {100 * largest:.2g} % {when}"
+    return Finding(largest > 0, says, largest)
+
+
+# --- solvable
+
+
+def solvable(structures: Structures) -> Finding:
+    """Whether the structural functions have a closed form of sensible length.  Value: operations of the Gaussian ones."""
+    try:
+        operations = length(structures.gaussian)
+        _ = structures.linearised
+    except NoClosedForm as error:
+        return Finding(False, str(error))
+    says = f"closed form, {operations} operations in the Gaussian structural functions"
+    return Finding(operations <= LONGEST, says + ("" if operations <= LONGEST else f", more than {LONGEST}"), float(operations))
+
+
+def length(structure: Structure) -> int:
+    """Operations in the formulas of the structural functions."""
+    return sum(int(entry.count_ops()) for name in ("tau", "Theta", "h", "G", "F") for entry in sp.flatten([structure[name]]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +20,6 @@ from kfcourse.filters import (
     fos,
     gpb2,
     imm,
-    jump_pointmass,
     logic_dynamic,
     logic_dynamic_fbp,
     logic_dynamic_fkp,
@@ -32,9 +30,9 @@ from kfcourse.filters import (
     mfos,
     particle,
     pointmass,
-    undisturbed,
 )
-from kfcourse.filters.initial_states import is_undisturbed
+from kfcourse.filters.densities import has_object_noise
+from kfcourse.filters.exact.laws import modes_of
 from kfcourse.filters.optimal_structure import STEPS
 from kfcourse.lab.checked_quadrature import Checked, of_checked_order
 from kfcourse.lab.families import FAMILIES, family
@@ -272,31 +270,19 @@ def check_names(names: Sequence[str], known: Mapping[str, object] = FILTERS) -> 
 def exact(model: Model | JumpModel) -> Filter:
     """The exact AOF, by point masses where they reach, else by particles, whose own error does not enter the bound.
 
-    Where point masses fail in the middle of a comparison, particles take over (`Filter.instead`).
-
     Raises
     ------
     ModelError
-        Neither can be had: there is no density of y given x.
+        Neither can be had: there is no density of y given x, or no noise enters the object.
     """
-    try:
-        found = jump_pointmass(model) if isinstance(model, JumpModel) else pointmass(model)
-    except ModelError:
-        return _sampled(model)
-    try:
-        return dataclasses.replace(found, instead=_sampled(model))
-    except ModelError:  # without noise in the meter there are no weights
-        return found
-
-
-def _sampled(model: Model | JumpModel) -> Filter:
-    """The exact AOF by sampling: of initial states if they tell all that follows."""
-    if is_undisturbed(model):
-        return undisturbed(model, name="aof-exact")
+    if has_exact(model):
+        return pointmass(model)
+    if not all(map(has_object_noise, modes_of(model))):
+        raise ModelError("no noise enters the object, and copies of a particle stay copies: there is no bound")
     return particle(model, BOUND, name="aof-exact")
 
 
-def has_exact(model: Model) -> bool:
+def has_exact(model: Model | JumpModel) -> bool:
     """Whether the exact AOF can be computed for the model by point masses: scalar, noises entering linearly."""
     try:
         pointmass(model)

@@ -1,23 +1,32 @@
-"""The variants of the lab, read from TOML."""
+"""The variants of the lab, read from TOML: variants.toml, tasks.toml, jumps.toml, or a file of one's own."""
 
 from __future__ import annotations
 
+import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from kfcourse.lab.variant_tables import SHIPPED, VariantError, on_a_line, read_tables, shipped
+from kfcourse.errors import expect_sizes
 from kfcourse.symbolic.jumping import JumpModel, model_of_table
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import shown
 from kfcourse.symbolic.sense import nothing_random
 
-MODEL_KEYS = {"parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs", "interval", "angles"}
-JUMP_KEYS = {"modes", "transition", "first"}
-VARIANT_KEYS = {"title", "steps", "state", "meter"} | MODEL_KEYS | JUMP_KEYS
+SHIPPED = ("variants.toml", "tasks.toml", "jumps.toml")
+TABLES = {"parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs", "modes"}
+KEYS = {"title", "steps", "state", "meter", "interval", "angles", "transition", "first"} | TABLES
 STEPS = 51  # of the lab, where a variant does not say another number
+RUNS = 40_000  # trajectories by which a variant is checked
+MANY = 40  # names that a message lists
+LARGEST_FILE = 1_000_000  # bytes; thousands of variants.  /dev/zero never ends
+
+
+class VariantError(ValueError):
+    """A file of variants, or a variant in it, cannot be used; the message names both."""
 
 
 class VariantWarning(UserWarning):
@@ -26,7 +35,10 @@ class VariantWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Variant:
-    """A variant of the lab: its name in the file, a title, its model, how many measurements, and the table it was read from."""
+    """A variant of the lab: its name in the file, a title, its model, how many measurements.
+
+    `table` is what it was read from.
+    """
 
     name: str
     title: str
@@ -38,22 +50,24 @@ class Variant:
         """The model; VariantError, which says what knows no modes, if it has some."""
         if isinstance(self.model, JumpModel):
             raise VariantError(
-                f"variant {self.name} jumps between modes ({', '.join(self.model.names)}), for which {what} are not made; "
-                f"`kfcourse lab {self.name}` compares filters on it (with --variants FILE if it is one of your own)"
+                f"variant {self.name} jumps between modes ({', '.join(self.model.names)}), for which "
+                f"{what} are not made; `kfcourse lab {self.name}` compares filters on it "
+                "(with --variants FILE if it is one of your own)"
             )
         return self.model
 
 
 def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
-    """Read the variants without modes of a TOML file; by default the shipped ones that are made for the exercises.
+    """Read the variants without modes of a TOML file; by default those made for the exercises.
 
     Parameters
     ----------
     path : path, optional
-        A file with tables ``[variants.NAME]``: `state`, `meter`, `parameters`, and optionally `title`,
-        `symbols`, `prior`, `state_noise`, `meter_noise`, `inputs`, `interval`, `angles` (see `Model.define`).
-        `steps` is how many measurements the lab takes.  Those with `modes`, `transition`, `first` (see `JumpModel.define`), and
-        the shipped tasks of the school's program, D1, D2 and D3, are read by `read_variants` and `find_variant`.
+        A file with tables ``[variants.NAME]``: `state`, `meter`, `parameters`, and optionally
+        `title`, `symbols`, `prior`, `state_noise`, `meter_noise`, `inputs`, `interval`, `angles`
+        (see `Model.define`).  `steps` is how many measurements the lab takes.  Those with `modes`,
+        `transition`, `first` (see `JumpModel.define`), and the shipped tasks of the school's
+        program, D1, D2 and D3, are read by `read_variants` and `find_variant`.
 
     Raises
     ------
@@ -69,40 +83,98 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     for fault in faults.values():
         warnings.warn(str(fault), VariantWarning, stacklevel=2)
     if not found:
-        cure = "`read_variants` reads them, or `find_variant` by name"
-        raise VariantError(f"{path} has no other variants than those that jump between modes: {cure}")
+        raise VariantError(
+            f"{path} has no other variants than those that jump between modes: "
+            "`read_variants` reads them, or `find_variant` by name"
+        )
     return found
 
 
-def usable_variants(path: str | Path | None = None) -> tuple[dict[str, Variant], dict[str, VariantError]]:
-    """What `load_variants` reads; and, by name, what is wrong with the others. VariantError as there."""
-    found, faults = read_variants(path, [*shipped(SHIPPED[0])] if path is None else ())
+def usable_variants(
+    path: str | Path | None = None,
+) -> tuple[dict[str, Variant], dict[str, VariantError]]:
+    """What `load_variants` reads; and, by name, what is wrong with the others."""
+    found, faults = read_variants(path, list(_shipped(SHIPPED[0])) if path is None else ())
     if not found:
         raise next(iter(faults.values()))
     return {name: one for name, one in found.items() if isinstance(one.model, Model)}, faults
 
 
+def find_variant(name: str, path: str | Path | None = None) -> Variant:
+    """One variant by name; VariantError lists the names if there is no such."""
+    return chosen_variants([name], False, path)[0]
+
+
+def chosen_variants(names: Sequence[str], everything: bool, path: str | Path | None = None) -> list[Variant]:
+    """The variants of these names, each once, or all of `load_variants`; VariantError for others."""
+    if everything:
+        return list(load_variants(path).values())
+    found, faults = read_variants(path, names)
+    for fault in faults.values():
+        raise fault
+    return list(found.values())
+
+
 def read_variants(
     path: str | Path | None = None, names: Sequence[str] = ()
 ) -> tuple[dict[str, Variant], dict[str, VariantError]]:
-    """The variants of these names, or all of a file; and, by name, what is wrong with those that are none.
+    """The variants of these names, or all of a file; and, by name, what is wrong with the others.
 
     Only what is asked for is built: a file may hold thousands.
+    """
+    found: dict[str, Variant] = {}
+    faults: dict[str, VariantError] = {}
+    for name, table in read_tables(path, names).items():
+        try:
+            found[name] = read_variant(name, table, str(path or "the shipped variants"))
+        except VariantError as error:
+            faults[name] = error
+    return found, faults
+
+
+def read_tables(path: str | Path | None = None, names: Sequence[str] = ()) -> dict[str, Any]:
+    """The tables of these names, or all, as they are written in a file; None: those shipped.
 
     Raises
     ------
     VariantError
         The file is missing or not TOML, or has no variant of such a name.
     """
-    where, tables = read_tables(path, names)
-    found: dict[str, Variant] = {}
-    faults: dict[str, VariantError] = {}
-    for name, table in tables.items():
-        try:
-            found[name] = read_variant(name, table, where)
-        except VariantError as error:
-            faults[name] = error
-    return found, faults
+    shipped = {name: table for file in SHIPPED for name, table in _shipped(file).items()}
+    tables = shipped if path is None else _tables(Path(path))
+    if unknown := [name for name in names if name not in tables]:
+        known = ", ".join([*tables][:MANY]) + (f", ... ({len(tables)} in all)" if len(tables) > MANY else "")
+        raise VariantError(f"no variant {', '.join(map(repr, unknown))}; there are {known}")
+    return {name: tables[name] for name in dict.fromkeys(names) or tables}
+
+
+def _shipped(file: str) -> dict[str, Any]:
+    text = (resources.files("kfcourse.lab") / file).read_text(encoding="utf-8")
+    return dict(tomllib.loads(text)["variants"])
+
+
+def _tables(path: Path) -> dict[str, Any]:
+    """The tables of a file of one's own."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
+        text = content.decode("utf-8-sig").replace("\r\n", "\n")
+    except FileNotFoundError:
+        raise VariantError(f"no file of variants at {path}; check the path") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise VariantError(f"{path} cannot be read: {error}") from None
+    if len(content) > LARGEST_FILE:
+        raise VariantError(f"{path} has more than {LARGEST_FILE:,} bytes: it is no file of variants; check the path")
+    try:
+        tables = tomllib.loads(text).get("variants")
+    except (ValueError, RecursionError) as error:
+        raise VariantError(
+            f"{path} is not valid TOML: {error}; formulas and other texts stand in quotes, and a number has a digit before "
+            "its point, as in 0.9"
+        ) from None
+    if not isinstance(tables, dict) or not tables:
+        raise VariantError(f'{path} has no variants; it needs tables such as [variants.53] with state = "..." and meter = "..."')
+    return tables
 
 
 def read_variant(name: str, table: Any, where: str) -> Variant:
@@ -112,39 +184,43 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
     prefix = f"variant {name} in {where}: "
     if not isinstance(table, Mapping):
         raise VariantError(f"{prefix}expected a table [variants.{name}], got {shown(table)}")
-    unknown, missing = sorted(set(table) - VARIANT_KEYS), sorted({"state", "meter"} - set(table))
+    unknown, missing = sorted(set(table) - KEYS), sorted({"state", "meter"} - set(table))
     if unknown or missing:
         problem = f"unknown key {', '.join(unknown)}" if unknown else f"no {' and no '.join(missing)}"
-        raise VariantError(f"{prefix}{problem}; the keys are {', '.join(sorted(VARIANT_KEYS))}")
-    for key in ("parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs", "modes"):
-        if key in table and not isinstance(table[key], Mapping):
+        raise VariantError(f"{prefix}{problem}; the keys are {', '.join(sorted(KEYS))}")
+    for key in sorted(TABLES & set(table)):
+        if not isinstance(table[key], Mapping):
             raise VariantError(f"{prefix}`{key}` must be a table such as {{ c = 0.9 }}, got {shown(table[key])}")
     try:
         model = model_of_table(table)
+        steps = table.get("steps", STEPS)
+        expect_sizes(steps=steps)
     except (ValueError, TypeError, OverflowError) as error:  # FormulaError and ModelError are ValueErrors
         raise VariantError(f"{prefix}{error}") from None
-    steps = table.get("steps", STEPS)
-    if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
-        raise VariantError(f"{prefix}`steps` must be a positive whole number of measurements, got {shown(steps)}")
     for mode in model.modes if isinstance(model, JumpModel) else (model,):
         if problem := nothing_random(mode):
             raise VariantError(f"{prefix}{problem}")
     return Variant(name, on_a_line(str(table.get("title", ""))), model, steps, dict(table))
 
 
-def find_variant(name: str, path: str | Path | None = None) -> Variant:
-    """One variant by name; VariantError lists the names if there is no such, and tells what is wrong with it."""
-    return chosen_variants([name], False, path)[0]
+def on_a_line(text: str) -> str:
+    """A title or formula that goes to terminals: no line breaks, no characters that cannot be seen."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
-def chosen_variants(names: Sequence[str], everything: bool, path: str | Path | None = None) -> list[Variant]:
-    """The variants of these names, each once, or all that can be used (`load_variants`).
+def summary(name: str, table: Mapping[str, Any]) -> str:
+    """Name, title and equations as the table has them; a line for each mode, of what differs there."""
+    modes: Mapping[str, Mapping[str, Any]] = table.get("modes", {})
+    numbers = [{**table.get("parameters", {}), **mode.get("parameters", {})} for mode in modes.values()]
+    formulas = [_equations({**table, **mode}) for mode in modes.values()] or [_equations(table)]
+    common = formulas[:1] if len(set(formulas)) == 1 else []
+    lines = [f"{name:>6}  {on_a_line(str(table.get('title', ''))) or 'no title'}", *common]
+    for mode, formula, values in zip(modes, formulas, numbers, strict=bool(modes)):
+        own = [f"{key} = {value:g}" for key, value in values.items() if any(one.get(key) != value for one in numbers)]
+        lines.append(f"{mode}: {';  '.join(own if common else [formula, *own])}")
+    return "\n        ".join(lines)
 
-    VariantError if there is no such, or if one of them is not a model.
-    """
-    if everything:
-        return list(load_variants(path).values())
-    found, faults = read_variants(path, names)
-    for fault in faults.values():
-        raise fault
-    return list(found.values())
+
+def _equations(table: Mapping[str, Any]) -> str:
+    state, meter = ([one] if isinstance(one, str) else one for one in (table["state"], table["meter"]))
+    return f"x' = {', '.join(map(on_a_line, state))};  y = {', '.join(map(on_a_line, meter))}"

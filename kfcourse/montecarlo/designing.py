@@ -1,23 +1,21 @@
 """Finding the coefficients of the designed filters (DUOF, FOS and their kin) over an ensemble.
 
-All designs advance together, step by step.  At each step the equations of every block run until they
-ask for a regression; the moments of all blocks are merged, the regression solved, and its coefficients
-sent back into the equations.
+The equations of a step run until they ask for a regression; the ensemble answers it, and its coefficients are sent back
+into the equations.  Each design does so by itself, so that threads can share the designs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
 from kfcourse.errors import NotFinite, expect
 from kfcourse.filters.base import Filter, State, with_angles_on_circle
-from kfcourse.filters.designed import Affine, Design, Scatter
-from kfcourse.filters.fused import Fused
-from kfcourse.laws import Array, NegativeVariance
-from kfcourse.montecarlo.ensemble import Instant, Serial
+from kfcourse.filters.designed import Affine, Design
+from kfcourse.laws import NegativeVariance
+from kfcourse.montecarlo.ensemble import Instant
 
 
 def failed(name: str, step: int, error: Exception) -> NotFinite:
@@ -26,16 +24,16 @@ def failed(name: str, step: int, error: Exception) -> NotFinite:
     return NotFinite(f"step {step}: {name} failed: {error}", name, kind, step=step)
 
 
-def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: Executor | None = None) -> list[Filter]:
+def design(designs: Sequence[Design], ensemble: Iterable[Instant], jobs: int = 1) -> list[Filter]:
     """Fit every design on the same trajectories.
 
     Parameters
     ----------
     designs : sequence of Design
-    ensemble : iterable
-        For each step the list of blocks `Instant(x, y, x_next)`: `Ensemble.by_step(pool)`, or stored trajectories.
-    pool : Executor, optional
-        Blocks of a step are computed in its threads.
+    ensemble : iterable of Instant
+        For each step x_k, y_k and x_{k+1}: an `Ensemble`, or stored trajectories.
+    jobs : int
+        Threads that share the designs.
 
     Returns
     -------
@@ -52,100 +50,56 @@ def design(designs: Sequence[Design], ensemble: Iterable[list[Instant]], pool: E
     for one in designs:
         expect(one, Design, "design")
     coefficients: list[list[list[Affine]]] = [[] for _ in designs]
-    states: list[list[State]] = []  # [block][design]
-    for k, blocks in enumerate(ensemble):
-        if not states:
-            drawn = blocks[0].x.shape[1], blocks[0].y.shape[1]
-            for one in designs:
-                if (one.model.n, one.model.p) != drawn:
-                    raise ValueError(
-                        f"{one.name} was built for a model with {one.model.n} states and {one.model.p} measurements; "
-                        f"the ensemble has {drawn[0]} and {drawn[1]}"
-                    )
-            states = [[one.init(len(block.x)) for one in designs] for block in blocks]
-        runs = [_BlockStep(designs, before, block, k) for before, block in zip(states, blocks, strict=True)]
-        fits = _fit_step(designs, runs, k, pool or Serial())
-        states = [run.after() for run in runs]
-        for table, row in zip(coefficients, fits, strict=True):
-            table.append(row)
+    states = list[State]()
+    with ThreadPoolExecutor(jobs) as pool:
+        for k, instant in enumerate(ensemble):
+            if k == 0:
+                _check_sizes(designs, instant)
+                states = [one.init(len(instant.x)) for one in designs]
+            given = [(one, state, instant, k) for one, state in zip(designs, states, strict=True)]
+            results = list(pool.map(lambda some: _fitted(*some), given))
+            states = [state for state, _ in results]
+            for table, (_, fits) in zip(coefficients, results, strict=True):
+                table.append(fits)
     return [one.with_coefficients(table) for one, table in zip(designs, coefficients, strict=True)]
 
 
-def design_together(
-    designs: Sequence[Fused], ensemble: Iterable[tuple[Array, Array]], size: tuple[int, int], pool: Executor
-) -> list[Filter]:
-    """`design` by compiled loops, of `size` runs and steps: each design passes over `Ensemble.together` in a thread of its own.
-
-    A design that meets infinite or NaN values is missing: `design` tells why, or gets along with them.
-    """
-    begun = [pool.submit(one.begin, *size) for one in designs]
-    running, end = list[Future[None]](), 0
-    for x, y in ensemble:  # the next is drawn while the designs work on this one
-        work = [(one, *future.result()) for one, future in zip(designs, begun, strict=True)]
-        for future in running:
-            future.result()
-        first, end = end, end + len(y)
-        running = [pool.submit(one.find, table[first:end], y, x, *law) for one, table, law in work]
-    for future in running:
-        future.result()
-    return [one.fitted(table) for one, table, _ in work if np.isfinite(table).all()]
+def _check_sizes(designs: Sequence[Design], instant: Instant) -> None:
+    n, p = instant.x.shape[1], instant.y.shape[1]
+    for one in designs:
+        if (one.model.n, one.model.p) != (n, p):
+            raise ValueError(
+                f"{one.name} was built for a model with {one.model.n} states and {one.model.p} measurements; "
+                f"the ensemble has {n} and {p}"
+            )
 
 
-class _BlockStep:
-    """The equations of all designs over one step of one block of trajectories."""
-
-    def __init__(self, designs: Sequence[Design], states: Sequence[State], block: Instant, k: int):
-        self.block, self.names, self.k = block, [one.name for one in designs], k
-        self.angles = [one.model.angles.x for one in designs]
-        self.running = [one.equations(before, block.y) for one, before in zip(designs, states, strict=True)]
-        self.results: list[State | None] = [None] * len(designs)
-
-    def advance(self, answers: dict[int, Affine | None]) -> list[Scatter | None]:
-        """Answer the waiting designs; the moments of the regression each asks for next, None if it is through."""
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported, by name
-            return [self._advance(i, answer) for i, answer in answers.items()]
-
-    def _advance(self, i: int, answer: Affine | None) -> Scatter | None:
+def _fitted(one: Design, state: State, instant: Instant, k: int) -> tuple[State, list[Affine]]:
+    """One step of a design: the next state, angles between -pi and pi, and the coefficients of its regressions."""
+    fits = list[Affine]()
+    equations = one.equations(state, instant.y)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported, by name
         try:
-            request = self.running[i].send(answer)  # type: ignore[arg-type]  # None starts a generator
+            request = next(equations)
+            while True:
+                moments = request.scatter(instant.x, instant.x_next, instant.mode)
+                if not moments.size:
+                    raise NotFinite(
+                        f"step {k}: no trajectory of the design is in a mode that {one.name} fits; take more trajectories",
+                        one.name,
+                    )
+                if not np.isfinite(moments.scatter).all():
+                    raise _diverged(one.name, instant, k)
+                fits.append(moments.regression())
+                request = equations.send(fits[-1])
         except StopIteration as stop:
-            self.results[i] = stop.value
-            return None
+            return with_angles_on_circle(stop.value, one.model.angles.x), fits
         except (NegativeVariance, np.linalg.LinAlgError) as error:
-            raise failed(self.names[i], self.k, error) from None
-        return request.scatter(self.block.x, self.block.x_next, getattr(self.block, "mode", None))
-
-    def after(self) -> list[State]:
-        """The states of the designs, which are all through: angles between -pi and pi, as when they run."""
-        done = [state for state in self.results if state is not None]
-        return [with_angles_on_circle(state, angles) for state, angles in zip(done, self.angles, strict=True)]
+            raise failed(one.name, k, error) from None
 
 
-def _fit_step(designs: Sequence[Design], runs: Sequence[_BlockStep], k: int, pool: Executor) -> list[list[Affine]]:
-    """One step of every design: its coefficients, each regression answered from the whole ensemble."""
-    fits: list[list[Affine]] = [[] for _ in designs]
-    active = list(range(len(designs)))
-    while active:
-        answers = {i: fits[i][-1] if fits[i] else None for i in active}
-        moments = list(pool.map(lambda run, answers=answers: run.advance(answers), runs))
-        asked = []
-        for i, parts in zip(active, zip(*moments, strict=True), strict=True):
-            if parts[0] is None:
-                continue
-            known = [part for part in parts if part is not None]
-            if not any(part.size for part in known):
-                raise NotFinite(
-                    f"step {k}: no trajectory of the design is in a mode that {designs[i].name} fits; take more trajectories",
-                    designs[i].name,
-                )
-            with np.errstate(over="ignore", invalid="ignore"):
-                merged = Scatter.together(known)
-            if not np.isfinite(merged.scatter).all():
-                if not all(np.isfinite(run.block.x_next).all() and np.isfinite(run.block.y).all() for run in runs):
-                    raise NotFinite(f"step {k}: the model's trajectories become infinite, check its equations and parameters")
-                said = f"{designs[i].name}, step {k}: the design met infinite or NaN values; the model or this filter diverges"
-                raise NotFinite(said, designs[i].name, "infinite", step=k)
-            fits[i].append(merged.regression())
-            asked.append(i)
-        active = asked
-    return fits
+def _diverged(name: str, instant: Instant, k: int) -> NotFinite:
+    if not (np.isfinite(instant.x_next).all() and np.isfinite(instant.y).all()):
+        return NotFinite(f"step {k}: the model's trajectories become infinite, check its equations and parameters")
+    words = f"{name}, step {k}: the design met infinite or NaN values; the model or this filter diverges"
+    return NotFinite(words, name, "infinite", step=k)

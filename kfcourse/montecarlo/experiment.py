@@ -4,41 +4,43 @@
 
     compare(filters, model, runs, steps, seed) -> Comparison
 
-designs the filters that need it on one ensemble, runs all of them on another, and keeps sums over
-batches of trajectories, never the trajectories themselves.
+designs the filters that need it on an ensemble of their own, runs all of them on the same trajectories, and keeps sums over
+batches of these, never the trajectories themselves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Executor
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
-from itertools import accumulate, chain, islice
-from typing import Any
+from itertools import accumulate, islice
+from typing import Any, NamedTuple, TypeVar
 
+import joblib
 import numpy as np
+from tqdm import tqdm
 
-from kfcourse.errors import Reason, expect, expect_sizes
+from kfcourse.angles import difference, near
+from kfcourse.errors import NotFinite, Reason, Refused, expect, expect_sizes
 from kfcourse.filters.base import Filter, State
 from kfcourse.filters.designed import Design
-from kfcourse.filters.fused import Fused, fuse
-from kfcourse.laws import Array, Gaussian, stacked
-from kfcourse.montecarlo.batches import BATCHES, batch_sizes
-from kfcourse.montecarlo.blocks import progress_bar, run_block, run_stretches
-from kfcourse.montecarlo.comparison import Comparison
-from kfcourse.montecarlo.designing import NotFinite, design, design_together
-from kfcourse.montecarlo.ensemble import STEPS_AT_ONCE, Ensemble, workers
-from kfcourse.montecarlo.exceptional import Chosen, Scores, how_many
-from kfcourse.montecarlo.parallel import Cluster, cluster, cores
-from kfcourse.montecarlo.slow_filters import LEAST, run_slow_filters
+from kfcourse.filters.looking_back import looked_back
+from kfcourse.laws import Array, Gaussian, NegativeVariance, stacked
+from kfcourse.montecarlo import BATCHES
+from kfcourse.montecarlo.comparison import EXACT, Comparison
+from kfcourse.montecarlo.designing import design, failed
+from kfcourse.montecarlo.ensemble import Instant, instants, weights
+from kfcourse.montecarlo.parallel import cluster, cores
 from kfcourse.montecarlo.statistics import Sums
-from kfcourse.montecarlo.two_phase import Replicas
-from kfcourse.montecarlo.widths import best_width
-from kfcourse.symbolic.compiled import REMEDY, is_scalar
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 
-DESIGN_RUNS = 1_000_000  # more find coefficients no comparison could tell from these
+PIECE = 2500  # trajectories of a piece of work: a pass over fewer takes as long as the interpreter does
+DESIGN_RUNS = 200_000  # coefficients of so many cost a filter some hundred-thousandth of its accuracy
+
+WIDE = 1.5  # times as wide as the prior: a law from which half of the initial states are drawn
+
+T = TypeVar("T")
 
 
 def run(one: Filter, y: Array) -> Gaussian:
@@ -119,15 +121,9 @@ def compare(
     seed: int,
     *,
     design_runs: int | None = None,
-    designs: int = 1,
     same_ensemble: bool = False,
     smoothers: Sequence[Filter] = (),
-    wide: float | None = None,
-    compiled: bool = False,
-    slow_runs: int = 2000,
-    slow_seconds: float | None = None,
-    slow_memory: float | None = None,
-    threads: int | None = None,
+    jobs: int | None = None,
     dask: str | None = None,
     progress: bool | None = None,
 ) -> Comparison:
@@ -136,107 +132,77 @@ def compare(
     Parameters
     ----------
     filters : sequence of Filter or Design
-        Designs are designed first, on an ensemble of their own.
+        Designs are designed first, on an ensemble of their own; standard errors hold for the filters as they were designed.
+        One that cannot go on (the exact one, particles) is left out, and `Comparison.left_out` tells why.
     model : Model
     runs, steps : int
         Trajectories, and measurements of each.
     seed : int
-        The same seed gives the same numbers, bit by bit, whatever the number of threads.  Another NumPy or processor may do
+        The same seed gives the same numbers, bit by bit, whatever the number of jobs.  Another NumPy or processor may do
         linear algebra by another kernel (BLAS): then vector models differ by rounding, up to some 1e-12, and scalar ones hardly.
     design_runs : int, optional
-        Size of the design ensemble, which is held at once: a trajectory of a scalar model takes 0.15 kB with one designed filter
-        and 0.45 kB with the lab's seven, one of a model of two states 0.36 kB with one.  By default `runs`, at most a million:
-        coefficients from so many cost a filter about a millionth of its accuracy, and memory does not grow with `runs`.
-    designs : int
-        Designed filters are designed on so many ensembles.  The first design is reported; how the others differ from it on the
-        common trajectories goes into the standard errors.  With 1 these hold for the filters just as they were designed.
+        Size of the design ensemble; by default ten times `runs`, at most 200,000.
     same_ensemble : bool
         Design on the very trajectories of the comparison, as the lab does: optimistic for the designed
         filters, by about the number of coefficients over `runs`.
     smoothers : sequence of Filter
         Filters that look back from the end of each record, such as `aof(gaussian(model))`, and `pointmass(model)` as their bound;
         `Comparison.smoothing` tells how good they are.
-    wide : float, optional
-        Draw half of the initial states of the comparison from a law so many times as wide as the prior, all by strata, and weight
-        every trajectory (importance sampling): where rare far starts dominate the error, that gives the standard errors of many
-        times the trajectories.  By default a pilot on the fast filters chooses among 1, 1.5, 2 and 3.
-    compiled : bool
-        Run compiled code (numba: `pip install kfcourse[fast]`) where a scalar model and its filters have formulas to compile.
-        The numbers are the same but for rounding; the first time, compiling takes seconds, and is kept.
-    slow_runs : int
-        Slow filters (exact, particle) run on this many of the common trajectories, at least 100: the first ones, and those on
-        which the fast filters disagree or err the most (`exceptional`).  What they differ by from the Gaussian AOF (or else the
-        most accurate fast filter) is found there.  0 leaves them out.
-    slow_seconds : float, optional
-        The slow filters stop after so long, on fewer trajectories; `Comparison.slow_runs` tells on how many.  With
-        the same seed, as many trajectories give the same numbers.  A slow filter that fails, or that does not come through
-        the first few in this time, is left out, and `Comparison.left_out` tells why.
-    slow_memory : float, optional
-        Bytes that the slow filters may take beyond what the process has (Linux).  They then take fewer trajectories at once,
-        which changes nothing but the time; one that has not room for the first few is left out.
-    threads : int, optional
-        How many processor cores to use, by default all there are: threads share the blocks of trajectories, and processes the
-        slow filters' chunks, as far as these take more than a moment.
+    jobs : int, optional
+        How many threads share the work, by default one for each processor core.
     dask : str, optional
-        Address of a Dask scheduler, such as "tcp://scheduler:8786": its workers run the filters, in blocks of trajectories and in
-        chunks of the slow filters'; the numbers are the same.  Designed is here.  `slow_memory` is theirs to keep, not limited.
+        Address of a Dask scheduler, such as "tcp://scheduler:8786": its workers run the filters; the numbers are the same.
+        Designed is here.
     progress : bool, optional
         Show progress bars; by default if standard error is a terminal.
 
     Raises
     ------
     ValueError
-        Filters of equal name, sizes that are not positive whole numbers; `compiled` without numba.
+        Filters of equal name, sizes that are not positive whole numbers.
     NotFinite
         A trajectory or a filter left the finite numbers.
     """
-    _check_arguments(filters, model, slow_runs, slow_seconds, slow_memory)
-    _check_designs(designs, same_ensemble, wide)
+    _check_arguments(filters, model)
     if smoothers:
         for one in smoothers:
             expect(one, Filter, "smoothers=")
-        _check_arguments(smoothers, model, slow_runs, slow_seconds, slow_memory)
-    if compiled:
-        filters = _compiled(filters)
-    threads = cores() if threads is None else threads
-    names = [one.name for one in filters]
-    slow = [one for one in filters if one.slow and slow_runs]
-    fast = [one for one in filters if not one.slow]
-    run_seed, pilot_seed, *design_seeds = np.random.SeedSequence(seed).spawn(2 + designs)
-    common = Ensemble(model, runs, steps, run_seed, compiled=compiled)
-    size = min(runs, DESIGN_RUNS) if design_runs is None else design_runs
-    design_ensemble, *others = (
-        [common] if same_ensemble else [Ensemble(model, size, steps, one, compiled=compiled) for one in design_seeds]
-    )
-    to_design = [one for one in fast if isinstance(one, Design)]
-    with workers(threads) as pool, cluster(dask) as far:
-        ready = _designed(fast, design_ensemble, pool, progress)
-        again = [_designed(to_design, one, pool, progress) for one in others]
-        if not same_ensemble:
-            common = replace(common, wide=best_width(ready, replace(common, seed=pilot_seed)) if wide is None else wide)
-        everyone = [*ready, *chain(*again)]
-        few, limits = min(slow_runs, runs), (slow_seconds, slow_memory, threads)
-        count = how_many(runs) if few and any(one.slow for one in (*filters, *smoothers)) else 0
-        executor, judged = far.executor if far else pool, (len(ready), count)
+        _check_arguments(smoothers, model)
+    jobs = cores() if jobs is None else jobs
+    expect_sizes(runs=runs, steps=steps, jobs=jobs)
+    design_runs = min(10 * runs, DESIGN_RUNS) if design_runs is None else design_runs
+    expect_sizes(design_runs=design_runs)
+    if not isinstance(seed, int | np.integer) or seed < 0:
+        raise ValueError(f"the seed must be a whole number, not negative, got {seed!r}")
+    design_seed, *seeds = np.random.SeedSequence(seed).spawn(1 + min(BATCHES, runs))
+    sizes = batch_sizes(runs)
+    where = (sizes, seeds) if same_ensemble else ([design_runs], [design_seed])
+    ready = _designed(filters, instants(model, where[0], steps, where[1]), steps, jobs, progress)
+    sample = Sample(model, steps, sizes, seeds, None if same_ensemble else width(model))
+    with cluster(dask):
         try:
-            everything, exceptional = _run_blocks(everyone, common, executor, progress, judged)
+            result = _compared(ready, sample, seed, jobs, progress)
         except NotFinite:
-            if wide is not None or not common.wide or common.wide == 1:
+            if sample.wide is None:
                 raise
-            common = replace(common, wide=1.0)  # some far start is too far: none but the prior's own
-            everything, exceptional = _run_blocks(everyone, common, executor, progress, judged)
-        sums, replicas = _split(everything, fast, len(others))
-        chosen = Chosen.of(few, exceptional)
-        slow_part, left_out = None, dict[str, Reason]()
-        if slow:
-            slow_ready = _designed(slow, design_ensemble, pool, progress)
-            slow_part, left_out = run_slow_filters(ready, slow_ready, common, chosen, sums.counts, *limits, progress, far=far)
-        smoothing = None
+            sample = sample._replace(wide=None)  # some far start is too far: none but the prior's own
+            result = _compared(ready, sample, seed, jobs, progress)
+        if not same_ensemble:
+            result = replace(result, designed=tuple(one.name for one in filters if isinstance(one, Design)))
         if smoothers:
-            smoothing = _smoothing(smoothers, common, seed, pool, chosen, limits, progress, far)
-    quick = tuple(one.name for one in fast)
-    found = Comparison(model, tuple(names), quick, runs, steps, seed, sums, slow_part, left_out, replicas)
-    return replace(found.without_unhealthy(), smoothing=smoothing)
+            looking_back = _compared(smoothers, sample, seed, jobs, progress, back=True)
+            result = replace(result, smoothing=looking_back)
+    return result
+
+
+def width(model: Model | JumpModel) -> float | None:
+    """How much wider half of the initial states are drawn: not at all where they are angles, or where nothing is drawn."""
+    return WIDE if not model.angles.x and np.any(model.prior.cov) else None
+
+
+def batch_sizes(runs: int) -> list[int]:
+    """Trajectories of each batch: nearly equal."""
+    return np.diff(np.linspace(0, runs, min(BATCHES, runs) + 1).astype(int)).tolist()
 
 
 def without_failing(
@@ -264,37 +230,178 @@ def without_failing(
             return replace(found, left_out={**reasons, **found.left_out})
 
 
-def _smoothing(
-    smoothers: Sequence[Filter],
-    common: Ensemble,
-    seed: int,
-    pool: Executor,
-    chosen: Chosen,
-    limits: tuple[float | None, float | None, int],
-    progress: bool | None,
-    far: Cluster | None,
-) -> Comparison:
-    """The comparison of smoothers on the same trajectories, the slow ones on those that the slow filters saw."""
-    few = len(chosen.places)
-    slow, fast = ([one for one in smoothers if one.slow == which and (few or not one.slow)] for which in (True, False))
-    sums, _ = _run_blocks(fast, common, far.executor if far else pool, progress, (0, 0), back=True)
-    slow_part, left_out = None, dict[str, Reason]()
-    if slow:
-        given = fast, slow, common, chosen, sums.counts
-        slow_part, left_out = run_slow_filters(*given, *limits, progress, back=True, far=far)
-    names, quick = (tuple(one.name for one in some) for some in (smoothers, fast))
-    found = Comparison(common.model, names, quick, common.runs, common.steps, seed, sums, slow_part, left_out)
-    return found.without_unhealthy()
+class Sample(NamedTuple):
+    """The trajectories of a comparison: batches of such sizes, each drawn from its seed."""
+
+    model: Model | JumpModel
+    steps: int
+    sizes: list[int]
+    seeds: list[np.random.SeedSequence]
+    wide: float | None = None
+
+    def part(self, batches: slice) -> Sample:
+        """Some of the batches."""
+        return self._replace(sizes=self.sizes[batches], seeds=self.seeds[batches])
+
+    def instants(self) -> Iterator[Instant]:
+        """The steps of all batches side by side."""
+        return instants(self.model, self.sizes, self.steps, self.seeds, self.wide)
 
 
-def _check_arguments(
+def _designed(
     filters: Sequence[Filter | Design],
-    model: Model | JumpModel,
-    slow_runs: int,
-    slow_seconds: float | None,
-    slow_memory: float | None,
-) -> None:
-    """ValueError for what `compare` cannot do with these arguments."""
+    ensemble: Iterable[Instant],
+    steps: int,
+    jobs: int,
+    progress: bool | None,
+) -> list[Filter]:
+    """The filters in their order, those that need it designed on the ensemble."""
+    designs = [one for one in filters if isinstance(one, Design)]
+    if not designs:
+        return [one for one in filters if isinstance(one, Filter)]
+    ready = iter(design(designs, _progress("designing", steps, "step", progress, ensemble), jobs))
+    return [next(ready) if isinstance(one, Design) else one for one in filters]
+
+
+def _compared(
+    filters: Sequence[Filter],
+    sample: Sample,
+    seed: int,
+    jobs: int,
+    progress: bool | None,
+    *,
+    back: bool = False,
+) -> Comparison:
+    """All filters on the sample; one that cannot go on is left out, and the others start again."""
+    running, left_out = list(filters), dict[str, Reason]()
+    while True:
+        # slow filters take much memory for each trajectory, and so does looking back
+        dear = back or any(one.slow for one in running)
+        each = 1 if dear else max(1, PIECE // max(sample.sizes))
+        parts = [sample.part(slice(b, b + each)) for b in range(0, len(sample.sizes), each)]
+        work = (joblib.delayed(run_batches)(running, part, back=back) for part in parts)
+        done = joblib.Parallel(jobs, prefer="threads", return_as="generator")(work)
+        try:
+            sums = Sums.together([*_progress("comparing", len(parts), "part", progress, done)])
+        except LeftOut as failure:
+            left_out[failure.filter_name] = failure.reason
+            running = [one for one in running if one.name != failure.filter_name]
+            if not running:
+                raise NotFinite(str(failure.reason), failure.filter_name) from None
+        else:
+            names = tuple(one.name for one in running)
+            runs = sum(sample.sizes)
+            return Comparison(sample.model, names, runs, sample.steps, seed, sums, left_out=left_out)
+
+
+class LeftOut(Exception):
+    """A filter that cannot go on, as it is slow or says so itself, and that the others do without."""
+
+    def __init__(self, filter_name: str, reason: Reason):
+        super().__init__(filter_name, reason)
+        self.filter_name, self.reason = filter_name, reason
+
+
+def run_batches(filters: Sequence[Filter], sample: Sample, *, back: bool = False) -> Sums:
+    """Advance all filters together over the steps of a sample; `back`: let them look back from its end."""
+    starts = np.concatenate([[0], np.cumsum(sample.sizes[:-1])]).astype(int)
+    sums = Sums.empty(len(filters), sample.steps, sample.model.n, len(sample.sizes))
+    exact = next((i for i, one in enumerate(filters) if one.name == EXACT), None)
+    angles = sample.model.angles.x
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what diverges is reported below, by name
+        for k, (instant, laws) in enumerate((_back if back else _onward)(filters, sample)):
+            if k == 0:
+                weight = weights(sample.model.prior, instant.x, sample.wide)
+                sums.weight[:] = np.add.reduceat(weight, starts)
+            sums.size[k] = np.add.reduceat(weight * (instant.x**2).sum(axis=1), starts)
+            for i, state in enumerate(laws):
+                with _named(filters[i], k):
+                    x = near(instant.x, state.posterior.mean, angles)
+                    sums.record(i, k, x, state.posterior, weight, starts)
+            if exact is None:
+                continue
+            first, second, error = _twice(laws[exact])
+            sums.doubt[k] = np.add.reduceat(weight * error**2, starts)
+            for i in {*range(len(laws))} - {exact}:
+                mean = laws[i].posterior.mean
+                product = difference(mean, first, angles) * difference(mean, second, angles)
+                sums.distance[i, k] = np.add.reduceat(weight * product.sum(axis=1), starts)
+    _check_finite(filters, sums)
+    return sums
+
+
+def _onward(filters: Sequence[Filter], sample: Sample) -> Iterator[tuple[Instant, list[State]]]:
+    """The states of all filters after each measurement."""
+    states = [one.init(sum(sample.sizes)) for one in filters]
+    for k, instant in enumerate(sample.instants()):
+        for i, one in enumerate(filters):
+            with _named(one, k):
+                states[i] = one.step(states[i], instant.y)
+        yield instant, states
+
+
+def _back(filters: Sequence[Filter], sample: Sample) -> Iterator[tuple[Instant, list[State]]]:
+    """What all filters tell of each step once they have seen the last."""
+    record = list(sample.instants())
+    y = np.stack([instant.y for instant in record])
+    laws = []
+    for one in filters:
+        with _named(one, len(record) - 1):
+            laws.append(looked_back(one, islice(walk(one, y), 1, None), y))
+    yield from zip(record, map(list, zip(*laws, strict=True)), strict=True)
+
+
+def _twice(state: State) -> tuple[Array, Array, Array]:
+    """Two estimates of the exact filter whose errors, if it has any, are independent, and its own error (runs,).
+
+    Those of both clouds of particles, and half their distance: a product of distances from them then does not hold their errors.
+    Of point masses twice the same, and what discretisation leaves.
+    """
+    halves = getattr(state.memory, "halves", None)
+    if halves is not None:
+        return *halves, state.memory.apart()
+    stated = getattr(state.memory, "discretisation_error", None)
+    mean = state.posterior.mean
+    return mean, mean, np.zeros(len(mean)) if stated is None else stated()
+
+
+@contextmanager
+def _named(one: Filter, step: int) -> Iterator[None]:
+    """What goes wrong in a filter is said with its name: it can be left out."""
+    try:
+        yield
+    except (ValueError, ArithmeticError, MemoryError) as error:
+        if one.slow or isinstance(error, Refused):
+            raise LeftOut(one.name, error.with_traceback(None)) from None
+        if isinstance(error, NegativeVariance | np.linalg.LinAlgError):
+            raise failed(one.name, step, error) from None
+        raise
+
+
+def _check_finite(filters: Sequence[Filter], sums: Sums) -> None:
+    finite = np.asarray(np.isfinite(sums.square).all(axis=(2, 3)) & ~np.isnan(sums.own).any(axis=2))
+    if finite.all():
+        return
+    step = int(np.argmin(finite.all(axis=0)))
+    if not finite[:, step].any():
+        raise NotFinite(
+            f"step {step}: every filter fails; the model's trajectories become infinite, check its equations and parameters"
+        )
+    one = filters[int(np.argmin(finite[:, step]))]
+    words = f"step {step}: {one.name} became infinite or NaN although the trajectories are finite"
+    if one.slow:
+        raise LeftOut(one.name, NotFinite(words, one.name, "infinite", step=step))
+    raise NotFinite(f"{words}: it diverges; leave it out, or check the model", one.name, "infinite", step=step)
+
+
+def _progress(what: str, total: int, unit: str, progress: bool | None, items: Iterable[T]) -> Iterable[T]:
+    """The items, with a progress bar."""
+    # tqdm: disable=None means "unless standard error is a terminal"
+    return tqdm(items, desc=what, total=total, unit=unit, disable=None if progress is None else not progress, delay=0.5)
+
+
+def _check_arguments(filters: Sequence[Filter | Design], model: Model | JumpModel) -> None:
+    """TypeError or ValueError for what `compare` cannot do with these arguments."""
     if isinstance(filters, Filter | Design):
         raise TypeError(f"compare expects a list of filters, and one came: compare([{filters.name}], model, ...)")
     for one in filters:
@@ -303,91 +410,9 @@ def _check_arguments(
     names = [one.name for one in filters]
     if len(set(names)) < len(names) or not names:
         raise ValueError(f"give at least one filter, and each a name of its own: {', '.join(names) or 'none given'}")
-    if all(one.slow for one in filters):
-        raise ValueError(f"{names[0]} is found through its difference from a fast filter; add one, such as aof-gaussian")
-    if not isinstance(slow_runs, int | np.integer) or slow_runs < 0:
-        raise ValueError(f"slow_runs must be a whole number of trajectories, 0 for none, got {slow_runs!r}")
-    if slow_seconds is not None and not slow_seconds > 0:
-        raise ValueError(f"slow_seconds must be positive, got {slow_seconds}; slow_runs=0 leaves the slow filters out")
-    if slow_memory is not None and not slow_memory >= LEAST:
-        raise ValueError(f"slow_memory must be at least {LEAST:g}, got {slow_memory}; slow_runs=0 leaves the slow filters out")
     for one in filters:
         if (one.model.n, one.model.p) != (model.n, model.p):
             raise ValueError(
                 f"{one.name} was built for a model with {one.model.n} states and {one.model.p} measurements; "
                 f"this one has {model.n} and {model.p}"
             )
-
-
-def _compiled(filters: Sequence[Filter | Design]) -> list[Filter | Design]:
-    """The filters with compiled steps as far as that can be; ValueError if there is no numba."""
-    try:
-        return [fuse(one) for one in filters]
-    except ImportError:
-        raise ValueError(REMEDY) from None
-
-
-def _check_designs(designs: int, same_ensemble: bool, wide: float | None) -> None:
-    expect_sizes(designs=designs)
-    if designs > 1 and same_ensemble:
-        raise ValueError("there is one ensemble of the comparison: same_ensemble=True goes with designs=1 only")
-    if same_ensemble and wide is not None:
-        raise ValueError("a design weighs all its trajectories alike: same_ensemble=True goes without wide")
-
-
-def _split(sums: Sums, fast: Sequence[Filter | Design], again: int) -> tuple[Sums, Replicas | None]:
-    """Sums of the fast filters, and of the designed ones for each of their designs."""
-    own = sums.of_filters(slice(len(fast)))
-    designed = [i for i, one in enumerate(fast) if isinstance(one, Design)]
-    if not designed or not again:
-        return own, None
-    starts = [len(fast) + len(designed) * i for i in range(again)]
-    others = (sums.of_filters(slice(start, start + len(designed))) for start in starts)
-    return own, Replicas(tuple(fast[i].name for i in designed), (own.of_filters(designed), *others))
-
-
-def _designed(filters: Sequence[Filter | Design], ensemble: Ensemble, pool: Executor, progress: bool | None) -> list[Filter]:
-    """The filters in their order, those that need it designed on the ensemble."""
-    found = {one.name: one for one in filters if isinstance(one, Filter)}
-    if quick := [one for one in filters if isinstance(one, Fused)]:
-        few = progress_bar("designing", -(-ensemble.steps // STEPS_AT_ONCE), "stretch", progress, ensemble.together(pool))
-        found |= {one.name: one for one in design_together(quick, few, (ensemble.runs, ensemble.steps), pool)}
-    if rest := [one for one in filters if isinstance(one, Design) and one.name not in found]:
-        steps = progress_bar("designing", ensemble.steps, "step", progress, ensemble.by_step(pool))
-        found |= {one.name: one for one in design(rest, steps, pool)}
-    return [found[one.name] for one in filters]
-
-
-def _run_blocks(
-    filters: Sequence[Filter],
-    ensemble: Ensemble,
-    pool: Executor,
-    progress: bool | None,
-    judged: tuple[int, int],
-    *,
-    back: bool = False,
-) -> tuple[Sums, Array]:
-    """Sums over all trajectories, its blocks in parallel.
-
-    Judged by the first so many filters, also the numbers of so many of the most exceptional trajectories.
-    """
-    judges, count = judged
-    several = ensemble.compiled and is_scalar(ensemble.model) and not back and not count
-
-    def block(index: int) -> tuple[Sums, tuple[Array, Array]]:
-        size = ensemble.sizes[index]
-        counts = batch_sizes(size, max(1, round(BATCHES * size / ensemble.runs)))
-        sums = Sums.empty(len(filters), ensemble.steps, ensemble.model.n, counts)
-        scores = Scores(size, judges) if count else None
-        if several:
-            run_stretches(filters, ensemble.stretches(index), sums, ensemble.weight)
-        else:
-            run_block(filters, ensemble.block(index), sums, weight_of=ensemble.weight, back=back, scores=scores)
-        return sums, scores.highest(count) if scores else (np.empty(0, dtype=int), np.empty(0))
-
-    indices = range(len(ensemble.sizes))
-    found, highest = zip(*progress_bar("comparing", len(indices), "block", progress, pool.map(block, indices)), strict=True)
-    starts = accumulate(ensemble.sizes, initial=0)
-    places = np.concatenate([start + here for start, (here, _) in zip(starts, highest, strict=False)])
-    best = np.argsort(-np.concatenate([scores for _, scores in highest]), kind="stable")[:count]
-    return Sums.concatenate(found), np.sort(places[best])

@@ -10,9 +10,14 @@ from typing import Any
 
 import click
 
-from kfcourse.montecarlo.parallel import cores
 from kfcourse.notebooks.grading.sandbox import KINDS
 from kfcourse.notebooks.grading.submissions import SECONDS
+
+
+def _cores() -> int:
+    from joblib import cpu_count
+
+    return int(cpu_count())
 
 
 def _options(command: Callable) -> Callable:
@@ -26,9 +31,8 @@ def _options(command: Callable) -> Callable:
         click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder of the notebooks."),
         click.option("--masters", type=click.Path(path_type=Path), help="Folder of other masters, <set>/statement.md each."),
         click.option(
-            "--jobs", "workers", type=click.IntRange(min=1), default=cores, show_default="all cores", help="Notebooks at once."
+            "--jobs", "workers", type=click.IntRange(min=1), default=_cores, show_default="all cores", help="Notebooks at once."
         ),
-        click.option("--dask", help="Address of a Dask scheduler that does the work instead."),
     ]
     return functools.reduce(lambda decorated, option: option(decorated), reversed(options), command)
 
@@ -65,7 +69,9 @@ def _make(kind: str, **options: Any) -> None:
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="File of the table.  [default: FOLDER-grades.csv]")
 @click.option("--variants", "variants_file", type=click.Path(path_type=Path), help="The file of variants that you handed out.")
 @click.option("--masters", type=click.Path(path_type=Path), help="Folder of other masters, <set>/statement.md each.")
-@click.option("--jobs", "workers", type=click.IntRange(min=1), default=cores, show_default="all cores", help="Notebooks at once.")
+@click.option(
+    "--jobs", "workers", type=click.IntRange(min=1), default=_cores, show_default="all cores", help="Notebooks at once."
+)
 @click.option(
     "--seconds",
     type=click.FloatRange(min=1),

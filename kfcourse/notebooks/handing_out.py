@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 from tqdm import tqdm
@@ -30,7 +31,6 @@ def hand_out(
     out: Path,
     masters: Path | None,
     workers: int,
-    dask: str | None,
     with_pdf: bool = False,
 ) -> bool:
     """Write the notebooks that `kfcourse exercises` or `solutions` is asked for; whether all could be made."""
@@ -39,19 +39,21 @@ def hand_out(
     if everything:
         variants, faults = usable_variants(variants_file)
     else:
-        variants = {one.name: one for one in chosen_variants(names, bool(students and not names), variants_file)}
-    for one in variants.values():
-        one.plain("the exercises")  # said once, not for each set
+        chosen = chosen_variants(names, bool(students and not names), variants_file)
+        variants = {variant.name: variant for variant in chosen}
+    for variant in variants.values():
+        variant.plain("the exercises")  # told once, not for each set
     if variants_file and (everything or not names):
         _say_left_out(variants_file, bool(variants))
+    options = {"variants_file": variants_file, "masters": masters, "with_pdf": with_pdf}
     if students:
-        work = _for_students(kind, students, [*variants], wanted, out, variants_file, masters, with_pdf)
+        work = _for_students(kind, students, [*variants], wanted, out, options)
     else:
-        work = plan(kind, out, [*variants], wanted, variants_file, masters, with_pdf)
+        work = plan(kind, out, [*variants], wanted, **options)
     _separate(work)
     out.mkdir(parents=True, exist_ok=True)
-    failed = _show(run_all(work, make, workers, kind, dask), work)
-    for outcome in sorted(failed, key=lambda one: one.job.name):
+    failed = _show(run_all(work, make, workers, kind), work)
+    for outcome in sorted(failed, key=lambda outcome: outcome.job.name):
         click.echo(f"FAILED {clean(outcome.job.name)}: {clean(outcome.message, 2000)}", err=True)
     for fault in faults.values():
         click.echo(f"FAILED {clean(str(fault), 2000)}", err=True)
@@ -77,30 +79,22 @@ def _letters(given: str | None) -> list[str]:
 
 
 def _for_students(
-    kind: str,
-    students: Path,
-    variants: Sequence[str],
-    letters: Sequence[str],
-    out: Path,
-    variants_file: Path | None,
-    masters: Path | None,
-    with_pdf: bool,
+    kind: str, students: Path, variants: Sequence[str], letters: Sequence[str], out: Path, options: Mapping[str, Any]
 ) -> list[Job]:
     """A folder for each student, out/group/name, with their variant's notebooks; the assignment is printed."""
-    work = []
     given = assign(students, variants)
     click.echo("group       variant   name")
-    for one in given:
-        click.echo(f"{one.group:<11} {clean(one.variant):<9} {one.name}")
-        work += [
-            Job(letter, one.variant, out / one.folder, kind, variants_file, masters, with_pdf, f"{one.name}, {one.group}")
-            for letter in letters
-        ]
+    for student in given:
+        click.echo(f"{student.group:<11} {clean(student.variant):<9} {student.name}")
     if kind == "exercises":
         out.mkdir(parents=True, exist_ok=True)
-        save_assignment([replace(one, sets=" ".join(letters)) for one in given], out / ASSIGNMENT)
+        save_assignment([replace(student, sets=" ".join(letters)) for student in given], out / ASSIGNMENT)
         click.echo(f"\nWho has which variant: {out / ASSIGNMENT}, for `kfcourse grade --students`")
-    return work
+    return [
+        Job(letter, student.variant, out / student.folder, kind, student=f"{student.name}, {student.group}", **options)
+        for student in given
+        for letter in letters
+    ]
 
 
 def _separate(work: Sequence[Job]) -> None:

@@ -10,7 +10,6 @@ import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,6 @@ from kfcourse.checks import Exercise, sets
 from kfcourse.checks.question import PASSED
 from kfcourse.files import package_digest, replacing, save
 from kfcourse.lab.variants import find_variant
-from kfcourse.montecarlo.parallel import cluster
 from kfcourse.notebooks.execution import NotebookFailed, execute, html, pdf, pictures, results
 from kfcourse.notebooks.kernels import prefer_forked
 from kfcourse.notebooks.master import read, render, solution, student
@@ -143,8 +141,8 @@ def _up_to_date(path: Path, notebook: NotebookNode) -> bool:
     return old == notebook.metadata["kfcourse"]["fingerprint"]
 
 
-def run_all(jobs: Sequence[Any], work: Callable[[Any], Any], workers: int, what: str, dask: str | None = None) -> Iterator[Any]:
-    """The outcomes of all jobs as they come, with a progress bar.
+def run_all(jobs: Sequence[Any], work: Callable[[Any], Any], workers: int, what: str) -> Iterator[Any]:
+    """The outcomes of all jobs as they come, in so many processes, with a progress bar.
 
     Parameters
     ----------
@@ -152,47 +150,23 @@ def run_all(jobs: Sequence[Any], work: Callable[[Any], Any], workers: int, what:
     work : callable
         Job -> outcome; never raises.
     workers : int
-        Processes at once.
     what : str
         Label of the progress bar.
-    dask : str, optional
-        Address of a Dask scheduler whose workers do the jobs; they need this package and a common file system.
 
     Raises
     ------
     ValueError
-        Dask is wanted and not installed, or not reachable; or a process of ours was killed.
+        A process of ours was killed.
     """
-    with _backend(dask, workers) as parallel:
-        done = parallel(joblib.delayed(work)(job) for job in jobs)
-        try:
-            yield from tqdm(done, desc=what, total=len(jobs), unit="notebook", disable=None)
-        except BrokenProcessPool:
-            raise ValueError("a working process was killed (out of memory?); run the same again, with fewer --jobs") from None
+    prefer_forked()
+    parallel = joblib.Parallel(n_jobs=workers, return_as="generator_unordered")
+    done = parallel(joblib.delayed(work)(job) for job in jobs)
+    try:
+        yield from tqdm(done, desc=what, total=len(jobs), unit="notebook", disable=None)
+    except BrokenProcessPool:
+        raise ValueError("a working process was killed (out of memory?); run the same again, with fewer --jobs") from None
 
 
-@contextmanager
-def _backend(dask: str | None, workers: int) -> Iterator[joblib.Parallel]:
-    if dask is None:
-        prefer_forked()
-        yield joblib.Parallel(n_jobs=workers, return_as="generator_unordered")
-        return
-    with cluster(dask) as far:
-        assert far is not None
-        with far.client.as_current(), joblib.parallel_config(backend="dask", wait_for_workers_timeout=60):
-            yield joblib.Parallel(return_as="generator_unordered")
-
-
-def plan(
-    kind: str,
-    folder: Path,
-    variants: Iterable[str],
-    letters: Sequence[str],
-    variants_file: Path | None = None,
-    masters: Path | None = None,
-    with_pdf: bool = False,
-) -> list[Job]:
-    """One job a set and variant, each variant in a folder of its own."""
-    return [
-        Job(letter, name, folder / safe(name), kind, variants_file, masters, with_pdf) for name in variants for letter in letters
-    ]
+def plan(kind: str, folder: Path, variants: Iterable[str], letters: Sequence[str], **options: Any) -> list[Job]:
+    """One job a set and variant, each variant in a folder of its own; `options` are fields of the jobs."""
+    return [Job(letter, name, folder / safe(name), kind, **options) for name in variants for letter in letters]

@@ -203,7 +203,7 @@ def leading(found: ParameterMap) -> dict[str, Any]:
         gaps.append([{name: [round(100 * float(one[k]), 4) for one in parts] for name, parts in of.items()} for k in steps])
         order = [result.leaders(k) for k in steps]
         leaders.append([(best, len(others)) for best, *others in order])
-    exact = min(result.slow_runs for result in found.cells.values())
+    exact = min(result.runs for result in found.cells.values())
     return {"trajectories": exact, "ratios": ratios, "gaps": gaps, "leaders": leaders}
 
 

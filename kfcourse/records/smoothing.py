@@ -9,7 +9,7 @@ The slope of the structural function stands to the object as G = dh/dm stands to
 Striebel (`kfcourse.linear.smoothing`) is at the same time the extended, the unscented, the quadrature and the normal one.
 
 What none of them can beat is the mean of the density itself: the exact filter looks back on its nodes, and particles along their
-ancestors drawn anew (`kfcourse.filters.exact.smoothing`, `particles`).
+ancestors drawn anew (`kfcourse.filters.exact`, `particles`).
 """
 
 from __future__ import annotations

@@ -15,7 +15,9 @@ local_level(q, r)        a level that wanders, as the flow of the Nile 1871-1970
 from __future__ import annotations
 
 import json
+import tomllib
 from importlib import resources
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +25,9 @@ from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.symbolic.model import Model
+
+DATA = resources.files("kfcourse.scenarios") / "data"
+MODELS = tomllib.loads((DATA / "benchmarks.toml").read_text(encoding="utf-8"))
 
 # Root mean square errors of the angle over the 500 steps of the data, as Särkkä and Svensson's notebooks print them.
 PENDULUM_ERRORS = {
@@ -59,20 +64,22 @@ PENDULUM_SMOOTHED = {"EKF": 0.057446202494837, "UKF": 0.036617555415464256}
 PENDULUM_PARTICLES = {"filter": 0.0799, "smoother": 0.0306}
 
 
+def _model(name: str, **changes: Any) -> Model:
+    return Model.of_table(MODELS[name] | changes)
+
+
+def _wander(dt: float) -> Array:
+    """Covariance of position and velocity that a white acceleration of intensity one makes in dt."""
+    return np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
+
+
 def pendulum() -> Model:
     """The angle and angular velocity of a pendulum, x1' = x1 + dt x2, x2' = x2 - g dt sin(x1), y = sin(x1); noises added.
 
     The law N(0, I) is that before the first prediction: filters of this package, which correct first, need a missing
     measurement before the data.
     """
-    dt = 0.01
-    return Model.define(
-        ["x1 + dt*x2 + v1", "x2 - g*dt*sin(x1) + v2"],
-        "sin(x1) + w1",
-        {"dt": dt, "g": 9.81},
-        state_noise={"variance": 0.01 * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])},
-        meter_noise={"variance": 0.1},
-    )
+    return _model("pendulum", state_noise={"variance": 0.01 * _wander(0.01)})
 
 
 def pendulum_data() -> tuple[Array, Array]:
@@ -85,17 +92,7 @@ def car() -> Model:
 
     As of `pendulum`, the law is that before the first prediction.
     """
-    dt = 0.1
-    wander = np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
-    return Model.define(
-        ["x + T*v_x + v1", "y + T*v_y + v2", "v_x + v3", "v_y + v4"],
-        ["x + w1", "y + w2"],
-        {"T": dt},
-        symbols={"x": ["x", "y", "v_x", "v_y"]},
-        prior={"mean": [0, 0, 1, -1], "variance": 1},
-        state_noise={"variance": np.kron(wander, np.eye(2))},
-        meter_noise={"variance": 0.25},
-    )
+    return _model("car", state_noise={"variance": np.kron(_wander(0.1), np.eye(2))})
 
 
 def car_data() -> tuple[Array, Array]:
@@ -105,39 +102,29 @@ def car_data() -> tuple[Array, Array]:
 
 def _simulation(name: str) -> tuple[Array, Array]:
     """States and measurements of a simulation of the book, a missing measurement before them."""
-    data = json.loads((resources.files("kfcourse.scenarios") / "data" / f"{name}.json").read_text(encoding="utf-8"))
+    data = json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))
     x, y = (np.atleast_2d(data[letter]).T for letter in "XY")
     return x, np.concatenate([np.full((1, y.shape[1]), np.nan), y])[:, None]
 
 
 def growth_model(variance: float = 1) -> Model:
     """x' = x/2 + 25 x/(1 + x^2) + 8 cos(1.2 k) + v,  y = x^2/20 + w;  x_0 ~ N(0, 5), w ~ N(0, 1), v of this variance."""
-    return Model.define(
-        "x/2 + 25*x/(1 + x**2) + 8*cos(1.2*k) + v",
-        "x**2/20 + w",
-        prior={"mean": 0, "variance": 5},
-        state_noise={"variance": variance},
-    )
+    return _model("growth_model", state_noise={"variance": variance})
 
 
 def cubic_sensor() -> Model:
     """x' = x/(1 + x^2) + v,  y = x^3 + x + w;  x_0 ~ N(0.1, 1)."""
-    return Model.define("x/(1 + x**2) + v", "x**3 + x + w", prior={"mean": 0.1, "variance": 1})
+    return _model("cubic_sensor")
 
 
 def logistic() -> Model:
     """x' = max(-10^4, x(1 - x)) + v,  y = x + w;  x_0 ~ N(0.1, 0.01).  Above, x(1 - x) <= 1/4."""
-    return Model.define("(-b if x*(1 - x) < -b else x*(1 - x)) + v", "x + w", {"b": 1e4}, prior={"mean": 0.1, "variance": 0.01})
+    return _model("logistic")
 
 
 def inverse_cube_root() -> Model:
     """x' = min(100, x^(-1/3)) + v with the odd root,  y = x + w;  x_0 ~ N(3.01, 1)."""
-    return Model.define(
-        "((b if x < 1/b**3 else Abs(x)**(-1/3)) if x >= 0 else -Abs(x)**(-1/3)) + v",
-        "x + w",
-        {"b": 100},
-        prior={"mean": 3.01, "variance": 1},
-    )
+    return _model("inverse_cube_root")
 
 
 def lorenz(noise: float) -> Model:
@@ -178,18 +165,8 @@ def bearings() -> Model:
 
     As of `pendulum`, the law is that before the first prediction.
     """
-    dt, q = 0.01, 0.1
-    wander = q * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
-    return Model.define(
-        ["x + T*v_x + v1", "y + T*v_y + v2", "v_x + v3", "v_y + v4"],
-        ["atan2(y + 2, x + 1) + w1", "atan2(y - 1, x - 1) + w2"],
-        {"T": dt},
-        symbols={"x": ["x", "y", "v_x", "v_y"]},
-        angles=["y1", "y2"],
-        prior={"mean": [0, 0, 0, 0], "variance": [0.1, 0.1, 10, 10]},
-        state_noise={"variance": np.kron(wander, np.eye(2))},
-        meter_noise={"variance": 0.05**2},
-    )
+    noise = 0.1 * np.kron(_wander(0.01), np.eye(2))
+    return _model("bearings", state_noise={"variance": noise}, meter_noise={"variance": 0.05**2})
 
 
 def bearings_data(runs: int, seed: int | np.random.Generator) -> tuple[Array, Array]:
@@ -239,29 +216,15 @@ def reentry(known: bool) -> Model:
 
 def passing_target(angles: list[str]) -> Model:
     """A target 10 km west of a radar, flying south: its bearing, y2, jumps from pi to -pi after about 20 s."""
-    return Model.define(
-        ["x + T*vx", "y + T*vy", "vx + s*v1", "vy + s*v2"],
-        ["sqrt(x**2 + y**2) + s_r*w1", "atan2(y, x) + s_a*w2"],
-        {"T": 1.0, "s": 1.0, "s_r": 50, "s_a": 0.01},
-        symbols={"x": ["x", "y", "vx", "vy"]},
-        angles=angles,
-        prior={"mean": [-10_000, 3_000, 20, -150], "variance": np.square([100, 100, 15, 15])},
-    )
+    return _model("passing_target", angles=angles)
 
 
 def local_level(q: float = 1468.5, r: float = 15099.7) -> Model:
     """x' = x + v, y = x + w with variances q and r; N(0, 10^7) before the first measurement."""
-    return Model.define(
-        "x + v",
-        "x + w",
-        {"q": q, "r": r},
-        prior={"mean": 0, "variance": 1e7},
-        state_noise={"variance": "q"},
-        meter_noise={"variance": "r"},
-    )
+    return _model("local_level", parameters={"q": q, "r": r})
 
 
 def nile() -> Array:
     """Annual flow of the Nile at Aswan from 1871 to 1970, 10^8 m^3, (100, 1, 1)."""
-    text = (resources.files("kfcourse.scenarios") / "data" / "nile.csv").read_text(encoding="utf-8")
+    text = (DATA / "nile.csv").read_text(encoding="utf-8")
     return np.array([float(row.split(",")[1]) for row in text.split()[1:]])[:, None, None]

@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kfcourse.errors import expect_positive
 from kfcourse.laws import Array
 
 PIECE = 1.0  # s; the horizontal path is integrated over pieces not longer than this
@@ -102,15 +103,11 @@ def aircraft(
     """
     _numbers("start", start, 3)
     _numbers("turns", turns, 2)
-    for name, value in (("heading", heading), ("descent", descent)):
-        if not np.isfinite(value):
-            raise ValueError(f"{name} must be a finite number, got {value}")
+    _numbers("heading and descent", (heading, descent), 2)
     for name, given, size in (("speeds", speeds, 2), ("radii", radii, 2), ("durations", durations, 3)):
-        if min(_numbers(name, given, size)) <= 0:
-            raise ValueError(f"{name} must be positive, got {tuple(given)}")
-    for name, value in (("interval", interval), ("ramp", ramp)):
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name} must be a positive number of seconds, got {value}")
+        _numbers(name, given, size)
+        expect_positive(**{name: min(given)})
+    expect_positive(interval=interval, ramp=ramp)
 
     circles = [abs(angle) * radius / speed for angle, radius, speed in zip(turns, radii, speeds, strict=True)]
     lengths = [durations[0], circles[0] + ramp, durations[1], circles[1] + ramp, durations[2]]
@@ -153,11 +150,9 @@ def aircraft(
     return Track(time, position, velocity, acceleration, part)
 
 
-def _numbers(name: str, values: Sequence[float], size: int) -> Array:
-    array = np.asarray(values, dtype=float)
-    if array.shape != (size,) or not np.isfinite(array).all():
+def _numbers(name: str, values: Sequence[float], size: int) -> None:
+    if np.shape(values) != (size,) or not np.isfinite(values).all():
         raise ValueError(f"{name} must be {size} finite numbers, got {values!r}")
-    return array
 
 
 def _step(u: Array) -> Array:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.errors import expect_sizes
+from kfcourse.errors import expect_positive, expect_sizes
 from kfcourse.laws import Array
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.symbolic.model import Model
@@ -70,8 +70,7 @@ def irregular_track(
     for name, share in (("missing", missing), ("outliers", outliers)):
         if not 0 <= share <= 1:
             raise ValueError(f"{name} is a share of the fixes, between 0 and 1; got {share}")
-    if not 0 < times < np.inf:
-        raise ValueError(f"times must be a positive number, got {times}")
+    expect_positive(times=times)
     rng = np.random.default_rng(seed)
     interval = rng.uniform(0.1, 1.5, steps)
     model = Model.define(

@@ -26,7 +26,7 @@ import numpy as np
 import sympy as sp
 from numpy.polynomial import Polynomial
 
-from kfcourse.errors import expect_sizes
+from kfcourse.errors import expect_not_negative, expect_positive, expect_sizes
 from kfcourse.laws import Array, Gaussian
 from kfcourse.linear.arithmetic import predict_law
 from kfcourse.linear.runs import Run, run
@@ -60,10 +60,8 @@ def uniform_acceleration(interval: float, acceleration_sd: float, measurement_sd
     measurement_sd : float
         Standard deviation of the noise of each coordinate, px.
     """
-    _positive(interval=interval)
-    for name, value in (("acceleration_sd", acceleration_sd), ("measurement_sd", measurement_sd)):
-        if not (np.isfinite(value) and value >= 0):
-            raise ValueError(f"{name} is a standard deviation: expected a number that is not negative, got {value}")
+    expect_positive(interval=interval)
+    expect_not_negative(acceleration_sd=acceleration_sd, measurement_sd=measurement_sd)
     A, B, H = (_numeric(matrix, interval) for matrix in (TRANSITION, INPUT, SENSITIVITY))
     Q = acceleration_sd**2 * (B @ B.T)
     return LinearSystem(A, H, 0.5 * (Q + Q.T), measurement_sd**2 * np.eye(2), B)
@@ -93,13 +91,11 @@ def start_up(y: Array, interval: float, R: Array) -> Gaussian:
     ValueError
         Not three complete samples, or R of another shape.
     """
-    _positive(interval=interval)
+    expect_positive(interval=interval)
     if y.ndim != 3 or (y.shape[0], y.shape[2]) != (3, 2):
         raise ValueError(f"the start-up takes three samples of two coordinates, (3, runs, 2); got {y.shape}")
     if not np.isfinite(y).all():
         raise ValueError("a sample of the start-up is missing; wait for three complete samples in a row")
-    if np.shape(R) != (2, 2):
-        raise ValueError(f"R is the covariance of the two coordinates' noise, (2, 2); got the shape {np.shape(R)}")
     M = _numeric(START, interval)
     mean = np.einsum("ij,jra->ria", M, y).reshape(y.shape[1], 6)
     return Gaussian(mean, np.kron(M @ M.T, R))
@@ -110,7 +106,7 @@ def acceleration_from(y: Array, interval: float) -> Array:
 
     (y_k - 2 y_{k-1} + y_{k-2}) / interval^2, the last row of `START`.  Its noise has the variance 6 R / interval^4.
     """
-    _positive(interval=interval)
+    expect_positive(interval=interval)
     if len(y) < 3:
         raise ValueError(f"an acceleration takes three samples, got {len(y)}")
     weights = _numeric(START, interval)[2]
@@ -261,10 +257,9 @@ class Samples(NamedTuple):
 
 def sample(track: HandTrack, interval: float, measurement_sd: float, runs: int, seed: int | np.random.Generator) -> Samples:
     """The track every `interval` seconds from its start to its end, with `runs` realisations of white noise added."""
-    _positive(interval=interval)
+    expect_positive(interval=interval)
     expect_sizes(runs=runs)
-    if not (np.isfinite(measurement_sd) and measurement_sd >= 0):
-        raise ValueError(f"measurement_sd is a standard deviation: expected a number that is not negative, got {measurement_sd}")
+    expect_not_negative(measurement_sd=measurement_sd)
     time = interval * np.arange(int(track.end / interval) + 1)
     now, following = track.at(time), track.at(time + interval)
     state = np.concatenate([now.position, now.velocity], axis=-1)[:, None]
@@ -275,9 +270,3 @@ def sample(track: HandTrack, interval: float, measurement_sd: float, runs: int, 
 
 def _numeric(matrix: sp.MatrixBase, interval: float) -> Array:
     return np.array(matrix.subs(DT, interval), dtype=float)
-
-
-def _positive(**lengths: float) -> None:
-    for name, value in lengths.items():
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name} is a time between samples: expected a positive number of seconds, got {value}")

@@ -8,7 +8,7 @@ import numpy as np
 import sympy as sp
 
 from kfcourse.angles import on_circle
-from kfcourse.errors import expect_sizes
+from kfcourse.errors import expect_not_negative, expect_positive, expect_sizes
 from kfcourse.laws import Array
 from kfcourse.scenarios.flight import Track
 from kfcourse.symbolic.codegen import compile_function
@@ -147,11 +147,8 @@ def kinematic(
     """
     if dimensions not in (1, 2, 3) or order not in (1, 2):
         raise ValueError(f"dimensions must be 1, 2 or 3 and order 1 or 2, got {dimensions} and {order}")
-    if not (np.isfinite(interval) and interval > 0):
-        raise ValueError(f"interval must be a positive number of seconds, got {interval}")
-    for name, value in (("noise_sd", noise_sd), ("measurement_sd", measurement_sd)):
-        if not (np.isfinite(value) and value >= 0):
-            raise ValueError(f"{name} must be finite and not negative, got {value}")
+    expect_positive(interval=interval)
+    expect_not_negative(noise_sd=noise_sd, measurement_sd=measurement_sd)
     axes = "xyz"[:dimensions]
     names = [prefix + axis for prefix in ("", "v", "a")[: order + 1] for axis in axes]
     T, state = symbol("T"), [symbol(name) for name in names]

@@ -12,5 +12,5 @@ structure    structural functions tau, Theta, h, G, F, derived: `linearised`, `g
 quadrature   the same by quadrature: `unscented`, `gauss_hermite`;  averaging: averaged over modes
 sides        object and meter at a normal law, in symbols: what derivations by hand start from
 codegen      expressions -> NumPy over the ensemble; the only place where formulas become code
-javascript   the same programs as JavaScript, for the pages;  compiled: as loops for numba
+javascript   the same programs as JavaScript, for the pages
 """

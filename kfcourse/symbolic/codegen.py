@@ -2,7 +2,7 @@
 
 The only place where expressions become code.  `lower` splits expressions into elementary assignments
 (common subexpressions once, small powers as products) that any target could print; `numpy_source`
-prints them as NumPy, `javascript.loop` as JavaScript, `compiled.loop` for numba.
+prints them as NumPy, `javascript.loop` as JavaScript.
 """
 
 from __future__ import annotations

@@ -52,15 +52,6 @@ def test_alpha_and_index_are_inverse():
     assert steady_beta(0.6) == pytest.approx(2 * (2 - 0.6) - 4 * np.sqrt(1 - 0.6), rel=1e-14)
 
 
-@pytest.mark.parametrize("alpha", [0.0, 1.0, -0.1, np.nan])
-def test_coefficients_outside_their_range_are_refused(alpha):
-    for function in (steady_beta, tracking_index):
-        with pytest.raises(ValueError, match="between 0 and 1"):
-            function(alpha)
-    with pytest.raises(ValueError, match="tracking index"):
-        steady_alpha(-1.0 if alpha == 1.0 else np.nan)
-
-
 # --- the estimates
 
 
@@ -228,16 +219,6 @@ def test_the_covariance_is_the_scatter_of_the_errors(missing):
     assert (np.abs(scatter - claimed) < 5 * np.sqrt(2 / runs) * sd[:, :, None] * sd[:, None, :]).all()
 
 
-def test_one_trajectory_is_an_ensemble_of_one():
-    model = planar()
-    y = simulate(model, 5, 12, seed=6).y
-    y[3, 2] = np.nan
-    one = alpha_beta(model, 0.3, 0.05)
-    together, alone = run(one, y), run(one, y[:, 2:3])
-    np.testing.assert_allclose(together.mean[:, 2], alone.mean[:, 0], rtol=ROUNDING)
-    np.testing.assert_allclose(together.cov[:, 2], alone.cov[:, 0], rtol=ROUNDING, atol=1e-12)
-
-
 def test_it_can_be_built_for_a_model_written_by_hand():
     model = Model.define(["r + T*s + v", "s + w"], "r + n", {"T": 0.5}, symbols={"x": ["r", "s"], "v": ["v", "w"], "w": ["n"]})
     one = alpha_beta(model, 0.3, 0.1)
@@ -272,14 +253,3 @@ def test_other_models_are_refused():
 def test_coefficients_whose_errors_grow_are_refused(coefficients):
     with pytest.raises(ValueError, match="is unstable"):
         alpha_beta(planar(), *coefficients)
-
-
-def test_an_unknown_start_is_refused():
-    with pytest.raises(ValueError, match="start must be"):
-        alpha_beta(planar(), 0.3, 0.1, start="now")
-
-
-@pytest.mark.parametrize("arguments", [{"gains": "shrinking"}, {"start": "prior", "gains": "growing"}])
-def test_unknown_gains_are_refused(arguments):
-    with pytest.raises(ValueError, match="gains must be"):
-        alpha_beta(planar(), 0.3, 0.1, **arguments)

@@ -1,14 +1,12 @@
 """Angles: filters near the place where pi becomes -pi give what they give elsewhere."""
 
 import warnings
-from functools import partial
 
 import numpy as np
 import pytest
 
 from kfcourse.angles import difference, moments_on_circle, near, on_circle, wrapped
 from kfcourse.filters import (
-    adaptive_pointmass,
     alpha_beta,
     aof,
     duof,
@@ -20,7 +18,7 @@ from kfcourse.filters import (
     particle,
     pointmass,
 )
-from kfcourse.filters.densities import likelihood, scalar_densities
+from kfcourse.filters.densities import likelihood
 from kfcourse.laws import Gaussian
 from kfcourse.linear.consistency import innovations, nees
 from kfcourse.montecarlo.designing import design
@@ -211,8 +209,8 @@ def test_designed_filters_too(scenes):
     plain, turned, x, y, other = scenes
     steps = len(y) - 1
     plain = radar(1)  # declared here too: the filters with three arguments take the innovation of an angle as regressor
-    here = design(designs_of(plain), ([Instant(x[k], y[k], x[k + 1])] for k in range(steps)))
-    there = design(designs_of(turned), ([Instant(-x[k], other[k], -x[k + 1])] for k in range(steps)))
+    here = design(designs_of(plain), (Instant(x[k], y[k], x[k + 1]) for k in range(steps)))
+    there = design(designs_of(turned), (Instant(-x[k], other[k], -x[k + 1]) for k in range(steps)))
     for one, two in zip(here, there, strict=True):
         # coefficients are regressions over 150 trajectories of states that hardly differ: some digits more are lost
         np.testing.assert_allclose(run(two, other[:-1]).mean, -run(one, y[:-1]).mean, atol=1e-2, err_msg=one.name)
@@ -330,7 +328,7 @@ def test_errors_of_a_comparison_go_the_short_way():
         s = linearised(model)
         return [kalman_filter(model), aof(s), duof(model), fos(s), mfos(s), fos(s, arguments=3)]
 
-    line, circle = (compare(filters(m), m, 2000, 30, seed=4, threads=1) for m in (phase([]), phase(["psi", "y"])))
+    line, circle = (compare(filters(m), m, 2000, 30, seed=4, jobs=1) for m in (phase([]), phase(["psi", "y"])))
     np.testing.assert_allclose(circle.error_variance("kalman").value, line.error_variance("kalman").value, rtol=1e-9)
     for name in circle.names:
         ratio = circle.error_variance(name).value / line.error_variance("kalman").value
@@ -364,14 +362,10 @@ def test_alpha_beta_follows_an_angle():
 def test_the_density_of_a_measured_angle_is_one_over_the_circle(sd):
     grid = np.linspace(-PI, PI, 4001)[:-1]
     model = Model.define("x + v", f"x + {sd}*w", angles=["y"])
-    for log_likelihood in (
-        lambda y, x: likelihood(model)(y[:, None], np.full((len(y), 1), x)),
-        lambda y, x: scalar_densities(model).log_likelihood(y, np.full(len(y), x)),
-    ):
-        for x in (0.0, 3.1, 40.0):
-            density = np.exp(log_likelihood(grid, x))
-            # the trapezoidal rule of a smooth periodic function
-            assert density.sum() * (grid[1] - grid[0]) == pytest.approx(1, rel=1e-12)
+    for x in (0.0, 3.1, 40.0):
+        density = np.exp(likelihood(model)(grid[:, None], np.full((len(grid), 1), x)))
+        # the trapezoidal rule of a smooth periodic function
+        assert density.sum() * (grid[1] - grid[0]) == pytest.approx(1, rel=1e-12)
     both = Model.define(
         ["x1 + v1", "x2 + v2"], ["x1 + w1", "x2 + w2"], meter_noise={"variance": [[sd**2, 0.3], [0.3, 400]]}, angles=["y1"]
     )
@@ -398,18 +392,17 @@ def by_grid(model_sd, meter_sd, prior, y, signal=lambda x: x):
     return found, x
 
 
-@pytest.mark.parametrize("build", [partial(pointmass, accuracy=1e-6), adaptive_pointmass])
 @pytest.mark.parametrize(("prior", "meter_sd"), [((3.0, 0.16), 0.3), ((1.0, 9.0), 0.5), ((0.0, 4.0), 0.05)])
-def test_the_exact_filter_of_a_measured_angle(build, prior, meter_sd):
+def test_the_exact_filter_of_a_measured_angle(prior, meter_sd):
     """Against a fine grid: a narrow prior near the jump, a wide one that leaves several turns possible, a sharp meter.
 
-    The grid's sums are exact to rounding; the filters promise 1e-6 and 1e-5 posterior deviations a step.
+    The grid's sums are exact to rounding; the filter promises 1e-6 posterior deviations a step.
     """
     law = {"mean": prior[0], "variance": prior[1]}
     model = Model.define("x + 0.3*v", f"x + {meter_sd}*w", prior=law, angles=["y"])
     y = np.array([3.1, -3.0, 2.9, -2.7, -2.2])
     expected, _ = by_grid(0.3, meter_sd, prior, y)
-    found = run(build(model), y)
+    found = run(pointmass(model, accuracy=1e-6), y)
     for k, (mean, variance, _) in enumerate(expected):
         assert found.mean[k].item() == pytest.approx(mean, abs=1e-4 * np.sqrt(variance))
         assert found.cov[k].item() == pytest.approx(variance, rel=1e-4)
@@ -447,9 +440,8 @@ def test_the_prediction_of_an_angle_is_as_wide_as_that_on_the_line(sd):
 def test_the_ensemble_is_drawn_on_the_circle():
     model = phase(["psi", "y"])
     ensemble = Ensemble(model, 200, 30, seed=1)
-    for block in ensemble.by_step():
-        for instant in block:
-            assert np.abs(instant.x[:, 0]).max() <= PI and np.abs(instant.x_next[:, 0]).max() <= PI
+    for instant in ensemble:
+        assert np.abs(instant.x[:, 0]).max() <= PI and np.abs(instant.x_next[:, 0]).max() <= PI
 
 
 def test_whole_numbers_are_not_cut_off():

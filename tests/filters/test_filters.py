@@ -1,7 +1,6 @@
-"""The filters: linear-Gaussian theorem, slow loops from the page, the printed equations executed."""
+"""The filters: slow loops from the page, the printed equations executed; what holds for all is in test_every_filter."""
 
 from functools import partial
-from types import SimpleNamespace
 
 import control
 import filterpy.kalman
@@ -10,167 +9,26 @@ import oracles
 import pytest
 import scipy.linalg
 import sympy as sp
+from test_every_filter import LINEAR, OF_MEASUREMENTS, STRUCTURES, exact_ensemble
 
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import notation as s
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.designed import Design
-from kfcourse.filters.exact.pointmasses import pointmass
-from kfcourse.filters.iterated_ekf import iterated
 from kfcourse.filters.kalman import kalman_filter
-from kfcourse.filters.multiple_models import imm
-from kfcourse.filters.optimal_structure import ESTIMATES, MEASUREMENTS, dfkp, dfmp, fbp, fkp, fos, mdfkp, mdfmp, mfkp, mfos
-from kfcourse.filters.particles import particle
-from kfcourse.lab.short_names import FILTERS
+from kfcourse.filters.optimal_structure import ESTIMATES, MEASUREMENTS, dfmp, fbp, fos, mdfmp, mfos
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Instant, simulate
 from kfcourse.montecarlo.experiment import run
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.quadrature import gauss_hermite, unscented
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import gaussian, linearised
 
 pytestmark = pytest.mark.quick
 
-STRUCTURES = {
-    "linearised": linearised,
-    "gaussian": gaussian,
-    "unscented": unscented,
-    "gauss-hermite": lambda m: gauss_hermite(m, 3),
-}
 
 # ---------------------------------------------------------------- linear-Gaussian models
-
-
-class Linear(SimpleNamespace):
-    """x' = A x + B v + a, y = H x + C w + b with laws of x_0, v, w: matrices, and the model built from strings."""
-
-    def model(self) -> Model:
-        def rows(matrix, symbol, other, noise, constant):
-            def name(letter, i, size):
-                return letter if size == 1 else f"{letter}{i + 1}"
-
-            return [
-                " + ".join(
-                    [f"({float(m)!r})*{name(symbol, j, len(row))}" for j, m in enumerate(row)]
-                    + [f"({float(m)!r})*{name(noise, j, len(more))}" for j, m in enumerate(more)]
-                    + [f"({float(c)!r})"]
-                )
-                for row, more, c in zip(matrix, other, constant, strict=True)
-            ]
-
-        state, meter = rows(self.A, "x", self.B, "v", self.a), rows(self.H, "x", self.C, "w", self.b)
-        laws = {key: {"mean": mean, "variance": cov} for key, (mean, cov) in self.laws.items()}
-        return Model.define(state if len(state) > 1 else state[0], meter if len(meter) > 1 else meter[0], **laws)
-
-
-def linear(n: int, p: int, v: int, w: int, seed: int) -> Linear:
-    """Everything non-unit, non-zero and correlated; rounded so that the strings are exact."""
-    rng = np.random.default_rng(seed)
-
-    def matrix(rows, columns):
-        return np.round(rng.normal(size=(rows, columns)), 2)
-
-    def law(size):
-        root = matrix(size, size)
-        return np.round(rng.normal(size=size), 2), np.round(root @ root.T + 0.3 * np.eye(size), 4)
-
-    A = matrix(n, n)
-    A = np.round(0.9 * A / max(abs(np.linalg.eigvals(A))), 2)
-    laws = {"prior": law(n), "state_noise": law(v), "meter_noise": law(w)}
-    return Linear(A=A, B=matrix(n, v), a=matrix(1, n)[0], H=matrix(p, n), C=matrix(p, w), b=matrix(1, p)[0], laws=laws)
-
-
-LINEAR = {
-    "scalar": linear(1, 1, 1, 1, 11),
-    "scalar, more noises": linear(1, 1, 2, 3, 12),
-    "n=2, p=1": linear(2, 1, 2, 1, 13),
-    "n=2, p=2": linear(2, 2, 2, 2, 14),
-    "n=2, p=2, more noises": linear(2, 2, 3, 3, 15),
-    "n=3, p=2": linear(3, 2, 3, 2, 19),
-    "n=1, p=2": linear(1, 2, 1, 2, 17),
-}
-STEPS = 6
-OF_MEASUREMENTS = (fkp, mfkp, dfkp, mdfkp)
-
-
-def exact_ensemble(one: Linear, steps: int, seed: int) -> list[Instant]:
-    """Trajectories whose sample moments are exactly the model's.
-
-    A random matrix (trajectories x all independent noises), centred, orthonormalised and scaled, has sample
-    mean 0 and sample covariance I to rounding; the trajectories are affine functions of its columns.
-    """
-    sizes = {key: len(mean) for key, (mean, _) in one.laws.items()}
-    columns = sizes["prior"] + steps * (sizes["state_noise"] + sizes["meter_noise"])
-    draws = np.random.default_rng(seed).normal(size=(3 * columns, columns))
-    orthonormal, _ = np.linalg.qr(draws - draws.mean(axis=0))
-    standard = iter((orthonormal * np.sqrt(len(draws))).T)
-
-    def draw(key):
-        mean, cov = one.laws[key]
-        return mean + np.stack([next(standard) for _ in mean], axis=-1) @ np.linalg.cholesky(cov).T
-
-    x, moments = draw("prior"), []
-    for _ in range(steps):
-        y = x @ one.H.T + draw("meter_noise") @ one.C.T + one.b
-        x_next = x @ one.A.T + draw("state_noise") @ one.B.T + one.a
-        moments.append(Instant(x, y, x_next))
-        x = x_next
-    return moments
-
-
-def every_filter(model: Model):
-    structures = {name: build(model) for name, build in STRUCTURES.items()}
-    ready = [aof(structure) for structure in structures.values()]
-    designs = [duof(model)]
-    for name in ("linearised", "gaussian"):
-        designs += [family(structures[name], arguments) for family in (fos, mfos) for arguments in (2, 3)]
-        designs += [dfmp(structures[name]), mdfmp(structures[name]), fbp(structures[name], 3)]
-        designs += [family(structures[name], STEPS) for family in OF_MEASUREMENTS]  # all that there are
-    return ready, designs
-
-
-@pytest.mark.parametrize("name", LINEAR)
-def test_on_a_linear_gaussian_model_every_filter_is_the_kalman_filter(name):
-    """Every filter equals the Kalman filter when the model is linear and Gaussian.
-
-    AOF: the structural functions of a linear model are exact whatever the approximation, and the posterior
-    is Gaussian, so its mean and covariance are the exact ones.  DUOF, FOS, MFOS: their estimates are affine
-    in the noises, so all that the design takes from the ensemble is means and covariances of affine functions
-    of the noises; in `exact_ensemble` these are the model's.  Pugachev's corrections find the Kalman
-    gain because nothing affine in the innovation does better, and the FOS's condition finds Cov(x, z) = Cov(z)
-    (the error is orthogonal to the estimate), so Gamma is the identity on all values that z takes,
-    u = z and T = p.  Where Cov(z), Cov(sigma) or Cov(y, z) is singular (fewer measurements than components; z_0
-    an affine function of y_0), the pseudo-inverse acts on the values that occur, and estimates are unchanged.
-
-    Tolerance: rounding (1e-16) times the condition of the regressions (the least non-zero eigenvalue of the
-    correlations of (y, z) is above 1e-7 here), and each of the six steps carries the error of the one before.
-    """
-    one = LINEAR[name]
-    model = one.model()
-    moments = exact_ensemble(one, STEPS, seed=3)
-    ready, designs = every_filter(model)
-    # Measured: new trajectories, not those of the design.
-    y = simulate(model, 5, STEPS, seed=8).y
-    expected = run(kalman_filter(model), y)
-    for filter_, tolerance in [(f, 1e-11) for f in ready] + [
-        (f, 1e-9) for f in design(designs, [[moment] for moment in moments])
-    ]:
-        found = run(filter_, y)
-        np.testing.assert_allclose(found.mean, expected.mean, rtol=tolerance, atol=tolerance, err_msg=filter_.name)
-        np.testing.assert_allclose(found.cov, expected.cov, rtol=tolerance, atol=tolerance, err_msg=filter_.name)
-
-
-def test_the_design_does_not_depend_on_how_the_ensemble_is_cut():
-    one = LINEAR["n=2, p=2"]
-    moments = exact_ensemble(one, STEPS, seed=3)
-    _, designs = every_filter(one.model())
-    whole = design(designs, [[moment] for moment in moments])
-    cut = design(designs, [[Instant(*(a[:7] for a in m)), Instant(*(a[7:] for a in m))] for m in moments])
-    y = simulate(one.model(), 3, STEPS, seed=9).y
-    for first, second in zip(whole, cut, strict=True):
-        np.testing.assert_allclose(run(second, y).mean, run(first, y).mean, rtol=1e-8, atol=1e-8)
 
 
 def test_the_kalman_filter_is_the_loop_of_the_page():
@@ -279,7 +137,7 @@ def test_the_aof_is_the_loop_of_the_page(variant53, trajectories, kind):
 
 def designed_on(designs, trajectories):
     x, y, x_next = (array[..., None] for array in trajectories)
-    return design(designs, [[Instant(*step)] for step in zip(x, y, x_next, strict=True)])
+    return design(designs, [Instant(*step) for step in zip(x, y, x_next, strict=True)])
 
 
 def test_the_duof_is_the_loop_of_the_page(variant53, trajectories):
@@ -436,7 +294,7 @@ def test_the_printed_equations_are_what_runs(family, size, kind):
     x, y = simulate(model, runs, steps + 1, seed=31)
     filter_ = build(structure)
     if isinstance(filter_, Design):
-        (filter_,) = design([filter_], [[Instant(x[k], y[k], x[k + 1])] for k in range(steps)])
+        (filter_,) = design([filter_], [Instant(x[k], y[k], x[k + 1]) for k in range(steps)])
 
     functions = structural_values(model, structure)
     state = filter_.init(runs)
@@ -485,48 +343,6 @@ def filters_of(model, trajectories):
         ],
         trajectories,
     )
-
-
-def test_a_missing_measurement_is_no_correction_and_the_others_do_not_notice(variant53, trajectories):
-    y = trajectories[1][..., None]
-    gaps = y.copy()
-    gaps[3, 4] = np.nan
-    for filter_ in filters_of(variant53, trajectories):
-        state, holed = filter_.init(40), filter_.init(40)
-        others = np.arange(40) != 4
-        for k in range(len(y)):
-            predicted = holed.predicted
-            state, holed = filter_.step(state, y[k]), filter_.step(holed, gaps[k])
-            np.testing.assert_array_equal(holed.posterior.mean[others], state.posterior.mean[others], err_msg=filter_.name)
-            if k == 3:
-                np.testing.assert_array_equal(holed.posterior.mean[4], predicted.mean[4], err_msg=filter_.name)
-        assert np.isfinite(holed.posterior.mean).all()
-
-
-def test_the_kalman_filter_skips_what_is_missing_too():
-    one = LINEAR["n=2, p=2"]
-    model = one.model()
-    y = simulate(model, 4, 6, seed=2).y
-    y[2, 1] = np.nan
-    y[3, 2, 0] = np.nan
-    found, expected = run(kalman_filter(model), y), run(aof(linearised(model)), y)
-    np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-11, atol=1e-11)
-    np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-11, atol=1e-11)
-
-
-@pytest.mark.parametrize("kind", STRUCTURES)
-def test_with_one_component_missing_the_aof_uses_the_other(kind):
-    both = PRINTED["p=2"]()
-    alone = Model.define(
-        list(both.state_equation), [both.meter_equation[1]], symbols={"v": ["v1", "v2"], "w": ["w1", "w2"]},
-        prior={"mean": both.prior.mean, "variance": both.prior.cov}, meter_noise={"variance": both.meter_noise.cov},
-    )  # fmt: skip
-    y = simulate(both, 6, 5, seed=12).y
-    holed = y.copy()
-    holed[:, :, 0] = np.nan
-    found, expected = run(aof(STRUCTURES[kind](both)), holed), run(aof(STRUCTURES[kind](alone)), y[..., 1:])
-    np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-10, atol=1e-11)
-    np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-10, atol=1e-11)
 
 
 @pytest.mark.parametrize("kind", STRUCTURES)
@@ -598,7 +414,7 @@ def test_the_duof_s_own_covariances_are_those_of_its_errors():
     """
     model, steps = PRINTED["p=2"](), 3
     x, y = simulate(model, 40, steps + 1, seed=14)
-    (filter_,) = design([duof(model)], [[Instant(x[k], y[k], x[k + 1])] for k in range(steps)])
+    (filter_,) = design([duof(model)], [Instant(x[k], y[k], x[k + 1]) for k in range(steps)])
     state = filter_.init(40)
     for k in range(steps):
         state = filter_.step(state, y[k])
@@ -633,37 +449,6 @@ def test_other_numbers_of_arguments_are_refused(variant53, family, arguments):
 
 
 def test_a_design_on_trajectories_that_diverge_says_so(variant53):
-    broken = [[Instant(np.ones((3, 1)), np.full((3, 1), np.inf), np.ones((3, 1)))]]
+    broken = [Instant(np.ones((3, 1)), np.full((3, 1), np.inf), np.ones((3, 1)))]
     with pytest.raises(NotFinite, match=r"step 0.*trajectories become infinite"):
         design([duof(variant53)], broken)
-
-
-def test_every_filter_has_its_name_counts_its_measurements_and_says_if_it_is_slow(variant53, trajectories):
-    """Results are asked for by name, designs and random streams are looked up by step, and the slow run on a part.
-
-    All that the lab has is tested here.
-    """
-    filters = filters_of(variant53, trajectories)
-    assert sorted(one.name for one in filters) == sorted({*FILTERS} - {"aof-exact", "particle"})
-    assert {*FAMILIES} == {*EQUATIONS}
-    structure = linearised(variant53)
-    slow = [particle(variant53, 20), pointmass(variant53)]
-    filters += [iterated(structure), imm([structure], [[1.0]]), *slow, kalman_filter(LINEAR["scalar"].model())]
-    assert [one.name for one in filters[-5:]] == ["iterated-linearised", "imm", "particle", "aof-exact", "kalman"]
-    for one in filters:
-        state = one.init(2)
-        for k in range(3):
-            assert state.step == k, one.name
-            state = one.step(state, np.full((2, 1), 0.5))
-        assert one.slow == (one in slow), one.name
-
-
-def test_filters_are_values(variant53):
-    filter_ = aof(gaussian(variant53))
-    start = filter_.init(3)
-    before = [np.array(a) for a in start.predicted]
-    first, second = filter_.step(start, np.ones((3, 1))), filter_.step(start, np.ones((3, 1)))
-    for a, b in zip(first.posterior, second.posterior, strict=True):
-        np.testing.assert_array_equal(a, b)
-    for a, b in zip(start.predicted, before, strict=True):
-        np.testing.assert_array_equal(a, b)

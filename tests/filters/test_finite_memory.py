@@ -7,7 +7,7 @@ import oracles
 import pytest
 from test_filters import LINEAR, OF_MEASUREMENTS, STRUCTURES, designed_on, exact_ensemble
 
-from kfcourse.filters import aof, dfkp, dfmp, fbp, fkp, fos, kalman_filter, mdfkp, mdfmp, mfkp, mfos
+from kfcourse.filters import dfkp, dfmp, fbp, fkp, fos, kalman_filter, mdfkp, mdfmp, mfkp, mfos
 from kfcourse.filters.optimal_structure import Memory, Recipe, Remembered, of_structure
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble, Instant, simulate
@@ -49,8 +49,7 @@ def test_each_is_the_loop_of_the_note(variant53, trajectories, kind, family, mem
 
 def test_a_memory_of_one_estimate_is_the_fos_to_the_last_bit(variant53):
     one, other = (
-        design([each], Ensemble(variant53, 500, 6, seed=1).by_step())[0]
-        for each in (fos(gaussian(variant53)), fbp(gaussian(variant53), 1))
+        design([each], Ensemble(variant53, 500, 6, seed=1))[0] for each in (fos(gaussian(variant53)), fbp(gaussian(variant53), 1))
     )
     y = simulate(variant53, 20, 6, seed=2).y
     np.testing.assert_array_equal(run(one, y).mean, run(other, y).mean)
@@ -67,7 +66,7 @@ def test_on_a_linear_model_a_window_gives_the_best_estimate_from_its_measurement
     one, memory, steps = LINEAR[name], 2, 6
     model = one.model()
     moments = exact_ensemble(one, steps, seed=3)
-    (filter_,) = design([family(linearised(model), memory)], [[moment] for moment in moments])
+    (filter_,) = design([family(linearised(model), memory)], moments)
     y = simulate(model, 2, steps, seed=8).y
     found = run(filter_, y)
     (m, d), (m_v, D_v), (m_w, D_w) = one.laws.values()
@@ -90,7 +89,7 @@ def test_where_the_object_is_linear_the_dfkp_regresses_on_the_memory_itself():
     """
     quiet = Model.define("0.8*x + 0.3", "x + 0.1*x**2*w + 0.2*w", prior={"mean": 0.5, "variance": 1})
     x, y = simulate(quiet, 60, 7, seed=4)
-    blocks = [[Instant(x[k], y[k], x[k + 1])] for k in range(6)]
+    blocks = [Instant(x[k], y[k], x[k + 1]) for k in range(6)]
     structure = gaussian(quiet)
     filter_ = design([dfkp(structure, 2)], blocks)[0]
     state = filter_.init(60)
@@ -105,7 +104,7 @@ def test_where_the_object_is_linear_the_dfkp_regresses_on_the_memory_itself():
 @pytest.mark.parametrize("family", ["dfmp", "mfos", "mdfmp", "mfkp", "dfkp", "mdfkp"])
 def test_a_regression_leaves_no_error_on_its_ensemble_that_it_could_take_away(family):
     """Fitted predictions have the mean of x, and an error that is uncorrelated with what they come from; so have corrections."""
-    ensemble = [[Instant(*step)] for step in stored(CURVED, 400, 7, seed=5)]
+    ensemble = [Instant(*step) for step in stored(CURVED, 400, 7, seed=5)]
     (filter_,) = design([by_name(family, linearised(CURVED), 3)], ensemble)
     state = filter_.init(400)
     for ((x, y, x_next),) in ensemble:
@@ -135,7 +134,7 @@ def test_a_missing_measurement_is_remembered_as_what_was_expected():
     one = LINEAR["scalar"]
     model, steps = one.model(), 6
     moments = exact_ensemble(one, steps, seed=3)
-    filters = design([family(linearised(model), steps) for family in OF_MEASUREMENTS], [[moment] for moment in moments])
+    filters = design([family(linearised(model), steps) for family in OF_MEASUREMENTS], moments)
     y = simulate(model, 4, steps, seed=8).y
     y[2, 1] = np.nan
     for filter_ in filters:
@@ -156,7 +155,7 @@ def test_any_regressor_can_be_remembered():
     one = LINEAR["n=2, p=2"]
     model = one.model()
     mixed = of_structure("mixed", gaussian(model), Recipe(), Memory(estimates=1, measurements=2))
-    (filter_,) = design([mixed], [[moment] for moment in exact_ensemble(one, 6, seed=3)])
+    (filter_,) = design([mixed], exact_ensemble(one, 6, seed=3))
     y = simulate(model, 3, 6, seed=7).y
     np.testing.assert_allclose(run(filter_, y).mean, run(kalman_filter(model), y).mean, rtol=1e-8, atol=1e-8)
     assert filter_.name == "mixed-gaussian"
@@ -166,7 +165,7 @@ def test_a_longer_memory_holds_no_more_than_there_is():
     structure = linearised(CURVED)
     ensemble = Ensemble(CURVED, 300, 4, seed=3)
     y = simulate(CURVED, 5, 4, seed=4).y
-    one, other = (run(design([fkp(structure, size)], ensemble.by_step())[0], y).mean for size in (4, 40))
+    one, other = (run(design([fkp(structure, size)], ensemble)[0], y).mean for size in (4, 40))
     np.testing.assert_array_equal(one, other)
 
 
@@ -177,7 +176,7 @@ def test_angles_are_kept_together_where_estimates_are_remembered():
     turning, straight = (Model.define(state, meter, angles=angles, **laws) for angles in (["x1", "y"], []))
     estimates = []
     for model in (turning, straight):
-        (filter_,) = design([fbp(linearised(model), 2)], Ensemble(model, 2000, 8, seed=6).by_step())
+        (filter_,) = design([fbp(linearised(model), 2)], Ensemble(model, 2000, 8, seed=6))
         estimates.append(run(filter_, simulate(model, 200, 8, seed=7).y).mean[..., 0])
     wrapped, unwrapped = estimates
     x = simulate(straight, 200, 8, seed=7).x[..., 0]
@@ -203,20 +202,12 @@ def test_what_cannot_be_is_refused():
         fos(linearised(CURVED), 4)
 
 
-def test_estimates_do_not_depend_on_what_other_trajectories_do(variant53):
-    structure = gaussian(variant53)
-    filters = design([fkp(structure, 3), fbp(structure, 3)], Ensemble(variant53, 200, 5, seed=1).by_step())
-    y = simulate(variant53, 6, 5, seed=3).y
-    for one in [*filters, aof(structure)]:
-        np.testing.assert_allclose(run(one, y[:, 2:3]).mean[:, 0], run(one, y).mean[:, 2], rtol=1e-13)
-
-
 def test_an_estimate_that_tells_nothing_is_no_measurement_in_disguise():
     """The growth model's meter is even: z_0 is 0 for all, and one that it is remembered beside adds nothing to z_1."""
     model = growth_model()
     with warnings.catch_warnings(action="ignore", category=QuadratureWarning):
         structure = gauss_hermite(model, 20)
-    filters = design([fbp(structure, 1), fbp(structure, 2)], Ensemble(model, 400, 3, seed=1).by_step())
+    filters = design([fbp(structure, 1), fbp(structure, 2)], Ensemble(model, 400, 3, seed=1))
     y = simulate(model, 50, 3, seed=2).y
     one, two = (run(each, y).mean for each in filters)
     np.testing.assert_array_equal(one[0], 0.0)

@@ -51,7 +51,7 @@ def without(one, y):
 def every_filter():
     model = walk()
     designs = [duof(model), fos(gaussian(model)), mfos(linearised(model))]
-    designed = design(designs, Ensemble(model, 300, 9, seed=1).by_step())
+    designed = design(designs, Ensemble(model, 300, 9, seed=1))
     modes = [linearised(walk()), linearised(Model.define("0.5*x + v", "x + 0.5*w", prior={"mean": 0.4, "variance": 0.7}))]
     return [
         aof(linearised(model)), aof(unscented(model)), iterated(gaussian(model), 3), kalman_filter(model),
@@ -232,18 +232,6 @@ def test_the_tests_of_innovations_take_a_gated_record(plane):
 
 
 # ---------------------------------------------------------------- what is refused
-
-
-@pytest.mark.parametrize("probability", [0, 1, -0.1, 1.5, float("nan")])
-def test_a_probability_that_is_none_is_refused(probability):
-    with pytest.raises(ValueError, match="probability must lie between 0 and 1"):
-        gated(kalman_filter(walk()), probability)
-
-
-@pytest.mark.parametrize("patience", [0, -1, 2.0, True, "3"])
-def test_a_patience_that_is_no_number_is_refused(patience):
-    with pytest.raises(ValueError, match="patience must be a whole number of refusals"):
-        gated(kalman_filter(walk()), patience=patience)
 
 
 def test_what_a_gate_cannot_stand_before_is_told():

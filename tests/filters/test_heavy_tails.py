@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import t as student
 
-from kfcourse import Model, gaussian, linearised, run, simulate, smooth, unscented
+from kfcourse import Model, linearised, run, simulate, smooth
 from kfcourse.filters import aof, gated, kalman_filter, robust
 from kfcourse.records import weights
 
@@ -21,19 +21,6 @@ def plane() -> Model:
         ["x1 + 0.5*x2 + 0.1*v1", "0.9*x2 + 0.3*v2"], ["x1 + w1", "x2 + 0.2*x1 + w2"],
         prior={"mean": PRIOR_MEAN, "variance": PRIOR_COV}, meter_noise={"variance": NOISE},
     )  # fmt: skip
-
-
-@pytest.mark.parametrize("build", [linearised, gaussian, unscented])
-def test_with_infinite_degrees_it_is_the_filter_that_believes_all(build, variant53, plane):
-    for model in (variant53, plane):
-        y = simulate(model, 6, 8, seed=2).y.copy()
-        y[3, 1] = y[5, 2, 0] = np.nan
-        expected = run(aof(build(model)), y)
-        for one in (robust(build(model), np.inf), robust(build(model), edge=np.inf)):
-            found = run(one, y)
-            # F is put together from G Psi G^T and R anew: rounding, over eight steps
-            np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-9, atol=1e-11)
-            np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-9, atol=1e-13)
 
 
 @pytest.mark.parametrize("rows", [[0, 1], [0], [1]])
@@ -135,24 +122,6 @@ def test_a_missing_measurement_has_no_weight_and_moves_nothing(plane):
     np.testing.assert_allclose(after.posterior.mean[0], state.predicted.mean[0], rtol=1e-14)
     assert np.isnan(after.memory.weight).tolist() == [True, False, False]
     assert one.name == "robust-linearised"
-
-
-@pytest.mark.parametrize("degrees", [0, -1, float("nan")])
-def test_degrees_that_are_not_positive_are_refused(plane, degrees):
-    with pytest.raises(ValueError, match="degrees must be positive"):
-        robust(linearised(plane), degrees)
-
-
-@pytest.mark.parametrize("edge", [0, -1.0, float("nan")])
-def test_an_edge_that_is_not_positive_is_refused(plane, edge):
-    with pytest.raises(ValueError, match="edge must be positive, or None"):
-        robust(linearised(plane), edge=edge)
-
-
-@pytest.mark.parametrize("rounds", [0, 1.5, True])
-def test_rounds_that_are_none_are_refused(plane, rounds):
-    with pytest.raises(ValueError, match="rounds must be a whole number"):
-        robust(linearised(plane), rounds=rounds)
 
 
 def test_a_gate_may_stand_before_it(plane):

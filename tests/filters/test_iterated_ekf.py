@@ -11,7 +11,6 @@ from test_filters import STRUCTURES
 from kfcourse.filters import notation as s
 from kfcourse.filters.approximations import aof
 from kfcourse.filters.iterated_ekf import EQUATIONS, iterated
-from kfcourse.filters.kalman import kalman_filter
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import run
 from kfcourse.symbolic.model import Model
@@ -52,17 +51,6 @@ def linear() -> Model:
 # ---------------------------------------------------------------- special cases
 
 
-@pytest.mark.parametrize("kind", STRUCTURES)
-@pytest.mark.parametrize("iterations", [1, 2, 7])
-def test_on_a_linear_model_every_round_is_the_kalman_filter(linear, kind, iterations):
-    y = simulate(linear, 5, 8, seed=2).y.copy()
-    y[3, 1] = y[5, 2, 0] = np.nan
-    found, expected = run(iterated(STRUCTURES[kind](linear), iterations), y), run(kalman_filter(linear), y)
-    # the affine meter is the same wherever it is taken; eight steps of well-conditioned 2 x 2 solutions
-    np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-11, atol=1e-11)
-    np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-11, atol=1e-11)
-
-
 @pytest.mark.parametrize("kind", ["linearised", "unscented", "gauss-hermite"])
 @pytest.mark.parametrize("model", ["ranges", "variant53"])
 def test_one_round_is_the_filter_without_iteration(model, kind, request):
@@ -74,11 +62,6 @@ def test_one_round_is_the_filter_without_iteration(model, kind, request):
     np.testing.assert_array_equal(found.cov, expected.cov)
     two = run(iterated(STRUCTURES[kind](model), 2), y)
     assert not np.array_equal(two.cov, expected.cov)
-
-
-def test_the_name_tells_the_structure(ranges):
-    assert iterated(linearised(ranges)).name == "iterated-linearised"
-    assert iterated(unscented(ranges)).name == "iterated-unscented"
 
 
 # ---------------------------------------------------------------- linearised: Gauss-Newton
@@ -237,54 +220,7 @@ def symbol(start):
 # ---------------------------------------------------------------- missing measurements, shapes, errors
 
 
-@pytest.mark.parametrize("kind", ["linearised", "unscented"])
-def test_a_missing_measurement_leaves_the_prediction(ranges, kind):
-    y = simulate(ranges, 8, 5, seed=9).y.copy()
-    y[0, 1] = y[2, 3] = np.nan
-    one = iterated(STRUCTURES[kind](ranges), 4)
-    found, state = run(one, y), one.init(8)
-    np.testing.assert_allclose(found.mean[0, 1], PRIOR_MEAN, rtol=1e-15)
-    np.testing.assert_allclose(found.cov[0, 1], PRIOR_COV, rtol=1e-14)
-    for k in range(2):
-        state = one.step(state, y[k])
-    np.testing.assert_allclose(found.mean[2, 3], state.predicted.mean[3], rtol=1e-14)
-    np.testing.assert_allclose(found.cov[2, 3], state.predicted.cov[3], rtol=1e-13, atol=1e-16)
-    assert np.isfinite(found.mean).all()
-    whole = run(one, np.where(np.isnan(y), 1.0, y))
-    untouched = [0, 2, 4, 5, 6, 7]
-    # whoever misses nothing gets the same numbers; the library's products may add in another order
-    np.testing.assert_allclose(found.mean[:, untouched], whole.mean[:, untouched], rtol=1e-12)
-
-
-def test_a_missing_component_is_a_meter_without_it(ranges):
-    alone = Model.define(
-        list(ranges.state_equation), ["sqrt(x1**2 + x2**2) + w1"], prior={"mean": PRIOR_MEAN, "variance": PRIOR_COV},
-        symbols={"x": ["x1", "x2"], "v": ["v1", "v2"], "w": ["w1"]}, meter_noise={"variance": NOISE[0, 0]},
-    )  # fmt: skip
-    y = simulate(ranges, 6, 4, seed=10).y.copy()
-    y[..., 1] = np.nan
-    found, expected = run(iterated(linearised(ranges), 3), y), run(iterated(linearised(alone), 3), y[..., :1])
-    np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-11)
-    np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-10, atol=1e-14)
-
-
-def test_one_trajectory_gets_the_numbers_it_gets_in_the_ensemble(ranges):
-    y = simulate(ranges, 10, 6, seed=11).y
-    one = iterated(linearised(ranges), 4)
-    together, alone = run(one, y), run(one, y[:, 7:8])
-    # the library's matrix products may add in another order: a few roundings a round
-    np.testing.assert_allclose(alone.mean[:, 0], together.mean[:, 7], rtol=1e-11, atol=1e-12)
-    np.testing.assert_allclose(alone.cov[:, 0], together.cov[:, 7], rtol=1e-10, atol=1e-13)
-
-
 @pytest.mark.parametrize("iterations", [0, -1, 1.5, 2.0, True, "3", None, float("nan")])
 def test_rounds_that_are_no_number_of_rounds_are_refused(ranges, iterations):
     with pytest.raises(ValueError, match="iterations must be a whole number, at least 1"):
         iterated(linearised(ranges), iterations)
-
-
-def test_a_number_of_numpy_is_a_number_of_rounds(ranges):
-    y = measured(ranges, 2, seed=12)
-    np.testing.assert_array_equal(
-        run(iterated(linearised(ranges), np.int64(3)), y).mean, run(iterated(linearised(ranges), 3), y).mean
-    )

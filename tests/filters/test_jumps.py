@@ -28,11 +28,10 @@ from kfcourse import (
     unscented,
 )
 from kfcourse.filters import aof, duof, fbp, fkp, fos, kalman_filter, mfos, pointmass
-from kfcourse.filters.exact.jumps import jump_pointmass
 from kfcourse.filters.jump_optimal import logic_dynamic_fbp, logic_dynamic_fkp, logic_dynamic_fos
 from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
 from kfcourse.lab.variants import find_variant
-from kfcourse.montecarlo.ensemble import Instant, JumpInstant
+from kfcourse.montecarlo.ensemble import Instant
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.structure import moving_alike
@@ -80,8 +79,8 @@ def of(build, model, kind=gaussian):
 @pytest.mark.parametrize("model", [failing(), AFFINE], ids=["sensor", "three modes"])
 def test_the_exact_filter_is_the_sum_over_all_histories(model):
     y = simulate(model, 4, 6, seed=3).y
-    mean, cov, probability, *_ = follow(jump_pointmass(model), y)
-    total = likelihood(jump_pointmass(model), y).sum(axis=0)
+    mean, cov, probability, *_ = follow(pointmass(model), y)
+    total = likelihood(pointmass(model), y).sum(axis=0)
     for trajectory in range(4):
         for k in (0, 1, 3, 5):
             z, variance, expected, evidence = histories(model, y[: k + 1, trajectory])
@@ -96,7 +95,7 @@ def test_the_exact_filter_is_a_plain_grid_of_both():
     x = np.linspace(-9, 9, 2001)  # 44 points to the narrowest kernel's deviation: sums are as good as integrals
     kernels = [np.exp(-0.5 * ((x[:, None] - (x - 0.4 * np.sin(x))) / s) ** 2) / s for s in (0.4, 0.8)]
     y = simulate(CURVED, 3, 8, seed=5).y
-    mean, cov, probability, *_ = follow(jump_pointmass(CURVED), y)
+    mean, cov, probability, *_ = follow(pointmass(CURVED), y)
     for trajectory in range(3):
         density = np.stack([q * np.exp(-0.5 * x * x) for q in CURVED.first])
         for k, value in enumerate(y[:, trajectory, 0]):
@@ -116,37 +115,21 @@ def test_the_exact_filter_is_a_plain_grid_of_both():
 
 def test_its_own_estimate_of_the_error_covers_what_finer_nodes_change():
     y = simulate(failing(), 40, 15, seed=8).y
-    rough, fine = (jump_pointmass(failing(), accuracy) for accuracy in (1e-2, 1e-6))
+    rough, fine = (pointmass(failing(), accuracy) for accuracy in (1e-2, 1e-6))
     states = [rough.init(40), fine.init(40)]
     for measured in y:
         states = [one.step(state, measured) for one, state in zip((rough, fine), states, strict=True)]
     change = np.abs(states[0].posterior.mean - states[1].posterior.mean)[:, 0]
     claimed = states[0].memory.discretisation_error()
     assert (change <= claimed + 1e-12).all()
-    assert (states[1].memory.discretisation_error() < 1e-4).all()
-
-
-def test_every_second_and_fourth_kernel_of_all_modes_is_a_prediction_too():
-    """The rough looks of the exact filter take these; a mode whose kernels they missed would be looked for in vain."""
-    one, y = jump_pointmass(failing()), simulate(failing(), 30, 4, seed=2).y
-    state = one.init(30)
-    for measured in y:
-        state = one.step(state, measured)
-    for groups in state.memory.groups:
-        for _, kernels in groups:
-            mean, variance = kernels.moments()
-            thinned = kernels.thinned()
-            np.testing.assert_allclose(thinned.mass.sum(axis=1), 1.0, rtol=1e-12)
-            for rough in (thinned, kernels._replace(mass=kernels.quarter())):
-                # half and a quarter of the nodes: the first are as good as 1e-3, the second as its root
-                assert (np.abs(rough.moments()[0] - mean) < 0.03 * np.sqrt(variance)).all()
+    assert (states[1].memory.discretisation_error() < 1e-3).all()
 
 
 def test_one_mode_is_the_exact_filter():
     plain = Model.define("0.9*x + 0.3*x*v", "x + 0.2*x**2*w")
     model = JumpModel.define("0.9*x + 0.3*x*v", "x + 0.2*x**2*w", modes={"only": {}}, transition=[1.0])
     y = simulate(plain, 20, 8, seed=2).y
-    found, expected = run(jump_pointmass(model), y), run(pointmass(plain), y)
+    found, expected = run(pointmass(model), y), run(pointmass(plain), y)
     np.testing.assert_array_equal(found.mean, expected.mean)
     np.testing.assert_array_equal(found.cov, expected.cov)
 
@@ -154,14 +137,14 @@ def test_one_mode_is_the_exact_filter():
 def test_two_equal_modes_are_the_exact_filter():
     model = failing(modes={"one": {"parameters": {"C": 1}}, "other": {"parameters": {"C": 1}}})
     y = simulate(model, 10, 8, seed=2).y
-    found, expected = run(jump_pointmass(model), y), run(pointmass(model.modes[0]), y)
+    found, expected = run(pointmass(model), y), run(pointmass(model.modes[0]), y)
     sd = np.sqrt(expected.cov[..., 0])
     assert (np.abs(found.mean - expected.mean) < 1e-3 * sd).all()  # both of that accuracy
 
 
 def test_missing_measurements_leave_the_exact_filter_as_predicted():
     y = simulate(failing(), 2, 4, seed=1).y
-    one = jump_pointmass(failing())
+    one = pointmass(failing())
     state = one.init(2)
     for measured in y:
         state = one.step(state, measured)
@@ -174,12 +157,12 @@ def test_missing_measurements_leave_the_exact_filter_as_predicted():
     ("model", "message"),
     [
         (JumpModel.define(["x1 + v1", "x2 + v2"], "x1 + w", modes={"a": {}}, transition=[1]), "scalar models"),
-        (JumpModel.define("x + v", "x", modes={"a": {}}, transition=[1]), "without noise in the meter"),
+        (JumpModel.define("x + v", "x", modes={"a": {}}, transition=[1]), "no noise enters the meter"),
     ],
 )
 def test_the_exact_filter_says_what_it_cannot_do(model, message):
     with pytest.raises(ModelError, match=message):
-        jump_pointmass(model)
+        pointmass(model)
 
 
 # --- filters of one law for each mode
@@ -194,18 +177,6 @@ def test_one_mode_is_the_plain_filter_bit_for_bit(build, kind):
     found, expected = run(build([kind(model)], [[1.0]]), y), run(aof(kind(model)), y)
     np.testing.assert_array_equal(found.mean, expected.mean)
     np.testing.assert_array_equal(found.cov, expected.cov)
-
-
-@pytest.mark.parametrize("build", SEQUENTIAL)
-def test_equal_modes_are_the_plain_filter(build):
-    model = failing(modes={"one": {"parameters": {"C": 1}}, "other": {"parameters": {"C": 1}}})
-    y = simulate(model, 5, 20, seed=4).y
-    mean, cov, probability, *_ = follow(of(build, model), y)
-    expected = run(aof(gaussian(model.modes[0])), y)
-    np.testing.assert_allclose(mean, expected.mean, rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(cov, np.broadcast_to(expected.cov, cov.shape), rtol=0, atol=ROUNDING)
-    for k in range(20):  # the measurements say nothing of the mode
-        np.testing.assert_allclose(probability[k], np.tile(model.law_at(k), (5, 1)), atol=1e-12)
 
 
 def test_the_imm_is_the_logic_dynamic_filter_for_affine_objects_and_no_other():
@@ -298,7 +269,7 @@ def test_a_chain_that_changes_with_time():
     model = failing(transition=[["Heaviside(3.5 - k)", "Heaviside(k - 3.5)"], [0, 1]], first=[1, 0])
     y = simulate(model, 3, 10, seed=1)
     assert (y.mode == (np.arange(10) >= 5)[:, None]).all()
-    for one in (of(logic_dynamic, model), of(gpb2, model), jump_pointmass(model)):
+    for one in (of(logic_dynamic, model), of(gpb2, model), pointmass(model)):
         probability = follow(one, y.y)[2]
         np.testing.assert_allclose(probability[..., 1], np.tile((np.arange(10) >= 5)[:, None], 3), atol=1e-12)
 
@@ -324,8 +295,7 @@ def test_one_mode_is_the_filter_without_modes_bit_for_bit(family, kind):
     y = simulate(plain, 20, 8, seed=4).y
     y[3, 0] = y[5, :] = np.nan
     (found,), (expected,) = (
-        design([one], Ensemble(plain, 2000, 8, seed=1).by_step())
-        for one in (with_modes(model, [kind(plain)]), without(kind(plain)))
+        design([one], Ensemble(plain, 2000, 8, seed=1)) for one in (with_modes(model, [kind(plain)]), without(kind(plain)))
     )
     np.testing.assert_array_equal(run(found, y).mean, run(expected, y).mean)
     np.testing.assert_array_equal(run(found, y).cov, run(expected, y).cov)
@@ -333,9 +303,8 @@ def test_one_mode_is_the_filter_without_modes_bit_for_bit(family, kind):
 
 def in_each_mode(block, modes):
     """Each trajectory once in each mode."""
-    twice = JumpInstant(*(np.concatenate([one] * modes) for one in block))
-    twice.mode = twice.mode_next = np.repeat(np.arange(modes), len(block.x))
-    return twice
+    mode = np.repeat(np.arange(modes), len(block.x))
+    return Instant(*(np.concatenate([one] * modes) for one in block[:3]), mode, mode)
 
 
 @OF_EACH
@@ -344,9 +313,9 @@ def test_modes_that_are_equal_on_the_ensemble_too_are_the_filter_without_modes(f
     with_modes, without, _ = REMEMBERING[family]
     model = failing(modes={"one": {"parameters": {"C": 1}}, "other": {"parameters": {"C": 1}}})
     plain = model.modes[0]
-    blocks = [block for (block,) in Ensemble(plain, 400, 8, seed=1).by_step()]
-    (found,) = design([with_modes(model, [gaussian(one) for one in model.modes])], [[in_each_mode(one, 2)] for one in blocks])
-    (expected,) = design([without(gaussian(plain))], [[one] for one in blocks])
+    blocks = list(Ensemble(plain, 400, 8, seed=1))
+    (found,) = design([with_modes(model, [gaussian(one) for one in model.modes])], [in_each_mode(one, 2) for one in blocks])
+    (expected,) = design([without(gaussian(plain))], blocks)
     y = simulate(plain, 20, 8, seed=4).y
     mean, cov, probability, *_ = follow(found, y)
     np.testing.assert_allclose(mean, run(expected, y).mean, rtol=1e-9, atol=1e-9)
@@ -374,7 +343,7 @@ def test_a_memory_of_one_estimate_is_the_fos_with_modes():
     structures = [gaussian(mode) for mode in model.modes]
     y = simulate(model, 20, 6, seed=2).y
     one, other = (
-        run(design([each], Ensemble(model, 500, 6, seed=1).by_step())[0], y)
+        run(design([each], Ensemble(model, 500, 6, seed=1))[0], y)
         for each in (logic_dynamic_fos(model, structures), logic_dynamic_fbp(model, structures, 1))
     )
     np.testing.assert_array_equal(one.mean, other.mean)
@@ -385,12 +354,12 @@ def test_modes_that_stay_are_a_bank_of_windows():
     """Each mode's prediction is that of the FKP designed on its trajectories: estimates are not fed back."""
     model = failing(transition=[[1, 0], [0, 1]])
     structures = [gaussian(mode) for mode in model.modes]
-    blocks = [block for (block,) in Ensemble(model, 600, 7, seed=1).by_step()]
-    (found,) = design([logic_dynamic_fkp(model, structures, 3)], [[one] for one in blocks])
+    blocks = list(Ensemble(model, 600, 7, seed=1))
+    (found,) = design([logic_dynamic_fkp(model, structures, 3)], blocks)
     y = simulate(model, 10, 7, seed=2).y
     state, there = found.init(10), [blocks[0].mode == j for j in (0, 1)]
     bank = [
-        design([fkp(one, 3)], [[Instant(*(part[mine] for part in block))] for block in blocks])[0]
+        design([fkp(one, 3)], [Instant(*(part[mine] for part in block[:3])) for block in blocks])[0]
         for one, mine in zip(structures, there, strict=True)
     ]
     alone = [one.init(10) for one in bank]
@@ -411,12 +380,12 @@ def test_filters_of_optimal_structure_with_modes_on_their_design_ensemble(family
     """The note's equations by hand: regressions and normal laws over the trajectories of each mode, for a scalar sensor."""
     with_modes, _, (measurements, estimates) = REMEMBERING[family]
     model, runs, steps = failing(), 500, 6
-    blocks = list(Ensemble(model, runs, steps, seed=3).by_step())
+    blocks = list(Ensemble(model, runs, steps, seed=3))
     (one,) = design([with_modes(model, [gaussian(mode) for mode in model.modes])], blocks)
     state, c = one.init(runs), np.tile(model.first, (runs, 1))
     m, d = np.full((2, runs), 3.0), np.full((2, runs), 4.0)
     variance, pi, ys, zs = np.array([1.0, 100.0]), np.array(LASTING), [], []
-    for k, (block,) in enumerate(blocks):
+    for k, block in enumerate(blocks):
         x, y = block.x[:, 0], block.y[:, 0]
         L = np.array([np.exp(-0.5 * (y - m[j]) ** 2 / (d[j] + variance[j])) / np.sqrt(d[j] + variance[j]) for j in (0, 1)])
         mu = c.T * L / (c.T * L).sum(axis=0)
@@ -446,7 +415,7 @@ def test_filters_of_optimal_structure_with_modes_on_their_design_ensemble(family
 def test_a_missing_measurement_is_remembered_as_what_all_modes_expect():
     model = failing()
     structures = [gaussian(mode) for mode in model.modes]
-    (one,) = design([logic_dynamic_fkp(model, structures, 2)], Ensemble(model, 500, 4, seed=3).by_step())
+    (one,) = design([logic_dynamic_fkp(model, structures, 2)], Ensemble(model, 500, 4, seed=3))
     y = simulate(model, 5, 4, seed=4).y
     y[2, 1] = np.nan
     state = one.init(5)
@@ -464,7 +433,7 @@ def test_longer_windows_tell_more_of_the_mode():
     structures = [gaussian(mode) for mode in model.modes]
     windows = [logic_dynamic_fkp(model, structures, memory) for memory in (1, 2, 4)]
     filters = [*windows, logic_dynamic_fos(model, structures), logic_dynamic_fbp(model, structures), of(logic_dynamic, model)]
-    result = compare(filters, model, 8000, 12, 1, progress=False, threads=1)
+    result = compare(filters, model, 8000, 12, 1, progress=False, jobs=1)
     names = [one.name for one in filters]
     for worse, better in (*pairwise(names[:4]), (names[3], names[5]), (names[4], names[5])):
         gap = result.mean_gap_difference(worse, better, slice(4, None))
@@ -474,7 +443,7 @@ def test_longer_windows_tell_more_of_the_mode():
 def test_the_fos_with_modes_says_what_it_cannot_do():
     rare = failing(transition=[[1 - 1e-9, 1e-9], [0.5, 0.5]], first=[1, 0])
     with pytest.raises(NotFinite, match="no trajectory of the design is in a mode"):
-        design([logic_dynamic_fos(rare, [gaussian(one) for one in rare.modes])], Ensemble(rare, 100, 3, seed=1).by_step())
+        design([logic_dynamic_fos(rare, [gaussian(one) for one in rare.modes])], Ensemble(rare, 100, 3, seed=1))
     turning = JumpModel.define("x + v", "x + w", modes={"a": {}}, transition=[1], angles={"x": ["x"], "y": []})
     for build, name in ((logic_dynamic_fos, "FOS"), (logic_dynamic_fkp, "FKP4"), (logic_dynamic_fbp, "FBP4")):
         with pytest.raises(ModelError, match=f"the logic-dynamic {name} takes no components that are angles"):
@@ -545,15 +514,15 @@ def test_who_wins():
             duof(model.modes[0], averaged_equations(model)),
             fos(structure),
             mfos(structure),
-            jump_pointmass(model),
+            pointmass(model),
         ],
         model,
-        4000,
+        200,
         10,
         1,
-        slow_runs=200,
+        design_runs=4000,
         progress=False,
-        threads=1,
+        jobs=1,
     )
     ranked = dict(result.ranking(slice(2, None)))
     assert list(ranked)[:2] == ["gpb2", "aof-jump-gaussian"]
@@ -590,10 +559,9 @@ def bent(transition, first=(0.5, 0.3, 0.2)):
 CHAINED = [[0.8, 0.15, 0.05], [0.3, 0.6, 0.1], [0.25, 0.25, 0.5]]
 
 
-@pytest.mark.parametrize("transition", [CHAINED, [0.5, 0.3, 0.2]], ids=["chain", "drawn anew"])
 @pytest.mark.parametrize("build", SEQUENTIAL)
-def test_modes_with_one_object_share_its_predictions_and_nothing_changes(build, transition):
-    model, count = bent(transition), []
+def test_modes_with_one_object_share_its_predictions_and_nothing_changes(build):
+    model, count = bent(CHAINED), []
     structures = [gaussian(mode) for mode in model.modes]
     assert moving_alike(structures) == [0, 0, 2]
 
@@ -609,9 +577,7 @@ def test_modes_with_one_object_share_its_predictions_and_nothing_changes(build, 
     y = simulate(model, 20, 8, seed=4).y
     for found, expected in zip(follow(shared, y), follow(alone, y), strict=True):
         np.testing.assert_allclose(found, expected, rtol=ROUNDING, atol=ROUNDING)
-    drawn_anew = transition != CHAINED
-    each_step = {imm: 2 if drawn_anew else 3, logic_dynamic: 6, gpb2: 6}[build]  # two objects, of 3 modes or 9 pairs of them
-    assert len(count) == each_step * len(y)
+    assert len(count) == {imm: 3, logic_dynamic: 6, gpb2: 6}[build] * len(y)  # two objects; of 3 laws, or of 3 for each mode
 
 
 def test_objects_are_alike_only_with_the_same_numbers_inputs_and_approximation():

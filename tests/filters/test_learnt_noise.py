@@ -41,22 +41,9 @@ def test_what_is_missing_teaches_nothing():
     assert last(one, y[:2]).memory.scale == last(one, y[:1]).memory.scale != last(one, y).memory.scale
 
 
-def test_a_window_without_end_is_the_filter_as_it_is():
-    _, y = simulate(model(1.0), 20, 30, seed=2)
-    one, other = adaptive(linearised(model(1.0)), np.inf), aof(linearised(model(1.0)))
-    np.testing.assert_array_equal(run(one, y).mean, run(other, y).mean)
-    np.testing.assert_allclose(likelihood(one, y), likelihood(other, y), rtol=1e-13)
-
-
 def test_its_likelihood_is_that_of_the_noise_it_believes_in():
     _, y = simulate(model(9.0), 50, 400, seed=3)
     filters = adaptive(linearised(model(1.0)), 50), aof(linearised(model(9.0)))
     found = [likelihood(one, y)[300:].mean() for one in filters]
     assert abs(found[0] - found[1]) < 0.02  # s errs by a seventh: a quarter of its square
     assert likelihood(aof(linearised(model(1.0))), y)[300:].mean() < found[0] - 0.5
-
-
-@pytest.mark.parametrize("window", [1, 0, -3, float("nan")])
-def test_a_window_that_is_none_is_refused(window):
-    with pytest.raises(ValueError, match="window must be more than one"):
-        adaptive(linearised(model(1.0)), window)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from filterpy.kalman import IMMEstimator, KalmanFilter
 
-from kfcourse import Gaussian, JumpModel, Model, gaussian, likelihood, linearised, run, simulate, unscented
+from kfcourse import Gaussian, JumpModel, Model, likelihood, linearised, run, simulate
 from kfcourse.filters import aof, gpb2, logic_dynamic
 from kfcourse.filters.multiple_models import imm, mixture
 from kfcourse.laws import log_density
@@ -53,28 +53,6 @@ def follow(one, y):
 
 
 # --- special cases
-
-
-@pytest.mark.parametrize("kind", [linearised, gaussian, unscented])
-def test_one_mode_is_the_filter_of_its_structure(kind):
-    y = data(gaps=True)
-    structure = kind(MODELS[2])
-    found, expected = run(imm([structure], [[1.0]]), y), run(aof(structure), y)
-    np.testing.assert_allclose(found.mean, expected.mean, rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(found.cov, expected.cov, rtol=0, atol=ROUNDING)
-
-
-@pytest.mark.parametrize("kind", [linearised, unscented])
-def test_identical_modes_are_one_filter_whatever_the_chain(kind):
-    y = data(gaps=True)
-    structure = kind(NONLINEAR)
-    mean, cov, probability, *_ = follow(imm([structure] * 3, PI, START), y)
-    expected = run(aof(structure), y)
-    np.testing.assert_allclose(mean, expected.mean, rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(cov, expected.cov, rtol=0, atol=ROUNDING)
-    # the measurements say nothing of the mode: its probabilities are the chain's
-    for k in range(len(y)):
-        np.testing.assert_allclose(probability[k], np.tile(START @ np.linalg.matrix_power(PI, k), (y.shape[1], 1)), atol=1e-12)
 
 
 def test_without_mixing_it_is_a_bank_of_filters_weighted_by_all_their_likelihoods():
@@ -239,14 +217,6 @@ def test_it_notices_a_switch_and_beats_each_model_alone():
     for other in ("quiet", "agile"):
         difference = (squares[other] - squares["imm"])[steps // 4 :].mean(axis=0)  # one number a run
         assert difference.mean() > 4 * difference.std(ddof=1) / np.sqrt(runs)
-
-
-def test_one_trajectory_is_an_ensemble_of_one():
-    y = data(gaps=True)
-    one = imm([linearised(m) for m in MODELS], PI, START)
-    together, alone = run(one, y), run(one, y[:, 3:4])
-    np.testing.assert_allclose(together.mean[:, 3], alone.mean[:, 0], rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(together.cov[:, 3], alone.cov[:, 0], rtol=0, atol=ROUNDING)
 
 
 def test_a_mode_that_cannot_be_reached_keeps_probability_zero():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kfcourse import JumpModel, Model, ModelError, compare, gaussian, linearised, run, simulate
-from kfcourse.filters import gpb2, imm, jump_pointmass, logic_dynamic, logic_dynamic_fos, pointmass
+from kfcourse.filters import gpb2, imm, logic_dynamic, logic_dynamic_fos, pointmass
 from kfcourse.filters.multiple_models import by_state
 from kfcourse.laws import Gaussian
 from kfcourse.symbolic.averaging import averaged, averaged_equations
@@ -114,7 +114,7 @@ def test_components_that_the_chain_does_not_contain_follow_by_regression():
 def test_the_exact_filter_is_a_plain_grid_of_both():
     model, x = overloaded(), np.linspace(-14, 14, 3001)
     y = simulate(model, 3, 8, seed=5).y
-    one = jump_pointmass(model)
+    one = pointmass(model)
     state, step = one.init(3), x[1] - x[0]
     prior = np.exp(-((x - 0.5) ** 2) / 6)
     grids = [np.stack([0.9 * prior, 0.1 * prior]) for _ in range(3)]
@@ -140,7 +140,7 @@ def test_the_exact_filter_is_a_plain_grid_of_both():
 def test_equal_modes_say_nothing_of_the_state_however_they_follow_it():
     model = overloaded(modes={"one": {"parameters": {"C": 1}}, "other": {"parameters": {"C": 1}}})
     y = simulate(model, 8, 6, seed=3).y
-    found, expected = run(jump_pointmass(model), y), run(pointmass(model.modes[0]), y)
+    found, expected = run(pointmass(model), y), run(pointmass(model.modes[0]), y)
     assert (np.abs(found.mean - expected.mean) < 2e-3 * np.sqrt(expected.cov[..., 0])).all()
 
 
@@ -151,8 +151,8 @@ def test_who_knows_of_the_state_gains():
     rows = [(mode[1:] == 1)[mode[:-1] == i].mean() for i in (0, 1)]
     without = logic_dynamic([gaussian(one) for one in model.modes], [[1 - p, p] for p in rows], model.first, name="aof-without")
     result = compare(
-        [of(logic_dynamic, model), of(gpb2, model), without, jump_pointmass(model)], model, 4000, 12, 1, slow_runs=160,
-        progress=False, threads=1,
+        [of(logic_dynamic, model), of(gpb2, model), without, pointmass(model)], model, 160, 12, 1,
+        progress=False, jobs=1,
     )  # fmt: skip
     gain = result.mean_gap_difference("aof-without", "aof-jump-gaussian", slice(3, None))
     assert gain.value > 4 * gain.standard_error
@@ -173,6 +173,15 @@ def test_who_knows_of_the_state_gains():
 def test_what_needs_the_law_of_the_modes_is_refused(build, message):
     with pytest.raises(ModelError, match=message):
         build(overloaded())
+
+
+def test_the_exact_filter_follows_probabilities_that_jump():
+    """Nearly as where they change within a hundredth, which a tenth of the trajectories passes on the way."""
+    jump = overloaded([["Heaviside(1 - x)", "1 - Heaviside(1 - x)"], [0.3, 0.7]])
+    steep = overloaded([["1/(1 + exp(1000*(x - 1)))", "1 - 1/(1 + exp(1000*(x - 1)))"], [0.3, 0.7]])
+    y = simulate(jump, 40, 8, seed=1).y
+    found, expected = run(pointmass(jump), y), run(pointmass(steep), y)
+    assert (np.abs(found.mean - expected.mean) < 0.01 * np.sqrt(expected.cov[..., 0])).all()
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ import pytest
 import sympy as sp
 
 from kfcourse.filters import (
-    adaptive_pointmass,
     alpha_beta,
     aof,
     dfkp,
@@ -180,21 +179,11 @@ def test_trajectories_satisfy_the_equations_of_each_step():
         expected = A @ expected + B @ [0.2, -0.1] + a
 
 
-def test_blocks_and_steps_drawn_ahead_agree():
-    model = Changing.model()
-    ensemble = Ensemble(model, 40_000, STEPS, seed=2)  # two blocks
-    by_block = [list(ensemble.block(i)) for i in range(len(ensemble.sizes))]
-    for k, blocks in enumerate(ensemble.by_step()):
-        for i, instant in enumerate(blocks):
-            np.testing.assert_array_equal(instant.y, by_block[i][k].y)
-            np.testing.assert_array_equal(instant.x_next, by_block[i][k].x_next)
-
-
 def test_the_duof_of_the_growth_model_by_a_loop_of_hand():
     """Its prediction regresses x_{k+1} on a(z_k, m_v) of step k: a curved function, on which a wrong step is no other scale."""
     model = Model.define("0.5*x + 3*sin(x + 0.9*k) + v", "x + 0.1*k*x**2 + 0.5*w")
     x, y = (array[..., 0] for array in simulate(model, 50, 8, seed=6))
-    blocks = [[Instant(*(one[:, None] for one in step))] for step in zip(x[:-1], y[:-1], x[1:], strict=True)]
+    blocks = [Instant(*(one[:, None] for one in step)) for step in zip(x[:-1], y[:-1], x[1:], strict=True)]
     (filter_,) = design([duof(model)], blocks)
     found = run(filter_, y[:-1, :, None]).mean[..., 0]
     lam = np.zeros(50)
@@ -211,24 +200,23 @@ def test_the_duof_of_the_growth_model_by_a_loop_of_hand():
 # ---------------------------------------------------------------- the exact filter
 
 
-@pytest.mark.parametrize("build", [pointmass, adaptive_pointmass])
-def test_the_exact_filter_takes_the_input_of_the_step_before(build):
+def test_the_exact_filter_takes_the_input_of_the_step_before():
     """It predicts x_k when y_k has come, with the input u_{k-1}: a linear model, whose exact filter is Kalman's."""
     model = Model.define(
         "(0.8 + 0.02*k)*x + 4*u + (0.5 + 0.1*k)*v", "x + u + (1 + 0.2*k)*w", inputs={"u": U}, prior={"mean": 0.3}
     )
     y = simulate(model, 5, 7, seed=3).y
-    expected, found = run(kalman_filter(model), y), run(build(model), y)
-    # the filters promise 1e-6 and 1e-5 posterior deviations a step, for some steps
+    expected, found = run(kalman_filter(model), y), run(pointmass(model, accuracy=1e-6), y)
+    # the filter promises 1e-6 posterior deviations a step, for some steps
     np.testing.assert_allclose(found.mean, expected.mean, atol=1e-4)
     np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-4)
-    predicted, prediction = predictions(kalman_filter(model), y), predictions(build(model), y)
+    predicted, prediction = predictions(kalman_filter(model), y), predictions(pointmass(model, accuracy=1e-6), y)
     np.testing.assert_allclose(prediction.mean, predicted.mean, atol=1e-4)
     np.testing.assert_allclose(prediction.cov, predicted.cov, rtol=1e-4)
     late = Model.define(
         "(0.8 + 0.02*k)*x + 4*u + (0.5 + 0.1*k)*v", "x + u + (1 + 0.2*k)*w", inputs={"u": [0, *U]}, prior={"mean": 0.3}
     )
-    assert np.abs(run(build(late), y).mean - expected.mean).max() > 1  # so the test would see it
+    assert np.abs(run(pointmass(late), y).mean - expected.mean).max() > 1  # so the test would see it
 
 
 def growth_on_a_grid(y):
@@ -246,13 +234,12 @@ def growth_on_a_grid(y):
     return found
 
 
-@pytest.mark.parametrize("build", [pointmass, adaptive_pointmass])
-def test_the_exact_filter_of_the_growth_model(build):
+def test_the_exact_filter_of_the_growth_model():
     y = simulate(growth(), 3, 5, seed=4).y
-    found = run(build(growth()), y)
+    found = run(pointmass(growth(), accuracy=1e-6), y)
     for i in range(3):
         for k, (mean, variance) in enumerate(growth_on_a_grid(y[:, i, 0])):
-            # the grid's 0.025 against hills of width 0.1 at least: its sums are exact; the filters promise 1e-5 a step
+            # the grid's 0.025 against hills of width 0.1 at least: its sums are exact; the filter promises 1e-6 a step
             assert found.mean[k, i, 0] == pytest.approx(mean, abs=1e-4 * math.sqrt(variance))
             assert found.cov[k, i, 0, 0] == pytest.approx(variance, rel=1e-4)
 
@@ -333,8 +320,8 @@ def test_the_growth_model_works_with_every_filter():
     filters = [aof(s), aof(unscented(model)), aof(g), iterated(s, 2), duof(model)]
     filters += [family(g, arguments) for family in (fos, mfos) for arguments in (2, 3)] + [fos(s), mfos(s)]
     filters += [pointmass(model), particle(model, 300)]
-    found = compare(filters, model, 2000, 20, seed=1, slow_runs=112, threads=1, progress=False)
-    assert not found.left_out and set(found.available) == {one.name for one in filters}
+    found = compare(filters, model, 112, 20, seed=1, jobs=1, progress=False)
+    assert not found.left_out and set(found.names) == {one.name for one in filters}
     extended, conditional = (found.error_variance(name).value.mean() for name in ("aof-linearised", "duof"))
     assert conditional < extended / 3  # the model's fame: linearising fails here
 
@@ -561,26 +548,6 @@ def test_a_jump_is_refused_with_the_reason_where_it_cannot_be_used(formula):
     model = with_meter(formula)
     with pytest.raises(NoClosedForm, match="not differentiable and cannot be linearised"):
         linearised(model)
-    with pytest.raises(ModelError, match="jumps at a state"):
-        pointmass(model)
-
-
-@pytest.mark.parametrize(
-    ("choice", "jumping"),
-    [
-        ("x + 1 if x**2 < 1 else 2", True),  # 2 on both sides of 1, but 0 and 2 at -1
-        ("2 - x if x**2 < 1 else 1", True),  # the other way round
-        ("x**2 if x**2 < 1 else 1", False),  # 1 at both
-        ("2*abs(x) if x**2 < 4 else 4", False),
-    ],
-)
-def test_a_choice_with_several_borders_jumps_if_it_does_at_one(choice, jumping):
-    model = with_meter(f"({choice})")
-    if jumping:
-        with pytest.raises(ModelError, match="jumps at a state"):
-            pointmass(model)
-    else:
-        assert pointmass(model).name == "aof-exact"
 
 
 def test_the_reason_is_told_in_the_formulas_of_the_model():
@@ -603,7 +570,7 @@ def test_where_there_is_no_closed_form_sampling_and_regressions_do(formula):
     expected = (weight @ grid) / weight.sum(axis=1)
     found = run(particle(model, 20_000), y[:, :20]).mean[0, :, 0]
     np.testing.assert_allclose(found, expected, atol=5 / np.sqrt(20_000 / 10))
-    fitted = design([duof(model)], Ensemble(model, 20_000, 1, seed=1).by_step())[0]
+    fitted = design([duof(model)], Ensemble(model, 20_000, 1, seed=1))[0]
     slope, offset = np.polyfit(y[0, :, 0], x[0, :, 0], 1)
     np.testing.assert_allclose(run(fitted, y).mean[0, :, 0], offset + slope * y[0, :, 0], rtol=1e-6, atol=1e-9)
 
@@ -626,7 +593,7 @@ def test_a_choice_that_the_state_or_a_noise_makes_is_no_constant(state, meter):
     for refuses in (kalman_filter, linearised, gaussian):
         with pytest.raises((ModelError, NoClosedForm)):
             refuses(model)
-    if state == "0.9*x + v*(1 if x > 0 else 2)":  # its nodes are split where the object jumps: test_exact_narrow.py
+    if "if x > 0" in state + meter:  # it follows jumps of the state: test_exact.py
         assert pointmass(model).name == "aof-exact"
     else:
         with pytest.raises(ModelError):

@@ -53,7 +53,7 @@ def measurements(name: str) -> np.ndarray:
 
 
 @cache
-def drawn(name: str, runs: int = 2000) -> list[list[Instant]]:
+def drawn(name: str, runs: int = 2000) -> list[Instant]:
     """The trajectories of a variant on which its filters are designed."""
     model, rng = VARIANTS[name], np.random.default_rng(1)
     state, meter = (
@@ -72,7 +72,7 @@ def drawn(name: str, runs: int = 2000) -> list[list[Instant]]:
     x, instants = draw(model.prior), []
     for k in range(STEPS):
         y, x_next = evaluate(meter, x, draw(model.meter_noise), k), evaluate(state, x, draw(model.state_noise), k)
-        instants.append([Instant(x, y, x_next)])
+        instants.append(Instant(x, y, x_next))
         x = x_next
     return instants
 

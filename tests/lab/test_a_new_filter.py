@@ -47,13 +47,8 @@ def test_a_filter_added_by_the_recipe_is_known_everywhere(recipe, tmp_path):
     done = CliRunner().invoke(cli.main, ["lab", "53", "--filters", names, *size, "--report", "ru", "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert "GFading" in done.output
-    for written, title, heading in (
-        ("handin.html", "ГФЗП", "Фильтр с затухающей памятью"),
-        ("report.html", "LFading", "Fading memory"),
-    ):
-        text = (tmp_path / written).read_text("utf-8")
-        assert title in text
-        assert heading in text
+    text = (tmp_path / "report.html").read_text("utf-8")
+    assert "ГФЗП" in text and "Фильтр с затухающей памятью" in text
 
 
 def test_its_look_is_that_of_its_family(recipe):

@@ -106,14 +106,14 @@ def test_a_trial_tells_a_filter_from_the_model():
     [("53", "aof-gaussian,duof", FILTERS), ("J1", "imm,aof-jump-gaussian,duof", JUMP_FILTERS)],
 )
 def test_the_lab_looks_at_each_filter_once(variant, filters, all_of_them, tmp_path, monkeypatch):
-    """Those compared, then the others for the report's table; the student's report and its modes take what is there."""
+    """Those compared, then the others for the report's table; the report and its modes take what is there."""
     looked, look = [], admission._admitted
     monkeypatch.setattr(admission, "_admitted", lambda name, structures: looked.append(name) or look(name, structures))
     few = ["--runs", "40", "--steps", "2", "--slow-runs", "0", "--designs", "1", "--report", "en", "--out", str(tmp_path)]
     result = CliRunner().invoke(cli.main, ["lab", variant, "--filters", filters, *few])
     assert result.exit_code == 0, result.output
     assert looked[: filters.count(",") + 1] == filters.split(",") and sorted(looked) == sorted(all_of_them)
-    assert (tmp_path / "handin-modes.svg").exists() == (variant == "J1")
+    assert (tmp_path / "modes.svg").exists() == (variant == "J1")
 
 
 def test_formulas_that_were_not_derived_in_time_are_not_derived_again():
@@ -193,11 +193,11 @@ def test_a_variance_that_turns_negative_as_the_filter_runs_is_the_affair_of_that
 
     broken = type(good)("broken", model, good.init, step)
     with pytest.raises(NotFinite, match=r"^step 2: broken failed: a covariance has the variance -1") as caught:
-        compare([good, broken], model, 100, 4, 1, threads=1, progress=False)
+        compare([good, broken], model, 100, 4, 1, jobs=1, progress=False)
     assert caught.value.filter_name == "broken"
     with pytest.raises(ModelError, match="the input u has 2 value"):  # a mistake in the model is no filter's affair
         timed = Model.define("0.9*x + u + v", "x + w", inputs={"u": [1, 2]})
-        compare([aof(gaussian(timed))], timed, 10, 4, 1, threads=1, progress=False)
+        compare([aof(gaussian(timed))], timed, 10, 4, 1, jobs=1, progress=False)
 
 
 @pytest.mark.parametrize("meter", [["x + w", "x + w"], ["x + w", "2*x + w"], ["x + w1", "x + w1 + w2", "w2 + x**2"]])
@@ -207,5 +207,5 @@ def test_measurements_whose_noises_depend_on_one_another_have_no_density(meter):
     particles, normal = admissions(model, ["particle", "aof-gaussian"])
     assert particles.one is None and "depend on one another" in str(particles.reason) and not has_bound(model)
     assert normal.verdict == "yes"
-    result = compare([normal.one], model, 100, 4, 1, threads=1, progress=False)
+    result = compare([normal.one], model, 100, 4, 1, jobs=1, progress=False)
     assert np.isfinite(result.error_variance("aof-gaussian").value).all()

@@ -12,7 +12,7 @@ from kfcourse.lab.short_names import title
 @pytest.fixture(scope="module")
 def found():
     model = load_variants()["53"].model
-    return parameter_map(model, {"e": (0.02, 0.05), "f": (0.02, 0.05)}, slow_runs=300, design_runs=5000, runs=3000)
+    return parameter_map(model, {"e": (0.02, 0.05), "f": (0.02, 0.05)}, design_runs=5000, runs=300)
 
 
 def test_each_cell_has_its_parameters(found):
@@ -20,7 +20,7 @@ def test_each_cell_has_its_parameters(found):
     for (e, f), result in found.cells.items():
         assert float(result.model.parameters["e"]) == e
         assert float(result.model.parameters["f"]) == f
-        assert result.slow_runs == 300
+        assert result.runs == 300
         assert result.designs == 2
         assert found[e, f] is result
 

@@ -10,11 +10,10 @@ import pytest
 from click.testing import CliRunner
 
 from kfcourse import JumpModel, cli, load_variants, simulate
-from kfcourse.filters import jump_pointmass, logic_dynamic
+from kfcourse.filters import logic_dynamic, pointmass
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.short_names import JUMP_LAB, JumpStructures, title
-from kfcourse.lab.variant_tables import summary
-from kfcourse.lab.variants import VariantError, chosen_variants, find_variant, read_variants
+from kfcourse.lab.variants import VariantError, chosen_variants, find_variant, read_variants, summary
 from kfcourse.montecarlo.modes import recognised
 from kfcourse.notebooks import handing_out
 from kfcourse.notebooks.jobs import Outcome
@@ -161,7 +160,7 @@ def test_a_wrong_table_is_refused_with_its_name(tmp_path, change, message):
 def test_the_share_of_right_modes_is_that_of_the_trajectories():
     model = JUMPS["J1-lasting"].model
     one = logic_dynamic(JumpStructures(model).gaussian, model.transition_at, model.first)
-    found = recognised([one, jump_pointmass(model)], model, 160, 8, 4)
+    found = recognised([one, pointmass(model)], model, 160, 8, 4)
     _, y, mode = simulate(model, 160, 8, 4)
     state, right = one.init(160), []
     for k in range(8):

@@ -10,7 +10,7 @@ from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.optimal_structure import fos, mfos
 from kfcourse.montecarlo.designing import NotFinite, design
-from kfcourse.montecarlo.ensemble import BLOCK, SMALL_BLOCK, Ensemble, simulate, workers
+from kfcourse.montecarlo.ensemble import Ensemble, instants, simulate
 from kfcourse.montecarlo.experiment import compare, predictions, run
 from kfcourse.records import likelihood, smooth
 from kfcourse.symbolic.model import Model
@@ -79,27 +79,13 @@ def test_the_seed_decides_the_trajectories(variant53):
     assert not np.isin(first.x[0], other.x[0]).any()
 
 
-@pytest.mark.parametrize("runs", [1, 3, 2 * SMALL_BLOCK - 1, 2 * SMALL_BLOCK, BLOCK - 1, BLOCK + 1, 3 * BLOCK])
-def test_blocks_are_nearly_equal_and_none_is_too_long(variant53, runs):
-    sizes = Ensemble(variant53, runs, 1, np.random.SeedSequence(0)).sizes
-    assert sum(sizes) == runs
-    assert max(sizes) <= BLOCK
-    assert max(sizes) - min(sizes) <= 1
-    assert len(sizes) >= 2 or runs < 2 * SMALL_BLOCK
-
-
-@pytest.mark.parametrize("runs", [1, 3, 2 * SMALL_BLOCK + 1])
-@pytest.mark.parametrize("threads", [1, 3])
-def test_by_step_and_by_block_are_the_same_trajectories(variant53, runs, threads):
-    ensemble = Ensemble(variant53, runs, 5, np.random.SeedSequence(6))
-    blocks = [list(ensemble.block(index)) for index in range(len(ensemble.sizes))]
-    with workers(threads) as pool:
-        steps = list(ensemble.by_step(pool))
-    assert (len(steps), len(blocks), sum(ensemble.sizes)) == (5, len(ensemble.sizes), runs)
-    for k, step in enumerate(steps):
-        for block, moment in zip(blocks, step, strict=True):
-            for a, b in zip(block[k], moment, strict=True):
-                np.testing.assert_array_equal(a, b)
+def test_ensembles_side_by_side_are_those_alone(variant53):
+    seeds = np.random.SeedSequence(6).spawn(2)
+    together = list(instants(variant53, [3, 5], 6, seeds))
+    for here, size, seed in ((slice(3), 3, seeds[0]), (slice(3, 8), 5, seeds[1])):
+        for one, both in zip(Ensemble(variant53, size, 6, seed), together, strict=True):
+            for alone, side in zip(one[:3], both[:3], strict=True):
+                np.testing.assert_array_equal(side[here], alone)
 
 
 # ---------------------------------------------------------------- run
@@ -130,12 +116,12 @@ def test_measurements_of_another_size_are_refused(kind, request):
 
 
 def numbers(comparison):
-    return [getattr(comparison.sums, name) for name in ("counts", "error", "square", "own", "normalised")]
+    return [getattr(comparison.sums, name) for name in ("weight", "error", "square", "own", "normalised")]
 
 
-@pytest.mark.parametrize("runs", [37, 2 * SMALL_BLOCK + 1234])
-def test_the_number_of_threads_changes_nothing(variant53, runs):
-    results = [compare(lab_of(variant53), variant53, runs, 6, seed=7, threads=threads, progress=False) for threads in (1, 2, 3)]
+@pytest.mark.parametrize("runs", [37, 2345])
+def test_the_number_of_jobs_changes_nothing(variant53, runs):
+    results = [compare(lab_of(variant53), variant53, runs, 6, seed=7, jobs=jobs, progress=False) for jobs in (1, 2, 3)]
     for other in results[1:]:
         for first, second in zip(numbers(results[0]), numbers(other), strict=True):
             np.testing.assert_array_equal(first, second)
@@ -148,9 +134,9 @@ def test_the_seed_changes_everything(variant53):
 
 def test_a_filter_s_numbers_do_not_depend_on_its_company(variant53):
     filters = lab_of(variant53)
-    together = compare(filters, variant53, 500, 4, seed=7, wide=2, progress=False)
+    together = compare(filters, variant53, 500, 4, seed=7, progress=False)
     for filter_ in (filters[0], filters[2], filters[5]):
-        alone = compare([filter_], variant53, 500, 4, seed=7, wide=2, progress=False)
+        alone = compare([filter_], variant53, 500, 4, seed=7, progress=False)
         np.testing.assert_array_equal(alone.error_variance(filter_.name).value, together.error_variance(filter_.name).value)
 
 
@@ -168,7 +154,7 @@ def test_the_design_ensemble_is_another_one(variant53):
     """On the design's own trajectories MFOS looks better than on fresh ones, and never worse than it would by chance."""
     filters = [aof(gaussian(variant53)), mfos(gaussian(variant53))]
     same = compare(filters, variant53, 60, 1, seed=11, same_ensemble=True, progress=False)
-    fresh = compare(filters, variant53, 60, 1, seed=11, progress=False)
+    fresh = compare(filters, variant53, 60, 1, seed=11, design_runs=20, progress=False)
     # At k = 0 the MFOS's correction is the best affine one over its own ensemble: no other coefficients can be below.
     own, others = (result.gap("mfos-gaussian").value[0] for result in (same, fresh))
     assert own <= 0 < others
@@ -179,13 +165,13 @@ def test_memory_does_not_grow_with_the_number_of_steps(variant53):
 
     def peak(steps):
         tracemalloc.start()
-        compare(filters, variant53, runs, steps, seed=1, threads=1, progress=False)
+        compare(filters, variant53, runs, steps, seed=1, jobs=1, progress=False)
         found = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return found
 
     peak(4)  # what is compiled and cached once
-    # The sums: 2 filters x 60 more steps x 4 statistics x 128 batches x 8 bytes = 0.5 MB; trajectories would be 20 MB.
+    # The sums: 2 filters x 60 more steps x 6 statistics x 64 batches x 8 bytes = 0.4 MB; trajectories would be 20 MB.
     assert peak(80) - peak(20) < 1.5e6
 
 
@@ -199,14 +185,12 @@ def test_memory_does_not_grow_with_the_number_of_steps(variant53):
         ({"runs": True}, "runs"),
         ({"steps": 0}, "steps"),
         ({"steps": 2.0}, "steps"),
-        ({"threads": 0}, "threads"),
+        ({"jobs": 0}, "jobs"),
         ({"design_runs": 0}, "runs"),
         ({"seed": -1}, "negative|seed"),
         ({"seed": "one"}, "seed"),
         ({"seed": 1.5}, "seed"),
         ({"seed": None}, "seed"),
-        ({"slow_runs": -1}, "slow_runs"),
-        ({"slow_runs": 2.5}, "slow_runs"),
         ({"filters": []}, "at least one"),
         ({"filters": "twice"}, "name of its own"),
         ({"filters": "other model"}, "model"),
@@ -272,7 +256,7 @@ def test_one_trajectory_of_a_scalar_meter_may_be_a_vector(variant53, vector):
 
 def test_a_design_that_is_run_says_what_to_do(variant53):
     y = simulate(variant53, 2, 3, seed=1).y
-    with pytest.raises(TypeError, match=r"the Design duof came.*design\(\[it\], Ensemble\(model, 100_000, steps, seed=1"):
+    with pytest.raises(TypeError, match=r"got Design duof: .*design\(\.\.\.\) makes one of a design"):
         run(duof(variant53), y)
-    one = design([duof(variant53)], Ensemble(variant53, 1000, 3, seed=1).by_step())[0]  # what the message says
+    one = design([duof(variant53)], Ensemble(variant53, 1000, 3, seed=1))[0]
     assert np.isfinite(run(one, y).mean).all()

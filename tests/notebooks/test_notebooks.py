@@ -2,11 +2,9 @@
 
 import ast
 import hashlib
-import os
 import random
 import re
 import shutil
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -394,38 +392,29 @@ def test_exercises_have_pictures_and_no_solutions(tmp_path, masters, no_kernel):
     assert not any(cell.outputs or cell.execution_count for cell in code(notebook))
 
 
-@pytest.mark.parametrize("error", [OSError("disk full"), RuntimeError("a bug"), MemoryError(), KeyboardInterrupt()])
-@pytest.mark.parametrize("place", ["html", "pdf", "write"])
-def test_an_interruption_leaves_nothing_half_written(tmp_path, masters, no_kernel, monkeypatch, place, error):
+@pytest.mark.parametrize("error", [OSError(28, "disk full"), KeyboardInterrupt()])
+def test_an_interruption_leaves_nothing_half_written(tmp_path, masters, no_kernel, monkeypatch, error):
     one = job(tmp_path, masters, with_pdf=True)
     monkeypatch.setattr(jobs, "pdf", lambda page, target: target.write_bytes(b"%PDF"))
     make(one)
     whole = contents(one.folder)
     (masters / "b_aof" / "statement.md").write_text(TINY.replace("Divide.", "Divide by F."), encoding="utf-8")
 
-    def fails(*arguments, **_):
-        if place == "pdf":
-            arguments[1].write_bytes(b"%PD")
+    def fails(_, target):
+        target.write_bytes(b"%PD")
         raise error
 
     with monkeypatch.context() as broken:
-        if place == "write":
-            broken.setattr(nbformat, "writes", fails)
-        else:
-            broken.setattr(jobs, place, fails)
+        broken.setattr(jobs, "pdf", fails)
         if isinstance(error, KeyboardInterrupt):
             with pytest.raises(KeyboardInterrupt):
                 make(one)
         else:
             outcome = make(one)
-            assert outcome.status == "failed"
-            assert str(error) in outcome.message
-
+            assert outcome.status == "failed" and "disk full" in outcome.message
     now = contents(one.folder)
     assert set(now) == set(whole)  # no temporary files
-    assert now["b-aof-solution.ipynb"] == whole["b-aof-solution.ipynb"]
-    assert now["b-aof-solution.pdf"].startswith(b"%PDF")
-    assert now["b-aof-solution.html"].rstrip().endswith(b"</html>")
+    assert now["b-aof-solution.ipynb"] == whole["b-aof-solution.ipynb"] and now["b-aof-solution.pdf"] == b"%PDF"
     assert make(one).status == "written"
     assert b"Divide by F." in contents(one.folder)["b-aof-solution.html"]
 
@@ -539,16 +528,22 @@ def test_a_variant_that_is_no_model_is_told_at_the_end_and_the_others_are_made(c
     assert sorted(contents(tmp_path / "out")) == ["good/b-aof.ipynb"]
 
 
+STOPPED = """
+import os, nbformat
+from kfcourse.notebooks.execution import execute
+stop = f"import os, signal, time; os.kill({os.getpid()}, signal.SIGINT); time.sleep(60)"
+try:
+    execute(nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(stop)]), "stopped")
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no signal to another process")
 def test_ctrl_c_ends_the_command_and_not_a_kernel_alone():
     """Otherwise the notebook fails, and the next ones are made."""
-    stop = f"import os, signal, time\nos.kill({os.getpid()}, signal.SIGINT)\ntime.sleep(60)"
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            execution.execute(nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(stop)]), "stopped")
-    finally:
-        signal.signal(signal.SIGINT, before)
+    done = subprocess.run([sys.executable, "-c", STOPPED], capture_output=True, text=True, timeout=120)
+    assert done.stdout == "interrupted\n", done.stderr
 
 
 def double(number):
@@ -568,15 +563,6 @@ def killed(_):
 def test_a_killed_worker_is_told():
     with pytest.raises(ValueError, match="a working process was killed"):
         list(run_all([1, 2], killed, 2, "test"))
-
-
-def test_dask_has_to_be_installed(call, masters, monkeypatch):
-    monkeypatch.setitem(sys.modules, "dask", None)
-    monkeypatch.setitem(sys.modules, "dask.distributed", None)
-    result = call(
-        "exercises", "--variant", "53", "--sets", "b", "--masters", masters, "--out", "out", "--dask", "tcp://nowhere:1"
-    )
-    refused(result, "--dask needs the package `distributed`: pip install 'kfcourse[dask]'")
 
 
 def test_unknown_names_are_refused(call, tmp_path):

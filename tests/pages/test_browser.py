@@ -129,7 +129,7 @@ def shipped(one: dict[str, np.ndarray]) -> dict:
 def of_package(model: Model, name: str, designing, running) -> np.ndarray:
     """D_k of a filter of the package, on the trajectories given."""
     (one,) = lab_filters(model, [name])
-    instants = [[Instant(designing["x"][k], designing["y"][k], designing["x"][k + 1])] for k in range(STEPS)]
+    instants = [Instant(designing["x"][k], designing["y"][k], designing["x"][k + 1]) for k in range(STEPS)]
     if hasattr(one, "with_coefficients"):
         (one,) = design([one], instants)
     z = run(one, running["y"]).mean
@@ -249,7 +249,7 @@ def test_intervals_above_the_bound_cover(page, id):
     0.95 - 3 sqrt(0.95 0.05 / 40) = 0.85.  The draws of the page are its own, so this compares these, too.
     """
     model = SCALAR[id]
-    result = compare(lab_filters(model, [*LAB[:2], "aof-exact"]), model, runs=200_000, steps=3, seed=1, slow_runs=8000)
+    result = compare(lab_filters(model, [*LAB[:2], "aof-exact"]), model, runs=8000, steps=3, seed=1)
     found = np.array([array(computed(page, COVERAGE, {"id": id, "seed": seed})) for seed in range(1, 41)])
     ratio, error, bound = np.moveaxis(found, -1, 0)
     gaps = [result.gap(name) for name in ("aof-linearised", "aof-gaussian")]

@@ -148,7 +148,7 @@ def test_nothing_is_computed_where_nobody_asks_and_nothing_twice(build):
 
 def test_what_has_no_density_is_told():
     model = Model.define("0.9*x + v", "x + w")
-    (designed,) = design([duof(model)], Ensemble(model, 100, 3, seed=1).by_step())
+    (designed,) = design([duof(model)], Ensemble(model, 100, 3, seed=1))
     with pytest.raises(ValueError, match=f"the likelihood needs the structural functions.*{designed.name} has none"):
         likelihood(designed, np.zeros((3, 1, 1)))
     known = Model.define(["x1"], ["x1", "x1"], prior={"mean": [1.0]}, symbols={"x": ["x1"]})

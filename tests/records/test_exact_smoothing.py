@@ -7,8 +7,7 @@ import pytest
 
 from kfcourse import Model, compare, gaussian, linearised, run, simulate, smooth
 from kfcourse.filters import aof, kalman_filter, particle, pointmass
-from kfcourse.filters.exact import pointmasses
-from kfcourse.filters.exact.kernels import Unresolved
+from kfcourse.filters.exact.pointmasses import Unresolved
 from kfcourse.lab.variants import find_variant
 from kfcourse.montecarlo.experiment import states
 from kfcourse.records import smoothing_error
@@ -141,19 +140,6 @@ def test_where_kernels_are_narrow_rho_is_taken_between_the_nodes():
     np.testing.assert_allclose(np.sqrt(found.cov[:, 0, 0, 0]), sd, rtol=1e-4)
 
 
-def test_a_meter_without_noise_leaves_a_few_points():
-    """y = x^2: signs are all that is unknown, and there are eight trajectories."""
-    model = Model.define("0.8*x + 0.2 + 0.3*v", "x**2", prior={"mean": 0.2, "variance": 1.0})
-    roots = np.sqrt([0.2, 0.05, 0.3])
-    signs = np.array(np.meshgrid([1, -1], [1, -1], [1, -1])).reshape(3, -1).T
-    x = signs * roots
-    logs = -0.5 * (x[:, 0] - 0.2) ** 2 - 0.5 * ((x[:, 1:] - 0.8 * x[:, :-1] - 0.2) / 0.3) ** 2 @ [1, 1]
-    mass = np.exp(logs) / np.exp(logs).sum()
-    found = smooth(pointmass(model), roots**2)
-    np.testing.assert_allclose(found.mean[:, 0, 0], mass @ x, rtol=1e-9)
-    np.testing.assert_allclose(found.cov[:, 0, 0, 0], mass @ (x - mass @ x) ** 2, rtol=1e-8)
-
-
 def test_its_variance_is_its_error_and_nobody_beats_it():
     model = find_variant("53").model
     x, y = simulate(model, 1500, 6, seed=21)
@@ -182,32 +168,20 @@ def test_the_last_state_is_the_filter_s():
     assert mean[:-1].max() > 0.1
 
 
-def test_what_cannot_be_resolved_is_refused_in_words(monkeypatch):
-    from kfcourse.filters.exact import smoothing
-
-    monkeypatch.setattr(smoothing, "SMOOTHING_NODES", (9, 17))
-    monkeypatch.setattr(smoothing, "TOLERABLE", 1e-9)
-    model = find_variant("53").model
-    with pytest.raises(Unresolved, match=r"looking back to step \d: 17 nodes do not resolve.*smooth\(particle\(model\), y\)"):
-        smooth(pointmass(model), simulate(model, 3, 3, seed=1).y)
-
-
-def test_it_finds_what_a_record_that_contradicts_the_model_has_lost_in_the_filter():
+def test_a_record_that_contradicts_the_model_is_right_or_refused():
     """A prior 4 to 11 deviations away from the measurements, at once or by and by; the Kalman filter has the truth."""
-    found = []
+    refused, model = [], Model.define("x + 0.1*v", "x + 0.5*w")
     for first, level in itertools.product((np.nan, 0.0), np.arange(4.0, 12.0)):
-        y = np.array([first, *4 * [level]])[:, None, None]
-        model = Model.define("x + 0.1*v", "x + 0.5*w")
-        mean, _ = off(run(pointmass(model), y), run(kalman_filter(model), y))
+        y, one = np.array([first, *4 * [level]])[:, None, None], pointmass(model)
+        expected = smooth(kalman_filter(model), y)
         try:
-            told = smoothing_error(pointmass(model), y) / np.sqrt(smooth(kalman_filter(model), y).cov[..., 0, 0])
+            mean, _ = off(smooth(one, y), expected)
+            stated = smoothing_error(one, y) / np.sqrt(expected.cov[..., 0, 0])
         except Unresolved:
-            told = np.array(np.inf)
-        found.append((mean.max(), told.max()))
-    wrong, told = np.array(found).T
-    assert (told > wrong / 3).all()  # the worst of a step each, of looking back and of the filter
-    assert (wrong[np.isinf(told)] > 0.01).all() and (told[wrong < 1e-6] < 1e-4).all()  # and without false alarm
-    assert 3 < np.isinf(told).sum() < 10  # of sixteen: both cases are among them
+            refused.append(level)
+            continue
+        assert mean.max() <= 3 * stated.max()
+    assert 3 < len(refused) < 14  # of sixteen: both cases are among them
 
 
 @pytest.mark.parametrize("lag", [0, 1])
@@ -247,21 +221,6 @@ def test_what_has_no_lag_and_what_is_none_are_refused():
             smooth(one, np.ones(3), lag=-1)
     with pytest.raises(ValueError, match="does not know how good its laws are"):
         smoothing_error(aof(linearised(model)), np.ones(3))
-
-
-def test_predictions_are_made_again_only_where_there_is_no_room_for_them(monkeypatch):
-    model, made, predictions = Model.define("sin(x) + 0.3*v", "x + 0.1*w"), [], pointmasses.predictions
-    y = simulate(model, 5, 4, seed=1).y
-    monkeypatch.setattr(pointmasses, "predictions", lambda *given: made.append(1) or predictions(*given))
-    found = smooth(pointmass(model), y)
-    assert len(made) == 4  # the filter's own
-    again = smooth(pointmass(model, memory=1), y)
-    assert len(made) == 4 + 4 + 2 * 3
-    np.testing.assert_array_equal(again.mean, found.mean)
-    np.testing.assert_array_equal(again.cov, found.cov)
-
-
-# ---------------------------------------------------------------- particles
 
 
 @pytest.fixture(scope="module")
@@ -356,7 +315,7 @@ def test_smoothers_are_compared_with_the_exact_one():
     model = find_variant("53").model
     gaof, exact = aof(gaussian(model)), pointmass(model)
     plain, both = (
-        compare([gaof, exact], model, 4000, 4, seed=1, slow_runs=400, smoothers=some, progress=False)
+        compare([gaof, exact], model, 400, 4, seed=1, smoothers=some, progress=False)
         for some in ((), (gaof, aof(linearised(model)), exact))
     )
     assert plain.smoothing is None
@@ -364,7 +323,6 @@ def test_smoothers_are_compared_with_the_exact_one():
     found = both.smoothing
     assert found.names == ("aof-gaussian", "aof-linearised", "aof-exact")
     last = found.bound()[3], both.bound()[3]  # after the last measurement nothing comes; on the same trajectories
-    np.testing.assert_array_equal(found.slow_part.exceptional.size, both.slow_part.exceptional.size)
     assert last[0].value == pytest.approx(last[1].value, rel=1e-3)
     assert (found.bound().value[:-1] < 0.9 * both.bound().value[:-1]).all()
     gap = found.gap("aof-gaussian")
@@ -374,9 +332,3 @@ def test_smoothers_are_compared_with_the_exact_one():
     x, y = simulate(model, 400, 4, seed=5)
     by_hand = ((smooth(gaof, y).mean - x) ** 2).mean(axis=(1, 2))
     assert (np.abs(np.log(by_hand / found.error_variance("aof-gaussian").value)) < 1).all()
-
-
-def test_smoothers_need_a_fast_one_among_them():
-    model = find_variant("53").model
-    with pytest.raises(ValueError, match="is found through its difference from a fast filter"):
-        compare([aof(gaussian(model))], model, 100, 2, seed=1, smoothers=[pointmass(model)], progress=False)

@@ -311,7 +311,7 @@ def test_rounds_that_are_no_number_of_rounds_are_refused(curved, rounds):
 
 def test_a_filter_whose_laws_are_not_normal_cannot_look_back(curved):
     model = Model.define("0.9*x + v", "x + w")
-    (designed,) = design([duof(model)], Ensemble(model, 100, 3, seed=1).by_step())
+    (designed,) = design([duof(model)], Ensemble(model, 100, 3, seed=1))
     for one in (designed, imm([linearised(model)], [[1.0]])):
         with pytest.raises(ValueError, match=rf"looking back needs the structural functions.*{one.name} has none.*take one"):
             smooth(one, np.zeros((3, 1, 1)))

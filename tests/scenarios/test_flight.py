@@ -107,15 +107,15 @@ def test_the_samples_do_not_depend_on_the_interval():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"interval": 0.0}, "interval must be a positive"),
-        ({"ramp": np.nan}, "ramp must be a positive"),
+        ({"interval": 0.0}, "interval must be positive"),
+        ({"ramp": np.nan}, "ramp must be positive"),
         ({"speeds": (200.0, -1.0)}, "speeds must be positive"),
         ({"radii": (6e3,)}, "radii must be 2 finite numbers"),
         ({"start": (0.0, np.inf, 1.0)}, "start must be 3 finite numbers"),
         ({"turns": (0.0, 1.0)}, "part 2 lasts 8 s, less than its two ramps"),
         ({"durations": (100.0, 10.0, 60.0)}, "part 3 lasts 10 s"),
         ({"descent": 40.0}, "start higher, lower `descent`"),
-        ({"heading": np.nan}, "heading must be a finite"),
+        ({"heading": np.nan}, "heading and descent must be 2 finite"),
     ],
 )
 def test_a_flight_that_cannot_be_flown_is_refused(change, message):
@@ -196,7 +196,7 @@ def test_matrices_of_the_kinematic_models():
         ({"dimensions": 4}, "dimensions must be 1, 2 or 3"),
         ({"order": 0}, "order 1 or 2"),
         ({"interval": -1.0}, "interval must be"),
-        ({"noise_sd": np.nan}, "noise_sd must be finite"),
+        ({"noise_sd": np.nan}, "noise_sd must be finite and not negative"),
         ({"measurement_sd": -1.0}, "measurement_sd must be finite and not negative"),
     ],
 )

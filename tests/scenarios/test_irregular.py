@@ -55,7 +55,7 @@ def test_a_seed_stands_for_one_track():
         ({"missing": 15}, "missing is a share of the fixes"),
         ({"outliers": -0.1}, "outliers is a share of the fixes"),
         ({"missing": np.nan}, "missing is a share of the fixes"),
-        ({"times": 0}, "times must be a positive number"),
+        ({"times": 0}, "times must be positive"),
         ({"steps": 0}, "steps must be a positive whole number"),
         ({"runs": 1.5}, "runs must be a positive whole number"),
     ],

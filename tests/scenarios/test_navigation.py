@@ -227,8 +227,8 @@ def test_what_is_observed():
 @pytest.mark.parametrize(
     ("timing", "message"),
     [
-        ({"latency": -0.1}, "latency and jitter must not be negative"),
-        ({"jitter": -0.1}, "latency and jitter must not be negative"),
+        ({"latency": -0.1}, "latency must be finite and not negative"),
+        ({"jitter": -0.1}, "jitter must be finite and not negative"),
         ({"offset": np.nan}, "offset must be finite"),
         ({"clock": Clock(0.0)}, "positive finite rate"),
         ({"clock": Clock(1.0, np.inf)}, "finite shift"),
@@ -240,7 +240,7 @@ def test_sensor_says_what_is_wrong(timing, message):
 
 
 def test_sensor_needs_a_positive_period():
-    with pytest.raises(ValueError, match="gyro: the period must be positive, got 0"):
+    with pytest.raises(ValueError, match="gyro: the period must be positive and finite, got 0"):
         Sensor.define("gyro", STATES, "s + w", 1.0, 0)
 
 

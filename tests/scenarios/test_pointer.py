@@ -195,7 +195,7 @@ def test_an_interval_that_is_none(interval):
         lambda: acceleration_from(y, interval),
         lambda: sample(track, interval, 1.0, 1, 0),
     ):
-        with pytest.raises(ValueError, match="positive number of seconds"):
+        with pytest.raises(ValueError, match="interval must be positive and finite"):
             call()
 
 
@@ -205,8 +205,8 @@ def test_arguments_that_do_not_fit():
     missing = y.copy()
     missing[1, 0, 0] = np.nan
     for call, message in (
-        (lambda: uniform_acceleration(0.1, -1.0, 1.0), "acceleration_sd is a standard deviation"),
-        (lambda: uniform_acceleration(0.1, 1.0, np.nan), "measurement_sd is a standard deviation"),
+        (lambda: uniform_acceleration(0.1, -1.0, 1.0), "acceleration_sd must be finite and not negative"),
+        (lambda: uniform_acceleration(0.1, 1.0, np.nan), "measurement_sd must be finite and not negative"),
         (lambda: start_up(y, 0.1, np.eye(2)), "three samples of two coordinates"),
         (lambda: start_up(missing[:3], 0.1, np.eye(2)), "wait for three complete samples"),
         (lambda: follow(system, missing, 0.1), "wait for three complete samples"),
@@ -214,10 +214,9 @@ def test_arguments_that_do_not_fit():
         (lambda: acceleration_from(y[:2], 0.1), "takes three samples"),
         (lambda: hand_track(1, strokes=0), "strokes must be a positive whole number"),
         (lambda: hand_track(1, screen=(100.0, 500.0)), "at least 100 px long"),
-        (lambda: sample(hand_track(1), 0.1, -1.0, 1, 0), "measurement_sd is a standard deviation"),
+        (lambda: sample(hand_track(1), 0.1, -1.0, 1, 0), "measurement_sd must be finite and not negative"),
         (lambda: sample(hand_track(1), 0.1, 1.0, 0, 0), "runs must be a positive whole number"),
         (lambda: follow(system, y, 0.2), "made for an interval of 0.1 s, and the samples have 0.2 s"),
-        (lambda: start_up(y[:3], 0.1, np.eye(3)), r"\(2, 2\); got the shape \(3, 3\)"),
     ):
         with pytest.raises(ValueError, match=message):
             call()

@@ -1,142 +1,892 @@
-"""Panels that are halved until a Gauss-Legendre rule resolves densities on each of them, for many trajectories at once."""
+r"""The Stratonovich equation for one trajectory, compiled: densities on panels, halved until polynomials resolve them.
+
+A density is held as its logarithm at the Q Lobatto points of each panel.  The polynomials through
+these points are the density, and their two last Legendre coefficients tell how good it is.  Lobatto's
+points see both ends of a panel: a hump at an end would lie between the points of Gauss.  A step takes
+three functions, read in this order:
+
+kernels    the prediction, a normal kernel for each point of the posterior.  Where those of a panel
+           would leave gaps it is halved, and its polynomial gives the points between.  Kernels far
+           narrower than their panel are widened from s to S, and a factor keeps the curvature:
+           N(mu, s^2) = N(mu, S^2) (1 - (S^2 - s^2) / (2 S^2) (u^2 - 1)) up to the fourth derivative
+search     first panels, halved until the standardised residual (y - b(x)) / sigma_w(x) can hide no
+           hump of the likelihood between two points
+corrected  the posterior on these panels, halved until it is resolved
+
+Looking back, `corrected` multiplies by what later measurements tell of x (`sources`):
+
+    p(x_k | all y) ~ p(x_k | y_0..k) Integral p(x' | x_k) r(x') dx',    r = all that y_k+1.. tell of x'
+
+A model comes as the address of one small function (`laws`), so that all this is compiled once for
+all models.  Everything compiled stands in this file, as the compiler keeps its work by the file's date.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from math import atan2, cos, exp, floor, log, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import legendre
+from numba import njit, types
+from numpy.polynomial import Chebyshev, Polynomial, legendre
 
-from kfcourse.filters.exact.constants import NEGLIGIBLE
-from kfcourse.filters.exact.kernels import Grid, Unresolved
-from kfcourse.laws import Array
+from kfcourse.filters.exact.columns import (
+    ERROR,
+    EVIDENCE,
+    EXPECTED,
+    KEPT,
+    LEFT,
+    LIKELY,
+    LOST,
+    MEAN,
+    NEXT_MEAN,
+    NEXT_VARIANCE,
+    PROBABILITY,
+    RIGHT,
+    STATUS,
+    VARIANCE,
+    Q,
+)
 
-SPLITS = 40  # times a panel may be halved
-PANEL_NODES = 20_000  # nodes of a posterior
+SPAN = 5.0  # deviations that the kernels of a panel may cover at accuracy 1e-3: eight points err with the 14th power
+BLUR = 0.01  # of a panel's length: kernels are widened to it, its fourth power is the error that is left
+REACH = 7.0  # deviations of a law that count: 1e-11 lies beyond
+WINDOW = 9.0  # deviations beyond which a kernel is left out of a sum: 1e-18 of its height
+APART = 3.0  # deviations of first borders from one another
+JUMP = 2.0  # of the residual between two points, beyond which a hump may be hidden
+LEFT_OUT = 1e-11  # mass of a density that its panels may lack
+FAINT = 30.0  # below the highest log-likelihood that humps are sought: 1e-13 of it
+NOTHING = 46.0  # below the highest log-density where no panel is looked at: 1e-20 of it
+TAIL = 20.0  # below a bound of a prediction's density where its tails begin
+IMPOSSIBLE = 9.0  # deviations of the meter's noise that no record of the model has: 1e-19
+GOES_ON = 23.0  # below the highest log-density where a density has not ended: 1e-10 of it
+CURVED = 0.1  # times the square of the last coefficients of a density, a bound of the rule's error
+ROUNDING = 1e-15  # of a state
+SHORTEST = 1e-14  # of a state, or of a whole, that a panel may be long
+PANELS, KERNELS = 3000, 40_000  # that a posterior and a prediction may have
+TURNS = 100  # halvings one after the other, at most
+WOUND = 50  # turns of an angle whose noise is so large that it tells nothing
+
+FINE, PANELLED, KERNELLED, EMPTY = range(4)  # how a step ended; the others: why there is no posterior
+MOVES, METER = 0, 1  # which law: of mode j, 2 j + MOVES and 2 j + METER
+
+# Columns of a panel's row that are of the step itself, behind those that are kept.
+HIGH, MASS, FIRST, SECOND, ROUGH, LOG_ROUGH, BOUND, SHARE, BEFORE, FIT = range(KEPT, KEPT + 10)
+COLUMNS = KEPT + 10
+
+POINT = np.concatenate([[-1.0], legendre.legroots(legendre.legder([0] * (Q - 1) + [1])), [1.0]])
+WEIGHT = 2 / (Q * (Q - 1) * legendre.legval(POINT, [0] * (Q - 1) + [1]) ** 2)
+COEFFICIENT = np.linalg.inv(legendre.legvander(POINT, Q - 1))  # of Legendre's polynomials, from values
+LAST, LAST_BUT_ONE = COEFFICIENT[-1].copy(), COEFFICIENT[-2].copy()
+POWER = np.array([legendre.leg2poly(column) for column in COEFFICIENT.T]).T.copy()
+SLOPE = np.array([legendre.legval(POINT, legendre.legder(column)) for column in COEFFICIENT.T]).T.copy()
+
+VALUES, TABLE = types.float64[::1], types.float64[:, ::1]
+# law(which, points, y, constants, x, mean, deviation)
+LAW = types.FunctionType(types.void(types.int64, types.int64, types.float64, VALUES, VALUES, VALUES, VALUES))
+
+HALVES = Chebyshev.interpolate(np.exp2, 9, [-0.5, 0.5]).convert(kind=Polynomial)
+EXP2 = tuple(HALVES.coef.tolist())
+LN2, SHIFT = np.log(2), 1.5 * 2.0**52
+ROOT_BITS, SHIFT_BITS = np.array([np.sqrt(0.5), SHIFT]).view(np.int64).tolist()
+LOG_ROOT = 0.5 * np.log(2 * np.pi)
+TURN = 2 * np.pi
+
+EXACT = {"error_model": "numpy", "fastmath": {"contract"}}
+FAST = {"error_model": "numpy", "fastmath": {"reassoc", "nsz", "contract", "arcp"}}
+# Functions with a `Room` are called from here alone: what would let Python call them takes long to compile.
+INNER = {**FAST, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
-@dataclass(frozen=True)
-class Rule:
-    """A Gauss-Legendre rule on [-1, 1] that knows whether it resolves a function.
+@njit(**EXACT)
+def half(u):
+    """2^-u, |u| < 1021, to 3e-14 of it, by arithmetic that a processor does for many numbers at once."""
+    whole = SHIFT - u
+    r = (SHIFT - whole) - u
+    z = r * r
+    even = (((EXP2[8] * z + EXP2[6]) * z + EXP2[4]) * z + EXP2[2]) * z + EXP2[0]
+    odd = (((EXP2[9] * z + EXP2[7]) * z + EXP2[5]) * z + EXP2[3]) * z + EXP2[1]
+    bits = np.float64(even + r * odd).view(np.int64) + (np.float64(whole).view(np.int64) << 52)
+    return np.int64(bits).view(np.float64)
 
-    Attributes
-    ----------
-    nodes, weights : ndarray (q,)
-    tail : ndarray (2, q)
-        Gives the two last Legendre coefficients of a function from its values at the nodes.
-    tolerance : float
-        Largest tail, relative to the mass of all panels, of a resolved panel.
+
+@njit(**EXACT)
+def ln(x):
+    """ln x, 1e-300 < x < 1e300, likewise."""
+    bits = np.float64(x).view(np.int64)
+    k = (bits - ROOT_BITS) >> 52
+    m = np.int64(bits - (k << 52)).view(np.float64)
+    s = (m - 1) / (m + 1)
+    z = s * s
+    odd = (((((z / 15 + 1 / 13) * z + 1 / 11) * z + 1 / 9) * z + 1 / 7) * z + 1 / 5) * z + 1 / 3
+    return (np.int64(k + SHIFT_BITS).view(np.float64) - SHIFT) * LN2 + 2 * s * (odd * z + 1)
+
+
+@njit(**FAST)
+def density(logarithm):
+    """The exponential of a log-density."""
+    return half(-1 / LN2 * max(logarithm, -700.0))
+
+
+class Model(NamedTuple):
+    """A model's function, the mode that is looked at, its constants at a step, and the turns of y and x.
+
+    The turn of what is no angle is infinite.
     """
 
-    nodes: Array
-    weights: Array
-    tail: Array
-    tolerance: float
-
-    @classmethod
-    def of_order(cls, q: int, tolerance: float) -> Rule:
-        nodes, weights = legendre.leggauss(q)
-        vander = legendre.legvander(nodes, q - 1)
-        scale = (2 * np.arange(q) + 1) / 2
-        return cls(nodes, weights, (vander * weights[:, None] * scale).T[-2:], tolerance)
+    law: object
+    mode: int
+    constants: np.ndarray
+    turn: float
+    turn_of_state: float
 
 
-def resolve(
-    borders: Array, log_density: Callable[[Array, Array], Array], too_wide: Callable[[Array, Array], Array], rule: Rule
-) -> list[tuple[Grid, float]]:
-    """Nodes and masses of exp(log_density), panels split until the rule resolves the density on each.
+class Room(NamedTuple):
+    """Where a step works: room for the hardest one, allocated once for many trajectories.
+
+    panels (PANELS + 4, COLUMNS)
+    kernel (4, KERNELS): rate r and r times centre, of half((r x - r centre)^2); weight, and the weight
+        of the factor u^2
+    group (3, KERNELS / Q): of Q kernels, where they begin and end, their least deviation
+    edge (3, 4 PANELS): a place; +1 where a law begins, -1 where it ends, 0 at a border; a deviation
+    later: three vectors (KERNELS,), what later measurements tell, as points, weights, deviations;
+        or laws whose moments are asked for
+    stack (2, TURNS + 2): parts of a panel that wait
+    point, work: four vectors (Q,) each, the first for arguments and results of the law
+    """
+
+    panels: np.ndarray
+    kernel: np.ndarray
+    group: np.ndarray
+    edge: np.ndarray
+    later: tuple[np.ndarray, ...]
+    stack: np.ndarray
+    point: tuple[np.ndarray, ...]
+    work: tuple[np.ndarray, ...]
+
+
+class Sum(NamedTuple):
+    """How much of the room a prediction takes: groups, edges, a bound of its density; an error of it."""
+
+    groups: int
+    edges: int
+    height: float
+    rough: float
+
+
+@njit(**INNER)
+def points(left, right, x):
+    for i in range(Q):
+        x[i] = 0.5 * (left + right) + 0.5 * (right - left) * POINT[i]
+
+
+@njit(**INNER)
+def residual(model, which, y, spread, point):
+    """At a panel's points: z = (y - b) / sigma, q with ln p(y | x) = q - z^2 / 2, a turn in deviations.
+
+    z is 1e100 where no noise makes y.  A missing y (NaN) tells nothing: z = q = 0.
+    """
+    x, z, q, turn = point
+    model.law(2 * model.mode + which, Q, y, model.constants, x, z, q)
+    whole = model.turn if which == METER else model.turn_of_state
+    for i in range(Q):
+        deviation = max(sqrt(q[i] * q[i] + spread * spread), 1e-150)
+        z[i] = (y - z[i]) / deviation
+        z[i] = min(max(z[i], -1e100), 1e100) if z[i] == z[i] and deviation < np.inf else 1e100
+        q[i], turn[i] = -ln(min(deviation, 1e150)) - LOG_ROOT, whole / deviation
+        if y != y:
+            z[i], q[i], turn[i] = 0.0, 0.0, np.inf
+
+
+@njit(**FAST)
+def short_way(z, turn):
+    """The residual of an angle, the short way round."""
+    return z - turn * floor(z / turn + 0.5) if turn < np.inf else z
+
+
+@njit(**FAST)
+def log_likelihood(z, q, turn):
+    """ln p(y | x); of an angle the law is wound around the circle: densities of all turns add up."""
+    z = abs(short_way(z, turn))
+    total, k = 1.0, 1
+    while turn < np.inf and k <= WOUND:
+        away = turn * k
+        nearer = exp(-0.5 * away * (away - 2 * z))
+        total += nearer + exp(-0.5 * away * (away + 2 * z))
+        k = k + 1 if nearer > 1e-17 else WOUND + 1
+    return q - 0.5 * z * z + (log(total) if total > 1 else 0.0)
+
+
+@njit(**INNER)
+def predicted(room, total, x, logs):
+    """Logarithm of the prediction at the points of a panel."""
+    kernel, group = room.kernel, room.group
+    for i in range(Q):
+        logs[i] = 0.0
+    g = 0
+    while g < total.groups:
+        begin = g
+        while g < total.groups and group[0, g] <= x[Q - 1] and group[1, g] >= x[0]:
+            g += 1
+        rate, centre = kernel[0, Q * begin : Q * g], kernel[1, Q * begin : Q * g]
+        weight, bent = kernel[2, Q * begin : Q * g], kernel[3, Q * begin : Q * g]
+        for i in range(Q if g > begin else 0):
+            part = 0.0
+            for j in range(len(rate)):
+                u = x[i] * rate[j] - centre[j]
+                u = min(u * u, 1000.0)
+                part += (weight[j] - bent[j] * u) * half(u)
+            logs[i] += part
+        g += g == begin
+    for i in range(Q):
+        if logs[i] > 1e-16 * total.height:
+            logs[i] = ln(logs[i])
+        else:  # far out: the nearest kernel's slope, exact where there is one kernel, the prior
+            away = np.inf
+            for g in range(total.groups):
+                beyond = max(group[0, g] - x[i], x[i] - group[1, g], 0.0)
+                away = min(away, WINDOW + beyond / group[2, g])
+            logs[i] = log(total.height) - 0.5 * away * away
+
+
+@njit(**INNER)
+def log_later(model, room, later):
+    """Adds to z at a panel's points what later measurements tell of x, through the object's law."""
+    x, mean, deviation, _ = room.point
+    place, weight, blur = room.later
+    model.law(2 * model.mode + MOVES, Q, 0.0, model.constants, x, mean, deviation)
+    for i in range(Q):
+        total = 0.0
+        for j in range(later):
+            square = deviation[i] * deviation[i] + blur[j] * blur[j] + 1e-300
+            u = (place[j] - mean[i]) * (place[j] - mean[i]) / square
+            extra = 0.5 * blur[j] * blur[j] / square
+            factor = (1 + extra - extra * u) / sqrt(square)
+            total += weight[j] * factor * half(min(0.5 / LN2 * u, 1000.0))
+        mean[i] = ln(total) - LOG_ROOT if total > 1e-290 else -700.0
+
+
+@njit(**INNER)
+def evaluate(model, room, y, p, total, later):
+    """The logarithm of the posterior at the points of a panel, and what follows from it."""
+    row, (x, z, q, turn), fit = room.panels[p], room.point, room.work[0]
+    points(row[LEFT], row[RIGHT], x)
+    residual(model, METER, y, 0.0, room.point)
+    predicted(room, total, x, row)
+    for i in range(Q):
+        row[LIKELY + i] = log_likelihood(z[i], q[i], turn[i])
+        fit[i] = abs(short_way(z[i], turn[i]))
+    if later:
+        log_later(model, room, later)
+        for i in range(Q):
+            row[LIKELY + i] += z[i]
+    high = -np.inf
+    for i in range(Q):
+        before, row[i] = row[i], max(row[i] + row[LIKELY + i], -1e100)
+        if row[i] > high:
+            high, row[BEFORE], row[FIT] = row[i], before, fit[i]
+    mass = first = second = a = b = d = e = 0.0
+    for i in range(Q):
+        logarithm = max(row[i] - high, -80.0)
+        value = half(-1 / LN2 * logarithm)
+        mass += WEIGHT[i] * value
+        first += WEIGHT[i] * value * POINT[i]
+        second += WEIGHT[i] * value * POINT[i] * POINT[i]
+        a += LAST[i] * value
+        b += LAST_BUT_ONE[i] * value
+        d += LAST[i] * logarithm
+        e += LAST_BUT_ONE[i] * logarithm
+    row[HIGH], row[MASS] = high, 0.5 * (row[RIGHT] - row[LEFT]) * mass
+    row[FIRST], row[SECOND] = first / mass, second / mass
+    row[ROUGH], row[LOG_ROUGH] = CURVED * ((abs(a) + abs(b)) / mass) ** 2, abs(d) + abs(e)
+
+
+@njit(**INNER)
+def new(P, n, left, right):
+    P[n, LEFT], P[n, RIGHT], P[n, MASS], P[n, BOUND] = left, right, -1.0, np.inf
+
+
+@njit(**INNER)
+def depth(z, turn, i):
+    """How near to 0 the residual may come between its points i and i + 1.
+
+    To 0 where it changes its sign, or passes a whole turn.  At a dip, twice as deep as a parabola.
+    """
+    a, b = abs(short_way(z[i], turn[i])), abs(short_way(z[i + 1], turn[i + 1]))
+    if z[i] * z[i + 1] <= 0 or floor(z[i] / turn[i]) != floor(z[i + 1] / turn[i + 1]):
+        return 0.0
+    left = i == 0 or abs(short_way(z[i - 1], turn[i - 1])) > a
+    right = i == Q - 2 or abs(short_way(z[i + 2], turn[i + 2])) > b
+    if not (left and right):
+        return min(a, b)
+    before = abs(z[i - 1] - 2 * z[i] + z[i + 1]) if i else 0.0
+    after = abs(z[i] - 2 * z[i + 1] + z[i + 2]) if i < Q - 2 else 0.0
+    return max(0.0, min(a, b) - 0.5 * max(before, after))
+
+
+@njit(**INNER)
+def search(model, which, y, spread, room, n):
+    """Halves n panels until no hump of the likelihood is hidden between two points: their number."""
+    P, (x, z, q, turn) = room.panels, room.point
+    best, p, shortest = -np.inf, 0, ROUNDING * (P[n - 1, RIGHT] - P[0, LEFT])
+    while p < n:
+        left, right = P[p, LEFT], P[p, RIGHT]
+        points(left, right, x)
+        residual(model, which, y, spread, room.point)
+        bound, hidden = -np.inf, False
+        for i in range(Q):
+            near = short_way(z[i], turn[i])
+            best = max(best, q[i] - 0.5 * near * near)
+        for i in range(Q - 1):
+            low = depth(z, turn, i)
+            top = max(q[i], q[i + 1]) - 0.5 * low * low
+            bound = max(bound, top)
+            hidden |= top > best - FAINT and abs(z[i + 1] - z[i]) > JUMP
+        middle = 0.5 * (left + right)
+        if hidden and n < PANELS and right - left > max(shortest, SHORTEST * abs(middle)):
+            new(P, n, middle, right)
+            P[p, RIGHT] = middle
+            n += 1
+        else:
+            new(P, p, left, right)
+            P[p, BOUND] = bound if which == METER else np.inf
+            p += 1
+    return n
+
+
+@njit(**INNER)
+def weighed(P, n, likeliest, peak):
+    """Shares of the panels, and of the density the integral, mean from the middle of a panel, variance."""
+    total = mean = variance = 0.0
+    for p in range(n):
+        total += P[p, MASS] * exp(max(P[p, HIGH] - peak, -700.0))
+    origin = 0.5 * (P[likeliest, LEFT] + P[likeliest, RIGHT])
+    for p in range(n):
+        P[p, SHARE] = P[p, MASS] * exp(max(P[p, HIGH] - peak, -700.0)) / total
+        middle, size = 0.5 * (P[p, LEFT] + P[p, RIGHT]) - origin, 0.5 * (P[p, RIGHT] - P[p, LEFT])
+        mean += P[p, SHARE] * (middle + size * P[p, FIRST])
+    for p in range(n):
+        middle = 0.5 * (P[p, LEFT] + P[p, RIGHT]) - origin - mean
+        size = 0.5 * (P[p, RIGHT] - P[p, LEFT])
+        square = middle * middle + 2 * middle * size * P[p, FIRST] + size * size * P[p, SECOND]
+        variance += P[p, SHARE] * square
+    return total, mean, variance
+
+
+@njit(**INNER)
+def sorted_rows(P, n, whole):
+    """The panels that count, in order and first, their density divided by e^whole: how many."""
+    kept = 0
+    for p in range(n):
+        if P[p, SHARE] > LEFT_OUT:
+            place = kept
+            for i in range(Q):
+                P[kept, i] = P[p, i] - whole
+                P[kept, LIKELY + i] = P[p, LIKELY + i] - whole
+            P[kept, LEFT], P[kept, RIGHT] = P[p, LEFT], P[p, RIGHT]
+            while place and P[place - 1, LEFT] > P[place, LEFT]:
+                for i in range(KEPT):
+                    P[place, i], P[place - 1, i] = P[place - 1, i], P[place, i]
+                place -= 1
+            kept += 1
+    return kept
+
+
+@njit(**INNER)
+def grown(P, n, height, whole):
+    """Factor by which a measurement changes the mass in the prediction's tails: p(y | tails) / p(y).
+
+    What panels have lost lies there.  It grows where measurements lead to where the state was never
+    thought to be, by and by or at once: so a record that contradicts the model is known.
+    """
+    mass = seen = 0.0
+    for p in range(n):
+        for i in range(Q if P[p, MASS] > 0 else 0):
+            before = P[p, i] - P[p, LIKELY + i] - log(height)
+            if before < -TAIL:
+                share = WEIGHT[i] * (P[p, RIGHT] - P[p, LEFT]) * exp(max(before, -700.0))
+                mass += share
+                seen += share * exp(min(P[p, LIKELY + i] - whole, 100.0))
+    return seen / mass if mass > 0 else 0.0
+
+
+@njit(**INNER)
+def lacking(room, groups, place, top):
+    """Error by each mass that the prediction lacks, if all of it were where the posterior is.
+
+    The prediction, of the logarithm `top`, is nearly nothing where the record contradicts the model.
+    """
+    nearest, away = 0, np.inf
+    for g in range(groups):
+        far = abs(room.group[0, g] + room.group[1, g] - 2 * place)
+        if far < away:
+            nearest, away = g, far
+    return exp(min(-top, 100.0)) / room.group[2, nearest]
+
+
+@njit(**INNER)
+def corrected(model, room, y, n, total, later, accuracy, first, expected, numbers):
+    """The posterior from the n first panels: how it ended, and how many are left, in order.
+
+    numbers: mean, variance, ln p(y | the past), estimated error of mean and deviation in deviations.
+    """
+    P = room.panels
+    n = search(model, METER, y, 0.0, room, n)
+    if later:
+        n = search(model, MOVES, numbers[MEAN], sqrt(numbers[VARIANCE]), room, n)
+    low, high, likeliest, peak, tolerance = np.inf, -np.inf, 0, -np.inf, 0.2 * accuracy
+    for p in range(n):
+        low, high = min(low, P[p, LEFT]), max(high, P[p, RIGHT])
+        likeliest = p if P[p, BOUND] > P[likeliest, BOUND] else likeliest
+    integral = mean = variance = error = origin = 0.0
+    for _ in range(TURNS):
+        for i in range(n):
+            p = (i + likeliest) % n
+            if P[p, MASS] < 0 and P[p, BOUND] + log(total.height) < peak - NOTHING:
+                P[p, HIGH] = P[p, 0] = P[p, Q - 1] = -1e300
+                P[p, MASS] = P[p, FIRST] = P[p, SECOND] = P[p, ROUGH] = P[p, LOG_ROUGH] = 0.0
+            elif P[p, MASS] < 0:
+                evaluate(model, room, y, p, total, later)
+                peak = max(peak, P[p, HIGH])
+        for p in range(n):
+            likeliest = p if P[p, HIGH] > P[likeliest, HIGH] else likeliest
+        integral, mean, variance = weighed(P, n, likeliest, peak)
+        if not 0 < integral < np.inf:
+            return EMPTY, 0
+        variance = max(variance, 1e-300)  # of a single point, as long as panels are too long
+        origin, error, before = 0.5 * (P[likeliest, LEFT] + P[likeliest, RIGHT]), 0.0, n
+        for p in range(before):
+            if n > PANELS - 4:
+                return PANELLED, 0
+            left, right = P[p, LEFT], P[p, RIGHT]
+            far = max(abs(left - origin - mean), abs(right - origin - mean))
+            share = P[p, SHARE] * (1 + far * far / variance)
+            rough = share * max(P[p, LOG_ROUGH], P[p, ROUGH])
+            if rough > tolerance and right - left > SHORTEST * abs(origin):
+                new(P, n, 0.5 * (left + right), right)
+                new(P, p, left, 0.5 * (left + right))
+                n += 1
+                continue
+            error += 0.25 * share * (P[p, LOG_ROUGH] + P[p, ROUGH])
+            size = 2 * (high - low)
+            if left == low and P[p, 0] > peak - GOES_ON:
+                low = left - size
+                new(P, n, low, left)
+                n += 1
+            if right == high and P[p, Q - 1] > peak - GOES_ON:
+                high = right + size
+                new(P, n, right, high)
+                n += 1
+        if n == before:
+            break
+    else:
+        return PANELLED, 0
+    whole, top = peak + log(integral), P[likeliest, BEFORE]
+    error += ROUNDING * abs(origin) / sqrt(variance)
+    if not variance > 1e-300:
+        return EMPTY, 0
+    error += 1.0 if P[likeliest, FIT] > IMPOSSIBLE else 0.0
+    if not first:
+        lost = numbers[LOST] + LEFT_OUT
+        numbers[LOST] = lost * expected * grown(P, n, total.height, whole)
+        error += lost * lacking(room, total.groups, origin, top) + REACH * REACH * numbers[LOST] + total.rough
+    numbers[MEAN], numbers[VARIANCE] = origin + mean, variance
+    numbers[EVIDENCE], numbers[ERROR] = whole, error
+    return FINE, sorted_rows(P, n, whole)
+
+
+@njit(**INNER)
+def widths(B, p):
+    """Deviations to which kernels are widened at both ends of a panel: those of neighbours agree.
+
+    A jump of widths from panel to panel would make ripples of per cents.
+    """
+    size = B[p, RIGHT] - B[p, LEFT]
+    before = after = BLUR * size
+    if p > 0 and B[p - 1, RIGHT] == B[p, LEFT]:
+        before = min(before, BLUR * (B[p - 1, RIGHT] - B[p - 1, LEFT]))
+    if p < len(B) - 1 and B[p + 1, LEFT] == B[p, RIGHT]:
+        after = min(after, BLUR * (B[p + 1, RIGHT] - B[p + 1, LEFT]))
+    return before, after
+
+
+@njit(**FAST)
+def between(before, after, t):
+    """From `before` at t = -1 to `after` at t = 1, smoothly."""
+    t = 0.25 * (1 + t) * (1 + t) * (2 - t)
+    return (1 - t) * before + t * after
+
+
+@njit(**INNER)
+def polynomial(row, start, top, power):
+    """Powers' coefficients of a row's logarithms, from `start` on, less `top`."""
+    for k in range(Q):
+        power[k] = 0.0
+        for i in range(Q):
+            power[k] += POWER[k, i] * max(row[start + i] - top, -80.0)
+
+
+@njit(**FAST)
+def value_at(power, t):
+    """The polynomial at t, at most 1: between points it may not rise far above their highest, 0."""
+    value = 0.0
+    for k in range(Q - 1, -1, -1):
+        value = value * t + power[k]
+    return min(value, 1.0)
+
+
+@njit(**INNER)
+def highest(row, start):
+    top = -np.inf
+    for i in range(Q):
+        top = max(top, row[start + i])
+    return top
+
+
+@njit(**INNER)
+def in_halves(stack, waiting, a, b):
+    """Puts both halves of [a, b] on the stack, the left one on top."""
+    stack[0, waiting], stack[1, waiting] = 0.5 * (a + b), b
+    stack[0, waiting + 1], stack[1, waiting + 1] = a, 0.5 * (a + b)
+    return waiting + 2
+
+
+@njit(**INNER)
+def kernels(model, weight_law, shift, B, room, total, accuracy):
+    """Adds the prediction from panels B to the room: how it ended, and how much it now takes.
+
+    The logarithm of a weight is `shift`; a weight that depends on the state is a law, `weight_law` < 0.
+    """
+    kernel, group, edge, stack = room.kernel, room.group, room.edge, room.stack
+    (x, m, s, _), (power, mass, deviation, weight) = room.point, room.work
+    count, many, height, error = total
+    span = SPAN * min(accuracy / 1e-3, 1.0) ** (1 / 14)
+    for p in range(len(B)):
+        middle, size = 0.5 * (B[p, LEFT] + B[p, RIGHT]), 0.5 * (B[p, RIGHT] - B[p, LEFT])
+        top, (before, after) = highest(B[p], 0), widths(B, p)
+        polynomial(B[p], 0, top, power)
+        stack[0, 0], stack[1, 0], waiting, low, high = -1.0, 1.0, 1, np.inf, -np.inf
+        while waiting:
+            waiting -= 1
+            a, b = stack[0, waiting], stack[1, waiting]
+            part = 0.5 * (b - a)
+            points(middle + size * a, middle + size * b, x)
+            if weight_law < 0:
+                model.law(weight_law, Q, 0.0, model.constants, x, weight, s)
+            model.law(2 * model.mode + MOVES, Q, 0.0, model.constants, x, m, s)
+            share, covered, least, calm, steep = 0.0, 0.0, np.inf, np.inf, False
+            for i in range(1, Q):
+                covered = max(covered, abs(m[i] - m[0]))
+            d = e = f = g = 0.0
+            for i in range(Q):
+                t, slope = 0.5 * (a + b) + part * POINT[i], 0.0
+                value = value_at(power, t) if part < 1 else B[p, i] - top
+                mass[i] = WEIGHT[i] * part * size * density(value + top + shift)
+                if weight_law < 0:
+                    mass[i] *= weight[i]
+                share += mass[i]
+                for k in range(Q):
+                    slope += SLOPE[i, k] * m[k]
+                blur = abs(slope) / (part * size) * between(before, after, t)
+                # beside a jump or a pole the slope of a point is no measure of a panel's
+                steep, calm, blur = steep or blur > covered, min(calm, s[i]), min(blur, covered / span)
+                deviation[i] = sqrt(s[i] * s[i] + blur * blur + 1e-300)
+                least = min(least, deviation[i])
+                d += LAST[i] * m[i]
+                e += LAST_BUT_ONE[i] * m[i]
+                f += LAST[i] * s[i]
+                g += LAST_BUT_ONE[i] * s[i]
+            digits = 10 * ROUNDING * abs(m[0])
+            rough = max(abs(d) + abs(e) + abs(f) + abs(g) - digits, 0.0) / least
+            # a measurement may ask for what has little share
+            gaps = covered > span * least or sqrt(share) * rough > 0.03 * accuracy or (steep and covered > calm)
+            if share > 1e-10 and gaps and part > 1e-9:
+                waiting = in_halves(stack, waiting, a, b)
+                continue
+            if count == KERNELS // Q:
+                return KERNELLED, Sum(0, 0, 0.0, 0.0)
+            group[0, count], group[1, count], group[2, count] = np.inf, -np.inf, least
+            for i in range(Q):
+                j, wide = Q * count + i, max(deviation[i], covered / span)
+                rate, extra = sqrt(0.5 / LN2) / wide, 0.5 - 0.5 * (s[i] / wide) ** 2
+                amount = mass[i] * rate * sqrt(LN2 / np.pi)
+                kernel[0, j], kernel[1, j] = rate, m[i] * rate
+                kernel[2, j], kernel[3, j] = amount * (1 + extra), amount * extra * 2 * LN2
+                height += kernel[2, j]
+                group[0, count] = min(group[0, count], m[i] - WINDOW * wide)
+                group[1, count] = max(group[1, count], m[i] + WINDOW * wide)
+                reach = REACH * REACH + 2 * ln(max(mass[i], 1e-299))
+                if reach > 0:
+                    low = min(low, m[i] - sqrt(reach) * wide)
+                    high = max(high, m[i] + sqrt(reach) * wide)
+            count += 1
+            error += share * rough
+            if a == -1:
+                edge[0, many], edge[1, many], edge[2, many] = m[0], 0.0, deviation[0]
+                many += 1
+            if b == 1:
+                edge[0, many], edge[1, many], edge[2, many] = m[Q - 1], 0.0, deviation[Q - 1]
+                many += 1
+        if low < high:
+            edge[0, many], edge[1, many], edge[2, many] = low, 1.0, 0.0
+            edge[0, many + 1], edge[1, many + 1], edge[2, many + 1] = high, -1.0, 0.0
+            many += 2
+    return FINE, Sum(count, many, height, error)
+
+
+@njit(**INNER)
+def borders(room, many):
+    """First panels, between edges of the prediction that are far enough from one another: how many."""
+    edge, P = room.edge, room.panels
+    for i in range(1, many):
+        while i and edge[0, i - 1] > edge[0, i]:
+            for row in range(3):
+                edge[row, i], edge[row, i - 1] = edge[row, i - 1], edge[row, i]
+            i -= 1
+    open_, n, last, width = 0, 0, edge[0, 0], 0.0
+    for i in range(many):
+        place, kind, deviation = edge[0, i], edge[1, i], edge[2, i]
+        apart = kind == 0 and open_ > 0 and place - last > APART * min(deviation, width)
+        ends = (kind > 0 and open_ == 0) or (kind < 0 and open_ == 1)
+        if place > last and n < PANELS // 2 and (apart or ends):
+            new(P, n, last, place)
+            last, width = place, deviation
+            n += 1
+        open_ += int(kind)
+    return n
+
+
+@njit(**INNER)
+def from_prior(mean, deviation, probability, room):
+    """The prior as a prediction, its first two panels: how much room it takes."""
+    rate = sqrt(0.5 / LN2) / deviation
+    for j in range(Q):
+        room.kernel[0, j], room.kernel[1, j] = rate, mean * rate
+        room.kernel[2, j] = room.kernel[3, j] = 0.0
+    room.kernel[2, 0] = probability * sqrt(0.5 / np.pi) / deviation
+    room.group[0, 0], room.group[1, 0] = mean - WINDOW * deviation, mean + WINDOW * deviation
+    room.group[2, 0] = deviation
+    new(room.panels, 0, mean - REACH * deviation, mean)
+    new(room.panels, 1, mean, mean + REACH * deviation)
+    return Sum(1, 0, room.kernel[2, 0], 0.0)
+
+
+@njit(**INNER)
+def sources(B, least, room):
+    """What y_k+1.. tell of the next state, as points, weights and deviations of kernels: how many.
+
+    0 where they do not fit into the room.
+    """
+    (place, weight, blurs), stack, power, count = room.later, room.stack, room.work[0], 0
+    for p in range(len(B)):
+        middle, size = 0.5 * (B[p, LEFT] + B[p, RIGHT]), 0.5 * (B[p, RIGHT] - B[p, LEFT])
+        top, (before, after) = highest(B[p], LIKELY), widths(B, p)
+        polynomial(B[p], LIKELY, top, power)
+        stack[0, 0], stack[1, 0], waiting = -1.0, 1.0, 1
+        while waiting:
+            waiting -= 1
+            a, b = stack[0, waiting], stack[1, waiting]
+            blur = min(before, after)
+            if (b - a) * size > SPAN * sqrt(least * least + blur * blur) and b - a > 1e-9:
+                waiting = in_halves(stack, waiting, a, b)
+                continue
+            if count > KERNELS - Q:
+                return 0
+            for i in range(Q):
+                t = 0.5 * (a + b) + 0.5 * (b - a) * POINT[i]
+                amount = WEIGHT[i] * 0.5 * (b - a) * size
+                place[count] = middle + size * t
+                weight[count] = amount * exp(min(max(value_at(power, t) + top, -700.0), 700.0))
+                blurs[count] = between(before, after, t)
+                count += 1
+    return count
+
+
+@njit(**INNER)
+def least_deviation(model, room, n):
+    """Of the object's noise at the points of n panels."""
+    (x, m, s, _), least = room.point, np.inf
+    for p in range(n):
+        points(room.panels[p, LEFT], room.panels[p, RIGHT], x)
+        model.law(2 * model.mode + MOVES, Q, 0.0, model.constants, x, m, s)
+        for i in range(Q):
+            least = min(least, s[i])
+    return least
+
+
+@njit(**INNER)
+def moments(room, count, turn):
+    """Mass, mean and variance of `count` laws in the room for `later`: means, masses, variances.
+
+    Of an angle, as seen from the circular mean.
+    """
+    mean, mass, variance = room.later
+    whole = first = second = sine = cosine = 0.0
+    for i in range(count if turn < np.inf else 0):
+        sine += mass[i] * sin(mean[i])
+        cosine += mass[i] * cos(mean[i])
+    centre = atan2(sine, cosine) if turn < np.inf else mean[0]
+    for i in range(count):
+        away = short_way(mean[i] - centre, turn)
+        whole += mass[i]
+        first += mass[i] * away
+        second += mass[i] * (away * away + variance[i])
+    if not whole > 0:
+        return 0.0, 0.0, 0.0
+    first /= whole
+    return whole, short_way(centre + first, turn), second / whole - first * first
+
+
+@njit(**INNER)
+def of_panels(B, room):
+    """Puts the density on panels B into the room as laws of single points: how many."""
+    mean, mass, variance = room.later
+    for p in range(len(B)):
+        points(B[p, LEFT], B[p, RIGHT], room.point[0])
+        for i in range(Q):
+            j = p * Q + i
+            mean[j], variance[j] = room.point[0][i], 0.0
+            mass[j] = WEIGHT[i] * 0.5 * (B[p, RIGHT] - B[p, LEFT]) * density(B[p, i])
+    return len(B) * Q
+
+
+@njit(**INNER)
+def of_kernels(total, room):
+    """Puts the kernels of a prediction into the room as laws: how many."""
+    mean, mass, variance = room.later
+    for j in range(total.groups * Q):
+        rate, centre = room.kernel[0, j], room.kernel[1, j]
+        weight, bent = room.kernel[2, j], room.kernel[3, j]
+        wide, half_bent = sqrt(0.5 / LN2) / rate, bent / (2 * LN2)
+        mean[j], mass[j] = centre / rate, (weight - half_bent) / rate * sqrt(np.pi / LN2)
+        variance[j] = wide * wide * (1 - 2 * half_bent / max(weight - half_bent, 1e-300))
+    return total.groups * Q
+
+
+@njit(**INNER)
+def room_for_a_step():
+    return Room(
+        np.empty((PANELS + 4, COLUMNS)),
+        np.empty((4, KERNELS)),
+        np.empty((3, KERNELS // Q)),
+        np.empty((3, 4 * PANELS)),
+        (np.empty(KERNELS), np.empty(KERNELS), np.empty(KERNELS)),
+        np.empty((2, TURNS + 2)),
+        (np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q)),
+        (np.empty(Q), np.empty(Q), np.empty(Q), np.empty(Q)),
+    )
+
+
+@njit(**INNER)
+def mixed(numbers):
+    """Probabilities of a trajectory's modes, from the densities of what each measured."""
+    top, total = -np.inf, 0.0
+    for j in range(len(numbers)):
+        top = max(top, numbers[j, EVIDENCE])
+    for j in range(len(numbers)):
+        numbers[j, PROBABILITY] = exp(numbers[j, EVIDENCE] - top) if top > -np.inf else 0.0
+        total += numbers[j, PROBABILITY]
+    for j in range(len(numbers)):
+        numbers[j, PROBABILITY] /= total
+
+
+@njit(**INNER)
+def prediction(law, mode, constants, turns, posterior, begin, numbers, weight, room, accuracy):
+    """The sum of kernels from the posteriors of all modes to one: how it ended, how much room it takes.
+
+    weight : probabilities of transitions (J, J), negative where they depend on the state.
+    """
+    model = Model(law, mode, constants, turns[0], turns[1])
+    status, total, modes = FINE, Sum(0, 0, 0.0, 0.0), len(weight)
+    for i in range(modes):
+        rows, by_state = posterior[begin[i] : begin[i + 1]], weight[i, mode] < 0
+        share = numbers[i, PROBABILITY] * abs(weight[i, mode])
+        if status == FINE and len(rows) and share > 0:
+            weight_law = -1 - i * modes - mode if by_state else 0
+            status, total = kernels(model, weight_law, log(share), rows, room, total, accuracy)
+    return status, total
+
+
+ADVANCE = types.Tuple((TABLE, types.int64[::1]))(
+    LAW, TABLE, VALUES, VALUES, TABLE, TABLE, types.int64[::1], TABLE, types.int64[::1], TABLE,
+    types.boolean, types.float64, TABLE,
+)  # fmt: skip
+
+
+@njit(ADVANCE, cache=True, nogil=True, error_model="numpy")
+def advance(law, constants, turns, y, prior, before, begin, later, later_begin, transitions, back, accuracy, numbers):
+    """One step of some trajectories, forward, or back.
 
     Parameters
     ----------
-    borders : ndarray (T, B)
-        Of the first panels of each trajectory, ascending; equal ones have no panel between them.
-    log_density : function of x (R, N) and trajectories (R,), to (R, N)
-    too_wide : function of left and right (P,), to (P,)
-        Panels to be split whatever the density.
+    law : the model's function
+    constants : ndarray (2, ...)
+        Of this step, and of the one before.
+    turns : ndarray (2,)
+        Of y and of x, infinite for what is no angle.
+    y : ndarray (T,)
+    prior : ndarray (J, 3)
+        Mean and deviation, and the probability of each mode; not looked at after the first step.
+    before, begin : ndarray (rows, KEPT), (T J + 1,)
+        Posteriors of the step before; none before the first step.
+    later, later_begin
+        What is known of the next step, looking back.
+    transitions : ndarray (2 J, J)
+        To the next step, and to this one; negative where they depend on the state.
+    back : bool
+    accuracy : float
+    numbers : ndarray (T J, NUMBERS)
+        Of the step before; PROBABILITY is used; looking back MEAN and VARIANCE of the next.  Is filled.
 
     Returns
     -------
-    list of (Grid, float)
-        Each with the part of the mass that is in the last two Legendre coefficients: as large as the error where the density
-        has kinks, and far larger where it is smooth, as a rule of q nodes integrates 2 q coefficients exactly.
+    panels : ndarray (rows, KEPT)
+        The posterior of each mode of each trajectory, one below the other; begin : where they begin.
     """
-    panels = _Panels(len(borders), log_density, rule)
-    first, place = np.nonzero(borders[:, 1:] > borders[:, :-1])
-    panels.add(first, borders[first, place], borders[first, place + 1])
-    for _ in range(SPLITS):
-        mass, unresolved = panels.masses()
-        total = np.bincount(panels.row, mass, len(borders))[panels.row]
-        kept = mass > NEGLIGIBLE * total
-        if rule.nodes.size * np.bincount(panels.row[kept], minlength=1).max() > PANEL_NODES:
-            raise Unresolved(f"the posterior needs more than {PANEL_NODES:,} nodes")
-        middle = 0.5 * (panels.left + panels.right)
-        split = kept & (unresolved > rule.tolerance * total)
-        split |= kept & (mass > rule.tolerance * total) & too_wide(panels.left, panels.right)
-        split &= (middle > panels.left) & (middle < panels.right) & panels.seen()
-        row, left, middle, right = (array[split] for array in (panels.row, panels.left, middle, panels.right))
-        panels.keep(kept & ~split)
-        if not len(row):
-            break
-        panels.add(np.concatenate([row, row]), np.concatenate([left, middle]), np.concatenate([middle, right]))
-    return panels.grids()
-
-
-class _Panels:
-    """Panels of all trajectories: row, left and right end (P,), nodes and log-densities (P, q)."""
-
-    def __init__(self, rows: int, log_density: Callable[[Array, Array], Array], rule: Rule):
-        self.rows, self.log_density, self.rule = rows, log_density, rule
-        self.peak = np.full(rows, -np.inf)  # the highest log-density of each trajectory
-        self.row: Array = np.empty(0, dtype=int)
-        self.left: Array = np.empty(0)
-        self.right: Array = np.empty(0)
-        self.x, self.logs = np.empty((2, 0, len(rule.nodes)))
-
-    def add(self, row: Array, left: Array, right: Array) -> None:
-        """Further ones, in any order; log-densities of all trajectories are asked for at once."""
-        if not len(row):
-            return
-        x = 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * self.rule.nodes
-        some, place, count = np.unique(row, return_inverse=True, return_counts=True)
-        order = np.argsort(place, kind="stable")
-        slot = np.empty(len(row), dtype=int)
-        slot[order] = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
-        asked = np.repeat(x[order[np.cumsum(count) - 1]][:, None], count.max(), axis=1)  # filled up with the last panel
-        asked[place, slot] = x
-        logs = self.log_density(asked.reshape(len(some), -1), some).reshape(asked.shape)[place, slot]
-        np.maximum.at(self.peak, row, logs.max(axis=1))
-        for name, new in (("row", row), ("left", left), ("right", right), ("x", x), ("logs", logs)):
-            setattr(self, name, np.concatenate([getattr(self, name), new]))
-
-    def keep(self, chosen: Array) -> None:
-        for name in ("row", "left", "right", "x", "logs"):
-            setattr(self, name, getattr(self, name)[chosen])
-
-    def seen(self) -> Array:
-        """Panels of trajectories whose density is a number anywhere."""
-        return np.isfinite(self.peak)[self.row]
-
-    def values(self) -> Array:
-        """Densities (P, q) relative to the highest of each trajectory; flat where nothing is seen."""
-        with np.errstate(invalid="ignore"):
-            return np.where(self.seen()[:, None], np.exp(self.logs - self.peak[self.row, None]), 1.0)
-
-    def masses(self) -> tuple[Array, Array]:
-        """The mass of each panel (P,), and that in its last two Legendre coefficients."""
-        values, half = self.values(), 0.5 * (self.right - self.left)
-        return half * (values @ self.rule.weights), half * np.abs(values @ self.rule.tail.T).sum(axis=1)
-
-    def grids(self) -> list[tuple[Grid, float]]:
-        values, (mass, unresolved) = self.values(), self.masses()
-        masses = 0.5 * (self.right - self.left)[:, None] * self.rule.weights * values
-        total, left_over = (np.bincount(self.row, one, self.rows) for one in (mass, unresolved))
-        order = np.lexsort((self.left, self.row))
-        order = order[mass[order] > NEGLIGIBLE * total[self.row[order]]]
-        ends = np.cumsum(np.bincount(self.row[order], minlength=self.rows))
-        found = []
-        for i, chosen in enumerate(np.split(order, ends[:-1])):
-            x, m, density = (array[chosen].ravel() for array in (self.x, masses, values))
-            whole = m.sum()
-            found.append((Grid(x, m / whole, density / whole), float(left_over[i] / whole)))
-        return found
+    room = room_for_a_step()
+    T, modes = len(y), len(prior)
+    first, used = len(before) == 0, 0
+    after, places = np.empty((8 * T * modes + 64, KEPT)), np.zeros(T * modes + 1, dtype=np.int64)
+    for t in range(T):
+        start = t * modes
+        here = numbers[start : start + modes]
+        known, n, later_count, lost = here.copy(), 0, 0, 0.0
+        for j in range(modes):
+            lost += known[j, PROBABILITY] * known[j, LOST]
+        for j in range(modes):
+            model = Model(law, j, constants[0], turns[0], turns[1])
+            if first:
+                status, total = FINE, from_prior(prior[j, 0], prior[j, 1], prior[j, 2], room)
+                n = 2 if prior[j, 2] > 0 else 0
+            else:
+                status, total = prediction(
+                    law, j, constants[1], turns, before, begin[start:], known, transitions[modes:], room, accuracy
+                )
+                n = borders(room, total.edges) if status == FINE and total.edges else 0
+            if back and n:
+                rows = later[later_begin[t] : later_begin[t + 1]]
+                later_count = sources(rows, least_deviation(model, room, n), room)
+                status = status if later_count or not len(rows) else KERNELLED
+            kept, here[j, EVIDENCE], here[j, LOST] = 0, -np.inf, lost
+            if status == FINE and n:
+                status, kept = corrected(model, room, y[t], n, total, later_count, accuracy, first, known[j, EXPECTED], here[j])
+            here[j, STATUS] = status
+            if used + kept > len(after):
+                more = np.empty((2 * len(after) + kept, KEPT))
+                more[:used] = after[:used]
+                after = more
+            after[used : used + kept] = room.panels[:kept, :KEPT]
+            if kept and turns[1] < np.inf:
+                count = of_panels(after[used : used + kept], room)
+                _, here[j, MEAN], here[j, VARIANCE] = moments(room, count, turns[1])
+            used += kept
+            places[start + j + 1] = used
+        mixed(here)
+        for j in range(0 if back else modes):
+            status, total = prediction(
+                law, j, constants[0], turns, after, places[start:], here, transitions[:modes], room, accuracy
+            )
+            mass, mean, variance = moments(room, of_kernels(total, room), turns[1])
+            here[j, NEXT_MEAN], here[j, NEXT_VARIANCE] = mean, variance
+            here[j, EXPECTED] = mass if status == FINE else 1.0  # so that the next step is refused
+    return after[:used].copy(), places

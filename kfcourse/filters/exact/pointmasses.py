@@ -1,40 +1,57 @@
-"""The exact filter by point masses: a step, the ways it may take, and the error that is carried from step to step."""
+"""The exact filter of scalar models, with modes or without: what `panels` computes, as a `Filter`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from kfcourse.angles import moments_on_circle
 from kfcourse.errors import expect
 from kfcourse.filters.base import Filter, State, initial_state
-from kfcourse.filters.densities import ScalarDensities, is_nonlinear, scalar_densities
-from kfcourse.filters.exact.adaptive import TENTH, check_scalar, on_panels
-from kfcourse.filters.exact.batch import Place, Posteriors, posteriors
-from kfcourse.filters.exact.constants import ELEMENTS, MORE, NODES, SPACINGS, TOLERABLE
-from kfcourse.filters.exact.evidence import log_evidence
-from kfcourse.filters.exact.kernels import Grid, Kernels, TooNarrow, Unresolved, apart, chunks, of_prior
-from kfcourse.filters.exact.places import Candidates, hidden, likeliest, looked, of_kernels, spaced
-from kfcourse.filters.exact.prediction import predictions
-from kfcourse.filters.exact.roots import at_roots
-from kfcourse.filters.exact.smoothing import smoothed
-from kfcourse.filters.exact.usual import Packed, UsualWay, compiled_usual_way
+from kfcourse.filters.exact.columns import (
+    ERROR,
+    EVIDENCE,
+    EXPECTED,
+    KEPT,
+    LEFT,
+    LOST,
+    MEAN,
+    NEXT_MEAN,
+    NUMBERS,
+    PROBABILITY,
+    RIGHT,
+    STATUS,
+    VARIANCE,
+    Q,
+)
+from kfcourse.filters.exact.laws import constants, load, modes_of, printed
+from kfcourse.filters.multiple_models import mixture
 from kfcourse.laws import Array, Gaussian
-from kfcourse.symbolic.compiled import is_scalar
+from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
 
-# Of the mean and the deviation at a step, in posterior standard deviations: their square, 1e-6 of the bound, is far below what
-# any number of trajectories tells.
+# Of the mean and the deviation at a step, in posterior deviations: their square, 1e-6 of the bound, is
+# far below what any number of trajectories tells.
 ACCURACY = 1e-3
-FINE = (129, 257)  # nodes of a posterior that must be interpolated: the second if the first are too few to share its mass
-TRIED = 65  # nodes of a posterior after one that needed panels
-MEMORY = 2**28  # bytes of predictions
-REMADE = 128  # trajectories whose predictions are made again at once
+FINEST = 1e-6  # what a sum of eight kernels over five deviations allows
+TOLERABLE = 0.1  # error of a step, in deviations, beyond which there is no posterior
+CHUNK = 64  # trajectories that a thread takes at once: some milliseconds
+SHARPEST = 1e-7  # deviation of a prior without variance, in units of its mean, or of 1
+NEGLIGIBLE = 1e-12  # probability of a mode whose density need not be found
+REASONS = (
+    "its error is above a tenth of a deviation: the measurement contradicts the model, or digits are lost",
+    "the posterior needs too many panels",
+    "the prediction needs too many kernels",
+    "no state explains the measurement",
+)  # of `panels`' statuses, the first one's where the step ended well
+
+
+class Unresolved(ModelError):
+    """A posterior cannot be had: a record contradicts the model, or a density is too rough."""
 
 
 class PointMass(NamedTuple):
@@ -42,46 +59,47 @@ class PointMass(NamedTuple):
 
     Attributes
     ----------
-    fine : sequence of Grid
-        The posterior of each trajectory.
+    panels, begin : ndarray (rows, KEPT), (runs * J + 1,)
+        The densities, and where those of a mode begin (`columns`).
+    numbers : ndarray (runs, J, NUMBERS)
+    log_likelihood : ndarray (runs,)
+        ln p(y_k | y_0, ..., y_{k-1}).
     error : ndarray (runs,)
-        Estimated error of mean and deviation, in posterior standard deviations: that of this step and of all before it, as if
-        the filter never forgot one.
+        Estimated error of mean and deviation, in posterior deviations: that of this step and of all
+        before it, as if the filter never forgot one.
     variance : ndarray (runs,)
         Of the posteriors.
-    adaptive : ndarray (runs,)
-        Whether this step was left to the adaptive filter.
-    groups : list of (ndarray, Kernels)
-        The predictions: numbers of trajectories, and their kernels.
-    later : ndarray of int
-        Trajectories whose predictions are made again in the next step, as there is no room for them.
     """
 
-    fine: Sequence[Grid]
+    panels: Array
+    begin: Array
+    numbers: Array
+    log_likelihood: Array
     error: Array
     variance: Array
-    adaptive: Array
-    groups: list[tuple[Array, Kernels]]
-    later: Array
 
-    def predictions(self, law: ScalarDensities) -> Iterator[tuple[Array, Kernels]]:
-        """Those of all trajectories, as `groups`; with the law of the step that was made."""
-        yield from self.groups
-        for chunk in chunks(len(self.later), 1, REMADE):
-            rows = self.later[chunk]
-            for some, kernels in predictions([self.fine[i] for i in rows.tolist()], law):
-                yield rows[some], kernels
+    @property
+    def probability(self) -> Array:
+        """Posterior probabilities of the modes, (runs, J)."""
+        return self.numbers[:, :, PROBABILITY]
 
-    def bytes(self) -> int:
-        """That the predictions hold."""
-        return sum(kernels.bytes() for _, kernels in self.groups)
+    @property
+    def expected(self) -> Array:
+        """Probabilities of the modes at the next step, (runs, J)."""
+        return self.numbers[:, :, EXPECTED]
 
-    def without_predictions(self) -> PointMass:
-        """The same, all predictions to be made again."""
-        return self._replace(groups=[], later=np.arange(len(self.fine)))
+    def density(self, run: int, mode: int = 0) -> tuple[Array, Array]:
+        """States x (M,), ascending, at which a trajectory's posterior is held, and p(x, mode) there."""
+        from kfcourse.filters.exact.panels import POINT
+
+        place = run * self.numbers.shape[1] + mode
+        rows = self.panels[self.begin[place] : self.begin[place + 1]]
+        middle, size = rows[:, LEFT] + rows[:, RIGHT], rows[:, RIGHT] - rows[:, LEFT]
+        x = 0.5 * (middle[:, None] + size[:, None] * POINT)
+        return x.ravel(), np.exp(rows[:, :Q]).ravel() * self.probability[run, mode]
 
     def evidence_error(self) -> Array:
-        """Estimated error of the last ln p(y_k | y_0, ..., y_{k-1}), (runs,): the total's relative error is part of `error`."""
+        """Estimated error of `log_likelihood`, (runs,): a density's total errs by no more than it does."""
         return self.error
 
     def discretisation_error(self) -> Array:
@@ -89,301 +107,176 @@ class PointMass(NamedTuple):
         return self.error * np.sqrt(self.variance)
 
 
-def pointmass(model: Model, accuracy: float = ACCURACY, memory: float = MEMORY) -> Filter:
+def pointmass(model: Model | JumpModel, accuracy: float = ACCURACY) -> Filter:
     """The exact AOF of a scalar model by point masses.
 
     Parameters
     ----------
-    model : Model
-        One state, one measurement, noises entering linearly (with any functions of x as factors); the meter's may be solved
-        for (`inverted`), or be nothing.  The object may jump, at thresholds farther apart than a posterior's nodes.
+    model : Model or JumpModel
+        One state, one measurement, noises entering linearly (with any functions of x as factors); the
+        meter's may be one that can be solved for, as in y = exp(x + w).  Of a model with modes, all of
+        which are such, `state.memory.probability` are their posterior probabilities.
     accuracy : float
-        Largest estimated error of a step, in posterior standard deviations; a step with a larger one is left to the
-        adaptive filter.
-    memory : float
-        Bytes that predictions may take from one step to the next, and those of all steps for who looks back; further ones are
-        made twice, a chunk of some 50 MB at a time.  A posterior is some kB, 10 MB at most, and not counted.
+        Error of a step's mean and deviation, in posterior deviations, at most.
 
     Raises
     ------
     ModelError
-        The model is not scalar, the meter jumps, or a noise enters nonlinearly and cannot be solved for.
+        The model is not scalar, a noise enters nonlinearly, or object or meter have none.
     Unresolved
-        When it runs: a step would need more nodes than the budget has.
+        When it runs: a step whose error is above a tenth of a deviation.  A record that contradicts the
+        model makes one, where a state is more than some six deviations from where it was predicted.
 
     Notes
     -----
-    Nodes overlap where a density has 1e-10 of its height and end where it has 1e-14, which no trajectory of the model notices.
-    A record that contradicts the model, so that later measurements put a state more than some six deviations from where it was
-    thought to be, needs what has been cut off: the filter is wrong then and does not tell.  `smoothing_error` does, or refuses.
+    It is compiled when it first runs, which takes some seconds once, and kept on the disk.
     """
-    expect(model, Model, "pointmass")
-    check_scalar(model)
-    if not 0 < accuracy < 1:
-        raise ModelError(f"the point-mass filter needs 0 < accuracy < 1, got {accuracy}")
-    densities, init, prior = scalar_densities(model), initial_state(model), of_prior(model.prior)
+    expect(model, Model, "pointmass", JumpModel)
+    if not FINEST <= accuracy < 1:
+        raise ModelError(f"the exact filter needs {FINEST:g} <= accuracy < 1, got {accuracy}")
+    modes = modes_of(model)
+    if len(modes) > 1 and model.angles.x:
+        raise ModelError("the exact filter over modes holds no state that is an angle; use particle(model)")
+    exact = _Exact(model, printed(model), accuracy)
+    back = exact.look_back if len(modes) == 1 else None
+    return Filter("aof-exact", modes[0], exact.init, exact.step, evidence=_evidence, look_back=back)
 
-    def before(state: State, runs: int) -> Iterable[tuple[Array, Kernels]]:
-        if state.memory:
-            return state.memory.predictions(densities.at(state.step - 1))
-        return [(np.arange(runs), prior.rows(np.zeros(runs, dtype=int)))]
 
-    def step(state: State, y: Array, usual_way: UsualWay | None = None) -> State:
-        law = densities.at(state.step)
-        way = partial(_quick_step, usual_way, state.memory, model.prior) if usual_way else _step
-        try:
-            try:
-                posterior, predicted, found = way(before(state, len(y)), y, law, accuracy, FINE[0], memory)
-            except TooNarrow:
-                posterior, predicted, found = way(before(state, len(y)), y, law, accuracy, FINE[1], memory)
-        except Unresolved as error:
-            raise Unresolved(f"step {state.step} of {model}: {error}; leave the exact filter out (--slow-runs 0)") from None
-        if model.angles.x:
-            posterior, predicted = _on_circle(found, law)
-        if state.memory:
-            found = found._replace(error=found.error + state.memory.error)
-        return State(state.step + 1, posterior, predicted, found)
+def _evidence(before: State, y: Array, after: State) -> Array:
+    return after.memory.log_likelihood
 
-    def evidence(state: State, y: Array, after: State) -> Array:
-        return log_evidence(before(state, len(y)), y, densities.at(state.step), after.memory.fine)
 
-    def look_back(states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
-        runs, room, visited = y.shape[1], memory, [init(y.shape[1])]
-        for state in states:
-            room -= state.memory.bytes()
-            visited.append(state if room >= 0 else state._replace(memory=state.memory.without_predictions()))
+@dataclass(frozen=True)
+class _Exact:
+    """The exact filter of a model, which is printed as the function `text`."""
+
+    model: Model | JumpModel
+    text: str
+    accuracy: float
+
+    def init(self, runs: int) -> State:
+        chances = self._prior()[:, 2]
+        numbers = np.zeros((runs, len(chances), NUMBERS))
+        numbers[:, :, PROBABILITY] = numbers[:, :, EXPECTED] = chances
+        begin = np.zeros(runs * len(chances) + 1, dtype=np.int64)
+        memory = PointMass(np.empty((0, KEPT)), begin, numbers, *np.zeros((3, runs)))
+        return initial_state(modes_of(self.model)[0])(runs)._replace(memory=memory)
+
+    def step(self, state: State, y: Array) -> State:
+        k, before = state.step, state.memory
+        panels, begin, numbers = self._advance(k, y[:, 0], before)
+        memory = PointMass(panels, begin, numbers, *np.zeros((3, len(y))))
+        posterior = _law(numbers, MEAN, memory.probability)
+        error = _error(numbers, posterior)
+        self._check(f"step {k}", memory, before.expected, error)
+        memory = memory._replace(
+            log_likelihood=np.where(np.isnan(y[:, 0]), 0.0, _log_sum(numbers[:, :, EVIDENCE])),
+            error=before.error + error,
+            variance=posterior.cov[:, 0, 0],
+        )
+        return State(k + 1, posterior, _law(numbers, NEXT_MEAN, memory.expected), memory)
+
+    def look_back(self, states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
+        """`Filter.look_back` of a model without modes."""
+        visited = [self.init(y.shape[1]), *states]
 
         def back(end: int) -> Iterator[State]:
-            memories = [state.memory for state in visited[1 : end + 1]]
-            known = [one.fine for one in memories], np.array([one.error for one in memories])
-            found = smoothed(*known, y, lambda k: before(visited[k], runs), densities, accuracy, bool(model.angles.x))
-            for step, one in zip(range(end, 0, -1), found, strict=True):
-                law = Gaussian(one.mean[:, None], one.variance[:, None, None])
-                yield State(step, law, law, one)
+            state, error = visited[end], np.zeros(y.shape[1])
+            yield state
+            for k in reversed(range(end - 1)):
+                before, filtered = visited[k].memory, visited[k + 1].memory
+                panels, begin, numbers = self._advance(k, y[k, :, 0], before, state.memory)
+                memory = filtered._replace(panels=panels, begin=begin, numbers=numbers)
+                law = _law(numbers, MEAN, memory.probability)
+                self._check(f"looking back to step {k}", memory, filtered.probability, _error(numbers, law))
+                error = error + _error(numbers, law)
+                memory = memory._replace(error=filtered.error + error, variance=law.cov[:, 0, 0])
+                state = State(k + 1, law, law, memory)
+                yield state
 
         return back
 
-    found = Filter("aof-exact", model, init, step, slow=True, evidence=evidence, look_back=look_back)
-    if not is_scalar(model) or densities.noiseless or densities.piece or is_nonlinear(model):
-        return found
-    return replace(found, quick=(step, lambda: partial(step, usual_way=compiled_usual_way(model))))
+    def _prior(self) -> Array:
+        """Mean, deviation, and the mode's probability, (J, 3)."""
+        mean, deviation = self.model.prior.mean[0], np.sqrt(self.model.prior.cov[0, 0])
+        deviation = max(deviation, SHARPEST * max(abs(mean), 1.0))
+        chances = self.model.first if isinstance(self.model, JumpModel) else np.ones(1)
+        return np.array([[mean, deviation, chance] for chance in chances], dtype=float)
 
+    def _transitions(self, k: int) -> Array:
+        """Probabilities of transitions from step k, (J, J); negative where they depend on the state."""
+        if not isinstance(self.model, JumpModel):
+            return np.ones((1, 1))
+        if self.model.by_state:
+            return np.full(self.model.chain.shape, -1.0)
+        return self.model.transition_at(k)
 
-def _on_circle(memory: PointMass, law: ScalarDensities) -> tuple[Gaussian, Gaussian]:
-    """Posterior and prediction of a state that is an angle: the filter works on the line, whole turns are dropped at the end."""
-    after, before = np.empty((2, len(memory.fine))), np.empty((2, len(memory.fine)))
-    for place, grid in enumerate(memory.fine):
-        after[:, place] = moments_on_circle(grid.x, grid.mass)
-    for rows, kernels in memory.predictions(law):
-        mean, variance = moments_on_circle(kernels.mu, kernels.mass)
-        before[:, rows] = mean, variance + (kernels.mass * kernels.sigma**2).sum(axis=1)
-    posterior, predicted = (Gaussian(mean[:, None], variance[:, None, None]) for mean, variance in (after, before))
-    return posterior, predicted
+    def _advance(self, k: int, y: Array, before: PointMass, later: PointMass | None = None) -> tuple[Array, Array, Array]:
+        """Panels of the posteriors at step k, where they begin, their numbers; looking back from `later`.
 
+        Threads take some trajectories each.  What they compute does not depend on how many there are;
+        joblib's workers have one each.
+        """
+        from numba import config
 
-class Corrected(NamedTuple):
-    """Posteriors of some trajectories: grids by number, and moments, estimated error, and whether adaptive, (runs,) each."""
+        from kfcourse.filters.exact.panels import advance
 
-    grids: dict[int, Grid]
-    mean: Array
-    variance: Array
-    error: Array
-    adaptive: Array
+        law, prior, last = load(self.text), self._prior(), max(k - 1, 0)
+        now_and_then = np.stack([constants(self.model, k), constants(self.model, last)])
+        chain = np.concatenate([self._transitions(k), self._transitions(last)])
+        turns = np.array([2 * np.pi if which else np.inf for which in reversed(self.model.angles)])
+        ahead = later or before
+        numbers, values, size = ahead.numbers.copy(), np.array(y, dtype=float), len(prior)
+        numbers[:, :, LOST] = before.numbers[:, :, LOST]
 
+        def chunk(start: int) -> tuple[Array, Array]:
+            runs = slice(start, start + CHUNK)
+            ends = slice(start * size, (start + CHUNK) * size + 1)
+            return advance(
+                law, now_and_then, turns, values[runs], prior,
+                before.panels, before.begin[ends], ahead.panels, ahead.begin[ends],
+                chain, later is not None, self.accuracy, numbers[runs].reshape(-1, NUMBERS),
+            )  # fmt: skip
 
-def corrected(
-    groups: Iterable[tuple[Array, Kernels]], y: Array, law: ScalarDensities, accuracy: float, fine_nodes: int
-) -> Corrected:
-    """The posteriors from predictions, (numbers of trajectories, kernels), and y (runs, 1); NaN for trajectories in no group."""
-    grids: dict[int, Grid] = {}
-    mean, variance, error = np.full((3, len(y)), np.nan)
-    adaptive = np.zeros(len(y), dtype=bool)
-
-    def correct(rows: Array, kernels: Kernels, hasty: bool) -> None:
-        values, resolved = y[rows], np.zeros(len(rows), dtype=bool)
-        error[rows] = np.inf
-        place, candidates = likeliest(kernels, values, law)
-        for some, found, good in _in_batch(kernels, values, law, place, candidates, accuracy, fine_nodes, hasty):
-            done = rows[some]
-            mean[done], variance[done], error[done] = found.mean, found.variance, found.error + found.inherited
-            for i, x, mass, density in zip(done.tolist(), found.x, found.mass, found.density, strict=True):
-                grids[i] = Grid(x, mass, density, uniform=True)
-            resolved[some] = good
-        left = np.flatnonzero(~resolved)
-        if not len(left):
-            return
-        better = _on_panels(kernels.rows(left), values[left], law, candidates.rows(left), accuracy, error[rows[left]])
-        for row, grid, error_there in better:
-            i = int(rows[left[row]])
-            grids[i], error[i], adaptive[i] = grid, error_there, True
-            mean[i], variance[i] = grid.mean(), grid.variance()
-        if hasty and np.isinf(error[rows]).any():
-            raise Unresolved("panels do not resolve a posterior")
-
-    for rows, kernels in groups:
-        if law.noiseless and not np.isnan(y[rows]).any():
-            for place, grid in zip(rows.tolist(), at_roots(kernels, y[rows], law), strict=True):
-                grids[place], error[place] = grid, 0.0
-                mean[place], variance[place] = grid.mean(), grid.variance()
-            continue
-        for chunk in chunks(len(rows), NODES[0] * kernels.mu.shape[1], ELEMENTS):
-            some, here, hasty = rows[chunk], kernels.rows(chunk), kernels.panels and accuracy >= TENTH
-            try:
-                correct(some, here, hasty)
-            except Unresolved:
-                if not hasty:
-                    raise
-                correct(some, here, hasty=False)
-    return Corrected(grids, mean, variance, error, adaptive)
-
-
-def _step(
-    groups: Iterable[tuple[Array, Kernels]], y: Array, law: ScalarDensities, accuracy: float, fine_nodes: int, room: float
-) -> tuple[Gaussian, Gaussian, PointMass]:
-    """Posterior, prediction of the next state, and memory after the measurements y (runs, 1)."""
-    grids, mean, variance, error, adaptive = corrected(groups, y, law, accuracy, fine_nodes)
-    fine = [grids[place] for place in range(len(y))]
-    predicted = np.empty((2, len(y)))
-    following, later = _following(fine, np.arange(len(y)), law, room, predicted)
-    memory = PointMass(fine, error, variance, adaptive, following, later)
-    posterior, prediction = (Gaussian(m[:, None], v[:, None, None]) for m, v in ((mean, variance), predicted))
-    return posterior, prediction, memory
-
-
-def _following(
-    grids: Sequence[Grid], rows: Array, law: ScalarDensities, room: float, moments: Array, usual: Array | None = None
-) -> tuple[list[tuple[Array, Kernels]], Array]:
-    """The predictions from posteriors of these numbers as far as there is room, and the others' numbers; writes their moments.
-
-    `usual` is told which are sums of kernels that overlap, and these are not kept: loops make them again.
-    """
-    kept, later = [], [np.empty(0, dtype=int)]
-    for places, kernels in predictions(grids, law):
-        some = rows[places]
-        moments[:, some] = kernels.moments()
-        again = usual is not None and kernels.spectral.all()
-        if usual is not None:
-            usual[some] = again
-        room -= 0 if again else kernels.bytes()
-        if again or room < 0:
-            later.append(some)
+        starts = range(0, len(values), CHUNK)
+        if len(starts) == 1 or config.NUMBA_NUM_THREADS == 1:
+            parts = [chunk(start) for start in starts]
         else:
-            kept.append((some, kernels))
-    return kept, np.sort(np.concatenate(later))
+            with ThreadPoolExecutor(config.NUMBA_NUM_THREADS) as pool:
+                parts = list(pool.map(chunk, starts))
+        lengths = np.concatenate([[0], *(np.diff(begin) for _, begin in parts)])
+        return np.concatenate([panels for panels, _ in parts]), np.cumsum(lengths), numbers
 
-
-def _quick_step(
-    usual_way: UsualWay,
-    memory: PointMass | None,
-    prior: Gaussian,
-    groups: Iterable[tuple[Array, Kernels]],
-    y: Array,
-    law: ScalarDensities,
-    accuracy: float,
-    fine_nodes: int,
-    room: float,
-) -> tuple[Gaussian, Gaussian, PointMass]:
-    """`_step` with the usual way and sums of kernels compiled: what the first leaves, and its predictions, go here as there."""
-    from kfcourse.filters.exact.loops import add_bells
-
-    numbers, size, usual = np.empty((5, len(y))), np.zeros(len(y), dtype=int), np.zeros(len(y), dtype=bool)
-    values = np.empty((3, 0))
-    known = memory.fine if memory else Packed.of_normal(prior, len(y))
-    if isinstance(known, Packed):
-        rows = np.flatnonzero(known.usual)
-        done = usual_way(known, rows, y[rows, 0], accuracy, fine_nodes)
-        values, numbers[:, rows], size[rows], usual[rows] = done.values, done.numbers, done.size, done.usual
-    if memory:
-        groups = memory._replace(later=memory.later[size[memory.later] == 0]).predictions(law)
-    else:
-        groups = ((some[size[some] == 0], kernels.rows(size[some] == 0)) for some, kernels in groups if (size[some] == 0).any())
-    groups = ((some, kernels._replace(bells=add_bells)) for some, kernels in groups)
-    found = corrected(groups, y, law, accuracy, fine_nodes)
-    others = size == 0
-    numbers[:3, others] = np.array(found[1:4])[:, others]
-    fine = Packed.together(values, size, usual, found.grids)
-    rest = np.flatnonzero(~usual)
-    following, later = _following([fine[i] for i in rest.tolist()], rest, law, room, numbers[3:], usual)
-    mean, variance, error, *predicted = numbers
-    later = np.union1d(later, np.flatnonzero(usual))
-    after = PointMass(fine, error, variance, found.adaptive, following, later)
-    posterior, prediction = (Gaussian(m[:, None], v[:, None, None]) for m, v in ((mean, variance), predicted))
-    return posterior, prediction, after
-
-
-def _in_batch(
-    kernels: Kernels,
-    y: Array,
-    law: ScalarDensities,
-    place: Place,
-    candidates: Candidates,
-    accuracy: float,
-    fine_nodes: int,
-    hasty: bool,
-) -> Iterator[tuple[Array, Posteriors, Array]]:
-    """Rows of kernels, their posteriors, and whether these are resolved; on the finest grid also those that are not.
-
-    In haste only few nodes are tried, and once: a posterior after one that needed panels is likely to need them, too.
-    """
-    look = looked(kernels, y, law, place)
-    left, least = np.arange(len(y)), np.zeros(len(y))  # trajectories to do, and the nodes that kernels need
-    spacings, most = (SPACINGS[:1], TRIED) if hasty else (SPACINGS, NODES[-1])
-    for spacing in spacings:
-        place, wanted = spaced(look.rows(left), candidates.rows(left), law, spacing)
-        sizes = np.searchsorted(NODES[:-1], np.maximum(wanted, least[left]))
-        again = np.zeros(len(left), dtype=bool)
-        for size in np.unique(sizes[np.array(NODES)[sizes] <= most]).tolist():
-            count, todo = NODES[size], np.flatnonzero(sizes == size)
-            for chunk in chunks(len(todo), count * kernels.mu.shape[1], ELEMENTS):
-                some = todo[chunk]
-                i, there = left[some], place.rows(some)
-                found = posteriors(kernels.rows(i), y[i], law, there, count)
-                least[i] = nodes_for_kernels(law, found, count, fine_nodes)
-                humps = candidates.rows(i)
-                if kernels.panels:  # the prediction may have humps of its own
-                    humps = humps.beside(of_kernels(kernels.rows(i), y[i], law))
-                unseen = hidden(humps, there, count)
-                found = found._replace(error=np.where(unseen, np.inf, found.error))
-                good = (found.error <= accuracy) & (least[i] <= count)
-                told = good | (spacing == spacings[-1]) | (count == NODES[-1])
-                yield i[told], Posteriors(*(array[told] for array in found)), good[told]
-                least[i] = np.maximum(least[i], np.where(good, 0, MORE * count))
-                again[some] = ~told
-        left = left[again]
-        if not len(left):
+    def _check(self, where: str, memory: PointMass, expected: Array, error: Array) -> None:
+        """Unresolved if a mode that is possible has no posterior, or an error is too large."""
+        empty = (np.diff(memory.begin).reshape(expected.shape) == 0) & (expected > NEGLIGIBLE)
+        wrong = empty.any(axis=1) | ~(error < TOLERABLE)
+        if not wrong.any():
             return
+        run = int(np.argmax(wrong))
+        statuses = memory.numbers[run, empty[run], STATUS].astype(int)
+        reason = REASONS[statuses[0] or len(REASONS) - 1] if len(statuses) else REASONS[0]
+        raise Unresolved(f"{where} of {self.model}, run {run}: {reason}; look at the measurement, or leave the exact filter out")
 
 
-def _on_panels(
-    kernels: Kernels, y: Array, law: ScalarDensities, candidates: Candidates, accuracy: float, error: Array
-) -> Iterator[tuple[int, Grid, float]]:
-    """Rows, their posteriors and errors on panels, where these are better than with nodes; together, or else one by one."""
-
-    def found(rows: slice) -> list[tuple[Grid, float]]:
-        return on_panels(kernels.rows(rows), y[rows], law, candidates.rows(rows), accuracy)
-
-    try:
-        results = found(slice(None))
-    except Unresolved:
-        results = []
-        for i in range(len(y)):
-            try:
-                results += found(slice(i, i + 1))
-            except Unresolved:
-                if not error[i] <= TOLERABLE:
-                    raise
-                results.append((Grid(*np.empty((3, 0))), np.inf))
-    for row, (grid, error_there) in enumerate(results):
-        if TOLERABLE < error_there < np.inf and not error[row] <= TOLERABLE:
-            raise Unresolved("a posterior has more humps, spikes or kinks than its nodes resolve")
-        if error_there < error[row]:
-            yield row, grid, error_there
+def _law(numbers: Array, mean: int, probability: Array) -> Gaussian:
+    """Mean and variance over all modes, from the columns `mean` and the one behind it."""
+    modes = np.moveaxis(numbers, 1, 0)
+    laws = [Gaussian(mode[:, mean, None], mode[:, mean + 1, None, None]) for mode in modes]
+    return mixture(laws, probability)
 
 
-def nodes_for_kernels(law: ScalarDensities, found: Posteriors, count: int, fine_nodes: int) -> Array:
-    """How many nodes a posterior needs, (T,), that the next prediction be a sum of kernels that overlap.
+def _log_sum(logs: Array) -> Array:
+    top = logs.max(axis=1, keepdims=True)
+    return (top + np.log(np.exp(logs - top).sum(axis=1, keepdims=True)))[:, 0]
 
-    If they are too many even for the finest grid, `fine_nodes`: it will be interpolated.
+
+def _error(numbers: Array, law: Gaussian) -> Array:
+    """Error of the mixture in its deviations, (runs,).
+
+    A mode's mean errs in the mode's deviations, its probability by that part of itself.
     """
-    wanted = (count - 1) * apart(*law.kernel(found.x), found.mass) + 1
-    return np.where(wanted <= NODES[-1], wanted, fine_nodes)
+    sd, apart = np.sqrt(numbers[:, :, VARIANCE]), np.abs(numbers[:, :, MEAN] - law.mean)
+    moved = numbers[:, :, PROBABILITY] * numbers[:, :, ERROR] * (sd + apart)
+    with np.errstate(invalid="ignore", divide="ignore"):  # what has no posterior is told by `_check`
+        return moved.sum(axis=1) / np.sqrt(law.cov[:, 0, 0])

@@ -19,8 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
+from numpy.typing import ArrayLike
 
-from kfcourse.errors import expect_sizes
+from kfcourse.errors import expect_not_negative, expect_sizes
 from kfcourse.laws import Array, Gaussian, apply, square_root, symmetric
 from kfcourse.linear.runs import check_prior
 
@@ -29,7 +30,7 @@ LAST_PLACES = 4  # units in the last place by which a moment that is computed in
 TRANSITIONS = 4096  # intervals remembered: sensors of fixed rates need a few, random delays many
 
 
-def rounding(*moments: Array | float) -> float:
+def rounding(*moments: ArrayLike) -> float:
     """By how much moments may differ that are the same but for rounding: more at stamps of Unix, which hold 2e-7 s."""
     largest = max(float(np.max(np.abs(moment), initial=0.0)) for moment in moments)
     return max(ROUNDING, LAST_PLACES * float(np.spacing(largest)))
@@ -105,12 +106,12 @@ class Dynamics:
         ValueError
             dt negative or not finite.
         """
-        if not (math.isfinite(dt) and dt >= 0):
-            raise ValueError(f"the interval must be finite and not negative, got {dt}")
+        expect_not_negative(interval=dt)
         n, size = len(self.A), float(np.abs(self.A).sum(axis=1).max())
         doublings = max(0, math.ceil(math.log2(max(2 * size * dt, 1.0))))
         block = np.zeros((2 * n + self.inputs,) * 2)
-        block[:n], block[n : 2 * n, n : 2 * n] = np.hstack([self.A, self.Qc, self.B]), -self.A.T
+        block[:n, :n], block[:n, n : 2 * n], block[:n, 2 * n :] = self.A, self.Qc, self.B
+        block[n : 2 * n, n : 2 * n] = -self.A.T
         Phi, X, Gamma = np.split(scipy.linalg.expm(block * (dt / 2**doublings))[:n], [n, 2 * n], axis=1)
         Q = X @ Phi.T
         for _ in range(doublings):

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kfcourse.angles import on_circle
+from kfcourse.errors import expect_not_negative, expect_positive
 from kfcourse.laws import Array, Measurement, square_root
 from kfcourse.scenarios.navigation.dynamics import rounding
 from kfcourse.symbolic.equations import compile_model
@@ -95,16 +96,12 @@ class Sensor:
     structure: Callable[[Model], Structure] = linearised
 
     def __post_init__(self) -> None:
-        for name in ("period", "offset", "latency", "jitter"):
-            if not math.isfinite(getattr(self, name) or 0.0):
-                raise ValueError(f"{self.name}: {name} must be finite, got {getattr(self, name)}")
-        if self.period is not None and self.period <= 0:
-            raise ValueError(f"{self.name}: the period must be positive, got {self.period}")
-        if self.latency < 0 or self.jitter < 0:
-            raise ValueError(
-                f"{self.name}: data cannot arrive before they are captured; latency and jitter must not be negative, "
-                f"got {self.latency} and {self.jitter}"
-            )
+        timing = {"latency": self.latency, "jitter": self.jitter}  # data cannot arrive before they are captured
+        expect_not_negative(**{f"{self.name}: {name}": value for name, value in timing.items()})
+        if self.period is not None:
+            expect_positive(**{f"{self.name}: the period": self.period})
+        if not math.isfinite(self.offset):
+            raise ValueError(f"{self.name}: offset must be finite, got {self.offset}")
         if self.model.timed:
             raise ModelError(
                 f"{self.name}: the meter depends on the step, {self.model.known.symbols}, but a sensor has moments of its own; "

@@ -10,9 +10,8 @@ from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.families import FAMILIES, family
-from kfcourse.lab.handin_sections import Block, StudentReport
-from kfcourse.lab.handin_text import law, lines_of, matrix
-from kfcourse.lab.report import printed
+from kfcourse.lab.report_sections import Block, StudentReport
+from kfcourse.lab.report_text import law, lines_of, matrix, printed
 from kfcourse.lab.short_names import Structures
 from kfcourse.lab.written_out import written_lines
 from kfcourse.montecarlo.comparison import Comparison
@@ -41,7 +40,7 @@ class PlainReport(StudentReport):
 
     def __init__(self, result: Comparison, words: dict[str, str]) -> None:
         super().__init__(result, words)
-        assert isinstance(result.model, Model)  # `write_handin` takes the other report for those with modes
+        assert isinstance(result.model, Model)  # `write_report` takes the other report for those with modes
         self.model = result.model
         self.structures = Structures(self.model)
         self.derivable: list[str] = []  # kinds whose formulas are found in time, and are not too long
@@ -130,13 +129,12 @@ class PlainReport(StudentReport):
         if kind == "gaussian" and isinstance(found := self.structures.quadrature, Checked):
             yield Block("text", self.said("by_quadrature", order=found.order))
             return
-        block = printed(self.structures, kind)
         yield Block("text", self.words["result"])
-        if FUNCTION_LATEX["tau"] not in block:
+        if (lines := printed(self.structures, kind)) is None:
             yield Block("text", self.words["not_printed"])
             return
         self.derivable.append(kind)
-        yield Block("formulas", lines=lines_of(block))
+        yield Block("formulas", lines=lines)
         if self.model.n == self.model.p == 1:
             structure = getattr(self.structures, kind)
             forms = {name: (name, str(sp.expand(structure[name]))) for name in FUNCTION_LATEX}

@@ -12,8 +12,7 @@ from kfcourse.filters import notation as s
 from kfcourse.filters.jump_equations import number, square, vector
 from kfcourse.lab import Variant, find_variant
 from kfcourse.lab.admission import admissions
-from kfcourse.lab.handin import LANGUAGES, write_handin
-from kfcourse.lab.report import recognised_modes
+from kfcourse.lab.report import LANGUAGES, recognised_modes, write_report
 from kfcourse.laws import Measurement, log_density
 
 MODEL = JumpModel.define(
@@ -83,16 +82,16 @@ def written(request, tmp_path_factory):
     names = ["aof-jump-gaussian", "imm", "gpb2", "fos-jump-gaussian", "fkp4-jump-gaussian", "aof-averaged", "aof-exact"]
     model = find_variant("J1-lasting").model
     filters = [one.one for one in admissions(model, names)]
-    result = compare(filters, model, 1000, 3, 1, slow_runs=128, progress=False, threads=1)
+    result = compare(filters, model, 128, 3, 1, progress=False, jobs=1)
     folder = tmp_path_factory.mktemp(request.param)
-    paths = write_handin(find_variant("J1-lasting"), result, folder, request.param, recognised_modes(result, filters))
-    texts = [(folder / name).read_text(encoding="utf-8") for name in ("handin.tex", "handin.html")]
+    paths = write_report(find_variant("J1-lasting"), result, folder, request.param, modes=recognised_modes(result, filters))
+    texts = [(folder / name).read_text(encoding="utf-8") for name in ("report.tex", "report.html")]
     return request.param, *texts, {path.name for path in paths}
 
 
 def test_it_tells_the_modes_their_chain_and_the_filters_of_the_variant(written):
     language, tex, page, names = written
-    assert {"handin-modes.svg", "handin-modes.pdf", "handin-accuracy.svg"} <= names
+    assert {"modes.svg", "modes.pdf", "accuracy.svg"} <= names
     assert "$2$ & faulty & $10$" in tex and "<td>sound</td>" in page
     assert r"\pi &= " in tex and "repair" in tex and r"q &= \begin{pmatrix}0.8 & 0.2\end{pmatrix}" in tex
     for block in (jump_equations.correction("j", 2), jump_equations.combination("j", 2), jump_equations.prediction("j", 2)):
@@ -114,8 +113,8 @@ def test_modes_with_other_equations_are_told_one_by_one(tmp_path):
         "0.9*x + v", "x + w", modes={"calm": {}, "curved": {"meter": "x + 0.1*x**2 + w"}}, transition=[0.8, 0.2]
     )
     both = [logic_dynamic([kind(mode) for mode in model.modes], model, model.first) for kind in (gaussian, linearised)]
-    result = compare(both, model, 400, 3, 1, progress=False, threads=1)
-    write_handin(Variant("own", "", model), result, tmp_path, "en")
-    tex = (tmp_path / "handin.tex").read_text(encoding="utf-8")
+    result = compare(both, model, 400, 3, 1, progress=False, jobs=1)
+    write_report(Variant("own", "", model), result, tmp_path, "en")
+    tex = (tmp_path / "report.tex").read_text(encoding="utf-8")
     assert tex.count("In mode $j=2$ (curved):") == 3  # the task, and two kinds of structural functions
     assert "In every mode" not in tex

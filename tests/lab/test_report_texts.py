@@ -1,10 +1,8 @@
-"""The student's report: what it says is what was computed, in both languages, and its files are whole."""
+"""The report: what it says is what was computed, in both languages, and its files are whole."""
 
 import dataclasses
 import pickle
 import re
-import tomllib
-from importlib import resources
 
 import numpy as np
 import pytest
@@ -13,14 +11,12 @@ from matplotlib.legend import Legend
 
 from kfcourse import Model, compare, gaussian, lab_filters, linearised, load_variants, run, simulate
 from kfcourse.filters import aof
-from kfcourse.lab import Variant, handin, report
+from kfcourse.lab import Variant, report_text
 from kfcourse.lab.admission import admissions
-from kfcourse.lab.handin import FIGURES, LANGUAGES, write_handin
-from kfcourse.lab.handin_plain import CATALOGUE
-from kfcourse.lab.handin_sections import StudentReport
-from kfcourse.lab.handin_text import filled, inline_tex
-from kfcourse.lab.refusals import cause
-from kfcourse.lab.report import ranges
+from kfcourse.lab.report import FIGURES, LANGUAGES, WORDS, write_report
+from kfcourse.lab.report_plain import CATALOGUE
+from kfcourse.lab.report_sections import StudentReport
+from kfcourse.lab.report_text import cause, filled, inline_tex, ranges
 from kfcourse.lab.short_names import LAB, title
 from kfcourse.lab.written_out import scalar_equations
 from kfcourse.laws import NegativeVariance
@@ -28,24 +24,22 @@ from kfcourse.montecarlo.comparison import Verdict
 from kfcourse.montecarlo.designing import NotFinite, failed
 from kfcourse.montecarlo.statistics import Estimate
 
-WORDS = tomllib.loads((resources.files("kfcourse.lab") / "handin.toml").read_text(encoding="utf-8"))
-
 
 @pytest.fixture(scope="module")
 def result():
     model = load_variants()["53"].model
-    return compare(lab_filters(model, [*LAB, "aof-exact"]), model, 2000, 4, 1, slow_runs=200, designs=2, progress=False)
+    return compare(lab_filters(model, [*LAB, "aof-exact"]), model, 200, 4, 1, design_runs=2000, progress=False)
 
 
 @pytest.fixture(scope="module")
 def written(result, tmp_path_factory):
-    """Text of handin.tex and handin.html by language."""
+    """Text of report.tex and report.html by language."""
     texts = {}
     for language in LANGUAGES:
         folder = tmp_path_factory.mktemp(language)
-        paths = write_handin(load_variants()["53"], result, folder, language)
+        paths = write_report(load_variants()["53"], result, folder, language)
         assert all(path.exists() for path in paths)
-        texts[language] = {name: (folder / name).read_text(encoding="utf-8") for name in ("handin.tex", "handin.html")}
+        texts[language] = {name: (folder / name).read_text(encoding="utf-8") for name in ("report.tex", "report.html")}
     return texts
 
 
@@ -63,7 +57,7 @@ def test_both_languages_have_the_same_words_with_the_same_places():
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_the_report_of_variant_53(written, language):
-    tex = written[language]["handin.tex"]
+    tex = written[language]["report.tex"]
     for formula in (
         r"{x}_{k+1} &= a(x_k, v_k) = c {x}_{k} + e {x}_{k} {v}_{k}",
         r"{y}_{k} &= b(x_k, w_k) = g {x}_{k} + f {x}_{k}^{2} {w}_{k}",
@@ -90,7 +84,7 @@ def test_the_report_of_variant_53(written, language):
     assert (r"\usepackage[english,russian]{babel}" in tex) == (language == "ru")
     assert tex.count(r"\begin{") == tex.count(r"\end{")
     assert not re.search(r"(?<!\\)%", tex), "an unescaped per cent sign hides the rest of its line"
-    page = written[language]["handin.html"]
+    page = written[language]["report.html"]
     assert (
         f'<html lang="{language}">' in page
         and "$" not in page
@@ -99,7 +93,7 @@ def test_the_report_of_variant_53(written, language):
 
 
 def test_numbers_and_verdicts_are_those_of_the_comparison(written, result):
-    tex = written["en"]["handin.tex"]
+    tex = written["en"]["report.tex"]
     value = result.error_variance("duof")[2]
     power = int(np.floor(np.log10(value.value)))
     assert rf"$({value.value / 10.0**power:.3f} \pm {value.standard_error / 10.0**power:.3f})\cdot 10^{{{power}}}$" in tex
@@ -116,7 +110,7 @@ class Told:
     entrants = ("aof-gaussian", "duof", "fos-gaussian")
 
     def __init__(self):
-        self.model, self.available = load_variants()["53"].model, self.entrants
+        self.model, self.names = load_variants()["53"].model, self.entrants
 
     def ranking(self):
         return [(name, Estimate(np.array(0.1), np.array(0.01), 9)) for name in self.entrants]
@@ -231,8 +225,8 @@ def test_only_scalar_models_are_written_out():
 def test_a_vector_variant_has_no_scalar_derivation(tmp_path):
     model = load_variants()["20"].model
     found = compare(lab_filters(model, ["aof-gaussian", "duof"]), model, 500, 3, 1, progress=False)
-    write_handin(load_variants()["20"], found, tmp_path, "ru")
-    tex = (tmp_path / "handin.tex").read_text(encoding="utf-8")
+    write_report(load_variants()["20"], found, tmp_path, "ru")
+    tex = (tmp_path / "report.tex").read_text(encoding="utf-8")
     assert "В среднем по шагам точнее всех ГАОФ; дисперсия ошибки наименее точного, ДУОФ, больше на $" in tex
     assert r"После знака $\pm$ указана стандартная ошибка." in tex
     assert r"\Psi_0 = D_0 = \begin{pmatrix}0.1 & 0 \\ 0 & 0.1\end{pmatrix}" in tex
@@ -252,9 +246,9 @@ def test_figures_speak_the_language_of_the_report(result, language, monkeypatch,
         draw(figure, *arguments, **options)
 
     monkeypatch.setattr(Figure, "savefig", listen)
-    paths = write_handin(load_variants()["53"], result, tmp_path, language)
+    paths = write_report(load_variants()["53"], result, tmp_path, language)
     plain = " ".join(re.sub(r"\$[^$]*\$", "", text) for text in said)
-    assert {path.stem for path in paths} == {"handin", *(f"handin-{name}" for name in FIGURES)}
+    assert {path.stem for path in paths} == {"report", *FIGURES}
     assert ("точный АОФ" in said and "ЛМФОС" in said) == (language == "ru")
     assert ("exact AOF" in said and "LMFOS" in said) == (language == "en")
     assert bool(re.search("[а-яА-Я]", plain)) == (language == "ru")
@@ -303,17 +297,17 @@ def test_one_filter_left(tmp_path):
     reasons = {one.name: one.reason for one in found if one.one is None}
     result = compare([one.one for one in found if one.one], model, 200, 3, 1, progress=False)
     result = dataclasses.replace(result, left_out=reasons)
-    paths = write_handin(Variant("one_left", "", model), result, tmp_path, "ru")
-    tex = (tmp_path / "handin.tex").read_text(encoding="utf-8")
+    paths = write_report(Variant("one_left", "", model), result, tmp_path, "ru")
+    tex = (tmp_path / "report.tex").read_text(encoding="utf-8")
     assert r"\item ЛАОФ, ЛФОС, ЛМФОС: уравнения не дифференцируемы" in tex and r"\text{при}" in tex and r"\text{for}" not in tex
     assert r"one\_left" in tex and "участвует один фильтр, ДУОФ" in tex
-    assert {path.stem for path in paths} == {"handin", "handin-accuracy", "handin-consistency"}
+    assert {path.stem for path in paths} == {"report", "accuracy", "consistency"}
 
 
 def test_formulas_that_are_too_long_are_not_printed(result, monkeypatch, tmp_path):
-    monkeypatch.setattr(report, "LONGEST", 10)
-    write_handin(load_variants()["53"], result, tmp_path, "ru")
-    tex = (tmp_path / "handin.tex").read_text(encoding="utf-8")
+    monkeypatch.setattr(report_text, "LONGEST", 10)
+    write_report(load_variants()["53"], result, tmp_path, "ru")
+    tex = (tmp_path / "report.tex").read_text(encoding="utf-8")
     assert (
         tex.count("Формулы слишком громоздки") == 2
         and "уравнения для данной модели" not in tex
@@ -341,5 +335,5 @@ def test_runs_of_steps_are_joined():
 @pytest.mark.quick
 def test_an_unknown_language_is_refused(tmp_path):
     with pytest.raises(ValueError, match="en or ru"):
-        write_handin(load_variants()["53"], None, tmp_path, "de")
-    assert list(tmp_path.iterdir()) == [] and handin.LANGUAGES == ("en", "ru")
+        write_report(load_variants()["53"], None, tmp_path, "de")
+    assert list(tmp_path.iterdir()) == [] and LANGUAGES == ("en", "ru")

@@ -1,19 +1,22 @@
-"""What all students' reports have: pieces, the comparison, the conclusion (`handin_plain`, `handin_modes`: what comes before)."""
+"""What all reports have: pieces, the comparison, the conclusion (`report_plain`, `report_modes`: what comes before)."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from kfcourse.lab.handin_text import filled, in_percent, power_of_ten
-from kfcourse.lab.refusals import cause
-from kfcourse.lab.report import LEVEL, ROUNDING, ranges, remarks, table_steps
+from kfcourse.lab.admission import Admission
+from kfcourse.lab.report_text import cause, filled, in_percent, power_of_ten, ranges
 from kfcourse.lab.short_names import FILTERS, Entry
+from kfcourse.laws import CONFIDENCE
 from kfcourse.montecarlo.comparison import EXACT, Comparison, Verdict
 
+ROUNDING = 1e-6  # per cent: equal filters may have lost half of their digits on the way
+LEVEL = f"{100 * CONFIDENCE:g} %"
 COLUMNS = 4  # filters side by side in a table, so that it fits a page
 FIGURES = ("accuracy", "relative", "ranking", "consistency")
 
@@ -35,7 +38,8 @@ class StudentReport:
 
     def __init__(self, result: Comparison, words: dict[str, str]) -> None:
         self.result, self.words = result, words
-        self.kinds = [kind for kind in ("linearised", "gaussian") if any(name.endswith(kind) for name in result.available)]
+        self.known: Sequence[Admission] = ()
+        self.kinds = [kind for kind in ("linearised", "gaussian") if any(name.endswith(kind) for name in result.names)]
         compared = result.has_bound or len(result.entrants) > 1
         self.figures = [name for name in FIGURES if compared or name not in ("relative", "ranking")]
 
@@ -60,6 +64,15 @@ class StudentReport:
         yield from self.filters()
         yield from self.experiment()
         yield from self.conclusion()
+        if self.known:
+            yield Block("section", self.words["admitted"])
+            heading = [self.words["filter"], self.words["admitted_verdict"], self.words["admitted_why"]]
+            rows = [[self.title(one.name), self.words[f"admitted_{one.verdict}"], self.why(one)] for one in self.known]
+            yield Block("table", self.words["admitted_text"], heading, rows)
+
+    def why(self, one: Admission) -> str:
+        """Why a filter is not admitted, or what to know of it."""
+        return cause(one.reason, self.result.model, self.words) if one.reason else one.says
 
     def task(self) -> Iterator[Block]:
         """The equations, the laws, and what is asked for."""
@@ -83,27 +96,35 @@ class StudentReport:
         result, words = self.result, self.words
         yield Block("section", words["experiment"])
         sentences = [self.said("experiment_text", runs=result.runs, steps=result.steps, seed=str(result.seed))]
-        if result.replicas:
-            designed = ", ".join(map(self.title, result.replicas.names))
-            sentences.append(self.said("designs", filters=designed, designs=result.designs))
+        if result.designed:
+            sentences.append(self.said("designs", filters=", ".join(map(self.title, result.designed))))
         if result.has_bound:
-            sentences.append(self.said("exact", runs=result.slow_runs))
+            sentences.append(words["exact"])
         yield Block("text", " ".join(sentences))
         if result.left_out:
             yield Block("text", words["left_out"])
             yield Block("items", lines=list(self.left_out()))
-        for start in range(0, len(result.available), COLUMNS):
-            names = result.available[start : start + COLUMNS]
+        for start in range(0, len(result.names), COLUMNS):
+            names = result.names[start : start + COLUMNS]
             estimates = [result.error_variance(name) for name in names]
             rows = [[f"${k}$", *(power_of_ten(one[k]) for one in estimates)] for k in table_steps(result)]
             yield Block("table", words["table_goes_on" if start else "table"], ["$k$", *map(self.title, names)], rows)
-        for kind, values in remarks(result):
-            whose = ", ".join(map(self.title, values.get("names", ())))
-            told = values | {"names": whose, "at": self.at(np.flatnonzero(values["steps"]).tolist())}
-            yield Block("text", self.said(f"remark_{kind}", **told))
+        for text in self.remarks():
+            yield Block("text", text)
         reference = words["of_exact"] if result.has_bound else self.title(result.control)
         for name in self.figures:
-            yield Block("figure", self.said(f"figure_{name}", reference=reference, level=LEVEL), [f"handin-{name}"])
+            yield Block("figure", self.said(f"figure_{name}", reference=reference, level=LEVEL), [name])
+        if "ranking" in self.figures:
+            gaps = [words["diverges"] if name in result.lost else in_percent(gap) for name, gap in result.ranking()]
+            rows = [[self.title(name), gap] for (name, _), gap in zip(result.ranking(), gaps, strict=True)]
+            yield Block("table", self.said("ranking_table", reference=reference), [words["filter"], "%"], rows)
+
+    def remarks(self) -> Iterator[str]:
+        """What a reader must know before he relies on distances from the bound."""
+        for kind, values in remarks(self.result):
+            whose = ", ".join(map(self.title, values.get("names", ())))
+            at = self.at(np.flatnonzero(values["steps"]).tolist())
+            yield self.said(f"remark_{kind}", **values | {"names": whose, "at": at})
 
     def left_out(self) -> Iterator[str]:
         """The filters that do not take part, and why, those with the same reason together."""
@@ -174,3 +195,19 @@ class StudentReport:
         entry = self.entries[name]
         exact = self.words["exact_title"] if name == EXACT else ""
         return exact or (entry.russian if self.words["language"] == "ru" else entry.title)
+
+
+def remarks(result: Comparison) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Kinds of `REMARKS` that this comparison needs, with what is put into the words: steps as a mask, names of filters."""
+    if result.without_error.any():
+        yield "rounding", {"steps": result.without_error}
+    if result.doubtful.any():
+        yield "doubtful", {"steps": result.doubtful}
+    if result.lost:
+        yield "diverged", {"names": [*result.lost], "steps": np.any([*result.lost.values()], axis=0)}
+
+
+def table_steps(result: Comparison) -> list[int]:
+    """The first steps and then some, to the last."""
+    steps = [k for k in (0, 1, 2, 3, 4, 5, 7, 10, 15, 20, 30, 50, 100, 200, 500, 1000) if k < result.steps]
+    return steps if steps[-1] == result.steps - 1 else [*steps, result.steps - 1]

@@ -6,20 +6,19 @@ from collections.abc import Iterator
 
 import sympy as sp
 
+from kfcourse.errors import NoClosedForm
 from kfcourse.filters import latex as equations_latex
 from kfcourse.filters.jump_equations import combination, correction, prediction
 from kfcourse.filters.optimal_structure import ESTIMATES, MEASUREMENTS
 from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.families import family
-from kfcourse.lab.handin_sections import Block, StudentReport
-from kfcourse.lab.handin_text import law, lines_of, matrix
-from kfcourse.lab.report import NO_FORMULAS, percent, printed
+from kfcourse.lab.report_sections import Block, StudentReport
+from kfcourse.lab.report_text import in_percent, law, lines_of, matrix, printed
 from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures, Structures
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.modes import Recognised
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.structure import FUNCTION_LATEX
 from kfcourse.symbolic.writing import number_latex
 
 # What the filters of optimal structure with modes remember.
@@ -33,7 +32,7 @@ class JumpReport(StudentReport):
 
     def __init__(self, result: Comparison, words: dict[str, str], modes: Recognised | None) -> None:
         super().__init__(result, words)
-        assert isinstance(result.model, JumpModel)  # `write_handin` takes the other report for those without
+        assert isinstance(result.model, JumpModel)  # `write_report` takes the other report for those without
         self.model = result.model
         self.modes = modes
         self.structures = JumpStructures(self.model)
@@ -90,18 +89,23 @@ class JumpReport(StudentReport):
         yield Block("text", words["functions_modes"])
         for kind in self.kinds:
             yield from self.defined(kind)
-            blocks = [printed(Structures(mode), kind) for mode in self.model.modes]
-            alike = all(block == blocks[0] for block in blocks)
-            said = [self.said("in_mode", j=f"$j={j}$", name=name) for j, name, _ in self.numbered]
-            for text, block in [(words["in_every_mode"], blocks[0])] if alike else zip(said, blocks, strict=True):
+            names = [self.said("in_mode", j=f"$j={j}$", name=name) for j, name, _ in self.numbered]
+            each = [self.of_mode(mode, kind) for _, _, mode in self.numbered]
+            if all(block == each[0] for block in each):
+                names, each = [words["in_every_mode"]], each[:1]
+            for text, block in zip(names, each, strict=True):
                 yield Block("text", text)
-                found = self.structures.quadrature if NO_FORMULAS in block else None
-                if isinstance(found, Checked):
-                    yield Block("text", self.said("by_quadrature", order=found.order))
-                elif FUNCTION_LATEX["tau"] in block:
-                    yield Block("formulas", lines=lines_of(block))
-                else:
-                    yield Block("text", words["not_printed"])
+                yield block
+
+    def of_mode(self, mode: Model, kind: str) -> Block:
+        """The structural functions of a mode, or why they are not printed."""
+        try:
+            lines = printed(Structures(mode), kind)
+        except NoClosedForm:
+            found = self.structures.quadrature
+            assert isinstance(found, Checked)  # else no filter with these functions takes part
+            return Block("text", self.said("by_quadrature", order=found.order))
+        return Block("text", self.words["not_printed"]) if lines is None else Block("formulas", lines=lines)
 
     def filters(self) -> Iterator[Block]:
         words, size = self.words, len(self.model.modes)
@@ -137,10 +141,10 @@ class JumpReport(StudentReport):
         yield from super().experiment()
         if self.modes is None:
             return
-        rows = [[self.title(name), "$" + percent(share).replace("±", r"\pm") + "$"] for name, share in self.modes.share.items()]
+        rows = [[self.title(name), in_percent(share)] for name, share in self.modes.share.items()]
         guess = [self.words["guess"], f"${100 * self.modes.guess:.1f}$"]
         yield Block("table", self.words["share_table"], [self.words["filter"], self.words["share"]], [*rows, guess])
-        yield Block("figure", self.words["figure_modes"], ["handin-modes"])
+        yield Block("figure", self.words["figure_modes"], ["modes"])
 
 
 def _number(mode: Model, name: sp.Symbol) -> str:

@@ -1,0 +1,156 @@
+"""Pieces of reports: laws, numbers and steps in LaTeX; text with $formulas$ for HTML and for LaTeX."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+import jinja2
+import numpy as np
+
+from kfcourse.errors import NotFinite, Reason, Refused
+from kfcourse.lab.short_names import Structures
+from kfcourse.laws import Array, Gaussian
+from kfcourse.limits import OutOfTime, time_limit
+from kfcourse.montecarlo.statistics import Estimate
+from kfcourse.symbolic.jumping import JumpModel
+from kfcourse.symbolic.markup import mathml
+from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.writing import by_thousands, formula_latex, number_latex
+
+FORMULAS = 60.0  # seconds that each kind of structural functions may take
+LONGEST = 40_000  # characters of LaTeX: some ten pages
+
+
+def filled(text: str, thousands: str, **values: object) -> str:
+    """The text with {name} replaced by what the name stands for; braces of LaTeX stay, `thousands` parts long numbers.
+
+    {name:step/steps} puts a number and the word that goes with it, in Russian one of three: {name:шаг/шага/шагов}.
+    """
+
+    def value(found: re.Match[str]) -> str:
+        one = values[found["name"]]
+        if not isinstance(one, int):
+            return str(one)
+        return by_thousands(str(one), thousands) + (f" {with_number(one, found['words'].split('/'))}" if found["words"] else "")
+
+    return re.sub(rf"\{{(?P<name>{'|'.join(values)})(:(?P<words>[^{{}}]*))?\}}", value, text)
+
+
+def with_number(number: int, words: list[str]) -> str:
+    """The word that goes with a number: of one and many, or in Russian of 1, 2 and 5, as 21, 22 and 25 have them too."""
+    if len(words) == 2:
+        return words[number != 1]
+    ends, teens = number % 10, number % 100 in range(11, 15)
+    return words[2 if teens or ends == 0 or ends > 4 else 0 if ends == 1 else 1]
+
+
+def lines_of(block: str) -> list[str]:
+    """The lines of an `aligned` block."""
+    body = re.sub(r"\\(begin|end)\{aligned\}", "", block)
+    return [line.strip() for line in body.split("\\\\\n")]
+
+
+def printed(structures: Structures, kind: str) -> list[str] | None:
+    """The lines of the structural functions of a kind; None if they are not found in time, or too long to print.
+
+    Raises
+    ------
+    NoClosedForm
+        There are no formulas.
+    """
+    try:
+        with time_limit(FORMULAS):
+            block = getattr(structures, kind).latex()
+    except OutOfTime:
+        return None
+    return lines_of(block) if len(block) <= LONGEST else None
+
+
+def law(given: Gaussian) -> str:
+    """N(0, 1); N(mean, covariance) with matrices for vectors."""
+    left, right = ("(", ")") if given.mean.size == 1 else (r"\left(", r"\right)")
+    return rf"\mathcal{{N}}{left}{matrix(given.mean[:, None])},\; {matrix(given.cov)}{right}"
+
+
+def matrix(values: Array) -> str:
+    """Numbers (r, c) in brackets; one alone without."""
+    if values.size == 1:
+        return number_latex(values.item())
+    rows = r" \\ ".join(" & ".join(map(number_latex, row)) for row in values)
+    return rf"\begin{{pmatrix}}{rows}\end{{pmatrix}}"
+
+
+def power_of_ten(estimate: Estimate) -> str:
+    """A value and its standard error on one power of ten: (6.51 ± 0.07)·10^-4."""
+    value, error, power = on_one_power(estimate)
+    if power is None:
+        return f"${value:g}$" if np.isfinite(value) else r"$\infty$"
+    return rf"$({value:.3f} \pm {error:.3f})\cdot 10^{{{power}}}$"
+
+
+def in_percent(estimate: Estimate) -> str:
+    """A part and its standard error in per cent, as a formula."""
+    found = percent(estimate)
+    return found if found == "–" else "$" + found.replace("±", r"\pm") + "$"
+
+
+def inline_html(text: str) -> str:
+    """Text for HTML: special characters escaped, $formulas$ as MathML."""
+    pieces = re.split(r"\$([^$]+)\$", text)
+    return "".join(
+        mathml(piece, "inline") if i % 2 else str(jinja2.filters.do_forceescape(piece)) for i, piece in enumerate(pieces)
+    )
+
+
+def inline_tex(text: str) -> str:
+    """Text for LaTeX: special characters escaped outside of $formulas$."""
+    pieces = re.split(r"(\$[^$]+\$)", text)
+    return "".join(piece if i % 2 else _typeset(escape_tex(piece)) for i, piece in enumerate(pieces))
+
+
+def _typeset(text: str) -> str:
+    return text.replace("–", "--").replace("—", "---").replace("\u202f", r"\,").replace("\u00a0", "~")
+
+
+def ranges(steps: Sequence[int], one: str = "{}") -> str:
+    """1, 3–5, 8: runs of steps joined, each number written as `one`."""
+    parts: list[list[int]] = []
+    for k in steps:
+        if parts and k == parts[-1][1] + 1:
+            parts[-1][1] = k
+        else:
+            parts.append([k, k])
+    return ", ".join(one.format(a) if a == b else f"{one.format(a)}–{one.format(b)}" for a, b in parts)
+
+
+def percent(part: Estimate) -> str:
+    """A part and its standard error in per cent, the latter with two digits: "1.19 ± 0.40"; "–" where there is none."""
+    if np.isnan(part.value):
+        return "–"
+    value, error = 100 * float(part.value), 100 * float(part.standard_error)
+    places = int(np.clip(1 - np.floor(np.log10(error)), 0, 6)) if np.isfinite(error) and error > 0 else 2
+    return f"{value:.{places}f} ± {error:.{places}f}"
+
+
+def on_one_power(estimate: Estimate) -> tuple[float, float, int | None]:
+    """Value and standard error over the power of ten of the value, and that power; None for zero and what is not finite."""
+    value, error = float(estimate.value), float(estimate.standard_error)
+    if not (np.isfinite(value) and value):
+        return value, error, None
+    power = int(np.floor(np.log10(abs(value))))
+    return value / 10.0**power, error / 10.0**power, power
+
+
+def escape_tex(text: str) -> str:
+    """Plain text for LaTeX."""
+    special = {"\\": r"\textbackslash{}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}", "±": r"$\pm$", "·": r"$\cdot$"}
+    return re.sub(r"[#$%&_{}\\^~±·]", lambda found: special.get(found[0], "\\" + found[0]), text)
+
+
+def cause(reason: Reason, model: Model | JumpModel, words: Mapping[str, str]) -> str:
+    """The sentence for an error of a kind, `left_KIND` of the report's words; other messages are quoted."""
+    if not (isinstance(reason, Refused | NotFinite) and reason.kind):
+        return words["left_other"].format(reason=reason)
+    parts = {name: formula_latex(part, model.x) if name == "term" else part for name, part in reason.parts.items()}
+    return words[f"left_{reason.kind}"].format(**parts)
