@@ -38,15 +38,15 @@ def predict(posterior: Array, x: Array, move: Law) -> Array:
 
 def run_filter(y: Array, x: Array, prior: Array, move: Law, see: Law) -> tuple[Array, Array, Array]:
     """Means, variances and ln p(y); a missing measurement (NaN) leaves the prediction."""
-    predicted, found, total = prior, [], 0.0
+    predicted, found, total = prior, [], np.zeros(())
     for y_k in y:
         missing = np.isnan(y_k)
         q, evidence = (predicted, 1.0) if missing else correct(predicted, y_k, x, see)
         found.append(moments(q, x)[1:])
-        total += np.log(evidence)
+        total = total + np.log(evidence)
         predicted = predict(q, x, move)
     z, p = np.array(found).T
-    return z, p, np.asarray(total)
+    return z, p, total
 
 
 def nodes_needed(low: float, high: float, sigma: float, error: float) -> Array:

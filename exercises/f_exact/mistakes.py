@@ -205,13 +205,13 @@ WRONG_RUNS = edits(
         "sum-of-densities",
         "The densities are added; the logarithms add, as the densities multiply.",
         "np.log(evidence)",
-        "0 if missing else evidence",
+        "(0 if missing else evidence)",
     ),
     (
         "last-only",
         "That is the last step alone; all measurements count.",
-        "total += np.log(evidence)",
-        "total = total if missing else np.log(evidence)",
+        "total + np.log(evidence)",
+        "(total if missing else np.log(evidence))",
     ),
 )
 

@@ -39,7 +39,7 @@ def correct_root(lam: Array, S: Array, y: Array, H: Array, R: Array) -> tuple[Ar
     """z and the lower triangular root of its covariance, diagonal positive: a QR decomposition of the pre-array."""
     p = len(y)
     array = np.block([[np.linalg.cholesky(R), H @ S], [np.zeros((len(S), p)), S]])
-    lower = np.linalg.qr(array.T, mode="r").T
+    lower = np.asarray(np.linalg.qr(array.T, mode="r")).T
     top, cross, root = lower[:p, :p], lower[p:, :p], lower[p:, p:]
     z = lam + cross @ np.linalg.solve(top, y - H @ lam)
     return z, root * np.sign(np.diag(root))

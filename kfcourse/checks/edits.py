@@ -81,8 +81,9 @@ def pieces(key: Answer) -> dict[str, FunctionType]:
     waiting: list[Callable] = [key]
     while waiting:
         function = waiting.pop(0)
-        own = isinstance(function, FunctionType) and (function is key or function.__module__.startswith(SETS))
-        if own and function.__name__ not in found:
+        if not isinstance(function, FunctionType) or function.__name__ in found:
+            continue
+        if function is key or function.__module__.startswith(SETS):
             found[function.__name__] = function
             waiting += [function.__globals__[name] for name in _names(function.__code__) if name in function.__globals__]
     return found

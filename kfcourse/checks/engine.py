@@ -312,15 +312,15 @@ class _Check:
     def _follows(self, found: list[Any]) -> tuple[str, ...]:
         """Earlier questions on whose wrong answers this one is right: all of them, or one."""
         key = self.question.key
-        key = key.step if isinstance(key, ForVariant) else key
-        if key is None:
+        own_step = key.step if isinstance(key, ForVariant) else key
+        if own_step is None:
             return ()
         earlier = {one.function: one for one in self.exercise.questions.values() if one.name in self.past.wrong}
-        own = [function for function in earlier if function in uses(key)]
+        own = [function for function in earlier if function in uses(own_step)]
         for chosen in ([own] if len(own) > 1 else []) + [[one] for one in own]:
             try:
                 answers = {function: self._in_form(earlier[function]) for function in chosen}
-                step = rebound(key, answers)
+                step = rebound(own_step, answers)
                 with time_limit(self.seconds):
                     theirs = [
                         like(step(*copy.deepcopy(values)), wanted)

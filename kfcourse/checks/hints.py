@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import combinations
 from operator import itemgetter
 from typing import Any
@@ -64,13 +65,13 @@ OF_ARGUMENT: tuple[tuple[str, Callable[[Any], Any]], ...] = (
 def results(case: Case) -> Iterator[Row]:
     """The right result with one simple thing done to it, another result, or an argument as it came."""
     for name, says, change in OF_RESULT:
-        yield name, says, lambda change=change: [change(value) for value in case.expected]
+        yield name, says, partial(applied, change, case.expected)
     for name, expected in case.others:
-        yield "another-result", f"That is what belongs in the place of {name}.", lambda expected=expected: expected
+        yield "another-result", f"That is what belongs in the place of {name}.", partial(list, expected)
     for place, name in enumerate(case.names if case.numeric else ()):
         given = [values[place] for values in case.arguments]
         if all(isinstance(value, np.ndarray) for value in given):
-            yield "unchanged", f"That is the argument `{name}`, unchanged.", lambda given=given: [*map(np.nan_to_num, given)]
+            yield "unchanged", f"That is the argument `{name}`, unchanged.", partial(applied, np.nan_to_num, given)
 
 
 def arguments(case: Case) -> Iterator[Row]:
@@ -78,7 +79,7 @@ def arguments(case: Case) -> Iterator[Row]:
     for i, j in combinations(range(len(case.names)), 2):
         if all(alike(values[i], values[j]) for values in case.arguments):
             says = f"It is right with `{case.names[i]}` and `{case.names[j]}` exchanged: which is which?"
-            yield "exchanged", says, lambda i=i, j=j: instead(case, {i: itemgetter(j), j: itemgetter(i)})
+            yield "exchanged", says, partial(instead, case, {i: itemgetter(j), j: itemgetter(i)})
     known = [(f"the argument `{name}`", [values[i] for values in case.arguments]) for i, name in enumerate(case.names)]
     known += [(f"the result {name}", list(values)) for name, values in case.others]
     known += [("one", [1.0 if case.numeric else sp.S.One] * len(case.expected))]
@@ -93,11 +94,7 @@ def arguments(case: Case) -> Iterator[Row]:
         ):
             much = "added, or forgotten" if name == "term" else "too many, or forgotten"
             says = f"It is right but for a {name} that is {what}: {much}?"
-            yield (
-                name,
-                says,
-                lambda change=change, values=values: [change(b, v) for b, v in zip(case.expected, values, strict=True)],
-            )
+            yield name, says, partial(applied, change, case.expected, values)
 
 
 def replaced(case: Case) -> Iterator[Row]:
@@ -107,13 +104,17 @@ def replaced(case: Case) -> Iterator[Row]:
             for which in range(3) if callable(case.arguments[0][place]) else (None,):
                 other = f"`{name}`" if which is None else f"result {which + 1} of `{name}`"
                 says = f"The right answer would give that with {words.format(other)} in the place of {other}."
-                yield (
-                    "replaced",
-                    says,
-                    lambda place=place, change=change, which=which: instead(
-                        case, {place: lambda values: changed(values[place], change, which)}
-                    ),
-                )
+                yield "replaced", says, partial(instead, case, {place: partial(altered, place, change, which)})
+
+
+def altered(place: int, change: Callable[[Any], Any], which: int | None, values: Sequence[Any]) -> Any:
+    """One of the arguments, changed."""
+    return changed(values[place], change, which)
+
+
+def applied(change: Callable[..., Any], *columns: Sequence[Any]) -> list[Any]:
+    """The change of what stands in each place."""
+    return [change(*row) for row in zip(*columns, strict=True)]
 
 
 def instead(case: Case, other: dict[int, Callable[[Sequence[Any]], Any]]) -> list[Any]:
@@ -358,12 +359,13 @@ POWERS = [sp.Rational(k, 2) for k in range(-8, 9)]
 def power(case: Case) -> Said | None:
     """Another power of an argument than in the right answer."""
     if case.numeric:
-        before, grown = (case.found, case.expected), {}
+        before = case.found, case.expected
+        grown: dict[str, list[list[float]]] = {}
         for factor in (2.0, 4.0):
             for name, *after in with_argument(case, factor):
                 grown.setdefault(name, []).append([ratio(new, old) for new, old in zip(after, before, strict=True)])
         for name, growth in grown.items():
-            if len(growth) == 2 and None not in (*growth[0], *growth[1]):
+            if len(growth) == 2 and np.isfinite(growth).all():
                 (mine, right), again = growth
                 if abs(right - mine) > 1e-6 and np.allclose(again, [mine**2, right**2], rtol=1e-6):  # powers, both of them
                     return "power", f"It grows with another power of `{name}` than it should: check the units."
@@ -377,15 +379,15 @@ def power(case: Case) -> Said | None:
     return None
 
 
-def ratio(new: Sequence[Any], old: Sequence[Any]) -> float | None:
-    """By how much everything has grown, if it has grown alike."""
+def ratio(new: Sequence[Any], old: Sequence[Any]) -> float:
+    """By how much everything has grown; NaN if it has not grown alike."""
     pairs = list(zip(new, old, strict=False))
     if any(np.shape(a) != np.shape(b) for a, b in pairs):
-        return None
+        return np.nan
     a, b = (np.concatenate([np.ravel(pair[which]) for pair in pairs]) for which in (0, 1))
     clear = np.abs(b) > 1e-9 * np.max(np.abs(b), initial=0.0)
     ratios = a[clear] / b[clear]
-    return float(ratios[0]) if len(ratios) and np.ptp(ratios) <= 1e-7 * np.abs(ratios).max() else None
+    return float(ratios[0]) if len(ratios) and np.ptp(ratios) <= 1e-7 * np.abs(ratios).max() else np.nan
 
 
 def narrow(case: Case) -> Said | None:
