@@ -252,13 +252,13 @@ def _checked(
         ):
             if mine != its:
                 raise ValueError(f"all modes need the same {what}: {mine} and {its} differ")
-    jumps = isinstance(transition, JumpModel)
+    jumping = transition if isinstance(transition, JumpModel) else None
     if probabilities is None:
-        probabilities = transition.first if jumps else np.full(size, 1.0 / size)
+        probabilities = np.full(size, 1.0 / size) if jumping is None else jumping.first
     start = _probabilities("probabilities", probabilities, (size,))
-    if jumps and transition.by_state:
-        return by_state(transition), start, first
-    given = transition.transition_at if jumps else transition
+    if jumping is not None and jumping.by_state:
+        return by_state(jumping), start, first
+    given = transition.transition_at if isinstance(transition, JumpModel) else transition
 
     def pi_at(k: int) -> Array:
         return _probabilities("transition", given(k) if callable(given) else given, (size, size))

@@ -32,6 +32,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
+from zlib import crc32
 
 import numpy as np
 from scipy.special import gammaln
@@ -125,9 +126,9 @@ def particle(
     expect(model, Model, "particle", JumpModel)
     if not isinstance(particles, int | np.integer) or particles < 2 or particles % 2:
         raise ModelError(f"a particle filter needs an even number of at least 2 particles, got {particles!r}")
-    jumps = isinstance(model, JumpModel)
-    modes = [Mode.of(each) for each in (model.modes if jumps else (model,))]
-    first, size = model.first if jumps else np.ones(1), particles // 2
+    jumping = model if isinstance(model, JumpModel) else None
+    modes = [Mode.of(each) for each in (model.modes if isinstance(model, JumpModel) else (model,))]
+    first, size = np.ones(1) if jumping is None else jumping.first, particles // 2
     prior, angles = modes[0].model.prior, modes[0].model.angles.x
     gaussian_init = initial_state(modes[0].model)
     root = square_root(prior.cov)
@@ -140,14 +141,14 @@ def particle(
 
     def chances(x: Array, mode: Array, k: int) -> Array:
         """Probabilities of the mode after step k, (runs, 2, M/2, J)."""
-        if not jumps:
+        if jumping is None:
             return np.ones((*mode.shape, 1))
-        return np.take_along_axis(model.transition_of(x, k), mode[..., None, None], axis=-2)[..., 0, :]
+        return np.take_along_axis(jumping.transition_of(x, k), mode[..., None, None], axis=-2)[..., 0, :]
 
     def drawn(rng: np.random.Generator, before: Clouds, y: Array, k: int) -> tuple[Array, Array, Array]:
         """x_k (runs, 2, M/2, n), its modes, and ln of p over the density with which both were drawn."""
         shape = (len(y), 2, size)
-        if before.x is None:
+        if before.x is None or before.mode is None:
             pi, n = np.broadcast_to(first, (*shape, len(modes))), len(prior.mean)
             at = np.tile(STARTS[:, None] / np.sqrt(n), (len(y), 1, 1, 1, n))
             moves = [lambda s: on_circle(prior.mean + s @ root.T, angles)] * len(modes)
@@ -157,10 +158,10 @@ def particle(
             moves = [partial(mode.moved, before.x, k=k - 1) for mode in modes]
             starts = [np.zeros((*shape, 1, mode.noises)) for mode in modes]
         states, logs, heights = [], [], []
-        for mode, moved, at in zip(modes, moves, starts, strict=True):
+        for way, moved, at in zip(modes, moves, starts, strict=True):
             s, log, height = rng.standard_normal((*shape, at.shape[-1])), np.zeros(shape), np.zeros(shape)
             if guided:
-                law, tells, height = mode.look(moved, at, y[:, None, None, None], k)
+                law, tells, height = way.look(moved, at, y[:, None, None, None], k)
                 wide, log_of_wide = _wide(rng, law, shape)
                 s, log = np.where(tells[..., None], wide, s), np.where(tells, log_of_wide, log)
             states.append(moved(s))
@@ -173,10 +174,11 @@ def particle(
         return np.choose(mode[..., None], states), mode, lifted + np.choose(mode, logs)
 
     def step(state: State, y: Array) -> State:
-        k, rng = state.step, np.random.default_rng([seed, len(y), state.step])
+        # The measurements are part of the seed: batches of a comparison draw other numbers.
+        k, rng = state.step, np.random.default_rng([seed, len(y), state.step, crc32(y.tobytes())])
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             x, mode, logs = drawn(rng, state.memory, y, k)
-            lost = ~(np.abs(x) < LARGEST).all(axis=-1)
+            lost = np.asarray(~(np.abs(x) < LARGEST).all(axis=-1))
             x = np.where(lost[..., None], np.clip(np.nan_to_num(x), -LARGEST, LARGEST), x)
             logs = logs + np.choose(mode, [each.log_likelihood(y[:, None, None], x, k) for each in modes])
             weights, log_mean = _normalised(np.where(lost, -np.inf, logs))
@@ -184,8 +186,8 @@ def particle(
             probability = [(weights * (mode == j)).sum(axis=-1).mean(axis=1) for j in range(len(modes))]
             kept = _systematic(rng, weights)
             x, mode = np.take_along_axis(x, kept[..., None], axis=2), np.take_along_axis(mode, kept, axis=2)
-            ahead = [each.moved(x, rng.standard_normal((*mode.shape, each.noises)), k) for each in modes]
-            ahead = np.choose(_chosen(rng, chances(x, mode, k))[..., None], ahead)
+            moves = [each.moved(x, rng.standard_normal((*mode.shape, each.noises)), k) for each in modes]
+            ahead = np.choose(_chosen(rng, chances(x, mode, k))[..., None], moves)
             predicted = _of_both(*weighted(ahead, np.full(mode.shape, 1 / size), angles), angles)
         effective = (1 / (weights**2).sum(axis=-1)).sum(axis=1)
         halves = np.moveaxis(mean, 1, 0)
@@ -193,7 +195,7 @@ def particle(
         return State(k + 1, _of_both(mean, cov, angles), predicted, memory)
 
     def look_back(states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
-        memories, law = [state.memory for state in states], transition(model)
+        memories, law = [state.memory for state in states], transition(modes[0].model)
 
         def back(end: int) -> Iterator[State]:
             rng = np.random.default_rng([seed, end])
@@ -206,7 +208,7 @@ def particle(
 
         return back
 
-    way_back = None if jumps else look_back
+    way_back = look_back if jumping is None else None
     return Filter(name, modes[0].model, init, step, slow=True, evidence=_evidence, look_back=way_back)
 
 
@@ -262,7 +264,7 @@ class Mode(NamedTuple):
             s, x = law.mean, moved(law.mean)
             h = self.meter(x, still, k)
             H = slopes(lambda s: self.meter(moved(s), still, k), s, SMALL)
-            B = slopes(lambda w, x=x: self.meter(x, w, k), still, 1.0)
+            B = slopes(lambda w, x=x: self.meter(x, w, k), still, 1.0)  # type: ignore[misc]
             R = B @ transpose(B)
             seen, value = Measurement(h - apply(H, s), H, H @ transpose(H) + R, R), near(y, h, turning)
             law = correct(Gaussian(np.zeros_like(s), np.eye(s.shape[-1])), seen, value)
