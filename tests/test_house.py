@@ -2,12 +2,15 @@
 
 import ast
 import builtins
+import collections
 import doctest
 import inspect
+import io
 import os
 import re
 import subprocess
 import sys
+import tokenize
 from graphlib import TopologicalSorter
 from importlib import import_module
 from pathlib import Path
@@ -182,3 +185,31 @@ def test_two_copies_of_the_project_are_not_mixed(tmp_path):
     mixed = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=other)
     assert f"kfcourse is that of {copy}" in mixed.stderr.splitlines()[-1]
     assert subprocess.run(command).returncode == 0
+
+
+# Code tokens of each room, without comments, docstrings and line ends.  A number may only fall: who writes less lowers it.
+ROOMS = {}
+OF_LAYOUT = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
+DOCUMENTED = (ast.Module, ast.FunctionDef, ast.ClassDef, ast.AsyncFunctionDef)
+
+
+def tokens(path):
+    """Code tokens of a file."""
+    source = path.read_text(encoding="utf-8")
+    first = {node.body[0] for node in ast.walk(ast.parse(source)) if isinstance(node, DOCUMENTED) and node.body}
+    texts = {node.lineno for node in first if isinstance(node, ast.Expr) and isinstance(getattr(node.value, "value", None), str)}
+    made = tokenize.generate_tokens(io.StringIO(source).readline)
+    return sum(t.type not in OF_LAYOUT and not (t.type == tokenize.STRING and t.start[0] in texts) for t in made)
+
+
+def test_no_room_grows():
+    root, found = Path(__file__).parent.parent, collections.Counter()
+    for path in root.rglob("*.py"):
+        parts = path.relative_to(root).parts
+        if parts[0] in ("kfcourse", "exercises", "book", "tests", "benchmarks"):
+            inside = parts[0] == "kfcourse"
+            found["/".join(parts[:2]) if inside and len(parts) > 2 else "kfcourse/*.py" if inside else parts[0]] += tokens(path)
+    assert found.keys() == ROOMS.keys()
+    assert {room: count for room, count in found.items() if count > ROOMS[room]} == {}
+    # a number far above what is there would hold nothing
+    assert {room: count for room, count in found.items() if count < 0.97 * ROOMS[room]} == {}

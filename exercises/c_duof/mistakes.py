@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kfcourse.checks.edits import edits
+from kfcourse.checks.editing import edits
 from kfcourse.exercises import messages
 from kfcourse.exercises.c_duof.keys import design_and_run, design_step, structure
 from kfcourse.exercises.shared import MOMENTS, OFFSET, regression

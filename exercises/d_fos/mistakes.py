@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kfcourse.checks.edits import edits
+from kfcourse.checks.editing import edits
 from kfcourse.exercises import messages
 from kfcourse.exercises.d_fos.keys import condition, condition_on_both, fos_step, mfos_step
 from kfcourse.exercises.shared import MOMENTS, OFFSET

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kfcourse.checks.edits import edits
+from kfcourse.checks.editing import edits
 from kfcourse.exercises import messages
 from kfcourse.exercises.i_track.keys import correct_root, matrices, process_noise, start_up, step
 

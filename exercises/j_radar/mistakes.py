@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kfcourse.checks.edits import edits
+from kfcourse.checks.editing import edits
 from kfcourse.exercises import messages
 from kfcourse.exercises.j_radar.keys import alpha_beta, cartesian, lag, meter_jacobian, noise_left, steady_gain
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kfcourse.checks.edits import edits
+from kfcourse.checks.editing import edits
 from kfcourse.exercises import messages
 from kfcourse.exercises.k_integration.keys import bias_error, error_meter, gained, integrate, lost, steady_state
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kfcourse.checks.edits import edits
+from kfcourse.checks.editing import edits
 from kfcourse.exercises import messages
 from kfcourse.exercises.l_time_tags.keys import correct, cost, dimension, fit_clock, fuse, move, own_time
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kfcourse.checks.edits import edits
+from kfcourse.checks.editing import edits
 from kfcourse.exercises import messages
 from kfcourse.exercises.m_smoothing.keys import gate, log_likelihood, neighbours, new_r, smooth, step_back, weight
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kfcourse.checks.edits import edits
+from kfcourse.checks.editing import edits
 from kfcourse.exercises.o_modes.keys import chain, decide, merged, mixed, posterior, two_steps
 
 TRANSPOSED = "The matrix is used the other way round: its row is the mode that is left, its column the mode that is entered."

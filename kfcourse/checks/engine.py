@@ -22,7 +22,7 @@ import sympy as sp
 from kfcourse.checks.case import Agree
 from kfcourse.checks.derived import Derivation
 from kfcourse.checks.diagnosis import GENERAL, Wrong, part_of
-from kfcourse.checks.edits import rebound, uses
+from kfcourse.checks.editing import rebound, uses
 from kfcourse.checks.equality import Places, Unusable, depends, equal, like, with_values
 from kfcourse.checks.question import (
     MISSING,

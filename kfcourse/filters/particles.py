@@ -32,7 +32,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
-from zlib import crc32
 
 import numpy as np
 from scipy.special import gammaln
@@ -174,8 +173,7 @@ def particle(
         return np.choose(mode[..., None], states), mode, lifted + np.choose(mode, logs)
 
     def step(state: State, y: Array) -> State:
-        # The measurements are part of the seed: batches of a comparison draw other numbers.
-        k, rng = state.step, np.random.default_rng([seed, len(y), state.step, crc32(y.tobytes())])
+        k, rng = state.step, np.random.default_rng([seed, len(y), state.step])
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             x, mode, logs = drawn(rng, state.memory, y, k)
             lost = np.asarray(~(np.abs(x) < LARGEST).all(axis=-1))

@@ -20,7 +20,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import combinations
 from typing import NamedTuple
 
@@ -195,12 +194,9 @@ def examine_all(
 
     `dask` is the address of a Dask scheduler whose workers do it instead.
     """
-    with cluster(dask) as far:
-        if far is None:
-            parallel = joblib.Parallel(n_jobs=max(1, min(jobs, len(variants))), return_as="generator")
-            done = parallel(joblib.delayed(examine)(one, runs, seed, ask) for one in variants)
-        else:
-            done = far.executor.map(partial(examine, runs=runs, seed=seed, ask=ask), variants)
+    with cluster(dask):
+        parallel = joblib.Parallel(n_jobs=max(1, min(jobs, len(variants))), return_as="generator")
+        done = parallel(joblib.delayed(examine)(one, runs, seed, ask) for one in variants)
         yield from tqdm(done, desc="checking", total=len(variants), unit="variant", disable=None)
 
 

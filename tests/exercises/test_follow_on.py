@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kfcourse.checks import Derivation, exercise, sets
-from kfcourse.checks.edits import rebound, uses
+from kfcourse.checks.editing import rebound, uses
 from kfcourse.checks.question import ForVariant
 
 FOLLOWING = [

@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 
 from kfcourse.checks import Derivation, ExerciseError, engine, exercise, sets
-from kfcourse.checks.edits import edited
+from kfcourse.checks.editing import edited
 from kfcourse.lab.variants import load_variants
 
 # Questions about the variant's model are asked for variants of all kinds.  The others are called with hidden functions, numbers:

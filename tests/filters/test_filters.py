@@ -434,7 +434,7 @@ def test_without_a_measurement_three_arguments_predict_from_the_prediction(famil
     """
     one = LINEAR["n=2, p=2"]
     model = one.model()
-    (filter_,) = design([family(linearised(model), 3)], [[exact_ensemble(one, 1, seed=3)[0]]])
+    (filter_,) = design([family(linearised(model), 3)], [exact_ensemble(one, 1, seed=3)[0]])
     state = filter_.step(filter_.init(1), np.full((1, 2), np.nan))
     expected = kalman_filter(model).step(kalman_filter(model).init(1), np.full((1, 2), np.nan))
     # regressions on singular covariances, as in the theorem above

@@ -107,7 +107,7 @@ def test_a_regression_leaves_no_error_on_its_ensemble_that_it_could_take_away(fa
     ensemble = [Instant(*step) for step in stored(CURVED, 400, 7, seed=5)]
     (filter_,) = design([by_name(family, linearised(CURVED), 3)], ensemble)
     state = filter_.init(400)
-    for ((x, y, x_next),) in ensemble:
+    for x, y, x_next, *_ in ensemble:
         lam, Psi = state.predicted
         measurement = linearised(CURVED).measure(lam, Psi)
         state = filter_.step(state, y)

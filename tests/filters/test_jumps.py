@@ -330,8 +330,8 @@ def test_without_jumps_a_linear_model_has_its_kalman_filter(family):
     plain = one.model()
     model = replace(TWO_CHAINS, modes=(plain, plain))
     build = {"fos": logic_dynamic_fos, "fkp": partial(logic_dynamic_fkp, memory=steps), "fbp": logic_dynamic_fbp}[family]
-    blocks = [[in_each_mode(moment, 2)] for moment in exact_ensemble(one, steps, seed=3)]
-    (found,) = design([build(model, [gaussian(plain)] * 2)], blocks)
+    moments = [in_each_mode(moment, 2) for moment in exact_ensemble(one, steps, seed=3)]
+    (found,) = design([build(model, [gaussian(plain)] * 2)], moments)
     y = simulate(plain, 4, steps, seed=8).y
     expected = run(kalman_filter(plain), y)
     np.testing.assert_allclose(run(found, y).mean, expected.mean, rtol=1e-8, atol=1e-8)

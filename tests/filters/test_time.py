@@ -140,7 +140,7 @@ def test_every_filter_is_the_kalman_filter_with_the_matrices_of_each_step():
     expected = [kalman_loop(y[:, i]) for i in range(y.shape[1])]
     mean = np.stack([[z for z, _ in one] for one in expected], axis=1)
     cov = np.stack([[p for _, p in one] for one in expected], axis=1)
-    for one in [*ready, *design(designs, ([instant] for instant in instants))]:
+    for one in [*ready, *design(designs, instants)]:
         found = run(one, y)
         np.testing.assert_allclose(found.mean, mean, rtol=1e-7, atol=1e-7, err_msg=one.name)
         if one.name.split("-")[0] in ("kalman", "aof", "iterated", "imm"):

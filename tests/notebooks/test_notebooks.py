@@ -571,7 +571,7 @@ def test_a_folder_has_its_line_as_soon_as_it_is_done(call, tmp_path, masters, mo
 
 
 def test_commands_import_what_they_need_when_they_have_something_to_do():
-    slow = ["nbconvert", "nbformat", "jupytext", "joblib", "matplotlib.figure", "IPython"]
+    slow = ["nbconvert", "nbformat", "jupytext", "IPython"]
     code = f"import sys, kfcourse.notebooks.commands; print([name for name in {slow} if name in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 
