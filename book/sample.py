@@ -9,7 +9,7 @@ from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parent.parent / "_build" / "sample"
 REPORT = FOLDER / "sample"  # into the book's folder goes what is in FOLDER
-ARGUMENTS = ["lab", "53", "--report", "ru", "--runs", "20000", "--slow-runs", "2000", "--steps", "21"]
+ARGUMENTS = ["lab", "53", "--report", "ru", "--runs", "20000", "--steps", "21"]
 
 
 def write() -> None:

@@ -35,7 +35,7 @@ from kfcourse.lab import plots
 from kfcourse.lab.admission import admissions
 from kfcourse.lab.report import conclusions, write_json
 from kfcourse.lab.short_names import LAB
-from kfcourse.lab.variants import VARIANT_KEYS, Variant, VariantError, load_variants, read_variant
+from kfcourse.lab.variants import KEYS, Variant, VariantError, load_variants, read_variant
 from kfcourse.symbolic.angular import AngleWarning
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.formula import CONSTANTS, FUNCTIONS, parse, symbol
@@ -404,7 +404,7 @@ SOUND = {"state": "c*x + 0.1*v", "meter": "x + w", "parameters": {"c": 0.9}}
 
 
 @cases(0.1)
-@given(st.dictionaries(st.sampled_from([*sorted(VARIANT_KEYS), "speed"]), ANYTHING, min_size=1, max_size=3), st.booleans())
+@given(st.dictionaries(st.sampled_from([*sorted(KEYS), "speed"]), ANYTHING, min_size=1, max_size=3), st.booleans())
 def test_any_table_is_a_variant_or_refused_by_its_name(table, completed):
     with soon(), warnings.catch_warnings():
         warnings.simplefilter("ignore", AngleWarning)

@@ -50,7 +50,7 @@ def kfcourse(tmp_path_factory):
 def test_every_command_runs_without_a_checkout(kfcourse):
     call, folder = kfcourse
     assert "53" in call("variants")
-    call("lab", 53, "--runs", 500, "--steps", 3, "--slow-runs", 0)
+    call("lab", 53, "--runs", 500, "--steps", 3)
     assert (folder / "lab-53" / "report.html").exists()
     call("exercises", "--variant", 53, "--sets", "e", "--out", "handed-out")
     assert "task.check" in (folder / "handed-out" / "53" / "e-comparison.ipynb").read_text(encoding="utf-8")

@@ -91,7 +91,7 @@ BAD = {
     ),
     "heavy tails": (dict(state="0.9*x + 0.9*x*v", meter="x + 0.3*w"), {"bounded": "too heavy tails"}),
     "noise only": (dict(state="0.9*x + v", meter="x*w"), {"observable": "hardly tells", "filters differ": SAME}),
-    "far too noisy": (dict(state="0.9*x + 0.2*sin(x) + v", meter="x + 20*w"), {"observable": r"leaves 9\d\.\d % .* of x$"}),
+    "far too noisy": (dict(state="0.9*x + 0.2*sin(x) + v", meter="x + 20*w"), {"observable": r"leaves 9\d(\.\d)? % .* of x$"}),
     "symmetric": (dict(state="0.9*x + 0.3*v", meter="x**2 + 0.3*w"), {"observable": "hardly tells"}),
     "a component not seen": (
         dict(state=["0.9*x1 + 0.3*v1", "0.8*x2 + 0.3*v2"], meter=["x1 + 0.3*(1 + x1**2)*w1"]),
@@ -160,11 +160,6 @@ def test_a_variant_whose_questions_cannot_be_posed_is_named_with_the_question():
     assert unposed(constant).says.startswith("question c3 of the exercises cannot be posed")
     assert examine(constant, FEWEST, ask=unposed).faults["solvable"] == unposed(constant).says
     assert unposed(SHIPPED["2"]) is None
-
-
-def test_too_few_trajectories_are_refused():
-    with pytest.raises(ValueError, match="at least 256 trajectories, got 255"):
-        examine(SHIPPED["53"], 255)
 
 
 # --- bounded
@@ -318,7 +313,7 @@ def test_what_is_forgotten_at_the_first_step_is_not_observable():
 def test_the_filters_of_a_linear_variant_do_not_differ_even_if_their_design_is_noisy():
     """With these trajectories GAOF and DUOF differ in score by five standard errors: the price of fitted coefficients."""
     result = compared(LINEAR, LAB, 10_000, 4)
-    score = result.score_difference("aof-gaussian", "duof")
+    score = result.mean_gap_difference("aof-gaussian", "duof")
     assert abs(score.value) > 5 * score.standard_error
     assert differences(result, DESIGNED) == Finding(
         False, "no two filters differ by more than the statistical error of 10000 trajectories", 0.0
@@ -590,7 +585,6 @@ def test_an_interrupt_leaves_no_file(call, tmp_path, monkeypatch):
         ("--generate", 1, "--variants", "mine.toml"),
         ("--check", "--out", "new.toml"),
         ("--out", "new.toml"),
-        ("--check", "--runs", 255),
         ("--check", "--jobs", 0),
         ("--check", "--seed", "x"),
     ],
