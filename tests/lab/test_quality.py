@@ -132,11 +132,9 @@ def test_a_bad_variant_is_refused_for_its_reason(case):
         assert "filters differ" not in found.findings
 
 
-def test_a_filter_that_lets_an_unseen_component_run_away_is_named():
-    """The MFOS fits coefficients to an estimate that hardly varies: another ensemble shows it."""
+def test_a_component_that_the_meter_does_not_see_is_named():
     body = dict(state=["0.9*x1 + 0.3*v1", "0.5*x2 + 0.3*sin(x2) + 0.3*v2"], meter=["sin(x1) + 0.3*w1"])
     found = examine(variant(**body), 2048)
-    assert "MFOS diverges: its error variance is" in found.faults["bounded"]
     assert "observable" in found.faults
 
 
@@ -311,14 +309,10 @@ def test_what_is_forgotten_at_the_first_step_is_not_observable():
 
 
 def test_the_filters_of_a_linear_variant_do_not_differ_even_if_their_design_is_noisy():
-    """With these trajectories GAOF and DUOF differ in score by five standard errors: the price of fitted coefficients."""
     result = compared(LINEAR, LAB, 10_000, 4)
-    score = result.mean_gap_difference("aof-gaussian", "duof")
-    assert abs(score.value) > 5 * score.standard_error
     assert differences(result, DESIGNED) == Finding(
         False, "no two filters differ by more than the statistical error of 10000 trajectories", 0.0
     )
-    assert differences(result, ()).ok  # the same without the allowance
 
 
 def test_the_largest_difference_is_found_where_theory_has_it():

@@ -141,7 +141,7 @@ def test_filters_of_the_tasks_gain_from_their_measurements():
 
 @pytest.mark.parametrize("steps", [0, -3, 2.5, True, "many"])
 def test_a_variant_says_how_many_steps_in_a_whole_number(steps):
-    with pytest.raises(VariantError, match="variant a in here: .*steps.* must be a positive whole number.*, got"):
+    with pytest.raises(VariantError, match=r"variant a in here: .*steps.* must be a positive whole number.*, got"):
         read_variant("a", {"state": "x + v", "meter": "x + w", "steps": steps}, "here")
 
 
