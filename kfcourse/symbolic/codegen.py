@@ -88,7 +88,7 @@ def _compiled(
     varying = [matrix.xreplace(renamed) for _, matrix in outputs if matrix.free_symbols]
     used = set().union(*(matrix.free_symbols for matrix in varying))
     taken = [place for place in places.values() if place[0] in used]
-    entries = [entry for matrix in varying for entry in matrix if not entry.is_number]
+    entries = [_in_floats(entry) for matrix in varying for entry in matrix if not entry.is_number]
     formulas = sp.lambdify([symbol for symbol, *_ in taken], entries, ["scipy", "numpy"], cse=_shared)
     assembled = [_assembler(matrix, key in vectors, arguments) for key, matrix in outputs]
 
@@ -98,6 +98,12 @@ def _compiled(
         return tuple(assemble(values, leads) for assemble in assembled)
 
     return Compiled(function, inspect.getsource(formulas).replace("_lambdifygenerated", name))
+
+
+def _in_floats(expression: sp.Expr) -> sp.Expr:
+    """With floats for fractions of numbers that a 64-bit integer does not hold: NumPy would take these for objects."""
+    large = [number for number in expression.atoms(sp.Rational) if max(abs(number.p), number.q) > 2**53]
+    return expression.xreplace({number: sp.Float(number, 17) for number in large})
 
 
 def _shared(expressions: Sequence[sp.Expr]) -> tuple[list[tuple[sp.Symbol, sp.Expr]], list[sp.Expr]]:
