@@ -144,15 +144,17 @@ class Model(NamedTuple):
 class Room(NamedTuple):
     """Where a step works: room for the hardest one, allocated once for many trajectories.
 
-    panels (PANELS + 4, COLUMNS)
-    kernel (4, KERNELS): rate r and r times centre, of half((r x - r centre)^2); weight, and the weight
-        of the factor u^2
-    group (3, KERNELS / Q): of Q kernels, where they begin and end, their least deviation
-    edge (3, 4 PANELS): a place; +1 where a law begins, -1 where it ends, 0 at a border; a deviation
-    later: three vectors (KERNELS,), what later measurements tell, as points, weights, deviations;
-        or laws whose moments are asked for
-    stack (2, TURNS + 2): parts of a panel that wait
-    point, work: four vectors (Q,) each, the first for arguments and results of the law
+    ::
+
+        panels (PANELS + 4, COLUMNS)
+        kernel (4, KERNELS): rate r and r times centre, of half((r x - r centre)^2); weight, and the weight
+            of the factor u^2
+        group (3, KERNELS / Q): of Q kernels, where they begin and end, their least deviation
+        edge (3, 4 PANELS): a place; +1 where a law begins, -1 where it ends, 0 at a border; a deviation
+        later: three vectors (KERNELS,), what later measurements tell, as points, weights, deviations;
+            or laws whose moments are asked for
+        stack (2, TURNS + 2): parts of a panel that wait
+        point, work: four vectors (Q,) each, the first for arguments and results of the law
     """
 
     panels: np.ndarray
