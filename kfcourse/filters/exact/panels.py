@@ -128,7 +128,7 @@ def density(logarithm):
     return half(-1 / LN2 * max(logarithm, -700.0))
 
 
-class Model(NamedTuple):
+class Setting(NamedTuple):
     """A model's function, the mode that is looked at, its constants at a step, and the turns of y and x.
 
     The turn of what is no angle is infinite.
@@ -804,7 +804,7 @@ def prediction(law, mode, constants, turns, posterior, begin, numbers, weight, r
 
     weight : probabilities of transitions (J, J), negative where they depend on the state.
     """
-    model = Model(law, mode, constants, turns[0], turns[1])
+    model = Setting(law, mode, constants, turns[0], turns[1])
     status, total, modes = FINE, Sum(0, 0, 0.0, 0.0), len(weight)
     for i in range(modes):
         rows, by_state = posterior[begin[i] : begin[i + 1]], weight[i, mode] < 0
@@ -862,7 +862,7 @@ def advance(law, constants, turns, y, prior, before, begin, later, later_begin, 
         for j in range(modes):
             lost += known[j, PROBABILITY] * known[j, LOST]
         for j in range(modes):
-            model = Model(law, j, constants[0], turns[0], turns[1])
+            model = Setting(law, j, constants[0], turns[0], turns[1])
             if first:
                 status, total = FINE, from_prior(prior[j, 0], prior[j, 1], prior[j, 2], room)
                 n = 2 if prior[j, 2] > 0 else 0

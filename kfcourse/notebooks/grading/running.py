@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -63,7 +64,8 @@ class Ran(NamedTuple):
     answers: dict[str, str]
 
 
-class Site(NamedTuple):
+@dataclass(frozen=True)
+class Site:
     """Where notebooks run: the package as they see it, and the sandbox."""
 
     stage: Path
