@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pathlib
 import re
 import secrets
 import shutil
@@ -12,7 +13,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -64,11 +64,10 @@ class Ran(NamedTuple):
     answers: dict[str, str]
 
 
-@dataclass(frozen=True)
-class Site:
+class Site(NamedTuple):
     """Where notebooks run: the package as they see it, and the sandbox."""
 
-    stage: Path
+    stage: pathlib.Path
     sandbox: Sandbox
 
 
