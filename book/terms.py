@@ -95,8 +95,7 @@ def _list(app, name: str) -> nodes.definition_list:
         russian = nodes.inline("", ", ".join(term.ru), classes=["kf-ru", "language-ru"])
         head += [nodes.Text(" "), russian]
         _, page = contents.page(app.env, term.page)
-        title = page.title.replace(" ★", "")
-        where = nodes.reference("", f"{page.number}. {title}" if page.number else title, internal=True)
+        where = nodes.reference("", f"{page.number}. {page.title}" if page.number else page.title, internal=True)
         where["refuri"] = app.builder.get_relative_uri(name, term.page) + f"#first-{term.identity}"
         place = nodes.inline("", "", where, classes=["kf-where"])
         meaning = nodes.paragraph("", f"{term.meaning} ", place)
