@@ -27,10 +27,9 @@ from kfcourse.filters import (
     particle,
     pointmass,
 )
-from kfcourse.filters.densities import likelihood, transition
-from kfcourse.linear.system import is_linear, linear_system, linear_systems
+from kfcourse.linear.system import is_linear
 from kfcourse.montecarlo.designing import design
-from kfcourse.montecarlo.ensemble import Ensemble, Instant, simulate
+from kfcourse.montecarlo.ensemble import Instant, simulate
 from kfcourse.montecarlo.experiment import compare, predictions, run
 from kfcourse.scenarios.navigation import Sensor
 from kfcourse.symbolic.equations import compile_model, compile_noiseless
@@ -147,22 +146,6 @@ def test_every_filter_is_the_kalman_filter_with_the_matrices_of_each_step():
             np.testing.assert_allclose(found.cov, cov, rtol=1e-7, atol=1e-9, err_msg=one.name)
 
 
-def test_the_matrices_are_those_of_the_page():
-    model = Changing.model()
-    assert is_linear(model) and model.timed
-    systems = linear_systems(model)
-    noise = Changing.options["state_noise"], Changing.options["meter_noise"]
-    for k in range(STEPS):
-        A, B, a, H, C, b = Changing.matrices(k)
-        system, shift, offset = systems(k)
-        Q, R = (M @ np.array(law["variance"]) @ M.T for M, law in zip((B, C), noise, strict=True))
-        expected = (A, Q, a + B @ noise[0]["mean"], H, R, b + C @ noise[1]["mean"])
-        for one, other in zip((system.A, system.Q, shift, system.H, system.R, offset), expected, strict=True):
-            np.testing.assert_allclose(one, other, rtol=1e-14, atol=1e-14)
-    with pytest.raises(ModelError, match="depends on the step"):
-        linear_system(model)
-
-
 def test_trajectories_satisfy_the_equations_of_each_step():
     """Without noises of the object and prior, x is one sequence; the rest is the meter's noise, in its place and size."""
     options = Changing.options | {
@@ -219,98 +202,7 @@ def test_the_exact_filter_takes_the_input_of_the_step_before():
     assert np.abs(run(pointmass(late), y).mean - expected.mean).max() > 1  # so the test would see it
 
 
-def growth_on_a_grid(y):
-    """Posterior means and variances of the growth model by sums over a grid, typed from its page."""
-    x = np.linspace(-45, 45, 3601)
-    density = np.exp(-0.5 * x**2 / 5)
-    found = []
-    for k, value in enumerate(y):
-        density = density * np.exp(-0.5 * (value - x**2 / 20) ** 2)
-        density /= density.sum()
-        mean = density @ x
-        found.append((mean, density @ (x - mean) ** 2))
-        centre = x / 2 + 25 * x / (1 + x**2) + 8 * np.cos(1.2 * k)
-        density = np.exp(-0.05 * (x[:, None] - centre) ** 2) @ density
-    return found
-
-
-def test_the_exact_filter_of_the_growth_model():
-    y = simulate(growth(), 3, 5, seed=4).y
-    found = run(pointmass(growth(), accuracy=1e-6), y)
-    for i in range(3):
-        for k, (mean, variance) in enumerate(growth_on_a_grid(y[:, i, 0])):
-            # the grid's 0.025 against hills of width 0.1 at least: its sums are exact; the filter promises 1e-6 a step
-            assert found.mean[k, i, 0] == pytest.approx(mean, abs=1e-4 * math.sqrt(variance))
-            assert found.cov[k, i, 0, 0] == pytest.approx(variance, rel=1e-4)
-
-
-def test_the_signal_of_a_pure_noise_meter_may_have_an_offset_that_changes():
-    """Stochastic volatility with a level b_k: known, so it is as if it were taken off y."""
-    plain = Model.define("0.9*x + 0.3*v", "exp(x/2)*w")
-    shifted = Model.define("0.9*x + 0.3*v", "exp(x/2)*w + u", inputs={"u": U})
-    y = simulate(plain, 4, 6, seed=5).y
-    moved = y + np.array(U[:6])[:, None, None]
-    np.testing.assert_allclose(run(pointmass(shifted), moved).mean, run(pointmass(plain), y).mean, rtol=1e-7, atol=1e-9)
-
-
-def test_particles_of_each_step():
-    model = Changing.model()
-    y = simulate(model, 3, STEPS, seed=6).y
-    found = run(particle(model, 20_000), y)
-    for i in range(3):
-        for k, (z, p) in enumerate(kalman_loop(y[:, i])):
-            # a tenth of the particles counts
-            assert (np.abs(found.mean[k, i] - z) < 5 * np.sqrt(np.diag(p) / 2000)).all()
-    law = transition(model)(np.array([1.0, 2.0]), 3)
-    A, B, a, *_ = Changing.matrices(3)
-    np.testing.assert_allclose(law.mean, A @ [1.0, 2.0] + B @ [0.2, -0.1] + a, rtol=1e-14)
-    assert likelihood(model)(y[3, :1], np.array([[1.0, 2.0]]), 3) != likelihood(model)(y[3, :1], np.array([[1.0, 2.0]]), 2)
-
-
 # ---------------------------------------------------------------- the growth model, by hand
-
-
-def extended_loop(y):
-    z, p, found = 0.0, 5.0, []
-    for k, value in enumerate(y):
-        slope = z / 10
-        gain = p * slope / (slope**2 * p + 1)
-        z, p = z + gain * (value - z**2 / 20), (1 - gain * slope) * p
-        found.append((z, p))
-        slope = 0.5 + 25 * (1 - z**2) / (1 + z**2) ** 2
-        z, p = z / 2 + 25 * z / (1 + z**2) + 8 * math.cos(1.2 * k), slope**2 * p + 10
-    return found
-
-
-def unscented_loop(y):
-    """Three points, spread 3; the noises are added."""
-    z, p, found = 0.0, 5.0, []
-    weights = np.array([2 / 3, 1 / 6, 1 / 6])
-    for k, value in enumerate(y):
-        x = z + math.sqrt(3 * p) * np.array([0, 1, -1])
-        signal = x**2 / 20
-        h = weights @ signal
-        cross, variance = weights @ ((x - z) * (signal - h)), weights @ (signal - h) ** 2 + 1
-        z, p = z + cross / variance * (value - h), p - cross**2 / variance
-        found.append((z, p))
-        x = z + math.sqrt(3 * p) * np.array([0, 1, -1])
-        following = x / 2 + 25 * x / (1 + x**2) + 8 * np.cos(1.2 * k)
-        z = weights @ following
-        p = weights @ (following - z) ** 2 + 10
-    return found
-
-
-@pytest.mark.filterwarnings("ignore::kfcourse.symbolic.quadrature.QuadratureWarning")
-@pytest.mark.parametrize(("build", "loop"), [(linearised, extended_loop), (unscented, unscented_loop)])
-def test_the_growth_model_by_a_loop_of_hand(build, loop):
-    model = growth()
-    y = simulate(model, 6, 30, seed=7).y
-    found = run(aof(build(model)), y)
-    for i in range(6):
-        expected = np.array(loop(y[:, i, 0]))
-        # errors of rounding grow where the slope 25 (1 - z^2)/(1 + z^2)^2 does: 25 at each step that passes near 0
-        np.testing.assert_allclose(found.mean[:, i, 0], expected[:, 0], rtol=1e-6, atol=1e-6)
-        np.testing.assert_allclose(found.cov[:, i, 0, 0], expected[:, 1], rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.filterwarnings("ignore::kfcourse.symbolic.quadrature.QuadratureWarning")
@@ -324,17 +216,6 @@ def test_the_growth_model_works_with_every_filter():
     assert not found.left_out and set(found.names) == {one.name for one in filters}
     extended, conditional = (found.error_variance(name).value.mean() for name in ("aof-linearised", "duof"))
     assert conditional < extended / 3  # the model's fame: linearising fails here
-
-
-def test_time_as_a_state_gives_the_same_as_time_in_the_formula():
-    """The trick that was needed before: a second state x2 = k, known exactly."""
-    trick = Model.define(
-        ["x1/2 + 25*x1/(1 + x1**2) + 8*cos(1.2*x2) + v1", "x2 + 1"], ["x1**2/20 + w"],
-        state_noise={"variance": 10}, prior={"mean": [0, 0], "variance": [5.0, 0.0]}, symbols={"v": ["v1"]},
-    )  # fmt: skip
-    y = simulate(growth(), 5, 12, seed=8).y
-    for ours, theirs in ((aof(linearised(growth())), aof(linearised(trick))),):
-        np.testing.assert_allclose(run(ours, y).mean[..., 0], run(theirs, y).mean[..., 0], rtol=1e-7, atol=1e-7)
 
 
 # ---------------------------------------------------------------- what may be written
@@ -434,13 +315,6 @@ def test_a_variance_must_be_one_at_the_steps_that_are_run():
             simulate(model, 3, steps + 1, seed=1)
     short = Model.define("0.9*x + u + v", "x + w", meter_noise={"variance": "exp(k)"}, inputs={"u": [0.0] * 60})
     assert short.known.steps == 60
-
-
-def test_models_without_time_pay_nothing(variant53):
-    structure = linearised(variant53)
-    assert structure.at(5) is structure and "known" not in structure.source()
-    densities = pointmass(variant53)
-    assert densities is not None and variant53.known.symbols == ()
 
 
 def test_what_is_printed_names_the_step():
@@ -555,26 +429,6 @@ def test_the_reason_is_told_in_the_formulas_of_the_model():
         gaussian(growth())
 
 
-@pytest.mark.parametrize("formula", [*JUMPS, *SMOOTH_ENOUGH])
-def test_where_there_is_no_closed_form_sampling_and_regressions_do(formula):
-    """Against the exact posterior on a grid at the first step: particles; the DUOF is the best affine function."""
-    model = with_meter(formula)
-    with pytest.raises(NoClosedForm):
-        gaussian(model)
-    x, y = simulate(model, 20_000, 1, seed=1)
-    grid = np.linspace(-6, 7, 4001)
-    _, meter = compile_model(model)
-    signal = np.broadcast_to(meter(grid[:, None], np.zeros((4001, 1))), (4001, 1))[:, 0]
-    few = y[0, :20, 0]
-    weight = np.exp(-0.5 * (grid - 0.4) ** 2 - 2 * (few[:, None] - signal) ** 2)
-    expected = (weight @ grid) / weight.sum(axis=1)
-    found = run(particle(model, 20_000), y[:, :20]).mean[0, :, 0]
-    np.testing.assert_allclose(found, expected, atol=5 / np.sqrt(20_000 / 10))
-    fitted = design([duof(model)], Ensemble(model, 20_000, 1, seed=1))[0]
-    slope, offset = np.polyfit(y[0, :, 0], x[0, :, 0], 1)
-    np.testing.assert_allclose(run(fitted, y).mean[0, :, 0], offset + slope * y[0, :, 0], rtol=1e-6, atol=1e-9)
-
-
 @pytest.mark.parametrize(
     ("state", "meter"),
     [
@@ -605,19 +459,3 @@ def test_a_choice_that_the_state_or_a_noise_makes_is_no_constant(state, meter):
     h, _, F, _ = found.measure(mean, variance)
     for moment, sample in ((tau, x[1].mean()), (theta, x[1].var()), (h, y[0].mean()), (F, y[0].var())):
         assert np.squeeze(moment) == pytest.approx(sample, abs=0.15)
-
-
-@pytest.mark.parametrize("build", [linearised, gaussian, unscented])
-def test_a_choice_between_noises_by_the_step_is_one_of_constants(build):
-    chosen = Model.define("0.9*x + (2*v if k < 2 else x*v)", "x + (w if 1 <= k < 3 else 3*w + x**2)")
-    for k in range(4):
-        plain = build(Model.define("0.9*x + " + ("2*v" if k < 2 else "x*v"), "x + " + ("w" if 1 <= k < 3 else "3*w + x**2")))
-        law = np.array([[0.3]]), np.array([[[0.7]]])
-        now = build(chosen).at(k)
-        if build is unscented:  # a noise that is only added at some steps gets points at all
-            np.testing.assert_allclose(now.predict(*law).mean, plain.predict(*law).mean, rtol=1e-12)
-            continue
-        for one, other in zip(
-            (*now.predict(*law), *now.measure(*law)), (*plain.predict(*law), *plain.measure(*law)), strict=True
-        ):
-            np.testing.assert_allclose(*np.broadcast_arrays(one, other), rtol=1e-12, atol=1e-14)

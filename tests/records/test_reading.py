@@ -5,9 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from kfcourse import Model, likelihood, linearised, read_measurements, run, simulate
-from kfcourse.filters import aof
-from kfcourse.records.reading import LARGEST, RecordError, RecordWarning, intervals
+from kfcourse import Model, read_measurements, simulate
+from kfcourse.records.reading import LARGEST, RecordError, RecordWarning
 from kfcourse.symbolic.reading import ModelError
 
 pytestmark = pytest.mark.quick
@@ -100,32 +99,6 @@ def test_of_a_single_column_an_empty_line_is_a_missing_measurement(read):
     """But not those before the names or after the last row, nor of several columns, where a missing row has its commas."""
     for end in ("", "\n", "\n\n\n"):
         np.testing.assert_array_equal(read(f"\n\ny\n1\n\n  \n4{end}", PLAIN).y.ravel(), [1, np.nan, np.nan, 4])
-
-
-def test_one_row_is_a_record(read):
-    assert read("time,y1,y2,a\n3,1,2,0\n").model.known.inputs["dt"] == (1.0,)
-    np.testing.assert_array_equal(intervals(np.array([3.0]), 0.25), [0.25])
-
-
-def test_a_filter_on_what_was_read_is_the_one_with_the_inputs_typed(read):
-    """Against the model built with the sequences themselves."""
-    rng = np.random.default_rng(1)
-    times = np.cumsum(rng.uniform(0.1, 1.5, 30))
-    push, y = rng.normal(size=30), rng.normal(size=(30, 2))
-    y[rng.random((30, 2)) < 0.3] = np.nan
-    rows = ["time,y1,y2,a"]
-    rows += [
-        ",".join("" if np.isnan(one) else repr(float(one)) for one in (t, *row, a))
-        for t, row, a in zip(times, y, push, strict=True)
-    ]
-    record = read("\n".join(rows))
-    dt = np.append(np.diff(times), np.diff(times)[-1])
-    typed = Model.define(
-        list(WALK.state_equation), list(WALK.meter_equation), {"q": 0.3}, symbols={"x": ["x", "u"]}, inputs={"dt": dt, "a": push}
-    )
-    for ours, theirs in zip(run(aof(linearised(record.model)), record.y), run(aof(linearised(typed)), y[:, None]), strict=True):
-        np.testing.assert_array_equal(ours, theirs)
-    assert np.isfinite(likelihood(aof(linearised(record.model)), record.y)).all()
 
 
 @pytest.mark.parametrize(
