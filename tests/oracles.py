@@ -59,27 +59,6 @@ def aof_trajectory(kind: str, measurements: list[float]) -> list[tuple[float, fl
     return found
 
 
-def kalman_trajectory(
-    measurements: list[float],
-    a: float,
-    q: float,
-    b: float,
-    r: float,
-    mean: float,
-    variance: float,
-    u: float = 0.0,
-    s: float = 0.0,
-) -> list[tuple[float, float]]:
-    """(z_k, p_k) of the scalar Kalman filter of x' = a x + u + noise(q), y = b x + s + noise(r)."""
-    found = []
-    for y in measurements:
-        gain = variance * b / (b * variance * b + r)
-        mean, variance = mean + gain * (y - b * mean - s), (1 - gain * b) * variance
-        found.append((mean, variance))
-        mean, variance = a * mean + u, a * variance * a + q
-    return found
-
-
 def regression(target, *regressors):
     """Affine least squares: (matrix, offset, residual variance) by Cov(t, r) Cov(r)^+."""
     rows = np.stack(regressors)

@@ -47,11 +47,3 @@ def test_a_notebook_imports_no_module_of_a_key(letter):
     for name in imported:
         source = (sets()[letter].folder / f"{name}.py").read_text(encoding="utf-8")
         assert not re.search(r"kfcourse\.exercises\.\w+\.", source)
-
-
-@pytest.mark.parametrize("letter", sets())
-@pytest.mark.parametrize("variant", ["53", "20"])  # scalar and vector formulas are printed by different code
-def test_code_of_solutions_fits_the_page(letter, variant):
-    notebook = render(read(letter), exercise(letter, variant))
-    lines = [line for cell in notebook.cells if cell.cell_type == "code" for line in cell.source.splitlines()]
-    assert [line for line in lines if len(line) > 78] == []

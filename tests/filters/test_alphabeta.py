@@ -12,7 +12,6 @@ from kfcourse.filters.alphabeta import (
     steady_beta,
     tracking_index,
 )
-from kfcourse.linear import covariances
 from kfcourse.linear.system import linear_system
 from kfcourse.scenarios.radar import kinematic
 
@@ -38,16 +37,6 @@ def test_the_coefficients_are_the_stationary_kalman_gain(alpha, order):
     gain = predicted @ system.H.T / (system.H @ predicted @ system.H.T + system.R)
     # The Riccati equation loses digits where the noises differ much: alpha = 0.01 has an index of 5e-5, squared 2.5e-9.
     np.testing.assert_allclose(gain[:, 0], np.array([alpha, beta / T, gamma / (2 * T**2)])[: order + 1], rtol=1e-6)
-
-
-def test_alpha_and_index_are_inverse():
-    for index in (1e-9, 1e-3, 0.2, 1.0, 50.0):
-        assert tracking_index(steady_alpha(index)) == pytest.approx(index, rel=1e-9)
-    # the textbook's form of the same formula, which cancels for a small index
-    index = 0.8
-    textbook = -(index**2 + 8 * index - (index + 4) * np.sqrt(index**2 + 8 * index)) / 8
-    assert steady_alpha(index) == pytest.approx(textbook, rel=1e-14)
-    assert steady_beta(0.6) == pytest.approx(2 * (2 - 0.6) - 4 * np.sqrt(1 - 0.6), rel=1e-14)
 
 
 # --- the estimates
@@ -114,18 +103,6 @@ def test_a_growing_memory_is_the_polynomial_through_all_measurements(order):
 # --- the covariance
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_the_covariance_from_a_prior_is_that_of_covariance_analysis(order):
-    coefficients = (0.4, 0.15, 0.05)[: order + 1]
-    model = planar(order=order, prior={"variance": np.diag(np.arange(1.0, 2 * order + 3)) + 0.2})
-    make = alpha_beta if order == 1 else alpha_beta_gamma
-    found = run(make(model, *coefficients, start="prior"), simulate(model, 2, 60, seed=1).y).cov
-    gain = np.kron((np.array([1, 1 / T, 1 / (2 * T**2)])[: order + 1] * coefficients)[:, None], np.eye(2))
-    system, _, _ = linear_system(model)
-    expected = covariances(system, model.prior.cov, 60, gain).posterior
-    np.testing.assert_allclose(found[:, 1], expected, rtol=1e-10, atol=1e-12)
-
-
 def test_it_can_be_built_for_a_model_written_by_hand():
     model = Model.define(["r + T*s + v", "s + w"], "r + n", {"T": 0.5}, symbols={"x": ["r", "s"], "v": ["v", "w"], "w": ["n"]})
     one = alpha_beta(model, 0.3, 0.1)
@@ -160,3 +137,13 @@ def test_other_models_are_refused():
 def test_coefficients_whose_errors_grow_are_refused(coefficients):
     with pytest.raises(ValueError, match="is unstable"):
         alpha_beta(planar(), *coefficients)
+
+
+def test_alpha_and_index_are_inverse():
+    for index in (1e-9, 1e-3, 0.2, 1.0, 50.0):
+        assert tracking_index(steady_alpha(index)) == pytest.approx(index, rel=1e-9)
+    # the textbook's form of the same formula, which cancels for a small index
+    index = 0.8
+    textbook = -(index**2 + 8 * index - (index + 4) * np.sqrt(index**2 + 8 * index)) / 8
+    assert steady_alpha(index) == pytest.approx(textbook, rel=1e-14)
+    assert steady_beta(0.6) == pytest.approx(2 * (2 - 0.6) - 4 * np.sqrt(1 - 0.6), rel=1e-14)

@@ -2,7 +2,6 @@
 
 import math
 
-import filterpy.kalman
 import numpy as np
 import pytest
 
@@ -117,26 +116,6 @@ def test_the_filter_is_the_slow_loop_of_the_page_in_both_forms(radar, y, form):
             assert_equal_to_rounding(found.mean[k, i], found.cov[k, i], z, p)
 
 
-class Filterpy(filterpy.kalman.ExtendedKalmanFilter):
-    """filterpy leaves the prediction of the state to its user."""
-
-    def predict_x(self, u=0):
-        self.x = f(self.x[:, 0])[:, None]
-
-
-def test_the_filter_is_filterpy_s_on_the_same_data(radar, y):
-    found = run(aof(linearised(radar)), y)
-    for i in range(y.shape[1]):
-        reference = Filterpy(4, 2)
-        reference.x, reference.P, reference.R = MEAN[:, None], COV, D_N
-        for k in range(STEPS):
-            reference.update(y[k, i][:, None], lambda x: S_jacobian(x[:, 0]), lambda x: S(x[:, 0])[:, None])
-            assert_equal_to_rounding(found.mean[k, i], found.cov[k, i], reference.x[:, 0], reference.P)
-            z = reference.x[:, 0]
-            reference.F, reference.Q = f_jacobian(z), g(z) @ D_XI @ g(z).T
-            reference.predict()
-
-
 # ---------------------------------------------------------------- atan2 in formulas
 
 
@@ -168,3 +147,8 @@ def test_an_angle_has_no_gaussian_moments_in_closed_form(radar, y):
     by_points, by_tangent = run(aof(unscented(radar)), y), run(aof(linearised(radar)), y)
     sd = np.sqrt(np.diagonal(by_tangent.cov, axis1=-2, axis2=-1))
     assert (abs(by_points.mean - by_tangent.mean) / sd)[-1].max() < 0.1
+
+
+def test_calls_of_two_arguments_nest_no_deeper_than_others():
+    with pytest.raises(FormulaError, match="nested more than 5 deep"):
+        parse("atan2(x, " * 6 + "x" + ")" * 6, {"x": symbol("x")})

@@ -28,17 +28,6 @@ pytestmark = pytest.mark.quick
 # ---------------------------------------------------------------- linear-Gaussian models
 
 
-def test_the_kalman_filter_is_the_loop_of_the_page():
-    one = LINEAR["scalar"]
-    (m, d), (m_v, d_v), (m_w, d_w) = ((mean.item(), cov.item()) for mean, cov in one.laws.values())
-    A, B, a, H, C, b = (array.item() for array in (one.A, one.B, one.a, one.H, one.C, one.b))
-    y = simulate(one.model(), 1, 20, seed=4).y
-    expected = oracles.kalman_trajectory(y[:, 0, 0].tolist(), A, B**2 * d_v, H, C**2 * d_w, m, d, u=B * m_v + a, s=C * m_w + b)
-    found = run(kalman_filter(one.model()), y)
-    np.testing.assert_allclose(found.mean[:, 0, 0], [z for z, _ in expected], rtol=1e-12)
-    np.testing.assert_allclose(found.cov[:, 0, 0, 0], [p for _, p in expected], rtol=1e-12)
-
-
 def test_the_kalman_filter_refuses_what_is_not_linear(variant53):
     with pytest.raises(ModelError, match="not linear"):
         kalman_filter(variant53)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.stats import chi2, multivariate_normal
+from scipy.stats import chi2
 
 from kfcourse import Model, gaussian, likelihood, linearised, predictions, run, simulate, smooth, unscented
 from kfcourse.filters import alpha_beta, aof, duof, fos, gated, imm, iterated, kalman_filter, mfos, particle, pointmass, robust
@@ -163,22 +163,6 @@ def test_gaps_neither_feed_nor_calm_impatience_and_the_next_measurement_passes_w
     gap = np.nan
     y = np.array([0.0, 50.0, gap, gap, 51.0, gap, -4000.0, 0.0])
     np.testing.assert_array_equal(weights(one, y).ravel(), [1, 0, gap, gap, 0, gap, 1, 0])
-
-
-# ---------------------------------------------------------------- what it does to tests and likelihood
-
-
-def test_in_the_likelihood_a_refused_measurement_stands_at_the_edge(plane):
-    y = simulate(plane, 4, 5, seed=9).y.copy()
-    y[2, 1] += [50, -80]
-    one = gated(kalman_filter(plane), 0.99)
-    found, law = likelihood(one, y), predictions(one, y)
-    expected = one.structure.measure(law.mean[2, 1], law.cov[2, 1])
-    at_edge = multivariate_normal(np.zeros(2), expected.F).logpdf(np.zeros(2)) - 0.5 * chi2.ppf(0.99, 2)
-    assert found[2, 1] == pytest.approx(at_edge, rel=1e-10)
-    others = np.ones((5, 4), dtype=bool)
-    others[2, 1] = False
-    np.testing.assert_allclose(found[others], likelihood(kalman_filter(plane), without(one, y))[others], rtol=1e-12)
 
 
 # ---------------------------------------------------------------- what is refused

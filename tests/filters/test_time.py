@@ -1,28 +1,20 @@
 """Models with time and known inputs: against loops typed by hand, and the Kalman filter with matrices that change."""
 
 import math
-from typing import ClassVar
 
 import numpy as np
 import oracles
 import pytest
 import sympy as sp
+from test_every_filter import LINEAR, Changing
 
 from kfcourse.filters import (
     alpha_beta,
     aof,
-    dfkp,
-    dfmp,
     duof,
-    fbp,
-    fkp,
     fos,
-    imm,
     iterated,
     kalman_filter,
-    mdfkp,
-    mdfmp,
-    mfkp,
     mfos,
     particle,
     pointmass,
@@ -30,7 +22,7 @@ from kfcourse.filters import (
 from kfcourse.linear.system import is_linear
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Instant, simulate
-from kfcourse.montecarlo.experiment import compare, predictions, run
+from kfcourse.montecarlo.experiment import compare, run
 from kfcourse.scenarios.navigation import Sensor
 from kfcourse.symbolic.equations import compile_model, compile_noiseless
 from kfcourse.symbolic.formula import FormulaError
@@ -43,7 +35,7 @@ from kfcourse.symbolic.structure import gaussian, linearised
 pytestmark = pytest.mark.quick
 
 STEPS = 6
-U = [0.7, -2.0, 3.0, 0.0, 1.5, -1.0, 0.4]  # of every step another value: a step too early or too late is seen
+U = list(Changing.U)
 
 
 def growth():
@@ -55,111 +47,33 @@ def growth():
 # ---------------------------------------------------------------- linear models whose matrices change
 
 
-class Changing:
-    """x' = A_k x + B_k v + a_k, y = H_k x + C_k w + b_k, as text and as arrays typed apart from it."""
-
-    text = (
-        ["(0.9 + 0.1*sin(k))*x1 + 0.2*x2 + (1 + t)*v1 + u", "0.1*x1 + (0.8 - 0.05*k)*x2 + 0.5*v2 - 2*u + v1"],
-        ["x1 + 0.1*k*x2 + (2 if t < 1 else 1)*w1 + u**2", "x2 + w2 + cos(t)"],
-    )
-    options: ClassVar = {
-        "inputs": {"u": U}, "interval": 0.5, "prior": {"mean": [1.0, -0.5], "variance": [[1.0, 0.3], [0.3, 0.8]]},
-        "state_noise": {"mean": [0.2, -0.1], "variance": [[0.5, 0.1], [0.1, 0.3]]},
-        "meter_noise": {"mean": [0.1, 0.3], "variance": [[0.4, 0.1], [0.1, 0.6]]},
-    }  # fmt: skip
-
-    @staticmethod
-    def matrices(k):
-        t, u = 0.5 * k, U[k]
-        A = np.array([[0.9 + 0.1 * math.sin(k), 0.2], [0.1, 0.8 - 0.05 * k]])
-        B = np.array([[1 + t, 0.0], [1.0, 0.5]])
-        H = np.array([[1.0, 0.1 * k], [0.0, 1.0]])
-        C = np.diag([2.0 if t < 1 else 1.0, 1.0])
-        return A, B, np.array([u, -2 * u]), H, C, np.array([u**2, math.cos(t)])
-
-    @classmethod
-    def model(cls):
-        return Model.define(*cls.text, **cls.options)
-
-
-def kalman_loop(y):
-    """The textbook's filter with the matrices of each step, one trajectory: y (steps, 2)."""
-    laws = {
-        key: (np.array(law["mean"]), np.array(law["variance"])) for key, law in Changing.options.items() if "i" not in key[:1]
-    }
-    (x, P), (m_v, D_v), (m_w, D_w) = laws["prior"], laws["state_noise"], laws["meter_noise"]
-    found = []
-    for k, value in enumerate(y):
-        A, B, a, H, C, b = Changing.matrices(k)
+@pytest.mark.parametrize("name", ["changing", "scalar", "n=2, p=2, more noises", "n=1, p=2"])
+def test_the_kalman_filter_is_the_loop_of_the_textbook_with_the_matrices_of_each_step(name):
+    one = LINEAR[name]
+    y = simulate(one.model(), 4, STEPS, seed=3).y
+    found = run(kalman_filter(one.model()), y)
+    (mean, P), (m_v, D_v), (m_w, D_w) = one.laws.values()
+    x = np.tile(mean, (4, 1))
+    for k in range(STEPS):
+        A, B, a, H, C, b = one.at(k)
         K = P @ H.T @ np.linalg.inv(H @ P @ H.T + C @ D_w @ C.T)
-        x, P = x + K @ (value - H @ x - C @ m_w - b), P - K @ H @ P
-        found.append((x, P))
-        x, P = A @ x + B @ m_v + a, A @ P @ A.T + B @ D_v @ B.T
-    return found
-
-
-def every_filter(model):
-    structures = [linearised(model), gaussian(model), unscented(model), gauss_hermite(model, 3)]
-    ready = [kalman_filter(model), *(aof(one) for one in structures), *(iterated(one, 3) for one in structures)]
-    ready.append(imm(structures[:2], [[0.9, 0.1], [0.1, 0.9]]))
-    designs = [duof(model)]
-    designs += [family(one, arguments) for one in structures[:2] for family in (fos, mfos) for arguments in (2, 3)]
-    designs += [family(one) for one in structures[:2] for family in (dfmp, mdfmp, fbp)]
-    designs += [family(one, STEPS) for one in structures[:2] for family in (fkp, mfkp, dfkp, mdfkp)]
-    return ready, designs
-
-
-def exact_ensemble(steps, seed):
-    """Trajectories whose sample moments are exactly the model's: affine functions of orthonormal columns."""
-    columns = 2 + 4 * steps
-    draws = np.random.default_rng(seed).normal(size=(3 * columns, columns))
-    orthonormal, _ = np.linalg.qr(draws - draws.mean(axis=0))
-    standard = iter((orthonormal * np.sqrt(len(draws))).T)
-
-    def draw(key):
-        law = Changing.options[key]
-        root = np.linalg.cholesky(np.array(law["variance"]))
-        return np.array(law["mean"]) + np.stack([next(standard), next(standard)], axis=-1) @ root.T
-
-    x, found = draw("prior"), []
-    for k in range(steps):
-        A, B, a, H, C, b = Changing.matrices(k)
-        y = x @ H.T + draw("meter_noise") @ C.T + b
-        following = x @ A.T + draw("state_noise") @ B.T + a
-        found.append(Instant(x, y, following))
-        x = following
-    return found
-
-
-def test_every_filter_is_the_kalman_filter_with_the_matrices_of_each_step():
-    """As for models without time: structural functions are exact, designs take exact moments; tolerances as there."""
-    model, instants = Changing.model(), exact_ensemble(STEPS, seed=3)
-    y = np.stack([one.y for one in instants])
-    ready, designs = every_filter(model)
-    expected = [kalman_loop(y[:, i]) for i in range(y.shape[1])]
-    mean = np.stack([[z for z, _ in one] for one in expected], axis=1)
-    cov = np.stack([[p for _, p in one] for one in expected], axis=1)
-    for one in [*ready, *design(designs, instants)]:
-        found = run(one, y)
-        np.testing.assert_allclose(found.mean, mean, rtol=1e-7, atol=1e-7, err_msg=one.name)
-        if one.name.split("-")[0] in ("kalman", "aof", "iterated", "imm"):
-            np.testing.assert_allclose(found.cov, cov, rtol=1e-7, atol=1e-9, err_msg=one.name)
+        x, P = x + (y[k] - x @ H.T - C @ m_w - b) @ K.T, P - K @ H @ P
+        np.testing.assert_allclose(found.mean[k], x, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(np.broadcast_to(found.cov[k], (4, *P.shape)), np.tile(P, (4, 1, 1)), rtol=1e-9, atol=1e-9)
+        x, P = x @ A.T + B @ m_v + a, A @ P @ A.T + B @ D_v @ B.T
 
 
 def test_trajectories_satisfy_the_equations_of_each_step():
-    """Without noises of the object and prior, x is one sequence; the rest is the meter's noise, in its place and size."""
-    options = Changing.options | {
-        "prior": {"mean": [1.0, -0.5], "variance": 0.0}, "state_noise": {"mean": [0.2, -0.1], "variance": 0.0}
-    }  # fmt: skip
-    x, y = simulate(Model.define(*Changing.text, **options), 4000, STEPS, seed=1)
-    expected = np.array([1.0, -0.5])
-    for k in range(STEPS):
-        A, B, a, H, C, b = Changing.matrices(k)
-        np.testing.assert_allclose(x[k], np.tile(expected, (4000, 1)), rtol=1e-12)
-        w = (y[k] - H @ expected - b) / np.diag(C)
-        assert (np.abs(w.mean(axis=0) - [0.1, 0.3]) < 4 * np.sqrt(np.array([0.4, 0.6]) / 4000)).all()
-        assert (np.abs(w.var(axis=0) - [0.4, 0.6]) < 4 * np.array([0.4, 0.6]) * np.sqrt(2 / 4000)).all()
-        expected = A @ expected + B @ [0.2, -0.1] + a
+    """What is left of them are the noises, in their places and sizes: four standard errors."""
+    one, runs = LINEAR["changing"], 4000
+    x, y = simulate(one.model(), runs, STEPS, seed=1)
+    _, (m_v, D_v), (m_w, D_w) = one.laws.values()
+    for k in range(STEPS - 1):
+        A, B, a, H, C, b = one.at(k)
+        for left, M, mean, cov in ((x[k + 1] - x[k] @ A.T - a, B, m_v, D_v), (y[k] - x[k] @ H.T - b, C, m_w, D_w)):
+            noise, d = np.linalg.solve(M, left.T).T, np.diag(cov)
+            assert (np.abs(noise.mean(axis=0) - mean) < 4 * np.sqrt(d / runs)).all()
+            assert (np.abs(np.cov(noise.T) - cov) < 4 * np.sqrt((np.outer(d, d) + cov**2) / runs)).all()
 
 
 def test_the_duof_of_the_growth_model_by_a_loop_of_hand():
@@ -178,28 +92,6 @@ def test_the_duof_of_the_growth_model_by_a_loop_of_hand():
         alpha = 0.5 * z + 3 * np.sin(z + 0.9 * k)
         (slope,), offset, _ = oracles.regression(x[k + 1], alpha)
         lam = slope * alpha + offset
-
-
-# ---------------------------------------------------------------- the exact filter
-
-
-def test_the_exact_filter_takes_the_input_of_the_step_before():
-    """It predicts x_k when y_k has come, with the input u_{k-1}: a linear model, whose exact filter is Kalman's."""
-    model = Model.define(
-        "(0.8 + 0.02*k)*x + 4*u + (0.5 + 0.1*k)*v", "x + u + (1 + 0.2*k)*w", inputs={"u": U}, prior={"mean": 0.3}
-    )
-    y = simulate(model, 5, 7, seed=3).y
-    expected, found = run(kalman_filter(model), y), run(pointmass(model, accuracy=1e-6), y)
-    # the filter promises 1e-6 posterior deviations a step, for some steps
-    np.testing.assert_allclose(found.mean, expected.mean, atol=1e-4)
-    np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-4)
-    predicted, prediction = predictions(kalman_filter(model), y), predictions(pointmass(model, accuracy=1e-6), y)
-    np.testing.assert_allclose(prediction.mean, predicted.mean, atol=1e-4)
-    np.testing.assert_allclose(prediction.cov, predicted.cov, rtol=1e-4)
-    late = Model.define(
-        "(0.8 + 0.02*k)*x + 4*u + (0.5 + 0.1*k)*v", "x + u + (1 + 0.2*k)*w", inputs={"u": [0, *U]}, prior={"mean": 0.3}
-    )
-    assert np.abs(run(pointmass(late), y).mean - expected.mean).max() > 1  # so the test would see it
 
 
 # ---------------------------------------------------------------- the growth model, by hand
@@ -281,21 +173,6 @@ def test_noise_laws_that_change_with_time_are_factors_in_the_equations(build):
     y = simulate(by_law, 4, 7, seed=9).y
     for one, other in zip(run(aof(build(by_law)), y), run(aof(build(by_hand)), y), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12)
-    several = Model.define(
-        ["x1 + v1", "x2 + v2"], ["x1 + w1", "x2 + w2"], state_noise={"variance": [2, "1 + k"], "mean": ["k", 1]},
-        meter_noise={"variance": "1 + t"}, interval=0.5,
-    )  # fmt: skip
-    for k in (0, 3):
-        now = build(several).at(k)
-        tau, Theta = now.predict(np.zeros((1, 2)), np.zeros((1, 2, 2)))
-        np.testing.assert_allclose(tau, [[k, 1]], atol=1e-12)
-        np.testing.assert_allclose(np.broadcast_to(Theta, (1, 2, 2))[0], np.diag([2, 1 + k]), rtol=1e-12, atol=1e-12)
-        np.testing.assert_allclose(
-            np.broadcast_to(now.measure(np.zeros((1, 2)), np.eye(2)).R, (1, 2, 2))[0],
-            (1 + k / 2) * np.eye(2),
-            rtol=1e-10,
-            atol=1e-10,
-        )
 
 
 def test_k_and_t_mean_what_else_they_name():
@@ -459,3 +336,19 @@ def test_a_choice_that_the_state_or_a_noise_makes_is_no_constant(state, meter):
     h, _, F, _ = found.measure(mean, variance)
     for moment, sample in ((tau, x[1].mean()), (theta, x[1].var()), (h, y[0].mean()), (F, y[0].var())):
         assert np.squeeze(moment) == pytest.approx(sample, abs=0.15)
+
+
+@pytest.mark.parametrize("build", [linearised, gaussian, unscented])
+def test_a_choice_between_noises_by_the_step_is_one_of_constants(build):
+    chosen = Model.define("0.9*x + (2*v if k < 2 else x*v)", "x + (w if 1 <= k < 3 else 3*w + x**2)")
+    for k in range(4):
+        plain = build(Model.define("0.9*x + " + ("2*v" if k < 2 else "x*v"), "x + " + ("w" if 1 <= k < 3 else "3*w + x**2")))
+        law = np.array([[0.3]]), np.array([[[0.7]]])
+        now = build(chosen).at(k)
+        if build is unscented:  # a noise that is only added at some steps gets points at all
+            np.testing.assert_allclose(now.predict(*law).mean, plain.predict(*law).mean, rtol=1e-12)
+            continue
+        for one, other in zip(
+            (*now.predict(*law), *now.measure(*law)), (*plain.predict(*law), *plain.measure(*law)), strict=True
+        ):
+            np.testing.assert_allclose(*np.broadcast_arrays(one, other), rtol=1e-12, atol=1e-14)

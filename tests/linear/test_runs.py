@@ -4,13 +4,9 @@ import control
 import numpy as np
 import pytest
 
-from kfcourse.filters.kalman import kalman_filter
 from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem, covariances, run, simulate, steady_state
 from kfcourse.linear.arithmetic import FORMS
-from kfcourse.linear.factored import factors, product
-from kfcourse.montecarlo.experiment import run as run_filter
-from kfcourse.symbolic.model import Model
 
 pytestmark = pytest.mark.quick
 
@@ -91,49 +87,11 @@ def test_every_form_is_the_filter_of_the_page(case, arithmetic, missing):
             np.testing.assert_allclose(laws.cov[:, i], [cov for _, cov in reference], **ROUNDING)
 
 
-@pytest.mark.parametrize("arithmetic", FORMS)
-def test_the_model_s_kalman_filter_is_the_same(arithmetic):
-    # x' = A x + C v + constant, y = H x + D w with correlated noises: the filter of a Model finds the matrices itself.
-    model = Model.define(
-        ["0.8*x1 + 0.3*x2 + 0.5*v1 + 0.2*v2 + 0.4", "-0.2*x1 + 0.9*x2 + 0.7*v2 - 0.1"],
-        ["1.2*x1 - 0.4*x2 + 0.6*w1 + 0.25"],
-        prior={"mean": [0.3, -1], "variance": [[2, 0.5], [0.5, 1]]},
-        state_noise={"variance": [[1, 0.3], [0.3, 0.5]]},
-    )
-    A, C = np.array([[0.8, 0.3], [-0.2, 0.9]]), np.array([[0.5, 0.2], [0, 0.7]])
-    Q = symmetrical(C @ np.array([[1, 0.3], [0.3, 0.5]]) @ C.T)
-    one = LinearSystem(A, np.array([[1.2, -0.4]]), Q, np.array([[0.36]]), np.eye(2))
-    prior = Gaussian(np.array([0.3, -1]), np.array([[2, 0.5], [0.5, 1]]))
-    shift = np.broadcast_to([0.4, -0.1], (9, 1, 2))
-    y = simulate(one, prior, 9, 3, 4, shift).y + 0.25
-    y[4, 1] = np.nan
-    estimates = run_filter(kalman_filter(model), y)
-    laws = run(one, prior, y - 0.25, shift, arithmetic).posterior
-    np.testing.assert_allclose(estimates.mean, laws.mean, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(estimates.cov, laws.cov, rtol=1e-12, atol=1e-12)
-
-
 def test_the_input_may_be_one_for_all_runs():
     one, prior = system(2, 1, 1, 7)
     u = np.random.default_rng(1).normal(size=(6, 1, 1))
     y = simulate(one, prior, 6, 3, 2, u).y
     np.testing.assert_array_equal(run(one, prior, y, u).posterior.mean, run(one, prior, y, np.tile(u, (1, 3, 1))).posterior.mean)
-
-
-# ---------------------------------------------------------------- simulation
-
-
-def test_simulated_moments_are_those_of_the_system():
-    one, prior = system(2, 2, 1, 6)
-    u = np.array([1.0, -2.0, 0.5])[:, None, None]
-    x, y = simulate(one, prior, 3, 40_000, 3, u)
-    mean, cov = prior.mean, prior.cov
-    for k in range(3):
-        for data, m, c in ((x[k], mean, cov), (y[k], one.H @ mean, one.H @ cov @ one.H.T + one.R)):
-            # 4 standard errors: of a mean, sd / sqrt(N); of a covariance of normal variables, at most sqrt(2 c_ii c_jj / N).
-            assert (abs(data.mean(axis=0) - m) < 4 * np.sqrt(np.diag(c) / 40_000)).all()
-            assert (abs(np.cov(data.T) - c) < 4 * np.sqrt(2 * np.outer(np.diag(c), np.diag(c)) / 40_000)).all()
-        mean, cov = one.A @ mean + one.B @ u[k, 0], one.A @ cov @ one.A.T + one.Q
 
 
 # ---------------------------------------------------------------- covariance analysis
@@ -146,31 +104,6 @@ def test_covariances_in_advance_are_those_of_the_run(case):
     np.testing.assert_allclose(found.posterior, laws.posterior.cov[:, 0], **ROUNDING)
     F = one.H @ found.predicted @ one.H.T + one.R
     np.testing.assert_allclose(found.gains @ F, found.predicted @ one.H.T, **ROUNDING)
-
-
-@pytest.mark.parametrize("constant", [True, False])
-def test_covariances_of_wrong_gains_against_simulation(constant):
-    # The filter believes in other noises; its true errors are those of `covariances` with its gains.
-    one, prior = system(3, 2, 0, 12)
-    believed = LinearSystem(one.A, one.H, 0.05 * one.Q, 4 * one.R)
-    runs, steps = 20_000, 6
-    gains = steady_state(believed).gain if constant else covariances(believed, 0.2 * prior.cov, steps).gains
-    x, y = simulate(one, prior, steps, runs, seed=13)
-    found = covariances(one, prior.cov, steps, gains)
-    estimate = np.tile(prior.mean, (runs, 1))
-    for k in range(steps):
-        K = gains if constant else gains[k]
-        for after, expected in ((False, found.predicted[k]), (True, found.posterior[k])):
-            if after:
-                estimate = estimate + (y[k] - estimate @ one.H.T) @ K.T
-            error = x[k] - estimate
-            # 4 standard errors of a covariance of normal variables: sqrt((c_ii c_jj + c_ij^2) / N)
-            bound = 4 * np.sqrt((np.outer(np.diag(expected), np.diag(expected)) + expected**2) / runs)
-            assert (abs(error.T @ error / runs - expected) < bound).all()
-        estimate = estimate @ one.A.T
-    optimal = covariances(one, prior.cov, steps).posterior
-    # Wrong gains lose in every direction, once two measurements of two components have reached all three states.
-    assert (np.linalg.eigvalsh((found.posterior - optimal)[1:]) > 0).all()
 
 
 def test_steady_state_against_python_control(case):
@@ -204,19 +137,6 @@ def ill_conditioned():
     return short, prior, y, right
 
 
-@pytest.mark.parametrize("arithmetic", FORMS)
-def test_float32_stays_float32(arithmetic, ill_conditioned):
-    # In this case the variance of a measurement gets negative.
-    short, prior, y, _ = ill_conditioned
-    for laws in run(short, prior, y, arithmetic=arithmetic):
-        assert (laws.mean.dtype, laws.cov.dtype) == (np.float32, np.float32)
-    one, calm = system(3, 2, 1, 4)
-    y, u = simulate(one, calm, 5, 3, 1).y, np.ones((5, 3, 1))
-    y[2, 1, 0] = np.nan
-    for laws in run(one.astype(np.float32), calm, y, u, arithmetic):
-        assert (laws.mean.dtype, laws.cov.dtype) == (np.float32, np.float32)
-
-
 def lost(mean, right, since=0):
     """Share of the runs in which the estimate is more than three standard deviations from the right one at some step."""
     sd = np.sqrt(np.diagonal(right.cov, axis1=-2, axis2=-1))
@@ -248,16 +168,6 @@ def test_short_words_do_not_break_the_factored_forms(arithmetic, ill_conditioned
 
 
 # ---------------------------------------------------------------- the pieces of the UD form
-
-
-@pytest.mark.parametrize("rank", [0, 1, 3, 4])
-def test_the_factors_are_triangular_and_give_the_covariance(rank):
-    root = np.random.default_rng(5).normal(size=(6, 4, rank))
-    cov = root @ root.swapaxes(1, 2)
-    unit, diagonal = factors(cov)
-    assert np.array_equal(unit, np.triu(unit)) and (np.einsum("kii->ki", unit) == 1).all() and (diagonal >= 0).all()
-    # what rounding leaves of the directions without variance: sixteen digits of the largest entry, times their growth
-    np.testing.assert_allclose(product(unit, diagonal), cov, atol=1e-11 * max(1.0, abs(cov).max()))
 
 
 def test_the_ud_form_takes_a_meter_without_noise():
@@ -349,3 +259,16 @@ def test_the_square_root_needs_noise_of_the_meter():
         law = run(silent, GOOD_PRIOR, np.ones((1, 1, 1)), arithmetic=arithmetic).posterior
         np.testing.assert_allclose(law.mean[0, 0], [0.5, 0.5], rtol=1e-14)  # x1 + x2 = 1 exactly
         np.testing.assert_allclose(law.cov[0, 0], [[0.5, -0.5], [-0.5, 0.5]], rtol=1e-14)
+
+
+@pytest.mark.parametrize("arithmetic", FORMS)
+def test_float32_stays_float32(arithmetic, ill_conditioned):
+    # In this case the variance of a measurement gets negative.
+    short, prior, y, _ = ill_conditioned
+    for laws in run(short, prior, y, arithmetic=arithmetic):
+        assert (laws.mean.dtype, laws.cov.dtype) == (np.float32, np.float32)
+    one, calm = system(3, 2, 1, 4)
+    y, u = simulate(one, calm, 5, 3, 1).y, np.ones((5, 3, 1))
+    y[2, 1, 0] = np.nan
+    for laws in run(one.astype(np.float32), calm, y, u, arithmetic):
+        assert (laws.mean.dtype, laws.cov.dtype) == (np.float32, np.float32)

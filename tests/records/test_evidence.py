@@ -5,8 +5,7 @@ import oracles
 import pytest
 
 from kfcourse import Model, gaussian, likelihood, linearised, simulate, unscented
-from kfcourse.filters import aof, duof, iterated, kalman_filter, pointmass
-from kfcourse.lab.variants import find_variant
+from kfcourse.filters import aof, duof, iterated, kalman_filter
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble
 from kfcourse.scenarios.benchmarks import local_level, nile
@@ -53,27 +52,7 @@ def test_the_flow_of_the_nile_has_its_likelihood():
         assert likelihood(build(local_level()), nile()).sum() == pytest.approx(-641.5856, abs=5e-5)
 
 
-def test_an_angle_s_innovation_goes_the_short_way_round():
-    model = Model.define("x + 0.1*v", "x + 0.3*w", angles={"x": ["x"], "y": ["y"]}, prior={"mean": 3.1, "variance": 0.01})
-    plain = Model.define("x + 0.1*v", "x + 0.3*w", prior={"mean": 3.1, "variance": 0.01})
-    y = 3.1 + 0.2 * np.sin(np.arange(9.0))
-    wrapped = y - 2 * np.pi * np.round(y / (2 * np.pi))
-    assert wrapped.min() < -3 < 3 < wrapped.max()
-    for build in FILTERS.values():
-        np.testing.assert_allclose(likelihood(build(model), wrapped), likelihood(kalman_filter(plain), y), rtol=1e-9)
-
-
 # ---------------------------------------------------------------- the exact filter, and particles
-
-
-def test_the_exact_filter_s_is_the_kalman_filter_s_on_linear_models():
-    for name in ("1", "k"):
-        model = find_variant("1").model if name == "1" else Model.define("0.9*x + (0.3 + 0.1*k)*v", "x + k/10 + 0.5*w")
-        y = simulate(model, 20, 20, seed=1).y.copy()
-        y[3, 4] = y[5:8, 2] = np.nan
-        found = likelihood(pointmass(model), y)
-        assert np.abs(found - likelihood(kalman_filter(model), y)).max() < 1e-3  # the accuracy that was asked for
-        assert (found[5:8, 2] == 0).all() and found[3, 4] == 0
 
 
 def test_what_has_no_density_is_told():

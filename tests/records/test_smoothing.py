@@ -8,9 +8,6 @@ from scipy.optimize import least_squares
 from kfcourse import Model, gauss_hermite, gaussian, linearised, simulate, smooth, unscented
 from kfcourse.filters import aof, duof, imm, iterated, kalman_filter
 from kfcourse.laws import Gaussian
-from kfcourse.linear import LinearSystem
-from kfcourse.linear import run as run_linear
-from kfcourse.linear import smooth as smooth_linear
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble
 from kfcourse.records import smooth_iterated
@@ -121,19 +118,6 @@ def dense(n, lag=None):
 def test_of_any_number_of_states_it_is_the_regression_on_what_it_knows(n, lag):
     model, y, expected = dense(n, lag)
     same(smooth(aof(linearised(model)), y, lag), expected)
-
-
-def test_given_matrices_are_smoothed_as_the_model_they_come_from():
-    A, _, Q, H, b, R = matrices(2)
-    system, rng = LinearSystem(A, H, Q, R, np.eye(2)), np.random.default_rng(5)
-    y, u = rng.normal(size=(STEPS, 3, 2)), rng.normal(size=(STEPS, 3, 2))
-    for measured in (y, with_gaps(np.concatenate([y, y], axis=1))[:, :3]):
-        found = smooth_linear(system, run_linear(system, Gaussian(*PRIOR), measured, u))
-        assert (found.cov.strides[1] == 0) == (measured is y)  # stored once where all runs miss nothing
-        for i in range(3):
-            steps = [(A, u[k, i], Q, H, 0 * b, R) for k in range(STEPS)]
-            mean, cov, _ = oracles.joint_posterior(steps, PRIOR, measured[:, i])
-            same(Gaussian(found.mean[:, i], found.cov[:, i]), Gaussian(mean, cov))
 
 
 # ---------------------------------------------------------------- nonlinear

@@ -61,16 +61,6 @@ def test_the_attractor_is_that_of_lorenz():
     np.testing.assert_allclose(x[1:], step(x[:-1]), rtol=1e-9, atol=1e-9)  # nothing disturbs it
 
 
-@pytest.mark.quick
-def test_measurements_of_the_bearings_have_the_errors_of_the_model():
-    x, y = bearings_data(200, 1)
-    assert np.isnan(y[0]).all() and y.shape == (501, 200, 2)
-    for i, (px, py) in enumerate(((-1, -2), (1, 1))):
-        noise = y[1:, :, i] - np.arctan2(x[..., 1] - py, x[..., 0] - px)
-        assert abs(noise.std() / 0.05 - 1) < 4 / np.sqrt(2 * noise.size)  # 4 standard errors
-        assert abs(noise.mean()) < 4 * 0.05 / np.sqrt(noise.size)
-
-
 def test_the_extended_filter_has_the_published_errors():
     """Means of roots of mean square errors over runs, within four standard errors of both simulations and the printed digits."""
     x, y = bearings_data(200, 1)

@@ -6,7 +6,7 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 from kfcourse.linear.system import linear_system
-from kfcourse.scenarios.errors import rms_by_part
+from kfcourse.scenarios.errors import rms_by_part, rms_difference
 from kfcourse.scenarios.flight import aircraft
 from kfcourse.scenarios.radar import CARTESIAN, SPHERICAL, cartesian, kinematic, measure_cartesian, measure_spherical, spherical
 
@@ -23,7 +23,6 @@ OTHER = dict(
     descent=7.0,
     ramp=6.0,
 )
-FLIGHTS = pytest.mark.parametrize("flight", [{}, OTHER], ids=["default", "other"])
 
 
 def test_the_path_is_that_of_an_integrator_that_knows_only_speed_and_turn_rate():
@@ -51,33 +50,7 @@ def test_the_path_is_that_of_an_integrator_that_knows_only_speed_and_turn_rate()
     # Tolerance 1e-12 of 4e4 m over some 10^3 steps; the kinks of the ramps and the interpolation between steps cost more.
     np.testing.assert_allclose(track.position, solved[:, :3], rtol=0, atol=1e-4)
     np.testing.assert_allclose(np.linalg.norm(track.velocity[:, :2], axis=1), solved[:, 3], rtol=0, atol=1e-6)
-
-
-@FLIGHTS
-def test_the_five_parts_are_as_described(flight):
-    track = aircraft(0.5, **flight)
-    speeds, radii = flight.get("speeds", (200.0, 130.0)), flight.get("radii", (6_000.0, 10_000.0))
-    speed = np.linalg.norm(track.velocity[:, :2], axis=1)
-    turning = (track.velocity[:, 0] * track.acceleration[:, 1] - track.velocity[:, 1] * track.acceleration[:, 0]) / speed**2
-    parts = [track.part == number for number in range(1, 6)]
-    assert np.array_equal(np.unique(track.part), [1, 2, 3, 4, 5])
-    assert (np.diff(track.part) >= 0).all()
-    rounding = 1e-12
-    assert np.abs(track.acceleration[parts[0]]).max() < rounding
-    assert np.ptp(track.position[parts[0] | parts[1] | parts[2], 2]) == 0
-    for part, radius, value in zip((parts[1], parts[3]), radii, speeds, strict=True):
-        assert np.abs(speed[part] - value).max() < 1e-9
-        assert np.abs(turning[part]).max() == pytest.approx(value / radius, rel=1e-9)
-        # away from the two ramps it is a circle: equal distances from one centre
-        inside = np.where(part)[0][40:-40]
-        left = np.column_stack([-track.velocity[inside, 1], track.velocity[inside, 0]])
-        centres = track.position[inside, :2] + left / turning[inside, None]
-        assert np.ptp(centres, axis=0).max() < 1e-6  # rounding of positions of 4e4 m over the sum of 10^3 pieces
-    assert np.abs(turning[parts[2] | parts[4]]).max() < rounding
-    assert (np.diff(speed[parts[2]]) <= rounding).all()
-    assert speed[parts[2]][-1] < 1.001 * speeds[1]
-    assert (np.diff(track.position[parts[4], 2]) < 0).all()
-    assert track.velocity[-1, 2] == -flight.get("descent", 10.0)
+    np.testing.assert_array_equal(track.part, 1 + np.searchsorted(ends[:4], track.time))
 
 
 @pytest.mark.parametrize(
@@ -178,6 +151,10 @@ def test_rms_by_part_by_hand():
     # two numbers a and b: standard deviation |a - b| / sqrt 2, of their mean |a - b| / 2
     assert found.standard_error == pytest.approx([11.5 / 2 / (2 * first), 32 / 2 / (2 * second)])
     assert found.freedom == 1
+    for one, other in zip(rms_difference(error, 0 * error, np.array([1, 1, 7])), found, strict=True):
+        np.testing.assert_array_equal(one, other)
+    with pytest.raises(ValueError, match="of the same runs, got 2 and 4"):
+        rms_difference(error, np.tile(error, (1, 2, 1)), np.array([1, 1, 7]))
     with pytest.raises(ValueError, match="at least 2 runs"):
         rms_by_part(error[:, :1], np.array([1, 1, 7]))
     with pytest.raises(ValueError, match=r"shape \(2, runs"):

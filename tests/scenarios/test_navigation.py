@@ -20,6 +20,7 @@ from kfcourse.scenarios.navigation import (
     Inputs,
     Observation,
     Sensor,
+    follow,
     fuse,
     observe,
     sample,
@@ -247,18 +248,6 @@ def test_a_measurement_of_this_very_moment_counts():
     assert np.abs(at - fuse(FREE, [sensor], PRIOR, [], [0.3]).mean).max() > 1
 
 
-def test_a_run_without_a_measurement_keeps_its_prediction():
-    sensors = two_sensors()
-    value = np.array([[1.0, 2.0], [np.nan, np.nan], [np.nan, 2.0]])
-    law = fuse(FREE, sensors, PRIOR, [Observation("slow", 0.4, 0.5, value)], [0.6])
-    free = fuse(FREE, sensors, PRIOR, [], [0.6])
-    np.testing.assert_allclose(law.mean[0, 1], free.mean[0, 0], rtol=1e-13)
-    np.testing.assert_allclose(law.cov[0, 1], free.cov[0, 0], rtol=1e-13)
-    only = Sensor.define("slow", STATES, "s + V + w", 0.8, 0.4)
-    second = fuse(FREE, [only], PRIOR, [Observation("slow", 0.4, 0.5, np.array([[2.0]]))], [0.6])
-    np.testing.assert_allclose(law.mean[0, 2], second.mean[0, 0], rtol=1e-12)
-
-
 # ---------------------------------------------------------------- fusion: nonlinear sensors
 
 
@@ -360,6 +349,24 @@ def test_fuse_says_what_is_wrong(changes, message):
 # ---------------------------------------------------------------- recorded data: innovations, no period
 
 
+def test_innovations_are_told_in_the_order_of_capture_and_the_estimates_are_the_same():
+    sensors, times = two_sensors(latency=0.3, jitter=0.2), np.linspace(0.1, 4, 14)
+    _, messages = measured(sensors, 3.0, 2, [0.0])
+    told = follow(FREE, sensors, PRIOR, messages, times)
+    np.testing.assert_array_equal(told.law.mean, fuse(FREE, sensors, PRIOR, messages, times).mean)
+    ordered = sorted(messages, key=lambda message: message.tag)
+    assert [(one.sensor, one.time) for one in told.innovations] == [(m.sensor, pytest.approx(m.tag)) for m in ordered]
+    meters = {"fast": ([[-1, 2]], [[0.3]]), "slow": ([[1, 0], [1, 1]], [[0.5, 0.2], [0.2, 0.8]])}
+    for last in (0, 5, -1):  # each is what the estimate of all that was captured before leaves
+        now, found = ordered[last], told.innovations[last]
+        earlier = [m._replace(arrival=m.tag) for m in ordered if m.tag < now.tag]
+        before = fuse(FREE, sensors, PRIOR, earlier, [now.tag])
+        H, R = map(np.array, meters[now.sensor])
+        np.testing.assert_allclose(found.innovation, now.value - before.mean[0] @ H.T, rtol=0, atol=ROUNDING)
+        cov = np.broadcast_to(H @ before.cov[0, :1] @ H.T + R, found.cov.shape)
+        np.testing.assert_allclose(found.cov, cov, rtol=0, atol=ROUNDING)
+
+
 def test_a_recorded_sensor_needs_no_period():
     given, free = (Sensor.define("s", STATES, "s + w", 0.5, *period) for period in ([0.25], []))
     messages = [Observation("s", tag, tag, np.array([[value]])) for tag, value in ((0.1, 3.0), (0.75, 2.0), (0.8, 2.1))]
@@ -393,24 +400,3 @@ def test_what_paths_are_not_sampled_from():
 def test_fuse_takes_dynamics():
     with pytest.raises(TypeError, match="fuse expects a Dynamics, got Model"):
         fuse(Model.define("x + v", "x + w"), [], PRIOR, [], [1.0])
-
-
-@pytest.mark.parametrize("start", [0.0, 1_484_649_904.0, 345_600.25])
-def test_where_a_time_scale_begins_changes_nothing(start):
-    """Stamps of Unix hold 2e-7 s: each estimate has the measurement of its own moment, however both were rounded."""
-    rng = np.random.default_rng(3)
-    clock = Clock(1 + 1e-5, 0.1 - start * 1e-5)
-    sensor = Sensor.define("slow", STATES, "s + w", 0.01, clock=clock)
-    moments, values = np.cumsum(rng.uniform(0.05, 0.15, 200)), rng.normal(size=(200, 1, 1))
-    outputs = start + moments
-    messages = [Observation("slow", clock.reading(t), t, y) for t, y in zip(outputs.tolist(), values, strict=True)]
-    found = fuse(FREE, [sensor], PRIOR, messages, outputs, start=start)
-    plain = Sensor.define("slow", STATES, "s + w", 0.01)
-    expected = fuse(
-        FREE, [plain], PRIOR, [Observation("slow", t, t, y) for t, y in zip(moments.tolist(), values, strict=True)], moments
-    )
-    # moments that are off by some 1e-6 s, of a state that moves by less than 10 a second
-    np.testing.assert_allclose(found.mean, expected.mean, rtol=0, atol=1e-4)
-    np.testing.assert_allclose(found.cov, expected.cov, rtol=0, atol=1e-4)
-    path = sample(FREE, PRIOR, outputs, 1, 0)
-    np.testing.assert_array_equal(path(outputs[7] + np.spacing(start) * np.arange(2)), path.states[[7, 7]])

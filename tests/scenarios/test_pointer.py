@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from kfcourse.scenarios.pointer import (
-    MINIMUM_JERK,
     SHORTEST,
     acceleration_from,
     follow,
@@ -69,18 +68,6 @@ def test_a_uniformly_accelerated_track_without_noise_is_followed_exactly(arithme
 # ---------------------------------------------------------------- the track
 
 
-def test_a_stroke_is_smooth_from_rest_to_rest():
-    for order in range(3):
-        np.testing.assert_allclose(MINIMUM_JERK.deriv(order)(np.array([0.0, 1.0])), [0, 1 if order == 0 else 0], atol=1e-13)
-    # Least jerk: the sixth derivative is zero, and any other smooth path has more.
-    assert MINIMUM_JERK.degree() == 5
-    tau = np.linspace(0, 1, 2001)
-    bump = np.polynomial.Polynomial([0, 0, 0, 1, -3, 3, -1])  # tau^3 (1 - tau)^3: changes nothing at the ends
-    least = np.trapezoid(MINIMUM_JERK.deriv(3)(tau) ** 2, tau)
-    for size in (-1.0, -0.01, 0.01, 1.0):
-        assert np.trapezoid((MINIMUM_JERK + size * bump).deriv(3)(tau) ** 2, tau) > least
-
-
 @pytest.mark.parametrize("seed", range(20))
 def test_the_track_stays_on_the_screen_and_comes_to_rest(seed):
     track = hand_track(seed, screen=(500.0, 300.0))
@@ -92,16 +79,6 @@ def test_the_track_stays_on_the_screen_and_comes_to_rest(seed):
     np.testing.assert_allclose(after.position, track.origin + track.displacement.sum(axis=0), rtol=1e-12)
     for motion in (before, after):
         assert not motion.velocity.any() and not motion.acceleration.any()
-
-
-def test_samples_of_different_rates_are_of_one_track():
-    track = hand_track(1, strokes=4)
-    slow, fast = (sample(track, interval, 0.0, 1, seed=0) for interval in (0.1, 0.01))
-    np.testing.assert_allclose(fast.state[::10][: len(slow.state)], slow.state, rtol=1e-9, atol=1e-9)
-    np.testing.assert_array_equal(slow.y, slow.state[..., :2])
-    assert slow.time[-1] <= track.end < slow.time[-1] + 0.1
-    # the input is the mean acceleration: it brings the velocity of one sample to that of the next
-    np.testing.assert_allclose(slow.state[:-1, :, 2:] + 0.1 * slow.input[:-1], slow.state[1:, :, 2:], rtol=1e-9, atol=1e-9)
 
 
 # ---------------------------------------------------------------- errors
