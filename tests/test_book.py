@@ -533,24 +533,3 @@ def test_descriptions_and_icon(page):
     for name in ("description", "og:title", "og:description", "og:type"):
         assert len(re.findall(rf'<meta (?:name|property)="{name}" content="[^"]', head)) == 1, name
     assert len(re.findall(r'<link [^>]*rel="[^"]*\bicon"', head)) == 1
-
-
-def test_the_live_chapter_prints_what_its_page_shows(browser):
-    notebook = nbformat.read(EXECUTED / "live-track.ipynb", as_version=4)
-    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
-    printed = next(text for one in outputs if "whole track" in (text := one.get("data", {}).get("text/markdown", "")))
-    with browser.new_context(offline=True) as context:
-        tab = context.new_page()
-        tab.clock.install(time=0)  # time stands still but for fast_forward(ms)
-        tab.goto((HTML / "live-track.html").as_uri())
-        tab.clock.pause_at(1000)
-        tab.get_by_role("button", name="Play the recorded track").press("Enter")
-        again = tab.get_by_role("button", name="Play again")
-        for _ in range(600):  # frames of 0.1 s, the longest steps it makes: a minute at most
-            if again.is_visible():
-                break
-            tab.clock.fast_forward(100)
-        for name in ("noisy", "filtered", "inside", "nis"):
-            row = tab.locator(f"tr:has([data-show={name}-all])")
-            label, value = row.locator("th").inner_text(), row.locator(f"[data-show={name}-all]").inner_text()
-            assert f"| {label} | {value} |".replace("\u00a0", " ") in printed, (label, value, printed)

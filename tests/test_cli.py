@@ -5,16 +5,14 @@ import json
 import math
 import re
 import time
-import warnings
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
-from kfcourse import cli, compare
+from kfcourse import cli
 from kfcourse.lab import report
-from kfcourse.lab.short_names import FILTERS, LAB, lab_filters
-from kfcourse.lab.variants import find_variant
+from kfcourse.lab.short_names import FILTERS, LAB
 
 QUICK = ("--runs", "100", "--steps", "3")
 EXAMPLE = """
@@ -357,15 +355,3 @@ def test_a_warning_is_one_line_and_numpy_s_are_none(call, no_report):
     result = call("lab", "tan", *QUICK, "--variants", "mine.toml", "--filters", "aof-unscented,duof")
     (line,) = [line for line in result.output.splitlines() if "may be infinite" in line]
     assert line.startswith("Warning: UKF: unscented: ")
-
-
-def test_a_noiseless_meter_warns_of_nothing(call, tmp_path):
-    table = '[variants.exact]\nstate = "0.9*x + 0.3*v"\nmeter = "x"\n'
-    (tmp_path / "exact.toml").write_text(table, encoding="utf-8")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        model = find_variant("exact", tmp_path / "exact.toml").model
-        result = compare(lab_filters(model), model, 400, 5, seed=1, progress=False)
-    assert all(result.error_variance(name).value.max() < 1e-25 for name in LAB)  # rounding of a state of size 1
-    done = call("lab", "exact", *QUICK, "--variants", "exact.toml")
-    assert done.exit_code == 0 and "arning" not in done.output

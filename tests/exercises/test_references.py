@@ -7,8 +7,7 @@ from scipy.integrate import solve_ivp
 
 from kfcourse import Model, gaussian, linearised, predictions, run, simulate
 from kfcourse.checks import exercise
-from kfcourse.continuous import ContinuousModel, coarsen, extended_kalman_bucy, steady_state
-from kfcourse.continuous import simulate as simulate_continuous
+from kfcourse.continuous import ContinuousModel, steady_state
 from kfcourse.exercises.f_exact import companion
 from kfcourse.exercises.f_exact import keys as grid
 from kfcourse.exercises.g_extended import keys as extended
@@ -94,26 +93,6 @@ def test_continuous_numbers():
         assert abs(continuous_time.riccati(*scalar).item()) < 1e-9
         late = solve_ivp(riccati, (0, 60), [3.0], args=tuple(arguments), rtol=1e-10, atol=1e-12)
         assert late.y[0, -1] == pytest.approx(float(D), rel=1e-6)
-
-
-def test_the_continuous_step_tends_to_the_package_s_filter():
-    model = ContinuousModel.define(
-        "-a*x", "s", "sin(x)", dict(a=0.5, s=0.8), prior={"variance": 0.5}, spectral_density=2, noise_density=0.3
-    )
-    fine = simulate_continuous(model, 1 / 2048, 2048, 20, seed=3)
-    distance = []
-    for factor in (32, 8):
-        path = coarsen(fine, factor)
-        z, D = np.zeros(20), np.full(20, 0.5)
-        for y in path.y[..., 0]:
-            z, D = continuous_time.filter_step(
-                z, D, y, path.step, lambda x: -0.5 * x, lambda x: -0.5 + 0 * x, lambda x: 0.8 + 0 * x, np.sin, np.cos, 2.0, 0.3
-            )
-        padded = np.concatenate([path.y, np.full((1, 20, 1), np.nan)])
-        law = predictions(extended_kalman_bucy(model, path.step), padded)
-        distance.append(max(np.abs(z - law.mean[-1, :, 0]).max(), np.abs(D - law.cov[-1, :, 0, 0]).max()))
-    assert distance[0] < 0.1
-    assert distance[1] < 0.6 * distance[0]  # both schemes tend to the same equations
 
 
 @pytest.mark.parametrize("variant", ["53", "21"])

@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from kfcourse.angles import difference, moments_on_circle, near, on_circle, wrapped
+from kfcourse.angles import difference, moments_on_circle, wrapped
 from kfcourse.filters import (
     aof,
     duof,
@@ -137,20 +137,6 @@ def test_points_of_an_angle_that_go_round_the_circle_warn(build):
         build(model(3.5))
 
 
-def test_wrapping_leaves_what_needs_none_and_finds_the_short_way():
-    inside = np.linspace(-PI, PI, 1001)
-    np.testing.assert_array_equal(wrapped(inside), inside)
-    turns = np.arange(-3, 4)[:, None] * 2 * PI
-    # rounding of a number of size 20
-    np.testing.assert_allclose(wrapped(inside[1:-1] + turns), np.tile(inside[1:-1], (7, 1)), atol=20 * np.finfo(float).eps)
-    left, right = np.array([[3.1, 5.0]]), np.array([[-3.1, 1.0]])
-    np.testing.assert_allclose(difference(left, right, (0,)), [[6.2 - 2 * PI, 4.0]], rtol=1e-14)
-    np.testing.assert_allclose(near(left, right, (0,)), [[3.1 - 2 * PI, 5.0]], rtol=1e-14)
-    assert near(left, right, ()) is left and on_circle(left, ()) is left
-    mean, variance = moments_on_circle(np.array([PI - 0.1, -PI + 0.3]), np.array([0.25, 0.75]))
-    assert (mean, variance) == (pytest.approx(-PI + 0.2), pytest.approx(0.25 * 0.75 * 0.4**2))
-
-
 # ---------------------------------------------------------------- a bearing that passes from pi to -pi
 
 
@@ -231,20 +217,6 @@ def test_innovations_and_normalised_errors_go_the_short_way(scenes):
     posterior = run(kalman_filter(angle), y)
     assert nees(x, posterior, angle.angles.x).mean() == pytest.approx(1, abs=4 * np.sqrt(2 / 500))  # of one step; 20 are more
     assert nees(x, posterior).mean() > 10
-
-
-def test_the_first_point_that_is_looked_at_does_not_decide_the_mean():
-    """Sigma points on both sides of the jump: mean and covariance are those of the scene turned to where there is none."""
-    mean, cov = np.array([[2.0, 0.1]]), np.array([[0.3, 0.1], [0.1, 0.4]])
-    state, meter = ["x1 + v1", "x2 + v2"], ["atan2(x2, x1) + 0.1*w"]
-    for build in (unscented, lambda m: gauss_hermite(m, 5)):
-        options = {"prior": {"mean": mean[0], "variance": cov}}
-        plain, turned = (build(Model.define(state, meter, angles=angles, **options)) for angles in ([], ["y"]))
-        expected, found = plain.measure(mean, cov), turned.measure(-mean, cov)
-        np.testing.assert_allclose(found.h, wrapped(expected.h + PI), rtol=1e-13)
-        np.testing.assert_allclose(found.G, -expected.G, rtol=1e-12)
-        np.testing.assert_allclose(found.F, expected.F, rtol=1e-12)
-        assert plain.measure(-mean, cov).F.item() > 10 * found.F.item()
 
 
 def test_sensors_of_bearings_are_fused_across_the_jump():

@@ -141,23 +141,6 @@ def test_after_its_patience_the_gate_lets_the_next_one_through(patience):
     assert (error[after] ** 2).mean() < 0.2 * (np.abs(run(plain, y).mean - x)[after] ** 2).mean()
 
 
-def test_widened_the_prediction_explains_what_was_refused(plane):
-    y = np.zeros((4, 2, 2))
-    y[1:3, 0], y[1:3, 1] = [30.0, -20.0], [np.nan, 25.0]
-    one = gated(kalman_filter(plane), patience=2)
-    state = one.init(2)
-    for k in range(3):
-        before, state = state, one.step(state, y[k])
-    np.testing.assert_array_equal(state.memory.in_a_row, [2, 2])
-    untouched = one.structure.predict(*state.posterior).cov
-    H = np.array([[1.0, 0, 0, 0], [0.2, 1, 0, 0]])
-    for i, rows in ((0, [0, 1]), (1, [1])):
-        nu = (y[2, i] - before.predicted.mean[i] @ H.T)[rows]
-        state_alone = (H @ np.broadcast_to(before.predicted.cov, (2, 4, 4))[i] @ H.T)[np.ix_(rows, rows)]
-        scale = nu @ np.linalg.solve(state_alone, nu) / len(rows)
-        np.testing.assert_allclose(state.predicted.cov[i], scale * untouched[i], rtol=1e-9)
-
-
 def test_gaps_neither_feed_nor_calm_impatience_and_the_next_measurement_passes_whatever_it_is():
     one = gated(kalman_filter(Model.define("x + 0.1*v", "x + w", prior={"mean": 0.0, "variance": 1.0})), patience=2)
     gap = np.nan

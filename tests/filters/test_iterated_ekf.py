@@ -68,54 +68,11 @@ def test_each_round_is_a_step_of_gauss_and_newton(ranges, rounds):
 # ---------------------------------------------------------------- moments: posterior linearisation
 
 
-def sigma_points(mean, cov):
-    """Symmetric points of Julier and Uhlmann with kappa = max(3 - s, 0): any root with root root^T = cov."""
-    size = len(mean)
-    kappa = max(3 - size, 0)
-    values, vectors = np.linalg.eigh(cov)
-    root = vectors * np.sqrt(values)
-    offsets = [np.zeros(size)] + [sign * np.sqrt(size + kappa) * root[:, j] for j in range(size) for sign in (1, -1)]
-    weights = [kappa / (size + kappa)] + [0.5 / (size + kappa)] * (2 * size)
-    return [mean + offset for offset in offsets], weights
-
-
-@pytest.mark.parametrize("rounds", [2, 5])
-def test_with_sigma_points_it_is_iterated_posterior_linearisation(rounds):
-    """A scalar state measured twice, the noise added: the loop of Garcia-Fernandez and others, their letters."""
-    noise, prior_mean, prior_cov = np.array([[0.04, 0.01], [0.01, 0.09]]), np.array([1.2]), np.array([[0.5]])
-    model = Model.define(
-        "0.9*x + 0.1*v",
-        ["x + 0.3*x**2 + w1", "exp(x/2) + w2"],
-        {},
-        prior={"mean": 1.2, "variance": 0.5},
-        meter_noise={"variance": noise},
-    )
-    y = measured(model, 5, seed=7)
-    found = run(iterated(unscented(model), rounds), y)
-    for i in range(5):
-        mean, cov = prior_mean, prior_cov
-        for _ in range(rounds):
-            # points over (x, w): the package's rule
-            joint = np.block([[cov, np.zeros((1, 2))], [np.zeros((2, 1)), noise]])
-            points, weights = sigma_points(np.concatenate([mean, np.zeros(2)]), joint)
-            images = [np.array([q[0] + 0.3 * q[0] ** 2 + q[1], np.exp(q[0] / 2) + q[2]]) for q in points]
-            y_bar = sum(w * image for w, image in zip(weights, images, strict=True))
-            Psi = sum(w * np.outer(q[:1] - mean, image - y_bar) for w, q, image in zip(weights, points, images, strict=True))
-            Phi = sum(w * np.outer(image - y_bar, image - y_bar) for w, image in zip(weights, images, strict=True))
-            A = Psi.T @ np.linalg.inv(cov)
-            b = y_bar - A @ mean
-            Omega = Phi - A @ cov @ A.T
-            S = A @ prior_cov @ A.T + Omega
-            K = prior_cov @ A.T @ np.linalg.inv(S)
-            mean, cov = prior_mean + K @ (y[0, i] - A @ prior_mean - b), prior_cov - K @ S @ K.T
-        # the page's Omega and p are differences of numbers some 1e2 times larger, in each round
-        np.testing.assert_allclose(found.mean[0, i], mean, rtol=1e-10)
-        np.testing.assert_allclose(found.cov[0, i], cov, rtol=1e-9)
-
-
-def test_the_printed_equations_are_the_filter(ranges):
+@pytest.mark.parametrize("build", [linearised, unscented])
+def test_the_printed_equations_are_the_filter(ranges, build):
+    """Gauss and Newton's method at the tangent, iterated posterior linearisation with sigma points."""
     y, rounds = measured(ranges, 1, seed=8), 3
-    structure = linearised(ranges)
+    structure = build(ranges)
     values = {s.y: y[0, 0][:, None], s.lam: PRIOR_MEAN[:, None], s.Psi: PRIOR_COV}
     z_i, P_i = (symbol(name) for name in (r"z^{(i)}", r"p^{(i)}"))
     values |= {z_i: values[s.lam], P_i: values[s.Psi]}

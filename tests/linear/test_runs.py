@@ -186,16 +186,11 @@ GOOD = {"A": np.eye(2), "H": np.ones((1, 2)), "Q": np.eye(2), "R": np.eye(1), "B
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("A", np.ones(2), "A must be a matrix"),
         ("A", np.ones((2, 3)), r"A has the shape \(2, 3\); with 2 states and 1 measurements it is \(2, 2\)"),
-        ("H", np.ones((1, 3)), "H has the shape"),
-        ("Q", np.eye(3), "Q has the shape"),
-        ("R", np.eye(2), "R has the shape"),
         ("B", np.ones((3, 1)), "B has 3 rows; with 2 states it has 2"),
         ("A", np.array([[1, np.nan], [0, 1]]), "A must be finite"),
         ("Q", np.array([[1, 0.5], [0, 1]]), "Q is a covariance and must be symmetric"),
         ("Q", np.array([[1.0, 2], [2, 1]]), "Q is a covariance and must not be negative"),
-        ("R", np.array([[-1.0]]), "R is a covariance and must not be negative"),
     ],
 )
 def test_a_system_that_is_none(name, value, message):
@@ -210,16 +205,11 @@ GOOD_PRIOR = Gaussian(np.zeros(2), np.eye(2))
     ("change", "message"),
     [
         ({"y": np.zeros((4, 1))}, r"shape \(steps, runs, 1\), got \(4, 1\)"),
-        ({"y": np.zeros((4, 3, 2))}, r"shape \(steps, runs, 1\)"),
         ({"y": np.zeros((0, 3, 1))}, "write NaN where one is missing"),
         ({"y": np.full((4, 3, 1), np.inf)}, "measurements must be there, and finite"),
         ({"u": np.zeros((3, 3, 1))}, r"inputs must have the shape \(4, 3, 1\)"),
-        ({"u": np.zeros((4, 2, 1))}, r"or \(4, 1, 1\) for all runs"),
-        ({"u": np.zeros((4, 3, 2))}, "inputs must have the shape"),
         ({"u": np.full((4, 3, 1), np.nan)}, "inputs must be finite"),
         ({"prior": Gaussian(np.zeros(3), np.eye(2))}, "prior's mean must have the shape"),
-        ({"prior": Gaussian(np.zeros(2), np.eye(3))}, "prior's covariance must have the shape"),
-        ({"prior": Gaussian(np.zeros(2), np.diag([1, np.inf]))}, "prior must be finite"),
         ({"prior": Gaussian(np.zeros(2), -np.eye(2))}, "prior's variances must not be negative"),
         ({"arithmetic": "exact"}, "no form 'exact' of the Kalman filter; known: covariance, symmetrised"),
     ],
@@ -234,8 +224,6 @@ def test_sizes_and_gains_that_do_not_fit():
     one = LinearSystem(**GOOD)
     for call, message in (
         (lambda: simulate(one, GOOD_PRIOR, 0, 3, 1), "steps must be a positive whole number, got 0"),
-        (lambda: simulate(one, GOOD_PRIOR, 4, 2.0, 1), "runs must be a positive whole number, got 2.0"),
-        (lambda: covariances(one, np.eye(2), 0), "steps must be a positive whole number, got 0"),
         (lambda: covariances(one, np.eye(3), 4), r"prior's covariance must have the shape \(2, 2\), got \(3, 3\)"),
         (lambda: covariances(one, np.eye(2), 4, np.ones(2)), r"gains must have the shape \(4, 2, 1\) or \(2, 1\), got \(2,\)"),
     ):

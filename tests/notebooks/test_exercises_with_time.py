@@ -96,7 +96,6 @@ def test_a_wrong_step_is_named(name, question):
 
 
 k, u, c, q, r, e = sp.symbols("k u c q r e", real=True)
-EIGHT = sp.Rational(8)
 
 
 def growth(mean):
@@ -136,13 +135,6 @@ def test_formulas_with_time_and_inputs(name, answer, mistake):
     result = opened(name, "a").check("a2", answer)
     assert result.passed == (mistake == "")
     assert not mistake or mistake in result.diagnosis, result
-
-
-def test_formulas_with_a_wave():
-    lab = opened("growth", "a")
-    assert lab.check("a2", growth(lambda rest: rest + EIGHT * sp.cos(1.2 * k))).passed
-    assert "input-forgotten" in lab.check("a2", growth(lambda rest: rest)).diagnosis
-    assert "input-of-next-step" in lab.check("a2", growth(lambda rest: rest + 8 * sp.cos(1.2 * (k + 1)))).diagnosis
 
 
 def test_what_cannot_be_asked_is_refused_with_the_reason():

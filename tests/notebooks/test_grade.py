@@ -624,23 +624,6 @@ def three(tmp_path):
     return tmp_path
 
 
-def test_the_digest_knows_all_that_a_grade_depends_on(three, tmp_path):
-    masters, variants = tmp_path / "masters", tmp_path / "my.toml"
-    shutil.copytree(FIXTURES, masters)
-    variants.write_text('[variants.53]\nstate = "x + v"\nmeter = "x + w"\n', encoding="utf-8")
-
-    def digests(**options):
-        return [one.digest for one in submissions.returned(three, **({"masters": masters} | options))]
-
-    before = digests()
-    assert len(set(before)) == 3
-    assert digests() == before
-    assert not set(digests(seconds=7.0)) & set(before)
-    assert not set(digests(variants_file=variants)) & set(before)
-    change_file(masters / "b_aof" / "statement.md")
-    assert not set(digests()) & set(before)
-
-
 def test_a_kernel_that_does_not_start_is_a_row(three):
     def fails(*_, **__):
         raise RuntimeError("Kernel didn't respond in 60 seconds")

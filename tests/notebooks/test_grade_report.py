@@ -45,15 +45,6 @@ def test_the_group_in_a_path_tells_more_than_a_longer_name():
 
 
 @pytest.mark.quick
-def test_of_two_equally_good_notebooks_the_first_counts():
-    first, second = (graded(f"РТ-1/Иванов Иван/b{i}.ipynb", passed=["b1"], work=str(i)) for i in (1, 2))
-    for grades in ([first, second], [second, first]):
-        (one, *_), _ = people(grades, COURSE)
-        assert one.grades["b"] == first
-        assert "set b: came back more than once, the best counts" in one.flags
-
-
-@pytest.mark.quick
 @pytest.mark.parametrize(
     ("name", "student", "expected"),
     [

@@ -165,10 +165,8 @@ def test_a_variant_that_is_not_shipped_is_written_into_the_notebook(tmp_path):
 
 x, y, c = sp.symbols("x y c", real=True)
 FORMULAS = [
-    sp.Rational(1, 3), x - sp.Rational(1, 3), -x / 3, 2 * x / 7, x ** sp.Rational(1, 3), sp.sqrt(2) * x / 3, sp.E, sp.E**2,
-    sp.pi * x, 1 / sp.sqrt(x), c / sp.sqrt(x * y), 1 / (1 + 1 / sp.sqrt(x)), (x * y) ** sp.Rational(-3, 2), 2 ** (1 / sp.sqrt(x)),
-    x ** (-y), sp.exp(-(x**2) / 2), sp.exp(sp.Rational(1, 3)), sp.exp(x) ** y, sp.exp(x) - 1, sp.sin(x) ** 2, sp.atan2(y, x),
-    sp.Abs(x), sp.sign(x), sp.log(x), sp.tanh(x), sp.cosh(x), (x + sp.Rational(2, 3)) ** -2, sp.Integer(0), sp.Integer(-4),
+    x - sp.Rational(1, 3), x ** sp.Rational(1, 3), sp.E**2, c / sp.sqrt(x * y), 1 / (1 + 1 / sp.sqrt(x)), 2 ** (1 / sp.sqrt(x)),
+    sp.exp(-(x**2) / 2), sp.exp(x) ** y, sp.atan2(y, x), sp.Abs(x), (x + sp.Rational(2, 3)) ** -2,
     x * (y + c) ** 2 - (x - y) / (c + 1),
 ]  # fmt: skip
 

@@ -66,18 +66,3 @@ def test_labels_at_the_ends_are_apart_and_in_order() -> None:
     assert np.diff(sorted(heights.values())).min() > 0.1 - 1e-9
     assert heights["low"] >= ax.transAxes.inverted().transform(ax.transData.transform((0, 0)))[1] - 1e-9
     plt.close()
-
-
-def test_a_label_has_the_dashes_and_the_marker_of_its_curve_and_a_line_to_it_where_it_stands_aside() -> None:
-    _, ax = plt.subplots()
-    ax.plot([0, 1], [0, 1], "b--s", label="one")
-    ax.plot([0, 1], [0, 1.001], "b-o", label="other")
-    label_ends(ax, least=0.2)
-    handles = {one.get_texts()[0].get_text(): one.get_lines()[0] for one in ax.get_children() if isinstance(one, Legend)}
-    assert {name: (line.get_linestyle(), line.get_marker()) for name, line in handles.items()} == {
-        "one": ("--", "s"), "other": ("-", "o"),
-    }  # fmt: skip
-    leaders = [line for line in ax.get_lines() if line.get_label() == "_leader"]
-    assert len(leaders) == 2
-    assert all(abs(np.diff(line.get_ydata())[0]) > 0.05 for line in leaders)
-    plt.close()

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm
 
 from kfcourse import linearised, run, simulate
 from kfcourse.filters import aof, kalman_filter
@@ -24,21 +23,6 @@ from kfcourse.scenarios.benchmarks import (
     reentry,
 )
 from kfcourse.symbolic.equations import compile_noiseless
-
-
-@pytest.mark.quick
-def test_the_course_of_the_target_is_the_sources_matrix_exponential():
-    """x' = expm(F dt) x step by step, from (0, 0, 1, 0), with the turn rates of the same seed."""
-    rng = np.random.default_rng(4)
-    rate = np.zeros((500, 3))
-    for start in (49, 199, 349):  # a(1,50:100) counts from one
-        rate[start : start + 51] = np.pi / 2 / 51 / 0.01 + 0.01 * rng.standard_normal((51, 3))
-    for one in range(3):
-        state, course = np.array([0.0, 0.0, 1.0, 0.0]), []
-        for a in rate[:, one]:
-            state = expm(0.01 * np.array([[0, 0, 1, 0], [0, 0, 0, 1], [0, 0, 0, a], [0, 0, -a, 0]])) @ state
-            course.append(state[:2])
-        np.testing.assert_allclose(bearings_data(3, 4)[0][:, one], course, rtol=0, atol=1e-12)
 
 
 @pytest.mark.quick
