@@ -9,8 +9,11 @@ One trajectory at a time in plain floats for the filters without an ensemble; `n
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
+
+from kfcourse import Model
 
 C, E, G, F = 0.9, 0.05, 1.0, 0.02
 
@@ -110,3 +113,33 @@ def joint_posterior(steps, prior, y):
     log_density = -0.5 * (residual @ np.linalg.solve(F, residual) + np.linalg.slogdet(2 * np.pi * F).logabsdet)
     blocks = [slice(k * n, (k + 1) * n) for k in range(size)]
     return np.array([mean[b] for b in blocks]), np.array([cov[b, b] for b in blocks]), log_density
+
+
+class Changing:
+    """A linear model whose matrices, constants and noises change with time and input; as text, and as arrays typed apart."""
+
+    U = (0.7, -2.0, 3.0, 0.0, 1.5, -1.0, 0.4, -0.6, 2.2, 1.1)  # each step another: one too early or too late is seen
+    laws: ClassVar = {
+        "prior": (np.array([1.0, -0.5]), np.array([[1.0, 0.3], [0.3, 0.8]])),
+        "state_noise": (np.array([0.2, -0.1]), np.array([[0.5, 0.1], [0.1, 0.3]])),
+        "meter_noise": (np.array([0.1, 0.3]), np.array([[0.4, 0.1], [0.1, 0.6]])),
+    }
+
+    def at(self, k: int):
+        t, u = 0.5 * k, self.U[k]
+        A = np.array([[0.9 + 0.1 * np.sin(k), 0.2], [0.1, 0.8 - 0.05 * k]])
+        C = np.diag([2.0 if t < 1 else 1.0, 1.0])
+        H, b = np.array([[1.0, 0.1 * k], [0.0, 1.0]]), np.array([u**2, np.cos(t)])
+        return A, np.array([[1 + t, 0.0], [1.0, 0.5]]), np.array([u, -2 * u]), H, C, b
+
+    def steps(self, count: int):
+        """A, constant, Q, H, constant, R of each step, as `joint_posterior` takes them."""
+        _, (m_v, D_v), (m_w, D_w) = self.laws.values()
+        each = map(self.at, range(count))
+        return [(A, B @ m_v + a, B @ D_v @ B.T, H, C @ m_w + b, C @ D_w @ C.T) for A, B, a, H, C, b in each]
+
+    def model(self) -> Model:
+        state = ["(0.9 + 0.1*sin(k))*x1 + 0.2*x2 + (1 + t)*v1 + u", "0.1*x1 + (0.8 - 0.05*k)*x2 + 0.5*v2 - 2*u + v1"]
+        meter = ["x1 + 0.1*k*x2 + (2 if t < 1 else 1)*w1 + u**2", "x2 + w2 + cos(t)"]
+        laws = {key: {"mean": mean, "variance": cov} for key, (mean, cov) in self.laws.items()}
+        return Model.define(state, meter, inputs={"u": self.U}, interval=0.5, **laws)

@@ -32,15 +32,6 @@ def test_the_key_has_the_name_and_the_arguments_of_the_stub(letter, question):
 
 
 @pytest.mark.parametrize("letter", sets())
-def test_every_question_has_its_heading_and_its_check_cell(letter):
-    text = "\n".join(cell.source for cell in notebook(letter).cells)
-    for number, question in enumerate(sets()[letter].questions, 1):
-        assert question.name == f"{letter}{number}"
-        assert re.search(rf"^## Question {number} \({question.level}\): {re.escape(question.title)}", text, re.MULTILINE)
-        assert text.count(f'task.check("{question.name}", {question.function})') == 1
-
-
-@pytest.mark.parametrize("letter", sets())
 def test_a_notebook_imports_no_module_of_a_key(letter):
     imported = set(re.findall(r"kfcourse\.exercises\.\w+\.(\w+)", read(letter)))
     assert imported <= {"companion"}

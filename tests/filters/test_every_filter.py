@@ -4,9 +4,9 @@ ensemble of one, a state is never changed, no NaN, the same seed the same bytes,
 import pickle
 from functools import cache, partial
 from types import SimpleNamespace
-from typing import ClassVar
 
 import numpy as np
+import oracles
 import pytest
 import sympy as sp
 
@@ -135,30 +135,6 @@ def linear(n: int, p: int, v: int, w: int, seed: int) -> Linear:
     return Linear(A=A, B=matrix(n, v), a=matrix(1, n)[0], H=matrix(p, n), C=matrix(p, w), b=matrix(1, p)[0], laws=laws)
 
 
-class Changing:
-    """Matrices of each step, as text and as arrays typed apart from it."""
-
-    U = (0.7, -2.0, 3.0, 0.0, 1.5, -1.0, 0.4)  # of every step another value: a step too early or too late is seen
-    laws: ClassVar = {
-        "prior": (np.array([1.0, -0.5]), np.array([[1.0, 0.3], [0.3, 0.8]])),
-        "state_noise": (np.array([0.2, -0.1]), np.array([[0.5, 0.1], [0.1, 0.3]])),
-        "meter_noise": (np.array([0.1, 0.3]), np.array([[0.4, 0.1], [0.1, 0.6]])),
-    }
-
-    def at(self, k: int):
-        t, u = 0.5 * k, self.U[k]
-        A = np.array([[0.9 + 0.1 * np.sin(k), 0.2], [0.1, 0.8 - 0.05 * k]])
-        C = np.diag([2.0 if t < 1 else 1.0, 1.0])
-        H, b = np.array([[1.0, 0.1 * k], [0.0, 1.0]]), np.array([u**2, np.cos(t)])
-        return A, np.array([[1 + t, 0.0], [1.0, 0.5]]), np.array([u, -2 * u]), H, C, b
-
-    def model(self) -> Model:
-        state = ["(0.9 + 0.1*sin(k))*x1 + 0.2*x2 + (1 + t)*v1 + u", "0.1*x1 + (0.8 - 0.05*k)*x2 + 0.5*v2 - 2*u + v1"]
-        meter = ["x1 + 0.1*k*x2 + (2 if t < 1 else 1)*w1 + u**2", "x2 + w2 + cos(t)"]
-        laws = {key: {"mean": mean, "variance": cov} for key, (mean, cov) in self.laws.items()}
-        return Model.define(state, meter, inputs={"u": self.U}, interval=0.5, **laws)
-
-
 LINEAR = {
     "scalar": linear(1, 1, 1, 1, 11),
     "scalar, more noises": linear(1, 1, 2, 3, 12),
@@ -167,11 +143,11 @@ LINEAR = {
     "n=2, p=2, more noises": linear(2, 2, 3, 3, 15),
     "n=3, p=2": linear(3, 2, 3, 2, 19),
     "n=1, p=2": linear(1, 2, 1, 2, 17),
-    "changing": Changing(),
+    "changing": oracles.Changing(),
 }
 
 
-def exact_ensemble(one: Linear | Changing, steps: int, seed: int) -> list[Instant]:
+def exact_ensemble(one: Linear | oracles.Changing, steps: int, seed: int) -> list[Instant]:
     """Trajectories whose sample moments are exactly the model's.
 
     A random matrix (trajectories x all independent noises), centred, orthonormalised and scaled, has sample

@@ -6,7 +6,7 @@ import numpy as np
 import oracles
 import pytest
 import sympy as sp
-from test_every_filter import LINEAR, Changing
+from test_every_filter import LINEAR
 
 from kfcourse.filters import (
     alpha_beta,
@@ -35,7 +35,7 @@ from kfcourse.symbolic.structure import gaussian, linearised
 pytestmark = pytest.mark.quick
 
 STEPS = 6
-U = list(Changing.U)
+U = list(oracles.Changing.U)
 
 
 def growth():
@@ -196,7 +196,7 @@ def test_a_variance_must_be_one_at_the_steps_that_are_run():
 
 def test_what_is_printed_names_the_step():
     model = Model.define("x + u*v + t", "x + w", inputs={"u": U}, interval=0.5)
-    assert repr(model).endswith("inputs u (7 values))")
+    assert repr(model).endswith("inputs u (10 values))")
     text = model.latex()
     assert r"t &= \frac{k}{2}" in text and r"u_0, u_1, \ldots &= 0.7, -2, 3, 0, 1.5, -1, \ldots" in text
     assert r"\tau(z, p, k) &= " in linearised(model).latex()

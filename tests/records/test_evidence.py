@@ -24,26 +24,13 @@ FILTERS = {
 @pytest.mark.parametrize("kind", FILTERS)
 def test_on_a_linear_model_it_is_the_density_of_the_whole_record(kind):
     """Matrices that change with the step, noises with means and correlations, whole measurements and components missing."""
-    prior = np.array([1.0, -2.0]), np.array([[2.0, 0.5], [0.5, 1.0]])
-    V, W = np.array([[1.0, 0.3], [0.3, 2.0]]), np.array([[1.0, 0.6], [0.6, 2.0]])
-    model = Model.define(
-        ["(0.9 + 0.05*k)*x1 + 0.4*x2 + v1", "0.8*x2 - 0.3*x1 + v2 + 1"], ["x1 + 2*x2 + w1 - k", "x2 - (0.5 + 0.1*k)*x1 + w2"],
-        prior={"mean": prior[0], "variance": prior[1]}, state_noise={"variance": V},
-        meter_noise={"mean": [0.4, 0], "variance": W},
-    )  # fmt: skip
-    steps = [
-        (
-            np.array([[0.9 + 0.05 * k, 0.4], [-0.3, 0.8]]), np.array([0, 1.0]), V,
-            np.array([[1, 2], [-0.5 - 0.1 * k, 1]]), np.array([0.4 - k, 0]), W,
-        )
-        for k in range(8)
-    ]  # fmt: skip
-    y = simulate(model, 3, 8, seed=3).y.copy()
+    one = oracles.Changing()
+    y = simulate(one.model(), 3, 8, seed=3).y.copy()
     y[2, 1] = y[4, 2, 0] = y[7, 2, 1] = y[0, 1] = np.nan
-    found = likelihood(FILTERS[kind](model), y)
+    found = likelihood(FILTERS[kind](one.model()), y)
     assert found.shape == (8, 3)
     assert found[2, 1] == found[0, 1] == 0
-    expected = [oracles.joint_posterior(steps, prior, y[:, i])[2] for i in range(3)]
+    expected = [oracles.joint_posterior(one.steps(8), one.laws["prior"], y[:, i])[2] for i in range(3)]
     np.testing.assert_allclose(found.sum(axis=0), expected, rtol=1e-11)  # a 16 x 16 determinant against eight of 2 x 2
 
 

@@ -27,29 +27,11 @@ FILTERS = {name: lambda model, build=build: aof(build(model)) for name, build in
     "iterated": lambda model: iterated(linearised(model), 3),
 }
 STEPS = 9
-U = [0.7, -2.0, 3.0, 0.0, 1.5, -1.0, 0.4, -0.6, 2.2]  # of every step another value: a step too early or too late is seen
-PRIOR = np.array([1.0, -2.0]), np.array([[2.0, 0.5], [0.5, 1.0]])
-V, W = np.array([[1.0, 0.3], [0.3, 2.0]]), np.array([[1.0, 0.6], [0.6, 2.0]])
 
 
 @pytest.fixture(scope="module")
 def changing() -> Model:
-    """Linear; matrices, constants and noises change with time and input; noises are correlated and have means."""
-    return Model.define(
-        ["(0.9 + 0.05*k)*x1 + 0.4*x2 + (1 + 0.1*k)*v1 + u", "0.8*x2 - 0.3*x1 + v2"],
-        ["x1 + 2*x2 + w1 - u", "x2 - (0.5 + 0.1*k)*x1 + 0.3*w2"],
-        prior={"mean": PRIOR[0], "variance": PRIOR[1]},
-        state_noise={"mean": [0.2, -0.1], "variance": V},
-        meter_noise={"mean": [0.4, 0], "variance": W},
-        inputs={"u": U},
-    )
-
-
-def matrices(k):
-    """A, a, Q, H, b, R of `changing`, typed apart from it."""
-    A, B, C = np.array([[0.9 + 0.05 * k, 0.4], [-0.3, 0.8]]), np.diag([1 + 0.1 * k, 1.0]), np.diag([1, 0.3])
-    a, b = B @ [0.2, -0.1] + [U[k], 0], C @ [0.4, 0] + [-U[k], 0]
-    return A, a, B @ V @ B.T, np.array([[1, 2], [-(0.5 + 0.1 * k), 1]]), b, C @ W @ C.T
+    return oracles.Changing().model()
 
 
 def with_gaps(y):
@@ -63,7 +45,8 @@ def with_gaps(y):
 def record(changing):
     """Measurements with gaps (9, 5, 2), and what one dense regression finds in them."""
     y = with_gaps(simulate(changing, 5, STEPS, seed=2).y)
-    found = [oracles.joint_posterior([matrices(k) for k in range(STEPS)], PRIOR, y[:, run]) for run in range(5)]
+    one = oracles.Changing()
+    found = [oracles.joint_posterior(one.steps(STEPS), one.laws["prior"], y[:, run]) for run in range(5)]
     return y, Gaussian(np.stack([one[0] for one in found], axis=1), np.stack([one[1] for one in found], axis=1))
 
 
