@@ -461,6 +461,21 @@ def test_a_link_leads_to_its_place(browser, page):
         assert abs(tab.evaluate(COME_TO_REST, urlsplit(link.get_attribute("href")).fragment)) < 3
 
 
+@pytest.mark.parametrize("page", ["comparison", "manual/b-aof"])
+def test_contents_on_a_telephone(browser, page):
+    """They cover the text, a link closes them, and it arrives."""
+    with browser.new_context(offline=True, viewport={"width": 390, "height": 844}) as context:
+        tab = context.new_page()
+        tab.goto((HTML / f"{page}.html").as_uri())
+        tab.locator(".secondary-toggle").click()
+        drawer = tab.locator("#pst-secondary-sidebar-modal")
+        assert drawer.evaluate("e => [e, document.body].map((one) => getComputedStyle(one).backgroundColor)") == ["rgb(255, 255, 255)"] * 2
+        link = tab.locator("#pst-page-toc-nav > ul > li > a").nth(-2)
+        link.click()
+        assert abs(tab.evaluate(COME_TO_REST, urlsplit(link.get_attribute("href")).fragment)) < 3
+        assert not drawer.is_visible()
+
+
 def test_the_contents_show_where_the_reader_is(browser):
     """The section that fills the screen, and the one it is part of; at the top of a page none."""
     with browser.new_context(offline=True, viewport={"width": 1280, "height": 900}) as context:
