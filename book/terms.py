@@ -83,7 +83,14 @@ class Terms(SphinxDirective):
 def fill(app, doctree, name: str) -> None:
     """Put the terms in the place of the directive."""
     for place in list(doctree.findall(terms_here)):
-        place.replace_self(_index() if place["russian"] else _list(app, name))
+        place.replace_self(_index() if place["russian"] else [_letters(), _list(app, name)])
+
+
+def _letters() -> nodes.paragraph:
+    """A link to the first term with each letter."""
+    first = {term.name[0].upper(): term.identity for term in reversed(terms())}
+    links = [nodes.reference("", letter, refid=first[letter], internal=True) for letter in sorted(first)]
+    return nodes.paragraph("", "", *links, classes=["kf-letters"])
 
 
 def _list(app, name: str) -> nodes.definition_list:
