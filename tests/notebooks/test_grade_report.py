@@ -165,7 +165,7 @@ def test_right_parts_and_steps_on_wrong_ones_are_counted(tmp_path):
     assert [rows[name][key] for name in ("b2", "b3") for key in ("in part", "follows")] == ["1", "0", "0", "1"]
     page = (tmp_path / "overview.html").read_text(encoding="utf-8")
     assert "100 % for the right parts of a wrong answer, 25 % if it is right on top" in page
-    assert "right in part 1" in page and "1: follows" in page
+    assert "right in part 1" in page and "1: right on top of an earlier wrong answer" in page
 
 
 @pytest.fixture
