@@ -101,9 +101,9 @@ def _list(app, name: str) -> nodes.definition_list:
             head += nodes.Text(f" ({term.short})")
         russian = nodes.inline("", ", ".join(term.ru), classes=["kf-ru", "language-ru"])
         head += [nodes.Text(" "), russian]
-        _, page = contents.page(app.env, term.page)
-        title = page.title.replace(" ★", "")
-        where = nodes.reference("", f"{page.number}. {title}" if page.number else title, internal=True)
+        known = contents.page(app.env, term.page)
+        title, number = (known[1].title.replace(" ★", ""), known[1].number) if known else (term.page, None)
+        where = nodes.reference("", f"{number}. {title}" if number else title, internal=True)
         where["refuri"] = app.builder.get_relative_uri(name, term.page) + f"#first-{term.identity}"
         place = nodes.inline("", "", where, classes=["kf-where"])
         meaning = nodes.paragraph("", f"{term.meaning} ", place)
