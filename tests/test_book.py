@@ -404,6 +404,34 @@ def test_figures_are_counted_on_their_page(page):
     assert counted == [f"{chapter[1]}.{place}" if chapter else f"{place}" for place in range(1, len(counted) + 1)]
 
 
+# How far an element is from the upper edge of what may be read: asked until it stays there, or for ten seconds.
+COME_TO_REST = """(name) => new Promise((rest) => {
+    let there = 0, asked = 0;
+    const ask = () => {
+        const padding = parseFloat(getComputedStyle(document.documentElement).scrollPaddingTop);
+        const off = document.getElementById(name).getBoundingClientRect().top - padding;
+        there = Math.abs(off) < 3 ? there + 1 : 0;
+        if (there === 3 || ++asked === 50) rest(off); else setTimeout(ask, 200);
+    };
+    ask();
+})"""
+
+
+@pytest.mark.parametrize("page", ["comparison", "manual/b-aof"])
+def test_contents_on_a_telephone(browser, page):
+    """They cover the text, a link closes them, and it arrives."""
+    with browser.new_context(offline=True, viewport={"width": 390, "height": 844}) as context:
+        tab = context.new_page()
+        tab.goto((HTML / f"{page}.html").as_uri())
+        tab.locator(".secondary-toggle").click()
+        drawer = tab.locator("#pst-secondary-sidebar-modal")
+        assert drawer.evaluate("e => getComputedStyle(e).backgroundColor") == "rgb(255, 255, 255)"
+        link = tab.locator("#pst-page-toc-nav > ul > li > a").nth(-2)
+        link.click()
+        assert abs(tab.evaluate(COME_TO_REST, urlsplit(link.get_attribute("href")).fragment)) < 3
+        assert not drawer.is_visible()
+
+
 @pytest.mark.parametrize("page", [WHOLE, "comparison", "manual/r-loop"])
 def test_a_formula_stays_with_its_comma(page):
     """And with its bracket: no text that begins behind a formula begins with a mark."""
@@ -498,7 +526,9 @@ def test_a_chapter_is_downloaded_as_a_notebook(window):
     [
         ("stratonovich equation", "stratonovich.html", ""),
         ("variant 53 Russian report", "sample-report.html", ""),
-        ("ошибки фильтрации", "notation.html", "estimates-and-gains"),  # which says "ошибка", "фильтр"
+        ("что такое невязки", "glossary.html", "term-innovation"),  # which says "невязка"
+        ("what is the DUOF", "glossary.html", "term-two-step-conditionally-optimal-filter"),
+        ("why does the EKF diverge", "glossary.html", "term-extended-kalman-filter"),
         ("alpha-beta", "radar-tracking.html", "experiment-1-kalman-against-alpha-beta"),
         ("likelihood", "what-the-data-say.html", "likelihood-from-innovations"),
         ("smoothing_error", "package/kfcourse.records.html", "module-kfcourse.records.smoothing"),

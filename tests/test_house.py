@@ -140,7 +140,7 @@ ROOMS = {
     "kfcourse/*.py": 6_500,
     "kfcourse/checks": 20_210,
     "kfcourse/continuous": 4_330,
-    "kfcourse/derivations": 16_330,
+    "kfcourse/derivations": 16_540,
     "kfcourse/filters": 33_830,
     "kfcourse/lab": 24_040,
     "kfcourse/linear": 7_020,

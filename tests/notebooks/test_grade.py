@@ -461,7 +461,7 @@ def test_what_cannot_be_graded_is_named(graded):
 def test_a_course_list_tells_what_to_look_at(graded):
     assert [line for line in graded.output.splitlines() if line.startswith("look at")] == [
         "look at Иванов Иван: set b: came back empty",
-        "look at Петров: set b: marked as variant 53, which was given, and says that it is 12; set b: opens set b, variant 12",
+        "look at Петров: set b: for variant 12, and marked as variant 53, which was given",
         "look at Сидоров: missing: b",
     ]
     assert (graded.folder.parent / "returned-report" / "feedback" / "М-1" / "Петров.html").exists()
@@ -675,7 +675,7 @@ def test_the_variant_is_the_one_that_was_given(tmp_path):
     found, notes = claimed({"set": "b", "variant": "7"}, [Cell(1, "", "", f'task = exercise("b", {easy!r})')], None, "53")
     assert found.variant == exercise("b", "53").variant
     assert notes == [
-        "marked as variant 53, which was given, and says that it is 7",
+        "for variant 7, and marked as variant 53, which was given",
         "marked as variant 53, which was given, and opens one of its own that has this name",
     ]
     found, notes = claimed({"set": "b", "variant": "53"}, [Cell(1, "", "", f'task = exercise("b", {easy!r})')], None)
