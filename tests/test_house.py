@@ -197,7 +197,7 @@ ROOMS = {
     "kfcourse/continuous": 4_330,
     "kfcourse/derivations": 16_330,
     "kfcourse/filters": 33_830,
-    "kfcourse/lab": 24_040,
+    "kfcourse/lab": 23_020,
     "kfcourse/linear": 7_020,
     "kfcourse/montecarlo": 10_360,
     "kfcourse/notebooks": 26_830,

@@ -150,7 +150,7 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None =
 def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
     """The criteria that need trajectories x (steps, runs, n)."""
     steps, runs = x.shape[:2]
-    filters = [one.one for one in admissions(model, LAB) if one.one]
+    filters = [one.built for one in admissions(model, LAB) if one.built]
     moments = bounded(x)
     if moments.ok and not np.isfinite(simulate(_harsh(model), runs, steps, seed).x).all():
         rare = f"trajectories become infinite when deviations are {STRESS:g} times larger"

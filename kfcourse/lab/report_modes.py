@@ -11,7 +11,6 @@ from kfcourse.filters import latex as equations_latex
 from kfcourse.filters.jump_equations import combination, correction, prediction
 from kfcourse.filters.optimal_structure import ESTIMATES, MEASUREMENTS
 from kfcourse.lab.checked_quadrature import Checked
-from kfcourse.lab.families import family
 from kfcourse.lab.report_sections import Block, StudentReport
 from kfcourse.lab.report_text import in_percent, law, lines_of, matrix, printed
 from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures, Structures
@@ -126,8 +125,9 @@ class JumpReport(StudentReport):
         about = {"imm": "about_imm", "gpb2": "about_gpb2", **of_memory, "averaged": "about_averaged"}
         told: dict[str, list[str]] = {}
         for name in self.result.entrants:
-            averaged = name.endswith("averaged") or name == "duof"
-            told.setdefault("averaged" if averaged else name if name in about else family(name), []).append(self.title(name))
+            entry = self.entries[name]
+            averaged = entry.functions == "averaged" or entry.family == "duof"
+            told.setdefault("averaged" if averaged else entry.family, []).append(self.title(name))
         lines = [
             self.said(text, names=", ".join(told[key]), memory=f"$\\zeta_k = {MEMORIES.get(key)}$")
             for key, text in about.items()

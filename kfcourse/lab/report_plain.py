@@ -9,10 +9,10 @@ import sympy as sp
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab.checked_quadrature import Checked
-from kfcourse.lab.families import FAMILIES, family
+from kfcourse.lab.families import FAMILIES
 from kfcourse.lab.report_sections import Block, StudentReport
 from kfcourse.lab.report_text import law, lines_of, matrix, printed
-from kfcourse.lab.short_names import Structures
+from kfcourse.lab.short_names import Structures, entry
 from kfcourse.lab.written_out import written_lines
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.symbolic.model import Model
@@ -148,7 +148,7 @@ class PlainReport(StudentReport):
         yield Block("text", words["start"])
         mean, cov = self.model.prior
         yield Block("formulas", lines=[rf"\lambda_0 &= m_0 = {matrix(mean[:, None])},\qquad \Psi_0 = D_0 = {matrix(cov)}"])
-        families = dict.fromkeys(map(family, self.result.entrants))
+        families = dict.fromkeys(entry(name).family for name in self.result.entrants)
         designed = next((one for one in families if one != "aof"), "")
         for one in (one for one in families if one in EQUATIONS):
             heading = FAMILIES[one].russian_heading if words["language"] == "ru" else FAMILIES[one].heading

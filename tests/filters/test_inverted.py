@@ -7,7 +7,6 @@ from scipy import stats
 from kfcourse import Model, ModelError, run, simulate
 from kfcourse.filters import kalman_filter, particle, pointmass
 from kfcourse.filters.densities import likelihood
-from kfcourse.lab.short_names import has_bound
 
 
 @pytest.mark.parametrize(
@@ -53,4 +52,3 @@ def test_what_cannot_be_solved_for_is_refused(meter):
     model = Model.define("x + v", meter)
     with pytest.raises(ModelError, match="noise enters nonlinearly"):
         pointmass(model)
-    assert not has_bound(model)

@@ -216,4 +216,4 @@ def test_the_lab_says_so_in_its_reports(tmp_path, monkeypatch, meter, more, name
 def test_trajectories_that_become_infinite_are_no_pilot():
     model = Model.define(["x1**2", "abs(x1) + 0.3*v"], ["x1"])
     (one,) = admissions(model, ["aof-gaussian"], seconds=5)
-    assert one.one is None and "no closed-form" in str(one.reason)
+    assert one.built is None and "no closed-form" in str(one.reason)
