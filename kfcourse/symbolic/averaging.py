@@ -19,7 +19,7 @@ from kfcourse.laws import Array, Gaussian, Measurement, Transition, product, tra
 from kfcourse.symbolic.equations import Noiseless, compile_noiseless
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import Structure, each_once, expect_each, moving_alike, of_each_step
+from kfcourse.symbolic.structure import Structure, expect_each, of_each_step
 
 
 def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
@@ -36,15 +36,13 @@ def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
     expect_each(structures, "averaged")
     if len(structures) != len(model.modes):
         raise ValueError(f"averaged expects a structure for each of the {len(model.modes)} modes, got {len(structures)}")
-    alike = moving_alike(structures)
 
     def at(k: int) -> Structure:
         before, after = model.law_at(k), model.law_at(k + 1)
         now = [one.at(k) for one in structures]
 
         def predict(z: Array, p: Array) -> Gaussian:
-            each, law = each_once(now, alike), Gaussian(z, p)
-            laws = [each(j, law) for j in range(len(now))]
+            laws = [structure.predict(z, p) for structure in now]
             tau = _mean(after, [law.mean for law in laws])
             return Gaussian(tau, _mean(after, [law.cov + _square(law.mean - tau) for law in laws]))
 

@@ -14,7 +14,7 @@ predict/correct step serves them all.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial, reduce
 from itertools import product as cartesian
@@ -56,8 +56,6 @@ class Structure:
         The symbolic functions; None for the numerical structures.
     at_step : callable, optional
         Step to the structure of that step, if the model depends on it; see `at`.
-    moving : hashable, optional
-        Of numerical structures: the same for those that have the same tau and Theta.
 
     Covariances, G and h that do not depend on the trajectory may come without the leading axes.
     """
@@ -69,7 +67,6 @@ class Structure:
     transition: Callable[[Vectors, Matrices], Transition]
     formulas: StructuralFormulas | None = None
     at_step: Callable[[int], Structure] | None = None
-    moving: Hashable = None
 
     def at(self, k: int) -> Structure:
         """The structural functions of step k: tau and Theta from k to k + 1; h, G, F of y_k.
@@ -346,35 +343,3 @@ def expect_each(structures: Sequence[Structure], what: str) -> None:
         raise TypeError(f"{what} expects a list of structures, one a mode, and one came: give [{structures.name}, ...]")
     for one in structures:
         expect(one, Structure, what)
-
-
-def moving_alike(structures: Sequence[Structure]) -> list[int]:
-    """For each mode the first one with the same tau and Theta: of meters that fail, say, there is one object."""
-    keys = [_object(one) for one in structures]
-    return [next(i for i, other in enumerate(keys) if other == key) for key in keys]
-
-
-def _object(one: Structure) -> object:
-    """What tau and Theta hang on; of structures that do not tell they are nobody else's."""
-    if one.formulas is None:
-        return one.moving or id(one)
-    return one.name, *(part.tobytes() for part in one.model.state_noise), *object_equation(one.model)
-
-
-def object_equation(model: Model) -> tuple[Hashable, ...]:
-    """Equal for models with the same state equation: its numbers, its symbols in their order, its interval and inputs."""
-    known = model.known
-    return model.x, model.v, model.state_equation.subs(model.values), known.interval, tuple(known.inputs.items())
-
-
-def each_once(now: Sequence[Structure], alike: Sequence[int]) -> Callable[[int, Gaussian], Gaussian]:
-    """(mode, law) -> N(tau, Theta) of the next state, found once for modes that move alike."""
-    found: dict[tuple[int, int], tuple[Gaussian, Gaussian]] = {}
-
-    def predict(j: int, law: Gaussian) -> Gaussian:
-        key = alike[j], id(law)
-        if key not in found:
-            found[key] = law, now[j].predict(*law)  # while it is kept, no other law has its id
-        return found[key][1]
-
-    return predict

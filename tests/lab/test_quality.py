@@ -5,10 +5,8 @@ import tomllib
 from collections import Counter
 from itertools import product
 
-import control
 import numpy as np
 import pytest
-import scipy.stats
 from click.testing import CliRunner
 
 from kfcourse import Model, cli, compare, lab_filters, load_variants
@@ -26,9 +24,7 @@ from kfcourse.lab.quality import (
     differences,
     examine,
     examine_all,
-    kurtosis,
     not_diverging,
-    observable_share,
     shares,
     table,
     unmeasured,
@@ -96,14 +92,6 @@ BAD = {
     "a component not seen": (
         dict(state=["0.9*x1 + 0.3*v1", "0.8*x2 + 0.3*v2"], meter=["x1 + 0.3*(1 + x1**2)*w1"]),
         {"observable": "of the variance of x2$", "filters differ": SAME},
-    ),
-    "a component seen by its correlation only": (
-        dict(
-            state=["x1 + 0.1*x1*v1", "x2 + 0.1*x2*v1"],
-            meter=["x1 + 0.3*w1"],
-            prior={"mean": [1, 1], "variance": [[1, 0.99], [0.99, 1]]},
-        ),
-        {"observable": "the model is observable on 0 % of them"},
     ),
     "a constant component": (
         dict(state=["0.9*x1 + x2*v1", "x2"], meter=["x1 + x2 + 0.3*w1"], prior={"mean": [1, 1], "variance": [1, 0]}),
@@ -197,12 +185,6 @@ def test_infinite_trajectories_are_found_with_their_step(bad):
     assert "infinite (step 4)" in found.says
 
 
-def test_kurtosis_is_scipy_s():
-    x = np.random.default_rng(2).gamma(2.0, size=(3, 500, 2))
-    np.testing.assert_allclose(kurtosis(x), scipy.stats.kurtosis(x, axis=1, fisher=False), rtol=1e-12)
-    assert (kurtosis(np.full((3, 10, 1), 0.1)) == 0).all()
-
-
 def test_a_filter_that_diverges_is_named():
     def step(state, y):
         law = Gaussian(100 + 0 * y, np.eye(1))
@@ -270,39 +252,6 @@ def test_the_estimate_without_measurements_is_the_mean():
         assert abs(state.posterior.mean - mean).max() < 4 * np.sqrt(variance / 40_000)
         assert abs(state.posterior.cov / variance - 1) < 4 * np.sqrt(2 / 40_000)
         mean, variance = 0.5 * mean + 1, 0.25 * variance + 1
-
-
-def test_observability_is_control_s_for_linear_models():
-    """Random models, some of them made unobservable by a component that nothing sees."""
-    rng = np.random.default_rng(7)
-    seen = set()
-    for trial in range(6):
-        A, C = np.round(rng.uniform(-0.9, 0.9, (3, 3)), 2), np.round(rng.uniform(-1, 1, (1, 3)), 2)
-        if trial % 2:
-            A[:2, 2], C[0, 2] = 0, 0
-        rows = [" + ".join(f"({a})*x{j + 1}" for j, a in enumerate(row)) for row in [*A, *C]]
-        model = Model.define([f"{row} + v{i + 1}" for i, row in enumerate(rows[:3])], [rows[3] + " + w1"])
-        rank = np.linalg.matrix_rank(control.obsv(A, C))
-        assert observable_share(model, simulate(model, 20, 13, trial).x) == (rank == 3)
-        seen.add(int(rank))
-    assert seen == {2, 3}
-
-
-def test_observability_is_that_of_the_linearisation_along_the_trajectory():
-    model = Model.define(["0.9*x1 + x2*x1", "x2 + 0*v1"], ["x1 + w1"], prior={"mean": [1, 0], "variance": [1, 0.01]})
-    x = simulate(model, 50, 9, 1).x
-    assert observable_share(model, x) == 1
-    x[:, 10:] *= np.array([0.0, 1.0])  # where x1 is 0, x2 moves nothing
-    assert observable_share(model, x) == 0.2
-
-
-def test_what_is_forgotten_at_the_first_step_is_not_observable():
-    """Slopes [[1, x2], [1, x2]]: at x2 = 0 the next state does not depend on x2, whatever the later slopes are."""
-    model = Model.define(["x1 + x2**2/2 + v1", "x1 + x2**2/2 + v2"], ["x1 + w1"])
-    x = np.random.default_rng(3).normal(size=(8, 10, 2))
-    assert observable_share(model, x) == 1
-    x[0, :, 1] = 0
-    assert observable_share(model, x) == 0
 
 
 # --- the filters differ

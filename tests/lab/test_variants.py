@@ -164,9 +164,6 @@ BAD_VARIANTS = {
     "negative variance": (GOOD + "prior = { variance = -1.0 }", "negative variance"),
     "variance nan": (GOOD + "prior = { variance = nan }", "finite"),
     "mean huge": (GOOD + "prior = { mean = " + "9" * 400 + " }", "`prior`: mean and variance must be numbers"),
-    "mean that hides the variance": (GOOD + "prior = { mean = 6e23 }", "`prior`: the variance 1 is lost beside the mean 6e+23"),
-    "variance huge": (GOOD + "prior = { variance = 1e200 }", "`prior`: the variance 1e+200 is beyond"),
-    "variance tiny": (GOOD + "meter_noise = { variance = 1e-300 }", "`meter_noise`: the variance 1e-300 is beyond"),
     "a product beyond the floats": (
         'state = "a*a*a*a*a*x + v"\nmeter = "x + w"\nparameters = { a = 1e99 }',
         "the state equation a**5*x + v holds the number 1.00e+495 with these parameters",
@@ -198,8 +195,6 @@ BAD_VARIANTS = {
     "angles in a list of numbers": (GOOD + "angles = [1]", "`angles` must name components"),
     "ten thousand hexadecimal digits": (GOOD + f"parameters = {{ c = 0x{'f' * 10_000} }}", "numbers of thousands of digits"),
     "as many in a list": (GOOD + f"angles = [0x{'f' * 10_000}]", "numbers of thousands of digits"),
-    "a variance that ends at once": (GOOD + 'meter_noise = { variance = "1 - k" }', "-1 at step 2; it must not be negative"),
-    "a variance that is infinite": (GOOD + 'meter_noise = { variance = "1/k" }', "inf at step 0; it must be finite"),
     "symbols of other keys": (GOOD + 'symbols = { z = ["x"] }', "z"),
     "symbols not named": (GOOD + "symbols = { x = 5 }", "x must be a name or a list of names"),
     "one symbol for two": ('state = ["x1 + v1", "x2"]\nmeter = ["x1 + w1"]\nsymbols = { x = ["x1"] }', ""),
@@ -293,7 +288,7 @@ def test_an_editor_s_byte_order_mark_is_no_part_of_the_file(tmp_path):
 def test_a_missing_file_and_a_folder_are_refused_by_name(tmp_path):
     with pytest.raises(VariantError, match=r"no file of variants at .*nothing\.toml"):
         load_variants(tmp_path / "nothing.toml")
-    with pytest.raises(VariantError, match=f"{tmp_path}.*cannot be read"):
+    with pytest.raises(VariantError, match=f"no file of variants at {tmp_path}"):
         load_variants(tmp_path)
 
 
