@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial, reduce
 from itertools import product as cartesian
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 import sympy as sp
@@ -200,21 +200,18 @@ class StructuralFormulas:
 
 
 def of_steps(
-    name: str, model: Model, at: Callable[[int | None], Structure], formulas: StructuralFormulas | None = None
+    name: str,
+    model: Model,
+    at: Callable[[Any], Structure],
+    formulas: StructuralFormulas | None = None,
+    timed: bool = False,
 ) -> Structure:
-    """The structure at every step, or for a model that depends on it the one that `Structure.at` makes those of."""
-    return of_each_step(name, model, at, formulas) if model.timed else at(None)
-
-
-def of_each_step(
-    name: str, model: Model, at: Callable[[int], Structure], formulas: StructuralFormulas | None = None
-) -> Structure:
-    """The structure that `Structure.at` makes those of each step of."""
+    """The structure at every step; of what depends on the step the structure that `Structure.at` makes those of each step of."""
 
     def refused(mean: Vectors, cov: Matrices) -> NoReturn:
         raise ModelError(f"what is found of {model} depends on the step: say which, as in structure.at(k).predict(z, p)")
 
-    return Structure(name, model, refused, refused, refused, formulas, at)
+    return Structure(name, model, refused, refused, refused, formulas, at) if timed or model.timed else at(None)
 
 
 def _spread(law: Gaussian, over: Array, angles: Components) -> Gaussian:
@@ -279,7 +276,7 @@ def _taylor(equation, x, mean, noise, noise_mean):
     point = dict(zip(x, mean, strict=True)) | dict(zip(noise, noise_mean, strict=True))
     parts = [equation, equation.jacobian(sp.Matrix(x)), equation.jacobian(sp.Matrix(noise))]
     for part in parts:
-        if part.has(sp.Derivative, sp.DiracDelta) or any(jumps(one, [*x, *noise]) for one in equation.atoms(sp.Piecewise)):
+        if part.has(sp.Derivative, sp.DiracDelta) or any(jumps(choice, [*x, *noise]) for choice in equation.atoms(sp.Piecewise)):
             raise NoClosedForm(
                 f"{list(equation)} is not differentiable and cannot be linearised; use unscented(model) or gauss_hermite(model)",
                 "no_slope",
@@ -341,5 +338,5 @@ def expect_each(structures: Sequence[Structure], what: str) -> None:
     """TypeError unless these are structural functions, a list of them."""
     if isinstance(structures, Structure):
         raise TypeError(f"{what} expects a list of structures, one a mode, and one came: give [{structures.name}, ...]")
-    for one in structures:
-        expect(one, Structure, what)
+    for structure in structures:
+        expect(structure, Structure, what)

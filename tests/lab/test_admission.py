@@ -12,11 +12,9 @@ from kfcourse.filters import aof, duof
 from kfcourse.lab import admission
 from kfcourse.lab.admission import admissions, table
 from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, LAB, lab_filters
-from kfcourse.laws import gain
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare, without_failing
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import gaussian
 
 pytestmark = pytest.mark.quick
@@ -151,23 +149,6 @@ def test_a_negative_variance_is_the_affair_of_its_filter():
     assert re.match(failed, str(found.left_out["mfos-gaussian"]))
     expected = compare(filters[1:], *size, **options).error_variance("aof-gaussian").value
     np.testing.assert_array_equal(found.error_variance("aof-gaussian").value, expected)
-
-
-def test_a_variance_that_turns_negative_as_the_filter_runs_is_the_affair_of_that_filter():
-    model = Model.define("0.9*x + 0.3*v", "x + w")
-    good = aof(gaussian(model))
-
-    def step(state, y):
-        gain(np.ones((1, 1)), np.array([[-1.0 if state.step == 2 else 1.0]]))
-        return good.step(state, y)
-
-    broken = type(good)("broken", model, good.init, step)
-    with pytest.raises(NotFinite, match=r"^step 2: broken failed: a covariance has the variance -1") as caught:
-        compare([good, broken], model, 100, 4, 1, jobs=1, progress=False)
-    assert caught.value.filter_name == "broken"
-    with pytest.raises(ModelError, match="the input u has 2 value"):  # a mistake in the model is no filter's affair
-        timed = Model.define("0.9*x + u + v", "x + w", inputs={"u": [1, 2]})
-        compare([aof(gaussian(timed))], timed, 10, 4, 1, jobs=1, progress=False)
 
 
 @pytest.mark.parametrize("meter", [["x + w", "x + w"], ["x + w", "2*x + w"], ["x + w1", "x + w1 + w2", "w2 + x**2"]])

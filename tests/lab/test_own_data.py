@@ -229,21 +229,6 @@ def test_a_report_that_fails_leaves_what_was_there(call, place, monkeypatch):
     assert {path: path.read_bytes() for path in (place / "out").iterdir()} == before
 
 
-@pytest.mark.parametrize("where", ["examine", "save_texts"])
-def test_an_interrupt_leaves_what_was_there(call, place, monkeypatch, where):
-    """While the filter runs, and while the report is being written."""
-    arguments = ("line.csv", "--model", "my.toml", "--variant", "line", "--out", "out")
-    assert call(*arguments).exit_code == 0
-    before = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
-
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(own_data, where, interrupted)
-    assert call(*arguments, "--gate", 0.9).exit_code != 0
-    assert {path: path.read_bytes() for path in place.rglob("*") if path.is_file()} == before
-
-
 def test_the_model_of_a_file(place):
     assert model_of(place / "one.toml", None).name == "only"
     (place / "bad.toml").write_text(ONE.replace("0.9*x", "0.9*q"), encoding="utf-8")
