@@ -64,9 +64,9 @@ def _curve(
 
 def accuracy(result: Comparison, ax: Axes, names: Sequence[str] | None = None, words: Words = ENGLISH) -> Axes:
     """Error variance D_k of every filter against the step, on a logarithmic scale."""
+    ax.set_yscale("log")
     for name in names or result.names:
         _curve(ax, name, np.arange(result.steps), result.error_variance(name), words)
-    ax.set_yscale("log")
     ax.grid(True, which="major", alpha=0.3)
     return _labelled(ax, words.variance, words)
 

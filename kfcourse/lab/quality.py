@@ -51,8 +51,7 @@ STRESS = 1.5  # factor of all deviations
 SECONDS = 60.0  # for the derivation
 GROWTH = 10.0  # of a second moment over the second half of the steps: an unknown velocity has 4
 CARRIERS = 10.0  # trajectories, at least, that carry a second moment
-DIVERGED = 10.0  # a filter's error variance over that without measurements
-UNSEEN = 0.9  # the same of the best filter, when the meter tells too little
+UNSEEN = 0.9  # the best filter's error variance over that without measurements, when the meter tells too little
 SIGNIFICANCE = 0.01  # of "the filters differ", for all pairs and steps together
 ROUNDING = 1e-9  # relative differences that rounding alone explains
 LONGEST = 600  # operations of the Gaussian structural functions; the van der Pol oscillator has 309
@@ -157,7 +156,7 @@ def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
     except (NotFinite, np.linalg.LinAlgError) as error:  # a filter, or a decomposition for it
         return {"bounded": Finding(False, str(error), moments.value)}
     return {
-        "bounded": not_diverging(result) or moments,
+        "bounded": moments,
         "observable": observable(result, x),
         "filters differ": differences(result, [built.name for built in filters if isinstance(built, Design)]),
     }
@@ -234,14 +233,6 @@ def bounded(x: Array) -> Finding:
 def varies(x: Array) -> Array:
     """Whether a component of x (steps, runs, n) varies at a step, by more than rounding: (steps, n)."""
     return np.asarray(x.std(axis=1) > 1e-12 * np.abs(x).max(axis=1))
-
-
-def not_diverging(comparison: Comparison) -> Finding | None:
-    """The filter that is DIVERGED times worse than no measurements; None if there is none."""
-    worst, name = max((float(shares(comparison, name).value.max()), name) for name in measured(comparison))
-    if worst <= DIVERGED:
-        return None
-    return Finding(False, f"{title(name)} diverges: its error variance is {worst:.3g} times that without measurements", worst)
 
 
 def unmeasured(model: Model, x: Array) -> Filter:

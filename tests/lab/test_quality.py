@@ -23,7 +23,6 @@ from kfcourse.lab.quality import (
     differences,
     examine,
     examine_all,
-    not_diverging,
     shares,
     table,
     unmeasured,
@@ -171,19 +170,6 @@ def test_infinite_trajectories_are_found_with_their_step(bad):
         found = bounded(x)
     assert found.ok is False
     assert "infinite (step 4)" in found.says
-
-
-def test_a_filter_that_diverges_is_named():
-    def step(state, y):
-        law = Gaussian(100 + 0 * y, np.eye(1))
-        return State(state.step + 1, law, law)
-
-    wild = Filter("wild", LINEAR, initial_state(LINEAR), step)
-    x = simulate(LINEAR, 4000, 5, 1).x
-    good = compare([*lab_filters(LINEAR, ["duof"]), unmeasured(LINEAR, x)], LINEAR, 1000, 5, 1, progress=False)
-    assert not_diverging(good) is None
-    bad = compare([*lab_filters(LINEAR, ["duof"]), wild, unmeasured(LINEAR, x)], LINEAR, 1000, 5, 1, progress=False)
-    assert not_diverging(bad).says.startswith("wild diverges: its error variance is ")
 
 
 # --- observable
