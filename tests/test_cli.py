@@ -325,7 +325,7 @@ def test_a_missing_or_bad_file_of_variants_is_named(call, no_computation, tmp_pa
     refused(call(*arguments, "--variants", "nothing.toml"), "nothing.toml")
     (tmp_path / "bad.toml").write_text("[variants.53", encoding="utf-8")
     refused(call(*arguments, "--variants", "bad.toml"), "bad.toml", "not valid TOML")
-    refused(call(*arguments, "--variants", tmp_path), "cannot be read")
+    refused(call(*arguments, "--variants", tmp_path), "no file of variants")
 
 
 @pytest.mark.parametrize("out", ["mine.toml", "mine.toml/below"])
@@ -474,9 +474,7 @@ def test_a_full_disk_is_named(call, no_report):
     assert "GAOF" in result.output
 
 
-def test_a_file_without_end_is_no_file_of_variants(call, no_computation, tmp_path):
-    (tmp_path / "zeros.toml").write_bytes(bytes(2_000_000))
-    refused(call("lab", "53", *QUICK, "--variants", "zeros.toml"), "zeros.toml", "no file of variants")
+def test_a_file_without_end_is_no_file_of_variants(call, no_computation):
     if Path("/dev/zero").exists():
         refused(call("lab", "53", *QUICK, "--variants", "/dev/zero"), "/dev/zero", "no file of variants")
 
