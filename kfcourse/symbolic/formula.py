@@ -129,8 +129,10 @@ def syntax(formula: str) -> tuple[str, ast.expr, int]:
             tree = ast.parse(formula.strip(), mode="eval").body
     except SyntaxError as error:
         column = offset + max((error.offset or 1) - 1, 0)
-        hint = "; a product needs *, as in 2*x" if re.search(r"[0-9)]\s*[A-Za-z(]", formula) else ""
-        raise FormulaError(formula, f"the formula cannot be read ({error.msg}){hint}", column) from None
+        hint = "; a product needs *, as in 2*x" if re.search(r"[0-9)]\s*[A-Za-z(]|\w\s+\w", formula) else ""
+        # Python's words of brackets are good; what else it says is for programmers
+        words = error.msg if re.search("closed|match|nested", error.msg) else "something is missing here, or too much"
+        raise FormulaError(formula, f"the formula cannot be read: {words}{hint}", column) from None
     except (ValueError, MemoryError, RecursionError):
         raise FormulaError(formula, "the formula cannot be read: nested too deeply or has forbidden characters") from None
     return formula, tree, offset
