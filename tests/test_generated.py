@@ -346,7 +346,7 @@ def test_a_model_is_refused_or_computes_what_its_formulas_say(given):
 def test_the_lab_of_a_model_has_finite_results_or_says_why_not(given, figure):
     model = defined(given)
     assume(model is not None and not nothing_random(model))
-    filters = [one.one for one in admissions(model, LAB, seconds=5) if one.one]
+    filters = [one.built for one in admissions(model, LAB, seconds=5) if one.built]
     assume(filters)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", QuadratureWarning)

@@ -7,7 +7,6 @@ from scipy import stats
 from kfcourse import Model, ModelError, run, simulate
 from kfcourse.filters import pointmass
 from kfcourse.filters.densities import likelihood
-from kfcourse.lab.short_names import has_bound
 
 
 @pytest.mark.parametrize(
@@ -33,7 +32,6 @@ def test_what_cannot_be_solved_for_is_refused(meter):
     model = Model.define("x + v", meter)
     with pytest.raises(ModelError, match="noise enters nonlinearly"):
         pointmass(model)
-    assert not has_bound(model)
 
 
 def test_the_density_is_that_of_the_transformed_noise():

@@ -16,7 +16,6 @@ from kfcourse import (
     ModelError,
     NotFinite,
     design,
-    gauss_hermite,
     gaussian,
     likelihood,
     linearised,
@@ -31,7 +30,6 @@ from kfcourse.lab.variants import find_variant
 from kfcourse.montecarlo.ensemble import Instant
 from kfcourse.symbolic.averaging import averaged
 from kfcourse.symbolic.jumping import JumpModel
-from kfcourse.symbolic.structure import moving_alike
 
 pytestmark = pytest.mark.quick
 
@@ -317,51 +315,3 @@ def test_of_angles_there_is_no_average():
     )
     with pytest.raises(ModelError, match="angles have no average"):
         averaged(model, [linearised(mode) for mode in model.modes])
-
-
-# --- what modes share is found once
-
-CARRIED = {"sound": {}, "deaf": {"parameters": {"f": 3.0}}, "thrown": {"state": "x - 0.4*sin(x) + 1 + 0.8*v"}}
-
-
-def bent(transition, first=(0.5, 0.3, 0.2)):
-    return JumpModel.define(
-        "x - 0.4*sin(x) + s*v", "x + f*w", {"s": 0.4, "f": 0.5}, modes=CARRIED, transition=transition, first=list(first)
-    )
-
-
-CHAINED = [[0.8, 0.15, 0.05], [0.3, 0.6, 0.1], [0.25, 0.25, 0.5]]
-
-
-@pytest.mark.parametrize("build", SEQUENTIAL)
-def test_modes_with_one_object_share_its_predictions_and_nothing_changes(build):
-    model = bent(CHAINED)
-    structures = [gaussian(mode) for mode in model.modes]
-    shared = build(structures, model, model.first)
-    alone = build([replace(one, formulas=None) for one in structures], model, model.first)  # without formulas nobody knows
-    y = simulate(model, 20, 8, seed=4).y
-    for found, expected in zip(follow(shared, y), follow(alone, y), strict=True):
-        np.testing.assert_allclose(found, expected, rtol=ROUNDING, atol=ROUNDING)
-
-
-def test_objects_are_alike_only_with_the_same_numbers_inputs_and_approximation():
-    modes = bent(CHAINED).modes
-    assert moving_alike([gaussian(modes[0]), linearised(modes[0])]) == [0, 1]
-    assert moving_alike([gaussian(modes[0]), gaussian(modes[0].replace(s=0.5))]) == [0, 1]
-    assert moving_alike([gaussian(mode) for mode in modes]) == [0, 0, 2]
-    assert moving_alike([unscented(modes[0]), unscented(modes[1])]) == [0, 0]
-    assert moving_alike([gauss_hermite(modes[0], 3), gauss_hermite(modes[0], 4), gauss_hermite(modes[1], 3)]) == [0, 1, 0]
-    assert moving_alike([gauss_hermite(modes[0]), gauss_hermite(modes[0].replace(s=0.5))]) == [0, 1]
-    turned = [
-        Model.define(
-            ["p + v1", "q + v2"],
-            "p + w",
-            symbols={"x": ["p", "q"], "v": list(noises), "w": ["w"]},
-            state_noise={"variance": [1.0, 4.0]},
-        )
-        for noises in (("v1", "v2"), ("v1", "v2"), ("v2", "v1"))
-    ]
-    for build in (gaussian, linearised, unscented):
-        assert moving_alike([build(one) for one in turned]) == [0, 0, 2]  # the same formulas, the variances are each other's
-    driven = [Model.define("x + u + v", "x + w", inputs={"u": values}) for values in ([0, 1], [0, 1], [1, 0])]
-    assert moving_alike([gaussian(one) for one in driven]) == [0, 0, 2]
