@@ -1,4 +1,4 @@
-"""The house keeps its order: imports run down, no module hides behind a function, rooms say what they are."""
+"""The house keeps its order: imports run down, no module hides behind a function, no room grows."""
 
 import ast
 import collections
@@ -150,7 +150,7 @@ ROOMS = {
     "kfcourse/records": 6_710,
     "kfcourse/scenarios": 11_870,
     "kfcourse/symbolic": 26_280,
-    "tests": 223_970,
+    "tests": 221_400,
 }
 OF_LAYOUT = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
 DOCUMENTED = (ast.Module, ast.FunctionDef, ast.ClassDef, ast.AsyncFunctionDef)
