@@ -1,4 +1,4 @@
-"""Generated formulas, models and files of variants: each is right or refused, and none hangs, crashes or lies.
+"""Generated formulas, models and tables of variants: each is right or refused, and none hangs, crashes or lies.
 
 1,000 cases with `make test`, always the same; 20,000 other ones with `make fuzz`.
 """
@@ -10,8 +10,6 @@ import os
 import time
 import warnings
 from contextlib import contextmanager
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import mpmath
 import numpy as np
@@ -20,22 +18,14 @@ import sympy as sp
 from hypothesis import HealthCheck, Phase, assume, event, given, settings
 from hypothesis import strategies as st
 from latex2mathml.converter import convert
-from matplotlib.figure import Figure
 
 from kfcourse import (
     FormulaError,
     Model,
     ModelError,
-    NotFinite,
-    QuadratureWarning,
-    compare,
     simulate,
 )
-from kfcourse.lab import plots
-from kfcourse.lab.admission import admissions
-from kfcourse.lab.report import conclusions, write_json
-from kfcourse.lab.short_names import LAB
-from kfcourse.lab.variants import KEYS, Variant, VariantError, read_variant
+from kfcourse.lab.variants import KEYS, VariantError, read_variant
 from kfcourse.symbolic.angular import AngleWarning
 from kfcourse.symbolic.equations import compile_model
 from kfcourse.symbolic.formula import FUNCTIONS, parse, symbol
@@ -261,7 +251,6 @@ STATES = [
     "tau_k",
 ]
 SIZES = [0, 1, -1, 0.5, 2, 0.01, 1e-5, 1e5, 1e-60, 1e60, 1e99, -1e99, 1e-99, 3, sp.Rational(1, 3)]
-TAME = [1, 0.9, -0.5, 0.1, 2, 0.05]
 EXTREME = [0.0, 1e-300, 1e300, 1e200, 6e23, -1.0, math.nan, math.inf, 1e-60, 1e60, 1e-101, 5e-324]
 
 
@@ -274,23 +263,22 @@ def laws(size):
 
 
 @st.composite
-def models(draw, tame=False):
+def models(draw):
     """Keyword arguments of Model.define."""
     n = draw(st.integers(1, 2))
     x = draw(st.lists(st.sampled_from(STATES), min_size=n, max_size=n, unique=True))
-    numbers = ["0.5", "2", "0.1", "1"] if tame else NUMBERS
-    parameters = draw(st.dictionaries(st.sampled_from("abc"), st.sampled_from(TAME if tame else SIZES), max_size=2))
+    parameters = draw(st.dictionaries(st.sampled_from("abc"), st.sampled_from(SIZES), max_size=2))
     names = [*x, *parameters]
 
     def formulas(noise, count):
-        body = [text(named(draw(TREES), [*names, noise], numbers)) for _ in range(count)]
+        body = [text(named(draw(TREES), [*names, noise])) for _ in range(count)]
         return [f"{formula} + 0.3*{noise}" if draw(st.booleans()) else formula for formula in body]
 
     meters = formulas("w", draw(st.integers(1, 2)))
     meters[0] += f" + {x[0]}" if draw(st.booleans()) else ""
     given = {"state": formulas("v", n), "meter": meters, "parameters": parameters, "symbols": {"x": x}, "angles": []}
     for what, size in {"prior": n, "state_noise": 1, "meter_noise": 1}.items():
-        if not tame and draw(st.booleans()):
+        if draw(st.booleans()):
             given[what] = draw(laws(size))
     return given
 

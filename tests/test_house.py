@@ -1,4 +1,4 @@
-"""The house keeps its order: imports run down, no module hides behind a function, rooms say what they are."""
+"""The house keeps its order: imports run down, no module hides behind a function, no room grows."""
 
 import ast
 import collections

@@ -113,3 +113,8 @@ def test_what_is_not_finite_does_not_reach_lapack(capfd):
     wrong = outcome(fitted, lambda a: np.array([1.0, 2.0]))
     assert wrong.diagnosis == ("unused",)
     assert capfd.readouterr() == ("", "")
+
+
+def test_results_in_another_order_may_have_other_shapes():
+    question = asks(lambda a: (a[0], a), [(np.ones((2, 2)),)], parts=("row", "all"))
+    assert "another order" in outcome(question, lambda a: (a, a[0])).message

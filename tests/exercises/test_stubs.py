@@ -1,4 +1,4 @@
-"""What a student is given and what is checked belong together: names, arguments, titles and levels."""
+"""What a student is given and what is checked belong together: names, arguments, imports."""
 
 import ast
 import inspect

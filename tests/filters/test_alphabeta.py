@@ -1,4 +1,4 @@
-"""Alpha-beta(-gamma) filters against the Riccati equation, filterpy, plain floats, and their own errors in simulation."""
+"""Alpha-beta(-gamma) filters against the Riccati equation and plain floats."""
 
 import control
 import numpy as np

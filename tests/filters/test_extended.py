@@ -1,4 +1,4 @@
-"""The extended Kalman filter against independent implementations, and the angle of a point in formulas."""
+"""The extended Kalman filter against the slow loop of the page, and the angle of a point in formulas."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The filters: slow loops from the page, the printed equations executed; what holds for all is in test_every_filter."""
+"""The filters: the printed equations executed; what holds for all is in test_every_filter."""
 
 from functools import partial
 

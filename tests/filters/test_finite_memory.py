@@ -1,4 +1,4 @@
-"""Filters that remember: the note's loops, the best estimate from a window, identities, and what is refused."""
+"""Filters that remember: what is missing, other regressors, angles, and what is refused."""
 
 import numpy as np
 import pytest

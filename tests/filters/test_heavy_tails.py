@@ -1,4 +1,4 @@
-"""Weights instead of a gate: the equations of the fixed point, limits, brute force over heavy tails, and outliers."""
+"""Weights instead of a gate: the equations of the fixed point, Huber's cost, and outliers."""
 
 import numpy as np
 import pytest

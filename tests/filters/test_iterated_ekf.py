@@ -1,4 +1,4 @@
-"""The iterated filter: Gauss and Newton's method, posterior linearisation, and the Kalman filter where nothing is curved."""
+"""The iterated filter: Gauss and Newton's method, and the printed equations at the tangent and with sigma points."""
 
 import re
 

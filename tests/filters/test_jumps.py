@@ -1,4 +1,4 @@
-"""Filters of models that jump: against all histories of modes, a plain grid, and the cases in which they are other filters."""
+"""Filters of models that jump: against all histories of modes, and the cases in which they are other filters."""
 
 from dataclasses import replace
 from functools import partial

@@ -1,4 +1,4 @@
-"""The interacting-multiple-model filter against one model, a slow loop, filterpy, and the truth."""
+"""The interacting-multiple-model filter against a slow loop."""
 
 import math
 

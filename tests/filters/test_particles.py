@@ -156,20 +156,6 @@ def test_the_evidence_is_that_of_all_histories():
         assert abs(found[i] - histories(THROWN, y[:, i])[3]) < 4 * 0.05
 
 
-# --- the proposal
-
-
-def test_it_is_guided_in_models_that_depend_on_the_step_too():
-    """Meter and noise change with k: the Kalman filter's estimates within 4 errors of the sampling; most particles count."""
-    model = Model.define("0.9*x + (1 + 0.2*k)*v", "(2 - 0.3*k)*x + 0.05*(1 + k)*w")
-    y = simulate(model, 50, 4, seed=1).y
-    expected = run(kalman_filter(model), y)
-    for k, state in enumerate([*states(particle(model, 1000), y)][1:]):
-        distance = (state.posterior.mean - expected.mean[k])[:, 0] / np.sqrt(expected.cov[k, :, 0, 0])
-        assert (state.memory.effective > 400).all()
-        assert (abs(distance) < 4 * np.sqrt(1.5 / state.memory.effective)).all()
-
-
 # --- behaviour
 
 

@@ -158,11 +158,6 @@ def test_what_is_no_probability_for_a_state_is_refused_there(row, message):
         model.transition_of(np.array([[0.0], [30.0]]), 0)
 
 
-def test_transitions_by_the_state_need_a_first_law():
-    with pytest.raises(ModelError, match="`first` is missing"):
-        overloaded(transition=["exp(-x**2)", "1 - exp(-x**2)"], first=None)
-
-
 def test_transitions_of_many_components_are_refused():
     names = [f"x{i + 1}" for i in range(4)]
     p = "exp(-x1**2 - x2**2 - x3**2 - x4**2)"

@@ -1,4 +1,4 @@
-"""Consistency tests: their bounds hold for filters that are right, and fail for those that are wrong."""
+"""Consistency tests against the loops of the page; whether they find what is wrong is tested with records."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Expectation and maximisation: every round climbs, and stays at the top; states that are seen; gaps and refusals."""
+"""Expectation and maximisation: every round climbs; refusals."""
 
 import numpy as np
 import oracles

@@ -1,4 +1,4 @@
-"""What a page computes in the reader's browser is what the package computes: functions, filters, the exact filter, statistics."""
+"""What a page computes in the reader's browser is what the package computes: filters, the exact filter, statistics."""
 
 from __future__ import annotations
 

@@ -15,12 +15,6 @@ from kfcourse.lab.short_names import title
 from kfcourse.linear.consistency import autocorrelation, innovations, nees, nis
 from kfcourse.pages.scenes import FAULTS, HIDDEN
 
-# ---------------------------------------------------------------- what was printed is what NumPy computes
-
-REACH = dict(y=5, x=4, z=4, h=3, Delta=9, n=3, v=3) | {"lambda": 3}
-GRID = {key: np.random.default_rng(1).uniform(-reach, reach, 200) for key, reach in REACH.items()}
-GRID |= {key: np.random.default_rng(2).uniform(0.1, 4, 200) for key in ("Psi", "p", "F")}
-
 
 @pytest.mark.parametrize("name", MADE)
 def test_a_figure_is_small(name):

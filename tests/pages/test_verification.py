@@ -44,14 +44,6 @@ def test_the_message_says_what_is_left() -> None:
         verified((x + z, z - x))
 
 
-def test_definitions_are_put_in_for_printed_symbols_and_into_each_other() -> None:
-    h = sp.Symbol("h")
-    shown = verified((p, x - K), where={p: h + x, h: -K})
-    assert "p &= x - K" in shown.markdown
-    with pytest.raises(Unverified):
-        verified((p, x - K), where={p: h + x, h: K})
-
-
 def test_letters_of_matrices_stand_for_their_entries() -> None:
     A, B, C = (sp.MatrixSymbol(name, 2, 2) for name in "ABC")
     entries = {A: sp.Matrix([[x, z], [0, 1]]), B: sp.Matrix([[1, 0], [x, z]]), C: A * B}

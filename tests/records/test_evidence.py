@@ -1,4 +1,4 @@
-"""The likelihood of a record: a dense normal density, the Nile's figure, brute force, and what has none."""
+"""The likelihood of a record: a dense normal density, the Nile's figure, and what has none."""
 
 import numpy as np
 import oracles

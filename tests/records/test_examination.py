@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-import scipy.stats
 
 from kfcourse import Model, likelihood, linearised, predictions, run, simulate, smooth
 from kfcourse.filters import aof, gated
 from kfcourse.linear.consistency import innovations
 from kfcourse.records import examine, findings
-from kfcourse.records.examination import _below
 
 MODEL = Model.define(["x + u", "u + 0.3*v"], ["x + w1", "u + w2"], symbols={"x": ["x", "u"]})
 STRUCTURE = linearised(MODEL)
@@ -62,16 +60,6 @@ def test_a_wrong_filter_is_found():
     assert "size" in failing(rough, y)
     assert {"neighbours of y1", "neighbours of y2"} & failing(stiff, y)
     assert {"mean of y1", "mean of y2"} & failing(MODEL, offset)
-
-
-@pytest.mark.parametrize("degrees", [1, 2, 3])
-@pytest.mark.parametrize("edge", [0.6, 0.999])
-def test_chi_squared_below_an_edge(degrees, edge):
-    """By quadrature of the density."""
-    g = scipy.stats.chi2.ppf(edge, degrees)
-    first, second = (scipy.integrate.quad(lambda c, k=k: c**k * scipy.stats.chi2.pdf(c, degrees), 0, g)[0] / edge for k in (1, 2))
-    mean, variance = _below(np.array([degrees]), edge)
-    assert (mean[0], variance[0]) == pytest.approx((first, second - first**2), rel=1e-7)
 
 
 def test_nothing_is_found_of_a_record_that_is_refused():

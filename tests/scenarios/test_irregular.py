@@ -1,4 +1,4 @@
-"""The track with gaps and gross errors: its motion is that of the intervals, and as many are missing and wrong as asked for."""
+"""The track with gaps and gross errors: as many are missing and wrong as asked for."""
 
 import numpy as np
 import pytest

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from kfcourse import Model
 from kfcourse.laws import Gaussian
 from kfcourse.linear.consistency import nees
 from kfcourse.scenarios.navigation import (
@@ -239,45 +238,7 @@ def test_late_measurements_are_used_as_on_the_page(with_inputs):
         np.testing.assert_allclose(ours.cov[k, 0], cov, rtol=0, atol=ROUNDING)
 
 
-def test_a_measurement_of_this_very_moment_counts():
-    """0.1 + 0.2 is later than 0.3 by rounding only."""
-    sensor = Sensor.define("fast", STATES, "s + w", 0.3, 0.1)
-    message = Observation("fast", 0.1 + 0.2, 0.1 + 0.2, np.array([[7.0]]))
-    at, after = (fuse(FREE, [sensor], PRIOR, [message], [time]).mean for time in (0.3, 0.3 + 1e-12))
-    assert np.abs(at - after).max() < 1e-10
-    assert np.abs(at - fuse(FREE, [sensor], PRIOR, [], [0.3]).mean).max() > 1
-
-
 # ---------------------------------------------------------------- fusion: nonlinear sensors
-
-
-def test_nonlinear_sensors_are_the_extended_kalman_filter():
-    """A slow loop in floats: range to a beacon, and a meter with a noise proportional to what it measures."""
-    duration, outputs = 6.0, np.array([0.33, 2.0, 4.57, 6.3])
-    sensors = [
-        Sensor.define("range", STATES, "sqrt((s - d)**2 + 400) + w", 0.25, 0.5, parameters={"d": 7}, latency=0.2),
-        Sensor.define("speed", STATES, "V*(1 + c*w)", 1.0, 0.3, parameters={"c": 0.2}, latency=0.05),
-    ]
-    _, messages = measured(sensors, duration, 1, outputs, 9)
-    ours = fuse(FREE, sensors, PRIOR, messages, outputs)
-    for k, now in enumerate(outputs):
-        z, p, time = PRIOR.mean.copy(), PRIOR.cov.copy(), 0.0
-        for m in [*sorted((m for m in messages if m.arrival <= now), key=lambda m: m.tag), None]:
-            end = now if m is None else m.tag
-            loan = scipy.linalg.expm(np.block([[-A, QC], [np.zeros((2, 2)), A.T]]) * (end - time))
-            F = loan[2:, 2:].T
-            z, p, time = F @ z, F @ p @ F.T + F @ loan[:2, 2:], end
-            if m is None:
-                break
-            if m.sensor == "range":
-                distance = math.hypot(z[0] - 7, 20)
-                h, H, R = distance, np.array([(z[0] - 7) / distance, 0.0]), 0.25
-            else:
-                h, H, R = z[1], np.array([0.0, 1.0]), (0.2 * z[1]) ** 2
-            gain = p @ H / (H @ p @ H + R)
-            z, p = z + gain * (m.value[0, 0] - h), p - np.outer(gain, H @ p)
-        np.testing.assert_allclose(ours.mean[k, 0], z, rtol=0, atol=ROUNDING)
-        np.testing.assert_allclose(ours.cov[k, 0], p, rtol=0, atol=ROUNDING)
 
 
 def test_the_covariance_is_right_by_tag_and_wrong_by_arrival():
@@ -372,21 +333,3 @@ def test_a_recorded_sensor_needs_no_period():
 def test_no_clock_runs_backwards(times, readings):
     with pytest.raises(ValueError, match="readings"):
         Clock.fit(times, readings)
-
-
-def test_what_paths_are_not_sampled_from():
-    driven = Inputs(np.array([0.0]), np.zeros((1, 3, 1)))
-    for dynamics, prior, runs, inputs, message in (
-        (FREE, Gaussian(np.zeros(1), np.eye(2)), 2, None, "prior's mean must have the shape"),
-        (FREE, Gaussian(np.zeros(2), -np.eye(2)), 2, None, "variances must not be negative"),
-        (FREE, Gaussian(np.full(2, np.nan), np.eye(2)), 2, None, "prior must be finite"),
-        (FREE, PRIOR, 0, None, "runs must be a positive whole number"),
-        (DRIVEN, PRIOR, 2, driven, "the inputs are those of 3 runs, and 2 are sampled"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            sample(dynamics, prior, [0.0, 1.0], runs, 1, inputs)
-
-
-def test_fuse_takes_dynamics():
-    with pytest.raises(TypeError, match="fuse expects a Dynamics, got Model"):
-        fuse(Model.define("x + v", "x + w"), [], PRIOR, [], [1.0])
