@@ -102,7 +102,7 @@ def _list(app, name: str) -> nodes.definition_list:
         russian = nodes.inline("", ", ".join(term.ru), classes=["kf-ru", "language-ru"])
         head += [nodes.Text(" "), russian]
         known = contents.page(app.env, term.page)
-        title, number = (known[1].title.replace(" ★", ""), known[1].number) if known else (term.page, None)
+        title, number = (known[1].title, known[1].number) if known else (term.page, None)
         where = nodes.reference("", f"{number}. {title}" if number else title, internal=True)
         where["refuri"] = app.builder.get_relative_uri(name, term.page) + f"#first-{term.identity}"
         place = nodes.inline("", "", where, classes=["kf-where"])

@@ -16,25 +16,38 @@ paths        `simulate`, `coarsen`
 equations    `log_likelihood_rate`, `filter_equations`: the filter's formulas, derived
 bucy         `extended_kalman_bucy`: the filter
 stationary   `steady_state` of a linear model
+
+An object that moves in continuous time may be measured at instants only; then it is a `Model` as every other:
+
+sampling     `sampled`: such a model, with unit intensity of its Wiener processes
+integration  `moment_equations` between two measurements, derived; they are integrated with an error control
+benes        `benes_filter`: exact where the drift is tanh(x)
 """
 
+from kfcourse.continuous.benes import benes_filter
 from kfcourse.continuous.bucy import extended_kalman_bucy
 from kfcourse.continuous.equations import FilterEquations, filter_equations, log_likelihood_rate, symmetrised_drift
+from kfcourse.continuous.integration import MomentEquations, moment_equations
 from kfcourse.continuous.model import ContinuousModel, to_discrete
 from kfcourse.continuous.paths import Path, coarsen, simulate
+from kfcourse.continuous.sampling import sampled
 from kfcourse.continuous.stationary import Linear, Steady, linear_matrices, steady_state
 
 __all__ = [
     "ContinuousModel",
     "FilterEquations",
     "Linear",
+    "MomentEquations",
     "Path",
     "Steady",
+    "benes_filter",
     "coarsen",
     "extended_kalman_bucy",
     "filter_equations",
     "linear_matrices",
     "log_likelihood_rate",
+    "moment_equations",
+    "sampled",
     "simulate",
     "steady_state",
     "symmetrised_drift",

@@ -103,7 +103,7 @@ class ContinuousModel:
         given = table("parameters", parameters)
         values = {checked_name(name): exact_number(f"parameter {name}", value) for name, value in given.items()}
         f, S = (formula_list(what, _plain(formulas)) for what, formulas in (("drift", drift), ("signal", signal)))
-        g = _rows(diffusion)
+        g = diffusion_rows(diffusion)
         n, noises = len(f), len(g[0])
         names = [*([symbols] if isinstance(symbols, str) else symbols or (["x"] if n == 1 else [f"x{i + 1}" for i in range(n)]))]
         if len(names) != n or len(g) != n:
@@ -179,7 +179,7 @@ def _plain(formulas: Any) -> Any:
     return list(formulas) if isinstance(formulas, sp.MatrixBase) else formulas
 
 
-def _rows(diffusion: Any) -> list[list[Formula]]:
+def diffusion_rows(diffusion: Any) -> list[list[Formula]]:
     rows = diffusion.tolist() if isinstance(diffusion, sp.MatrixBase) else diffusion
     if isinstance(rows, str | sp.Expr):
         return [[rows]]

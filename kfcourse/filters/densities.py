@@ -55,7 +55,7 @@ def scalar_formulas(model: Model) -> ScalarFormulas:
             f"the exact filter is for scalar models: the state has dimension {model.n}, the measurement {model.p}: "
             "use particle(model)"
         )
-    mean, variance = _law(model, "object", model.state_equation, model.v, model.state_noise)
+    mean, variance = _law(model, "object", model.difference_equation("a density"), model.v, model.state_noise)
     if omega := noise_of_meter(model):
         z = (omega - model.meter_noise.mean[0]) / sp.Float(np.sqrt(model.meter_noise.cov[0, 0]))
         deviation = 1 / sp.Abs(z.diff(Y))
@@ -66,7 +66,11 @@ def scalar_formulas(model: Model) -> ScalarFormulas:
 
 def transition(model: Model) -> Callable[..., Gaussian]:
     """x (..., n), and the step if the model has one -> law of the next state; ModelError if there is none."""
-    law = _compiled(model, "transition", _law(model, "object", model.state_equation, model.v, model.state_noise))
+    law = _compiled(
+        model,
+        "transition",
+        _law(model, "object", model.difference_equation("a density"), model.v, model.state_noise),
+    )
     return lambda x, k=None: Gaussian(*law.at(k)(x))
 
 
@@ -164,7 +168,7 @@ def _states(model: Model) -> Array:
 
 def has_object_noise(model: Model) -> bool:
     """Whether any noise enters the object."""
-    B = model.state_equation.jacobian(sp.Matrix(model.v)) * exact_matrix(model.state_noise.cov)
+    B = model.difference_equation("a density").jacobian(sp.Matrix(model.v)) * exact_matrix(model.state_noise.cov)
     return not B.subs(model.values).is_zero_matrix
 
 

@@ -113,7 +113,7 @@ def linear_systems(model: Model) -> Callable[[int | None], tuple[LinearSystem, V
     ModelError
         The model is not linear.
     """
-    state = _affine(model.state_equation, model.x, model.v, model)
+    state = _affine(model.difference_equation("a linear system"), model.x, model.v, model)
     meter = _affine(model.meter_equation, model.x, model.w, model)
     if not model.timed:
         system = _system(model, state.at(None)(), meter.at(None)())
@@ -130,7 +130,7 @@ def _system(model: Model, state: Sequence[Array], meter: Sequence[Array]) -> tup
 
 def is_linear(model: Model) -> bool:
     """Whether both equations are linear in state and noise, so that the Kalman filter is exact."""
-    sides = (model.state_equation, model.v), (model.meter_equation, model.w)
+    sides = (model.difference_equation("a linear system"), model.v), (model.meter_equation, model.w)
     return all(_constant(_slopes(equation, [*model.x, *noise], model), equation, [*model.x, *noise]) for equation, noise in sides)
 
 

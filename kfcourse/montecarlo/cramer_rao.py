@@ -67,7 +67,7 @@ def posterior_bound(model: Model, runs: int, steps: int, seed: int) -> Estimate:
     except np.linalg.LinAlgError:
         said = "the prior leaves a component, or a sum of some, without variance: there is no density, and no bound of this kind"
         raise ModelError(said) from None
-    object_ = _information(model, model.state_equation, model.v, model.state_noise, "state")
+    object_ = _information(model, model.difference_equation("this bound"), model.v, model.state_noise, "state")
     meter = _information(model, model.meter_equation, model.w, model.meter_noise, "meter")
     J = np.linalg.inv(model.prior.cov)
     bounds = []

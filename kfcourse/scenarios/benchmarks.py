@@ -9,6 +9,8 @@ stochastic_volatility()  a state that shows only in the measurement's variance
 bearings()               two bearings of a target (Hartikainen, Solin and Särkkä, 2011), with its course: `bearings_data(...)`
 reentry(known)           a vehicle that enters the atmosphere (Julier and Uhlmann, 2004), seen by a radar
 passing_target(angles)   a target whose bearing jumps by a turn
+exact_mul(a, b), double_well(a, b, s)   two of Jimenez's objects in continuous time, with his data: `jimenez_data(name)`
+benes(interval, r)       the object in continuous time whose filter is known exactly (Benes, 1981)
 local_level(q, r)        a level that wanders, as the flow of the Nile 1871-1970 (Cobb, 1978): `nile()`
 """
 
@@ -21,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from kfcourse.continuous.sampling import sampled
 from kfcourse.errors import expect_sizes
 from kfcourse.laws import Array
 from kfcourse.montecarlo.ensemble import simulate
@@ -57,6 +60,11 @@ CUBIC_SENSOR = {"error variance": 0.356, "state variance": 1.155}
 # The ensemble filter has ten members, the particle filter four thousand.
 LORENZ_ERRORS = {"EKF": 0.92, "ensemble filter": 0.60, "particles": 0.27}
 LORENZ_EVERY = 25  # steps between measurements
+
+# Log likelihoods as Jimenez's toolbox SdeEstimation prints them, (1/2) ln 2 pi less than the sum over all innovations but the
+# first, with the estimates to which they belong: of a and b by exact moments, of a, b and s by the normal law's.
+EXACT_MUL = (-0.099611, 0.114830, 17.209)
+DOUBLE_WELL = (-0.9677, 0.083952, 2.2758, -874.0219)
 
 # The pendulum's errors again, of the smoothers.
 PENDULUM_SMOOTHED = {"EKF": 0.057446202494837, "UKF": 0.036617555415464256}
@@ -228,3 +236,29 @@ def nile() -> Array:
     """Annual flow of the Nile at Aswan from 1871 to 1970, 10^8 m^3, (100, 1, 1)."""
     text = (DATA / "nile.csv").read_text(encoding="utf-8")
     return np.array([float(row.split(",")[1]) for row in text.split()[1:]])[:, None, None]
+
+
+def jimenez_data(name: str) -> tuple[Array, Array]:
+    """Instants (steps,) and measurements (steps, 1, 1) of "exact-mul" or "double-well"; licence: data/LICENSE-jimenez.txt."""
+    t, y = np.loadtxt((DATA / f"jimenez-{name}.csv").open(encoding="utf-8"), delimiter=",", skiprows=1).T
+    return t, y[:, None, None]
+
+
+def exact_mul(a: float, b: float, **options: Any) -> Model:
+    """dx = a t x dt + b sqrt(t) x dw, x(0.5) = 1, y = x + w with variance 1e-4 at his instants: its moments are known exactly."""
+    instants = jimenez_data("exact-mul")[0].tolist()
+    noise, prior = {"variance": 1e-4}, {"mean": 1, "variance": 0}
+    values = {"a": a, "b": b}
+    return sampled("a*t*x", "b*sqrt(t)*x", "x + w", values, instants=instants, prior=prior, meter_noise=noise, **options)
+
+
+def double_well(a: float, b: float, s: float, **options: Any) -> Model:
+    """dx = -(a x + b x^3) dt + s dw, x(0) = 0, seen without error every second."""
+    values = {"a": a, "b": b, "s": s}
+    return sampled("-(a*x + b*x**3)", "s", "x + 0*w", values, prior={"variance": 0}, **options)
+
+
+def benes(interval: float = 0.2, r: float = 0.1, **options: Any) -> Model:
+    """dx = tanh(x) dt + dw, x(0) = 0.1, y = x + w with variance r: as Sarkka and Solin (2019) have it, but for a known start."""
+    noise, prior = {"variance": r}, {"mean": 0.1, "variance": 0}
+    return sampled("tanh(x)", "1", "x + w", interval=interval, prior=prior, meter_noise=noise, **options)

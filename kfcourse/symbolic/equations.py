@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+import numpy as np
 import sympy as sp
 
 from kfcourse.laws import Array
@@ -29,17 +30,22 @@ def compile_model(model: Model) -> tuple[Equation, Equation]:
 
     Those of a model that depends on the step need it: `state(x, v, k)`.
     """
-    state = _compiled("state", model.state_equation, {"x": model.x, "v": model.v}, model)
     meter = _compiled("meter", model.meter_equation, {"x": model.x, "w": model.w}, model)
+    if model.between is not None:
+        return model.between.motion(model), lambda x, w, k=None: meter.at(k)(x, w)[0]
+    state = _compiled("state", model.state_equation, {"x": model.x, "v": model.v}, model)
     return lambda x, v, k=None: state.at(k)(x, v)[0], lambda x, w, k=None: meter.at(k)(x, w)[0]
 
 
 def compile_noiseless(model: Model) -> tuple[Noiseless, Noiseless]:
     """a(x, m_v) and b(x, m_w), the equations with the noises at their means: x (..., n) -> (..., n), (..., p)."""
-    state_equation = model.state_equation.subs(dict(zip(model.v, exact_matrix(model.state_noise.mean), strict=True)))
     meter_equation = model.meter_equation.subs(dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True)))
-    state = _compiled("state", state_equation, {"x": model.x}, model)
     meter = _compiled("meter", meter_equation, {"x": model.x}, model)
+    if model.between is not None:
+        motion, still = model.between.motion(model), np.zeros(len(model.v))
+        return lambda x, k=None: motion(x, still, k), lambda x, k=None: meter.at(k)(x)[0]
+    state_equation = model.state_equation.subs(dict(zip(model.v, exact_matrix(model.state_noise.mean), strict=True)))
+    state = _compiled("state", state_equation, {"x": model.x}, model)
     return lambda x, k=None: state.at(k)(x)[0], lambda x, k=None: meter.at(k)(x)[0]
 
 

@@ -66,6 +66,8 @@ class Model:
         What is known of every step: its number k, its time t, and the inputs that the equations contain.
     angles : Angles
         Numbers of the components of x and of y that are angles, kept between -pi and pi.
+    between : kfcourse.continuous.sampling.Between, optional
+        How the state moves in continuous time from one measurement to the next.  The state equation then is dx/dt.
     """
 
     state_equation: sp.ImmutableMatrix
@@ -79,6 +81,7 @@ class Model:
     meter_noise: Gaussian = field(compare=False)
     angles: Angles = field(default_factory=Angles)
     known: Known = field(default_factory=Known)
+    between: Any = None
 
     @classmethod
     def define(
@@ -201,6 +204,15 @@ class Model:
         """Parameter symbols and their values, for `subs`."""
         return {symbol(name): value for name, value in self.parameters.items()}
 
+    def difference_equation(self, what: str) -> sp.ImmutableMatrix:
+        """a(x, v); ModelError if the model moves in continuous time, of which `what` knows nothing."""
+        if self.between is not None:
+            raise ModelError(
+                f"{what} needs a difference equation, and {self} moves in continuous time between its measurements: take "
+                "aof(structure), fos(structure) or another filter of structural functions, duof(model), or particle(model)"
+            )
+        return self.state_equation
+
     @property
     def timed(self) -> bool:
         """Whether the equations depend on the step: on its number k, its time t or an input."""
@@ -251,10 +263,10 @@ class Model:
         """
         x, v, w = ([sp.Symbol(with_index(sp.latex(s), "k")) if indexed else s for s in some] for some in (self.x, self.v, self.w))
         at_k = dict(zip((*self.x, *self.v, *self.w), (*x, *v, *w), strict=True))
-        state = [sp.latex(x) for x in self.x]
+        state, moves = [sp.latex(x) for x in self.x], self.between is not None
         meter = ["y"] if self.p == 1 else [f"y_{{{i + 1}}}" for i in range(self.p)]
         lines = [
-            rf"{with_index(name, 'k+1')} &= {formula_latex(formula.xreplace(at_k), x, v)}"
+            rf"{rf'd{name}/dt' if moves else with_index(name, 'k+1')} &= {formula_latex(formula.xreplace(at_k), x, v)}"
             for name, formula in zip(state, self.state_equation, strict=True)
         ]
         lines += [
@@ -276,7 +288,8 @@ class Model:
 
     @cached_property
     def _text(self) -> str:
-        a = ", ".join(f"{name}' = {formula}" for name, formula in zip(self.x, self.state_equation, strict=True))
+        rate = "{}'" if self.between is None else "d{}/dt"
+        a = ", ".join(f"{rate.format(name)} = {formula}" for name, formula in zip(self.x, self.state_equation, strict=True))
         b = ", ".join(f"{name} = {formula}" for name, formula in zip(self.measured, self.meter_equation, strict=True))
         values = ", ".join(f"{name} = {value}" for name, value in self.parameters.items())
         angles = ", ".join([self.x[i].name for i in self.angles.x] + [self.measured[i] for i in self.angles.y])

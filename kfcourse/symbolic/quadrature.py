@@ -11,6 +11,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import product as cartesian
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -71,6 +72,8 @@ def unscented(model: Model, kappa: float | None = None) -> Structure:
     """
 
     expect(model, Model, "unscented")
+    if model.between is not None:
+        return model.between.structure(model, partial(unscented, kappa=kappa))
 
     def rule(size: int) -> tuple[Array, Array]:
         k = max(3.0 - size, 0.0) if kappa is None else float(kappa)
@@ -100,6 +103,8 @@ def gauss_hermite(model: Model, order: int = 5) -> Structure:
         A function is not finite at a point of the prior law, or twice as many points an axis give other moments there.
     """
     expect(model, Model, "gauss_hermite")
+    if model.between is not None:
+        return model.between.structure(model, partial(gauss_hermite, order=order))
     if not isinstance(order, int | np.integer) or order < 2:
         raise ModelError(f"Gauss-Hermite quadrature needs an order of at least 2, a whole number, got {order!r}")
     return _checked("gauss-hermite", model, product_rule(order), _Equations.of(model, _NOT_LINEAR), order)

@@ -262,6 +262,8 @@ def linearised(model: Model) -> Structure:
         If an equation is not differentiable.
     """
     expect(model, Model, "linearised")
+    if model.between is not None:
+        return model.between.structure(model, linearised)
     (z, p), (m, d) = gaussian_symbols(model, "z", "p"), gaussian_symbols(model, "m", "d")
     tau, A, B = _taylor(model.state_equation, model.x, z, model.v, exact_matrix(model.state_noise.mean))
     h, H, C = _taylor(model.meter_equation, model.x, m, model.w, exact_matrix(model.meter_noise.mean))
@@ -301,6 +303,8 @@ def gaussian(model: Model) -> Structure:
         If a term has no closed-form Gaussian mean: use `unscented` or `gauss_hermite`.
     """
     expect(model, Model, "gaussian")
+    if model.between is not None:
+        return model.between.structure(model, gaussian)
     (z, p), (m, d) = gaussian_symbols(model, "z", "p"), gaussian_symbols(model, "m", "d")
     known = model.known.symbols
     tau, Theta = _moments(model.state_equation, model.x, z, p, model.v, *_exact(model.state_noise), known)

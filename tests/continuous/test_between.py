@@ -1,0 +1,502 @@
+"""Measurements at instants: Kalman's filter by matrix exponentials, slow Euler loops, closed forms, published figures."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import scipy.linalg
+import sympy as sp
+
+from kfcourse import Model, compare, gauss_hermite, gaussian, likelihood, linearised, predictions, run, smooth, unscented
+from kfcourse.continuous import benes_filter, moment_equations, sampled
+from kfcourse.errors import NotFinite
+from kfcourse.filters import aof, duof, fos, kalman_filter, particle, pointmass
+from kfcourse.montecarlo.cramer_rao import posterior_bound
+from kfcourse.montecarlo.ensemble import simulate
+from kfcourse.records import estimate, read_measurements
+from kfcourse.scenarios.benchmarks import DOUBLE_WELL, EXACT_MUL, benes, double_well, exact_mul, jimenez_data
+from kfcourse.symbolic.formula import FormulaError
+from kfcourse.symbolic.moments import NoClosedForm
+from kfcourse.symbolic.reading import ModelError
+
+pytestmark = pytest.mark.quick
+
+INSTANTS = [0.2, 0.5, 1.7, 1.9, 4.0, 4.3]
+A = np.array([[-0.2, 1.0], [-2.0, -0.7]])
+B = np.array([[0.5, 0.2], [-0.3, 0.8]])
+H = np.array([[1.0, 0.3], [0.2, -1.0]])
+R = np.array([[0.3, 0.1], [0.1, 0.4]])
+PRIOR = np.array([0.5, -0.4]), np.array([[0.8, 0.2], [0.2, 0.6]])
+FORCE = [0.3, -1.0, 0.7, 2.0, 0.1, 0.0]
+
+
+def oscillator(extra="", **changes):
+    """Two states, correlated noises and meters, a force that is known: nothing unit, nothing diagonal."""
+    return sampled(
+        [f"-0.2*x1 + x2{extra}", "-2*x1 - 0.7*x2 + u + 0.1"],
+        [["0.5", "0.2"], ["-0.3", "0.8"]],
+        ["x1 + 0.3*x2 + w1", "0.2*x1 - x2 + w2"],
+        prior={"mean": PRIOR[0], "variance": PRIOR[1]},
+        meter_noise={"variance": R},
+        inputs={"u": FORCE},
+        **({"instants": INSTANTS} | changes),
+    )
+
+
+def transitions():
+    """exp(A dt), what the force adds, and the noise's covariance, the last two by Simpson's rule over ten thousand intervals."""
+    spans = [*np.diff(INSTANTS), 4.3 - 4.0]
+    for span, u in zip(spans, FORCE, strict=True):
+        s = np.linspace(0, span, 10_001)
+        rule = np.where(np.arange(10_001) % 2, 4.0, 2.0)
+        rule[[0, -1]] = 1
+        rule *= span / 30_000
+        values, vectors = np.linalg.eig(A)
+        powers = np.einsum("ij,sj,jk->sik", vectors, np.exp(s[:, None] * values), np.linalg.inv(vectors)).real
+        shift = np.einsum("s,sij,j", rule, powers, np.array([0, u + 0.1]))
+        Q = np.einsum("s,sij,jk,slk->il", rule, powers, B @ B.T, powers)
+        yield scipy.linalg.expm(A * span), shift, Q
+
+
+def record():
+    y = np.random.default_rng(3).normal(size=(6, 4, 2))
+    y[2, 1], y[4, :, 0] = np.nan, np.nan
+    return y
+
+
+def kalman(y):
+    """The textbook's filter of one record: predictions, estimates, covariances, log densities."""
+    m, P = PRIOR
+    rows = []
+    for (Phi, shift, Q), value in zip(transitions(), y, strict=True):
+        seen = ~np.isnan(value)
+        before, S = (m, P), H[seen] @ P @ H[seen].T + R[np.ix_(seen, seen)]
+        nu, density = value[seen] - H[seen] @ m, 0.0
+        if seen.any():
+            K = P @ H[seen].T @ np.linalg.inv(S)
+            density = -0.5 * (nu @ np.linalg.solve(S, nu) + np.log(np.linalg.det(2 * np.pi * S)))
+            m, P = m + K @ nu, P - K @ S @ K.T
+        rows.append((*before, m, P, density))
+        m, P = Phi @ m + shift, Phi @ P @ Phi.T + Q
+    return [np.array(column) for column in zip(*rows, strict=True)]
+
+
+@pytest.mark.parametrize("structure", [linearised, gaussian, unscented, gauss_hermite])
+def test_a_linear_model_has_kalmans_filter(structure):
+    one, y = aof(structure(oscillator())), record()
+    before, after, density = predictions(one, y), run(one, y), likelihood(one, y)
+    for i in range(4):
+        mean, cov, z, p, terms = kalman(y[:, i])
+        for got, wanted in (
+            (before.mean[:, i], mean),
+            (before.cov[:, i], cov),
+            (after.mean[:, i], z),
+            (after.cov[:, i], p),
+            (density[:, i], terms),
+        ):
+            np.testing.assert_allclose(got, wanted, rtol=0, atol=1e-11)  # Simpson's rule: 1e-13
+
+
+@pytest.mark.parametrize("structure", [linearised, gaussian, unscented, gauss_hermite])
+def test_integrated_the_linear_model_is_the_same_but_for_the_accuracy(structure):
+    y = record()
+    # (1 + t - t)-like changes would be simplified away; so small a cubic is none, but the equations are integrated
+    for accuracy in (1e-5, 1e-9):
+        one = aof(structure(oscillator(" - 1e-14*x1**3", accuracy=accuracy)))
+        error = run(one, y).mean - run(aof(linearised(oscillator())), y).mean
+        assert np.abs(error).max() < 100 * accuracy  # some tens of steps
+    assert np.abs(error).max() < 1e-8
+
+
+def test_the_smoother_is_the_regression_on_the_whole_record():
+    y, one = record()[:, :1], aof(gaussian(oscillator()))
+    steps = list(transitions())
+    mean, blocks = [PRIOR[0]], [[PRIOR[1]]]
+    for Phi, shift, Q in steps[:-1]:
+        mean.append(Phi @ mean[-1] + shift)
+        last = blocks[-1]
+        blocks.append([Phi @ block for block in last] + [Phi @ last[-1] @ Phi.T + Q])
+    joint = np.zeros((6, 2, 6, 2))
+    for i, row in enumerate(blocks):
+        for j, block in enumerate(row):
+            joint[i, :, j], joint[j, :, i] = block, block.T
+    joint, mean = joint.reshape(12, 12), np.concatenate(mean)
+    flat = y.ravel()
+    seen = ~np.isnan(flat)
+    G = scipy.linalg.block_diag(*[H] * 6)[seen]
+    S = G @ joint @ G.T + scipy.linalg.block_diag(*[R] * 6)[np.ix_(seen, seen)]
+    K = joint @ G.T @ np.linalg.inv(S)
+    law = smooth(one, y)
+    np.testing.assert_allclose(law.mean.ravel(), mean + K @ (flat[seen] - G @ mean), atol=1e-10)
+    left = (joint - K @ S @ K.T).reshape(6, 2, 6, 2)
+    np.testing.assert_allclose(law.cov[:, 0], [left[i, :, i] for i in range(6)], atol=1e-10)
+    law = smooth(aof(gaussian(oscillator(" - 1e-14*x1**3", accuracy=1e-9))), y)
+    np.testing.assert_allclose(law.cov[:, 0], [left[i, :, i] for i in range(6)], atol=1e-7)
+
+
+def test_very_stiff_linear_models_are_exact():
+    stiff = sampled(["-1e6*(x1 - x2)", "-x2"], [["0"], ["1"]], "x1 + w", interval=0.7)
+    tau, Theta = linearised(stiff).at(0).predict(np.array([[3.0, 2.0]]), np.eye(2))
+    left = np.exp(-0.7)
+    # x2 is Ornstein and Uhlenbeck's; x1 follows it by 1e-6
+    np.testing.assert_allclose(tau, [[2 * left, 2 * left]], rtol=2e-6)
+    np.testing.assert_allclose(Theta, np.full((2, 2), left**2 + (1 - left**2) / 2), rtol=3e-6)
+
+
+# ---------------------------------------------------------------- nonlinear: van der Pol, as the school's C2, from the page
+
+L, W, ALPHA, BETA = 3.0, 0.1 * np.pi, 1.0, 0.25
+
+
+def van_der_pol(**options):
+    drift = ["x2", "-w0**2*x1 + al*x2*(1 - be*x1**2)"]
+    values = {"w0": W, "al": ALPHA, "be": BETA}
+    prior = {"mean": [2, -1], "variance": 0.15}
+    return sampled(drift, [["0"], ["x1"]], ["x1 + w1", "x2 + w2"], values, interval=0.4, prior=prior, **options)
+
+
+def of_page(exact):
+    """tau-dot, A and Theta-dot of C2 at z, p: `exact` means over the normal law, or those at its mean."""
+
+    def rates(z, p):
+        z1, z2 = z
+        p11, p12 = (p[0, 0], p[0, 1]) if exact else (0.0, 0.0)
+        drift = -(W**2) * z1 + ALPHA * z2 - ALPHA * BETA * (z1**2 * z2 + z2 * p11 + 2 * z1 * p12)
+        slopes = [[0, 1], [-(W**2) - 2 * ALPHA * BETA * (z1 * z2 + p12), ALPHA - ALPHA * BETA * (z1**2 + p11)]]
+        return np.array([z2, drift]), np.array(slopes), np.diag([0, z1**2 + p11])
+
+    return rates
+
+
+def by_euler(rates, z, p, span, steps):
+    dt = span / steps
+    for _ in range(steps):
+        drift, slopes, intensity = rates(z, p)
+        z, p = z + dt * drift, p + dt * (slopes @ p + p @ slopes.T + intensity)
+    return z, p
+
+
+@pytest.mark.parametrize(("structure", "exact"), [(linearised, False), (gaussian, True), (gauss_hermite, True)])
+def test_the_moment_equations_against_a_slow_loop(structure, exact):
+    z, p = np.array([1.5, -0.8]), np.array([[0.3, 0.1], [0.1, 0.5]])
+    tau, Theta = structure(van_der_pol()).at(0).predict(z[None], p[None])
+    coarse, fine = (by_euler(of_page(exact), z, p, 0.4, steps) for steps in (4000, 8000))
+    for got, less, more in zip((tau[0], Theta[0]), coarse, fine, strict=True):
+        # Euler's error is halved, so twice the fine less the coarse has that of the next order, (1e-4)^2
+        np.testing.assert_allclose(got, 2 * more - less, rtol=0, atol=1e-6)
+        assert np.abs(more - less).max() > 1e-6  # it is that extrapolation which meets us, not either
+
+
+def test_the_derived_equations_are_the_page_s():
+    model = van_der_pol()
+    for structure, exact in ((linearised, False), (gaussian, True)):
+        equations = moment_equations(model, structure)
+        values = np.array([1.5, -0.8, 0.3, 0.1, 0.5])
+        at = dict(zip((*equations.z, *[equations.p[i] for i in (0, 1, 3)]), values, strict=True)) | model.values
+        z, p = values[:2], np.array([[0.3, 0.1], [0.1, 0.5]])
+        drift, slopes, intensity = of_page(exact)(z, p)
+        for formula, value in zip(equations[2:], (drift[:, None], slopes, intensity), strict=True):
+            np.testing.assert_allclose(np.array(formula.subs(at), dtype=float), value, atol=1e-12)
+        mean, spread = equations.rates
+        np.testing.assert_allclose(np.array(spread.subs(at), dtype=float), slopes @ p + p @ slopes.T + intensity, atol=1e-12)
+        assert mean == equations.drift
+
+
+def test_trajectories_of_an_ensemble_do_not_change_one_another_by_more_than_the_accuracy():
+    structure = gaussian(van_der_pol(accuracy=1e-9)).at(0)
+    z = np.array([[1.5, -0.8], [0.1, 3.0], [-2.0, 0.5]])
+    p = np.array([np.diag([0.3, 0.5]), np.diag([0.01, 0.2]), np.diag([1.0, 0.1])])
+    together = structure.predict(z, p)
+    for i in range(3):
+        alone = structure.predict(z[i : i + 1], p[i : i + 1])
+        np.testing.assert_allclose(together.mean[i], alone.mean[0], atol=1e-7)
+        np.testing.assert_allclose(together.cov[i], alone.cov[0], atol=1e-7)
+    shared = structure.predict(z, p[0])
+    np.testing.assert_allclose(shared.cov[0], structure.predict(z[:1], p[:1]).cov[0], atol=1e-7)
+
+
+def test_means_and_second_moments_of_the_exact_multiplicative_object():
+    """M x' = m exp(a (t^2 - s^2) / 2), M x'^2 = (M x^2) exp((2 a + b^2) (t^2 - s^2) / 2)."""
+    a, b = -0.3, 0.4
+    structure = gaussian(exact_mul(a, b, accuracy=1e-10)).at(2)
+    (tau,), ((Theta,),) = (part[0] for part in structure.predict(np.array([[0.8]]), np.array([[[0.05]]])))
+    t, s = 3.5, 2.5
+    mean = 0.8 * np.exp(a * (t**2 - s**2) / 2)
+    second = (0.05 + 0.8**2) * np.exp((2 * a + b**2) * (t**2 - s**2) / 2)
+    np.testing.assert_allclose([tau, Theta], [mean, second - mean**2], rtol=0, atol=1e-9)
+
+
+# ---------------------------------------------------------------- published figures
+
+
+def published(model, y, structure=gaussian):
+    """Jimenez's sum: over the innovations after the first, and (1/2) ln 2 pi once more."""
+    return likelihood(aof(structure(model)), y)[1:].sum() - 0.5 * np.log(2 * np.pi)
+
+
+def test_the_log_likelihood_of_the_exact_multiplicative_object():
+    a, b, printed = EXACT_MUL
+    assert published(exact_mul(a, b), jimenez_data("exact-mul")[1]) == pytest.approx(printed, abs=5e-4)
+
+
+def test_the_log_likelihood_of_the_double_well():
+    *values, printed = DOUBLE_WELL
+    t, y = jimenez_data("double-well")
+    assert np.array_equal(t, np.arange(501)) and y[0] == 0
+    y[0] = np.nan  # x(0) is known, and measured without error
+    assert published(double_well(*values), y) == pytest.approx(printed, abs=1e-4)
+
+
+def test_the_estimates_of_the_exact_multiplicative_object():
+    found = estimate(exact_mul(-0.1, 0.1), jimenez_data("exact-mul")[1], ["a", "b"], ["b"])
+    a, b, _ = EXACT_MUL
+    assert found.value == pytest.approx([a, b], abs=2e-3)  # his sum leaves the first measurement out
+
+
+# ---------------------------------------------------------------- Benes
+
+
+def bayes_on_a_grid(y, interval, r):
+    """Means, variances and log densities by the object's own transition density, e^(-t/2) cosh(x') / cosh(x) N(x'; x, t)."""
+    x = np.linspace(-14, 14, 3001)
+    h = x[1] - x[0]
+    log_cosh = np.logaddexp(x, -x) - np.log(2)
+    kernel = np.exp(-0.5 * (x[:, None] - x) ** 2 / interval - interval / 2 + log_cosh[:, None] - log_cosh)
+    kernel *= h / np.sqrt(2 * np.pi * interval)
+    start = np.exp(-0.5 * (x - 0.1) ** 2 / interval - interval / 2 + log_cosh - np.log(np.cosh(0.1)))
+    density = start / np.sqrt(2 * np.pi * interval)  # at the second instant; x(0) = 0.1
+    rows = []
+    for value in y[1:]:
+        if not np.isnan(value):
+            density = density * np.exp(-0.5 * (value - x) ** 2 / r) / np.sqrt(2 * np.pi * r)
+        c = density.sum() * h
+        density = density / c
+        mean = (x * density).sum() * h
+        rows.append((mean, ((x - mean) ** 2 * density).sum() * h, np.log(c)))
+        density = kernel @ density
+    return np.array(rows).T
+
+
+def test_benes_filter_is_bayes_rule():
+    y = np.array([0.3, 0.5, -0.4, np.nan, -1.2, 0.8])
+    one = benes_filter(benes())
+    law, terms = run(one, y), likelihood(one, y)
+    mean, variance, densities = bayes_on_a_grid(y, 0.2, 0.1)
+    np.testing.assert_allclose(law.mean[1:, 0, 0], mean, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(law.cov[1:, 0, 0, 0], variance, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(terms[1:, 0], densities, rtol=0, atol=1e-10)
+
+
+def test_no_filter_beats_benes_and_the_quadrature_filter_comes_near():
+    model = benes(interval=1.0, substeps=64)
+    filters = [benes_filter(model), aof(gauss_hermite(model, 9)), aof(linearised(model))]
+    found = compare(filters, model, 4000, 12, seed=1)
+    for worse, better in (("aof-gauss-hermite", "benes"), ("aof-linearised", "aof-gauss-hermite")):
+        difference = found.difference(worse, better)
+        assert (difference.value[1:] > -4 * difference.standard_error[1:]).all()
+        assert difference.value[3:].mean() > 0
+    # its own covariance is the actual one
+    own = run(benes_filter(model), simulate(model, 4000, 12, 2).y).cov[..., 0, 0].mean(axis=1)
+    actual = found.error_variance("benes")
+    assert (np.abs(own - actual.value)[1:] < 6 * actual.standard_error[1:]).all()  # own has an error, too
+
+
+def test_benes_filter_refuses_other_objects():
+    for model in (
+        sampled("tanh(2*x)", "1", "x + w"),
+        sampled("tanh(x)", "2", "x + w"),
+        Model.define("tanh(x) + v", "x + w"),
+    ):
+        with pytest.raises(ModelError, match="tanh"):
+            benes_filter(model)
+    with pytest.raises(ModelError, match="linear in x"):
+        benes_filter(sampled("tanh(x)", "1", "x**2 + w"))
+
+
+# ---------------------------------------------------------------- simulation
+
+
+def strong_errors(model, exact, substeps):
+    """Mean absolute errors at the end of an interval, on common Wiener paths; and their standard errors."""
+    rng = np.random.default_rng(5)
+    finest, runs = max(substeps), 4000
+    fine = rng.standard_normal((runs, finest))
+    x = np.full((runs, 1), 1.0)
+    found = []
+    for count in substeps:
+        noise = fine.reshape(runs, count, -1).sum(axis=-1) / np.sqrt(finest // count)
+        between = dataclasses.replace(model.between, substeps=count)
+        error = np.abs(between.motion(model)(x, noise, 0) - exact(fine))
+        found.append((error.mean(), error.std() / np.sqrt(runs)))
+    return np.array(found).T
+
+
+def test_the_strong_order_of_the_simulation():
+    counts = [4, 16, 64, 256]
+    geometric = sampled("0.5*x", "0.8*x", "x + w")
+    mean, error = strong_errors(
+        geometric, lambda fine: np.exp(0.5 - 0.32 + 0.8 * fine.sum(axis=1) / np.sqrt(256))[:, None], counts
+    )
+    orders = np.log(mean[:-1] / mean[1:]) / np.log(4)
+    assert np.abs(orders - 0.5).max() < 0.1 and (4 * error / mean < 0.1 * np.log(4)).all()
+    additive = sampled("-sin(2*x)", "0.8", "x + w")
+    finest = dataclasses.replace(additive.between, substeps=4096)
+    path = np.random.default_rng(6).standard_normal((4000, 4096))
+    wanted = finest.motion(additive)(np.full((4000, 1), 1.0), path, 0)
+    errors = []
+    for count in counts[:3]:
+        noise = path.reshape(4000, count, -1).sum(axis=-1) / np.sqrt(4096 // count)
+        got = dataclasses.replace(additive.between, substeps=count).motion(additive)(np.full((4000, 1), 1.0), noise, 0)
+        errors.append(np.abs(got - wanted).mean())
+    orders = np.log(np.array(errors[:-1]) / errors[1:]) / np.log(4)
+    assert np.abs(orders - 1).max() < 0.15
+
+
+def test_the_weak_order_where_the_noise_is_added():
+    """A linear object: the variance of its scheme follows from its formula, and errs by the square of the step."""
+    errors = []
+    for count in (4, 8, 16):
+        model = sampled("-x", "1", "x + w", substeps=count)
+        moves = model.between.motion(model)
+        unit = [moves(np.zeros((1, 1)), row[None], 0).item() for row in np.eye(count)]  # linear in each noise
+        errors.append(abs(np.square(unit).sum() - (1 - np.exp(-2)) / 2))
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([2, 2], abs=0.25)
+
+
+def test_an_ensemble_has_the_moments_that_are_integrated():
+    model = oscillator(substeps=32)
+    x = simulate(model, 20_000, 6, seed=2).x
+    mean, cov = PRIOR
+    for k, (Phi, shift, Q) in enumerate(transitions()):
+        if k == 5:
+            break
+        mean, cov = Phi @ mean + shift, Phi @ cov @ Phi.T + Q
+        error = np.sqrt(np.diag(cov) / 20_000)
+        assert (np.abs(x[k + 1].mean(axis=0) - mean) < 4.5 * error + 1e-3).all()  # and (1/32)^2 of weak error
+        sample = np.cov(x[k + 1].T)
+        assert (np.abs(sample - cov) < 4.5 * np.sqrt(2 / 20_000) * np.sqrt(np.outer(np.diag(cov), np.diag(cov))) + 2e-3).all()
+
+
+# ---------------------------------------------------------------- what works as everywhere
+
+
+def test_stratonovich_adds_half_of_b_db():
+    model = sampled("-a*x", "s*x", "x + w", {"a": 0.5, "s": 0.8}, stratonovich=True, interval=2, accuracy=1e-9)
+    s, x = sp.Symbol("s", real=True), model.x[0]
+    assert model.between.correction[0].subs(model.values) == sp.Rational(8, 25) * x
+    tau, Theta = gaussian(model).at(0).predict(np.array([[1.5]]), np.array([[[0.2]]]))
+    rate = -0.5 + 0.32
+    assert tau.item() == pytest.approx(1.5 * np.exp(2 * rate), abs=1e-8)
+    second = (1.5**2 + 0.2) * np.exp(2 * (2 * rate + 0.64))
+    assert Theta.item() == pytest.approx(second - (1.5 * np.exp(2 * rate)) ** 2, abs=1e-7)
+    two = sampled(["0", "0"], [["x2", "1"], ["x1*x2", "x2"]], ["x1 + w"], stratonovich=True)
+    x1, x2 = two.x
+    # by hand: 1/2 sum_j (dB_j/dx) B_j with B_1 = (x2, x1 x2), B_2 = (1, x2)
+    assert sp.expand(two.between.correction - sp.Matrix([x1 * x2, x2**2 + x1**2 * x2 + x2]) / 2) == sp.zeros(2, 1)
+    assert s not in two.between.correction.free_symbols
+
+
+def test_fos_and_duof_tend_to_kalmans_filter():
+    model = sampled("-0.5*x + 0.2", "0.9", "x + 0.5*w", interval=0.8, substeps=64)
+    filters = [aof(linearised(model)), fos(gaussian(model)), duof(model)]
+    found = compare(filters, model, 4000, 8, seed=3, design_runs=20_000)
+    for name in found.names[1:]:
+        relative = found.relative(name, "aof-linearised")
+        assert np.abs(relative.value - 1).max() < 0.01  # coefficients of 20,000 trajectories, and (1/64)^2 of weak error
+
+
+def test_particles_agree_with_the_normal_filter_where_it_is_exact():
+    model = sampled("-0.5*x", "0.9", "x + 0.5*w", interval=0.8, substeps=16)
+    y = simulate(model, 2, 6, 4).y
+    ours, exact = run(particle(model, 4000), y), run(aof(gaussian(model)), y)
+    assert np.abs(ours.mean - exact.mean).max() < 6 * np.sqrt(exact.cov.max() / 1000)  # a quarter of them count
+
+
+def test_parameters_are_estimated_as_everywhere():
+    """Of Ornstein and Uhlenbeck's process seen without error the maximum is that of a regression, in closed form."""
+    truth = sampled("-a*x", "s", "x + 0*w", {"a": 0.8, "s": 1.1}, interval=0.5, prior={"variance": 0}, substeps=32)
+    y = simulate(truth, 1, 400, 7).y
+    x = y[:, 0, 0]
+    slope = (x[1:] @ x[:-1]) / (x[:-1] @ x[:-1])
+    a = -np.log(slope) / 0.5
+    s2 = np.mean((x[1:] - slope * x[:-1]) ** 2) * 2 * a / (1 - slope**2)
+    y[0] = np.nan
+    found = estimate(truth, y, ["a", "s"], ["a", "s"])
+    assert found.value == pytest.approx([a, np.sqrt(s2)], rel=1e-3)
+
+
+def test_a_record_brings_its_instants(tmp_path):
+    path = tmp_path / "record.csv"
+    rows = [f"{t},{'' if np.isnan(y) else y}" for t, y in zip([0.0, 0.3, 1.1, 1.2], [0.1, np.nan, -0.5, 0.7], strict=True)]
+    path.write_text("time,y\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    settings = {"parameters": {"a": 0.5}, "meter_noise": {"variance": 0.2}}
+    given = read_measurements(path, sampled("-a*x", "1", "x + w", **settings))
+    listed = sampled("-a*x", "1", "x + w", **settings, instants=[0, 0.3, 1.1, 1.2])
+    ours = run(aof(linearised(given.model)), given.y)
+    np.testing.assert_array_equal(ours.mean, run(aof(linearised(listed)), given.y).mean)
+    far = run(aof(linearised(sampled("-a*x", "1", "x + w", **settings))), given.y)
+    assert np.abs(far.mean - ours.mean).max() > 0.01
+
+
+def test_angles_stay_on_the_circle():
+    model = sampled("2", "0.1", "x + w", interval=1, angles={"x": ["x"], "y": ["y"]}, prior={"mean": 3, "variance": 0.01})
+    tau, _ = linearised(model).at(0).predict(np.array([[3.0]]), np.array([[[0.01]]]))
+    assert tau.item() == pytest.approx(5 - 2 * np.pi)
+
+
+def test_the_model_is_printed_as_a_differential_equation():
+    model = sampled("-a*x", "s*x", "x + w", {"a": 0.5, "s": 1})
+    assert str(model).startswith("Model(dx/dt = -a*x + s*v*x, y = w + x;")
+    assert model.latex().startswith("\\begin{aligned}\ndx/dt &= ")
+    changed = model.replace(a=2)
+    tau, _ = linearised(changed).at(0).predict(np.array([[1.0]]), np.array([[[0.0]]]))
+    assert tau.item() == pytest.approx(np.exp(-2), abs=1e-6)
+
+
+# ---------------------------------------------------------------- refused, in words
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("x", ["1"], "x + w"), "list of rows"),
+        (("x", 1.5, "x + w"), "list of rows"),
+        (("x", [["1"], ["2"]], "x + w"), "a row for each of x: it has 2"),
+        ((["x1", "x2"], [["1", "0"], ["2"]], "x1 + w"), "rows of different lengths"),
+        (("x + v", "1", "x + w"), "holds noise"),
+        (("x", "1", "x + w", {"t": 1}), "t is the time"),
+        (("v2*x", "1", "x + w", {"v2": 1}), "those of the noises"),
+    ],
+)
+def test_what_is_no_model(arguments, words):
+    with pytest.raises(ModelError, match=words):
+        sampled(*arguments)
+
+
+def test_other_mistakes():
+    with pytest.raises(FormulaError, match="unknown symbol 'q'"):
+        sampled("x", "q", "x + w")
+    with pytest.raises(ModelError, match=r"t_2 = 0.5 comes after t_1 = 1"):
+        sampled("x", "1", "x + w", instants=[0, 1, 0.5])
+    with pytest.raises(ModelError, match="accuracy"):
+        sampled("x", "1", "x + w", accuracy=0)
+    with pytest.raises(ValueError, match="substeps"):
+        sampled("x", "1", "x + w", substeps=0)
+    with pytest.raises(NoClosedForm, match="tanh"):
+        gaussian(benes())
+    for other in (pointmass, kalman_filter, lambda model: posterior_bound(model, 10, 3, 1)):
+        with pytest.raises(ModelError, match="moves in continuous time between"):
+            other(sampled("-x", "1", "x + w"))
+
+
+def test_a_drift_that_explodes_is_named():
+    model = sampled("0.01*x**3 - 0.5*x", "1.5", "x + w", prior={"mean": 8}, interval=5)
+    with pytest.raises(NotFinite, match=r"infinite [\d.]+ after an instant, and the next is 5 after it"):
+        run(aof(gaussian(model)), np.full(3, np.nan))
+
+
+def test_a_stiff_model_does_not_take_minutes(monkeypatch):
+    monkeypatch.setattr("kfcourse.continuous.integration.MOST_STEPS", 300)
+    model = sampled("-1e5*(x - sin(t)) - x**3", "1", "x + w", interval=5)
+    with pytest.raises(NotFinite, match="stiff: 300 steps reach"):
+        run(aof(linearised(model)), np.zeros(3))
