@@ -329,34 +329,6 @@ def test_a_model_is_refused_or_computes_what_its_formulas_say(given):
     assert tracks.x.shape == (3, 4, model.n) and tracks.y.shape == (3, 4, model.p)
 
 
-@cases(0.01)
-@given(models(tame=True), st.sampled_from(["accuracy", "relative_accuracy", "ranking", "consistency"]))
-def test_the_lab_of_a_model_has_finite_results_or_says_why_not(given, figure):
-    model = defined(given)
-    assume(model is not None and not nothing_random(model))
-    filters = [one.built for one in admissions(model, LAB, seconds=5) if one.built]
-    assume(filters)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", QuadratureWarning)
-        try:
-            result = compare(filters, model, 256, 3, seed=1, jobs=1, progress=False)
-        except NotFinite as error:
-            event("not finite")
-            assert "step" in str(error)
-            return
-    for name in result.names:
-        estimate = result.error_variance(name)
-        assert np.isfinite(estimate.value).all() and (estimate.value >= 0).all()
-        assert not np.isnan(result.own_variance(name).value).any()
-    assert len(conclusions(result)) == max(len(result.entrants) - len(result.lost) - 1, 0)
-    with TemporaryDirectory() as folder:
-        write_json(Variant("generated", "", model), result, Path(folder) / "n.json")
-        picture = Figure()
-        with np.errstate(all="ignore"):
-            getattr(plots, figure)(result, picture.add_subplot())
-            picture.savefig(Path(folder) / "figure.svg")
-
-
 # --- laws, tables and files
 
 
