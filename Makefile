@@ -59,7 +59,7 @@ nightly:
 	$(MAKE) CHOSEN= test
 
 # Named, since pytest takes twenty seconds to collect all tests.
-QUICK := tests/test_house.py tests/test_laws.py tests/symbolic tests/linear tests/checks/test_engine.py tests/lab/test_variants.py
+QUICK := tests/test_house.py tests/test_laws.py tests/symbolic tests/linear
 quick: lint
 	$(BIN)/pytest -q -n 0 -m quick $(QUICK)
 
