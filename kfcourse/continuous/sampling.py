@@ -27,7 +27,7 @@ from kfcourse.symbolic.codegen import compile_function
 from kfcourse.symbolic.equations import Equation
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.known import Known
-from kfcourse.symbolic.model import Model
+from kfcourse.symbolic.model import OF_A_VARIANT, Model
 from kfcourse.symbolic.reading import Formula, Formulas, ModelError, Names, by_name, read
 from kfcourse.symbolic.structure import Structure, of_steps
 
@@ -203,3 +203,8 @@ def sampled(
     for k in range(len(known.inputs.get("t", ()))):
         clock(known, k)
     return model
+
+
+def sampled_of_table(table: Mapping[str, Any]) -> Model:
+    """The model of a table with `drift` and `diffusion`: its keys are the arguments of `sampled`, but for title and steps."""
+    return sampled(**{key: value for key, value in table.items() if key not in OF_A_VARIANT})

@@ -10,6 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from kfcourse.continuous.sampling import sampled_of_table
 from kfcourse.errors import expect_sizes
 from kfcourse.symbolic.jumping import JumpModel, model_of_table
 from kfcourse.symbolic.model import Model
@@ -19,6 +20,8 @@ from kfcourse.symbolic.sense import nothing_random
 SHIPPED = ("variants.toml", "tasks.toml", "jumps.toml")
 TABLES = {"parameters", "symbols", "prior", "state_noise", "meter_noise", "inputs", "modes"}
 KEYS = {"title", "steps", "state", "meter", "interval", "angles", "transition", "first"} | TABLES
+IN_TIME = {"drift", "diffusion", "instants", "stratonovich", "substeps", "accuracy"}  # of an object in continuous time
+OF_STEPS = {"state", "state_noise", "modes", "transition", "first"}
 STEPS = 51  # of the lab, where a variant does not say another number
 RUNS = 40_000  # trajectories by which a variant is checked
 MANY = 40  # names that a message lists
@@ -64,7 +67,9 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     path : path, optional
         A file with tables ``[variants.NAME]``: `state`, `meter`, `parameters`, and optionally
         `title`, `symbols`, `prior`, `state_noise`, `meter_noise`, `inputs`, `interval`, `angles`
-        (see `Model.define`).  `steps` is how many measurements the lab takes.  Those with `modes`,
+        (see `Model.define`); of an object in continuous time `drift` and `diffusion` in the place of
+        `state`, and `instants` (see `kfcourse.continuous.sampled`).
+        `steps` is how many measurements the lab takes.  Those with `modes`,
         `transition`, `first` (see `JumpModel.define`), and the shipped tasks of the school's
         program, D1, D2 and D3, are read by `read_variants` and `find_variant`.
 
@@ -175,15 +180,17 @@ def read_variant(name: str, table: Any, where: str) -> Variant:
     prefix = f"variant {name} in {where}: "
     if not isinstance(table, Mapping):
         raise VariantError(f"{prefix}expected a table [variants.{name}], got {shown(table)}")
-    unknown, missing = sorted(set(table) - KEYS), sorted({"state", "meter"} - set(table))
+    moves = bool({"drift", "diffusion"} & set(table))
+    keys, needed = (KEYS - OF_STEPS | IN_TIME, {"drift", "diffusion"}) if moves else (KEYS, {"state"})
+    unknown, missing = sorted(set(table) - keys), sorted(({"meter"} | needed) - set(table))
     if unknown or missing:
         problem = f"unknown key {', '.join(unknown)}" if unknown else f"no {' and no '.join(missing)}"
-        raise VariantError(f"{prefix}{problem}; the keys are {', '.join(sorted(KEYS))}")
+        raise VariantError(f"{prefix}{problem}; the keys are {', '.join(sorted(keys))}")
     for key in sorted(TABLES & set(table)):
         if not isinstance(table[key], Mapping):
             raise VariantError(f"{prefix}`{key}` must be a table such as {{ c = 0.9 }}, got {shown(table[key])}")
     try:
-        model = model_of_table(table)
+        model = sampled_of_table(table) if moves else model_of_table(table)
         steps = table.get("steps", STEPS)
         expect_sizes(steps=steps)
     except (ValueError, TypeError, OverflowError) as error:  # FormulaError and ModelError are ValueErrors
@@ -213,5 +220,7 @@ def summary(name: str, table: Mapping[str, Any]) -> str:
 
 
 def _equations(table: Mapping[str, Any]) -> str:
-    state, meter = ([side] if isinstance(side, str) else side for side in (table["state"], table["meter"]))
-    return f"x' = {', '.join(map(on_a_line, state))};  y = {', '.join(map(on_a_line, meter))}"
+    left, key = ("dx/dt", "drift") if "drift" in table else ("x'", "state")
+    state, meter = ([side] if isinstance(side, str) else side for side in (table[key], table["meter"]))
+    pushed = f" + ({on_a_line(str(table['diffusion']))}) v" if key == "drift" else ""
+    return f"{left} = {', '.join(map(on_a_line, state))}{pushed};  y = {', '.join(map(on_a_line, meter))}"

@@ -207,8 +207,8 @@ class Model:
         """a(x, v); ModelError if the model moves in continuous time, of which `what` knows nothing."""
         if self.between is not None:
             raise ModelError(
-                f"{what} needs a difference equation, and {self} moves in continuous time between its measurements: take "
-                "aof(structure), fos(structure) or another filter of structural functions, duof(model), or particle(model)"
+                f"{what} needs a difference equation, and {self} moves in continuous time between its measurements; filters "
+                "of structural functions, duof(model) and particle(model) take it"
             )
         return self.state_equation
 

@@ -11,6 +11,8 @@ from kfcourse import Model, compare, gauss_hermite, gaussian, likelihood, linear
 from kfcourse.continuous import benes_filter, moment_equations, sampled
 from kfcourse.errors import NotFinite
 from kfcourse.filters import aof, duof, fos, kalman_filter, particle, pointmass
+from kfcourse.lab import find_variant
+from kfcourse.lab.variants import VariantError, summary
 from kfcourse.montecarlo.cramer_rao import posterior_bound
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.records import estimate, read_measurements
@@ -500,3 +502,34 @@ def test_a_stiff_model_does_not_take_minutes(monkeypatch):
     model = sampled("-1e5*(x - sin(t)) - x**3", "1", "x + w", interval=5)
     with pytest.raises(NotFinite, match="stiff: 300 steps reach"):
         run(aof(linearised(model)), np.zeros(3))
+
+
+def test_a_table_has_drift_and_diffusion(tmp_path):
+    """The school's CD1 with a drift that comes back, from a file; and what is wrong with tables."""
+    path = tmp_path / "my.toml"
+    table = """[variants.{}]
+title = "cubic drift, quadratic meter"
+drift = "a1*x + a3*x**3"
+{}
+meter = "x + 0.5*x**2 + w"
+parameters = {{ a1 = -0.5, a3 = -0.01 }}
+steps = 11
+"""
+    texts = [
+        table.format(name, more) for name, more in (("CD1", 'diffusion = "1.5"'), ("none", ""), ("row", 'diffusion = ["1"]'))
+    ]
+    path.write_text("\n".join([*texts, table.format("state", 'diffusion = "1"\nstate = "x"')]), encoding="utf-8")
+    chosen = find_variant("CD1", path)
+    assert chosen.steps == 11 and chosen.model.between.diffusion[0] == sp.Rational(3, 2)
+    z, p = 0.7, 0.4
+    equations = moment_equations(chosen.model)
+    at = {equations.z[0]: z, equations.p[0]: p} | chosen.model.values
+    # the page's: a1 z + a3 (z^3 + 3 z p), a1 + 3 a3 (z^2 + p), 2.25
+    wanted = [-0.5 * z - 0.01 * (z**3 + 3 * z * p), -0.5 - 0.03 * (z**2 + p), 2.25]
+    assert [float(part[0].subs(at)) for part in equations[2:]] == pytest.approx(wanted, abs=1e-12)
+    h, G, F, _ = gaussian(chosen.model).at(0).measure(np.array([[z]]), np.array([[[p]]]))
+    assert [h.item(), G.item(), F.item()] == pytest.approx([z + 0.5 * (z**2 + p), 1 + z, (1 + z) ** 2 * p + 0.5 * p**2 + 1])
+    assert "dx/dt = a1*x + a3*x**3 + (1.5) v" in summary("CD1", chosen.table)
+    for name, words in (("none", "no diffusion"), ("row", "list of rows"), ("state", "unknown key state")):
+        with pytest.raises(VariantError, match=words):
+            find_variant(name, path)
