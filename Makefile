@@ -16,13 +16,14 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help literature book test nightly quick lint unit notebooks lock lock-check clean distclean install figure benchmark fuzz
+.PHONY: help literature book page test nightly quick lint unit notebooks lock lock-check clean distclean install figure benchmark fuzz
 
 help:
 	@echo "make book        execute the chapters and build the book in _build/html"
+	@echo "make page NAME=drive   one page alone, to look at: half a minute; links to other pages lead nowhere"
 	@echo "make test        lint, types, unit tests, documentation examples, the book, nbval on its notebooks"
 	@echo "make nightly     the same, and the tests marked slow: coverage of intervals, hostile processes, all pages"
-	@echo "make quick       lint, types and the tests marked quick, before a commit"
+	@echo "make quick       lint, types and the quick tests of the house, of formulas and of linear filters: a minute of CPU"
 	@echo "make lint        ruff check, ruff format --check, mypy, the columns of the pages"
 	@echo "make unit        unit tests and documentation examples only"
 	@echo "make install     the virtual environment .venv only"
@@ -38,6 +39,18 @@ help:
 book: install
 	$(BIN)/python book/build.py
 
+# One page and the front page, in a folder of their own; outputs of its cells are kept until the package changes.
+# Of what Sphinx says, all but that the other pages are not there.
+PAGE := _build/page/_build/html
+page: install
+	@test -f "book/$(NAME).md" || { echo "make page NAME=drive: the name of a file book/NAME.md without its ending" >&2; exit 1; }
+	@test -z "$$(find kfcourse exercises -name '*.py' -newer _build/page/_toc.yml 2>&1)" || rm -rf _build/page
+	@rm -rf $(PAGE) && mkdir -p _build/page _build/sample
+	@printf 'format: jb-book\nroot: intro\nchapters:\n  - file: %s\n' "$(NAME)" > _build/page/_toc.yml
+	@$(BIN)/jupyter-book build book --config _config.yml --toc "$(CURDIR)/_build/page/_toc.yml" --path-output _build/page -q 2>&1 \
+	  | grep -vE "unknown document|undefined label|no page '|cross-reference|not found:|equation not found" || true
+	@test -f "$(PAGE)/$(NAME).html" && echo "The page: $(CURDIR)/$(PAGE)/$(NAME).html"
+
 # What a change needs; the tests marked slow run every night.
 CHOSEN := -m "not slow"
 test: lint unit book notebooks
@@ -45,8 +58,10 @@ test: lint unit book notebooks
 nightly:
 	$(MAKE) CHOSEN= test
 
+# Named, since pytest takes twenty seconds to collect all tests.
+QUICK := tests/test_house.py tests/test_laws.py tests/symbolic tests/linear tests/checks/test_engine.py tests/lab/test_variants.py
 quick: lint
-	$(BIN)/pytest -q -n auto --dist loadscope -m quick --ignore tests/test_book.py
+	$(BIN)/pytest -q -n 0 -m quick $(QUICK)
 
 lint: install
 	$(BIN)/ruff check .

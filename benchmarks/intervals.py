@@ -37,7 +37,7 @@ def filters_of(name: str) -> list[Filter | Design]:
     """Those that `kfcourse lab` compares."""
     model = find_variant(name).model
     names = [*(JUMP_LAB if isinstance(model, JumpModel) else LAB), EXACT]
-    return [found.one for found in admissions(model, names) if found.one is not None]
+    return [known.built for known in admissions(model, names) if known.built]
 
 
 def designed(filters: Sequence[Filter | Design], ensemble: Ensemble, jobs: int) -> list[Filter]:

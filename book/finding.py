@@ -19,12 +19,13 @@ from sphinx import addnodes
 SCRIPTS = Path(__file__).resolve().parent / "search"  # not in _static, whose scripts every page loads
 REPEATS = "equations"  # the page that repeats those of the others
 SILENT = (nodes.raw, nodes.math_block, nodes.comment, nodes.title, nodes.image, nodes.classifier, addnodes.toctree)
+REPEATED = {"cell", "kf-terms", "kf-russian"}  # code and what it prints; terms, which have rows of their own
 SILENT += (addnodes.desc_parameterlist, addnodes.desc_returns)
 READABLE = re.compile(r"[\w+=-]{1,3}|[a-z]_[0-9k]|[a-z]_\{(k [+-] 1)\}")  # without TeX
 
 
 def collect(app, doctree, name: str) -> None:
-    """Address, titles of page and section, and text of each section of a page; the first has the page's own title."""
+    """Address, titles of page and section, and text of each section of a page, of the first without a title; and of each term."""
     if name == REPEATS:
         return
     known = contents.page(app.env, name)
@@ -34,6 +35,11 @@ def collect(app, doctree, name: str) -> None:
         anchor = f"#{section['ids'][0]}" if i else ""
         row = app.builder.get_target_uri(name) + anchor, page, title if i else "", " ".join("".join(_said(section)).split())
         app.env.kf_sections.append(row)
+    for item in doctree.findall(nodes.definition_list_item):
+        if "kf-terms" in item.parent["classes"]:
+            term, meaning = item.children
+            row = f"{app.builder.get_target_uri(name)}#{term['ids'][0]}", page, term.astext(), meaning.astext()
+            app.env.kf_sections.append(row)
 
 
 def _said(node: nodes.Element) -> Iterator[str]:
@@ -43,7 +49,7 @@ def _said(node: nodes.Element) -> Iterator[str]:
             yield child.astext()
         elif isinstance(child, nodes.math):
             yield text if READABLE.fullmatch(text := child.astext()) else "…"
-        elif not (isinstance(child, (*SILENT, nodes.section)) or "cell" in child.get("classes", [])):
+        elif not (isinstance(child, (*SILENT, nodes.section)) or REPEATED.intersection(child.get("classes", []))):
             yield from _said(child)
             yield "" if isinstance(child, nodes.Inline) and not isinstance(child, addnodes.desc_signature) else " "
 

@@ -25,8 +25,9 @@ SOLUTIONS = Path(__file__).resolve().parent.parent / "_build" / "solutions"
 NOTE = """
 ```{{admonition}} Your own notebook
 The formulas and pictures on this page are those of variant {variant}.
-{{download}}`Download its notebook <notebooks/{file}.ipynb>`, or ask your instructor for the notebook of your variant.
-Open it in Jupyter, in an environment in which `kfcourse` is installed: {{doc}}`../lab-manual`.
+{{download}}`Download its notebook <notebooks/{file}.ipynb>`, or make that of your own variant, here 5:
+`kfcourse exercises --variant 5 --sets {file[0]} --out mine`. Open it in Jupyter, in an environment in which `kfcourse` is
+installed: {{doc}}`../lab-manual`.
 ```
 """
 

@@ -83,7 +83,14 @@ class Terms(SphinxDirective):
 def fill(app, doctree, name: str) -> None:
     """Put the terms in the place of the directive."""
     for place in list(doctree.findall(terms_here)):
-        place.replace_self(_index() if place["russian"] else _list(app, name))
+        place.replace_self(_index() if place["russian"] else [_letters(), _list(app, name)])
+
+
+def _letters() -> nodes.paragraph:
+    """A link to the first term with each letter."""
+    first = {term.name[0].upper(): term.identity for term in reversed(terms())}
+    links = [nodes.reference("", letter, refid=first[letter], internal=True) for letter in sorted(first)]
+    return nodes.paragraph("", "", *links, classes=["kf-letters"])
 
 
 def _list(app, name: str) -> nodes.definition_list:
@@ -94,9 +101,9 @@ def _list(app, name: str) -> nodes.definition_list:
             head += nodes.Text(f" ({term.short})")
         russian = nodes.inline("", ", ".join(term.ru), classes=["kf-ru", "language-ru"])
         head += [nodes.Text(" "), russian]
-        _, page = contents.page(app.env, term.page)
-        title = page.title.replace(" ★", "")
-        where = nodes.reference("", f"{page.number}. {title}" if page.number else title, internal=True)
+        known = contents.page(app.env, term.page)
+        title, number = (known[1].title, known[1].number) if known else (term.page, None)
+        where = nodes.reference("", f"{number}. {title}" if number else title, internal=True)
         where["refuri"] = app.builder.get_relative_uri(name, term.page) + f"#first-{term.identity}"
         place = nodes.inline("", "", where, classes=["kf-where"])
         meaning = nodes.paragraph("", f"{term.meaning} ", place)

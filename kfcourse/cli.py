@@ -23,7 +23,7 @@ from kfcourse.derivations.setting import of_model
 from kfcourse.errors import NotFinite
 from kfcourse.files import replacing_together, save
 from kfcourse.lab import grammar, quality
-from kfcourse.lab.admission import admissions, on_trial
+from kfcourse.lab.admission import admissions
 from kfcourse.lab.admission import table as table_of_filters
 from kfcourse.lab.own_data import STRUCTURES, estimate_record, model_of, write_record
 from kfcourse.lab.report import (
@@ -176,12 +176,12 @@ def lab(
     else:
         wanted = [name.strip() for name in names.split(",") if name.strip()]
     found = admissions(model, wanted, DERIVATION)
-    refused = {one.name: one.reason for one in found if one.one is None}
+    refused = {one.name: one.reason for one in found if one.built is None}
     for one in found:
         for warning in one.warnings:
             click.echo(f"Warning: {title(one.name)}: {warning}", err=True)
     entries = JUMP_FILTERS if isinstance(model, JumpModel) else FILTERS
-    of_functions = [one for one in found if entries[one.name].functions in ("gaussian", "best")]
+    of_functions = [one for one in found if entries[one.name].functions in ("gaussian", "best", "averaged")]
     for remark in dict.fromkeys(remark for one in of_functions for remark in one.remarks):
         whose = ", ".join(title(one.name) for one in of_functions if remark in one.remarks)
         click.echo(f"{whose}: {remark}", err=True)
@@ -193,7 +193,7 @@ def lab(
     folder = out or Path("lab-" + re.sub(r"[^\w.-]+", "-", chosen.name))  # no folder but this one
     _check_places(folder, json_file)  # before the long part
     click.echo(f"Variant {chosen.name}: {chosen.title or model}", err=True)
-    filters = [one.one for one in found if one.one]
+    filters = [one.built for one in found if one.built]
     result = without_failing(
         filters,
         model,
@@ -243,15 +243,14 @@ def _kept(folder: Path) -> Iterator[None]:
 @main.command()
 @click.argument("places", nargs=-1, required=True, metavar="[FILE] VARIANT")
 @VARIANTS
-@click.option("--trial/--no-trial", default=True, show_default=True, help="Also run each filter on a few hundred trajectories.")
-def filters(places: tuple[str, ...], variants_file: Path | None, trial: bool) -> None:
+def filters(places: tuple[str, ...], variants_file: Path | None) -> None:
     """Say of each filter whether VARIANT, of FILE or of the lab, admits it, and why not."""
     if len(places) > 2 or (len(places) == 2 and variants_file):
         raise click.UsageError("give a VARIANT, or a FILE of variants and a VARIANT of it")
     chosen = find_variant(places[-1], Path(places[0]) if len(places) == 2 else variants_file)
     found = admissions(chosen.model, seconds=DERIVATION)
     click.echo(f"Variant {chosen.name}: {chosen.title or chosen.model}", err=True)
-    click.echo(table_of_filters(on_trial(chosen.model, found) if trial else found))
+    click.echo(table_of_filters(found))
 
 
 @main.command()

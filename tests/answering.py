@@ -104,12 +104,6 @@ def html(name: str) -> str:
     return MADE[name]()
 
 
-def functions(name: str) -> dict[str, str]:
-    """The functions that SymPy printed for a figure, by name, as text."""
-    found = re.findall(r"^(function (\w+)\(n, v, c, a\) \{\n.*?^\})", html(name), re.DOTALL | re.MULTILINE)
-    return {called: text for text, called in found}
-
-
 def fragment(tab) -> str:
     return tab.evaluate("decodeURIComponent(location.hash)")
 

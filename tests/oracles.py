@@ -9,8 +9,11 @@ One trajectory at a time in plain floats for the filters without an ensemble; `n
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
+
+from kfcourse import Model
 
 C, E, G, F = 0.9, 0.05, 1.0, 0.02
 
@@ -59,27 +62,6 @@ def aof_trajectory(kind: str, measurements: list[float]) -> list[tuple[float, fl
     return found
 
 
-def kalman_trajectory(
-    measurements: list[float],
-    a: float,
-    q: float,
-    b: float,
-    r: float,
-    mean: float,
-    variance: float,
-    u: float = 0.0,
-    s: float = 0.0,
-) -> list[tuple[float, float]]:
-    """(z_k, p_k) of the scalar Kalman filter of x' = a x + u + noise(q), y = b x + s + noise(r)."""
-    found = []
-    for y in measurements:
-        gain = variance * b / (b * variance * b + r)
-        mean, variance = mean + gain * (y - b * mean - s), (1 - gain * b) * variance
-        found.append((mean, variance))
-        mean, variance = a * mean + u, a * variance * a + q
-    return found
-
-
 def regression(target, *regressors):
     """Affine least squares: (matrix, offset, residual variance) by Cov(t, r) Cov(r)^+."""
     rows = np.stack(regressors)
@@ -87,97 +69,6 @@ def regression(target, *regressors):
     matrix = joint[0, 1:] @ np.linalg.pinv(joint[1:, 1:], hermitian=True)
     offset = np.mean(target) - matrix @ np.mean(rows, axis=1)
     return matrix, offset, joint[0, 0] - matrix @ joint[1:, 0]
-
-
-def duof_ensemble(x, y, x_next):
-    """Estimates z (steps, N) of the DUOF designed on the same scalar ensemble (steps, N) that it filters."""
-    lam = np.zeros(x.shape[1])
-    estimates = []
-    for x_k, y_k, following in zip(x, y, x_next, strict=True):
-        omega = y_k - G * lam
-        matrix, offset, _ = regression(x_k - lam, omega)
-        z = lam + matrix[0] * omega + offset
-        alpha = C * z
-        matrix, offset, _ = regression(following, alpha)
-        lam = matrix[0] * alpha + offset
-        estimates.append(z)
-    return np.array(estimates)
-
-
-def fos_ensemble(kind: str, arguments: int, x, y):
-    """Estimates z (steps, N) of the FOS: x regressed on z, or with three arguments on (y, z)."""
-    theta, f = STRUCTURES[kind]
-    lam, psi = np.zeros(x.shape[1]), np.ones(x.shape[1])
-    estimates = []
-    for x_k, y_k in zip(x, y, strict=True):
-        z = lam + psi * G / f(lam, psi) * (y_k - h(lam, psi))
-        u, t = _condition(arguments, x_k, y_k, z)
-        lam, psi = tau(u, t), theta(u, t)
-        estimates.append(z)
-    return np.array(estimates)
-
-
-def mfos_ensemble(kind: str, arguments: int, x, y, x_next):
-    """Estimates z (steps, N) of the MFOS."""
-    theta, f = STRUCTURES[kind]
-    lam, psi = np.zeros(x.shape[1]), np.ones(x.shape[1])
-    estimates = []
-    for x_k, y_k, following in zip(x, y, x_next, strict=True):
-        sigma = psi * G / f(lam, psi) * (y_k - h(lam, psi))
-        matrix, offset, _ = regression(x_k - lam, sigma)
-        z = lam + matrix[0] * sigma + offset
-        u, t = _condition(arguments, x_k, y_k, z)
-        s = tau(u, t)
-        matrix, offset, _ = regression(following, s)
-        lam, psi = matrix[0] * s + offset, theta(u, t)
-        estimates.append(z)
-    return np.array(estimates)
-
-
-def _condition(arguments: int, x, y, z):
-    regressors = (z,) if arguments == 2 else (y, z)
-    matrix, offset, t = regression(x, *regressors)
-    return matrix @ np.stack(regressors) + offset, t
-
-
-# Which parts the note's table fits: prediction, its variance, correction.
-RECIPES = {
-    "fos": (False, False, False),
-    "mfos": (True, False, True),
-    "dfmp": (True, True, False),
-    "mdfmp": (True, True, True),
-    "fkp": (False, False, False),
-    "mfkp": (True, False, True),
-    "dfkp": (True, True, False),
-    "mdfkp": (True, True, True),
-    "fbp": (False, False, False),
-}
-
-
-def remembering_ensemble(kind: str, family: str, memory: int, x, y, x_next):
-    """Estimates z (steps, N) of the filters of the note's table; a memory that is not yet full is padded with zeros."""
-    theta, f = STRUCTURES[kind]
-    fits_prediction, fits_variance, fits_correction = RECIPES[family]
-    runs = x.shape[1]
-    lam, psi = np.zeros(runs), np.ones(runs)
-    zeta = np.zeros((memory, runs))
-    estimates = []
-    for x_k, y_k, following in zip(x, y, x_next, strict=True):
-        sigma = psi * G / f(lam, psi) * (y_k - h(lam, psi))
-        z = lam + sigma
-        if fits_correction:
-            matrix, offset, _ = regression(x_k - lam, sigma)
-            z = lam + matrix[0] * sigma + offset
-        estimates.append(z)
-        zeta = np.vstack([y_k if "k" in family else z, zeta[:-1]])
-        matrix, offset, t = regression(x_k, *zeta)
-        u = matrix @ zeta + offset
-        lam, psi = tau(u, t), np.broadcast_to(theta(u, t), runs)
-        if fits_prediction:
-            matrix, offset, residual = regression(following, lam)
-            lam = matrix[0] * lam + offset
-            psi = np.full(runs, residual) if fits_variance else psi
-    return np.array(estimates)
 
 
 def gaussian_mean(function, mean, cov, order: int = 40):
@@ -222,3 +113,33 @@ def joint_posterior(steps, prior, y):
     log_density = -0.5 * (residual @ np.linalg.solve(F, residual) + np.linalg.slogdet(2 * np.pi * F).logabsdet)
     blocks = [slice(k * n, (k + 1) * n) for k in range(size)]
     return np.array([mean[b] for b in blocks]), np.array([cov[b, b] for b in blocks]), log_density
+
+
+class Changing:
+    """A linear model whose matrices, constants and noises change with time and input; as text, and as arrays typed apart."""
+
+    U = (0.7, -2.0, 3.0, 0.0, 1.5, -1.0, 0.4, -0.6, 2.2, 1.1)  # each step another: one too early or too late is seen
+    laws: ClassVar = {
+        "prior": (np.array([1.0, -0.5]), np.array([[1.0, 0.3], [0.3, 0.8]])),
+        "state_noise": (np.array([0.2, -0.1]), np.array([[0.5, 0.1], [0.1, 0.3]])),
+        "meter_noise": (np.array([0.1, 0.3]), np.array([[0.4, 0.1], [0.1, 0.6]])),
+    }
+
+    def at(self, k: int):
+        t, u = 0.5 * k, self.U[k]
+        A = np.array([[0.9 + 0.1 * np.sin(k), 0.2], [0.1, 0.8 - 0.05 * k]])
+        C = np.diag([2.0 if t < 1 else 1.0, 1.0])
+        H, b = np.array([[1.0, 0.1 * k], [0.0, 1.0]]), np.array([u**2, np.cos(t)])
+        return A, np.array([[1 + t, 0.0], [1.0, 0.5]]), np.array([u, -2 * u]), H, C, b
+
+    def steps(self, count: int):
+        """A, constant, Q, H, constant, R of each step, as `joint_posterior` takes them."""
+        _, (m_v, D_v), (m_w, D_w) = self.laws.values()
+        each = map(self.at, range(count))
+        return [(A, B @ m_v + a, B @ D_v @ B.T, H, C @ m_w + b, C @ D_w @ C.T) for A, B, a, H, C, b in each]
+
+    def model(self) -> Model:
+        state = ["(0.9 + 0.1*sin(k))*x1 + 0.2*x2 + (1 + t)*v1 + u", "0.1*x1 + (0.8 - 0.05*k)*x2 + 0.5*v2 - 2*u + v1"]
+        meter = ["x1 + 0.1*k*x2 + (2 if t < 1 else 1)*w1 + u**2", "x2 + w2 + cos(t)"]
+        laws = {key: {"mean": mean, "variance": cov} for key, (mean, cov) in self.laws.items()}
+        return Model.define(state, meter, inputs={"u": self.U}, interval=0.5, **laws)

@@ -1,4 +1,4 @@
-"""Generated formulas, models and files of variants: each is right or refused, and none hangs, crashes or lies.
+"""Generated formulas, models and tables of variants: each is right or refused, and none hangs, crashes or lies.
 
 1,000 cases with `make test`, always the same; 20,000 other ones with `make fuzz`.
 """
@@ -10,8 +10,6 @@ import os
 import time
 import warnings
 from contextlib import contextmanager
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import mpmath
 import numpy as np
@@ -20,26 +18,18 @@ import sympy as sp
 from hypothesis import HealthCheck, Phase, assume, event, given, settings
 from hypothesis import strategies as st
 from latex2mathml.converter import convert
-from matplotlib.figure import Figure
 
 from kfcourse import (
     FormulaError,
     Model,
     ModelError,
-    NotFinite,
-    QuadratureWarning,
-    compare,
     simulate,
 )
-from kfcourse.lab import plots
-from kfcourse.lab.admission import admissions
-from kfcourse.lab.report import conclusions, write_json
-from kfcourse.lab.short_names import LAB
-from kfcourse.lab.variants import KEYS, Variant, VariantError, load_variants, read_variant
+from kfcourse.lab.variants import KEYS, VariantError, read_variant
 from kfcourse.symbolic.angular import AngleWarning
 from kfcourse.symbolic.equations import compile_model
-from kfcourse.symbolic.formula import CONSTANTS, FUNCTIONS, parse, symbol
-from kfcourse.symbolic.sense import is_covariance, nothing_random
+from kfcourse.symbolic.formula import FUNCTIONS, parse, symbol
+from kfcourse.symbolic.sense import nothing_random
 
 CASES = int(os.environ.get("KFCOURSE_CASES", "1000"))
 SOON = 10.0  # seconds, ten times what the slowest case takes on a slow machine: whatever is longer hangs
@@ -261,7 +251,6 @@ STATES = [
     "tau_k",
 ]
 SIZES = [0, 1, -1, 0.5, 2, 0.01, 1e-5, 1e5, 1e-60, 1e60, 1e99, -1e99, 1e-99, 3, sp.Rational(1, 3)]
-TAME = [1, 0.9, -0.5, 0.1, 2, 0.05]
 EXTREME = [0.0, 1e-300, 1e300, 1e200, 6e23, -1.0, math.nan, math.inf, 1e-60, 1e60, 1e-101, 5e-324]
 
 
@@ -274,23 +263,22 @@ def laws(size):
 
 
 @st.composite
-def models(draw, tame=False):
+def models(draw):
     """Keyword arguments of Model.define."""
     n = draw(st.integers(1, 2))
     x = draw(st.lists(st.sampled_from(STATES), min_size=n, max_size=n, unique=True))
-    numbers = ["0.5", "2", "0.1", "1"] if tame else NUMBERS
-    parameters = draw(st.dictionaries(st.sampled_from("abc"), st.sampled_from(TAME if tame else SIZES), max_size=2))
+    parameters = draw(st.dictionaries(st.sampled_from("abc"), st.sampled_from(SIZES), max_size=2))
     names = [*x, *parameters]
 
     def formulas(noise, count):
-        body = [text(named(draw(TREES), [*names, noise], numbers)) for _ in range(count)]
+        body = [text(named(draw(TREES), [*names, noise])) for _ in range(count)]
         return [f"{formula} + 0.3*{noise}" if draw(st.booleans()) else formula for formula in body]
 
     meters = formulas("w", draw(st.integers(1, 2)))
     meters[0] += f" + {x[0]}" if draw(st.booleans()) else ""
     given = {"state": formulas("v", n), "meter": meters, "parameters": parameters, "symbols": {"x": x}, "angles": []}
     for what, size in {"prior": n, "state_noise": 1, "meter_noise": 1}.items():
-        if not tame and draw(st.booleans()):
+        if draw(st.booleans()):
             given[what] = draw(laws(size))
     return given
 
@@ -341,48 +329,7 @@ def test_a_model_is_refused_or_computes_what_its_formulas_say(given):
     assert tracks.x.shape == (3, 4, model.n) and tracks.y.shape == (3, 4, model.p)
 
 
-@cases(0.01)
-@given(models(tame=True), st.sampled_from(["accuracy", "relative_accuracy", "ranking", "consistency"]))
-def test_the_lab_of_a_model_has_finite_results_or_says_why_not(given, figure):
-    model = defined(given)
-    assume(model is not None and not nothing_random(model))
-    filters = [one.one for one in admissions(model, LAB, seconds=5) if one.one]
-    assume(filters)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", QuadratureWarning)
-        try:
-            result = compare(filters, model, 256, 3, seed=1, jobs=1, progress=False)
-        except NotFinite as error:
-            event("not finite")
-            assert "step" in str(error)
-            return
-    for name in result.names:
-        estimate = result.error_variance(name)
-        assert np.isfinite(estimate.value).all() and (estimate.value >= 0).all()
-        assert not np.isnan(result.own_variance(name).value).any()
-    assert len(conclusions(result)) == max(len(result.entrants) - len(result.lost) - 1, 0)
-    with TemporaryDirectory() as folder:
-        write_json(Variant("generated", "", model), result, Path(folder) / "n.json")
-        picture = Figure()
-        with np.errstate(all="ignore"):
-            getattr(plots, figure)(result, picture.add_subplot())
-            picture.savefig(Path(folder) / "figure.svg")
-
-
 # --- laws, tables and files
-
-
-@cases(0.05)
-@given(st.integers(1, 4), st.integers(0, 2**32 - 1), st.floats(-30, 30), st.floats(0.01, 0.9))
-def test_a_product_of_a_root_is_a_covariance_and_a_correlation_above_one_is_not(size, seed, power, excess):
-    rng = np.random.default_rng(seed)
-    root = rng.standard_normal((size, size)) * 10.0 ** rng.uniform(-abs(power), abs(power), (size, 1))
-    cov = root @ root.T
-    assert is_covariance((cov + cov.T) / 2)
-    if size > 1:
-        cov = np.diag(cov.diagonal())
-        cov[0, 1] = cov[1, 0] = (1 + excess) * math.sqrt(cov[0, 0] * cov[1, 1])
-        assert not is_covariance(cov)
 
 
 ANYTHING = st.recursive(
@@ -415,27 +362,3 @@ def test_any_table_is_a_variant_or_refused_by_its_name(table, completed):
             assert len(str(error)) > len("variant one in here: ") + 5
             return
     assert not nothing_random(variant.model)
-
-
-FILE = """[variants.53]
-title = "one"
-state = "c*x + e*x*v"
-meter = ["g*x + f*x**2*w"]
-parameters = { c = 0.9, e = 0.05, g = 1.0, f = 0.02 }
-prior = { mean = 1.0, variance = [[0.5]] }
-"""
-
-
-@cases(0.04)
-@given(mangled(st.just(FILE)))
-def test_any_file_is_variants_or_refused_by_its_name(content):
-    with TemporaryDirectory() as folder, soon():
-        path = Path(folder) / "mine.toml"
-        path.write_bytes(content.encode("utf-8", "surrogatepass"))
-        try:
-            found = load_variants(path)
-        except VariantError as error:
-            assert str(path) in str(error)
-            return
-    assert all(isinstance(variant.model, Model) for variant in found.values())
-    assert set(CONSTANTS).isdisjoint(found)

@@ -1,8 +1,14 @@
-// The search page: the sections that have all words, then those with some, best first, each with the place where a word stands.
+// The search page: the sections that have all words, those with the words in their titles first, then sections with some of the
+// words, each with the place where a word stands.  Words of grammar and of asking, "what is the", are no words here.
 const WORD = /[\p{L}\p{N}_]+/gu;
 const SHOWN = 30, AROUND = 110;
 const FEW = 10;  // sections with all the words, below which those with some of them follow
-const english = new Stemmer();  // Sphinx's, of language_data.js
+const english = new Stemmer();  // Sphinx's, as `stopwords` are, of language_data.js
+const ASKING = "what how why when where which who whose do does did can could should would i me my we our you your have has had am from than so "
+  + "и в во на с со по для не из от о об к ко или при что как это где когда почему какой какая какие чем";
+const SILENT = new Set([...stopwords, ...ASKING.split(" ")]);
+const LESS = { package: 0.3, manual: 0.5, "sample-report.html": 0.4, "glossary.html": 0.7 };  // than a chapter
+const worth = (address) => LESS[address.split(/[/#]/)[0]] ?? 1;
 
 // A word without its ending: "errors" finds "error", "ошибки" finds "ошибка", "фильтрации" finds "фильтрация".
 function stem(word) {
@@ -14,10 +20,18 @@ function stem(word) {
 const index = new MiniSearch({
   fields: ["page", "section", "text"],
   tokenize: (text) => text.match(WORD) || [],
-  processTerm: stem,
-  searchOptions: { boost: { page: 3, section: 4 }, prefix: (term) => term.length > 3, boostDocument: (id) => (SECTIONS[id][0].startsWith("package/") ? 0.3 : 1) },
+  processTerm: (word) => !SILENT.has(word.toLowerCase()) && stem(word),
+  searchOptions: { boost: { page: 3, section: 4 }, prefix: (term) => term.length > 3, boostDocument: (id) => worth(SECTIONS[id][0]) },
 });
 index.addAll(SECTIONS.map(([, page, section, text], id) => ({ id, page, section, text })));
+
+const stemsOf = (text) => (text.match(WORD) || []).filter((word) => !SILENT.has(word.toLowerCase())).map(stem);
+// Abbreviations, of the glossary's terms: "EKF" also finds "extended Kalman filter".
+const LONG = new Map();
+for (const [, , section] of SECTIONS) {
+  const [, long, short] = section.match(/^([\w' -]+) \(([A-Z0-9]{2,})\)/) ?? [];
+  if (short) LONG.set(stem(short), long);
+}
 
 // The text around the place with the most of the words, which are marked.
 function excerpt(text, stems) {
@@ -41,9 +55,17 @@ function excerpt(text, stems) {
 }
 
 function show(query) {
-  const stems = (query.match(WORD) || []).map(stem);
-  const all = index.search(query, { combineWith: "AND" });
-  const some = all.length >= FEW ? [] : index.search(query).filter(({ id }) => !all.some((one) => one.id === id));
+  const stems = stemsOf(query), queries = stems.map((one) => {
+    const long = LONG.get(one);
+    return long ? { combineWith: "OR", queries: [one, { combineWith: "AND", queries: [long] }] } : one;
+  });
+  const titled = ({ id }) => {
+    const [address, page, section] = SECTIONS[id], words = stemsOf(section || page);
+    const there = (all) => all.every((one) => words.some((word) => word.startsWith(one)));
+    return worth(address) > 0.5 && stems.every((one) => there([one]) || (LONG.has(one) && there(stemsOf(LONG.get(one))))) && (section ? 1 : 2);
+  };
+  const all = stems.length ? index.search({ combineWith: "AND", queries }).sort((a, b) => titled(b) - titled(a)) : [];
+  const some = all.length >= FEW ? [] : index.search({ combineWith: "OR", queries }).filter(({ id }) => !all.some((one) => one.id === id));
   const found = [...all, ...some];
   const rows = found.slice(0, SHOWN).map(({ id }) => {
     const [address, page, section, text] = SECTIONS[id];

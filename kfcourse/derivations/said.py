@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from kfcourse.derivations.setting import Setting
-from kfcourse.derivations.slips import Slip, term_path
+from kfcourse.derivations.slips import Slip, named, term_path
 from kfcourse.derivations.terms import CALL, MEAN, POWER, SUM, Node, at, letters, walk, written
 
 RULES = {
@@ -49,13 +49,13 @@ def told(setting: Setting, slip: Slip, text: str, line: Node, text_above: str, a
     `text_above` is empty if nothing that the student typed stands above: then nothing of it is quoted.
     """
     if slip.above:
-        term = shown(text_above, at(above, term_path(above, slip.path))) if text_above else ""
+        term = shown(text_above, at(above, named(above, slip.path))) if text_above else ""
         where = f"`{term}` of the line above" if term else "a term of the definition"
         return f"what has been made of {where} is not right{_moment(slip)}", term
-    node = at(line, term_path(line, slip.path))
-    term = shown(text, node)
+    place = named(line, slip.path)
+    term, of = shown(text, at(line, place)), "the sign of" if place == term_path(line, slip.path) else "a sign in"
     says: dict[str, Callable[[], str]] = {
-        "sign": lambda: f"the sign of `{term}` is not right",
+        "sign": lambda: f"{of} `{term}` is not right",
         "doubled": lambda: f"`{term}` stands there twice",
         "letter": lambda: f"in `{term}` the letter {slip.name}, {_role(setting, slip.name)}, stands in another one's place",
         "moment": lambda: f"`{term}` is not right{_moment(slip)}",
@@ -73,6 +73,8 @@ def told(setting: Setting, slip: Slip, text: str, line: Node, text_above: str, a
 
 
 def _moment(slip: Slip) -> str:
+    if slip.kind == "moment" and not slip.order:
+        return ": the mean of a function, or of its square, is not that of the mean"
     return f": it takes a moment of order {slip.order} for another one" if slip.order else ""
 
 

@@ -104,6 +104,12 @@ def term_path(root: Node, path: Path) -> Path:
     return ()
 
 
+def named(root: Node, path: Path) -> Path:
+    """The way to what is named: the term around a node, or the function in it whose argument the node is part of."""
+    functions = [path[:length] for length in range(len(path)) if at(root, path[:length]).kind == CALL]
+    return max([term_path(root, path), *functions], key=len)
+
+
 def find_slips(setting: Setting, line: Node, above: Node) -> list[Slip]:
     """The slips that explain a line best, at most two of different terms; none if no single change does."""
     search = _Search(setting, line, _open(setting, above))
@@ -325,8 +331,15 @@ class _Search:
         return [(one, new, self.values.of(new)) for one in terms for new in (one, mean(one))]
 
     def _moment_pairs(self) -> Iterator[tuple[Node, Node, int, tuple[Array, Array]]]:
-        """Wrong and right moments of the normal law, with their values."""
+        """Wrong and right moments of the normal law, with their values; of functions, too."""
         law = self.setting.law
+        at_mean = {state: letter(law.means[i]) for i, state in enumerate(law.states)}
+        for _, call in [*walk(self.line), *walk(self.above)]:
+            if call.kind == CALL and call.data in ENTIRE and letters(call) & set(law.states):
+                square, there = mean(power(call, 2)), replaced(call, at_mean)
+                for both in ((there, mean(call)), (power(there, 2), square), (power(mean(call), 2), square)):
+                    wrong, right = both[::-1] if self.mirrored else both
+                    yield wrong, right, 0, (self.values.of(wrong), self.values.of(right))
         for i, x in enumerate(law.states):
             m, moment = letter(law.means[i]), [mean(power(letter(x), k)) for k in range(9)]
             for k in range(2, 9):

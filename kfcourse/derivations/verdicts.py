@@ -13,7 +13,7 @@ from kfcourse.derivations.chains import Chain, FindModel, Typed, read_chains
 from kfcourse.derivations.compared import DIFFERENT, EQUAL, IF_POSITIVE, NO_VALUE, compare
 from kfcourse.derivations.said import UNEXPLAINED, rule, told
 from kfcourse.derivations.setting import Law, Setting, of_side
-from kfcourse.derivations.slips import find_slips, term_path
+from kfcourse.derivations.slips import find_slips, named
 from kfcourse.derivations.terms import LETTER, MEAN, Node, at, letter, walk
 from kfcourse.derivations.values import Uncomputed
 from kfcourse.limits import OutOfTime, time_limit
@@ -218,7 +218,7 @@ class _Chain:
         slips = find_slips(self.setting, node, previous) if result == DIFFERENT else []
         said = [told(self.setting, slip, link.text, node, above, previous) for slip in slips]
         words = " or ".join(words for words, _ in said)
-        places = [at(node, term_path(node, slip.path)).span for slip in slips if not slip.above]
+        places = [at(node, named(node, slip.path)).span for slip in slips if not slip.above]
         says = f"the line differs from {where}: {words}" if said else UNEXPLAINED.format(above=where)
         self._says(
             link,

@@ -32,7 +32,7 @@ from kfcourse.filters.optimal_structure import STEPS, Memory, Remembered, checke
 from kfcourse.laws import Array, Gaussian, Measurement, correct
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import Structure, each_once, expect_each, moving_alike
+from kfcourse.symbolic.structure import Structure, expect_each
 
 RIDGE = 1e-12  # of the largest variance, that a law of zeta without width in a direction has a density
 
@@ -84,8 +84,6 @@ def _remembering(name: str, model: JumpModel, structures: Sequence[Structure], m
     if model.angles.x or model.angles.y:
         raise ModelError(f"{what} takes no components that are angles")
 
-    alike = moving_alike(structures)
-
     def init(runs: int) -> State:
         start = initial_state(model.modes[0])(runs)
         expected = np.tile(model.first, (runs, 1))
@@ -119,8 +117,7 @@ def _remembering(name: str, model: JumpModel, structures: Sequence[Structure], m
             densities.append(Measurement(fit.offset, unit, cov, cov))
         xi, _ = modes_given(np.tile(weights, (len(y), 1)), densities, zeta)
         expected, shares = onward(xi, model.transition_at(k))
-        predict = each_once(now, alike)
-        following = [mixture([predict(j, law) for law in laws], shares[:, :, j]) for j in range(len(now))]
+        following = [mixture([now[j].predict(*law) for law in laws], shares[:, :, j]) for j in range(len(now))]
         return State(k + 1, posterior, mixture(following, expected), Remembering(mu, expected, tuple(following), kept))
 
     return Design(f"{name}-jump-{structures[0].name}", model.modes[0], equations, start=init)

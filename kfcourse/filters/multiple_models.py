@@ -47,7 +47,7 @@ from kfcourse.laws import Array, Gaussian, Measurement, apply, correct, gain, lo
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.quadrature import product_rule
-from kfcourse.symbolic.structure import Structure, each_once, expect_each, moving_alike
+from kfcourse.symbolic.structure import Structure, expect_each
 
 CERTAIN = 1e300  # in the place of the logarithm of an infinite density: infinities have no quotient
 ORDER = {1: 32, 2: 12, 3: 7}  # points an axis, by the number of components in the formulas of pi
@@ -139,7 +139,7 @@ def _one_law_a_mode(
 ) -> Filter:
     """A filter that merges what may lead to each mode by `following`: (the mode's tau, Theta; laws; weights) -> prediction."""
     links, first, model = _checked(name, structures, transition, probabilities)
-    angles, alike = model.angles.x, moving_alike(structures)
+    angles = model.angles.x
 
     def init(runs: int) -> State:
         start, expected = initial_state(model)(runs), np.tile(first, (runs, 1))
@@ -150,7 +150,10 @@ def _one_law_a_mode(
         corrected, mu, _ = _corrected(now, memory, y)
         pi, leading = links(state.step, corrected)
         expected, weights = onward(mu, pi)
-        predict = each_once(now, alike)
+
+        def predict(j: int, law: Gaussian) -> Gaussian:
+            return now[j].predict(*law)
+
         predicted = tuple(
             following(partial(predict, j), [row[j] for row in leading], weights[:, :, j], angles) for j in range(len(now))
         )
@@ -169,7 +172,7 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
     Arguments, result and errors as of `imm`; the memory's `predicted` holds the laws of the pairs, i first.
     """
     links, first, model = _checked(name, structures, transition, probabilities)
-    angles, alike, size = model.angles.x, moving_alike(structures), len(structures)
+    angles, size = model.angles.x, len(structures)
 
     def init(runs: int) -> State:
         start = initial_state(model)(runs)
@@ -185,7 +188,10 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
         law = mixture(laws, mu, angles)
         laws = [_where(mu[:, j] > 0, of_mode, law) for j, of_mode in enumerate(laws)]
         pi, leading = links(state.step, laws)
-        predict = each_once(now, alike)
+
+        def predict(j: int, law: Gaussian) -> Gaussian:
+            return now[j].predict(*law)
+
         predicted = tuple(predict(j, before) for row in leading for j, before in enumerate(row))
         expected = (mu[:, :, None] * pi).reshape(len(y), -1)
         return State(state.step + 1, law, mixture(predicted, expected, angles), Modes(mu, expected, predicted))

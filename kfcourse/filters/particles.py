@@ -75,6 +75,8 @@ class Clouds:
         Of each particle.
     probability : ndarray (runs, J)
         Of the modes after the last measurement.
+    part : tuple of int
+        Of a comparison: which trajectories these are.  Each part has random numbers of its own.
     """
 
     halves: Array
@@ -83,6 +85,11 @@ class Clouds:
     x: Array | None
     mode: Array | None
     probability: Array
+    part: tuple[int, ...] = ()
+
+    def generator(self, *entropy: int) -> np.random.Generator:
+        """Random numbers of the part, the same for the same `entropy`."""
+        return np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=self.part))
 
     def discretisation_error(self) -> Array:
         """Standard error of the estimates, (runs,): half the distance of both clouds."""
@@ -173,7 +180,7 @@ def particle(
         return np.choose(mode[..., None], states), mode, lifted + np.choose(mode, logs)
 
     def step(state: State, y: Array) -> State:
-        k, rng = state.step, np.random.default_rng([seed, len(y), state.step])
+        k, rng = state.step, state.memory.generator(seed, len(y), state.step)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             x, mode, logs = drawn(rng, state.memory, y, k)
             lost = np.asarray(~(np.abs(x) < LARGEST).all(axis=-1))
@@ -189,14 +196,14 @@ def particle(
             predicted = _of_both(*weighted(ahead, np.full(mode.shape, 1 / size), angles), angles)
         effective = (1 / (weights**2).sum(axis=-1)).sum(axis=1)
         halves = np.moveaxis(mean, 1, 0)
-        memory = Clouds(halves, effective, log_mean.T, x, mode, np.stack(probability, axis=-1))
+        memory = Clouds(halves, effective, log_mean.T, x, mode, np.stack(probability, axis=-1), state.memory.part)
         return State(k + 1, _of_both(mean, cov, angles), predicted, memory)
 
     def look_back(states: Iterable[State], y: Array) -> Callable[[int], Iterator[State]]:
         memories, law = [state.memory for state in states], transition(modes[0].model)
 
         def back(end: int) -> Iterator[State]:
-            rng = np.random.default_rng([seed, end])
+            rng = memories[0].generator(seed, end)
             for step, (clouds, weights) in zip(
                 range(end, 0, -1), _backwards(rng, [memory.x for memory in memories[:end]], law, angles), strict=True
             ):

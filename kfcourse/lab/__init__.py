@@ -13,7 +13,7 @@ report       what `kfcourse lab` writes, in English or Russian (report.toml): re
 own_data     what `kfcourse estimate` writes of a record from a file
 """
 
-from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_bound, has_exact, lab_filters, title
+from kfcourse.lab.short_names import FILTERS, LAB, Structures, has_exact, lab_filters, title
 from kfcourse.lab.variants import Variant, VariantError, find_variant, load_variants, read_variant
 
 __all__ = [
@@ -23,7 +23,6 @@ __all__ = [
     "Variant",
     "VariantError",
     "find_variant",
-    "has_bound",
     "has_exact",
     "lab_filters",
     "load_variants",

@@ -1,13 +1,11 @@
 """Which filter may I use?  For a model and each filter: whether it can be built, and what is known of it before any comparison.
 
 A filter is refused if it cannot be built: no closed form, equations that cannot be differentiated, no density.  It is warned of
-if it can be built and will not do: points that do not integrate the equations or do not see a noise, a slope that is zero, and
-what leaves the finite numbers on a trial.
+if it can be built and will not do: points that do not integrate the equations or do not see a noise, a slope that is zero.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
@@ -15,22 +13,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kfcourse.errors import NoClosedForm, NotFinite, Reason, Refused
+from kfcourse.errors import NoClosedForm, Reason, Refused
 from kfcourse.filters import Design, Filter
 from kfcourse.lab.checked_quadrature import Checked
 from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, Entry, JumpStructures, Structures, check_names, has_exact, title
 from kfcourse.limits import OutOfTime, time_limit
-from kfcourse.montecarlo.comparison import EXACT
-from kfcourse.montecarlo.ensemble import simulate
-from kfcourse.montecarlo.experiment import compare
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.quadrature import QuadratureWarning, gauss_hermite, unscented
 from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import Structure
 
-RUNS, STEPS, SLOW = 512, 20, 16  # of a trial; trajectories of a slow filter
 BLIND = 0.5  # of the unexplained variance, that must be seen
+TOO_LONG = (
+    "its formulas are not derived within {:g} s, as the model's are too long; simplify them, or take filters without formulas, "
+    "aof-unscented and duof"
+)
 
 
 @dataclass(frozen=True)
@@ -41,18 +38,18 @@ class Admission:
     ----------
     name : str
         Short name.
-    one : Filter or Design or None
+    built : Filter or Design or None
         None if it cannot be built.
     reason : str or Exception
         Why not; empty if it can.
     warnings : tuple of str
-        Why it will not do well, or not at all.
+        Why it will not do well.
     remarks : tuple of str
         Worth knowing.
     """
 
     name: str
-    one: Filter | Design | None
+    built: Filter | Design | None
     reason: Reason = ""
     warnings: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
@@ -60,7 +57,7 @@ class Admission:
     @property
     def verdict(self) -> str:
         """Whether it may be used: "yes", "no", or "poor" if it can be built, but there are warnings."""
-        return "no" if self.one is None else "poor" if self.warnings else "yes"
+        return "no" if self.built is None else "poor" if self.warnings else "yes"
 
     @property
     def says(self) -> str:
@@ -75,88 +72,57 @@ def admissions(
 ) -> list[Admission]:
     """Which of the filters, all by default, can be built for the model, and what to know of them; each as the lab builds it.
 
-    With `seconds`, the formulas of each must be derived in that time.  What is `known` of a filter is not found out again.
+    With `seconds`, the formulas of each must be derived in that time.  What is `known` of a filter is not asked again.
 
     Raises
     ------
     ValueError
         An unknown name; the message lists the known ones.
     """
-    there = JUMP_FILTERS if isinstance(model, JumpModel) else FILTERS
-    names = list(there if names is None else names)
-    check_names(names, there)
+    entries = JUMP_FILTERS if isinstance(model, JumpModel) else FILTERS
+    names = list(dict.fromkeys(entries if names is None else names))
+    check_names(names, entries)
     structures = JumpStructures(model) if isinstance(model, JumpModel) else Structures(model)
-    found = {one.name: one for one in known}
-    # filters with the same structural functions share the time
-    too_long = {there[one.name].functions: one.reason for one in known if getattr(one.reason, "kind", "") == "too_long"}
+    answers = {answer.name: answer for answer in known}
     for name in names:
-        functions = there[name].functions
-        if name in found:
+        if name in answers:
             continue
-        if (reason := too_long.get(functions)) is None:
+        # filters with the same structural functions share the time
+        late = [a for a in answers.values() if getattr(a.reason, "kind", "") == "too_long"]
+        reason = next((a.reason for a in late if entries[a.name].functions == entries[name].functions), None)
+        if reason is None:
             try:
                 with nullcontext() if seconds is None else time_limit(seconds):
-                    found[name] = _admitted(name, there[name], structures)
+                    answers[name] = _admitted(name, entries[name], structures)
                 continue
             except OutOfTime:
-                reason = too_long[functions] = Refused(_TOO_LONG.format(seconds), "too_long", seconds=f"{seconds:g}")
-        found[name] = Admission(name, None, reason)
-    return [found[name] for name in dict.fromkeys(names)]
-
-
-_TOO_LONG = (
-    "its formulas are not derived within {:g} s, as the model's are too long; simplify them, or take filters without formulas, "
-    "aof-unscented and duof"
-)
+                reason = Refused(TOO_LONG.format(seconds), "too_long", seconds=f"{seconds:g}")
+        answers[name] = Admission(name, None, reason)
+    return [answers[name] for name in names]
 
 
 def _admitted(name: str, entry: Entry, structures: Structures | JumpStructures) -> Admission:
     with warnings.catch_warnings(record=True) as caught, np.errstate(all="ignore"):
         warnings.simplefilter("always", QuadratureWarning)
         try:
-            one = entry.build(structures)
+            built = entry.build(structures)
         except (NoClosedForm, ModelError) as error:
             return Admission(name, None, error.with_traceback(None))
-        found = [str(warning.message) for warning in caught]
+        faults = [str(warning.message) for warning in caught]
         if isinstance(structures, Structures):
-            looks = {"linearised": _flat, "unscented": _blind}
-            found += looks.get(entry.functions, lambda _: ())(structures)
-        return Admission(name, one, "", tuple(found), () if found else tuple(_remarks(name, entry, structures)))
+            faults += {"linearised": _flat, "unscented": _blind}.get(entry.functions, lambda _: iter(()))(structures)
+        return Admission(name, built, "", tuple(faults), () if faults else tuple(_remarks(entry, structures)))
 
 
-def _remarks(name: str, entry: Entry, structures: Structures | JumpStructures) -> Iterator[str]:
+def _remarks(entry: Entry, structures: Structures | JumpStructures) -> Iterator[str]:
     """What is worth knowing of a filter that was built."""
-    if name == EXACT and not has_exact(structures.model):
+    if entry.functions == "exact" and not has_exact(structures.model):
         yield "by particles, as point masses do not reach this model"
-    if entry.functions in ("gaussian", "best") and isinstance(structures.quadrature, Checked):
-        yield structures.quadrature.says
-    if entry.functions == "best" and isinstance(structures, JumpStructures) and structures.best is structures.linearised:
-        yield "with linearised structural functions, as Gaussian ones cannot be had: see aof-jump-gaussian"
-
-
-def on_trial(model: Model | JumpModel, found: Sequence[Admission]) -> list[Admission]:
-    """The same after a small comparison: a filter that leaves the finite numbers, or a slow one that fails, is warned of."""
-    last = int(min(STEPS, model.steps if isinstance(model, JumpModel) else model.known.steps))
-    tried = []
-    for one in found:
-        failure = _failure(model, one.one, last) if one.one else ""
-        tried.append(dataclasses.replace(one, warnings=(*one.warnings, failure)) if failure else one)
-    return tried
-
-
-def _failure(model: Model | JumpModel, one: Filter | Design, steps: int) -> str:
-    """What goes wrong on a few hundred trajectories; empty if nothing."""
-    runs = SLOW if one.slow else RUNS
-    try:
-        compare([one], model, runs, steps, seed=1, jobs=1, progress=False)
-    except (NotFinite, np.linalg.LinAlgError) as error:
-        with np.errstate(all="ignore"):
-            finite = np.isfinite(simulate(model, runs, steps, seed=1).x).all()
-        return f"on a trial of {runs} trajectories it left the finite numbers" if finite and not one.slow else str(error)
-    return ""
-
-
-# ---------------------------------------------------------------- what can be seen without a trial
+    if entry.functions in ("gaussian", "best", "averaged"):
+        if isinstance(structures.quadrature, Checked):
+            yield structures.quadrature.says
+        elif structures.quadrature is not None:
+            yield "with linearised structural functions, as Gaussian ones cannot be had: see aof-jump-gaussian"
 
 
 def _flat(structures: Structures) -> Iterator[str]:
@@ -174,18 +140,16 @@ def _blind(structures: Structures) -> Iterator[str]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", QuadratureWarning)
         try:
-            points, better = unscented(model), _reference(structures)
-        except ModelError:
-            return
-    mean, cov = model.prior
-    (_, theta), (_, _, _, R) = points.at(0).predict(mean, cov), points.at(0).measure(mean, cov)
-    (_, theta_of_all), (_, _, _, R_of_all) = better.at(0).predict(mean, cov), better.at(0).measure(mean, cov)
-    sides = (
-        ("the measurement that the state does not explain", R, R_of_all),
-        ("the next state", theta, theta_of_all),
-    )
-    for what, seen, there in sides:
-        share = np.diagonal(np.broadcast_to(seen, there.shape)) / np.diagonal(there)
+            full = structures.gaussian
+        except NoClosedForm:
+            try:
+                full = gauss_hermite(model, 7)
+            except ModelError:
+                return
+        points = unscented(model)
+    seen, there = ([now.measure(*model.prior).R, now.predict(*model.prior).cov] for now in (points.at(0), full.at(0)))
+    for what, part, whole in zip(("the measurement that the state does not explain", "the next state"), seen, there, strict=True):
+        share = np.diagonal(np.broadcast_to(part, whole.shape)) / np.diagonal(whole)
         if (worst := np.nanmin(share, initial=1.0)) < BLIND:
             yield (
                 f"its points lie on the axes and see {100 * max(worst, 0.0):.0f} % of the variance of {what} at the prior law: "
@@ -193,15 +157,8 @@ def _blind(structures: Structures) -> Iterator[str]:
             )
 
 
-def _reference(structures: Structures) -> Structure:
-    try:
-        return structures.gaussian
-    except NoClosedForm:
-        return gauss_hermite(structures.model, 7)
-
-
-def table(found: Sequence[Admission]) -> str:
+def table(answers: Sequence[Admission]) -> str:
     """What `kfcourse filters` prints: a line for each filter."""
-    rows = [(one.name, title(one.name), one.verdict, one.says) for one in found]
+    rows = [(answer.name, title(answer.name), answer.verdict, answer.says) for answer in answers]
     widths = [max(map(len, column)) for column in list(zip(*rows, strict=True))[:3]]
     return "\n".join("  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[3]]).rstrip() for row in rows)

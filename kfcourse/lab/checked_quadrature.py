@@ -1,10 +1,9 @@
 """Normal moments where they have no closed form: Gauss-Hermite quadrature of an order that has been checked.
 
-A function such as x/(1 + x^2) has a mean over a normal law, but no formula for it.  How many points
-it takes depends on how wide the laws are that occur.  So a pilot runs the AOF with some order, and
-at the laws that it meets compares the structural functions with those of twice the order; the order
-is raised until both agree.  A model with modes has one order for all modes without formulas, each
-checked on trajectories of its own.
+A function such as x/(1 + x^2) has a mean over a normal law, but no formula for it.  How many points it takes depends on how
+wide the laws are that occur.  So the AOF runs over a pilot's trajectories with some order and with twice that order; the order
+is raised until both estimate the same.  A model with modes has one order for all modes without formulas, each checked on
+trajectories of its own.
 """
 
 from __future__ import annotations
@@ -18,7 +17,8 @@ import numpy as np
 from kfcourse.angles import difference
 from kfcourse.errors import ModelError, NoClosedForm, NotFinite
 from kfcourse.filters import aof
-from kfcourse.laws import Array, NegativeVariance
+from kfcourse.filters.exact.laws import modes_of
+from kfcourse.laws import NegativeVariance
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import run
 from kfcourse.symbolic.jumping import JumpModel
@@ -27,16 +27,15 @@ from kfcourse.symbolic.quadrature import QuadratureWarning, axes, gauss_hermite
 from kfcourse.symbolic.structure import Structure, gaussian
 
 ORDERS = (2, 3, 5, 7, 10, 20, 40, 80, 160)
-# Means may change by this part of a standard deviation when the order is doubled, covariances by
-# this part of themselves: root mean square over the trajectories of a step.  A prediction that is
-# shifted by a part q of its deviation has an error variance other by 2 q of itself at most, 0.02 %.
+# Estimates may change by this part of their deviation when the order is doubled, variances by this part of themselves: root mean
+# square over the trajectories of a step.  The error variance then changes by 0.02 % at most.
 CLOSE = 1e-4
 RUNS, STEPS = 100, 20  # of the pilot
 MOST = 200  # points together: with more, a comparison takes a quarter of an hour (343 points, D3)
 
 
 class Checked(NamedTuple):
-    """Structures by quadrature, of each mode one; where a mode has formulas they are these.
+    """Structures by quadrature, a structure for each mode; where a mode has formulas they are these.
 
     They are named "gaussian", as what they compute is; `order` is their number of points an axis,
     `apart` the largest difference that the pilot found, in the measure of `CLOSE`.
@@ -60,30 +59,28 @@ def of_checked_order(model: Model | JumpModel, why: NoClosedForm) -> Checked:
     Raises
     ------
     NoClosedForm
-        No order does; the message tells how far the highest one tried is from twice that order.
+        No order does; the message tells how far the highest order tried is from twice that order.
     """
-    modes = model.modes if isinstance(model, JumpModel) else (model,)
-    structures = [_formulas(mode) for mode in modes]
-    without = [j for j, structure in enumerate(structures) if structure is None]
-    size = max(axes(modes[j]) for j in without)
-    found = ""
+    structures = {j: _formulas(mode) for j, mode in enumerate(modes_of(model))}
+    without = {j: modes_of(model)[j] for j, structure in structures.items() if structure is None}
+    size = max(map(axes, without.values()))
+    problem = ""
     for order in ORDERS:
         if (points := order**size) > MOST:
-            found += f"; {order} points on each of {size} axes are {points}, more than the {MOST} with which a comparison ends"
+            problem += f"; {order} points on each of {size} axes are {points}, more than the {MOST} with which a comparison ends"
             break
         try:
             with warnings.catch_warnings(), np.errstate(all="ignore"):
                 warnings.simplefilter("ignore", QuadratureWarning)  # the pilot looks at more than the prior law
-                coarse = {j: replace(gauss_hermite(modes[j], order), name="gaussian") for j in without}
-                apart = float(np.max([_apart(one, gauss_hermite(one.model, 2 * order)) for one in coarse.values()]))
+                coarse = {j: replace(gauss_hermite(mode, order), name="gaussian") for j, mode in without.items()}
+                apart = float(np.max([_apart(coarse[j], gauss_hermite(mode, 2 * order)) for j, mode in without.items()]))
         except (ModelError, NotFinite, NegativeVariance, np.linalg.LinAlgError):
             continue
         if apart <= CLOSE:
-            whole = [structure or coarse[j] for j, structure in enumerate(structures)]
-            return Checked(whole, order, apart)
+            return Checked([structure or coarse[j] for j, structure in structures.items()], order, apart)
         error = f"by {100 * apart:.2g} %" if apart < 1 else "without bound"
-        found = f"; Gauss-Hermite quadrature with {order} points an axis still errs {error} on the laws that occur"
-    raise NoClosedForm(f"{why}{found}", why.kind, **why.parts)
+        problem = f"; Gauss-Hermite quadrature with {order} points an axis still errs {error} on the laws that occur"
+    raise NoClosedForm(f"{why}{problem}", why.kind, **why.parts)
 
 
 def _formulas(model: Model) -> Structure | None:
@@ -94,33 +91,14 @@ def _formulas(model: Model) -> Structure | None:
 
 
 def _apart(coarse: Structure, fine: Structure) -> float:
-    """How far structures are from finer ones at most, at the laws that the AOF by the first meets."""
-    model, distances = coarse.model, []
-    steps = int(min(STEPS, model.known.steps))
-    y = simulate(model, RUNS, steps, seed=1).y
+    """How far the AOF by the first is from that by the second at most, in the measure of `CLOSE`; NaN if an estimate is."""
+    model = coarse.model
+    y = simulate(model, RUNS, int(min(STEPS, model.known.steps)), seed=1).y
     if not np.isfinite(y).all():
         raise NotFinite("trajectories become infinite")
-    laws = run(aof(coarse), y)
-    mean, cov = np.broadcast_to(model.prior.mean, laws.mean[0].shape), model.prior.cov
-    for k in range(steps):
-        less, more = coarse.at(k).measure(mean, cov), fine.at(k).measure(mean, cov)
-        sd = _deviations(more.F, more.h)
-        distances.append(_mean_square(difference(less.h, more.h, model.angles.y) / sd))
-        distances.append(_mean_square((less.F - more.F) / (sd[..., :, None] * sd[..., None, :])))
-        slope = (less.G - more.G) * _deviations(cov, mean)[..., None, :]
-        distances.append(_mean_square(slope / sd[..., :, None]))
-        (mean, cov), (tau, theta) = (one.at(k).predict(laws.mean[k], laws.cov[k]) for one in (coarse, fine))
-        sd = _deviations(theta, tau)
-        distances.append(_mean_square(difference(mean, tau, model.angles.x) / sd))
-        distances.append(_mean_square((cov - theta) / (sd[..., :, None] * sd[..., None, :])))
-    return float(np.max(distances))  # NaN, if one is: no order is close then
-
-
-def _deviations(cov: Array, mean: Array) -> Array:
-    """Standard deviations; what does not vary has no size of its own but that of rounding."""
-    return np.sqrt(np.maximum(np.diagonal(cov, axis1=-2, axis2=-1), 0.0)) + 1e-12 * (1 + np.abs(mean))
-
-
-def _mean_square(deviation: Array) -> float:
-    """The largest root mean square over trajectories of the components."""
-    return float(np.sqrt((deviation**2).mean(axis=0)).max())
+    less, more = (run(aof(structure), y) for structure in (coarse, fine))
+    # what does not vary has no size of its own but that of rounding
+    sd = np.sqrt(np.maximum(np.diagonal(more.cov, axis1=-2, axis2=-1), 0.0)) + 1e-12 * (1 + np.abs(more.mean))
+    shift = difference(less.mean, more.mean, model.angles.x) / sd
+    spread = (less.cov - more.cov) / (sd[..., :, None] * sd[..., None, :])
+    return float(np.max([np.sqrt((part**2).mean(axis=1)).max() for part in (shift, spread)]))

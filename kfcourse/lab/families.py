@@ -99,18 +99,14 @@ FAMILIES: dict[str, Family] = {
     "imm": Family("IMM", "АОФлд (смешивание до прогноза)", colour="#D55E00"),
     "gpb2": Family("GPB2", "АОФлд (пары режимов)", colour="#009E73"),
     "iterated": Family("iterated EKF", "итерационный РФК", colour="#B87500"),
-    "alpha": Family("alpha-beta", "альфа-бета", colour="#B87500"),
+    "alpha-beta": Family("alpha-beta", "альфа-бета", colour="#B87500"),
+    "alpha-beta-gamma": Family("alpha-beta-gamma", "альфа-бета-гамма", colour="#B87500"),
+    # where three arguments of the FOS's gain stand beside two, they have a look of their own
+    "fos3": Family("FOS3", "ФОС, 3 арг.", colour="#8F33FF", marker="v"),
+    "mfos3": Family("MFOS3", "МФОС, 3 арг.", colour="#664400", marker="P"),
 }
-# Where three arguments of the FOS's gain stand beside two, they have a look of their own.
-LOOKS = {"fos3": ("#8F33FF", "v"), "mfos3": ("#664400", "P")}
 
 
-def family(name: str) -> str:
-    """The family of a filter by its short name: "fos" for "fos3-gaussian", "fkp" for "fkp4-linearised"."""
-    return name.split("-")[0].rstrip("0123456789")
-
-
-def look(name: str) -> tuple[str, str]:
-    """Colour and marker of a filter."""
-    one = FAMILIES.get(name.split("-")[0]) or FAMILIES.get(family(name), Family(name, name))
-    return LOOKS.get(name.split("-")[0], (one.colour, one.marker))
+def look(family: str) -> tuple[str, str]:
+    """Colour and marker of a family."""
+    return FAMILIES.get(family, Family(family, family))[4:]

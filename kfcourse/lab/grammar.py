@@ -44,8 +44,8 @@ class Generated(NamedTuple):
     def toml(self) -> str:
         """The variants as the text of a file that `load_variants` reads."""
         return "\n".join(
-            f"[variants.{one.name}]\n" + "".join(f"{key} = {_value(value)}\n" for key, value in one.table.items())
-            for one in self.variants
+            f"[variants.{variant.name}]\n" + "".join(f"{key} = {_value(value)}\n" for key, value in variant.table.items())
+            for variant in self.variants
         )
 
 
@@ -94,7 +94,7 @@ def propose(seed: int, index: int) -> dict[str, Any]:
 
 def _value(value: Any) -> str:
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_value(one)}" for key, one in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {_value(part)}" for key, part in value.items()) + " }"
     return json.dumps(value)  # strings, numbers and lists of them are the same in JSON and TOML
 
 

@@ -2,9 +2,9 @@
 
 ::
 
-    found = parameter_map(model, {"e": (0.02, 0.05, 0.2), "f": (0.01, 0.02, 0.05)})
-    found[0.05, 0.02].leaders(1)      the most accurate at step 1, and those that are not significantly worse
-    draw(found, 1, ax)                all of them as a map
+    cells = parameter_map(model, {"e": (0.02, 0.05, 0.2), "f": (0.01, 0.02, 0.05)})
+    cells[0.05, 0.02].leaders(1)      the most accurate at step 1, and those that are not significantly worse
+    draw(cells, 1, ax)                all of them as a map
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from kfcourse.symbolic.model import Model
 
 @dataclass(frozen=True)
 class ParameterMap:
-    """Comparisons over two parameters: `found[first, second]` is the one at these values.
+    """Comparisons over two parameters: `cells[first, second]` is the one at these values.
 
     Attributes
     ----------
@@ -71,11 +71,11 @@ def parameter_map(
     cells = {}
     for a in values[first]:
         for b in values[second]:
-            one = model.replace(**{first: a, second: b})
-            filters = lab_filters(one, [*LAB, EXACT])
+            changed = model.replace(**{first: a, second: b})
+            filters = lab_filters(changed, [*LAB, EXACT])
             cells[a, b] = compare(
                 filters,
-                one,
+                changed,
                 runs,
                 steps,
                 seed=1,
@@ -85,13 +85,13 @@ def parameter_map(
     return ParameterMap((first, second), cells)
 
 
-def draw(found: ParameterMap, step: int, ax: Axes, confidence: float = CONFIDENCE) -> Axes:
+def draw(cells: ParameterMap, step: int, ax: Axes, confidence: float = CONFIDENCE) -> Axes:
     """The map at a step: in each cell the most accurate filter and its distance from the bound, the least accurate and its.
 
     "GAOF, 2 more": two others are not significantly worse than the most accurate.
     """
-    firsts, seconds = (list(dict.fromkeys(key[i] for key in found.cells)) for i in (0, 1))
-    for (a, b), result in found.cells.items():
+    firsts, seconds = (list(dict.fromkeys(key[i] for key in cells.cells)) for i in (0, 1))
+    for (a, b), result in cells.cells.items():
         x, y = seconds.index(b), firsts.index(a)
         gaps = {name: result.gap(name)[step] for name in result.entrants}
         best, *others = result.leaders(step, confidence)
@@ -109,6 +109,6 @@ def draw(found: ParameterMap, step: int, ax: Axes, confidence: float = CONFIDENC
     ax.set(xlim=(-0.5, len(seconds) - 0.5), ylim=(-0.5, len(firsts) - 0.5))
     ax.set_xticks(range(len(seconds)), [f"{b:g}" for b in seconds])
     ax.set_yticks(range(len(firsts)), [f"{a:g}" for a in firsts])
-    ax.set_xlabel(f"${found.parameters[1]}$")
-    ax.set_ylabel(f"${found.parameters[0]}$")
+    ax.set_xlabel(f"${cells.parameters[1]}$")
+    ax.set_ylabel(f"${cells.parameters[0]}$")
     return ax

@@ -10,10 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from kfcourse.lab.families import look
-from kfcourse.lab.short_names import title
+from kfcourse.lab.short_names import entry, title
 from kfcourse.laws import CONFIDENCE, Array
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.montecarlo.modes import Recognised
+from kfcourse.montecarlo.statistics import Estimate
 
 
 class Words(NamedTuple):
@@ -31,33 +32,43 @@ class Words(NamedTuple):
 ENGLISH = Words()
 
 
+DASHES = {"linearised": "--", "unscented": ":", "gauss-hermite": "-.", "averaged": ":"}
+
+
 def style(name: str) -> dict[str, Any]:
-    """Line style of a filter: colour by family, dashes for the linearised approximation, black for the exact."""
-    approximation = name.partition("-")[2].removeprefix("jump-")
-    if approximation == "exact":
-        return {"color": "black", "linestyle": "-", "marker": "*", "label": title(name)}
-    colour, marker = look(name)
-    dashes = {"linearised": "--", "unscented": ":", "gauss-hermite": "-.", "averaged": ":"}.get(approximation, "-")
-    return {"color": colour, "linestyle": dashes, "marker": marker, "label": title(name)}
+    """Line style of a filter: colour and marker by family, dashes by structural functions, black for the exact."""
+    known = entry(name)
+    colour, marker = ("black", "*") if known.functions == "exact" else look(known.drawn)
+    return {"color": colour, "linestyle": DASHES.get(known.functions, "-"), "marker": marker, "label": known.title}
 
 
-def _steps(ax: Axes, label: str = "step $k$") -> None:
-    """The axis of steps: whole numbers."""
-    ax.set_xlabel(label)
+def _labelled(ax: Axes, ylabel: str, words: Words = ENGLISH) -> Axes:
+    """Axes of steps, which are whole numbers, with their legend."""
+    ax.set_xlabel(words.step)
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.set_ylabel(ylabel)
+    ax.legend(fontsize="small", ncols=2)
+    return ax
+
+
+def _curve(
+    ax: Axes, name: str, k: Array, estimate: Estimate, words: Words, confidence: float | None = None, scale: float = 1
+) -> None:
+    """A filter's estimates over the steps k, with a band of confidence."""
+    line = style(name) | {"label": words.title(name)}
+    ax.plot(k, scale * estimate.value, markersize=4, markevery=max(1, len(k) // 10), **line)
+    if confidence is not None:
+        low, high = estimate.interval(confidence)
+        ax.fill_between(k, scale * low, scale * high, color=line["color"], alpha=0.15, linewidth=0)
 
 
 def accuracy(result: Comparison, ax: Axes, names: Sequence[str] | None = None, words: Words = ENGLISH) -> Axes:
     """Error variance D_k of every filter against the step, on a logarithmic scale."""
-    steps = np.arange(result.steps)
+    ax.set_yscale("log")
     for name in names or result.names:
-        line = style(name) | {"label": words.title(name), "markersize": 4, "markevery": max(1, result.steps // 10)}
-        ax.semilogy(steps, result.error_variance(name).value, **line)
-    _steps(ax, words.step)
-    ax.set_ylabel(words.variance)
+        _curve(ax, name, np.arange(result.steps), result.error_variance(name), words)
     ax.grid(True, which="major", alpha=0.3)
-    ax.legend(fontsize="small", ncols=2)
-    return ax
+    return _labelled(ax, words.variance, words)
 
 
 def relative_accuracy(
@@ -72,22 +83,13 @@ def relative_accuracy(
 
     Without the exact AOF the control (the Gaussian AOF) is the zero line.
     """
-    k = np.arange(result.steps)[steps]
-    zero = result.reference
+    zero = words.title(result.reference)
     for name in result.entrants if names is None else names:
-        if name == zero:
-            continue
-        gap = result.gap(name)[steps]
-        low, high = gap.interval(confidence)
-        line = style(name) | {"label": words.title(name)}
-        ax.plot(k, 100 * gap.value, markersize=4, markevery=max(1, len(k) // 12), **line)
-        ax.fill_between(k, 100 * low, 100 * high, color=line["color"], alpha=0.15, linewidth=0)
-    ax.axhline(0, color="black", linewidth=0.8, label=words.title(zero))
-    _steps(ax, words.step)
-    ax.set_ylabel(words.above.replace("{name}", words.title(zero)))
+        if name != result.reference:
+            _curve(ax, name, np.arange(result.steps)[steps], result.gap(name)[steps], words, confidence, 100)
+    ax.axhline(0, color="black", linewidth=0.8, label=zero)
     ax.grid(True, alpha=0.3)
-    ax.legend(fontsize="small", ncols=2)
-    return ax
+    return _labelled(ax, words.above.replace("{name}", zero), words)
 
 
 def ranking(
@@ -96,9 +98,8 @@ def ranking(
     """Mean over steps of how far D_k is above the exact AOF's (without it, the control's), the best on top, with intervals."""
     ranked = result.ranking(steps)[::-1]
     for row, (name, gap) in enumerate(ranked):
-        line = style(name)
+        line, middle = style(name), float(gap.value)
         low, high = gap.interval(confidence)
-        middle = float(gap.value)
         ends = 100 * np.array([[middle - low], [high - middle]])
         ax.errorbar(100 * middle, row, xerr=ends, fmt=line["marker"], color=line["color"], capsize=3)
     ax.set_yticks(range(len(ranked)), [words.title(name) for name, _ in ranked])
@@ -112,22 +113,12 @@ def consistency(
     result: Comparison, ax: Axes, names: Sequence[str] | None = None, confidence: float = CONFIDENCE, words: Words = ENGLISH
 ) -> Axes:
     """Normalised squared error M[e^T p^-1 e]/n per step: 1 if the filter's own covariance is right."""
-    steps = np.arange(result.steps)
     for name in names or result.names:
-        value = result.normalised_error(name)
-        line = style(name) | {"label": words.title(name)}
-        ax.plot(steps, value.value, markersize=4, markevery=max(1, result.steps // 10), **line)
-        ax.fill_between(steps, *value.interval(confidence), color=line["color"], alpha=0.15, linewidth=0)
+        _curve(ax, name, np.arange(result.steps), result.normalised_error(name), words, confidence)
     ax.axhline(1, color="black", linewidth=0.8)
     ax.set_yscale("log")
-    _steps(ax, words.step)
-    ax.set_ylabel(words.normalised)
     ax.grid(True, alpha=0.3)
-    ax.legend(fontsize="small", ncols=2)
-    return ax
-
-
-OF_MODES = "Probabilities of the modes on one trajectory; grey: the true mode (of two modes: where the second is in force)."
+    return _labelled(ax, words.normalised, words)
 
 
 def mode_probabilities(modes: Recognised, ax: Axes, words: Words = ENGLISH) -> Axes:
@@ -139,22 +130,5 @@ def mode_probabilities(modes: Recognised, ax: Axes, words: Words = ENGLISH) -> A
         for j in range(1, size):
             label = words.title(name) + (f", $j={j + 1}$" if size > 2 else "")
             ax.plot(steps, probability[:, j], color=style(name)["color"], linestyle=dashes[(j - 1) % 4], label=label)
-    _steps(ax, words.step)
-    ax.set_ylabel(words.mode)
     ax.set_ylim(-0.02, 1.02)
-    ax.legend(fontsize="small", ncols=2)
-    return ax
-
-
-def trajectory(x: Array, y: Array, estimates: dict[str, Array], ax: Axes) -> Axes:
-    """One trajectory: true state x (steps,), measurements y (steps,), and estimates by filter name."""
-    steps = np.arange(len(x))
-    ax.plot(steps, x, color="black", linewidth=1.5, label="state $x_k$")
-    ax.plot(steps, y, ".", color="#999999", label="measurement $y_k$")
-    for name, estimate in estimates.items():
-        ax.plot(steps, estimate, markersize=0, **style(name))
-    _steps(ax)
-    ax.set_ylabel("state (units of $x$)")
-    ax.grid(True, alpha=0.3)
-    ax.legend(fontsize="small")
-    return ax
+    return _labelled(ax, words.mode, words)

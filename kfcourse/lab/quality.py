@@ -5,8 +5,7 @@ A variant is well posed if it is
 * bounded: its moments do not explode over the lab's steps, the filters stay finite, and so do
   trajectories when all deviations are `STRESS` times larger (a few of a million are as large);
 * observable: the best filter's error variance is clearly below the variance without measurements,
-  for each component, and the meter, linearised along typical trajectories, sees all directions of
-  the state;
+  for each component;
 * such that the filters differ by more than the statistical error; those of a linear variant are
   equal by design, and need not;
 * solvable: the structural functions have a closed form of sensible length, and every question of
@@ -21,7 +20,7 @@ import dataclasses
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import joblib
 import numpy as np
@@ -45,19 +44,14 @@ from kfcourse.montecarlo.experiment import compare
 from kfcourse.montecarlo.parallel import cluster
 from kfcourse.montecarlo.statistics import Estimate, ratio
 from kfcourse.symbolic.jumping import JumpModel
-from kfcourse.symbolic.known import Stepwise
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.reading import exact_matrix
-from kfcourse.symbolic.structure import Structure
 
 VECTOR = 8  # a vector model takes that much longer, and gets that many times fewer trajectories
 STRESS = 1.5  # factor of all deviations
 SECONDS = 60.0  # for the derivation
 GROWTH = 10.0  # of a second moment over the second half of the steps: an unknown velocity has 4
 CARRIERS = 10.0  # trajectories, at least, that carry a second moment
-DIVERGED = 10.0  # a filter's error variance over that without measurements
-UNSEEN = 0.9  # the same of the best filter, when the meter tells too little
-RANK = 1e-6  # singular values below, relative to the largest, are taken for 0
+UNSEEN = 0.9  # the best filter's error variance over that without measurements, when the meter tells too little
 SIGNIFICANCE = 0.01  # of "the filters differ", for all pairs and steps together
 ROUNDING = 1e-9  # relative differences that rounding alone explains
 LONGEST = 600  # operations of the Gaussian structural functions; the van der Pol oscillator has 309
@@ -122,15 +116,14 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None =
     if runs < FEWEST:
         raise ValueError(f"standard errors need at least {FEWEST} trajectories, got {runs}")
     model = variant.model
-    with np.errstate(all="ignore"):  # what diverges is told in the findings
+    with np.errstate(all="ignore"):  # what diverges is said in the findings
         if isinstance(model, JumpModel):
             moments = bounded(simulate(model, runs, int(min(variant.steps, model.steps)), seed).x)
             remark = f"has {len(model.modes)} modes: only whether it is bounded is checked"
             return Quality(variant.name, {"bounded": moments}, remarks=(remark,))
-        structures = Structures(model)
         try:
             with time_limit(SECONDS):
-                answers = solvable(structures)
+                answers = solvable(Structures(model))
         except OutOfTime:
             late = f"the structural functions are not found in {SECONDS:g} s; simplify the equations"
             return Quality(variant.name, {"solvable": Finding(False, late)})
@@ -138,23 +131,24 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None =
             answers = ask(variant) or answers
         size = runs if model.n == 1 else max(runs // VECTOR, FEWEST)
         x = simulate(model, size, variant.steps, seed).x
+        decays = (x.var(axis=1)[-1] < 1e-3 * x.var(axis=1)[0]).any()
+        linear = is_linear(model)
+        remarks = {"linear: the Kalman filter is exact": linear, "decays to a constant": decays}
         findings = _simulated(model, x, seed) | {"solvable": answers}
-        remarks = []
-        if linear := is_linear(model):
-            remarks.append("linear: the Kalman filter is exact")
-        if (x.var(axis=1)[-1] < 1e-3 * x.var(axis=1)[0]).any():
-            remarks.append("decays to a constant")
-        return Quality(variant.name, findings, linear, tuple(remarks))
+        return Quality(variant.name, findings, linear, tuple(remark for remark, holds in remarks.items() if holds))
 
 
 def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
     """The criteria that need trajectories x (steps, runs, n)."""
     steps, runs = x.shape[:2]
-    filters = [one.one for one in admissions(model, LAB) if one.one]
+    filters = [answer.built for answer in admissions(model, LAB) if answer.built]
     moments = bounded(x)
-    if moments.ok and not np.isfinite(simulate(_harsh(model), runs, steps, seed).x).all():
-        rare = f"trajectories become infinite when deviations are {STRESS:g} times larger"
-        moments = Finding(False, f"{rare}, so a few of very many will", moments.value)
+    if moments.ok:
+        laws = {name: getattr(model, name) for name in ("prior", "state_noise", "meter_noise")}
+        larger: dict[str, Any] = {name: Gaussian(law.mean, STRESS**2 * law.cov) for name, law in laws.items()}
+        if not np.isfinite(simulate(dataclasses.replace(model, **larger), runs, steps, seed).x).all():
+            rare = f"trajectories become infinite when deviations are {STRESS:g} times larger"
+            moments = Finding(False, f"{rare}, so a few of very many will", moments.value)
     if not moments.ok or not filters:
         return {"bounded": moments}
     try:
@@ -162,24 +156,10 @@ def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
     except (NotFinite, np.linalg.LinAlgError) as error:  # a filter, or a decomposition for it
         return {"bounded": Finding(False, str(error), moments.value)}
     return {
-        "bounded": not_diverging(result) or moments,
-        "observable": observable(model, result, x),
-        "filters differ": differences(result, [one.name for one in filters if isinstance(one, Design)]),
+        "bounded": moments,
+        "observable": observable(result, x),
+        "filters differ": differences(result, [built.name for built in filters if isinstance(built, Design)]),
     }
-
-
-def _harsh(model: Model) -> Model:
-    """The model with all deviations STRESS times larger."""
-
-    def larger(law: Gaussian) -> Gaussian:
-        return Gaussian(law.mean, STRESS**2 * law.cov)
-
-    return dataclasses.replace(
-        model,
-        prior=larger(model.prior),
-        state_noise=larger(model.state_noise),
-        meter_noise=larger(model.meter_noise),
-    )
 
 
 def examine_all(
@@ -196,7 +176,7 @@ def examine_all(
     """
     with cluster(dask):
         parallel = joblib.Parallel(n_jobs=max(1, min(jobs, len(variants))), return_as="generator")
-        done = parallel(joblib.delayed(examine)(one, runs, seed, ask) for one in variants)
+        done = parallel(joblib.delayed(examine)(variant, runs, seed, ask) for variant in variants)
         yield from tqdm(done, desc="checking", total=len(variants), unit="variant", disable=None)
 
 
@@ -205,29 +185,26 @@ observable      error variance of the best filter in per cent of the variance wi
 filters differ  the largest significant difference of two filters' error variances, relative"""
 
 
-def table(found: Sequence[Quality]) -> str:
+def table(qualities: Sequence[Quality]) -> str:
     """What `kfcourse variants --check` prints: a line for each variant, then what is not well posed."""
-    rows = [("variant", *CRITERIA, "remarks"), *map(_row, found)]
+    rows = [("variant", *CRITERIA, "remarks"), *map(_row, qualities)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    reasons = [f"variant {one.name} is not well posed, {fault}: {why}" for one in found for fault, why in one.faults.items()]
+    reasons = [f"variant {q.name} is not well posed, {fault}: {why}" for q in qualities for fault, why in q.faults.items()]
     return "\n".join([*lines, LEGEND, *([""] if reasons else []), *reasons])
 
 
-def _row(one: Quality) -> tuple[str, ...]:
+def _row(quality: Quality) -> tuple[str, ...]:
     cells = []
     for name in CRITERIA:
-        finding = one.findings.get(name, NOT_EXAMINED)
+        finding = quality.findings.get(name, NOT_EXAMINED)
         cell = {True: "yes", False: "NO", None: "-"}[finding.ok]
-        if name == "filters differ" and one.linear and not finding.ok:
+        if name == "filters differ" and quality.linear and not finding.ok:
             cell = "equal"
         elif name in ("observable", "filters differ") and finding.value > 0:
             cell += f" {100 * finding.value:.3g} %"
         cells.append(cell)
-    return one.name, *cells, "; ".join(one.remarks)
-
-
-# --- bounded
+    return quality.name, *cells, "; ".join(quality.remarks)
 
 
 def bounded(x: Array) -> Finding:
@@ -241,38 +218,21 @@ def bounded(x: Array) -> Finding:
     if not finite.all():
         return Finding(False, f"trajectories become infinite (step {int(np.argmin(finite))})", float("inf"))
     square, half = (x**2).mean(axis=1), (len(x) + 1) // 2
-    growth = float(ratio(square[half:].max(axis=0, initial=0.0), square[:half].max(axis=0), 0.0).max())  # of one step 0
+    growth = float(ratio(square[half:].max(axis=0, initial=0.0), square[:half].max(axis=0), 0.0).max())  # of a single step 0
     grows = f"the second moment grows {growth:.3g} times from the first half of the steps to the second"
     if growth > GROWTH:
         return Finding(False, grows, growth)
-    heaviest = float(kurtosis(x).max())
-    if heaviest * CARRIERS > x.shape[1]:
-        few = x.shape[1] / heaviest
-        return Finding(False, f"the second moment is that of {few:.1f} trajectories of {x.shape[1]}: too heavy tails", growth)
-    return Finding(True, grows, growth)
-
-
-def kurtosis(x: Array) -> Array:
-    """M u^4 / (M u^2)^2, u = x - M x, per step and component, (steps, n): 3 for a normal law; 0 for a constant."""
     u = x - x.mean(axis=1, keepdims=True)
-    variance = np.where(varies(x), (u**2).mean(axis=1), 0.0)
-    return ratio((u**4).mean(axis=1), variance**2, 0.0)
+    carriers = ratio((u**2).sum(axis=1) ** 2, (u**4).sum(axis=1), CARRIERS)[varies(x)].min(initial=np.inf)
+    if carriers < CARRIERS:
+        few = f"the second moment is that of {carriers:.1f} trajectories of {x.shape[1]}: too heavy tails"
+        return Finding(False, few, growth)
+    return Finding(True, grows, growth)
 
 
 def varies(x: Array) -> Array:
     """Whether a component of x (steps, runs, n) varies at a step, by more than rounding: (steps, n)."""
     return np.asarray(x.std(axis=1) > 1e-12 * np.abs(x).max(axis=1))
-
-
-def not_diverging(comparison: Comparison) -> Finding | None:
-    """The filter that is DIVERGED times worse than no measurements; None if there is none."""
-    worst, name = max((float(shares(comparison, one).value.max()), one) for one in measured(comparison))
-    if worst <= DIVERGED:
-        return None
-    return Finding(False, f"{title(name)} diverges: its error variance is {worst:.3g} times that without measurements", worst)
-
-
-# --- observable
 
 
 def unmeasured(model: Model, x: Array) -> Filter:
@@ -299,59 +259,27 @@ def shares(comparison: Comparison, name: str) -> Estimate:
     Steps where the component does not vary are left out; a component that never varies has the share 1.
     """
     squares = comparison.sums.means("square")
-    square, base = (squares[comparison.names.index(one)] for one in (name, UNMEASURED))
+    square, base = (squares[comparison.names.index(key)] for key in (name, UNMEASURED))
     used = base[..., :1] > 1e-24 * base[..., :1].max(axis=0)
     share = np.where(used, ratio(square, base, 0.0), 0.0).sum(axis=0) / np.maximum(used.sum(axis=0), 1)
     return Estimate.jackknife(np.where(used.any(axis=0), share, 1.0))
 
 
-def observable(model: Model, comparison: Comparison, x: Array) -> Finding:
+def observable(comparison: Comparison, x: Array) -> Finding:
     """Whether the meter tells something about every component of the state.  Value: the worst component's share.
 
-    The share of the best filter, see `shares`, plus four standard errors, is below UNSEEN; and the linearised model is
-    observable along at least half of the trajectories x (steps, runs, n).
+    The share of the best filter, see `shares`, plus four standard errors, is below UNSEEN.
     """
-    found = [shares(comparison, name) for name in measured(comparison)]
-    upper = np.min([one.value + 4 * one.standard_error for one in found], axis=0)
+    estimates = [shares(comparison, name) for name in measured(comparison)]
+    upper = np.min([share.value + 4 * share.standard_error for share in estimates], axis=0)
     worst = int(np.argmax(upper))
-    share, symbol = float(min(one.value[worst] for one in found)), model.x[worst]
-    if not varies(x).any(axis=0).all():
-        constant = model.x[int(np.argmin(varies(x).any(axis=0)))]
-        return Finding(False, f"{constant} does not vary, there is nothing to estimate", share)
-    left = f"the best filter leaves {100 * share:.3g} % of the variance of {symbol}"
-    if not upper[worst] < UNSEEN:
-        return Finding(False, f"the meter hardly tells: {left}", share)
-    full = observable_share(model, x[:, :200])
-    if full < 0.5:
-        return Finding(
-            False, f"linearised along typical trajectories, the model is observable on {100 * full:.0f} % of them", share
-        )
-    return Finding(True, left, share)
-
-
-def observable_share(model: Model, x: Array) -> float:
-    """Share of the trajectories x (steps, runs, n) along which the linearised model is observable.
-
-    The rows b_x(x_j) a_x(x_{j-1}) ... a_x(x_0) of the first 4 n steps, noises at their means and columns in units of the
-    state's deviation, have rank n.  1 if the equations are not differentiable.
-    """
-    state = model.state_equation.subs(dict(zip(model.v, exact_matrix(model.state_noise.mean), strict=True)))
-    meter = model.meter_equation.subs(dict(zip(model.w, exact_matrix(model.meter_noise.mean), strict=True)))
-    slopes = {name: part.subs(model.values).jacobian(sp.Matrix(model.x)) for name, part in (("A", state), ("C", meter))}
-    if any(slope.has(sp.Derivative, sp.DiracDelta) for slope in slopes.values()):
-        return 1.0
-    function = Stepwise.compile(model.known, "slopes", {"x": sp.Matrix(model.x)}, slopes, ["x"])
-    path = np.broadcast_to(np.diag(x.std(axis=1).max(axis=0)), (x.shape[1], model.n, model.n))
-    rows = []
-    for k, position in enumerate(x[: 4 * model.n]):
-        A, C = function.at(k)(position)
-        rows.append(C @ path)
-        path = A @ path
-    values = np.linalg.svd(np.concatenate(rows, axis=1), compute_uv=False)
-    return float(((values > RANK * values[:, :1]).sum(axis=1) == model.n).mean())
-
-
-# --- the filters differ
+    names = comparison.model.x
+    share = float(min(estimate.value[worst] for estimate in estimates))
+    constant = ~varies(x).any(axis=0)
+    if constant.any():
+        return Finding(False, f"{names[int(np.argmax(constant))]} does not vary, there is nothing to estimate", share)
+    left = f"the best filter leaves {100 * share:.3g} % of the variance of {names[worst]}"
+    return Finding(True, left, share) if upper[worst] < UNSEEN else Finding(False, f"the meter hardly tells: {left}", share)
 
 
 def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
@@ -367,34 +295,27 @@ def differences(comparison: Comparison, designed: Collection[str]) -> Finding:
     fitted = 2 * (comparison.model.n + comparison.model.p + 1) / comparison.runs
     control = comparison.error_variance(comparison.control).value
     largest, says = 0.0, f"no two filters differ by more than the statistical error of {comparison.runs} trajectories"
-    for first, second in pairs:
-        difference, score = comparison.difference(first, second), comparison.mean_gap_difference(first, second)
+    for pair in pairs:
+        difference, score = comparison.difference(*pair), comparison.mean_gap_difference(*pair)
         relative = np.abs(np.append(ratio(difference.value, control, 0.0), score.value))
         error = np.append(ratio(difference.standard_error, control, 0.0), score.standard_error)
         quantile = scipy.special.stdtrit(difference.freedom, 1 - SIGNIFICANCE / tests / 2)
-        allowed = quantile * error + ROUNDING + (fitted if first in designed or second in designed else 0.0)
+        allowed = quantile * error + ROUNDING + (0.0 if set(pair).isdisjoint(designed) else fitted)
         significant = np.where(relative > allowed, relative, 0.0)
         if significant.max() > largest:
             largest, step = float(significant.max()), int(significant.argmax())
             when = f"at step {step}" if step < comparison.steps else "on average"
-            says = f"{title(first)} and {title(second)} differ by {100 * largest:.2g} % {when}"
+            says = f"{' and '.join(map(title, pair))} differ by {100 * largest:.2g} % {when}"
     return Finding(largest > 0, says, largest)
-
-
-# --- solvable
 
 
 def solvable(structures: Structures) -> Finding:
     """Whether the structural functions have a closed form of sensible length.  Value: operations of the Gaussian ones."""
     try:
-        operations = length(structures.gaussian)
+        parts = [structures.gaussian[name] for name in ("tau", "Theta", "h", "G", "F")]
         _ = structures.linearised
     except NoClosedForm as error:
         return Finding(False, str(error))
+    operations = sum(int(formula.count_ops()) for formula in sp.flatten(parts))
     says = f"closed form, {operations} operations in the Gaussian structural functions"
     return Finding(operations <= LONGEST, says + ("" if operations <= LONGEST else f", more than {LONGEST}"), float(operations))
-
-
-def length(structure: Structure) -> int:
-    """Operations in the formulas of the structural functions."""
-    return sum(int(entry.count_ops()) for name in ("tau", "Theta", "h", "G", "F") for entry in sp.flatten([structure[name]]))

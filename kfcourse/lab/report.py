@@ -85,11 +85,10 @@ def write_report(
     """
     if language not in LANGUAGES:
         raise ValueError(f"the report is written in {' or '.join(LANGUAGES)}, not {language!r}")
-    words = WORDS[language]
-    report = _report(result, words, modes)
+    report = _report(result, language, modes)
     report.known = known
-    content = {"blocks": list(report.blocks()), "words": words, "variant": variant, "language": language}
-    labels = plots.Words(report.title, **{part: words[f"axis_{part}"] for part in plots.Words._fields[1:]})
+    content = {"blocks": list(report.blocks()), "words": report.words, "variant": variant, "language": language}
+    labels = plots.Words(report.title, **{part: report.words[f"axis_{part}"] for part in plots.Words._fields[1:]})
     with replacing_together(folder) as place:
         for name in report.figures:
             save_figure(partial(FIGURES[name], result, words=labels), place, name)
@@ -99,13 +98,14 @@ def write_report(
         return [folder / path.name for path in place.iterdir()]
 
 
-def _report(result: Comparison, words: dict[str, str], modes: Recognised | None = None) -> StudentReport:
+def _report(result: Comparison, language: str = "en", modes: Recognised | None = None) -> StudentReport:
+    words = WORDS[language]
     return JumpReport(result, words, modes) if isinstance(result.model, JumpModel) else PlainReport(result, words)
 
 
 def remarks_in_words(result: Comparison) -> list[str]:
     """What a reader must know before he relies on distances from the bound, for a terminal."""
-    return [text.replace("$", "") for text in _report(result, WORDS["en"]).remarks()]
+    return [text.replace("$", "") for text in _report(result).remarks()]
 
 
 def save_figure(draw: Callable[[Axes], Axes], folder: Path, name: str) -> None:
@@ -135,7 +135,11 @@ def save_texts(names: Sequence[str], folder: Path, content: Mapping[str, Any], *
 
 def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
     """Write the numbers, for programs: lists over the steps, keyed by the filters' short names."""
-    estimates = {name: result.error_variance(name) for name in result.names}
+
+    def lists(estimate: Callable[[str], Estimate], part: str = "value", names: Sequence[str] = result.names) -> dict[str, Any]:
+        return {name: getattr(estimate(name), part).tolist() for name in names}
+
+    ranking = [name for name, _ in result.ranking()]
     data: dict[str, Any] = {
         "variant": variant.name,
         "model": _model_in_numbers(result.model),
@@ -143,17 +147,16 @@ def write_json(variant: Variant, result: Comparison, path: Path) -> Path:
         "steps": result.steps,
         "seed": result.seed,
         "left_out": {name: str(reason) for name, reason in result.left_out.items()},
-        "error_variance": {name: e.value.tolist() for name, e in estimates.items()},
-        "standard_error": {name: e.standard_error.tolist() for name, e in estimates.items()},
-        "error_mean": {name: result.error_mean(name).value.tolist() for name in result.names},
-        "own_variance": {name: result.own_variance(name).value.tolist() for name in result.names},
-        "score": {name: _number(result.score(name)) for name, _ in result.ranking()},
+        "error_variance": lists(result.error_variance),
+        "standard_error": lists(result.error_variance, "standard_error"),
+        "error_mean": lists(result.error_mean),
+        "own_variance": lists(result.own_variance),
+        "score": {name: _number(result.score(name)) for name in ranking},
     }
     if result.has_bound:
-        above = {name: result.gap(name) for name in result.entrants}
-        data["above_bound"] = {name: e.value.tolist() for name, e in above.items()}
-        data["above_bound_standard_error"] = {name: e.standard_error.tolist() for name, e in above.items()}
-        data["mean_above_bound"] = {name: _number(gap) for name, gap in result.ranking()}
+        data["above_bound"] = lists(result.gap, names=result.entrants)
+        data["above_bound_standard_error"] = lists(result.gap, "standard_error", result.entrants)
+        data["mean_above_bound"] = {name: _number(result.mean_gap(name)) for name in ranking}
     text = json.dumps(_finite(data), indent=1, allow_nan=False)
     if str(path) in STANDARD_OUTPUT:
         print(text, flush=True)
@@ -171,7 +174,7 @@ def _model_in_numbers(model: Model | JumpModel) -> dict[str, Any]:
         modes = {name: _model_in_numbers(mode) for name, mode in zip(model.names, model.modes, strict=True)}
         return {
             "modes": modes,
-            "transition": [[str(one) for one in row] for row in model.chain.tolist()],
+            "transition": [list(map(str, row)) for row in model.chain.tolist()],
             "first": model.first.tolist(),
         }
     return {
@@ -219,15 +222,14 @@ def recognised_modes(result: Comparison, filters: Sequence[Filter | Design]) -> 
     model = result.model
     if not isinstance(model, JumpModel):
         return None
-    runs = min(result.runs, RECOGNISED)
-    names = {name for name, entry in JUMP_FILTERS.items() if entry.modes}.intersection(result.names)
-    of_modes = [one for one in filters if isinstance(one, Filter) and one.name in names]
-    return recognised(of_modes, model, runs, result.steps, result.seed) if of_modes else None
+    compared = [built for built in filters if isinstance(built, Filter) and built.name in result.names]
+    of_modes = [built for built in compared if JUMP_FILTERS[built.name].modes]
+    return recognised(of_modes, model, min(result.runs, RECOGNISED), result.steps, result.seed) if of_modes else None
 
 
 def _mathml(line: str) -> str:
     """One line of an aligned block as MathML, which browsers show without any script; columns of its matrices stay apart."""
-    return mathml(ALIGNMENT.sub(lambda found: found["inner"] or "", line))
+    return mathml(ALIGNMENT.sub(lambda match: match["inner"] or "", line))
 
 
 def _finite(data: Any) -> Any:

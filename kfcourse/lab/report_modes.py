@@ -11,8 +11,7 @@ from kfcourse.filters import latex as equations_latex
 from kfcourse.filters.jump_equations import combination, correction, prediction
 from kfcourse.filters.optimal_structure import ESTIMATES, MEASUREMENTS
 from kfcourse.lab.checked_quadrature import Checked
-from kfcourse.lab.families import family
-from kfcourse.lab.report_sections import Block, StudentReport
+from kfcourse.lab.report_sections import Block, StudentReport, formulas
 from kfcourse.lab.report_text import in_percent, law, lines_of, matrix, printed
 from kfcourse.lab.short_names import JUMP_FILTERS, JumpStructures, Structures
 from kfcourse.montecarlo.comparison import Comparison
@@ -46,47 +45,47 @@ class JumpReport(StudentReport):
 
     def task(self) -> Iterator[Block]:
         model, words = self.model, self.words
-        yield Block("section", words["task"])
-        yield Block("text", self.said("task_modes_text", modes=len(model.modes)))
+        yield self.section("task")
+        yield self.text("task_modes_text", modes=len(model.modes))
         equations = [lines_of(mode.latex(values=False, indexed=True)) for mode in model.modes]
         if all(lines == equations[0] for lines in equations):
-            yield Block("formulas", lines=equations[0])
+            yield formulas(equations[0])
         else:
             for (j, name, _), lines in zip(self.numbered, equations, strict=True):
-                yield Block("text", self.said("in_mode", j=f"$j={j}$", name=name))
-                yield Block("formulas", lines=lines)
+                yield self.text("in_mode", j=f"$j={j}$", name=name)
+                yield formulas(lines)
         names = dict.fromkeys(name for mode in model.modes for name in mode.values)
         values = {name: [mode.values.get(name) for mode in model.modes] for name in names}
         common = [name for name, each in values.items() if len(set(each)) == 1]
         if common:
-            said = ", ".join(f"${sp.latex(name)} = {number_latex(float(model.modes[0].values[name]))}$" for name in common)
-            yield Block("text", self.said("common_parameters", values=said))
+            listed = ", ".join(f"${sp.latex(name)} = {number_latex(float(model.modes[0].values[name]))}$" for name in common)
+            yield self.text("common_parameters", values=listed)
         own = [name for name in names if name not in common]
         heading = ["$j$", words["mode"], *(f"${sp.latex(name)}$" for name in own)]
-        rows = [[f"${j}$", name, *(_number(mode, one) for one in own)] for j, name, mode in self.numbered]
+        rows = [[f"${j}$", name, *(_number(mode, key) for key in own)] for j, name, mode in self.numbered]
         yield Block("table", words["modes_table"], heading, rows)
-        yield Block("text", words["laws"])
+        yield self.text("laws")
         lines = [rf"x_0 &\sim {law(model.prior)}"]
         for symbol, laws in (
             ("v_k", [mode.state_noise for mode in model.modes]),
             ("w_k", [mode.meter_noise for mode in model.modes]),
         ):
-            each = [law(one) for one in laws]
-            same = all(one == each[0] for one in each)
+            each = [law(of) for of in laws]
+            same = all(text == each[0] for text in each)
             lines += (
-                [rf"{symbol} &\sim {each[0]}"] if same else [rf"{symbol}^{{{j}}} &\sim {one}" for j, one in enumerate(each, 1)]
+                [rf"{symbol} &\sim {each[0]}"] if same else [rf"{symbol}^{{{j}}} &\sim {text}" for j, text in enumerate(each, 1)]
             )
-        yield Block("formulas", lines=lines)
-        yield Block("text", words["chain"])
+        yield formulas(lines)
+        yield self.text("chain")
         chain = rf"\pi &= \left(\mathsf{{P}}(i_{{k+1}} = j \mid i_k = i)\right)_{{ij}} = {sp.latex(model.chain)}"
-        yield Block("formulas", lines=[chain, rf"q &= {matrix(model.first[None])}"])
-        yield Block("text", words["independent"])
-        yield Block("text", self.said("find_modes", filters=", ".join(map(self.title, self.result.entrants))))
+        yield formulas([chain, rf"q &= {matrix(model.first[None])}"])
+        yield self.text("independent")
+        yield self.text("find_modes", filters=", ".join(map(self.title, self.result.entrants)))
 
     def functions(self) -> Iterator[Block]:
         words = self.words
-        yield Block("section", words["functions"])
-        yield Block("text", words["functions_modes"])
+        yield self.section("functions")
+        yield self.text("functions_modes")
         for kind in self.kinds:
             yield from self.defined(kind)
             names = [self.said("in_mode", j=f"$j={j}$", name=name) for j, name, _ in self.numbered]
@@ -102,36 +101,37 @@ class JumpReport(StudentReport):
         try:
             lines = printed(Structures(mode), kind)
         except NoClosedForm:
-            found = self.structures.quadrature
-            assert isinstance(found, Checked)  # else no filter with these functions takes part
-            return Block("text", self.said("by_quadrature", order=found.order))
-        return Block("text", self.words["not_printed"]) if lines is None else Block("formulas", lines=lines)
+            checked = self.structures.quadrature
+            assert isinstance(checked, Checked)  # else no filter with these functions takes part
+            return self.text("by_quadrature", order=checked.order)
+        return self.text("not_printed") if lines is None else formulas(lines)
 
     def filters(self) -> Iterator[Block]:
         words, size = self.words, len(self.model.modes)
         mean, cov = self.model.prior
-        yield Block("section", words["filters"])
-        yield Block("text", words["start_modes"])
+        yield self.section("filters")
+        yield self.text("start_modes")
         start = [rf"\lambda_0^j &= m_0 = {matrix(mean[:, None])},\qquad \Psi_0^j = D_0 = {matrix(cov)},\qquad c_0^j = q_j"]
-        yield Block("formulas", lines=start)
+        yield formulas(start)
         yield Block("subsection", words["logic_dynamic"])
         for key, equations in (
             ("in_each_mode", correction("j", size)),
             ("merged", combination("j", size)),
             ("ahead", prediction("j", size)),
         ):
-            yield Block("text", words[key])
-            yield Block("formulas", lines=lines_of(equations_latex(equations)))
+            yield self.text(key)
+            yield formulas(lines_of(equations_latex(equations)))
         of_memory = dict.fromkeys(MEMORIES, "about_memory")
         about = {"imm": "about_imm", "gpb2": "about_gpb2", **of_memory, "averaged": "about_averaged"}
-        told: dict[str, list[str]] = {}
+        titles: dict[str, list[str]] = {}
         for name in self.result.entrants:
-            averaged = name.endswith("averaged") or name == "duof"
-            told.setdefault("averaged" if averaged else name if name in about else family(name), []).append(self.title(name))
+            entry = self.entries[name]
+            averaged = entry.functions == "averaged" or entry.family == "duof"
+            titles.setdefault("averaged" if averaged else entry.family, []).append(self.title(name))
         lines = [
-            self.said(text, names=", ".join(told[key]), memory=f"$\\zeta_k = {MEMORIES.get(key)}$")
+            self.said(text, names=", ".join(titles[key]), memory=f"$\\zeta_k = {MEMORIES.get(key)}$")
             for key, text in about.items()
-            if key in told
+            if key in titles
         ]
         if lines:
             yield Block("subsection", words["others"])

@@ -9,10 +9,10 @@ import sympy as sp
 from kfcourse.filters import EQUATIONS
 from kfcourse.filters import latex as equations_latex
 from kfcourse.lab.checked_quadrature import Checked
-from kfcourse.lab.families import FAMILIES, family
-from kfcourse.lab.report_sections import Block, StudentReport
+from kfcourse.lab.families import FAMILIES
+from kfcourse.lab.report_sections import Block, StudentReport, formulas
 from kfcourse.lab.report_text import law, lines_of, matrix, printed
-from kfcourse.lab.short_names import Structures
+from kfcourse.lab.short_names import Structures, entry
 from kfcourse.lab.written_out import written_lines
 from kfcourse.montecarlo.comparison import Comparison
 from kfcourse.symbolic.model import Model
@@ -47,27 +47,27 @@ class PlainReport(StudentReport):
         self.derivable: list[str] = []  # kinds whose formulas are found in time, and are not too long
 
     def task(self) -> Iterator[Block]:
-        model, words = self.model, self.words
-        yield Block("section", words["task"])
-        yield Block("text", words["task_text"])
+        model = self.model
+        yield self.section("task")
+        yield self.text("task_text")
         state, *others = lines_of(model.latex(values=False, indexed=True))
         if model.n == model.p == 1:  # what a and b are called below
             meter, *others = others
             k = ", k" if model.timed else ""
             state = state.replace("&=", f"&= a(x_k, v_k{k}) =", 1)
             others = [meter.replace("&=", f"&= b(x_k, w_k{k}) =", 1), *others]
-        yield Block("formulas", lines=[state, *others])
+        yield formulas([state, *others])
         values = ", ".join(f"${sp.latex(name)} = {number_latex(float(value))}$" for name, value in model.values.items())
         if values:
-            yield Block("text", self.said("parameters", values=values))
+            yield self.text("parameters", values=values)
         laws = (("x_0", model.prior), ("v_k", model.state_noise), ("w_k", model.meter_noise))
-        yield Block("formulas", lines=[rf"{name} &\sim {law(one)}" for name, one in laws])
-        yield Block("text", words["independent"])
-        yield Block("text", self.said("find", filters=", ".join(self.title(name) for name in self.result.entrants)))
+        yield formulas([rf"{name} &\sim {law(of)}" for name, of in laws])
+        yield self.text("independent")
+        yield self.text("find", filters=", ".join(self.title(name) for name in self.result.entrants))
 
     def functions(self) -> Iterator[Block]:
         if self.kinds:
-            yield Block("section", self.words["functions"])
+            yield self.section("functions")
         for kind in self.kinds:
             yield from self.defined(kind)
             if self.model.n == self.model.p == 1:
@@ -83,20 +83,19 @@ class PlainReport(StudentReport):
             for formula, noises, letter, noise in sides
             for by, symbol in [("x", model.x[0]), *([(noise, noises[0])] if len(noises) == 1 else [])]
         ]
-        yield Block("text", self.words["derivatives"])
-        yield Block("formulas", lines=derivatives)
+        yield self.text("derivatives")
+        yield formulas(derivatives)
 
     def gaussian(self) -> Iterator[Block]:
         """The means of a scalar model, step by step."""
-        words = self.words
         if conditional := self.conditional():
-            yield Block("text", words["conditional"])
-            yield Block("formulas", lines=conditional)
+            yield self.text("conditional")
+            yield formulas(conditional)
         if moments := self.moments():
-            yield Block("text", words["recursion"])
-            yield Block("formulas", lines=[r"q_0 &= 1,\quad q_1 = m,\quad q_{n+1} = m\,q_n + n\,d\,q_{n-1}", *moments])
+            yield self.text("recursion")
+            yield formulas([r"q_0 &= 1,\quad q_1 = m,\quad q_{n+1} = m\,q_n + n\,d\,q_{n-1}", *moments])
         elif not self.structures.quadrature:
-            yield Block("text", words["exponentials"])
+            yield self.text("exponentials")
 
     def conditional(self) -> list[str]:
         """Means of a, a^2, b, b^2 over their noise, at a fixed state."""
@@ -127,40 +126,40 @@ class PlainReport(StudentReport):
 
     def derived(self, kind: str) -> Iterator[Block]:
         """The five functions, with their numbers in the catalogue where it has them."""
-        if kind == "gaussian" and isinstance(found := self.structures.quadrature, Checked):
-            yield Block("text", self.said("by_quadrature", order=found.order))
+        if kind == "gaussian" and isinstance(checked := self.structures.quadrature, Checked):
+            yield self.text("by_quadrature", order=checked.order)
             return
-        yield Block("text", self.words["result"])
+        yield self.text("result")
         if (lines := printed(self.structures, kind)) is None:
-            yield Block("text", self.words["not_printed"])
+            yield self.text("not_printed")
             return
         self.derivable.append(kind)
-        yield Block("formulas", lines=lines)
+        yield formulas(lines)
         if self.model.n == self.model.p == 1:
             structure = getattr(self.structures, kind)
             forms = {name: (name, str(sp.expand(structure[name]))) for name in FUNCTION_LATEX}
             numbers = [f"${FUNCTION_LATEX[name]}$ — {CATALOGUE[form]}" for name, form in forms.items() if form in CATALOGUE]
             if numbers:
-                yield Block("text", self.said("catalogue", numbers=", ".join(numbers)))
+                yield self.text("catalogue", numbers=", ".join(numbers))
 
     def filters(self) -> Iterator[Block]:
         words = self.words
-        yield Block("section", words["filters"])
-        yield Block("text", words["start"])
+        yield self.section("filters")
+        yield self.text("start")
         mean, cov = self.model.prior
-        yield Block("formulas", lines=[rf"\lambda_0 &= m_0 = {matrix(mean[:, None])},\qquad \Psi_0 = D_0 = {matrix(cov)}"])
-        families = dict.fromkeys(map(family, self.result.entrants))
-        designed = next((one for one in families if one != "aof"), "")
-        for one in (one for one in families if one in EQUATIONS):
-            heading = FAMILIES[one].russian_heading if words["language"] == "ru" else FAMILIES[one].heading
+        yield formulas([rf"\lambda_0 &= m_0 = {matrix(mean[:, None])},\qquad \Psi_0 = D_0 = {matrix(cov)}"])
+        families = dict.fromkeys(entry(name).family for name in self.result.entrants)
+        designed = next((family for family in families if family != "aof"), "")
+        for family in filter(EQUATIONS.get, families):
+            heading = FAMILIES[family].russian_heading if words["language"] == "ru" else FAMILIES[family].heading
             yield Block("subsection", heading)
-            if one == "duof":
-                yield Block("text", words["criteria"])
-                yield Block("formulas", lines=words["criteria_formulas"].split("\n"))
-            yield Block("formulas", lines=lines_of(equations_latex(EQUATIONS[one])))
-            if one == "aof" and self.model.n == self.model.p == 1:
+            if family == "duof":
+                yield self.text("criteria")
+                yield formulas(words["criteria_formulas"].split("\n"))
+            yield formulas(lines_of(equations_latex(EQUATIONS[family])))
+            if family == "aof" and self.model.n == self.model.p == 1:
                 for name in (f"aof-{kind}" for kind in self.derivable if f"aof-{kind}" in self.result.entrants):
-                    yield Block("text", self.said("written_out", name=self.title(name)))
-                    yield Block("formulas", lines=written_lines(getattr(self.structures, name.removeprefix("aof-"))))
-            if one == designed:
-                yield Block("text", words["over_ensemble"])
+                    yield self.text("written_out", name=self.title(name))
+                    yield formulas(written_lines(getattr(self.structures, name.removeprefix("aof-"))))
+            if family == designed:
+                yield self.text("over_ensemble")

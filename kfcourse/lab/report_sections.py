@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -31,6 +30,10 @@ class Block:
     rows: list[list[str]] = field(default_factory=list)
 
 
+def formulas(lines: list[str]) -> Block:
+    return Block("formulas", lines=lines)
+
+
 class StudentReport:
     """The blocks of the report, section by section; a subclass has the task, the functions and the filters."""
 
@@ -51,7 +54,13 @@ class StudentReport:
 
     def said(self, key: str, **values: object) -> str:
         """The words of that name, filled with what they speak of."""
-        return filled(self.words[key], self.words["thousands"], **values)
+        return filled(self.words[key], self.words["thousands"], **values) if values else self.words[key]
+
+    def section(self, key: str) -> Block:
+        return Block("section", self.words[key])
+
+    def text(self, key: str, **values: object) -> Block:
+        return Block("text", self.said(key, **values))
 
     def translated(self, text: str) -> str:
         for english, key in ((r"\text{for}", "if"), (r"\text{otherwise}", "else")):
@@ -65,14 +74,16 @@ class StudentReport:
         yield from self.experiment()
         yield from self.conclusion()
         if self.known:
-            yield Block("section", self.words["admitted"])
+            yield self.section("admitted")
             heading = [self.words["filter"], self.words["admitted_verdict"], self.words["admitted_why"]]
-            rows = [[self.title(one.name), self.words[f"admitted_{one.verdict}"], self.why(one)] for one in self.known]
+            rows = [
+                [self.title(answer.name), self.words[f"admitted_{answer.verdict}"], self.why(answer)] for answer in self.known
+            ]
             yield Block("table", self.words["admitted_text"], heading, rows)
 
-    def why(self, one: Admission) -> str:
+    def why(self, answer: Admission) -> str:
         """Why a filter is not admitted, or what to know of it."""
-        return cause(one.reason, self.result.model, self.words) if one.reason else one.says
+        return cause(answer.reason, self.result.model, self.words) if answer.reason else answer.says
 
     def task(self) -> Iterator[Block]:
         """The equations, the laws, and what is asked for."""
@@ -85,8 +96,8 @@ class StudentReport:
     def defined(self, kind: str) -> Iterator[Block]:
         """The heading of a kind of structural functions, and what they are."""
         yield Block("subsection", self.words[kind])
-        yield Block("text", self.words[f"{kind}_text"])
-        yield Block("formulas", lines=self.words[f"{kind}_formulas"].split("\n"))
+        yield self.text(f"{kind}_text")
+        yield formulas(self.words[f"{kind}_formulas"].split("\n"))
 
     def filters(self) -> Iterator[Block]:
         """The equations of the filters."""
@@ -94,7 +105,7 @@ class StudentReport:
 
     def experiment(self) -> Iterator[Block]:
         result, words = self.result, self.words
-        yield Block("section", words["experiment"])
+        yield self.section("experiment")
         sentences = [self.said("experiment_text", runs=result.runs, steps=result.steps, seed=str(result.seed))]
         if result.designed:
             sentences.append(self.said("designs", filters=", ".join(map(self.title, result.designed))))
@@ -102,12 +113,12 @@ class StudentReport:
             sentences.append(words["exact"])
         yield Block("text", " ".join(sentences))
         if result.left_out:
-            yield Block("text", words["left_out"])
+            yield self.text("left_out")
             yield Block("items", lines=list(self.left_out()))
         for start in range(0, len(result.names), COLUMNS):
             names = result.names[start : start + COLUMNS]
             estimates = [result.error_variance(name) for name in names]
-            rows = [[f"${k}$", *(power_of_ten(one[k]) for one in estimates)] for k in table_steps(result)]
+            rows = [[f"${k}$", *(power_of_ten(estimate[k]) for estimate in estimates)] for k in table_steps(result)]
             yield Block("table", words["table_goes_on" if start else "table"], ["$k$", *map(self.title, names)], rows)
         for text in self.remarks():
             yield Block("text", text)
@@ -121,10 +132,14 @@ class StudentReport:
 
     def remarks(self) -> Iterator[str]:
         """What a reader must know before he relies on distances from the bound."""
-        for kind, values in remarks(self.result):
-            whose = ", ".join(map(self.title, values.get("names", ())))
-            at = self.at(np.flatnonzero(values["steps"]).tolist())
-            yield self.said(f"remark_{kind}", **values | {"names": whose, "at": at})
+        result = self.result
+        steps = {"rounding": result.without_error, "doubtful": result.doubtful}
+        if result.lost:
+            steps["diverged"] = np.any([*result.lost.values()], axis=0)
+        for kind, mask in steps.items():
+            if mask.any():
+                whose, at = ", ".join(map(self.title, result.lost)), self.at(np.flatnonzero(mask).tolist())
+                yield self.said(f"remark_{kind}", names=whose, at=at)
 
     def left_out(self) -> Iterator[str]:
         """The filters that do not take part, and why, those with the same reason together."""
@@ -136,12 +151,12 @@ class StudentReport:
     def conclusion(self) -> Iterator[Block]:
         result, words = self.result, self.words
         if len(result.entrants) == 1:
-            yield Block("section", words["conclusion"])
+            yield self.section("conclusion")
             yield Block("text", self.mean_sentence("alone_bound" if result.has_bound else "alone_control"))
             return
         verdicts = result.verdicts()
-        yield Block("section", words["conclusion"])
-        yield Block("text", self.said("verdict_text", level=LEVEL))
+        yield self.section("conclusion")
+        yield self.text("verdict_text", level=LEVEL)
         heading = [words[key] for key in ("step", "best", "not_worse", "worst")]
         rows = [
             [f"${k}$", self.title(best), ", ".join(map(self.title, others)) or "–", self.title(worst) if worst else "–"]
@@ -154,7 +169,7 @@ class StudentReport:
         """The conclusion: who leads and who is last, on how many steps, and how far from the bound."""
         result, words = self.result, self.words
         alone = [best for best, others, _ in verdicts if not others]
-        for name in sorted(set(alone), key=lambda one: -alone.count(one)):
+        for name in sorted(set(alone), key=lambda name: -alone.count(name)):
             steps = [k for k, (best, others, _) in enumerate(verdicts) if best == name and not others]
             yield self.said("leads", name=self.title(name), at=self.at(steps))
         if not alone:
@@ -164,7 +179,7 @@ class StudentReport:
             yield self.said("together", at=self.at(unsure))
         last = [worst for _, _, worst in verdicts if worst]
         if last:
-            name = max(set(last), key=lambda one: (last.count(one), one))
+            name = max(set(last), key=lambda name: (last.count(name), name))
             yield self.said("last", name=self.title(name), steps=last.count(name), all=result.steps)
         else:
             yield words["nobody_last"]
@@ -178,7 +193,7 @@ class StudentReport:
     def mean_sentence(self, key: str) -> str:
         """How far the first filter and the last are from the bound, or from the control."""
         result = self.result
-        ranked = [one for one in result.ranking() if one[0] not in result.lost] or result.ranking()
+        ranked = [place for place in result.ranking() if place[0] not in result.lost] or result.ranking()
         (first, gap), (final, largest) = ranked[0], ranked[-1]
         if len(ranked) == 1 and len(result.entrants) > 1:
             return self.said("mean_alone", first=self.title(first))
@@ -195,16 +210,6 @@ class StudentReport:
         entry = self.entries[name]
         exact = self.words["exact_title"] if name == EXACT else ""
         return exact or (entry.russian if self.words["language"] == "ru" else entry.title)
-
-
-def remarks(result: Comparison) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Kinds of `REMARKS` that this comparison needs, with what is put into the words: steps as a mask, names of filters."""
-    if result.without_error.any():
-        yield "rounding", {"steps": result.without_error}
-    if result.doubtful.any():
-        yield "doubtful", {"steps": result.doubtful}
-    if result.lost:
-        yield "diverged", {"names": [*result.lost], "steps": np.any([*result.lost.values()], axis=0)}
 
 
 def table_steps(result: Comparison) -> list[int]:

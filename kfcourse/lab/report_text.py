@@ -28,13 +28,15 @@ def filled(text: str, thousands: str, **values: object) -> str:
     {name:step/steps} puts a number and the word that goes with it, in Russian one of three: {name:шаг/шага/шагов}.
     """
 
-    def value(found: re.Match[str]) -> str:
-        one = values[found["name"]]
-        if not isinstance(one, int):
-            return str(one)
-        return by_thousands(str(one), thousands) + (f" {with_number(one, found['words'].split('/'))}" if found["words"] else "")
+    def replacement(match: re.Match[str]) -> str:
+        value = values[match["name"]]
+        if not isinstance(value, int):
+            return str(value)
+        return by_thousands(str(value), thousands) + (
+            f" {with_number(value, match['words'].split('/'))}" if match["words"] else ""
+        )
 
-    return re.sub(rf"\{{(?P<name>{'|'.join(values)})(:(?P<words>[^{{}}]*))?\}}", value, text)
+    return re.sub(rf"\{{(?P<name>{'|'.join(values)})(:(?P<words>[^{{}}]*))?\}}", replacement, text)
 
 
 def with_number(number: int, words: list[str]) -> str:
@@ -91,8 +93,8 @@ def power_of_ten(estimate: Estimate) -> str:
 
 def in_percent(estimate: Estimate) -> str:
     """A part and its standard error in per cent, as a formula."""
-    found = percent(estimate)
-    return found if found == "–" else "$" + found.replace("±", r"\pm") + "$"
+    text = percent(estimate)
+    return text if text == "–" else "$" + text.replace("±", r"\pm") + "$"
 
 
 def inline_html(text: str) -> str:
@@ -113,15 +115,15 @@ def _typeset(text: str) -> str:
     return text.replace("–", "--").replace("—", "---").replace("\u202f", r"\,").replace("\u00a0", "~")
 
 
-def ranges(steps: Sequence[int], one: str = "{}") -> str:
-    """1, 3–5, 8: runs of steps joined, each number written as `one`."""
+def ranges(steps: Sequence[int], form: str = "{}") -> str:
+    """1, 3–5, 8: runs of steps joined, each number written by `form`."""
     parts: list[list[int]] = []
     for k in steps:
         if parts and k == parts[-1][1] + 1:
             parts[-1][1] = k
         else:
             parts.append([k, k])
-    return ", ".join(one.format(a) if a == b else f"{one.format(a)}–{one.format(b)}" for a, b in parts)
+    return ", ".join(form.format(a) if a == b else f"{form.format(a)}–{form.format(b)}" for a, b in parts)
 
 
 def percent(part: Estimate) -> str:
@@ -145,7 +147,7 @@ def on_one_power(estimate: Estimate) -> tuple[float, float, int | None]:
 def escape_tex(text: str) -> str:
     """Plain text for LaTeX."""
     special = {"\\": r"\textbackslash{}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}", "±": r"$\pm$", "·": r"$\cdot$"}
-    return re.sub(r"[#$%&_{}\\^~±·]", lambda found: special.get(found[0], "\\" + found[0]), text)
+    return re.sub(r"[#$%&_{}\\^~±·]", lambda match: special.get(match[0], "\\" + match[0]), text)
 
 
 def cause(reason: Reason, model: Model | JumpModel, words: Mapping[str, str]) -> str:

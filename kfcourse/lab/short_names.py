@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from kfcourse.filters import (
     Design,
@@ -35,8 +34,7 @@ from kfcourse.filters.densities import has_object_noise
 from kfcourse.filters.exact.laws import modes_of
 from kfcourse.filters.optimal_structure import STEPS
 from kfcourse.lab.checked_quadrature import Checked, of_checked_order
-from kfcourse.lab.families import FAMILIES, family
-from kfcourse.laws import Array
+from kfcourse.lab.families import FAMILIES
 from kfcourse.symbolic.averaging import averaged, averaged_equations
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.model import Model
@@ -45,229 +43,208 @@ from kfcourse.symbolic.quadrature import gauss_hermite, unscented
 from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import Structure, gaussian, linearised
 
+AnyModel = TypeVar("AnyModel", Model, JumpModel)
 
-class Structures:
-    """The structural functions of a model, derived when first asked for."""
 
-    def __init__(self, model: Model):
-        self.model = model
+class _OfModes(Generic[AnyModel]):
+    """The structural functions of every mode of a model, derived when first asked for."""
 
-    @cached_property
-    def linearised(self) -> Structure:
-        return linearised(self.model)
+    def __init__(self, model: AnyModel) -> None:
+        self.model: AnyModel = model
 
     @cached_property
-    def gaussian(self) -> Structure:
-        return gaussian(self.model)
+    def _linearised(self) -> list[Structure]:
+        return [linearised(mode) for mode in modes_of(self.model)]
+
+    @cached_property
+    def _gaussian(self) -> list[Structure]:
+        return [gaussian(mode) for mode in modes_of(self.model)]
 
     @cached_property
     def quadrature(self) -> Checked | NoClosedForm | None:
         """What takes the place of the Gaussian functions if they have no closed form, or why nothing does; None if they have."""
-        return _by_quadrature(self.model, lambda: self.gaussian)
+        try:
+            _ = self._gaussian
+        except NoClosedForm as why:
+            return _by_quadrature(self.model, why)
+        return None
 
     @property
-    def normal(self) -> Structure:
-        """The Gaussian functions, by quadrature if they have no closed form; NoClosedForm if that does not do either."""
-        return self.gaussian if self.quadrature is None else _found(self.quadrature)[0]
+    def _normal(self) -> list[Structure]:
+        if isinstance(self.quadrature, NoClosedForm):
+            raise self.quadrature
+        return self._gaussian if self.quadrature is None else self.quadrature.structures
 
 
-class JumpStructures:
+class Structures(_OfModes[Model]):
+    """The structural functions of a model.  `normal`: Gaussian, by quadrature if they have no closed form, else NoClosedForm."""
+
+    linearised = property(lambda self: self._linearised[0])
+    gaussian = property(lambda self: self._gaussian[0])
+    normal = property(lambda self: self._normal[0])
+
+
+class JumpStructures(_OfModes[JumpModel]):
     """Those of a model that jumps: of each mode, and averaged over the modes."""
 
-    def __init__(self, model: JumpModel):
-        self.model = model
-
-    @cached_property
-    def linearised(self) -> list[Structure]:
-        return [linearised(mode) for mode in self.model.modes]
-
-    @cached_property
-    def gaussian(self) -> list[Structure]:
-        return [gaussian(mode) for mode in self.model.modes]
-
-    @cached_property
-    def quadrature(self) -> Checked | NoClosedForm | None:
-        """As of `Structures`, for the modes that need it."""
-        return _by_quadrature(self.model, lambda: self.gaussian)
-
-    @property
-    def normal(self) -> list[Structure]:
-        """The Gaussian functions of each mode; as of `Structures`."""
-        return self.gaussian if self.quadrature is None else _found(self.quadrature)
-
-    @property
-    def chain(self) -> tuple[JumpModel, Array]:
-        """The model, for its transitions, and the law of the first mode: what filters with modes take."""
-        return self.model, self.model.first
+    linearised = property(lambda self: self._linearised)
+    gaussian = property(lambda self: self._gaussian)
+    normal = property(lambda self: self._normal)
 
     @property
     def best(self) -> list[Structure]:
         """Gaussian ones if they can be had, else linearised ones."""
-        try:
-            return self.normal
-        except NoClosedForm:
-            return self.linearised
+        return self._linearised if isinstance(self.quadrature, NoClosedForm) else self._normal
 
     @cached_property
     def averaged(self) -> Structure:
         return averaged(self.model, self.best)
 
 
-def _by_quadrature(model: Model | JumpModel, formulas: Callable[[], object]) -> Checked | NoClosedForm | None:
-    """As `Structures.quadrature`; of the models asked for last it is kept, as a pilot takes seconds, and a report asks again."""
-    for known, found in _ASKED:
-        if known is model:
-            return found
-    found = None
+def _by_quadrature(model: Model | JumpModel, why: NoClosedForm) -> Checked | NoClosedForm:
+    """As `quadrature`; kept of the models asked for last, as a pilot takes seconds, and a report asks again."""
+    for asked, kept in _ASKED:
+        if asked is model:
+            return kept
+    answer: Checked | NoClosedForm
     try:
-        formulas()
-    except NoClosedForm as why:
-        try:
-            found = of_checked_order(model, why)
-        except NoClosedForm as neither:
-            found = neither
-    _ASKED.append((model, found))
-    return found
+        answer = of_checked_order(model, why)
+    except NoClosedForm as neither:
+        answer = neither
+    _ASKED.append((model, answer))
+    return answer
 
 
-_ASKED: deque[tuple[Model | JumpModel, Checked | NoClosedForm | None]] = deque(maxlen=4)
+_ASKED: deque[tuple[Model | JumpModel, Checked | NoClosedForm]] = deque(maxlen=4)
 
 
-def _found(quadrature: Checked | NoClosedForm) -> list[Structure]:
-    if isinstance(quadrature, NoClosedForm):
-        raise quadrature
-    return quadrature.structures
-
-
-AnyStructures = TypeVar("AnyStructures", Structures, JumpStructures)
-
-
-class Entry(NamedTuple, Generic[AnyStructures]):
+class Entry(NamedTuple):
     """A filter of the lab, or of those for models that jump: printed names, how to build it, and what it is.
 
     functions : str
-        Of which structural functions: "gaussian", "linearised", "unscented", "gauss-hermite", "best" (Gaussian if they can be
-        had, else linearised); "" of none.
+        Of which structural functions: "gaussian", "linearised", "unscented", "gauss-hermite", "averaged" (over the modes), "best"
+        (Gaussian if they can be had, else linearised); "exact"; "" of none.
+    family, drawn : str
+        Keys of `FAMILIES`: of its equations, and of its colour and marker.
     memory, modes : bool
         Whether it remembers several steps, and whether its state has the probabilities of the modes.
     """
 
     title: str
     russian: str
-    build: Callable[[AnyStructures], Filter | Design]
+    build: Callable[[Any], Any]  # structures -> Filter or Design
     functions: str = ""
+    family: str = ""
+    drawn: str = ""
     memory: bool = False
     modes: bool = False
 
 
 def _twice(
-    short: str, build: Callable[[Structure], Filter | Design], russian: str = "", memory: bool = False
-) -> dict[str, Entry[Structures]]:
-    """The entries of "fos", "fos3": with Gaussian structural functions, and with linearised ones; `russian` ends the name."""
-    of = FAMILIES[family(short)]
-    title, russian = of.title + short.removeprefix(family(short)), of.russian + russian
-    return {
-        f"{short}-gaussian": Entry(f"G{title}", f"Г{russian}", lambda s: build(s.normal), "gaussian", memory),
-        f"{short}-linearised": Entry(f"L{title}", f"Л{russian}", lambda s: build(s.linearised), "linearised", memory),
-    }
-
-
-def _entry(short: str, build: Callable[[Structures], Filter | Design]) -> dict[str, Entry[Structures]]:
-    """The entry of a family that is one filter."""
-    return {short: Entry(FAMILIES[short].title, FAMILIES[short].russian, build)}
-
-
-def _with_modes(
-    short: str,
-    build: Callable[[JumpModel, list[Structure]], Filter | Design],
+    family: str,
+    build: Callable[..., Filter | Design],
+    number: str = "",
     russian: str = "",
+    jump: bool = False,
     memory: bool = False,
     modes: bool = False,
-) -> dict[str, Entry[JumpStructures]]:
-    """The same of a filter with the structural functions of each mode: "fos" is "fos-jump-gaussian", the LD-GFOS."""
-    of = FAMILIES[family(short)]
-    title = of.title + short.removeprefix(family(short))
+) -> dict[str, Entry]:
+    """The entries of "fos", or with a `number` of "fos3": with Gaussian structural functions and with linearised ones.
+
+    `russian` ends the Russian name.  Those that `jump` are built of the model and the functions of each mode: the LD-GFOS.
+    """
+    of = FAMILIES[family]
+    drawn = family + number if family + number in FAMILIES else family
+    middle, latin, cyrillic = ("jump-", "LD-", "лд") if jump else ("", "", "")
     return {
-        f"{short}-jump-{functions}": Entry(
-            f"LD-{functions[0].upper()}{title}",
-            f"{letter}{of.russian}лд{russian}",
-            partial(_of_modes, build, functions),
-            functions,
-            memory,
-            modes,
+        f"{family}{number}-{middle}{functions}": Entry(
+            f"{latin}{functions[0].upper()}{of.title}{number}",
+            f"{letter}{of.russian}{cyrillic}{russian}",
+            partial(_built, build, functions),
+            functions, family, drawn, memory, modes,
         )
         for functions, letter in (("gaussian", "Г"), ("linearised", "Л"))
-    }
+    }  # fmt: skip
 
 
-def _of_modes(
-    build: Callable[[JumpModel, list[Structure]], Filter | Design], functions: str, structures: JumpStructures
-) -> Filter | Design:
-    return build(structures.model, structures.normal if functions == "gaussian" else structures.linearised)
+def _built(build: Callable[..., Filter | Design], functions: str, structures: Structures | JumpStructures) -> Filter | Design:
+    of = structures.normal if functions == "gaussian" else structures.linearised
+    return build(of) if isinstance(structures, Structures) else build(structures.model, of)
 
 
-_MEMORY = f", {STEPS} шага"
+def _alone(family: str, build: Callable[[Any], Filter | Design], functions: str = "", modes: bool = False) -> dict[str, Entry]:
+    """The entry of a family that is a single filter."""
+    of = FAMILIES[family]
+    return {family: Entry(of.title, of.russian, build, functions, family, family, modes=modes)}
+
+
+_MEMORY = (str(STEPS), f", {STEPS} шага")  # as the lab's filters remember it
+_EXACT = Entry("exact AOF", "АОФ", lambda s: exact(s.model), "exact", "aof", modes=True)
 # One line a filter: this is where a new one is added.
-FILTERS: dict[str, Entry[Structures]] = {
+FILTERS: dict[str, Entry] = {
     **_twice("aof", aof),
-    **_entry("duof", lambda s: duof(s.model)),
+    **_alone("duof", lambda s: duof(s.model)),
     **_twice("fos", fos),
     **_twice("mfos", mfos),
-    **_twice("fos3", partial(fos, arguments=3), ", 3 арг."),
-    **_twice("mfos3", partial(mfos, arguments=3), ", 3 арг."),
+    **_twice("fos", partial(fos, arguments=3), "3", ", 3 арг."),
+    **_twice("mfos", partial(mfos, arguments=3), "3", ", 3 арг."),
     **_twice("dfmp", dfmp),
     **_twice("mdfmp", mdfmp),
-    **_twice(f"fkp{STEPS}", fkp, _MEMORY, True),
-    **_twice(f"mfkp{STEPS}", mfkp, _MEMORY, True),
-    **_twice(f"dfkp{STEPS}", dfkp, _MEMORY, True),
-    **_twice(f"mdfkp{STEPS}", mdfkp, _MEMORY, True),
-    **_twice(f"fbp{STEPS}", fbp, _MEMORY, True),
-    "aof-unscented": Entry("UKF", "АОФ, сигма-точки", lambda s: aof(unscented(s.model)), "unscented"),
-    "aof-gauss-hermite": Entry("GHKF", "АОФ, Гаусс–Эрмит", lambda s: aof(gauss_hermite(s.model)), "gauss-hermite"),
-    "aof-exact": Entry("exact AOF", "АОФ", lambda s: exact(s.model)),
-    **_entry("particle", lambda s: particle(s.model)),
+    **_twice("fkp", fkp, *_MEMORY, memory=True),
+    **_twice("mfkp", mfkp, *_MEMORY, memory=True),
+    **_twice("dfkp", dfkp, *_MEMORY, memory=True),
+    **_twice("mdfkp", mdfkp, *_MEMORY, memory=True),
+    **_twice("fbp", fbp, *_MEMORY, memory=True),
+    "aof-unscented": Entry("UKF", "АОФ, сигма-точки", lambda s: aof(unscented(s.model)), "unscented", "aof", "aof"),
+    "aof-gauss-hermite": Entry("GHKF", "АОФ, Гаусс–Эрмит", lambda s: aof(gauss_hermite(s.model)), "gauss-hermite", "aof", "aof"),
+    "aof-exact": _EXACT,
+    **_alone("particle", lambda s: particle(s.model)),
 }
 # The same for models that jump: filters that know the modes, and plain ones on the average over the modes.
-JUMP_FILTERS: dict[str, Entry[JumpStructures]] = {
-    **_with_modes("aof", lambda model, structures: logic_dynamic(structures, model, model.first), modes=True),
-    "imm": Entry(*FAMILIES["imm"][:2], lambda s: imm(s.best, *s.chain), "best", modes=True),
-    "gpb2": Entry(*FAMILIES["gpb2"][:2], lambda s: gpb2(s.best, *s.chain), "best", modes=True),
-    **_with_modes("fos", logic_dynamic_fos),
-    **_with_modes(f"fkp{STEPS}", logic_dynamic_fkp, _MEMORY, memory=True),
-    **_with_modes(f"fbp{STEPS}", logic_dynamic_fbp, _MEMORY, memory=True),
-    "aof-averaged": Entry("AOF (averaged)", "АОФ (среднее по режимам)", lambda s: aof(s.averaged), "best"),
-    "duof": Entry(*FAMILIES["duof"][:2], lambda s: duof(s.model.modes[0], averaged_equations(s.model))),
-    "fos-averaged": Entry("FOS (averaged)", "ФОС (среднее по режимам)", lambda s: fos(s.averaged), "best"),
-    "mfos-averaged": Entry("MFOS (averaged)", "МФОС (среднее по режимам)", lambda s: mfos(s.averaged), "best"),
-    "aof-exact": Entry("exact AOF", "АОФ", lambda s: exact(s.model), modes=True),
+JUMP_FILTERS: dict[str, Entry] = {
+    **_twice("aof", lambda model, structures: logic_dynamic(structures, model, model.first), jump=True, modes=True),
+    **_alone("imm", lambda s: imm(s.best, s.model, s.model.first), "best", modes=True),
+    **_alone("gpb2", lambda s: gpb2(s.best, s.model, s.model.first), "best", modes=True),
+    **_twice("fos", logic_dynamic_fos, jump=True),
+    **_twice("fkp", logic_dynamic_fkp, *_MEMORY, jump=True, memory=True),
+    **_twice("fbp", logic_dynamic_fbp, *_MEMORY, jump=True, memory=True),
+    "aof-averaged": Entry("AOF (averaged)", "АОФ (среднее по режимам)", lambda s: aof(s.averaged), "averaged", "aof", "aof"),
+    **_alone("duof", lambda s: duof(s.model.modes[0], averaged_equations(s.model))),
+    "fos-averaged": Entry("FOS (averaged)", "ФОС (среднее по режимам)", lambda s: fos(s.averaged), "averaged", "fos", "fos"),
+    "mfos-averaged": Entry(
+        "MFOS (averaged)", "МФОС (среднее по режимам)", lambda s: mfos(s.averaged), "averaged", "mfos", "mfos"
+    ),
+    "aof-exact": _EXACT,
 }
 # Printed names of filters that are not among the lab's.
-TITLES = {
-    "kalman": FAMILIES["kalman"].title,
-    "iterated-linearised": FAMILIES["iterated"].title,
-    "iterated-unscented": "iterated UKF",
-    "alpha-beta": FAMILIES["alpha"].title,
-    "alpha-beta-gamma": "alpha-beta-gamma",
-}
+TITLES = {"iterated-linearised": FAMILIES["iterated"].title, "iterated-unscented": "iterated UKF"}
 BOUND = 1000  # particles of the exact AOF where there are no point masses
 # As of models without jumps, those that remember several steps are asked for by name.
-JUMP_LAB = tuple(name for name, entry in JUMP_FILTERS.items() if name != "aof-exact" and not entry.memory)
+JUMP_LAB = tuple(name for name, known in JUMP_FILTERS.items() if name != "aof-exact" and not known.memory)
 LAB = ("aof-gaussian", "aof-linearised", "duof", "fos-gaussian", "fos-linearised", "mfos-gaussian", "mfos-linearised")
+
+
+def entry(name: str) -> Entry:
+    """What is known of a filter; of those that are not the lab's by what their names are made of, FAMILY[LENGTH]-FUNCTIONS."""
+    if known := FILTERS.get(name) or JUMP_FILTERS.get(name):
+        return known
+    kind, _, functions = name.partition("-")
+    family = kind.rstrip("0123456789")
+    usual = f"{family}{STEPS}-{functions}"
+    if known := FILTERS.get(usual) or JUMP_FILTERS.get(usual):  # of another length of memory
+        return known._replace(title=known.title.replace(str(STEPS), kind.removeprefix(family)))
+    drawn = next((key for key in (name, kind, family) if key in FAMILIES), family)
+    printed = FAMILIES[name].title if name in FAMILIES else TITLES.get(name, name)
+    return Entry(printed, printed, lambda _: check_names([name]), functions.removeprefix("jump-"), family, drawn)
 
 
 def title(name: str) -> str:
     """The printed name of a filter: "GAOF" for "aof-gaussian", "GFKP2" for "fkp2-gaussian"."""
-    if entry := FILTERS.get(name) or JUMP_FILTERS.get(name):
-        return entry.title
-    length = re.sub(r"\D", "", name.split("-")[0])
-    usual = f"{family(name)}{STEPS}-{name.partition('-')[2]}"
-    if entry := FILTERS.get(usual) or JUMP_FILTERS.get(usual):
-        return entry.title.replace(str(STEPS), length)
-    return TITLES.get(name, name)
+    return entry(name).title
 
 
 def lab_filters(model: Model, names: Sequence[str] = LAB) -> list[Filter | Design]:
-    """Filters of the lab for a model, by short names; `kfcourse.lab.admission` tells of each whether it can be had.
+    """Filters of the lab for a model, by short names; `kfcourse.lab.admission` says of each whether it can be had.
 
     Raises
     ------
@@ -313,15 +290,6 @@ def has_exact(model: Model | JumpModel) -> bool:
     """Whether the exact AOF can be computed for the model by point masses: scalar, noises entering linearly."""
     try:
         pointmass(model)
-    except ModelError:
-        return False
-    return True
-
-
-def has_bound(model: Model | JumpModel) -> bool:
-    """Whether the exact AOF can be computed for the model, by point masses or by particles."""
-    try:
-        exact(model)
     except ModelError:
         return False
     return True

@@ -25,7 +25,6 @@ OF_STEPS = {"state", "state_noise", "modes", "transition", "first"}
 STEPS = 51  # of the lab, where a variant does not say another number
 RUNS = 40_000  # trajectories by which a variant is checked
 MANY = 40  # names that a message lists
-LARGEST_FILE = 1_000_000  # bytes; thousands of variants.  /dev/zero never ends
 
 
 class VariantError(ValueError):
@@ -84,25 +83,25 @@ def load_variants(path: str | Path | None = None) -> dict[str, Variant]:
     VariantWarning
         A variant is not a model; the others can be used.
     """
-    found, faults = usable_variants(path)
+    variants, faults = usable_variants(path)
     for fault in faults.values():
         warnings.warn(str(fault), VariantWarning, stacklevel=2)
-    if not found:
+    if not variants:
         raise VariantError(
             f"{path} has no other variants than those that jump between modes: "
             "`read_variants` reads them, or `find_variant` by name"
         )
-    return found
+    return variants
 
 
 def usable_variants(
     path: str | Path | None = None,
 ) -> tuple[dict[str, Variant], dict[str, VariantError]]:
     """What `load_variants` reads; and, by name, what is wrong with the others."""
-    found, faults = read_variants(path, list(_shipped(SHIPPED[0])) if path is None else ())
-    if not found:
+    variants, faults = read_variants(path, list(_shipped(SHIPPED[0])) if path is None else ())
+    if not variants:
         raise next(iter(faults.values()))
-    return {name: one for name, one in found.items() if isinstance(one.model, Model)}, faults
+    return {name: variant for name, variant in variants.items() if isinstance(variant.model, Model)}, faults
 
 
 def find_variant(name: str, path: str | Path | None = None) -> Variant:
@@ -114,10 +113,10 @@ def chosen_variants(names: Sequence[str], everything: bool, path: str | Path | N
     """The variants of these names, each once, or all of `load_variants`; VariantError for others."""
     if everything:
         return list(load_variants(path).values())
-    found, faults = read_variants(path, names)
+    variants, faults = read_variants(path, names)
     for fault in faults.values():
         raise fault
-    return list(found.values())
+    return list(variants.values())
 
 
 def read_variants(
@@ -127,14 +126,14 @@ def read_variants(
 
     Only what is asked for is built: a file may hold thousands.
     """
-    found: dict[str, Variant] = {}
+    variants: dict[str, Variant] = {}
     faults: dict[str, VariantError] = {}
     for name, table in read_tables(path, names).items():
         try:
-            found[name] = read_variant(name, table, str(path or "the shipped variants"))
+            variants[name] = read_variant(name, table, str(path or "the shipped variants"))
         except VariantError as error:
             faults[name] = error
-    return found, faults
+    return variants, faults
 
 
 def read_tables(path: str | Path | None = None, names: Sequence[str] = ()) -> dict[str, Any]:
@@ -145,8 +144,7 @@ def read_tables(path: str | Path | None = None, names: Sequence[str] = ()) -> di
     VariantError
         The file is missing or not TOML, or has no variant of such a name.
     """
-    shipped = {name: table for file in SHIPPED for name, table in _shipped(file).items()}
-    tables = shipped if path is None else _tables(Path(path))
+    tables = {name: table for file in SHIPPED for name, table in _shipped(file).items()} if path is None else _tables(Path(path))
     if unknown := [name for name in names if name not in tables]:
         known = ", ".join([*tables][:MANY]) + (f", ... ({len(tables)} in all)" if len(tables) > MANY else "")
         raise VariantError(f"no variant {', '.join(map(repr, unknown))}; there are {known}")
@@ -154,24 +152,17 @@ def read_tables(path: str | Path | None = None, names: Sequence[str] = ()) -> di
 
 
 def _shipped(file: str) -> dict[str, Any]:
-    text = (resources.files("kfcourse.lab") / file).read_text(encoding="utf-8")
-    return dict(tomllib.loads(text)["variants"])
+    return dict(tomllib.loads((resources.files("kfcourse.lab") / file).read_text(encoding="utf-8"))["variants"])
 
 
 def _tables(path: Path) -> dict[str, Any]:
     """The tables of a file of one's own."""
+    if not path.is_file():
+        raise VariantError(f"no file of variants at {path}; check the path")
     try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_FILE + 1)
-        text = content.decode("utf-8-sig").replace("\r\n", "\n")
-    except FileNotFoundError:
-        raise VariantError(f"no file of variants at {path}; check the path") from None
+        tables = tomllib.loads(path.read_text(encoding="utf-8-sig")).get("variants")
     except (OSError, UnicodeDecodeError) as error:
         raise VariantError(f"{path} cannot be read: {error}") from None
-    if len(content) > LARGEST_FILE:
-        raise VariantError(f"{path} has more than {LARGEST_FILE:,} bytes: it is no file of variants; check the path")
-    try:
-        tables = tomllib.loads(text).get("variants")
     except (ValueError, RecursionError) as error:
         raise VariantError(
             f"{path} is not valid TOML: {error}; formulas and other texts stand in quotes, and a number has a digit before "
@@ -223,13 +214,13 @@ def summary(name: str, table: Mapping[str, Any]) -> str:
     common = formulas[:1] if len(set(formulas)) == 1 else []
     lines = [f"{name:>6}  {on_a_line(str(table.get('title', ''))) or 'no title'}", *common]
     for mode, formula, values in zip(modes, formulas, numbers, strict=bool(modes)):
-        own = [f"{key} = {value:g}" for key, value in values.items() if any(one.get(key) != value for one in numbers)]
+        own = [f"{key} = {value:g}" for key, value in values.items() if any(of.get(key) != value for of in numbers)]
         lines.append(f"{mode}: {';  '.join(own if common else [formula, *own])}")
     return "\n        ".join(lines)
 
 
 def _equations(table: Mapping[str, Any]) -> str:
     left, key = ("dx/dt", "drift") if "drift" in table else ("x'", "state")
-    state, meter = ([one] if isinstance(one, str) else one for one in (table[key], table["meter"]))
+    state, meter = ([side] if isinstance(side, str) else side for side in (table[key], table["meter"]))
     pushed = f" + ({on_a_line(str(table['diffusion']))}) v" if key == "drift" else ""
     return f"{left} = {', '.join(map(on_a_line, state))}{pushed};  y = {', '.join(map(on_a_line, meter))}"

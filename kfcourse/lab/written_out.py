@@ -21,15 +21,15 @@ def scalar_equations(structure: Structure) -> list[tuple[sp.Symbol, sp.Expr]]:
     only where they are long.
     """
     values = function_values(structure)
-    found: list[tuple[sp.Symbol, sp.Expr]] = []
+    equations: list[tuple[sp.Symbol, sp.Expr]] = []
     short: dict[sp.Symbol, sp.Expr] = {}
     for equation in EQUATIONS["aof"]:
         name, formula = scalar(equation.lhs), scalar(equation.rhs).xreplace(values).xreplace(short)
         if name in (scalar(s.h), scalar(s.G)) and symbols(formula_latex(formula, _VARIABLES)) <= SHORT:
             short[name] = formula
         else:
-            found.append((name, formula))
-    return found
+            equations.append((name, formula))
+    return equations
 
 
 def written_lines(structure: Structure) -> list[str]:
@@ -46,4 +46,4 @@ def written_lines(structure: Structure) -> list[str]:
 
 
 # In the order in which a product is written.
-_VARIABLES = [scalar(one) for one in (s.K, s.lam, s.z, s.Psi, s.P, s.G, s.F, s.y, s.h)]
+_VARIABLES = [scalar(symbol) for symbol in (s.K, s.lam, s.z, s.Psi, s.P, s.G, s.F, s.y, s.h)]

@@ -245,6 +245,13 @@ class Sample(NamedTuple):
         """Some of the batches."""
         return self._replace(sizes=self.sizes[batches], seeds=self.seeds[batches])
 
+    def begun(self, one: Filter) -> State:
+        """A filter's state before the first measurement; what draws random numbers draws others for each sample."""
+        state = one.init(sum(self.sizes))
+        if not hasattr(state.memory, "part"):
+            return state
+        return state._replace(memory=replace(state.memory, part=self.seeds[0].spawn_key))
+
     def instants(self) -> Iterator[Instant]:
         """The steps of all batches side by side."""
         return instants(self.model, self.sizes, self.steps, self.seeds, self.wide)
@@ -334,7 +341,7 @@ def run_batches(filters: Sequence[Filter], sample: Sample, *, back: bool = False
 
 def _onward(filters: Sequence[Filter], sample: Sample) -> Iterator[tuple[Instant, list[State]]]:
     """The states of all filters after each measurement."""
-    states = [one.init(sum(sample.sizes)) for one in filters]
+    states = [sample.begun(one) for one in filters]
     for k, instant in enumerate(sample.instants()):
         for i, one in enumerate(filters):
             with _named(one, k):
@@ -349,7 +356,8 @@ def _back(filters: Sequence[Filter], sample: Sample) -> Iterator[tuple[Instant, 
     laws = []
     for one in filters:
         with _named(one, len(record) - 1):
-            laws.append(looked_back(one, islice(walk(one, y), 1, None), y))
+            states = accumulate(y, one.step, initial=sample.begun(one))
+            laws.append(looked_back(one, islice(states, 1, None), y))
     yield from zip(record, map(list, zip(*laws, strict=True)), strict=True)
 
 
@@ -359,12 +367,8 @@ def _twice(state: State) -> tuple[Array, Array, Array]:
     Those of both clouds of particles, and half their distance: a product of distances from them then does not hold their errors.
     Of point masses twice the same, and what discretisation leaves.
     """
-    halves = getattr(state.memory, "halves", None)
-    if halves is not None:
-        return *halves, state.memory.discretisation_error()
-    stated = getattr(state.memory, "discretisation_error", None)
     mean = state.posterior.mean
-    return mean, mean, np.zeros(len(mean)) if stated is None else stated()
+    return *getattr(state.memory, "halves", (mean, mean)), state.memory.discretisation_error()
 
 
 @contextmanager

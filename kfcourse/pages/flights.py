@@ -21,7 +21,7 @@ from kfcourse.scenarios.flight import Track
 PARTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
 LOOKS: dict[str, dict[str, Any]] = {
     "Kalman": {"color": style("kalman")["color"]},
-    "alpha-beta": {"color": style("alpha")["color"], "linestyle": "--"},
+    "alpha-beta": {"color": style("alpha-beta")["color"], "linestyle": "--"},
     "extended": {"color": "#CC79A7"},
 }
 

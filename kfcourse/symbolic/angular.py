@@ -50,11 +50,11 @@ def _names(given: Any) -> list[str]:
 
 
 def warn_of_angles(equations: Mapping[str, sp.Expr]) -> None:
-    """AngleWarning for components that are found by atan2 and may pass from pi to -pi."""
-    if found := [name for name, equation in equations.items() if _jumps(equation)]:
+    """AngleWarning for components that are circular by atan2 and may pass from pi to -pi."""
+    if circular := [name for name, equation in equations.items() if _jumps(equation)]:
         _warn(
-            f"{' and '.join(found)}: atan2 jumps from pi to -pi, and a filter takes the jump for an innovation of a turn; "
-            f"say angles=[{_quoted(found)}], or angles=[] if it is no angle or never comes near pi"
+            f"{' and '.join(circular)}: atan2 jumps from pi to -pi, and a filter takes the jump for an innovation of a turn; "
+            f"say angles=[{_quoted(circular)}], or angles=[] if it is no angle or never comes near pi"
         )
 
 

@@ -19,7 +19,7 @@ from kfcourse.laws import Array, Gaussian, Measurement, Transition, product, tra
 from kfcourse.symbolic.equations import Noiseless, compile_noiseless
 from kfcourse.symbolic.jumping import JumpModel
 from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import Structure, each_once, expect_each, moving_alike, of_each_step
+from kfcourse.symbolic.structure import Structure, expect_each, of_steps
 
 
 def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
@@ -36,33 +36,31 @@ def averaged(model: JumpModel, structures: Sequence[Structure]) -> Structure:
     expect_each(structures, "averaged")
     if len(structures) != len(model.modes):
         raise ValueError(f"averaged expects a structure for each of the {len(model.modes)} modes, got {len(structures)}")
-    alike = moving_alike(structures)
 
     def at(k: int) -> Structure:
         before, after = model.law_at(k), model.law_at(k + 1)
-        now = [one.at(k) for one in structures]
+        now = [structure.at(k) for structure in structures]
 
         def predict(z: Array, p: Array) -> Gaussian:
-            each, law = each_once(now, alike), Gaussian(z, p)
-            laws = [each(j, law) for j in range(len(now))]
+            laws = [structure.predict(z, p) for structure in now]
             tau = _mean(after, [law.mean for law in laws])
             return Gaussian(tau, _mean(after, [law.cov + _square(law.mean - tau) for law in laws]))
 
         def measure(m: Array, d: Array) -> Measurement:
-            parts = [one.measure(m, d) for one in now]
-            h, G = _mean(before, [one.h for one in parts]), _mean(before, [one.G for one in parts])
-            R = _mean(before, [one.R + _form(one.G - G, d) + _square(one.h - h) for one in parts])
+            parts = [part.measure(m, d) for part in now]
+            h, G = _mean(before, [part.h for part in parts]), _mean(before, [part.G for part in parts])
+            R = _mean(before, [part.R + _form(part.G - G, d) + _square(part.h - h) for part in parts])
             return Measurement(h, G, _form(G, d) + R, R)
 
         def transition(z: Array, p: Array) -> Transition:
-            each, taus = [one.transition(z, p) for one in now], [one.predict(z, p).mean for one in now]
-            tau, A = _mean(after, taus), _mean(after, [one.A for one in each])
+            each, taus = [structure.transition(z, p) for structure in now], [structure.predict(z, p).mean for structure in now]
+            tau, A = _mean(after, taus), _mean(after, [part.A for part in each])
             parts = [Q + _form(slope - A, p) + _square(mean - tau) for (slope, Q), mean in zip(each, taus, strict=True)]
             return Transition(A, _mean(after, parts))
 
         return Structure("averaged", model.modes[0], predict, measure, transition)
 
-    return of_each_step("averaged", model.modes[0], at)
+    return of_steps("averaged", model.modes[0], at, timed=True)
 
 
 def averaged_equations(model: JumpModel) -> tuple[Noiseless, Noiseless]:
@@ -71,10 +69,13 @@ def averaged_equations(model: JumpModel) -> tuple[Noiseless, Noiseless]:
     each = [compile_noiseless(mode) for mode in model.modes]
 
     def state(x: Array, k: int | None = None) -> Array:
-        return sum(q * np.broadcast_to(one(x, k), x.shape) for q, (one, _) in zip(model.law_at((k or 0) + 1), each, strict=True))
+        return sum(
+            q * np.broadcast_to(equation(x, k), x.shape)
+            for q, (equation, _) in zip(model.law_at((k or 0) + 1), each, strict=True)
+        )
 
     def meter(x: Array, k: int | None = None) -> Array:
-        return sum(q * one(x, k) for q, (_, one) in zip(model.law_at(k or 0), each, strict=True))
+        return sum(q * equation(x, k) for q, (_, equation) in zip(model.law_at(k or 0), each, strict=True))
 
     return state, meter
 

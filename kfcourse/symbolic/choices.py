@@ -19,8 +19,8 @@ def masked(
         if not (known and formula.has(*known)):
             return formula
         if isinstance(formula, sp.Function) and not formula.has(*variables):
-            masks[found := sp.Dummy(real=True)] = formula
-            return found
+            masks[symbol := sp.Dummy(real=True)] = formula
+            return symbol
         if isinstance(formula, sp.Piecewise) and not decides(formula, variables):
             return sp.Add(*(mask(branch) * mask(indicator) for branch, indicator in _by_indicators(formula)))
         return formula.func(*map(mask, formula.args)) if formula.args else formula

@@ -9,46 +9,31 @@ from __future__ import annotations
 
 import ast
 import keyword
+import operator
 import re
 import unicodedata
 import warnings
 from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import sympy as sp
 from sympy.logic.boolalg import Boolean
 
-FUNCTIONS = {
-    "sin": sp.sin,
-    "cos": sp.cos,
-    "tan": sp.tan,
-    "atan": sp.atan,
-    "atan2": sp.atan2,
-    "exp": sp.exp,
-    "log": sp.log,
-    "sqrt": sp.sqrt,
-    "tanh": sp.tanh,
-    "sinh": sp.sinh,
-    "cosh": sp.cosh,
-    "abs": sp.Abs,
-    "Abs": sp.Abs,
-    "sign": sp.sign,
-    "Heaviside": sp.Heaviside,
-}
+NAMES = "sin cos tan atan atan2 exp log sqrt tanh sinh cosh Abs sign Heaviside"
+FUNCTIONS = {name: getattr(sp, name) for name in NAMES.split()} | {"abs": sp.Abs}
 ARGUMENTS = {"atan2": 2}  # how many a function takes; 1 if not named here.  atan2(y, x) is the angle of the point (x, y)
 CONSTANTS = {"pi": sp.pi}
 PIECEWISE = "Piecewise"  # Piecewise((x, x < 1), (1, True)), which may also be typed as x if x < 1 else 1
-COMPARISONS: dict[type[ast.cmpop], Callable[[sp.Expr, sp.Expr], Boolean]] = {
-    ast.Lt: sp.Lt,
-    ast.LtE: sp.Le,
-    ast.Gt: sp.Gt,
-    ast.GtE: sp.Ge,
-    ast.Eq: sp.Eq,
-    ast.NotEq: sp.Ne,
-}
+OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.USub: operator.neg, ast.UAdd: operator.pos, ast.And: sp.And, ast.Or: sp.Or,
+    ast.Lt: sp.Lt, ast.LtE: sp.Le, ast.Gt: sp.Gt, ast.GtE: sp.Ge, ast.Eq: sp.Eq, ast.NotEq: sp.Ne,
+}  # fmt: skip
+ARITHMETIC, COMPARISONS = tuple(OPERATORS)[:4], tuple(OPERATORS)[8:]
 
 NO_NUMBERS = (sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I)
-LARGEST = 1e100  # numbers beyond it, or below 1/LARGEST: products of some would leave the floats
+LARGEST = sp.Integer(10) ** 100  # numbers beyond it, or below 1/LARGEST: products of some would leave the floats
 MAX_LENGTH = 2000
 MAX_EXPONENT = 16
 MAX_DEGREE = 24
@@ -144,8 +129,10 @@ def syntax(formula: str) -> tuple[str, ast.expr, int]:
             tree = ast.parse(formula.strip(), mode="eval").body
     except SyntaxError as error:
         column = offset + max((error.offset or 1) - 1, 0)
-        hint = "; a product needs *, as in 2*x" if re.search(r"[0-9)]\s*[A-Za-z(]", formula) else ""
-        raise FormulaError(formula, f"the formula cannot be read ({error.msg}){hint}", column) from None
+        hint = "; a product needs *, as in 2*x" if re.search(r"[0-9)]\s*[A-Za-z(]|\w\s+\w", formula) else ""
+        # Python's words of brackets are good; what else it says is for programmers
+        words = error.msg if re.search("closed|match|nested", error.msg) else "something is missing here, or too much"
+        raise FormulaError(formula, f"the formula cannot be read: {words}{hint}", column) from None
     except (ValueError, MemoryError, RecursionError):
         raise FormulaError(formula, "the formula cannot be read: nested too deeply or has forbidden characters") from None
     return formula, tree, offset
@@ -187,20 +174,12 @@ class Reader:
                 return self.number(node)
             case ast.Name():
                 return self.name(node)
-            case ast.UnaryOp(op=ast.USub()):
-                return -self.read(node.operand)
-            case ast.UnaryOp(op=ast.UAdd()):
-                return self.read(node.operand)
-            case ast.BinOp(op=ast.Add()):
-                return self.read(node.left) + self.read(node.right)
-            case ast.BinOp(op=ast.Sub()):
-                return self.read(node.left) - self.read(node.right)
-            case ast.BinOp(op=ast.Mult()):
-                return self.read(node.left) * self.read(node.right)
-            case ast.BinOp(op=ast.Div()):
-                return self.read(node.left) / self.read(node.right)
+            case ast.UnaryOp(op=ast.USub() | ast.UAdd()):
+                return OPERATORS[type(node.op)](self.read(node.operand))
             case ast.BinOp(op=ast.Pow()):
                 return self.power(node)
+            case ast.BinOp() if isinstance(node.op, ARITHMETIC):
+                return OPERATORS[type(node.op)](self.read(node.left), self.read(node.right))
             case ast.Call(func=ast.Name(id="Piecewise")):
                 return self.piecewise(node)
             case ast.Call():
@@ -210,14 +189,14 @@ class Reader:
         raise self.fail(node, f"{type(node).__name__} is not allowed in a formula; only + - * / ** numbers, names, functions")
 
     def number(self, node: ast.Constant) -> sp.Expr:
-        value = node.value
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.fail(node, f"{value!r} is not a real number")
+        if type(node.value) not in (int, float):
+            raise self.fail(node, f"{node.value!r} is not a real number")
         written = ast.get_source_segment(self.formula[self.offset :], node) or ""
-        lost = not value and not written.startswith(("0x", "0o", "0b")) and re.match(r"[0._]*[1-9]", written)  # 1e-400 is 0.0
-        if lost or (value and not 1 / LARGEST < abs(value) < LARGEST):
+        # as written, since 1e-400 is 0 as a float
+        value = sp.Rational(node.value if isinstance(node.value, int) else written.replace("_", ""))
+        if value and not 1 / LARGEST < abs(value) < LARGEST:
             raise self.fail(node, "the number is too large or too small (1e-100 to 1e100 are read): change the units")
-        return sp.Rational(str(value))
+        return value
 
     def name(self, node: ast.Name) -> sp.Expr:
         known = self.symbols | CONSTANTS
@@ -256,14 +235,14 @@ class Reader:
         match node:
             case ast.Constant(value=bool()):
                 return sp.true if node.value else sp.false
-            case ast.Compare() if all(type(one) in COMPARISONS for one in node.ops):
-                sides = [self.read(one) for one in (node.left, *node.comparators)]
-                found = [COMPARISONS[type(one)](*both) for one, both in zip(node.ops, pairwise(sides), strict=True)]
-                if any(undecided(one) for one in found):
+            case ast.Compare() if all(isinstance(op, COMPARISONS) for op in node.ops):
+                sides = pairwise([self.read(side) for side in (node.left, *node.comparators)])
+                parts = [OPERATORS[type(op)](*pair) for op, pair in zip(node.ops, sides, strict=True)]
+                if any(map(undecided, parts)):
                     raise self.fail(node, f"{UNDECIDED}; write the one that holds")
-                return sp.And(*found)
+                return sp.And(*parts)
             case ast.BoolOp():
-                return (sp.And if isinstance(node.op, ast.And) else sp.Or)(*map(self.condition, node.values))
+                return OPERATORS[type(node.op)](*map(self.condition, node.values))
             case ast.UnaryOp(op=ast.Not()):
                 return sp.Not(self.condition(node.operand))
         raise self.fail(node, "a condition compares: x < 1, 30 <= t < 45, k == 20, joined by `and`, `or`, `not`")

@@ -9,7 +9,6 @@ ordinary `Model`, so that its structural functions, densities and code are deriv
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
@@ -26,7 +25,6 @@ from kfcourse.symbolic.model import OF_A_VARIANT, Model
 from kfcourse.symbolic.reading import Formula, Formulas, ModelError, by_name, exact_number, read, shown, table
 
 OF_A_MODE = ("state", "meter", "parameters", "state_noise", "meter_noise")  # in which modes may differ
-NAME = re.compile(r"(?=.*\S)[\w -]{1,40}")  # it stands in tables, reports and LaTeX
 SUM = 1e-9  # a row of probabilities written with ten digits sums to 1 within this
 
 
@@ -142,8 +140,8 @@ class JumpModel:
 
     @property
     def steps(self) -> float:
-        """For how many steps the modes' inputs have values and their noises variances."""
-        return min(self.chain_of_step.known.steps, *(one.known.steps for one in self.modes))
+        """For how many steps the modes' inputs have values."""
+        return min(self.chain_of_step.known.steps, *(mode.known.steps for mode in self.modes))
 
     @cached_property
     def by_state(self) -> bool:
@@ -163,25 +161,23 @@ class JumpModel:
         size = len(self.modes)
         if not self.by_state:
             return np.broadcast_to(self.transition_at(k), (*x.shape[:-1], size, size))
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            found = np.broadcast_to(self.chain_of_step.at(k)(x)[0], (*x.shape[:-1], size, size))
-            total = sum(np.moveaxis(found, -1, 0))[..., None]  # over few columns: many times as fast as a reduction
-            if np.minimum.reduce(found, axis=None) >= 0 and np.maximum.reduce(np.abs(total - 1), axis=None) <= SUM:
-                return found / total
-            wrong = ~((found >= 0).all(axis=(-2, -1)) & (np.abs(total - 1) <= SUM).all(axis=(-2, -1)))
-        if (wrong := wrong & np.isfinite(x).all(axis=-1)).any():
-            problem, there = _not_probabilities(found[wrong][0]), ", ".join(f"{one:g}" for one in x[wrong][0])
-            raise ModelError(f"`transition` at step {k}, where {', '.join(s.name for s in self.x)} = {there}: {problem}")
-        return found / total
+        with np.errstate(all="ignore"):
+            rows = np.broadcast_to(self.chain_of_step.at(k)(x)[0], (*x.shape[:-1], size, size))
+            total = rows.sum(axis=-1, keepdims=True)
+            wrong = ~((rows >= 0) & (np.abs(total - 1) <= SUM)).all(axis=(-2, -1)) & np.isfinite(x).all(axis=-1)
+        if wrong.any():
+            problem, place = _not_probabilities(rows[wrong][0]), ", ".join(f"{value:g}" for value in x[wrong][0])
+            raise ModelError(f"`transition` at step {k}, where {', '.join(s.name for s in self.x)} = {place}: {problem}")
+        return rows / total
 
     def transition_at(self, k: int) -> Array:
         """pi at step k, (J, J): from the mode of y_k to that of y_{k+1}; ModelError if it depends on the state."""
         self.without_state("a matrix of transitions for all states")
         with np.errstate(all="ignore"):
-            found = np.asarray(self.chain_of_step.at(k)()[0], dtype=float)
-        if problem := _not_probabilities(found):
+            rows = np.asarray(self.chain_of_step.at(k)()[0], dtype=float)
+        if problem := _not_probabilities(rows):
             raise ModelError(f"`transition` at step {k}: {problem}; change its formulas, or run at most {k} steps")
-        return found / found.sum(axis=1, keepdims=True)
+        return rows / rows.sum(axis=1, keepdims=True)
 
     def law_at(self, k: int) -> Array:
         """q_k, (J,): the probabilities of the modes of y_k before anything is measured; ModelError if they are not known."""
@@ -203,13 +199,13 @@ class JumpModel:
         for name, mode in zip(self.names, self.modes, strict=True):
             block = mode.latex().removeprefix("\\begin{aligned}\n").removesuffix("\n\\end{aligned}")
             lines += [rf"\text{{mode {name.replace('_', chr(92) + '_')}:}}\quad &", *block.split(" \\\\\n")]
-        first = sp.Matrix([[sp.Float(one, 4) for one in self.first]])
+        first = sp.Matrix([[sp.Float(share, 4) for share in self.first]])
         lines += [rf"\pi &= {sp.latex(self.chain)}", rf"q &= {sp.latex(first)}"]
         return "\\begin{aligned}\n" + " \\\\\n".join(lines) + "\n\\end{aligned}"
 
     def __repr__(self) -> str:
-        said = (repr(mode).removeprefix("Model(").removesuffix(")") for mode in self.modes)
-        return f"JumpModel({' | '.join(f'{name}: {text}' for name, text in zip(self.names, said, strict=True))})"
+        texts = (repr(mode).removeprefix("Model(").removesuffix(")") for mode in self.modes)
+        return f"JumpModel({' | '.join(f'{name}: {text}' for name, text in zip(self.names, texts, strict=True))})"
 
 
 def model_of_table(given: Mapping[str, Any]) -> Model | JumpModel:
@@ -232,8 +228,6 @@ def _tables(modes: Any) -> dict[str, dict[str, Any]]:
         raise ModelError(
             f"`modes` must be a table of modes by name, such as {{sound = {{}}, faulty = {{...}}}}, got {shown(modes)}"
         )
-    if odd := [name for name in modes if not NAME.fullmatch(str(name))]:
-        raise ModelError(f"the mode {shown(odd[0])} needs a name of letters, digits, spaces, _ and -, at most 40 of them")
     tables = {str(name): table(f"modes.{name}", change) for name, change in modes.items()}
     for name, change in tables.items():
         if unknown := sorted(set(change) - set(OF_A_MODE)):
@@ -245,15 +239,15 @@ def _fitting(names: tuple[str, ...], modes: Sequence[Model]) -> tuple[Model, ...
     """The modes, if they are of one state, measurement and noises; ModelError if not."""
     first = modes[0]
     for name, mode in zip(names, modes, strict=True):
-        for what, ours, theirs in (
+        for what, here, there in (
             ("state component(s)", first.n, mode.n),
             ("measurement component(s)", first.p, mode.p),
             ("noise(s) of the object", len(first.v), len(mode.v)),
             ("noise(s) of the meter", len(first.w), len(mode.w)),
         ):
-            if ours != theirs:
+            if here != there:
                 remedy = '; name them all by `symbols`, such as v = ["v1", "v2"]' if what.startswith("noise") else ""
-                raise ModelError(f"all modes need as many {what}: mode {names[0]} has {ours}, mode {name} has {theirs}{remedy}")
+                raise ModelError(f"all modes need as many {what}: mode {names[0]} has {here}, mode {name} has {there}{remedy}")
         if mode.x != first.x or mode.angles != first.angles:
             raise ModelError(f"modes {names[0]} and {name} differ in their state's symbols or angles")
     return tuple(modes)
@@ -261,14 +255,15 @@ def _fitting(names: tuple[str, ...], modes: Sequence[Model]) -> tuple[Model, ...
 
 def _chain(given: Any, size: int) -> tuple[list[list[Formula]], int]:
     """Rows of the matrix, (J, J), and how many were given."""
-    rows = list(given) if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str) else []
-    nested = [isinstance(row, Sequence | np.ndarray) and not isinstance(row, str) for row in rows]
-    if rows and not any(nested):
-        rows, nested = [rows] * size, [True] * size
-        count = 1
-    else:
-        count = len(rows)
-    if not rows or not all(nested) or len(rows) != size or any(len(row) != size for row in rows):
+
+    def is_row(row: Any) -> bool:
+        return isinstance(row, Sequence | np.ndarray) and not isinstance(row, str)
+
+    rows = [*given] if is_row(given) else []
+    count = len(rows) if any(map(is_row, rows)) else 1
+    if count == 1 and rows and not is_row(rows[0]):
+        rows = [rows] * size
+    if not rows or len(rows) != size or not all(is_row(row) and len(row) == size for row in rows):
         raise ModelError(
             f"`transition` must be {size} rows of {size} probabilities for {size} mode(s), or one row, got {shown(given)}"
         )
@@ -278,23 +273,22 @@ def _chain(given: Any, size: int) -> tuple[list[list[Formula]], int]:
 def _compiled(
     rows: list[list[Formula]], model: Model, common: Mapping[str, float], changed: set[str]
 ) -> tuple[sp.ImmutableMatrix, Stepwise]:
-    names = {name: symbol(name) for name in common if name not in changed}
+    names = {name: symbol(name) for name in common if name not in changed}  # what differs between the modes is not known
     of_step = model.known.names([*common, *changed, *(s.name for s in (*model.x, *model.v, *model.w))])
+    known = names | of_step | by_name(model.x)
     try:
-        matrix = sp.ImmutableMatrix([[_entry(one, names | of_step | by_name(model.x)) for one in row] for row in rows])
+        matrix = sp.ImmutableMatrix(
+            [
+                [read(p, known, "transition") if isinstance(p, str | sp.Expr) else exact_number("an entry", p) for p in row]
+                for row in rows
+            ]
+        )
     except (ModelError, FormulaError) as error:
-        differs = "".join(f"; {name} differs between the modes" for name in sorted(changed) if f"{name!r}" in str(error))
-        raise ModelError(f"`transition`: {error}{differs}") from None
-    known = model.known.used(matrix, of_step)
+        raise ModelError(f"`transition`: {error}") from None
     arguments = {"x": sp.Matrix(model.x)} if matrix.has(*model.x) else {}
     numeric = matrix.subs({symbol(name): exact_number(f"parameter {name}", value) for name, value in common.items()})
-    return matrix, Stepwise.compile(known, "transition", arguments, {"transition": numeric}, [*arguments])
-
-
-def _entry(one: Any, names: dict[str, sp.Symbol]) -> sp.Expr:
-    if isinstance(one, str | sp.Expr):
-        return read(one, names, "transition")
-    return exact_number("an entry", one)
+    used = model.known.used(matrix, of_step)
+    return matrix, Stepwise.compile(used, "transition", arguments, {"transition": numeric}, [*arguments])
 
 
 def _law(first: Any, size: int) -> Array:

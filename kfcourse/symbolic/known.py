@@ -16,10 +16,6 @@ from kfcourse.laws import Array
 from kfcourse.symbolic.codegen import Compiled, compile_function
 from kfcourse.symbolic.formula import symbol
 from kfcourse.symbolic.reading import ModelError, checked_name, exact_number, of_numbers, read, shown, table
-from kfcourse.symbolic.sense import not_computable
-
-CHECKED = 1000  # steps for which a variance is tried out
-SURE = 51  # steps of a run of the lab: a model whose variance fails before is refused as it is defined
 
 
 @dataclass(frozen=True)
@@ -34,14 +30,11 @@ class Known:
         Time between two steps, t = interval * k.
     inputs : dict
         Name to its values at the steps 0, 1, 2...
-    end : (float, str)
-        The first step at which a noise has no variance, and why; the model holds for the steps before.
     """
 
     symbols: tuple[sp.Symbol, ...] = ()
     interval: sp.Rational = sp.S.One
     inputs: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    end: tuple[float, str] = (np.inf, "")
 
     @classmethod
     def read(cls, interval: Any, inputs: Mapping[str, Sequence[float] | Array] | None) -> Known:
@@ -62,13 +55,11 @@ class Known:
 
     @property
     def steps(self) -> float:
-        """For how many steps the inputs have values and the noises variances; infinite if nothing ends."""
-        return min(self.end[0], *(len(values) for name, values in self.inputs.items() if symbol(name) in self.symbols), np.inf)
+        """For how many steps the inputs have values; infinite if nothing ends."""
+        return min([np.inf, *(len(values) for name, values in self.inputs.items() if symbol(name) in self.symbols)])
 
     def at(self, k: int) -> Array:
-        """Values of `symbols` at step k, (m,); ModelError if an input or a variance ends before."""
-        if k >= self.end[0]:
-            raise ModelError(f"{self.end[1]}; run at most {self.end[0]} steps, or change the formula")
+        """Values of `symbols` at step k, (m,); ModelError if an input ends before."""
         return np.array([self._value(s.name, k) for s in self.symbols])
 
     def _value(self, name: str, k: int) -> float:
@@ -138,92 +129,37 @@ def needed(k: int | None) -> int:
 
 
 def varying_law(
-    what: str,
-    given: Mapping[str, Any] | None,
-    noises: Sequence[sp.Symbol],
-    symbols: dict[str, sp.Symbol],
-    known: Known,
-    parameters: Mapping[sp.Symbol, sp.Rational],
-) -> tuple[dict[sp.Symbol, sp.Expr], dict[str, Any], Known]:
-    """A law of noises in which means and variances may be formulas of the step.
+    what: str, given: Mapping[str, Any] | None, noises: Sequence[sp.Symbol], symbols: dict[str, sp.Symbol]
+) -> tuple[dict[sp.Symbol, sp.Expr], dict[str, Any]]:
+    """A law of noises in which variances may be formulas of the step.
 
-    A noise with the mean m_k and the variance D_k is m_k + sqrt(D_k) v with a standard one: these go into the equations.
+    A noise with the mean m and the variance D_k is m + sqrt(D_k) v with a standard v: this goes into the equations.
 
     Returns
     -------
-    dict, dict, Known
-        What takes the place of each noise in the equations, the law that is left for it, and for which steps that holds.
+    dict, dict
+        What takes the place of each such noise in the equations, and the law that is left for the noises.
     """
-    law = table(what, given)
-    scale, shift = (_formulas(what, law.get(key), len(noises), symbols) for key in ("variance", "mean"))
-    if scale:
-        # A mean that is a number moves into the equations too, as the law's own is multiplied by the deviation.
-        means = _numbers(law.get("mean", 0.0), len(noises))
-        shift = {i: means[i] for i in scale if i < len(means)} | shift
-        law["mean"] = [0.0 if i in scale else one for i, one in enumerate(means)] if means else law.get("mean", 0.0)
-        law["variance"] = _without(scale, law["variance"], 1.0)
-        for i, variance in scale.items():
-            known = replace(known, end=min(known.end, _end_of(what, noises[i], variance, known, symbols, parameters)))
-    if shift:
-        law["mean"] = _without(shift, law["mean"], 0.0)
-    changed = {noises[i]: shift.get(i, 0) + sp.sqrt(scale.get(i, 1)) * noises[i] for i in {**scale, **shift}}
-    return changed, law, known
-
-
-def _numbers(given: Any, size: int) -> list[Any]:
-    """The entries of a list, or one number for all, exactly; formulas as they are; none if they do not fit, which `law` tells."""
-    entries = [given] * size if np.ndim(given) == 0 else [*given]
-    try:
-        return [one if _is_formula(one) else sp.Rational(str(float(one))) for one in entries]
-    except (TypeError, ValueError):
-        return []
-
-
-def _without(formulas: Mapping[int, sp.Expr], given: Any, instead: float) -> Any:
-    """What was given, with a number in the place of each formula."""
-    return instead if _is_formula(given) else [instead if i in formulas else one for i, one in enumerate(given)]
-
-
-def _formulas(what: str, given: Any, size: int, symbols: dict[str, sp.Symbol]) -> dict[int, sp.Expr]:
-    """The formulas among numbers, by the number of the component; one formula holds for all."""
-    entries = [given] * size if _is_formula(given) else [*given] if isinstance(given, Sequence) else []
+    law, size = table(what, given), len(noises)
+    variance = law.get("variance")
+    entries = [variance] * size if _is_formula(variance) else [*variance] if isinstance(variance, Sequence) else []
     if any(any(map(_is_formula, row)) for row in entries if isinstance(row, Sequence) and not isinstance(row, str)):
         raise ModelError(
             f"`{what}`: a covariance matrix cannot have formulas; write correlated noises that change with time into the "
             "equation, as in (1 + k)*v1 + k*v2"
         )
-    found = {i: read(one, symbols, what) for i, one in enumerate(entries) if _is_formula(one)}
-    if found and len(entries) != size:
-        raise ModelError(f"`{what}`: {len(entries)} entries for {size} noise(s); give one for each")
-    return found
+    formulas = {i: read(entry, symbols, what) for i, entry in enumerate(entries) if _is_formula(entry)}
+    if not formulas:
+        return {}, law
+    mean = law.get("mean", 0.0)
+    means = [mean] * size if np.ndim(mean) == 0 else [*mean]
+    if len(entries) != size or len(means) != size:
+        raise ModelError(f"`{what}`: {len(entries)} variances and {len(means)} means for {size} noise(s); give one for each")
+    law["mean"] = [0.0 if i in formulas else entry for i, entry in enumerate(means)]
+    law["variance"] = [1.0 if i in formulas else entry for i, entry in enumerate(entries)]
+    shift = {i: exact_number(f"`{what}`: mean", means[i]) for i in formulas}
+    return {noises[i]: shift[i] + sp.sqrt(formula) * noises[i] for i, formula in formulas.items()}, law
 
 
-def _is_formula(one: Any) -> bool:
-    return isinstance(one, str) or (isinstance(one, sp.Expr) and bool(one.free_symbols))
-
-
-def _end_of(
-    what: str,
-    noise: sp.Symbol,
-    variance: sp.Expr,
-    known: Known,
-    symbols: Mapping[str, sp.Symbol],
-    parameters: Mapping[sp.Symbol, sp.Rational],
-) -> tuple[float, str]:
-    """The first of many steps at which a variance is negative or not finite, and what to say then; ModelError if it is early."""
-    if problem := not_computable(sp.Matrix([variance]), parameters, {}):
-        raise ModelError(f"`{what}`: the variance of {noise}, {problem}")
-    numeric = sp.Matrix([variance.subs(parameters)])
-    used = replace(known, end=Known.end).used(numeric, {name: s for name, s in symbols.items() if s not in parameters})
-    steps = int(min(CHECKED, used.steps)) if used.symbols else 1  # the same at all steps
-    variance_at = Stepwise.compile(used, "variance", {}, {"variance": numeric}, [])
-    with np.errstate(all="ignore"):
-        for k in range(steps):
-            value = float(np.squeeze(variance_at.at(k)()[0]))
-            if not 0 <= value < np.inf:
-                wrong = "must be finite" if value > 0 else "must not be negative"
-                problem = f"`{what}`: the variance of {noise} is {value:g} at step {k}; it {wrong}"
-                if k < SURE:
-                    raise ModelError(problem)
-                return k, problem
-    return Known.end
+def _is_formula(entry: Any) -> bool:
+    return isinstance(entry, str) or (isinstance(entry, sp.Expr) and bool(entry.free_symbols))

@@ -111,8 +111,8 @@ class Model:
             Keys "x", "v", "w": lists of names.
         prior, state_noise, meter_noise : dict, optional
             Keys "mean" and "variance" (number, list of variances, or covariance matrix).  Standard
-            normal by default.  Means and variances of noises may be formulas of k, t, the inputs and the parameters, such as
-            "0.1 + 0.02*k": the noises are then standard, and these formulas go into the equations.
+            normal by default.  Variances of noises may be formulas of k, t, the inputs and the parameters, such as
+            "0.1 + 0.02*k": the noises are then standard, and the roots of the formulas go into the equations.
         angles : list of names, or dict, optional
             Components that are angles in radians, such as ["y2"], or {"x": ["psi"], "y": ["y2"]}: they are kept between -pi and
             pi, and every filter takes their innovations, means and errors the short way round.  [] says that there are none.
@@ -150,9 +150,8 @@ class Model:
             raise ModelError(f"{len(a)} state equation(s) but {len(x)} state symbol(s) {named['x']}; there must be one each")
         of_step = known.names([*values, *by_name(x, v, w)])
         constants = {name: symbol(name) for name in values} | of_step
-        numbers = {symbol(name): value for name, value in values.items()}
-        change_v, state_noise, known = varying_law("state_noise", state_noise, v, constants, known, numbers)
-        change_w, meter_noise, known = varying_law("meter_noise", meter_noise, w, constants, known, numbers)
+        change_v, state_noise = varying_law("state_noise", state_noise, v, constants)
+        change_w, meter_noise = varying_law("meter_noise", meter_noise, w, constants)
         state_equation = sp.ImmutableMatrix([read(f, constants | by_name(x, v), "state") for f in a]).subs(change_v)
         meter_equation = sp.ImmutableMatrix([read(f, constants | by_name(x, w), "meter") for f in b]).subs(change_w)
         model = cls(

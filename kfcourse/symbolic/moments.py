@@ -139,7 +139,7 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
     """
 
     names = {x.name for x in variables}
-    if strange := [one for one in sp.sympify(function).free_symbols - {*variables} if one.name in names]:
+    if strange := [symbol for symbol in sp.sympify(function).free_symbols - {*variables} if symbol.name in names]:
         raise ValueError(f"{strange[0]} in {function} is not the variable of that name: make both alike, such as real=True")
 
     # Hyperbolic and trigonometric functions of x become exponentials; those of parameters stay.
@@ -179,7 +179,7 @@ def decompose(function: sp.Expr, variables: Sequence[sp.Symbol]) -> list[Term]:
             raise _no_closed_form(sp.exp(exponent), function)
         collected[rate] = collected.get(rate, sp.S.Zero) + polynomial * _cis(constant)
     return [
-        Term(polynomial.xreplace(originals), tuple(one.xreplace(originals) for one in rate))
+        Term(polynomial.xreplace(originals), tuple(part.xreplace(originals) for part in rate))
         for rate, polynomial in collected.items()
     ]
 

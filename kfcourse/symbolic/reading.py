@@ -15,7 +15,7 @@ import sympy as sp
 from kfcourse.errors import ModelError
 from kfcourse.laws import Array, Gaussian
 from kfcourse.symbolic.formula import check_name, parse
-from kfcourse.symbolic.sense import is_covariance, unfit
+from kfcourse.symbolic.sense import is_covariance
 
 Formula: TypeAlias = str | sp.Expr
 Formulas: TypeAlias = Formula | Sequence[Formula] | sp.MatrixBase
@@ -127,8 +127,6 @@ def law(what: str, given: Mapping[str, Any] | None, size: int) -> Gaussian:
         raise ModelError(f"`{what}`: the covariance matrix must be symmetric, got {cov.tolist()}")
     if not is_covariance(cov):
         raise ModelError(f"`{what}`: negative variance in {cov.tolist()}")
-    if problem := unfit(mean, cov.diagonal()):
-        raise ModelError(f"`{what}`: {problem}")
     return Gaussian(mean, cov)
 
 

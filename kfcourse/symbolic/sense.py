@@ -15,9 +15,6 @@ from kfcourse.symbolic.formula import LARGEST, NO_NUMBERS, UNDECIDED, undecided
 if TYPE_CHECKING:
     from kfcourse.symbolic.model import Model
 
-ANGLE = 1e8  # radians; of a larger one a float keeps less than eight digits after the point
-DIGITS = 1e-13  # a deviation below this part of the mean keeps less than three of a float's 16 digits
-
 
 def is_covariance(cov: Array) -> bool:
     """Whether a symmetric matrix has no negative eigenvalue, in whatever units its components are."""
@@ -26,22 +23,6 @@ def is_covariance(cov: Array) -> bool:
     correlations = cov * scale[:, None] * scale
     rounding = 1e-12 * len(cov)  # of eigvalsh, and of a covariance that was itself computed
     return bool((variances >= 0).all() and np.linalg.eigvalsh(correlations).min() >= -rounding)
-
-
-def unfit(mean: Array, variances: Array) -> str:
-    """What is wrong with the sizes of a law's mean and variances; empty if nothing."""
-    for value in variances:
-        if value and not 1 / LARGEST <= value <= LARGEST:
-            return f"the variance {value:g} is beyond {1 / LARGEST:g} to {LARGEST:g}; change the units, or write 0 for no noise"
-    for middle, variance in zip(mean, variances, strict=True):
-        if middle and not LARGEST**-0.5 <= abs(middle) <= LARGEST**0.5:
-            return f"the mean {middle:g} is beyond {LARGEST**-0.5:g} to {LARGEST**0.5:g}; change the units"
-        if 0 < variance < (DIGITS * middle) ** 2:
-            return (
-                f"the variance {variance:g} is lost beside the mean {middle:g}, as numbers have 16 digits; "
-                "count from another zero, or write variance 0 for what is known exactly"
-            )
-    return ""
 
 
 def not_computable(equation: sp.MatrixBase, values: Mapping[sp.Symbol, sp.Expr], noise_means: Mapping[sp.Symbol, sp.Expr]) -> str:
@@ -89,8 +70,6 @@ def _unusable(formula: sp.Expr) -> str:
         size = abs(part if part.is_Rational else part.evalf(15))
         if part.is_real is False or not (size.is_Rational or size.is_Float):
             return f"has no finite real value with these parameters: {_short(part)}"
-        if isinstance(part, sp.sin | sp.cos | sp.tan) and abs(part.args[0]) > ANGLE:
-            return f"holds {_short(part)} with these parameters, an angle of so many turns that no digit of it is left"
         if size and not 1 / LARGEST <= size <= LARGEST:
             return f"holds the number {_short(sp.N(part, 3))} with these parameters, beyond 1e-100 to 1e100; change the units"
     return ""

@@ -14,11 +14,11 @@ predict/correct step serves them all.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial, reduce
 from itertools import product as cartesian
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 import sympy as sp
@@ -56,8 +56,6 @@ class Structure:
         The symbolic functions; None for the numerical structures.
     at_step : callable, optional
         Step to the structure of that step, if the model depends on it; see `at`.
-    moving : hashable, optional
-        Of numerical structures: the same for those that have the same tau and Theta.
 
     Covariances, G and h that do not depend on the trajectory may come without the leading axes.
     """
@@ -69,7 +67,6 @@ class Structure:
     transition: Callable[[Vectors, Matrices], Transition]
     formulas: StructuralFormulas | None = None
     at_step: Callable[[int], Structure] | None = None
-    moving: Hashable = None
 
     def at(self, k: int) -> Structure:
         """The structural functions of step k: tau and Theta from k to k + 1; h, G, F of y_k.
@@ -203,21 +200,18 @@ class StructuralFormulas:
 
 
 def of_steps(
-    name: str, model: Model, at: Callable[[int | None], Structure], formulas: StructuralFormulas | None = None
+    name: str,
+    model: Model,
+    at: Callable[[Any], Structure],
+    formulas: StructuralFormulas | None = None,
+    timed: bool = False,
 ) -> Structure:
-    """The structure at every step, or for a model that depends on it the one that `Structure.at` makes those of."""
-    return of_each_step(name, model, at, formulas) if model.timed else at(None)
-
-
-def of_each_step(
-    name: str, model: Model, at: Callable[[int], Structure], formulas: StructuralFormulas | None = None
-) -> Structure:
-    """The structure that `Structure.at` makes those of each step of."""
+    """The structure at every step; of what depends on the step the structure that `Structure.at` makes those of each step of."""
 
     def refused(mean: Vectors, cov: Matrices) -> NoReturn:
         raise ModelError(f"what is found of {model} depends on the step: say which, as in structure.at(k).predict(z, p)")
 
-    return Structure(name, model, refused, refused, refused, formulas, at)
+    return Structure(name, model, refused, refused, refused, formulas, at) if timed or model.timed else at(None)
 
 
 def _spread(law: Gaussian, over: Array, angles: Components) -> Gaussian:
@@ -284,7 +278,7 @@ def _taylor(equation, x, mean, noise, noise_mean):
     point = dict(zip(x, mean, strict=True)) | dict(zip(noise, noise_mean, strict=True))
     parts = [equation, equation.jacobian(sp.Matrix(x)), equation.jacobian(sp.Matrix(noise))]
     for part in parts:
-        if part.has(sp.Derivative, sp.DiracDelta) or any(jumps(one, [*x, *noise]) for one in equation.atoms(sp.Piecewise)):
+        if part.has(sp.Derivative, sp.DiracDelta) or any(jumps(choice, [*x, *noise]) for choice in equation.atoms(sp.Piecewise)):
             raise NoClosedForm(
                 f"{list(equation)} is not differentiable and cannot be linearised; use unscented(model) or gauss_hermite(model)",
                 "no_slope",
@@ -348,37 +342,5 @@ def expect_each(structures: Sequence[Structure], what: str) -> None:
     """TypeError unless these are structural functions, a list of them."""
     if isinstance(structures, Structure):
         raise TypeError(f"{what} expects a list of structures, one a mode, and one came: give [{structures.name}, ...]")
-    for one in structures:
-        expect(one, Structure, what)
-
-
-def moving_alike(structures: Sequence[Structure]) -> list[int]:
-    """For each mode the first one with the same tau and Theta: of meters that fail, say, there is one object."""
-    keys = [_object(one) for one in structures]
-    return [next(i for i, other in enumerate(keys) if other == key) for key in keys]
-
-
-def _object(one: Structure) -> object:
-    """What tau and Theta hang on; of structures that do not tell they are nobody else's."""
-    if one.formulas is None:
-        return one.moving or id(one)
-    return one.name, *(part.tobytes() for part in one.model.state_noise), *object_equation(one.model)
-
-
-def object_equation(model: Model) -> tuple[Hashable, ...]:
-    """Equal for models with the same state equation: its numbers, its symbols in their order, its interval and inputs."""
-    known = model.known
-    return model.x, model.v, model.state_equation.subs(model.values), known.interval, tuple(known.inputs.items())
-
-
-def each_once(now: Sequence[Structure], alike: Sequence[int]) -> Callable[[int, Gaussian], Gaussian]:
-    """(mode, law) -> N(tau, Theta) of the next state, found once for modes that move alike."""
-    found: dict[tuple[int, int], tuple[Gaussian, Gaussian]] = {}
-
-    def predict(j: int, law: Gaussian) -> Gaussian:
-        key = alike[j], id(law)
-        if key not in found:
-            found[key] = law, now[j].predict(*law)  # while it is kept, no other law has its id
-        return found[key][1]
-
-    return predict
+    for structure in structures:
+        expect(structure, Structure, what)

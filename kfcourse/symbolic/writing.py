@@ -92,10 +92,11 @@ class _Writer:
             return expression.func(*map(self.arranged, expression.args), evaluate=False)
         return expression
 
-    def factor_key(self, factor: sp.Expr) -> tuple[int, int, str]:
+    def factor_key(self, factor: sp.Expr) -> tuple[bool, bool, int, str]:
         ranks = [self.rank[symbol] for symbol in factor.free_symbols if symbol in self.rank]
-        kind = 0 if factor.is_number else 1 if not ranks else 2
-        return kind, max(ranks, default=0), str(factor)
+        # functions last, or what follows would seem to be in the argument: g cos m d
+        last = isinstance(factor.as_base_exp()[0], sp.Function)
+        return last, not factor.is_number, max(ranks, default=-1), str(factor)
 
     def terms(self, total: sp.Add) -> list[sp.Expr]:
         """Terms with the same parameters together: first the group with the shortest, earliest term; in it powers fall."""

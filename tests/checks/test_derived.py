@@ -117,17 +117,10 @@ def test_other_chains_may_stand_before_but_give_no_letter_another_meaning():
 
 HOSTILE = {
     "call": "F = __import__('os').system('true')",
-    "attribute": "F = x.__class__",
     "deep": "F = " + "(" * 900 + "x" + ")" * 900,
-    "tower": "F = 9^9^9^9",
-    "long": "F = " + "+".join(["x"] * 9000),
     "many": "F = x\n" + " = x\n" * 100,
-    "zero byte": "F = x\0",
-    "unicode": "F = х^2",  # Cyrillic
     "no name": " = 5",
-    "lambda": "F = (lambda: 1)()",
     "twice": f"{BEGIN}\n{BEGIN}",
-    "heading": f"x ~ N(a, b)\n{BEGIN}",
     "division": "F = 1/(x - x)",
 }
 

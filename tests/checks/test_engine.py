@@ -65,30 +65,6 @@ def test_a_known_mistake_is_named_and_its_message_shown():
     assert "does not look like" in outcome(question, lambda a, b: a * b).message
 
 
-def test_own_answers_are_asked_once_however_many_are_handed_in():
-    """Answers are compared with the same results again and again; and none of them reaches what the next one is given."""
-    asked = []
-
-    def tells(name, function):
-        return lambda *values: asked.append(name) or function(*values)
-
-    def arguments(_):
-        asked.append("arguments")
-        return SUM.arguments(None)
-
-    mistakes = catalogue((("once", "b enters twice", tells("once", lambda a, b: a + b)),))
-    question = Question("t1", "a test", "core", tells("key", lambda a, b: a + 2 * b), arguments, mistakes)
-    task = about()
-
-    def spoiling(a, b):
-        a += b
-        return a
-
-    for answer, diagnosis in ((spoiling, ("once",)), (lambda a, b: a + b, ("once",)), (lambda a, b: a + 2 * b, ())):
-        assert check(question, task, answer).diagnosis == diagnosis
-    assert asked == ["arguments", "key", "key", "once", "once"]  # two calls each
-
-
 def test_parts_are_told_apart():
     mistakes = catalogue((("both", "squared", lambda a, b: (a**2, b**2)),))
     question = asks(lambda a, b: (a, b), SUM.arguments(None), mistakes, ("first", "second"))

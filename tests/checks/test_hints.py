@@ -71,11 +71,6 @@ def test_the_same_is_said_once():
     assert message == "not right. sum, product: It is twice what it should be."
 
 
-def test_results_in_another_order_may_have_other_shapes():
-    question = asks(lambda a: (a[0], a), [(np.ones((2, 2)),)], parts=("row", "all"))
-    assert "another order" in outcome(question, lambda a: (a, a[0])).message
-
-
 @pytest.mark.filterwarnings("ignore:the matrix subclass")
 def test_other_forms_are_right():
     assert outcome(PAIR, lambda a, b: np.array([a + b, a * b])).passed
@@ -118,3 +113,8 @@ def test_what_is_not_finite_does_not_reach_lapack(capfd):
     wrong = outcome(fitted, lambda a: np.array([1.0, 2.0]))
     assert wrong.diagnosis == ("unused",)
     assert capfd.readouterr() == ("", "")
+
+
+def test_results_in_another_order_may_have_other_shapes():
+    question = asks(lambda a: (a[0], a), [(np.ones((2, 2)),)], parts=("row", "all"))
+    assert "another order" in outcome(question, lambda a: (a, a[0])).message

@@ -150,11 +150,6 @@ def test_an_argument_that_cancels_in_the_right_answer_may_stand_in_a_wrong_one()
     assert "depend" not in outcome(question, lambda a, b: a**2 + b**3).message
 
 
-def test_an_integer_is_used_if_any_change_of_it_tells():
-    question = asks(lambda a, k: a ** (1 + k % 3), [(1.7, 1)])
-    assert "depend" not in outcome(question, lambda a, k: a * (1 + k % 2) + 0.3 * (k > 2)).message
-
-
 def test_an_example_of_a_step_shows_the_rows_beside_it() -> None:
     """An interval is the difference of two rows: from one alone nobody sees what is wrong."""
     times, wrong = np.array([5.0, 7.0, 8.0]), np.array([2.0, 1.0, 7.0])

@@ -166,6 +166,18 @@ def test_of_a_first_line_the_definition_is_the_hint_and_nothing_of_the_key_is_sh
     assert "g*m" not in found.says
 
 
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("exp(d/2)*sin(m)", "a sign in `exp(d/2)`"),
+        ("sin(m)", "`sin(m)` is not right: the mean of a function"),
+        ("exp(-d)*sin(m)", "a number in `d`"),
+    ],
+)
+def test_the_mean_of_a_sine(line, says):
+    assert says in verdict_of(f"variant 5\nS = M[sin(x)]\n = {line}").says
+
+
 def test_a_noise_forgotten_and_a_noise_of_mean_one():
     start = f"{HEAD}F = M[(g*x + f*x^2*w - g*m)^2]\n = "
     assert verdict_of(start + "g^2*M[(x-m)^2]").kinds == ("noise-forgotten",)

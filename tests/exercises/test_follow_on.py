@@ -1,6 +1,5 @@
 """A right step on top of a student's own wrong one is marked and said: keys call earlier answers by their names."""
 
-import numpy as np
 import pytest
 
 from kfcourse.checks import Derivation, exercise, sets
@@ -42,24 +41,3 @@ def test_on_top_of_a_wrong_answer_the_right_step_follows(letter, question, step,
         pytest.fail(f"no mistake of {earlier.name} changes {question.name}")
     task.check(earlier.name, earlier.answer(task))
     assert not task.check(question.name, built).follows  # the step before is right now
-
-
-def test_a_step_with_a_wrong_gain_in_words():
-    task = exercise("b", "53")
-
-    def gain(Psi, G, F):
-        return Psi @ np.swapaxes(G, -1, -2)
-
-    def correct(lam, Psi, h, G, F, y):
-        K = gain(Psi, G, F)
-        return lam + (K @ (y - h)[..., None])[..., 0], Psi - K @ G @ Psi
-
-    def step(lam, Psi, y, measure, predict):
-        z, p = correct(lam, Psi, *measure(lam, Psi), y)
-        return z, p, *predict(z, p)
-
-    assert task.check("b1", gain).diagnosis == ("gain-not-divided",)
-    assert task.check("b2", correct).follows == ("b1",)
-    told = task.check("b3", step)
-    assert told.follows == ("b1", "b2")
-    assert "right on top of your b1 and b2" in told.message

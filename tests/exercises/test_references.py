@@ -7,12 +7,10 @@ from scipy.integrate import solve_ivp
 
 from kfcourse import Model, gaussian, linearised, predictions, run, simulate
 from kfcourse.checks import exercise
-from kfcourse.continuous import ContinuousModel, coarsen, extended_kalman_bucy, steady_state
-from kfcourse.continuous import simulate as simulate_continuous
+from kfcourse.continuous import ContinuousModel, steady_state
 from kfcourse.exercises.f_exact import companion
 from kfcourse.exercises.f_exact import keys as grid
 from kfcourse.exercises.g_extended import keys as extended
-from kfcourse.exercises.g_extended import questions as extended_questions
 from kfcourse.exercises.g_extended.companion import linearisation
 from kfcourse.exercises.g_extended.hidden import hidden_functions
 from kfcourse.exercises.h_continuous import keys as continuous_time
@@ -20,7 +18,7 @@ from kfcourse.exercises.h_continuous import questions as continuous_questions
 from kfcourse.exercises.o_modes import keys as modes
 from kfcourse.exercises.o_modes import questions as modes_questions
 from kfcourse.exercises.p_find_the_slip import keys as slips
-from kfcourse.filters import alphabeta, aof, kalman_filter, logic_dynamic, pointmass
+from kfcourse.filters import alphabeta, aof, kalman_filter, logic_dynamic
 from kfcourse.lab.variants import find_variant, load_variants
 from kfcourse.laws import Gaussian
 from kfcourse.linear.consistency import innovations, nees, nis
@@ -43,18 +41,6 @@ def test_the_grid_is_the_kalman_filter_on_a_linear_model():
     F = 1.7**2 * before.cov[:, 0, 0, 0] + 0.49
     logs = -0.5 * ((y[:, 0, 0] - 1.7 * before.mean[:, 0, 0]) ** 2 / F + np.log(2 * np.pi * F))
     assert total == pytest.approx(np.nansum(logs), abs=1e-11)
-
-
-def test_the_grid_is_the_exact_filter_on_a_nonlinear_model():
-    e = exercise("f", "21")
-    model = companion.scalar_model(e)
-    assert e.numbers and model is not e.model
-    y = simulate(model, 1, 6, seed=5).y
-    x = np.linspace(-7, 7, 900)
-    z, p, _ = grid.run_filter(y[:, 0, 0], x, grid.normal(x, *(q.item() for q in model.prior)), *companion.laws(model))
-    exact = run(pointmass(model, accuracy=1e-6), y)
-    np.testing.assert_allclose(z, exact.mean[:, 0, 0], atol=2e-6)
-    np.testing.assert_allclose(p, exact.cov[:, 0, 0, 0], rtol=4e-6)  # the accuracy asked for, over six steps
 
 
 @pytest.mark.parametrize("name", sorted(load_variants()))
@@ -91,16 +77,6 @@ def test_hidden_jacobians_are_derivatives():
         assert np.linalg.eigvalsh(one.D_n(x)).min() > 0
 
 
-def test_the_information_form_is_the_gain_form():
-    for W, H, D_n in extended_questions.information_arguments(exercise("g", "21")):
-        p, K = extended.information(W, H, D_n)
-        W, H, D_n, p, K = (m[1:] for m in (W, H, D_n, p, K))  # the first has no prior
-        Psi, T = np.linalg.inv(W), np.swapaxes(H, -1, -2)
-        gain = Psi @ T @ np.linalg.inv(H @ Psi @ T + D_n)
-        np.testing.assert_allclose(K, gain, atol=1e-10)
-        np.testing.assert_allclose(p, Psi - gain @ H @ Psi, atol=1e-10)
-
-
 def riccati(t, D, a, s, h, S_xi, N):
     return -2 * a * D + s * s * S_xi / 2 - 2 * h * h / N * D**2
 
@@ -117,45 +93,6 @@ def test_continuous_numbers():
         assert abs(continuous_time.riccati(*scalar).item()) < 1e-9
         late = solve_ivp(riccati, (0, 60), [3.0], args=tuple(arguments), rtol=1e-10, atol=1e-12)
         assert late.y[0, -1] == pytest.approx(float(D), rel=1e-6)
-
-
-def test_the_continuous_step_tends_to_the_package_s_filter():
-    model = ContinuousModel.define(
-        "-a*x", "s", "sin(x)", dict(a=0.5, s=0.8), prior={"variance": 0.5}, spectral_density=2, noise_density=0.3
-    )
-    fine = simulate_continuous(model, 1 / 2048, 2048, 20, seed=3)
-    distance = []
-    for factor in (32, 8):
-        path = coarsen(fine, factor)
-        z, D = np.zeros(20), np.full(20, 0.5)
-        for y in path.y[..., 0]:
-            z, D = continuous_time.filter_step(
-                z, D, y, path.step, lambda x: -0.5 * x, lambda x: -0.5 + 0 * x, lambda x: 0.8 + 0 * x, np.sin, np.cos, 2.0, 0.3
-            )
-        padded = np.concatenate([path.y, np.full((1, 20, 1), np.nan)])
-        law = predictions(extended_kalman_bucy(model, path.step), padded)
-        distance.append(max(np.abs(z - law.mean[-1, :, 0]).max(), np.abs(D - law.cov[-1, :, 0, 0]).max()))
-    assert distance[0] < 0.1
-    assert distance[1] < 0.6 * distance[0]  # both schemes tend to the same equations
-
-
-def test_simulated_moments():
-    rng = np.random.default_rng(4)
-    runs, T, a, s, S_xi, N = 20_000, 0.02, 0.7, 0.9, 2.2, 0.3
-    x = rng.normal(size=runs) * np.sqrt(s * s * S_xi / (4 * a))
-    for _ in range(50):
-        x, _ = continuous_time.simulate_step(
-            x, rng.normal(size=runs), rng.normal(size=runs), T, lambda x: -a * x, lambda x: s + 0 * x, lambda x: x, S_xi, N
-        )
-    # stationary variance s^2 S/(4a), Euler's bias a T/2 = 0.7 %, standard error sqrt(2/runs) = 1 %: four of them
-    assert np.var(x) == pytest.approx(s * s * S_xi / (4 * a), rel=0.047)
-
-
-def test_derivatives():
-    x, y, N = sp.symbols("x y N", real=True)
-    u, U = continuous_time.derivatives(sp.sin(x), x, y, N)
-    assert sp.simplify(u - 2 * sp.cos(x) * (y - sp.sin(x)) / N) == 0
-    assert sp.simplify(U + 2 * sp.cos(x) ** 2 / N + 2 * sp.sin(x) * (y - sp.sin(x)) / N) == 0
 
 
 @pytest.mark.parametrize("variant", ["53", "21"])

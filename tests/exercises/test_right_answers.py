@@ -6,7 +6,7 @@ import sympy as sp
 from numpy import matrix_transpose as T
 from scipy.integrate import quad
 from scipy.linalg import solve_discrete_are
-from scipy.stats import chi2, norm
+from scipy.stats import chi2
 from sympy import cos, sin
 
 from kfcourse.checks import exercise
@@ -85,28 +85,6 @@ def f2_by_logarithms(predicted, y, x, see):
     return scaled / mass, mass * np.exp(exponent.max())
 
 
-def f3_by_loop(posterior, x, move):
-    following = np.zeros_like(x)
-    for weight, mean, variance in zip(posterior, *move(x), strict=True):
-        following += weight * norm.pdf(x, mean, np.sqrt(variance))
-    return following * (x[1] - x[0])
-
-
-def g1_by_loops(function, x, h):
-    result = np.empty((len(x), function(x).shape[1], x.shape[1]))
-    for j in range(x.shape[1]):
-        right, left = x.copy(), x.copy()
-        right[:, j] += h
-        left[:, j] -= h
-        result[:, :, j] = (function(right) - function(left)) / 2 / h
-    return result
-
-
-def h2_by_variances(x, xi, n, T, f, g, S, S_xi, N):
-    v, w = S_xi / 2 / T, N / 2 / T
-    return x + (f(x) + g(x) * v**0.5 * xi) * T, S(x) + w**0.5 * n
-
-
 def h4_solved(a, s, h, S_xi, N):
     D = sp.Symbol("D", positive=True)
     roots = sp.solve(-2 * a * D + s**2 * S_xi / 2 - D**2 * h**2 * 2 / N, D)
@@ -119,13 +97,6 @@ def i3_solved(y0, y1, y2, dt):
     equations = [r - v * k * dt + a * (k * dt) ** 2 / 2 - y for k, y in ((0, y2), (1, y1), (2, y0))]
     found = sp.solve(equations, [r, v, a])
     return found[r], found[v], found[a]
-
-
-def i4_by_information(z, p, u, y, A, B, H, Q, R):
-    lam = B @ u + A @ z
-    Psi = Q + A @ p @ A.T
-    new = np.linalg.inv(np.linalg.inv(Psi) + H.T @ np.linalg.inv(R) @ H)
-    return lam, Psi, lam + new @ H.T @ np.linalg.inv(R) @ (y - H @ lam), new
 
 
 def i5_column_by_column(lam, S, y, H, R):
@@ -160,17 +131,6 @@ def j3_by_the_filter(alpha):
     return K[1], index
 
 
-def j4_matrices(y, T, alpha, beta, r, v):
-    A, K, H = np.array([[1, T], [0, 1]]), np.array([[alpha], [beta / T]]), np.array([[1, 0]])
-    s = np.array([r, v])[:, None, :] * np.ones((1, y.shape[1], 1))
-    found = []
-    for row in y:
-        s = s + np.einsum("ij,jnc->inc", K, row[None] - np.einsum("ij,jnc->inc", H, s))
-        found.append(s)
-        s = np.einsum("ij,jnc->inc", A, s)
-    return tuple(np.array(found).transpose(1, 0, 2, 3))
-
-
 def j5_solved(a, T, alpha, beta):
     e, d = sp.symbols("e d")
     before = e + T * d + a * T**2 / 2
@@ -187,62 +147,10 @@ def k2_through_p(sigma_xi, sigma_n):
     return p + sigma_xi**2, p, -p / sigma_n**2
 
 
-def k3_velocity_carried_on(y_ins, y_sr, sigma_xi, sigma_n, p0):
-    """The velocity itself is carried on by the differences of the INS."""
-    V, Psi, found, variances = y_ins[0], p0, [], []
-    for k, sr in enumerate(y_sr):
-        if k:
-            V, Psi = V + y_ins[k] - y_ins[k - 1], Psi + sigma_xi**2
-        weight = 0.0 if np.isnan(sr).any() else Psi / (Psi + sigma_n**2)
-        V, Psi = V + weight * (np.nan_to_num(sr) - V), Psi * (1 - weight)
-        found.append(V)
-        variances.append(Psi)
-    return np.array(found), np.array(variances)
-
-
-def l1_by_slice(steps, ratio, first):
-    sizes = np.ones(steps)
-    sizes[first::ratio] += 1
-    return sizes
-
-
-def l3_by_information(m, P, y, H, R):
-    use = ~np.isnan(y)
-    W = H[use].T @ np.linalg.inv(R[np.ix_(use, use)]) if use.any() else np.zeros((len(m), 0))
-    new = np.linalg.inv(np.linalg.inv(P) + W @ H[use])
-    return new @ (np.linalg.inv(P) @ m + W @ y[use]), new
-
-
-def l4_in_small_steps(m, P, dt, q):
-    for part in (0.25, 0.5, 0.25):
-        t = part * dt
-        P = np.array(
-            [
-                [P[0, 0] + 2 * t * P[0, 1] + t**2 * P[1, 1] + q * t**3 / 3, P[0, 1] + t * P[1, 1] + q * t**2 / 2],
-                [P[0, 1] + t * P[1, 1] + q * t**2 / 2, P[1, 1] + q * t],
-            ]
-        )
-        m = m + t * np.array([m[1], 0])
-    return m, P
-
-
 def l6_from_the_motion(V, a, tau):
     t = sp.Symbol("t")
     s = V * t + a * t**2 / 2
     return s.subs(t, -tau) - s.subs(t, 0), sp.diff(s, t).subs(t, -tau) - V
-
-
-def l7_normal_equations(edges, stamps):
-    A = np.column_stack([stamps, np.ones(len(stamps))])
-    slope, level = np.linalg.lstsq(A, edges, rcond=None)[0]
-    return 1 / slope, -level / slope
-
-
-def m3_by_blocks(p, A, Q):
-    """The joint covariance of both states, cut into blocks."""
-    lift = np.vstack([np.eye(2), A])
-    joint = lift @ p @ lift.T + np.block([[np.zeros((2, 4))], [np.zeros((2, 2)), Q]])
-    return joint[:2, 2:], joint[:2, 2:] @ np.linalg.inv(joint[2:, 2:])
 
 
 def m5_at_once(z, p, ahead, Psi, A, Q):
@@ -264,41 +172,9 @@ def m5_at_once(z, p, ahead, Psi, A, Q):
     return (P @ b).reshape(steps, n), np.array([P[k * n : k * n + n, k * n : k * n + n] for k in range(steps)])
 
 
-def m6_loop(y, z, p):
-    total, count = 0.0, 0
-    for value, mean, variance in zip(y, z, p, strict=True):
-        if not np.isnan(value):
-            total, count = total + value**2 - 2 * value * mean + mean**2 + variance, count + 1
-    return total / count
-
-
-def n1_by_loop(times):
-    found = [times[k + 1] - times[k] for k in range(len(times) - 1)]
-    return [*found, found[-1]]
-
-
-def n2_in_two_halves(dt, q):
-    """What the first half has added is carried over the second."""
-    found = []
-    for t in dt / 2:
-        half, A = q * np.array([[t**3 / 3, t**2 / 2], [t**2 / 2, t]]), np.array([[1, t], [0, 1]])
-        found.append(A @ half @ A.T + half)
-    return np.stack(found)
-
-
 def n4_by_whitening(nu, F, probability):
     white = np.stack([np.linalg.solve(np.linalg.cholesky(cov), entry) for entry, cov in zip(nu, F, strict=True)])
     return np.linalg.norm(white, axis=1) ** 2, -chi2.isf(1 - probability, 3) * -1
-
-
-def n6_by_loop(nu, F):
-    last, products = None, []
-    for entry, variance in zip(nu, F, strict=True):
-        if np.isfinite(entry):
-            if last is not None:
-                products.append(last * entry / np.sqrt(variance))
-            last = entry / np.sqrt(variance)
-    return sum(products) / len(products), 1 / np.sqrt(len(products))
 
 
 def one_time(variance, q):
@@ -352,32 +228,17 @@ RIGHT = [
     ("r4", "53", lambda p, A, D, T: p * A**2 / (2 * D) / (2 * np.pi * T)),  # pi with the digits of a float
     ("r5", "53", lambda variance, q: np.array([one_time(s, q) for s in variance])),
     ("f2", "53", f2_by_logarithms),
-    ("f3", "53", f3_by_loop),
-    ("g1", "53", g1_by_loops),
-    ("h2", "53", h2_by_variances),
     ("h4", "53", h4_solved),
     ("i3", "53", i3_solved),
-    ("i4", "53", i4_by_information),
     ("i5", "53", i5_column_by_column),
     ("j1", "53", j1_by_rotations),
     ("j3", "53", j3_by_the_filter),
-    ("j4", "53", j4_matrices),
     ("j5", "53", j5_solved),
     ("j6", "53", j6_closed),
     ("k2", "53", k2_through_p),
-    ("k3", "53", k3_velocity_carried_on),
-    ("l1", "53", l1_by_slice),
-    ("l3", "53", l3_by_information),
-    ("l4", "53", l4_in_small_steps),
     ("l6", "53", l6_from_the_motion),
-    ("l7", "53", l7_normal_equations),
-    ("m3", "53", m3_by_blocks),
     ("m5", "53", m5_at_once),
-    ("m6", "53", m6_loop),
-    ("n1", "53", n1_by_loop),
-    ("n2", "53", n2_in_two_halves),
     ("n4", "53", n4_by_whitening),
-    ("n6", "53", n6_by_loop),
 ]
 
 

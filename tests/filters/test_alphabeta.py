@@ -1,20 +1,17 @@
-"""Alpha-beta(-gamma) filters against the Riccati equation, filterpy, plain floats, and their own errors in simulation."""
+"""Alpha-beta(-gamma) filters against the Riccati equation and plain floats."""
 
 import control
 import numpy as np
 import pytest
-from filterpy.gh import GHFilter, GHKFilter
 
 from kfcourse import Gaussian, Model, ModelError, run, simulate
 from kfcourse.filters.alphabeta import (
     alpha_beta,
     alpha_beta_gamma,
-    growing_memory,
     steady_alpha,
     steady_beta,
     tracking_index,
 )
-from kfcourse.linear import covariances
 from kfcourse.linear.system import linear_system
 from kfcourse.scenarios.radar import kinematic
 
@@ -42,16 +39,6 @@ def test_the_coefficients_are_the_stationary_kalman_gain(alpha, order):
     np.testing.assert_allclose(gain[:, 0], np.array([alpha, beta / T, gamma / (2 * T**2)])[: order + 1], rtol=1e-6)
 
 
-def test_alpha_and_index_are_inverse():
-    for index in (1e-9, 1e-3, 0.2, 1.0, 50.0):
-        assert tracking_index(steady_alpha(index)) == pytest.approx(index, rel=1e-9)
-    # the textbook's form of the same formula, which cancels for a small index
-    index = 0.8
-    textbook = -(index**2 + 8 * index - (index + 4) * np.sqrt(index**2 + 8 * index)) / 8
-    assert steady_alpha(index) == pytest.approx(textbook, rel=1e-14)
-    assert steady_beta(0.6) == pytest.approx(2 * (2 - 0.6) - 4 * np.sqrt(1 - 0.6), rel=1e-14)
-
-
 # --- the estimates
 
 
@@ -60,33 +47,6 @@ PRIOR = {"mean": [4.0, -7.0, 3.0, 1.5], "variance": [50.0, 30.0, 9.0, 4.0]}
 
 def planar(**changes):
     return kinematic(**(dict(interval=T, dimensions=2, noise_sd=0.8, measurement_sd=5.0, prior=PRIOR) | changes))
-
-
-def test_alpha_beta_from_a_prior_is_filterpys():
-    model, alpha, beta = planar(), 0.4, 0.15
-    y = simulate(model, 3, 25, seed=1).y
-    found = run(alpha_beta(model, alpha, beta, start="prior"), y).mean
-    for trajectory in range(3):
-        for axis in range(2):
-            # filterpy predicts first: it starts a step earlier
-            r, s = PRIOR["mean"][axis], PRIOR["mean"][axis + 2]
-            reference = GHFilter(x=r - T * s, dx=s, dt=T, g=alpha, h=beta)
-            for k, value in enumerate(y[:, trajectory, axis]):
-                expected = reference.update(value)
-                np.testing.assert_allclose(found[k, trajectory, axis::2], expected, rtol=0, atol=100 * ROUNDING)
-
-
-def test_alpha_beta_gamma_from_a_prior_is_filterpys():
-    alpha, beta, gamma = 0.5, 0.3, 0.12
-    model = kinematic(T, dimensions=1, order=2, noise_sd=0.5, measurement_sd=4.0, prior={"mean": [0.0, 2.0, 0.0]})
-    y = simulate(model, 2, 25, seed=2).y
-    found = run(alpha_beta_gamma(model, alpha, beta, gamma, start="prior"), y).mean
-    for trajectory in range(2):
-        reference = GHKFilter(x=-T * 2.0, dx=2.0, ddx=0.0, dt=T, g=alpha, h=beta, k=gamma / 4)  # its gain is 2 k / T^2
-        for k, value in enumerate(y[:, trajectory, 0]):
-            reference.update(value)
-            expected = [reference.x, reference.dx, reference.ddx]
-            np.testing.assert_allclose(found[k, trajectory], expected, rtol=0, atol=100 * ROUNDING)
 
 
 def slow_alpha_beta(measurements, alpha, beta, growing):
@@ -125,20 +85,6 @@ def test_the_start_from_two_measurements_with_gaps_by_a_slow_loop(gains):
                     np.testing.assert_allclose(found[k, trajectory, axis::2], values, rtol=0, atol=1e3 * ROUNDING)
 
 
-def test_the_start_from_three_measurements_is_the_parabola_through_them():
-    model = kinematic(T, dimensions=1, order=2, prior={"mean": [1.0, 2.0, 3.0]})
-    y = np.array([2.0, np.nan, 5.0, 1.0, np.nan])[:, None, None]
-    found = run(alpha_beta_gamma(model, 0.5, 0.3, 0.1), y)
-    times = T * np.array([0, 2, 3])
-    parabola = np.polynomial.Polynomial.fit(times, [2.0, 5.0, 1.0], 2)
-    for k in (3, 4):  # at the third measurement, and coasting
-        expected = [parabola.deriv(d)(T * k) if d else parabola(T * k) for d in range(3)]
-        np.testing.assert_allclose(found.mean[k, 0], expected, rtol=1e-11)
-    # Two do not tell the acceleration: it is still the prior's, 3, and the velocity is such that both lie on the parabola.
-    speed = (5.0 - 2.0) / (2 * T) + 3.0 * 2 * T / 2
-    np.testing.assert_allclose(found.mean[2, 0], [5.0, speed, 3.0], rtol=1e-11)
-
-
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_growing_memory_is_the_polynomial_through_all_measurements(order):
     """Small coefficients leave the growing memory in force; NumPy's least squares."""
@@ -154,69 +100,7 @@ def test_a_growing_memory_is_the_polynomial_through_all_measurements(order):
         np.testing.assert_allclose(found[k], expected, rtol=1e-8, atol=1e-8)
 
 
-def test_growing_gains_come_to_the_constants_and_leave_the_kalman_filter_of_a_diffuse_prior_little():
-    model = planar(noise_sd=0.4, measurement_sd=50.0, prior={"mean": PRIOR["mean"], "variance": 1e8})
-    alpha = steady_alpha(0.4 * T**2 / 50.0)
-    one = alpha_beta(model, alpha, steady_beta(alpha))
-    y = simulate(model, 2, 300, seed=9).y
-    system, _, _ = linear_system(model)
-    best = covariances(system, model.prior.cov, 300).posterior[:, 0, 0]
-    growing, constant = (
-        run(alpha_beta(model, alpha, steady_beta(alpha), gains=g), y).cov[:, 0, 0, 0] for g in (None, "constant")
-    )
-    assert (growing[2:] >= best[2:] * (1 - 1e-6)).all()  # no gain does better than Kalman's
-    assert growing[2:].sum() < 1.15 * best[2:].sum()
-    assert constant[2:].sum() > 10 * best[2:].sum()
-    np.testing.assert_allclose(growing[-1], best[-1], rtol=1e-6)
-    assert one.name == "alpha-beta"
-
-
-@pytest.mark.parametrize(("size", "k"), [(2, 2), (3, 3)])
-def test_the_growing_memory_begins_with_the_polynomial_through_the_first_measurements(size, k):
-    expected = {2: [1, 1], 3: [1, 1.5, 2]}[
-        size
-    ]  # y_2 and y_2 - y_1; 3/2 y_3 - 2 y_2 + y_1/2 and the second difference, gamma/2 = 1
-    np.testing.assert_allclose(growing_memory(np.array(k), size), expected, rtol=1e-15)
-
-
 # --- the covariance
-
-
-@pytest.mark.parametrize("order", [1, 2])
-def test_the_covariance_from_a_prior_is_that_of_covariance_analysis(order):
-    coefficients = (0.4, 0.15, 0.05)[: order + 1]
-    model = planar(order=order, prior={"variance": np.diag(np.arange(1.0, 2 * order + 3)) + 0.2})
-    make = alpha_beta if order == 1 else alpha_beta_gamma
-    found = run(make(model, *coefficients, start="prior"), simulate(model, 2, 60, seed=1).y).cov
-    gain = np.kron((np.array([1, 1 / T, 1 / (2 * T**2)])[: order + 1] * coefficients)[:, None], np.eye(2))
-    system, _, _ = linear_system(model)
-    expected = covariances(system, model.prior.cov, 60, gain).posterior
-    np.testing.assert_allclose(found[:, 1], expected, rtol=1e-10, atol=1e-12)
-
-
-def test_the_covariance_after_two_measurements_in_closed_form():
-    sigma, noise_sd = 5.0, 8.0
-    model = planar(noise_sd=noise_sd, measurement_sd=sigma)
-    found = run(alpha_beta(model, 0.3, 0.05), simulate(model, 1, 2, seed=4).y).cov[1, 0]
-    expected = [[sigma**2, sigma**2 / T], [sigma**2 / T, 2 * sigma**2 / T**2 + noise_sd**2 * T**2 / 4]]
-    np.testing.assert_allclose(found, np.kron(expected, np.eye(2)), rtol=1e-12, atol=1e-9)
-
-
-@pytest.mark.parametrize("missing", [False, True])
-def test_the_covariance_is_the_scatter_of_the_errors(missing):
-    model = planar(noise_sd=6.0)
-    runs, steps = 4000, 30
-    x, y = simulate(model, runs, steps, seed=5)
-    if missing:
-        y[[2, 9, 10]] = np.nan
-        y[15, :, 1] = np.nan
-    found = run(alpha_beta(model, 0.35, 0.1), y)
-    error = (x - found.mean)[1:]
-    scatter = np.einsum("kri,krj->kij", error, error) / runs
-    claimed = found.cov[1:, 0]
-    sd = np.sqrt(np.diagonal(claimed, axis1=1, axis2=2))
-    # entries of a sample covariance have standard errors of at most sqrt(2 / runs) of s_i s_j; 5 of them for some 500 entries
-    assert (np.abs(scatter - claimed) < 5 * np.sqrt(2 / runs) * sd[:, :, None] * sd[:, None, :]).all()
 
 
 def test_it_can_be_built_for_a_model_written_by_hand():
@@ -253,3 +137,13 @@ def test_other_models_are_refused():
 def test_coefficients_whose_errors_grow_are_refused(coefficients):
     with pytest.raises(ValueError, match="is unstable"):
         alpha_beta(planar(), *coefficients)
+
+
+def test_alpha_and_index_are_inverse():
+    for index in (1e-9, 1e-3, 0.2, 1.0, 50.0):
+        assert tracking_index(steady_alpha(index)) == pytest.approx(index, rel=1e-9)
+    # the textbook's form of the same formula, which cancels for a small index
+    index = 0.8
+    textbook = -(index**2 + 8 * index - (index + 4) * np.sqrt(index**2 + 8 * index)) / 8
+    assert steady_alpha(index) == pytest.approx(textbook, rel=1e-14)
+    assert steady_beta(0.6) == pytest.approx(2 * (2 - 0.6) - 4 * np.sqrt(1 - 0.6), rel=1e-14)

@@ -6,6 +6,7 @@ from functools import cache, partial
 from types import SimpleNamespace
 
 import numpy as np
+import oracles
 import pytest
 import sympy as sp
 
@@ -95,6 +96,9 @@ def every(name):
 class Linear(SimpleNamespace):
     """x' = A x + B v + a, y = H x + C w + b with laws of x_0, v, w: matrices, and the model built from strings."""
 
+    def at(self, k: int):
+        return self.A, self.B, self.a, self.H, self.C, self.b
+
     def model(self) -> Model:
         def rows(matrix, symbol, other, noise, constant):
             def name(letter, i, size):
@@ -139,12 +143,11 @@ LINEAR = {
     "n=2, p=2, more noises": linear(2, 2, 3, 3, 15),
     "n=3, p=2": linear(3, 2, 3, 2, 19),
     "n=1, p=2": linear(1, 2, 1, 2, 17),
+    "changing": oracles.Changing(),
 }
-STEPS = 6
-OF_MEASUREMENTS = (fkp, mfkp, dfkp, mdfkp)
 
 
-def exact_ensemble(one: Linear, steps: int, seed: int) -> list[Instant]:
+def exact_ensemble(one: Linear | oracles.Changing, steps: int, seed: int) -> list[Instant]:
     """Trajectories whose sample moments are exactly the model's.
 
     A random matrix (trajectories x all independent noises), centred, orthonormalised and scaled, has sample
@@ -161,9 +164,10 @@ def exact_ensemble(one: Linear, steps: int, seed: int) -> list[Instant]:
         return mean + np.stack([next(standard) for _ in mean], axis=-1) @ np.linalg.cholesky(cov).T
 
     x, moments = draw("prior"), []
-    for _ in range(steps):
-        y = x @ one.H.T + draw("meter_noise") @ one.C.T + one.b
-        x_next = x @ one.A.T + draw("state_noise") @ one.B.T + one.a
+    for k in range(steps):
+        A, B, a, H, C, b = one.at(k)
+        y = x @ H.T + draw("meter_noise") @ C.T + b
+        x_next = x @ A.T + draw("state_noise") @ B.T + a
         moments.append(Instant(x, y, x_next))
         x = x_next
     return moments

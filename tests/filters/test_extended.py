@@ -1,18 +1,14 @@
-"""The extended Kalman filter against independent implementations, and the angle of a point in formulas."""
+"""The extended Kalman filter against the slow loop of the page, and the angle of a point in formulas."""
 
 import math
 
-import filterpy.kalman
 import numpy as np
 import pytest
-import sympy as sp
 
 from kfcourse.filters.approximations import aof
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import run
-from kfcourse.symbolic.codegen import compile_function
-from kfcourse.symbolic.equations import compile_noiseless
-from kfcourse.symbolic.formula import FormulaError, check_name, parse, symbol
+from kfcourse.symbolic.formula import FormulaError, parse, symbol
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.moments import NoClosedForm
 from kfcourse.symbolic.quadrature import unscented
@@ -120,85 +116,7 @@ def test_the_filter_is_the_slow_loop_of_the_page_in_both_forms(radar, y, form):
             assert_equal_to_rounding(found.mean[k, i], found.cov[k, i], z, p)
 
 
-class Filterpy(filterpy.kalman.ExtendedKalmanFilter):
-    """filterpy leaves the prediction of the state to its user."""
-
-    def predict_x(self, u=0):
-        self.x = f(self.x[:, 0])[:, None]
-
-
-def test_the_filter_is_filterpy_s_on_the_same_data(radar, y):
-    found = run(aof(linearised(radar)), y)
-    for i in range(y.shape[1]):
-        reference = Filterpy(4, 2)
-        reference.x, reference.P, reference.R = MEAN[:, None], COV, D_N
-        for k in range(STEPS):
-            reference.update(y[k, i][:, None], lambda x: S_jacobian(x[:, 0]), lambda x: S(x[:, 0])[:, None])
-            assert_equal_to_rounding(found.mean[k, i], found.cov[k, i], reference.x[:, 0], reference.P)
-            z = reference.x[:, 0]
-            reference.F, reference.Q = f_jacobian(z), g(z) @ D_XI @ g(z).T
-            reference.predict()
-
-
-def test_the_jacobians_are_those_typed_by_hand(radar):
-    structure = linearised(radar)
-    for x in simulate(radar, 20, 1, seed=2).x[0]:
-        h, G, F, R = structure.measure(x, COV)
-        tau, Theta = structure.predict(x, COV)
-        H, Phi = S_jacobian(x), f_jacobian(x)
-        for mine, theirs in ((h, S(x)), (G, H), (F, H @ COV @ H.T + D_N), (R, D_N), (tau, f(x))):
-            np.testing.assert_allclose(mine, theirs, rtol=1e-11, atol=1e-14)
-        # expanded polynomials of the same entries: products of 1e5 that cancel to 1e2
-        np.testing.assert_allclose(Theta, Phi @ COV @ Phi.T + g(x) @ D_XI @ g(x).T, rtol=1e-10, atol=1e-8)
-
-
-def test_covariances_depend_on_the_data_only_if_the_model_is_not_linear(radar, y):
-    straight = Model.define(
-        ["px + 0.5*vx", "py + 0.5*vy", "vx + v1", "vy + v2"], ["px + 50*w1", "py + 50*w2"],
-        symbols={"x": ["px", "py", "vx", "vy"], "v": ["v1", "v2"], "w": ["w1", "w2"]}, prior={"mean": MEAN, "variance": COV},
-    )  # fmt: skip
-    linear = run(aof(linearised(straight)), simulate(straight, 3, STEPS, seed=4).y)
-    np.testing.assert_array_equal(linear.cov[:, 0], linear.cov[:, 2])
-    curved = run(aof(linearised(radar)), y).cov[10, :, 0, 0]
-    assert np.ptp(curved) > 1e-6 * curved.mean()  # far above rounding
-
-
 # ---------------------------------------------------------------- atan2 in formulas
-
-
-POINTS = [(1.0, 2.0), (-1.0, 2.0), (-1.0, -2.0), (1.0, -2.0), (0.0, 1.5), (-2.0, 1e-9)]  # (x, y), all four quadrants
-
-
-def test_atan2_is_the_angle_of_the_point():
-    x, other = symbol("x"), symbol("y")
-    assert parse("atan2(y, x)", {"x": x, "y": other}) == sp.atan2(other, x)
-    assert parse("2*atan2(3*y, -x)", {"x": x, "y": other}) == 2 * sp.atan2(3 * other, -x)
-    assert parse("atan2(1, 1)", {}) == sp.pi / 4
-    model = Model.define(["x1 + v1", "x2 + v2"], ["atan2(x2, x1) + w1", "atan2(2*x2, 1) + atan2(1, x1) + w2"], angles=[])
-    angles = compile_noiseless(model)[1](np.array(POINTS))
-    expected = [[math.atan2(b, a), math.atan2(2 * b, 1) + math.atan2(1, a)] for a, b in POINTS]
-    np.testing.assert_allclose(angles, expected, rtol=1e-15)
-
-
-def test_its_derivative_is_right_in_every_quadrant():
-    model = Model.define(["x1 + v1", "x2 + v2"], ["atan2(x2, x1) + w"], angles=["y"])
-    points, step = np.array(POINTS[:4]), 1e-6
-    found = linearised(model).measure(points, np.eye(2)).G[:, 0]
-    for j in range(2):
-        shift = step * np.eye(2)[j]
-        difference = [(math.atan2(*(q + shift)[::-1]) - math.atan2(*(q - shift)[::-1])) / (2 * step) for q in points]
-        # the third derivative (below 1) times step^2, and rounding 1e-16 / step
-        np.testing.assert_allclose(found[:, j], difference, rtol=0, atol=1e-9)
-
-
-def test_generated_code_of_atan2_equals_numpy():
-    x1, x2 = sp.symbols("x1 x2", real=True)
-    entries = sp.Matrix([sp.atan2(x1 * x2, x1**2 + 1), sp.atan2(sp.Rational(1, 3), x2) ** 2])
-    x = np.random.default_rng(1).normal(size=(50, 2))
-    found = compile_function("f", {"x": sp.Matrix([x1, x2])}, {"a": entries}, ["x", "a"]).function(x)[0]
-    a, b = x.T
-    expected = np.stack([np.arctan2(a * b, a**2 + 1), np.arctan2(1 / 3, b) ** 2], axis=-1)
-    np.testing.assert_allclose(found, expected, rtol=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -222,16 +140,6 @@ def test_what_is_no_angle_is_refused(formula, message, column):
     assert caught.value.column == column
 
 
-def test_atan2_names_nothing_else():
-    with pytest.raises(ValueError, match="already means a function"):
-        check_name("atan2")
-
-
-def test_calls_of_two_arguments_nest_no_deeper_than_others():
-    with pytest.raises(FormulaError, match="nested more than 5 deep"):
-        parse("atan2(x, " * 6 + "x" + ")" * 6, {"x": symbol("x")})
-
-
 def test_an_angle_has_no_gaussian_moments_in_closed_form(radar, y):
     with pytest.raises(NoClosedForm, match="unscented"):
         gaussian(Model.define(["x1 + v1", "x2 + v2"], ["atan2(x2, x1) + w"], angles=["y"]))
@@ -239,3 +147,8 @@ def test_an_angle_has_no_gaussian_moments_in_closed_form(radar, y):
     by_points, by_tangent = run(aof(unscented(radar)), y), run(aof(linearised(radar)), y)
     sd = np.sqrt(np.diagonal(by_tangent.cov, axis1=-2, axis2=-1))
     assert (abs(by_points.mean - by_tangent.mean) / sd)[-1].max() < 0.1
+
+
+def test_calls_of_two_arguments_nest_no_deeper_than_others():
+    with pytest.raises(FormulaError, match="nested more than 5 deep"):
+        parse("atan2(x, " * 6 + "x" + ")" * 6, {"x": symbol("x")})

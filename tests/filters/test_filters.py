@@ -1,13 +1,10 @@
-"""The filters: slow loops from the page, the printed equations executed; what holds for all is in test_every_filter."""
+"""The filters: the printed equations executed; what holds for all is in test_every_filter."""
 
 from functools import partial
 
-import control
-import filterpy.kalman
 import numpy as np
 import oracles
 import pytest
-import scipy.linalg
 import sympy as sp
 from test_every_filter import LINEAR, OF_MEASUREMENTS, STRUCTURES, exact_ensemble
 
@@ -23,88 +20,12 @@ from kfcourse.montecarlo.ensemble import Instant, simulate
 from kfcourse.montecarlo.experiment import run
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.reading import ModelError
-from kfcourse.symbolic.structure import gaussian, linearised
+from kfcourse.symbolic.structure import linearised
 
 pytestmark = pytest.mark.quick
 
 
 # ---------------------------------------------------------------- linear-Gaussian models
-
-
-def test_the_kalman_filter_is_the_loop_of_the_page():
-    one = LINEAR["scalar"]
-    (m, d), (m_v, d_v), (m_w, d_w) = ((mean.item(), cov.item()) for mean, cov in one.laws.values())
-    A, B, a, H, C, b = (array.item() for array in (one.A, one.B, one.a, one.H, one.C, one.b))
-    y = simulate(one.model(), 1, 20, seed=4).y
-    expected = oracles.kalman_trajectory(y[:, 0, 0].tolist(), A, B**2 * d_v, H, C**2 * d_w, m, d, u=B * m_v + a, s=C * m_w + b)
-    found = run(kalman_filter(one.model()), y)
-    np.testing.assert_allclose(found.mean[:, 0, 0], [z for z, _ in expected], rtol=1e-12)
-    np.testing.assert_allclose(found.cov[:, 0, 0, 0], [p for _, p in expected], rtol=1e-12)
-
-
-@pytest.mark.parametrize("name", ["scalar", "n=2, p=1", "n=2, p=2", "n=3, p=2"])
-def test_the_kalman_filter_settles_at_the_riccati_solution(name):
-    one = LINEAR[name]
-    Q, R = one.B @ one.laws["state_noise"][1] @ one.B.T, one.C @ one.laws["meter_noise"][1] @ one.C.T
-    Q, R = (Q + Q.T) / 2, (R + R.T) / 2
-    predicted = scipy.linalg.solve_discrete_are(one.A.T, one.H.T, Q, R)
-    filter_ = kalman_filter(one.model())
-    state = filter_.init(1)
-    for _ in range(300):  # the closed loop's spectral radius is below 0.9: 0.9^600 is far below rounding
-        state = filter_.step(state, np.zeros((1, len(one.H))))
-    np.testing.assert_allclose(state.predicted.cov, predicted, rtol=1e-9, atol=1e-11)
-    L, P, _ = control.dlqe(one.A, np.eye(len(one.A)), one.H, Q, R)
-    np.testing.assert_allclose(state.predicted.cov, P, rtol=1e-9, atol=1e-11)
-    K = predicted @ one.H.T @ np.linalg.inv(one.H @ predicted @ one.H.T + R)
-    np.testing.assert_allclose(state.posterior.cov, predicted - K @ one.H @ predicted, rtol=1e-9, atol=1e-11)
-    np.testing.assert_allclose(one.A @ K, L, rtol=1e-9, atol=1e-11)  # control's gain takes the innovation to the next state
-
-
-@pytest.mark.parametrize("name", ["scalar", "n=2, p=1", "n=2, p=2, more noises"])
-def test_the_kalman_filter_is_filterpy_s(name):
-    one = LINEAR[name]
-    model, n, p = one.model(), len(one.A), len(one.H)
-    y = simulate(model, 1, 30, seed=6).y
-    reference = filterpy.kalman.KalmanFilter(n, p)
-    (m, d), (m_v, D_v), (m_w, D_w) = one.laws.values()
-    reference.x, reference.P, reference.F, reference.H = m[:, None], d, one.A, one.H
-    reference.Q, reference.R, reference.B = one.B @ D_v @ one.B.T, one.C @ D_w @ one.C.T, np.eye(n)
-    found = run(kalman_filter(model), y)
-    for k in range(30):
-        reference.update((y[k, 0] - one.C @ m_w - one.b)[:, None])
-        np.testing.assert_allclose(found.mean[k, 0], reference.x[:, 0], rtol=1e-10, atol=1e-11)
-        np.testing.assert_allclose(found.cov[k, 0], reference.P, rtol=1e-10, atol=1e-11)
-        reference.predict(u=(one.B @ m_v + one.a)[:, None])
-
-
-def test_the_linearised_aof_is_filterpy_s_extended_kalman_filter():
-    model = Model.define(
-        ["x1 + 0.1*x2", "x2 - 0.1*sin(x1) + 0.2*v"], ["sqrt(1 + x1**2) + 0.3*w1", "x1*x2 + 0.4*w2"],
-        prior={"mean": [1, 0.5], "variance": [[0.4, 0.1], [0.1, 0.3]]}, meter_noise={"variance": [[1, 0.2], [0.2, 2]]},
-    )  # fmt: skip
-    y = simulate(model, 1, 30, seed=6).y
-    reference = filterpy.kalman.ExtendedKalmanFilter(2, 2)
-    reference.x, reference.P, reference.Q = model.prior.mean[:, None], model.prior.cov, np.diag([0, 0.04])
-    reference.R = np.diag([0.3, 0.4]) @ model.meter_noise.cov @ np.diag([0.3, 0.4])
-
-    def jacobian(x):
-        return np.array([[x[0, 0] / np.sqrt(1 + x[0, 0] ** 2), 0], [x[1, 0], x[0, 0]]])
-
-    def meter(x):
-        return np.array([[np.sqrt(1 + x[0, 0] ** 2)], [x[0, 0] * x[1, 0]]])
-
-    found = run(aof(linearised(model)), y)
-    for k in range(30):
-        reference.update(y[k, 0][:, None], jacobian, meter)
-        # 30 steps of two well-conditioned filters
-        np.testing.assert_allclose(found.mean[k, 0], reference.x[:, 0], rtol=1e-9, atol=1e-10)
-        np.testing.assert_allclose(found.cov[k, 0], reference.P, rtol=1e-9, atol=1e-10)
-        first, second = reference.x[:, 0]
-        F = np.array([[1, 0.1], [-0.1 * np.cos(first), 1]])
-        reference.x, reference.P = (
-            np.array([[first + 0.1 * second], [second - 0.1 * np.sin(first)]]),
-            F @ reference.P @ F.T + reference.Q,
-        )
 
 
 def test_the_kalman_filter_refuses_what_is_not_linear(variant53):
@@ -138,30 +59,6 @@ def test_the_aof_is_the_loop_of_the_page(variant53, trajectories, kind):
 def designed_on(designs, trajectories):
     x, y, x_next = (array[..., None] for array in trajectories)
     return design(designs, [Instant(*step) for step in zip(x, y, x_next, strict=True)])
-
-
-def test_the_duof_is_the_loop_of_the_page(variant53, trajectories):
-    (filter_,) = designed_on([duof(variant53)], trajectories)
-    found = run(filter_, trajectories[1][..., None]).mean[..., 0]
-    # 40 trajectories: regressions of correlation near 1, conditioned up to 1e4 here
-    np.testing.assert_allclose(found, oracles.duof_ensemble(*trajectories), rtol=1e-9, atol=1e-11)
-
-
-@pytest.mark.parametrize("kind", ["linearised", "gaussian"])
-@pytest.mark.parametrize("arguments", [2, 3])
-def test_the_fos_is_the_loop_of_the_page(variant53, trajectories, kind, arguments):
-    (filter_,) = designed_on([fos(STRUCTURES[kind](variant53), arguments)], trajectories)
-    x, y, _ = trajectories
-    expected = oracles.fos_ensemble(kind, arguments, x, y)
-    np.testing.assert_allclose(run(filter_, y[..., None]).mean[..., 0], expected, rtol=1e-8, atol=1e-10)
-
-
-@pytest.mark.parametrize("kind", ["linearised", "gaussian"])
-@pytest.mark.parametrize("arguments", [2, 3])
-def test_the_mfos_is_the_loop_of_the_page(variant53, trajectories, kind, arguments):
-    (filter_,) = designed_on([mfos(STRUCTURES[kind](variant53), arguments)], trajectories)
-    expected = oracles.mfos_ensemble(kind, arguments, *trajectories)
-    np.testing.assert_allclose(run(filter_, trajectories[1][..., None]).mean[..., 0], expected, rtol=1e-8, atol=1e-10)
 
 
 # ---------------------------------------------------------------- the printed equations, executed
@@ -241,10 +138,6 @@ PRINTED = {
         prior={"mean": [0.5, -0.3], "variance": [[0.6, 0.2], [0.2, 0.5]]}, meter_noise={"variance": [[1, 0.3], [0.3, 0.5]]},
     ),
 }  # fmt: skip
-
-
-def column(array):
-    return array[..., None]
 
 
 def structural_values(model, structure):
@@ -332,19 +225,6 @@ def test_every_equation_is_printed_once_and_in_order(family, columns):
 # ---------------------------------------------------------------- missing measurements and degenerate cases
 
 
-def filters_of(model, trajectories):
-    ready = [aof(build(model)) for build in STRUCTURES.values()]
-    structures = [linearised(model), gaussian(model)]
-    return ready + designed_on(
-        [
-            duof(model),
-            *(f(one, a) for f in (fos, mfos) for one in structures for a in (2, 3)),
-            *(f(one) for f in (dfmp, mdfmp, *OF_MEASUREMENTS, fbp) for one in structures),
-        ],
-        trajectories,
-    )
-
-
 @pytest.mark.parametrize("kind", STRUCTURES)
 def test_a_known_zero_stays_zero(kind):
     # x_0 = 0 exactly: both noises vanish, F = 0, and the pseudo-inverse makes every gain 0.
@@ -354,40 +234,6 @@ def test_a_known_zero_stays_zero(kind):
     assert np.array_equal(found.cov, np.zeros((4, 3, 1, 1)))
 
 
-@pytest.mark.parametrize("state", ["0.9*x + v", "0.9*x1 + v1"])
-def test_a_blind_meter_leaves_the_prediction(state):
-    # A square meter linearised at 0 has neither sensitivity nor noise there: K = 0 and p = Psi, not 0.
-    x = "x1" if "x1" in state else "x"
-    model = Model.define([state], [f"{x}**2 + {x}**2*w{x[1:]}"])
-    state_ = aof(linearised(model)).step(aof(linearised(model)).init(2), np.ones((2, 1)))
-    assert np.array_equal(state_.posterior.mean, np.zeros((2, 1)))
-    np.testing.assert_array_equal(np.broadcast_to(state_.posterior.cov, (2, 1, 1)), np.ones((2, 1, 1)))
-
-
-@pytest.mark.parametrize("state", ["v", "0.5", "0.5 + 0.1*v"])
-def test_a_state_without_memory_can_be_filtered(state):
-    # tau is one constant for the whole ensemble.
-    model = Model.define(state, "x + w")
-    x, y = simulate(model, 50, 4, seed=5)
-    moments = (x[:-1, :, 0], y[:-1, :, 0], x[1:, :, 0])
-    for filter_ in filters_of(model, moments):
-        found = run(filter_, y[:-1])
-        assert found.mean.shape == (3, 50, 1)
-        assert np.isfinite(found.mean).all()
-
-
-def test_repeated_measurements_are_used_once():
-    # The same meter twice, and twice as strong: the pseudo-inverse makes of them one.
-    laws = {"prior": {"mean": [1, 2], "variance": [[2, 0.5], [0.5, 1]]}}
-    state = ["0.9*x1 + 0.2*x2 + v1", "0.7*x2 + v2"]
-    once, twice = Model.define(state, ["x1 + 0.5*w"], **laws), Model.define(state, ["x1 + 0.5*w", "2*x1 + w"], **laws)
-    y = simulate(twice, 5, 6, seed=5).y
-    for build in STRUCTURES.values():
-        found, expected = run(aof(build(twice)), y), run(aof(build(once)), y[..., :1])
-        np.testing.assert_allclose(found.mean, expected.mean, rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(found.cov, expected.cov, rtol=1e-9, atol=1e-9)
-
-
 # ---------------------------------------------------------------- designs
 
 
@@ -395,15 +241,6 @@ def test_a_designed_filter_stops_where_its_design_does(variant53, trajectories):
     (filter_,) = designed_on([duof(variant53)], trajectories)
     with pytest.raises(ValueError, match=r"designed for 8 steps.*to run step 9"):
         run(filter_, np.zeros((9, 1, 1)))
-
-
-def test_a_regression_cannot_make_its_own_step_worse(variant53, trajectories):
-    # "Change nothing" is an admissible coefficient, so on the design ensemble MFOS gains at k = 0 over the AOF.
-    x, y, _ = trajectories
-    plain = run(aof(gaussian(variant53)), y[..., None]).mean[0, :, 0]
-    better = run(designed_on([mfos(gaussian(variant53))], trajectories)[0], y[..., None]).mean[0, :, 0]
-    assert np.mean((x[0] - better) ** 2) <= np.mean((x[0] - plain) ** 2)
-    assert abs(np.mean(x[0] - better)) < 1e-15 * 40  # unbiased on its ensemble, to rounding
 
 
 def test_the_duof_s_own_covariances_are_those_of_its_errors():

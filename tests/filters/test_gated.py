@@ -1,13 +1,12 @@
 """The gate: refusing is missing, as many as promised, in every filter; and how a lost track is found again."""
 
 import numpy as np
-import oracles
 import pytest
-from scipy.stats import chi2, multivariate_normal
+from scipy.stats import chi2
 
 from kfcourse import Model, gaussian, likelihood, linearised, predictions, run, simulate, smooth, unscented
 from kfcourse.filters import alpha_beta, aof, duof, fos, gated, imm, iterated, kalman_filter, mfos, particle, pointmass, robust
-from kfcourse.linear.consistency import innovations, nis
+from kfcourse.linear.consistency import innovations
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble
 from kfcourse.records import weights
@@ -99,28 +98,6 @@ def test_a_right_filter_loses_as_many_as_it_was_told(plane, probability):
     assert not found[np.isnan(y).all(axis=-1)].any()
 
 
-def test_the_edge_is_chi_squared_of_what_was_measured(plane):
-    one = kalman_filter(plane)
-    F = one.structure.measure(plane.prior.mean, plane.prior.cov).F
-    for parts, degrees in (([0, 1], 2), ([1], 1), ([0], 1)):
-        edge = np.zeros(2)
-        edge[parts] = np.linalg.cholesky(F[np.ix_(parts, parts)])[:, 0] * np.sqrt(chi2.ppf(0.99, degrees))
-        y = np.full((1, 2, 2), np.nan)
-        y[0, :, parts] = (np.array([0.9999, 1.0001])[:, None] * edge[parts]).T
-        np.testing.assert_array_equal(refused(gated(one, 0.99), y), [[False, True]])
-
-
-def test_where_nothing_is_refused_the_gate_is_not_seen(plane):
-    y = simulate(plane, 20, 10, seed=7).y
-    one = kalman_filter(plane)
-    guarded = gated(one, 1 - 1e-12)
-    np.testing.assert_array_equal(run(guarded, y).cov, run(one, y).cov)
-    np.testing.assert_array_equal(smooth(guarded, y).mean, smooth(one, y).mean)
-    np.testing.assert_array_equal(likelihood(guarded, y), likelihood(one, y))
-    assert (weights(guarded, y) == 1).all()
-    assert guarded.name == "gated-kalman"
-
-
 def test_an_innovation_of_a_turn_is_none():
     model = Model.define("x + 0.1*v", "x + 0.2*w", angles={"x": ["x"], "y": ["y"]}, prior={"mean": 3.1, "variance": 0.01})
     y = np.array([3.1, -3.1, 3.12, 1.0, -3.13])
@@ -164,72 +141,11 @@ def test_after_its_patience_the_gate_lets_the_next_one_through(patience):
     assert (error[after] ** 2).mean() < 0.2 * (np.abs(run(plain, y).mean - x)[after] ** 2).mean()
 
 
-def test_widened_the_prediction_explains_what_was_refused(plane):
-    y = np.zeros((4, 2, 2))
-    y[1:3, 0], y[1:3, 1] = [30.0, -20.0], [np.nan, 25.0]
-    one = gated(kalman_filter(plane), patience=2)
-    state = one.init(2)
-    for k in range(3):
-        before, state = state, one.step(state, y[k])
-    np.testing.assert_array_equal(state.memory.in_a_row, [2, 2])
-    untouched = one.structure.predict(*state.posterior).cov
-    H = np.array([[1.0, 0, 0, 0], [0.2, 1, 0, 0]])
-    for i, rows in ((0, [0, 1]), (1, [1])):
-        nu = (y[2, i] - before.predicted.mean[i] @ H.T)[rows]
-        state_alone = (H @ np.broadcast_to(before.predicted.cov, (2, 4, 4))[i] @ H.T)[np.ix_(rows, rows)]
-        scale = nu @ np.linalg.solve(state_alone, nu) / len(rows)
-        np.testing.assert_allclose(state.predicted.cov[i], scale * untouched[i], rtol=1e-9)
-
-
-def test_a_smoother_takes_the_widening_for_noise_of_the_object():
-    """A lost track in one dense regression: what was refused is missing, and the object has so much more noise at that step."""
-    model, _, y = jump()
-    y = y[:20, :3]
-    one = gated(kalman_filter(model), 1 - 1e-6, patience=3)
-    found, before = smooth(one, y), predictions(one, y)
-    kept = without(one, y)
-    for i in range(3):
-        posterior = run(one, y).cov[:, i]
-        noise = before.cov[1:, i] - posterior[:-1]  # Psi' - p: 0.01, but where the track was lost
-        assert (np.flatnonzero(noise.ravel() > 0.011) == [12]).all()
-        steps = [(np.eye(1), np.zeros(1), Q, np.eye(1), np.zeros(1), np.eye(1)) for Q in [*noise, np.eye(1)]]
-        mean, cov, _ = oracles.joint_posterior(steps, (np.zeros(1), np.eye(1)), kept[:, i])
-        np.testing.assert_allclose(found.mean[:, i], mean, rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(found.cov[:, i], cov, rtol=1e-8, atol=1e-12)
-
-
 def test_gaps_neither_feed_nor_calm_impatience_and_the_next_measurement_passes_whatever_it_is():
     one = gated(kalman_filter(Model.define("x + 0.1*v", "x + w", prior={"mean": 0.0, "variance": 1.0})), patience=2)
     gap = np.nan
     y = np.array([0.0, 50.0, gap, gap, 51.0, gap, -4000.0, 0.0])
     np.testing.assert_array_equal(weights(one, y).ravel(), [1, 0, gap, gap, 0, gap, 1, 0])
-
-
-# ---------------------------------------------------------------- what it does to tests and likelihood
-
-
-def test_in_the_likelihood_a_refused_measurement_stands_at_the_edge(plane):
-    y = simulate(plane, 4, 5, seed=9).y.copy()
-    y[2, 1] += [50, -80]
-    one = gated(kalman_filter(plane), 0.99)
-    found, law = likelihood(one, y), predictions(one, y)
-    expected = one.structure.measure(law.mean[2, 1], law.cov[2, 1])
-    at_edge = multivariate_normal(np.zeros(2), expected.F).logpdf(np.zeros(2)) - 0.5 * chi2.ppf(0.99, 2)
-    assert found[2, 1] == pytest.approx(at_edge, rel=1e-10)
-    others = np.ones((5, 4), dtype=bool)
-    others[2, 1] = False
-    np.testing.assert_allclose(found[others], likelihood(kalman_filter(plane), without(one, y))[others], rtol=1e-12)
-
-
-def test_the_tests_of_innovations_take_a_gated_record(plane):
-    y = simulate(plane, 200, 20, seed=10).y.copy()
-    y[np.random.default_rng(1).random(y.shape[:2]) < 0.05] += 60.0
-    sizes = []
-    for one in (kalman_filter(plane), gated(kalman_filter(plane))):
-        record = without(one, y) if one.name.startswith("gated") else y
-        sizes.append(np.nanmean(nis(innovations(one.structure.measure, predictions(one, y), record))))
-    assert sizes[0] > 20
-    assert sizes[1] == pytest.approx(2, abs=0.15)  # 4 sqrt(2 * 2 / 4000) and the thousandth that a right filter refuses
 
 
 # ---------------------------------------------------------------- what is refused
@@ -266,13 +182,3 @@ def test_components_are_judged_each_for_itself_on_request(plane):
 
 def plane_meter(plane):
     return linearised(plane).measure
-
-
-def test_a_track_is_lost_only_where_all_components_are_refused(plane):
-    y = simulate(plane, 1, 12, seed=4).y
-    y[3:, 0, 0] += 1e3
-    found = weights(gated(aof(linearised(plane)), 0.999, patience=2, by_component=True), y)[:, 0]
-    np.testing.assert_array_equal(found[3:], 0.5)
-    y[3:, 0, 1] += 1e3
-    found = weights(gated(aof(linearised(plane)), 0.999, patience=2, by_component=True), y)[:, 0]
-    np.testing.assert_array_equal(found[3:6], [0, 0, 1])

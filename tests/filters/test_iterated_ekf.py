@@ -1,15 +1,12 @@
-"""The iterated filter: Gauss and Newton's method, posterior linearisation, and the Kalman filter where nothing is curved."""
+"""The iterated filter: Gauss and Newton's method, and the printed equations at the tangent and with sigma points."""
 
 import re
 
 import numpy as np
 import pytest
 import sympy as sp
-from scipy.optimize import least_squares
-from test_filters import STRUCTURES
 
 from kfcourse.filters import notation as s
-from kfcourse.filters.approximations import aof
 from kfcourse.filters.iterated_ekf import EQUATIONS, iterated
 from kfcourse.montecarlo.ensemble import simulate
 from kfcourse.montecarlo.experiment import run
@@ -36,32 +33,6 @@ def meter(x):
 
 def jacobian(x):
     return np.array([x / np.hypot(*x), [x[1], x[0]]])
-
-
-@pytest.fixture(scope="module")
-def linear() -> Model:
-    return Model.define(
-        ["0.9*x1 + 0.4*x2 + 0.3*v1 + 1", "0.8*x2 - 0.1*x1 + v2"], ["x1 + 2*x2 + w1 - 1", "x2 - 0.5*x1 + 0.3*w2"],
-        prior={"mean": [1, -2], "variance": [[2, 0.5], [0.5, 1]]},
-        state_noise={"mean": [0.2, -0.1], "variance": [[1, 0.3], [0.3, 2]]},
-        meter_noise={"mean": [0.4, 0], "variance": [[1, 0.6], [0.6, 2]]},
-    )  # fmt: skip
-
-
-# ---------------------------------------------------------------- special cases
-
-
-@pytest.mark.parametrize("kind", ["linearised", "unscented", "gauss-hermite"])
-@pytest.mark.parametrize("model", ["ranges", "variant53"])
-def test_one_round_is_the_filter_without_iteration(model, kind, request):
-    model = request.getfixturevalue(model)
-    y = simulate(model, 30, 6, seed=3).y.copy()
-    y[2, 4] = np.nan
-    found, expected = run(iterated(STRUCTURES[kind](model), 1), y), run(aof(STRUCTURES[kind](model)), y)
-    np.testing.assert_array_equal(found.mean, expected.mean)
-    np.testing.assert_array_equal(found.cov, expected.cov)
-    two = run(iterated(STRUCTURES[kind](model), 2), y)
-    assert not np.array_equal(two.cov, expected.cov)
 
 
 # ---------------------------------------------------------------- linearised: Gauss-Newton
@@ -94,104 +65,14 @@ def test_each_round_is_a_step_of_gauss_and_newton(ranges, rounds):
         np.testing.assert_allclose(found.cov[0, i], cov, rtol=1e-9, atol=1e-12)
 
 
-def test_the_rounds_settle_at_the_maximum_of_the_posterior(ranges):
-    y = measured(ranges, 20, seed=5)
-    found = run(iterated(linearised(ranges), 100), y)
-    prior_root, noise_root = np.linalg.cholesky(np.linalg.inv(PRIOR_COV)), np.linalg.cholesky(np.linalg.inv(NOISE))
-    for i in range(20):
-        minimum = least_squares(
-            lambda x, y_i=y[0, i]: np.concatenate([prior_root.T @ (x - PRIOR_MEAN), noise_root.T @ (y_i - meter(x))]),
-            PRIOR_MEAN,
-            method="lm",
-            jac="3-point",
-            xtol=1e-15,
-            ftol=1e-15,
-            gtol=1e-15,
-        )
-        # 3-point differences are right to eps^(2/3) = 4e-11 of the Jacobian, and rounding of the cost stops the search
-        # at sqrt(eps) = 1.5e-8 of a standard deviation, all of it times the condition (below 100) of the problem
-        sd = np.sqrt(np.diagonal(found.cov[0, i]))
-        np.testing.assert_allclose(found.mean[0, i] / sd, minimum.x / sd, rtol=0, atol=1.5e-6)
-        np.testing.assert_allclose(found.cov[0, i], np.linalg.inv(minimum.jac.T @ minimum.jac), rtol=1e-5, atol=1e-8)
-
-
-def test_the_gradient_of_the_posterior_vanishes_there(ranges):
-    y = measured(ranges, 20, seed=5)
-    first, last = (run(iterated(linearised(ranges), rounds), y).mean[0] for rounds in (1, 100))
-
-    def slope(x, y_i):
-        return jacobian(x).T @ np.linalg.solve(NOISE, y_i - meter(x)) + np.linalg.solve(PRIOR_COV, PRIOR_MEAN - x)
-
-    sizes = np.array([[np.abs(slope(x, y_i)).max() for x, y_i in zip(z, y[0], strict=True)] for z in (first, last)])
-    assert (sizes[1] < 1e-9).all()  # rounding of terms below 1e3
-    assert np.median(sizes[0]) > 0.1  # the extended filter's own estimate is not the maximum
-
-
-def test_it_is_more_accurate_where_the_meter_is_sharp_and_curved():
-    model = Model.define(
-        ["x1 + 0.01*v1", "x2 + 0.01*v2"], ["sqrt(x1**2 + x2**2) + 0.01*w1", "atan2(x2, x1) + 0.001*w2"],
-        prior={"mean": [10, 4], "variance": 1.0}, angles=["y2"],
-    )  # fmt: skip
-    x, y = simulate(model, 4000, 1, seed=6)
-    once, settled = (((run(iterated(linearised(model), rounds), y).mean - x) ** 2).sum(axis=-1)[0] for rounds in (1, 6))
-    difference = once - settled
-    assert difference.mean() > 4 * difference.std() / np.sqrt(difference.size)
-    # at the maximum the meter is nearly linear over the posterior: the error is what the Jacobian there says
-    claimed = np.trace(run(iterated(linearised(model), 6), y).cov[0], axis1=-2, axis2=-1)
-    assert abs((settled - claimed).mean()) < 4 * (settled - claimed).std() / np.sqrt(settled.size)
-
-
 # ---------------------------------------------------------------- moments: posterior linearisation
 
 
-def sigma_points(mean, cov):
-    """Symmetric points of Julier and Uhlmann with kappa = max(3 - s, 0): any root with root root^T = cov."""
-    size = len(mean)
-    kappa = max(3 - size, 0)
-    values, vectors = np.linalg.eigh(cov)
-    root = vectors * np.sqrt(values)
-    offsets = [np.zeros(size)] + [sign * np.sqrt(size + kappa) * root[:, j] for j in range(size) for sign in (1, -1)]
-    weights = [kappa / (size + kappa)] + [0.5 / (size + kappa)] * (2 * size)
-    return [mean + offset for offset in offsets], weights
-
-
-@pytest.mark.parametrize("rounds", [2, 5])
-def test_with_sigma_points_it_is_iterated_posterior_linearisation(rounds):
-    """A scalar state measured twice, the noise added: the loop of Garcia-Fernandez and others, their letters."""
-    noise, prior_mean, prior_cov = np.array([[0.04, 0.01], [0.01, 0.09]]), np.array([1.2]), np.array([[0.5]])
-    model = Model.define(
-        "0.9*x + 0.1*v",
-        ["x + 0.3*x**2 + w1", "exp(x/2) + w2"],
-        {},
-        prior={"mean": 1.2, "variance": 0.5},
-        meter_noise={"variance": noise},
-    )
-    y = measured(model, 5, seed=7)
-    found = run(iterated(unscented(model), rounds), y)
-    for i in range(5):
-        mean, cov = prior_mean, prior_cov
-        for _ in range(rounds):
-            # points over (x, w): the package's rule
-            joint = np.block([[cov, np.zeros((1, 2))], [np.zeros((2, 1)), noise]])
-            points, weights = sigma_points(np.concatenate([mean, np.zeros(2)]), joint)
-            images = [np.array([q[0] + 0.3 * q[0] ** 2 + q[1], np.exp(q[0] / 2) + q[2]]) for q in points]
-            y_bar = sum(w * image for w, image in zip(weights, images, strict=True))
-            Psi = sum(w * np.outer(q[:1] - mean, image - y_bar) for w, q, image in zip(weights, points, images, strict=True))
-            Phi = sum(w * np.outer(image - y_bar, image - y_bar) for w, image in zip(weights, images, strict=True))
-            A = Psi.T @ np.linalg.inv(cov)
-            b = y_bar - A @ mean
-            Omega = Phi - A @ cov @ A.T
-            S = A @ prior_cov @ A.T + Omega
-            K = prior_cov @ A.T @ np.linalg.inv(S)
-            mean, cov = prior_mean + K @ (y[0, i] - A @ prior_mean - b), prior_cov - K @ S @ K.T
-        # the page's Omega and p are differences of numbers some 1e2 times larger, in each round
-        np.testing.assert_allclose(found.mean[0, i], mean, rtol=1e-10)
-        np.testing.assert_allclose(found.cov[0, i], cov, rtol=1e-9)
-
-
-def test_the_printed_equations_are_the_filter(ranges):
+@pytest.mark.parametrize("build", [linearised, unscented])
+def test_the_printed_equations_are_the_filter(ranges, build):
+    """Gauss and Newton's method at the tangent, iterated posterior linearisation with sigma points."""
     y, rounds = measured(ranges, 1, seed=8), 3
-    structure = linearised(ranges)
+    structure = build(ranges)
     values = {s.y: y[0, 0][:, None], s.lam: PRIOR_MEAN[:, None], s.Psi: PRIOR_COV}
     z_i, P_i = (symbol(name) for name in (r"z^{(i)}", r"p^{(i)}"))
     values |= {z_i: values[s.lam], P_i: values[s.Psi]}

@@ -1,9 +1,7 @@
-"""Filters of models that jump: against all histories of modes, a plain grid, and the cases in which they are other filters."""
+"""Filters of models that jump: against all histories of modes, and the cases in which they are other filters."""
 
-import math
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -17,9 +15,7 @@ from kfcourse import (
     Model,
     ModelError,
     NotFinite,
-    compare,
     design,
-    gauss_hermite,
     gaussian,
     likelihood,
     linearised,
@@ -27,14 +23,13 @@ from kfcourse import (
     simulate,
     unscented,
 )
-from kfcourse.filters import aof, duof, fbp, fkp, fos, kalman_filter, mfos, pointmass
+from kfcourse.filters import aof, fbp, fkp, fos, kalman_filter, pointmass
 from kfcourse.filters.jump_optimal import logic_dynamic_fbp, logic_dynamic_fkp, logic_dynamic_fos
 from kfcourse.filters.multiple_models import gpb2, imm, logic_dynamic
 from kfcourse.lab.variants import find_variant
 from kfcourse.montecarlo.ensemble import Instant
-from kfcourse.symbolic.averaging import averaged, averaged_equations
+from kfcourse.symbolic.averaging import averaged
 from kfcourse.symbolic.jumping import JumpModel
-from kfcourse.symbolic.structure import moving_alike
 
 pytestmark = pytest.mark.quick
 
@@ -91,57 +86,6 @@ def test_the_exact_filter_is_the_sum_over_all_histories(model):
         assert abs(total[trajectory] - evidence) < 6e-3
 
 
-def test_the_exact_filter_is_a_plain_grid_of_both():
-    x = np.linspace(-9, 9, 2001)  # 44 points to the narrowest kernel's deviation: sums are as good as integrals
-    kernels = [np.exp(-0.5 * ((x[:, None] - (x - 0.4 * np.sin(x))) / s) ** 2) / s for s in (0.4, 0.8)]
-    y = simulate(CURVED, 3, 8, seed=5).y
-    mean, cov, probability, *_ = follow(pointmass(CURVED), y)
-    for trajectory in range(3):
-        density = np.stack([q * np.exp(-0.5 * x * x) for q in CURVED.first])
-        for k, value in enumerate(y[:, trajectory, 0]):
-            if k:
-                density = np.stack([kernels[j] @ (np.array(LASTING)[:, j] @ density) for j in range(2)])
-            for j, g in enumerate((1.0, -1.0)):
-                f = 0.3 * (1 + x * x)
-                density[j] *= np.exp(-0.5 * ((value - g * x - 0.3 * x * x) / f) ** 2) / f
-            density /= density.sum()
-            total = density.sum(axis=0)
-            z = total @ x
-            variance = total @ (x - z) ** 2
-            assert abs(mean[k, trajectory, 0] - z) < 1e-3 * math.sqrt(variance), k
-            assert abs(cov[k, trajectory, 0, 0] / variance - 1) < 2e-3, k
-            np.testing.assert_allclose(probability[k, trajectory], density.sum(axis=1), atol=1e-3)
-
-
-def test_its_own_estimate_of_the_error_covers_what_finer_nodes_change():
-    y = simulate(failing(), 40, 15, seed=8).y
-    rough, fine = (pointmass(failing(), accuracy) for accuracy in (1e-2, 1e-6))
-    states = [rough.init(40), fine.init(40)]
-    for measured in y:
-        states = [one.step(state, measured) for one, state in zip((rough, fine), states, strict=True)]
-    change = np.abs(states[0].posterior.mean - states[1].posterior.mean)[:, 0]
-    claimed = states[0].memory.discretisation_error()
-    assert (change <= claimed + 1e-12).all()
-    assert (states[1].memory.discretisation_error() < 1e-3).all()
-
-
-def test_one_mode_is_the_exact_filter():
-    plain = Model.define("0.9*x + 0.3*x*v", "x + 0.2*x**2*w")
-    model = JumpModel.define("0.9*x + 0.3*x*v", "x + 0.2*x**2*w", modes={"only": {}}, transition=[1.0])
-    y = simulate(plain, 20, 8, seed=2).y
-    found, expected = run(pointmass(model), y), run(pointmass(plain), y)
-    np.testing.assert_array_equal(found.mean, expected.mean)
-    np.testing.assert_array_equal(found.cov, expected.cov)
-
-
-def test_two_equal_modes_are_the_exact_filter():
-    model = failing(modes={"one": {"parameters": {"C": 1}}, "other": {"parameters": {"C": 1}}})
-    y = simulate(model, 10, 8, seed=2).y
-    found, expected = run(pointmass(model), y), run(pointmass(model.modes[0]), y)
-    sd = np.sqrt(expected.cov[..., 0])
-    assert (np.abs(found.mean - expected.mean) < 1e-3 * sd).all()  # both of that accuracy
-
-
 def test_missing_measurements_leave_the_exact_filter_as_predicted():
     y = simulate(failing(), 2, 4, seed=1).y
     one = pointmass(failing())
@@ -179,37 +123,6 @@ def test_one_mode_is_the_plain_filter_bit_for_bit(build, kind):
     np.testing.assert_array_equal(found.cov, expected.cov)
 
 
-def test_the_imm_is_the_logic_dynamic_filter_for_affine_objects_and_no_other():
-    y = simulate(AFFINE, 6, 25, seed=1).y
-    one, other = (follow(of(build, AFFINE), y) for build in (imm, logic_dynamic))
-    for left, right in zip(one, other, strict=True):
-        np.testing.assert_allclose(left, right, rtol=1e-9, atol=ROUNDING)
-    y = simulate(CURVED, 6, 25, seed=1).y
-    one, other = (run(of(build, CURVED), y).mean for build in (imm, logic_dynamic))
-    assert np.abs(one - other).max() > 1e-3
-
-
-@pytest.mark.parametrize("build", SEQUENTIAL)
-def test_a_mode_that_stays_is_one_of_a_bank(build):
-    model = JumpModel.define(
-        "x - 0.4*sin(x) + s*v",
-        "x + w",
-        {"s": 0.4},
-        modes={"calm": {}, "wild": {"parameters": {"s": 2}}},
-        transition=[[1, 0], [0, 1]],
-        first=[0.7, 0.3],
-    )
-    y = simulate(model, 6, 20, seed=2).y
-    mean, _, probability, *_ = follow(of(build, model), y)
-    bank = [aof(gaussian(mode)) for mode in model.modes]
-    logs = np.log(model.first) + np.stack([np.cumsum(likelihood(one, y), axis=0) for one in bank], axis=-1)
-    weights = np.exp(logs - logs.max(axis=-1, keepdims=True))
-    weights /= weights.sum(axis=-1, keepdims=True)
-    np.testing.assert_allclose(probability, weights, atol=1e-9)
-    means = np.stack([run(one, y).mean[..., 0] for one in bank], axis=-1)
-    np.testing.assert_allclose(mean[..., 0], (weights * means).sum(axis=-1), atol=1e-9)
-
-
 def test_what_is_merged_when():
     """Nothing is merged before y_0, pairs of modes by GPB2 only after y_1: so far they are exact."""
     y = simulate(AFFINE, 5, 3, seed=6).y
@@ -223,31 +136,6 @@ def test_what_is_merged_when():
                 if k < exact:
                     assert abs(cov[k, trajectory] / variance - 1) < 1e-9
                     np.testing.assert_allclose(probability[k, trajectory], expected, atol=1e-9)
-
-
-@pytest.mark.parametrize("build", SEQUENTIAL)
-def test_a_mode_that_is_observed_is_known(build):
-    """The second component tells the mode: what is left is a filter that is told at each step which model holds."""
-    model = JumpModel.define(
-        ["0.9*x + s*v"],
-        ["x + C*w1", "b + 1e-3*w2"],
-        {"s": 0.7, "b": 0, "C": 1},
-        modes={"sound": {}, "faulty": {"parameters": {"b": 1, "C": 10}}},
-        transition=LASTING,
-        first=FIRST,
-        symbols={"x": ["x"], "w": ["w1", "w2"]},
-    )
-    _, y, mode = simulate(model, 8, 25, seed=3)
-    mean, cov, probability, *_ = follow(of(build, model), y)
-    np.testing.assert_allclose(np.take_along_axis(probability, mode[..., None].astype(int), axis=-1), 1.0, atol=1e-9)
-    z, p = 0.0, 1.0
-    for k in range(25):
-        R = np.where(mode[k] == 0, 1.0, 100.0)
-        gain = p / (p + R)
-        z, p = z + gain * (y[k, :, 0] - z), p * R / (p + R)
-        np.testing.assert_allclose(mean[k, :, 0], z, atol=1e-6)
-        np.testing.assert_allclose(cov[k, :, 0, 0], p, atol=1e-6)
-        z, p = 0.9 * z, 0.81 * p + 0.49
 
 
 def test_a_mode_that_no_measurement_believes_does_not_take_the_filter_away():
@@ -307,22 +195,6 @@ def in_each_mode(block, modes):
     return Instant(*(np.concatenate([one] * modes) for one in block[:3]), mode, mode)
 
 
-@OF_EACH
-def test_modes_that_are_equal_on_the_ensemble_too_are_the_filter_without_modes(family):
-    """The same trajectories in both modes, so that their regressions are the same, and no measurement tells the mode."""
-    with_modes, without, _ = REMEMBERING[family]
-    model = failing(modes={"one": {"parameters": {"C": 1}}, "other": {"parameters": {"C": 1}}})
-    plain = model.modes[0]
-    blocks = list(Ensemble(plain, 400, 8, seed=1))
-    (found,) = design([with_modes(model, [gaussian(one) for one in model.modes])], [in_each_mode(one, 2) for one in blocks])
-    (expected,) = design([without(gaussian(plain))], blocks)
-    y = simulate(plain, 20, 8, seed=4).y
-    mean, cov, probability, *_ = follow(found, y)
-    np.testing.assert_allclose(mean, run(expected, y).mean, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(cov, np.broadcast_to(run(expected, y).cov, cov.shape), rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(probability, np.tile([[model.law_at(k)] for k in range(8)], (20, 1)), atol=1e-9)
-
-
 @pytest.mark.parametrize("family", ["fos", "fkp", "fbp"])
 def test_without_jumps_a_linear_model_has_its_kalman_filter(family):
     """With moments that are exact, and a memory that holds all there is; rounding as for the filters without modes."""
@@ -336,43 +208,6 @@ def test_without_jumps_a_linear_model_has_its_kalman_filter(family):
     expected = run(kalman_filter(plain), y)
     np.testing.assert_allclose(run(found, y).mean, expected.mean, rtol=1e-8, atol=1e-8)
     np.testing.assert_allclose(run(found, y).cov, expected.cov, rtol=1e-8, atol=1e-8)
-
-
-def test_a_memory_of_one_estimate_is_the_fos_with_modes():
-    model = failing()
-    structures = [gaussian(mode) for mode in model.modes]
-    y = simulate(model, 20, 6, seed=2).y
-    one, other = (
-        run(design([each], Ensemble(model, 500, 6, seed=1))[0], y)
-        for each in (logic_dynamic_fos(model, structures), logic_dynamic_fbp(model, structures, 1))
-    )
-    np.testing.assert_array_equal(one.mean, other.mean)
-    np.testing.assert_array_equal(one.cov, other.cov)
-
-
-def test_modes_that_stay_are_a_bank_of_windows():
-    """Each mode's prediction is that of the FKP designed on its trajectories: estimates are not fed back."""
-    model = failing(transition=[[1, 0], [0, 1]])
-    structures = [gaussian(mode) for mode in model.modes]
-    blocks = list(Ensemble(model, 600, 7, seed=1))
-    (found,) = design([logic_dynamic_fkp(model, structures, 3)], blocks)
-    y = simulate(model, 10, 7, seed=2).y
-    state, there = found.init(10), [blocks[0].mode == j for j in (0, 1)]
-    bank = [
-        design([fkp(one, 3)], [Instant(*(part[mine] for part in block[:3])) for block in blocks])[0]
-        for one, mine in zip(structures, there, strict=True)
-    ]
-    alone = [one.init(10) for one in bank]
-    for k in range(7):
-        state, alone = found.step(state, y[k]), [one.step(before, y[k]) for one, before in zip(bank, alone, strict=True)]
-        logs = np.empty((2, 10))
-        for j in (0, 1):
-            np.testing.assert_allclose(state.memory.predicted[j].mean, alone[j].predicted.mean, rtol=1e-9, atol=1e-9)
-            np.testing.assert_allclose(np.squeeze(state.memory.predicted[j].cov), np.squeeze(alone[j].predicted.cov), rtol=1e-9)
-            windows = np.concatenate([block.y for block in blocks[max(k - 2, 0) : k + 1]], axis=1)[there[j]]
-            law = multivariate_normal(windows.mean(axis=0), np.cov(windows.T, bias=True))
-            logs[j] = np.log(model.first[j]) + law.logpdf(y[max(k - 2, 0) : k + 1, :, 0].T)
-        np.testing.assert_allclose(state.memory.expected.T, np.exp(logs - np.logaddexp(*logs)), rtol=1e-6, atol=1e-9)
 
 
 @OF_EACH
@@ -427,19 +262,6 @@ def test_a_missing_measurement_is_remembered_as_what_all_modes_expect():
     np.testing.assert_allclose(state.posterior.mean[1], expected, rtol=1e-12)
 
 
-def test_longer_windows_tell_more_of_the_mode():
-    """On a failing meter each longer window is better, the longest is still behind the estimate, and nobody beats the AOF."""
-    model = failing()
-    structures = [gaussian(mode) for mode in model.modes]
-    windows = [logic_dynamic_fkp(model, structures, memory) for memory in (1, 2, 4)]
-    filters = [*windows, logic_dynamic_fos(model, structures), logic_dynamic_fbp(model, structures), of(logic_dynamic, model)]
-    result = compare(filters, model, 8000, 12, 1, progress=False, jobs=1)
-    names = [one.name for one in filters]
-    for worse, better in (*pairwise(names[:4]), (names[3], names[5]), (names[4], names[5])):
-        gap = result.mean_gap_difference(worse, better, slice(4, None))
-        assert gap.value > 4 * gap.standard_error, (worse, better)
-
-
 def test_the_fos_with_modes_says_what_it_cannot_do():
     rare = failing(transition=[[1 - 1e-9, 1e-9], [0.5, 0.5]], first=[1, 0])
     with pytest.raises(NotFinite, match="no trajectory of the design is in a mode"):
@@ -482,56 +304,6 @@ def test_the_average_has_the_moments_of_the_next_state_and_the_measurement():
     assert abs(cross.mean() - 0.5 * A.item()) < 4 * cross.std() / np.sqrt(size)
 
 
-def test_modes_that_move_apart_spread_the_average():
-    """tau = sum q (c z + r), Theta = sum q (c^2 p + s^2) + sum q (c z + r - tau)^2 with the modes of the step to come."""
-    z, p, q = 2.0, 0.3, AFFINE.law_at(4)
-    c, r, s = np.array([0.9, 1.1, 0.9]), np.array([0.0, 1.0, 0.0]), np.array([0.5, 0.5, 2.0])
-    each = c * z + r
-    tau, theta = averaged(AFFINE, [gaussian(mode) for mode in AFFINE.modes]).at(3).predict(np.array([z]), np.array([[p]]))
-    assert tau.item() == pytest.approx(q @ each, rel=1e-12)
-    assert theta.item() == pytest.approx(q @ (c * c * p + s * s) + q @ (each - q @ each) ** 2, rel=1e-12)
-
-
-def test_with_modes_drawn_anew_the_averaged_filter_is_the_best_linear_one():
-    """Its noise has the variance sum q C^2, and the Kalman filter with it is the best affine filter, as DUOF finds by itself."""
-    model = failing(transition=[0.8, 0.2], first=None)
-    plain = Model.define("0.9*x + 0.7*v", "x + f*w", {"f": math.sqrt(0.8 + 20)}, prior={"mean": 3, "variance": 4})
-    y = simulate(model, 5, 15, seed=1).y
-    found, expected = run(aof(averaged(model, [gaussian(mode) for mode in model.modes])), y), run(aof(gaussian(plain)), y)
-    np.testing.assert_allclose(found.mean, expected.mean, atol=ROUNDING)
-    np.testing.assert_allclose(found.cov, np.broadcast_to(expected.cov, found.cov.shape), atol=ROUNDING)
-
-
-def test_who_wins():
-    """Knowing the modes pays, nobody is below the bound, and merging later is better: the order of the theory."""
-    model = failing()
-    structure = averaged(model, [gaussian(mode) for mode in model.modes])
-    result = compare(
-        [
-            of(logic_dynamic, model),
-            of(gpb2, model),
-            aof(structure),
-            duof(model.modes[0], averaged_equations(model)),
-            fos(structure),
-            mfos(structure),
-            pointmass(model),
-        ],
-        model,
-        200,
-        10,
-        1,
-        design_runs=4000,
-        progress=False,
-        jobs=1,
-    )
-    ranked = dict(result.ranking(slice(2, None)))
-    assert list(ranked)[:2] == ["gpb2", "aof-jump-gaussian"]
-    assert all(gap.value > -4 * gap.standard_error for gap in ranked.values())
-    for name in ("aof-averaged", "duof", "fos-averaged", "mfos-averaged"):
-        better = result.mean_gap_difference(name, "aof-jump-gaussian", slice(2, None))
-        assert better.value > 4 * better.standard_error, name
-
-
 def test_of_angles_there_is_no_average():
     model = JumpModel.define(
         "x + v",
@@ -543,60 +315,3 @@ def test_of_angles_there_is_no_average():
     )
     with pytest.raises(ModelError, match="angles have no average"):
         averaged(model, [linearised(mode) for mode in model.modes])
-
-
-# --- what modes share is found once
-
-CARRIED = {"sound": {}, "deaf": {"parameters": {"f": 3.0}}, "thrown": {"state": "x - 0.4*sin(x) + 1 + 0.8*v"}}
-
-
-def bent(transition, first=(0.5, 0.3, 0.2)):
-    return JumpModel.define(
-        "x - 0.4*sin(x) + s*v", "x + f*w", {"s": 0.4, "f": 0.5}, modes=CARRIED, transition=transition, first=list(first)
-    )
-
-
-CHAINED = [[0.8, 0.15, 0.05], [0.3, 0.6, 0.1], [0.25, 0.25, 0.5]]
-
-
-@pytest.mark.parametrize("build", SEQUENTIAL)
-def test_modes_with_one_object_share_its_predictions_and_nothing_changes(build):
-    model, count = bent(CHAINED), []
-    structures = [gaussian(mode) for mode in model.modes]
-    assert moving_alike(structures) == [0, 0, 2]
-
-    def counted(one):
-        def predict(z, p):
-            count.append(one)
-            return one.predict(z, p)
-
-        return replace(one, predict=predict)
-
-    shared = build([counted(one) for one in structures], model, model.first)
-    alone = build([replace(one, formulas=None) for one in structures], model, model.first)  # without formulas nobody knows
-    y = simulate(model, 20, 8, seed=4).y
-    for found, expected in zip(follow(shared, y), follow(alone, y), strict=True):
-        np.testing.assert_allclose(found, expected, rtol=ROUNDING, atol=ROUNDING)
-    assert len(count) == {imm: 3, logic_dynamic: 6, gpb2: 6}[build] * len(y)  # two objects; of 3 laws, or of 3 for each mode
-
-
-def test_objects_are_alike_only_with_the_same_numbers_inputs_and_approximation():
-    modes = bent(CHAINED).modes
-    assert moving_alike([gaussian(modes[0]), linearised(modes[0])]) == [0, 1]
-    assert moving_alike([gaussian(modes[0]), gaussian(modes[0].replace(s=0.5))]) == [0, 1]
-    assert moving_alike([unscented(modes[0]), unscented(modes[1])]) == [0, 0]
-    assert moving_alike([gauss_hermite(modes[0], 3), gauss_hermite(modes[0], 4), gauss_hermite(modes[1], 3)]) == [0, 1, 0]
-    assert moving_alike([gauss_hermite(modes[0]), gauss_hermite(modes[0].replace(s=0.5))]) == [0, 1]
-    turned = [
-        Model.define(
-            ["p + v1", "q + v2"],
-            "p + w",
-            symbols={"x": ["p", "q"], "v": list(noises), "w": ["w"]},
-            state_noise={"variance": [1.0, 4.0]},
-        )
-        for noises in (("v1", "v2"), ("v1", "v2"), ("v2", "v1"))
-    ]
-    for build in (gaussian, linearised, unscented):
-        assert moving_alike([build(one) for one in turned]) == [0, 0, 2]  # the same formulas, the variances are each other's
-    driven = [Model.define("x + u + v", "x + w", inputs={"u": values}) for values in ([0, 1], [0, 1], [1, 0])]
-    assert moving_alike([gaussian(one) for one in driven]) == [0, 0, 2]

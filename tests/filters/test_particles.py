@@ -10,7 +10,6 @@ from scipy import stats
 from kfcourse import JumpModel, Model, ModelError, load_variants, run, simulate
 from kfcourse.filters import kalman_filter, particle
 from kfcourse.filters.densities import likelihood
-from kfcourse.filters.particles import Mode, _wide
 from kfcourse.lab import find_variant
 from kfcourse.lab.short_names import exact
 from kfcourse.linear.system import linear_system
@@ -157,98 +156,7 @@ def test_the_evidence_is_that_of_all_histories():
         assert abs(found[i] - histories(THROWN, y[:, i])[3]) < 4 * 0.05
 
 
-# --- the proposal
-
-
-@pytest.mark.parametrize("meter", ["x1 + 0.02*x1**2*w1", "x1**2 + 0.3*w1", "x1 + x2 + x1*x2 + 0.5*w1"])
-def test_draws_come_with_the_density_they_are_drawn_from(meter):
-    """M of N(s; 0, I) / q(s) over draws from q is 1, and of that times s^2 it is 1, whatever q is."""
-    n, count = 2 if "x2" in meter else 1, 40_000
-    model = Model.define([f"x{i + 1} + v{i + 1}" for i in range(n)], [meter])
-    starts = np.array([-1.0, 0.3, 1.0])[:, None] * np.ones((1, 1, 1, 1, n))
-    law, tells, _ = Mode.of(model).look(lambda s: s, starts, np.full((1, 1, 1, 1, 1), 0.7), 0)
-    assert tells.all()
-    s, logs = _wide(np.random.default_rng(1), law, (1, 1, count))
-    ratios = np.exp(logs[0, 0])
-    for values in (ratios, *(ratios[:, None] * s[0, 0] ** 2).T):
-        assert abs(values.mean() - 1) < 4 * values.std() / np.sqrt(count)
-    assert ratios.max() <= 10 * (1 + 1e-12)  # a tenth is drawn from N(0, I) itself
-
-
-def test_of_an_affine_meter_the_law_that_it_finds_is_the_posterior():
-    y = np.array([0.3, 1.2])
-    L = np.linalg.cholesky(LINEAR.prior.cov)
-    law, _, height = Mode.of(LINEAR).look(
-        lambda s: LINEAR.prior.mean + s @ L.T, np.zeros((1, 1, 1, 1, 2)), y[None, None, None, None], 0
-    )
-    posterior = kalman_filter(LINEAR).step(kalman_filter(LINEAR).init(1), y[None]).posterior
-    # slopes by differences of 1e-4: rounding 1e-12
-    np.testing.assert_allclose(LINEAR.prior.mean + L @ law.mean.ravel(), posterior.mean[0], rtol=1e-9)
-    np.testing.assert_allclose(L @ law.cov.reshape(2, 2) @ L.T, posterior.cov.reshape(2, 2), rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(height.item(), evidence(kalman_filter(LINEAR), y[None, None]).item(), rtol=1e-9)
-
-
-@pytest.mark.parametrize("name", ["53", "7", "10", "21"])
-def test_where_it_looks_most_particles_count(name):
-    """Half of a thousand or more in the median, at the first step of variant 53 where a few of the blind ones do."""
-    y = simulate(VARIANTS[name], 60, 4, seed=1).y
-    for state in [*states(particle(VARIANTS[name], 1000), y)][1:]:
-        assert np.median(state.memory.effective) > 450
-    if name == "53":
-        blind = [*states(particle(VARIANTS[name], 1000, guided=False), y[:1])][1]
-        assert np.median(blind.memory.effective) < 50
-
-
-def test_it_is_guided_in_models_that_depend_on_the_step_too():
-    """Meter and noise change with k: the Kalman filter's estimates within 4 errors of the sampling; most particles count."""
-    model = Model.define("0.9*x + (1 + 0.2*k)*v", "(2 - 0.3*k)*x + 0.05*(1 + k)*w")
-    y = simulate(model, 50, 4, seed=1).y
-    expected = run(kalman_filter(model), y)
-    for k, state in enumerate([*states(particle(model, 1000), y)][1:]):
-        distance = (state.posterior.mean - expected.mean[k])[:, 0] / np.sqrt(expected.cov[k, :, 0, 0])
-        assert (state.memory.effective > 400).all()
-        assert (abs(distance) < 4 * np.sqrt(1.5 / state.memory.effective)).all()
-
-
-def test_an_angle_that_is_measured_is_found_the_short_way_round():
-    """A direction near pi, measured sharply as one near -pi: guided particles find it, and most of them count."""
-    model = Model.define("x + 0.3*v", "x + 0.01*w", prior={"mean": 3.0, "variance": 0.04}, angles={"x": ["x"], "y": ["y"]})
-    swarm = particle(model, 400)
-    state = swarm.step(swarm.init(3), np.full((3, 1), -3.1))
-    expected = 3.0 + 0.04 / (0.04 + 1e-4) * (2 * np.pi - 3.1 - 3.0) - 2 * np.pi
-    assert (state.memory.effective > 200).all()
-    assert (abs(state.posterior.mean - expected) < 4 * 0.01 / np.sqrt(200)).all()
-    state = swarm.step(state, np.full((3, 1), 3.1))
-    assert (state.memory.effective > 200).all()
-    assert (abs(state.posterior.mean - 3.1) < 0.005).all()
-
-
 # --- behaviour
-
-
-def test_a_missing_measurement_weighs_nothing():
-    swarm = particle(VARIANTS["2"], 64)
-    state = swarm.init(3)
-    for _ in range(2):
-        state = swarm.step(state, np.full((3, 1), np.nan))
-        np.testing.assert_allclose(state.memory.effective, 64, rtol=64 * np.finfo(float).eps)
-        # equal weights: systematic resampling keeps every particle once
-        np.testing.assert_allclose(state.posterior.mean, state.memory.x.mean(axis=(1, 2)), rtol=0, atol=1e-14)
-    both = particle(THROWN, 2000)
-    state = both.step(both.init(50), np.full((50, 2), np.nan))
-    np.testing.assert_allclose(state.memory.probability.mean(axis=0), THROWN.first, atol=4 * 0.5 / np.sqrt(1e5))
-
-
-def test_the_prediction_is_the_law_of_the_predicted_particles():
-    """Resampled, they all weigh the same: their mean, and their covariance with the divisor M."""
-    model = Model.define(["x1 + 0.2*x2 + v1", "0.9*x2 + 1 + v2"], "x1 + 0.5*w", state_noise={"variance": [[0, 0], [0, 0]]})
-    swarm = particle(model, 30)
-    state = swarm.step(swarm.init(2), np.array([[0.4], [-0.7]]))
-    assert not np.array_equal(state.memory.x[0], state.memory.x[1])  # trajectories have particles of their own
-    for both, mean, cov in zip(state.memory.x, *state.predicted, strict=True):
-        particles = both.reshape(30, 2) @ np.array([[1, 0.2], [0, 0.9]]).T + [0, 1]
-        np.testing.assert_allclose(mean, particles.mean(axis=0), rtol=1e-12)
-        np.testing.assert_allclose(cov, np.cov(particles.T, bias=True), rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -281,14 +189,3 @@ def test_the_likelihood_is_the_normal_density_with_its_constant():
             mean, B = np.array(mean), np.array(B)
             expected = stats.multivariate_normal(mean + B @ np.full(len(B), 0.2), 1.5 * B @ B.T).logpdf(y)
             assert value == pytest.approx(expected, rel=1e-12)
-
-
-@pytest.mark.parametrize("angles", [[], ["y1", "y2"]])
-def test_of_a_measurement_with_a_missing_component_it_is_the_density_of_the_others(angles):
-    state, meter, x = ["x1 + v1", "x2 + v2"], ["x1 + 2*w1", "x2**2 + x1*w2 + 0.2*w1"], np.array([[0.3, -1.0], [2.0, 0.5]])
-    both = likelihood(Model.define(state, meter, angles=angles))
-    for i, y in enumerate(([0.7, np.nan], [np.nan, -0.4])):
-        kept = [f"y{i + 1}"] if angles else []
-        alone = likelihood(Model.define(state, [meter[i]], symbols={"w": ["w1", "w2"]}, angles={"y": ["y"] if kept else []}))
-        np.testing.assert_allclose(both(np.array(y), x), alone(np.array([y[i]]), x), rtol=1e-12)
-    np.testing.assert_array_equal(both(np.full(2, np.nan), x), 0.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kfcourse import JumpModel, Model, ModelError, compare, gaussian, linearised, run, simulate
+from kfcourse import JumpModel, ModelError, gaussian, linearised, run, simulate
 from kfcourse.filters import gpb2, imm, logic_dynamic, logic_dynamic_fos, pointmass
 from kfcourse.filters.multiple_models import by_state
 from kfcourse.laws import Gaussian
@@ -41,22 +41,6 @@ def test_a_constant_formula_is_the_constant_matrix_bit_for_bit(build):
     found = [run(of(build, one), drawn[0].y) for one in (numbers, formulas)]
     for left, right in zip(*found, strict=True):
         np.testing.assert_array_equal(left, right)
-
-
-@pytest.mark.parametrize("build", [imm, logic_dynamic, gpb2])
-@pytest.mark.parametrize("kind", [gaussian, linearised])
-def test_probabilities_that_hardly_vary_are_the_constant_ones(build, kind):
-    """1e-14 x changes nothing that is seen, but takes the way by quadrature."""
-    modes = SENSOR | {"third": {"state": "x - 0.4*sin(x) + 0.4*v", "parameters": {"C": 2}}}
-    rest, first = [[0.3, 0.6, 0.1], [0.2, 0.2, 0.6]], [0.8, 0.1, 0.1]
-    numbers = overloaded([[0.9, 0.06, 0.04], *rest], modes, first=first)
-    formulas = overloaded([["0.9 + 1e-14*x", "0.06 - 1e-14*x", 0.04], *rest], modes, first=first)
-    assert formulas.by_state
-    y = simulate(numbers, 6, 15, seed=1).y
-    y[4, 0] = np.nan
-    found = [run(of(build, one, kind), y) for one in (numbers, formulas)]
-    for left, right in zip(*found, strict=True):
-        np.testing.assert_allclose(left, right, rtol=1e-9, atol=1e-9)
 
 
 def test_trajectories_follow_the_state():
@@ -137,29 +121,6 @@ def test_the_exact_filter_is_a_plain_grid_of_both():
     assert (state.memory.discretisation_error() < 1e-2).all()
 
 
-def test_equal_modes_say_nothing_of_the_state_however_they_follow_it():
-    model = overloaded(modes={"one": {"parameters": {"C": 1}}, "other": {"parameters": {"C": 1}}})
-    y = simulate(model, 8, 6, seed=3).y
-    found, expected = run(pointmass(model), y), run(pointmass(model.modes[0]), y)
-    assert (np.abs(found.mean - expected.mean) < 2e-3 * np.sqrt(expected.cov[..., 0])).all()
-
-
-def test_who_knows_of_the_state_gains():
-    """Against the same filter with the mean of the probabilities; nobody is below the bound."""
-    model = overloaded()
-    mode = simulate(model, 20_000, 20, seed=9).mode
-    rows = [(mode[1:] == 1)[mode[:-1] == i].mean() for i in (0, 1)]
-    without = logic_dynamic([gaussian(one) for one in model.modes], [[1 - p, p] for p in rows], model.first, name="aof-without")
-    result = compare(
-        [of(logic_dynamic, model), of(gpb2, model), without, pointmass(model)], model, 160, 12, 1,
-        progress=False, jobs=1,
-    )  # fmt: skip
-    gain = result.mean_gap_difference("aof-without", "aof-jump-gaussian", slice(3, None))
-    assert gain.value > 4 * gain.standard_error
-    for _, gap in result.ranking():
-        assert gap.value > -4 * gap.standard_error
-
-
 @pytest.mark.parametrize(
     ("build", "message"),
     [
@@ -197,11 +158,6 @@ def test_what_is_no_probability_for_a_state_is_refused_there(row, message):
         model.transition_of(np.array([[0.0], [30.0]]), 0)
 
 
-def test_transitions_by_the_state_need_a_first_law():
-    with pytest.raises(ModelError, match="`first` is missing"):
-        overloaded(transition=["exp(-x**2)", "1 - exp(-x**2)"], first=None)
-
-
 def test_transitions_of_many_components_are_refused():
     names = [f"x{i + 1}" for i in range(4)]
     p = "exp(-x1**2 - x2**2 - x3**2 - x4**2)"
@@ -211,14 +167,3 @@ def test_transitions_of_many_components_are_refused():
     )  # fmt: skip
     with pytest.raises(ModelError, match="depend on 4 components"):
         of(imm, model, linearised)
-
-
-def test_a_chain_of_one_state_is_still_a_model():
-    """One mode: whatever the formula says it is 1."""
-    model = JumpModel.define("0.9*x + v", "x + w", modes={"only": {}}, transition=[["1 + 1e-99*x"]], first=[1])
-    plain = Model.define("0.9*x + v", "x + w")
-    y = simulate(plain, 4, 6, seed=1).y
-    assert model.by_state
-    np.testing.assert_allclose(
-        run(of(logic_dynamic, model), y).mean, run(logic_dynamic([gaussian(plain)], [[1.0]]), y).mean, rtol=1e-10
-    )

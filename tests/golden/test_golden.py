@@ -171,7 +171,8 @@ PARTS = {
     "equations": (equations, ["all"], 0.0),
 }
 # Four estimates of an object without noise tell one another to fifteen digits: measurements changed by 1e-15 move the filter by
-# 2e-5, and its covariance by half a hundredth.  The Gaussian functions of the lander with a fault are quadratures, whose points are chosen for 1e-5 deviations.
+# 2e-5, and its covariance by half a hundredth.  The Gaussian functions of the lander with a fault are quadratures, whose points
+# are chosen for 1e-5 deviations.
 LOOSE = {("filters D3", "fbp4-linearised"): 0.02}
 LOOSE |= {("modes J3", name): 1e-4 for name in ("aof-jump-gaussian", "imm", "gpb2", "aof-averaged")}
 CASES = [f"{part} {name}" for part, (_, names, _) in PARTS.items() for name in names]

@@ -56,8 +56,8 @@ def test_its_look_is_that_of_its_family(recipe):
     assert plots.style("fading-linearised")["marker"] == "d"
 
 
-@pytest.mark.parametrize("name", [name for name in short_names.FILTERS if families.family(name) in filters.EQUATIONS])
+@pytest.mark.parametrize("name", [name for name in short_names.FILTERS if short_names.entry(name).family in filters.EQUATIONS])
 def test_every_family_with_equations_has_its_headings(name):
-    family = families.FAMILIES[families.family(name)]
+    family = families.FAMILIES[short_names.entry(name).family]
     assert family.heading
     assert family.russian_heading

@@ -2,7 +2,6 @@
 
 import re
 import warnings
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,13 +10,11 @@ from click.testing import CliRunner
 from kfcourse import cli
 from kfcourse.filters import aof, duof
 from kfcourse.lab import admission
-from kfcourse.lab.admission import admissions, on_trial, table
-from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, LAB, has_bound, lab_filters
-from kfcourse.laws import gain
+from kfcourse.lab.admission import admissions, table
+from kfcourse.lab.short_names import FILTERS, JUMP_FILTERS, LAB, lab_filters
 from kfcourse.montecarlo.designing import NotFinite
 from kfcourse.montecarlo.experiment import compare, without_failing
 from kfcourse.symbolic.model import Model
-from kfcourse.symbolic.reading import ModelError
 from kfcourse.symbolic.structure import gaussian
 
 pytestmark = pytest.mark.quick
@@ -70,29 +67,6 @@ def test_what_can_be_built_and_will_not_do_is_warned_of():
     assert level <= kinds(found, "poor") and "tangent of y at the prior's mean is level" in found["fos3-linearised"].says
     growth = Model.define("x/2 + 25*x/(1 + x**2) + 8*cos(1.2*k) + v", "x**2/20 + w", prior={"variance": 5})
     assert "with 5 points an axis" in verdicts(growth)["aof-gauss-hermite"].says
-
-
-def test_a_trial_finds_what_leaves_the_finite_numbers():
-    model = Model.define("0.9*x + 0.3*v", "x + x**3/20 + w")
-    found = on_trial(model, admissions(model, ["duof", "aof-exact"]))
-    assert [one.verdict for one in found] == ["yes", "yes"]
-    endless = Model.define("x**3 + v", "x + w")
-    (one,) = on_trial(endless, admissions(endless, ["duof"]))
-    assert one.verdict == "poor" and "trajectories become infinite" in one.says
-    short = Model.define("0.9*x + u + v", "x + w", inputs={"u": [1, 2, 3]})
-    assert [one.verdict for one in on_trial(short, admissions(short))] == ["yes"] * len(FILTERS)  # no longer than the input
-
-
-def test_a_trial_tells_a_filter_from_the_model():
-    model = Model.define("0.9*x + v", "x + w")
-    good = admissions(model, ["aof-gaussian"])[0]
-
-    def step(state, y):
-        return good.one.step(state, y * np.inf)
-
-    broken = replace(good, one=replace(good.one, step=step))
-    (one,) = on_trial(model, [broken])
-    assert one.verdict == "poor" and one.says == "on a trial of 512 trajectories it left the finite numbers"
 
 
 @pytest.mark.parametrize(
@@ -177,29 +151,12 @@ def test_a_negative_variance_is_the_affair_of_its_filter():
     np.testing.assert_array_equal(found.error_variance("aof-gaussian").value, expected)
 
 
-def test_a_variance_that_turns_negative_as_the_filter_runs_is_the_affair_of_that_filter():
-    model = Model.define("0.9*x + 0.3*v", "x + w")
-    good = aof(gaussian(model))
-
-    def step(state, y):
-        gain(np.ones((1, 1)), np.array([[-1.0 if state.step == 2 else 1.0]]))
-        return good.step(state, y)
-
-    broken = type(good)("broken", model, good.init, step)
-    with pytest.raises(NotFinite, match=r"^step 2: broken failed: a covariance has the variance -1") as caught:
-        compare([good, broken], model, 100, 4, 1, jobs=1, progress=False)
-    assert caught.value.filter_name == "broken"
-    with pytest.raises(ModelError, match="the input u has 2 value"):  # a mistake in the model is no filter's affair
-        timed = Model.define("0.9*x + u + v", "x + w", inputs={"u": [1, 2]})
-        compare([aof(gaussian(timed))], timed, 10, 4, 1, jobs=1, progress=False)
-
-
 @pytest.mark.parametrize("meter", [["x + w", "x + w"], ["x + w", "2*x + w"], ["x + w1", "x + w1 + w2", "w2 + x**2"]])
 def test_measurements_whose_noises_depend_on_one_another_have_no_density(meter):
     """Two equal rows, and sums of rows: particles would meet a singular matrix; the Gaussian filters take the pseudo-inverse."""
     model = Model.define("0.9*x + v", meter)
     particles, normal = admissions(model, ["particle", "aof-gaussian"])
-    assert particles.one is None and "depend on one another" in str(particles.reason) and not has_bound(model)
+    assert particles.built is None and "depend on one another" in str(particles.reason)
     assert normal.verdict == "yes"
-    result = compare([normal.one], model, 100, 4, 1, jobs=1, progress=False)
+    result = compare([normal.built], model, 100, 4, 1, jobs=1, progress=False)
     assert np.isfinite(result.error_variance("aof-gaussian").value).all()

@@ -60,16 +60,6 @@ def written(path, times, y):
     path.write_text("\n".join(["time,y1,y2" if y.shape[1] == 2 else "time,y", *cells]), encoding="utf-8")
 
 
-LEVEL = """
-[variants.level]
-state = "x + sqrt(q*dt)*v"
-meter = "x + sqrt(r)*w"
-parameters = { q = 0.3, r = 3.0 }
-inputs = { dt = [1] }
-prior = { mean = 0, variance = 4 }
-"""
-
-
 @pytest.fixture
 def place(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -239,21 +229,6 @@ def test_a_report_that_fails_leaves_what_was_there(call, place, monkeypatch):
     assert {path: path.read_bytes() for path in (place / "out").iterdir()} == before
 
 
-@pytest.mark.parametrize("where", ["examine", "save_texts"])
-def test_an_interrupt_leaves_what_was_there(call, place, monkeypatch, where):
-    """While the filter runs, and while the report is being written."""
-    arguments = ("line.csv", "--model", "my.toml", "--variant", "line", "--out", "out")
-    assert call(*arguments).exit_code == 0
-    before = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
-
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(own_data, where, interrupted)
-    assert call(*arguments, "--gate", 0.9).exit_code != 0
-    assert {path: path.read_bytes() for path in place.rglob("*") if path.is_file()} == before
-
-
 def test_the_model_of_a_file(place):
     assert model_of(place / "one.toml", None).name == "only"
     (place / "bad.toml").write_text(ONE.replace("0.9*x", "0.9*q"), encoding="utf-8")
@@ -267,33 +242,7 @@ def test_a_finding_in_words():
     assert "y2: 0.300" in not_so and "claims more than it knows" in not_so
 
 
-def test_a_maximum_beside_a_jump_of_the_gate_is_found(place, call):
-    """A doubtful measurement of such a size that the largest likelihood has it just within the gate.
-
-    Where it passes, the estimate is that of the record without a gate; where it does not, of the record without it.
-    """
-    rng = np.random.default_rng(3)
-    y = np.cumsum(np.sqrt(0.3) * rng.normal(size=40)) + rng.normal(size=40)
-    y[20] += 5.15
-    (place / "level.toml").write_text(LEVEL, encoding="utf-8")
-    written(place / "level.csv", np.arange(40.0), y[:, None])
-    options = ("--unknown", "r", "--positive", "r")
-    result = call("level.csv", "--model", "level.toml", "--gate", 0.99, *options)
-    assert result.exit_code == 0 and "Near its maximum the likelihood jumps" in result.output
-    told = call("level.csv", "--model", "level.toml", *options)
-    assert "the likelihood jumps" not in told.output
-
-    def r(output):
-        return re.search(r"^r = .*$", output, re.M)[0]
-
-    assert r(result.output) == r(told.output)
-
-
 def test_names_that_are_none_are_told(place):
     variant = model_of(place / "my.toml", "line")
     with pytest.raises(ValueError, match=r"structure must be one of linearised, gaussian, .*, got 'extended'"):
         estimate_record(place / "line.csv", variant, structure="extended")
-    told = estimate_record(place / "line.csv", variant)
-    with pytest.raises(ValueError, match=r"two components of the state, x.*; got \('x', 'z'\)"):
-        own_data.write_record(told, place / "out", ("x", "z"))
-    assert not (place / "out").exists()

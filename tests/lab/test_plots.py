@@ -9,12 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from kfcourse import compare, lab_filters, load_variants, run, simulate
-from kfcourse.filters import aof
+from kfcourse import compare, lab_filters, load_variants
 from kfcourse.lab import plots
-from kfcourse.lab.families import FAMILIES, LOOKS, look
+from kfcourse.lab.families import FAMILIES, look
 from kfcourse.lab.short_names import FILTERS, LAB, title
-from kfcourse.symbolic.structure import gaussian
 
 pytestmark = pytest.mark.quick
 
@@ -149,18 +147,7 @@ def test_relative_accuracy_can_show_a_part_of_the_steps(results, ax):
     np.testing.assert_array_equal(ax.lines[0].get_xdata(), [2, 3, 4])
 
 
-def test_one_trajectory_with_estimates(ax):
-    model = load_variants()["53"].model
-    x, y = simulate(model, 1, 10, seed=1)
-    z = run(aof(gaussian(model)), y).mean[:, 0, 0]
-    assert plots.trajectory(x[:, 0, 0], y[:, 0, 0], {"aof-gaussian": z}, ax) is ax
-    assert ax.get_xlabel()
-    assert ax.get_ylabel()
-    assert "GAOF" in [text.get_text() for text in ax.get_legend().get_texts()]
-    np.testing.assert_array_equal(ax.lines[-1].get_ydata(), z)
-
-
-@pytest.mark.parametrize("name", [*FAMILIES, *LOOKS])
+@pytest.mark.parametrize("name", FAMILIES)
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_a_filter_s_line_is_seen_on_the_page(name, theme):
     """WCAG 2 wants 3 of what is no text."""

@@ -81,7 +81,7 @@ def written(request, tmp_path_factory):
     """Language, texts, and names of all files."""
     names = ["aof-jump-gaussian", "imm", "gpb2", "fos-jump-gaussian", "fkp4-jump-gaussian", "aof-averaged", "aof-exact"]
     model = find_variant("J1-lasting").model
-    filters = [one.one for one in admissions(model, names)]
+    filters = [one.built for one in admissions(model, names)]
     result = compare(filters, model, 128, 3, 1, progress=False, jobs=1)
     folder = tmp_path_factory.mktemp(request.param)
     paths = write_report(find_variant("J1-lasting"), result, folder, request.param, modes=recognised_modes(result, filters))

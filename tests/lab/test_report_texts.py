@@ -268,7 +268,7 @@ def test_the_cause_of_a_refusal_is_said_in_the_report_s_words(case):
     state, meter, name, english, russian = LEFT_OUT[case]
     model = Model.define(state, meter)
     (refused,) = admissions(model, [name])
-    assert refused.one is None
+    assert refused.built is None
     if case != "choice":  # its words are those of SymPy, translated in the whole report
         assert english in cause(refused.reason, model, WORDS["en"]) and russian in cause(refused.reason, model, WORDS["ru"])
     assert cause(refused.reason, model, WORDS["ru"]) != WORDS["ru"]["left_other"].format(reason=refused.reason)
@@ -292,8 +292,8 @@ def test_one_filter_left(tmp_path):
     """The others are refused: named with their causes, together where they share it; nothing is compared, nothing fails."""
     model = Model.define("0.9*x + v", "x + (1 if x > 0 else 0) + sin(w)")
     found = admissions(model, LAB)
-    reasons = {one.name: one.reason for one in found if one.one is None}
-    result = compare([one.one for one in found if one.one], model, 200, 3, 1, progress=False)
+    reasons = {one.name: one.reason for one in found if one.built is None}
+    result = compare([one.built for one in found if one.built], model, 200, 3, 1, progress=False)
     result = dataclasses.replace(result, left_out=reasons)
     paths = write_report(Variant("one_left", "", model), result, tmp_path, "ru")
     tex = (tmp_path / "report.tex").read_text(encoding="utf-8")

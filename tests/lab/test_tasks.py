@@ -133,7 +133,7 @@ def test_filters_of_the_tasks_gain_from_their_measurements():
     spread = simulate(TASKS["D2"].model, 1000, 30, seed=2).x[-1].var(axis=0).sum()
     assert all(result.error_variance(name).value[-1] < 0.1 * spread for name in result.names)
     found = JumpStructures(TASKS["J4"].model)
-    both = [logic_dynamic(found.linearised, *found.chain), aof(found.averaged)]
+    both = [logic_dynamic(found.linearised, found.model, found.model.first), aof(found.averaged)]
     result = compare(both, TASKS["J4"].model, 1000, 40, 1, progress=False, jobs=1)
     gain = result.mean_gap_difference("aof-averaged", "aof-jump-linearised", slice(20, None))
     assert gain.value > 4 * gain.standard_error

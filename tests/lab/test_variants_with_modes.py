@@ -57,13 +57,13 @@ def test_each_has_its_filters_and_finite_trajectories(name):
     if name in ("J3", "J4"):
         assert "no noise enters the object" in str(found["aof-exact"].reason)
     else:
-        assert found["aof-exact"].one is not None
+        assert found["aof-exact"].built is not None
         assert (JUMPS[name].model.n == 1) or "by particles" in found["aof-exact"].says
-    assert all(found[one].one for one in ("aof-jump-linearised", "imm", "gpb2"))
+    assert all(found[one].built for one in ("aof-jump-linearised", "imm", "gpb2"))
     for one in ("aof-averaged", "duof", "fos-averaged", "mfos-averaged", "fos-jump-gaussian"):
         reason = str(found[one].reason)
-        assert found[one].one or "closed" in reason or "nobody knows the probabilities" in reason
-        assert (found["duof"].one is None) == JUMPS[name].model.by_state
+        assert found[one].built or "closed" in reason or "nobody knows the probabilities" in reason
+        assert (found["duof"].built is None) == JUMPS[name].model.by_state
     assert np.isfinite(simulate(JUMPS[name].model, 200, 51, seed=1).x).all()
 
 
@@ -105,7 +105,7 @@ def test_listed_and_checked(own):
 
 
 def test_filters_are_told_for_modes():
-    told = kfcourse("filters", "J1", "--no-trial").output
+    told = kfcourse("filters", "J1").output
     assert "LD-GAOF" in told and "GPB2" in told and "particle" not in told
     assert "LD-GFKP4" in told and "LD-LFBP4" in told
     assert title("fbp2-jump-linearised") == "LD-LFBP2"

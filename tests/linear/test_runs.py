@@ -1,19 +1,12 @@
 """The linear Kalman filter in five arithmetic forms, covariance analysis and steady state, against independent references."""
 
-from fractions import Fraction
-
 import control
 import numpy as np
 import pytest
-import scipy.linalg
 
-from kfcourse.filters.kalman import kalman_filter
 from kfcourse.laws import Gaussian
 from kfcourse.linear import LinearSystem, covariances, run, simulate, steady_state
-from kfcourse.linear.arithmetic import FORMS, _triangular, form
-from kfcourse.linear.factored import bierman, factors, product
-from kfcourse.montecarlo.experiment import run as run_filter
-from kfcourse.symbolic.model import Model
+from kfcourse.linear.arithmetic import FORMS
 
 pytestmark = pytest.mark.quick
 
@@ -94,65 +87,6 @@ def test_every_form_is_the_filter_of_the_page(case, arithmetic, missing):
             np.testing.assert_allclose(laws.cov[:, i], [cov for _, cov in reference], **ROUNDING)
 
 
-@pytest.mark.parametrize("arithmetic", FORMS)
-def test_a_prior_of_each_run(arithmetic):
-    one, prior = system(3, 2, 0, 9)
-    y = simulate(one, prior, 8, 4, seed=2).y
-    rng = np.random.default_rng(3)
-    means, roots = rng.normal(size=(4, 3)), rng.normal(size=(4, 3, 3))
-    covs = roots @ roots.swapaxes(1, 2) + 0.2 * np.eye(3)
-    together = run(one, Gaussian(means, covs), y, arithmetic=arithmetic).posterior
-    for i in range(4):
-        alone = run(one, Gaussian(means[i], covs[i]), y[:, [i]], arithmetic=arithmetic).posterior
-        np.testing.assert_allclose(together.mean[:, i], alone.mean[:, 0], rtol=1e-12, atol=1e-12)
-        np.testing.assert_allclose(together.cov[:, i], alone.cov[:, 0], rtol=1e-12, atol=1e-12)
-
-
-@pytest.mark.parametrize("arithmetic", FORMS)
-def test_the_model_s_kalman_filter_is_the_same(arithmetic):
-    # x' = A x + C v + constant, y = H x + D w with correlated noises: the filter of a Model finds the matrices itself.
-    model = Model.define(
-        ["0.8*x1 + 0.3*x2 + 0.5*v1 + 0.2*v2 + 0.4", "-0.2*x1 + 0.9*x2 + 0.7*v2 - 0.1"],
-        ["1.2*x1 - 0.4*x2 + 0.6*w1 + 0.25"],
-        prior={"mean": [0.3, -1], "variance": [[2, 0.5], [0.5, 1]]},
-        state_noise={"variance": [[1, 0.3], [0.3, 0.5]]},
-    )
-    A, C = np.array([[0.8, 0.3], [-0.2, 0.9]]), np.array([[0.5, 0.2], [0, 0.7]])
-    Q = symmetrical(C @ np.array([[1, 0.3], [0.3, 0.5]]) @ C.T)
-    one = LinearSystem(A, np.array([[1.2, -0.4]]), Q, np.array([[0.36]]), np.eye(2))
-    prior = Gaussian(np.array([0.3, -1]), np.array([[2, 0.5], [0.5, 1]]))
-    shift = np.broadcast_to([0.4, -0.1], (9, 1, 2))
-    y = simulate(one, prior, 9, 3, 4, shift).y + 0.25
-    y[4, 1] = np.nan
-    estimates = run_filter(kalman_filter(model), y)
-    laws = run(one, prior, y - 0.25, shift, arithmetic).posterior
-    np.testing.assert_allclose(estimates.mean, laws.mean, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(estimates.cov, laws.cov, rtol=1e-12, atol=1e-12)
-
-
-def test_the_input_may_be_one_for_all_runs():
-    one, prior = system(2, 1, 1, 7)
-    u = np.random.default_rng(1).normal(size=(6, 1, 1))
-    y = simulate(one, prior, 6, 3, 2, u).y
-    np.testing.assert_array_equal(run(one, prior, y, u).posterior.mean, run(one, prior, y, np.tile(u, (1, 3, 1))).posterior.mean)
-
-
-# ---------------------------------------------------------------- simulation
-
-
-def test_simulated_moments_are_those_of_the_system():
-    one, prior = system(2, 2, 1, 6)
-    u = np.array([1.0, -2.0, 0.5])[:, None, None]
-    x, y = simulate(one, prior, 3, 40_000, 3, u)
-    mean, cov = prior.mean, prior.cov
-    for k in range(3):
-        for data, m, c in ((x[k], mean, cov), (y[k], one.H @ mean, one.H @ cov @ one.H.T + one.R)):
-            # 4 standard errors: of a mean, sd / sqrt(N); of a covariance of normal variables, at most sqrt(2 c_ii c_jj / N).
-            assert (abs(data.mean(axis=0) - m) < 4 * np.sqrt(np.diag(c) / 40_000)).all()
-            assert (abs(np.cov(data.T) - c) < 4 * np.sqrt(2 * np.outer(np.diag(c), np.diag(c)) / 40_000)).all()
-        mean, cov = one.A @ mean + one.B @ u[k, 0], one.A @ cov @ one.A.T + one.Q
-
-
 # ---------------------------------------------------------------- covariance analysis
 
 
@@ -165,31 +99,6 @@ def test_covariances_in_advance_are_those_of_the_run(case):
     np.testing.assert_allclose(found.gains @ F, found.predicted @ one.H.T, **ROUNDING)
 
 
-@pytest.mark.parametrize("constant", [True, False])
-def test_covariances_of_wrong_gains_against_simulation(constant):
-    # The filter believes in other noises; its true errors are those of `covariances` with its gains.
-    one, prior = system(3, 2, 0, 12)
-    believed = LinearSystem(one.A, one.H, 0.05 * one.Q, 4 * one.R)
-    runs, steps = 20_000, 6
-    gains = steady_state(believed).gain if constant else covariances(believed, 0.2 * prior.cov, steps).gains
-    x, y = simulate(one, prior, steps, runs, seed=13)
-    found = covariances(one, prior.cov, steps, gains)
-    estimate = np.tile(prior.mean, (runs, 1))
-    for k in range(steps):
-        K = gains if constant else gains[k]
-        for after, expected in ((False, found.predicted[k]), (True, found.posterior[k])):
-            if after:
-                estimate = estimate + (y[k] - estimate @ one.H.T) @ K.T
-            error = x[k] - estimate
-            # 4 standard errors of a covariance of normal variables: sqrt((c_ii c_jj + c_ij^2) / N)
-            bound = 4 * np.sqrt((np.outer(np.diag(expected), np.diag(expected)) + expected**2) / runs)
-            assert (abs(error.T @ error / runs - expected) < bound).all()
-        estimate = estimate @ one.A.T
-    optimal = covariances(one, prior.cov, steps).posterior
-    # Wrong gains lose in every direction, once two measurements of two components have reached all three states.
-    assert (np.linalg.eigvalsh((found.posterior - optimal)[1:]) > 0).all()
-
-
 def test_steady_state_against_python_control(case):
     one = case[0]
     found = steady_state(one)
@@ -200,31 +109,10 @@ def test_steady_state_against_python_control(case):
     np.testing.assert_allclose(found.predicted, X, rtol=1e-9, atol=1e-9)
 
 
-def test_steady_state_closed_form():
-    # Scalar: P = a^2 P r / (h^2 P + r) + q is a quadratic equation, h^2 P^2 + (r - a^2 r - h^2 q) P - q r = 0.
-    a, h, q, r = 1.3, 0.7, 0.4, 0.9
-    P = max(np.roots([h**2, r - a**2 * r - h**2 * q, -q * r]))
-    found = steady_state(LinearSystem(*(np.array([[value]]) for value in (a, h, q, r))))
-    np.testing.assert_allclose(found.predicted, [[P]], rtol=1e-12)
-    np.testing.assert_allclose(found.gain, [[P * h / (h**2 * P + r)]], rtol=1e-12)
-    np.testing.assert_allclose(found.posterior, [[P * r / (h**2 * P + r)]], rtol=1e-12)
-
-
 @pytest.mark.parametrize("growth", [1.0, 1.1])
 def test_no_steady_state_of_what_is_not_seen(growth):
     with pytest.raises(ValueError, match=r"no stabilising solution.*covariances"):
         steady_state(LinearSystem(np.diag([0.5, growth]), np.array([[1.0, 0]]), np.eye(2), np.eye(1)))
-
-
-def test_no_steady_state_of_what_stays_as_it_is_without_noise():
-    """Its variance falls for ever, as 1/k; of many such systems SciPy's matrix is none, or negative."""
-    rng = np.random.default_rng(0)
-    for n in rng.integers(1, 6, 100):
-        ways = np.linalg.qr(rng.standard_normal((n, n)))[0]
-        A = ways @ np.diag([*rng.uniform(-0.9, 0.9, n - 1), 1.0]) @ ways.T
-        B = ways[:, : n - 1] @ rng.standard_normal((n - 1, n - 1))
-        with pytest.raises(ValueError, match=r"no stabilising solution.*covariances"):
-            steady_state(LinearSystem(A, rng.standard_normal((1, n)), (B @ B.T + (B @ B.T).T) / 2, np.eye(1)))
 
 
 # ---------------------------------------------------------------- short words
@@ -242,72 +130,10 @@ def ill_conditioned():
     return short, prior, y, right
 
 
-@pytest.mark.parametrize("arithmetic", FORMS)
-def test_float32_stays_float32(arithmetic, ill_conditioned):
-    # In this case the variance of a measurement gets negative.
-    short, prior, y, _ = ill_conditioned
-    for laws in run(short, prior, y, arithmetic=arithmetic):
-        assert (laws.mean.dtype, laws.cov.dtype) == (np.float32, np.float32)
-    one, calm = system(3, 2, 1, 4)
-    y, u = simulate(one, calm, 5, 3, 1).y, np.ones((5, 3, 1))
-    y[2, 1, 0] = np.nan
-    for laws in run(one.astype(np.float32), calm, y, u, arithmetic):
-        assert (laws.mean.dtype, laws.cov.dtype) == (np.float32, np.float32)
-
-
-@pytest.mark.parametrize("arithmetic", FORMS)
-def test_float32_is_float64_to_its_precision(arithmetic):
-    one, prior = system(3, 2, 0, 4)
-    y = simulate(one, prior, 10, 3, 1).y
-    short = one.astype(np.float32)
-    found = run(short, prior, y, arithmetic=arithmetic).posterior
-    exact = run(one, prior, y, arithmetic=arithmetic).posterior
-    # Rounding of float32 is 6e-8; condition numbers are below 1e3 here.
-    np.testing.assert_allclose(found.mean, exact.mean, rtol=1e-4, atol=1e-4)
-    np.testing.assert_allclose(found.cov, exact.cov, rtol=1e-4, atol=1e-4)
-    assert not np.array_equal(found.cov, exact.cov)
-
-
 def lost(mean, right, since=0):
     """Share of the runs in which the estimate is more than three standard deviations from the right one at some step."""
     sd = np.sqrt(np.diagonal(right.cov, axis1=-2, axis2=-1))
     return (abs(mean - right.mean)[since:] > 3 * sd[since:]).any(axis=(0, 2)).mean()
-
-
-def in_a_loop(system, prior, y, guard):
-    """Means of the textbook's form in float32, one run after the other; guard: no correction where F <= 0."""
-    A, H, Q, R = (matrix.astype(np.float32) for matrix in (system.A, system.H, system.Q, system.R))
-    means = np.zeros((*y.shape[:2], len(A)), np.float32)
-    for r in range(y.shape[1]):
-        m, P = np.zeros(len(A), np.float32), prior.cov[r].astype(np.float32)
-        for k in range(len(y)):
-            F = (H @ P @ H.T + R)[0, 0]
-            K = (P @ H.T)[:, 0] / F if F > 0 or not guard else np.zeros(len(A), np.float32)
-            m, P = m + K * (y[k, r, 0] - (H @ m)[0]), P - np.outer(K, H @ P)
-            means[k, r] = m
-            m, P = A @ m, A @ P @ A.T + Q
-    return means
-
-
-@pytest.mark.parametrize("arithmetic", ["covariance", "symmetrised", "joseph"])
-def test_short_words_break_the_forms_with_covariances(arithmetic, ill_conditioned):
-    # The ratio of variances is 1e12, the word has 24 digits (1.7e7).  About 2 runs of 3 are thrown off, on any processor more
-    # than 1 of 3.  They divide by negative variances and find back: 1 in 200 is off at the end, on any processor below 1 in 20.
-    short, prior, y, right = ill_conditioned
-    laws = run(short, prior, y, arithmetic=arithmetic).posterior
-    assert lost(laws.mean, right) > 1 / 3
-    assert lost(laws.mean, right, since=-5) < 1 / 20
-    negative = (np.diagonal(laws.cov, axis1=-2, axis2=-1) < 0).any(axis=(0, 2))
-    assert negative.mean() > 1 / 3
-    symmetric_always = np.array_equal(laws.cov, laws.cov.swapaxes(-1, -2))
-    assert symmetric_always == (arithmetic != "covariance")
-
-
-def test_a_guard_against_negative_variances_would_lose_the_object_for_good(ill_conditioned):
-    short, prior, y, right = ill_conditioned
-    few = Gaussian(prior.mean, prior.cov[:100]), y[:, :100], Gaussian(right.mean[:, :100], right.cov[:, :100])
-    assert lost(in_a_loop(short, *few[:2], guard=False), few[2], since=-5) < 1 / 20
-    assert lost(in_a_loop(short, *few[:2], guard=True), few[2], since=-5) > 1 / 2  # 3 of 4
 
 
 @pytest.mark.parametrize("arithmetic", ["square-root", "ud"])
@@ -320,77 +146,7 @@ def test_short_words_do_not_break_the_factored_forms(arithmetic, ill_conditioned
     assert (np.diagonal(laws.cov, axis1=-2, axis2=-1) >= 0).all()
 
 
-def test_bierman_s_case_against_rational_numbers():
-    # Two nearly equal measurements with the small noise delta: condition number of p 3e8.
-    delta = float(np.float32(1 + 1e-4) - np.float32(1))
-    one = LinearSystem(np.diag([1, 1 + delta]), np.ones((1, 2)), np.zeros((2, 2)), np.array([[float(np.float32(delta**2))]]))
-
-    def exact(matrix):
-        return np.vectorize(lambda entry: Fraction(float(entry)), otypes=[object])(matrix)
-
-    A, H, R, P = (exact(matrix) for matrix in (one.A, one.H, one.R, np.eye(2)))
-    for k in range(2):
-        P = A @ P @ A.T if k else P
-        P = P - P @ H.T @ H @ P / (H @ P @ H.T + R)[0, 0]
-
-    def error(arithmetic, dtype):
-        """Relative error of the variance of x1 + x2, found from the factors where there are some."""
-        system, chosen = one.astype(dtype), form(arithmetic, one)
-        state = chosen.start(Gaussian(np.zeros((1, 2), dtype), np.eye(2, dtype=dtype)))
-        state = chosen.correct(system, state, np.zeros((1, 1), dtype))
-        state = chosen.correct(system, chosen.predict(system, state, 0.0), np.zeros((1, 1), dtype))
-        if arithmetic == "square-root":
-            root = exact(state.root.reshape(2, 2))
-            cov = root @ root.T
-        elif arithmetic == "ud":
-            unit = exact(state.unit.reshape(2, 2))
-            cov = unit @ np.diag(exact(state.diagonal.reshape(2))) @ unit.T
-        else:
-            cov = exact(state.cov.reshape(2, 2))
-        return abs(float((cov.sum() - P.sum()) / P.sum()))
-
-    # Rounding 6e-8 or 1e-16; the root's condition number is 2e4, the covariance's 3e8.  A factor of 10 for the dozen operations.
-    for name in ("square-root", "ud"):
-        assert error(name, np.float32) < 6e-8 * 2e4 * 10
-        assert error(name, float) < 1.1e-16 * 2e4 * 10
-    assert all(error(name, np.float32) > 1 for name in ("covariance", "symmetrised", "joseph"))
-    assert error("covariance", float) > error("square-root", float)
-
-
-# ---------------------------------------------------------------- the pieces of the square root
-
-
-def test_the_triangular_root_is_that_of_a_library():
-    wide = np.random.default_rng(2).normal(size=(3, 5))
-    reference = scipy.linalg.qr(wide.T, mode="economic")[1].T
-    np.testing.assert_allclose(abs(_triangular(wide)), abs(reference), rtol=1e-12)  # up to signs of the columns
-    # Short words are computed with, not only rounded to at the end.
-    short = wide.astype(np.float32)
-    long = scipy.linalg.qr(short.astype(float).T, mode="economic")[1].T
-    assert not np.array_equal(abs(_triangular(short)), abs(long).astype(np.float32))
-
-
 # ---------------------------------------------------------------- the pieces of the UD form
-
-
-@pytest.mark.parametrize("rank", [0, 1, 3, 4])
-def test_the_factors_are_triangular_and_give_the_covariance(rank):
-    root = np.random.default_rng(5).normal(size=(6, 4, rank))
-    cov = root @ root.swapaxes(1, 2)
-    unit, diagonal = factors(cov)
-    assert np.array_equal(unit, np.triu(unit)) and (np.einsum("kii->ki", unit) == 1).all() and (diagonal >= 0).all()
-    # what rounding leaves of the directions without variance: sixteen digits of the largest entry, times their growth
-    np.testing.assert_allclose(product(unit, diagonal), cov, atol=1e-11 * max(1.0, abs(cov).max()))
-
-
-def test_bierman_s_update_is_the_correction_of_the_page():
-    rng = np.random.default_rng(6)
-    root, h, noise = rng.normal(size=(4, 4)), rng.normal(size=4), 0.7
-    P = root @ root.T
-    unit, diagonal, K = bierman(*factors(P), h, np.array(noise))
-    expected = P @ h / (h @ P @ h + noise)
-    np.testing.assert_allclose(K, expected, rtol=1e-10)
-    np.testing.assert_allclose(product(unit, diagonal), P - np.outer(expected, h @ P), rtol=1e-9, atol=1e-11)
 
 
 def test_the_ud_form_takes_a_meter_without_noise():
@@ -409,16 +165,11 @@ GOOD = {"A": np.eye(2), "H": np.ones((1, 2)), "Q": np.eye(2), "R": np.eye(1), "B
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("A", np.ones(2), "A must be a matrix"),
         ("A", np.ones((2, 3)), r"A has the shape \(2, 3\); with 2 states and 1 measurements it is \(2, 2\)"),
-        ("H", np.ones((1, 3)), "H has the shape"),
-        ("Q", np.eye(3), "Q has the shape"),
-        ("R", np.eye(2), "R has the shape"),
         ("B", np.ones((3, 1)), "B has 3 rows; with 2 states it has 2"),
         ("A", np.array([[1, np.nan], [0, 1]]), "A must be finite"),
         ("Q", np.array([[1, 0.5], [0, 1]]), "Q is a covariance and must be symmetric"),
         ("Q", np.array([[1.0, 2], [2, 1]]), "Q is a covariance and must not be negative"),
-        ("R", np.array([[-1.0]]), "R is a covariance and must not be negative"),
     ],
 )
 def test_a_system_that_is_none(name, value, message):
@@ -433,16 +184,11 @@ GOOD_PRIOR = Gaussian(np.zeros(2), np.eye(2))
     ("change", "message"),
     [
         ({"y": np.zeros((4, 1))}, r"shape \(steps, runs, 1\), got \(4, 1\)"),
-        ({"y": np.zeros((4, 3, 2))}, r"shape \(steps, runs, 1\)"),
         ({"y": np.zeros((0, 3, 1))}, "write NaN where one is missing"),
         ({"y": np.full((4, 3, 1), np.inf)}, "measurements must be there, and finite"),
         ({"u": np.zeros((3, 3, 1))}, r"inputs must have the shape \(4, 3, 1\)"),
-        ({"u": np.zeros((4, 2, 1))}, r"or \(4, 1, 1\) for all runs"),
-        ({"u": np.zeros((4, 3, 2))}, "inputs must have the shape"),
         ({"u": np.full((4, 3, 1), np.nan)}, "inputs must be finite"),
         ({"prior": Gaussian(np.zeros(3), np.eye(2))}, "prior's mean must have the shape"),
-        ({"prior": Gaussian(np.zeros(2), np.eye(3))}, "prior's covariance must have the shape"),
-        ({"prior": Gaussian(np.zeros(2), np.diag([1, np.inf]))}, "prior must be finite"),
         ({"prior": Gaussian(np.zeros(2), -np.eye(2))}, "prior's variances must not be negative"),
         ({"arithmetic": "exact"}, "no form 'exact' of the Kalman filter; known: covariance, symmetrised"),
     ],
@@ -457,8 +203,6 @@ def test_sizes_and_gains_that_do_not_fit():
     one = LinearSystem(**GOOD)
     for call, message in (
         (lambda: simulate(one, GOOD_PRIOR, 0, 3, 1), "steps must be a positive whole number, got 0"),
-        (lambda: simulate(one, GOOD_PRIOR, 4, 2.0, 1), "runs must be a positive whole number, got 2.0"),
-        (lambda: covariances(one, np.eye(2), 0), "steps must be a positive whole number, got 0"),
         (lambda: covariances(one, np.eye(3), 4), r"prior's covariance must have the shape \(2, 2\), got \(3, 3\)"),
         (lambda: covariances(one, np.eye(2), 4, np.ones(2)), r"gains must have the shape \(4, 2, 1\) or \(2, 1\), got \(2,\)"),
     ):
@@ -482,3 +226,16 @@ def test_the_square_root_needs_noise_of_the_meter():
         law = run(silent, GOOD_PRIOR, np.ones((1, 1, 1)), arithmetic=arithmetic).posterior
         np.testing.assert_allclose(law.mean[0, 0], [0.5, 0.5], rtol=1e-14)  # x1 + x2 = 1 exactly
         np.testing.assert_allclose(law.cov[0, 0], [[0.5, -0.5], [-0.5, 0.5]], rtol=1e-14)
+
+
+@pytest.mark.parametrize("arithmetic", FORMS)
+def test_float32_stays_float32(arithmetic, ill_conditioned):
+    # In this case the variance of a measurement gets negative.
+    short, prior, y, _ = ill_conditioned
+    for laws in run(short, prior, y, arithmetic=arithmetic):
+        assert (laws.mean.dtype, laws.cov.dtype) == (np.float32, np.float32)
+    one, calm = system(3, 2, 1, 4)
+    y, u = simulate(one, calm, 5, 3, 1).y, np.ones((5, 3, 1))
+    y[2, 1, 0] = np.nan
+    for laws in run(one.astype(np.float32), calm, y, u, arithmetic):
+        assert (laws.mean.dtype, laws.cov.dtype) == (np.float32, np.float32)

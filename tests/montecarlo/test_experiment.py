@@ -9,9 +9,10 @@ from kfcourse.filters.approximations import aof
 from kfcourse.filters.conditionally_optimal import duof
 from kfcourse.filters.kalman import kalman_filter
 from kfcourse.filters.optimal_structure import fos, mfos
+from kfcourse.filters.particles import particle
 from kfcourse.montecarlo.designing import NotFinite, design
 from kfcourse.montecarlo.ensemble import Ensemble, instants, simulate
-from kfcourse.montecarlo.experiment import compare, predictions, run
+from kfcourse.montecarlo.experiment import Sample, compare, predictions, run
 from kfcourse.records import likelihood, smooth
 from kfcourse.symbolic.model import Model
 from kfcourse.symbolic.structure import gaussian, linearised
@@ -260,3 +261,13 @@ def test_a_design_that_is_run_says_what_to_do(variant53):
         run(duof(variant53), y)
     one = design([duof(variant53)], Ensemble(variant53, 1000, 3, seed=1))[0]
     assert np.isfinite(run(one, y).mean).all()
+
+
+def test_each_batch_of_a_comparison_has_particles_of_its_own(vector):
+    """Errors of particles that were the same in all batches would not average out, and no interval would know."""
+    seeds, cloud = np.random.SeedSequence(1).spawn(2), particle(vector, particles=20)
+    sample = Sample(vector, 1, [50, 50], seeds)
+    starts = [sample.part(slice(b, b + 1)).begun(cloud) for b in (0, 1, 0)]
+    first, second, again = (cloud.step(state, np.zeros((50, vector.p))).posterior.mean for state in starts)
+    np.testing.assert_array_equal(first, again)
+    assert (first != second).all()

@@ -1,21 +1,13 @@
 """Exercises about variants with time and inputs: solutions pass, untouched notebooks do not, a wrong step is never right."""
 
-import json
 import re
 from functools import cache
-from pathlib import Path
 
-import numpy as np
 import pytest
 import sympy as sp
-from inside import InsideKernel
 
 from kfcourse.checks import Exercise, ExerciseError, exercise, sets
-from kfcourse.checks.steps import at_step
 from kfcourse.lab.variants import read_variant
-from kfcourse.notebooks.grading import marking, submissions
-from kfcourse.notebooks.grading.running import Site
-from kfcourse.notebooks.grading.sandbox import Sandbox
 from kfcourse.notebooks.master import read, render, solution, student
 
 TABLES = {
@@ -104,7 +96,6 @@ def test_a_wrong_step_is_named(name, question):
 
 
 k, u, c, q, r, e = sp.symbols("k u c q r e", real=True)
-EIGHT = sp.Rational(8)
 
 
 def growth(mean):
@@ -146,56 +137,6 @@ def test_formulas_with_time_and_inputs(name, answer, mistake):
     assert not mistake or mistake in result.diagnosis, result
 
 
-def test_formulas_with_a_wave():
-    lab = opened("growth", "a")
-    assert lab.check("a2", growth(lambda rest: rest + EIGHT * sp.cos(1.2 * k))).passed
-    assert "input-forgotten" in lab.check("a2", growth(lambda rest: rest)).diagnosis
-    assert "input-of-next-step" in lab.check("a2", growth(lambda rest: rest + 8 * sp.cos(1.2 * (k + 1)))).diagnosis
-
-
-def test_returned_notebooks_are_graded(tmp_path):
-    """Through the values that travel between the notebook's process and the grader: the step is one of them."""
-    for label, made in (("solved", solution), ("untouched", lambda notebook: student(notebook, {}))):
-        path = tmp_path / f"{label}.ipynb"
-        path.write_text(json.dumps(made(rendered("driven", "b"))), encoding="utf-8")
-    variants = tmp_path / "mine.toml"
-    inputs = f"inputs = {{ u = {TABLES['driven']['inputs']['u']} }}"
-    numbers = ", ".join(f"{name} = {value}" for name, value in TABLES["driven"]["parameters"].items())
-    variants.write_text(
-        f'[variants.driven]\ntitle = "driven"\nstate = "{TABLES["driven"]["state"]}"\nmeter = "g*x + f*w"\n'
-        f"parameters = {{ {numbers} }}\n{inputs}\n",
-        encoding="utf-8",
-    )
-    setting = marking.Setting(Site(Path("stage"), Sandbox("none")), "salt")
-    found = {
-        work.path.stem: marking.grade(work, setting, start=InsideKernel)
-        for work in submissions.returned(tmp_path, variants_file=variants)
-    }
-    assert set(found["solved"].marks.values()) == {"passed"}, found["solved"]
-    assert set(found["untouched"].marks.values()) == {"not implemented"}
-
-
-def test_what_is_given_matches_the_model():
-    """Functions of arrays, at a step and of the step, are those of the model's structures; both sets of functions agree."""
-    lab = opened("driven", "b")
-    m, d = np.array([[0.3], [-1.0]]), np.array([[[0.2]], [[0.5]]])
-    measure, predict = lab.functions("gaussian")
-    for step in (7, 8, 9):
-        tau, Theta = predict(m, d, step)
-        u_k = TABLES["driven"]["inputs"]["u"][step]
-        np.testing.assert_allclose(tau, 0.9 * m + 0.7 * u_k, rtol=1e-14)
-        np.testing.assert_allclose(Theta, 0.81 * d + 0.09, rtol=1e-14)
-        for given, frozen in zip((measure, predict), lab.functions("gaussian", step), strict=True):
-            for one, other in zip(given(m, d, step), frozen(m, d), strict=True):
-                np.testing.assert_array_equal(one, other)
-    with pytest.raises(TypeError, match="'k'"):
-        predict(m, d)
-    a, b = lab.noiseless
-    np.testing.assert_allclose(a(m, 9), 0.9 * m - 0.7, rtol=1e-14)
-    np.testing.assert_allclose(at_step(b, 9)(m), 1.2 * m, rtol=1e-14)
-    assert lab.hidden_steps == [0, 8, 9]  # u = 0, 1, -1
-
-
 def test_what_cannot_be_asked_is_refused_with_the_reason():
     with pytest.raises(ExerciseError, match=r"set a asks for formulas.*no closed form.*another variant for this set"):
         rendered("growth", "a")
@@ -207,17 +148,3 @@ def test_what_cannot_be_asked_is_refused_with_the_reason():
 
 
 ANGLE = {"state": "0.9*x + 0.4*v", "meter": "x + 0.5*w", "angles": ["y"], "prior": {"mean": 3.0}}
-
-
-@pytest.mark.parametrize("letter", "aef")
-def test_sets_without_differences_of_angles_take_them(letter):
-    lab = exercise(letter, ANGLE)
-    functions = run(solution(render(read(letter), lab)))
-    for question in sets()[letter].questions:
-        assert lab.check(question.name, functions[question.function]).passed
-
-
-@pytest.mark.parametrize("letter", "abcdefg")
-def test_variants_without_time_read_nothing_of_it(letter):
-    text = "\n".join(cell.source for cell in render(read(letter), exercise(letter, "53")).cells)
-    assert not re.search(r"depend on the step|, k\)|quadrature", text)

@@ -1,14 +1,12 @@
 """Kernels that are forked: they are kernels like others, only sooner."""
 
 import itertools
-import os
 import subprocess
 import sys
 from multiprocessing import forkserver
 from pathlib import Path
 
 import nbformat
-import psutil
 import pytest
 from endings import ended
 from jupyter_client.connect import LocalPortCache
@@ -93,37 +91,6 @@ def test_its_time_ends(tmp_path):
 def test_its_death_is_noticed(tmp_path):
     with pytest.raises(DeadKernelError):
         run("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", folder=tmp_path)
-
-
-def test_it_is_interrupted_and_started_again():
-    manager, client = start_new_kernel()
-    try:
-        client.execute("print('begun', flush=True)\nwhile True: pass")
-        while client.get_iopub_msg(timeout=30)["msg_type"] != "stream":
-            pass
-        manager.interrupt_kernel()
-        while (reply := client.get_shell_msg(timeout=30))["msg_type"] != "execute_reply":
-            pass  # a kernel that starts slowly was asked several times who it is
-        assert reply["content"]["ename"] == "KeyboardInterrupt"
-        manager.restart_kernel(now=True)
-        client.wait_for_ready(timeout=30)  # where the first was
-    finally:
-        client.stop_channels()
-        manager.shutdown_kernel(now=True)
-    assert not manager.has_kernel
-
-
-def test_it_ends_with_the_fork_server():
-    """So no kernel outlives the process that wanted it: a fork server ends with that."""
-    manager, client = start_new_kernel()
-    client.execute_interactive("import os")
-    kernel = psutil.Process(manager.provisioner.pid)
-    server = kernel.parent()
-    assert server.pid != os.getpid()
-    client.stop_channels()
-    server.kill()
-    assert ended(kernel)
-    manager.shutdown_kernel(now=True)
 
 
 def test_it_ends_with_the_process_that_wanted_it_however_that_ends():

@@ -4,16 +4,15 @@ import base64
 import io
 import json
 import struct
-import time
 
 import numpy as np
 import pytest
 import sympy as sp
 
-from kfcourse.checks import Exercise, Question, exercise, sets
+from kfcourse.checks import Exercise, exercise, sets
 from kfcourse.notebooks.grading.asking import salted, steady
-from kfcourse.notebooks.grading.channel import Channel, Closed, PatientChannel
-from kfcourse.notebooks.grading.values import HEADS, Other, ProtocolError, decode, encode
+from kfcourse.notebooks.grading.channel import Channel, Closed
+from kfcourse.notebooks.grading.values import Other, ProtocolError, decode, encode
 
 x, y = sp.Symbol("x", positive=True), sp.Symbol("y", real=True)
 
@@ -47,11 +46,6 @@ def test_plain_values(value):
     assert (found, type(found)) == (value, type(value))
 
 
-def test_nan():
-    assert np.isnan(sent(float("nan")))
-    assert sent(sp.nan) is sp.nan
-
-
 @pytest.mark.parametrize("kind", ["?", "i1", "<u2", ">i8", "f2", "f4", "f8", "c8", "c16"])
 @pytest.mark.parametrize("shape", [(), (3,), (2, 0), (2, 3, 4)])
 def test_arrays(kind, shape):
@@ -68,14 +62,6 @@ def test_arrays(kind, shape):
     )
 
 
-@pytest.mark.filterwarnings("ignore:the matrix subclass")
-def test_arrays_of_formulas_and_matrices():
-    found = sent(np.array([[x, 1.5], [None, [1]]], dtype=object))
-    assert found.tolist() == [[x, 1.5], [None, [1]]]
-    assert isinstance(sent(np.asmatrix([[1.0]])), np.matrix)
-    assert sent(np.ma.masked_array([1.0, 2.0])).tolist() == [1.0, 2.0]
-
-
 @pytest.mark.parametrize(
     "value",
     [
@@ -90,12 +76,6 @@ def test_arrays_of_formulas_and_matrices():
 )
 def test_formulas(value):
     assert sp.srepr(sent(value)) == sp.srepr(value)
-
-
-def test_matrices_of_formulas():
-    matrix = sp.Matrix([[x, sp.sin(x)], [sp.sin(x) ** 2, 1]])
-    assert sent(matrix) == sp.ImmutableMatrix(matrix)
-    assert sent(sp.Identity(2)) == sp.ImmutableMatrix([[1, 0], [0, 1]])
 
 
 @pytest.mark.parametrize(
@@ -120,13 +100,6 @@ def test_functions_are_called_on_the_other_side():
     assert decode(data, lambda number: functions[number]) == [len]
     with pytest.raises(ProtocolError):
         decode(data)
-
-
-def test_what_is_too_large_is_not_read():
-    assert len(sent(sp.Add(*(sp.Symbol(f"x{i}") for i in range(9000)))).args) == 9000
-    for large in (sp.Add(*(sp.Symbol(f"x{i}") for i in range(60_000))), sp.Integer(10**4299 * 10)):
-        with pytest.raises((ProtocolError, ValueError)):
-            sent(large)
 
 
 def formula(text):
@@ -162,12 +135,6 @@ def test_an_array_of_objects_is_not_unpickled():
 def test_strange_messages_are_refused(data):
     with pytest.raises(ProtocolError):
         decode(data)
-
-
-def test_only_functions_of_sympy_are_made():
-    assert {"sin", "exp", "Add", "Pow"} <= set(HEADS)
-    assert all(one.__module__.startswith("sympy.") and issubclass(one, sp.Basic) for one in HEADS.values())
-    assert not {"Lambda", "Function", "sympify", "Symbol", "UndefinedFunction", "AppliedUndef"} & set(HEADS)
 
 
 def test_arguments_of_all_questions_can_be_sent():
@@ -209,24 +176,6 @@ def test_the_grader_asks_nothing_that_rounding_decides():
     assert salted("g", '"20"', "g7", "salt") is asked  # the same for all notebooks of a run
 
 
-@pytest.mark.parametrize(("part", "good"), [(0.05, True), (0.25, True), (0.35, False), (0.8, False), (2.0, False)])
-def test_rounding_may_take_a_third_of_the_tolerance(part, good):
-    """a - 1 of a = 1 + d changes by 4 last digits of 1 over d: by this part of what is allowed.  The rest is the student's.
-
-    Allowed is the tolerance of the number and once more of the largest one, here the same: twice the tolerance.
-    """
-    tolerance = 1e-9
-    d = 4 * np.finfo(float).eps / (part * 2 * tolerance)
-    question = Question("t1", "a test", "core", lambda a: a - 1, lambda _: [(1 + d,)], tolerance=tolerance)
-    assert steady(question, exercise("b", "53")) == good
-
-
-def test_a_number_and_the_same_number_with_digits_stay_what_they_are():
-    formula = x**2 + sp.Float(2.0) * y + sp.Float(1.0) * sp.sin(x) ** sp.Float(2.0)
-    assert sp.srepr(sent(formula)) == sp.srepr(formula)
-    assert [type(one) for one in sent(sp.Matrix([2, sp.Float(2.0)]))] == [sp.Integer, sp.Float]
-
-
 def test_all_questions_can_be_asked_with_the_first_arguments_that_are_good():
     for letter, one in sets().items():
         for question in one.questions:
@@ -255,12 +204,3 @@ def test_messages():
     sink = io.BytesIO()
     Channel(io.BytesIO(), sink).send({"b": [1.5]})
     assert channel(sink.getvalue()).receive() == {"b": [1.5]}
-
-
-def test_waiting_ends():
-    patient = PatientChannel(io.BytesIO(frame(b"{}")), io.BytesIO())
-    assert patient.wait(time.monotonic() + 5) == {}
-    with pytest.raises(Closed):
-        patient.wait(time.monotonic() + 5)
-    with pytest.raises(TimeoutError):
-        patient.wait(time.monotonic() - 1)

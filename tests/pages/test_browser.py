@@ -1,4 +1,4 @@
-"""What a page computes in the reader's browser is what the package computes: functions, filters, the exact filter, statistics."""
+"""What a page computes in the reader's browser is what the package computes: filters, the exact filter, statistics."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from kfcourse import Model, compare, gaussian, linearised, run
+from kfcourse import Model, compare, run
 from kfcourse.filters import pointmass
 from kfcourse.lab import lab_filters
 from kfcourse.lab.short_names import LAB
@@ -47,58 +47,6 @@ def computed(page, body: str, given: dict):
 
 def array(values) -> np.ndarray:
     return np.array(values, dtype=float)
-
-
-# ---------------------------------------------------------------- functions
-
-
-@pytest.mark.parametrize("id", SCALAR)
-def test_every_function_is_numpy_s(page, id):
-    """On a grid of states, variances and noises: 1e-12 is a hundred times the rounding of the few dozen operations of each.
-
-    Relative to the value, or where terms of other signs cancel, to the greatest value of the function on the grid over 1e4.
-    """
-    model = SCALAR[id]
-    x, noise, p = np.linspace(-2.9, 3.1, 13), np.linspace(-2.2, 2.3, 6), np.array([0.0, 1e-8, 0.01, 0.3, 2.5])
-
-    def same(found, expected):
-        np.testing.assert_allclose(array(found), np.ravel(expected), rtol=1e-12, atol=1e-16 * np.max(np.abs(expected)))
-
-    states, noises = (np.ravel(one) for one in np.meshgrid(x, noise))
-    v = np.stack([noises * (-0.7) ** i for i in range(len(model.v))], axis=-1)
-    w = np.stack([noises * (-0.7) ** i for i in range(len(model.w))], axis=-1)
-    body = (
-        SETTINGS
-        + """const n = x.length, a = { x, v, w, y: new Float64Array(n), next: new Float64Array(n) };
-        model.simulate(n, settings.values, {}, a); return [a.y, a.next];"""
-    )
-    y, following = computed(page, body, {"id": id, "x": states.tolist(), "v": np.ravel(v).tolist(), "w": np.ravel(w).tolist()})
-    state, meter = compile_model(model)
-    same(y, np.broadcast_to(meter(states[:, None], w), (len(states), 1)))
-    same(following, np.broadcast_to(state(states[:, None], v), (len(states), 1)))
-
-    means, variances = (np.ravel(one) for one in np.meshgrid(x, p))
-    body = (
-        SETTINGS
-        + """const n = z.length, out = () => new Float64Array(n);
-        const a = { z, p, m: z, d: p, tau: out(), Theta: out(), h: out(), G: out(), F: out() };
-        model[structure].predict(n, settings.values, {}, a); model[structure].measure(n, settings.values, {}, a);
-        return ["tau", "Theta", "h", "G", "F"].map(name => a[name]);"""
-    )
-    for structure in (linearised(model), gaussian(model)):
-        given = {"id": id, "structure": structure.name, "z": means.tolist(), "p": variances.tolist()}
-        law, shape = (means[:, None], variances[:, None, None]), (len(means), 1)
-        tau, Theta = structure.predict(*law)
-        h, G, F, _ = structure.measure(*law)
-        for found, expected in zip(computed(page, body, given), (tau, Theta[..., 0], h, G[..., 0], F[..., 0]), strict=True):
-            same(found, np.broadcast_to(expected, shape))
-
-
-def test_the_model_s_own_numbers_are_not_the_page_s():
-    """Parameters stay names: one function serves all positions of the sliders."""
-    text = printed.model_source(SCALAR["53"])
-    assert "v.c" in text and "v.f" in text
-    assert "0.02" not in text.split("...{")[0] and "0.05" not in text.split("...{")[0]
 
 
 # ---------------------------------------------------------------- filters
@@ -163,27 +111,6 @@ def test_the_same_draws_give_the_same_error_variances(page, id):
         assert (error > 0).all()
 
 
-def test_what_diverges_diverges_at_the_same_step(page):
-    """Variant 3 with noises that throw some of its filters off: up to there the numbers are the same, and from there on none."""
-    model, lost = SCALAR["3"].replace(e=0.45), 1e6  # of states of 1 or so
-
-    def tame(values):
-        return np.cumprod(values < lost).astype(bool)
-
-    designing, running = ensembles("3", e=0.45)
-    found = compared(page, "3", designing, running, {"e": 0.45})
-    diverged = []
-    for name in LAB:
-        with np.errstate(over="ignore", invalid="ignore"):
-            expected = of_package(model, name, designing, running)
-        value = array(found[name])[:, 0]
-        np.testing.assert_array_equal(tame(value), tame(expected), err_msg=name)
-        # a filter that leaves the states multiplies rounding by its growth at each step
-        np.testing.assert_allclose(value[tame(expected)], expected[tame(expected)], rtol=1e-7, err_msg=name)
-        diverged += [] if tame(expected).all() else [name]
-    assert "duof" in diverged and len(diverged) < len(LAB)
-
-
 # ---------------------------------------------------------------- the exact filter, and what is said of the bound
 
 
@@ -206,21 +133,6 @@ def test_the_exact_filter_is_the_package_s(page, id):
     assert off.max() < 0.01 and (off**2).mean() < 1e-5
     ratio = found[:, 1] / variance
     assert np.abs(ratio - 1).max() < 0.03 and abs(ratio.mean() - 1) < 1e-3
-
-
-def test_a_density_is_one_and_has_two_humps_where_it_should(page):
-    """|x| measured, nearly: y = x^2 with a prior that does not tell the side."""
-    model = Model.define("x + v", "x**2 + 0.3*w")
-    tab_script = printed.model_source(model, ["aof-gaussian"])
-    body = f"""const model = {tab_script}, settings = {{ values: model.parameters, prior: model.prior }};
-        const {{ densities, z, p }} = kfLab.exact(model, settings, [2.25]);
-        return [densities[0].x, Float64Array.from(densities[0].density), Float64Array.from([z[0], p[0]])];"""
-    x, density, (z, p) = map(array, computed(page, body, {"none": 0}))
-    grid = np.linspace(-6, 6, 200_001)
-    exact = np.exp(-0.5 * grid**2 - 0.5 * ((2.25 - grid**2) / 0.3) ** 2)
-    exact /= exact.sum() * (grid[1] - grid[0])
-    np.testing.assert_allclose(density, np.interp(x, grid, exact), rtol=1e-3, atol=1e-5)
-    assert abs(z) < 1e-6 and p == pytest.approx((grid**2 * exact).sum() * (grid[1] - grid[0]), rel=1e-5)
 
 
 COVERAGE = (

@@ -27,6 +27,7 @@ BY_HAND = [
     "variant 53\nlinearised\nF = g^2*d + f^2*m^4\n = G^2*d + f^2*m^2*m^2\n = (g^2 - f^2*m^3*m/d)*d",
     "variant 53\nF = M[(g*x + f*x^2*w - g*m)^2]\n = g^2*M[(x-m)^2]\n = g^2*d",
     "variant 53\nF = M[(g*x + f*x^2*w - h)^2]\n = g^2*d + f^2*m^4 + 2*f^2*m^2*d + f^2*d^2",
+    "variant 5\nS = M[sin(x)^2]\n = sin(m)^2*exp(-d)\nG = -g*cos(m)*exp(d/2)\nG = g*cos(m)\nG = g*cos(m)*exp(d/2)",
     "variant 21\nlinearised\nF11 = cos(m1)^2*d11 + r^2\n = (1 - sin(m1)^2)*d11 + r",
 ]
 
@@ -81,6 +82,12 @@ def test_by_keyboard(tab):
     tab.get_by_label("Your derivation, a step a line").fill("h = M[g*x + f*x^2*w]\n = g*m")
     tab.get_by_label("Your derivation, a step a line").press("Control+Enter")
     assert tab.get_by_role("status").inner_text() == "2 lines, each equal to the one above"
+    tab.reload()
+    assert tab.get_by_label("Your derivation, a step a line").input_value() == "h = M[g*x + f*x^2*w]\n = g*m"
+    tab.get_by_label("Your derivation, a step a line").fill("")
+    tab.get_by_label("Model").select_option("5")
+    assert tab.get_by_label("Your derivation, a step a line").input_value() == "h = M[f*w + g*sin(x)]"
+    assert tab.get_by_role("status").inner_text() == "1 line, each equal to the one above"
     tab.get_by_label("Model").select_option("a model of my own")
     tab.get_by_label("y =").fill("q*x + w")
     tab.get_by_label("Your derivation, a step a line").fill("F = M[(q*x + w - h)^2]\n = q^2*d + 1\n = <b>")

@@ -28,32 +28,6 @@ def test_paragraphs_of_equations_stand_as_they_are_and_sentences_do_not(paragrap
     assert ("::" in docstrings.to_restructured(["Summary.", "", paragraph])) == equation
 
 
-def test_programs_and_examples_stand_as_they_are():
-    lines = ["Summary, as in::", "", "    a = run(x, y_)", "", ">>> f(2)", "4", ""]
-    assert docstrings.to_restructured(lines) == lines
-
-
-def test_lines_of_two_columns_are_a_table_that_has_no_lines_to_break():
-    """They were a listing, whose columns were lost where its lines were longer than the page."""
-    lines = [
-        "Summary.",
-        "",
-        "one_name      what it is;  other: and what this is, which takes more than a line",
-        "              (as a line that goes on tells)",
-        "`pair(a, b)`, three   what *that* is",
-    ]
-    assert docstrings.to_restructured(lines)[2:] == [
-        ".. list-table::",
-        "   :class: kf-names",
-        "",
-        "   * - ``one_name``",
-        "     - what it is;  other: and what this is, which takes more than a line (as a line that goes on tells)",
-        "   * - ``pair(a, b)``, ``three``",
-        r"     - what \*that\* is",
-        "",
-    ]
-
-
 def entries(section, doc):
     """(names, what stands behind the colon) of each entry of a section of a docstring."""
     found = re.search(rf"^{section}\n-+\n(.*?)(?=^\w[^\n]*\n---|\Z)", inspect.cleandoc(doc or ""), re.DOTALL | re.MULTILINE)

@@ -76,17 +76,6 @@ def test_the_step_is_dragged_and_moved_by_keys(opened):
     assert 5 < state_of(tab, handle) < 15
 
 
-def test_another_variant_has_its_own_sliders(opened):
-    tab = opened("fig-live-lab")
-    rounds(tab)
-    tab.get_by_role("combobox", name="Variant").select_option("2")
-    tab.wait_for_function("!document.querySelector('[data-done]').dataset.done.match('400')")
-    assert rounds(tab)
-    assert tab.get_by_role("slider", name="h", exact=True).count() == 1
-    for wrong in ("#fig-live-lab?variant=77&53.c=x&53.e=1e9&nonsense=1", "#another"):  # an address that somebody mistyped
-        opened("fig-live-lab", wrong).locator(".kf-numbers", has_text="GAOF").wait_for()
-
-
 # ---------------------------------------------------------------- correction and prediction
 
 

@@ -11,7 +11,6 @@ from matplotlib import font_manager
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
-from matplotlib.ticker import MaxNLocator
 
 from kfcourse.pages import book_style, label_ends
 from kfcourse.pages.figures import FONTS
@@ -55,33 +54,6 @@ def test_marks_of_an_axis_that_counts_steps_are_whole_numbers(style, label):
     plt.close("all")
 
 
-def test_marks_of_21_steps_do_not_end_behind_the_last(style):
-    """The lab's axis went by threes, to 21, where the steps end at 20."""
-    figure, ax = plt.subplots()
-    ax.plot(range(21))
-    ax.set_xlabel("step $k$")
-    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    InteractiveShell.instance().display_formatter.format(figure)
-    low, high = ax.get_xlim()
-    assert [mark for mark in ax.get_xticks() if low <= mark <= high] == [0, 5, 10, 15, 20]
-    plt.close("all")
-
-
-def test_thousands_at_marks_are_parted_by_commas(style):
-    """Also of a third axis, of marks that were chosen, and in what else a figure says."""
-    figure = plt.figure()
-    plane, space = figure.add_subplot(1, 2, 1), figure.add_subplot(1, 2, 2, projection="3d")
-    plane.plot([-20_000, 20_000], [0, 5000])
-    space.plot([0, 1], [0, 1], [0, 30_000])
-    space.set(title="20000 runs", xticks=[0, 1], xticklabels=[9999, "10000 at most"])
-    InteractiveShell.instance().display_formatter.format(figure)
-    assert space.get_title() == "20,000 runs"
-    assert [mark.get_text() for mark in space.xaxis.get_majorticklabels()] == ["9999", "10,000 at most"]
-    marks = [[mark.get_text() for mark in axis.get_majorticklabels()] for axis in (plane.xaxis, plane.yaxis, space.zaxis)]
-    assert ["−20,000" in marks[0], "5000" in marks[1], "30,000" in marks[2]] == [True, True, True]
-    plt.close()
-
-
 def test_labels_at_the_ends_are_apart_and_in_order() -> None:
     _, ax = plt.subplots()
     for end, name in ((1.0, "low"), (1.01, "middle"), (1.02, "high"), (5.0, "far")):
@@ -94,26 +66,3 @@ def test_labels_at_the_ends_are_apart_and_in_order() -> None:
     assert np.diff(sorted(heights.values())).min() > 0.1 - 1e-9
     assert heights["low"] >= ax.transAxes.inverted().transform(ax.transData.transform((0, 0)))[1] - 1e-9
     plt.close()
-
-
-def test_a_label_has_the_dashes_and_the_marker_of_its_curve_and_a_line_to_it_where_it_stands_aside() -> None:
-    _, ax = plt.subplots()
-    ax.plot([0, 1], [0, 1], "b--s", label="one")
-    ax.plot([0, 1], [0, 1.001], "b-o", label="other")
-    label_ends(ax, least=0.2)
-    handles = {one.get_texts()[0].get_text(): one.get_lines()[0] for one in ax.get_children() if isinstance(one, Legend)}
-    assert {name: (line.get_linestyle(), line.get_marker()) for name, line in handles.items()} == {
-        "one": ("--", "s"), "other": ("-", "o"),
-    }  # fmt: skip
-    leaders = [line for line in ax.get_lines() if line.get_label() == "_leader"]
-    assert len(leaders) == 2
-    assert all(abs(np.diff(line.get_ydata())[0]) > 0.05 for line in leaders)
-    plt.close()
-
-
-def test_a_ground_is_painted(style) -> None:
-    with matplotlib.rc_context():
-        book_style(ground="white")
-        assert Figure().get_facecolor() == (1, 1, 1, 1)
-        book_style()
-        assert Figure().get_facecolor()[3] == 0

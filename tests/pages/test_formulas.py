@@ -30,14 +30,6 @@ def test_a_formula_is_set_for_the_eye_and_said_to_a_screen_reader(setter):
     assert not tree.select("[xmlns], [data-mjx-texclass]")
 
 
-def test_letters_have_no_boxes_that_change_nothing(setter):
-    """A box stays that is small, or stands apart."""
-    tree = BeautifulSoup(setter.html(r"x_{k} = 12\,y", display=False), "html.parser")
-    boxes = tree.select("mjx-mi, mjx-mo, mjx-mn, mjx-mstyle")
-    assert boxes and all(one.has_attr("size") or one.has_attr("space") for one in boxes)
-    assert len(tree.select("mjx-c")) == 6 and len(tree.select("mjx-mspace")) == 1
-
-
 def test_what_is_displayed_is_larger_and_has_a_line_of_its_own(setter):
     shown, small = (BeautifulSoup(setter.html(r"\frac{a}{b}", display), "html.parser") for display in (True, False))
     assert shown.select_one("mjx-container[display=true]") and not small.select_one("mjx-container[display=true]")
@@ -72,11 +64,3 @@ def test_the_style_sheet_has_the_letters_that_were_set(setter):
 )
 def test_lines_stand_one_below_the_other(tex, set_as):
     assert formulas._lines(tex) == set_as
-
-
-def test_a_process_that_ends_is_named_with_the_formula(monkeypatch, tmp_path):
-    monkeypatch.setattr(formulas, "MATHJAX", tmp_path)  # without MathJax in it
-    one = formulas.Setter()
-    with pytest.raises(RuntimeError, match=r"Node ended while it set \['x', False\]"):
-        one.html("x", display=False)
-    one.close()

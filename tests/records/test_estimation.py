@@ -30,34 +30,6 @@ def test_a_variance_alone_has_its_closed_form():
     assert found.standard_error[0] == pytest.approx(expected * np.sqrt(2 / 198), rel=1e-5)
 
 
-def test_a_coefficient_alone_has_its_closed_form():
-    """A state seen without noise: c is the regression of each state on the one before, of either sign."""
-    model = Model.define("c*x + 0.3*v", "x", {"c": 0.3})
-    y = simulate(model.replace(c=-0.6), 4, 30, seed=2).y
-    found = estimate(model, y, "c", build=lambda one: aof(linearised(one)))
-    square = (y[:-1] ** 2).sum()
-    assert found.value[0] == pytest.approx((y[1:] * y[:-1]).sum() / square, rel=1e-6)
-    assert found.standard_error[0] == pytest.approx(0.3 / np.sqrt(square), rel=1e-5)
-
-
-def test_where_the_search_begins_does_not_matter_for_what_is_told():
-    """Started hundreds of times too small, each is found as in closed form: a regression; two means."""
-    model = Model.define("a*x + v", "x", {"a": 0.001})
-    y = simulate(model.replace(a=0.4), 1, 100, seed=1).y
-    square = (y[:-1] ** 2).sum()
-    found = estimate(model, y, ["a"])
-    assert found.flat == ()
-    # the search ends where the slope is 1e-4, in units of .3 to 3 standard errors
-    assert found.value[0] == pytest.approx((y[1:] * y[:-1]).sum() / square, abs=4e-4 / np.sqrt(square))
-    assert found.standard_error[0] == pytest.approx(1 / np.sqrt(square), rel=1e-5)
-    biases = Model.define("x", ["x + b1 + w1", "x + b2 + w2"], {"b1": 0.001, "b2": 0.001}, prior={"mean": 0, "variance": 0})
-    y = simulate(biases.replace(b1=1, b2=-2), 2, 20, seed=1).y
-    found = estimate(biases, y, ["b1", "b2"])
-    assert found.flat == ()
-    np.testing.assert_allclose(found.value, y.mean(axis=(0, 1)), rtol=0, atol=4e-4 / np.sqrt(40))
-    np.testing.assert_allclose(found.standard_error, 1 / np.sqrt(40), rtol=1e-4)
-
-
 @pytest.mark.parametrize("start", [1.0, 3.0])
 def test_a_direction_that_is_not_told_is_named_whole(start):
     """g of any sign and a positive q: only g^2 q reaches the measurements, and neither gets a finite error."""
@@ -84,15 +56,6 @@ def test_what_the_record_does_not_tell_is_named():
     assert alone.flat == ()
     assert found.value[0] * found.value[1] == pytest.approx(1.5 * alone.value[0], rel=1e-4)
     assert found.standard_error[2] == pytest.approx(alone.standard_error[1], rel=1e-3)
-
-
-def test_a_noise_that_is_not_there_is_not_told():
-    y = np.random.default_rng(5).standard_normal((40, 1, 1)) * 2
-    y[::2] = -y[1::2]  # neighbours that differ in sign: no wandering level explains that
-    found = estimate(local_level(q=0.5, r=3.0), y, ["q", "r"], ["q", "r"])
-    assert found.flat == ("the record does not tell q: its likelihood does not depend on it here",)
-    assert found.value[0] < 1e-3
-    assert np.isinf(found.standard_error[0])
 
 
 def test_a_profile_is_the_best_over_the_others():

@@ -9,7 +9,6 @@ from kfcourse import Model, compare, gaussian, linearised, run, simulate, smooth
 from kfcourse.filters import aof, kalman_filter, particle, pointmass
 from kfcourse.filters.exact.pointmasses import Unresolved
 from kfcourse.lab.variants import find_variant
-from kfcourse.montecarlo.experiment import states
 from kfcourse.records import smoothing_error
 from kfcourse.symbolic.reading import ModelError
 
@@ -88,86 +87,6 @@ def test_it_is_the_posterior_of_the_whole_trajectory(name, missing):
     assert error.max() < 1e-3 * np.sqrt(found.cov.max())
 
 
-CURVED_METERS = {
-    "2": (lambda x: 0.9 * x, lambda x: x + 0.3 * x**2),
-    "5": (lambda x: 0.95 * x, np.sin),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("name", "some"), [("2", slice(148, 160)), ("5", slice(0, 12))])
-def test_far_humps_of_little_mass_have_nodes_too(name, some):
-    """The meter's other roots keep a mass of 1e-5 or so, a few per cent of a variance: recursions on 1,501 equidistant nodes."""
-    model, (move, see) = find_variant(name).model, CURVED_METERS[name]
-    y = simulate(model, 1000, 12, seed=0).y[:, some]
-    x = np.linspace(-9, 9, 1501)  # a seventeenth of the kernel's deviation, a tenth of the narrowest hump's
-    kernel = np.exp(-0.5 * ((x - move(x)[:, None]) / 0.2) ** 2)
-    filtered, ahead = [np.exp(-0.5 * x**2)], np.ones((y.shape[1], len(x)))
-    likelihood = np.exp(-0.5 * ((y - see(x)) / 0.3) ** 2)
-    for k in range(12):
-        density = filtered[-1] @ kernel if k else filtered.pop()
-        density = density * likelihood[k]
-        filtered.append(density / density.sum(axis=1, keepdims=True))
-    mean, variance = np.empty((2, 12, y.shape[1]))
-    for k in reversed(range(12)):
-        mass = filtered[k] * ahead
-        mass /= mass.sum(axis=1, keepdims=True)
-        mean[k] = mass @ x
-        variance[k] = mass @ x**2 - mean[k] ** 2
-        ahead = (ahead * likelihood[k]) @ kernel.T
-        ahead /= ahead.max(axis=1, keepdims=True)
-    one = pointmass(model)
-    found, error, sd = smooth(one, y), smoothing_error(one, y), np.sqrt(variance)
-    assert (np.abs(found.mean[..., 0] - mean) <= error + 1e-5 * sd).all()  # a hump with less of the variance is not looked for
-    np.testing.assert_allclose(found.cov[..., 0, 0], variance, rtol=1e-4)  # ten of these; the accuracy asked for is 1e-3
-
-
-def test_where_kernels_are_narrow_rho_is_taken_between_the_nodes():
-    """An object all but without noise: later states are functions of the first, and one integral tells everything."""
-    model = Model.define("x + sin(x)/2 + 1e-5*v", "x + x**2/4 + 0.5*w", prior={"mean": 0.5, "variance": 0.3})
-    y = np.array([0.9, 1.3, 1.2, 2.5])
-    x = [np.linspace(-3, 4, 20_001)]
-    for _ in range(3):
-        x.append(x[-1] + np.sin(x[-1]) / 2)
-    logs = -0.5 * (x[0] - 0.5) ** 2 / 0.3 - sum(
-        0.5 * ((value - each - each**2 / 4) / 0.5) ** 2 for value, each in zip(y, x, strict=True)
-    )
-    mass = np.exp(logs - logs.max())
-    mass /= mass.sum()
-    mean = np.array([mass @ each for each in x])
-    sd = np.sqrt([mass @ (each - m) ** 2 for each, m in zip(x, mean, strict=True)])
-    found = smooth(pointmass(model, accuracy=1e-6), y)
-    assert np.abs((found.mean[:, 0, 0] - mean) / sd).max() < 1e-4  # the noise that is left: (1e-5 / sd)^2, and interpolation
-    np.testing.assert_allclose(np.sqrt(found.cov[:, 0, 0, 0]), sd, rtol=1e-4)
-
-
-def test_its_variance_is_its_error_and_nobody_beats_it():
-    model = find_variant("53").model
-    x, y = simulate(model, 1500, 6, seed=21)
-    found = smooth(pointmass(model), y)
-    square = ((x - found.mean) ** 2 / found.cov[..., 0])[..., 0]
-    assert (np.abs(square.mean(axis=1) - 1) < 4 * square.std(axis=1) / np.sqrt(1500)).all()
-    for other in (smooth(aof(gaussian(model)), y), run(pointmass(model), y)):
-        cross = ((x - other.mean) ** 2 - (x - found.mean) ** 2 - (other.mean - found.mean) ** 2)[..., 0]
-        spread = cross.std(axis=1) / np.sqrt(1500)
-        assert (np.abs(cross.mean(axis=1)) <= 4.5 * spread).all()  # orthogonality, at twelve places together
-
-
-def test_one_trajectory_gets_the_numbers_it_gets_among_others():
-    model = find_variant("2").model
-    y = simulate(model, 12, 5, seed=1).y
-    one = pointmass(model)
-    together, alone = smooth(one, y), smooth(one, y[:, 4:5])
-    np.testing.assert_allclose(alone.mean[:, 0], together.mean[:, 4], rtol=1e-9)
-
-
-def test_the_last_state_is_the_filter_s():
-    model = find_variant("2").model
-    y = simulate(model, 12, 5, seed=1).y
-    mean, variance = off(smooth(pointmass(model), y), run(pointmass(model), y))
-    assert mean[-1].max() < 1e-3 and variance[-1].max() < 1e-3
-    assert mean[:-1].max() > 0.1
-
-
 def test_a_record_that_contradicts_the_model_is_right_or_refused():
     """A prior 4 to 11 deviations away from the measurements, at once or by and by; the Kalman filter has the truth."""
     refused, model = [], Model.define("x + 0.1*v", "x + 0.5*w")
@@ -203,17 +122,6 @@ def test_with_a_lag_it_is_the_posterior_of_a_shorter_record(lag):
     np.testing.assert_array_equal(found.mean[3 - lag - 1 :], later.mean[3 - lag - 1 :])
 
 
-@pytest.mark.parametrize("one", [lambda model: pointmass(model), lambda model: particle(model, 40, seed=3)])
-@pytest.mark.parametrize("lag", [4, 5, 9])
-def test_a_lag_as_long_as_the_record_changes_nothing(one, lag):
-    model = find_variant("53").model
-    y = simulate(model, 5, 5, seed=4).y
-    one = one(model)
-    for found, expected in zip(smooth(one, y, lag), smooth(one, y), strict=True):
-        np.testing.assert_array_equal(found, expected)
-    np.testing.assert_array_equal(smoothing_error(one, y, lag), smoothing_error(one, y))
-
-
 def test_what_has_no_lag_and_what_is_none_are_refused():
     model = find_variant("53").model
     for one in (pointmass(model), particle(model, 10), aof(linearised(model))):
@@ -240,66 +148,6 @@ def test_particles_look_back_as_well_as_they_say(plane):
     assert np.sqrt(np.mean(away[:-1] ** 2)) < 0.3 * np.sqrt(np.mean((run(one, y).mean - found.mean)[:-1] ** 2))
     ratio = (np.trace(found.cov, axis1=-2, axis2=-1) / np.trace(expected.cov, axis1=-2, axis2=-1)).mean(axis=1)
     assert np.abs(ratio - 1).max() < 0.08  # 60 covariances of 1,000 particles, of which a few hundred count
-
-
-@pytest.mark.parametrize("guided", [True, False])
-def test_what_clouds_tell_of_their_error_is_right_where_enough_particles_count(plane, guided):
-    """Ten records, 15 pairs of 50 particles each: the root mean square told over the true one is good to some 7 %.
-
-    Where fewer than ten particles count, at a far measurement that the proposal does not look at, both clouds share a bias.
-    """
-    y = np.repeat(simulate(plane, 10, 6, seed=1).y, 15, axis=1)
-    one = particle(plane, 100, seed=1, guided=guided)
-    away, told = smooth(one, y).mean - smooth(kalman_filter(plane), y).mean, smoothing_error(one, y)
-    few = np.min([state.memory.effective for state in states(one, y)[1:]], axis=0) < 10
-
-    def ratio(some):
-        return np.sqrt(np.mean(told[:, some] ** 2) / np.mean((away[:, some] ** 2).sum(axis=-1)))
-
-    assert ratio(~few) == pytest.approx(1, abs=0.2)
-    assert few.mean() < 0.15 if guided else ratio(few) < 0.8
-
-
-def test_particles_with_a_lag_are_near_the_kalman_smoother_with_that_lag(plane):
-    y = simulate(plane, 40, 5, seed=4).y
-    one, kalman = particle(plane, 500, seed=1), kalman_filter(plane)
-    found, expected = smooth(one, y, 2), smooth(kalman, y, 2)
-    away, error = np.linalg.norm(found.mean - expected.mean, axis=-1), smoothing_error(one, y, 2)
-    # 200 distances, half of them those of two clouds: root mean squares good to some 8 %, steps dependent
-    assert np.sqrt(np.mean(away**2)) == pytest.approx(np.sqrt(np.mean(error**2)), rel=0.25)
-    for other in (1, 3):  # steps 0 to 2 know nothing of the last; one measurement more or less is far more than that
-        wrong = np.linalg.norm(found.mean - smooth(kalman, y, other).mean, axis=-1)[:3]
-        assert np.sqrt(np.mean(wrong**2)) > 1.5 * np.sqrt(np.mean(away[:3] ** 2))
-
-
-def test_backward_weights_are_bayes_rule_over_the_particles():
-    """One path and few particles of a noise that depends on the state, an angle among them: shares typed by hand."""
-    from kfcourse.filters.particles import _ancestors
-
-    rng = np.random.default_rng(1)
-    after, mean = rng.normal(size=(1, 2, 3, 2)), rng.normal(size=(1, 2, 4, 2))
-    mean[0, 0, 0, 1] += 2 * np.pi  # a whole turn changes nothing
-    root = np.tril(rng.normal(size=(1, 2, 4, 2, 2))) + 2 * np.eye(2)
-    cov = root @ np.swapaxes(root, -1, -2)
-    found = _ancestors(after, mean, cov, (1,))
-    for c in range(2):
-        for b in range(3):
-            apart = after[0, c, b] - mean[0, c]
-            apart[:, 1] = (apart[:, 1] + np.pi) % (2 * np.pi) - np.pi
-            density = [
-                np.exp(-0.5 * d @ np.linalg.inv(P) @ d) / np.sqrt(np.linalg.det(P)) for d, P in zip(apart, cov[0, c], strict=True)
-            ]
-            np.testing.assert_allclose(found[0, c, b], np.array(density) / np.sum(density), rtol=1e-10)
-
-
-def test_particles_and_the_exact_smoother_agree_on_variant_53():
-    model = find_variant("53").model
-    y = simulate(model, 60, 4, seed=3).y
-    exact, one = smooth(pointmass(model), y), particle(model, 2000, seed=1)
-    error = smoothing_error(one, y)
-    away = np.abs(smooth(one, y).mean - exact.mean)[..., 0]
-    assert np.median(away / np.sqrt(exact.cov[..., 0, 0])) < 0.06
-    assert np.median(away) == pytest.approx(np.median(error), rel=0.3)  # 240 of each, dependent
 
 
 def test_an_object_without_noise_of_its_own_has_no_density_to_look_back_by():

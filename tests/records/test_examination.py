@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-import scipy.stats
 
 from kfcourse import Model, likelihood, linearised, predictions, run, simulate, smooth
 from kfcourse.filters import aof, gated
-from kfcourse.linear.consistency import innovations, nis
+from kfcourse.linear.consistency import innovations
 from kfcourse.records import examine, findings
-from kfcourse.records.examination import _below
 
 MODEL = Model.define(["x + u", "u + 0.3*v"], ["x + w1", "u + w2"], symbols={"x": ["x", "u"]})
 STRUCTURE = linearised(MODEL)
@@ -34,29 +32,6 @@ def test_the_parts_are_those_of_the_package():
         np.testing.assert_array_equal(ours, theirs)
     np.testing.assert_array_equal(np.isnan(told.weight), np.isnan(y).all(axis=-1))
     assert set(told.weight[~np.isnan(told.weight)]) == {1.0}
-
-
-def test_the_size_is_the_mean_nis_where_everything_is_measured():
-    _, y = simulate(MODEL, 1, 50, seed=3)
-    told = examine(aof(STRUCTURE), y)
-    size = findings(told)[0]
-    assert size.value == pytest.approx(nis(told.found).mean() / 2, rel=1e-12)
-    assert (size.low, size.high) == pytest.approx(np.array(scipy.stats.chi2.interval(0.95, 100)) / 100, rel=1e-12)
-
-
-@pytest.mark.parametrize("edge", [1.0, 0.9])
-def test_the_size_of_a_short_record_has_an_interval_that_covers(edge):
-    """2,000 records of 4 steps: 95 % with a standard error of .5 %; its lower end is never below 0."""
-    rng = np.random.default_rng(1)
-    value = scipy.stats.chi2(2).ppf(edge * rng.random((4, 2000)))  # squares of two components, below the edge
-    turn = rng.uniform(0, 2 * np.pi, value.shape)
-    nu = np.sqrt(value)[..., None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-    _, y = simulate(MODEL, 2000, 4, seed=3)
-    told = examine(aof(STRUCTURE), y, edge)
-    found = told.found._replace(value=nu, cov=np.broadcast_to(np.eye(2), (*nu.shape, 2)))
-    sizes = [findings(told._replace(found=found), run=run)[0] for run in range(2000)]
-    assert min(one.low for one in sizes) > 0
-    assert np.mean([one.fits for one in sizes]) == pytest.approx(0.95, abs=0.02)
 
 
 @pytest.mark.parametrize("by_component", [False, True])
@@ -85,16 +60,6 @@ def test_a_wrong_filter_is_found():
     assert "size" in failing(rough, y)
     assert {"neighbours of y1", "neighbours of y2"} & failing(stiff, y)
     assert {"mean of y1", "mean of y2"} & failing(MODEL, offset)
-
-
-@pytest.mark.parametrize("degrees", [1, 2, 3])
-@pytest.mark.parametrize("edge", [0.6, 0.999])
-def test_chi_squared_below_an_edge(degrees, edge):
-    """By quadrature of the density."""
-    g = scipy.stats.chi2.ppf(edge, degrees)
-    first, second = (scipy.integrate.quad(lambda c, k=k: c**k * scipy.stats.chi2.pdf(c, degrees), 0, g)[0] / edge for k in (1, 2))
-    mean, variance = _below(np.array([degrees]), edge)
-    assert (mean[0], variance[0]) == pytest.approx((first, second - first**2), rel=1e-7)
 
 
 def test_nothing_is_found_of_a_record_that_is_refused():

@@ -5,15 +5,11 @@ import oracles
 import pytest
 from scipy.optimize import least_squares
 
-from kfcourse import Model, gauss_hermite, gaussian, linearised, run, simulate, smooth, unscented
+from kfcourse import Model, gauss_hermite, gaussian, linearised, simulate, smooth, unscented
 from kfcourse.filters import aof, duof, imm, iterated, kalman_filter
 from kfcourse.laws import Gaussian
-from kfcourse.linear import LinearSystem
-from kfcourse.linear import run as run_linear
-from kfcourse.linear import smooth as smooth_linear
 from kfcourse.montecarlo.designing import design
 from kfcourse.montecarlo.ensemble import Ensemble
-from kfcourse.montecarlo.experiment import states
 from kfcourse.records import smooth_iterated
 from kfcourse.scenarios.benchmarks import PENDULUM_SMOOTHED, pendulum, pendulum_data
 
@@ -31,29 +27,11 @@ FILTERS = {name: lambda model, build=build: aof(build(model)) for name, build in
     "iterated": lambda model: iterated(linearised(model), 3),
 }
 STEPS = 9
-U = [0.7, -2.0, 3.0, 0.0, 1.5, -1.0, 0.4, -0.6, 2.2]  # of every step another value: a step too early or too late is seen
-PRIOR = np.array([1.0, -2.0]), np.array([[2.0, 0.5], [0.5, 1.0]])
-V, W = np.array([[1.0, 0.3], [0.3, 2.0]]), np.array([[1.0, 0.6], [0.6, 2.0]])
 
 
 @pytest.fixture(scope="module")
 def changing() -> Model:
-    """Linear; matrices, constants and noises change with time and input; noises are correlated and have means."""
-    return Model.define(
-        ["(0.9 + 0.05*k)*x1 + 0.4*x2 + (1 + 0.1*k)*v1 + u", "0.8*x2 - 0.3*x1 + v2"],
-        ["x1 + 2*x2 + w1 - u", "x2 - (0.5 + 0.1*k)*x1 + 0.3*w2"],
-        prior={"mean": PRIOR[0], "variance": PRIOR[1]},
-        state_noise={"mean": [0.2, -0.1], "variance": V},
-        meter_noise={"mean": [0.4, 0], "variance": W},
-        inputs={"u": U},
-    )
-
-
-def matrices(k):
-    """A, a, Q, H, b, R of `changing`, typed apart from it."""
-    A, B, C = np.array([[0.9 + 0.05 * k, 0.4], [-0.3, 0.8]]), np.diag([1 + 0.1 * k, 1.0]), np.diag([1, 0.3])
-    a, b = B @ [0.2, -0.1] + [U[k], 0], C @ [0.4, 0] + [-U[k], 0]
-    return A, a, B @ V @ B.T, np.array([[1, 2], [-(0.5 + 0.1 * k), 1]]), b, C @ W @ C.T
+    return oracles.Changing().model()
 
 
 def with_gaps(y):
@@ -67,7 +45,8 @@ def with_gaps(y):
 def record(changing):
     """Measurements with gaps (9, 5, 2), and what one dense regression finds in them."""
     y = with_gaps(simulate(changing, 5, STEPS, seed=2).y)
-    found = [oracles.joint_posterior([matrices(k) for k in range(STEPS)], PRIOR, y[:, run]) for run in range(5)]
+    one = oracles.Changing()
+    found = [oracles.joint_posterior(one.steps(STEPS), one.laws["prior"], y[:, run]) for run in range(5)]
     return y, Gaussian(np.stack([one[0] for one in found], axis=1), np.stack([one[1] for one in found], axis=1))
 
 
@@ -90,102 +69,17 @@ def test_on_a_linear_model_it_does_not_matter_where_it_is_linearised(changing, r
     same(smooth_iterated(STRUCTURES[kind](changing), y, rounds=3), expected)
 
 
-@pytest.mark.parametrize("lag", range(STEPS + 2))
-def test_with_a_lag_it_knows_so_many_measurements_more(changing, record, lag):
-    y, expected = record
-    one = aof(gaussian(changing))
-    found = smooth(one, y, lag=lag)
+@pytest.mark.parametrize("lag", [0, 2, STEPS])
+def test_with_a_lag_it_is_the_regression_on_what_is_known_then(changing, record, lag):
+    y, one = record[0][:, :2], oracles.Changing()
+    found = smooth(aof(linearised(changing)), y, lag)
     for k in range(STEPS):
-        same(Gaussian(*(part[k] for part in found)), Gaussian(*(part[k] for part in smooth(one, y[: k + lag + 1]))))
-    same(found, run(one, y) if lag == 0 else expected if lag >= STEPS - 1 else found)
-
-
-def dense(n, lag=None):
-    """A linear chain of n states with gaps, what its smoother finds, and what one dense regression does."""
-    A = np.eye(n) + np.diag(np.full(n - 1, 0.3), 1) - 0.1 * np.eye(n)[::-1]
-    Q, H, R = 0.2 * np.eye(n) + 0.1, np.eye(min(n, 2), n), np.diag(np.arange(1.0, 1 + min(n, 2)))
-    names = [f"x{i + 1}" for i in range(n)]
-    motion = [" + ".join(f"({float(A[i, j])!r})*{names[j]}" for j in range(n)) + f" + v{i + 1}" for i in range(n)]
-    model = Model.define(
-        motion,
-        [f"x{i + 1} + w{i + 1}" for i in range(min(n, 2))],
-        symbols={"x": names, "v": [f"v{i + 1}" for i in range(n)], "w": [f"w{i + 1}" for i in range(min(n, 2))]},
-        prior={"mean": np.zeros(n), "variance": np.eye(n)},
-        state_noise={"variance": Q},
-        meter_noise={"variance": R},
-    )
-    y = simulate(model, 5, 6, seed=3).y
-    y[2, 1] = y[4, 3] = y[0, 0] = np.nan
-    steps, prior = [(A, np.zeros(n), Q, H, np.zeros(len(H)), R)] * 6, (np.zeros(n), np.eye(n))
-    mean, cov = np.empty((6, 5, n)), np.empty((6, 5, n, n))
-    for k in range(6):
         known = y.copy()
-        known[k + 1 + (6 if lag is None else lag) :] = np.nan  # an independent way to say the lag
-        for i in range(5):
-            one = oracles.joint_posterior(steps, prior, known[:, i])
-            mean[k, i], cov[k, i] = one[0][k], one[1][k]
-    return model, y, Gaussian(mean, cov)
-
-
-@pytest.mark.parametrize("lag", [None, 0, 2])
-@pytest.mark.parametrize("n", [1, 3, 5])
-def test_of_any_number_of_states_it_is_the_regression_on_what_it_knows(n, lag):
-    model, y, expected = dense(n, lag)
-    same(smooth(aof(linearised(model)), y, lag), expected)
-
-
-def test_what_all_runs_share_is_stored_once():
-    """Gains and covariances of a linear model know nothing of the record, unless something is missing in one of the runs."""
-    model, y, _ = dense(3)
-    one = aof(linearised(model))
-    assert smooth(one, np.nan_to_num(y)).cov.strides[1] == 0 != smooth(one, y).cov.strides[1]
-
-
-def test_given_matrices_are_smoothed_as_the_model_they_come_from():
-    A, _, Q, H, b, R = matrices(2)
-    system, rng = LinearSystem(A, H, Q, R, np.eye(2)), np.random.default_rng(5)
-    y, u = rng.normal(size=(STEPS, 3, 2)), rng.normal(size=(STEPS, 3, 2))
-    for measured in (y, with_gaps(np.concatenate([y, y], axis=1))[:, :3]):
-        found = smooth_linear(system, run_linear(system, Gaussian(*PRIOR), measured, u))
-        assert (found.cov.strides[1] == 0) == (measured is y)  # stored once where all runs miss nothing
-        for i in range(3):
-            steps = [(A, u[k, i], Q, H, 0 * b, R) for k in range(STEPS)]
-            mean, cov, _ = oracles.joint_posterior(steps, PRIOR, measured[:, i])
-            same(Gaussian(found.mean[:, i], found.cov[:, i]), Gaussian(mean, cov))
-
-
-def test_later_measurements_never_make_it_less_sure(changing, record):
-    y, _ = record
-    gained = run(kalman_filter(changing), y).cov - smooth(kalman_filter(changing), y).cov
-    assert np.linalg.eigvalsh(gained).min() > -1e-12  # rounding of variances below 10
-    assert np.trace(gained[:-1], axis1=-2, axis2=-1).min() > 0.005  # the least gain is no rounding
-    np.testing.assert_array_equal(gained[-1], 0)
-
-
-def test_a_wide_prior_spoils_no_variance():
-    """Straight motion from a start known to 1e4 on either side, measured to 0.1: the textbook's form has no right digit."""
-    T, wide, sigma, steps = 0.1, 1e8, 0.1, 30
-    model = Model.define(
-        ["x1 + T*x2", "x2"], "x1 + w1", {"T": T}, prior={"mean": [0, 0], "variance": wide}, meter_noise={"variance": sigma**2}
-    )
-    y = 3.0 + 0.7 * T * np.arange(steps) + sigma * np.random.default_rng(1).normal(size=steps)
-    one = aof(linearised(model))
-    found = smooth(one, y[:, None, None])
-    regressors = np.stack([np.ones(steps), T * np.arange(steps)], axis=1)
-    information = regressors.T @ regressors / sigma**2 + np.eye(2) / wide  # of x_0: all states follow from it
-    expected = np.linalg.inv(information)
-    # correlations of the first predictions are 1 - 1e-10, so the regression S on them has six digits
-    np.testing.assert_allclose(found.mean[0, 0], np.linalg.solve(information, regressors.T @ y / sigma**2), rtol=1e-6)
-    np.testing.assert_allclose(found.cov[0, 0], expected, rtol=1e-5)
-    assert np.linalg.eigvalsh(found.cov).min() > 0
-
-    A, *visited = np.array([[1, T], [0, 1]]), *states(one, y[:, None, None])[1:]
-    p_s = visited[-1].posterior.cov
-    for state in visited[-2::-1]:
-        p, Psi = state.posterior.cov, state.predicted.cov  # one of both for all runs
-        S = p @ A.T @ np.linalg.inv(Psi)
-        p_s = p + S @ (p_s - Psi) @ S.T
-    assert np.abs(p_s / expected - 1).max() > 1  # what rounding makes of it differs between machines
+        known[k + 1 + lag :] = np.nan  # an independent way to say the lag
+        for i in range(2):
+            mean, cov, _ = oracles.joint_posterior(one.steps(STEPS), one.laws["prior"], known[:, i])
+            np.testing.assert_allclose(found.mean[k, i], mean[k], rtol=1e-10, atol=1e-10)
+            np.testing.assert_allclose(found.cov[k, i], cov[k], rtol=1e-10, atol=1e-10)
 
 
 # ---------------------------------------------------------------- nonlinear
@@ -209,30 +103,6 @@ def curved() -> Model:
         ["x1 + 0.3*sin(x2) + 0.2*v1", "0.9*x2 + 0.2*x1*x2 + (0.3 + 0.1*x1**2)*v2"], ["x1**2/2 + x2 + 0.3*w"],
         prior={"mean": [0.8, 0.5], "variance": [[0.2, 0.05], [0.05, 0.3]]},
     )  # fmt: skip
-
-
-def test_what_a_measured_next_state_tells_is_the_best_linear_estimate():
-    """x_0 is not measured, x_1 = a(x_0) + v is: exact moments make the smoother the regression of x_0 on y_1."""
-    model = Model.define(
-        ["x1 + sin(x2) + 0.2*v1", "x1*x2 + 0.3*x2*v2"], ["x1 + 0.5*x2 + 0.4*w"],
-        prior={"mean": [0.8, 0.5], "variance": [[0.2, 0.05], [0.05, 0.3]]},
-    )  # fmt: skip
-    y = np.array([np.nan, 1.7])[:, None, None]
-    mean, cov = np.r_[model.prior.mean, 0, 0], np.eye(4)
-    cov[:2, :2] = model.prior.cov
-
-    def measured(t):
-        return t[0] + np.sin(t[1]) + 0.2 * t[2] + 0.5 * (t[0] * t[1] + 0.3 * t[1] * t[3])
-
-    def moment(function):
-        return oracles.gaussian_mean(function, mean, cov, 12)  # ten points integrate this sine to 1e-12
-
-    expected = moment(measured)
-    cross = np.array([moment(lambda t, i=i: (t[i] - mean[i]) * measured(t)) for i in range(2)])
-    variance = moment(lambda t: (measured(t) - expected) ** 2) + 0.4**2
-    found = smooth(aof(gaussian(model)), y)
-    np.testing.assert_allclose(found.mean[0, 0], mean[:2] + cross / variance * (1.7 - expected), rtol=1e-9)
-    np.testing.assert_allclose(found.cov[0, 0], model.prior.cov - np.outer(cross, cross) / variance, rtol=1e-9)
 
 
 def test_the_iterated_extended_smoother_finds_the_likeliest_trajectory():
@@ -285,13 +155,6 @@ def test_angles_go_the_short_way_round_in_the_past_too():
     again, lagged = smooth_iterated(linearised(model), y, rounds=3), smooth(kalman_filter(model), y, lag=len(y))
     for other in (again, lagged):
         np.testing.assert_allclose(other.mean, smooth(kalman_filter(model), y).mean, atol=1e-9)
-
-
-def test_a_record_of_one_step_has_no_past(curved):
-    y = simulate(curved, 3, 1, seed=1).y
-    one = aof(linearised(curved))
-    for lag in (None, 0, 5):
-        np.testing.assert_array_equal(smooth(one, y, lag).mean, run(one, y).mean)
 
 
 # ---------------------------------------------------------------- what is refused

@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from kfcourse.laws import Gaussian
-from kfcourse.linear import run as run_linear
-from kfcourse.linear import steady_state
 from kfcourse.scenarios.pointer import (
-    MINIMUM_JERK,
     SHORTEST,
     acceleration_from,
     follow,
@@ -36,17 +32,6 @@ def test_the_matrices_are_those_of_the_paper():
     np.testing.assert_allclose(one.Q, sd**2 * effect @ effect.T, rtol=1e-13)
 
 
-def test_the_stationary_gain_is_kalata_s():
-    # Kalata (1984): with Lambda = sigma_a dt^2 / sigma, the gains (alpha, beta / dt) fulfil Lambda^2 = beta^2 / (1 - alpha) and
-    # beta = 2 (2 - alpha) - 4 sqrt(1 - alpha).
-    for dt, acceleration_sd, sigma in ((0.1, 500.0, 8.0), (0.01, 3e4, 2.0), (0.5, 0.3, 11.0)):
-        gain = steady_state(uniform_acceleration(dt, acceleration_sd, sigma)).gain
-        alpha, beta = gain[0, 0], gain[2, 0] * dt
-        np.testing.assert_allclose(beta**2 / (1 - alpha), (acceleration_sd * dt**2 / sigma) ** 2, rtol=1e-6)
-        np.testing.assert_allclose(beta, 2 * (2 - alpha) - 4 * np.sqrt(1 - alpha), rtol=1e-6)
-        np.testing.assert_allclose([gain[1, 1], gain[3, 1] * dt], [alpha, beta], rtol=1e-9)  # both axes alike
-
-
 # ---------------------------------------------------------------- start-up
 
 
@@ -59,43 +44,6 @@ def test_the_start_up_is_the_parabola_through_three_samples():
         for axis in range(2):
             c2, c1, c0 = np.polyfit(t, y[:, run, axis], 2)
             np.testing.assert_allclose(law.mean[run, axis::2], [c0, c1, 2 * c2], rtol=1e-11, atol=1e-11)
-
-
-def test_the_covariance_of_the_start_up_is_that_of_its_errors():
-    rng, dt, runs = np.random.default_rng(2), 0.05, 100_000
-    R = np.array([[4.0, 1.5], [1.5, 2.0]])  # the axes' noises may be correlated
-    y = rng.standard_normal((3, runs, 2)) @ np.linalg.cholesky(R).T
-    law = start_up(y, dt, R)
-    assert law.cov.shape == (6, 6)
-    # 4 standard errors of a covariance of normal variables
-    bound = 4 * np.sqrt((np.outer(np.diag(law.cov), np.diag(law.cov)) + law.cov**2) / runs)
-    assert (abs(law.mean.T @ law.mean / runs - law.cov) < bound).all()
-
-
-def test_the_start_up_is_the_limit_of_a_large_prior():
-    # Without noise of the object and with the true input, three measurements after a nearly unknown start leave the law that
-    # least squares give: velocity with variance sigma^2 / (2 dt^2) - smaller than from the parabola, which also fits a.
-    dt, sigma = 0.1, 2.0
-    system = uniform_acceleration(dt, 0.0, sigma)
-    y = np.random.default_rng(4).normal(size=(4, 3, 2))
-    wide = Gaussian(np.zeros(4), 1e6 * np.eye(4))
-
-    law = run_linear(system, wide, y).posterior
-    t = dt * np.array([-2, -1, 0])
-    slope, offset = np.polyfit(t, y[:3, 1, 0], 1)
-    # the prior's weight against the measurements': sigma^2 / (1e6 dt^2) = 4e-4 of the velocity's scale
-    np.testing.assert_allclose(law.mean[2, 1, [0, 2]], [offset, slope], rtol=2e-3, atol=2e-3)
-    np.testing.assert_allclose(law.cov[2, 1, 2, 2], sigma**2 / (2 * dt**2), rtol=1e-3)
-    assert law.cov[2, 1, 2, 2] < start_up(y[:3], dt, system.R).cov[2, 2]
-
-
-def test_accelerations_of_a_parabola_are_found():
-    t = 0.1 * np.arange(7)[:, None, None]
-    y = 3.0 + np.array([2.0, -1.0]) * t + np.array([4.0, -6.0]) * t**2 / 2
-    found = acceleration_from(y, 0.1)
-    assert np.isnan(found[:2]).all()
-    np.testing.assert_allclose(found[2:], np.broadcast_to([4.0, -6.0], (5, 1, 2)), rtol=1e-10)
-    np.testing.assert_allclose(found[2], start_up(y[:3], 0.1, np.eye(2)).mean[:, 4:], rtol=1e-12)
 
 
 # ---------------------------------------------------------------- the filter
@@ -120,36 +68,6 @@ def test_a_uniformly_accelerated_track_without_noise_is_followed_exactly(arithme
 # ---------------------------------------------------------------- the track
 
 
-def test_a_stroke_is_smooth_from_rest_to_rest():
-    for order in range(3):
-        np.testing.assert_allclose(MINIMUM_JERK.deriv(order)(np.array([0.0, 1.0])), [0, 1 if order == 0 else 0], atol=1e-13)
-    # Least jerk: the sixth derivative is zero, and any other smooth path has more.
-    assert MINIMUM_JERK.degree() == 5
-    tau = np.linspace(0, 1, 2001)
-    bump = np.polynomial.Polynomial([0, 0, 0, 1, -3, 3, -1])  # tau^3 (1 - tau)^3: changes nothing at the ends
-    least = np.trapezoid(MINIMUM_JERK.deriv(3)(tau) ** 2, tau)
-    for size in (-1.0, -0.01, 0.01, 1.0):
-        assert np.trapezoid((MINIMUM_JERK + size * bump).deriv(3)(tau) ** 2, tau) > least
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_velocity_and_acceleration_are_derivatives(seed):
-    track = hand_track(seed)
-    t, h = np.random.default_rng(seed).uniform(-0.2, track.end + 0.2, 200), 1e-5
-    now, before, after = track.at(t), track.at(t - h), track.at(t + h)
-    # central differences: h^2 / 6 times the next derivative but one, below 1e8 px/s^5 here, and rounding 1e-13 * 1000 / h
-    np.testing.assert_allclose((after.position - before.position) / (2 * h), now.velocity, atol=1e-3)
-    np.testing.assert_allclose((after.velocity - before.velocity) / (2 * h), now.acceleration, atol=5)
-
-
-def test_strokes_keep_their_order():
-    # Then the position is a mean of the targets with positive weights, and on the screen.
-    for seed in range(200):
-        track = hand_track(seed)
-        assert (np.diff(track.begin) > 0).all()
-        assert (np.diff(track.begin + track.duration) > 0).all()
-
-
 @pytest.mark.parametrize("seed", range(20))
 def test_the_track_stays_on_the_screen_and_comes_to_rest(seed):
     track = hand_track(seed, screen=(500.0, 300.0))
@@ -161,26 +79,6 @@ def test_the_track_stays_on_the_screen_and_comes_to_rest(seed):
     np.testing.assert_allclose(after.position, track.origin + track.displacement.sum(axis=0), rtol=1e-12)
     for motion in (before, after):
         assert not motion.velocity.any() and not motion.acceleration.any()
-
-
-def test_samples_of_different_rates_are_of_one_track():
-    track = hand_track(1, strokes=4)
-    slow, fast = (sample(track, interval, 0.0, 1, seed=0) for interval in (0.1, 0.01))
-    np.testing.assert_allclose(fast.state[::10][: len(slow.state)], slow.state, rtol=1e-9, atol=1e-9)
-    np.testing.assert_array_equal(slow.y, slow.state[..., :2])
-    assert slow.time[-1] <= track.end < slow.time[-1] + 0.1
-    # the input is the mean acceleration: it brings the velocity of one sample to that of the next
-    np.testing.assert_allclose(slow.state[:-1, :, 2:] + 0.1 * slow.input[:-1], slow.state[1:, :, 2:], rtol=1e-9, atol=1e-9)
-
-
-def test_the_noise_added():
-    samples = sample(hand_track(1, strokes=4), 0.01, 8.0, 300, seed=5)
-    noise = samples.y - samples.state[..., :2]
-    count = noise.size
-    assert abs(noise.mean()) < 4 * 8 / np.sqrt(count)
-    assert abs(noise.var() / 64 - 1) < 4 * np.sqrt(2 / count)
-    assert abs((noise[1:] * noise[:-1]).mean() / 64) < 4 / np.sqrt(count)  # white
-    np.testing.assert_array_equal(samples.y, sample(hand_track(1, strokes=4), 0.01, 8.0, 300, seed=5).y)
 
 
 # ---------------------------------------------------------------- errors

@@ -29,6 +29,7 @@ c, e, f, g, h, s, T = sp.symbols("c e f g h s T", real=True)
         ),
         (x + T * sp.sin(x) + s * v, [x], [v], r"x + T \sin {x} + s v"),
         (h * sp.sin(x) + w, [x], [w], r"h \sin {x} + w"),
+        (g * sp.cos(x) ** 2 * z, [x, z], [], r"g z \cos^{2} {x}"),
         (x + T * z + v, [x, z], [v], "x + T z + v"),
         (z - T * g * sp.sin(x) + v, [x, z], [v], r"z - T g \sin {x} + v"),
         (sp.S.Zero, [x], [], "0"),

@@ -59,9 +59,9 @@ def assembled(master: NotebookNode, cells: Sequence[Cell]) -> tuple[list[Step], 
     code = [(index, cell) for index, cell in enumerate(master.cells) if cell.cell_type == "code"]
     checks = check_cells(master)
     place = _places(code, checks, cells)
-    ordered = [(index, -1, Step(cell.source, f"the master's cell {cell.id}")) for index, cell in code[:1]]
+    ordered = [(index, -1, Step(cell.source, "the first cell")) for index, cell in code[:1]]
     for index, cell in code[1:]:
-        where = f"the master's cell {cell.id}"
+        where = f"the check of {', '.join(checks[cell.id])}" if cell.id in checks else f"the cell `{cell.source[:40].strip()}`"
         if cell.id in checks:
             names = tuple(dict.fromkeys(name for name, _ in CHECK.findall(cell.source)))
             ordered.append((index, 0, Step(cell.source, where, False, names, tuple(checks[cell.id]))))

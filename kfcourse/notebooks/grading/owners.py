@@ -105,7 +105,8 @@ def _hand_in(person: Person, grade: Grade, credit: Credit) -> None:
         person.flags.append(f"set {grade.letter}: the notebook was handed out to {grade.student}")
     if not grade.work and {*grade.marks.values()} <= {MISSING, NOT_RUN}:
         person.flags.append(f"set {grade.letter}: came back empty")
-    person.flags += [f"set {grade.letter}: {look}" for look in grade.looks]
+    gone = [note for note in grade.notes if note.startswith("the cell of")]
+    person.flags += [f"set {grade.letter}: {look}" for look in (*gone, *grade.looks)]
     other = person.grades.get(grade.letter)
     if other is not None:
         person.flags.append(f"set {grade.letter}: came back more than once, the best counts")

@@ -12,6 +12,7 @@ import jinja2
 import markupsafe
 
 from kfcourse.checks import Question, sets
+from kfcourse.checks.hints import OF_RESULT
 from kfcourse.checks.question import MISSING, PASSED, UNUSABLE, WRONG
 from kfcourse.files import save
 from kfcourse.notebooks.course_list import Student
@@ -119,9 +120,10 @@ def _grades_of(persons: Iterable[Person], question: str) -> Iterator[Grade]:
 
 
 def _in_words(question: Question, name: str) -> str:
-    """What is said of a known mistake; of others the name tells it."""
-    known = {mistake.name: mistake.says.partition(". ")[0].rstrip(".") for mistake in question.mistakes}
-    return known.get(name, name.replace("-", " "))
+    """What is said of a known mistake, or of what is known of any result; of others the name tells it."""
+    known = {"follows": "right on top of an earlier wrong answer"} | {code: says for code, says, _ in OF_RESULT}
+    known |= {mistake.name: mistake.says.partition(". ")[0] for mistake in question.mistakes}
+    return known.get(name, name.replace("-", " ")).rstrip(".")
 
 
 def feedback(person: Person, letters: Sequence[str], credit: Credit = USUAL) -> str:

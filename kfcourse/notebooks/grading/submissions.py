@@ -206,11 +206,11 @@ def claimed(claim: Any, cells: Sequence[Cell], variants_file: Path | None, given
         hint = "" if variants_file else f"if variant {given or name} is of a file of yours, name that with --variants; "
         raise Unreadable(f"{hint}{error}") from None  # the advice first: the list may be long, and is cut in the table
     marked = f"marked as variant {variant.name}" + ", which was given" * bool(given)
-    looks = [f"{marked}, and says that it is {name}"] if given and name != given else []
+    looks = [f"for variant {name}, and {marked}"] if given and name != given else []
     for other, what in (call for cell in cells for call in openings(cell.source)):
         table = {key: value for key, value in what.items() if key != "name"} if isinstance(what, dict) else None
         other_name = what.get("name") if isinstance(what, dict) else what
-        if (other, other_name) != (letter, variant.name):
+        if (other, other_name) not in ((letter, variant.name), (letter, name)):
             looks.append(f"opens set {other}, variant {other_name}")
         elif table is not None and table != variant.table:
             looks.append(f"{marked}, and opens one of its own that has this name")

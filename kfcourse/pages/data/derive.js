@@ -89,7 +89,10 @@
     const tokens = [], pattern = /\s+|(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)|([A-Za-z][A-Za-z0-9_]*)|(\*\*|[-+*/^()[\],])/y;
     while (pattern.lastIndex < text.length) {
       const start = pattern.lastIndex, found = pattern.exec(text);
-      if (!found) throw new Unreadable(`${text[start]} has no meaning in a formula`, start);
+      if (!found) {
+        const looks = "aceopxyABCEHKMOPTX"["асеорхуАВСЕНКМОРТХ".indexOf(text[start])], cyrillic = /\p{Script=Cyrillic}/u.test(text[start]);
+        throw new Unreadable(`${text[start]}${cyrillic ? " (a Cyrillic letter)" : ""} has no meaning in a formula${looks ? `; write ${looks} of the English keyboard` : ""}`, start);
+      }
       const kind = found[1] ? "number" : found[2] ? "name" : found[3] ? "sign" : "";
       if (kind) tokens.push({ kind, text: found[0] === "**" ? "^" : found[0], start, end: pattern.lastIndex });
     }
@@ -538,6 +541,11 @@
     return [];
   }
 
+  function named(root, path) {  // the term, or the function in it whose argument the node is part of
+    const functions = path.map((_, i) => path.slice(0, i)).filter((one) => at(root, one).kind === "call");
+    return [termPath(root, path), ...functions].reduce((a, b) => (b.length > a.length ? b : a));
+  }
+
   function rational(value) {
     for (let q = 1; q <= 720; q++) {
       const n = Math.round(value * q);
@@ -739,7 +747,15 @@
     }
 
     momentPairs() {
-      const found = [], { states, means, cov } = this.setting;
+      const found = [], { states, means, cov } = this.setting, atMean = Object.fromEntries(states.map((x, i) => [x, letter(means[i])]));
+      for (const [, call] of [...walk(this.line), ...walk(this.above)]) {
+        if (call.kind !== "call" || !ENTIRE.includes(call.data) || !states.some((x) => letters(call).has(x))) continue;
+        const square = mean(power(call, 2)), there = replaced(call, atMean);
+        for (const both of [[there, mean(call)], [power(there, 2), square], [power(mean(call), 2), square]]) {
+          const [wrong, right] = this.mirrored ? both.reverse() : both;
+          found.push([wrong, right, 0, this.values.of(wrong), this.values.of(right)]);
+        }
+      }
       states.forEach((x, i) => {
         const m = letter(means[i]), moment = [...Array(9).keys()].map((k) => mean(power(letter(x), k)));
         for (let k = 2; k < 9; k++) {
@@ -863,18 +879,19 @@
 
   function told(setting, slip, text, line, textAbove, above) {
     const shown = (from, node) => (node.span ? from.slice(...node.span) : "");
-    const moment = slip.order ? `: it takes a moment of order ${slip.order} for another one` : "";
+    const moment = slip.kind === "moment" && !slip.order ? ": the mean of a function, or of its square, is not that of the mean"
+      : slip.order ? `: it takes a moment of order ${slip.order} for another one` : "";
     if (slip.above) {
-      const term = textAbove ? shown(textAbove, at(above, termPath(above, slip.path))) : "";
+      const term = textAbove ? shown(textAbove, at(above, named(above, slip.path))) : "";
       return [`what has been made of ${term ? `\`${term}\` of the line above` : "a term of the definition"} is not right${moment}`, term];
     }
-    const term = shown(text, at(line, termPath(line, slip.path))), { name } = slip;
+    const place = named(line, slip.path), term = shown(text, at(line, place)), { name } = slip;
     const role = setting.means.includes(name) ? "a mean" : setting.cov.some((row, i) => row[i] === name) ? "a variance"
       : lawLetters(setting).has(name) ? "a covariance" : setting.states.includes(name) ? "the state"
       : setting.noises.includes(name) ? "a noise" : "a parameter";
     const lost = slip.lost && slip.lost.span && textAbove ? ` of the line above, \`${shown(textAbove, slip.lost)}\`` : name ? `, one with ${name}` : "";
     const says = {
-      sign: `the sign of \`${term}\` is not right`,
+      sign: `${place.length > termPath(line, slip.path).length ? "a sign in" : "the sign of"} \`${term}\` is not right`,
       doubled: `\`${term}\` stands there twice`,
       letter: `in \`${term}\` the letter ${name}, ${role}, stands in another one's place`,
       moment: `\`${term}\` is not right${moment}`,
@@ -1034,7 +1051,7 @@
         say(link, "differs", says, {
           kinds: slips.map((slip) => slip.kind),
           terms: said.map(([, term]) => term),
-          spans: slips.filter((slip) => !slip.above).map((slip) => at(node, termPath(node, slip.path)).span).filter(Boolean),
+          spans: slips.filter((slip) => !slip.above).map((slip) => at(node, named(node, slip.path)).span).filter(Boolean),
           rule: ruleOf(texts, setting, slips[0], node, previous, key),
         });
       }
@@ -1045,7 +1062,7 @@
   window.kfcourseDerive = { checkText, modelSetting, plainSetting, readLine, hermite, compare, DerivationError, Unreadable, Uncomputed };
 })();
 
-// The field of the page: nothing leaves it, nothing is kept.
+// The field of the page: nothing leaves the browser, which keeps what was typed.
 (function () {
   "use strict";
   const MARKS = { begins: "·", right: "✓", follows: "✓", "right in itself": "✓", differs: "✗", unreadable: "?", undecided: "?" };
@@ -1084,7 +1101,8 @@
       ], { class: `kf-${one.status.replaceAll(" ", "-")}` })), { class: "kf-derived" });
       result.append(list);
       const bad = verdicts.filter((one) => MARKS[one.status] !== "✓" && one.status !== "begins").length;
-      status.textContent = verdicts.length ? `${verdicts.length} lines, ${bad ? `${bad} to look at` : "each equal to the one above"}` : "type a line such as h = M[g*x]";
+      const lines = `${verdicts.length} line${verdicts.length === 1 ? "" : "s"}, `;
+      status.textContent = verdicts.length ? lines + (bad ? `${bad} to look at` : "each equal to the one above") : "type a line such as h = M[g*x]";
     } catch (error) {
       if (![derive.DerivationError, derive.Unreadable, derive.Uncomputed].some((kind) => error instanceof kind)) throw error;
       status.textContent = error.message;
@@ -1103,11 +1121,42 @@
     return { states: ["x"], v, w, parameters, state: [state], meter: [meter] };
   }
 
+  // Where a browser keeps nothing, the field begins anew each time.
+  const KEPT = "kf-derive";
+  function keep(controls) {
+    try { localStorage.setItem(KEPT, JSON.stringify(Object.fromEntries(controls.map((one) => [one.dataset.set, one.value])))); } catch { /* it is full, or closed */ }
+  }
+  function kept() {
+    try { return JSON.parse(localStorage.getItem(KEPT)) ?? {}; } catch { return {}; }
+  }
+
   function start() {
     document.querySelectorAll(".kf-derive").forEach((field) => {
       field.hidden = false;
-      const own = () => { field.querySelector("[data-own]").hidden = field.querySelector("[data-set=variant]").value !== ""; };
-      field.querySelector("[data-set=variant]").addEventListener("change", () => { own(); show(field); });
+      const controls = [...field.querySelectorAll("[data-set]")], [variant, text] = ["variant", "text"].map((name) => field.querySelector(`[data-set=${name}]`));
+      const { models } = JSON.parse(field.querySelector("script").textContent), first = variant.value;
+      // what a derivation begins with; the variant shown first has a whole example
+      const example = () => {
+        const model = models[variant.value], several = model?.meter.length > 1 ? "1" : "";
+        return variant.value === first ? text.defaultValue : model ? `h${several} = M[${model.meter[0]}]` : "";
+      };
+      let given = example();
+      const own = () => { field.querySelector("[data-own]").hidden = variant.value !== ""; };
+      const before = kept();
+      for (const one of controls) {
+        if (before[one.dataset.set] === undefined) continue;
+        const old = one.value;
+        one.value = before[one.dataset.set];
+        if (one.matches("select") && one.selectedIndex < 0) one.value = old;  // a variant that is no more
+      }
+      if (text.value !== given) given = example();
+      field.addEventListener("input", () => keep(controls));
+      variant.addEventListener("change", () => {
+        if ([given, ""].includes(text.value.trim())) text.value = given = example();  // not what the reader typed
+        keep(controls);
+        own();
+        show(field);
+      });
       field.querySelector("[data-set=kind]").addEventListener("change", () => show(field));
       field.querySelector("[data-do=check]").addEventListener("click", () => show(field));
       field.addEventListener("keydown", (event) => { if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) show(field); });

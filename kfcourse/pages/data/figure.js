@@ -43,6 +43,7 @@ button.kf-try { font: inherit; color: var(--accent, LinkText); background: none;
 .kf-explore .kf-keys { display: flex; flex-wrap: wrap; gap: .1rem 1rem; list-style: none; padding: 0; margin: .3rem 0; }
 .kf-explore .kf-keys li { margin: 0; } .kf-explore .kf-keys svg { filter: var(--picture, none); margin-right: .35rem; }
 .kf-explore p.kf-says { margin: .3rem 0; min-height: 1.4em; }
+.kf-explore.kf-old :is(.kf-charts, .kf-numbers) { opacity: .35; }
 @media screen { .kf-still { display: none !important; } }
 @media print { .kf-explore { display: none !important; } }`;
 

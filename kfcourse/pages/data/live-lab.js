@@ -107,9 +107,10 @@ const kfLiveLab = (root, name, given) => {
       place: ({ step }) => [step, result ? result.track.x[step] : 0],
     });
 
-    let asked = "", variant = "", result = null, bounds = null;
+    // What is shown is of one question, `answered`: until the one that has been `asked` is, it stays there in grey.
+    let asked = "", answered = "", variant = "", result = null, bounds = null;
     const ask = ui.worker(ui.code, (data) => {
-      if (data.kind === "errors") [result, bounds] = [data, null];
+      if (data.kind === "errors") [result, bounds, answered] = [data, null, asked];
       else bounds = data;
       root.dataset.done = data.m ?? 0;
       ui.redraw();
@@ -167,7 +168,7 @@ const kfLiveLab = (root, name, given) => {
       names.forEach((one, i) => places[one]([z[one][step]], [top * (0.04 + 0.035 * i)]));
     };
     const drawFunctions = (state) => {
-      const { step } = state, model = kfModels[state.variant], { values } = settings(state), n = 121;
+      const { variant: of, settings: { values } } = JSON.parse(answered), { step } = state, model = kfModels[of], n = 121;
       const [mean, sd] = result.state[step], spread = result.spread[step];
       const xs = Float64Array.from({ length: n }, (_, i) => mean + ((i - 60) / 20) * (sd || 1));
       const all = [];
@@ -207,7 +208,6 @@ const kfLiveLab = (root, name, given) => {
       if (!(state.variant in kfModels)) state.variant = given.first;
       if (variant !== state.variant) {
         variant = state.variant;
-        result = bounds = null;
         controls(variant);
         for (const show of ui.shown) show(state);
       }
@@ -216,12 +216,15 @@ const kfLiveLab = (root, name, given) => {
         asked = JSON.stringify(question);
         ask(question);
       }
+      const old = Boolean(result) && answered !== asked;
+      root.classList.toggle("kf-old", old);
       if (!result) {  // both take the room that they need later
         status.textContent = `${thousands(runs)} trajectories of ${steps} steps, seven filters: they are being designed and compared. The bound is being computed.`;
         drawTable(state);
         return;
       }
-      if (!result.finite) status.textContent = "With these numbers the trajectories themselves become infinite.";
+      if (old) status.textContent = "In grey, the numbers before your change. The new ones are being computed.";
+      else if (!result.finite) status.textContent = "With these numbers the trajectories themselves become infinite.";
       else
         status.textContent = `${thousands(runs)} trajectories of ${steps} steps, seven filters designed and compared: ${Math.round(result.milliseconds)}${SPACE}ms. `
           + (bounds ? `Bound by the exact filter on ${bounds.m} more.` : "The bound is being computed.");
