@@ -85,8 +85,8 @@ def kalman(y):
 
 @pytest.mark.parametrize("structure", [linearised, gaussian, unscented, gauss_hermite])
 def test_a_linear_model_has_kalmans_filter(structure):
-    one, y = aof(structure(oscillator())), record()
-    before, after, density = predictions(one, y), run(one, y), likelihood(one, y)
+    chosen, y = aof(structure(oscillator())), record()
+    before, after, density = predictions(chosen, y), run(chosen, y), likelihood(chosen, y)
     for i in range(4):
         mean, cov, z, p, terms = kalman(y[:, i])
         for got, wanted in (
@@ -104,14 +104,14 @@ def test_integrated_the_linear_model_is_the_same_but_for_the_accuracy(structure)
     y = record()
     # (1 + t - t)-like changes would be simplified away; so small a cubic is none, but the equations are integrated
     for accuracy in (1e-5, 1e-9):
-        one = aof(structure(oscillator(" - 1e-14*x1**3", accuracy=accuracy)))
-        error = run(one, y).mean - run(aof(linearised(oscillator())), y).mean
+        chosen = aof(structure(oscillator(" - 1e-14*x1**3", accuracy=accuracy)))
+        error = run(chosen, y).mean - run(aof(linearised(oscillator())), y).mean
         assert np.abs(error).max() < 100 * accuracy  # some tens of steps
     assert np.abs(error).max() < 1e-8
 
 
 def test_the_smoother_is_the_regression_on_the_whole_record():
-    y, one = record()[:, :1], aof(gaussian(oscillator()))
+    y, chosen = record()[:, :1], aof(gaussian(oscillator()))
     steps = list(transitions())
     mean, blocks = [PRIOR[0]], [[PRIOR[1]]]
     for Phi, shift, Q in steps[:-1]:
@@ -128,7 +128,7 @@ def test_the_smoother_is_the_regression_on_the_whole_record():
     G = scipy.linalg.block_diag(*[H] * 6)[seen]
     S = G @ joint @ G.T + scipy.linalg.block_diag(*[R] * 6)[np.ix_(seen, seen)]
     K = joint @ G.T @ np.linalg.inv(S)
-    law = smooth(one, y)
+    law = smooth(chosen, y)
     np.testing.assert_allclose(law.mean.ravel(), mean + K @ (flat[seen] - G @ mean), atol=1e-10)
     left = (joint - K @ S @ K.T).reshape(6, 2, 6, 2)
     np.testing.assert_allclose(law.cov[:, 0], [left[i, :, i] for i in range(6)], atol=1e-10)
@@ -250,9 +250,9 @@ def test_the_log_likelihood_of_the_double_well():
 
 
 def test_the_estimates_of_the_exact_multiplicative_object():
-    found = estimate(exact_mul(-0.1, 0.1), jimenez_data("exact-mul")[1], ["a", "b"], ["b"])
+    fitted = estimate(exact_mul(-0.1, 0.1), jimenez_data("exact-mul")[1], ["a", "b"], ["b"])
     a, b, _ = EXACT_MUL
-    assert found.value == pytest.approx([a, b], abs=2e-3)  # his sum leaves the first measurement out
+    assert fitted.value == pytest.approx([a, b], abs=2e-3)  # his sum leaves the first measurement out
 
 
 # ---------------------------------------------------------------- Benes
@@ -281,8 +281,8 @@ def bayes_on_a_grid(y, interval, r):
 
 def test_benes_filter_is_bayes_rule():
     y = np.array([0.3, 0.5, -0.4, np.nan, -1.2, 0.8])
-    one = benes_filter(benes())
-    law, terms = run(one, y), likelihood(one, y)
+    chosen = benes_filter(benes())
+    law, terms = run(chosen, y), likelihood(chosen, y)
     mean, variance, densities = bayes_on_a_grid(y, 0.2, 0.1)
     np.testing.assert_allclose(law.mean[1:, 0, 0], mean, rtol=0, atol=1e-10)
     np.testing.assert_allclose(law.cov[1:, 0, 0, 0], variance, rtol=0, atol=1e-10)
@@ -292,14 +292,14 @@ def test_benes_filter_is_bayes_rule():
 def test_no_filter_beats_benes_and_the_quadrature_filter_comes_near():
     model = benes(interval=1.0, substeps=64)
     filters = [benes_filter(model), aof(gauss_hermite(model, 9)), aof(linearised(model))]
-    found = compare(filters, model, 4000, 12, seed=1)
+    compared = compare(filters, model, 4000, 12, seed=1)
     for worse, better in (("aof-gauss-hermite", "benes"), ("aof-linearised", "aof-gauss-hermite")):
-        difference = found.difference(worse, better)
+        difference = compared.difference(worse, better)
         assert (difference.value[1:] > -4 * difference.standard_error[1:]).all()
         assert difference.value[3:].mean() > 0
     # its own covariance is the actual one
     own = run(benes_filter(model), simulate(model, 4000, 12, 2).y).cov[..., 0, 0].mean(axis=1)
-    actual = found.error_variance("benes")
+    actual = compared.error_variance("benes")
     assert (np.abs(own - actual.value)[1:] < 6 * actual.standard_error[1:]).all()  # own has an error, too
 
 
@@ -324,13 +324,13 @@ def strong_errors(model, exact, substeps):
     finest, runs = max(substeps), 4000
     fine = rng.standard_normal((runs, finest))
     x = np.full((runs, 1), 1.0)
-    found = []
+    errors = []
     for count in substeps:
         noise = fine.reshape(runs, count, -1).sum(axis=-1) / np.sqrt(finest // count)
         between = dataclasses.replace(model.between, substeps=count)
         error = np.abs(between.motion(model)(x, noise, 0) - exact(fine))
-        found.append((error.mean(), error.std() / np.sqrt(runs)))
-    return np.array(found).T
+        errors.append((error.mean(), error.std() / np.sqrt(runs)))
+    return np.array(errors).T
 
 
 def test_the_strong_order_of_the_simulation():
@@ -401,9 +401,9 @@ def test_stratonovich_adds_half_of_b_db():
 def test_fos_and_duof_tend_to_kalmans_filter():
     model = sampled("-0.5*x + 0.2", "0.9", "x + 0.5*w", interval=0.8, substeps=64)
     filters = [aof(linearised(model)), fos(gaussian(model)), duof(model)]
-    found = compare(filters, model, 4000, 8, seed=3, design_runs=20_000)
-    for name in found.names[1:]:
-        relative = found.relative(name, "aof-linearised")
+    compared = compare(filters, model, 4000, 8, seed=3, design_runs=20_000)
+    for name in compared.names[1:]:
+        relative = compared.relative(name, "aof-linearised")
         assert np.abs(relative.value - 1).max() < 0.01  # coefficients of 20,000 trajectories, and (1/64)^2 of weak error
 
 
@@ -423,8 +423,8 @@ def test_parameters_are_estimated_as_everywhere():
     a = -np.log(slope) / 0.5
     s2 = np.mean((x[1:] - slope * x[:-1]) ** 2) * 2 * a / (1 - slope**2)
     y[0] = np.nan
-    found = estimate(truth, y, ["a", "s"], ["a", "s"])
-    assert found.value == pytest.approx([a, np.sqrt(s2)], rel=1e-3)
+    fitted = estimate(truth, y, ["a", "s"], ["a", "s"])
+    assert fitted.value == pytest.approx([a, np.sqrt(s2)], rel=1e-3)
 
 
 def test_a_record_brings_its_instants(tmp_path):
