@@ -180,6 +180,10 @@ class Comparison:
         """How far above the bound a filter is, D_k(name) / D_k(exact AOF) - 1 per step, (steps,).
 
         Without the exact AOF, how far above the control.  NaN at steps that are not `usable`.
+
+        A few trajectories carry a gap that has become small, and a sample may lack them.  Of variant 53, whose gaps fall below
+        a thousandth, the 95 % intervals of 20,000 trajectories hold the true gap in 85 % of the cases over all 51 steps, and in
+        half at the worst step; those of `mean_gap` in 97 %, of `difference` in 94 % (24 seeds, `benchmarks/intervals.py`).
         """
         return Estimate.jackknife(self._gap(name))
 
