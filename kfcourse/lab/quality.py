@@ -51,6 +51,7 @@ STRESS = 1.5  # factor of all deviations
 SECONDS = 60.0  # for the derivation
 GROWTH = 10.0  # of a second moment over the second half of the steps: an unknown velocity has 4
 CARRIERS = 10.0  # trajectories, at least, that carry a second moment
+DIVERGED = 10.0  # a filter's error variance over that without measurements
 UNSEEN = 0.9  # the best filter's error variance over that without measurements, when the meter tells too little
 SIGNIFICANCE = 0.01  # of "the filters differ", for all pairs and steps together
 ROUNDING = 1e-9  # relative differences that rounding alone explains
@@ -156,7 +157,7 @@ def _simulated(model: Model, x: Array, seed: int) -> dict[str, Finding]:
     except (NotFinite, np.linalg.LinAlgError) as error:  # a filter, or a decomposition for it
         return {"bounded": Finding(False, str(error), moments.value)}
     return {
-        "bounded": moments,
+        "bounded": not_diverging(result) or moments,
         "observable": observable(result, x),
         "filters differ": differences(result, [built.name for built in filters if isinstance(built, Design)]),
     }
@@ -263,6 +264,14 @@ def shares(comparison: Comparison, name: str) -> Estimate:
     used = base[..., :1] > 1e-24 * base[..., :1].max(axis=0)
     share = np.where(used, ratio(square, base, 0.0), 0.0).sum(axis=0) / np.maximum(used.sum(axis=0), 1)
     return Estimate.jackknife(np.where(used.any(axis=0), share, 1.0))
+
+
+def not_diverging(comparison: Comparison) -> Finding | None:
+    """The filter that is DIVERGED times worse than no measurements; None if there is none."""
+    worst, name = max((float(shares(comparison, name).value.max()), name) for name in measured(comparison))
+    if worst <= DIVERGED:
+        return None
+    return Finding(False, f"{title(name)} diverges: its error variance is {worst:.3g} times that without measurements", worst)
 
 
 def observable(comparison: Comparison, x: Array) -> Finding:
