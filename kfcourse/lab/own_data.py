@@ -57,7 +57,7 @@ KINDS = {
 }
 
 
-class Result(NamedTuple):
+class Analysis(NamedTuple):
     """What a filter made of a record."""
 
     variant: Variant
@@ -124,7 +124,7 @@ def estimate_record(
     by_component: bool = False,
     unknown: Sequence[str] = (),
     positive: Sequence[str] = (),
-) -> Result:
+) -> Analysis:
     """Read a file, find unknown parameters if any, and examine the record by a filter.
 
     Parameters
@@ -160,7 +160,7 @@ def estimate_record(
         if likeliest:
             record = record._replace(model=likeliest.model)
         examined = examine(build(record.model), record.y, 1.0 if gate is None else gate, by_component)
-        result = Result(variant, record, structure, gate, likeliest, examined)
+        result = Analysis(variant, record, structure, gate, likeliest, examined)
     except NoDensity as error:
         raise RecordError(
             f"{path}: row {error.step + 1}, time {record.times[error.step]:.16g}, cannot be judged: what the filter expects "
@@ -178,7 +178,7 @@ def estimate_record(
     return result
 
 
-def write_record(result: Result, folder: Path, track: tuple[str, str] | None = None) -> None:
+def write_record(result: Analysis, folder: Path, track: tuple[str, str] | None = None) -> None:
     """Write estimate.csv, report.html and the figures, all of them or none."""
     model = result.record.model
     names = [symbol.name for symbol in model.x]
@@ -209,7 +209,7 @@ def write_record(result: Result, folder: Path, track: tuple[str, str] | None = N
         (place / "record.html").rename(place / "report.html")
 
 
-def write_numbers(result: Result, path: Path) -> None:
+def write_numbers(result: Analysis, path: Path) -> None:
     """The CSV file: a row for each row of the record; cells without a number are empty."""
     model, examined = result.record.model, result.examined
     columns = {}
@@ -241,7 +241,7 @@ def _labelled(ax: Axes, across: str, up: str) -> Axes:
     return ax
 
 
-def _component(result: Result, i: int, ax: Axes) -> Axes:
+def _component(result: Analysis, i: int, ax: Axes) -> Axes:
     """A component of the state with its band, and smoothed."""
     times = result.record.times
     for label, (law, colour) in result.laws.items():
@@ -251,7 +251,7 @@ def _component(result: Result, i: int, ax: Axes) -> Axes:
     return _labelled(ax, "time", result.record.model.x[i].name)
 
 
-def _track(result: Result, i: int, j: int, ax: Axes) -> Axes:
+def _track(result: Analysis, i: int, j: int, ax: Axes) -> Axes:
     """Two components against each other."""
     for label, (law, colour) in result.laws.items():
         ax.plot(*law.mean[:, 0, [i, j]].T, color=colour, linewidth=1, label=label, rasterized=len(law.mean) > MANY)
@@ -259,7 +259,7 @@ def _track(result: Result, i: int, j: int, ax: Axes) -> Axes:
     return _labelled(ax, result.record.model.x[i].name, result.record.model.x[j].name)
 
 
-def _innovations(result: Result, i: int, ax: Axes) -> Axes:
+def _innovations(result: Analysis, i: int, ax: Axes) -> Axes:
     """Innovations of a component of the meter, and what was expected of them."""
     times, value = result.record.times, result.examined.found.value[:, 0, i]
     two, many = 2 * _deviation(result.examined.found.cov, i), len(times) > MANY
@@ -273,7 +273,7 @@ def _innovations(result: Result, i: int, ax: Axes) -> Axes:
     return _labelled(ax, "time", f"innovation of {result.record.model.measured[i]}")
 
 
-def _whiteness(result: Result, i: int, ax: Axes) -> Axes:
+def _whiteness(result: Analysis, i: int, ax: Axes) -> Axes:
     """Autocorrelation of the innovations that were taken, from each to the next ones; nothing of fewer than three."""
     used = result.examined.passed[:, 0, i]
     if used.sum() >= 3:
