@@ -211,6 +211,9 @@ def lab(
     _tell(result, to_error)
     if json_file:
         write_json(chosen, result, json_file)
+    if getattr(model, "between", None) is not None:
+        click.echo("No report: its derivation begins with a difference equation, which this model has not", err=True)
+        return
     with _kept(folder), replacing_together(folder) as place:
         modes = recognised_modes(result, filters)
         write_report(chosen, result, place, language, admissions(model, None, DERIVATION, found), modes)

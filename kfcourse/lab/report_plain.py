@@ -42,12 +42,12 @@ class PlainReport(StudentReport):
         super().__init__(result, words)
         assert isinstance(result.model, Model)  # `write_report` takes the other report for those with modes
         self.model = result.model
-        self.model.difference_equation("the derivation in a report")
         self.structures = Structures(self.model)
         self.derivable: list[str] = []  # kinds whose formulas are found in time, and are not too long
 
     def task(self) -> Iterator[Block]:
         model = self.model
+        model.difference_equation("the derivation in a report")
         yield self.section("task")
         yield self.text("task_text")
         state, *others = lines_of(model.latex(values=False, indexed=True))

@@ -1,13 +1,16 @@
 """Measurements at instants: Kalman's filter by matrix exponentials, slow Euler loops, closed forms, published figures."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.linalg
 import sympy as sp
+from click.testing import CliRunner
 
 from kfcourse import Model, compare, gauss_hermite, gaussian, likelihood, linearised, predictions, run, smooth, unscented
+from kfcourse.cli import main
 from kfcourse.continuous import benes_filter, moment_equations, sampled
 from kfcourse.errors import NotFinite
 from kfcourse.filters import aof, duof, fos, kalman_filter, particle, pointmass
@@ -533,3 +536,12 @@ steps = 11
     for name, words in (("none", "no diffusion"), ("row", "list of rows"), ("state", "unknown key state")):
         with pytest.raises(VariantError, match=words):
             find_variant(name, path)
+
+
+def test_the_command_ranks_the_filters_of_such_a_variant(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("my.toml").write_text('[variants.mine]\ndrift = "-a*x"\ndiffusion = "1"\nmeter = "x + w"\nparameters = { a = 0.5 }\n')
+    chosen = ["--filters", "aof-linearised,duof", "--runs", "300", "--steps", "3"]
+    done = CliRunner().invoke(main, ["lab", "mine", "--variants", "my.toml", *chosen, "--json", "numbers.json"])
+    assert done.exit_code == 0 and "LAOF" in done.stdout and "No report" in done.stderr
+    assert Path("numbers.json").exists() and not Path("lab-mine").exists()
