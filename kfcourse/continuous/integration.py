@@ -105,10 +105,7 @@ def rates_of(model: Model, approximation: Callable[[Model], Structure]) -> Rates
     structure = approximation(_seen(model))
 
     def by_points(known: Any, z: Vectors, p: Matrices) -> tuple[Array, ...]:
-        try:
-            h, G, *_ = structure.at(known).measure(z, p)
-        except np.linalg.LinAlgError:  # no covariance, within a step that is too long
-            h, G = np.full((*z.shape[:-1], n + n * n), np.nan), np.full((*z.shape[:-1], n, n), np.nan)
+        h, G, *_ = structure.at(known).measure(z, p)
         return h[..., :n], G[..., :n, :], h[..., n:].reshape(*h.shape[:-1], n, n)
 
     return by_points

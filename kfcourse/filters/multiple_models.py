@@ -53,7 +53,7 @@ CERTAIN = 1e300  # in the place of the logarithm of an infinite density: infinit
 ORDER = {1: 32, 2: 12, 3: 7}  # points an axis, by the number of components in the formulas of pi
 
 Chain: TypeAlias = Array | Callable[[int], Array] | JumpModel
-Predict: TypeAlias = Callable[[Gaussian], Gaussian]
+Predict: TypeAlias = Callable[[Array, Array], Gaussian]
 # Step and laws in each mode to pi, (M, M) or (runs, M, M), and the laws that lead from i to j.
 Links: TypeAlias = Callable[[int, Sequence[Gaussian]], tuple[Array, list[list[Gaussian]]]]
 
@@ -106,7 +106,7 @@ def imm(structures: Sequence[Structure], transition: Chain, probabilities: Array
     """
 
     def following(predict: Predict, laws: Sequence[Gaussian], weights: Array, angles: Components) -> Gaussian:
-        return predict(mixture(laws, weights, angles))
+        return predict(*mixture(laws, weights, angles))
 
     return _one_law_a_mode(name, structures, transition, probabilities, following)
 
@@ -124,7 +124,7 @@ def logic_dynamic(
     expect_each(structures, "logic_dynamic")
 
     def following(predict: Predict, laws: Sequence[Gaussian], weights: Array, angles: Components) -> Gaussian:
-        return mixture([predict(law) for law in laws], weights, angles)
+        return mixture([predict(*law) for law in laws], weights, angles)
 
     name = name or "aof-jump-" + "".join(structure.name for structure in structures[:1])
     return _one_law_a_mode(name, structures, transition, probabilities, following)
@@ -150,12 +150,8 @@ def _one_law_a_mode(
         corrected, mu, _ = _corrected(now, memory, y)
         pi, leading = links(state.step, corrected)
         expected, weights = onward(mu, pi)
-
-        def predict(j: int, law: Gaussian) -> Gaussian:
-            return now[j].predict(*law)
-
         predicted = tuple(
-            following(partial(predict, j), [row[j] for row in leading], weights[:, :, j], angles) for j in range(len(now))
+            following(structure.predict, [row[j] for row in leading], weights[:, :, j], angles) for j, structure in enumerate(now)
         )
         law, ahead = mixture(corrected, mu, angles), mixture(predicted, expected, angles)
         return State(state.step + 1, law, ahead, Modes(mu, expected, predicted))
@@ -188,11 +184,7 @@ def gpb2(structures: Sequence[Structure], transition: Chain, probabilities: Arra
         law = mixture(laws, mu, angles)
         laws = [_where(mu[:, j] > 0, of_mode, law) for j, of_mode in enumerate(laws)]
         pi, leading = links(state.step, laws)
-
-        def predict(j: int, law: Gaussian) -> Gaussian:
-            return now[j].predict(*law)
-
-        predicted = tuple(predict(j, before) for row in leading for j, before in enumerate(row))
+        predicted = tuple(structure.predict(*law) for row in leading for structure, law in zip(now, row, strict=True))
         expected = (mu[:, :, None] * pi).reshape(len(y), -1)
         return State(state.step + 1, law, mixture(predicted, expected, angles), Modes(mu, expected, predicted))
 

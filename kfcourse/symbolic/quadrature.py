@@ -236,6 +236,23 @@ def _warn_of_turns(name: str, model: Model, deviation: Array) -> None:
             )
 
 
+def _lower_root(cov: Array) -> tuple[Array, Array]:
+    """The Cholesky factor, and which components (..., n) the earlier ones determine: their columns are those of I."""
+    n = cov.shape[-1]
+    try:
+        return np.linalg.cholesky(cov), np.zeros(cov.shape[:-1], dtype=bool)
+    except np.linalg.LinAlgError:
+        root, rest, known = np.zeros_like(cov), cov.copy(), np.zeros(cov.shape[:-1], dtype=bool)
+    for j in range(n):
+        pivot = rest[..., j, j]
+        known[..., j] = ~(pivot > n * EPS * cov[..., j, j])
+        column = np.where(np.arange(n) >= j, rest[..., :, j] / np.sqrt(np.where(known[..., j], 1.0, pivot))[..., None], 0.0)
+        root[..., :, j] = np.where(known[..., j, None], np.eye(n)[j], column)
+        column = np.where(known[..., j, None], 0.0, column)
+        rest = rest - column[..., :, None] * column[..., None, :]
+    return root, known
+
+
 def _by_points(name: str, model: Model, rule: Rule, sides: Sequence[_Side]) -> Structure:
     """A structure from standard normal points and weights: rule(size) -> (points (q, size), weights (q,))."""
     n, measurement = model.n, measurement_of(model.angles.y)
@@ -243,10 +260,9 @@ def _by_points(name: str, model: Model, rule: Rule, sides: Sequence[_Side]) -> S
 
     def propagate(side: _Side, points: Array, weights: Array, mean: Array, cov: Array, k: int | None):
         """Mean of the function, its deviations from that at the points (0 exactly for what does not vary), deviations of x,
-        the root of cov with a 1 in the place of each variance 0, and the covariance that noises without points add."""
-        known = np.diagonal(cov, axis1=-2, axis2=-1) == 0
-        root = np.linalg.cholesky(cov * (1 + (UNSEEN if n > 1 else 0) * np.eye(n)) + known[..., None] * np.eye(n))
-        dx = np.where(known[..., None, :], 0.0, points[:, :n] @ transpose(root))
+        the root of cov with 1 for what is known, and the covariance that noises without points add."""
+        root, known = _lower_root(cov * (1 + (UNSEEN if n > 1 else 0) * np.eye(n)))
+        dx = np.where(known[..., None, :], 0.0, points[:, :n]) @ transpose(root)
         _warn_of_turns(name, model, dx)
         x = mean[..., None, :] + dx
         noise = side.mean + points[:, n:] @ side.root.T

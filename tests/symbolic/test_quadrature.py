@@ -224,3 +224,12 @@ def test_a_meter_without_noise_leaves_no_rounding_as_a_variance(build):
     np.testing.assert_array_equal(run(aof(build(still)), np.ones(3)).cov, np.zeros((3, 1, 1, 1)))
     with pytest.raises(ValueError, match="no density for the measurement of step 1"):
         likelihood(aof(build(still)), np.array([1.0, 1.1]))
+
+
+def test_a_covariance_that_rounding_has_broken_is_no_error():
+    """After a measurement 1e13 times as sharp as the prior the covariance of the state is none, by some units of precision."""
+    prior = {"mean": [0, 1], "variance": [1e8, 4e8]}
+    model = Model.define(["x1 + x2", "x2"], ["x1 + 1e-9*w1", "x1 + x2 + w2"], prior=prior)
+    filters = aof(gauss_hermite(model)), aof(linearised(model))
+    (_, points), (_, exact) = (run(each, np.zeros((6, 1, 2))) for each in filters)
+    np.testing.assert_allclose(points[-1], exact[-1], rtol=1e-5)
