@@ -142,7 +142,7 @@ ROOMS = {
     "kfcourse/continuous": 8_550,
     "kfcourse/derivations": 16_540,
     "kfcourse/filters": 33_720,
-    "kfcourse/lab": 22_110,
+    "kfcourse/lab": 22_120,
     "kfcourse/linear": 7_000,
     "kfcourse/montecarlo": 10_350,
     "kfcourse/notebooks": 26_800,

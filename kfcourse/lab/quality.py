@@ -133,7 +133,7 @@ def examine(variant: Variant, runs: int = RUNS, seed: int = 1, ask: Ask | None =
         size = runs if model.n == 1 else max(runs // VECTOR, FEWEST)
         x = simulate(model, size, variant.steps, seed).x
         decays = (x.var(axis=1)[-1] < 1e-3 * x.var(axis=1)[0]).any()
-        linear = is_linear(model)
+        linear = model.between is None and is_linear(model)
         remarks = {"linear: the Kalman filter is exact": linear, "decays to a constant": decays}
         findings = _simulated(model, x, seed) | {"solvable": answers}
         return Quality(variant.name, findings, linear, tuple(remark for remark, holds in remarks.items() if holds))
